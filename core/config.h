@@ -1,0 +1,86 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/pose.h"
+#include "core/result.h"
+
+namespace limn {
+
+/// A place in a JSON file that people edit; it knows its path. The getters return the value, or note the first
+/// problem of the file ("FILE: projectors[0].lens.fx: expected …, found ….") and return a default, so that a
+/// reader reads straight through and asks Config::status() once at the end.
+class ConfigNode {
+ public:
+  ConfigNode() = default;  ///< an absent node: every getter returns its default and notes nothing
+
+  /// A required member; its absence is a problem.
+  ConfigNode at(const std::string& key) const;
+  /// An optional member.
+  std::optional<ConfigNode> find(const std::string& key) const;
+  /// The elements of an array.
+  std::vector<ConfigNode> items() const;
+  /// Member names of an object, in the file's order.
+  std::vector<std::string> keys() const;
+
+  double number() const;    ///< finite
+  double positive() const;  ///< finite and > 0
+  int integer() const;
+  bool boolean() const;
+  std::string text() const;
+  /// One of `choices`.
+  std::string choice(const std::vector<std::string>& choices) const;
+  /// Array of exactly `count` finite numbers (any number when count < 0).
+  std::vector<double> numbers(int count) const;
+  Eigen::Vector3d vector3() const;
+  /// {"rotation_wxyz": [...], "translation_m": [...]}; the quaternion must have unit length within 1e-3.
+  Pose pose() const;
+  /// A relative path that must stay inside the file's folder; returned joined to that folder.
+  std::filesystem::path path_inside() const;
+
+  bool is_object() const;
+  bool is_array() const;
+  bool is_string() const;
+  bool is_number() const;
+  const nlohmann::json& json() const;
+
+  /// Notes a problem here: "expected X, found Y." is the caller's sentence.
+  void problem(const std::string& sentence) const;
+  /// Problem when the object has a key outside `known`, with the nearest known key as advice.
+  void only(const std::set<std::string>& known) const;
+  const std::string& where() const { return where_; }
+
+ private:
+  friend class Config;
+  struct File;
+  ConfigNode(std::shared_ptr<File> file, const nlohmann::json* json, std::string where)
+      : file_(std::move(file)), json_(json), where_(std::move(where)) {}
+  std::shared_ptr<File> file_;
+  const nlohmann::json* json_ = nullptr;
+  std::string where_;
+};
+
+/// A JSON file (with // comments) whose "schema" is checked.
+class Config {
+ public:
+  /// `schema` such as "limn.scene/1"; empty accepts files without one (POSES.json, VIEWER.json).
+  static Result<Config> load(const std::filesystem::path& path, const std::string& schema);
+  ConfigNode root() const;
+  /// The first problem noted, if any.
+  Status status() const;
+  std::filesystem::path folder() const;
+
+ private:
+  std::shared_ptr<ConfigNode::File> file_;
+};
+
+/// {"rotation_wxyz": [w,x,y,z], "translation_m": [x,y,z]}
+nlohmann::json to_json(const Pose& pose);
+
+}  // namespace limn

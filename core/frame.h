@@ -1,0 +1,26 @@
+#pragma once
+
+#include <chrono>
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+namespace limn {
+
+/// A moment on the session's monotonic clock; which moment, the variable's name says (`captured_at`).
+using Stamp = std::chrono::time_point<std::chrono::steady_clock, std::chrono::nanoseconds>;
+
+/// Seconds from `from` to `to`.
+inline double seconds_between(Stamp from, Stamp to) { return std::chrono::duration<double>(to - from).count(); }
+/// `at` moved by a number of seconds.
+inline Stamp shifted(Stamp at, double seconds) {
+  return at + std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(seconds));
+}
+
+/// One picture of one camera: 8-bit, one channel (grey) or three (BGR, sRGB).
+struct Frame {
+  std::string camera;
+  cv::Mat image;
+  Stamp captured_at;
+};
+
+}  // namespace limn

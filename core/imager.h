@@ -1,0 +1,39 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+
+#include "core/lens.h"
+#include "core/pose.h"
+
+namespace limn {
+
+/// A half-line: origin (m) and unit direction.
+struct Ray {
+  Eigen::Vector3d p_origin = Eigen::Vector3d::Zero();
+  Eigen::Vector3d d = Eigen::Vector3d::UnitZ();
+};
+
+/// A camera or a projector: the geometry is one type, the light only runs the other way.
+/// Frame: x right, y down, z forward; pixel (0,0) is the centre of the top-left pixel.
+struct Imager {
+  std::string name;
+  int width = 0;
+  int height = 0;
+  Lens lens;
+  Pose imager_from_world;
+
+  /// Pixel of a world point, also when outside the picture; nullopt when it has none (behind).
+  std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& p_world) const;
+  /// Ray of a pixel in the world.
+  std::optional<Ray> ray(const Eigen::Vector2d& px) const;
+  /// Whether px lies on the picture, its outer pixels' areas included.
+  bool contains(const Eigen::Vector2d& px) const;
+};
+
+/// An imager without distortion, horizontal field of view `fov_deg`, principal point at ((w-1)/2, (h-1)/2):
+/// the Viewer of interfaces.md.
+Imager viewer_imager(const Pose& world_from_viewer, int width, int height, double fov_deg);
+
+}  // namespace limn

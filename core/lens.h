@@ -1,0 +1,72 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+
+namespace limn {
+
+/// One of mrcal's lens models, without its values: `LENSMODEL_PINHOLE`, `LENSMODEL_OPENCV4/5/8/12`,
+/// `LENSMODEL_SPLINED_STEREOGRAPHIC_order=…`, and so on. The formulas are mrcal's alone (mrcal_project).
+/// Cheap to copy; safe to use from several threads.
+class LensModel {
+ public:
+  /// `LENSMODEL_PINHOLE`.
+  LensModel();
+  static Result<LensModel> parse(const std::string& name);
+
+  const std::string& name() const;
+  /// Values a lens of this model has; the first four are fx, fy, cx, cy (pixels).
+  int value_count() const;
+
+  /// Pixel of p (imager frame, any unit, |p| > 0), for solvers that hold the values elsewhere. `d_px_d_p` (2x3)
+  /// and `d_px_d_values` (2 x value_count), both row-major, are filled when not null. False when p has no
+  /// finite pixel (behind the imager for models with a projection plane, or not finite).
+  bool project(std::span<const double> values,
+               const Eigen::Vector3d& p,
+               Eigen::Vector2d* px,
+               double* d_px_d_p = nullptr,
+               double* d_px_d_values = nullptr) const;
+
+  /// Unit direction that project() takes to px. False when there is none (outside the model's domain).
+  bool unproject(std::span<const double> values, const Eigen::Vector2d& px, Eigen::Vector3d* d_imager) const;
+
+  bool operator==(const LensModel& other) const { return name() == other.name(); }
+
+ private:
+  struct Impl;
+  std::shared_ptr<const Impl> impl_;
+  explicit LensModel(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
+};
+
+/// A lens: model and values. Pixel (0,0) is the centre of the top-left pixel.
+struct Lens {
+  LensModel model;
+  std::vector<double> values = {1, 1, 0, 0};
+
+  /// Checks the number of values, that all are finite and that the focal lengths are positive.
+  static Result<Lens> create(const std::string& model_name, std::vector<double> values);
+  static Lens pinhole(double fx, double fy, double cx, double cy);
+
+  double fx() const { return values[0]; }
+  double fy() const { return values[1]; }
+  double cx() const { return values[2]; }
+  double cy() const { return values[3]; }
+
+  /// Pixel of p (imager frame); nullopt when it has none.
+  std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& p) const;
+  /// Unit direction of a pixel; nullopt when it has none.
+  std::optional<Eigen::Vector3d> unproject(const Eigen::Vector2d& px) const;
+};
+
+/// Unit directions of every `step`-th pixel of a width x height picture, row by row, for baked maps and ray
+/// tracing: (ceil(height / step) * ceil(width / step)) entries, entry (row, col) is pixel (col, row) * step.
+/// Uses all cores. Pixels without a direction are NaN.
+std::vector<Eigen::Vector3f> direction_map(const Lens& lens, int width, int height, int step = 1);
+
+}  // namespace limn

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <filesystem>
+#include <opencv2/core/mat.hpp>
+
+#include "core/result.h"
+
+namespace limn {
+
+/// Reads a PNG or JPEG as 8-bit grey or BGR, as stored (alpha is dropped, 16 bits become 8). A truncated or
+/// damaged file is an error, never a half picture.
+Result<cv::Mat> read_picture(const std::filesystem::path& path);
+/// As read_picture, converted to one 8-bit grey channel.
+Result<cv::Mat> read_grey_picture(const std::filesystem::path& path);
+/// One channel of an 8-bit grey, BGR or BGRA picture; the same data when it is grey already.
+cv::Mat to_grey(const cv::Mat& picture);
+
+struct PngOptions {
+  int compression = 3;          ///< 0 fast and large … 9; 1 for captures.
+  double pixels_per_metre = 0;  ///< written as pHYs when > 0 (boards and markers of true size).
+};
+/// Writes an 8- or 16-bit PNG through a temporary file, so that `path` is either old or complete.
+Status write_png(const std::filesystem::path& path, const cv::Mat& picture, const PngOptions& options = {});
+
+}  // namespace limn

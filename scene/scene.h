@@ -1,0 +1,80 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/imager.h"
+#include "core/marker.h"
+#include "core/result.h"
+#include "scene/mesh.h"
+
+namespace limn::scene {
+
+/// The physical thing that is lit. Its frame is its mesh's.
+struct Prototype {
+  Mesh mesh;
+  std::vector<BodyMarker> markers;  ///< body_from_marker is prototype_from_marker
+  double albedo = 0.8;              ///< diffuse, when no picture is given
+  cv::Mat albedo_picture;           ///< 8-bit BGR sRGB in the mesh's uv; empty: none
+};
+
+enum class Mode {
+  view,    ///< drawn as seen from the viewer's eye (stands off the surface)
+  surface  ///< drawn on the surface itself, the same for every viewer
+};
+
+struct Variant {
+  std::string name;
+  Mesh mesh;
+};
+
+/// A place for one part, carried by one marker.
+struct Slot {
+  std::string name;
+  MarkerName marker;
+  double size_m = 0;
+  Pose marker_from_part;
+  Mode mode = Mode::view;
+  bool stick_to_surface = false;
+  std::vector<Variant> variants;
+};
+
+/// A marker that acts when covered, turned or laid down.
+struct Control {
+  MarkerName marker;
+  std::string action;
+  std::string slot;
+  std::string gesture;
+};
+
+/// Whose eye `view` parts are drawn for: a fixed imager or one that a marker carries.
+struct Viewer {
+  std::optional<Imager> fixed;
+  std::optional<MarkerName> marker;
+};
+
+/// What is shown: a project folder's scene.json (limn.scene/1), read with everything that it names.
+struct Scene {
+  std::filesystem::path folder;
+  std::optional<Prototype> prototype;  ///< absent: parts over a camera picture only
+  std::vector<Slot> slots;
+  std::vector<Control> controls;
+  std::optional<Viewer> viewer;
+
+  const Slot* find_slot(const std::string& name) const;
+};
+
+/// `path` is the scene.json or its folder.
+Result<Scene> load_scene(const std::filesystem::path& path);
+
+/// A viewer file of interfaces.md: {"world_from_viewer": POSE, "size": [w,h], "fov_deg": 40}.
+Result<Imager> load_viewer(const std::filesystem::path& path);
+
+/// What the tracker is to look for: the body "prototype" and one body per slot, named as the slot.
+std::vector<Body> bodies(const Scene& scene);
+
+}  // namespace limn::scene
