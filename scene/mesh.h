@@ -34,7 +34,8 @@ struct Mesh {
 Result<double> metres_per_unit(const std::string& units);
 
 /// Reads glb, gltf, obj, stl or ply and scales by metres_per_unit(units). Missing normals are made; vertices
-/// are joined. Errors: unreadable or truncated file, no triangles, NaN or infinite coordinates, unknown units.
+/// are joined. Errors: unreadable or truncated file, no triangles, NaN or infinite coordinates, unknown
+/// units.
 Result<Mesh> load_mesh(const std::filesystem::path& path, const std::string& units);
 
 }  // namespace limn::scene

@@ -17,16 +17,20 @@ struct PosedPart {
   Pose world_from_part;
 };
 
-/// A scene at a moment: where everything is and which variant each slot shows. A slot that is not seen is absent.
+/// A scene at a moment: where everything is and which variant each slot shows. A slot that is not seen is
+/// absent.
 struct PosedScene {
   std::optional<Pose> world_from_prototype;
   std::vector<PosedPart> parts;
 };
 
-/// The scene as the tracks (bodies of `bodies(scene)`) place it; `variants[i]` is the chosen variant of slot i
-/// (absent: its first). A part that sticks to the surface is laid onto the prototype's mesh: its marker's z axis
-/// along the inward normal at the mesh point nearest to the marker's centre, turned as the marker is turned.
-PosedScene posed(const Scene& scene, std::span<const Track> tracks, std::span<const std::string> variants = {});
+/// The scene as the tracks (bodies of `bodies(scene)`) place it; `variants[i]` is the chosen variant of slot
+/// i (absent: its first). A part that sticks to the surface is laid onto the prototype's mesh: its marker's z
+/// axis along the inward normal at the mesh point nearest to the marker's centre, turned as the marker is
+/// turned.
+PosedScene posed(const Scene& scene,
+                 std::span<const Track> tracks,
+                 std::span<const std::string> variants = {});
 
 /// POSES.json of interfaces.md. Unknown slots and variants are errors; a missing variant is the slot's first.
 Result<PosedScene> load_poses(const std::filesystem::path& path, const Scene& scene);

@@ -1,0 +1,258 @@
+#include "scene/scene.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "core/config.h"
+#include "core/picture.h"
+
+namespace limn::scene {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A file that the scene names; read after the whole scene.json proved right.
+struct MeshFile {
+  std::string where;
+  fs::path path;
+  std::string units;
+};
+
+struct Reader {
+  std::vector<MeshFile> part_meshes;  // in the order of slots and variants
+  std::optional<MeshFile> prototype_mesh;
+  std::optional<fs::path> albedo_picture;
+  std::map<std::string, std::string> marker_users;  // marker -> where it stands
+};
+
+MarkerName read_marker_name(const ConfigNode& node) {
+  const auto name = MarkerName::parse(node.text());
+  if (!name) node.problem(name.message());
+  return name ? *name : MarkerName{};
+}
+
+// A marker that carries something; it can carry one thing only.
+MarkerName read_carrier(const ConfigNode& node, Reader* reader) {
+  MarkerName name = read_marker_name(node);
+  const auto [user, fresh] = reader->marker_users.try_emplace(name.text(), node.where());
+  if (!fresh) {
+    node.problem(fmt::format("expected a marker of its own, found {}, which {} uses already.", name.text(),
+                             user->second));
+  }
+  return name;
+}
+
+MeshFile read_mesh_file(const ConfigNode& node) {
+  const ConfigNode mesh = node.at("mesh");
+  return {mesh.where(), mesh.path_inside(), node.at("units").choice({"m", "cm", "mm", "in", "ft"})};
+}
+
+double read_size_m(const ConfigNode& node) { return node.at("size_mm").positive() * 1e-3; }
+
+void read_albedo(const ConfigNode& node, Prototype* prototype, Reader* reader) {
+  if (node.is_string()) {
+    reader->albedo_picture = node.path_inside();
+    return;
+  }
+  prototype->albedo = node.number();
+  if (prototype->albedo < 0 || prototype->albedo > 1) {
+    node.problem(
+        fmt::format("expected a share of light from 0 to 1, or a PNG, found {}.", prototype->albedo));
+  }
+}
+
+Prototype read_prototype(const ConfigNode& node, Reader* reader) {
+  node.only({"mesh", "units", "markers", "albedo"});
+  Prototype prototype;
+  reader->prototype_mesh = read_mesh_file(node);
+  if (const auto markers = node.find("markers")) {
+    for (const ConfigNode& item : markers->items()) {
+      item.only({"name", "size_mm", "prototype_from_marker"});
+      prototype.markers.push_back({read_carrier(item.at("name"), reader), read_size_m(item),
+                                   item.at("prototype_from_marker").pose()});
+    }
+  }
+  if (const auto albedo = node.find("albedo")) read_albedo(*albedo, &prototype, reader);
+  return prototype;
+}
+
+void read_variants(const ConfigNode& node, Slot* slot, Reader* reader) {
+  std::set<std::string> names;
+  for (const ConfigNode& item : node.items()) {
+    item.only({"name", "mesh", "units"});
+    Variant variant{item.at("name").text(), {}};
+    if (!names.insert(variant.name).second) {
+      item.at("name").problem(fmt::format("expected a name of its own, found '{}' twice.", variant.name));
+    }
+    reader->part_meshes.push_back(read_mesh_file(item));
+    slot->variants.push_back(std::move(variant));
+  }
+  if (slot->variants.empty()) node.problem("expected at least one variant, found none.");
+}
+
+Slot read_slot(const ConfigNode& node, Reader* reader) {
+  node.only({"name", "marker", "size_mm", "marker_from_part", "mode", "stick_to_surface", "variants"});
+  Slot slot;
+  slot.name = node.at("name").text();
+  if (slot.name == "prototype" || slot.name.empty() || slot.name.find_first_of("/\\") != std::string::npos) {
+    node.at("name").problem(fmt::format(
+        "expected a name without slashes other than 'prototype' (files are named after it), found '{}'.",
+        slot.name));
+  }
+  slot.marker = read_carrier(node.at("marker"), reader);
+  slot.size_m = read_size_m(node);
+  slot.marker_from_part = node.at("marker_from_part").pose();
+  if (const auto mode = node.find("mode")) {
+    slot.mode = mode->choice({"view", "surface"}) == "surface" ? Mode::surface : Mode::view;
+  }
+  if (const auto stick = node.find("stick_to_surface")) slot.stick_to_surface = stick->boolean();
+  read_variants(node.at("variants"), &slot, reader);
+  return slot;
+}
+
+std::vector<Slot> read_slots(const ConfigNode& node, Reader* reader) {
+  std::vector<Slot> slots;
+  std::set<std::string> names;
+  for (const ConfigNode& item : node.items()) {
+    slots.push_back(read_slot(item, reader));
+    if (!names.insert(slots.back().name).second) {
+      item.at("name").problem(
+          fmt::format("expected a name of its own, found '{}' twice.", slots.back().name));
+    }
+  }
+  return slots;
+}
+
+Control read_control(const ConfigNode& node, const Scene& scene) {
+  node.only({"marker", "action", "slot", "gesture"});
+  Control control;
+  control.marker = read_marker_name(node.at("marker"));
+  control.action = node.at("action").text();
+  if (const auto gesture = node.find("gesture")) control.gesture = gesture->text();
+  if (const auto slot = node.find("slot")) {
+    control.slot = slot->text();
+    if (!scene.find_slot(control.slot)) {
+      slot->problem(fmt::format("expected the name of a slot, found '{}'.", control.slot));
+    }
+  }
+  return control;
+}
+
+int read_side(const ConfigNode& size, double value) {
+  constexpr double k_most = 16384;  // largest picture side that GL 4.5 must hold
+  if (value >= 1 && value <= k_most && value == static_cast<int>(value)) return static_cast<int>(value);
+  size.problem(fmt::format("expected a whole number of pixels from 1 to {}, found {}.", k_most, value));
+  return 1;
+}
+
+Imager read_viewer_imager(const ConfigNode& node) {
+  node.only({"schema", "world_from_viewer", "size", "fov_deg"});
+  const Pose world_from_viewer = node.at("world_from_viewer").pose();
+  const ConfigNode size = node.at("size");
+  std::vector<double> sides = size.numbers(2);
+  sides.resize(2, 1);
+  double fov_deg = node.at("fov_deg").positive();
+  if (fov_deg >= 180) {
+    node.at("fov_deg").problem(fmt::format("expected less than 180 degrees, found {}.", fov_deg));
+    fov_deg = 60;
+  }
+  if (!(fov_deg > 0)) fov_deg = 60;  // noted already
+  return viewer_imager(world_from_viewer, read_side(size, sides[0]), read_side(size, sides[1]), fov_deg);
+}
+
+Viewer read_viewer(const ConfigNode& node) {
+  node.only({"fixed", "marker"});
+  Viewer viewer;
+  if (const auto fixed = node.find("fixed")) viewer.fixed = read_viewer_imager(*fixed);
+  if (const auto marker = node.find("marker")) viewer.marker = read_marker_name(*marker);
+  if (viewer.fixed.has_value() == viewer.marker.has_value()) {
+    node.problem(
+        fmt::format("expected either \"fixed\" or \"marker\", found {}.", viewer.fixed ? "both" : "neither"));
+  }
+  return viewer;
+}
+
+Result<Mesh> load_named_mesh(const MeshFile& file, const fs::path& scene_path) {
+  auto mesh = load_mesh(file.path, file.units);
+  if (!mesh) return error("{}: {}: {}", scene_path.string(), file.where, mesh.message());
+  return mesh;
+}
+
+Status load_albedo_picture(const fs::path& path, const fs::path& scene_path, Prototype* prototype) {
+  auto picture = read_picture(path);
+  if (!picture) return error("{}: prototype.albedo: {}", scene_path.string(), picture.message());
+  prototype->albedo_picture = std::move(picture).value();
+  if (prototype->albedo_picture.channels() == 1) {
+    const cv::Mat grey = prototype->albedo_picture;
+    cv::merge(std::vector<cv::Mat>{grey, grey, grey}, prototype->albedo_picture);
+  }
+  if (prototype->mesh.uvs.empty()) {
+    return error(
+        "{}: prototype.albedo: expected a mesh with texture coordinates for the picture, found one without. "
+        "Give a number instead, or export the mesh with uv.",
+        scene_path.string());
+  }
+  return {};
+}
+
+Status load_files(const Reader& reader, const fs::path& path, Scene* scene) {
+  if (scene->prototype) {
+    LIMN_TRY(scene->prototype->mesh, load_named_mesh(*reader.prototype_mesh, path));
+    if (reader.albedo_picture) {
+      LIMN_TRY_STATUS(load_albedo_picture(*reader.albedo_picture, path, &*scene->prototype));
+    }
+  }
+  std::size_t next = 0;
+  for (Slot& slot : scene->slots) {
+    for (Variant& variant : slot.variants) {
+      LIMN_TRY(variant.mesh, load_named_mesh(reader.part_meshes[next++], path));
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+const Slot* Scene::find_slot(const std::string& name) const {
+  const auto found =
+      std::find_if(slots.begin(), slots.end(), [&](const Slot& slot) { return slot.name == name; });
+  return found == slots.end() ? nullptr : &*found;
+}
+
+Result<Scene> load_scene(const fs::path& path) {
+  std::error_code code;
+  const fs::path file = fs::is_directory(path, code) ? path / "scene.json" : path;
+  LIMN_TRY(const Config config, Config::load(file, "limn.scene/1"));
+  const ConfigNode root = config.root();
+  root.only({"schema", "prototype", "slots", "controls", "viewer"});
+  Scene scene;
+  Reader reader;
+  scene.folder = config.folder();
+  if (const auto node = root.find("prototype")) scene.prototype = read_prototype(*node, &reader);
+  scene.slots = read_slots(root.at("slots"), &reader);
+  if (const auto controls = root.find("controls")) {
+    for (const ConfigNode& item : controls->items()) scene.controls.push_back(read_control(item, scene));
+  }
+  if (const auto node = root.find("viewer")) scene.viewer = read_viewer(*node);
+  LIMN_TRY_STATUS(config.status());
+  LIMN_TRY_STATUS(load_files(reader, file, &scene));
+  return scene;
+}
+
+Result<Imager> load_viewer(const fs::path& path) {
+  LIMN_TRY(const Config config, Config::load(path, ""));
+  Imager viewer = read_viewer_imager(config.root());
+  LIMN_TRY_STATUS(config.status());
+  return viewer;
+}
+
+std::vector<Body> bodies(const Scene& scene) {
+  std::vector<Body> out;
+  if (scene.prototype && !scene.prototype->markers.empty())
+    out.push_back({"prototype", scene.prototype->markers});
+  for (const Slot& slot : scene.slots) out.push_back({slot.name, {{slot.marker, slot.size_m, Pose()}}});
+  return out;
+}
+
+}  // namespace limn::scene
