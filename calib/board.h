@@ -1,0 +1,76 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+
+namespace limn::calib {
+
+enum class BoardKind { charuco, chessboard };
+
+/// A flat calibration target. Board frame: origin at the outer corner of the top-left square (the grid's
+/// corner, not the sheet's), x right, y down, z into the sheet; metres. The top-left square is black; on a
+/// ChArUco board every white square carries a marker, ids counted row by row from 0.
+///
+/// Text form, as in interfaces.md:
+///   `charuco:11x8:25mm`                        11 x 8 squares of 25 mm
+///   `charuco:11x8:25mm:aruco_5x5_100:0.7`      with its dictionary and the marker's side as a share of the
+///   square `chessboard:9x7:75mm`                      9 x 7 INNER corners, that is 10 x 8 squares
+/// Defaults: the smallest aruco_4x4 dictionary that has enough markers; 0.75 (whole cells: 8 to a square).
+struct Board {
+  BoardKind kind = BoardKind::charuco;
+  int columns = 0;  ///< squares across (both kinds)
+  int rows = 0;     ///< squares down (both kinds)
+  double square_m = 0;
+  std::string dictionary;   ///< ChArUco: OpenCV's predefined dictionary, `aruco_4x4_50`
+  double marker_share = 0;  ///< ChArUco: the marker's side / the square's side
+
+  static Result<Board> parse(const std::string& text);
+  std::string text() const;
+
+  /// Inner corners, where four squares meet: id = row * (columns - 1) + column, from the top left.
+  int corner_count() const { return (columns - 1) * (rows - 1); }
+  /// Place of a corner on the flat board (z = 0).
+  Eigen::Vector3d p_corner(int id) const;
+  double width_m() const { return columns * square_m; }
+  double height_m() const { return rows * square_m; }
+  bool is_black(int column, int row) const { return (column + row) % 2 == 0; }
+};
+
+/// The whole sheet as exact pixels: every square and every marker cell is a whole number of pixels.
+struct BoardSheet {
+  cv::Mat picture;              ///< 8-bit grey: 0 black ink, 255 paper
+  double pixels_per_metre = 0;  ///< for pHYs and for texturing a plane
+  /// Pixel coordinates (pixel centres at integers) of the board frame's origin; ends in .5, for it is an
+  /// edge: px = px_board_origin + pixels_per_metre * p_board.xy
+  Eigen::Vector2d px_board_origin = Eigen::Vector2d::Zero();
+};
+
+struct DrawOptions {
+  int square_px = 80;  ///< at least; the next size with whole marker cells is taken
+  int margin_px = -1;  ///< white border around the grid; -1: as wide as a square
+};
+BoardSheet draw_board(const Board& board, const DrawOptions& options = {});
+
+/// An inner corner found in a picture.
+struct BoardCorner {
+  int id = 0;
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  /// Of one coordinate, from the fit's residual and geometry; never below k_corner_floor_px.
+  double stddev_px = 0;
+};
+/// What remains of a perfect fit in 8 bits: lens blur and aliasing that the junction's model lacks.
+constexpr double k_corner_floor_px = 0.02;
+
+/// The board's corners in an 8-bit grey picture, by rising id; empty when it is not visible. ChArUco boards
+/// may be seen in part, chessboards must be seen whole. Found by OpenCV's detectors, then each corner is
+/// refined in the picture by fitting two blurred edges that cross (least squares over the pixels along both
+/// edges, up to 0.42 squares away, clear of the markers), so that nothing depends on OpenCV's interpolation,
+/// which in 4.6 shifts ChArUco corners by half a pixel. A chessboard with an even number of squares both ways
+/// looks the same when turned by 180 degrees: its first corner is the one nearer to the picture's top left.
+std::vector<BoardCorner> find_board(const Board& board, const cv::Mat& grey);
+
+}  // namespace limn::calib

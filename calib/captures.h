@@ -1,0 +1,66 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "calib/board.h"
+#include "calib/patterns.h"
+#include "core/result.h"
+
+namespace limn::calib {
+
+/// A camera or projector that took part.
+struct CapturedDevice {
+  std::string name;
+  int width = 0;
+  int height = 0;
+};
+
+/// One placement of the board (or of the scene, where no board is visible).
+struct CapturedPose {
+  std::string name;  ///< the directory's name
+  /// pictures[projector][camera][pattern]: the files, in the order of the patterns.
+  std::vector<std::vector<std::vector<std::filesystem::path>>> pictures;
+};
+
+/// A captures folder (interfaces.md): what was shown, what was photographed, where the pictures are.
+struct Captures {
+  std::filesystem::path folder;
+  std::vector<CapturedDevice> cameras;
+  std::vector<CapturedDevice> projectors;
+  std::vector<Patterns> patterns;  ///< one for each projector
+  Board board;
+  std::vector<CapturedPose> poses;  ///< by name
+};
+
+/// A captures folder that is about to be filled: Gray code patterns for every projector, no poses yet.
+Captures plan_captures(const std::filesystem::path& folder,
+                       std::vector<CapturedDevice> cameras,
+                       std::vector<CapturedDevice> projectors,
+                       const Board& board);
+
+/// The file of one picture: pose00/camera0/000.png, or pose00/projector0/camera0/000.png with several
+/// projectors.
+std::filesystem::path picture_path(
+    const Captures& captures, int pose, int projector, int camera, int pattern);
+
+/// Reads capture.json and patterns.json and lists the poses (`pose*` directories). A pose without all of its
+/// pictures is an error that names the first missing file.
+Result<Captures> load_captures(const std::filesystem::path& folder);
+
+/// Pictures that somebody else took: one camera, one projector, OpenCV's Gray code.
+struct ForeignCaptures {
+  std::filesystem::path folder;
+  int projector_width = 0;
+  int projector_height = 0;
+  Board board;
+  std::string poses = "pose*";  ///< names of the pose directories: * and ? stand for any text, any character
+  std::string shots = "*.png";  ///< names of the pictures in each, in the order of their names
+};
+Result<Captures> import_opencv_gray(const ForeignCaptures& foreign);
+
+/// Without the poses of these names; a name that no pose has is an error.
+Result<Captures> without_poses(Captures captures, const std::vector<std::string>& names);
+
+}  // namespace limn::calib
