@@ -13,9 +13,9 @@
 
 namespace limn {
 
-/// A place in a JSON file that people edit; it knows its path. The getters return the value, or note the first
-/// problem of the file ("FILE: projectors[0].lens.fx: expected …, found ….") and return a default, so that a
-/// reader reads straight through and asks Config::status() once at the end.
+/// A place in a JSON file that people edit; it knows its path. The getters return the value, or note the
+/// first problem of the file ("FILE: projectors[0].lens.fx: expected …, found ….") and return a default, so
+/// that a reader reads straight through and asks Config::status() once at the end.
 class ConfigNode {
  public:
   ConfigNode() = default;  ///< an absent node: every getter returns its default and notes nothing

@@ -11,7 +11,7 @@ namespace limn {
 /// Whole content of a file.
 Result<std::string> read_file(const std::filesystem::path& path);
 
-/// Writes through a temporary file in the same folder, synced and renamed: `path` is either old or complete.
+/// Writes through a temporary file in the same folder, then renamed: `path` is either old or complete.
 /// A read-only folder or a full disk is an error that names it.
 Status write_file(const std::filesystem::path& path, std::string_view content);
 

@@ -10,7 +10,9 @@ namespace limn {
 using Stamp = std::chrono::time_point<std::chrono::steady_clock, std::chrono::nanoseconds>;
 
 /// Seconds from `from` to `to`.
-inline double seconds_between(Stamp from, Stamp to) { return std::chrono::duration<double>(to - from).count(); }
+inline double seconds_between(Stamp from, Stamp to) {
+  return std::chrono::duration<double>(to - from).count();
+}
 /// `at` moved by a number of seconds.
 inline Stamp shifted(Stamp at, double seconds) {
   return at + std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(seconds));

@@ -23,10 +23,12 @@ class LensModel {
   const std::string& name() const;
   /// Values a lens of this model has; the first four are fx, fy, cx, cy (pixels).
   int value_count() const;
+  /// Whether points behind the imager can have a pixel (splined and fisheye models).
+  bool projects_behind() const;
 
-  /// Pixel of p (imager frame, any unit, |p| > 0), for solvers that hold the values elsewhere. `d_px_d_p` (2x3)
-  /// and `d_px_d_values` (2 x value_count), both row-major, are filled when not null. False when p has no
-  /// finite pixel (behind the imager for models with a projection plane, or not finite).
+  /// Pixel of p (imager frame, any unit, |p| > 0), for solvers that hold the values elsewhere. `d_px_d_p`
+  /// (2x3) and `d_px_d_values` (2 x value_count), both row-major, are filled when not null. False when p has
+  /// no finite pixel (behind the imager for models with a projection plane, or not finite).
   bool project(std::span<const double> values,
                const Eigen::Vector3d& p,
                Eigen::Vector2d* px,
@@ -58,7 +60,8 @@ struct Lens {
   double cx() const { return values[2]; }
   double cy() const { return values[3]; }
 
-  /// Pixel of p (imager frame); nullopt when it has none.
+  /// Pixel of p (imager frame); nullopt when it has none, also where a polynomial distortion has folded back
+  /// on itself so far off the axis that LensModel::project would answer with a pixel of another direction.
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& p) const;
   /// Unit direction of a pixel; nullopt when it has none.
   std::optional<Eigen::Vector3d> unproject(const Eigen::Vector2d& px) const;

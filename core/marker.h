@@ -8,8 +8,8 @@
 
 namespace limn {
 
-/// `family:id`, such as `apriltag_36h11:0`, `aruco_4x4_50:3`, `artoolkit:hiro.patt`. Everything after the last
-/// colon is the id, so that `aruco:FILE.yml:7` has the family `aruco:FILE.yml`.
+/// `family:id`, such as `apriltag_36h11:0`, `aruco_4x4_50:3`, `artoolkit:hiro.patt`. Everything after the
+/// last colon is the id, so that `aruco:FILE.yml:7` has the family `aruco:FILE.yml`.
 struct MarkerName {
   std::string family;
   std::string id;

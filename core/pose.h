@@ -34,22 +34,22 @@ Eigen::Quaterniond exp_rotation(const Eigen::Vector3d& w);
 /// Inverse of exp_rotation, |w| <= pi.
 Eigen::Vector3d log_rotation(const Eigen::Quaterniond& q);
 
-/// Left perturbation in the axes of a: delta = [w; v], R' = Exp(w) R, t' = t + v. Every 6x6 covariance in Limn
-/// is the covariance of this delta; its lower block is therefore that of the position of b's origin in a.
-/// (docs/decisions/0002-pose-perturbation.md says why v does not ride on the rotation.)
+/// Left perturbation in the axes of a: delta = [w; v], R' = Exp(w) R, t' = t + v. Every 6x6 covariance in
+/// Limn is the covariance of this delta; its lower block is therefore that of the position of b's origin in
+/// a. (docs/decisions/0002-pose-perturbation.md says why v does not ride on the rotation.)
 Pose boxplus(const Pose& a_from_b, const Vector6d& delta);
 /// delta such that boxplus(from, delta) == to.
 Vector6d boxminus(const Pose& to, const Pose& from);
 
-/// From `from` (t = 0) to `to` (t = 1): shortest arc for the rotation, straight line for b's origin. t outside
-/// [0, 1] extrapolates.
+/// From `from` (t = 0) to `to` (t = 1): shortest arc for the rotation, straight line for b's origin. t
+/// outside [0, 1] extrapolates.
 Pose interpolated(const Pose& from, const Pose& to, double t);
 
 /// Angle between two orientations, radians in [0, pi].
 double angle_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b);
 
-/// camera_from_world of an imager at `p_eye` that looks at `p_target` with its image's down direction as close
-/// to -`d_up` as possible (x right, y down, z forward).
+/// camera_from_world of an imager at `p_eye` that looks at `p_target` with its image's down direction as
+/// close to -`d_up` as possible (x right, y down, z forward).
 Pose looking_at(const Eigen::Vector3d& p_eye, const Eigen::Vector3d& p_target, const Eigen::Vector3d& d_up);
 
 }  // namespace limn

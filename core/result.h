@@ -24,8 +24,8 @@ Error error(fmt::format_string<Args...> format, Args&&... args) {
 template <class T>
 class [[nodiscard]] Result {
  public:
-  Result(T value) : state_(std::move(value)) {}        // NOLINT(google-explicit-constructor)
-  Result(Error error) : state_(std::move(error)) {}    // NOLINT(google-explicit-constructor)
+  Result(T value) : state_(std::move(value)) {}      // NOLINT(google-explicit-constructor)
+  Result(Error error) : state_(std::move(error)) {}  // NOLINT(google-explicit-constructor)
 
   bool ok() const { return std::holds_alternative<T>(state_); }
   explicit operator bool() const { return ok(); }
@@ -53,7 +53,7 @@ class [[nodiscard]] Result {
 class [[nodiscard]] Status {
  public:
   Status() = default;
-  Status(Error error) : error_(std::move(error)) {}    // NOLINT(google-explicit-constructor)
+  Status(Error error) : error_(std::move(error)) {}  // NOLINT(google-explicit-constructor)
   bool ok() const { return !error_; }
   explicit operator bool() const { return ok(); }
   const Error& error() const { return error_.value(); }
@@ -73,13 +73,13 @@ namespace detail {
 #define LIMN_CONCAT(a, b) LIMN_CONCAT_(a, b)
 
 /// LIMN_TRY(auto rig, load_rig(folder)); declares `rig`, or returns the error from the enclosing function.
-#define LIMN_TRY(declaration, expression)                      \
-  auto LIMN_CONCAT(result_, __LINE__) = (expression);          \
+#define LIMN_TRY(declaration, expression)                                             \
+  auto LIMN_CONCAT(result_, __LINE__) = (expression);                                 \
   if (!LIMN_CONCAT(result_, __LINE__)) return LIMN_CONCAT(result_, __LINE__).error(); \
   declaration = std::move(LIMN_CONCAT(result_, __LINE__)).value()
 
 /// LIMN_TRY_STATUS(write_rig(rig, folder)); returns the error from the enclosing function, if any.
-#define LIMN_TRY_STATUS(expression) \
+#define LIMN_TRY_STATUS(expression)                                                        \
   if (auto LIMN_CONCAT(status_, __LINE__) = (expression); !LIMN_CONCAT(status_, __LINE__)) \
   return LIMN_CONCAT(status_, __LINE__).error()
 

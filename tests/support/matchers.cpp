@@ -1,9 +1,10 @@
 #include "tests/support/matchers.h"
 
+#include <unistd.h>
+
 #include <cstdlib>
 #include <functional>
 #include <opencv2/core.hpp>
-#include <unistd.h>
 
 #include "core/picture.h"
 
@@ -30,22 +31,22 @@ testing::AssertionResult pose_near(const Pose& found, const Pose& expected, doub
                                      << " mm (limit " << distance * 1e3 << ")";
 }
 
-testing::AssertionResult near(const Eigen::VectorXd& found, const Eigen::VectorXd& expected, double distance) {
+testing::AssertionResult near(const Eigen::VectorXd& found,
+                              const Eigen::VectorXd& expected,
+                              double distance) {
   const double found_distance = (found - expected).norm();
   if (found_distance <= distance) return testing::AssertionSuccess();
   return testing::AssertionFailure() << "(" << found.transpose() << ") is " << found_distance << " from ("
                                      << expected.transpose() << "), limit " << distance;
 }
 
-testing::AssertionResult image_near(const cv::Mat& actual,
-                                    const cv::Mat& expected,
-                                    double mean,
-                                    double worst,
-                                    const std::string& name) {
+testing::AssertionResult image_near(
+    const cv::Mat& actual, const cv::Mat& expected, double mean, double worst, const std::string& name) {
   if (actual.size() != expected.size() || actual.type() != expected.type()) {
-    return testing::AssertionFailure() << name << ": size or type differ: " << actual.cols << "x" << actual.rows
-                                       << " type " << actual.type() << ", expected " << expected.cols << "x"
-                                       << expected.rows << " type " << expected.type();
+    return testing::AssertionFailure()
+           << name << ": size or type differ: " << actual.cols << "x" << actual.rows << " type "
+           << actual.type() << ", expected " << expected.cols << "x" << expected.rows << " type "
+           << expected.type();
   }
   cv::Mat a, e;
   actual.reshape(1).convertTo(a, CV_64F);
@@ -56,9 +57,9 @@ testing::AssertionResult image_near(const cv::Mat& actual,
   const double found_mean = cv::mean(difference)[0];
   const bool finite = cv::checkRange(a) && cv::checkRange(e);
   if (finite && found_mean <= mean && found_worst <= worst) return testing::AssertionSuccess();
-  auto result = testing::AssertionFailure() << name << ": mean " << found_mean << " (limit " << mean << "), worst "
-                                            << found_worst << " (limit " << worst << ")"
-                                            << (finite ? "" : ", NaN or infinite values");
+  auto result = testing::AssertionFailure()
+                << name << ": mean " << found_mean << " (limit " << mean << "), worst " << found_worst
+                << " (limit " << worst << ")" << (finite ? "" : ", NaN or infinite values");
   const auto folder = test_folder();
   const double scale = actual.depth() == CV_8U ? 1 : 255;
   auto write = [&](const char* kind, const cv::Mat& picture, double factor) {
@@ -76,8 +77,8 @@ testing::AssertionResult image_near(const cv::Mat& actual,
 std::mt19937_64 test_rng() { return std::mt19937_64(std::hash<std::string>{}(running_test())); }
 
 std::filesystem::path test_folder() {
-  const auto folder = std::filesystem::temp_directory_path() / ("limn-test-" + std::to_string(getuid())) /
-                      running_test();
+  const auto folder =
+      std::filesystem::temp_directory_path() / ("limn-test-" + std::to_string(getuid())) / running_test();
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   return folder;

@@ -16,26 +16,25 @@ namespace limn::test {
 
 inline namespace literals {
 constexpr double operator""_deg(long double v) { return static_cast<double>(v) * std::numbers::pi / 180; }
-constexpr double operator""_deg(unsigned long long v) { return static_cast<double>(v) * std::numbers::pi / 180; }
+constexpr double operator""_deg(unsigned long long v) {
+  return static_cast<double>(v) * std::numbers::pi / 180;
+}
 constexpr double operator""_mm(long double v) { return static_cast<double>(v) * 1e-3; }
 constexpr double operator""_mm(unsigned long long v) { return static_cast<double>(v) * 1e-3; }
 }  // namespace literals
 
-/// EXPECT_TRUE(pose_near(found, expected, 0.1_deg, 0.5_mm)): says which of angle and distance broke, and by how
-/// much. Compares the rotation's angle itself. NaN fails.
+/// EXPECT_TRUE(pose_near(found, expected, 0.1_deg, 0.5_mm)): says which of angle and distance broke, and by
+/// how much. Compares the rotation's angle itself. NaN fails.
 testing::AssertionResult pose_near(const Pose& found, const Pose& expected, double angle, double distance);
 
 /// Distance of two points of any dimension; NaN fails.
 testing::AssertionResult near(const Eigen::VectorXd& found, const Eigen::VectorXd& expected, double distance);
 
-/// Mean absolute difference <= `mean` and largest <= `worst`, over channels, in levels (8-bit) or units (float).
-/// On failure writes NAME-actual.png, NAME-expected.png, NAME-difference.png (8x) under the test's output
-/// folder and names them. NaN or another size or type fails.
-testing::AssertionResult image_near(const cv::Mat& actual,
-                                    const cv::Mat& expected,
-                                    double mean,
-                                    double worst,
-                                    const std::string& name);
+/// Mean absolute difference <= `mean` and largest <= `worst`, over channels, in levels (8-bit) or units
+/// (float). On failure writes NAME-actual.png, NAME-expected.png, NAME-difference.png (8x) under the test's
+/// output folder and names them. NaN or another size or type fails.
+testing::AssertionResult image_near(
+    const cv::Mat& actual, const cv::Mat& expected, double mean, double worst, const std::string& name);
 
 /// A generator seeded from the running test's name: the same numbers every run, others in every test.
 std::mt19937_64 test_rng();
@@ -43,8 +42,8 @@ std::mt19937_64 test_rng();
 /// A fresh folder of the running test, removed and made anew at the call.
 std::filesystem::path test_folder();
 
-/// The folder of real photographs ($LIMN_REAL_DATA or ../shared/data beside the checkout); nullopt when absent.
-/// Tests then GTEST_SKIP() << the folder's name.
+/// The folder of real photographs ($LIMN_REAL_DATA or ../shared/data beside the checkout); nullopt when
+/// absent. Tests then GTEST_SKIP() << the folder's name.
 std::optional<std::filesystem::path> real_data(const std::string& inside);
 
 }  // namespace limn::test

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <filesystem>
+
+#include "core/imager.h"
+#include "core/result.h"
+
+namespace limn {
+
+/// Reads mrcal's text format. The imager's name is the file's stem, the reference frame is the world.
+Result<Imager> load_cameramodel(const std::filesystem::path& path);
+
+/// Writes mrcal's text format, extrinsics included; `path` is either old or complete.
+Status save_cameramodel(const Imager& imager, const std::filesystem::path& path);
+
+}  // namespace limn

@@ -1,0 +1,72 @@
+#include "core/file.h"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+namespace limn {
+namespace {
+
+namespace fs = std::filesystem;
+
+Error write_error(const fs::path& path, int code) {
+  const char* advice = code == ENOSPC ? "Free some space, or choose another folder."
+                       : code == EACCES || code == EROFS || code == EPERM
+                           ? "Make the folder writable, or choose another one."
+                           : "Check that the folder exists and can be written.";
+  return error("{}: expected to write here, found: {}. {}", path.string(), std::strerror(code), advice);
+}
+
+// Writes all of content to an open file; 0 or errno.
+int write_all(int fd, std::string_view content) {
+  while (!content.empty()) {
+    const ssize_t written = ::write(fd, content.data(), content.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return errno;
+    content.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return 0;
+}
+
+}  // namespace
+
+Result<std::string> read_file(const fs::path& path) {
+  if (fs::is_directory(path)) return error("{}: expected a file, found a folder.", path.string());
+  std::ifstream in(path, std::ios::binary);
+  if (!in)
+    return error("{}: cannot read this file: {}. Check its name.", path.string(), std::strerror(errno));
+  std::ostringstream content;
+  content << in.rdbuf();
+  if (in.bad()) return error("{}: reading stopped: {}.", path.string(), std::strerror(errno));
+  return std::move(content).str();
+}
+
+Status write_file(const fs::path& path, std::string_view content) {
+  std::string temporary = path.string() + ".XXXXXX";
+  const int fd = ::mkstemp(temporary.data());
+  if (fd < 0) return write_error(path, errno);
+  ::fchmod(fd, 0644);
+  int code = write_all(fd, content);
+  if (::close(fd) != 0 && code == 0) code = errno;
+  if (code == 0 && ::rename(temporary.c_str(), path.c_str()) != 0) code = errno;
+  if (code != 0) {
+    ::unlink(temporary.c_str());
+    return write_error(path, code);
+  }
+  return {};
+}
+
+Status make_folder(const fs::path& path) {
+  std::error_code problem;
+  fs::create_directories(path, problem);
+  if (problem) return write_error(path, problem.value());
+  if (!fs::is_directory(path)) return error("{}: expected a folder, found a file.", path.string());
+  if (::access(path.c_str(), W_OK | X_OK) != 0) return write_error(path, errno);
+  return {};
+}
+
+}  // namespace limn

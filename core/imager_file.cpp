@@ -1,0 +1,231 @@
+#include "core/imager_file.h"
+
+#include <Eigen/Cholesky>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "core/cameramodel.h"
+#include "core/file.h"
+
+namespace limn {
+namespace {
+
+namespace fs = std::filesystem;
+
+// ---- OpenCV ----
+
+std::vector<double> numbers_of(const cv::FileNode& node) {
+  cv::Mat values;
+  if (!node.empty() && node.isMap()) node >> values;
+  if (values.empty()) return {};
+  values.convertTo(values, CV_64F);
+  const cv::Mat flat = values.reshape(1, 1).clone();
+  return {flat.ptr<double>(), flat.ptr<double>() + flat.cols};
+}
+
+Result<std::string> model_of_distortion(std::vector<double>* distortion, const fs::path& path) {
+  while (distortion->size() > 12 && distortion->back() == 0) distortion->pop_back();
+  switch (distortion->size()) {
+    case 0:
+      return std::string("LENSMODEL_PINHOLE");
+    case 4:
+      return std::string("LENSMODEL_OPENCV4");
+    case 5:
+      return std::string("LENSMODEL_OPENCV5");
+    case 8:
+      return std::string("LENSMODEL_OPENCV8");
+    case 12:
+      return std::string("LENSMODEL_OPENCV12");
+    default:
+      return error("{}: distortion_coefficients: expected 0, 4, 5, 8 or 12 numbers, found {}.", path.string(),
+                   distortion->size());
+  }
+}
+
+Result<Imager> load_opencv(const fs::path& path, const std::string& text) {
+  try {
+    const cv::FileStorage file(text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
+    const auto first_of = [&](std::initializer_list<const char*> names) {
+      for (const char* name : names) {
+        if (!file[name].empty()) return file[name];
+      }
+      return cv::FileNode();
+    };
+    const auto matrix = numbers_of(first_of({"camera_matrix", "cameraMatrix", "Camera_Matrix", "K"}));
+    if (matrix.size() != 9) {
+      return error(
+          "{}: camera_matrix: expected a 3x3 matrix as OpenCV's calibration writes it, found {} numbers.",
+          path.string(), matrix.size());
+    }
+    auto distortion =
+        numbers_of(first_of({"distortion_coefficients", "distCoeffs", "Distortion_Coefficients", "D"}));
+    LIMN_TRY(const std::string model, model_of_distortion(&distortion, path));
+    std::vector<double> values = {matrix[0], matrix[4], matrix[2], matrix[5]};
+    values.insert(values.end(), distortion.begin(), distortion.end());
+    auto lens = Lens::create(model, values);
+    if (!lens) return error("{}: {}", path.string(), lens.message());
+    const cv::FileNode width = first_of({"image_width", "image_Width"});
+    const cv::FileNode height = first_of({"image_height", "image_Height"});
+    return Imager{path.stem().string(), width.empty() ? 0 : static_cast<int>(width.real()),
+                  height.empty() ? 0 : static_cast<int>(height.real()), *lens, Pose()};
+  } catch (const cv::Exception& problem) {
+    return error("{}: expected an OpenCV camera file, found a damaged one ({}).", path.string(), problem.err);
+  }
+}
+
+// ---- ARToolKit ----
+
+// Parameters of camera_para.dat: an ideal pixel by the 3x4 matrix, then a distortion in the picture's plane.
+struct ArtoolkitCamera {
+  int version = 0;
+  int width = 0;
+  int height = 0;
+  std::vector<double> matrix;   // 3x4, row by row
+  std::vector<double> factors;  // meaning depends on the version
+};
+
+// Observed pixel of an ideal one (ARToolKit's arParamIdeal2Observ, versions 1 to 4).
+Eigen::Vector2d observed_pixel(const ArtoolkitCamera& camera, const Eigen::Vector2d& ideal) {
+  const auto& d = camera.factors;
+  if (camera.version == 4) {
+    const Eigen::Vector2d f(d[4], d[5]), centre(d[6], d[7]);
+    const Eigen::Vector2d n = ((ideal - centre) * d[8]).cwiseQuotient(f);
+    const double r2 = n.squaredNorm(), radial = 1 + d[0] * r2 + d[1] * r2 * r2, xy2 = 2 * n.x() * n.y();
+    const Eigen::Vector2d bent(n.x() * radial + d[2] * xy2 + d[3] * (r2 + 2 * n.x() * n.x()),
+                               n.y() * radial + d[2] * (r2 + 2 * n.y() * n.y()) + d[3] * xy2);
+    return bent.cwiseProduct(f) + centre;
+  }
+  const Eigen::Vector2d centre(d[0], d[1]);
+  const double scale = camera.version == 1 ? d[3] : d[2];  // version 1 stores radial factor and scale swapped
+  const double aspect = camera.version == 3 ? d[3] : 1;
+  const double k1 = camera.version == 1 ? d[2] : camera.version == 2 ? d[3] : d[4];
+  const double k2 = camera.version == 1 ? 0 : camera.version == 2 ? d[4] : d[5];
+  const Eigen::Vector2d n = (ideal - centre) * scale;
+  const double r2 = n.squaredNorm();
+  const Eigen::Vector2d bent = n * (1 - k1 * 1e-8 * r2 - k2 * 1e-13 * r2 * r2);
+  return Eigen::Vector2d(bent.x() * aspect, bent.y()) + centre;
+}
+
+struct LensSample {
+  Eigen::Vector3d p;  // direction, z = 1
+  Eigen::Vector2d px;
+};
+
+// Lens of `model` that fits the samples best in pixels: Gauss-Newton from a pinhole.
+std::vector<double> fitted_lens_values(const LensModel& model,
+                                       std::vector<double> values,
+                                       const std::vector<LensSample>& samples) {
+  using RowMajor = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>;
+  const Eigen::Index count = model.value_count();
+  for (int iteration = 0; iteration < 20; ++iteration) {
+    Eigen::MatrixXd hessian = Eigen::MatrixXd::Identity(count, count) * 1e-9;
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(count);
+    for (const LensSample& sample : samples) {
+      Eigen::Vector2d px;
+      RowMajor jacobian(2, count);
+      if (!model.project(values, sample.p, &px, nullptr, jacobian.data())) continue;
+      hessian += jacobian.transpose() * jacobian;
+      gradient += jacobian.transpose() * (sample.px - px);
+    }
+    const Eigen::VectorXd step = hessian.ldlt().solve(gradient);
+    for (Eigen::Index i = 0; i < count; ++i) values[static_cast<std::size_t>(i)] += step[i];
+  }
+  return values;
+}
+
+// Grid of directions over the picture with the pixels where ARToolKit's model puts them.
+std::vector<LensSample> samples_of(const ArtoolkitCamera& camera) {
+  constexpr int k_grid = 24;
+  Eigen::Matrix3d pinhole;
+  for (int row = 0; row < 3; ++row) {
+    for (int col = 0; col < 3; ++col)
+      pinhole(row, col) = camera.matrix[static_cast<std::size_t>(4 * row + col)];
+  }
+  const Eigen::Matrix3d inverse = pinhole.inverse();
+  std::vector<LensSample> samples;
+  for (int row = 0; row <= k_grid; ++row) {
+    for (int col = 0; col <= k_grid; ++col) {
+      const Eigen::Vector2d ideal(camera.width * col / double{k_grid}, camera.height * row / double{k_grid});
+      const Eigen::Vector3d p = inverse * ideal.homogeneous();
+      samples.push_back({p / p.z(), observed_pixel(camera, ideal)});
+    }
+  }
+  return samples;
+}
+
+Result<ArtoolkitCamera> parse_artoolkit(const std::string& bytes, const fs::path& path) {
+  constexpr std::size_t k_factor_counts[] = {4, 5, 6, 9};  // versions 1 to 4, told apart by the file's size
+  ArtoolkitCamera camera;
+  std::size_t at = 0;
+  const auto take = [&](std::size_t size) {
+    std::uint64_t value = 0;
+    for (std::size_t i = 0; i < size; ++i) value = value << 8 | static_cast<unsigned char>(bytes[at++]);
+    return value;
+  };
+  for (int version = 1; version <= 4; ++version) {
+    const std::size_t factor_count = k_factor_counts[version - 1];
+    if (bytes.size() != 8 + 8 * (12 + factor_count)) continue;
+    camera.version = version;
+    camera.width = static_cast<int>(take(4));
+    camera.height = static_cast<int>(take(4));
+    for (int i = 0; i < 12; ++i) camera.matrix.push_back(std::bit_cast<double>(take(8)));
+    for (std::size_t i = 0; i < factor_count; ++i) camera.factors.push_back(std::bit_cast<double>(take(8)));
+  }
+  bool sane = camera.version != 0 && camera.width > 0 && camera.width < 100000 && camera.height > 0 &&
+              camera.height < 100000;
+  for (const double value : camera.matrix) sane = sane && std::isfinite(value);
+  for (const double value : camera.factors) sane = sane && std::isfinite(value);
+  if (!sane) {
+    return error(
+        "{}: expected an ARToolKit camera_para.dat of 136, 144, 152 or 176 bytes (versions 1 to 4), found "
+        "{} bytes that are not one.",
+        path.string(), bytes.size());
+  }
+  return camera;
+}
+
+Result<Imager> load_artoolkit(const fs::path& path, const std::string& bytes) {
+  LIMN_TRY(const ArtoolkitCamera camera, parse_artoolkit(bytes, path));
+  const auto samples = samples_of(camera);
+  const LensModel model = LensModel::parse("LENSMODEL_OPENCV5").value();
+  const auto& m = camera.matrix;
+  auto lens =
+      Lens::create(model.name(), fitted_lens_values(model, {m[0], m[5], m[2], m[6], 0, 0, 0, 0, 0}, samples));
+  if (!lens) return error("{}: {}", path.string(), lens.message());
+  double worst_px = 0;
+  for (const LensSample& sample : samples) {
+    const auto px = lens->project(sample.p);
+    worst_px = px ? std::max(worst_px, (*px - sample.px).norm()) : INFINITY;
+  }
+  constexpr double k_max_refit_px = 0.1;
+  if (!(worst_px <= k_max_refit_px)) {
+    return error(
+        "{}: this ARToolKit distortion (version {}) is {:.2f} px from every LENSMODEL_OPENCV5, expected at "
+        "most {} px. Calibrate the camera with limn calibrate.",
+        path.string(), camera.version, worst_px, k_max_refit_px);
+  }
+  return Imager{path.stem().string(), camera.width, camera.height, *lens, Pose()};
+}
+
+bool starts_like_filestorage(const std::string& text) {
+  const auto first = text.find_first_not_of(" \t\r\n\xef\xbb\xbf");
+  return first != std::string::npos && (text[first] == '%' || text[first] == '<' || text[first] == '{');
+}
+
+}  // namespace
+
+Result<Imager> load_imager(const fs::path& path) {
+  if (path.extension() == ".cameramodel") return load_cameramodel(path);
+  LIMN_TRY(const std::string bytes, read_file(path));
+  if (path.extension() == ".dat") return load_artoolkit(path, bytes);
+  if (starts_like_filestorage(bytes)) return load_opencv(path, bytes);
+  return error(
+      "{}: expected a camera as .cameramodel, OpenCV YAML/XML/JSON or ARToolKit .dat, found something else.",
+      path.string());
+}
+
+}  // namespace limn

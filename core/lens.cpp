@@ -1,0 +1,204 @@
+#include "core/lens.h"
+
+extern "C" {
+#include <mrcal/mrcal.h>
+}
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <cmath>
+#include <limits>
+#include <thread>
+
+namespace limn {
+
+struct LensModel::Impl {
+  std::string name;
+  mrcal_lensmodel_t model{};
+  int value_count = 0;
+  bool projects_behind = false;
+};
+
+namespace {
+
+// Beyond this tangent of the off-axis angle (35°) a polynomial lens may have folded back on itself; below it
+// none that a person would build does.
+constexpr double k_surely_unfolded_tangent = 0.7;
+constexpr double k_fold_step = 1.15;  // ratio of the tangents that are checked on the way out
+constexpr int k_max_newton_steps = 30;
+constexpr double k_unproject_tolerance_px = 1e-9;
+constexpr double k_accepted_residual_px = 1e-6;
+
+using Jacobian2x3 = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
+
+// Determinant of d(px)/d(x, y) at (x, y, 1): positive where the lens keeps the picture's orientation.
+bool keeps_orientation(const LensModel& model, std::span<const double> values, const Eigen::Vector2d& xy) {
+  Eigen::Vector2d px;
+  Jacobian2x3 jacobian;
+  if (!model.project(values, xy.homogeneous(), &px, jacobian.data())) return false;
+  return jacobian.leftCols<2>().determinant() > 0;
+}
+
+// Whether the lens maps the whole segment from the axis to (x, y, 1) without folding.
+bool is_unfolded(const LensModel& model, std::span<const double> values, const Eigen::Vector2d& xy) {
+  const double tangent = xy.norm();
+  if (!(tangent > k_surely_unfolded_tangent)) return true;
+  for (double r = k_surely_unfolded_tangent; r < tangent; r *= k_fold_step) {
+    if (!keeps_orientation(model, values, xy * (r / tangent))) return false;
+  }
+  return keeps_orientation(model, values, xy);
+}
+
+// Newton on the normalised coordinates, steps halved while the residual grows.
+bool newton_unproject(const LensModel& model,
+                      std::span<const double> values,
+                      const Eigen::Vector2d& px,
+                      Eigen::Vector2d xy,
+                      Eigen::Vector3d* d_imager) {
+  Eigen::Vector2d found;
+  Jacobian2x3 jacobian;
+  if (!model.project(values, xy.homogeneous(), &found, jacobian.data())) return false;
+  double residual = (found - px).norm();
+  for (int step = 0; step < k_max_newton_steps && residual > k_unproject_tolerance_px; ++step) {
+    const Eigen::Vector2d delta = jacobian.leftCols<2>().inverse() * (px - found);
+    double scale = 1;
+    Eigen::Vector2d tried;
+    for (;; scale /= 2) {
+      if (scale < 1e-3 || !delta.allFinite()) return false;
+      tried = xy + scale * delta;
+      if (model.project(values, tried.homogeneous(), &found, jacobian.data()) &&
+          (found - px).norm() < residual) {
+        break;
+      }
+      if (residual < k_accepted_residual_px) {  // rounding: no step improves it further
+        *d_imager = xy.homogeneous().normalized();
+        return true;
+      }
+    }
+    xy = tried;
+    residual = (found - px).norm();
+  }
+  if (!(residual < k_accepted_residual_px)) return false;
+  *d_imager = xy.homogeneous().normalized();
+  return true;
+}
+
+}  // namespace
+
+LensModel::LensModel() : LensModel(parse("LENSMODEL_PINHOLE").value()) {}
+
+Result<LensModel> LensModel::parse(const std::string& name) {
+  auto impl = std::make_shared<Impl>();
+  impl->name = name;
+  const Error unknown = error(
+      "lens model '{}': expected one of mrcal's, such as LENSMODEL_PINHOLE, LENSMODEL_OPENCV4, "
+      "LENSMODEL_OPENCV5, LENSMODEL_OPENCV8, LENSMODEL_OPENCV12 or "
+      "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=30_Ny=18_fov_x_deg=100.",
+      name);
+  if (!mrcal_lensmodel_type_is_valid(mrcal_lensmodel_type_from_name(name.c_str()))) return unknown;
+  if (!mrcal_lensmodel_from_name(&impl->model, name.c_str())) return unknown;
+  const mrcal_lensmodel_metadata_t metadata = mrcal_lensmodel_metadata(&impl->model);
+  if (!metadata.has_core || !metadata.has_gradients) return unknown;
+  impl->projects_behind = metadata.can_project_behind_camera;
+  impl->value_count = mrcal_lensmodel_num_params(&impl->model);
+  return LensModel(std::move(impl));
+}
+
+const std::string& LensModel::name() const { return impl_->name; }
+int LensModel::value_count() const { return impl_->value_count; }
+bool LensModel::projects_behind() const { return impl_->projects_behind; }
+
+bool LensModel::project(std::span<const double> values,
+                        const Eigen::Vector3d& p,
+                        Eigen::Vector2d* px,
+                        double* d_px_d_p,
+                        double* d_px_d_values) const {
+  LIMN_CHECK(static_cast<int>(values.size()) == impl_->value_count);
+  if (!p.allFinite() || p.isZero(0) || (!impl_->projects_behind && p.z() <= 0)) return false;
+  const mrcal_point3_t point{.xyz = {p.x(), p.y(), p.z()}};
+  mrcal_point2_t pixel{};
+  mrcal_point3_t gradient[2];
+  if (!mrcal_project(&pixel, d_px_d_p ? gradient : nullptr, d_px_d_values, &point, 1, &impl_->model,
+                     values.data())) {
+    return false;
+  }
+  *px = {pixel.x, pixel.y};
+  if (d_px_d_p) {
+    for (int row = 0; row < 2; ++row) {
+      for (int col = 0; col < 3; ++col) d_px_d_p[3 * row + col] = gradient[row].xyz[col];
+    }
+  }
+  return px->allFinite();
+}
+
+bool LensModel::unproject(std::span<const double> values,
+                          const Eigen::Vector2d& px,
+                          Eigen::Vector3d* d_imager) const {
+  if (!px.allFinite()) return false;
+  if (!impl_->projects_behind) {
+    const Eigen::Vector2d start((px.x() - values[2]) / values[0], (px.y() - values[3]) / values[1]);
+    return newton_unproject(*this, values, px, start, d_imager) &&
+           is_unfolded(*this, values, d_imager->hnormalized());
+  }
+  const mrcal_point2_t pixel{.xy = {px.x(), px.y()}};
+  mrcal_point3_t direction{};
+  if (!mrcal_unproject(&direction, &pixel, 1, &impl_->model, values.data())) return false;
+  *d_imager = Eigen::Vector3d(direction.x, direction.y, direction.z).normalized();
+  return d_imager->allFinite();
+}
+
+Result<Lens> Lens::create(const std::string& model_name, std::vector<double> values) {
+  LIMN_TRY(LensModel model, LensModel::parse(model_name));
+  if (static_cast<int>(values.size()) != model.value_count()) {
+    return error("lens values: expected {} numbers for {}, found {}.", model.value_count(), model_name,
+                 values.size());
+  }
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!std::isfinite(values[i]))
+      return error("lens values[{}]: expected a finite number, found {}.", i, values[i]);
+  }
+  if (!(values[0] > 0 && values[1] > 0)) {
+    return error("lens values: expected focal lengths fx, fy in pixels (> 0), found {} and {}.", values[0],
+                 values[1]);
+  }
+  return Lens{std::move(model), std::move(values)};
+}
+
+Lens Lens::pinhole(double fx, double fy, double cx, double cy) { return {LensModel(), {fx, fy, cx, cy}}; }
+
+std::optional<Eigen::Vector2d> Lens::project(const Eigen::Vector3d& p) const {
+  Eigen::Vector2d px;
+  if (!model.project(values, p, &px)) return std::nullopt;
+  if (!model.projects_behind() && !is_unfolded(model, values, p.hnormalized())) return std::nullopt;
+  return px;
+}
+
+std::optional<Eigen::Vector3d> Lens::unproject(const Eigen::Vector2d& px) const {
+  Eigen::Vector3d d_imager;
+  if (!model.unproject(values, px, &d_imager)) return std::nullopt;
+  return d_imager;
+}
+
+std::vector<Eigen::Vector3f> direction_map(const Lens& lens, int width, int height, int step) {
+  const int columns = (width + step - 1) / step;
+  const int rows = (height + step - 1) / step;
+  std::vector<Eigen::Vector3f> directions(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
+  const auto fill_rows = [&](int begin, int stride) {
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    for (int row = begin; row < rows; row += stride) {
+      for (int column = 0; column < columns; ++column) {
+        const auto d = lens.unproject(Eigen::Vector2d(column, row) * step);
+        directions[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+                   static_cast<std::size_t>(column)] =
+            d ? Eigen::Vector3f(d->cast<float>()) : Eigen::Vector3f(nan, nan, nan);
+      }
+    }
+  };
+  const int thread_count = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < thread_count; ++i) threads.emplace_back(fill_rows, i, thread_count);
+  threads.clear();
+  return directions;
+}
+
+}  // namespace limn

@@ -1,0 +1,57 @@
+#include "core/log.h"
+
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <mutex>
+
+namespace limn {
+namespace {
+
+std::atomic<LogLevel> g_level{LogLevel::info};
+std::mutex g_stderr;
+
+double now_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+constexpr double k_silent_s = 1;  // shorter work shows no progress (interfaces.md)
+constexpr double k_terminal_every_s = 0.1;
+constexpr double k_file_every_s = 5;
+
+}  // namespace
+
+void set_log_level(LogLevel level) { g_level = level; }
+
+void log_line(LogLevel level, const std::string& line) {
+  if (level > g_level.load()) return;
+  const std::lock_guard lock(g_stderr);
+  fmt::print(stderr, "{}\n", line);
+}
+
+Progress::Progress(std::string what, int total)
+    : what_(std::move(what)), total_(total), started_s_(now_s()), printed_s_(0) {}
+
+void Progress::step(int done) {
+  done_ = done;
+  const double now = now_s();
+  const bool terminal = isatty(STDERR_FILENO) != 0;
+  const double every = terminal ? k_terminal_every_s : k_file_every_s;
+  if (g_level.load() < LogLevel::info || now - started_s_ < k_silent_s || now - printed_s_ < every) return;
+  printed_s_ = now;
+  const std::lock_guard lock(g_stderr);
+  fmt::print(stderr, "{}{} {}/{} ({:.0f} s){}", terminal ? "\r\033[K" : "", what_, done_, total_,
+             now - started_s_, terminal ? "" : "\n");
+}
+
+Progress::~Progress() {
+  const double seconds = now_s() - started_s_;
+  if (g_level.load() < LogLevel::info || seconds < k_silent_s) return;
+  const std::lock_guard lock(g_stderr);
+  fmt::print(stderr, "{}{} {}/{} ({:.1f} s)\n", isatty(STDERR_FILENO) ? "\r\033[K" : "", what_, done_, total_,
+             seconds);
+}
+
+}  // namespace limn

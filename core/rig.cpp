@@ -1,0 +1,151 @@
+#include "core/rig.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "core/config.h"
+#include "core/file.h"
+
+namespace limn {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+Imager read_imager(const ConfigNode& node) {
+  node.only({"name", "size", "lens", "imager_from_world"});
+  Imager imager;
+  imager.name = node.at("name").text();
+  const ConfigNode size = node.at("size");
+  const auto pixels = size.items();
+  if (pixels.size() == 2) {
+    imager.width = pixels[0].integer();
+    imager.height = pixels[1].integer();
+  }
+  if (pixels.size() != 2 || imager.width <= 0 || imager.height <= 0) {
+    size.problem("expected [width, height] in pixels, both > 0.");
+  }
+  const ConfigNode lens = node.at("lens");
+  lens.only({"model", "values"});
+  auto made = Lens::create(lens.at("model").text(), lens.at("values").numbers(-1));
+  if (made) imager.lens = *made;
+  if (!made) lens.problem(made.message() + " Run limn calibrate again.");
+  imager.imager_from_world = node.at("imager_from_world").pose();
+  return imager;
+}
+
+std::vector<Imager> read_imagers(const ConfigNode& root,
+                                 const std::string& key,
+                                 std::set<std::string>* names) {
+  std::vector<Imager> imagers;
+  for (const ConfigNode& node : root.at(key).items()) {
+    imagers.push_back(read_imager(node));
+    const std::string& name = imagers.back().name;
+    if (name.empty() || name.find('/') != std::string::npos) {
+      node.problem(fmt::format("name: expected a name without '/', found \"{}\".", name));
+    }
+    if (!names->insert(name).second)
+      node.problem(fmt::format("name: \"{}\" stands twice in this rig.", name));
+  }
+  return imagers;
+}
+
+Result<std::vector<Response>> load_responses(const fs::path& path) {
+  LIMN_TRY(const Config config, Config::load(path, "limn.response/1"));
+  config.root().only({"schema", "projectors", "provenance"});
+  std::vector<Response> responses;
+  for (const ConfigNode& node : config.root().at("projectors").items()) {
+    node.only({"name", "red", "green", "blue"});
+    responses.push_back({node.at("name").text(), node.at("red").numbers(-1), node.at("green").numbers(-1),
+                         node.at("blue").numbers(-1)});
+    for (const auto* curve : {&responses.back().red, &responses.back().green, &responses.back().blue}) {
+      if (curve->size() < 2 || !std::is_sorted(curve->begin(), curve->end())) {
+        node.problem("expected curves of at least 2 numbers that never fall.");
+      }
+    }
+  }
+  LIMN_TRY_STATUS(config.status());
+  return responses;
+}
+
+Result<Rig> load_rig_json(const fs::path& path) {
+  LIMN_TRY(const Config config, Config::load(path, "limn.rig/1"));
+  const ConfigNode root = config.root();
+  root.only({"schema", "cameras", "projectors", "covariance", "provenance"});
+  Rig rig;
+  std::set<std::string> names;
+  rig.cameras = read_imagers(root, "cameras", &names);
+  rig.projectors = read_imagers(root, "projectors", &names);
+  if (const auto node = root.find("covariance")) rig.covariance_json = node->json().dump();
+  if (const auto node = root.find("provenance")) rig.provenance_json = node->json().dump();
+  LIMN_TRY_STATUS(config.status());
+  if (fs::exists(config.folder() / "response.json")) {
+    LIMN_TRY(rig.responses, load_responses(config.folder() / "response.json"));
+  }
+  return rig;
+}
+
+Result<Rig> load_cameramodels(const fs::path& folder) {
+  std::vector<fs::path> paths;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (entry.path().extension() == ".cameramodel") paths.push_back(entry.path());
+  }
+  std::sort(paths.begin(), paths.end());
+  if (paths.empty()) {
+    return error(
+        "{}: expected a rig folder with rig.json or .cameramodel files, found neither. Run limn calibrate.",
+        folder.string());
+  }
+  Rig rig;
+  for (const fs::path& path : paths) {
+    LIMN_TRY(const Imager imager, load_cameramodel(path));
+    (imager.name.starts_with("projector") ? rig.projectors : rig.cameras).push_back(imager);
+  }
+  return rig;
+}
+
+Json json_of(const Imager& imager) {
+  return {{"name", imager.name},
+          {"size", {imager.width, imager.height}},
+          {"lens", {{"model", imager.lens.model.name()}, {"values", imager.lens.values}}},
+          {"imager_from_world", to_json(imager.imager_from_world)}};
+}
+
+}  // namespace
+
+const Imager* Rig::find(const std::string& name) const {
+  for (const auto* imagers : {&cameras, &projectors}) {
+    for (const Imager& imager : *imagers) {
+      if (imager.name == name) return &imager;
+    }
+  }
+  return nullptr;
+}
+
+Result<Rig> load_rig(const fs::path& path) {
+  std::error_code ignored;
+  if (fs::is_regular_file(path, ignored)) return load_rig_json(path);
+  if (!fs::is_directory(path, ignored)) {
+    return error("{}: expected a rig folder or its rig.json, found nothing. Check the name.", path.string());
+  }
+  if (fs::exists(path / "rig.json")) return load_rig_json(path / "rig.json");
+  return load_cameramodels(path);
+}
+
+Status save_rig(const Rig& rig, const fs::path& folder) {
+  LIMN_TRY_STATUS(make_folder(folder));
+  Json json = {{"schema", "limn.rig/1"}, {"cameras", Json::array()}, {"projectors", Json::array()}};
+  for (const Imager& camera : rig.cameras) json["cameras"].push_back(json_of(camera));
+  for (const Imager& projector : rig.projectors) json["projectors"].push_back(json_of(projector));
+  if (!rig.covariance_json.empty()) json["covariance"] = Json::parse(rig.covariance_json);
+  if (!rig.provenance_json.empty()) json["provenance"] = Json::parse(rig.provenance_json);
+  for (const auto* imagers : {&rig.cameras, &rig.projectors}) {
+    for (const Imager& imager : *imagers) {
+      LIMN_TRY_STATUS(save_cameramodel(imager, folder / (imager.name + ".cameramodel")));
+    }
+  }
+  return write_file(folder / "rig.json", json.dump(2) + "\n");
+}
+
+}  // namespace limn
