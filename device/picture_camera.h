@@ -1,0 +1,38 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "device/camera_source.h"
+
+namespace limn::device {
+
+struct PictureCameraOptions {
+  std::string name = "camera0";   ///< what the frames are called
+  double frames_per_second = 30;  ///< spacing of the stamps; nothing is waited for
+  bool repeat = false;            ///< start again after the last picture instead of ending
+};
+
+/// A camera that plays stored pictures: every PNG and JPEG of a folder in the order of their names, or one
+/// file. Stamps start at the session clock's zero and advance by the frame period, so that a replay is the
+/// same each time.
+class PictureCamera : public CameraSource {
+ public:
+  /// Errors: no such path, no picture in the folder, first picture unreadable.
+  static Result<PictureCamera> open(const std::filesystem::path& path,
+                                    const PictureCameraOptions& options = {});
+
+  const std::string& name() const override { return options_.name; }
+  cv::Size size() const override { return size_; }
+  /// Error at the end, for an unreadable picture and for one of another size than the first.
+  Result<Frame> next() override;
+
+ private:
+  PictureCamera() = default;
+  PictureCameraOptions options_;
+  std::vector<std::filesystem::path> pictures_;
+  cv::Size size_;
+  std::size_t shown_ = 0;  // frames handed out so far
+};
+
+}  // namespace limn::device

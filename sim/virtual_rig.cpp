@@ -1,0 +1,130 @@
+#include "sim/virtual_rig.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace limn::sim {
+
+class VirtualRig::Camera : public device::CameraSource {
+ public:
+  Camera(VirtualRig& rig, int index) : rig_(rig), index_(index) {}
+  const std::string& name() const override { return imager().name; }
+  cv::Size size() const override { return {imager().width, imager().height}; }
+  Result<Frame> next() override { return rig_.grab(index_); }
+
+ private:
+  const Imager& imager() const { return rig_.world_.rig.cameras[static_cast<std::size_t>(index_)]; }
+  VirtualRig& rig_;
+  int index_;
+};
+
+class VirtualRig::Projector : public device::Display {
+ public:
+  Projector(VirtualRig& rig, int index) : rig_(rig), index_(index) {}
+  const std::string& name() const override { return imager().name; }
+  cv::Size size() const override { return {imager().width, imager().height}; }
+  Result<Stamp> show(const cv::Mat& picture) override { return rig_.show(index_, picture); }
+
+ private:
+  const Imager& imager() const { return rig_.world_.rig.projectors[static_cast<std::size_t>(index_)]; }
+  VirtualRig& rig_;
+  int index_;
+};
+
+VirtualRig::VirtualRig(World world, const VirtualRigOptions& options)
+    : world_(std::move(world)), options_(options) {
+  LIMN_CHECK(options_.frame_period_s > 0);
+  LIMN_CHECK(world_.rig.cameras.size() == world_.camera_effects.size());
+  LIMN_CHECK(world_.rig.projectors.size() == world_.projector_effects.size());
+  for (std::size_t i = 0; i < world_.rig.cameras.size(); ++i)
+    cameras_.push_back(std::make_unique<Camera>(*this, static_cast<int>(i)));
+  for (std::size_t i = 0; i < world_.rig.projectors.size(); ++i)
+    projectors_.push_back(std::make_unique<Projector>(*this, static_cast<int>(i)));
+  samples_.resize(cameras_.size());
+  darken();
+}
+
+VirtualRig::~VirtualRig() = default;
+
+device::CameraSource& VirtualRig::camera(int index) { return *cameras_.at(static_cast<std::size_t>(index)); }
+
+device::Display& VirtualRig::projector(int index) { return *projectors_.at(static_cast<std::size_t>(index)); }
+
+World& VirtualRig::edit() {
+  for (auto& samples : samples_) samples.reset();
+  return world_;
+}
+
+void VirtualRig::move(const std::string& object, const Pose& world_from_object) {
+  World& world = edit();
+  if (object == "prototype") return move_prototype(world, world_from_object);
+  Object* found = world.find(object);
+  LIMN_CHECK(found != nullptr);
+  found->world_from_object = world_from_object;
+}
+
+void VirtualRig::place(const Object& object) {
+  World& world = edit();
+  if (Object* found = world.find(object.name))
+    *found = object;
+  else
+    world.objects.push_back(object);
+}
+
+void VirtualRig::remove(const std::string& object) {
+  World& world = edit();
+  std::erase_if(world.objects, [&](const Object& o) { return o.name == object; });
+  std::erase_if(world.markers, [&](const PlacedMarker& m) { return m.object == object; });
+}
+
+void VirtualRig::darken() { shown_.assign(projectors_.size(), {Shown{cv::Mat(), now_}}); }
+
+const Samples& VirtualRig::samples(int camera) {
+  auto& samples = samples_.at(static_cast<std::size_t>(camera));
+  if (!samples) samples = trace(world_, camera);
+  return *samples;
+}
+
+Result<Stamp> VirtualRig::show(int projector, const cv::Mat& picture) {
+  const cv::Size size = this->projector(projector).size();
+  if (picture.size() != size || (picture.type() != CV_8UC1 && picture.type() != CV_8UC3))
+    return error(
+        "{}: expected an 8-bit grey or BGR picture of {}x{}, found {}x{} with {} channels. Draw it at the "
+        "projector's size.",
+        this->projector(projector).name(), size.width, size.height, picture.cols, picture.rows,
+        picture.channels());
+  const Stamp shown_at = shifted(now_, options_.display_delay_s);
+  shown_[static_cast<std::size_t>(projector)].push_back({picture.clone(), shown_at});
+  return shown_at;
+}
+
+Stamp VirtualRig::light_settles_at() const {
+  Stamp settled = now_;
+  for (const auto& queue : shown_) settled = std::max(settled, queue.back().shown_at);
+  return settled;
+}
+
+std::vector<cv::Mat> VirtualRig::pictures_at(Stamp moment) const {
+  std::vector<cv::Mat> pictures;
+  for (const auto& queue : shown_) {
+    const auto later =
+        std::find_if(queue.begin() + 1, queue.end(), [&](const Shown& s) { return s.shown_at > moment; });
+    pictures.push_back(std::prev(later)->picture);
+  }
+  return pictures;
+}
+
+Result<Frame> VirtualRig::grab(int camera) {
+  const Stamp earliest = options_.grab_waits_for_light ? light_settles_at() : now_;
+  const double periods = seconds_between(Stamp{}, earliest) / options_.frame_period_s;
+  const Stamp captured_at = shifted(Stamp{}, std::floor(periods + 1) * options_.frame_period_s);
+  const std::vector<cv::Mat> shown = pictures_at(captured_at);
+  for (auto& queue : shown_)  // what an earlier picture covered is gone
+    while (queue.size() > 1 && queue[1].shown_at <= captured_at) queue.erase(queue.begin());
+  Frame frame{this->camera(camera).name(),
+              photograph(world_, samples(camera), shown, world_.seed + ++frames_), captured_at};
+  now_ = shifted(captured_at, options_.camera_delay_s);
+  return frame;
+}
+
+}  // namespace limn::sim

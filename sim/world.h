@@ -1,0 +1,130 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/marker.h"
+#include "core/result.h"
+#include "core/rig.h"
+#include "scene/mesh.h"
+#include "scene/posed.h"
+#include "scene/scene.h"
+
+namespace limn::sim {
+
+/// How a camera turns linear light into numbers. The defaults are an ideal, noise-free sensor; each effect is
+/// off at its default.
+struct CameraEffects {
+  bool colour = false;     ///< BGR frames instead of grey ones
+  double exposure = 1;     ///< share of full scale per unit of light (albedo x illuminance)
+  double psf_px = 0;       ///< stdev of the lens' Gaussian blur; 0: off
+  double vignetting = 0;   ///< share of light lost in the picture's corners, quadratic in radius; 0: off
+  double full_well_e = 0;  ///< electrons at full scale: shot noise variance = signal / full_well_e; 0: off
+  double read_noise = 0;   ///< stdev in 8-bit levels of linear signal; 0: off
+  double black_level = 0;  ///< 8-bit level of no light
+  bool srgb = false;       ///< encodes by the sRGB curve instead of linearly
+};
+
+/// How a projector turns display values into light. Each effect is off at its default.
+struct ProjectorEffects {
+  double illuminance_at_1m = 1;  ///< of full white, 1 m away, head on
+  double gamma = 1;              ///< light = value^gamma; 1: off
+  double black_level = 0;        ///< light of black, as a share of white; 0: off
+  double vignetting = 0;         ///< share of light lost in the panel's corners, quadratic in radius; 0: off
+  double focus_m = 1;            ///< depth of sharp focus
+  double aperture_m = 0;         ///< diameter of the exit pupil, for defocus; 0: off
+  bool falloff = true;           ///< light falls with the square of the distance; false: as at 1 m
+  bool incidence = true;         ///< light falls with the cosine of incidence; false: as head on
+};
+
+/// A physical thing. Diffuse: reflects albedo x illuminance.
+struct Object {
+  std::string name;
+  std::shared_ptr<const scene::Mesh> mesh;
+  Pose world_from_object;
+  Eigen::Vector3d albedo = {0.8, 0.8, 0.8};  ///< linear BGR reflectance where the texture is white
+  double ink_albedo = 0;                     ///< reflectance where the texture is black
+  cv::Mat texture;                           ///< 8-bit sRGB, grey or BGR, in the mesh's uv; empty: plain
+  bool sharp_texture = false;  ///< pixels are little squares (printed cells) instead of interpolated
+  std::optional<Pose> prototype_from_object;  ///< moves with the prototype when set
+};
+
+/// A marker that physically stands in the world: its frame is its object's.
+struct PlacedMarker {
+  MarkerName marker;
+  double size_m = 0;
+  std::string object;
+};
+
+/// A small lamp: illuminance on a surface head on, 1 m away. `radius_m` softens its shadows.
+struct Lamp {
+  Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
+  double illuminance_at_1m = 0;
+  double radius_m = 0;
+};
+
+/// Light of the room apart from projectors: the ambient part reaches every surface, more from above.
+struct Room {
+  double ambient = 0;
+  std::vector<Lamp> lamps;
+};
+
+/// Everything that the virtual rig knows to be true. World frame: metres, z up, z = 0 is the table's top.
+struct World {
+  Rig rig;                                          ///< true lenses and places
+  std::vector<CameraEffects> camera_effects;        ///< one per rig.cameras
+  std::vector<ProjectorEffects> projector_effects;  ///< one per rig.projectors
+  std::vector<Object> objects;
+  std::vector<PlacedMarker> markers;
+  Room room;
+  std::uint64_t seed = 1;
+
+  std::optional<scene::Scene> scene;  ///< what is to be shown; its parts are NOT among the objects
+  Pose world_from_prototype;
+
+  const Object* find(const std::string& object) const;
+  Object* find(const std::string& object);
+};
+
+/// Grey 8-bit picture of a marker's black square alone, without margin: its edge is the marker's edge.
+using MarkerPicture = std::function<Result<cv::Mat>(const MarkerName&)>;
+
+/// Reads a limn.world/1 file and the scene that it names; `marker_picture` draws its markers. The prototype
+/// becomes the object "prototype", its markers "marker-FAMILY:ID", the table "table".
+Result<World> load_world(const std::filesystem::path& path, const MarkerPicture& marker_picture);
+
+/// The same world seen by ideal devices: no blur, noise, vignetting, gamma, black level; exposure is kept.
+World without_effects(World world);
+
+/// A flat sheet: frame at its centre, x right, y down, z away from the printed face (as a marker's).
+/// `picture` (8-bit sRGB; may be empty) covers it wholly, its pixels are little squares. The back is plain.
+Object sheet(const std::string& name,
+             double width_m,
+             double height_m,
+             const cv::Mat& picture,
+             const Pose& world_from_sheet);
+
+/// Adds a marker plate with a white margin; `attached_to_prototype` makes it move with the prototype.
+Status add_marker(World& world,
+                  const BodyMarker& marker,
+                  bool attached_to_prototype,
+                  const MarkerPicture& marker_picture);
+
+/// Moves the prototype and everything attached to it.
+void move_prototype(World& world, const Pose& world_from_prototype);
+
+/// Where the slots' markers truly put their parts: what a perfect tracker would report.
+scene::PosedScene true_poses(const World& world, std::span<const std::string> variants = {});
+
+/// world_from_marker of a placed marker; nullopt when there is none of that name.
+std::optional<Pose> world_from_marker(const World& world, const MarkerName& marker);
+
+}  // namespace limn::sim
