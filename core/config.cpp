@@ -212,12 +212,12 @@ Result<Config> Config::load(const std::filesystem::path& path, const std::string
   try {
     file->json = Json::parse(text, nullptr, true, true);
   } catch (const Json::parse_error& problem) {
-    const auto line =
-        1 + std::count(text.begin(),
-                       text.begin() + static_cast<std::ptrdiff_t>(std::min(problem.byte, text.size())), '\n');
+    const auto end = text.begin() + static_cast<std::ptrdiff_t>(std::min(problem.byte, text.size()));
     return error(
         "{}:{}: expected JSON (// comments allowed), found a syntax error or the end of a truncated file.",
-        path.string(), line);
+        path.string(), 1 + std::count(text.begin(), end, '\n'));
+  } catch (const Json::exception& problem) {
+    return error("{}: expected JSON (// comments allowed), found: {}.", path.string(), problem.what());
   }
   Config config;
   config.file_ = std::move(file);

@@ -32,6 +32,10 @@ struct Imager {
   bool contains(const Eigen::Vector2d& px) const;
 };
 
+/// The same imager read out at another resolution of the same aspect ratio (within 1 %), as ARToolKit's
+/// camera files are meant; nullopt for another aspect ratio or a size of 0.
+std::optional<Imager> resized(const Imager& imager, int width, int height);
+
 /// An imager without distortion, horizontal field of view `fov_deg`, principal point at ((w-1)/2, (h-1)/2):
 /// the Viewer of interfaces.md.
 Imager viewer_imager(const Pose& world_from_viewer, int width, int height, double fov_deg);

@@ -191,20 +191,21 @@ Result<ArtoolkitCamera> parse_artoolkit(const std::string& bytes, const fs::path
 Result<Imager> load_artoolkit(const fs::path& path, const std::string& bytes) {
   LIMN_TRY(const ArtoolkitCamera camera, parse_artoolkit(bytes, path));
   const auto samples = samples_of(camera);
-  const LensModel model = LensModel::parse("LENSMODEL_OPENCV5").value();
+  const LensModel model = LensModel::parse("LENSMODEL_OPENCV8").value();
   const auto& m = camera.matrix;
-  auto lens =
-      Lens::create(model.name(), fitted_lens_values(model, {m[0], m[5], m[2], m[6], 0, 0, 0, 0, 0}, samples));
+  auto lens = Lens::create(
+      model.name(), fitted_lens_values(model, {m[0], m[5], m[2], m[6], 0, 0, 0, 0, 0, 0, 0, 0}, samples));
   if (!lens) return error("{}: {}", path.string(), lens.message());
   double worst_px = 0;
   for (const LensSample& sample : samples) {
     const auto px = lens->project(sample.p);
     worst_px = px ? std::max(worst_px, (*px - sample.px).norm()) : INFINITY;
   }
-  constexpr double k_max_refit_px = 0.1;
+  constexpr double k_max_refit_px =
+      0.5;  // version 1 is round in pixels, mrcal's models in tangents: 0.18 px for fy/fx = 1.036
   if (!(worst_px <= k_max_refit_px)) {
     return error(
-        "{}: this ARToolKit distortion (version {}) is {:.2f} px from every LENSMODEL_OPENCV5, expected at "
+        "{}: this ARToolKit distortion (version {}) is {:.2f} px from every LENSMODEL_OPENCV8, expected at "
         "most {} px. Calibrate the camera with limn calibrate.",
         path.string(), camera.version, worst_px, k_max_refit_px);
   }
