@@ -1,0 +1,117 @@
+#include "device/gl_context.h"
+
+#include <dlfcn.h>
+#include <epoxy/egl.h>
+#include <epoxy/gl.h>
+
+#include <algorithm>
+#include <cstring>
+#include <vector>
+
+namespace limn::device {
+
+struct GlContext::Impl {
+  EGLDisplay display = EGL_NO_DISPLAY;
+  EGLContext context = EGL_NO_CONTEXT;
+  std::string description;
+
+  // The display stays initialised: it is the process's, and other contexts may live on it.
+  ~Impl() {
+    if (context == EGL_NO_CONTEXT) return;
+    if (eglGetCurrentContext() == context) {
+      eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+    }
+    eglDestroyContext(display, context);
+  }
+};
+
+namespace {
+
+bool has_word(const char* list, const char* word) {
+  if (!list) return false;
+  const std::size_t length = std::strlen(word);
+  for (const char* at = std::strstr(list, word); at; at = std::strstr(at + 1, word)) {
+    if ((at == list || at[-1] == ' ') && (at[length] == ' ' || at[length] == '\0')) return true;
+  }
+  return false;
+}
+
+// Displays to try: hardware devices, software devices, then Mesa without a surface.
+std::vector<EGLDisplay> candidate_displays() {
+  std::vector<EGLDisplay> displays;
+  const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
+  if (has_word(client, "EGL_EXT_device_enumeration") || has_word(client, "EGL_EXT_device_base")) {
+    EGLint count = 0;
+    eglQueryDevicesEXT(0, nullptr, &count);
+    std::vector<EGLDeviceEXT> devices(static_cast<std::size_t>(std::max(count, 0)));
+    if (count > 0) eglQueryDevicesEXT(count, devices.data(), &count);
+    std::stable_partition(devices.begin(), devices.end(), [](EGLDeviceEXT device) {
+      return !has_word(eglQueryDeviceStringEXT(device, EGL_EXTENSIONS), "EGL_MESA_device_software");
+    });
+    for (const EGLDeviceEXT device : devices) {
+      displays.push_back(eglGetPlatformDisplayEXT(EGL_PLATFORM_DEVICE_EXT, device, nullptr));
+    }
+  }
+  if (has_word(client, "EGL_MESA_platform_surfaceless")) {
+    displays.push_back(eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr));
+  }
+  std::erase(displays, EGL_NO_DISPLAY);
+  return displays;
+}
+
+EGLContext create_context(EGLDisplay display) {
+  EGLint major = 0, minor = 0;
+  if (!eglInitialize(display, &major, &minor) || !eglBindAPI(EGL_OPENGL_API)) return EGL_NO_CONTEXT;
+  const EGLint config_wanted[] = {EGL_SURFACE_TYPE, 0, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE};
+  EGLConfig config = nullptr;
+  EGLint count = 0;
+  if (!eglChooseConfig(display, config_wanted, &config, 1, &count) || count < 1) return EGL_NO_CONTEXT;
+  const EGLint context_wanted[] = {EGL_CONTEXT_MAJOR_VERSION,
+                                   4,
+                                   EGL_CONTEXT_MINOR_VERSION,
+                                   5,
+                                   EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                                   EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                                   EGL_NONE};
+  return eglCreateContext(display, config, EGL_NO_CONTEXT, context_wanted);
+}
+
+}  // namespace
+
+GlContext::GlContext(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+GlContext::GlContext(GlContext&&) noexcept = default;
+GlContext& GlContext::operator=(GlContext&&) noexcept = default;
+GlContext::~GlContext() = default;
+
+Result<GlContext> GlContext::create() {
+  constexpr const char* k_advice =
+      "Install a driver (Debian: libegl1 and libgl1-mesa-dri for software rendering).";
+  // epoxy ends the process when the library itself is missing, so ask for it first.
+  if (!dlopen("libEGL.so.1", RTLD_LAZY | RTLD_GLOBAL)) {
+    return error("OpenGL: expected the library libEGL.so.1, found none. {}", k_advice);
+  }
+  const std::vector<EGLDisplay> displays = candidate_displays();
+  for (const EGLDisplay display : displays) {
+    auto impl = std::make_unique<Impl>();
+    impl->display = display;
+    impl->context = create_context(display);
+    if (impl->context == EGL_NO_CONTEXT) continue;
+    if (!eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, impl->context)) continue;
+    impl->description = fmt::format("{}, {}", reinterpret_cast<const char*>(glGetString(GL_RENDERER)),
+                                    reinterpret_cast<const char*>(glGetString(GL_VERSION)));
+    return GlContext(std::move(impl));
+  }
+  return error(
+      "OpenGL: expected an EGL device with desktop OpenGL 4.5, found {} EGL displays and none that gives it. "
+      "{}",
+      displays.size(), k_advice);
+}
+
+void GlContext::make_current() const {
+  eglBindAPI(EGL_OPENGL_API);
+  LIMN_CHECK(eglMakeCurrent(impl_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, impl_->context));
+}
+
+const std::string& GlContext::description() const { return impl_->description; }
+
+}  // namespace limn::device

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "core/result.h"
+
+namespace limn::device {
+
+/// A desktop OpenGL 4.5 core context without a window, through EGL: hardware devices first, then software
+/// ones, then Mesa without a surface. Current on the calling thread from creation on; what it owns in GL must
+/// be destroyed before it.
+class GlContext {
+ public:
+  /// Error when the machine has no EGL, or none that gives OpenGL 4.5; it says what was tried.
+  static Result<GlContext> create();
+  GlContext(GlContext&&) noexcept;
+  GlContext& operator=(GlContext&&) noexcept;
+  ~GlContext();
+
+  /// Makes it current on the calling thread again, after a window's.
+  void make_current() const;
+  /// GL_RENDERER and GL_VERSION, for reports: "llvmpipe (LLVM 15.0.6, 256 bits), 4.5 (Core Profile)
+  /// Mesa 22.3.6".
+  const std::string& description() const;
+
+ private:
+  struct Impl;
+  explicit GlContext(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace limn::device
