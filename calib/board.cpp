@@ -4,7 +4,8 @@
 #include <cmath>
 #include <map>
 #include <numeric>
-#include <opencv2/aruco.hpp>
+
+#include "calib/board_dictionary.h"
 
 namespace limn::calib {
 namespace {
@@ -60,10 +61,6 @@ bool read_length(const std::string& text, double* metres) {
 }
 
 int marker_count(const Board& board) { return board.columns * board.rows / 2; }
-
-cv::Ptr<cv::aruco::Dictionary> dictionary_of(const Board& board) {
-  return cv::aruco::getPredefinedDictionary(dictionaries().at(board.dictionary));
-}
 
 std::string default_dictionary(int markers) {
   for (int count : {50, 100, 250, 1000}) {
@@ -124,6 +121,10 @@ PixelGrid pixel_grid(const Board& board, int least) {
 }
 
 }  // namespace
+
+cv::Ptr<cv::aruco::Dictionary> dictionary_of(const Board& board) {
+  return cv::aruco::getPredefinedDictionary(dictionaries().at(board.dictionary));
+}
 
 Result<Board> Board::parse(const std::string& text) {
   constexpr auto k_forms = "charuco:11x8:25mm, charuco:11x8:25mm:aruco_5x5_100:0.7 or chessboard:9x7:75mm";

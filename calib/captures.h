@@ -57,10 +57,8 @@ struct ForeignCaptures {
   Board board;
   std::string poses = "pose*";  ///< names of the pose directories: * and ? stand for any text, any character
   std::string shots = "*.png";  ///< names of the pictures in each, in the order of their names
+  std::vector<std::string> skip;  ///< as in load_captures
 };
 Result<Captures> import_opencv_gray(const ForeignCaptures& foreign);
-
-/// Without the poses of these names; a name that no pose has is an error.
-Result<Captures> without_poses(Captures captures, const std::vector<std::string>& names);
 
 }  // namespace limn::calib

@@ -1,0 +1,81 @@
+#include "calib/capture.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+#include "core/picture.h"
+
+namespace limn::calib {
+namespace {
+
+nlohmann::ordered_json devices_json(const std::vector<CapturedDevice>& devices) {
+  auto list = nlohmann::ordered_json::array();
+  for (const CapturedDevice& device : devices)
+    list.push_back({{"name", device.name}, {"size", {device.width, device.height}}});
+  return list;
+}
+
+// patterns.json for the first projector's size, patterns-NAME.json for projectors of other sizes.
+std::string patterns_file(const Captures& plan, size_t projector) {
+  if (plan.patterns[projector] == plan.patterns[0]) return "patterns.json";
+  return "patterns-" + plan.projectors[projector].name + ".json";
+}
+
+Status capture_picture(const Captures& plan, int pose, int projector, int pattern, const Stage& stage) {
+  for (int camera = 0; camera < static_cast<int>(plan.cameras.size()); ++camera) {
+    const CapturedDevice& device = plan.cameras[static_cast<size_t>(camera)];
+    LIMN_TRY(const cv::Mat picture, stage.grab(camera));
+    if (picture.cols != device.width || picture.rows != device.height)
+      return error("{}: expected pictures of {}x{}, the camera gave {}x{}. Has its mode changed?",
+                   device.name, device.width, device.height, picture.cols, picture.rows);
+    LIMN_TRY_STATUS(stage.store(picture_path(plan, pose, projector, camera, pattern), picture));
+  }
+  return {};
+}
+
+}  // namespace
+
+Status store_now(const std::filesystem::path& path, const cv::Mat& picture) {
+  return write_png(path, picture, {.compression = 1});
+}
+
+Status begin_captures(const Captures& plan) {
+  const auto path = plan.folder / "capture.json";
+  if (std::filesystem::exists(path))
+    return error("{}: there are captures here already. Choose another folder, or remove this one.",
+                 path.string());
+  LIMN_TRY_STATUS(make_folder(plan.folder));
+  nlohmann::ordered_json projectors = devices_json(plan.projectors);
+  for (size_t i = 0; i < plan.projectors.size(); ++i) {
+    const std::string file = patterns_file(plan, i);
+    LIMN_TRY_STATUS(save_patterns(plan.patterns[i], plan.folder / file));
+    if (file != "patterns.json") projectors[i]["patterns"] = file;
+  }
+  const nlohmann::ordered_json json = {{"schema", "limn.capture/1"},
+                                       {"cameras", devices_json(plan.cameras)},
+                                       {"projectors", projectors},
+                                       {"board", plan.board.text()},
+                                       {"patterns", "patterns.json"}};
+  return write_file(path, json.dump(2) + "\n");
+}
+
+Status capture_pose(const Captures& plan, int pose, const Stage& stage) {
+  const int projectors = static_cast<int>(plan.projectors.size()),
+            cameras = static_cast<int>(plan.cameras.size());
+  int done = 0, total = 0;
+  for (const Patterns& patterns : plan.patterns) total += patterns.count() * cameras;
+  for (int projector = 0; projector < projectors; ++projector) {
+    const Patterns& patterns = plan.patterns[static_cast<size_t>(projector)];
+    for (int camera = 0; camera < cameras; ++camera)
+      LIMN_TRY_STATUS(make_folder(picture_path(plan, pose, projector, camera, 0).parent_path()));
+    for (int pattern = 0; pattern < patterns.count(); ++pattern) {
+      LIMN_TRY_STATUS(stage.show(projector, patterns.picture(pattern)));
+      LIMN_TRY_STATUS(capture_picture(plan, pose, projector, pattern, stage));
+      done += cameras;
+      if (stage.tell) stage.tell(done, total);
+    }
+  }
+  return {};
+}
+
+}  // namespace limn::calib
