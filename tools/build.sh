@@ -1,0 +1,72 @@
+# Sourced by ./limn and ./test, with $root set: installs missing packages, builds when sources changed.
+
+say() { printf '%s\n' "limn: $*" >&2; }
+
+install_packages() {
+  local wanted missing=() runner=()
+  mapfile -t wanted < <(sed 's/#.*//; /^[[:space:]]*$/d' "$root/packages.txt")
+  if ! command -v dpkg-query >/dev/null; then
+    say "expected a Debian 12 system with apt; install the equivalents of packages.txt by hand."
+    return 0
+  fi
+  for package in "${wanted[@]}"; do
+    dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q '^install ok installed$' || missing+=("$package")
+  done
+  [ ${#missing[@]} -eq 0 ] && return 0
+  if [ "$(id -u)" -ne 0 ]; then
+    if ! command -v sudo >/dev/null; then
+      say "these Debian packages are missing and there is no sudo; as root: apt-get install ${missing[*]}"
+      return 1
+    fi
+    runner=(sudo)
+  fi
+  say "installing ${#missing[@]} Debian packages: ${missing[*]}"
+  local log
+  log="$(mktemp)"
+  if "${runner[@]}" apt-get update -qq >"$log" 2>&1 &&
+    "${runner[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends --no-remove \
+      "${missing[@]}" >>"$log" 2>&1; then
+    rm -f "$log"
+    return 0
+  fi
+  tail -n 20 "$log" >&2
+  say "apt-get could not install the packages above (whole log: $log)."
+  return 1
+}
+
+# Passes on ninja's "[12/345]" every few seconds as one line of progress.
+show_progress() {
+  local line last=0
+  while IFS= read -r line; do
+    printf '%s\n' "$line"
+    if [[ $line =~ ^\[([0-9]+)/([0-9]+)\] ]] && ((SECONDS - last >= 5)); then
+      last=$SECONDS
+      say "building ${BASH_REMATCH[1]}/${BASH_REMATCH[2]} (${SECONDS} s)"
+    fi
+  done
+}
+
+# build TARGET: nothing to do when no source is newer than the last build of TARGET.
+build() {
+  local target="$1" folder="$root/build/release" stamp="$root/build/release/.built-$1"
+  local sources=(CMakeLists.txt CMakePresets.json packages.txt tools core scene device calib tracker projector shaders
+    sim apps)
+  [ "$target" = all ] && sources+=(tests)
+  if [ -e "$stamp" ] && [ -z "$(cd "$root" && find "${sources[@]}" -newer "$stamp" -print -quit)" ]; then
+    return 0
+  fi
+  install_packages || return 1
+  mkdir -p "$folder"
+  local begun="$folder/.begun" log="$folder/build.log"
+  touch "$begun"
+  say "building (first time: some minutes; log: $log)"
+  if (cd "$root" && cmake --preset release >"$log" 2>&1) &&
+    cmake --build "$folder" --target "$target" -j "$(nproc)" 2>&1 | show_progress >>"$log" &&
+    [ "${PIPESTATUS[0]}" -eq 0 ]; then
+    mv "$begun" "$stamp"
+    return 0
+  fi
+  grep -E -A 20 'error|FAILED|Error' "$log" | head -n 60 >&2
+  say "the build failed; whole log: $log"
+  return 1
+}
