@@ -2,8 +2,6 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <opencv2/core/mat.hpp>
-#include <span>
 #include <vector>
 
 #include "sim/world.h"
@@ -41,22 +39,5 @@ struct Samples {
 /// Traces the pixels of a camera. Pixels on silhouettes, texture edges and shadow edges get 32 sub-samples,
 /// merged where they agree. Surfaces are diffuse; light bounces once.
 Samples trace(const World& world, int camera);
-
-/// Linear light in every pixel (CV_32FC1, or C3 for a colour camera): no blur, no noise, no exposure. `shown`
-/// holds one 8-bit grey or BGR picture per projector; an empty picture is black, an empty span is all black.
-/// A projector's pixels are little squares, blurred by defocus where the surface is out of focus.
-cv::Mat ideal_light(const World& world, const Samples& samples, std::span<const cv::Mat> shown);
-
-/// After the lens: PSF, vignetting, exposure. Linear, 1 is full scale; may exceed it.
-cv::Mat exposed(const World& world, int camera, const cv::Mat& light);
-
-/// After the sensor: shot and read noise, encoding, black level, 8 bits. The same seed gives the same bytes.
-cv::Mat digitised(const World& world, int camera, const cv::Mat& signal, std::uint64_t seed);
-
-/// All three steps. Throws std::logic_error when `shown` does not fit the projectors.
-cv::Mat photograph(const World& world,
-                   const Samples& samples,
-                   std::span<const cv::Mat> shown,
-                   std::uint64_t seed);
 
 }  // namespace limn::sim

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/photograph.h"
+
 namespace limn::sim {
 
 class VirtualRig::Camera : public device::CameraSource {

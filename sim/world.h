@@ -54,6 +54,7 @@ struct Object {
   double ink_albedo = 0;                     ///< reflectance where the texture is black
   cv::Mat texture;                           ///< 8-bit sRGB, grey or BGR, in the mesh's uv; empty: plain
   bool sharp_texture = false;  ///< pixels are little squares (printed cells) instead of interpolated
+  bool by_material = false;    ///< takes the mesh's own materials instead of albedo and texture
   std::optional<Pose> prototype_from_object;  ///< moves with the prototype when set
 };
 

@@ -1,0 +1,192 @@
+#include "sim/ray_scene.h"
+
+#include <embree3/rtcore.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/result.h"
+
+namespace limn::sim {
+namespace {
+
+constexpr double k_surface_gap = 1e-4;  // m; below it a shadow ray's own surface is not an occluder
+
+RTCRay ray_between(const Eigen::Vector3f& from, const Eigen::Vector3f& d, float near, float far) {
+  RTCRay ray{};
+  ray.org_x = from.x();
+  ray.org_y = from.y();
+  ray.org_z = from.z();
+  ray.tnear = near;
+  ray.dir_x = d.x();
+  ray.dir_y = d.y();
+  ray.dir_z = d.z();
+  ray.tfar = far;
+  ray.mask = ~0U;
+  return ray;
+}
+
+struct Placed {
+  const scene::Mesh* mesh = nullptr;
+  Pose world_from_mesh;
+  std::vector<Eigen::Vector3f>
+      positions;  // in the world; shared with Embree, which may read 4 bytes past the end
+};
+
+RTCGeometry geometry_of(RTCDevice device, Placed& placed) {
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  const std::size_t vertices = placed.mesh->positions.size();
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, placed.positions.data(),
+                             0, sizeof(Eigen::Vector3f), vertices);
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                             placed.mesh->triangles.data(), 0, sizeof(placed.mesh->triangles[0]),
+                             placed.mesh->triangles.size());
+  rtcCommitGeometry(geometry);
+  return geometry;
+}
+
+}  // namespace
+
+struct RayScene::Impl {
+  RTCDevice device = nullptr;
+  RTCScene scene = nullptr;
+  std::vector<Placed> placed;
+
+  ~Impl() {
+    if (scene != nullptr) rtcReleaseScene(scene);
+    if (device != nullptr) rtcReleaseDevice(device);
+  }
+
+  const std::array<std::uint32_t, 3>& corners(const Hit& hit) const {
+    return placed[static_cast<std::size_t>(hit.object)]
+        .mesh->triangles[static_cast<std::size_t>(hit.triangle)];
+  }
+  Eigen::Vector3d corner(const Hit& hit, std::size_t k) const {
+    return placed[static_cast<std::size_t>(hit.object)].positions[corners(hit)[k]].cast<double>();
+  }
+  Eigen::Vector3d scaled_normal(const Hit& hit) const {
+    const Eigen::Vector3d p = corner(hit, 0);
+    return (corner(hit, 1) - p).cross(corner(hit, 2) - p);
+  }
+
+  Hit completed(const RTCRayHit& found, const Eigen::Vector3d& p_origin, const Eigen::Vector3d& d) const {
+    Hit hit;
+    if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) return hit;
+    hit.object = static_cast<int>(found.hit.geomID);
+    hit.triangle = static_cast<int>(found.hit.primID);
+    hit.barycentric = {found.hit.u, found.hit.v};
+    const Eigen::Vector3d n = scaled_normal(hit);
+    const double approach = n.dot(d);
+    const double exact = n.dot(corner(hit, 0) - p_origin) / approach;
+    const double traced = static_cast<double>(found.ray.tfar);
+    // Edge-on triangles have no usable plane; the traced distance is as good as it gets there.
+    hit.distance = std::abs(exact - traced) < 1e-3 ? exact : traced;
+    return hit;
+  }
+};
+
+RayScene::RayScene(std::span<const PlacedMesh> meshes) : impl_(std::make_unique<Impl>()) {
+  impl_->device = rtcNewDevice("threads=2");
+  LIMN_CHECK(impl_->device != nullptr);
+  impl_->scene = rtcNewScene(impl_->device);
+  rtcSetSceneFlags(impl_->scene, RTC_SCENE_FLAG_ROBUST);
+  impl_->placed.resize(meshes.size());
+  for (std::size_t i = 0; i < meshes.size(); ++i) {
+    Placed& placed = impl_->placed[i];
+    placed.mesh = meshes[i].mesh;
+    placed.world_from_mesh = meshes[i].world_from_mesh;
+    placed.positions.reserve(placed.mesh->positions.size() + 1);
+    for (const Eigen::Vector3f& p : placed.mesh->positions)
+      placed.positions.push_back((placed.world_from_mesh * p.cast<double>()).cast<float>());
+    placed.positions.push_back(Eigen::Vector3f::Zero());
+    RTCGeometry geometry = geometry_of(impl_->device, placed);
+    rtcAttachGeometryByID(impl_->scene, geometry, static_cast<unsigned>(i));
+    rtcReleaseGeometry(geometry);
+  }
+  rtcCommitScene(impl_->scene);
+}
+
+RayScene::~RayScene() = default;
+RayScene::RayScene(RayScene&&) noexcept = default;
+RayScene& RayScene::operator=(RayScene&&) noexcept = default;
+
+Hit RayScene::first_hit(const Ray& ray) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCRayHit query{};
+  query.ray =
+      ray_between(ray.p_origin.cast<float>(), ray.d.cast<float>(), 0, std::numeric_limits<float>::infinity());
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  rtcIntersect1(impl_->scene, &context, &query);
+  return impl_->completed(query, ray.p_origin, ray.d);
+}
+
+void RayScene::first_hits(const Eigen::Vector3d& p_origin,
+                          std::span<const Eigen::Vector3f> d,
+                          std::span<Hit> hits) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  const Eigen::Vector3f from = p_origin.cast<float>();
+  std::vector<RTCRayHit> queries(d.size());
+  for (std::size_t i = 0; i < d.size(); ++i) {
+    const bool usable = d[i].allFinite();
+    queries[i].ray = ray_between(from, usable ? d[i] : Eigen::Vector3f::UnitZ(), 0,
+                                 usable ? std::numeric_limits<float>::infinity() : -1.0F);
+    queries[i].hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  }
+  rtcIntersect1M(impl_->scene, &context, queries.data(), static_cast<unsigned>(queries.size()),
+                 sizeof(RTCRayHit));
+  for (std::size_t i = 0; i < d.size(); ++i)
+    hits[i] = impl_->completed(queries[i], p_origin, d[i].cast<double>());
+}
+
+void RayScene::lit(const Eigen::Vector3d& p_light,
+                   std::span<const Eigen::Vector3f> p,
+                   std::span<std::uint8_t> lit) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  const Eigen::Vector3f from = p_light.cast<float>();
+  std::vector<RTCRay> queries(p.size());
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    const Eigen::Vector3f towards = p[i] - from;
+    const float distance = towards.norm();
+    const bool usable = std::isfinite(distance) && distance > 0;
+    queries[i] = ray_between(from, usable ? Eigen::Vector3f(towards / distance) : Eigen::Vector3f::UnitZ(), 0,
+                             usable ? distance - static_cast<float>(k_surface_gap) : -1.0F);
+  }
+  rtcOccluded1M(impl_->scene, &context, queries.data(), static_cast<unsigned>(queries.size()),
+                sizeof(RTCRay));
+  for (std::size_t i = 0; i < p.size(); ++i) lit[i] = queries[i].tfar >= 0 ? 1 : 0;  // blocked: -infinity
+}
+
+bool RayScene::lit(const Eigen::Vector3d& p_light, const Eigen::Vector3d& p) const {
+  const Eigen::Vector3f point = p.cast<float>();
+  std::uint8_t result = 0;
+  lit(p_light, std::span(&point, 1), std::span(&result, 1));
+  return result != 0;
+}
+
+Eigen::Vector3d RayScene::face_normal(const Hit& hit) const { return impl_->scaled_normal(hit).normalized(); }
+
+Eigen::Vector3d RayScene::shading_normal(const Hit& hit) const {
+  const Placed& placed = impl_->placed[static_cast<std::size_t>(hit.object)];
+  const auto& normals = placed.mesh->normals;
+  if (normals.empty()) return face_normal(hit);
+  const auto& c = impl_->corners(hit);
+  const float u = hit.barycentric.x(), v = hit.barycentric.y();
+  const Eigen::Vector3f n = (1 - u - v) * normals[c[0]] + u * normals[c[1]] + v * normals[c[2]];
+  return (placed.world_from_mesh.rotation * n.cast<double>()).normalized();
+}
+
+Eigen::Vector2f RayScene::uv(const Hit& hit) const {
+  const auto& uvs = impl_->placed[static_cast<std::size_t>(hit.object)].mesh->uvs;
+  if (uvs.empty()) return Eigen::Vector2f::Zero();
+  const auto& c = impl_->corners(hit);
+  const float u = hit.barycentric.x(), v = hit.barycentric.y();
+  return (1 - u - v) * uvs[c[0]] + u * uvs[c[1]] + v * uvs[c[2]];
+}
+
+}  // namespace limn::sim

@@ -1,0 +1,499 @@
+#include "sim/trace.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <opencv2/core.hpp>
+
+#include "sim/ray_scene.h"
+
+namespace limn::sim {
+namespace {
+
+constexpr int k_sub_samples = 32;       // of a pixel on an edge: an edge's place is then known to 1/64 px
+constexpr int k_direction_step = 8;     // px between exact directions; cubic between them errs below 1e-8 rad
+constexpr float k_same_albedo = 0.02F;  // samples of one pixel that differ by less are one surface
+constexpr float k_same_normal = 0.99F;  // cosine, about 8°
+constexpr float k_same_depth = 1e-3F;   // m, departure from a plane within one pixel
+constexpr int k_lamp_points = 5;        // of a lamp's disc: its centre and four on the rim
+
+// Where ray directions of any sub-pixel place come from: exact ones on a grid that reaches over the border,
+// cubic interpolation (Catmull-Rom) between them.
+class Directions {
+ public:
+  explicit Directions(const Imager& imager)
+      : columns_(imager.width / k_direction_step + 5), rows_(imager.height / k_direction_step + 5) {
+    knots_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
+    const Eigen::Matrix3d world_from_imager = imager.imager_from_world.inverse().rotation_matrix();
+    cv::parallel_for_({0, rows_}, [&](const cv::Range& range) {
+      for (int r = range.start; r < range.end; ++r)
+        for (int c = 0; c < columns_; ++c) {
+          const Eigen::Vector2d px((c - 2) * k_direction_step, (r - 2) * k_direction_step);
+          const auto d = imager.lens.unproject(px);
+          knots_[index(r, c)] = d ? Eigen::Vector3d(world_from_imager * *d)
+                                  : Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+        }
+    });
+  }
+
+  Eigen::Vector3f at(double x, double y) const {
+    const double cx = x / k_direction_step + 2, cy = y / k_direction_step + 2;
+    const int c = static_cast<int>(cx), r = static_cast<int>(cy);
+    const std::array<double, 4> wx = weights(cx - c), wy = weights(cy - r);
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (int j = 0; j < 4; ++j) {
+      Eigen::Vector3d row = Eigen::Vector3d::Zero();
+      for (int i = 0; i < 4; ++i)
+        row += wx[static_cast<std::size_t>(i)] * knots_[index(r - 1 + j, c - 1 + i)];
+      sum += wy[static_cast<std::size_t>(j)] * row;
+    }
+    return sum.normalized().cast<float>();
+  }
+
+  /// Directions of pixels (x0, y), (x0 + 1, y), …
+  void row(double x0, double y, std::span<Eigen::Vector3f> d) const {
+    const double cy = y / k_direction_step + 2;
+    const int r = static_cast<int>(cy);
+    const std::array<double, 4> wy = weights(cy - r);
+    std::vector<Eigen::Vector3d> knots(static_cast<std::size_t>(columns_), Eigen::Vector3d::Zero());
+    for (int c = 0; c < columns_; ++c)
+      for (int j = 0; j < 4; ++j)
+        knots[static_cast<std::size_t>(c)] += wy[static_cast<std::size_t>(j)] * knots_[index(r - 1 + j, c)];
+    for (std::size_t i = 0; i < d.size(); ++i) {
+      const double cx = (x0 + static_cast<double>(i)) / k_direction_step + 2;
+      const auto c = static_cast<std::size_t>(cx);
+      const std::array<double, 4> wx = weights(cx - static_cast<double>(c));
+      const Eigen::Vector3d sum =
+          wx[0] * knots[c - 1] + wx[1] * knots[c] + wx[2] * knots[c + 1] + wx[3] * knots[c + 2];
+      d[i] = sum.normalized().cast<float>();
+    }
+  }
+
+ private:
+  std::size_t index(int r, int c) const {
+    return static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(c);
+  }
+  static std::array<double, 4> weights(double t) {
+    return {((-0.5 * t + 1) * t - 0.5) * t, ((1.5 * t - 2.5) * t) * t + 1, ((-1.5 * t + 2) * t + 0.5) * t,
+            ((0.5 * t - 0.5) * t) * t};
+  }
+  int columns_, rows_;
+  std::vector<Eigen::Vector3d> knots_;
+};
+
+const std::array<float, 256>& linear_of_srgb() {
+  static const std::array<float, 256> table = [] {
+    std::array<float, 256> t{};
+    for (std::size_t i = 0; i < t.size(); ++i) {
+      const double v = static_cast<double>(i) / 255;
+      t[i] = static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+    }
+    return t;
+  }();
+  return table;
+}
+
+// Linear BGR of a texture's pixel; coordinates beyond the border take the border's.
+Eigen::Vector3f texel(const cv::Mat& texture, int x, int y) {
+  const auto& linear = linear_of_srgb();
+  x = std::clamp(x, 0, texture.cols - 1);
+  y = std::clamp(y, 0, texture.rows - 1);
+  const std::uint8_t* p = texture.ptr(y) + x * texture.channels();
+  if (texture.channels() == 1) return Eigen::Vector3f::Constant(linear[p[0]]);
+  return {linear[p[0]], linear[p[1]], linear[p[2]]};
+}
+
+Eigen::Vector3f textured(const cv::Mat& texture, const Eigen::Vector2f& uv, bool sharp) {
+  const float x = uv.x() * static_cast<float>(texture.cols),
+              y = (1 - uv.y()) * static_cast<float>(texture.rows);
+  if (sharp) return texel(texture, static_cast<int>(std::floor(x)), static_cast<int>(std::floor(y)));
+  const int c = static_cast<int>(std::floor(x - 0.5F)), r = static_cast<int>(std::floor(y - 0.5F));
+  const float fx = x - 0.5F - static_cast<float>(c), fy = y - 0.5F - static_cast<float>(r);
+  return (1 - fy) * ((1 - fx) * texel(texture, c, r) + fx * texel(texture, c + 1, r)) +
+         fy * ((1 - fx) * texel(texture, c, r + 1) + fx * texel(texture, c + 1, r + 1));
+}
+
+Eigen::Vector3f material_albedo(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv) {
+  const auto t = static_cast<std::size_t>(triangle);
+  const std::size_t m = mesh.triangle_materials.empty() ? 0 : mesh.triangle_materials[t];
+  const scene::Material& material = mesh.materials[m];
+  const Eigen::Vector3f bgr = material.base_colour.reverse();
+  if (material.texture.empty()) return bgr;
+  return bgr.cwiseProduct(textured(material.texture, uv, false));
+}
+
+// What one ray sees.
+struct Surface {
+  int object = -1;
+  float distance = 0;
+  Eigen::Vector3f p = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
+  Eigen::Vector3f n = Eigen::Vector3f::Zero();       // shading normal towards the camera
+  Eigen::Vector3f n_face = Eigen::Vector3f::Zero();  // geometric normal towards the camera
+  Eigen::Vector3f albedo = Eigen::Vector3f::Zero();
+};
+
+struct LampPoint {
+  Eigen::Vector3d p_world;
+  double illuminance_at_1m;
+};
+
+std::vector<LampPoint> points_of(const Lamp& lamp) {
+  if (lamp.radius_m <= 0) return {{lamp.p_world, lamp.illuminance_at_1m}};
+  std::vector<LampPoint> points;
+  const double share = lamp.illuminance_at_1m / k_lamp_points;
+  points.push_back({lamp.p_world, share});
+  for (int k = 0; k < k_lamp_points - 1; ++k) {
+    const double angle = (k + 0.5) * 2 * std::numbers::pi / (k_lamp_points - 1);
+    points.push_back(
+        {lamp.p_world + lamp.radius_m * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0), share});
+  }
+  return points;
+}
+
+std::vector<PlacedMesh> placed(const std::vector<Object>& objects) {
+  std::vector<PlacedMesh> meshes;
+  for (const Object& object : objects) meshes.push_back({object.mesh.get(), object.world_from_object});
+  return meshes;
+}
+
+// One camera's view while it is being traced.
+class Tracer {
+ public:
+  Tracer(const World& world, int camera)
+      : world_(world),
+        imager_(world.rig.cameras.at(static_cast<std::size_t>(camera))),
+        scene_(placed(world.objects)),
+        directions_(imager_),
+        p_eye_(imager_.imager_from_world.inverse().translation) {
+    for (const Lamp& lamp : world.room.lamps)
+      for (const LampPoint& point : points_of(lamp)) lamps_.push_back(point);
+    for (const Imager& projector : world.rig.projectors)
+      p_projectors_.push_back(projector.imager_from_world.inverse().translation);
+    samples_.camera = camera;
+    samples_.width = imager_.width;
+    samples_.height = imager_.height;
+  }
+
+  Samples run() {
+    first_samples();
+    mark_shadow_edges();
+    refine_edges();
+    complete();
+    return std::move(samples_);
+  }
+
+ private:
+  struct Group {
+    Surface first;
+    float count = 0;
+    Eigen::Vector3f p = Eigen::Vector3f::Zero(), n = Eigen::Vector3f::Zero(),
+                    albedo = Eigen::Vector3f::Zero();
+    float room_light = 0;
+    std::vector<float> lit;
+  };
+  struct Refined {
+    std::int32_t pixel;
+    std::vector<Group> groups;
+  };
+
+  std::size_t pixel_count() const {
+    return static_cast<std::size_t>(imager_.width) * static_cast<std::size_t>(imager_.height);
+  }
+
+  Surface surface(const Hit& hit, const Eigen::Vector3f& d) const {
+    Surface s;
+    if (hit.object < 0) return s;
+    const Object& object = world_.objects[static_cast<std::size_t>(hit.object)];
+    s.object = hit.object;
+    s.distance = static_cast<float>(hit.distance);
+    s.p = (p_eye_ + hit.distance * d.cast<double>()).cast<float>();
+    s.n_face = scene_.face_normal(hit).cast<float>();
+    s.n = scene_.shading_normal(hit).cast<float>();
+    const bool back = s.n_face.dot(d) > 0;
+    if (back) s.n_face = -s.n_face, s.n = -s.n;
+    s.albedo = object.albedo.cast<float>();
+    if (object.by_material)
+      s.albedo = material_albedo(*object.mesh, hit.triangle, scene_.uv(hit));
+    else if (!object.texture.empty() && !(back && object.sharp_texture)) {
+      const Eigen::Vector3f share = textured(object.texture, scene_.uv(hit), object.sharp_texture);
+      const auto ink = static_cast<float>(object.ink_albedo);
+      s.albedo = (s.albedo.array() - ink) * share.array() + ink;
+    }
+    return s;
+  }
+
+  std::vector<Surface> surfaces(std::span<const Eigen::Vector3f> d) const {
+    std::vector<Hit> hits(d.size());
+    scene_.first_hits(p_eye_, d, hits);
+    std::vector<Surface> found(d.size());
+    for (std::size_t i = 0; i < d.size(); ++i) found[i] = surface(hits[i], d[i]);
+    return found;
+  }
+
+  static bool agree(const Surface& a, const Surface& b) {
+    if (a.object != b.object) return false;
+    if (a.object < 0) return true;
+    return (a.albedo - b.albedo).cwiseAbs().maxCoeff() < k_same_albedo && a.n.dot(b.n) > k_same_normal;
+  }
+  static bool is_smooth(const Surface& centre, const std::array<const Surface*, 4>& corners) {
+    float depth = 0;
+    for (const Surface* corner : corners) {
+      if (!agree(centre, *corner)) return false;
+      depth += corner->distance / 4;
+    }
+    return std::abs(depth - centre.distance) < k_same_depth;
+  }
+
+  // Light reaches the side of the surface that the camera sees.
+  static bool faces(const Surface& s, const Eigen::Vector3d& p_light) {
+    return s.n_face.dot(p_light.cast<float>() - s.p) > 0;
+  }
+
+  std::vector<std::uint8_t> lit(const Eigen::Vector3d& p_light, std::span<const Surface> surfaces) const {
+    std::vector<Eigen::Vector3f> points;
+    for (const Surface& s : surfaces)  // NaN points cost no traversal
+      points.push_back(s.object >= 0 && faces(s, p_light) ? s.p : Eigen::Vector3f::Constant(NAN));
+    std::vector<std::uint8_t> result(surfaces.size());
+    scene_.lit(p_light, points, result);
+    for (std::size_t i = 0; i < points.size(); ++i)
+      result[i] = result[i] != 0 && points[i].allFinite() ? 1 : 0;
+    return result;
+  }
+
+  float lamp_light(const LampPoint& lamp, const Surface& s) const {
+    const Eigen::Vector3f towards = lamp.p_world.cast<float>() - s.p;
+    const float d2 = towards.squaredNorm();
+    return static_cast<float>(lamp.illuminance_at_1m) * std::max(0.0F, s.n.dot(towards) / std::sqrt(d2)) / d2;
+  }
+  float ambient_light(const Surface& s) const {
+    return s.object < 0 ? 0
+                        : static_cast<float>(world_.room.ambient) * (0.75F + 0.25F * s.n.z());  // sky above
+  }
+
+  void first_samples() {
+    const std::size_t count = pixel_count();
+    surfaces_.resize(count);
+    edge_.assign(count, 0);
+    room_.assign(count, 0);
+    lit_.assign(world_.rig.projectors.size(), std::vector<std::uint8_t>(count, 0));
+    constexpr int k_strip = 16;  // rows; the corner row between strips is traced twice
+    cv::parallel_for_({0, (imager_.height + k_strip - 1) / k_strip}, [&](const cv::Range& strips) {
+      for (int strip = strips.start; strip < strips.end; ++strip)
+        trace_rows(strip * k_strip, std::min(imager_.height, (strip + 1) * k_strip));
+    });
+  }
+
+  std::vector<Surface> corner_row(int row) const {
+    std::vector<Eigen::Vector3f> d(static_cast<std::size_t>(imager_.width) + 1);
+    directions_.row(-0.5, row - 0.5, d);
+    return surfaces(d);
+  }
+
+  void trace_rows(int begin, int end) {
+    const auto width = static_cast<std::size_t>(imager_.width);
+    std::vector<Eigen::Vector3f> d(width);
+    std::vector<Surface> above = corner_row(begin);
+    for (int row = begin; row < end; ++row) {
+      const std::vector<Surface> below = corner_row(row + 1);
+      directions_.row(0, row, d);
+      const std::vector<Surface> centres = surfaces(d);
+      const std::size_t at = static_cast<std::size_t>(row) * width;
+      for (std::size_t i = 0; i < width; ++i) {
+        surfaces_[at + i] = centres[i];
+        edge_[at + i] = is_smooth(centres[i], {&above[i], &above[i + 1], &below[i], &below[i + 1]}) ? 0 : 1;
+      }
+      light_row(centres, at);
+      above = below;
+    }
+  }
+
+  void light_row(std::span<const Surface> row, std::size_t at) {
+    for (std::size_t k = 0; k < lit_.size(); ++k) {
+      const std::vector<std::uint8_t> result = lit(p_projectors_[k], row);
+      std::copy(result.begin(), result.end(), lit_[k].begin() + static_cast<std::ptrdiff_t>(at));
+    }
+    for (std::size_t i = 0; i < row.size(); ++i) room_[at + i] = ambient_light(row[i]);
+    for (const LampPoint& lamp : lamps_) {
+      const std::vector<std::uint8_t> result = lit(lamp.p_world, row);
+      for (std::size_t i = 0; i < row.size(); ++i)
+        if (result[i] != 0) room_[at + i] += lamp_light(lamp, row[i]);
+    }
+  }
+
+  // Where a projector's light ends between two pixels, both are edges.
+  void mark_shadow_edges() {
+    const int width = imager_.width, height = imager_.height;
+    for (const auto& lit : lit_)
+      for (int row = 0; row < height; ++row)
+        for (int column = 0; column < width; ++column) {
+          const auto i = static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
+                         static_cast<std::size_t>(column);
+          if (column + 1 < width && lit[i] != lit[i + 1]) edge_[i] = edge_[i + 1] = 1;
+          const std::size_t below = i + static_cast<std::size_t>(width);
+          if (row + 1 < height && lit[i] != lit[below]) edge_[i] = edge_[below] = 1;
+        }
+  }
+
+  void refine_edges() {
+    for (std::size_t i = 0; i < edge_.size(); ++i)
+      if (edge_[i] != 0) refined_.push_back({static_cast<std::int32_t>(i), {}});
+    constexpr int k_chunk = 256;
+    const int count = static_cast<int>(refined_.size());
+    cv::parallel_for_({0, (count + k_chunk - 1) / k_chunk}, [&](const cv::Range& chunks) {
+      for (int chunk = chunks.start; chunk < chunks.end; ++chunk)
+        for (int i = chunk * k_chunk; i < std::min(count, (chunk + 1) * k_chunk); ++i)
+          refined_[static_cast<std::size_t>(i)].groups = refine(refined_[static_cast<std::size_t>(i)].pixel);
+    });
+  }
+
+  // A (0,2)-sequence (van der Corput, Sobol): each of 32 columns and 32 rows of the pixel is met once.
+  static Eigen::Vector2d sub_sample(unsigned k) {
+    double x = 0, y = 0;
+    for (unsigned bit = 0; bit < 5; ++bit)
+      if ((k >> bit & 1U) != 0) x += 0.5 / (1U << bit);
+    unsigned sobol = 0;
+    for (unsigned v = 1U << 31, i = k; i != 0; i >>= 1U, v ^= v >> 1U)
+      if ((i & 1U) != 0) sobol ^= v;
+    y = static_cast<double>(sobol) / 4294967296.0;
+    constexpr double k_centred = 0.5 / k_sub_samples - 0.5;
+    return {x + k_centred, y + k_centred};
+  }
+
+  std::vector<Group> refine(std::int32_t pixel) const {
+    const Eigen::Vector2d px(pixel % imager_.width, pixel / imager_.width);
+    std::array<Eigen::Vector3f, k_sub_samples> d;
+    for (unsigned k = 0; k < k_sub_samples; ++k) {
+      const Eigen::Vector2d at = px + sub_sample(k);
+      d[k] = directions_.at(at.x(), at.y());
+    }
+    const std::vector<Surface> found = surfaces(d);
+    std::vector<std::vector<std::uint8_t>> lit_by;
+    for (const Eigen::Vector3d& p_projector : p_projectors_) lit_by.push_back(lit(p_projector, found));
+    std::vector<float> room(found.size());
+    for (std::size_t k = 0; k < found.size(); ++k) room[k] = ambient_light(found[k]);
+    for (const LampPoint& lamp : lamps_) {
+      const std::vector<std::uint8_t> result = lit(lamp.p_world, found);
+      for (std::size_t k = 0; k < found.size(); ++k)
+        if (result[k] != 0) room[k] += lamp_light(lamp, found[k]);
+    }
+    std::vector<Group> groups;
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      Group& group = group_of(groups, found[k]);
+      group.count += 1;
+      group.p += found[k].p;
+      group.n += found[k].n;
+      group.albedo += found[k].albedo;
+      group.room_light += room[k];
+      for (std::size_t j = 0; j < lit_by.size(); ++j) group.lit[j] += static_cast<float>(lit_by[j][k]);
+    }
+    return groups;
+  }
+
+  Group& group_of(std::vector<Group>& groups, const Surface& s) const {
+    for (Group& group : groups)
+      if (agree(group.first, s) && std::abs(group.first.distance - s.distance) < 2 * k_same_depth)
+        return group;
+    Group group;
+    group.first = s;
+    group.lit.assign(p_projectors_.size(), 0);
+    groups.push_back(std::move(group));
+    return groups.back();
+  }
+
+  void complete() {
+    std::size_t count = pixel_count();
+    for (const Refined& r : refined_) count += r.groups.size() - 1;
+    resize(count);
+    for (std::size_t i = 0; i < pixel_count(); ++i)
+      if (edge_[i] == 0) put(i, static_cast<std::int32_t>(i), surfaces_[i], room_[i]);
+    std::size_t next = pixel_count();
+    for (const Refined& r : refined_)
+      for (std::size_t g = 0; g < r.groups.size(); ++g)
+        put(g == 0 ? static_cast<std::size_t>(r.pixel) : next++, r.pixel, r.groups[g]);
+    cv::parallel_for_({0, static_cast<int>((count + 4095) / 4096)}, [&](const cv::Range& chunks) {
+      for (auto i = static_cast<std::size_t>(chunks.start) * 4096;
+           i < std::min(count, static_cast<std::size_t>(chunks.end) * 4096); ++i)
+        view(i);
+    });
+  }
+
+  void resize(std::size_t count) {
+    samples_.pixel.resize(count);
+    samples_.weight.resize(count);
+    samples_.object.resize(count);
+    samples_.p_world.resize(count);
+    samples_.n_world.resize(count);
+    samples_.albedo.resize(count);
+    samples_.grey_albedo.resize(count);
+    samples_.room_light.resize(count);
+    samples_.projectors.assign(p_projectors_.size(), std::vector<ProjectorView>(count));
+  }
+
+  void put(std::size_t i, std::int32_t pixel, const Surface& s, float room_light) {
+    samples_.pixel[i] = pixel;
+    samples_.weight[i] = 1;
+    samples_.object[i] = static_cast<std::int16_t>(s.object);
+    samples_.p_world[i] = s.p;
+    samples_.n_world[i] = s.n;
+    samples_.albedo[i] = s.albedo;
+    samples_.grey_albedo[i] = s.albedo.mean();
+    samples_.room_light[i] = room_light;
+    for (std::size_t k = 0; k < lit_.size(); ++k)
+      samples_.projectors[k][i].visible = lit_[k][static_cast<std::size_t>(pixel)];
+  }
+  void put(std::size_t i, std::int32_t pixel, const Group& group) {
+    Surface mean = group.first;
+    mean.p = group.p / group.count;
+    mean.n = group.n.normalized();
+    mean.albedo = group.albedo / group.count;
+    put(i, pixel, mean, group.room_light / group.count);
+    samples_.weight[i] = group.count / k_sub_samples;
+    for (std::size_t k = 0; k < group.lit.size(); ++k)
+      samples_.projectors[k][i].visible = group.lit[k] / group.count;
+  }
+
+  // The projectors' geometry of a sample, through their true lenses.
+  void view(std::size_t i) {
+    if (samples_.object[i] < 0) return;
+    const Eigen::Vector3d p = samples_.p_world[i].cast<double>();
+    for (std::size_t k = 0; k < p_projectors_.size(); ++k) {
+      ProjectorView& view = samples_.projectors[k][i];
+      if (view.visible <= 0) continue;
+      const Imager& projector = world_.rig.projectors[k];
+      const Eigen::Vector3d p_projector = projector.imager_from_world * p;
+      const auto px = p_projector.z() > 0 ? projector.lens.project(p_projector) : std::nullopt;
+      if (!px || px->x() < -1 || px->y() < -1 || px->x() > projector.width || px->y() > projector.height) {
+        view.visible = 0;
+        continue;
+      }
+      const Eigen::Vector3d towards = p_projectors_[k] - p;
+      view.u = static_cast<float>(px->x());
+      view.v = static_cast<float>(px->y());
+      view.distance = static_cast<float>(towards.norm());
+      view.depth = static_cast<float>(p_projector.z());
+      view.cosine = std::max(0.0F, samples_.n_world[i].dot(towards.normalized().cast<float>()));
+    }
+  }
+
+  const World& world_;
+  const Imager& imager_;
+  RayScene scene_;
+  Directions directions_;
+  Eigen::Vector3d p_eye_;
+  std::vector<LampPoint> lamps_;
+  std::vector<Eigen::Vector3d> p_projectors_;
+  std::vector<Surface> surfaces_;  // of pixel centres
+  std::vector<std::uint8_t> edge_;
+  std::vector<float> room_;
+  std::vector<std::vector<std::uint8_t>> lit_;  // per projector, of pixel centres
+  std::vector<Refined> refined_;
+  Samples samples_;
+};
+
+}  // namespace
+
+Samples trace(const World& world, int camera) { return Tracer(world, camera).run(); }
+
+}  // namespace limn::sim
