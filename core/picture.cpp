@@ -86,6 +86,18 @@ std::string physical_size_chunk(double pixels_per_metre) {
   return big_endian(static_cast<std::uint32_t>(body.size() - 4)) + body + big_endian(crc32(body));
 }
 
+std::string base64(const std::vector<uchar>& bytes) {
+  static constexpr char k_digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t at = 0; at < bytes.size(); at += 3) {
+    const std::size_t count = std::min<std::size_t>(3, bytes.size() - at);
+    std::uint32_t group = 0;
+    for (std::size_t i = 0; i < 3; ++i) group = group << 8 | (i < count ? bytes[at + i] : 0u);
+    for (std::size_t i = 0; i < 4; ++i) text += i <= count ? k_digits[group >> (18 - 6 * i) & 63] : '=';
+  }
+  return text;
+}
+
 constexpr std::size_t k_behind_ihdr = 8 + 25;  // signature, then length + "IHDR" + 13 bytes + CRC
 
 }  // namespace
@@ -109,6 +121,12 @@ Status write_png(const fs::path& path, const cv::Mat& picture, const PngOptions&
   if (options.pixels_per_metre > 0)
     bytes.insert(k_behind_ihdr, physical_size_chunk(options.pixels_per_metre));
   return write_file(path, bytes);
+}
+
+std::string data_uri(const cv::Mat& picture) {
+  std::vector<uchar> encoded;
+  cv::imencode(".jpg", picture, encoded, {cv::IMWRITE_JPEG_QUALITY, 90});
+  return "data:image/jpeg;base64," + base64(encoded);
 }
 
 }  // namespace limn

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <opencv2/core/mat.hpp>
+#include <string>
 
 #include "core/result.h"
 
@@ -21,5 +22,8 @@ struct PngOptions {
 };
 /// Writes an 8- or 16-bit PNG through a temporary file, so that `path` is either old or complete.
 Status write_png(const std::filesystem::path& path, const cv::Mat& picture, const PngOptions& options = {});
+
+/// The picture as a `data:image/jpeg;base64,…` address (quality 90) for self-contained HTML pages.
+std::string data_uri(const cv::Mat& picture);
 
 }  // namespace limn

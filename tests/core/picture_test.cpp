@@ -71,6 +71,14 @@ TEST(Picture, DamagedMissingAndForeignFilesAreErrors) {
   EXPECT_NE(foreign.message().find("expected a PNG or JPEG"), std::string::npos);
 }
 
+TEST(Picture, DataUriHoldsTheJpeg) {
+  const std::string uri = data_uri(noise(5, 7, CV_8UC3));
+  const std::string head = "data:image/jpeg;base64,";
+  ASSERT_TRUE(uri.starts_with(head));
+  EXPECT_TRUE(uri.substr(head.size()).starts_with("/9j/")) << "ff d8 ff, the start of a JPEG";
+  EXPECT_EQ((uri.size() - head.size()) % 4, 0u);
+}
+
 TEST(File, AMissingFolderIsToldAndWritingReplacesWhole) {
   const auto folder = test::test_folder();
   const auto status = write_file(folder / "missing" / "a.txt", "x");
