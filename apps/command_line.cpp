@@ -14,7 +14,7 @@ using Run = std::function<int()>;
 int finished(const Status& status) {
   if (status) return 0;
   log_warning("limn: {}", status.message());
-  return 1;
+  return status.error().wrong_usage ? 2 : 1;
 }
 
 }  // namespace

@@ -13,11 +13,18 @@ namespace limn {
 /// Something a person can fix. The message says where, what was expected, what was found, what to do.
 struct Error {
   std::string message;
+  bool wrong_usage = false;  ///< of the command line: exit code 2 instead of 1
 };
 
 template <class... Args>
 Error error(fmt::format_string<Args...> format, Args&&... args) {
-  return Error{fmt::format(format, std::forward<Args>(args)...)};
+  return Error{fmt::format(format, std::forward<Args>(args)...), false};
+}
+
+/// An error in how the command was called.
+template <class... Args>
+Error usage_error(fmt::format_string<Args...> format, Args&&... args) {
+  return Error{fmt::format(format, std::forward<Args>(args)...), true};
 }
 
 /// A value, or the error that kept it from being made.
