@@ -107,7 +107,7 @@ TEST(House, HeadersKeepSlowThirdPartiesOut) {
     for (const Include& include : includes_of(fs::path(LIMN_SOURCE_DIR) / room)) {
       if (include.file.extension() != ".h") continue;
       for (const char* slow : {"nlohmann/json.hpp", "opencv2/opencv.hpp", "CLI/", "boost/", "ceres/",
-                               "assimp/", "embree3/", "mrcal/", "epoxy/"}) {
+                               "assimp/", "embree3/", "mrcal/"}) {
         EXPECT_FALSE(include.what.starts_with(slow)) << include.file << " includes " << include.what;
       }
     }
