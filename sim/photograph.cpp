@@ -185,7 +185,8 @@ const std::vector<float>& normal_quantiles() {
     for (std::size_t i = 0; i < t.size() / 2; ++i) {
       const double p = (static_cast<double>(i) + 0.5) / static_cast<double>(t.size());
       for (int step = 0; step < 8; ++step)
-        x -= (0.5 * std::erfc(-x / std::sqrt(2.0)) - p) / (std::exp(-x * x / 2) / std::sqrt(2 * std::numbers::pi));
+        x -= (0.5 * std::erfc(-x / std::sqrt(2.0)) - p) /
+             (std::exp(-x * x / 2) / std::sqrt(2 * std::numbers::pi));
       t[i] = static_cast<float>(x);
       t[t.size() - 1 - i] = static_cast<float>(-x);
     }
