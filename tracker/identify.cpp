@@ -1,0 +1,285 @@
+#include "tracker/identify.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <vector>
+
+namespace limn::tracker {
+namespace {
+
+constexpr int k_max_grid = 9;  // 7 cells and the border
+// Share of border cells that may read white (a finger, glare): families whose code has few bits need it
+// clean.
+constexpr double k_border_errors = 0.12;
+constexpr double k_border_errors_few_bits = 0.05;
+constexpr int k_few_bits = 25;
+// Mean margin of the cells (0: at the limit, 1: as black or white as beside the edge). Clutter lies below.
+constexpr double k_min_score = 0.35;
+constexpr double k_min_score_few_bits = 0.5;
+// Margin that wrong bits may hold together, as share of all: a clear bit that is wrong is no noise.
+constexpr double k_max_wrong_margin = 0.1;
+constexpr double k_min_correlation = 0.65;   // of a template, see numbers of the real Hiro frame in the tests
+constexpr double k_min_rotation_lead = 0.1;  // best rotation over the second best
+constexpr double k_sharpen_below_px = 4;     // cells smaller than this blur into each other
+constexpr double k_sharpening = 0.25;        // Laplacian weight
+
+// Marker square [0,1]^2 to pixels (Heckbert 1989).
+class SquareToQuad {
+ public:
+  explicit SquareToQuad(const std::array<Eigen::Vector2d, 4>& q) {
+    const Eigen::Vector2d sum = q[0] - q[1] + q[2] - q[3];
+    const Eigen::Vector2d a = q[1] - q[2];
+    const Eigen::Vector2d b = q[3] - q[2];
+    const double determinant = a.x() * b.y() - b.x() * a.y();
+    const double g = (sum.x() * b.y() - b.x() * sum.y()) / determinant;
+    const double h = (a.x() * sum.y() - sum.x() * a.y()) / determinant;
+    matrix_ << q[1].x() - q[0].x() + g * q[1].x(), q[3].x() - q[0].x() + h * q[3].x(), q[0].x(),
+        q[1].y() - q[0].y() + g * q[1].y(), q[3].y() - q[0].y() + h * q[3].y(), q[0].y(), g, h, 1;
+  }
+  Eigen::Vector2d at(double x, double y) const {
+    const Eigen::Vector3d p = matrix_ * Eigen::Vector3d(x, y, 1);
+    return p.head<2>() / p.z();
+  }
+
+ private:
+  Eigen::Matrix3d matrix_;
+};
+
+// Bilinear; the picture's edge goes on outside.
+double sample(const cv::Mat& grey, const Eigen::Vector2d& px) {
+  const double x = std::clamp(px.x(), 0.0, static_cast<double>(grey.cols - 1));
+  const double y = std::clamp(px.y(), 0.0, static_cast<double>(grey.rows - 1));
+  const int x0 = std::min(static_cast<int>(x), std::max(0, grey.cols - 2));
+  const int y0 = std::min(static_cast<int>(y), std::max(0, grey.rows - 2));
+  const int x1 = std::min(x0 + 1, grey.cols - 1);
+  const int y1 = std::min(y0 + 1, grey.rows - 1);
+  const double fx = x - x0;
+  const double fy = y - y0;
+  const std::uint8_t* upper = grey.ptr(y0);
+  const std::uint8_t* lower = grey.ptr(y1);
+  return (1 - fy) * ((1 - fx) * upper[x0] + fx * upper[x1]) + fy * ((1 - fx) * lower[x0] + fx * lower[x1]);
+}
+
+// Plane a + b x + c y over the unit square through the values at the middles of its four sides.
+struct Plane {
+  double a, b, c;
+  explicit Plane(const std::array<double, 4>& side)
+      : a(0.25 * (side[0] + side[1] + side[2] + side[3]) - 0.5 * (side[1] - side[3]) -
+          0.5 * (side[2] - side[0])),
+        b(side[1] - side[3]),
+        c(side[2] - side[0]) {}
+  double at(double x, double y) const { return a + b * x + c * y; }
+};
+
+using Grid = std::array<double, k_max_grid * k_max_grid>;
+
+// What one quad shows, as brightness relative to its edges: -1 as dark as inside them, 1 as light as outside.
+struct Reader {
+  const cv::Mat& grey;
+  SquareToQuad px_from_square;
+  Plane light, dark;
+  double side_px;
+
+  Reader(const cv::Mat& picture, const RefinedQuad& quad)
+      : grey(picture),
+        px_from_square(quad.corners_px),
+        light(quad.outside_level),
+        dark(quad.inside_level),
+        side_px(std::sqrt(area(quad.corners_px))) {}
+
+  static double area(const std::array<Eigen::Vector2d, 4>& q) {
+    const Eigen::Vector2d a = q[2] - q[0];
+    const Eigen::Vector2d b = q[3] - q[1];
+    return 0.5 * std::abs(a.x() * b.y() - a.y() * b.x());
+  }
+
+  double relative(double x, double y) const {
+    const double high = light.at(x, y);
+    const double low = dark.at(x, y);
+    const double half = std::max(1.0, 0.5 * (high - low));
+    return (sample(grey, px_from_square.at(x, y)) - 0.5 * (high + low)) / half;
+  }
+
+  // Mean over the middle half of cell (row, column) of a grid with `cells` a side.
+  double cell(int row, int column, double cells, bool several) const {
+    const double x = (column + 0.5) / cells;
+    const double y = (row + 0.5) / cells;
+    if (!several) return relative(x, y);
+    const double d = 0.2 / cells;
+    return 0.2 * (relative(x, y) + relative(x - d, y - d) + relative(x + d, y - d) + relative(x - d, y + d) +
+                  relative(x + d, y + d));
+  }
+
+  // All cells, border included.
+  void read(int cells, Grid* grid) const {
+    const bool several = side_px / cells >= k_sharpen_below_px;
+    for (int row = 0; row < cells; ++row)
+      for (int column = 0; column < cells; ++column)
+        (*grid)[static_cast<std::size_t>(row * cells + column)] = cell(row, column, cells, several);
+    if (!several) sharpen(cells, grid);
+  }
+
+  // Takes off what blur brought over from the four neighbours (outside the marker: white).
+  static void sharpen(int cells, Grid* grid) {
+    const Grid before = *grid;
+    const auto value = [&](int row, int column) {
+      const bool outside = row < 0 || column < 0 || row >= cells || column >= cells;
+      return outside ? 1.0 : before[static_cast<std::size_t>(row * cells + column)];
+    };
+    for (int row = 0; row < cells; ++row)
+      for (int column = 0; column < cells; ++column) {
+        const double here = value(row, column);
+        const double around =
+            value(row - 1, column) + value(row + 1, column) + value(row, column - 1) + value(row, column + 1);
+        (*grid)[static_cast<std::size_t>(row * cells + column)] = here + k_sharpening * (4 * here - around);
+      }
+  }
+};
+
+struct Bits {
+  std::uint64_t code = 0;
+  std::array<double, 64> margin;  // by bit, lowest first; clipped to 1
+  double mean_margin = 0;
+  int border_errors = 0;
+  int border_cells = 0;
+};
+
+Bits bits_of(const Grid& grid, int cells) {
+  Bits bits;
+  const int width = cells + 2;
+  int at = cells * cells;
+  for (int row = 0; row < width; ++row)
+    for (int column = 0; column < width; ++column) {
+      const double value = grid[static_cast<std::size_t>(row * width + column)];
+      if (row == 0 || column == 0 || row > cells || column > cells) {
+        ++bits.border_cells;
+        bits.border_errors += value > 0;
+        continue;
+      }
+      bits.code = (bits.code << 1) | std::uint64_t{value > 0};
+      const double margin = std::min(1.0, std::abs(value));
+      bits.margin[static_cast<std::size_t>(--at)] = margin;
+      bits.mean_margin += margin / (cells * cells);
+    }
+  return bits;
+}
+
+struct Nearest {
+  std::size_t id = 0, rotation = 0;
+  int errors = 64;
+};
+
+// Own function so that the processor's own bit count is used where it has one.
+__attribute__((target_clones("popcnt", "default"))) Nearest nearest(
+    const std::vector<std::array<std::uint64_t, 4>>& codes, std::uint64_t seen) {
+  Nearest best;
+  for (std::size_t id = 0; id < codes.size(); ++id)
+    for (std::size_t k = 0; k < 4; ++k) {
+      const int errors = __builtin_popcountll(codes[id][k] ^ seen);
+      if (errors < best.errors) best = {id, k, errors};
+    }
+  return best;
+}
+
+std::optional<Identity> read_code(const CodeFamily& family, const Bits& bits) {
+  const bool few = family.cells * family.cells <= k_few_bits;
+  const double border_share = few ? k_border_errors_few_bits : k_border_errors;
+  if (bits.border_errors > border_share * bits.border_cells) return std::nullopt;
+  if (bits.mean_margin < (few ? k_min_score_few_bits : k_min_score)) return std::nullopt;
+  const Nearest best = nearest(family.codes, bits.code);
+  if (best.errors > family.max_errors) return std::nullopt;
+  double wrong = 0;
+  std::uint64_t differing = family.codes[best.id][best.rotation] ^ bits.code;
+  for (; differing != 0; differing &= differing - 1)
+    wrong += bits.margin[static_cast<std::size_t>(std::countr_zero(differing))];
+  const double all = bits.mean_margin * family.cells * family.cells;
+  if (wrong > k_max_wrong_margin * all) return std::nullopt;
+  return Identity{
+      {family.name, std::to_string(best.id)}, best.rotation, bits.mean_margin * (1 - 2 * wrong / all)};
+}
+
+// Border of a template: a quarter of the side; dark at 12 places of its middle ring.
+bool has_template_border(const Reader& reader) {
+  int light = 0;
+  for (int i = 0; i < 3; ++i) {
+    const double along = 0.2 + 0.3 * i;
+    light += reader.relative(along, 0.125) > 0;
+    light += reader.relative(along, 0.875) > 0;
+    light += reader.relative(0.125, along) > 0;
+    light += reader.relative(0.875, along) > 0;
+  }
+  return light <= 1;
+}
+
+double correlation(const std::vector<float>& a, const std::vector<double>& unit) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * unit[i];
+  return sum;
+}
+
+// The inner half as size x size values of zero mean and unit length; empty when it is flat.
+std::vector<double> read_inner_half(const Reader& reader, int size) {
+  std::vector<double> values;
+  const double cells = 2.0 * size;
+  const bool several = reader.side_px / cells > 2;
+  double mean = 0;
+  for (int row = 0; row < size; ++row)
+    for (int column = 0; column < size; ++column) {
+      values.push_back(reader.cell(row + size / 2, column + size / 2, cells, several));
+      mean += values.back();
+    }
+  mean /= static_cast<double>(values.size());
+  double square = 0;
+  for (double& v : values) {
+    v -= mean;
+    square += v * v;
+  }
+  if (square < 0.02 * static_cast<double>(values.size()))
+    return {};  // stdev below a fifteenth of black to white
+  for (double& v : values) v /= std::sqrt(square);
+  return values;
+}
+
+std::optional<Identity> read_templates(const Reader& reader, const std::vector<TemplatePattern>& templates) {
+  if (templates.empty() || !has_template_border(reader)) return std::nullopt;
+  std::optional<Identity> best;
+  for (const TemplatePattern& pattern : templates) {
+    const std::vector<double> seen = read_inner_half(reader, pattern.size);
+    if (seen.empty()) continue;
+    std::array<double, 4> scores;
+    for (std::size_t k = 0; k < 4; ++k) scores[k] = correlation(pattern.rotations[k], seen);
+    const auto top =
+        static_cast<std::size_t>(std::max_element(scores.begin(), scores.end()) - scores.begin());
+    const double score = scores[top];
+    std::sort(scores.begin(), scores.end());
+    if (score < k_min_correlation || score - scores[2] < k_min_rotation_lead) continue;
+    if (!best || score > best->score) best = Identity{{"artoolkit", pattern.id}, top, score};
+  }
+  return best;
+}
+
+}  // namespace
+
+std::optional<Identity> identify(const cv::Mat& grey, const RefinedQuad& quad, const Families& families) {
+  const Reader reader(grey, quad);
+  std::optional<Identity> best;
+  int read_cells = 0;
+  Bits bits;
+  for (const CodeFamily& family : families.codes()) {
+    if (family.cells != read_cells) {
+      Grid grid;
+      reader.read(family.cells + 2, &grid);
+      bits = bits_of(grid, family.cells);
+      read_cells = family.cells;
+    }
+    const std::optional<Identity> found = read_code(family, bits);
+    if (found && (!best || found->score > best->score)) best = found;
+  }
+  if (best) return best;
+  return read_templates(reader, families.templates());
+}
+
+}  // namespace limn::tracker

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <vector>
+
+#include "core/lens.h"
+#include "tracker/candidates.h"
+
+namespace limn::tracker {
+
+/// A quad whose corners are the intersections of its sub-pixel edge lines.
+struct RefinedQuad {
+  std::array<Eigen::Vector2d, 4> corners_px;
+  std::array<Eigen::Matrix2d, 4> corner_covariance;
+  /// Grey levels on both sides of each edge (of the side from corner i to i + 1), averaged along it.
+  std::array<double, 4> outside_level, inside_level;
+};
+
+/// Finds where each side's edge crosses the rows (steep sides) or columns (flat sides) of the raw picture and
+/// fits its line. A crossing is the centroid of the grey differences along the row. For the picture of a
+/// straight edge that pixels of square shape and any symmetric blur have averaged, that centroid is exact at
+/// any phase and slope (the sampled first moment of a function that was twice averaged over a pixel has no
+/// aliasing), which crossings of a middle level are not. With a lens the side is straight in undistorted
+/// directions: the bow that the lens gives it is taken off before the line is fitted. Holds its buffers
+/// between calls.
+class EdgeRefiner {
+ public:
+  /// nullopt when a side shows no edge from light outside to dark inside of at least `min_contrast` levels.
+  std::optional<RefinedQuad> refine(const cv::Mat& grey,
+                                    const Quad& quad,
+                                    double min_contrast,
+                                    const Lens* lens);
+
+ private:
+  struct Crossing {
+    double u, v;    // v(u) across the side's main axis
+    double weight;  // relative, from contrast
+  };
+  std::vector<Crossing> crossings_;
+  std::vector<double> gradients_;   // of all rows, reach_ * 2 each
+  std::vector<double> deviations_;  // scratch of the robust scale
+
+ public:
+  /// A side's line v = offset + slope * (u - u_middle) in the raw picture less the lens's bow.
+  struct EdgeLine {
+    bool flat = true;  ///< u is x and v is y; otherwise the other way round
+    double u_middle = 0;
+    double offset = 0, slope = 0;
+    Eigen::Matrix2d covariance;  ///< of (offset, slope)
+    double outside_level = 0, inside_level = 0;
+  };
+
+ private:
+  bool fit_side(const cv::Mat& grey,
+                const std::array<Eigen::Vector2d, 4>& corners,
+                std::size_t side,
+                double reach_px,
+                double min_contrast,
+                const Lens* lens,
+                EdgeLine* line);
+  bool fit_line(EdgeLine* line);
+};
+
+}  // namespace limn::tracker
