@@ -1,0 +1,66 @@
+#include "projector/gl.h"
+
+#include "core/result.h"
+
+namespace limn::projector {
+
+GlName make_texture(GLenum target, GLenum format, int width, int height, int layers, int levels) {
+  GLuint name = 0;
+  glCreateTextures(target, 1, &name);
+  GlName texture(name, [](GLuint n) { glDeleteTextures(1, &n); });
+  if (target == GL_TEXTURE_2D_ARRAY) {
+    glTextureStorage3D(name, levels, format, width, height, layers);
+  } else {
+    glTextureStorage2D(name, levels, format, width, height);
+  }
+  glTextureParameteri(name, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glTextureParameteri(name, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  glTextureParameteri(name, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  glTextureParameteri(name, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  return texture;
+}
+
+GlName make_framebuffer() {
+  GLuint name = 0;
+  glCreateFramebuffers(1, &name);
+  return {name, [](GLuint n) { glDeleteFramebuffers(1, &n); }};
+}
+
+GlName make_depth_buffer(int width, int height) {
+  GLuint name = 0;
+  glCreateRenderbuffers(1, &name);
+  glNamedRenderbufferStorage(name, GL_DEPTH_COMPONENT32F, width, height);
+  return {name, [](GLuint n) { glDeleteRenderbuffers(1, &n); }};
+}
+
+GlName make_buffer(const void* data, std::size_t bytes) {
+  GLuint name = 0;
+  glCreateBuffers(1, &name);
+  constexpr std::size_t k_least = 16;  // an empty buffer cannot be bound
+  glNamedBufferData(name, static_cast<GLsizeiptr>(std::max(bytes, k_least)), nullptr, GL_DYNAMIC_DRAW);
+  if (bytes > 0) glNamedBufferSubData(name, 0, static_cast<GLsizeiptr>(bytes), data);
+  return {name, [](GLuint n) { glDeleteBuffers(1, &n); }};
+}
+
+void upload(const GlName& texture, const cv::Mat& picture) {
+  LIMN_CHECK(picture.depth() == CV_8U || picture.depth() == CV_32F);
+  const cv::Mat whole = picture.isContinuous() ? picture : picture.clone();
+  const bool bytes = whole.depth() == CV_8U;
+  const GLenum formats[] = {GL_RED, GL_RG, static_cast<GLenum>(bytes ? GL_BGR : GL_RGB),
+                            static_cast<GLenum>(bytes ? GL_BGRA : GL_RGBA)};
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  glTextureSubImage2D(*texture, 0, 0, 0, whole.cols, whole.rows, formats[whole.channels() - 1],
+                      bytes ? GL_UNSIGNED_BYTE : GL_FLOAT, whole.data);
+}
+
+cv::Mat read_back(const GlName& framebuffer, int width, int height, int type, GLenum format) {
+  cv::Mat picture(height, width, type);
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, *framebuffer);
+  glReadBuffer(GL_COLOR_ATTACHMENT0);
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadPixels(0, 0, width, height, format, CV_MAT_DEPTH(type) == CV_8U ? GL_UNSIGNED_BYTE : GL_FLOAT,
+               picture.data);
+  return picture;
+}
+
+}  // namespace limn::projector

@@ -1,0 +1,170 @@
+#include "projector/gpu_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "core/result.h"
+
+namespace limn::projector {
+namespace {
+
+constexpr int k_largest_look = 4096;  // texels a side
+
+struct GpuMaterial {
+  Eigen::Vector4f colour;  // a: 1 when unlit
+  Eigen::Vector4f look;    // x: texture layer, -1 when it has none
+};
+
+struct GpuOwner {
+  Eigen::Matrix4f owner_from_scene = Eigen::Matrix4f::Identity();
+  Eigen::Vector4f lower = Eigen::Vector4f::Zero();  // w: 1 when it is shown
+  Eigen::Vector4f upper = Eigen::Vector4f::Zero();  // w: 1 when its mode is surface
+};
+
+template <class T>
+GlName buffer_of(const std::vector<T>& items) {
+  return make_buffer(items.data(), items.size() * sizeof(T));
+}
+
+int level_count(int side) { return 1 + static_cast<int>(std::floor(std::log2(side))); }
+
+}  // namespace
+
+struct GpuScene::Staging {
+  std::vector<Eigen::Vector4f> corners, normals;
+  std::vector<std::array<std::uint32_t, 2>> owners;
+  std::vector<GpuMaterial> materials;
+  std::vector<cv::Mat> textures;
+};
+
+GpuScene::GpuScene(const scene::Scene& scene) {
+  Staging staging;
+  if (scene.prototype) prototype_ = add(scene.prototype->mesh, 0, &staging);
+  for (const scene::Slot& slot : scene.slots) {
+    SlotRuns runs{slot.name, slot.mode == scene::Mode::surface, {}};
+    const int owner = owner_count();
+    for (const scene::Variant& variant : slot.variants) {
+      runs.variants.emplace(variant.name, add(variant.mesh, owner, &staging));
+    }
+    slots_.push_back(std::move(runs));
+  }
+  corners_ = buffer_of(staging.corners);
+  normals_ = buffer_of(staging.normals);
+  owners_ = buffer_of(staging.owners);
+  materials_ = buffer_of(staging.materials);
+  placements_ = make_buffer(nullptr, 0);
+  upload_looks(staging.textures);
+
+  GLuint name = 0;
+  glCreateVertexArrays(1, &name);
+  vertex_array_ = GlName(name, [](GLuint n) { glDeleteVertexArrays(1, &n); });
+  glVertexArrayVertexBuffer(name, 0, *corners_, 0, sizeof(Eigen::Vector4f));
+  glVertexArrayAttribFormat(name, 0, 4, GL_FLOAT, GL_FALSE, 0);
+  glVertexArrayAttribBinding(name, 0, 0);
+  glEnableVertexArrayAttrib(name, 0);
+}
+
+TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) {
+  const auto first_material = static_cast<std::uint32_t>(staging->materials.size());
+  for (const scene::Material& material : mesh.materials) {
+    GpuMaterial gpu{material.base_colour.homogeneous(), Eigen::Vector4f::Constant(-1)};
+    gpu.colour.w() = material.unlit ? 1 : 0;
+    if (!material.texture.empty() && !mesh.uvs.empty()) {
+      gpu.look.x() = static_cast<float>(staging->textures.size());
+      staging->textures.push_back(material.texture);
+    }
+    staging->materials.push_back(gpu);
+  }
+  TriangleRun run;
+  run.first = static_cast<int>(staging->owners.size());
+  run.count = static_cast<int>(mesh.triangles.size());
+  Eigen::AlignedBox3f bounds;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (const std::uint32_t i : mesh.triangles[t]) {
+      const Eigen::Vector2f uv = mesh.uvs.empty() ? Eigen::Vector2f(0, 0) : mesh.uvs[i];
+      staging->corners.push_back((Eigen::Vector4f() << mesh.positions[i], uv.x()).finished());
+      staging->normals.push_back((Eigen::Vector4f() << mesh.normals[i], uv.y()).finished());
+      bounds.extend(mesh.positions[i]);
+    }
+    staging->owners.push_back(
+        {static_cast<std::uint32_t>(owner), first_material + mesh.triangle_materials[t]});
+  }
+  if (run.count > 0) {
+    run.p_lower = bounds.min().cast<double>();
+    run.p_upper = bounds.max().cast<double>();
+  }
+  return run;
+}
+
+// One layer a texture, all brought to the size of the largest, so that one sampler serves and uv stays 0
+// to 1.
+void GpuScene::upload_looks(const std::vector<cv::Mat>& textures) {
+  int width = 1, height = 1;
+  for (const cv::Mat& texture : textures) {
+    width = std::min(k_largest_look, std::max(width, texture.cols));
+    height = std::min(k_largest_look, std::max(height, texture.rows));
+  }
+  const int layers = std::max(1, static_cast<int>(textures.size()));
+  looks_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_SRGB8_ALPHA8, width, height, layers,
+                        level_count(std::max(width, height)));
+  glTextureParameteri(*looks_, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
+  glTextureParameteri(*looks_, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  glTextureParameteri(*looks_, GL_TEXTURE_WRAP_S, GL_REPEAT);
+  glTextureParameteri(*looks_, GL_TEXTURE_WRAP_T, GL_REPEAT);
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  for (std::size_t i = 0; i < textures.size(); ++i) {
+    cv::Mat layer;
+    cv::resize(textures[i], layer, cv::Size(width, height), 0, 0, cv::INTER_LINEAR);
+    glTextureSubImage3D(*looks_, 0, 0, 0, static_cast<GLint>(i), width, height, 1, GL_BGR, GL_UNSIGNED_BYTE,
+                        layer.data);
+  }
+  if (!textures.empty()) glGenerateTextureMipmap(*looks_);
+}
+
+Pose GpuScene::scene_from_world(const scene::PosedScene& posed) {
+  return posed.world_from_prototype ? posed.world_from_prototype->inverse() : Pose();
+}
+
+std::vector<PlacedRun> GpuScene::placed(const scene::PosedScene& posed) const {
+  const Pose from_world = scene_from_world(posed);
+  std::vector<PlacedRun> runs;
+  if (prototype_ && posed.world_from_prototype) runs.push_back({0, &*prototype_, Pose(), false});
+  for (const scene::PosedPart& part : posed.parts) {
+    for (std::size_t i = 0; i < slots_.size(); ++i) {
+      if (slots_[i].name != part.slot) continue;
+      const auto variant = slots_[i].variants.find(part.variant);
+      LIMN_CHECK(variant != slots_[i].variants.end());
+      runs.push_back({static_cast<int>(i) + 1, &variant->second, from_world * part.world_from_part,
+                      slots_[i].on_surface});
+    }
+  }
+  return runs;
+}
+
+void GpuScene::place(const std::vector<PlacedRun>& runs) {
+  std::vector<GpuOwner> owners(static_cast<std::size_t>(owner_count()));
+  for (const PlacedRun& placed : runs) {
+    GpuOwner& owner = owners[static_cast<std::size_t>(placed.owner)];
+    owner.owner_from_scene = placed.scene_from_owner.inverse().matrix().cast<float>();
+    owner.lower << placed.run->p_lower.cast<float>(), 1.f;
+    owner.upper << placed.run->p_upper.cast<float>(), placed.on_surface ? 1.f : 0.f;
+  }
+  placements_ = buffer_of(owners);
+}
+
+void GpuScene::bind() const {
+  const GlName* buffers[] = {&corners_, &normals_, &owners_, &materials_, &placements_};
+  for (GLuint i = 0; i < std::size(buffers); ++i) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, **buffers[i]);
+}
+
+void append_bounds(const PlacedRun& placed, std::vector<Eigen::Vector3d>* corners) {
+  for (int k = 0; k < 8; ++k) {
+    Eigen::Vector3d p;
+    for (int axis = 0; axis < 3; ++axis)
+      p[axis] = (k >> axis & 1 ? placed.run->p_upper : placed.run->p_lower)[axis];
+    corners->push_back(placed.scene_from_owner * p);
+  }
+}
+
+}  // namespace limn::projector

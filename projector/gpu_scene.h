@@ -1,0 +1,66 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "projector/gl.h"
+#include "scene/posed.h"
+
+namespace limn::projector {
+
+/// A run of triangles on the GPU and its bounds in its own frame (m).
+struct TriangleRun {
+  int first = 0;
+  int count = 0;
+  Eigen::Vector3d p_lower = Eigen::Vector3d::Zero();
+  Eigen::Vector3d p_upper = Eigen::Vector3d::Zero();
+};
+
+/// A piece in its place: owner 0 is the prototype, owner i + 1 slot i.
+struct PlacedRun {
+  int owner = 0;
+  const TriangleRun* run = nullptr;
+  Pose scene_from_owner;
+  bool on_surface = false;  ///< its slot's mode is surface
+};
+
+/// All meshes of a scene on the GPU, as shaders/scene.glsl reads them.
+class GpuScene {
+ public:
+  explicit GpuScene(const scene::Scene& scene);
+
+  /// What a posed scene shows. Rays are cast in the frame "scene": the prototype's where it is placed, else
+  /// the world.
+  std::vector<PlacedRun> placed(const scene::PosedScene& posed) const;
+  static Pose scene_from_world(const scene::PosedScene& posed);
+  /// Sends the places to the GPU.
+  void place(const std::vector<PlacedRun>& runs);
+  /// Binds the buffers for a drawing.
+  void bind() const;
+
+  const GlName& looks() const { return looks_; }
+  GLuint vertex_array() const { return *vertex_array_; }
+  int owner_count() const { return static_cast<int>(slots_.size()) + 1; }
+
+ private:
+  struct SlotRuns {
+    std::string name;
+    bool on_surface = false;
+    std::map<std::string, TriangleRun> variants;
+  };
+  struct Staging;
+  TriangleRun add(const scene::Mesh& mesh, int owner, Staging* staging);
+  void upload_looks(const std::vector<cv::Mat>& textures);
+
+  std::optional<TriangleRun> prototype_;
+  std::vector<SlotRuns> slots_;
+  GlName corners_, normals_, owners_, materials_, placements_, looks_, vertex_array_;
+};
+
+/// The eight corners of a run's bounds in the scene's frame, appended.
+void append_bounds(const PlacedRun& placed, std::vector<Eigen::Vector3d>* corners);
+
+}  // namespace limn::projector

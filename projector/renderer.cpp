@@ -1,0 +1,319 @@
+#include "projector/renderer.h"
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <opencv2/imgproc.hpp>
+
+#include "projector/gpu_scene.h"
+#include "projector/shader.h"
+#include "projector/sights.h"
+
+namespace limn::projector {
+namespace {
+
+constexpr int k_response_columns = 1025;
+// Texture units; the sights take three from k_sights_unit on.
+constexpr int k_tangents_unit = 0, k_looks_unit = 1, k_response_unit = 2, k_centre_unit = 3,
+              k_picture_unit = 4, k_sights_unit = 5;
+// Towards the lamp of shaders/look.glsl in the viewer's frame: above and behind the left shoulder.
+const Eigen::Vector3d k_d_lamp_viewer = Eigen::Vector3d(-0.36, -0.64, -0.68).normalized();
+
+// A picture that is drawn into.
+struct Canvas {
+  int width = 0, height = 0;
+  GlName texture, framebuffer;
+
+  Canvas() = default;
+  Canvas(int w, int h, GLenum format) : width(w), height(h) {
+    texture = make_texture(GL_TEXTURE_2D, format, w, h);
+    framebuffer = make_framebuffer();
+    glNamedFramebufferTexture(*framebuffer, GL_COLOR_ATTACHMENT0, *texture, 0);
+  }
+};
+
+bool is_same(const Pose& a, const Pose& b) {
+  return a.rotation.coeffs() == b.rotation.coeffs() && a.translation == b.translation;
+}
+
+bool is_same(const scene::PosedScene& a, const scene::PosedScene& b) {
+  if (a.world_from_prototype.has_value() != b.world_from_prototype.has_value()) return false;
+  if (a.world_from_prototype && !is_same(*a.world_from_prototype, *b.world_from_prototype)) return false;
+  return std::equal(
+      a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(), [](const auto& p, const auto& q) {
+        return p.slot == q.slot && p.variant == q.variant && is_same(p.world_from_part, q.world_from_part);
+      });
+}
+
+bool is_same_lens(const Imager& a, const Imager& b) {
+  return a.width == b.width && a.height == b.height && a.lens.model == b.lens.model &&
+         a.lens.values == b.lens.values;
+}
+
+const Response* find_response(const Rig& rig, const std::string& projector) {
+  const auto found = std::find_if(rig.responses.begin(), rig.responses.end(),
+                                  [&](const Response& r) { return r.projector == projector; });
+  return found == rig.responses.end() ? nullptr : &*found;
+}
+
+Status check_context() {
+  if (epoxy_has_gl_extension("GL_ARB_direct_state_access") && epoxy_gl_version() >= 45) return {};
+  return error("OpenGL: expected a current context of version 4.5 or later, found version {}.{}.",
+               epoxy_gl_version() / 10, epoxy_gl_version() % 10);
+}
+
+// The mask and shares of the part of one owner in what coverage.frag wrote.
+PartCoverage counted(const scene::PosedPart& part, const cv::Mat& seen, std::uint8_t owner) {
+  constexpr std::uint8_t k_projected = 2;  // as in shaders/seen.glsl
+  PartCoverage out{part.slot, part.variant, 0, 0, 0, cv::Mat::zeros(seen.size(), CV_8U)};
+  int projected = 0;
+  for (int row = 0; row < seen.rows; ++row) {
+    for (int column = 0; column < seen.cols; ++column) {
+      const auto& pixel = seen.at<cv::Vec2b>(row, column);
+      if (pixel[0] != owner) continue;
+      const bool is_projected = pixel[1] == k_projected;
+      out.mask.at<std::uint8_t>(row, column) = is_projected ? 255 : 128;
+      ++out.viewer_pixels;
+      projected += is_projected;
+    }
+  }
+  if (out.viewer_pixels > 0) {
+    out.on_surface_share = static_cast<double>(projected) / out.viewer_pixels;
+    out.off_surface_share = 1 - out.on_surface_share;
+  }
+  return out;
+}
+
+}  // namespace
+
+struct Renderer::Impl {
+  Rig rig;
+  std::vector<std::string> slot_names;
+  GpuScene scene;
+  Sights sights;
+  Program points, light_centre, light, coverage, parts_centre, composite;
+  std::vector<GlName> responses;
+  GlName vertex_array;  // without attributes, for whole.vert
+
+  // What was drawn last, so that the same is not drawn again.
+  std::optional<scene::PosedScene> drawn;
+  std::vector<PlacedRun> runs;
+  Pose scene_from_world;
+  enum class EyeKind { none, imager, eye };
+  EyeKind eye_kind = EyeKind::none;
+  Imager eye;
+  std::vector<std::pair<Imager, GpuLens>> lenses;  // of cameras and viewers, the newest last
+  std::map<std::tuple<int, int, GLenum>, Canvas> canvases;
+
+  Impl(const scene::Scene& scene_in, const Rig& rig_in, Sights sights_in)
+      : rig(rig_in), scene(scene_in), sights(std::move(sights_in)) {
+    GLuint name = 0;
+    glCreateVertexArrays(1, &name);
+    vertex_array = GlName(name, [](GLuint n) { glDeleteVertexArrays(1, &n); });
+    for (const scene::Slot& slot : scene_in.slots) slot_names.push_back(slot.name);
+    for (const Imager& projector : rig.projectors) {
+      responses.push_back(make_texture(GL_TEXTURE_2D, GL_RGB32F, k_response_columns, 1));
+      upload(responses.back(), response_table(find_response(rig, projector.name), k_response_columns));
+    }
+  }
+
+  Status link_programs();
+  const GpuLens& lens_of(const Imager& imager);
+  const Canvas& canvas(int width, int height, GLenum format);
+  void prepare(const scene::PosedScene& posed);
+  void look_from_eye(const Imager& viewer);
+  void look_from_imager(const Imager& imager);
+  void set_up(const Program& program, const GpuLens& lens, const Imager* viewer) const;
+  void draw(const Program& program, const Canvas& into) const;
+};
+
+Status Renderer::Impl::link_programs() {
+  const std::pair<Program*, const char*> wanted[] = {
+      {&points, "points.frag"},     {&light_centre, "light_centre.frag"}, {&light, "light.frag"},
+      {&coverage, "coverage.frag"}, {&parts_centre, "parts_centre.frag"}, {&composite, "composite.frag"}};
+  for (const auto& [program, file] : wanted) {
+    LIMN_TRY(*program, Program::link("whole.vert", file));
+  }
+  return {};
+}
+
+const GpuLens& Renderer::Impl::lens_of(const Imager& imager) {
+  for (const auto& [known, lens] : lenses) {
+    if (is_same_lens(known, imager)) return lens;
+  }
+  constexpr std::size_t k_most = 8;  // cameras and viewers of a session
+  if (lenses.size() >= k_most) lenses.erase(lenses.begin());
+  GpuLens lens{baked(imager), {}};
+  lens.tangents = make_texture(GL_TEXTURE_2D, GL_RG32F, lens.baked.tangents.cols, lens.baked.tangents.rows);
+  upload(lens.tangents, lens.baked.tangents);
+  return lenses.emplace_back(imager, std::move(lens)).second;
+}
+
+const Canvas& Renderer::Impl::canvas(int width, int height, GLenum format) {
+  auto& canvas = canvases[{width, height, format}];
+  if (!canvas.texture) canvas = Canvas(width, height, format);
+  return canvas;
+}
+
+void Renderer::Impl::prepare(const scene::PosedScene& posed) {
+  if (drawn && is_same(*drawn, posed)) return;
+  runs = scene.placed(posed);
+  scene_from_world = GpuScene::scene_from_world(posed);
+  scene.place(runs);
+  sights.see_from_projectors(scene, runs, scene_from_world);
+  eye_kind = EyeKind::none;
+  drawn = posed;
+}
+
+void Renderer::Impl::look_from_eye(const Imager& viewer) {
+  if (eye_kind == EyeKind::eye && is_same(eye.imager_from_world, viewer.imager_from_world)) return;
+  const Pose scene_from_viewer = scene_from_world * viewer.imager_from_world.inverse();
+  sights.see_from_eye(scene, runs, scene_from_viewer.translation,
+                      scene_from_viewer.rotation * -Eigen::Vector3d::UnitY());
+  eye_kind = EyeKind::eye;
+  eye = viewer;
+}
+
+void Renderer::Impl::look_from_imager(const Imager& imager) {
+  if (eye_kind == EyeKind::imager && is_same_lens(eye, imager) &&
+      is_same(eye.imager_from_world, imager.imager_from_world)) {
+    return;
+  }
+  sights.see_from_imager(scene, runs, scene_from_world, imager, lens_of(imager).baked);
+  eye_kind = EyeKind::imager;
+  eye = imager;
+}
+
+// `viewer` gives the lamp its place (shaders/look.glsl); null for programs without looks.
+void Renderer::Impl::set_up(const Program& program, const GpuLens& lens, const Imager* viewer) const {
+  scene.bind();
+  sights.bind(program, k_sights_unit);
+  program.bind("s_tangents", k_tangents_unit, lens.tangents);
+  const cv::Mat& tangents = lens.baked.tangents;
+  program.set("u_tangents",
+              Eigen::Vector4f(static_cast<float>(lens.baked.step), static_cast<float>(tangents.cols),
+                              static_cast<float>(tangents.rows), 0));
+  program.bind("s_looks", k_looks_unit, scene.looks());
+  program.set("u_placement_count", scene.owner_count());
+  const auto shown = [&](bool on_surface) {
+    return std::any_of(runs.begin(), runs.end(),
+                       [&](const PlacedRun& r) { return r.owner != 0 && r.on_surface == on_surface; });
+  };
+  program.set("u_has_view_parts", shown(false));
+  program.set("u_has_surface_parts", shown(true));
+  if (!viewer) return;
+  const Eigen::Quaterniond scene_from_viewer =
+      (scene_from_world * viewer->imager_from_world.inverse()).rotation;
+  const auto direction = [&](const Eigen::Vector3d& d_viewer) {
+    const Eigen::Vector3f d = (scene_from_viewer * d_viewer).cast<float>();
+    return Eigen::Vector4f(d.x(), d.y(), d.z(), 0);
+  };
+  program.set("u_d_up", direction(-Eigen::Vector3d::UnitY()));
+  program.set("u_d_lamp", direction(k_d_lamp_viewer));
+}
+
+void Renderer::Impl::draw(const Program& program, const Canvas& into) const {
+  glBindFramebuffer(GL_FRAMEBUFFER, *into.framebuffer);
+  glViewport(0, 0, into.width, into.height);
+  glDisable(GL_DEPTH_TEST);
+  glDisable(GL_SCISSOR_TEST);
+  glDisable(GL_BLEND);
+  glDisable(GL_CULL_FACE);
+  glBindVertexArray(*vertex_array);
+  program.use();
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+Renderer::Renderer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Renderer::Renderer(Renderer&&) noexcept = default;
+Renderer& Renderer::operator=(Renderer&&) noexcept = default;
+Renderer::~Renderer() = default;
+
+Result<Renderer> Renderer::create(const scene::Scene& scene, const Rig& rig) {
+  LIMN_TRY_STATUS(check_context());
+  LIMN_TRY(Sights sights, Sights::create(rig.projectors));
+  auto impl = std::make_unique<Impl>(scene, rig, std::move(sights));
+  LIMN_TRY_STATUS(impl->link_programs());
+  return Renderer(std::move(impl));
+}
+
+cv::Mat Renderer::projector_picture(std::size_t index, const scene::PosedScene& posed, const Imager& viewer) {
+  LIMN_CHECK(index < impl_->rig.projectors.size());
+  const Imager& projector = impl_->rig.projectors[index];
+  impl_->prepare(posed);
+  impl_->look_from_eye(viewer);
+  const Canvas& centre = impl_->canvas(projector.width, projector.height, GL_RGBA32F);
+  const Canvas& display = impl_->canvas(projector.width, projector.height, GL_RGBA8);
+  for (const Program* program : {&impl_->light_centre, &impl_->light}) {
+    impl_->set_up(*program, impl_->sights.projector_lens(index), &viewer);
+    program->set("u_projector", static_cast<int>(index));
+  }
+  impl_->draw(impl_->light_centre, centre);
+  impl_->light.bind("s_centre", k_centre_unit, centre.texture);
+  impl_->light.bind("s_response", k_response_unit, impl_->responses[index]);
+  impl_->draw(impl_->light, display);
+  return read_back(display.framebuffer, projector.width, projector.height, CV_8UC3, GL_BGR);
+}
+
+cv::Mat Renderer::surface_points(std::size_t index, const scene::PosedScene& posed) {
+  LIMN_CHECK(index < impl_->rig.projectors.size());
+  const Imager& projector = impl_->rig.projectors[index];
+  impl_->prepare(posed);
+  const Canvas& canvas = impl_->canvas(projector.width, projector.height, GL_RGBA32F);
+  impl_->set_up(impl_->points, impl_->sights.projector_lens(index), nullptr);
+  impl_->points.set("u_projector", static_cast<int>(index));
+  impl_->draw(impl_->points, canvas);
+  const cv::Mat points = read_back(canvas.framebuffer, projector.width, projector.height, CV_32FC4, GL_RGBA);
+  cv::Mat out(points.size(), CV_32FC3, cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()));
+  for (int row = 0; row < out.rows; ++row) {
+    for (int column = 0; column < out.cols; ++column) {
+      const auto& p = points.at<cv::Vec4f>(row, column);
+      if (p[3] > 0) out.at<cv::Vec3f>(row, column) = {p[0], p[1], p[2]};
+    }
+  }
+  return out;
+}
+
+cv::Mat Renderer::composite(std::size_t camera,
+                            const cv::Mat& picture,
+                            const scene::PosedScene& posed,
+                            Composite what) {
+  LIMN_CHECK(camera < impl_->rig.cameras.size());
+  const Imager& imager = impl_->rig.cameras[camera];
+  LIMN_CHECK(picture.cols == imager.width && picture.rows == imager.height && picture.depth() == CV_8U);
+  impl_->prepare(posed);
+  impl_->look_from_imager(imager);
+  cv::Mat bgr = picture;
+  if (picture.channels() == 1) cv::cvtColor(picture, bgr, cv::COLOR_GRAY2BGR);
+  const GlName behind = make_texture(GL_TEXTURE_2D, GL_RGBA8, bgr.cols, bgr.rows);
+  upload(behind, bgr);
+  const Canvas& centre = impl_->canvas(bgr.cols, bgr.rows, GL_RGBA32F);
+  const Canvas& out = impl_->canvas(bgr.cols, bgr.rows, GL_RGBA8);
+  for (const Program* program : {&impl_->parts_centre, &impl_->composite}) {
+    impl_->set_up(*program, impl_->lens_of(imager), &imager);
+    program->set("u_rest", what == Composite::rest);
+  }
+  impl_->draw(impl_->parts_centre, centre);
+  impl_->composite.bind("s_centre", k_centre_unit, centre.texture);
+  impl_->composite.bind("s_picture", k_picture_unit, behind);
+  impl_->draw(impl_->composite, out);
+  return read_back(out.framebuffer, bgr.cols, bgr.rows, CV_8UC3, GL_BGR);
+}
+
+std::vector<PartCoverage> Renderer::coverage(const scene::PosedScene& posed, const Imager& viewer) {
+  impl_->prepare(posed);
+  impl_->look_from_imager(viewer);
+  const Canvas& canvas = impl_->canvas(viewer.width, viewer.height, GL_RG8);
+  impl_->set_up(impl_->coverage, impl_->lens_of(viewer), &viewer);
+  impl_->draw(impl_->coverage, canvas);
+  const cv::Mat seen = read_back(canvas.framebuffer, viewer.width, viewer.height, CV_8UC2, GL_RG);
+  std::vector<PartCoverage> out;
+  for (const scene::PosedPart& part : posed.parts) {
+    const auto slot = std::find(impl_->slot_names.begin(), impl_->slot_names.end(), part.slot);
+    const auto owner = static_cast<std::uint8_t>(slot - impl_->slot_names.begin() + 1);
+    out.push_back(counted(part, seen, owner));
+  }
+  return out;
+}
+
+}  // namespace limn::projector

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+#include "core/rig.h"
+#include "scene/posed.h"
+#include "scene/scene.h"
+
+namespace limn::projector {
+
+/// What a composite draws of the parts over the camera's picture.
+enum class Composite {
+  rest,  ///< only what light cannot show: the picture shows the rest already
+  full   ///< the whole parts
+};
+
+/// How one part is shown to a viewer.
+struct PartCoverage {
+  std::string slot;
+  std::string variant;
+  int viewer_pixels = 0;         ///< that see the part, not hidden by the prototype or another part
+  double on_surface_share = 0;   ///< of them, shown by projected light; 0 when there are none
+  double off_surface_share = 0;  ///< of them, left to the screen
+  cv::Mat mask;                  ///< CV_8UC1 in the viewer's picture: 255 projected, 128 screen, 0 none
+};
+
+/// Draws a scene for a rig: projector pictures, composites over camera pictures, coverage. Every pixel is a
+/// ray of the true (distorted) lens, met exactly with the triangles that a rasterised picture from the same
+/// eye lists around it. Belongs to the GL context (4.5 core) that is current when it is created; that context
+/// must be current at every call and at destruction. Poses may change from call to call; what did not change
+/// is not drawn again.
+class Renderer {
+ public:
+  /// Copies scene and rig to the GPU. Error: no current GL context of version 4.5, or a driver that refuses
+  /// shaders.
+  static Result<Renderer> create(const scene::Scene& scene, const Rig& rig);
+  Renderer(Renderer&&) noexcept;
+  Renderer& operator=(Renderer&&) noexcept;
+  ~Renderer();
+
+  /// What projector `index` of the rig is to show, CV_8UC3 BGR display values by its measured response
+  /// (gamma 2.2 without). `view` parts are drawn as seen from the viewer's eye, also beyond its picture;
+  /// black elsewhere. Light is shared with the other projectors that reach the same point, so that the sum in
+  /// linear light is the part's colour.
+  cv::Mat projector_picture(std::size_t index, const scene::PosedScene& posed, const Imager& viewer);
+
+  /// CV_32FC3: the prototype's point (its own frame, m) that each pixel of the projector lights; NaN where
+  /// none.
+  cv::Mat surface_points(std::size_t index, const scene::PosedScene& posed);
+
+  /// The parts drawn into a camera's own (distorted) picture, 8-bit grey or BGR of the camera's size; sRGB
+  /// BGR.
+  cv::Mat composite(std::size_t camera,
+                    const cv::Mat& picture,
+                    const scene::PosedScene& posed,
+                    Composite what);
+
+  /// For each posed part, pixel by pixel (at pixel centres): does the ray behind it meet the prototype where
+  /// at least one projector reaches it? A surface part more than 2 mm off the prototype counts as not.
+  std::vector<PartCoverage> coverage(const scene::PosedScene& posed, const Imager& viewer);
+
+ private:
+  struct Impl;
+  explicit Renderer(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace limn::projector

@@ -1,0 +1,82 @@
+#include "projector/shader.h"
+
+#include <algorithm>
+#include <sstream>
+#include <vector>
+
+namespace limn::projector {
+namespace {
+
+// A shader's text with its includes in place; the files in the order of their numbers in #line.
+struct Unrolled {
+  std::string text;
+  std::vector<std::string> files;
+};
+
+Status unroll(const std::string& file, Unrolled* out) {
+  const auto found = embedded_shaders().find(file);
+  if (found == embedded_shaders().end())
+    return error("shaders/{}: expected this file, found none. Build again.", file);
+  const std::size_t number = out->files.size();
+  out->files.push_back(file);
+  std::istringstream lines(found->second);
+  std::string line;
+  if (number > 0) out->text += fmt::format("#line 1 {}\n", number);
+  for (int at = 1; std::getline(lines, line); ++at) {
+    if (line.rfind("#include \"", 0) != 0) {
+      out->text += line + "\n";
+      continue;
+    }
+    const std::string included = line.substr(10, line.rfind('"') - 10);
+    if (std::find(out->files.begin(), out->files.end(), included) != out->files.end()) {
+      out->text += "\n";
+      continue;
+    }
+    LIMN_TRY_STATUS(unroll(included, out));
+    out->text += fmt::format("#line {} {}\n", at + 1, number);
+  }
+  return {};
+}
+
+std::string numbered(const std::vector<std::string>& files) {
+  std::string text;
+  for (std::size_t i = 0; i < files.size(); ++i) text += fmt::format("{} is shaders/{}; ", i, files[i]);
+  return text;
+}
+
+Result<GlName> compile(GLenum stage, const std::string& file) {
+  Unrolled source;
+  LIMN_TRY_STATUS(unroll(file, &source));
+  GlName shader(glCreateShader(stage), [](GLuint n) { glDeleteShader(n); });
+  const char* text = source.text.c_str();
+  glShaderSource(*shader, 1, &text, nullptr);
+  glCompileShader(*shader);
+  GLint ok = 0;
+  glGetShaderiv(*shader, GL_COMPILE_STATUS, &ok);
+  if (ok) return shader;
+  char message[4096] = "";
+  glGetShaderInfoLog(*shader, sizeof(message), nullptr, message);
+  return error("shaders/{}: the graphics driver does not compile it ({}): {}", file, numbered(source.files),
+               message);
+}
+
+}  // namespace
+
+Result<Program> Program::link(const std::string& vertex_file, const std::string& fragment_file) {
+  LIMN_TRY(const GlName vertex, compile(GL_VERTEX_SHADER, vertex_file));
+  LIMN_TRY(const GlName fragment, compile(GL_FRAGMENT_SHADER, fragment_file));
+  Program program;
+  program.name_ = GlName(glCreateProgram(), [](GLuint n) { glDeleteProgram(n); });
+  glAttachShader(*program.name_, *vertex);
+  glAttachShader(*program.name_, *fragment);
+  glLinkProgram(*program.name_);
+  GLint ok = 0;
+  glGetProgramiv(*program.name_, GL_LINK_STATUS, &ok);
+  if (ok) return program;
+  char message[4096] = "";
+  glGetProgramInfoLog(*program.name_, sizeof(message), nullptr, message);
+  return error("shaders/{} and {}: the graphics driver does not link them: {}", vertex_file, fragment_file,
+               message);
+}
+
+}  // namespace limn::projector

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <epoxy/gl.h>
+
+#include <Eigen/Core>
+#include <map>
+#include <string>
+
+#include "core/result.h"
+#include "projector/gl.h"
+
+namespace limn::projector {
+
+/// File name -> text of everything in shaders/, put into the program at build time.
+const std::map<std::string, std::string>& embedded_shaders();
+
+/// A linked vertex and fragment shader.
+class Program {
+ public:
+  /// By file names in shaders/. `#include "x.glsl"` is replaced by the file once, with #line directives, so
+  /// that the driver's messages name the true line. Error: the driver's message with file names.
+  static Result<Program> link(const std::string& vertex_file, const std::string& fragment_file);
+
+  void use() const { glUseProgram(*name_); }
+  void set(const char* uniform, int value) const { glProgramUniform1i(*name_, at(uniform), value); }
+  void set_id(const char* uniform, unsigned value) const { glProgramUniform1ui(*name_, at(uniform), value); }
+  void set(const char* uniform, const Eigen::Vector4f& v) const {
+    glProgramUniform4fv(*name_, at(uniform), 1, v.data());
+  }
+  void set(const char* uniform, const Eigen::Matrix4f& m) const {
+    glProgramUniformMatrix4fv(*name_, at(uniform), 1, GL_FALSE, m.data());
+  }
+  /// Binds a texture to a unit and the sampler to it.
+  void bind(const char* sampler, int unit, const GlName& texture) const {
+    glBindTextureUnit(static_cast<GLuint>(unit), *texture);
+    set(sampler, unit);
+  }
+
+ private:
+  // -1 for a uniform that this program does not use; GL ignores setting it.
+  GLint at(const char* uniform) const { return glGetUniformLocation(*name_, uniform); }
+  GlName name_;
+};
+
+}  // namespace limn::projector

@@ -1,0 +1,187 @@
+#include "projector/sights.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace limn::projector {
+namespace {
+
+constexpr double k_oversampling =
+    1.25;                         // texels of ids a pixel; finds triangles that fall between pixel centres
+constexpr int k_eye_side = 2048;  // texels of the longer side of the eye's ids
+constexpr int k_map_columns = 321,
+              k_map_rows = 241;        // of the pixel maps: 4-5 px a cell, 0.01 px true between
+constexpr double k_soft_border = 0.1;  // of the picture's smaller side, over which a projector fades
+
+Pose sight_pose(const Imager& imager, const Pose& scene_from_world) {
+  return imager.imager_from_world * scene_from_world.inverse();
+}
+
+std::vector<Eigen::Vector3d> bounds_of(const std::vector<PlacedRun>& runs) {
+  std::vector<Eigen::Vector3d> corners;
+  for (const PlacedRun& placed : runs) append_bounds(placed, &corners);
+  return corners;
+}
+
+std::vector<PlacedRun> only(const std::vector<PlacedRun>& runs, bool (*wanted)(const PlacedRun&)) {
+  std::vector<PlacedRun> kept;
+  std::copy_if(runs.begin(), runs.end(), std::back_inserter(kept), wanted);
+  return kept;
+}
+
+bool is_prototype(const PlacedRun& placed) { return placed.owner == 0; }
+bool is_part(const PlacedRun& placed) { return placed.owner != 0; }
+bool is_surface_part(const PlacedRun& placed) { return placed.owner != 0 && placed.on_surface; }
+
+}  // namespace
+
+struct Sights::GpuSight {
+  Eigen::Matrix4f sight_from_scene;
+  Eigen::Vector4f focal_centre, p_eye, size, map, quality;
+
+  GpuSight(const Twin& twin, int first_layer) {
+    sight_from_scene = twin.twin_from_scene.matrix().cast<float>();
+    const auto focal = static_cast<float>(twin.focal);
+    focal_centre << focal, focal, twin.centre.cast<float>();
+    p_eye << twin.twin_from_scene.inverse().translation.cast<float>(), static_cast<float>(first_layer);
+    size << static_cast<float>(twin.width), static_cast<float>(twin.height), 0, 0;
+    map.setZero();
+    quality << focal, 0, 0, 0;
+  }
+  void of_imager(const Imager& imager) {
+    size.tail<2>() << static_cast<float>(imager.width), static_cast<float>(imager.height);
+    quality.x() = static_cast<float>(imager.lens.fx());
+    quality.y() = static_cast<float>(k_soft_border * std::min(imager.width, imager.height));
+  }
+};
+
+Result<Sights> Sights::create(const std::vector<Imager>& projectors) {
+  Sights sights;
+  LIMN_TRY(sights.program_, Program::link("ids.vert", "ids.frag"));
+  sights.projectors_ = projectors;
+  const int count = std::max(1, static_cast<int>(projectors.size()));
+  sights.pixel_maps_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_RG32F, k_map_columns, k_map_rows, count);
+  for (std::size_t i = 0; i < projectors.size(); ++i) {
+    GpuLens lens{baked(projectors[i]), {}};
+    lens.tangents = make_texture(GL_TEXTURE_2D, GL_RG32F, lens.baked.tangents.cols, lens.baked.tangents.rows);
+    upload(lens.tangents, lens.baked.tangents);
+    const cv::Mat map = pixel_map(projectors[i], lens.baked.rect, k_map_columns, k_map_rows);
+    glTextureSubImage3D(*sights.pixel_maps_, 0, 0, 0, static_cast<GLint>(i), map.cols, map.rows, 1, GL_RG,
+                        GL_FLOAT, map.data);
+    const Eigen::Vector2d extent =
+        k_oversampling * projectors[i].lens.fx() * (lens.baked.rect.upper - lens.baked.rect.lower);
+    sights.ids_width_ = std::clamp(static_cast<int>(extent.x()) + 8, sights.ids_width_, 2 * k_eye_side);
+    sights.ids_height_ = std::clamp(static_cast<int>(extent.y()) + 8, sights.ids_height_, 2 * k_eye_side);
+    sights.lenses_.push_back(std::move(lens));
+  }
+  sights.projector_ids_ =
+      make_texture(GL_TEXTURE_2D_ARRAY, GL_R32UI, sights.ids_width_, sights.ids_height_, 2 * count);
+  sights.eye_ids_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_R32UI, k_eye_side, k_eye_side, 2);
+  sights.depth_ =
+      make_depth_buffer(std::max(k_eye_side, sights.ids_width_), std::max(k_eye_side, sights.ids_height_));
+  sights.framebuffer_ = make_framebuffer();
+  glNamedFramebufferRenderbuffer(*sights.framebuffer_, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, *sights.depth_);
+  const std::vector<std::byte> empty((projectors.size() + 1) * sizeof(GpuSight));
+  sights.sights_ = make_buffer(empty.data(), empty.size());
+  return sights;
+}
+
+void Sights::draw(const GpuScene& scene,
+                  const std::vector<PlacedRun>& runs,
+                  const Twin& twin,
+                  const GlName& ids,
+                  int layer) {
+  glNamedFramebufferTextureLayer(*framebuffer_, GL_COLOR_ATTACHMENT0, *ids, 0, layer);
+  glBindFramebuffer(GL_FRAMEBUFFER, *framebuffer_);
+  glViewport(0, 0, twin.width, twin.height);
+  glEnable(GL_SCISSOR_TEST);  // clears what is read, no more
+  glScissor(0, 0, twin.width, twin.height);
+  const GLuint nothing[4] = {};
+  const float farthest = 0;
+  glClearNamedFramebufferuiv(*framebuffer_, GL_COLOR, 0, nothing);
+  glClearNamedFramebufferfv(*framebuffer_, GL_DEPTH, 0, &farthest);
+  glDisable(GL_SCISSOR_TEST);
+  glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+  glEnable(GL_DEPTH_TEST);
+  glDepthMask(GL_TRUE);
+  glDepthFunc(GL_GREATER);
+  glDisable(GL_CULL_FACE);
+  glDisable(GL_BLEND);
+  glBindVertexArray(scene.vertex_array());
+  program_.use();
+  for (const PlacedRun& placed : runs) {
+    const Eigen::Matrix4d clip_from_owner =
+        clip_from_twin(twin) * (twin.twin_from_scene * placed.scene_from_owner).matrix();
+    program_.set("u_clip_from_owner", Eigen::Matrix4f(clip_from_owner.cast<float>()));
+    program_.set_id("u_first_id", static_cast<unsigned>(placed.run->first) + 1);
+    glDrawArrays(GL_TRIANGLES, 3 * placed.run->first, 3 * placed.run->count);
+  }
+  glDisable(GL_DEPTH_TEST);
+}
+
+void Sights::send(std::size_t index, const GpuSight& sight) {
+  glNamedBufferSubData(*sights_, static_cast<GLintptr>(index * sizeof(GpuSight)), sizeof(GpuSight), &sight);
+}
+
+void Sights::see_from_projectors(const GpuScene& scene,
+                                 const std::vector<PlacedRun>& runs,
+                                 const Pose& scene_from_world) {
+  const auto prototype = only(runs, is_prototype);
+  const auto surface_parts = only(runs, is_surface_part);
+  const auto bounds = bounds_of(prototype);
+  for (std::size_t i = 0; i < projectors_.size(); ++i) {
+    const Pose pose = sight_pose(projectors_[i], scene_from_world);
+    const TangentRect& whole = lenses_[i].baked.rect;
+    const Twin twin = twin_over(pose, intersected(whole, spanned(pose, bounds)),
+                                k_oversampling * projectors_[i].lens.fx(), ids_width_, ids_height_);
+    const int layer = 2 * static_cast<int>(i);
+    draw(scene, prototype, twin, projector_ids_, layer);
+    draw(scene, surface_parts, twin, projector_ids_, layer + 1);
+    GpuSight sight(twin, layer);
+    sight.of_imager(projectors_[i]);
+    const Eigen::Vector2d nodes(k_map_columns - 1, k_map_rows - 1);
+    sight.map << whole.lower.cast<float>(), nodes.cwiseQuotient(whole.upper - whole.lower).cast<float>();
+    sight.quality.z() = static_cast<float>(i);
+    send(i, sight);
+  }
+}
+
+void Sights::see_from_imager(const GpuScene& scene,
+                             const std::vector<PlacedRun>& runs,
+                             const Pose& scene_from_world,
+                             const Imager& imager,
+                             const BakedLens& lens) {
+  const Pose pose = sight_pose(imager, scene_from_world);
+  const TangentRect rect = intersected(lens.rect, spanned(pose, bounds_of(runs)));
+  const Twin twin = twin_over(pose, rect, k_oversampling * imager.lens.fx(), k_eye_side, k_eye_side);
+  draw(scene, only(runs, is_prototype), twin, eye_ids_, 0);
+  draw(scene, only(runs, is_part), twin, eye_ids_, 1);
+  GpuSight sight(twin, 0);
+  sight.of_imager(imager);
+  send(projectors_.size(), sight);
+}
+
+void Sights::see_from_eye(const GpuScene& scene,
+                          const std::vector<PlacedRun>& runs,
+                          const Eigen::Vector3d& p_eye_scene,
+                          const Eigen::Vector3d& d_up_scene) {
+  const auto bounds = bounds_of(runs);
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& p : bounds) box.extend(p);
+  const Pose pose = bounds.empty() ? Pose() : looking_at(p_eye_scene, box.center(), d_up_scene);
+  const Twin twin = twin_over(pose, spanned(pose, bounds), 1e9, k_eye_side, k_eye_side);
+  draw(scene, only(runs, is_prototype), twin, eye_ids_, 0);
+  draw(scene, only(runs, is_part), twin, eye_ids_, 1);
+  send(projectors_.size(), GpuSight(twin, 0));
+}
+
+void Sights::bind(const Program& program, int first_unit) const {
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 5, *sights_);
+  program.bind("s_projector_ids", first_unit, projector_ids_);
+  program.bind("s_eye_ids", first_unit + 1, eye_ids_);
+  program.bind("s_pixel_maps", first_unit + 2, pixel_maps_);
+  program.set("u_projector_count", static_cast<int>(projectors_.size()));
+  program.set("u_eye", eye());
+}
+
+}  // namespace limn::projector

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <vector>
+
+#include "projector/bake.h"
+#include "projector/gpu_scene.h"
+#include "projector/shader.h"
+#include "projector/twin.h"
+
+namespace limn::projector {
+
+/// A lens on the GPU.
+struct GpuLens {
+  BakedLens baked;
+  GlName tangents;
+};
+
+/// Id pictures (shaders/ids.frag) from the eyes of all projectors and of one viewer or camera, and where
+/// those eyes are, as shaders/scene.glsl reads them. Layer 2 i of the projectors' ids is the prototype, 2 i +
+/// 1 the surface parts; layer 0 of the eye's ids is the prototype, 1 the parts.
+class Sights {
+ public:
+  static Result<Sights> create(const std::vector<Imager>& projectors);
+
+  /// Draws the projectors' ids of a posed scene.
+  void see_from_projectors(const GpuScene& scene,
+                           const std::vector<PlacedRun>& runs,
+                           const Pose& scene_from_world);
+  /// Draws the ids from an imager's own eye, over its picture.
+  void see_from_imager(const GpuScene& scene,
+                       const std::vector<PlacedRun>& runs,
+                       const Pose& scene_from_world,
+                       const Imager& imager,
+                       const BakedLens& lens);
+  /// Draws the ids from an eye, over everything that is there; `d_up_scene` is any direction but the line of
+  /// sight.
+  void see_from_eye(const GpuScene& scene,
+                    const std::vector<PlacedRun>& runs,
+                    const Eigen::Vector3d& p_eye_scene,
+                    const Eigen::Vector3d& d_up_scene);
+
+  const GpuLens& projector_lens(std::size_t i) const { return lenses_[i]; }
+  /// Index of the eye among the sights of the shaders.
+  int eye() const { return static_cast<int>(projectors_.size()); }
+  /// Binds ids and sights for a program that includes scene.glsl (and reach.glsl).
+  void bind(const Program& program, int first_unit) const;
+
+ private:
+  struct GpuSight;
+  void draw(const GpuScene& scene,
+            const std::vector<PlacedRun>& runs,
+            const Twin& twin,
+            const GlName& ids,
+            int layer);
+  void send(std::size_t index, const GpuSight& sight);
+
+  std::vector<Imager> projectors_;
+  std::vector<GpuLens> lenses_;
+  Program program_;
+  GlName framebuffer_, depth_, projector_ids_, eye_ids_, pixel_maps_, sights_;
+  int ids_width_ = 1, ids_height_ = 1;  // room of the projectors' ids
+};
+
+}  // namespace limn::projector

@@ -1,0 +1,60 @@
+#include "projector/twin.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace limn::projector {
+namespace {
+
+constexpr double k_near = 0.01;           // m; nothing is lit or worn nearer to a lens
+constexpr double k_widest_tangent = 3.7;  // 75 degrees; a flat picture of more is mostly its border
+
+}  // namespace
+
+TangentRect intersected(const TangentRect& a, const TangentRect& b) {
+  return {a.lower.cwiseMax(b.lower), a.upper.cwiseMin(b.upper)};
+}
+
+Twin twin_over(
+    const Pose& twin_from_scene, const TangentRect& rect, double focal, int max_width, int max_height) {
+  Twin twin;
+  twin.twin_from_scene = twin_from_scene;
+  if (rect.is_empty()) return twin;
+  constexpr double k_margin = 2;  // texels around, so that the border has neighbours
+  const Eigen::Vector2d extent = rect.upper - rect.lower;
+  twin.focal =
+      std::min({focal, (max_width - 2 * k_margin) / extent.x(), (max_height - 2 * k_margin) / extent.y()});
+  twin.width = std::min(max_width, static_cast<int>(std::ceil(twin.focal * extent.x() + 2 * k_margin)));
+  twin.height = std::min(max_height, static_cast<int>(std::ceil(twin.focal * extent.y() + 2 * k_margin)));
+  twin.centre = Eigen::Vector2d::Constant(k_margin - 0.5) - twin.focal * rect.lower;
+  return twin;
+}
+
+TangentRect spanned(const Pose& twin_from_scene, std::span<const Eigen::Vector3d> points) {
+  const Eigen::Vector2d widest = Eigen::Vector2d::Constant(k_widest_tangent);
+  TangentRect rect{widest, -widest};
+  for (const Eigen::Vector3d& p_scene : points) {
+    const Eigen::Vector3d p = twin_from_scene * p_scene;
+    if (p.z() < 2 * k_near) return {-widest, widest};
+    const Eigen::Vector2d tangent = p.head<2>() / p.z();
+    rect.lower = rect.lower.cwiseMin(tangent);
+    rect.upper = rect.upper.cwiseMax(tangent);
+  }
+  rect.lower = rect.lower.cwiseMax(-widest);
+  rect.upper = rect.upper.cwiseMin(widest);
+  return rect;
+}
+
+Eigen::Matrix4d clip_from_twin(const Twin& twin) {
+  // GL's window coordinate of a pixel centre is the pixel's number plus one half.
+  Eigen::Matrix4d clip = Eigen::Matrix4d::Zero();
+  clip(0, 0) = 2 * twin.focal / twin.width;
+  clip(0, 2) = 2 * (twin.centre.x() + 0.5) / twin.width - 1;
+  clip(1, 1) = 2 * twin.focal / twin.height;
+  clip(1, 2) = 2 * (twin.centre.y() + 0.5) / twin.height - 1;
+  clip(2, 3) = k_near;
+  clip(3, 2) = 1;
+  return clip;
+}
+
+}  // namespace limn::projector

@@ -1,0 +1,36 @@
+// Surface parts on the prototype: found along the prototype's normal.
+
+const float k_on_surface = 0.002;  // m; a surface part within this of the prototype is on it
+
+bool may_hold_surface_part(vec3 p, int placement_count) {
+  for (int i = 1; i < placement_count; ++i) {
+    Owner owner = s_placements[i];
+    if (owner.lower.w < 0.5 || owner.upper.w < 0.5) continue;
+    vec3 q = (owner.owner_from_scene * vec4(p, 1)).xyz;
+    if (all(greaterThan(q, owner.lower.xyz - k_on_surface)) && all(lessThan(q, owner.upper.xyz + k_on_surface))) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// The surface part on the prototype's point p with unit normal d_normal: the hit of the normal line with a triangle
+// within 2 mm, nearest first. The triangles tried are those that the sight sees around the line.
+Hit surface_part_at(usampler2DArray s_ids, Sight sight, vec3 p, vec3 d_normal) {
+  const float k_heights[5] = float[](0.0, 0.5, -0.5, 1.0, -1.0);
+  Hit best = k_no_hit;
+  uint tried = 0u;
+  for (int i = 0; i < 5; ++i) {
+    uvec4 ids = ids_around(s_ids, sight, 1, p + k_heights[i] * k_on_surface * d_normal - sight.p_eye.xyz);
+    for (int k = 0; k < 4; ++k) {
+      uint id = ids[k];
+      if (id == 0u || id == tried) continue;
+      tried = id;
+      if (s_placements[owner_of(id)].upper.w < 0.5) continue;
+      Hit hit;
+      if (!plane_hit(id, p, d_normal, hit) || !is_inside(hit)) continue;
+      if (abs(hit.t) <= k_on_surface && abs(hit.t) < abs(best.t)) best = hit;
+    }
+  }
+  return best;
+}

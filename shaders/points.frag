@@ -1,0 +1,14 @@
+#version 450 core
+// The prototype's point that each pixel of a projector lights, in the scene's frame; w: 0 where there is none.
+#include "scene.glsl"
+#include "lens.glsl"
+layout(location = 0) out vec4 o_point;
+uniform usampler2DArray s_projector_ids;
+uniform int u_projector;
+
+void main() {
+  Sight projector = s_sights[u_projector];
+  vec3 d = ray_of(projector, floor(gl_FragCoord.xy));
+  Hit hit = first_hit(s_projector_ids, projector, 0, d);
+  o_point = hit.id == 0u ? vec4(0) : vec4(projector.p_eye.xyz + hit.t * d, 1);
+}

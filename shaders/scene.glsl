@@ -1,0 +1,143 @@
+// The triangles of the prototype and of every variant, and where they stand. A triangle's number counts from 0 over
+// all of them; an id is the number + 1, so that 0 means none. "scene" is the frame that rays are cast in.
+
+layout(std430, binding = 0) readonly buffer Corners { vec4 s_corners[]; };  // 3 a triangle: p in its owner's frame, u
+layout(std430, binding = 1) readonly buffer Normals { vec4 s_normals[]; };  // 3 a triangle: unit normal, v
+layout(std430, binding = 2) readonly buffer Owners { uvec2 s_owners[]; };   // owner (0 prototype, slot + 1), material
+
+struct Material {
+  vec4 colour;  // linear light; a: 1 when unlit
+  vec4 look;    // x: texture layer, -1 when it has none
+};
+layout(std430, binding = 3) readonly buffer Materials { Material s_materials[]; };
+
+struct Owner {
+  mat4 owner_from_scene;
+  vec4 lower;  // of its bounds, owner frame; w: 1 when it is shown
+  vec4 upper;  // w: 1 when its mode is surface
+};
+layout(std430, binding = 4) readonly buffer Placements { Owner s_placements[]; };
+
+// A place that rays start from, with the ids that a pinhole picture from there holds: layer 0 the prototype, layer 1
+// the parts. Pixel (0,0) is the centre of the top-left texel.
+struct Sight {
+  mat4 sight_from_scene;
+  vec4 focal_centre;  // fx, fy, cx, cy of the pinhole picture
+  vec4 p_eye;         // scene frame; w: first layer of its ids
+  vec4 size;          // of the pinhole picture; zw: of the imager's own picture
+  vec4 map;           // tangents of the first node of the imager's pixel map, nodes per tangent
+  vec4 quality;       // focal length of the imager (px), width of the soft border (px), layer of its pixel map
+};
+layout(std430, binding = 5) readonly buffer Sights { Sight s_sights[]; };
+
+struct Hit {
+  uint id;       // 0: nothing
+  float t;       // metres along the unit direction
+  vec3 weights;  // barycentric
+};
+const Hit k_no_hit = Hit(0u, 1e30, vec3(0));
+
+const float k_edge_slack = 1e-4;   // barycentric; closes the cracks that rounding opens between neighbours
+const float k_same_place = 1e-4;   // m; nearer than this two hits are one surface
+
+uint owner_of(uint id) { return s_owners[id - 1u].x; }
+
+vec3 to_owner(uint owner, vec3 p) { return (s_placements[owner].owner_from_scene * vec4(p, 1)).xyz; }
+vec3 turned_to_owner(uint owner, vec3 d) { return mat3(s_placements[owner].owner_from_scene) * d; }
+vec3 turned_to_scene(uint owner, vec3 d) { return d * mat3(s_placements[owner].owner_from_scene); }
+
+// Where the ray meets the plane of a triangle (scene frame, d of unit length). False when it runs along it.
+bool plane_hit(uint id, vec3 p_origin, vec3 d, out Hit hit) {
+  uint owner = owner_of(id);
+  vec3 o = to_owner(owner, p_origin);
+  vec3 w = turned_to_owner(owner, d);
+  uint first = 3u * (id - 1u);
+  vec3 a = s_corners[first].xyz - o;
+  vec3 ab = s_corners[first + 1u].xyz - o - a;
+  vec3 ac = s_corners[first + 2u].xyz - o - a;
+  vec3 n = cross(ab, ac);
+  float along = dot(n, w);
+  hit = k_no_hit;
+  if (along == 0.0) return false;
+  hit.id = id;
+  hit.t = dot(n, a) / along;
+  vec3 m = cross(w, a);  // twice the signed areas seen from the ray
+  hit.weights.y = -dot(m, ac) / along;
+  hit.weights.z = dot(m, ab) / along;
+  hit.weights.x = 1.0 - hit.weights.y - hit.weights.z;
+  return true;
+}
+
+bool is_inside(Hit hit) { return all(greaterThanEqual(hit.weights, vec3(-k_edge_slack))); }
+
+// Whether a triangle is smaller than two texels of the sight: then its neighbours' ids may hide it.
+bool is_small(uint id, float t, Sight sight) {
+  uint first = 3u * (id - 1u);
+  vec3 a = s_corners[first].xyz, b = s_corners[first + 1u].xyz, c = s_corners[first + 2u].xyz;
+  float side = max(distance(a, b), max(distance(b, c), distance(c, a)));
+  return side * sight.focal_centre.x < 2.0 * t;
+}
+
+// Texels around the direction d: ids, the nearest first.
+uvec4 ids_around(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
+  vec3 q = mat3(sight.sight_from_scene) * d;
+  if (q.z <= 0.0) return uvec4(0);
+  vec2 px = sight.focal_centre.xy * q.xy / q.z + sight.focal_centre.zw;
+  if (any(lessThan(px, vec2(-1))) || any(greaterThan(px, sight.size.xy))) return uvec4(0);
+  ivec2 near = ivec2(floor(px + 0.5));
+  ivec2 beside = ivec2(px.x < float(near.x) ? -1 : 1, px.y < float(near.y) ? -1 : 1);
+  ivec2 last = ivec2(sight.size.xy) - 1;
+  int z = int(sight.p_eye.w) + layer;
+  uvec4 ids;
+  ids.x = texelFetch(s_ids, ivec3(clamp(near, ivec2(0), last), z), 0).x;
+  ids.y = texelFetch(s_ids, ivec3(clamp(near + ivec2(beside.x, 0), ivec2(0), last), z), 0).x;
+  ids.z = texelFetch(s_ids, ivec3(clamp(near + ivec2(0, beside.y), ivec2(0), last), z), 0).x;
+  ids.w = texelFetch(s_ids, ivec3(clamp(near + beside, ivec2(0), last), z), 0).x;
+  return ids;
+}
+
+// First surface that the ray from the sight's eye meets: exactly, by intersecting the triangles that the texels
+// around it saw. Triangles smaller than texels can all be missed: then the plane of the nearest texel's serves.
+Hit first_hit(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
+  uvec4 ids = ids_around(s_ids, sight, layer, d);
+  Hit best = k_no_hit;
+  if (ids == uvec4(0)) return best;
+  for (int k = 0; k < 4; ++k) {
+    uint id = ids[k];
+    if (id == 0u || (k > 0 && id == ids[0]) || (k > 1 && id == ids[1])) continue;
+    Hit hit;
+    if (plane_hit(id, sight.p_eye.xyz, d, hit) && is_inside(hit) && hit.t > 0.0 && hit.t < best.t) best = hit;
+  }
+  if (best.id != 0u || ids.x == 0u) return best;
+  Hit hit;
+  if (!plane_hit(ids.x, sight.p_eye.xyz, d, hit) || hit.t <= 0.0) return best;
+  if (any(equal(ids, uvec4(0))) && !is_small(ids.x, hit.t, sight)) return best;
+  hit.weights = max(hit.weights, vec3(0));
+  hit.weights /= hit.weights.x + hit.weights.y + hit.weights.z;
+  return hit;
+}
+
+// Whether the prototype hides p (a point on it) from the sight's eye.
+bool is_hidden(usampler2DArray s_ids, Sight sight, vec3 p) {
+  vec3 d = p - sight.p_eye.xyz;
+  float t = length(d);
+  Hit hit = first_hit(s_ids, sight, 0, d / t);
+  bool exact = hit.id != 0u && all(greaterThan(hit.weights, vec3(0)));
+  float slack = k_same_place + (exact ? 1e-5 * t : 2.0 * t / sight.focal_centre.x);
+  return hit.id != 0u && hit.t < t - slack;
+}
+
+// Unit normal of the triangle itself, scene frame.
+vec3 flat_normal(uint id) {
+  uint first = 3u * (id - 1u);
+  vec3 a = s_corners[first].xyz;
+  vec3 n = cross(s_corners[first + 1u].xyz - a, s_corners[first + 2u].xyz - a);
+  return turned_to_scene(owner_of(id), normalize(n));
+}
+
+// Unit normal interpolated from the corners, scene frame.
+vec3 smooth_normal(Hit hit) {
+  uint first = 3u * (hit.id - 1u);
+  vec3 n = mat3(s_normals[first].xyz, s_normals[first + 1u].xyz, s_normals[first + 2u].xyz) * hit.weights;
+  return turned_to_scene(owner_of(hit.id), normalize(n));
+}
