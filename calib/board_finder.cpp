@@ -27,6 +27,7 @@ constexpr double k_min_square_px = 8;      // smaller squares leave too few pixe
 struct Expected {
   int id = 0;
   Vector2d px, right, down;
+  bool black_up_left = true;  // the square between -right and -down
 };
 
 double erf_slope(double x) { return 2 / std::sqrt(std::numbers::pi) * std::exp(-x * x); }
@@ -178,8 +179,7 @@ std::optional<BoardCorner> refined(const Board& board, const cv::Mat& grey, Expe
     if (!((at.px - px_start).norm() < k_max_shift * side)) return std::nullopt;
   }
   const double half = fit->junction.v[8];
-  const int column = at.id % (board.columns - 1), row = at.id / (board.columns - 1);
-  const bool sign_fits = (half < 0) == board.is_black(column, row);
+  const bool sign_fits = (half < 0) == at.black_up_left;
   if (!sign_fits || std::abs(half) < k_min_half_contrast) return std::nullopt;
   if (fit->residual > k_max_residual * std::abs(half)) return std::nullopt;
   const bool seen =
@@ -199,7 +199,7 @@ std::vector<Expected> expected_on_grid(const std::vector<cv::Point2f>& grid, int
       const int c0 = std::max(column - 1, 0), c1 = std::min(column + 1, across - 1);
       const int r0 = std::max(row - 1, 0), r1 = std::min(row + 1, down - 1);
       expected.push_back({row * across + column, at(column, row), (at(c1, row) - at(c0, row)) / (c1 - c0),
-                          (at(column, r1) - at(column, r0)) / (r1 - r0)});
+                          (at(column, r1) - at(column, r0)) / (r1 - r0), true});
     }
   }
   return expected;
@@ -241,7 +241,13 @@ std::vector<Expected> find_chessboard(const Board& board, const cv::Mat& grey) {
                                  cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE) &&
       !cv::findChessboardCornersSB(grey, inner, grid, cv::CALIB_CB_NORMALIZE_IMAGE))
     return {};
-  return expected_on_grid(uprighted(grey, grid, inner.width, inner.height), inner.width, inner.height);
+  std::vector<Expected> expected =
+      expected_on_grid(uprighted(grey, grid, inner.width, inner.height), inner.width, inner.height);
+  // Boards that look the same when turned are printed with either colour first.
+  const bool black_first = first_square_is_black(grey, expected);
+  for (Expected& at : expected)
+    at.black_up_left = board.is_black(at.id % inner.width, at.id / inner.width) == black_first;
+  return expected;
 }
 
 // A marker seen: its square and its corners, in units of squares and in pixels.
@@ -316,7 +322,8 @@ std::optional<Expected> expected_beside(const Board& board, const std::vector<Se
       {x, y}, {x + 0.5F, y}, {x - 0.5F, y}, {x, y + 0.5F}, {x, y - 0.5F}};
   std::vector<cv::Point2f> found;
   cv::perspectiveTransform(places, found, h);
-  return Expected{id, to_vector(found[0]), to_vector(found[1] - found[2]), to_vector(found[3] - found[4])};
+  return Expected{id, to_vector(found[0]), to_vector(found[1] - found[2]), to_vector(found[3] - found[4]),
+                  board.is_black(column, row)};
 }
 
 std::vector<Expected> find_charuco(const Board& board, const cv::Mat& grey) {

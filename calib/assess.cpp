@@ -1,0 +1,288 @@
+#include "calib/assess.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <set>
+
+#include "core/log.h"
+
+namespace limn::calib {
+namespace {
+
+using Eigen::Vector2d;
+
+constexpr int k_coverage_grid = 10;
+constexpr double k_little_tilt_deg = 10;  // boards closer than this to one plane do not fix the focal length
+constexpr double k_low_share = 0.5;       // of lit pixels decoded
+constexpr double k_low_coverage = 0.25;
+constexpr double k_odd_pose = 2.5;  // held-out RMS of a pose over the median of the others
+constexpr int k_few_poses = 5;
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+std::vector<int> scored_poses(const Observations& observations) {
+  std::set<int> poses;
+  for (const Match& match : observations.matches) poses.insert(match.pose);
+  return {poses.begin(), poses.end()};
+}
+
+// Distance on the board between the match's point and where the projector's light of that pixel lands: the
+// pixel error times the local scale of the mapping from the board's plane to projector pixels.
+double error_on_board(const Observations& observations,
+                      const Solution& solution,
+                      const Pose& world_from_board,
+                      const Match& match,
+                      const Vector2d& residual) {
+  const auto p = surface_point(observations, solution, world_from_board, match);
+  if (!p) return std::numeric_limits<double>::quiet_NaN();
+  const Imager& projector = solution.rig.projectors[static_cast<size_t>(match.projector)];
+  constexpr double k_step = 1e-4;  // m
+  Eigen::Matrix2d px_by_m;
+  const auto at = projector.project(*p);
+  for (int axis = 0; axis < 2; ++axis) {
+    const auto moved =
+        projector.project(*p + k_step * (world_from_board.rotation * Eigen::Vector3d::Unit(axis)));
+    if (!at || !moved) return std::numeric_limits<double>::quiet_NaN();
+    px_by_m.col(axis) = (*moved - *at) / k_step;
+  }
+  return (px_by_m.inverse() * residual).norm();
+}
+
+struct Score {
+  double squared = 0;
+  int cells = 0;
+};
+
+Result<Score> score_pose(const Observations& observations,
+                         const Solution& solution,
+                         int pose,
+                         HeldOut* into) {
+  LIMN_TRY(const Pose world_from_board, board_pose_from_cameras(observations, solution, pose));
+  Score score;
+  for (size_t i = 0; i < observations.matches.size(); ++i) {
+    const Match& match = observations.matches[i];
+    if (match.pose != pose) continue;
+    const auto px = predicted(observations, solution, world_from_board, match);
+    if (!px) continue;
+    into->residuals[i] = *px - match.px_projector;
+    into->errors_m[i] = error_on_board(observations, solution, world_from_board, match, into->residuals[i]);
+    score.squared += into->residuals[i].squaredNorm();
+    ++score.cells;
+  }
+  return score;
+}
+
+// Accumulates one device's points.
+struct Tally {
+  DeviceQuality quality;
+  double squared = 0;
+  std::set<int> cells;
+
+  void take(const Vector2d& px, const CapturedDevice& device, const Vector2d& residual, bool outlier) {
+    const int x =
+        std::clamp(static_cast<int>((px.x() + 0.5) / device.width * k_coverage_grid), 0, k_coverage_grid - 1);
+    const int y = std::clamp(static_cast<int>((px.y() + 0.5) / device.height * k_coverage_grid), 0,
+                             k_coverage_grid - 1);
+    cells.insert(y * k_coverage_grid + x);
+    ++quality.points;
+    if (outlier) {
+      ++quality.outliers;
+    } else {
+      squared += residual.squaredNorm();
+    }
+  }
+  DeviceQuality finished(const std::string& name) {
+    quality.name = name;
+    const int inliers = quality.points - quality.outliers;
+    quality.rms_px = inliers > 0 ? std::sqrt(squared / inliers) : 0;
+    quality.coverage = static_cast<double>(cells.size()) / (k_coverage_grid * k_coverage_grid);
+    return quality;
+  }
+};
+
+std::vector<DeviceQuality> device_qualities(const Observations& observations, const Solution& solution) {
+  std::vector<Tally> cameras(observations.cameras.size()), projectors(observations.projectors.size());
+  for (size_t i = 0; i < observations.corners.size(); ++i) {
+    const CornerSeen& seen = observations.corners[i];
+    const auto camera = static_cast<size_t>(seen.camera);
+    cameras[camera].take(seen.px, observations.cameras[camera], solution.corner_residuals[i],
+                         solution.corner_outlier[i]);
+  }
+  for (size_t i = 0; i < observations.matches.size(); ++i) {
+    const Match& match = observations.matches[i];
+    const auto projector = static_cast<size_t>(match.projector);
+    projectors[projector].take(match.px_projector, observations.projectors[projector],
+                               solution.match_residuals[i], solution.match_outlier[i]);
+  }
+  std::vector<DeviceQuality> qualities;
+  for (size_t i = 0; i < cameras.size(); ++i)
+    qualities.push_back(cameras[i].finished(observations.cameras[i].name));
+  for (size_t i = 0; i < projectors.size(); ++i)
+    qualities.push_back(projectors[i].finished(observations.projectors[i].name));
+  return qualities;
+}
+
+std::vector<double> errors_by_projector(const Observations& observations, const HeldOut& score) {
+  std::vector<std::vector<double>> errors(observations.projectors.size());
+  for (size_t i = 0; i < observations.matches.size(); ++i) {
+    if (std::isfinite(score.errors_m[i]))
+      errors[static_cast<size_t>(observations.matches[i].projector)].push_back(score.errors_m[i] * 1e3);
+  }
+  std::vector<double> p95;
+  for (auto& list : errors) {
+    std::sort(list.begin(), list.end());
+    p95.push_back(list.empty() ? std::numeric_limits<double>::infinity()
+                               : list[static_cast<size_t>(0.95 * static_cast<double>(list.size() - 1))]);
+  }
+  return p95;
+}
+
+void note_board(const Observations& observations, std::vector<Fault>* faults) {
+  for (int pose = 0; pose < static_cast<int>(observations.poses.size()); ++pose) {
+    const bool seen = std::any_of(observations.corners.begin(), observations.corners.end(),
+                                  [&](const CornerSeen& corner) { return corner.pose == pose; });
+    if (!seen)
+      faults->push_back(
+          {"board_not_visible",
+           fmt::format("no camera sees the board in {}", observations.poses[static_cast<size_t>(pose)]),
+           "a scene capture is fine; otherwise light the board and keep it in the picture"});
+  }
+}
+
+void note_geometry(const Observations& observations, const Solution& solution, std::vector<Fault>* faults) {
+  double largest = 0;
+  int poses = 0;
+  for (const auto& a : solution.world_from_board) {
+    if (!a) continue;
+    ++poses;
+    for (const auto& b : solution.world_from_board) {
+      if (!b) continue;
+      const double cosine =
+          (a->rotation * Eigen::Vector3d::UnitZ()).dot(b->rotation * Eigen::Vector3d::UnitZ());
+      largest = std::max(largest, std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / std::numbers::pi);
+    }
+  }
+  if (poses < k_few_poses)
+    faults->push_back({"few_poses", fmt::format("{} board poses of {}", poses, observations.poses.size()),
+                       "capture at least 8, tilted to different sides, at the working distance"});
+  if (largest < k_little_tilt_deg)
+    faults->push_back({"little_tilt",
+                       fmt::format("the boards' planes differ by at most {:.1f} degrees", largest),
+                       "tilt the board by 20 to 45 degrees to different sides"});
+}
+
+void note_pictures(const Observed& observed, const Assessment& assessment, std::vector<Fault>* faults) {
+  const Observations& observations = observed.observations;
+  for (const DecodeShare& share : observed.decoded) {
+    const double part = share.lit > 0 ? static_cast<double>(share.decoded) / share.lit : 0;
+    if (part < k_low_share)
+      faults->push_back(
+          {"low_decode",
+           fmt::format("{} of {} in {}: {:.0f} % of {} lit pixels decoded",
+                       observations.cameras[static_cast<size_t>(share.camera)].name,
+                       observations.projectors[static_cast<size_t>(share.projector)].name,
+                       observations.poses[static_cast<size_t>(share.pose)], 100 * part, share.lit),
+           "focus the projector, darken the room, raise the exposure without saturating"});
+  }
+  for (const DeviceQuality& device : assessment.devices) {
+    if (device.coverage < k_low_coverage)
+      faults->push_back(
+          {"low_coverage",
+           fmt::format("{}: observations in {:.0f} % of the picture", device.name, 100 * device.coverage),
+           "bring the board to the corners of the picture, too"});
+  }
+}
+
+void note_odd_poses(const HeldOut& score, std::vector<Fault>* faults) {
+  for (const HeldOutPose& pose : score.poses) {
+    std::vector<double> others;
+    for (const HeldOutPose& other : score.poses) {
+      if (other.pose != pose.pose) others.push_back(other.rms_px);
+    }
+    if (others.size() < 3 || pose.rms_px < k_odd_pose * median(others) || pose.rms_px < k_good_px) continue;
+    faults->push_back(
+        {"odd_pose",
+         fmt::format("{}: held-out {:.2f} px, the others' median {:.2f} px", pose.pose, pose.rms_px,
+                     median(others)),
+         "the board or a device may have moved while it was captured; try --skip-poses " + pose.pose});
+  }
+}
+
+}  // namespace
+
+std::string to_text(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::good:
+      return "good";
+    case Verdict::usable:
+      return "usable";
+    case Verdict::reject:
+      break;
+  }
+  return "reject";
+}
+
+Result<HeldOut> held_out(const Observations& observations,
+                         const SolveOptions& options,
+                         const Solution& solution) {
+  const Vector2d none = Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  HeldOut score;
+  score.residuals.assign(observations.matches.size(), none);
+  score.errors_m.assign(observations.matches.size(), none.x());
+  const std::vector<int> poses = scored_poses(observations);
+  Score total;
+  for (const int pose : poses) {
+    const std::string& name = observations.poses[static_cast<size_t>(pose)];
+    const auto left = solve(without_pose(observations, pose), options, &solution);
+    if (!left) return error("held-out solve without {}: {}", name, left.message());
+    const auto scored = score_pose(observations, *left, pose, &score);
+    if (!scored) return error("held-out pose {}: {}", name, scored.message());
+    if (scored->cells == 0) continue;
+    const double rms = std::sqrt(scored->squared / scored->cells);
+    score.poses.push_back({name, rms, scored->cells});
+    score.worst_px = std::max(score.worst_px, rms);
+    total.squared += scored->squared;
+    total.cells += scored->cells;
+  }
+  if (total.cells == 0)
+    return error("held-out: no match of any pose could be predicted. Capture more board poses.");
+  score.rms_px = std::sqrt(total.squared / total.cells);
+  return score;
+}
+
+Result<Assessment> assess(const Observed& observed, const SolveOptions& options, const Solution& solution) {
+  const Observations& observations = observed.observations;
+  Assessment assessment;
+  LIMN_TRY(assessment.held_out, held_out(observations, options, solution));
+  assessment.devices = device_qualities(observations, solution);
+  assessment.predicted_error_mm = errors_by_projector(observations, assessment.held_out);
+  double lit = 0, decoded = 0;
+  for (const DecodeShare& share : observed.decoded) {
+    lit += share.lit;
+    decoded += share.decoded;
+    assessment.decode_outliers += share.outliers;
+  }
+  assessment.decoded_share = lit > 0 ? decoded / lit : 0;
+  note_board(observations, &assessment.faults);
+  note_geometry(observations, solution, &assessment.faults);
+  note_pictures(observed, assessment, &assessment.faults);
+  note_odd_poses(assessment.held_out, &assessment.faults);
+  const double px = assessment.held_out.rms_px;
+  const double mm =
+      *std::max_element(assessment.predicted_error_mm.begin(), assessment.predicted_error_mm.end());
+  if (px <= k_good_px && mm <= k_good_mm) {
+    assessment.verdict = Verdict::good;
+  } else if (px <= k_usable_px && mm <= k_usable_mm) {
+    assessment.verdict = Verdict::usable;
+  }
+  return assessment;
+}
+
+}  // namespace limn::calib

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "calib/observations.h"
+#include "calib/solve.h"
+#include "core/result.h"
+
+namespace limn::calib {
+
+/// How well one board pose is foretold by a solve that has not seen it.
+struct HeldOutPose {
+  std::string pose;
+  double rms_px = 0;
+  int cells = 0;
+};
+
+struct HeldOut {
+  double rms_px = 0;    ///< over all cells of all poses; RMS of the 2-vector
+  double worst_px = 0;  ///< of the poses' RMS
+  std::vector<HeldOutPose> poses;
+  /// Parallel to Observations::matches: predicted minus measured projector pixel (NaN where not scored), and
+  /// the same error as a distance on the board's surface, m.
+  std::vector<Eigen::Vector2d> residuals;
+  std::vector<double> errors_m;
+};
+
+/// Leaves out each board pose in turn: solves without it, takes its pose from the camera's corners alone and
+/// predicts the projector pixels of its matches (each the average over a cell of the board).
+Result<HeldOut> held_out(const Observations& observations,
+                         const SolveOptions& options,
+                         const Solution& solution);
+
+struct DeviceQuality {
+  std::string name;
+  double rms_px = 0;  ///< per point, over inliers
+  int points = 0;
+  int outliers = 0;
+  double coverage = 0;  ///< share of a 10 x 10 grid over the picture with at least one observation
+};
+
+struct Fault {
+  std::string name;      ///< stable, for programs: board_not_visible, little_tilt, …
+  std::string evidence;  ///< with numbers
+  std::string advice;
+};
+
+enum class Verdict { good, usable, reject };
+std::string to_text(Verdict verdict);
+
+struct Assessment {
+  Verdict verdict = Verdict::reject;
+  std::vector<DeviceQuality> devices;
+  HeldOut held_out;
+  /// 95 % of the held-out errors on the board's surface, mm, at the distances of the captured boards: a
+  /// measured error, model error included, not a propagated covariance. One for each projector.
+  std::vector<double> predicted_error_mm;
+  double decoded_share = 0;  ///< of lit pixels
+  int decode_outliers = 0;
+  std::vector<Fault> faults;
+};
+
+/// Limits of the verdict. Good: a part's edge lands within a pixel and a millimetre wherever the board was;
+/// usable: within what an eye at arm's length forgives.
+constexpr double k_good_px = 0.5, k_good_mm = 1.0;
+constexpr double k_usable_px = 1.5, k_usable_mm = 3.0;
+
+Result<Assessment> assess(const Observed& observed, const SolveOptions& options, const Solution& solution);
+
+}  // namespace limn::calib

@@ -1,0 +1,279 @@
+#include "calib/observations.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "core/file.h"
+#include "core/frame.h"
+#include "core/log.h"
+#include "core/picture.h"
+
+namespace limn::calib {
+namespace {
+
+using Eigen::Vector2d;
+
+constexpr int k_cells = 2;          // to a square's side, as interfaces.md's held-out score averages
+constexpr double k_inset_px = 2;    // from a square's edge: pixels across it see the light of one side only
+constexpr double k_inset = 0.06;    // of a square, likewise
+constexpr int k_least_pixels = 12;  // in a cell: three times a plane's unknowns and some
+constexpr double k_least_share = 0.2;  // of a cell's pixels with a label; fewer are a glint or a dark square
+constexpr double k_outlier_px = 3;     // from the cell's plane
+constexpr double k_stddev_floor_px = 0.02;
+
+// Pixel of every grid point (column, row of squares' corners, rim included) that corners nearby tell.
+class Grid {
+ public:
+  Grid(const Board& board, const std::vector<BoardCorner>& corners) : board_(board), corners_(corners) {
+    for (int row = 0; row <= board.rows; ++row) {
+      for (int column = 0; column <= board.columns; ++column) points_.push_back(place(column, row));
+    }
+  }
+  const std::optional<Vector2d>& at(int column, int row) const {
+    return points_[static_cast<size_t>(row * (board_.columns + 1) + column)];
+  }
+
+ private:
+  std::pair<int, int> grid_of(const BoardCorner& corner) const {
+    return {corner.id % (board_.columns - 1) + 1, corner.id / (board_.columns - 1) + 1};
+  }
+
+  std::optional<Vector2d> place(int column, int row) const {
+    constexpr size_t k_nearest = 12;
+    std::vector<std::pair<int, const BoardCorner*>> near;
+    for (const BoardCorner& corner : corners_) {
+      const auto [c, r] = grid_of(corner);
+      if (c == column && r == row) return corner.px;
+      const int distance = (c - column) * (c - column) + (r - row) * (r - row);
+      if (distance <= 18) near.emplace_back(distance, &corner);
+    }
+    std::stable_sort(near.begin(), near.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    if (near.size() < 6 || near.front().first > 2) return std::nullopt;
+    near.resize(std::min(near.size(), k_nearest));
+    return extrapolated(near, column, row);
+  }
+
+  std::optional<Vector2d> extrapolated(const std::vector<std::pair<int, const BoardCorner*>>& near,
+                                       int column,
+                                       int row) const {
+    std::vector<cv::Point2d> squares, px;
+    for (const auto& [distance, corner] : near) {
+      const auto [c, r] = grid_of(*corner);
+      squares.emplace_back(c - column, r - row);
+      px.emplace_back(corner->px.x(), corner->px.y());
+    }
+    const cv::Mat h = cv::findHomography(squares, px, 0);
+    if (h.empty()) return std::nullopt;
+    const Vector2d found(h.at<double>(0, 2) / h.at<double>(2, 2), h.at<double>(1, 2) / h.at<double>(2, 2));
+    const Vector2d nearest = near.front().second->px;
+    const double side = (near[0].second->px - near[1].second->px).norm();
+    if (!found.allFinite() || (found - nearest).norm() > 4 * side)
+      return std::nullopt;  // corners on one line
+    return found;
+  }
+
+  const Board& board_;
+  const std::vector<BoardCorner>& corners_;
+  std::vector<std::optional<Vector2d>> points_;
+};
+
+struct Labelled {
+  Vector2d px, label;
+  double weight = 0;
+};
+
+// A robust plane through a cell's labels; the means of what fits.
+std::optional<Match> fitted(std::vector<Labelled> pixels) {
+  for (int pass = 0; pass < 3; ++pass) {
+    if (static_cast<int>(pixels.size()) < k_least_pixels) return std::nullopt;
+    double total = 0;
+    Vector2d mean = Vector2d::Zero(), mean_label = Vector2d::Zero();
+    for (const Labelled& p : pixels) total += p.weight;
+    for (const Labelled& p : pixels) {
+      mean += p.weight / total * p.px;
+      mean_label += p.weight / total * p.label;
+    }
+    Eigen::Matrix2d normal = 1e-9 * Eigen::Matrix2d::Identity(), product = Eigen::Matrix2d::Zero();
+    for (const Labelled& p : pixels) {
+      normal += p.weight * (p.px - mean) * (p.px - mean).transpose();
+      product += p.weight * (p.px - mean) * (p.label - mean_label).transpose();
+    }
+    const Eigen::Matrix2d slope = normal.ldlt().solve(product);
+    auto residual = [&](const Labelled& p) -> Vector2d {
+      return p.label - mean_label - slope.transpose() * (p.px - mean);
+    };
+    double squared = 0;
+    for (const Labelled& p : pixels) squared += p.weight / total * residual(p).squaredNorm() / 2;
+    const double limit = std::min(k_outlier_px, std::max(4 * std::sqrt(squared), 1.0));
+    const size_t before = pixels.size();
+    std::erase_if(pixels, [&](const Labelled& p) { return residual(p).cwiseAbs().maxCoeff() > limit; });
+    if (pixels.size() < before && pass < 2) continue;
+    Match match;
+    match.px_camera = mean;
+    match.px_projector = mean_label;
+    match.pixels = static_cast<int>(before);
+    match.stddev_px = std::hypot(std::sqrt(squared / static_cast<double>(before)), k_stddev_floor_px);
+    return match;
+  }
+  return std::nullopt;
+}
+
+// The labelled pixels of one square, by cell; adds how many pixels each cell has.
+using Cells = std::array<std::vector<Labelled>, k_cells * k_cells>;
+void collect(const std::array<Vector2d, 4>& quad,
+             const Decoded& decoded,
+             Cells* cells,
+             std::array<int, 4>* areas) {
+  std::array<cv::Point2f, 4> from, to = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
+  Vector2d low = quad[0], high = quad[0];
+  double side = 1e9;
+  for (size_t i = 0; i < 4; ++i) {
+    from[i] = {static_cast<float>(quad[i].x()), static_cast<float>(quad[i].y())};
+    low = low.cwiseMin(quad[i]);
+    high = high.cwiseMax(quad[i]);
+    side = std::min(side, (quad[i] - quad[(i + 1) % 4]).norm());
+  }
+  const cv::Mat cv_h = cv::getPerspectiveTransform(from.data(), to.data());
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> h(cv_h.ptr<double>());
+  const double inset = std::max(k_inset, k_inset_px / side);
+  const cv::Mat& labels = decoded.px_projector;
+  for (int y = std::max(0, static_cast<int>(low.y()));
+       y <= std::min(labels.rows - 1, static_cast<int>(high.y()) + 1); ++y) {
+    for (int x = std::max(0, static_cast<int>(low.x()));
+         x <= std::min(labels.cols - 1, static_cast<int>(high.x()) + 1); ++x) {
+      const Vector2d s = (h * Eigen::Vector3d(x, y, 1)).hnormalized();
+      if (!(s.minCoeff() > inset) || !(s.maxCoeff() < 1 - inset)) continue;
+      const auto cell = static_cast<size_t>(static_cast<int>(s.y() * k_cells) * k_cells +
+                                            static_cast<int>(s.x() * k_cells));
+      ++(*areas)[cell];
+      const auto& label = labels.at<cv::Vec2f>(y, x);
+      if (std::isnan(label[0])) continue;
+      const auto& variance = decoded.variance.at<cv::Vec2f>(y, x);
+      (*cells)[cell].push_back(
+          {Vector2d(x, y), Vector2d(label[0], label[1]), 1.0 / (variance[0] + variance[1])});
+    }
+  }
+}
+
+// The mean of the projectors' white pictures: wherever any of them lights the board it is visible.
+Result<cv::Mat> lit_picture(const Captures& captures, size_t pose, size_t camera) {
+  const CapturedDevice& device = captures.cameras[camera];
+  cv::Mat sum(device.height, device.width, CV_32F, cv::Scalar(0));
+  for (size_t p = 0; p < captures.projectors.size(); ++p) {
+    const auto& path =
+        captures.poses[pose].pictures[p][camera][static_cast<size_t>(captures.patterns[p].white())];
+    LIMN_TRY(const cv::Mat white, read_shot(path, device.width, device.height));
+    cv::add(sum, white, sum, cv::noArray(), CV_32F);
+  }
+  cv::Mat mean;
+  sum.convertTo(mean, CV_8U, 1.0 / static_cast<double>(captures.projectors.size()));
+  return mean;
+}
+
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+Status observe_pose(
+    const Captures& captures, int pose, int camera, const DecodeOptions& options, Observed* into) {
+  const auto at_pose = static_cast<size_t>(pose), at_camera = static_cast<size_t>(camera);
+  const double started = now();
+  LIMN_TRY(const cv::Mat lit, lit_picture(captures, at_pose, at_camera));
+  const std::vector<BoardCorner> corners = find_board(captures.board, lit);
+  into->seconds_board += now() - started;
+  if (corners.empty()) return {};
+  for (const BoardCorner& corner : corners)
+    into->observations.corners.push_back({camera, pose, corner.id, corner.px, corner.stddev_px});
+  const double decoding = now();
+  for (size_t p = 0; p < captures.projectors.size(); ++p) {
+    const CapturedDevice& device = captures.cameras[at_camera];
+    LIMN_TRY(const Decoded decoded,
+             decode(captures.patterns[p], captures.poses[at_pose].pictures[p][at_camera], device.width,
+                    device.height, options));
+    const int projector = static_cast<int>(p);
+    into->decoded.push_back({camera, projector, pose, decoded.lit, decoded.decoded, decoded.outliers});
+    for (Match match : matches_on_board(captures.board, corners, decoded)) {
+      match.camera = camera;
+      match.projector = projector;
+      match.pose = pose;
+      into->observations.matches.push_back(match);
+    }
+  }
+  into->seconds_decode += now() - decoding;
+  return {};
+}
+
+}  // namespace
+
+Result<Observed> observe(const Captures& captures, const DecodeOptions& options) {
+  Observed observed;
+  observed.observations.board = captures.board;
+  observed.observations.cameras = captures.cameras;
+  observed.observations.projectors = captures.projectors;
+  const int poses = static_cast<int>(captures.poses.size()),
+            cameras = static_cast<int>(captures.cameras.size());
+  Progress progress("decode", poses * cameras);
+  for (int pose = 0; pose < poses; ++pose) {
+    observed.observations.poses.push_back(captures.poses[static_cast<size_t>(pose)].name);
+    for (int camera = 0; camera < cameras; ++camera) {
+      LIMN_TRY_STATUS(observe_pose(captures, pose, camera, options, &observed));
+      progress.step(pose * cameras + camera + 1);
+    }
+  }
+  return observed;
+}
+
+std::vector<Match> matches_on_board(const Board& board,
+                                    const std::vector<BoardCorner>& corners,
+                                    const Decoded& decoded) {
+  const Grid grid(board, corners);
+  std::vector<Match> matches;
+  for (int row = 0; row < board.rows; ++row) {
+    for (int column = 0; column < board.columns; ++column) {
+      const auto &a = grid.at(column, row), &b = grid.at(column + 1, row), &c = grid.at(column + 1, row + 1),
+                 &d = grid.at(column, row + 1);
+      if (!a || !b || !c || !d) continue;
+      Cells cells;
+      std::array<int, k_cells * k_cells> areas{};
+      collect({*a, *b, *c, *d}, decoded, &cells, &areas);
+      for (size_t i = 0; i < cells.size(); ++i) {
+        if (static_cast<double>(cells[i].size()) < k_least_share * areas[i]) continue;
+        if (auto match = fitted(std::move(cells[i]))) matches.push_back(*match);
+      }
+    }
+  }
+  return matches;
+}
+
+Status save_observations(const Observations& observations, const std::filesystem::path& path) {
+  nlohmann::ordered_json json = {{"schema", "limn.observations/1"},
+                                 {"board", observations.board.text()},
+                                 {"poses", observations.poses},
+                                 {"corner", {"camera", "pose", "corner", "x", "y", "stddev_px"}},
+                                 {"match",
+                                  {"camera", "projector", "pose", "camera_x", "camera_y", "projector_x",
+                                   "projector_y", "stddev_px", "pixels"}}};
+  for (const CornerSeen& c : observations.corners)
+    json["corners"].push_back({c.camera, c.pose, c.corner, c.px.x(), c.px.y(), c.stddev_px});
+  for (const Match& m : observations.matches)
+    json["matches"].push_back({m.camera, m.projector, m.pose, m.px_camera.x(), m.px_camera.y(),
+                               m.px_projector.x(), m.px_projector.y(), m.stddev_px, m.pixels});
+  return write_file(path, json.dump() + "\n");
+}
+
+Observations without_pose(const Observations& observations, int pose) {
+  Observations left = observations;
+  std::erase_if(left.corners, [&](const CornerSeen& corner) { return corner.pose == pose; });
+  std::erase_if(left.matches, [&](const Match& match) { return match.pose == pose; });
+  return left;
+}
+
+}  // namespace limn::calib

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "calib/board_finder.h"
+#include "calib/captures.h"
+#include "calib/decode.h"
+#include "core/result.h"
+
+namespace limn::calib {
+
+/// A board corner in a camera's picture.
+struct CornerSeen {
+  int camera = 0;
+  int pose = 0;
+  int corner = 0;  ///< its id on the board
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  double stddev_px = 0;  ///< of one coordinate
+};
+
+/// A small patch of the board (half a square wide): the mean of the camera pixels in it that have a label and
+/// the mean of their labels, so that whole-pixel codes average out.
+struct Match {
+  int camera = 0;
+  int projector = 0;
+  int pose = 0;
+  Eigen::Vector2d px_camera = Eigen::Vector2d::Zero();
+  Eigen::Vector2d px_projector = Eigen::Vector2d::Zero();
+  double stddev_px = 0;  ///< of one projector coordinate, from the labels' scatter in the patch
+  int pixels = 0;
+};
+
+/// Everything measured, as flat arrays; all that the solve sees.
+struct Observations {
+  Board board;
+  std::vector<CapturedDevice> cameras;
+  std::vector<CapturedDevice> projectors;
+  std::vector<std::string> poses;
+  std::vector<CornerSeen> corners;
+  std::vector<Match> matches;
+};
+
+/// What became of one series of pictures.
+struct DecodeShare {
+  int camera = 0;
+  int projector = 0;
+  int pose = 0;
+  int lit = 0;
+  int decoded = 0;
+  int outliers = 0;
+};
+
+struct Observed {
+  Observations observations;
+  std::vector<DecodeShare> decoded;
+  double seconds_board = 0;
+  double seconds_decode = 0;
+};
+
+/// The corners and matches of all captures. Where a camera does not see the board nothing is decoded: such
+/// poses are scene captures. An unreadable picture is an error that names it.
+Result<Observed> observe(const Captures& captures, const DecodeOptions& options = {});
+
+/// The matches on the board's squares of one camera, projector and pose. Squares are placed by their corners
+/// (a homography each; those at the board's rim by extrapolation), so that no lens is needed. In each half
+/// square a plane is fitted to the labels, robustly, and the means of what fits are the match.
+std::vector<Match> matches_on_board(const Board& board,
+                                    const std::vector<BoardCorner>& corners,
+                                    const Decoded& decoded);
+
+/// observations.json: limn.observations/1, arrays of numbers in the order of the structs; for plots and
+/// replays.
+Status save_observations(const Observations& observations, const std::filesystem::path& path);
+
+/// Without one pose: its corners and matches are gone, numbers of poses stay as they were.
+Observations without_pose(const Observations& observations, int pose);
+
+}  // namespace limn::calib

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+
+#include "core/lens.h"
+#include "core/pose.h"
+
+namespace limn::calib {
+
+/// How a nearly flat board is bent: two parabolas, as mrcal has them. Height (m, along the board's z) of the
+/// sheet at (x, y): bend.x (1 - xr^2) + bend.y (1 - yr^2), where xr and yr run from -1 to 1 over the squares.
+struct BoardShape {
+  double width_m = 1;
+  double height_m = 1;
+  double z(const Eigen::Vector2d& bend, double x, double y) const;
+  /// (dz/dx, dz/dy)
+  Eigen::Vector2d slope(const Eigen::Vector2d& bend, double x, double y) const;
+  /// (dz/dbend.x, dz/dbend.y)
+  Eigen::Vector2d per_bend(double x, double y) const;
+};
+
+/// Borrowed places of an imager's unknowns.
+struct ImagerView {
+  const LensModel& model;
+  std::span<const double> values;
+  const Pose& imager_from_world;
+};
+
+/// Derivatives of a predicted pixel. Poses: by boxplus's delta [rotation; translation]; values: 2 x
+/// value_count.
+struct Derivatives {
+  using Pose6 = Eigen::Matrix<double, 2, 6>;
+  using Values = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>;
+  Values camera_values, projector_values;
+  Pose6 camera_pose, projector_pose, board_pose;
+  Eigen::Matrix2d bend;
+};
+
+/// Camera pixel of the board's point (x, y). False when it has none (behind the camera).
+bool predict_corner(const ImagerView& camera,
+                    const Pose& world_from_board,
+                    const BoardShape& shape,
+                    const Eigen::Vector2d& bend,
+                    const Eigen::Vector2d& p_board_xy,
+                    Eigen::Vector2d* px,
+                    Derivatives* derivatives = nullptr);
+
+/// World point where the ray of a camera pixel meets the board. False when it does not.
+bool meet_board(const ImagerView& camera,
+                const Pose& world_from_board,
+                const BoardShape& shape,
+                const Eigen::Vector2d& bend,
+                const Eigen::Vector2d& px_camera,
+                Eigen::Vector3d* p_world);
+
+/// Projector pixel of that point. Its derivatives by the camera's values come from the implicit function
+/// theorem: project(values, d) = px stays true, so J_d dd = -J_values dvalues with dd across d.
+bool predict_match(const ImagerView& camera,
+                   const ImagerView& projector,
+                   const Pose& world_from_board,
+                   const BoardShape& shape,
+                   const Eigen::Vector2d& bend,
+                   const Eigen::Vector2d& px_camera,
+                   Eigen::Vector2d* px_projector,
+                   Derivatives* derivatives = nullptr);
+
+}  // namespace limn::calib

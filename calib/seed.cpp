@@ -1,0 +1,317 @@
+#include "calib/seed.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <opencv2/calib3d.hpp>
+
+#include "calib/predict.h"
+
+namespace limn::calib {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr int k_least_corners = 8;  // of a view that helps to calibrate a camera
+
+Pose to_pose(const cv::Mat& rvec, const cv::Mat& tvec) {
+  const Vector3d w(rvec.at<double>(0), rvec.at<double>(1), rvec.at<double>(2));
+  return {exp_rotation(w), Vector3d(tvec.at<double>(0), tvec.at<double>(1), tvec.at<double>(2))};
+}
+
+// One camera's lens and its poses of the boards it saw.
+struct CameraSeed {
+  Lens lens;
+  std::map<int, Pose> camera_from_board;
+};
+
+struct Views {
+  std::vector<int> poses;
+  std::vector<std::vector<cv::Point3f>> p_board;
+  std::vector<std::vector<cv::Point2f>> px;
+};
+
+Views views_of(const Observations& observations, int camera) {
+  Views views;
+  for (int pose = 0; pose < static_cast<int>(observations.poses.size()); ++pose) {
+    std::vector<cv::Point3f> p_board;
+    std::vector<cv::Point2f> px;
+    for (const CornerSeen& seen : observations.corners) {
+      if (seen.camera != camera || seen.pose != pose) continue;
+      const Vector3d p = observations.board.p_corner(seen.corner);
+      p_board.emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()), 0.F);
+      px.emplace_back(static_cast<float>(seen.px.x()), static_cast<float>(seen.px.y()));
+    }
+    if (static_cast<int>(px.size()) < k_least_corners) continue;
+    views.poses.push_back(pose);
+    views.p_board.push_back(std::move(p_board));
+    views.px.push_back(std::move(px));
+  }
+  return views;
+}
+
+Result<CameraSeed> seed_camera(const Observations& observations, int camera, const LensModel& model) {
+  const CapturedDevice& device = observations.cameras[static_cast<size_t>(camera)];
+  const Views views = views_of(observations, camera);
+  if (views.poses.size() < 2)
+    return error(
+        "{}: expected the board in at least 3 poses, found it in {}. Capture more poses, with the whole "
+        "board "
+        "in the picture and lit.",
+        device.name, views.poses.size());
+  cv::Mat matrix = cv::Mat::eye(3, 3, CV_64F), distortion = cv::Mat::zeros(1, 5, CV_64F);
+  std::vector<cv::Mat> rotations, translations;
+  const bool distorted = model.value_count() > 4;
+  const int flags = cv::CALIB_FIX_K3 | cv::CALIB_ZERO_TANGENT_DIST | cv::CALIB_FIX_PRINCIPAL_POINT |
+                    (distorted ? 0 : cv::CALIB_FIX_K1 | cv::CALIB_FIX_K2);
+  try {
+    cv::calibrateCamera(views.p_board, views.px, {device.width, device.height}, matrix, distortion, rotations,
+                        translations, flags);
+  } catch (const cv::Exception& problem) {
+    return error(
+        "{}: its {} views of the board do not determine a lens. Tilt the board more, by 20 to 45 degrees to "
+        "different sides. ({})",
+        device.name, views.poses.size(), problem.err);
+  }
+  CameraSeed seeded;
+  seeded.lens.model = model;
+  seeded.lens.values.assign(static_cast<size_t>(model.value_count()), 0.0);
+  seeded.lens.values[0] = matrix.at<double>(0, 0);
+  seeded.lens.values[1] = matrix.at<double>(1, 1);
+  seeded.lens.values[2] = matrix.at<double>(0, 2);
+  seeded.lens.values[3] = matrix.at<double>(1, 2);
+  if (distorted) {
+    seeded.lens.values[4] = distortion.at<double>(0);
+    seeded.lens.values[5] = distortion.at<double>(1);
+  }
+  const double f = seeded.lens.fx() / device.width;
+  if (!(f > 0.1 && f < 50))
+    return error(
+        "{}: the views of the board do not determine its focal length (found {:.4g} widths). Tilt the board "
+        "more, by 20 to 45 degrees to different sides.",
+        device.name, f);
+  for (size_t i = 0; i < views.poses.size(); ++i)
+    seeded.camera_from_board[views.poses[i]] = to_pose(rotations[i], translations[i]);
+  return seeded;
+}
+
+double disagreement(const Pose& a, const Pose& b) {
+  return angle_between(a.rotation, b.rotation) + (a.translation - b.translation).norm();
+}
+
+// The candidate with the smallest sum of distances to the others: one board misread does not matter.
+Pose medoid(const std::vector<Pose>& candidates) {
+  size_t best = 0;
+  double best_sum = std::numeric_limits<double>::max();
+  for (size_t i = 0; i < candidates.size(); ++i) {
+    double sum = 0;
+    for (const Pose& other : candidates) sum += disagreement(candidates[i], other);
+    if (sum < best_sum) {
+      best_sum = sum;
+      best = i;
+    }
+  }
+  return candidates[best];
+}
+
+// camera_from_world for every camera, board poses in the world, from camera 0 outwards.
+Status link(const Observations& observations, const std::vector<CameraSeed>& seeds, Seed* into) {
+  std::vector<bool> linked(seeds.size(), false);
+  auto place = [&](size_t camera, const Pose& camera_from_world) {
+    linked[camera] = true;
+    into->cameras[camera].imager_from_world = camera_from_world;
+    for (const auto& [pose, camera_from_board] : seeds[camera].camera_from_board) {
+      auto& world_from_board = into->world_from_board[static_cast<size_t>(pose)];
+      if (!world_from_board) world_from_board = camera_from_world.inverse() * camera_from_board;
+    }
+  };
+  place(0, Pose());
+  for (size_t round = 1; round < seeds.size(); ++round) {
+    for (size_t camera = 1; camera < seeds.size(); ++camera) {
+      if (linked[camera]) continue;
+      std::vector<Pose> candidates;
+      for (const auto& [pose, camera_from_board] : seeds[camera].camera_from_board) {
+        const auto& world_from_board = into->world_from_board[static_cast<size_t>(pose)];
+        if (world_from_board) candidates.push_back(camera_from_board * world_from_board->inverse());
+      }
+      if (!candidates.empty()) place(camera, medoid(candidates));
+    }
+  }
+  for (size_t camera = 0; camera < seeds.size(); ++camera) {
+    if (!linked[camera])
+      return error(
+          "{}: sees no board pose together with another camera. Capture some poses that it shares with {}.",
+          observations.cameras[camera].name, observations.cameras[0].name);
+  }
+  return {};
+}
+
+struct Points {
+  std::vector<Vector3d> p_world;
+  std::vector<Vector2d> px;
+  std::vector<int> poses;
+};
+
+Points points_of(const Observations& observations, const Seed& seeded, int projector) {
+  const BoardShape shape{observations.board.width_m(), observations.board.height_m()};
+  Points points;
+  for (const Match& match : observations.matches) {
+    if (match.projector != projector) continue;
+    const auto& world_from_board = seeded.world_from_board[static_cast<size_t>(match.pose)];
+    if (!world_from_board) continue;
+    const Imager& camera = seeded.cameras[static_cast<size_t>(match.camera)];
+    Vector3d p;
+    if (!meet_board({camera.lens.model, camera.lens.values, camera.imager_from_world}, *world_from_board,
+                    shape, Vector2d::Zero(), match.px_camera, &p))
+      continue;
+    points.p_world.push_back(p);
+    points.px.push_back(match.px_projector);
+    points.poses.push_back(match.pose);
+  }
+  return points;
+}
+
+Result<Imager> seed_projector(const Observations& observations,
+                              const Seed& seeded,
+                              int projector,
+                              const LensModel& model) {
+  const CapturedDevice& device = observations.projectors[static_cast<size_t>(projector)];
+  const Points points = points_of(observations, seeded, projector);
+  std::vector<int> poses = points.poses;
+  poses.erase(std::unique(poses.begin(), poses.end()), poses.end());
+  if (poses.size() < 2 || points.px.size() < 20)
+    return error(
+        "{}: expected its light on the board in at least 3 poses, found {} poses with {} patches. Point it "
+        "at "
+        "the board, darken the room, check the exposure.",
+        device.name, poses.size(), points.px.size());
+  const auto linear = linear_camera(points.p_world, points.px);
+  if (!linear)
+    return error(
+        "{}: the {} board poses do not determine it. Vary tilt (20 to 45 degrees) and distance more.",
+        device.name, poses.size());
+  Imager imager;
+  imager.lens.model = model;
+  imager.lens.values.assign(static_cast<size_t>(model.value_count()), 0.0);
+  const double f = std::sqrt(linear->fx * linear->fy);
+  imager.lens.values[0] = imager.lens.values[1] = f;
+  imager.lens.values[2] = linear->cx;
+  imager.lens.values[3] = linear->cy;
+  imager.imager_from_world = linear->imager_from_world;
+  return imager;
+}
+
+// Moves the points' centre to 0 and scales their mean distance to sqrt(dimension).
+template <int N>
+Eigen::Matrix<double, N + 1, N + 1> normaliser(const std::vector<Eigen::Matrix<double, N, 1>>& points) {
+  Eigen::Matrix<double, N, 1> mean = Eigen::Matrix<double, N, 1>::Zero();
+  for (const auto& p : points) mean += p / static_cast<double>(points.size());
+  double distance = 0;
+  for (const auto& p : points) distance += (p - mean).norm() / static_cast<double>(points.size());
+  const double scale = distance > 0 ? std::sqrt(static_cast<double>(N)) / distance : 1;
+  Eigen::Matrix<double, N + 1, N + 1> t = Eigen::Matrix<double, N + 1, N + 1>::Identity();
+  t.topLeftCorner(N, N) *= scale;
+  t.topRightCorner(N, 1) = -scale * mean;
+  return t;
+}
+
+// K upper triangular with a positive diagonal, R a rotation: K R = m (m has a positive determinant).
+void split_camera(const Matrix3d& m, Matrix3d* k, Matrix3d* r) {
+  const Matrix3d flip = (Matrix3d() << 0, 0, 1, 0, 1, 0, 1, 0, 0).finished();
+  const Eigen::HouseholderQR<Matrix3d> qr((flip * m).transpose());
+  const Matrix3d q = qr.householderQ();
+  const Matrix3d upper = qr.matrixQR().triangularView<Eigen::Upper>();
+  *k = flip * upper.transpose() * flip;
+  *r = flip * q.transpose();
+  const Matrix3d signs = k->diagonal().cwiseSign().asDiagonal();
+  *k = *k * signs;
+  *r = signs * *r;
+}
+
+}  // namespace
+
+std::optional<LinearCamera> linear_camera(const std::vector<Vector3d>& p_world,
+                                          const std::vector<Vector2d>& px) {
+  if (px.size() < 6) return std::nullopt;
+  const Eigen::Matrix4d t_world = normaliser<3>(p_world);
+  const Matrix3d t_px = normaliser<2>(px);
+  Eigen::Matrix<double, 12, 12> normal = Eigen::Matrix<double, 12, 12>::Zero();
+  for (size_t i = 0; i < px.size(); ++i) {
+    const Eigen::Vector4d x = t_world * p_world[i].homogeneous();
+    const Vector3d u = t_px * px[i].homogeneous();
+    Eigen::Matrix<double, 2, 12> rows;
+    rows << x.transpose(), Eigen::RowVector4d::Zero(), -u.x() * x.transpose(),  //
+        Eigen::RowVector4d::Zero(), x.transpose(), -u.y() * x.transpose();
+    normal += rows.transpose() * rows;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 12, 12>> eigen(normal);
+  // On a plane two more directions are free.
+  if (!(eigen.eigenvalues()[1] > 1e-9 * eigen.eigenvalues()[11])) return std::nullopt;
+  const Eigen::Matrix<double, 12, 1> v = eigen.eigenvectors().col(0);
+  Eigen::Matrix<double, 3, 4> p;
+  p << v.segment<4>(0).transpose(), v.segment<4>(4).transpose(), v.segment<4>(8).transpose();
+  p = t_px.inverse() * p * t_world;
+  if (p.leftCols<3>().determinant() < 0) p = -p;
+  Matrix3d k, r;
+  split_camera(p.leftCols<3>(), &k, &r);
+  const Vector3d t = k.inverse() * p.col(3);
+  k /= k(2, 2);
+  LinearCamera camera{k(0, 0), k(1, 1), k(0, 2), k(1, 2), Pose(r, t)};
+  size_t in_front = 0;
+  for (const Vector3d& point : p_world) in_front += (camera.imager_from_world * point).z() > 0 ? 1 : 0;
+  const bool proper = camera.imager_from_world.is_finite() && camera.fx > 0 && camera.fy > 0 &&
+                      camera.fx < 5 * camera.fy && camera.fy < 5 * camera.fx && in_front == p_world.size();
+  if (!proper) return std::nullopt;
+  return camera;
+}
+
+Result<Pose> board_pose_seed(const Observations& observations, const Rig& rig) {
+  std::vector<int> counts(rig.cameras.size(), 0);
+  for (const CornerSeen& seen : observations.corners) ++counts[static_cast<size_t>(seen.camera)];
+  const auto best = static_cast<size_t>(std::max_element(counts.begin(), counts.end()) - counts.begin());
+  const Imager& camera = rig.cameras[best];
+  std::vector<cv::Point3d> p_board;
+  std::vector<cv::Point2d> flat;  // on the plane z = 1
+  for (const CornerSeen& seen : observations.corners) {
+    const auto d = static_cast<size_t>(seen.camera) == best ? camera.lens.unproject(seen.px) : std::nullopt;
+    if (!d || !(d->z() > 0)) continue;
+    const Vector3d p = observations.board.p_corner(seen.corner);
+    p_board.emplace_back(p.x(), p.y(), 0);
+    flat.emplace_back(d->x() / d->z(), d->y() / d->z());
+  }
+  cv::Mat rvec, tvec;
+  if (p_board.size() < 4 || !cv::solvePnP(p_board, flat, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rvec,
+                                          tvec, false, cv::SOLVEPNP_IPPE))
+    return error("{}: no pose of the board from {} corners.", camera.name, p_board.size());
+  return camera.imager_from_world.inverse() * to_pose(rvec, tvec);
+}
+
+Result<Seed> seed(const Observations& observations,
+                  const LensModel& camera_model,
+                  const LensModel& projector_model) {
+  Seed seeded;
+  seeded.world_from_board.resize(observations.poses.size());
+  std::vector<CameraSeed> cameras;
+  for (int i = 0; i < static_cast<int>(observations.cameras.size()); ++i) {
+    LIMN_TRY(CameraSeed camera, seed_camera(observations, i, camera_model));
+    const CapturedDevice& device = observations.cameras[static_cast<size_t>(i)];
+    seeded.cameras.push_back({device.name, device.width, device.height, camera.lens, Pose()});
+    cameras.push_back(std::move(camera));
+  }
+  LIMN_TRY_STATUS(link(observations, cameras, &seeded));
+  for (int i = 0; i < static_cast<int>(observations.projectors.size()); ++i) {
+    LIMN_TRY(Imager projector, seed_projector(observations, seeded, i, projector_model));
+    const CapturedDevice& device = observations.projectors[static_cast<size_t>(i)];
+    projector.name = device.name;
+    projector.width = device.width;
+    projector.height = device.height;
+    seeded.projectors.push_back(std::move(projector));
+  }
+  return seeded;
+}
+
+}  // namespace limn::calib

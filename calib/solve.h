@@ -1,0 +1,74 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/observations.h"
+#include "calib/predict.h"
+#include "core/result.h"
+#include "core/rig.h"
+
+namespace limn::calib {
+
+struct SolveOptions {
+  /// LENSMODEL_PINHOLE, OPENCV4, OPENCV5, OPENCV8 or OPENCV12. More values want more poses: five poses hold
+  /// OPENCV4.
+  std::string camera_model = "LENSMODEL_OPENCV4";
+  std::string projector_model = "LENSMODEL_OPENCV4";
+  /// Whether the board may be bent (two unknowns for all poses).
+  bool bend = true;
+  /// Residuals beyond this many standard deviations are told down (Cauchy).
+  double robust_at = 2;
+  /// Weak knowledge about lenses, standard deviations. Of the principal point from the picture's centre, as
+  /// shares of the width; a projector's vertical place is left free, for projectors shift their lens upwards
+  /// by anything.
+  double camera_centre = 0.1;
+  double projector_centre = 0.25;
+  /// Of fy / fx from 1: pixels are square to well below this.
+  double aspect = 0.003;
+  /// Of radial and of tangential distortion values from 0.
+  double radial = 0.5;
+  double tangential = 0.02;
+  /// Of the board's bend from 0, as a share of its width.
+  double bend_share = 0.01;
+};
+
+/// What the solve found. Rig: world is camera 0. Residual arrays run parallel to the observations' arrays:
+/// predicted minus measured pixel; NaN where the observation has no prediction.
+struct Solution {
+  Rig rig;
+  std::vector<std::optional<Pose>> world_from_board;  ///< for each pose; none where no camera saw the board
+  Eigen::Vector2d bend_m = Eigen::Vector2d::Zero();
+  std::vector<Eigen::Vector2d> corner_residuals, match_residuals;
+  std::vector<bool> corner_outlier, match_outlier;  ///< beyond 4 standard deviations
+  /// What one coordinate scatters by beyond its own stddev, px: estimated from the residuals.
+  double corner_noise_px = 0, match_noise_px = 0;
+  int iterations = 0;
+};
+
+/// One least-squares problem over all cameras, projectors, board poses and the board's bend: cameras see
+/// corners; a match says that the camera's ray meets the board where the projector's pixel does. Starts from
+/// nothing but the observations, or from `start` (of the same devices and poses). Deterministic. Errors: too
+/// few poses, a device that saw none, a camera that shares no pose with the others, no convergence.
+Result<Solution> solve(const Observations& observations,
+                       const SolveOptions& options = {},
+                       const Solution* start = nullptr);
+
+/// Pose of one placement of the board from what cameras see of its corners alone, everything else as in
+/// `solution`.
+Result<Pose> board_pose_from_cameras(const Observations& observations, const Solution& solution, int pose);
+
+/// Projector pixel that a solution predicts for a match whose board stands at `world_from_board`.
+std::optional<Eigen::Vector2d> predicted(const Observations& observations,
+                                         const Solution& solution,
+                                         const Pose& world_from_board,
+                                         const Match& match);
+/// World point of a match on that board.
+std::optional<Eigen::Vector3d> surface_point(const Observations& observations,
+                                             const Solution& solution,
+                                             const Pose& world_from_board,
+                                             const Match& match);
+
+}  // namespace limn::calib
