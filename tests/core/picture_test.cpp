@@ -1,7 +1,9 @@
 #include "core/picture.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <csignal>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
@@ -87,6 +89,24 @@ TEST(File, AMissingFolderIsToldAndWritingReplacesWhole) {
   ASSERT_TRUE(write_file(folder / "a.txt", "old and longer"));
   ASSERT_TRUE(write_file(folder / "a.txt", "new"));
   EXPECT_EQ(read_file(folder / "a.txt").value(), "new");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1) << "no temporary file is left";
+}
+
+// A limit on file sizes makes write() fail half way, as a full disk does.
+TEST(File, AWriteThatFailsHalfWayKeepsTheOldFile) {
+  const auto folder = test::test_folder();
+  ASSERT_TRUE(write_file(folder / "a.txt", "old"));
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  rlimit small = before;
+  small.rlim_cur = 1000;
+  std::signal(SIGXFSZ, SIG_IGN);
+  setrlimit(RLIMIT_FSIZE, &small);
+  const Status status = write_file(folder / "a.txt", std::string(5000, 'x'));
+  setrlimit(RLIMIT_FSIZE, &before);
+  ASSERT_FALSE(status);
+  EXPECT_NE(status.message().find("a.txt"), std::string::npos) << status.message();
+  EXPECT_EQ(read_file(folder / "a.txt").value(), "old");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1) << "no temporary file is left";
 }
 
