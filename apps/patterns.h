@@ -1,0 +1,26 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "core/result.h"
+
+namespace limn::apps {
+
+struct PatternsOptions {
+  std::string projector;  ///< its size, "1280x800"
+  std::string code = "gray";
+  std::filesystem::path out;
+};
+
+/// `limn patterns`: the code's numbered PNGs and patterns.json.
+Status run_patterns(const PatternsOptions& options);
+
+/// "1280x800" as numbers; anything else is wrong usage.
+struct PixelSize {
+  int width = 0;
+  int height = 0;
+};
+Result<PixelSize> parse_pixel_size(const std::string& text);
+
+}  // namespace limn::apps

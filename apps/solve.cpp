@@ -1,0 +1,100 @@
+#include "apps/solve.h"
+
+#include <chrono>
+
+#include "apps/patterns.h"
+#include "calib/assess.h"
+#include "calib/captures.h"
+#include "calib/observations.h"
+#include "calib/report.h"
+#include "calib/solve.h"
+#include "core/file.h"
+#include "core/lens.h"
+#include "core/log.h"
+
+namespace limn::apps {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begun) {
+  return std::chrono::duration<double>(Clock::now() - begun).count();
+}
+
+Result<calib::Captures> foreign_captures(const SolveOptions& options) {
+  if (options.import_format != "opencv-gray")
+    return usage_error("--import: expected opencv-gray, found '{}'.", options.import_format);
+  if (options.projector.empty() || options.board.empty())
+    return usage_error("--import {}: needs --projector 1024x768 and --board chessboard:9x7:75mm.",
+                       options.import_format);
+  LIMN_TRY(const PixelSize size, parse_pixel_size(options.projector));
+  const auto board = calib::Board::parse(options.board);
+  if (!board) return usage_error("--board: {}", board.message());
+  return calib::import_opencv_gray(
+      {options.captures, size.width, size.height, *board, options.poses, options.shots, options.skip_poses});
+}
+
+Result<calib::Captures> captures_of(const SolveOptions& options) {
+  if (!options.import_format.empty()) return foreign_captures(options);
+  if (!options.projector.empty() || !options.board.empty())
+    return usage_error("--projector and --board describe foreign captures: they need --import opencv-gray.");
+  return calib::load_captures(options.captures, options.skip_poses);
+}
+
+Status check_models(const SolveOptions& options) {
+  for (const std::string& name : {options.camera_model, options.projector_model}) {
+    if (const auto model = LensModel::parse(name); !model) return usage_error("{}", model.message());
+  }
+  return {};
+}
+
+void print_table(const calib::Assessment& assessment) {
+  fmt::print("{:<14} {:>8} {:>9} {:>9}\n", "device", "RMS px", "outliers", "coverage");
+  for (const calib::DeviceQuality& d : assessment.devices)
+    fmt::print("{:<14} {:>8.3f} {:>4}/{:<4} {:>7.0f} %\n", d.name, d.rms_px, d.outliers, d.points,
+               100 * d.coverage);
+  fmt::print("{:<14} {:>8} {:>9}\n", "held-out pose", "RMS px", "cells");
+  for (const calib::HeldOutPose& pose : assessment.held_out.poses)
+    fmt::print("{:<14} {:>8.3f} {:>9}\n", pose.pose, pose.rms_px, pose.cells);
+  for (const calib::Fault& fault : assessment.faults)
+    fmt::print("fault {}: {}; {}.\n", fault.name, fault.evidence, fault.advice);
+  fmt::print("held-out {:.3f} px RMS, worst {:.3f} px; decoded {:.0f} %; {}\n", assessment.held_out.rms_px,
+             assessment.held_out.worst_px, 100 * assessment.decoded_share,
+             calib::to_text(assessment.verdict));
+}
+
+}  // namespace
+
+Status run_solve(const SolveOptions& options) {
+  const auto begun = Clock::now();
+  LIMN_TRY_STATUS(check_models(options));
+  LIMN_TRY(const calib::Captures captures, captures_of(options));
+  LIMN_TRY(const calib::Observed observed, calib::observe(captures));
+  calib::SolveOptions solving;
+  solving.camera_model = options.camera_model;
+  solving.projector_model = options.projector_model;
+  const auto solving_begun = Clock::now();
+  LIMN_TRY(const calib::Solution solution, calib::solve(observed.observations, solving));
+  const double solve_seconds = seconds_since(solving_begun);
+  log_info("solved in {} steps, judging by held-out poses", solution.iterations);
+  const auto judging_begun = Clock::now();
+  LIMN_TRY(const calib::Assessment assessment, calib::assess(observed, solving, solution));
+  const calib::Report report{observed,
+                             solution,
+                             assessment,
+                             {{"board", observed.seconds_board},
+                              {"decode", observed.seconds_decode},
+                              {"solve", solve_seconds},
+                              {"assess", seconds_since(judging_begun)},
+                              {"total", seconds_since(begun)}}};
+  LIMN_TRY_STATUS(calib::write_rig_folder(report, solving, options.out));
+  if (options.json) {
+    fmt::print("{}", calib::report_json(report));
+  } else {
+    print_table(assessment);
+    fmt::print("rig and report in {} ({:.1f} s)\n", options.out.string(), seconds_since(begun));
+  }
+  return {};
+}
+
+}  // namespace limn::apps

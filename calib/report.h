@@ -1,0 +1,37 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "calib/assess.h"
+#include "calib/observations.h"
+#include "calib/solve.h"
+#include "core/result.h"
+
+namespace limn::calib {
+
+/// Everything that a rig folder says about a calibration.
+struct Report {
+  const Observed& observed;
+  const Solution& solution;
+  const Assessment& assessment;
+  std::vector<std::pair<std::string, double>> seconds;  ///< of each stage, in order
+};
+
+/// report.json, as interfaces.md describes it.
+std::string report_json(const Report& report);
+
+/// report.html: self-contained, pictures first (SVG): where each imager was observed and what was left over
+/// there.
+std::string report_html(const Report& report);
+
+/// Writes the rig folder: rig.json, one .cameramodel for each device, observations.json, report.json,
+/// report.html. Each file replaces its predecessor only when it is complete. rig.json's provenance says from
+/// what and how.
+Status write_rig_folder(const Report& report,
+                        const SolveOptions& options,
+                        const std::filesystem::path& folder);
+
+}  // namespace limn::calib
