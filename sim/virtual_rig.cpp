@@ -79,6 +79,22 @@ void VirtualRig::remove(const std::string& object) {
   std::erase_if(world.markers, [&](const PlacedMarker& m) { return m.object == object; });
 }
 
+void VirtualRig::clear_stage() {
+  if (prototype_home_) return;
+  prototype_home_ = world_.world_from_prototype;
+  effects_home_ = world_.camera_effects;
+  const Eigen::Vector3d away(0, 0, -100);  // far below the table
+  move_prototype(edit(), Pose(prototype_home_->rotation, prototype_home_->translation + away));
+  for (CameraEffects& effects : world_.camera_effects) effects.colour = false;
+}
+
+void VirtualRig::restore_stage() {
+  if (!prototype_home_) return;
+  move_prototype(edit(), *prototype_home_);
+  world_.camera_effects = effects_home_;
+  prototype_home_.reset();
+}
+
 void VirtualRig::darken() { shown_.assign(projectors_.size(), {Shown{cv::Mat(), now_}}); }
 
 const Samples& VirtualRig::samples(int camera) {

@@ -40,6 +40,14 @@ class VirtualRig {
   /// Adds an object, or replaces the one of that name.
   void place(const Object& object);
   void remove(const std::string& object);
+  /// A camera's sensor settings; changing them (colour, exposure, encoding) keeps what was traced.
+  CameraEffects& camera_effects(int camera) {
+    return world_.camera_effects.at(static_cast<std::size_t>(camera));
+  }
+  /// For calibration: the prototype is carried out of the room, cameras deliver grey. restore_stage() undoes
+  /// it.
+  void clear_stage();
+  void restore_stage();
   /// All projectors black.
   void darken();
 
@@ -66,6 +74,8 @@ class VirtualRig {
   VirtualRigOptions options_;
   Stamp now_;
   std::uint64_t frames_ = 0;
+  std::optional<Pose> prototype_home_;  // set while the stage is clear
+  std::vector<CameraEffects> effects_home_;
   std::vector<std::vector<Shown>> shown_;  // per projector, oldest first; the first is on the surface
   std::vector<std::optional<Samples>> samples_;
   std::vector<std::unique_ptr<Camera>> cameras_;

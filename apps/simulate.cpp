@@ -1,0 +1,180 @@
+#include "apps/simulate.h"
+
+#include <algorithm>
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+
+#include "apps/world_markers.h"
+#include "core/config.h"
+#include "core/file.h"
+#include "core/log.h"
+#include "core/picture.h"
+#include "core/rig.h"
+#include "sim/photograph.h"
+#include "sim/truth.h"
+#include "sim/world.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+// The pictures to shine, one per projector; those not named stay black.
+Result<std::vector<cv::Mat>> shown_pictures(const std::vector<std::string>& show, const Rig& rig) {
+  std::vector<cv::Mat> shown(rig.projectors.size());
+  for (const std::string& text : show) {
+    const std::size_t equals = text.find('=');
+    const std::string name = text.substr(0, equals);
+    const auto projector = std::find_if(rig.projectors.begin(), rig.projectors.end(),
+                                        [&](const Imager& p) { return p.name == name; });
+    if (equals == std::string::npos || projector == rig.projectors.end())
+      return usage_error(
+          "--show: expected PROJECTOR=PICTURE with a projector of the world, found '{}'. Try --show "
+          "projector0=picture.png.",
+          text);
+    LIMN_TRY(const cv::Mat picture, read_picture(text.substr(equals + 1)));
+    if (picture.cols != projector->width || picture.rows != projector->height)
+      return error("{}: expected {}x{}, the size of {}, found {}x{}. Draw it at the projector's size.",
+                   text.substr(equals + 1), projector->width, projector->height, name, picture.cols,
+                   picture.rows);
+    shown[static_cast<std::size_t>(projector - rig.projectors.begin())] = picture;
+  }
+  return shown;
+}
+
+Result<std::vector<std::string>> chosen_variants(const std::string& text, const sim::World& world) {
+  if (!world.scene) return std::vector<std::string>{};
+  std::vector<std::string> variants(world.scene->slots.size());
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    const std::string item = text.substr(begin, end - begin);
+    const std::size_t equals = item.find('=');
+    const scene::Slot* slot = world.scene->find_slot(item.substr(0, equals));
+    const bool known =
+        slot != nullptr && equals != std::string::npos &&
+        std::any_of(slot->variants.begin(), slot->variants.end(),
+                    [&](const scene::Variant& v) { return v.name == item.substr(equals + 1); });
+    if (!known)
+      return usage_error(
+          "--variants: expected SLOT=VARIANT of the world's scene, found '{}'. The scene's scene.json lists "
+          "them.",
+          item);
+    variants[static_cast<std::size_t>(slot - world.scene->slots.data())] = item.substr(equals + 1);
+    begin = end + 1;
+  }
+  return variants;
+}
+
+ordered_json pose_json(const Pose& pose) { return ordered_json(to_json(pose)); }
+
+// Outer corners of the black square, pixel per camera; whether each is in the picture with nothing before it.
+ordered_json marker_json(const sim::World& world, const sim::Truth& truth, const sim::PlacedMarker& marker) {
+  const Pose world_from_marker = *sim::world_from_marker(world, marker.marker);
+  ordered_json json = {{"name", marker.marker.text()},
+                       {"size_mm", marker.size_m * 1e3},
+                       {"world_from_marker", pose_json(world_from_marker)}};
+  const double h = marker.size_m / 2;
+  for (const Imager& camera : world.rig.cameras) {
+    ordered_json corners = ordered_json::array();
+    bool visible = true;
+    for (const auto& [x, y] : {std::pair{-h, -h}, {h, -h}, {h, h}, {-h, h}}) {
+      const Eigen::Vector3d p_world = world_from_marker * Eigen::Vector3d(x, y, 0);
+      const auto px = camera.project(p_world);
+      const Eigen::Vector3d d_in = world_from_marker.rotation * Eigen::Vector3d::UnitZ();
+      const bool faces = d_in.dot(p_world - camera.imager_from_world.inverse().translation) > 0;
+      visible = visible && faces && truth.visible(camera, p_world);
+      corners.push_back(px ? ordered_json{px->x(), px->y()} : ordered_json());
+    }
+    json["cameras"][camera.name] = {{"corners_px", corners}, {"visible", visible}};
+  }
+  return json;
+}
+
+Status write_truth(const sim::World& world, const scene::PosedScene& parts, const fs::path& out) {
+  const sim::Truth truth(world, parts);
+  ordered_json json = {{"schema", "limn.truth/1"}, {"rig", "rig"}};
+  if (world.scene && world.scene->prototype)
+    json["world_from_prototype"] = pose_json(world.world_from_prototype);
+  json["slots"] = ordered_json::object();
+  for (const scene::PosedPart& part : parts.parts)
+    json["slots"][part.slot] = {{"world_from_part", pose_json(part.world_from_part)},
+                                {"variant", part.variant}};
+  json["markers"] = ordered_json::array();
+  for (const sim::PlacedMarker& marker : world.markers)
+    json["markers"].push_back(marker_json(world, truth, marker));
+  LIMN_TRY_STATUS(save_rig(world.rig, out / "rig"));
+  return write_file(out / "truth.json", json.dump(2) + "\n");
+}
+
+// Photographs of one camera; numbers the shots so that each has its own noise.
+class Studio {
+ public:
+  Studio(const sim::World& world, int camera) : world_(world), camera_(camera) {
+    const auto begin = std::chrono::steady_clock::now();
+    samples_ = sim::trace(world_, camera_);
+    trace_s_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  }
+
+  Status shoot(const fs::path& out, const std::string& what, const std::vector<cv::Mat>& shown) {
+    const std::string file = name() + "-" + what + ".png";
+    const auto begin = std::chrono::steady_clock::now();
+    const cv::Mat picture = sim::photograph(world_, samples_, shown, world_.seed + ++shots_);
+    const double shot_ms =
+        1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    LIMN_TRY_STATUS(write_png(out / file, picture));
+    fmt::print("{}  {}x{}, shot in {:.0f} ms\n", (out / file).string(), picture.cols, picture.rows, shot_ms);
+    return {};
+  }
+  void report_trace() const {
+    log_info("{}: {} samples traced in {:.2f} s", name(), samples_.size(), trace_s_);
+  }
+
+ private:
+  const std::string& name() const { return world_.rig.cameras[static_cast<std::size_t>(camera_)].name; }
+  const sim::World& world_;
+  int camera_;
+  sim::Samples samples_;
+  double trace_s_ = 0;
+  std::uint64_t shots_ = 0;
+};
+
+Status shoot_camera(const sim::World& world,
+                    const scene::PosedScene& parts,
+                    int camera,
+                    const SimulateOptions& options,
+                    const std::vector<cv::Mat>& shown) {
+  std::vector<cv::Mat> white;
+  for (const Imager& projector : world.rig.projectors)
+    white.emplace_back(projector.height, projector.width, CV_8U, cv::Scalar(255));
+  Studio studio(world, camera);
+  studio.report_trace();
+  sim::World dark = world;  // projectors switched off, their black light too
+  for (sim::ProjectorEffects& effects : dark.projector_effects) effects.black_level = 0;
+  LIMN_TRY_STATUS(Studio(dark, camera).shoot(options.out, "ambient", {}));
+  LIMN_TRY_STATUS(studio.shoot(options.out, "white", white));
+  if (!options.show.empty()) LIMN_TRY_STATUS(studio.shoot(options.out, "shown", shown));
+  if (!parts.parts.empty()) {
+    const sim::World still_life = sim::with_parts(world, parts);
+    LIMN_TRY_STATUS(Studio(still_life, camera).shoot(options.out, "still-life", white));
+  }
+  return {};
+}
+
+}  // namespace
+
+Status run_simulate(const SimulateOptions& options) {
+  LIMN_TRY(sim::World world, sim::load_world(options.world, marker_picture));
+  LIMN_TRY(const std::vector<cv::Mat> shown, shown_pictures(options.show, world.rig));
+  LIMN_TRY(const std::vector<std::string> variants, chosen_variants(options.variants, world));
+  LIMN_TRY_STATUS(make_folder(options.out));
+  const scene::PosedScene parts = sim::true_poses(world, variants);
+  LIMN_TRY_STATUS(write_truth(world, parts, options.out));
+  for (sim::CameraEffects& effects : world.camera_effects) effects.srgb = true;
+  for (std::size_t i = 0; i < world.rig.cameras.size(); ++i)
+    LIMN_TRY_STATUS(shoot_camera(world, parts, static_cast<int>(i), options, shown));
+  return {};
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/imager.h"
+#include "scene/posed.h"
+#include "sim/ray_scene.h"
+#include "sim/world.h"
+
+namespace limn::sim {
+
+/// Where a ray from an imager lands.
+struct Landing {
+  std::string object;
+  Eigen::Vector3d p_world;
+  Eigen::Vector3d p_object;  ///< in the object's own frame
+  Eigen::Vector3d n_world;   ///< geometric normal, towards the imager
+};
+
+/// A point of a surface, in its mesh's frame.
+struct SurfacePoint {
+  Eigen::Vector3d p;
+  Eigen::Vector3d n;  ///< unit, interpolated
+};
+
+/// Names of what each pixel shows: `picture` (CV_16S) holds indices into `names`, -1 for nothing.
+struct ObjectPicture {
+  cv::Mat picture;
+  std::vector<std::string> names;
+};
+
+/// The judge: exact rays in a world as it stands when this is made, beside the virtual parts at `parts`.
+/// Physical questions ignore the parts.
+class Truth {
+ public:
+  explicit Truth(const World& world, const scene::PosedScene& parts = {});
+
+  /// Where the light of a projector's pixel lands, or what a camera's pixel sees; nullopt when nothing is
+  /// there.
+  std::optional<Landing> landing(const Imager& imager, const Eigen::Vector2d& px) const;
+
+  /// Whether a point on a surface (within 0.1 mm) is in the imager's picture with nothing in between.
+  bool visible(const Imager& imager, const Eigen::Vector3d& p_world) const;
+
+  /// The nearest thing in every pixel's centre: physical objects and, in front of or behind them, parts
+  /// ("part-SLOT").
+  ObjectPicture object_picture(const Imager& imager) const;
+
+  /// A part in the viewer's picture: 255 where the ray behind the part meets the prototype at a point that a
+  /// projector reaches, 128 where not, 0 where the part is not seen (the prototype hides it, or it is
+  /// elsewhere). Only the prototype hides and shadows: plates and stands are taken for its surface. A part on
+  /// the surface (Mode::surface) is seen within 2 mm of it.
+  cv::Mat part_mask(const Imager& viewer, const std::string& slot) const;
+
+ private:
+  struct Part {
+    scene::PosedPart posed;
+    const scene::Slot* slot;
+    const scene::Mesh* mesh;
+  };
+  std::vector<Hit> hits(const RayScene& scene, const Imager& imager) const;
+  bool projected(const Eigen::Vector3d& p_world, const Eigen::Vector3d& n_world) const;
+  const Part* find_part(const std::string& slot) const;
+
+  const World& world_;
+  std::vector<Part> parts_;
+  RayScene physical_;
+  RayScene prototype_;
+};
+
+/// At least `count` random points, uniform over the mesh's area; the same seed gives the same points.
+std::vector<SurfacePoint> surface_points(const scene::Mesh& mesh, int count, std::uint64_t seed);
+
+/// The world with the parts in it as if they were physical: what the lit prototype is to look like.
+World with_parts(const World& world, const scene::PosedScene& parts);
+
+}  // namespace limn::sim
