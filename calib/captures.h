@@ -46,8 +46,10 @@ std::filesystem::path picture_path(
     const Captures& captures, int pose, int projector, int camera, int pattern);
 
 /// Reads capture.json and patterns.json and lists the poses (`pose*` directories). A pose without all of its
-/// pictures is an error that names the first missing file.
-Result<Captures> load_captures(const std::filesystem::path& folder);
+/// pictures is an error that names the first missing file. Poses named in `skip` are left out unread; a name
+/// in it that no pose has is an error.
+Result<Captures> load_captures(const std::filesystem::path& folder,
+                               const std::vector<std::string>& skip = {});
 
 /// Pictures that somebody else took: one camera, one projector, OpenCV's Gray code.
 struct ForeignCaptures {
