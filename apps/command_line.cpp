@@ -2,7 +2,13 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <memory>
 
+#include "apps/capture.h"
+#include "apps/demo.h"
+#include "apps/patterns.h"
+#include "apps/solve.h"
+#include "apps/simulate.h"
 #include "core/log.h"
 
 namespace limn::apps {
@@ -17,6 +23,68 @@ int finished(const Status& status) {
   return status.error().wrong_usage ? 2 : 1;
 }
 
+void add_demo(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("demo", "a whole session on the virtual rig: calibrate, track, project, composite");
+  command->footer("Example: limn demo --out out   (then open out/demo.html)");
+  auto options = std::make_shared<DemoOptions>();
+  command->add_option("--out", options->out, "folder for pictures, demo.html and demo.json")->capture_default_str();
+  command->add_flag("--window", options->window, "also show the pictures in a window; Escape closes it");
+  command->add_flag("--keep-captures", options->keep_captures, "keep the calibration's pictures (some 1 GB)");
+  command->callback([options, &run] { run = [options] { return finished(run_demo(*options)); }; });
+}
+
+void add_capture(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("capture", "show the patterns of a plan and take the pictures");
+  command->footer("Example: limn capture --plan config/plans/bench.json --out captures");
+  auto options = std::make_shared<CaptureOptions>();
+  command->add_option("--plan", options->plan, "plan file (limn.plan/1)")->required();
+  command->add_option("--out", options->out, "captures folder to make")->required();
+  command->callback([options, &run] { run = [options] { return finished(run_capture(*options)); }; });
+}
+
+void add_patterns(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("patterns", "the pictures that a projector shows for calibration");
+  command->footer("Example: limn patterns --projector 1280x800 --out patterns");
+  auto options = std::make_shared<PatternsOptions>();
+  command->add_option("--projector", options->projector, "its size, such as 1280x800")->required();
+  command->add_option("--code", options->code, "gray")->capture_default_str();
+  command->add_option("--out", options->out, "folder for 000.png ... and patterns.json")->required();
+  command->callback([options, &run] { run = [options] { return finished(run_patterns(*options)); }; });
+}
+
+void add_solve(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("solve", "captures to a calibrated rig with a report that says how far to trust it");
+  command->footer(
+      "Example: limn solve captures --out rig\n"
+      "Example: limn solve photos --import opencv-gray --projector 1024x768 --board chessboard:9x7:75mm "
+      "--poses 'capture_*' --shots 'graycode_*.png' --out rig");
+  auto options = std::make_shared<SolveOptions>();
+  command->add_option("captures", options->captures, "captures folder")->required();
+  command->add_option("--out", options->out, "rig folder to write")->required();
+  command->add_option("--skip-poses", options->skip_poses, "poses to leave out, by name, with commas")->delimiter(',');
+  command->add_option("--camera-model", options->camera_model, "mrcal lens model of cameras")->capture_default_str();
+  command->add_option("--projector-model", options->projector_model, "mrcal lens model of projectors")
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "print report.json instead of a table");
+  command->add_option("--import", options->import_format, "read somebody else's captures: opencv-gray");
+  command->add_option("--projector", options->projector, "with --import: the projector's size, such as 1024x768");
+  command->add_option("--board", options->board, "with --import: such as chessboard:9x7:75mm (inner corners)");
+  command->add_option("--poses", options->poses, "with --import: pattern of the pose folders")->capture_default_str();
+  command->add_option("--shots", options->shots, "with --import: pattern of the pictures")->capture_default_str();
+  command->callback([options, &run] { run = [options] { return finished(run_solve(*options)); }; });
+}
+
+void add_simulate(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("simulate", "pictures of the virtual rig, and the truth behind them");
+  command->footer("Example: limn simulate config/worlds/studio.json --out simulated --variants mirror=sport");
+  auto options = std::make_shared<SimulateOptions>();
+  command->add_option("world", options->world, "world file (limn.world/1)")->required();
+  command->add_option("--out", options->out, "folder for pictures, truth.json and the true rig")->required();
+  command->add_option("--show", options->show, "PROJECTOR=PICTURE to shine; again for another projector");
+  command->add_option("--variants", options->variants, "SLOT=VARIANT,… of the still life");
+  command->callback([options, &run] { run = [options] { return finished(run_simulate(*options)); }; });
+}
+
 }  // namespace
 
 int run_command_line(int argc, char** argv) {
@@ -24,7 +92,12 @@ int run_command_line(int argc, char** argv) {
   app.name("limn");
   app.require_subcommand(1);
   Run run;
-  // One block per command, in the order of a session: add_NAME(app, run).
+  // In the order of a session: add_NAME(app, run).
+  add_demo(app, run);
+  add_patterns(app, run);
+  add_capture(app, run);
+  add_solve(app, run);
+  add_simulate(app, run);
 
   try {
     app.parse(argc, argv);

@@ -271,7 +271,7 @@ const std::vector<MirrorStyle>& mirror_styles() {
                                                    0.045,
                                                    2.0,
                                                    0.0,
-                                                   {-0.015, 0.062, 0.062},
+                                                   {-0.015, 0.050, 0.060},
                                                    0.55,
                                                    0.020,
                                                    0.0075,
@@ -285,7 +285,7 @@ const std::vector<MirrorStyle>& mirror_styles() {
                                                    0.055,
                                                    3.0,
                                                    0.45,
-                                                   {-0.030, 0.056, 0.066},
+                                                   {-0.030, 0.050, 0.066},
                                                    0.50,
                                                    0.018,
                                                    0.0090,
@@ -299,7 +299,7 @@ const std::vector<MirrorStyle>& mirror_styles() {
                                                    0.048,
                                                    5.0,
                                                    0.12,
-                                                   {-0.020, 0.066, 0.064},
+                                                   {-0.020, 0.050, 0.064},
                                                    0.45,
                                                    0.024,
                                                    0.0110,
@@ -478,7 +478,7 @@ scene::Scene car_door_scene() {
   scene.prototype = door_prototype();
   const Clay clay(scene.prototype->mesh);
   scene::Slot mirror = slot_on_door("mirror", "0", scene::Mode::view);
-  mirror.marker_from_part = marker_from_upright(-0.070, 0.018);
+  mirror.marker_from_part = marker_from_upright(-0.072, -0.010);
   for (const MirrorStyle& style : mirror_styles())
     mirror.variants.push_back({style.name, mirror_mesh(style)});
   scene::Slot trim = slot_on_door("trim", "1", scene::Mode::surface);

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <opencv2/core.hpp>
 
 #include "sim/ray_scene.h"
@@ -17,7 +16,7 @@ constexpr int k_direction_step = 8;     // px between exact directions; cubic be
 constexpr float k_same_albedo = 0.02F;  // samples of one pixel that differ by less are one surface
 constexpr float k_same_normal = 0.99F;  // cosine, about 8°
 constexpr float k_same_depth = 1e-3F;   // m, departure from a plane within one pixel
-constexpr int k_lamp_points = 5;        // of a lamp's disc: its centre and four on the rim
+constexpr int k_lamp_points = 12;        // spread evenly over a lamp's disc
 
 // Where ray directions of any sub-pixel place come from: exact ones on a grid that reaches over the border,
 // cubic interpolation (Catmull-Rom) between them.
@@ -142,12 +141,11 @@ struct LampPoint {
 std::vector<LampPoint> points_of(const Lamp& lamp) {
   if (lamp.radius_m <= 0) return {{lamp.p_world, lamp.illuminance_at_1m}};
   std::vector<LampPoint> points;
-  const double share = lamp.illuminance_at_1m / k_lamp_points;
-  points.push_back({lamp.p_world, share});
-  for (int k = 0; k < k_lamp_points - 1; ++k) {
-    const double angle = (k + 0.5) * 2 * std::numbers::pi / (k_lamp_points - 1);
-    points.push_back(
-        {lamp.p_world + lamp.radius_m * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0), share});
+  constexpr double k_golden_angle = 2.399963229728653;  // sunflower: equal areas, no rows
+  for (int k = 0; k < k_lamp_points; ++k) {
+    const double radius = lamp.radius_m * std::sqrt((k + 0.5) / k_lamp_points), angle = k * k_golden_angle;
+    points.push_back({lamp.p_world + radius * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0),
+                      lamp.illuminance_at_1m / k_lamp_points});
   }
   return points;
 }
