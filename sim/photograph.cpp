@@ -15,22 +15,18 @@ constexpr int k_grey = -1;               // channel of a grey camera
 constexpr double k_blur_step_px = 0.25;  // defocus is rounded to this stdev: its edge spreads differ by < 1 %
 constexpr int k_blur_levels = 40;        // up to 10 px, far beyond any use
 
-double squared_radius(double x, double y, double width, double height) {
-  const double dx = (x - (width - 1) / 2) / (width / 2), dy = (y - (height - 1) / 2) / (height / 2);
-  const double aspect = height / width;
-  return (dx * dx + dy * dy * aspect * aspect) / (1 + aspect * aspect);  // 1 in the corners
-}
-
 // The light of one projector in one colour channel, ready for lookups.
 class Beam {
  public:
   Beam(const Imager& projector, const ProjectorEffects& effects, const cv::Mat& shown, int channel)
       : width_(static_cast<float>(projector.width)),
         height_(static_cast<float>(projector.height)),
-        focal_px_(projector.lens.fx()),
         effects_(effects),
         dark_(shown.empty()) {
     black_ = static_cast<float>(effects.illuminance_at_1m * effects.black_level);
+    vignetting_ = static_cast<float>(effects.vignetting) * 4 / (width_ * width_ + height_ * height_);
+    blur_levels_m_ = static_cast<float>(projector.lens.fx() * effects.aperture_m / 4 / k_blur_step_px);
+    blur_at_focus_ = blur_levels_m_ / static_cast<float>(effects.focus_m);
     if (!dark_) sharp_ = light_of(shown, channel);
   }
 
@@ -38,19 +34,17 @@ class Beam {
   void prepare(std::span<const ProjectorView> views) {
     if (dark_) return;
     std::array<bool, k_blur_levels> used{};
-    for (std::size_t i = 0; i < views.size(); i += 7)  // neighbours differ by less than a level
-      if (views[i].visible > 0) used[level_of(views[i].depth)] = true;
-    for (std::size_t level = 0; level < used.size(); ++level) {
-      const bool near =
-          used[level] || (level > 0 && used[level - 1]) || (level + 1 < used.size() && used[level + 1]);
-      if (near) levels_[level] = blurred(level);
-    }
+    for (const ProjectorView& view : views)
+      if (view.gain > 0) used[level_of(view.depth)] = true;
+    cv::parallel_for_({0, k_blur_levels}, [&](const cv::Range& range) {
+      for (auto level = static_cast<std::size_t>(range.start); level < static_cast<std::size_t>(range.end);
+           ++level)
+        if (used[level]) levels_[level] = blurred(level);
+    });
   }
 
   float at(const ProjectorView& view) const {
-    const float strength = view.visible * (effects_.incidence ? view.cosine : 1.0F) /
-                           (effects_.falloff ? view.distance * view.distance : 1.0F);
-    return strength * vignette(view) * (dark_ ? black_ * coverage(view) : looked_up(view));
+    return view.gain * vignette(view) * (dark_ ? black_ * coverage(view) : looked_up(view));
   }
 
  private:
@@ -84,17 +78,13 @@ class Beam {
 
   // A disc of diameter D has a stdev of D / 4; D = aperture |depth - focus| / focus on the surface.
   std::size_t level_of(float depth) const {
-    if (effects_.aperture_m <= 0) return 0;
-    const double disc_px =
-        focal_px_ * effects_.aperture_m * std::abs(1 / effects_.focus_m - 1 / static_cast<double>(depth));
-    return std::min<std::size_t>(static_cast<std::size_t>(disc_px / 4 / k_blur_step_px + 0.5),
-                                 k_blur_levels - 1);
+    const float level = std::abs(blur_at_focus_ - blur_levels_m_ / depth) + 0.5F;
+    return std::min<std::size_t>(static_cast<std::size_t>(level), k_blur_levels - 1);
   }
 
   // Bilinear: the projector's square pixel averaged over a camera pixel of like size.
   float looked_up(const ProjectorView& view) const {
-    const cv::Mat& picture = levels_[level_of(view.depth)];
-    const cv::Mat& light = picture.empty() ? sharp_ : picture;
+    const cv::Mat& light = levels_[level_of(view.depth)];
     const float x = view.u + k_pad, y = view.v + k_pad;
     const int c = static_cast<int>(x), r = static_cast<int>(y);
     const float fx = x - static_cast<float>(c), fy = y - static_cast<float>(r);
@@ -109,15 +99,16 @@ class Beam {
   }
 
   float vignette(const ProjectorView& view) const {
-    if (effects_.vignetting <= 0) return 1;
-    return 1 - static_cast<float>(effects_.vignetting * squared_radius(view.u, view.v, width_, height_));
+    const float dx = view.u - (width_ - 1) / 2, dy = view.v - (height_ - 1) / 2;
+    return 1 - vignetting_ * (dx * dx + dy * dy);
   }
 
   float width_, height_;
-  double focal_px_;
   ProjectorEffects effects_;
   bool dark_;
   float black_ = 0;
+  float vignetting_ = 0;                         // per squared pixel from the panel's middle
+  float blur_levels_m_ = 0, blur_at_focus_ = 0;  // blur level = |blur_at_focus - blur_levels_m / depth|
   cv::Mat sharp_;
   std::array<cv::Mat, k_blur_levels> levels_;
 };
@@ -140,14 +131,18 @@ std::vector<Beam> beams_of(const World& world,
   return beams;
 }
 
-float sample_light(const Samples& samples, std::span<const Beam> beams, int channel, std::size_t i) {
-  float illuminance = samples.room_light[i];
-  for (std::size_t k = 0; k < beams.size(); ++k) {
-    const ProjectorView& view = samples.projectors[k][i];
-    if (view.visible > 0) illuminance += beams[k].at(view);
-  }
-  const float albedo = channel == k_grey ? samples.grey_albedo[i] : samples.albedo[i][channel];
-  return samples.weight[i] * albedo * illuminance;
+// What the gain of a view is to be multiplied by where falloff or incidence is switched off.
+float unphysical_gain(const World& world, const Samples& samples, std::size_t projector, std::size_t i) {
+  const ProjectorEffects& effects = world.projector_effects[projector];
+  if (effects.falloff && effects.incidence) return 1;
+  const Eigen::Vector3d p = world.rig.projectors[projector].imager_from_world.inverse().translation;
+  const Eigen::Vector3f towards = p.cast<float>() - samples.p_world[i];
+  const float cosine = samples.n_world[i].dot(towards.normalized());
+  return (effects.falloff ? 1 : towards.squaredNorm()) / (effects.incidence ? 1 : std::max(cosine, 1e-3F));
+}
+
+float reflected(const Samples& samples, int channel, std::size_t i) {
+  return channel == k_grey ? samples.grey[i] : samples.weight[i] * samples.albedo[i][channel];
 }
 
 cv::Mat channel_light(const World& world,
@@ -159,15 +154,38 @@ cv::Mat channel_light(const World& world,
   auto* out = light.ptr<float>();
   const std::size_t pixels = light.total(), extra = samples.size() - pixels;
   std::vector<float> more(extra);
+  const bool physical = std::all_of(world.projector_effects.begin(), world.projector_effects.end(),
+                                    [](const ProjectorEffects& e) { return e.falloff && e.incidence; });
   constexpr std::size_t k_chunk = 16384;
   const auto chunks = static_cast<int>((samples.size() + k_chunk - 1) / k_chunk);
   cv::parallel_for_({0, chunks}, [&](const cv::Range& range) {
     const std::size_t end = std::min(samples.size(), static_cast<std::size_t>(range.end) * k_chunk);
-    for (std::size_t i = static_cast<std::size_t>(range.start) * k_chunk; i < end; ++i)
-      (i < pixels ? out[i] : more[i - pixels]) = sample_light(samples, beams, channel, i);
+    for (std::size_t i = static_cast<std::size_t>(range.start) * k_chunk; i < end; ++i) {
+      float illuminance = samples.room_light[i];
+      for (std::size_t k = 0; k < beams.size(); ++k) {
+        const ProjectorView& view = samples.projectors[k][i];
+        if (view.gain <= 0) continue;
+        illuminance += beams[k].at(view) * (physical ? 1 : unphysical_gain(world, samples, k, i));
+      }
+      (i < pixels ? out[i] : more[i - pixels]) = reflected(samples, channel, i) * illuminance;
+    }
   });
   for (std::size_t i = 0; i < extra; ++i) out[samples.pixel[pixels + i]] += more[i];
   return light;
+}
+
+// Exposure and vignetting: quadratic in the distance from the picture's middle.
+void expose_row(const CameraEffects& effects, cv::Mat& signal, int r) {
+  const auto width = static_cast<float>(signal.cols), height = static_cast<float>(signal.rows);
+  const auto exposure = static_cast<float>(effects.exposure);
+  const float loss = static_cast<float>(effects.vignetting) * 4 / (width * width + height * height);
+  const float dy = static_cast<float>(r) - (height - 1) / 2;
+  auto* value = signal.ptr<float>(r);
+  for (int c = 0; c < signal.cols; ++c) {
+    const float dx = static_cast<float>(c) - (width - 1) / 2;
+    const float gain = exposure * (1 - loss * (dx * dx + dy * dy));
+    for (int k = 0; k < signal.channels(); ++k) *value++ *= gain;
+  }
 }
 
 void in_row_strips(int rows, const std::function<void(const cv::Range&)>& work) {
@@ -264,14 +282,7 @@ cv::Mat exposed(const World& world, int camera, const cv::Mat& light) {
                        cv::BORDER_REPLICATE);
     else
       light.rowRange(rows).copyTo(strip);
-    const int channels = light.channels();
-    for (int r = rows.start; r < rows.end; ++r) {
-      auto* row = signal.ptr<float>(r);
-      for (int i = 0; i < light.cols * channels; ++i) {
-        const double loss = effects.vignetting * squared_radius(i / channels, r, light.cols, light.rows);
-        row[i] *= static_cast<float>(effects.exposure * (1 - loss));
-      }
-    }
+    for (int r = rows.start; r < rows.end; ++r) expose_row(effects, signal, r);
   });
   return signal;
 }

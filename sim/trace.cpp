@@ -16,7 +16,7 @@ constexpr int k_direction_step = 8;     // px between exact directions; cubic be
 constexpr float k_same_albedo = 0.02F;  // samples of one pixel that differ by less are one surface
 constexpr float k_same_normal = 0.99F;  // cosine, about 8°
 constexpr float k_same_depth = 1e-3F;   // m, departure from a plane within one pixel
-constexpr int k_lamp_points = 12;        // spread evenly over a lamp's disc
+constexpr int k_lamp_points = 12;       // spread evenly over a lamp's disc
 
 // Where ray directions of any sub-pixel place come from: exact ones on a grid that reaches over the border,
 // cubic interpolation (Catmull-Rom) between them.
@@ -424,7 +424,7 @@ class Tracer {
     samples_.p_world.resize(count);
     samples_.n_world.resize(count);
     samples_.albedo.resize(count);
-    samples_.grey_albedo.resize(count);
+    samples_.grey.resize(count);
     samples_.room_light.resize(count);
     samples_.projectors.assign(p_projectors_.size(), std::vector<ProjectorView>(count));
   }
@@ -436,10 +436,10 @@ class Tracer {
     samples_.p_world[i] = s.p;
     samples_.n_world[i] = s.n;
     samples_.albedo[i] = s.albedo;
-    samples_.grey_albedo[i] = s.albedo.mean();
+    samples_.grey[i] = s.albedo.mean();
     samples_.room_light[i] = room_light;
     for (std::size_t k = 0; k < lit_.size(); ++k)
-      samples_.projectors[k][i].visible = lit_[k][static_cast<std::size_t>(pixel)];
+      samples_.projectors[k][i].gain = lit_[k][static_cast<std::size_t>(pixel)];
   }
   void put(std::size_t i, std::int32_t pixel, const Group& group) {
     Surface mean = group.first;
@@ -448,8 +448,9 @@ class Tracer {
     mean.albedo = group.albedo / group.count;
     put(i, pixel, mean, group.room_light / group.count);
     samples_.weight[i] = group.count / k_sub_samples;
+    samples_.grey[i] *= samples_.weight[i];
     for (std::size_t k = 0; k < group.lit.size(); ++k)
-      samples_.projectors[k][i].visible = group.lit[k] / group.count;
+      samples_.projectors[k][i].gain = group.lit[k] / group.count;
   }
 
   // The projectors' geometry of a sample, through their true lenses.
@@ -458,20 +459,20 @@ class Tracer {
     const Eigen::Vector3d p = samples_.p_world[i].cast<double>();
     for (std::size_t k = 0; k < p_projectors_.size(); ++k) {
       ProjectorView& view = samples_.projectors[k][i];
-      if (view.visible <= 0) continue;
+      if (view.gain <= 0) continue;
       const Imager& projector = world_.rig.projectors[k];
       const Eigen::Vector3d p_projector = projector.imager_from_world * p;
       const auto px = p_projector.z() > 0 ? projector.lens.project(p_projector) : std::nullopt;
       if (!px || px->x() < -1 || px->y() < -1 || px->x() > projector.width || px->y() > projector.height) {
-        view.visible = 0;
+        view.gain = 0;
         continue;
       }
       const Eigen::Vector3d towards = p_projectors_[k] - p;
       view.u = static_cast<float>(px->x());
       view.v = static_cast<float>(px->y());
-      view.distance = static_cast<float>(towards.norm());
       view.depth = static_cast<float>(p_projector.z());
-      view.cosine = std::max(0.0F, samples_.n_world[i].dot(towards.normalized().cast<float>()));
+      const float cosine = std::max(0.0F, samples_.n_world[i].dot(towards.normalized().cast<float>()));
+      view.gain *= cosine / static_cast<float>(towards.squaredNorm());  // was: the share that is reached
     }
   }
 

@@ -11,10 +11,8 @@ namespace limn::sim {
 /// How a projector sees one sample: everything that its light needs apart from the picture shown.
 struct ProjectorView {
   float u = 0, v = 0;  ///< pixel, through the true lens
-  float visible = 0;   ///< share of the sample that the projector reaches, 0..1 (shadow rays, facing)
-  float cosine = 0;    ///< of the angle of incidence
-  float distance = 1;  ///< from the projector's centre, m
-  float depth = 1;     ///< along its axis, m
+  float gain = 0;   ///< share that is reached (shadow rays, facing) x cosine of incidence / distance², 1/m²
+  float depth = 1;  ///< along the projector's axis, m
 };
 
 /// What a camera's pixels see, traced once per geometry; showing another picture is a lookup. Sample i <
@@ -30,7 +28,7 @@ struct Samples {
   std::vector<Eigen::Vector3f> p_world;                ///< mean hit point
   std::vector<Eigen::Vector3f> n_world;                ///< unit normal towards the camera
   std::vector<Eigen::Vector3f> albedo;                 ///< linear BGR
-  std::vector<float> grey_albedo;                      ///< their mean, what a grey camera sees
+  std::vector<float> grey;                             ///< weight x mean albedo, what a grey camera sees
   std::vector<float> room_light;                       ///< illuminance by the room
   std::vector<std::vector<ProjectorView>> projectors;  ///< per projector
   std::size_t size() const { return pixel.size(); }
