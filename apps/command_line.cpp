@@ -7,6 +7,7 @@
 #include "apps/capture.h"
 #include "apps/demo.h"
 #include "apps/patterns.h"
+#include "apps/render.h"
 #include "apps/solve.h"
 #include "apps/simulate.h"
 #include "core/log.h"
@@ -74,6 +75,26 @@ void add_solve(CLI::App& app, Run& run) {
   command->callback([options, &run] { run = [options] { return finished(run_solve(*options)); }; });
 }
 
+void add_render(CLI::App& app, Run& run) {
+  auto* command =
+      app.add_subcommand("render", "a scene's pictures: for every projector, over camera pictures, and what light shows");
+  command->footer(
+      "With --poses alone the composites are drawn over black, one for each camera.\n"
+      "Example: limn render --rig rig --scene config/scenes/door --frame camera0=picture.png --out rendered\n"
+      "Example: limn render --rig rig --scene config/scenes/door --poses poses.json --viewer pose.json --out rendered");
+  auto options = std::make_shared<RenderOptions>();
+  command->add_option("--rig", options->rig, "rig folder, rig.json or folder of .cameramodel files")->required();
+  command->add_option("--scene", options->scene, "scene folder or its scene.json")->required();
+  command->add_option("--frame", options->frames, "CAMERA=PICTURE, again for another camera; its markers place the scene");
+  command->add_option("--poses", options->poses, "POSES.json that places the scene; frames are then only drawn over");
+  command->add_option("--viewer", options->viewer, "viewer file; without it the scene's viewer, else camera 0");
+  command->add_option("--composite", options->composite, "full parts, or rest: only what light cannot show")
+      ->check(CLI::IsMember({"full", "rest"}))
+      ->capture_default_str();
+  command->add_option("--out", options->out, "folder for the pictures and coverage.json")->required();
+  command->callback([options, &run] { run = [options] { return finished(run_render(*options)); }; });
+}
+
 void add_simulate(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand("simulate", "pictures of the virtual rig, and the truth behind them");
   command->footer("Example: limn simulate config/worlds/studio.json --out simulated --variants mirror=sport");
@@ -97,6 +118,7 @@ int run_command_line(int argc, char** argv) {
   add_patterns(app, run);
   add_capture(app, run);
   add_solve(app, run);
+  add_render(app, run);
   add_simulate(app, run);
 
   try {

@@ -21,7 +21,8 @@ Hit surface_part_at(usampler2DArray s_ids, Sight sight, vec3 p, vec3 d_normal) {
   Hit best = k_no_hit;
   uint tried = 0u;
   for (int i = 0; i < 5; ++i) {
-    uvec4 ids = ids_around(s_ids, sight, 1, p + k_heights[i] * k_on_surface * d_normal - sight.p_eye.xyz);
+    vec4 share;
+    uvec4 ids = ids_around(s_ids, sight, 1, p + k_heights[i] * k_on_surface * d_normal - sight.p_eye.xyz, share);
     for (int k = 0; k < 4; ++k) {
       uint id = ids[k];
       if (id == 0u || id == tried) continue;

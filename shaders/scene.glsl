@@ -34,10 +34,11 @@ struct Hit {
   uint id;       // 0: nothing
   float t;       // metres along the unit direction
   vec3 weights;  // barycentric
+  float slack;   // of the weights: what rounding may have moved them by
 };
-const Hit k_no_hit = Hit(0u, 1e30, vec3(0));
+const Hit k_no_hit = Hit(0u, 1e30, vec3(0), 0.0);
 
-const float k_edge_slack = 1e-4;   // barycentric; closes the cracks that rounding opens between neighbours
+const float k_rounding = 2e-6;     // m; of single precision a few metres away, closes cracks between neighbours
 const float k_same_place = 1e-4;   // m; nearer than this two hits are one surface
 
 uint owner_of(uint id) { return s_owners[id - 1u].x; }
@@ -65,10 +66,11 @@ bool plane_hit(uint id, vec3 p_origin, vec3 d, out Hit hit) {
   hit.weights.y = -dot(m, ac) / along;
   hit.weights.z = dot(m, ab) / along;
   hit.weights.x = 1.0 - hit.weights.y - hit.weights.z;
+  hit.slack = 1e-6 + k_rounding * inversesqrt(length(n));
   return true;
 }
 
-bool is_inside(Hit hit) { return all(greaterThanEqual(hit.weights, vec3(-k_edge_slack))); }
+bool is_inside(Hit hit) { return all(greaterThanEqual(hit.weights, vec3(-hit.slack))); }
 
 // Whether a triangle is smaller than two texels of the sight: then its neighbours' ids may hide it.
 bool is_small(uint id, float t, Sight sight) {
@@ -78,14 +80,17 @@ bool is_small(uint id, float t, Sight sight) {
   return side * sight.focal_centre.x < 2.0 * t;
 }
 
-// Texels around the direction d: ids, the nearest first.
-uvec4 ids_around(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
+// Texels around the direction d: ids, the nearest first, and their bilinear weights.
+uvec4 ids_around(usampler2DArray s_ids, Sight sight, int layer, vec3 d, out vec4 share) {
+  share = vec4(1, 0, 0, 0);
   vec3 q = mat3(sight.sight_from_scene) * d;
   if (q.z <= 0.0) return uvec4(0);
   vec2 px = sight.focal_centre.xy * q.xy / q.z + sight.focal_centre.zw;
   if (any(lessThan(px, vec2(-1))) || any(greaterThan(px, sight.size.xy))) return uvec4(0);
   ivec2 near = ivec2(floor(px + 0.5));
   ivec2 beside = ivec2(px.x < float(near.x) ? -1 : 1, px.y < float(near.y) ? -1 : 1);
+  vec2 f = abs(px - vec2(near));
+  share = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
   ivec2 last = ivec2(sight.size.xy) - 1;
   int z = int(sight.p_eye.w) + layer;
   uvec4 ids;
@@ -96,10 +101,24 @@ uvec4 ids_around(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
   return ids;
 }
 
+// The point of a small triangle next to the ray, where the ray slips between the triangles that texels saw.
+Hit beside_hit(uint id, vec3 p_origin, vec3 d) {
+  Hit hit;
+  if (!plane_hit(id, p_origin, d, hit)) return k_no_hit;
+  hit.weights = max(hit.weights, vec3(0));
+  hit.weights /= hit.weights.x + hit.weights.y + hit.weights.z;
+  uint first = 3u * (id - 1u);
+  vec3 p = mat3(s_corners[first].xyz, s_corners[first + 1u].xyz, s_corners[first + 2u].xyz) * hit.weights;
+  uint owner = owner_of(id);
+  hit.t = dot(p - to_owner(owner, p_origin), turned_to_owner(owner, d));
+  return hit;
+}
+
 // First surface that the ray from the sight's eye meets: exactly, by intersecting the triangles that the texels
-// around it saw. Triangles smaller than texels can all be missed: then the plane of the nearest texel's serves.
+// around it saw. Triangles smaller than texels can all be missed: then the texels decide, by bilinear coverage.
 Hit first_hit(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
-  uvec4 ids = ids_around(s_ids, sight, layer, d);
+  vec4 share;
+  uvec4 ids = ids_around(s_ids, sight, layer, d, share);
   Hit best = k_no_hit;
   if (ids == uvec4(0)) return best;
   for (int k = 0; k < 4; ++k) {
@@ -108,12 +127,12 @@ Hit first_hit(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
     Hit hit;
     if (plane_hit(id, sight.p_eye.xyz, d, hit) && is_inside(hit) && hit.t > 0.0 && hit.t < best.t) best = hit;
   }
-  if (best.id != 0u || ids.x == 0u) return best;
-  Hit hit;
-  if (!plane_hit(ids.x, sight.p_eye.xyz, d, hit) || hit.t <= 0.0) return best;
-  if (any(equal(ids, uvec4(0))) && !is_small(ids.x, hit.t, sight)) return best;
-  hit.weights = max(hit.weights, vec3(0));
-  hit.weights /= hit.weights.x + hit.weights.y + hit.weights.z;
+  if (best.id != 0u) return best;
+  float cover = dot(share, vec4(notEqual(ids, uvec4(0))));
+  if (cover < 0.5) return best;
+  uint id = ids.x != 0u ? ids.x : ids.y != 0u ? ids.y : ids.z != 0u ? ids.z : ids.w;
+  Hit hit = beside_hit(id, sight.p_eye.xyz, d);
+  if (hit.t <= 0.0 || (any(equal(ids, uvec4(0))) && !is_small(id, hit.t, sight))) return best;
   return hit;
 }
 

@@ -1,0 +1,209 @@
+#include "apps/render.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "core/config.h"
+#include "core/file.h"
+#include "core/log.h"
+#include "core/picture.h"
+#include "core/rig.h"
+#include "device/gl_context.h"
+#include "projector/renderer.h"
+#include "scene/posed.h"
+#include "scene/scene.h"
+#include "tracker/detector.h"
+#include "tracker/family.h"
+#include "tracker/observed.h"
+
+namespace limn::apps {
+namespace {
+
+// Pictures by camera, in the rig's order; empty where none was given.
+using Frames = std::vector<cv::Mat>;
+
+std::string names_of(const std::vector<Imager>& imagers) {
+  std::string names;
+  for (const Imager& imager : imagers) names += (names.empty() ? "" : ", ") + imager.name;
+  return names.empty() ? "none" : names;
+}
+
+// A camera file without a size (OpenCV's calibration writes none at times) takes its picture's.
+Status accept(const cv::Mat& picture, const std::string& file, Imager* camera) {
+  if (camera->width == 0 && camera->height == 0) {
+    camera->width = picture.cols;
+    camera->height = picture.rows;
+  }
+  if (picture.cols == camera->width && picture.rows == camera->height) return {};
+  return error(
+      "{}: expected a picture of {}'s size {}x{}, found {}x{}. Give the picture as the camera took it.", file,
+      camera->name, camera->width, camera->height, picture.cols, picture.rows);
+}
+
+Result<Frames> read_frames(const std::vector<std::string>& arguments, Rig* rig) {
+  Frames frames(rig->cameras.size());
+  for (const std::string& argument : arguments) {
+    const auto equals = argument.find('=');
+    if (equals == std::string::npos) {
+      return usage_error("--frame {}: expected CAMERA=PICTURE, such as camera0=picture.png.", argument);
+    }
+    const std::string name = argument.substr(0, equals), file = argument.substr(equals + 1);
+    const auto camera = std::find_if(rig->cameras.begin(), rig->cameras.end(),
+                                     [&](const Imager& c) { return c.name == name; });
+    if (camera == rig->cameras.end()) {
+      return usage_error("--frame {}: expected a camera of the rig ({}), found '{}'.", argument,
+                         names_of(rig->cameras), name);
+    }
+    LIMN_TRY(cv::Mat picture, read_picture(file));
+    LIMN_TRY_STATUS(accept(picture, file, &*camera));
+    frames[static_cast<std::size_t>(camera - rig->cameras.begin())] = std::move(picture);
+  }
+  return frames;
+}
+
+// The surer one of every body that several cameras see.
+void merge(std::vector<Track> found, std::map<std::string, Track>* tracks) {
+  for (Track& track : found) {
+    const auto [known, fresh] = tracks->try_emplace(track.body, track);
+    if (!fresh && track.covariance.trace() < known->second.covariance.trace())
+      known->second = std::move(track);
+  }
+}
+
+Result<std::vector<Track>> find_bodies(const scene::Scene& scene, const Rig& rig, const Frames& frames) {
+  const std::vector<Body> bodies = scene::bodies(scene);
+  const std::vector<std::string> names = tracker::families_of(bodies);
+  LIMN_TRY(tracker::Families families, tracker::Families::load(names, scene.folder));
+  tracker::Detector detector(std::move(families));
+  std::map<std::string, Track> tracks;
+  std::size_t marker_count = 0;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (frames[i].empty()) continue;
+    const auto detections = detector.detect(to_grey(frames[i]), &rig.cameras[i].lens);
+    marker_count += detections.size();
+    merge(tracker::observed(bodies, detections, rig.cameras[i], Stamp{}), &tracks);
+  }
+  if (tracks.empty()) {
+    return error(
+        "frames: expected a marker of the scene's {} bodies, found {} markers of its families and none that "
+        "the scene names. Look at light, focus and marker names.",
+        bodies.size(), marker_count);
+  }
+  std::vector<Track> found;
+  for (auto& [body, track] : tracks) found.push_back(std::move(track));
+  return found;
+}
+
+void report_missing(const scene::Scene& scene, const scene::PosedScene& posed) {
+  if (scene.prototype && !posed.world_from_prototype) {
+    log_warning("render: the prototype was not found; parts are drawn without it");
+  }
+  for (const scene::Slot& slot : scene.slots) {
+    const bool placed = std::any_of(posed.parts.begin(), posed.parts.end(),
+                                    [&](const scene::PosedPart& p) { return p.slot == slot.name; });
+    if (!placed) log_warning("render: slot '{}' was not found; its part is not drawn", slot.name);
+  }
+}
+
+Result<scene::PosedScene> place(const RenderOptions& options,
+                                const scene::Scene& scene,
+                                const Rig& rig,
+                                const Frames& frames) {
+  if (!options.poses.empty()) return scene::load_poses(options.poses, scene);
+  LIMN_TRY(const std::vector<Track> tracks, find_bodies(scene, rig, frames));
+  for (const Track& track : tracks) {
+    fmt::print("{}: {} marker{}, {:.2f} px\n", track.body, track.marker_count,
+               track.marker_count == 1 ? "" : "s", track.rms_px);
+  }
+  return scene::posed(scene, tracks);
+}
+
+Result<Imager> choose_viewer(const RenderOptions& options, const scene::Scene& scene, const Rig& rig) {
+  if (!options.viewer.empty()) return scene::load_viewer(options.viewer);
+  if (scene.viewer && scene.viewer->fixed) return *scene.viewer->fixed;
+  if (rig.cameras.empty()) {
+    return usage_error(
+        "--viewer: expected a viewer file, since neither the scene has a viewer nor the rig a camera.");
+  }
+  if (scene.viewer)
+    log_warning("render: the viewer's marker gives no picture size; {} looks instead", rig.cameras[0].name);
+  return rig.cameras[0];
+}
+
+Status write_coverage(const std::vector<projector::PartCoverage>& parts,
+                      const Imager& viewer,
+                      const std::filesystem::path& out) {
+  nlohmann::ordered_json json;
+  json["schema"] = "limn.coverage/1";
+  json["viewer"] = {{"name", viewer.name}, {"size", {viewer.width, viewer.height}}};
+  json["parts"] = nlohmann::ordered_json::array();
+  for (const projector::PartCoverage& part : parts) {
+    const std::string mask = "mask-" + part.slot + ".png";
+    json["parts"].push_back({{"part", part.slot},
+                             {"variant", part.variant},
+                             {"viewer_pixels", part.viewer_pixels},
+                             {"on_surface", part.on_surface_share},
+                             {"off_surface", part.off_surface_share},
+                             {"mask", mask}});
+    LIMN_TRY_STATUS(write_png(out / mask, part.mask));
+    fmt::print("{} ({}): {} viewer pixels, {:.1f} % by light, {:.1f} % on the screen\n", part.slot,
+               part.variant, part.viewer_pixels, 100 * part.on_surface_share, 100 * part.off_surface_share);
+  }
+  return write_file(out / "coverage.json", json.dump(2) + "\n");
+}
+
+// With frames, the cameras that have one; with poses alone all cameras, over black.
+Status write_composites(projector::Renderer* renderer,
+                        const RenderOptions& options,
+                        const Rig& rig,
+                        const Frames& frames,
+                        const scene::PosedScene& posed) {
+  const auto what = options.composite == "rest" ? projector::Composite::rest : projector::Composite::full;
+  for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
+    const Imager& camera = rig.cameras[i];
+    cv::Mat behind = frames[i];
+    if (behind.empty() && options.frames.empty() && camera.width > 0) {
+      behind = cv::Mat::zeros(camera.height, camera.width, CV_8UC3);
+    }
+    if (behind.empty()) continue;
+    const auto file = options.out / ("composite-" + camera.name + ".png");
+    LIMN_TRY_STATUS(write_png(file, renderer->composite(i, behind, posed, what)));
+  }
+  return {};
+}
+
+}  // namespace
+
+Status run_render(const RenderOptions& options) {
+  if (options.frames.empty() && options.poses.empty()) {
+    return usage_error(
+        "expected --frame CAMERA=PICTURE or --poses POSES.json to place the scene, found neither.");
+  }
+  if (options.composite != "full" && options.composite != "rest") {
+    return usage_error("--composite: expected full or rest, found '{}'.", options.composite);
+  }
+  LIMN_TRY(Rig rig, load_rig(options.rig));
+  LIMN_TRY(const scene::Scene scene, scene::load_scene(options.scene));
+  LIMN_TRY(const Frames frames, read_frames(options.frames, &rig));
+  LIMN_TRY(const scene::PosedScene posed, place(options, scene, rig, frames));
+  LIMN_TRY(const Imager viewer, choose_viewer(options, scene, rig));
+  report_missing(scene, posed);
+  LIMN_TRY_STATUS(make_folder(options.out));
+
+  LIMN_TRY(const device::GlContext context, device::GlContext::create());
+  log_info("render: {}", context.description());
+  LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, rig));
+  for (std::size_t i = 0; i < rig.projectors.size(); ++i) {
+    const auto file = options.out / ("projector-" + rig.projectors[i].name + ".png");
+    LIMN_TRY_STATUS(write_png(file, renderer.projector_picture(i, posed, viewer)));
+  }
+  LIMN_TRY_STATUS(write_composites(&renderer, options, rig, frames, posed));
+  return write_coverage(renderer.coverage(posed, viewer), viewer, options.out);
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+
+namespace limn::apps {
+
+struct RenderOptions {
+  std::filesystem::path rig;
+  std::filesystem::path scene;
+  std::vector<std::string> frames;  ///< CAMERA=PICTURE
+  std::filesystem::path poses;      ///< POSES.json; places everything, frames are then only drawn over
+  std::filesystem::path viewer;     ///< empty: the scene's, else camera 0
+  std::string composite = "full";   ///< or "rest": only what light cannot show
+  std::filesystem::path out;
+};
+
+/// `limn render`: places the scene by the markers in the frames, or by the poses, and writes
+/// projector-NAME.png, composite-NAME.png (per camera with a frame; with poses alone per camera, over black),
+/// coverage.json and mask-PART.png.
+Status run_render(const RenderOptions& options);
+
+}  // namespace limn::apps
