@@ -6,12 +6,14 @@
 namespace limn::projector {
 namespace {
 
-constexpr double k_oversampling =
-    1.25;                         // texels of ids a pixel; finds triangles that fall between pixel centres
-constexpr int k_eye_side = 2048;  // texels of the longer side of the eye's ids
-constexpr int k_map_columns = 321,
-              k_map_rows = 241;        // of the pixel maps: 4-5 px a cell, 0.01 px true between
-constexpr double k_soft_border = 0.1;  // of the picture's smaller side, over which a projector fades
+// Texels of ids a pixel; more of them find thinner triangles.
+constexpr double k_oversampling = 1.5;
+// Most texels of a side of the eye's ids.
+constexpr int k_eye_side = 2560;
+// Nodes of the pixel maps: 4-5 px a cell, within 0.01 px of the lens between them.
+constexpr int k_map_columns = 321, k_map_rows = 241;
+// Share of the picture's smaller side over which a projector fades towards its border.
+constexpr double k_soft_border = 0.1;
 
 Pose sight_pose(const Imager& imager, const Pose& scene_from_world) {
   return imager.imager_from_world * scene_from_world.inverse();

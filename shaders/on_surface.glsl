@@ -15,23 +15,34 @@ bool may_hold_surface_part(vec3 p, int placement_count) {
 }
 
 // The surface part on the prototype's point p with unit normal d_normal: the hit of the normal line with a triangle
-// within 2 mm, nearest first. The triangles tried are those that the sight sees around the line.
+// within 2 mm, nearest first. The triangles tried are those that the sight sees around the line; where they are all
+// missed in the middle of a part, at the corner of many, the one missed by least serves.
 Hit surface_part_at(usampler2DArray s_ids, Sight sight, vec3 p, vec3 d_normal) {
   const float k_heights[5] = float[](0.0, 0.5, -0.5, 1.0, -1.0);
-  Hit best = k_no_hit;
+  Hit best = k_no_hit, missed = k_no_hit;
+  float missed_by = 0.5;  // of a triangle's height
+  bool in_middle = false;
   uint tried = 0u;
   for (int i = 0; i < 5; ++i) {
     vec4 share;
     uvec4 ids = ids_around(s_ids, sight, 1, p + k_heights[i] * k_on_surface * d_normal - sight.p_eye.xyz, share);
+    if (i == 0) in_middle = all(notEqual(ids, uvec4(0)));
     for (int k = 0; k < 4; ++k) {
       uint id = ids[k];
       if (id == 0u || id == tried) continue;
       tried = id;
       if (s_placements[owner_of(id)].upper.w < 0.5) continue;
       Hit hit;
-      if (!plane_hit(id, p, d_normal, hit) || !is_inside(hit)) continue;
-      if (abs(hit.t) <= k_on_surface && abs(hit.t) < abs(best.t)) best = hit;
+      if (!plane_hit(id, p, d_normal, hit) || abs(hit.t) > k_on_surface) continue;
+      float outside = -min(hit.weights.x, min(hit.weights.y, hit.weights.z));
+      if (outside <= hit.slack) {
+        if (abs(hit.t) < abs(best.t)) best = hit;
+      } else if (outside < missed_by) {
+        missed = hit;
+        missed_by = outside;
+      }
     }
   }
+  if (best.id == 0u && in_middle) best = missed;
   return best;
 }

@@ -72,12 +72,13 @@ bool plane_hit(uint id, vec3 p_origin, vec3 d, out Hit hit) {
 
 bool is_inside(Hit hit) { return all(greaterThanEqual(hit.weights, vec3(-hit.slack))); }
 
-// Whether a triangle is smaller than two texels of the sight: then its neighbours' ids may hide it.
-bool is_small(uint id, float t, Sight sight) {
+// Whether a triangle, as seen along d, is thinner than two texels of the sight: then texels can miss it.
+bool is_thin(uint id, float t, vec3 d, Sight sight) {
   uint first = 3u * (id - 1u);
   vec3 a = s_corners[first].xyz, b = s_corners[first + 1u].xyz, c = s_corners[first + 2u].xyz;
   float side = max(distance(a, b), max(distance(b, c), distance(c, a)));
-  return side * sight.focal_centre.x < 2.0 * t;
+  float area = abs(dot(cross(b - a, c - a), turned_to_owner(owner_of(id), d)));
+  return area * sight.focal_centre.x < 2.0 * t * side;
 }
 
 // Texels around the direction d: ids, the nearest first, and their bilinear weights.
@@ -101,8 +102,9 @@ uvec4 ids_around(usampler2DArray s_ids, Sight sight, int layer, vec3 d, out vec4
   return ids;
 }
 
-// The point of a small triangle next to the ray, where the ray slips between the triangles that texels saw.
-Hit beside_hit(uint id, vec3 p_origin, vec3 d) {
+// Where the ray meets a triangle that it just misses: its plane, or its nearest point where the plane is too steep
+// to be trusted beyond its triangle.
+Hit beside_hit(uint id, vec3 p_origin, vec3 d, Sight sight) {
   Hit hit;
   if (!plane_hit(id, p_origin, d, hit)) return k_no_hit;
   hit.weights = max(hit.weights, vec3(0));
@@ -110,12 +112,14 @@ Hit beside_hit(uint id, vec3 p_origin, vec3 d) {
   uint first = 3u * (id - 1u);
   vec3 p = mat3(s_corners[first].xyz, s_corners[first + 1u].xyz, s_corners[first + 2u].xyz) * hit.weights;
   uint owner = owner_of(id);
-  hit.t = dot(p - to_owner(owner, p_origin), turned_to_owner(owner, d));
+  float t = dot(p - to_owner(owner, p_origin), turned_to_owner(owner, d));
+  const float k_steepest = 4.0;  // texels of depth a texel, 76 degrees
+  if (!(abs(hit.t - t) < k_steepest * t / sight.focal_centre.x)) hit.t = t;
   return hit;
 }
 
 // First surface that the ray from the sight's eye meets: exactly, by intersecting the triangles that the texels
-// around it saw. Triangles smaller than texels can all be missed: then the texels decide, by bilinear coverage.
+// around it saw. Triangles thinner than texels can all be missed: then the texels decide, by bilinear coverage.
 Hit first_hit(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
   vec4 share;
   uvec4 ids = ids_around(s_ids, sight, layer, d, share);
@@ -131,8 +135,8 @@ Hit first_hit(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
   float cover = dot(share, vec4(notEqual(ids, uvec4(0))));
   if (cover < 0.5) return best;
   uint id = ids.x != 0u ? ids.x : ids.y != 0u ? ids.y : ids.z != 0u ? ids.z : ids.w;
-  Hit hit = beside_hit(id, sight.p_eye.xyz, d);
-  if (hit.t <= 0.0 || (any(equal(ids, uvec4(0))) && !is_small(id, hit.t, sight))) return best;
+  Hit hit = beside_hit(id, sight.p_eye.xyz, d, sight);
+  if (hit.t <= 0.0 || (any(equal(ids, uvec4(0))) && !is_thin(id, hit.t, d, sight))) return best;
   return hit;
 }
 

@@ -1,0 +1,622 @@
+#include "projector/renderer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <opencv2/imgproc.hpp>
+
+#include "core/picture.h"
+#include "device/gl_context.h"
+#include "sim/ray_scene.h"
+#include "tests/support/matchers.h"
+
+namespace limn::projector {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using scene::Mesh;
+using scene::PosedScene;
+using scene::Scene;
+using scene::Slot;
+
+// The room of these tests: the prototype's front looks towards -z, where projectors, viewer and camera stand.
+const Vector3d k_up(0, -1, 0);
+
+Mesh grid(int columns, int rows, const std::function<Vector3d(double, double)>& at) {
+  Mesh mesh;
+  for (int r = 0; r <= rows; ++r) {
+    for (int c = 0; c <= columns; ++c) {
+      mesh.positions.push_back(at(1.0 * c / columns, 1.0 * r / rows).cast<float>());
+      mesh.normals.push_back(Eigen::Vector3f(0, 0, -1));
+    }
+  }
+  const auto index = [&](int c, int r) { return static_cast<std::uint32_t>(r * (columns + 1) + c); };
+  for (int r = 0; r < rows; ++r) {
+    for (int c = 0; c < columns; ++c) {
+      mesh.triangles.push_back({index(c, r), index(c, r + 1), index(c + 1, r)});
+      mesh.triangles.push_back({index(c + 1, r), index(c, r + 1), index(c + 1, r + 1)});
+    }
+  }
+  mesh.triangle_materials.assign(mesh.triangles.size(), 0);
+  return mesh;
+}
+
+// A rectangle in a plane of constant z, its middle at the origin.
+Mesh sheet(double width, double height, double z = 0, int cells = 7) {
+  return grid(cells, cells,
+              [=](double u, double v) { return Vector3d((u - 0.5) * width, (v - 0.5) * height, z); });
+}
+
+Mesh coloured(Mesh mesh, const Eigen::Vector3f& colour, bool unlit = true) {
+  mesh.materials[0].base_colour = colour;
+  mesh.materials[0].unlit = unlit;
+  return mesh;
+}
+
+Imager imager_at(
+    const std::string& name, int width, int height, const Vector3d& p_eye, std::vector<double> lens) {
+  Imager imager{name, width, height, {}, looking_at(p_eye, {0, 0, 0}, k_up)};
+  imager.lens = Lens::create("LENSMODEL_OPENCV4", std::move(lens)).value();
+  return imager;
+}
+
+Imager projector_left() {
+  return imager_at("projector0", 640, 400, {-0.35, -0.1, -1.1},
+                   {900, 900, 325, 190, -0.15, 0.1, 0.002, -0.001});
+}
+Imager projector_right() {
+  return imager_at("projector1", 640, 400, {0.35, -0.05, -1.15}, {950, 950, 310, 205, -0.1, 0.05, 0, 0.001});
+}
+Imager camera() {
+  return imager_at("camera0", 640, 480, {0.05, -0.2, -1.3}, {1000, 1000, 320, 240, -0.2, 0.1, 0.001, 0.001});
+}
+Imager viewer_from(const Vector3d& p_eye) {
+  return viewer_imager(looking_at(p_eye, {0, 0, 0}, k_up).inverse(), 640, 480, 35);
+}
+
+Rig two_projectors() {
+  Rig rig;
+  rig.cameras = {camera()};
+  rig.projectors = {projector_left(), projector_right()};
+  return rig;
+}
+
+Slot slot(const std::string& name, scene::Mode mode, Mesh mesh) {
+  Slot out;
+  out.name = name;
+  out.mode = mode;
+  out.variants.push_back({"a", std::move(mesh)});
+  return out;
+}
+
+Scene scene_of(Mesh prototype, std::vector<Slot> slots) {
+  Scene scene;
+  scene.prototype = scene::Prototype{std::move(prototype), {}, 0.8, {}};
+  scene.slots = std::move(slots);
+  return scene;
+}
+
+PosedScene posed_at_origin(const Scene& scene) {
+  PosedScene posed;
+  if (scene.prototype) posed.world_from_prototype = Pose();
+  for (const Slot& slot : scene.slots) posed.parts.push_back({slot.name, "a", Pose()});
+  return posed;
+}
+
+// Light of an 8-bit display value, gamma 2.2.
+double light_of(std::uint8_t value) { return std::pow(value / 255.0, 2.2); }
+
+// Where the ray meets the rectangle of a sheet() at z; nullopt beside it.
+std::optional<Vector3d> on_sheet(const Ray& ray, double width, double height, double z) {
+  const double t = (z - ray.p_origin.z()) / ray.d.z();
+  const Vector3d p = ray.p_origin + t * ray.d;
+  if (!(t > 0) || std::abs(p.x()) > width / 2 || std::abs(p.y()) > height / 2) return std::nullopt;
+  return p;
+}
+
+// Mean of f over the 16 places of a pixel that the renderer samples, too.
+double pixel_mean(int column, int row, const std::function<double(const Vector2d&)>& f) {
+  const double first = f(Vector2d(column - 0.5, row - 0.5));
+  if (first == f(Vector2d(column + 0.5, row - 0.5)) && first == f(Vector2d(column - 0.5, row + 0.5)) &&
+      first == f(Vector2d(column + 0.5, row + 0.5))) {
+    return first;  // no corner of a sheet pokes into a pixel
+  }
+  double sum = 0;
+  for (int k = 0; k < 16; ++k) {
+    sum += f(Vector2d(column + (k % 4 + 0.5) / 4 - 0.5, row + (k / 4 + 0.5) / 4 - 0.5));
+  }
+  return sum / 16;
+}
+
+class RendererTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    auto made = device::GlContext::create();
+    ASSERT_TRUE(made) << made.message();
+    context = std::make_unique<device::GlContext>(std::move(made).value());
+  }
+  static void TearDownTestSuite() { context.reset(); }
+
+  static Renderer renderer(const Scene& scene, const Rig& rig) {
+    auto made = Renderer::create(scene, rig);
+    if (!made) throw std::runtime_error(made.message());
+    return std::move(made).value();
+  }
+
+  static std::unique_ptr<device::GlContext> context;
+};
+
+std::unique_ptr<device::GlContext> RendererTest::context;
+
+TEST_F(RendererTest, SurfacePointsOfAPlaneAreOnTheExactRays) {
+  const Scene scene = scene_of(sheet(0.5, 0.4), {});
+  PosedScene posed = posed_at_origin(scene);
+  posed.world_from_prototype = Pose(exp_rotation({0.2, -0.3, 0.1}), {0.02, 0.01, 0.05});
+  const Rig rig = two_projectors();
+  Renderer drawing = renderer(scene, rig);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const cv::Mat points = drawing.surface_points(i, posed);
+    ASSERT_EQ(points.type(), CV_32FC3);
+    int seen = 0, disagreeing = 0;
+    double worst_px = 0;
+    for (int row = 0; row < points.rows; ++row) {
+      for (int column = 0; column < points.cols; ++column) {
+        const auto& p = points.at<cv::Vec3f>(row, column);
+        const Ray world = *rig.projectors[i].ray(Vector2d(column, row));
+        const Pose from_world = posed.world_from_prototype->inverse();
+        const Ray ray{from_world * world.p_origin, from_world.rotation * world.d};
+        const auto truth = on_sheet(ray, 0.5, 0.4, 0);
+        if (std::isnan(p[0]) == truth.has_value()) {
+          ++disagreeing;
+          continue;
+        }
+        if (!truth) continue;
+        ++seen;
+        const auto px = rig.projectors[i].project(*posed.world_from_prototype * Vector3d(p[0], p[1], p[2]));
+        worst_px = std::max(worst_px, (*px - Vector2d(column, row)).norm());
+        EXPECT_NEAR((Vector3d(p[0], p[1], p[2]) - *truth).norm(), 0, 3e-5);
+      }
+    }
+    EXPECT_GT(seen, 50000);
+    EXPECT_LE(disagreeing, 8);  // pixel centres within 0.005 px of an outline of 1500 px
+    EXPECT_LT(worst_px, 0.02);
+  }
+}
+
+TEST_F(RendererTest, SurfacePointsOfADenseSphereReachItsSilhouette) {
+  constexpr double k_radius = 0.15;
+  // Triangles well below a pixel near the poles, so that the ids miss most of them.
+  const Scene scene =
+      scene_of(grid(300, 300,
+                    [](double u, double v) {
+                      const double a = 2 * M_PI * u, b = M_PI * v;
+                      return Vector3d(k_radius * std::sin(b) * std::cos(a), -k_radius * std::cos(b),
+                                      k_radius * std::sin(b) * std::sin(a));
+                    }),
+               {});
+  const Rig rig = two_projectors();
+  const cv::Mat points = renderer(scene, rig).surface_points(0, posed_at_origin(scene));
+  int seen = 0, disagreeing = 0;
+  double worst = 0;
+  for (int row = 0; row < points.rows; ++row) {
+    for (int column = 0; column < points.cols; ++column) {
+      const auto& found = points.at<cv::Vec3f>(row, column);
+      const Ray ray = *rig.projectors[0].ray(Vector2d(column, row));
+      const double along = -ray.p_origin.dot(ray.d);
+      const double off_axis = (ray.p_origin + along * ray.d).norm();
+      if (std::isnan(found[0]) == (off_axis < k_radius)) ++disagreeing;
+      if (std::isnan(found[0])) continue;
+      ++seen;
+      if (off_axis > 0.99 * k_radius) continue;  // grazing beyond 82 degrees: texels see slivers
+      worst = std::max(worst, std::abs(Vector3d(found[0], found[1], found[2]).norm() - k_radius));
+    }
+  }
+  EXPECT_GT(seen, 40000);
+  EXPECT_LT(disagreeing, 150);  // 0.2 px of a silhouette of some 800 px
+  EXPECT_LT(worst, 6e-5);       // chords of 300 segments sink by 1 to 4e-5 m
+}
+
+TEST_F(RendererTest, ViewPartStandsWhereTheViewersEyeSeesIt) {
+  // 50 mm off the surface, overhanging its right edge.
+  const Eigen::Vector3f colour(0.25f, 0.5f, 0.75f);
+  const Scene scene = scene_of(
+      sheet(0.5, 0.4), {slot("mirror", scene::Mode::view, coloured(sheet(0.16, 0.1, -0.05), colour))});
+  PosedScene posed = posed_at_origin(scene);
+  posed.parts[0].world_from_part.translation = {0.2, 0.02, 0};
+  Rig rig = two_projectors();
+  rig.projectors.pop_back();
+  for (const Vector3d& p_eye : {Vector3d(-0.3, -0.3, -1.2), Vector3d(0.4, 0.1, -1.0)}) {
+    const cv::Mat found = renderer(scene, rig).projector_picture(0, posed, viewer_from(p_eye));
+    cv::Mat expected(found.size(), CV_64FC3), light(found.size(), CV_64FC3);
+    for (int row = 0; row < found.rows; ++row) {
+      for (int column = 0; column < found.cols; ++column) {
+        const double cover = pixel_mean(column, row, [&](const Vector2d& px) {
+          const auto p = on_sheet(*rig.projectors[0].ray(px), 0.5, 0.4, 0);
+          if (!p) return 0;
+          const Ray from_eye{p_eye - Vector3d(0.2, 0.02, 0), (*p - p_eye).normalized()};
+          return on_sheet(from_eye, 0.16, 0.1, -0.05) ? 1 : 0;
+        });
+        for (int c = 0; c < 3; ++c) {
+          expected.at<cv::Vec3d>(row, column)[c] = cover * static_cast<double>(colour[2 - c]);
+          light.at<cv::Vec3d>(row, column)[c] = light_of(found.at<cv::Vec3b>(row, column)[c]);
+        }
+      }
+    }
+    EXPECT_GT(cv::sum(expected)[0], 3000);
+    // A column of the sixteen samples may fall on the other side of an edge.
+    EXPECT_TRUE(test::image_near(light, expected, 1e-4, 4.2 / 16, "light"));
+  }
+}
+
+TEST_F(RendererTest, SurfacePartIsTheSameForEveryViewerAndOnlyWithinTwoMillimetres) {
+  const auto part = [](double z) {
+    return slot("trim", scene::Mode::surface, coloured(sheet(0.2, 0.03, z), {1, 1, 1}));
+  };
+  const Rig rig = two_projectors();
+  for (const double z : {0.0, -0.0015, 0.0015, -0.003}) {
+    const Scene scene = scene_of(sheet(0.5, 0.4), {part(z)});
+    Renderer drawing = renderer(scene, rig);
+    const PosedScene posed = posed_at_origin(scene);
+    const cv::Mat a = drawing.projector_picture(0, posed, viewer_from({-0.3, -0.3, -1.2}));
+    const cv::Mat b = drawing.projector_picture(0, posed, viewer_from({0.5, 0.1, -1.0}));
+    EXPECT_EQ(cv::norm(a, b, cv::NORM_INF), 0);
+    const cv::Mat points = drawing.surface_points(0, posed);
+    int lit = 0, wrong = 0;
+    for (int row = 0; row < a.rows; ++row) {
+      for (int column = 0; column < a.cols; ++column) {
+        const auto& p = points.at<cv::Vec3f>(row, column);
+        const bool is_lit = a.at<cv::Vec3b>(row, column)[1] > 0;
+        lit += is_lit;
+        const double beside = std::max(std::abs(p[0]) - 0.1f, std::abs(p[1]) - 0.015f);
+        if (std::abs(beside) < 0.001) continue;  // the pixel lies on the outline
+        wrong += is_lit != (beside < 0 && std::abs(z) <= 0.002);
+      }
+    }
+    EXPECT_EQ(wrong, 0) << "height " << z;
+    if (std::abs(z) <= 0.002) {
+      EXPECT_GT(lit, 3000);
+    } else {
+      EXPECT_EQ(lit, 0);
+    }
+  }
+}
+
+TEST_F(RendererTest, PartBehindThePrototypeGetsNoLightAndIsCutInTheComposite) {
+  const Scene scene = scene_of(
+      sheet(0.3, 0.3), {slot("mirror", scene::Mode::view, coloured(sheet(0.2, 0.1, 0.05), {1, 0, 0}))});
+  PosedScene posed = posed_at_origin(scene);
+  posed.parts[0].world_from_part.translation = {0.15, 0, 0};
+  const Rig rig = two_projectors();
+  Renderer drawing = renderer(scene, rig);
+  EXPECT_EQ(cv::countNonZero(drawing.projector_picture(0, posed, rig.cameras[0]).reshape(1)), 0);
+  const cv::Mat picture(480, 640, CV_8UC3, cv::Scalar(10, 20, 30));
+  const cv::Mat full = drawing.composite(0, picture, posed, Composite::full);
+  int drawn = 0, wrong = 0;
+  for (int row = 0; row < full.rows; ++row) {
+    for (int column = 0; column < full.cols; ++column) {
+      const bool is_drawn = full.at<cv::Vec3b>(row, column)[2] > 187;  // more than half of its light
+      drawn += is_drawn;
+      Ray ray = *rig.cameras[0].ray(Vector2d(column, row));
+      const bool hidden = on_sheet(ray, 0.3, 0.3, 0).has_value();
+      ray.p_origin -= Vector3d(0.15, 0, 0);
+      wrong += is_drawn != (!hidden && on_sheet(ray, 0.2, 0.1, 0.05).has_value());
+    }
+  }
+  EXPECT_GT(drawn, 2000);
+  EXPECT_LT(wrong, 40);  // half-covered pixels of an outline of some 400
+}
+
+TEST_F(RendererTest, CoverageSplitsAPartWhereTheSurfaceEnds) {
+  const Scene scene = scene_of(sheet(0.3, 0.3), {slot("mirror", scene::Mode::view, sheet(0.2, 0.1, -0.05)),
+                                                 slot("away", scene::Mode::view, sheet(0.05, 0.05, 0.05))});
+  PosedScene posed = posed_at_origin(scene);
+  posed.parts[0].world_from_part.translation = {0.12, 0.03, 0};
+  const Rig rig = two_projectors();
+  const Imager viewer = viewer_from({-0.2, -0.2, -1.3});
+  const auto coverage = renderer(scene, rig).coverage(posed, viewer);
+  ASSERT_EQ(coverage.size(), 2u);
+  EXPECT_EQ(coverage[1].viewer_pixels, 0);  // behind the prototype
+  int on = 0, off = 0, wrong = 0;
+  for (int row = 0; row < viewer.height; ++row) {
+    for (int column = 0; column < viewer.width; ++column) {
+      Ray ray = *viewer.ray(Vector2d(column, row));
+      const auto behind = on_sheet(ray, 0.3, 0.3, 0);
+      ray.p_origin -= Vector3d(0.12, 0.03, 0);
+      int expected = 0;
+      if (on_sheet(ray, 0.2, 0.1, -0.05)) {
+        const bool reached =
+            behind && std::any_of(rig.projectors.begin(), rig.projectors.end(), [&](const Imager& p) {
+              const auto px = p.project(*behind);
+              return px && p.contains(*px);
+            });
+        expected = reached ? 255 : 128;
+      }
+      on += expected == 255;
+      off += expected == 128;
+      wrong += coverage[0].mask.at<std::uint8_t>(row, column) != expected;
+    }
+  }
+  EXPECT_GT(on, 2000);
+  EXPECT_GT(off, 1000);
+  EXPECT_LT(wrong, 10);
+  EXPECT_NEAR(coverage[0].on_surface_share, 1.0 * on / (on + off), 0.001);
+  EXPECT_NEAR(coverage[0].on_surface_share + coverage[0].off_surface_share, 1, 1e-12);
+}
+
+TEST_F(RendererTest, CompositeDrawsPartsThroughTheCamerasLens) {
+  const Scene scene = scene_of(
+      sheet(0.3, 0.3), {slot("mirror", scene::Mode::view, coloured(sheet(0.25, 0.2, -0.05), {1, 1, 1}))});
+  PosedScene posed = posed_at_origin(scene);
+  posed.parts[0].world_from_part = Pose(exp_rotation({0.3, 0.4, 0.5}), {0.15, 0.05, 0});
+  const Rig rig = two_projectors();
+  Renderer drawing = renderer(scene, rig);
+  const cv::Mat picture = cv::Mat::zeros(480, 640, CV_8UC1);
+  const cv::Mat full = drawing.composite(0, picture, posed, Composite::full);
+  const cv::Mat rest = drawing.composite(0, picture, posed, Composite::rest);
+  const Pose part_from_world = posed.parts[0].world_from_part.inverse();
+  cv::Mat expected(480, 640, CV_64F), found(480, 640, CV_64F);
+  int wrong_rest = 0, rest_pixels = 0;
+  for (int row = 0; row < 480; ++row) {
+    for (int column = 0; column < 640; ++column) {
+      const auto seen = [&](const Vector2d& px) {
+        const Ray ray = *rig.cameras[0].ray(px);
+        const Ray in_part{part_from_world * ray.p_origin, part_from_world.rotation * ray.d};
+        const auto p = on_sheet(in_part, 0.25, 0.2, -0.05);
+        const auto behind = on_sheet(ray, 0.3, 0.3, 0);
+        if (!p || (behind && (*p - in_part.p_origin).norm() > (*behind - ray.p_origin).norm())) return 0.0;
+        return 1.0;
+      };
+      const double value = full.at<cv::Vec3b>(row, column)[0] / 255.0;
+      found.at<double>(row, column) =
+          value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
+      expected.at<double>(row, column) = pixel_mean(column, row, seen);
+      const bool off = !on_sheet(*rig.cameras[0].ray(Vector2d(column, row)), 0.3, 0.3, 0);
+      const bool is_drawn = rest.at<cv::Vec3b>(row, column)[0] > 187;  // more than half of its light
+      rest_pixels += is_drawn;
+      wrong_rest += is_drawn != (off && seen(Vector2d(column, row)) > 0);
+    }
+  }
+  EXPECT_GT(cv::sum(expected)[0], 20000);
+  EXPECT_TRUE(test::image_near(found, expected, 1e-4, 4.2 / 16, "composite"));
+  EXPECT_GT(rest_pixels, 3000);
+  EXPECT_LT(wrong_rest, 60);  // half-covered pixels of an outline of some 1000
+}
+
+TEST_F(RendererTest, WhereNoPartIsTheCompositeIsTheCamerasPicture) {
+  const Scene scene = scene_of(sheet(0.3, 0.3), {});
+  auto rng = test::test_rng();
+  cv::Mat picture(480, 640, CV_8UC3);
+  std::generate(picture.begin<cv::Vec3b>(), picture.end<cv::Vec3b>(), [&] {
+    const auto v = rng();
+    return cv::Vec3b(static_cast<std::uint8_t>(v), static_cast<std::uint8_t>(v >> 8),
+                     static_cast<std::uint8_t>(v >> 16));
+  });
+  const cv::Mat out =
+      renderer(scene, two_projectors()).composite(0, picture, posed_at_origin(scene), Composite::full);
+  EXPECT_EQ(cv::norm(out, picture, cv::NORM_INF), 0);
+}
+
+TEST_F(RendererTest, LightOfTwoProjectorsSumsToThePartsColour) {
+  // A white sheet over everything that both reach; 0.5 so that both clipping and rounding would show.
+  const Scene scene = scene_of(
+      sheet(0.9, 0.7), {slot("paint", scene::Mode::surface, coloured(sheet(0.9, 0.7), {0.5f, 0.5f, 0.5f}))});
+  const PosedScene posed = posed_at_origin(scene);
+  const Rig rig = two_projectors();
+  Renderer drawing = renderer(scene, rig);
+  const Imager viewer = viewer_from({0, 0, -1.3});
+  cv::Mat light[2];
+  for (std::size_t i = 0; i < 2; ++i) {
+    const cv::Mat picture = drawing.projector_picture(i, posed, viewer);
+    light[i] = cv::Mat(picture.size(), CV_32F);
+    for (int row = 0; row < picture.rows; ++row) {
+      for (int column = 0; column < picture.cols; ++column) {
+        light[i].at<float>(row, column) = static_cast<float>(light_of(picture.at<cv::Vec3b>(row, column)[1]));
+      }
+    }
+  }
+  const cv::Mat points = drawing.surface_points(0, posed);
+  double worst = 0, worst_step = 0;
+  int both = 0, alone = 0;
+  for (int row = 1; row + 1 < points.rows; ++row) {
+    double before = -1;
+    for (int column = 1; column + 1 < points.cols; ++column) {
+      const auto& p = points.at<cv::Vec3f>(row, column);
+      if (!(std::abs(p[0]) < 0.445f && std::abs(p[1]) < 0.345f)) continue;  // not at the sheet's edge
+      const Vector2d px = *rig.projectors[1].project(Vector3d(p[0], p[1], p[2]));
+      double other = 0;
+      const auto border = [](const Vector2d& q) {
+        return std::min({q.x(), q.y(), 639 - q.x(), 399 - q.y()});
+      };
+      // Where two borders cross, the shares turn from 0 to 1 around one point.
+      if (std::max(border(px), border(Vector2d(column, row))) < 8) continue;
+      if (rig.projectors[1].contains(px)) {
+        const cv::Mat map(1, 1, CV_32FC2, cv::Scalar(px.x(), px.y()));
+        cv::Mat value;
+        cv::remap(light[1], value, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+        other = static_cast<double>(value.at<float>(0));
+      }
+      const double sum = static_cast<double>(light[0].at<float>(row, column)) + other;
+      worst = std::max(worst, std::abs(sum / 0.5 - 1));
+      if (before >= 0) worst_step = std::max(worst_step, std::abs(sum - before) / 0.5);
+      before = sum;
+      ++(other > 0 ? both : alone);
+    }
+  }
+  EXPECT_GT(both, 50000);
+  EXPECT_GT(alone, 5000);
+  EXPECT_LT(worst, 0.02);       // 8 bits at half light are 1.3 % of it, twice over
+  EXPECT_LT(worst_step, 0.02);  // the bar for seams, docs: 2 % in linear light
+}
+
+TEST_F(RendererTest, ProjectorInTheOthersShadowGivesAllTheLight) {
+  // A post before the plate keeps the right projector's light from a strip of it.
+  Mesh mesh = sheet(0.5, 0.4);
+  const Mesh post = sheet(0.04, 0.4, -0.15);
+  const auto offset = static_cast<std::uint32_t>(mesh.positions.size());
+  for (const auto& p : post.positions) mesh.positions.push_back(p);
+  for (const auto& n : post.normals) mesh.normals.push_back(n);
+  for (auto t : post.triangles) {
+    for (auto& i : t) i += offset;
+    mesh.triangles.push_back(t);
+    mesh.triangle_materials.push_back(0);
+  }
+  const Scene scene =
+      scene_of(mesh, {slot("paint", scene::Mode::surface, coloured(sheet(0.5, 0.4), {1, 1, 1}))});
+  const PosedScene posed = posed_at_origin(scene);
+  const Rig rig = two_projectors();
+  Renderer drawing = renderer(scene, rig);
+  const cv::Mat left = drawing.projector_picture(0, posed, viewer_from({0, 0, -1.3}));
+  const cv::Mat points = drawing.surface_points(0, posed);
+  const Vector3d p_right = rig.projectors[1].imager_from_world.inverse().translation;
+  int shadowed = 0, dim = 0;
+  for (int row = 0; row < left.rows; ++row) {
+    for (int column = 0; column < left.cols; ++column) {
+      const auto& p = points.at<cv::Vec3f>(row, column);
+      if (std::isnan(p[0]) || p[2] < -0.01f) continue;
+      const Vector3d p_surface(p[0], p[1], p[2]);
+      const Ray to_right{p_right, (p_surface - p_right).normalized()};
+      const auto px = rig.projectors[1].project(p_surface);
+      const double soft = std::min({px->x(), px->y(), 639 - px->x(), 399 - px->y()});
+      // A millimetre away from the shadow's outline and inside the plate.
+      if (std::abs(p[0]) > 0.245f || std::abs(p[1]) > 0.195f || soft < 60) continue;
+      if (on_sheet(to_right, 0.036, 0.396, -0.15)) {
+        ++shadowed;
+        EXPECT_EQ(left.at<cv::Vec3b>(row, column)[1], 255) << row << " " << column;
+      } else if (!on_sheet(to_right, 0.044, 0.404, -0.15)) {
+        dim += left.at<cv::Vec3b>(row, column)[1] < 255;
+      }
+    }
+  }
+  EXPECT_GT(shadowed, 500);
+  EXPECT_GT(dim, 10000);
+}
+
+TEST_F(RendererTest, UnlitColourIsExactAndTheResponseIsApplied) {
+  const Eigen::Vector3f colour(0.2f, 0.5f, 0.9f);
+  const Scene scene =
+      scene_of(sheet(0.5, 0.4), {slot("paint", scene::Mode::view, coloured(sheet(0.2, 0.2, -0.02), colour))});
+  Rig rig = two_projectors();
+  rig.projectors.pop_back();
+  const Imager viewer = viewer_from({0, 0, -1.3});
+  const Vector2d middle = *rig.projectors[0].project({0, 0, 0});
+  const auto at_middle = [&](const Rig& used) {
+    const cv::Mat picture = renderer(scene, used).projector_picture(0, posed_at_origin(scene), viewer);
+    EXPECT_EQ(picture.at<cv::Vec3b>(2, 2), cv::Vec3b(0, 0, 0));
+    return picture.at<cv::Vec3b>(static_cast<int>(middle.y()), static_cast<int>(middle.x()));
+  };
+  const cv::Vec3b gamma = at_middle(rig);
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_EQ(gamma[2 - c], std::lround(255 * std::pow(static_cast<double>(colour[c]), 1 / 2.2)));
+  }
+  Response response{"projector0", {}, {}, {}};
+  for (int i = 0; i <= 255; ++i) {
+    response.red.push_back(std::pow(i / 255.0, 1.8));
+    response.green.push_back(i / 255.0);
+    response.blue.push_back(std::pow(i / 255.0, 2.6));
+  }
+  rig.responses = {response};
+  const cv::Vec3b measured = at_middle(rig);
+  EXPECT_EQ(measured[2], std::lround(255 * std::pow(0.2, 1 / 1.8)));
+  EXPECT_EQ(measured[1], std::lround(255 * 0.5));
+  EXPECT_EQ(measured[0], std::lround(255 * std::pow(0.9, 1 / 2.6)));
+}
+
+TEST_F(RendererTest, TextureStandsTheRightWayUp) {
+  // Left half red, top half bright, as seen by a viewer whose picture's down is +y.
+  Mesh part = coloured(sheet(0.2, 0.2, -0.001), {1, 1, 1});
+  for (const auto& p : part.positions) part.uvs.push_back({p.x() / 0.2f + 0.5f, 0.5f - p.y() / 0.2f});
+  cv::Mat texture(64, 64, CV_8UC3, cv::Scalar(0, 0, 255));
+  texture(cv::Rect(32, 0, 32, 64)).setTo(cv::Scalar(255, 0, 0));
+  texture(cv::Rect(0, 32, 64, 32)) *= 0.5;
+  part.materials[0].texture = texture;
+  const Scene scene = scene_of(sheet(0.5, 0.4), {slot("paint", scene::Mode::view, part)});
+  const Rig rig = two_projectors();
+  const cv::Mat out =
+      renderer(scene, rig)
+          .composite(0, cv::Mat::zeros(480, 640, CV_8UC3), posed_at_origin(scene), Composite::full);
+  const auto colour_at = [&](double x, double y) {
+    const Vector2d px = *rig.cameras[0].project({x, y, -0.001});
+    return out.at<cv::Vec3b>(static_cast<int>(px.y()), static_cast<int>(px.x()));
+  };
+  EXPECT_EQ(colour_at(-0.05, -0.05), cv::Vec3b(0, 0, 255));
+  EXPECT_EQ(colour_at(0.05, -0.05), cv::Vec3b(255, 0, 0));
+  EXPECT_NEAR(colour_at(-0.05, 0.05)[2], 128, 1);
+}
+
+TEST_F(RendererTest, SceneWithoutPrototypeOrProjectorsIsClassicAugmentedReality) {
+  Scene scene;
+  scene.slots = {slot("mirror", scene::Mode::view, coloured(sheet(0.1, 0.1), {0, 1, 0}))};
+  Rig rig;
+  rig.cameras = {camera()};
+  Renderer drawing = renderer(scene, rig);
+  const PosedScene posed = posed_at_origin(scene);
+  const cv::Mat picture(480, 640, CV_8UC3, cv::Scalar(9, 9, 9));
+  for (const Composite what : {Composite::rest, Composite::full}) {
+    const cv::Mat out = drawing.composite(0, picture, posed, what);
+    const Vector2d middle = *rig.cameras[0].project({0, 0, 0});
+    EXPECT_EQ(out.at<cv::Vec3b>(static_cast<int>(middle.y()), static_cast<int>(middle.x())),
+              cv::Vec3b(0, 255, 0));
+    EXPECT_EQ(out.at<cv::Vec3b>(2, 2), cv::Vec3b(9, 9, 9));
+  }
+  const auto coverage = drawing.coverage(posed, rig.cameras[0]);
+  EXPECT_GT(coverage[0].viewer_pixels, 1000);
+  EXPECT_EQ(coverage[0].off_surface_share, 1);
+}
+
+// The judge of the whole door: Embree, which shares no code with the renderer.
+TEST_F(RendererTest, DoorsCoverageAgreesWithARayTracer) {
+  const auto loaded = scene::load_scene(std::filesystem::path(LIMN_SOURCE_DIR) / "config/scenes/door");
+  ASSERT_TRUE(loaded) << loaded.message();
+  const Scene& scene = *loaded;
+  // The door's front looks to +z with y up: turn it into this room.
+  const Pose turned(Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, Vector3d::UnitX())), Vector3d::Zero());
+  PosedScene posed;
+  posed.world_from_prototype = turned;
+  posed.parts.push_back({"mirror", scene.find_slot("mirror")->variants[0].name,
+                         turned * Pose(exp_rotation({0.1, 0.2, 0}), {-0.27, 0.1, 0.1})});
+  const Rig rig = two_projectors();
+  const Imager viewer = viewer_from({-0.4, -0.3, -1.2});
+  Renderer drawing = renderer(scene, rig);
+  const auto coverage = drawing.coverage(posed, viewer);
+  const scene::Variant& variant = scene.find_slot("mirror")->variants[0];
+  const sim::PlacedMesh prototype{&scene.prototype->mesh, *posed.world_from_prototype};
+  const sim::PlacedMesh part{&variant.mesh, posed.parts[0].world_from_part};
+  const sim::RayScene prototype_rays(std::span(&prototype, 1)), part_rays(std::span(&part, 1));
+  const auto reaches = [&](const Imager& projector, const Vector3d& p, const Vector3d& n) {
+    const auto px = projector.project(p);
+    const Vector3d p_light = projector.imager_from_world.inverse().translation;
+    return px && projector.contains(*px) && n.dot(p_light - p) > 0 && prototype_rays.lit(p_light, p);
+  };
+  double same = 0, either = 0, on_same = 0, on_either = 0;
+  for (int row = 0; row < viewer.height; ++row) {
+    for (int column = 0; column < viewer.width; ++column) {
+      const Ray ray = *viewer.ray(Vector2d(column, row));
+      const sim::Hit hit = part_rays.first_hit(ray), behind = prototype_rays.first_hit(ray);
+      int expected = 0;
+      if (hit.object >= 0 && (behind.object < 0 || hit.distance < behind.distance)) {
+        expected = 128;
+        if (behind.object >= 0) {
+          const Vector3d p = ray.p_origin + behind.distance * ray.d;
+          Vector3d n = prototype_rays.face_normal(behind);
+          if (n.dot(ray.d) > 0) n = -n;
+          if (reaches(rig.projectors[0], p, n) || reaches(rig.projectors[1], p, n)) expected = 255;
+        }
+      }
+      const int found = coverage[0].mask.at<std::uint8_t>(row, column);
+      same += expected > 0 && found > 0;
+      either += expected > 0 || found > 0;
+      on_same += expected == 255 && found == 255;
+      on_either += expected == 255 || found == 255;
+    }
+  }
+  EXPECT_GT(on_either, 1000);
+  EXPECT_GT(same / either, 0.99);
+  EXPECT_GT(on_same / on_either, 0.99);
+  RecordProperty("iou_part", std::to_string(same / either));
+  RecordProperty("iou_projected", std::to_string(on_same / on_either));
+  std::cout << "IoU part " << same / either << ", projected " << on_same / on_either << "\n";
+}
+
+}  // namespace
+}  // namespace limn::projector
