@@ -8,6 +8,7 @@
 #include <opencv2/aruco/dictionary.hpp>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "core/file.h"
@@ -229,7 +230,7 @@ Result<TemplatePattern> load_template(const std::filesystem::path& path) {
     pattern.grey.push_back(static_cast<std::uint8_t>(std::lround(grey[i])));
   }
   // The file's other three rotations are the same values turned; turning them here settles the direction.
-  pattern.rotations[0] = normalised(grey);
+  pattern.rotations[0] = normalised(smoothed(grey, size));
   if (pattern.rotations[0].empty())
     return error("{}: expected a picture, found one grey value throughout", path.string());
   for (std::size_t k = 1; k < 4; ++k) pattern.rotations[k] = turned(pattern.rotations[k - 1], size);
@@ -268,9 +269,28 @@ cv::Mat drawn_template(const TemplatePattern& pattern, int pixels_per_cell) {
 
 }  // namespace
 
+std::vector<float> smoothed(const std::vector<float>& values, int size) {
+  std::vector<float> result(values.size());
+  const auto at = [&](int row, int column) {
+    return values[static_cast<std::size_t>(std::clamp(row, 0, size - 1) * size +
+                                           std::clamp(column, 0, size - 1))];
+  };
+  for (int row = 0; row < size; ++row)
+    for (int column = 0; column < size; ++column) {
+      float sum = 0;
+      for (int r = -1; r <= 1; ++r)
+        for (int c = -1; c <= 1; ++c)
+          sum += static_cast<float>((2 - std::abs(r)) * (2 - std::abs(c))) * at(row + r, column + c);
+      result[static_cast<std::size_t>(row * size + column)] = sum / 16;
+    }
+  return result;
+}
+
 Result<Families> Families::load(std::span<const std::string> names, const std::filesystem::path& folder) {
   Families families;
+  std::set<std::string> seen;
   for (const std::string& name : names) {
+    if (!seen.insert(name).second) continue;
     const auto known = std::find_if(predefined().begin(), predefined().end(),
                                     [&](const auto& entry) { return entry.first == name; });
     if (known != predefined().end()) {

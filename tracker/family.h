@@ -27,13 +27,17 @@ struct CodeFamily {
 };
 
 /// An ARToolKit template: size x size grey values of the marker's inner half (its border is a quarter of the
-/// side), with zero mean and unit length, four rotations as in CodeFamily.
+/// side), smoothed(), with zero mean and unit length, four rotations as in CodeFamily.
 struct TemplatePattern {
   std::string id;
   int size = 0;
   std::array<std::vector<float>, 4> rotations;
   std::vector<std::uint8_t> grey;  ///< upright, as stored
 };
+
+/// A size x size picture blurred by (1 2 1)/4 along rows and columns: templates and what is compared with
+/// them, so that half a cell of misplacement costs little.
+std::vector<float> smoothed(const std::vector<float>& values, int size);
 
 /// What the detector looks for.
 class Families {

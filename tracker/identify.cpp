@@ -23,8 +23,9 @@ constexpr double k_min_score_few_bits = 0.5;
 constexpr double k_max_wrong_margin = 0.1;
 constexpr double k_min_correlation = 0.65;   // of a template, see numbers of the real Hiro frame in the tests
 constexpr double k_min_rotation_lead = 0.1;  // best rotation over the second best
-constexpr double k_sharpen_below_px = 4;     // cells smaller than this blur into each other
-constexpr double k_sharpening = 0.25;        // Laplacian weight
+constexpr double k_min_template_variance = 0.02;  // stdev a fifteenth of black to white
+constexpr double k_sharpen_below_px = 4;          // cells smaller than this blur into each other
+constexpr double k_sharpening = 0.25;             // Laplacian weight
 
 // Marker square [0,1]^2 to pixels (Heckbert 1989).
 class SquareToQuad {
@@ -214,32 +215,27 @@ bool has_template_border(const Reader& reader) {
   return light <= 1;
 }
 
-double correlation(const std::vector<float>& a, const std::vector<double>& unit) {
+double correlation(const std::vector<float>& a, const std::vector<float>& b) {
   double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * unit[i];
+  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
   return sum;
 }
 
-// The inner half as size x size values of zero mean and unit length; empty when it is flat.
-std::vector<double> read_inner_half(const Reader& reader, int size) {
-  std::vector<double> values;
+// The inner half as size x size values, smoothed, of zero mean and unit length; empty when it is flat.
+std::vector<float> read_inner_half(const Reader& reader, int size) {
+  std::vector<float> values;
   const double cells = 2.0 * size;
   const bool several = reader.side_px / cells > 2;
-  double mean = 0;
   for (int row = 0; row < size; ++row)
-    for (int column = 0; column < size; ++column) {
-      values.push_back(reader.cell(row + size / 2, column + size / 2, cells, several));
-      mean += values.back();
-    }
-  mean /= static_cast<double>(values.size());
+    for (int column = 0; column < size; ++column)
+      values.push_back(static_cast<float>(reader.cell(row + size / 2, column + size / 2, cells, several)));
+  values = smoothed(values, size);
+  double mean = 0;
+  for (const float v : values) mean += v / static_cast<double>(values.size());
   double square = 0;
-  for (double& v : values) {
-    v -= mean;
-    square += v * v;
-  }
-  if (square < 0.02 * static_cast<double>(values.size()))
-    return {};  // stdev below a fifteenth of black to white
-  for (double& v : values) v /= std::sqrt(square);
+  for (const float v : values) square += (v - mean) * (v - mean);
+  if (square < k_min_template_variance * static_cast<double>(values.size())) return {};
+  for (float& v : values) v = static_cast<float>((v - mean) / std::sqrt(square));
   return values;
 }
 
@@ -247,7 +243,7 @@ std::optional<Identity> read_templates(const Reader& reader, const std::vector<T
   if (templates.empty() || !has_template_border(reader)) return std::nullopt;
   std::optional<Identity> best;
   for (const TemplatePattern& pattern : templates) {
-    const std::vector<double> seen = read_inner_half(reader, pattern.size);
+    const std::vector<float> seen = read_inner_half(reader, pattern.size);
     if (seen.empty()) continue;
     std::array<double, 4> scores;
     for (std::size_t k = 0; k < 4; ++k) scores[k] = correlation(pattern.rotations[k], seen);

@@ -1,0 +1,345 @@
+#include "tracker/detector.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "core/file.h"
+#include "tests/support/matchers.h"
+#include "tests/tracker/marker_pictures.h"
+
+namespace limn::tracker {
+namespace {
+
+using namespace test::literals;
+using test::PlacedMarker;
+
+Families families(const std::vector<std::string>& names) { return Families::load(names).value(); }
+
+double uniform(std::mt19937_64& rng, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(rng);
+}
+
+Lens pinhole_vga() { return Lens::pinhole(600, 600, 319.5, 239.5); }
+Lens bent_vga() {
+  return Lens::create("LENSMODEL_OPENCV8", {500, 500, 319.5, 239.5, -0.25, 0.08, 1e-3, -1e-3, 0, 0, 0, 0})
+      .value();
+}
+
+struct Sweep {
+  double low_px, high_px, max_tilt;
+  test::PictureOptions picture;
+  bool spin = true;
+  Lens lens = pinhole_vga();
+  bool give_lens = false;
+};
+
+struct SweepResult {
+  int markers = 0, found = 0, wrong = 0, corners = 0;
+  double rms_px = 0;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  double outward = 0;      ///< mean error away from the marker's centre
+  double mahalanobis = 0;  ///< mean of e' C^-1 e / 2: 1 when the covariance is true
+};
+
+SweepResult swept(const Sweep& sweep, int count) {
+  auto rng = test::test_rng();
+  Detector detector(families({"apriltag_36h11", "aruco_4x4_50"}));
+  SweepResult result;
+  double squares = 0;
+  for (int i = 0; i < count; ++i) {
+    const MarkerName name{i % 2 ? "apriltag_36h11" : "aruco_4x4_50", std::to_string(i % 50)};
+    const PlacedMarker marker =
+        test::placed(sweep.lens, name, {uniform(rng, 120, 520), uniform(rng, 120, 360)},
+                     uniform(rng, sweep.low_px, sweep.high_px), sweep.spin ? uniform(rng, 0, 6.28) : 0,
+                     uniform(rng, 0, sweep.max_tilt), uniform(rng, 0, 6.28));
+    const cv::Mat grey =
+        test::picture_of(sweep.lens, test::plain(640, 480, 100), std::vector{marker}, sweep.picture, rng);
+    const auto truth = test::true_corners(sweep.lens, marker);
+    ++result.markers;
+    for (const Detection& found : detector.detect(grey, sweep.give_lens ? &sweep.lens : nullptr)) {
+      if (found.marker != name || (found.corners_px[0] - truth[0]).norm() > 5) {
+        ++result.wrong;
+        continue;
+      }
+      ++result.found;
+      const Eigen::Vector2d centre = 0.25 * (truth[0] + truth[1] + truth[2] + truth[3]);
+      for (std::size_t k = 0; k < 4; ++k) {
+        const Eigen::Vector2d e = found.corners_px[k] - truth[k];
+        squares += e.squaredNorm();
+        result.mean += e;
+        result.outward += e.dot((truth[k] - centre).normalized());
+        result.mahalanobis += 0.5 * e.dot(found.corner_covariance[k].inverse() * e);
+        ++result.corners;
+      }
+    }
+  }
+  result.rms_px = std::sqrt(squares / result.corners);
+  result.mean /= result.corners;
+  result.outward /= result.corners;
+  result.mahalanobis /= result.corners;
+  return result;
+}
+
+TEST(Detector, FindsSharpMarkersToATwentiethOfAPixelWithoutBias) {
+  Sweep sweep{48, 120, 70_deg, {}};
+  sweep.picture.noise_levels = 2;
+  const SweepResult r = swept(sweep, 60);
+  EXPECT_EQ(r.found, r.markers);
+  EXPECT_EQ(r.wrong, 0);
+  EXPECT_LT(r.rms_px, 0.08);
+  EXPECT_LT(r.mean.norm(), 0.012);
+  EXPECT_LT(std::abs(r.outward), 0.012);
+}
+
+TEST(Detector, HasNoBiasWhereSidesRunAlongThePixels) {
+  Sweep sweep{48, 120, 0, {}};
+  sweep.spin = false;
+  sweep.picture.noise_levels = 2;
+  const SweepResult r = swept(sweep, 40);
+  EXPECT_EQ(r.found, r.markers);
+  EXPECT_LT(r.rms_px, 0.08);
+  EXPECT_LT(r.mean.norm(), 0.015);
+  EXPECT_LT(std::abs(r.outward), 0.015);
+}
+
+TEST(Detector, FindsSmallMarkers) {
+  Sweep sweep{16, 32, 45_deg, {}};
+  sweep.picture.noise_levels = 2;
+  sweep.picture.blur_px = 0.4;
+  const SweepResult r = swept(sweep, 60);
+  EXPECT_GE(r.found, 58);
+  EXPECT_EQ(r.wrong, 0);
+  EXPECT_LT(r.rms_px, 0.15);
+}
+
+TEST(Detector, StraightensTheSidesOfADistortedPictureThroughItsLens) {
+  Sweep sweep{120, 200, 45_deg, {}};
+  sweep.lens = bent_vga();
+  sweep.picture.blur_px = 0.5;
+  sweep.picture.noise_levels = 1;
+  const SweepResult without = swept(sweep, 30);
+  sweep.give_lens = true;
+  const SweepResult with = swept(sweep, 30);
+  EXPECT_GE(with.found, 28);
+  EXPECT_LT(with.rms_px, 0.05);
+  EXPECT_LT(std::abs(with.outward), 0.01);
+  EXPECT_GT(without.rms_px, 3 * with.rms_px);
+}
+
+TEST(Detector, SaysHowSureItsCornersAre) {
+  Sweep sweep{60, 120, 50_deg, {}};
+  sweep.picture.blur_px = 0.7;
+  sweep.picture.noise_levels = 8;  // noise far above the systematic floor, so that the pull is the noise's
+  const SweepResult r = swept(sweep, 60);
+  EXPECT_GE(r.found, 58);
+  EXPECT_GT(r.mahalanobis, 0.6);
+  EXPECT_LT(r.mahalanobis, 1.6);
+}
+
+// Every marker of a family in a sheet, turned by quarters: right id, right corner order.
+void expect_whole_family(const std::string& family, int count) {
+  auto rng = test::test_rng();
+  const Lens lens = Lens::pinhole(2000, 2000, 799.5, 599.5);
+  Detector detector(families({family}));
+  constexpr int k_columns = 16;
+  constexpr int k_rows = 12;
+  for (int first = 0; first < count; first += k_columns * k_rows) {
+    std::vector<PlacedMarker> sheet;
+    for (int id = first; id < std::min(count, first + k_columns * k_rows); ++id) {
+      const int cell = id - first;
+      sheet.push_back(test::placed(lens, {family, std::to_string(id)},
+                                   {100.0 * (cell % k_columns) + 50, 100.0 * (cell / k_columns) + 50}, 60,
+                                   0.5 * std::numbers::pi * (id % 4) + 0.1, 0.1, 1));
+    }
+    const cv::Mat grey =
+        test::picture_of(lens, test::plain(1600, 1200, 160), sheet, {.noise_levels = 2}, rng);
+    const auto found = detector.detect(grey);
+    EXPECT_EQ(found.size(), sheet.size());
+    for (const PlacedMarker& marker : sheet) {
+      const auto truth = test::true_corners(lens, marker);
+      int hits = 0;
+      for (const Detection& d : found)
+        if (d.marker == marker.marker) {
+          ++hits;
+          for (std::size_t k = 0; k < 4; ++k) EXPECT_TRUE(test::near(d.corners_px[k], truth[k], 0.5));
+        }
+      EXPECT_EQ(hits, 1) << marker.marker.text();
+    }
+  }
+}
+
+TEST(Detector, FindsAllOfApriltag36h11InAllTurns) { expect_whole_family("apriltag_36h11", 587); }
+TEST(Detector, FindsAllOfApriltag25h9InAllTurns) { expect_whole_family("apriltag_25h9", 35); }
+TEST(Detector, FindsAllOfApriltag16h5InAllTurns) { expect_whole_family("apriltag_16h5", 30); }
+TEST(Detector, FindsAllOfAruco4x4InAllTurns) { expect_whole_family("aruco_4x4_50", 50); }
+TEST(Detector, FindsAllOfAruco7x7InAllTurns) { expect_whole_family("aruco_7x7_100", 100); }
+TEST(Detector, FindsTheOriginalArucoInAllTurns) { expect_whole_family("aruco_original", 180); }
+
+TEST(Detector, FindsSeveralFamiliesInOnePicture) {
+  auto rng = test::test_rng();
+  const Lens lens = pinhole_vga();
+  const std::vector<std::string> names = {"apriltag_36h11", "aruco_4x4_50", "aruco_6x6_250", "apriltag_25h9"};
+  std::vector<PlacedMarker> markers;
+  for (std::size_t i = 0; i < names.size(); ++i)
+    markers.push_back(
+        test::placed(lens, {names[i], "7"}, {100 + 140.0 * static_cast<double>(i), 240}, 70, 0.4, 0.3, 2));
+  const auto found =
+      Detector(families(names)).detect(test::picture_of(lens, test::plain(640, 480, 40), markers, {}, rng));
+  ASSERT_EQ(found.size(), names.size());
+  for (const PlacedMarker& marker : markers)
+    EXPECT_EQ(
+        std::count_if(found.begin(), found.end(), [&](const auto& d) { return d.marker == marker.marker; }),
+        1);
+}
+
+TEST(Detector, SeesNoMarkersInClutter) {
+  auto rng = test::test_rng();
+  Detector detector(
+      families({"apriltag_36h11", "apriltag_16h5", "aruco_4x4_50", "aruco_6x6_250", "aruco_original"}));
+  for (int i = 0; i < 12; ++i) {
+    const auto found = detector.detect(test::clutter(1280, 720, rng));
+    EXPECT_EQ(found.size(), 0u) << (found.empty() ? "" : found[0].marker.text());
+  }
+}
+
+TEST(Detector, SeesNoMarkersInNoise) {
+  auto rng = test::test_rng();
+  Detector detector(families({"aruco_4x4_1000", "apriltag_16h5"}));
+  std::uniform_int_distribution<int> level(0, 255);
+  cv::Mat noise(480, 640, CV_8UC1);
+  for (int i = 0; i < noise.rows * noise.cols; ++i) noise.data[i] = static_cast<std::uint8_t>(level(rng));
+  EXPECT_TRUE(detector.detect(noise).empty());
+}
+
+TEST(Detector, SurvivesOddPictures) {
+  Detector detector(families({"aruco_4x4_50"}));
+  EXPECT_TRUE(detector.detect(cv::Mat()).empty());
+  for (const auto& [width, height] : {std::pair{1, 1}, {2, 3}, {3, 2}, {5, 7}, {1, 400}, {400, 1}, {13, 13}})
+    for (const int grey : {0, 128, 255})
+      EXPECT_TRUE(detector.detect(test::plain(width, height, grey)).empty());
+  EXPECT_TRUE(detector.detect(test::plain(640, 480, 0)).empty());
+}
+
+TEST(Detector, FindsAMarkerInAPartOfALargerPicture) {
+  auto rng = test::test_rng();
+  const PlacedMarker marker = test::placed(pinhole_vga(), {"aruco_4x4_50", "3"}, {320, 240}, 80, 0.3, 0.2, 1);
+  const cv::Mat whole =
+      test::picture_of(pinhole_vga(), test::plain(640, 480, 60), std::vector{marker}, {}, rng);
+  const cv::Mat part = whole(cv::Rect(201, 101, 237, 281));  // its rows do not follow each other in memory
+  Detector detector(families({"aruco_4x4_50"}));
+  const auto in_whole = detector.detect(whole);
+  const auto in_part = detector.detect(part);
+  ASSERT_EQ(in_part.size(), 1u);
+  ASSERT_EQ(in_whole.size(), 1u);
+  for (std::size_t k = 0; k < 4; ++k)
+    EXPECT_TRUE(
+        test::near(in_part[0].corners_px[k] + Eigen::Vector2d(201, 101), in_whole[0].corners_px[k], 0.05));
+}
+
+std::string template_text(int size) {
+  // An L with a dot: no rotation looks like another.
+  const auto grey = [&](int row, int column) {
+    const bool stem = column > size / 5 && column < size / 2 && row > size / 8;
+    const bool foot = row > size * 3 / 4 && column > size / 5 && column < size * 7 / 8;
+    const bool dot = row < size / 3 && column > size * 3 / 4;
+    return stem || foot || dot ? 20 : 235;
+  };
+  std::string text;
+  for (int turn = 0; turn < 4; ++turn)
+    for (int colour = 0; colour < 3; ++colour)
+      for (int row = 0; row < size; ++row) {
+        for (int column = 0; column < size; ++column) {
+          int r = row;
+          int c = column;
+          for (int k = 0; k < turn; ++k) {
+            const int before = r;
+            r = size - 1 - c;
+            c = before;
+          }
+          text += fmt::format(" {:3d}", grey(r, c));
+        }
+        text += "\n";
+      }
+  return text;
+}
+
+TEST(Detector, FindsATemplateInAllTurns) {
+  auto rng = test::test_rng();
+  const auto file = test::test_folder() / "letter.patt";
+  ASSERT_TRUE(write_file(file, template_text(16)));
+  Detector detector(families({"artoolkit:" + file.string()}));
+  const MarkerName name{"artoolkit", file.string()};
+  for (int turn = 0; turn < 8; ++turn) {
+    const PlacedMarker marker =
+        test::placed(pinhole_vga(), name, {320, 240}, 110, turn * 45_deg, 35_deg, turn);
+    test::PictureOptions options;
+    options.noise_levels = 2;
+    const auto found = detector.detect(
+        test::picture_of(pinhole_vga(), test::plain(640, 480, 90), std::vector{marker}, options, rng));
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_EQ(found[0].marker.text(), "artoolkit:letter.patt");
+    EXPECT_GT(found[0].score, 0.9);
+    const auto truth = test::true_corners(pinhole_vga(), marker);
+    for (std::size_t k = 0; k < 4; ++k) EXPECT_TRUE(test::near(found[0].corners_px[k], truth[k], 0.2));
+  }
+}
+
+std::string load_message(const std::string& name) {
+  const auto loaded = Families::load(std::vector<std::string>{name});
+  return loaded ? "loaded" : loaded.message();
+}
+
+TEST(Families, SaysWhatIsWrongWithAName) {
+  EXPECT_NE(load_message("aruco_9x9_50").find("aruco_4x4_50"), std::string::npos);
+  EXPECT_NE(load_message("aruco:").find("expected one of"), std::string::npos);
+  EXPECT_NE(load_message("artoolkit:absent.patt").find("absent.patt"), std::string::npos);
+}
+
+TEST(Families, SaysWhatIsWrongWithATemplateFile) {
+  const auto file = test::test_folder() / "broken.patt";
+  const std::string good = template_text(16);
+  ASSERT_TRUE(write_file(file, good.substr(0, good.size() / 2)));
+  EXPECT_NE(load_message("artoolkit:" + file.string()).find("cut short"), std::string::npos);
+  ASSERT_TRUE(write_file(file, "not a pattern"));
+  EXPECT_NE(load_message("artoolkit:" + file.string()).find("expected numbers"), std::string::npos);
+  ASSERT_TRUE(write_file(file, ""));
+  EXPECT_NE(load_message("artoolkit:" + file.string()).find("found 0"), std::string::npos);
+}
+
+TEST(Families, SaysWhatIsWrongWithADictionaryFile) {
+  const auto file = test::test_folder() / "broken.yml";
+  const auto message = [&](const std::string& text) {
+    EXPECT_TRUE(write_file(file, text));
+    return load_message("aruco:" + file.string());
+  };
+  EXPECT_NE(message("%YAML:1.0\nnmarkers: 2\nmarkersize: 3\nmarker_0: \"010101010\"\n").find("marker_1"),
+            std::string::npos);
+  EXPECT_NE(message("%YAML:1.0\nnmarkers: 1\nmarkersize: 3\nmarker_0: \"01\"\n").find("9 characters"),
+            std::string::npos);
+  EXPECT_NE(message("%YAML:1.0\nnmarkers: 1\nmarkersize: 30\nmarker_0: \"01\"\n").find("markersize"),
+            std::string::npos);
+  EXPECT_NE(message("%YAML:1.0\nnmarkers: [").find("broken.yml"), std::string::npos);
+  EXPECT_NE(message("").find("broken.yml"), std::string::npos);
+  EXPECT_EQ(message("%YAML:1.0\nnmarkers: 1\nmarkersize: 3\nmarker_0: \"010110100\"\n"), "loaded");
+}
+
+TEST(Families, DrawsOnlyIdsThatExist) {
+  EXPECT_TRUE(draw_marker({"aruco_4x4_50", "49"}, 4));
+  EXPECT_NE(draw_marker({"aruco_4x4_50", "50"}, 4).message().find("0 to 49"), std::string::npos);
+  EXPECT_FALSE(draw_marker({"aruco_4x4_50", "-1"}, 4));
+  EXPECT_FALSE(draw_marker({"aruco_4x4_50", "3x"}, 4));
+}
+
+TEST(Families, AreNamedOnceForTheMarkersOfBodies) {
+  const std::vector<Body> bodies = {
+      {"prototype", {{{"aruco_4x4_50", "1"}, 0.04, {}}, {{"aruco_4x4_50", "2"}, 0.04, {}}}},
+      {"slot", {{{"artoolkit", "hiro.patt"}, 0.08, {}}}}};
+  EXPECT_EQ(families_of(bodies), (std::vector<std::string>{"aruco_4x4_50", "artoolkit:hiro.patt"}));
+}
+
+}  // namespace
+}  // namespace limn::tracker

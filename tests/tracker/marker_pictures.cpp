@@ -1,0 +1,234 @@
+#include "tests/tracker/marker_pictures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "tracker/family.h"
+
+namespace limn::test {
+namespace {
+
+constexpr int k_few_samples = 9;
+constexpr int k_many_samples = 400;  // coverage of an edge pixel to 0.3 levels of 180
+
+// Intersection of a camera direction with the marker's plane, in marker coordinates over its side (0 … 1
+// inside).
+struct MarkerPlane {
+  Pose marker_from_camera;
+  double size_m;
+  explicit MarkerPlane(const PlacedMarker& placed)
+      : marker_from_camera(placed.camera_from_marker.inverse()), size_m(placed.size_m) {}
+  std::optional<Eigen::Vector2d> at(const Eigen::Vector3d& d_camera) const {
+    const Eigen::Vector3d d = marker_from_camera.rotation * d_camera;
+    const Eigen::Vector3d& origin = marker_from_camera.translation;
+    const double distance = -origin.z() / d.z();
+    if (!(distance > 0)) return std::nullopt;
+    return Eigen::Vector2d((origin + distance * d).head<2>() / size_m + Eigen::Vector2d(0.5, 0.5));
+  }
+};
+
+// 1 white, 0 black, nullopt beside the paper.
+std::optional<double> ink(const cv::Mat& cells, double margin, const Eigen::Vector2d& p) {
+  if (p.minCoeff() < -margin || p.maxCoeff() > 1 + margin) return std::nullopt;
+  if (p.minCoeff() < 0 || p.maxCoeff() >= 1) return 1.0;
+  const int column = std::min(static_cast<int>(p.x() * cells.cols), cells.cols - 1);
+  const int row = std::min(static_cast<int>(p.y() * cells.rows), cells.rows - 1);
+  return cells.at<std::uint8_t>(row, column) / 255.0;
+}
+
+cv::Mat cells_of(const MarkerName& marker) {
+  static std::map<std::string, cv::Mat> known;
+  cv::Mat& cells = known[marker.text()];
+  if (cells.empty()) cells = tracker::draw_marker(marker, 1).value();
+  return cells;
+}
+
+cv::Rect bounds(const Lens& lens, const PlacedMarker& placed, const cv::Size& size) {
+  Eigen::Vector2d low(1e9, 1e9);
+  Eigen::Vector2d high(-1e9, -1e9);
+  PlacedMarker paper = placed;
+  paper.size_m *= 1 + 2 * placed.margin;
+  for (const Eigen::Vector2d& px : true_corners(lens, paper)) {
+    low = low.cwiseMin(px);
+    high = high.cwiseMax(px);
+  }
+  const Eigen::Vector2d bow = 0.05 * (high - low) + Eigen::Vector2d(2, 2);  // sides bend in a lens
+  low -= bow;
+  high += bow;
+  const cv::Rect box(cv::Point(static_cast<int>(low.x()), static_cast<int>(low.y())),
+                     cv::Point(static_cast<int>(high.x()) + 1, static_cast<int>(high.y()) + 1));
+  return box & cv::Rect({}, size);
+}
+
+// Means over the areas of the pixels of one marker's box.
+class MarkerPainter {
+ public:
+  MarkerPainter(const Lens& lens, const PlacedMarker& placed, const PictureOptions& options)
+      : lens_(lens), placed_(placed), plane_(placed), options_(options), cells_(cells_of(placed.marker)) {}
+
+  void paint(cv::Mat& picture, std::mt19937_64& rng) const {
+    const cv::Rect box = bounds(lens_, placed_, picture.size());
+    for (int y = box.y; y < box.y + box.height; ++y)
+      for (int x = box.x; x < box.x + box.width; ++x) paint_pixel(picture.at<float>(y, x), x, y, rng);
+  }
+
+ private:
+  const Lens& lens_;
+  const PlacedMarker& placed_;
+  MarkerPlane plane_;
+  const PictureOptions& options_;
+  cv::Mat cells_;
+
+  // Directions are linear over a pixel to far better than 1e-4 of it.
+  void paint_pixel(float& pixel, int x, int y, std::mt19937_64& rng) const {
+    const Eigen::Vector2d px(x, y);
+    const auto centre = lens_.unproject(px);
+    const auto right = lens_.unproject(px + Eigen::Vector2d(0.5, 0));
+    const auto below = lens_.unproject(px + Eigen::Vector2d(0, 0.5));
+    if (!centre || !right || !below) return;
+    const Eigen::Vector3d du = 2 * (*right - *centre);
+    const Eigen::Vector3d dv = 2 * (*below - *centre);
+    std::uniform_real_distribution<double> phase(0, 1);
+    const double u0 = phase(rng);
+    const double v0 = phase(rng);
+    double sum = 0;
+    double first = 0;
+    bool mixed = false;
+    int count = k_few_samples;
+    for (int i = 0; i < count; ++i) {
+      // R2 sequence (Roberts 2018): additive recurrence with the plastic number.
+      const double u = std::fmod(u0 + i * 0.7548776662466927, 1.0) - 0.5;
+      const double v = std::fmod(v0 + i * 0.5698402909980532, 1.0) - 0.5;
+      const auto p = plane_.at(*centre + u * du + v * dv);
+      const auto white = p ? ink(cells_, placed_.margin, *p) : std::nullopt;
+      const double level = white ? options_.black + *white * (options_.white - options_.black) : pixel;
+      if (i == 0) first = level;
+      mixed = mixed || level != first;
+      if (mixed) count = k_many_samples;
+      sum += level;
+    }
+    pixel = static_cast<float>(sum / count);
+  }
+};
+
+double uniform(std::mt19937_64& rng, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(rng);
+}
+int whole(std::mt19937_64& rng, int low, int high) {
+  return std::uniform_int_distribution<int>(low, high)(rng);
+}
+
+}  // namespace
+
+std::array<Eigen::Vector2d, 4> true_corners(const Lens& lens, const PlacedMarker& placed) {
+  const double h = 0.5 * placed.size_m;
+  const std::array<Eigen::Vector3d, 4> corners = {Eigen::Vector3d(-h, -h, 0), Eigen::Vector3d(h, -h, 0),
+                                                  Eigen::Vector3d(h, h, 0), Eigen::Vector3d(-h, h, 0)};
+  std::array<Eigen::Vector2d, 4> px;
+  for (std::size_t i = 0; i < 4; ++i) px[i] = lens.project(placed.camera_from_marker * corners[i]).value();
+  return px;
+}
+
+PlacedMarker placed(const Lens& lens,
+                    const MarkerName& marker,
+                    const Eigen::Vector2d& px,
+                    double side_px,
+                    double spin,
+                    double tilt,
+                    double tilt_direction) {
+  PlacedMarker result;
+  result.marker = marker;
+  const Eigen::Vector3d d = lens.unproject(px).value();
+  const double depth = lens.fx() * result.size_m / side_px;
+  const Eigen::Vector3d axis(std::cos(tilt_direction), std::sin(tilt_direction), 0);
+  result.camera_from_marker =
+      Pose(exp_rotation(tilt * axis) * exp_rotation({0, 0, spin}), Eigen::Vector3d(d * depth / d.z()));
+  return result;
+}
+
+cv::Mat picture_of(const Lens& lens,
+                   const cv::Mat& background,
+                   std::span<const PlacedMarker> markers,
+                   const PictureOptions& options,
+                   std::mt19937_64& rng) {
+  cv::Mat picture;
+  background.convertTo(picture, CV_32F);
+  for (const PlacedMarker& marker : markers) MarkerPainter(lens, marker, options).paint(picture, rng);
+  if (options.blur_px > 0) cv::GaussianBlur(picture, picture, {0, 0}, options.blur_px);
+  if (options.noise_levels > 0) {
+    std::normal_distribution<float> noise(0, static_cast<float>(options.noise_levels));
+    for (int y = 0; y < picture.rows; ++y)
+      for (int x = 0; x < picture.cols; ++x) picture.at<float>(y, x) += noise(rng);
+  }
+  cv::Mat grey;
+  picture.convertTo(grey, CV_8U);  // rounds and saturates
+  return grey;
+}
+
+cv::Mat plain(int width, int height, int grey) { return cv::Mat(height, width, CV_8UC1, cv::Scalar(grey)); }
+
+cv::Mat clutter(int width, int height, std::mt19937_64& rng) {
+  cv::Mat picture = plain(width, height, 120);
+  const double scale = width / 1280.0;
+  const auto point = [&] { return cv::Point(whole(rng, 0, width), whole(rng, 0, height)); };
+  const auto level = [&] { return cv::Scalar(whole(rng, 10, 245)); };
+  const auto size = [&](double low, double high) {
+    return static_cast<int>(scale * std::exp(uniform(rng, std::log(low), std::log(high))));
+  };
+  const int shapes = static_cast<int>(500 * scale * scale);
+  for (int i = 0; i < shapes; ++i) {
+    const cv::Point p = point();
+    switch (whole(rng, 0, 4)) {
+      case 0: {
+        const cv::RotatedRect box(
+            p, cv::Size2f(static_cast<float>(size(8, 200)), static_cast<float>(size(8, 200))),
+            static_cast<float>(uniform(rng, 0, 180)));
+        std::array<cv::Point2f, 4> corners;
+        box.points(corners.data());
+        std::vector<cv::Point> polygon(corners.begin(), corners.end());
+        cv::fillConvexPoly(picture, polygon, level(), cv::LINE_AA);
+        break;
+      }
+      case 1:
+        cv::ellipse(picture, p, {size(4, 100), size(4, 100)}, uniform(rng, 0, 180), 0, 360, level(), -1,
+                    cv::LINE_AA);
+        break;
+      case 2: {
+        const std::vector<cv::Point> triangle = {p, p + cv::Point(size(10, 150), size(5, 80)),
+                                                 p + cv::Point(-size(5, 80), size(10, 150))};
+        cv::fillConvexPoly(picture, triangle, level(), cv::LINE_AA);
+        break;
+      }
+      case 3:
+        cv::line(picture, p, point(), level(), whole(rng, 1, 6), cv::LINE_AA);
+        break;
+      default: {
+        std::string text;
+        for (int k = whole(rng, 3, 12); k > 0; --k) text += static_cast<char>(whole(rng, 'A', 'z'));
+        cv::putText(picture, text, p, cv::FONT_HERSHEY_SIMPLEX, scale * uniform(rng, 0.3, 1.5), level(),
+                    whole(rng, 1, 3), cv::LINE_AA);
+      }
+    }
+  }
+  // A chessboard and fine grain: many small black squares, many tiny boundaries.
+  const int square = size(10, 40);
+  const cv::Point board = point();
+  for (int row = 0; row < 8; ++row)
+    for (int column = 0; column < 8; ++column)
+      cv::rectangle(picture, board + cv::Point(column * square, row * square),
+                    board + cv::Point((column + 1) * square - 1, (row + 1) * square - 1),
+                    cv::Scalar((row + column) % 2 == 0 ? 20 : 230), -1);
+  const cv::Rect grain =
+      cv::Rect(point(), cv::Size(size(150, 400), size(150, 400))) & cv::Rect({}, picture.size());
+  for (int y = grain.y; y < grain.y + grain.height; ++y)
+    for (int x = grain.x; x < grain.x + grain.width; ++x)
+      picture.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(whole(rng, 40, 200));
+  cv::GaussianBlur(picture, picture, {0, 0}, 0.7);
+  return picture;
+}
+
+}  // namespace limn::test

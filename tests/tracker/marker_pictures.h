@@ -1,0 +1,59 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <opencv2/core/mat.hpp>
+#include <random>
+#include <span>
+#include <vector>
+
+#include "core/lens.h"
+#include "core/marker.h"
+#include "core/pose.h"
+
+namespace limn::test {
+
+/// A marker to be drawn into a picture.
+struct PlacedMarker {
+  MarkerName marker;
+  Pose camera_from_marker;
+  double size_m = 0.08;
+  double margin = 0.125;  ///< of white paper around it, as share of its side
+};
+
+struct PictureOptions {
+  double black = 30;        ///< grey level of ink
+  double white = 210;       ///< grey level of paper
+  double blur_px = 0;       ///< sigma of a Gaussian after the pixels' own area
+  double noise_levels = 0;  ///< standard deviation per pixel
+};
+
+/// Pictures of markers with exact truth: every pixel is the mean over its area (coverage by low-discrepancy
+/// samples, as many as an edge needs), through the true lens; pixel centres at integers. `background` (8-bit
+/// grey) is what is seen beside the papers; later markers cover earlier ones.
+cv::Mat picture_of(const Lens& lens,
+                   const cv::Mat& background,
+                   std::span<const PlacedMarker> markers,
+                   const PictureOptions& options,
+                   std::mt19937_64& rng);
+
+/// The corners' true pixels in the order of Detection::corners_px.
+std::array<Eigen::Vector2d, 4> true_corners(const Lens& lens, const PlacedMarker& marker);
+
+/// A marker whose centre is seen at `px`, `side_px` wide when seen from straight ahead, turned by `spin`
+/// about its own axis and tilted by `tilt` towards `tilt_direction` (radians).
+PlacedMarker placed(const Lens& lens,
+                    const MarkerName& marker,
+                    const Eigen::Vector2d& px,
+                    double side_px,
+                    double spin,
+                    double tilt,
+                    double tilt_direction);
+
+/// Shapes, stripes, dots, writing and gradients of all sizes: everything but markers.
+cv::Mat clutter(int width, int height, std::mt19937_64& rng);
+
+/// Even grey.
+cv::Mat plain(int width, int height, int grey);
+
+}  // namespace limn::test

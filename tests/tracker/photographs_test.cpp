@@ -1,0 +1,157 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "core/picture.h"
+#include "core/rig.h"
+#include "tests/support/matchers.h"
+#include "tracker/detector.h"
+#include "tracker/marker_pose.h"
+
+namespace limn::tracker {
+namespace {
+
+struct Listed {
+  std::string file, id;
+  std::vector<Eigen::Vector2d> corners;
+};
+
+std::vector<Listed> read_list(const std::filesystem::path& path) {
+  std::ifstream stream(path);
+  std::string line;
+  std::getline(stream, line);
+  std::vector<Listed> list;
+  while (std::getline(stream, line)) {
+    std::istringstream cells(line);
+    Listed row;
+    std::getline(cells, row.file, ',');
+    std::getline(cells, row.id, ',');
+    for (std::string x, y; std::getline(cells, x, ',') && std::getline(cells, y, ',') && !x.empty();)
+      row.corners.emplace_back(std::stod(x), std::stod(y));
+    list.push_back(row);
+  }
+  return list;
+}
+
+std::vector<Detection> detections_in(const std::filesystem::path& picture,
+                                     const std::vector<std::string>& names) {
+  Detector detector(Families::load(names).value());
+  return detector.detect(read_grey_picture(picture).value());
+}
+
+#define DATA_OR_SKIP(folder)                                      \
+  const auto folder##_data = test::real_data("markers/" #folder); \
+  if (!folder##_data) GTEST_SKIP() << "no photographs: markers/" #folder
+
+// Every listed marker, once, in its corner order, within 1.5 px of its whole-pixel corners; nothing else.
+void expect_listed(const std::filesystem::path& folder, const std::string& csv, const std::string& family) {
+  const auto list = read_list(folder / csv);
+  ASSERT_FALSE(list.empty());
+  const auto found = detections_in(folder / list[0].file, {family});
+  EXPECT_EQ(found.size(), list.size());
+  for (const Listed& row : list) {
+    const auto hit =
+        std::find_if(found.begin(), found.end(), [&](const Detection& d) { return d.marker.id == row.id; });
+    ASSERT_NE(hit, found.end()) << row.file << ": marker " << row.id << " is missing";
+    for (std::size_t k = 0; k < 4; ++k)
+      EXPECT_TRUE(test::near(hit->corners_px[k], row.corners[k], 1.5)) << row.file << ": marker " << row.id;
+  }
+}
+
+TEST(Photographs, ShowAllSingleMarkers) {
+  DATA_OR_SKIP(opencv);
+  expect_listed(*opencv_data, "opencv_singlemarkers_6x6_250.csv", "aruco_6x6_250");
+}
+TEST(Photographs, ShowAllMarkersOfACharucoBoard) {
+  DATA_OR_SKIP(opencv);
+  expect_listed(*opencv_data, "opencv_choriginal_6x6_250.csv", "aruco_6x6_250");
+}
+TEST(Photographs, ShowAllMarkersOfACoveredCharucoBoard) {
+  DATA_OR_SKIP(opencv);
+  expect_listed(*opencv_data, "opencv_chocclusion_6x6_250.csv", "aruco_6x6_250");
+}
+TEST(Photographs, ShowAllMarkersOfAGridBoard) {
+  DATA_OR_SKIP(opencv);
+  expect_listed(*opencv_data, "opencv_gboriginal_tutorialdict.csv",
+                "aruco:" + (*opencv_data / "tutorial_dict.yml").string());
+}
+
+TEST(Photographs, ShowTheIdsOfAllDiamonds) {
+  DATA_OR_SKIP(opencv);
+  std::vector<std::string> wanted, ids;
+  for (const Listed& row : read_list(*opencv_data / "opencv_diamond_ids_tutorialdict_idsonly.csv"))
+    wanted.push_back(row.id);
+  for (const Detection& d : detections_in(*opencv_data / "diamondmarkers.png",
+                                          {"aruco:" + (*opencv_data / "tutorial_dict.yml").string()}))
+    ids.push_back(d.marker.id);
+  std::sort(wanted.begin(), wanted.end());
+  std::sort(ids.begin(), ids.end());
+  EXPECT_EQ(ids, wanted);
+}
+
+// AprilTag's own list: its corners start elsewhere, and its pixel centres lie at halves.
+bool is_listed_tag(const Listed& row, const Detection& found) {
+  if (found.marker.id != row.id) return false;
+  return std::all_of(row.corners.begin(), row.corners.end(), [&](const Eigen::Vector2d& corner) {
+    return std::any_of(found.corners_px.begin(), found.corners_px.end(), [&](const Eigen::Vector2d& c) {
+      return (c + Eigen::Vector2d(0.5, 0.5) - corner).norm() < 2.5;
+    });
+  });
+}
+
+TEST(Photographs, ShowAtLeast44Of47DistantTags) {
+  DATA_OR_SKIP(apriltag);
+  std::map<std::string, std::vector<Detection>> found;
+  int listed = 0, hits = 0;
+  for (const Listed& row : read_list(*apriltag_data / "apriltag_swarmathon.csv")) {
+    if (!found.count(row.file))
+      found[row.file] = detections_in(*apriltag_data / row.file, {"apriltag_36h11"});
+    const auto& in_picture = found[row.file];
+    ++listed;
+    hits += std::any_of(in_picture.begin(), in_picture.end(),
+                        [&](const auto& d) { return is_listed_tag(row, d); });
+  }
+  EXPECT_EQ(listed, 47);
+  EXPECT_GE(hits, 44);
+  for (const auto& [file, detections] : found)  // all tags there are of two kinds
+    for (const Detection& d : detections)
+      EXPECT_TRUE(d.marker.id == "0" || d.marker.id == "1") << file << d.marker.id;
+}
+
+TEST(Photographs, ShowHiroAtItsDistance) {
+  DATA_OR_SKIP(artoolkit);
+  const auto camera = load_imager(*artoolkit_data / "hiro_frame_camera_para.dat");
+  ASSERT_TRUE(camera) << camera.message();
+  const auto grey = read_grey_picture(*artoolkit_data / "hiro_frame_320x240.png").value();
+  const std::vector<std::string> names = {"artoolkit:" + (*artoolkit_data / "kanji.patt").string(),
+                                          "artoolkit:" + (*artoolkit_data / "sample1.patt").string(),
+                                          "artoolkit:" + (*artoolkit_data / "hiro.patt").string()};
+  const auto found = Detector(Families::load(names).value()).detect(grey, &camera->lens);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].marker.text(), "artoolkit:hiro.patt");
+  // The writing runs from the upper left to the lower right of the picture.
+  EXPECT_TRUE(test::near(found[0].corners_px[0], Eigen::Vector2d(177, 21), 1.5));
+  const auto poses = marker_poses(camera->lens, 0.08, found[0].corners_px, found[0].corner_covariance);
+  ASSERT_FALSE(poses.empty());
+  EXPECT_LT(poses[0].rms_px, 0.5);
+  EXPECT_GT(poses[0].camera_from_marker.translation.z(), 0.15);
+  EXPECT_LT(poses[0].camera_from_marker.translation.z(), 0.5);
+}
+
+TEST(Photographs, WithoutMarkersShowNone) {
+  const auto folder = test::real_data("graycode");
+  if (!folder) GTEST_SKIP() << "no photographs: graycode";
+  const std::vector<std::string> names = {"apriltag_36h11", "aruco_4x4_50", "aruco_6x6_250"};
+  for (const std::string pose : {"capture_0", "capture_2", "capture_4"})
+    for (const std::string shot :
+         {"graycode_06.png", "graycode_10.png", "graycode_30.png", "graycode_40.png"})
+      EXPECT_TRUE(detections_in(*folder / pose / shot, names).empty()) << pose << "/" << shot;
+}
+
+}  // namespace
+}  // namespace limn::tracker
