@@ -162,7 +162,7 @@ std::optional<JunctionFit> fit_junction(const std::vector<Sample>& samples, cons
 
 // Share of a square that is clear of markers on both sides of an edge.
 double clear_band(const Board& board) {
-  return board.kind == BoardKind::charuco ? 0.85 * (1 - board.marker_share) / 2 : k_band;
+  return board.kind == BoardKind::charuco ? 0.65 * (1 - board.marker_share) / 2 : k_band;
 }
 
 std::optional<BoardCorner> refined(const Board& board, const cv::Mat& grey, Expected at) {

@@ -16,7 +16,7 @@ struct BoardCorner {
   double stddev_px = 0;
 };
 /// What remains of a perfect fit in 8 bits: lens blur and aliasing that the junction's model lacks.
-constexpr double k_corner_floor_px = 0.02;
+constexpr double k_corner_floor_px = 0.005;
 
 /// The board's corners in an 8-bit grey picture, by rising id; empty when it is not visible. ChArUco boards
 /// may be seen in part, chessboards must be seen whole. Found by OpenCV's detectors, then each corner is

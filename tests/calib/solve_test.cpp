@@ -1,0 +1,325 @@
+#include "calib/solve.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "calib/assess.h"
+#include "calib/seed.h"
+#include "tests/support/matchers.h"
+
+namespace limn::calib {
+namespace {
+
+using namespace test;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double k_infinite = std::numeric_limits<double>::infinity();
+
+SolveOptions without_priors() {
+  SolveOptions options;
+  options.camera_centre = options.projector_centre = options.aspect = options.radial = options.tangential =
+      options.bend_share = k_infinite;
+  return options;
+}
+
+// A rig with known truth, a board shown to it in some poses, and what it would observe.
+struct World {
+  Rig rig;
+  Observations observations;
+  std::vector<Pose> world_from_board;
+  Vector2d bend{0.0005, -0.0008};
+  BoardShape shape;
+};
+
+Imager imager(const std::string& name, int width, int height, std::vector<double> values, const Pose& pose) {
+  return {name, width, height, Lens::create("LENSMODEL_OPENCV4", std::move(values)).value(), pose};
+}
+
+ImagerView view(const Imager& imager) {
+  return {imager.lens.model, imager.lens.values, imager.imager_from_world};
+}
+
+void observe_corners(World* world, int camera, int pose) {
+  const Imager& imager = world->rig.cameras[static_cast<size_t>(camera)];
+  for (int id = 0; id < world->observations.board.corner_count(); ++id) {
+    Vector2d px;
+    if (predict_corner(view(imager), world->world_from_board[static_cast<size_t>(pose)], world->shape,
+                       world->bend, world->observations.board.p_corner(id).head<2>(), &px) &&
+        imager.contains(px))
+      world->observations.corners.push_back({camera, pose, id, px, 0.02});
+  }
+}
+
+void observe_matches(World* world, int camera, int projector, int pose) {
+  const Board& board = world->observations.board;
+  const Imager& eye = world->rig.cameras[static_cast<size_t>(camera)];
+  const Imager& light = world->rig.projectors[static_cast<size_t>(projector)];
+  const Pose& world_from_board = world->world_from_board[static_cast<size_t>(pose)];
+  for (int i = 0; i < 4 * board.columns * board.rows; ++i) {
+    const Vector2d xy((i % (2 * board.columns) + 0.5) * board.square_m / 2,
+                      (i / (2 * board.columns) + 0.5) * board.square_m / 2);
+    Vector2d px_camera, px_projector;
+    if (!predict_corner(view(eye), world_from_board, world->shape, world->bend, xy, &px_camera)) continue;
+    if (!eye.contains(px_camera)) continue;
+    if (!predict_match(view(eye), view(light), world_from_board, world->shape, world->bend, px_camera,
+                       &px_projector))
+      continue;
+    if (light.contains(px_projector))
+      world->observations.matches.push_back({camera, projector, pose, px_camera, px_projector, 0.02, 100});
+  }
+}
+
+// `shift`: how far the projectors' lenses are shifted, panel heights.
+World make_world(int cameras, int projectors, int poses, double shift) {
+  World world;
+  world.observations.board = Board::parse("charuco:11x8:25mm").value();
+  world.shape = {world.observations.board.width_m(), world.observations.board.height_m()};
+  world.rig.cameras.push_back(
+      imager("camera0", 1280, 1024, {1400, 1403, 652, 498, -0.12, 0.08, 0.0006, -0.0004}, Pose()));
+  if (cameras > 1)
+    world.rig.cameras.push_back(imager("camera1", 1280, 1024,
+                                       {1500, 1499, 630, 520, -0.05, 0.02, -0.0003, 0.0005},
+                                       looking_at({0.5, 0.05, 0.05}, {0, 0, 1.1}, {0, -1, 0})));
+  // A lens shift moves the picture off the axis: the projector is turned so that it still meets the board.
+  const double cy = 399.5 + 800 * shift;
+  for (int i = 0; i < projectors; ++i) {
+    const Vector3d p_eye(i == 0 ? -0.35 : 0.3, 0.1, 0.0);
+    const Pose towards = looking_at(p_eye, {0, 0, 1.1}, {0, -1, 0});
+    const Pose turned(exp_rotation({std::atan2(800 * shift, 1600.0), 0, 0}), Vector3d::Zero());
+    world.rig.projectors.push_back(imager("projector" + std::to_string(i), 1280, 800,
+                                          {1600, 1602, 655, cy, -0.06, 0.03, 0.0004, 0.0003},
+                                          turned * towards));
+  }
+  std::mt19937_64 rng(7);
+  std::uniform_real_distribution<double> share(-1, 1);
+  for (int pose = 0; pose < poses; ++pose) {
+    const double around = 2.4 * pose, tilt = 0.35 + 0.2 * share(rng);
+    const Pose board_at(exp_rotation({tilt * std::cos(around), tilt * std::sin(around), 0.3 * share(rng)}),
+                        Vector3d(0.12 * share(rng), 0.1 * share(rng), 1.1 + 0.15 * share(rng)));
+    const Pose centre(Eigen::Quaterniond::Identity(),
+                      {-world.shape.width_m / 2, -world.shape.height_m / 2, 0});
+    world.world_from_board.push_back(board_at * centre);
+    world.observations.poses.push_back("pose" + std::to_string(pose));
+  }
+  for (const Imager& i : world.rig.cameras) world.observations.cameras.push_back({i.name, i.width, i.height});
+  for (const Imager& i : world.rig.projectors)
+    world.observations.projectors.push_back({i.name, i.width, i.height});
+  for (int pose = 0; pose < poses; ++pose) {
+    for (int camera = 0; camera < cameras; ++camera) {
+      observe_corners(&world, camera, pose);
+      for (int projector = 0; projector < projectors; ++projector)
+        observe_matches(&world, camera, projector, pose);
+    }
+  }
+  return world;
+}
+
+void add_noise(World* world, double corner_px, double match_px, std::mt19937_64 rng) {
+  std::normal_distribution<double> scatter(0, 1);
+  for (CornerSeen& seen : world->observations.corners) {
+    seen.px += corner_px * Vector2d(scatter(rng), scatter(rng));
+    seen.stddev_px = 1e-3;
+  }
+  for (Match& match : world->observations.matches) {
+    match.px_projector += match_px * Vector2d(scatter(rng), scatter(rng));
+    match.stddev_px = 1e-3;
+  }
+}
+
+void expect_same_lens(const Imager& found, const Imager& expected, double pixels, double distortion) {
+  ASSERT_EQ(found.lens.values.size(), expected.lens.values.size());
+  for (size_t i = 0; i < found.lens.values.size(); ++i)
+    EXPECT_NEAR(found.lens.values[i], expected.lens.values[i], i < 4 ? pixels : distortion)
+        << expected.name << " value " << i;
+}
+
+TEST(Seed, TheLinearTransformRecoversAShiftedProjectorExactly) {
+  const Pose pose(exp_rotation({0.2, -0.3, 0.1}), Vector3d(0.1, -0.2, 0.3));
+  const Lens lens = Lens::pinhole(1500, 1510, 640, 1280);
+  std::vector<Vector3d> points;
+  std::vector<Vector2d> pixels;
+  std::mt19937_64 rng = test_rng();
+  std::uniform_real_distribution<double> share(-0.3, 0.3);
+  for (int i = 0; i < 50; ++i) {
+    points.emplace_back(share(rng), share(rng), 1.5 + share(rng));
+    pixels.push_back(*lens.project(pose * points.back()));
+  }
+  const auto found = linear_camera(points, pixels);
+  ASSERT_TRUE(found.has_value());
+  EXPECT_NEAR(found->fx, 1500, 1e-4);
+  EXPECT_NEAR(found->fy, 1510, 1e-4);
+  EXPECT_NEAR(found->cy, 1280, 1e-4);
+  EXPECT_TRUE(pose_near(found->imager_from_world, pose, 1e-7, 1e-7));
+  for (Vector3d& p : points) p.z() = 1.5 + 0.2 * p.x();  // now all on a plane
+  pixels.clear();
+  for (const Vector3d& p : points) pixels.push_back(*lens.project(pose * p));
+  EXPECT_FALSE(linear_camera(points, pixels).has_value());
+}
+
+class PerfectData : public testing::TestWithParam<std::tuple<int, int, double>> {};
+
+TEST_P(PerfectData, GivesTheTruth) {
+  const auto [cameras, projectors, shift] = GetParam();
+  const World world = make_world(cameras, projectors, 6, shift);
+  const auto solution = solve(world.observations, without_priors());
+  ASSERT_TRUE(solution.ok()) << solution.message();
+  for (size_t i = 0; i < world.rig.cameras.size(); ++i) {
+    expect_same_lens(solution->rig.cameras[i], world.rig.cameras[i], 1e-4, 1e-6);
+    EXPECT_TRUE(pose_near(solution->rig.cameras[i].imager_from_world, world.rig.cameras[i].imager_from_world,
+                          1e-6, 1e-6));
+  }
+  for (size_t i = 0; i < world.rig.projectors.size(); ++i) {
+    expect_same_lens(solution->rig.projectors[i], world.rig.projectors[i], 1e-4, 1e-6);
+    EXPECT_TRUE(pose_near(solution->rig.projectors[i].imager_from_world,
+                          world.rig.projectors[i].imager_from_world, 1e-6, 1e-6));
+  }
+  EXPECT_TRUE(near(solution->bend_m, world.bend, 1e-8));
+  for (const Vector2d& r : solution->match_residuals) ASSERT_LT(r.norm(), 1e-5);
+}
+
+INSTANTIATE_TEST_SUITE_P(Solve,
+                         PerfectData,
+                         testing::Values(std::tuple(1, 1, 0.0),
+                                         std::tuple(1, 1, 0.5),
+                                         std::tuple(1, 1, 1.1),
+                                         std::tuple(2, 2, 0.5)));
+
+TEST(Solve, FindsTheNoiseThatWasPutIn) {
+  World world = make_world(1, 1, 8, 0.5);
+  add_noise(&world, 0.1, 0.05, test_rng());
+  const auto solution = solve(world.observations);
+  ASSERT_TRUE(solution.ok()) << solution.message();
+  EXPECT_NEAR(solution->corner_noise_px, 0.1, 0.01);
+  EXPECT_NEAR(solution->match_noise_px, 0.05, 0.005);
+  double squared = 0;
+  for (const Vector2d& r : solution->match_residuals) squared += r.squaredNorm();
+  EXPECT_NEAR(std::sqrt(squared / (2.0 * static_cast<double>(solution->match_residuals.size()))), 0.05,
+              0.003);
+}
+
+// Where light lands, not single values: those trade against each other. Weak priors must not show either.
+TEST(Solve, NoisyShiftedProjectorLandsWithinATenthOfAPixel) {
+  World world = make_world(1, 1, 10, 1.1);
+  const Observations clean = world.observations;
+  add_noise(&world, 0.1, 0.1, test_rng());
+  const auto solution = solve(world.observations);
+  ASSERT_TRUE(solution.ok()) << solution.message();
+  double squared = 0;
+  for (const Match& match : clean.matches) {
+    const auto& pose = solution->world_from_board[static_cast<size_t>(match.pose)];
+    const auto px = predicted(clean, *solution, *pose, match);
+    ASSERT_TRUE(px.has_value());
+    squared += (*px - match.px_projector).squaredNorm();
+  }
+  EXPECT_LT(std::sqrt(squared / static_cast<double>(clean.matches.size())), 0.05);
+}
+
+TEST(Solve, OutliersDoNotMatter) {
+  World world = make_world(1, 1, 8, 0.5);
+  add_noise(&world, 0.05, 0.05, test_rng());
+  const auto clean = solve(world.observations);
+  ASSERT_TRUE(clean.ok()) << clean.message();
+  int wrong = 0;
+  for (size_t i = 0; i < world.observations.matches.size(); i += 25, ++wrong)
+    world.observations.matches[i].px_projector += Vector2d(4, -6);
+  for (size_t i = 0; i < world.observations.corners.size(); i += 40)
+    world.observations.corners[i].px += Vector2d(2, 1.5);
+  const auto solution = solve(world.observations);
+  ASSERT_TRUE(solution.ok()) << solution.message();
+  EXPECT_TRUE(pose_near(solution->rig.projectors[0].imager_from_world,
+                        clean->rig.projectors[0].imager_from_world, 0.05_deg, 1_mm));
+  int found = 0;
+  for (size_t i = 0; i < world.observations.matches.size(); i += 25)
+    found += solution->match_outlier[i] ? 1 : 0;
+  EXPECT_EQ(found, wrong);
+}
+
+TEST(Solve, IsTheSameEveryTime) {
+  World world = make_world(1, 2, 6, 0.5);
+  add_noise(&world, 0.1, 0.1, test_rng());
+  const auto a = solve(world.observations), b = solve(world.observations);
+  ASSERT_TRUE(a.ok() && b.ok());
+  EXPECT_EQ(a->rig.projectors[1].lens.values, b->rig.projectors[1].lens.values);
+  EXPECT_EQ(a->rig.cameras[0].lens.values, b->rig.cameras[0].lens.values);
+}
+
+TEST(Solve, SaysWhatIsMissing) {
+  World world = make_world(1, 1, 6, 0.5);
+  Observations dark = world.observations;
+  dark.matches.clear();
+  EXPECT_NE(solve(dark).message().find("projector0"), std::string::npos);
+  Observations blind = world.observations;
+  blind.corners.clear();
+  EXPECT_NE(solve(blind).message().find("camera0"), std::string::npos);
+  SolveOptions options;
+  options.projector_model = "LENSMODEL_CAHVOR";
+  EXPECT_NE(solve(world.observations, options).message().find("LENSMODEL_CAHVOR"), std::string::npos);
+
+  World apart = make_world(2, 1, 6, 0.5);
+  std::erase_if(apart.observations.corners,
+                [](const CornerSeen& c) { return (c.camera == 0) == (c.pose < 3); });
+  std::erase_if(apart.observations.matches, [](const Match& m) { return (m.camera == 0) == (m.pose < 3); });
+  EXPECT_NE(solve(apart.observations).message().find("camera1"), std::string::npos);
+}
+
+TEST(Solve, NotANumberIsAnErrorNotACrash) {
+  World world = make_world(1, 1, 6, 0.5);
+  world.observations.matches[3].px_projector.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(solve(world.observations).ok());
+}
+
+TEST(Assess, HeldOutErrorIsTheNoiseOfTheCells) {
+  World world = make_world(1, 1, 8, 0.5);
+  add_noise(&world, 0.05, 0.1, test_rng());
+  const auto solution = solve(world.observations);
+  ASSERT_TRUE(solution.ok()) << solution.message();
+  const auto score = held_out(world.observations, {}, *solution);
+  ASSERT_TRUE(score.ok()) << score.message();
+  EXPECT_EQ(score->poses.size(), 8U);
+  EXPECT_GT(score->rms_px, 0.1 * std::sqrt(2.0) * 0.97);  // the 2-vector
+  EXPECT_LT(score->rms_px, 0.1 * std::sqrt(2.0) * 1.15);
+  // 0.1 px of 1600 px focal length at 1.1 m are 0.07 mm, a Rayleigh's 95 % is 2.45 of that.
+  Observed observed{world.observations, {{0, 0, 0, 1000, 900, 2}}, 0, 0};
+  const auto assessment = assess(observed, {}, *solution);
+  ASSERT_TRUE(assessment.ok()) << assessment.message();
+  EXPECT_NEAR(assessment->predicted_error_mm[0], 0.18, 0.06);
+  EXPECT_EQ(assessment->verdict, Verdict::good);
+  EXPECT_DOUBLE_EQ(assessment->decoded_share, 0.9);
+}
+
+TEST(Assess, NoticesABoardThatMovedWhileItWasCaptured) {
+  World world = make_world(1, 1, 8, 0.5);
+  add_noise(&world, 0.05, 0.05, test_rng());
+  for (Match& match : world.observations.matches) {
+    if (match.pose == 3) match.px_projector += Vector2d(5, 3);
+  }
+  const auto solution = solve(world.observations);
+  ASSERT_TRUE(solution.ok()) << solution.message();
+  const auto assessment = assess({world.observations, {}, 0, 0}, {}, *solution);
+  ASSERT_TRUE(assessment.ok()) << assessment.message();
+  EXPECT_NE(assessment->verdict, Verdict::good);
+  bool named = false;
+  for (const Fault& fault : assessment->faults)
+    named = named || (fault.name == "odd_pose" && fault.evidence.find("pose3") != std::string::npos);
+  EXPECT_TRUE(named);
+}
+
+TEST(Assess, NoticesPosesWithoutABoardAndWithoutTilt) {
+  World world = make_world(1, 1, 6, 0.5);
+  add_noise(&world, 0.05, 0.05, test_rng());
+  world.observations = without_pose(world.observations, 2);
+  const auto solution = solve(world.observations);
+  ASSERT_TRUE(solution.ok()) << solution.message();
+  const auto assessment = assess({world.observations, {}, 0, 0}, {}, *solution);
+  ASSERT_TRUE(assessment.ok()) << assessment.message();
+  ASSERT_FALSE(assessment->faults.empty());
+  EXPECT_EQ(assessment->faults[0].name, "board_not_visible");
+  EXPECT_NE(assessment->faults[0].evidence.find("pose2"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace limn::calib
