@@ -182,11 +182,13 @@ Eigen::Vector3d read_albedo(const ConfigNode& node) {
   return rgb.reverse();
 }
 
-Object read_object(const ConfigNode& node) {
-  node.only({"name", "rectangle_m", "box_m", "world_from_object", "albedo"});
+Object read_object(const ConfigNode& node, const Pose& world_from_prototype) {
+  node.only({"name", "rectangle_m", "box_m", "world_from_object", "moves_with_prototype", "albedo"});
   Object object;
   object.name = node.at("name").text();
   object.world_from_object = node.at("world_from_object").pose();
+  if (const auto moves = node.find("moves_with_prototype"); moves && moves->boolean())
+    object.prototype_from_object = world_from_prototype.inverse() * object.world_from_object;
   object.albedo = read_albedo(node.at("albedo"));
   Eigen::Vector3d size = Eigen::Vector3d::Ones();
   if (const auto rectangle = node.find("rectangle_m")) {
@@ -324,10 +326,11 @@ Result<World> load_world(const std::filesystem::path& path, const MarkerPicture&
   read_devices(root, &world);
   world.room = read_room(root.at("room"));
   if (const auto seed = root.find("seed")) world.seed = static_cast<std::uint64_t>(seed->integer());
+  if (const auto node = root.find("world_from_prototype")) world.world_from_prototype = node->pose();
   if (const auto objects = root.find("objects")) {
     std::set<std::string> names;
     for (const ConfigNode& node : objects->items()) {
-      world.objects.push_back(read_object(node));
+      world.objects.push_back(read_object(node, world.world_from_prototype));
       own_name(node, world.objects.back().name, &names);
     }
   }
@@ -337,7 +340,7 @@ Result<World> load_world(const std::filesystem::path& path, const MarkerPicture&
   std::filesystem::path scene_folder;
   if (const auto node = root.find("scene")) {
     scene_folder = config.folder() / node->text();
-    world.world_from_prototype = root.at("world_from_prototype").pose();
+    root.at("world_from_prototype");
     if (const auto markers = root.find("slot_markers")) places = read_slot_places(*markers);
   }
   LIMN_TRY_STATUS(config.status());
