@@ -281,9 +281,14 @@ Result<Mesh> load_mesh(const fs::path& path, const std::string& units) {
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   const aiScene* scene = importer.ReadFile(
       path.string(), aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_ValidateDataStructure);
+  const std::string problem = importer.GetErrorString();
+  const bool without_faces =
+      problem.find("no faces") != std::string::npos ||
+      problem.find("No meshes remaining") != std::string::npos;  // points and lines only
+  if (!scene && without_faces) return no_triangles(path);
   if (!scene) {
     return error("{}: expected a whole {} mesh, found one that cannot be read ({}). Export it again.",
-                 path.string(), extension(path).substr(1), importer.GetErrorString());
+                 path.string(), extension(path).substr(1), problem);
   }
   if (!scene->mRootNode) return no_triangles(path);
   Soup soup;

@@ -1,0 +1,245 @@
+#include "scene/mesh.h"
+
+#include <Eigen/Geometry>
+#include <cstring>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+
+#include "core/file.h"
+#include "core/picture.h"
+#include "scene/nearest.h"
+#include "tests/support/matchers.h"
+
+namespace limn::scene {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::Vector3f;
+namespace fs = std::filesystem;
+
+fs::path written(const std::string& name, const std::string& content) {
+  const fs::path path = fs::temp_directory_path() / ("limn-mesh-" + std::to_string(getpid())) / name;
+  fs::create_directories(path.parent_path());
+  EXPECT_TRUE(write_file(path, content));
+  return path;
+}
+
+// Twelve triangles of a cube of side 2 around the origin, three corners each, outward.
+std::vector<std::array<Vector3f, 3>> cube() {
+  std::vector<std::array<Vector3f, 3>> triangles;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const float side : {-1.f, 1.f}) {
+      const auto corner = [&](float u, float v) {
+        Vector3f p;
+        p[axis] = side;
+        p[(axis + 1) % 3] = u * side;
+        p[(axis + 2) % 3] = v;
+        return p;
+      };
+      triangles.push_back({corner(-1, -1), corner(1, -1), corner(1, 1)});
+      triangles.push_back({corner(-1, -1), corner(1, 1), corner(-1, 1)});
+    }
+  }
+  return triangles;
+}
+
+std::string binary_stl(const std::vector<std::array<Vector3f, 3>>& triangles) {
+  std::string bytes(80, ' ');
+  const auto put = [&](const void* data, std::size_t size) {
+    bytes.append(static_cast<const char*>(data), size);
+  };
+  const auto count = static_cast<std::uint32_t>(triangles.size());
+  put(&count, 4);
+  for (const auto& t : triangles) {
+    const Vector3f n = (t[1] - t[0]).cross(t[2] - t[0]).normalized();
+    put(n.data(), 12);
+    for (const Vector3f& p : t) put(p.data(), 12);
+    put("\0\0", 2);
+  }
+  return bytes;
+}
+
+const char* k_quad_ply =
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+    "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+    "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n";
+
+std::string base64(const std::string& bytes) {
+  static const char* k_letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t v = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      v = v << 8 | (i + k < bytes.size() ? static_cast<std::uint8_t>(bytes[i + k]) : 0);
+    for (std::size_t k = 0; k < 4; ++k)
+      out += i + k <= bytes.size() ? k_letters[v >> (18 - 6 * k) & 63] : '=';
+  }
+  return out;
+}
+
+// One unlit, textured triangle in a node that is moved, turned by 90 degrees about x and scaled by 2.
+std::string textured_gltf(const std::string& image) {
+  const float data[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, /* uv */ 0, 0, 1, 0, 0, 1};
+  const std::string buffer(reinterpret_cast<const char*>(data), sizeof(data));
+  return R"({"asset":{"version":"2.0"},"extensionsUsed":["KHR_materials_unlit"],"scene":0,"scenes":[{"nodes":[0]}],
+"nodes":[{"translation":[10,20,30],"children":[1]},{"rotation":[0.7071067811865476,0,0,0.7071067811865476],"scale":[2,2,2],"mesh":0}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":1},"material":0}]}],
+"materials":[{"extensions":{"KHR_materials_unlit":{}},"pbrMetallicRoughness":{"baseColorFactor":[0.25,0.5,0.75,1],"baseColorTexture":{"index":0}}}],
+"textures":[{"source":0}],"images":[{)" +
+         image + R"(}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},
+{"bufferView":1,"componentType":5126,"count":3,"type":"VEC2"}],
+"bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":24}],
+"buffers":[{"byteLength":60,"uri":"data:application/octet-stream;base64,)" +
+         base64(buffer) + R"("}]})";
+}
+
+std::string small_png() {
+  cv::Mat picture(2, 2, CV_8UC3, cv::Scalar(10, 20, 30));
+  picture.at<cv::Vec3b>(0, 1) = {200, 100, 50};
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".png", picture, bytes);
+  return {bytes.begin(), bytes.end()};
+}
+
+void expect_unit_outward_normals(const Mesh& mesh) {
+  ASSERT_EQ(mesh.normals.size(), mesh.positions.size());
+  for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
+    EXPECT_NEAR(mesh.normals[i].norm(), 1, 1e-5);
+    EXPECT_GT(mesh.normals[i].dot(mesh.positions[i]), 0);
+  }
+}
+
+TEST(Mesh, StlCubeIsJoinedAndKeepsItsEdges) {
+  const auto mesh = load_mesh(written("cube.stl", binary_stl(cube())), "mm");
+  ASSERT_TRUE(mesh) << mesh.message();
+  EXPECT_EQ(mesh->triangles.size(), 12u);
+  EXPECT_EQ(mesh->positions.size(), 24u);  // three normals at each of eight corners
+  EXPECT_NEAR(mesh->positions[0].cwiseAbs().maxCoeff(), 0.001, 1e-9);
+  for (const Vector3f& n : mesh->normals) EXPECT_NEAR(n.cwiseAbs().maxCoeff(), 1, 1e-6);
+  expect_unit_outward_normals(*mesh);
+}
+
+TEST(Mesh, StlSphereIsSmooth) {
+  std::vector<std::array<Vector3f, 3>> triangles;
+  constexpr int k_steps = 40;
+  const auto at = [](int i, int j) {
+    const double a = 2 * M_PI * (i % k_steps) / k_steps, b = M_PI * j / k_steps;
+    const double ring = j == 0 || j == k_steps ? 0 : std::sin(b);
+    return Vector3f(Vector3d(ring * std::cos(a), ring * std::sin(a), std::cos(b)).cast<float>());
+  };
+  for (int i = 0; i < k_steps; ++i) {
+    for (int j = 0; j < k_steps; ++j) {
+      if (j > 0) triangles.push_back({at(i, j), at(i, j + 1), at(i + 1, j)});
+      if (j + 1 < k_steps) triangles.push_back({at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)});
+    }
+  }
+  const auto mesh = load_mesh(written("sphere.stl", binary_stl(triangles)), "m");
+  ASSERT_TRUE(mesh) << mesh.message();
+  EXPECT_EQ(mesh->positions.size(), static_cast<std::size_t>(k_steps * (k_steps - 1) + 2));
+  for (std::size_t i = 0; i < mesh->normals.size(); ++i)
+    EXPECT_GT(mesh->normals[i].dot(mesh->positions[i]), 0.999f);
+}
+
+TEST(Mesh, GltfNodesUnlitAndEmbeddedTexture) {
+  const auto path =
+      written("part.gltf", textured_gltf(R"("uri":"data:image/png;base64,)" + base64(small_png()) + "\""));
+  const auto mesh = load_mesh(path, "cm");
+  ASSERT_TRUE(mesh) << mesh.message();
+  ASSERT_EQ(mesh->positions.size(), 3u);
+  // (0, 1, 0): scaled by 2, turned about x onto z, moved, in centimetres. No axis is swapped.
+  bool found = false;
+  for (std::size_t i = 0; i < 3; ++i) {
+    if ((mesh->positions[i] - Vector3f(0.10f, 0.20f, 0.32f)).norm() > 1e-6f) continue;
+    found = true;
+    EXPECT_NEAR(mesh->uvs[i].y(), 0, 1e-6);  // glTF's v counts down, ours up
+  }
+  EXPECT_TRUE(found);
+  EXPECT_NEAR(mesh->normals[0].y(), -1, 1e-5);
+  const Material& material = mesh->materials[mesh->triangle_materials[0]];
+  EXPECT_TRUE(material.unlit);
+  EXPECT_TRUE(test::near(material.base_colour.cast<double>(), Vector3d(0.25, 0.5, 0.75), 1e-6));
+  ASSERT_EQ(material.texture.type(), CV_8UC3);
+  EXPECT_EQ(material.texture.at<cv::Vec3b>(0, 1), cv::Vec3b(200, 100, 50));
+}
+
+TEST(Mesh, TextureBesideTheMeshOrAnErrorThatNamesIt) {
+  const auto path = written("beside/part.gltf", textured_gltf(R"("uri":"paint.png")"));
+  const auto missing = load_mesh(path, "m");
+  ASSERT_FALSE(missing);
+  EXPECT_NE(missing.message().find("paint.png"), std::string::npos) << missing.message();
+  written("beside/paint.png", small_png());
+  const auto mesh = load_mesh(path, "m");
+  ASSERT_TRUE(mesh) << mesh.message();
+  EXPECT_EQ(mesh->materials[mesh->triangle_materials[0]].texture.cols, 2);
+}
+
+TEST(Mesh, ObjAndPlyLoadWithNormalsMade) {
+  const auto obj = load_mesh(written("quad.obj", "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n"), "in");
+  ASSERT_TRUE(obj) << obj.message();
+  EXPECT_EQ(obj->triangles.size(), 2u);
+  EXPECT_EQ(obj->positions.size(), 4u);
+  EXPECT_NEAR(obj->positions[2].x(), 0.0508, 1e-6);
+  EXPECT_NEAR(obj->normals[0].z(), 1, 1e-6);
+  EXPECT_FALSE(obj->materials.empty());
+  const auto ply = load_mesh(written("quad.ply", k_quad_ply), "m");
+  ASSERT_TRUE(ply) << ply.message();
+  EXPECT_EQ(ply->positions.size(), 4u);
+  EXPECT_NEAR(ply->normals[3].z(), 1, 1e-6);
+}
+
+TEST(Mesh, BadFilesAreErrorsThatNameThem) {
+  auto triangles = cube();
+  const std::string whole = binary_stl(triangles);
+  triangles[3][1].y() = std::numeric_limits<float>::quiet_NaN();
+  const std::string ply = k_quad_ply;
+  const struct {
+    const char* name;
+    std::string content;
+    const char* says;
+  } cases[] = {
+      {"truncated.stl", whole.substr(0, whole.size() / 2), "truncated.stl"},
+      {"truncated.ply", ply.substr(0, ply.find("1 1 0")), "truncated.ply"},
+      {"truncated.glb", std::string("glTF\2\0\0\0\xff\0\0\0", 12), "truncated.glb"},
+      {"garbage.gltf", "not json", "garbage.gltf"},
+      {"empty.obj", "", "empty.obj"},
+      {"points.obj", "v 0 0 0\nv 1 0 0\n", "triangles"},
+      {"lines.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n", "triangles"},
+      {"flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "triangles"},
+      {"nan.stl", binary_stl(triangles), "finite"},
+      {"part.step", "ISO-10303-21;", "glb"},
+  };
+  for (const auto& bad : cases) {
+    const auto mesh = load_mesh(written(bad.name, bad.content), "m");
+    ASSERT_FALSE(mesh) << bad.name;
+    EXPECT_NE(mesh.message().find(bad.says), std::string::npos) << mesh.message();
+    EXPECT_NE(mesh.message().find(bad.name), std::string::npos) << mesh.message();
+  }
+  EXPECT_FALSE(load_mesh("nowhere.stl", "m"));
+  const auto units = load_mesh(written("cube.stl", whole), "parsec");
+  ASSERT_FALSE(units);
+  EXPECT_NE(units.message().find("parsec"), std::string::npos) << units.message();
+}
+
+TEST(Nearest, AgreesWithASearchOverSamplesOfACube) {
+  const auto mesh = load_mesh(written("nearest.stl", binary_stl(cube())), "m");
+  ASSERT_TRUE(mesh) << mesh.message();
+  auto rng = test::test_rng();
+  std::uniform_real_distribution<double> u(-3, 3);
+  for (int i = 0; i < 500; ++i) {
+    const Vector3d p(u(rng), u(rng), u(rng));
+    const SurfacePoint found = nearest_on(*mesh, p);
+    Vector3d expected = p.cwiseMax(-1).cwiseMin(1);
+    if (expected == p) {  // inside: onto the nearest side
+      int axis = 0;
+      p.cwiseAbs().maxCoeff(&axis);
+      expected[axis] = p[axis] > 0 ? 1 : -1;
+    }
+    EXPECT_TRUE(test::near(found.p, expected, 1e-5));
+    EXPECT_NEAR(found.distance, (expected - p).norm(), 1e-5);
+    EXPECT_NEAR(found.d_normal.dot(found.p), 1, 1e-5);  // of the cube's sides
+  }
+}
+
+}  // namespace
+}  // namespace limn::scene

@@ -1,0 +1,181 @@
+#include "scene/scene.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+
+#include "core/file.h"
+#include "core/picture.h"
+#include "tests/support/matchers.h"
+
+namespace limn::scene {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+const json k_pose = {{"rotation_wxyz", {1, 0, 0, 0}}, {"translation_m", {0.1, 0.2, 0.3}}};
+
+json whole_scene() {
+  return {
+      {"schema", "limn.scene/1"},
+      {"prototype",
+       {{"mesh", "quad.obj"},
+        {"units", "mm"},
+        {"albedo", 0.6},
+        {"markers", {{{"name", "apriltag_36h11:4"}, {"size_mm", 40}, {"prototype_from_marker", k_pose}}}}}},
+      {"slots",
+       {{{"name", "mirror"},
+         {"marker", "aruco_4x4_50:3"},
+         {"size_mm", 30},
+         {"marker_from_part", k_pose},
+         {"mode", "view"},
+         {"stick_to_surface", true},
+         {"variants",
+          {{{"name", "a"}, {"mesh", "quad.obj"}, {"units", "m"}},
+           {{"name", "b"}, {"mesh", "quad.obj"}, {"units", "cm"}}}}},
+        {{"name", "trim"},
+         {"marker", "aruco_4x4_50:5"},
+         {"size_mm", 30},
+         {"marker_from_part", k_pose},
+         {"mode", "surface"},
+         {"variants", {{{"name", "line"}, {"mesh", "quad.obj"}, {"units", "m"}}}}}}},
+      {"controls",
+       {{{"marker", "aruco_4x4_50:9"},
+         {"action", "next_variant"},
+         {"slot", "mirror"},
+         {"gesture", "cover"}}}},
+      {"viewer", {{"fixed", {{"world_from_viewer", k_pose}, {"size", {640, 480}}, {"fov_deg", 40}}}}}};
+}
+
+fs::path folder_with(const json& scene) {
+  const fs::path folder = test::test_folder();
+  EXPECT_TRUE(write_file(folder / "quad.obj", "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n"));
+  EXPECT_TRUE(write_file(folder / "scene.json", scene.dump(2)));
+  return folder;
+}
+
+TEST(Scene, EveryKeyIsRead) {
+  const auto scene = load_scene(folder_with(whole_scene()));
+  ASSERT_TRUE(scene) << scene.message();
+  EXPECT_NEAR(scene->prototype->mesh.positions[2].x(), 0.002, 1e-9);
+  EXPECT_EQ(scene->prototype->albedo, 0.6);
+  ASSERT_EQ(scene->prototype->markers.size(), 1u);
+  EXPECT_EQ(scene->prototype->markers[0].marker.text(), "apriltag_36h11:4");
+  EXPECT_NEAR(scene->prototype->markers[0].size_m, 0.04, 1e-12);
+  const Slot* mirror = scene->find_slot("mirror");
+  ASSERT_TRUE(mirror);
+  EXPECT_EQ(mirror->mode, Mode::view);
+  EXPECT_TRUE(mirror->stick_to_surface);
+  EXPECT_NEAR(mirror->size_m, 0.03, 1e-12);
+  EXPECT_NEAR(mirror->marker_from_part.translation.z(), 0.3, 1e-12);
+  ASSERT_EQ(mirror->variants.size(), 2u);
+  EXPECT_NEAR(mirror->variants[1].mesh.positions[2].x(), 0.02, 1e-8);
+  EXPECT_EQ(scene->find_slot("trim")->mode, Mode::surface);
+  EXPECT_FALSE(scene->find_slot("grille"));
+  EXPECT_EQ(scene->controls[0].gesture, "cover");
+  ASSERT_TRUE(scene->viewer && scene->viewer->fixed);
+  EXPECT_EQ(scene->viewer->fixed->width, 640);
+  const auto found = bodies(*scene);
+  ASSERT_EQ(found.size(), 3u);
+  EXPECT_EQ(found[0].name, "prototype");
+  EXPECT_EQ(found[2].name, "trim");
+  EXPECT_EQ(found[2].markers[0].marker.id, "5");
+}
+
+TEST(Scene, PrototypeIsOptionalAndAlbedoMayBeAPicture) {
+  json without = whole_scene();
+  without.erase("prototype");
+  const auto scene = load_scene(folder_with(without) / "scene.json");
+  ASSERT_TRUE(scene) << scene.message();
+  EXPECT_FALSE(scene->prototype);
+  EXPECT_EQ(bodies(*scene).size(), 2u);
+
+  json painted = whole_scene();
+  painted["prototype"]["mesh"] = "uv.obj";
+  painted["prototype"]["albedo"] = "paint.png";
+  const fs::path folder = folder_with(painted);
+  ASSERT_TRUE(
+      write_file(folder / "uv.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"));
+  ASSERT_TRUE(write_png(folder / "paint.png", cv::Mat(4, 4, CV_8UC3, cv::Scalar(1, 2, 3))));
+  const auto with_picture = load_scene(folder);
+  ASSERT_TRUE(with_picture) << with_picture.message();
+  EXPECT_EQ(with_picture->prototype->albedo_picture.at<cv::Vec3b>(3, 3), cv::Vec3b(1, 2, 3));
+}
+
+TEST(Scene, MistakesAreErrorsWithTheirPath) {
+  struct Mistake {
+    const char* patch;  // a JSON patch
+    const char* says;
+  };
+  const Mistake mistakes[] = {
+      {R"([{"op":"add","path":"/colour","value":1}])", "colour"},
+      {R"([{"op":"add","path":"/slots/0/stick","value":true}])", "slots[0]"},
+      {R"([{"op":"remove","path":"/prototype/units"}])", "prototype.units"},
+      {R"([{"op":"remove","path":"/slots/1/variants/0/units"}])", "slots[1].variants[0].units"},
+      {R"([{"op":"replace","path":"/slots/0/variants/0/units","value":"yard"}])", "yard"},
+      {R"([{"op":"replace","path":"/slots/1/name","value":"mirror"}])", "slots[1].name"},
+      {R"([{"op":"replace","path":"/slots/1/name","value":"prototype"}])", "prototype"},
+      {R"([{"op":"replace","path":"/slots/1/name","value":"../trim"}])", "slots[1].name"},
+      {R"([{"op":"replace","path":"/slots/0/variants/1/name","value":"a"}])", "slots[0].variants[1].name"},
+      {R"([{"op":"replace","path":"/slots/0/variants","value":[]}])", "slots[0].variants"},
+      {R"([{"op":"replace","path":"/slots/1/marker","value":"aruco_4x4_50:3"}])", "slots[1].marker"},
+      {R"([{"op":"replace","path":"/slots/1/marker","value":"five"}])", "slots[1].marker"},
+      {R"([{"op":"replace","path":"/slots/1/size_mm","value":-3}])", "slots[1].size_mm"},
+      {R"([{"op":"replace","path":"/slots/1/mode","value":"hologram"}])", "slots[1].mode"},
+      {R"([{"op":"replace","path":"/slots/1/variants/0/mesh","value":"nowhere.glb"}])", "nowhere.glb"},
+      {R"([{"op":"replace","path":"/prototype/mesh","value":"/etc/door.obj"}])", "prototype.mesh"},
+      {R"([{"op":"replace","path":"/prototype/mesh","value":"../quad.obj"}])", "prototype.mesh"},
+      {R"([{"op":"replace","path":"/prototype/albedo","value":1.5}])", "prototype.albedo"},
+      {R"([{"op":"replace","path":"/prototype/albedo","value":"nowhere.png"}])", "nowhere.png"},
+      {R"([{"op":"replace","path":"/slots/0/marker_from_part/rotation_wxyz","value":[2,0,0,0]}])",
+       "marker_from_part"},
+      {R"([{"op":"replace","path":"/controls/0/slot","value":"grille"}])", "controls[0].slot"},
+      {R"([{"op":"add","path":"/viewer/marker","value":"aruco_4x4_50:8"}])", "viewer"},
+      {R"([{"op":"replace","path":"/viewer/fixed/fov_deg","value":200}])", "viewer.fixed.fov_deg"},
+      {R"([{"op":"replace","path":"/viewer/fixed/size","value":[640.5,480]}])", "viewer.fixed.size"},
+      {R"([{"op":"replace","path":"/slots","value":"none"}])", "slots"},
+      {R"([{"op":"replace","path":"/schema","value":"limn.rig/1"}])", "schema"},
+  };
+  for (const Mistake& mistake : mistakes) {
+    const auto scene = load_scene(folder_with(whole_scene().patch(json::parse(mistake.patch))));
+    ASSERT_FALSE(scene) << mistake.patch;
+    EXPECT_NE(scene.message().find(mistake.says), std::string::npos) << mistake.patch << "\n"
+                                                                     << scene.message();
+    EXPECT_NE(scene.message().find("scene.json"), std::string::npos) << scene.message();
+  }
+}
+
+TEST(Scene, MissingAndTruncatedFilesAreErrors) {
+  EXPECT_FALSE(load_scene(test::test_folder()));
+  const fs::path folder = folder_with(whole_scene());
+  const std::string text = whole_scene().dump();
+  ASSERT_TRUE(write_file(folder / "scene.json", text.substr(0, text.size() / 2)));
+  EXPECT_FALSE(load_scene(folder));
+}
+
+TEST(Scene, TheDoorOfTheConfigFolderLoads) {
+  const auto scene = load_scene(fs::path(LIMN_SOURCE_DIR) / "config/scenes/door");
+  ASSERT_TRUE(scene) << scene.message();
+  EXPECT_TRUE(scene->prototype);
+  EXPECT_EQ(scene->find_slot("mirror")->variants.size(), 3u);
+}
+
+TEST(Viewer, FileIsAnImagerWithoutDistortion) {
+  const fs::path file = test::test_folder() / "viewer.json";
+  json viewer = {{"world_from_viewer", k_pose}, {"size", {801, 600}}, {"fov_deg", 40}};
+  ASSERT_TRUE(write_file(file, viewer.dump()));
+  const auto imager = load_viewer(file);
+  ASSERT_TRUE(imager) << imager.message();
+  EXPECT_NEAR(imager->lens.cx(), 400, 1e-9);
+  EXPECT_TRUE(test::near(imager->ray({400, 299.5})->p_origin, Eigen::Vector3d(0.1, 0.2, 0.3), 1e-12));
+  viewer.erase("fov_deg");
+  ASSERT_TRUE(write_file(file, viewer.dump()));
+  const auto missing = load_viewer(file);
+  ASSERT_FALSE(missing);
+  EXPECT_NE(missing.message().find("fov_deg"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace limn::scene
