@@ -11,14 +11,14 @@ namespace limn::apps {
 struct SolveOptions {
   std::filesystem::path captures;
   std::filesystem::path out;
-  std::vector<std::string> skip_poses;  ///< names of poses to leave out
+  std::vector<std::string> skip_poses = {};  ///< names of poses to leave out
   std::string camera_model = "LENSMODEL_OPENCV4";
   std::string projector_model = "LENSMODEL_OPENCV4";
   bool json = false;  ///< print report.json instead of the table
 
-  std::string import_format;  ///< "opencv-gray": somebody else's captures; then also
-  std::string projector;      ///< the projector's size, "1024x768"
-  std::string board;          ///< "chessboard:9x7:75mm"
+  std::string import_format = {};  ///< "opencv-gray": somebody else's captures; then also
+  std::string projector = {};      ///< the projector's size, "1024x768"
+  std::string board = {};          ///< "chessboard:9x7:75mm"
   std::string poses = "pose*";
   std::string shots = "*.png";
 };

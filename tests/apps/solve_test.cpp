@@ -1,0 +1,206 @@
+#include "apps/solve.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+
+#include "calib/board.h"
+#include "calib/capture.h"
+#include "core/file.h"
+#include "core/picture.h"
+#include "core/rig.h"
+#include "tests/support/matchers.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace test;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// A camera and a shifted projector before a ChArUco board, drawn by looking up board and pattern along camera
+// rays.
+struct Stage {
+  Imager camera{"camera0", 640, 480,
+                Lens::create("LENSMODEL_OPENCV4", {800, 800, 322, 238, -0.1, 0.05, 0, 0}).value(), Pose()};
+  Imager projector{
+      "projector0", 256, 192, Lens::pinhole(330, 330, 128, 180),
+      Pose(exp_rotation({0.25, 0, 0}), Vector3d::Zero()) * looking_at({-0.35, 0, 0}, {0, 0, 1}, {0, -1, 0})};
+  calib::Board board = calib::Board::parse("charuco:8x6:40mm").value();
+  calib::BoardSheet sheet = calib::draw_board(board, {.square_px = 48});
+  static constexpr int k_samples = 2;  // by each axis of a pixel
+
+  Pose world_from_board(int pose) const {
+    const double around = 2.2 * pose, tilt = 0.45;
+    return Pose(exp_rotation({tilt * std::cos(around), tilt * std::sin(around), 0.1 * pose}),
+                Vector3d(0.03 * std::sin(around), 0, 1 + 0.05 * pose)) *
+           Pose(Eigen::Quaterniond::Identity(), Vector3d(-board.width_m() / 2, -board.height_m() / 2, 0));
+  }
+
+  struct Sample {
+    float albedo = 0;
+    int column = -1, row = -1;
+  };
+
+  std::vector<Sample> samples(int pose, bool with_board) const {
+    std::vector<Sample> all;
+    const Pose board_from_camera = world_from_board(pose).inverse();
+    for (int y = 0; y < camera.height * k_samples; ++y) {
+      for (int x = 0; x < camera.width * k_samples; ++x) {
+        const Vector2d px((x + 0.5) / k_samples - 0.5, (y + 0.5) / k_samples - 0.5);
+        const Vector3d d = board_from_camera.rotation * *camera.lens.unproject(px);
+        const Vector3d p = board_from_camera.translation - board_from_camera.translation.z() / d.z() * d;
+        const Vector2d at = sheet.px_board_origin + sheet.pixels_per_metre * p.head<2>();
+        const int u = static_cast<int>(std::lround(at.x())), v = static_cast<int>(std::lround(at.y()));
+        const bool inside = u >= 0 && v >= 0 && u < sheet.picture.cols && v < sheet.picture.rows;
+        Sample sample;
+        sample.albedo = inside && with_board && sheet.picture.at<uchar>(v, u) == 0 ? 0.05F : 0.8F;
+        if (const auto light = projector.project(world_from_board(pose) * p);
+            light && projector.contains(*light)) {
+          sample.column = static_cast<int>(std::lround(light->x()));
+          sample.row = static_cast<int>(std::lround(light->y()));
+        }
+        all.push_back(sample);
+      }
+    }
+    return all;
+  }
+
+  cv::Mat photograph(const std::vector<Sample>& samples, const cv::Mat& shown) const {
+    cv::Mat light(camera.height, camera.width, CV_32F, cv::Scalar(0));
+    for (int y = 0; y < camera.height * k_samples; ++y) {
+      for (int x = 0; x < camera.width * k_samples; ++x) {
+        const Sample& s = samples[static_cast<size_t>(y * camera.width * k_samples + x)];
+        const bool lit = s.column >= 0 && shown.at<uchar>(s.row, s.column) != 0;
+        light.at<float>(y / k_samples, x / k_samples) +=
+            s.albedo * (lit ? 230.F : 25.F) / (k_samples * k_samples);
+      }
+    }
+    cv::Mat photo;
+    light.convertTo(photo, CV_8U);
+    return photo;
+  }
+
+  void capture(const fs::path& folder, int poses, bool with_board = true) const {
+    const calib::Captures plan =
+        calib::plan_captures(folder, {{camera.name, camera.width, camera.height}},
+                             {{projector.name, projector.width, projector.height}}, board);
+    ASSERT_TRUE(calib::begin_captures(plan).ok());
+    for (int pose = 0; pose < poses; ++pose) {
+      const std::vector<Sample> seen = samples(pose, with_board);
+      cv::Mat photo;
+      const Status status = calib::capture_pose(
+          plan, pose,
+          {.show = [&](int, const cv::Mat& shown) { return photo = photograph(seen, shown), Status(); },
+           .grab = [&](int) { return Result<cv::Mat>(photo); }});
+      ASSERT_TRUE(status.ok()) << status.message();
+    }
+  }
+};
+
+// The captures of six poses, made once for all tests of this file.
+const fs::path& captured() {
+  static const fs::path folder = [] {
+    const fs::path made = test_folder() / "captures";
+    Stage().capture(made, 6);
+    return made;
+  }();
+  return folder;
+}
+
+// A copy of the captures that a test may damage.
+fs::path own_captures() {
+  const fs::path original = captured();
+  const fs::path copy = original.parent_path() / "damaged";
+  fs::remove_all(copy);
+  fs::copy(original, copy, fs::copy_options::recursive);
+  return copy;
+}
+
+TEST(SolveCommand, FindsTheRigThatTookTheCaptures) {
+  const fs::path captures = captured(), out = captures.parent_path() / "rig";
+  const Status status = run_solve({.captures = captures, .out = out});
+  ASSERT_TRUE(status.ok()) << status.message();
+  const auto rig = load_rig(out);
+  ASSERT_TRUE(rig.ok()) << rig.message();
+  const Stage truth;
+  ASSERT_EQ(rig->projectors.size(), 1U);
+  EXPECT_NEAR(rig->cameras[0].lens.fx(), truth.camera.lens.fx(), 4);
+  EXPECT_NEAR(rig->projectors[0].lens.cy(), truth.projector.lens.cy(), 4);
+  EXPECT_TRUE(
+      pose_near(rig->projectors[0].imager_from_world, truth.projector.imager_from_world, 0.5_deg, 8_mm));
+  for (const char* file :
+       {"camera0.cameramodel", "projector0.cameramodel", "report.html", "observations.json"})
+    EXPECT_TRUE(fs::exists(out / file)) << file;
+
+  const auto report = nlohmann::json::parse(read_file(out / "report.json").value());
+  EXPECT_EQ(report["verdict"], "good");
+  EXPECT_LT(report["held_out"]["rms_px"], 0.15);
+  EXPECT_EQ(report["held_out"]["poses"].size(), 6U);
+  EXPECT_GT(report["decode"]["share"], 0.9);
+  EXPECT_LT(report["predicted_error_mm"]["p95"], 1.0);
+  EXPECT_EQ(report["devices"].size(), 2U);
+  EXPECT_TRUE(report["seconds"].contains("total"));
+
+  const std::string first = read_file(out / "rig.json").value();
+  ASSERT_TRUE(run_solve({.captures = captures, .out = out}).ok());
+  EXPECT_EQ(read_file(out / "rig.json").value(), first) << "the same captures must give the same rig";
+}
+
+TEST(SolveCommand, ChangesNothingWhenCapturesAreDamaged) {
+  const fs::path captures = own_captures(), out = captures.parent_path() / "old rig";
+  ASSERT_TRUE(make_folder(out).ok());
+  ASSERT_TRUE(write_file(out / "rig.json", "old").ok());
+  const auto failure = [&] {
+    const Status status = run_solve({.captures = captures, .out = out});
+    EXPECT_FALSE(status.ok());
+    EXPECT_EQ(read_file(out / "rig.json").value(), "old");
+    EXPECT_FALSE(fs::exists(out / "report.json"));
+    return status.ok() ? std::string() : status.message();
+  };
+  const fs::path shot = captures / "pose03" / "camera0" / "007.png";
+  const std::string content = read_file(shot).value();
+  ASSERT_TRUE(write_file(shot, content.substr(0, content.size() - 30)).ok());
+  EXPECT_NE(failure().find("pose03/camera0/007.png"), std::string::npos);
+  ASSERT_TRUE(write_png(shot, cv::Mat(100, 100, CV_8U, cv::Scalar(0))).ok());
+  EXPECT_NE(failure().find("pose03/camera0/007.png"), std::string::npos);
+  fs::remove(shot);
+  EXPECT_NE(failure().find("pose03/camera0/007.png"), std::string::npos);
+  EXPECT_TRUE(run_solve({.captures = captures, .out = out, .skip_poses = {"pose03"}}).ok());
+}
+
+TEST(SolveCommand, SaysThatNoBoardIsVisible) {
+  const fs::path folder = test_folder();
+  Stage().capture(folder / "captures", 2, false);
+  const Status status = run_solve({.captures = folder / "captures", .out = folder / "rig"});
+  ASSERT_FALSE(status.ok());
+  EXPECT_NE(status.message().find("camera0"), std::string::npos) << status.message();
+  EXPECT_NE(status.message().find("board"), std::string::npos) << status.message();
+  EXPECT_FALSE(fs::exists(folder / "rig"));
+}
+
+TEST(SolveCommand, CallsWrongOptionsWrongUsage) {
+  const fs::path folder = test_folder();
+  const auto usage = [](const SolveOptions& options) {
+    const Status status = run_solve(options);
+    return !status.ok() && status.error().wrong_usage;
+  };
+  SolveOptions foreign{.captures = folder, .out = folder / "rig"};
+  foreign.import_format = "opencv-gray";
+  EXPECT_TRUE(usage(foreign));
+  foreign.projector = "1024x768";
+  foreign.board = "chessboard:9x7";
+  EXPECT_TRUE(usage(foreign));
+  foreign.board = "chessboard:9x7:75mm";
+  EXPECT_FALSE(usage(foreign)) << "the folder's emptiness is no wrong usage";
+  foreign.import_format = "other";
+  EXPECT_TRUE(usage(foreign));
+  EXPECT_TRUE(usage({.captures = folder, .out = folder / "rig", .camera_model = "LENSMODEL_NONE"}));
+  EXPECT_TRUE(usage({.captures = folder, .out = folder / "rig", .projector = "1024x768"}));
+}
+
+}  // namespace
+}  // namespace limn::apps
