@@ -1,0 +1,76 @@
+#include "apps/capture.h"
+
+#include "apps/picture_writer.h"
+#include "apps/world_markers.h"
+#include "calib/capture.h"
+#include "core/log.h"
+
+namespace limn::apps {
+namespace {
+
+std::vector<calib::CapturedDevice> devices(const std::vector<Imager>& imagers) {
+  std::vector<calib::CapturedDevice> devices;
+  for (const Imager& imager : imagers) devices.push_back({imager.name, imager.width, imager.height});
+  return devices;
+}
+
+}  // namespace
+
+sim::Object board_object(const calib::Board& board, const Pose& world_from_board) {
+  const calib::BoardSheet drawn = calib::draw_board(board);
+  const double metres_per_px = 1 / drawn.pixels_per_metre;
+  const Eigen::Vector2d px_centre((drawn.picture.cols - 1) / 2.0, (drawn.picture.rows - 1) / 2.0);
+  const Eigen::Vector2d p_centre = (px_centre - drawn.px_board_origin) * metres_per_px;
+  const Pose board_from_sheet(Eigen::Quaterniond::Identity(), {p_centre.x(), p_centre.y(), 0});
+  return sim::sheet("board", drawn.picture.cols * metres_per_px, drawn.picture.rows * metres_per_px,
+                    drawn.picture, world_from_board * board_from_sheet);
+}
+
+Status capture_virtually(const Plan& plan, sim::VirtualRig* rig, const std::filesystem::path& out) {
+  const calib::Captures captures = calib::plan_captures(out, devices(rig->world().rig.cameras),
+                                                        devices(rig->world().rig.projectors), plan.board);
+  LIMN_TRY_STATUS(calib::begin_captures(captures));
+  PictureWriter writer;
+  const int pose_count = static_cast<int>(plan.world_from_board.size());
+  rig->clear_stage();
+  int done_before = 0;
+  std::optional<Progress> progress;
+  const calib::Stage stage{
+      .show = [&](int projector, const cv::Mat& picture) -> Status {
+        rig->darken();
+        const auto shown_at = rig->projector(projector).show(picture);
+        return shown_at ? Status() : Status(shown_at.error());
+      },
+      .grab = [&](int camera) -> Result<cv::Mat> {
+        LIMN_TRY(const Frame frame, rig->camera(camera).next());
+        return frame.image;
+      },
+      .store = [&](const std::filesystem::path& path,
+                   const cv::Mat& picture) { return writer.store(path, picture); },
+      .tell =
+          [&](int done, int total) {
+            if (!progress) progress.emplace("capture", total * pose_count);
+            progress->step(done_before + done);
+            if (done == total) done_before += total;
+          },
+  };
+  for (int pose = 0; pose < pose_count; ++pose) {
+    rig->place(board_object(plan.board, plan.world_from_board[static_cast<std::size_t>(pose)]));
+    LIMN_TRY_STATUS(calib::capture_pose(captures, pose, stage));
+  }
+  rig->darken();
+  rig->remove("board");
+  rig->restore_stage();
+  return writer.finish();
+}
+
+Status run_capture(const CaptureOptions& options) {
+  LIMN_TRY(const Plan plan, load_plan(options.plan));
+  LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_picture));
+  sim::VirtualRig rig(std::move(world));
+  LIMN_TRY_STATUS(capture_virtually(plan, &rig, options.out));
+  fmt::print("{} poses in {}\n", plan.world_from_board.size(), options.out.string());
+  return {};
+}
+
+}  // namespace limn::apps

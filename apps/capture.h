@@ -1,0 +1,26 @@
+#pragma once
+
+#include <filesystem>
+
+#include "apps/plan.h"
+#include "calib/captures.h"
+#include "core/result.h"
+#include "sim/virtual_rig.h"
+
+namespace limn::apps {
+
+struct CaptureOptions {
+  std::filesystem::path plan;
+  std::filesystem::path out;
+};
+
+/// `limn capture`: shows the patterns and takes the pictures of every pose of a plan, on its virtual rig.
+Status run_capture(const CaptureOptions& options);
+
+/// The board as a thing in the world, called "board".
+sim::Object board_object(const calib::Board& board, const Pose& world_from_board);
+
+/// Captures every pose of the plan with the board in a virtual rig, whose prototype is put away meanwhile.
+Status capture_virtually(const Plan& plan, sim::VirtualRig* rig, const std::filesystem::path& out);
+
+}  // namespace limn::apps

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "scene/mesh.h"
+#include "sim/world.h"
+
+namespace limn::apps {
+
+/// Small white discs on a prototype, to be projected as a surface part: each is aimed at a point of the
+/// surface.
+struct AimedDots {
+  scene::Mesh mesh;                      ///< prototype frame; unlit
+  std::vector<Eigen::Vector3d> p_aimed;  ///< centre of each disc, prototype frame
+};
+
+/// About `count` random points on the prototype, at least k_dot_spacing_m apart, with a disc on each. Only
+/// points that some true projector reaches with its whole disc, well inside its picture.
+AimedDots aimed_dots(const sim::World& world, int count, std::uint64_t seed);
+
+/// How far light lands from where it was aimed, on the surface.
+struct Registration {
+  double rms_mm = 0;
+  double p95_mm = 0;
+  int points = 0;
+  int unlit = 0;  ///< of them, dots that got no light: counted with the largest distance looked at
+  std::vector<double> errors_mm;  ///< per dot
+};
+
+/// Shines the projectors' 8-bit pictures (true gamma) through the true rig onto the true prototype, pixel by
+/// pixel, and compares the centroid of each dot's light with the point it was aimed at.
+Registration judged_registration(const sim::World& world,
+                                 const AimedDots& dots,
+                                 std::span<const cv::Mat> projector_pictures);
+
+/// RMS distance in pixels between the outlines of two masks (non-zero is inside), both ways; outlines along
+/// the picture's border do not count. Infinite when one of them is empty.
+double outline_distance_px(const cv::Mat& found, const cv::Mat& truth);
+
+/// Intersection over union of two labelled pictures: pixels where both have the same label other than 0, over
+/// pixels where either has one.
+double label_iou(const cv::Mat& found, const cv::Mat& truth);
+
+}  // namespace limn::apps

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <filesystem>
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+
+namespace limn::apps {
+
+/// A row of the demo's table: what was measured, the value, what is asked for.
+struct DemoRow {
+  std::string what;
+  std::string value;
+  std::string limit;  ///< empty: no limit
+  bool good = true;
+};
+
+struct DemoPicture {
+  std::string title;
+  std::string caption;
+  cv::Mat picture;  ///< 8-bit BGR or grey
+};
+
+/// The demo's result as people look at it.
+struct DemoPage {
+  std::string headline;
+  std::vector<DemoRow> rows;
+  std::vector<DemoPicture> pictures;
+};
+
+/// Writes one HTML file that needs no other: pictures are embedded, scaled to at most 1280 pixels across.
+Status write_demo_page(const DemoPage& page, const std::filesystem::path& path);
+
+/// The rows as a table for a terminal.
+std::string text_table(const std::vector<DemoRow>& rows);
+
+}  // namespace limn::apps

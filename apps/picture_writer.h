@@ -1,0 +1,47 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <deque>
+#include <filesystem>
+#include <mutex>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <thread>
+
+#include "core/result.h"
+
+namespace limn::apps {
+
+/// Writes captured pictures as lightly compressed PNG on a thread of its own, so that the next picture is
+/// taken meanwhile. The queue is short: store() waits when the disk is slower than the camera.
+class PictureWriter {
+ public:
+  PictureWriter();
+  ~PictureWriter();  ///< writes what is queued
+  PictureWriter(const PictureWriter&) = delete;
+  PictureWriter& operator=(const PictureWriter&) = delete;
+
+  /// Queues a picture; the error is the first one of an earlier picture.
+  Status store(const std::filesystem::path& path, const cv::Mat& picture);
+  /// Waits until all is written; the first error, if any.
+  Status finish();
+
+ private:
+  struct Job {
+    std::filesystem::path path;
+    cv::Mat picture;
+  };
+  void run();
+  Status failure() const;  // call with mutex_ held
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Job> jobs_;
+  std::size_t unwritten_ = 0;  // queued or being written
+  std::optional<Error> failure_;
+  bool closing_ = false;
+  std::thread thread_;
+};
+
+}  // namespace limn::apps

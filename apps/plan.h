@@ -1,0 +1,25 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "calib/board.h"
+#include "core/pose.h"
+#include "core/result.h"
+
+namespace limn::apps {
+
+/// What to capture (limn.plan/1): on which rig, with which board and code, and, for a virtual rig, where the
+/// board is held.
+struct Plan {
+  std::filesystem::path world;  ///< the virtual rig's world file
+  calib::Board board;
+  std::string code = "gray";
+  std::vector<Pose> world_from_board;  ///< board frame as in calib/board.h
+};
+
+/// Reads a plan; `world` is relative to the plan's folder.
+Result<Plan> load_plan(const std::filesystem::path& path);
+
+}  // namespace limn::apps
