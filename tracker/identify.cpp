@@ -23,6 +23,7 @@ constexpr double k_min_score_few_bits = 0.5;
 constexpr double k_max_wrong_margin = 0.1;
 constexpr double k_min_correlation = 0.65;   // of a template, see numbers of the real Hiro frame in the tests
 constexpr double k_min_rotation_lead = 0.1;  // best rotation over the second best
+constexpr double k_uneven_paper = 1.3;       // brightest side over the second darkest
 constexpr double k_min_template_variance = 0.02;  // stdev a fifteenth of black to white
 constexpr double k_sharpen_below_px = 4;          // cells smaller than this blur into each other
 constexpr double k_sharpening = 0.25;             // Laplacian weight
@@ -257,10 +258,7 @@ std::optional<Identity> read_templates(const Reader& reader, const std::vector<T
   return best;
 }
 
-}  // namespace
-
-std::optional<Identity> identify(const cv::Mat& grey, const RefinedQuad& quad, const Families& families) {
-  const Reader reader(grey, quad);
+std::optional<Identity> read(const Reader& reader, const Families& families) {
   std::optional<Identity> best;
   int read_cells = 0;
   Bits bits;
@@ -274,8 +272,20 @@ std::optional<Identity> identify(const cv::Mat& grey, const RefinedQuad& quad, c
     const std::optional<Identity> found = read_code(family, bits);
     if (found && (!best || found->score > best->score)) best = found;
   }
-  if (best) return best;
-  return read_templates(reader, families.templates());
+  return best ? best : read_templates(reader, families.templates());
+}
+
+}  // namespace
+
+std::optional<Identity> identify(const cv::Mat& grey, const RefinedQuad& quad, const Families& families) {
+  if (const auto found = read(Reader(grey, quad), families)) return found;
+  // Something brighter than the paper may stand behind one side: try the second darkest side's paper for all.
+  std::array<double, 4> levels = quad.outside_level;
+  std::sort(levels.begin(), levels.end());
+  if (levels[3] < k_uneven_paper * levels[1]) return std::nullopt;
+  RefinedQuad even = quad;
+  even.outside_level.fill(levels[1]);
+  return read(Reader(grey, even), families);
 }
 
 }  // namespace limn::tracker

@@ -12,9 +12,16 @@ namespace {
 constexpr double k_systematic_px = 0.02;
 // The averaged gradient's tails below this share of its peak count as flat.
 constexpr double k_flat_share = 0.05;
+// Below this share a rise means another edge of the same direction behind the first: grey paper, then a white
+// table.
+constexpr double k_valley_share = 0.35;
 constexpr int k_max_reach = 10;
 constexpr double k_huber = 1.5;  // in robust standard deviations
 constexpr int k_min_crossings = 3;
+constexpr std::size_t k_min_bent_crossings = 12;
+constexpr double k_min_bow_px = 0.1;         // half a side's bow against its chord
+constexpr double k_min_bow_deviations = 10;  // so that noise never bends a straight side
+constexpr double k_max_bow_share = 0.06;     // of half a side
 
 // v of the lens's bow against the chord: t (1 - t) (c0 + c1 t + c2 t^2), t from 0 to 1 along the chord.
 struct Bow {
@@ -64,6 +71,7 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
                            double reach_px,
                            double min_contrast,
                            const Lens* lens,
+                           const EdgeLine* before,
                            EdgeLine* line) {
   const Eigen::Vector2d& from = corners[side];
   const Eigen::Vector2d& to = corners[(side + 1) % 4];
@@ -92,11 +100,12 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   crossings_.clear();
   gradients_.clear();
   std::array<double, 2 * k_max_reach> mean{};
-  double inside = 0;
   for (int u = first; u <= last; ++u) {
-    const double v = from[v_axis] + (u - from[u_axis]) * slope + bow.at(u);
+    const double straight =
+        before && before->flat == line->flat ? before->at(u) : from[v_axis] + (u - from[u_axis]) * slope;
+    const double v = straight + bow.at(u);
+    if (!(v > reach && v < v_limit - 1 - reach)) continue;
     const int centre = static_cast<int>(std::lround(v));
-    if (centre - reach < 0 || centre + reach >= v_limit) continue;
     const std::uint8_t* pixel = line->flat ? grey.ptr(centre) + u : grey.ptr(u) + centre;
     for (int k = 0; k < 2 * reach; ++k) {
       const std::ptrdiff_t at = (k - reach) * v_stride;
@@ -104,7 +113,6 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
       gradients_.push_back(difference);
       mean[static_cast<std::size_t>(k)] += difference;
     }
-    inside += pixel[0];
     crossings_.push_back({static_cast<double>(u), static_cast<double>(centre), 0});
   }
   if (static_cast<int>(crossings_.size()) < k_min_crossings) return false;
@@ -123,8 +131,12 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   const double flat_below = k_flat_share * mean[peak];
   std::size_t low = peak;
   std::size_t high = peak + 1;
-  while (low > 0 && mean[low - 1] > flat_below) --low;
-  while (high < profile && mean[high] > flat_below) ++high;
+  const double valley_below = k_valley_share * mean[peak];
+  while (low > 0 && mean[low - 1] > flat_below && !(mean[low] < valley_below && mean[low - 1] > mean[low]))
+    --low;
+  while (high < profile && mean[high] > flat_below &&
+         !(mean[high - 1] < valley_below && mean[high] > mean[high - 1]))
+    ++high;
   double contrast = 0;
   for (std::size_t k = low; k < high; ++k) contrast += mean[k];
   contrast /= static_cast<double>(crossings_.size());
@@ -159,82 +171,102 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   return fit_line(line);
 }
 
-// Weighted least squares, then Huber weights on the residuals' robust scale.
+// Straight, or bent where that explains the crossings much better: a bow of a tenth of a pixel or more, ten
+// standard deviations of itself.
 bool EdgeRefiner::fit_line(EdgeLine* line) {
   double u_sum = 0;
   for (const Crossing& c : crossings_) u_sum += c.u;
   line->u_middle = u_sum / static_cast<double>(crossings_.size());
-  line->offset = line->slope = 0;
+  if (!(fit_terms(2, line) >= 0)) return false;
+  if (crossings_.size() < k_min_bent_crossings) return true;
+  EdgeLine bent = *line;
+  if (!(fit_terms(3, &bent) >= 0)) return true;
+  const double half = 0.5 * std::abs(crossings_.back().u - crossings_.front().u);
+  const double bow = std::abs(bent.curvature) * half * half;
+  const double deviation = std::sqrt(bent.covariance(2, 2)) * half * half;
+  if (bow > k_min_bow_px && bow > k_min_bow_deviations * deviation && bow < k_max_bow_share * half)
+    *line = bent;
+  return true;
+}
+
+// Weighted least squares of the first `terms` of offset, slope, curvature, then Huber weights on the
+// residuals' robust scale. The residuals' variance; negative when the crossings do not determine the terms.
+double EdgeRefiner::fit_terms(int terms, EdgeLine* line) {
+  line->offset = line->slope = line->curvature = 0;
   double scale = 0;  // 0: no robust weights yet
-  Eigen::Matrix2d inverse = Eigen::Matrix2d::Zero();
-  double squares = 0;
-  double weights = 0;
+  double variance = -1;
   for (int round = 0; round < 4; ++round) {
-    double s = 0, su = 0, suu = 0, sv = 0, suv = 0;
-    squares = weights = 0;
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d right = Eigen::Vector3d::Zero();
     for (const Crossing& c : crossings_) {
-      const double u = c.u - line->u_middle;
-      const double residual = std::abs(c.v - line->offset - line->slope * u);
+      const double d = c.u - line->u_middle;
+      const double residual = std::abs(c.v - line->at(c.u));
       const double huber = scale > 0 && residual > k_huber * scale ? k_huber * scale / residual : 1;
       const double w = c.weight * huber;
-      s += w;
-      su += w * u;
-      suu += w * u * u;
-      sv += w * c.v;
-      suv += w * u * c.v;
+      const Eigen::Vector3d row(1, d, d * d);
+      normal += w * row * row.transpose();
+      right += w * c.v * row;
     }
-    const double determinant = s * suu - su * su;
-    if (!(determinant > 1e-9 * s * s)) return false;
-    line->offset = (suu * sv - su * suv) / determinant;
-    line->slope = (s * suv - su * sv) / determinant;
-    inverse << suu / determinant, -su / determinant, -su / determinant, s / determinant;
+    if (terms == 2) {
+      normal.row(2).setZero();
+      normal.col(2).setZero();
+      normal(2, 2) = 1;
+      right[2] = 0;
+    }
+    if (!(normal.determinant() > 1e-9 * normal(0, 0) * normal(0, 0) * normal(2, 2))) return -1;
+    Eigen::Matrix3d inverse = normal.inverse();
+    const Eigen::Vector3d solution = inverse * right;
+    line->offset = solution[0];
+    line->slope = solution[1];
+    line->curvature = solution[2];
+    if (terms == 2) inverse(2, 2) = 0;
+    double squares = 0;
+    double weights = 0;
     deviations_.clear();
     for (const Crossing& c : crossings_) {
-      const double residual = c.v - line->offset - line->slope * (c.u - line->u_middle);
-      deviations_.push_back(std::abs(residual));
-      const double bounded = scale > 0 ? std::min(std::abs(residual), 3 * scale) : std::abs(residual);
+      const double residual = std::abs(c.v - line->at(c.u));
+      deviations_.push_back(residual);
+      const double bounded = scale > 0 ? std::min(residual, 3 * scale) : residual;
       squares += c.weight * bounded * bounded;
       weights += c.weight;
     }
     const auto middle = deviations_.begin() + static_cast<std::ptrdiff_t>(deviations_.size() / 2);
     std::nth_element(deviations_.begin(), middle, deviations_.end());
     scale = std::max(1.4826 * *middle, 1e-3);
+    const double count = static_cast<double>(crossings_.size());
+    variance = squares / weights * count / std::max(1.0, count - terms);
+    line->covariance = inverse * variance;
   }
-  const double freedom =
-      std::max(1.0, static_cast<double>(crossings_.size()) - 2) / static_cast<double>(crossings_.size());
-  line->covariance = inverse * (squares / weights / freedom);
-  return true;
+  return variance;
 }
 
 namespace {
 
-// n . p = c of an edge line, in pixels.
-void implicit(const EdgeRefiner::EdgeLine& line, Eigen::Vector2d* n, double* c) {
-  *n = line.flat ? Eigen::Vector2d(-line.slope, 1) : Eigen::Vector2d(1, -line.slope);
-  *c = line.offset - line.slope * line.u_middle;
-}
-
+// Where two edges meet: their tangents at the corner, a few times over when they are bent.
 bool intersect(const EdgeRefiner::EdgeLine& a,
                const EdgeRefiner::EdgeLine& b,
                Eigen::Vector2d* corner,
                Eigen::Matrix2d* covariance) {
   Eigen::Matrix2d n;
   Eigen::Vector2d c;
-  Eigen::Vector2d row;
-  implicit(a, &row, &c[0]);
-  n.row(0) = row.transpose();
-  implicit(b, &row, &c[1]);
-  n.row(1) = row.transpose();
-  const double sine = n.determinant() / (n.row(0).norm() * n.row(1).norm());
-  if (!(std::abs(sine) > 0.05)) return false;
-  const Eigen::Matrix2d inverse = n.inverse();
-  *corner = inverse * c;
+  const bool bent = a.curvature != 0 || b.curvature != 0;
+  for (int round = 0; round < (bent ? 4 : 1); ++round) {
+    for (int i = 0; i < 2; ++i) {
+      const EdgeRefiner::EdgeLine& line = i == 0 ? a : b;
+      const double u = bent ? (line.flat ? corner->x() : corner->y()) : line.u_middle;
+      const double slope = line.slope_at(u);
+      n.row(i) = line.flat ? Eigen::RowVector2d(-slope, 1) : Eigen::RowVector2d(1, -slope);
+      c[i] = line.at(u) - slope * u;
+    }
+    const double sine = n.determinant() / (n.row(0).norm() * n.row(1).norm());
+    if (!(std::abs(sine) > 0.05)) return false;
+    *corner = n.inverse() * c;
+  }
   const auto variance = [&](const EdgeRefiner::EdgeLine& line) {
-    const Eigen::Vector2d at(1, (line.flat ? corner->x() : corner->y()) - line.u_middle);
-    return at.dot(line.covariance * at);
+    return line.variance(line.flat ? corner->x() : corner->y());
   };
-  const Eigen::Vector2d variances(variance(a), variance(b));
-  *covariance = inverse * variances.asDiagonal() * inverse.transpose();
+  const Eigen::Matrix2d inverse = n.inverse();
+  *covariance = inverse * Eigen::Vector2d(variance(a), variance(b)).asDiagonal() * inverse.transpose();
   *covariance += k_systematic_px * k_systematic_px * Eigen::Matrix2d::Identity();
   return corner->allFinite();
 }
@@ -262,18 +294,20 @@ std::optional<RefinedQuad> EdgeRefiner::refine(const cv::Mat& grey,
                                                const Lens* lens) {
   RefinedQuad refined;
   refined.corners_px = quad.corners_px;
+  std::array<EdgeLine, 4> lines;
   constexpr int k_rounds = 2;  // the second one's windows and bow start from the first one's corners
   for (int round = 0; round < k_rounds; ++round) {
     const double reach =
         std::clamp(0.22 * shortest_side(refined.corners_px), 2.5, static_cast<double>(k_max_reach));
-    std::array<EdgeLine, 4> lines;
+    const std::array<EdgeLine, 4> before = lines;
     for (std::size_t side = 0; side < 4; ++side) {
-      if (!fit_side(grey, refined.corners_px, side, reach, min_contrast, lens, &lines[side]))
+      if (!fit_side(grey, refined.corners_px, side, reach, min_contrast, lens,
+                    round > 0 ? &before[side] : nullptr, &lines[side]))
         return std::nullopt;
       refined.outside_level[side] = lines[side].outside_level;
       refined.inside_level[side] = lines[side].inside_level;
     }
-    std::array<Eigen::Vector2d, 4> corners;
+    std::array<Eigen::Vector2d, 4> corners = refined.corners_px;
     for (std::size_t i = 0; i < 4; ++i) {
       if (!intersect(lines[(i + 3) % 4], lines[i], &corners[i], &refined.corner_covariance[i]))
         return std::nullopt;

@@ -44,13 +44,27 @@ class EdgeRefiner {
   std::vector<double> deviations_;  // scratch of the robust scale
 
  public:
-  /// A side's line v = offset + slope * (u - u_middle) in the raw picture less the lens's bow.
+  /// A side's line v = offset + slope * d + curvature * d^2, d = u - u_middle, in the raw picture less the
+  /// lens's bow. The curvature is 0 unless the crossings show it beyond doubt: bent paper, a lens that is not
+  /// given.
   struct EdgeLine {
     bool flat = true;  ///< u is x and v is y; otherwise the other way round
     double u_middle = 0;
-    double offset = 0, slope = 0;
-    Eigen::Matrix2d covariance;  ///< of (offset, slope)
+    double offset = 0, slope = 0, curvature = 0;
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of (offset, slope, curvature)
     double outside_level = 0, inside_level = 0;
+
+    double at(double u) const {
+      const double d = u - u_middle;
+      return offset + d * (slope + d * curvature);
+    }
+    double slope_at(double u) const { return slope + 2 * curvature * (u - u_middle); }
+    /// Variance of at(u).
+    double variance(double u) const {
+      const double d = u - u_middle;
+      const Eigen::Vector3d row(1, d, d * d);
+      return row.dot(covariance * row);
+    }
   };
 
  private:
@@ -60,8 +74,10 @@ class EdgeRefiner {
                 double reach_px,
                 double min_contrast,
                 const Lens* lens,
+                const EdgeLine* before,
                 EdgeLine* line);
   bool fit_line(EdgeLine* line);
+  double fit_terms(int terms, EdgeLine* line);
 };
 
 }  // namespace limn::tracker
