@@ -30,15 +30,14 @@ double rounded(double v) { return std::round(v * 1e6) / 1e6; }  // to the microm
 
 // Height of the clay over the door's plane, m. (x, y) within the outline.
 double height(double x, double y) {
-  const double barrel =
-      -0.030 * (y / k_half_height) * (y / k_half_height) - 0.020 * (x / k_half_width) * (x / k_half_width);
+  const double barrel = -0.046 * std::pow(y / k_half_height, 2) - 0.030 * std::pow(x / k_half_width, 2);
   const double swage = 0.060 + 0.07 * (x + 0.1) - y;         // the crease rises towards the rear
-  const double shoulder = -0.022 * sigmoid(-swage / 0.010);  // above it the surface steps back
-  const double ridge = 0.010 * std::exp(-std::max(swage, 0.0) / 0.045) * sigmoid(swage / 0.010);
-  const double sill = 0.014 * sigmoid((-0.135 - y) / 0.014);
+  const double shoulder = -0.028 * sigmoid(-swage / 0.011);  // above it the surface steps back
+  const double ridge = 0.011 * std::exp(-std::max(swage, 0.0) / 0.045) * sigmoid(swage / 0.010);
+  const double sill = 0.016 * sigmoid((-0.135 - y) / 0.014);
   const Vector2d handle((x - 0.165) / 0.062, (y - 0.125) / 0.026);
-  const double recess = -0.020 * std::exp(-std::pow(handle.squaredNorm(), 2));
-  return 0.032 + barrel + shoulder + ridge + sill + recess;
+  const double recess = -0.022 * std::exp(-std::pow(handle.squaredNorm(), 2));
+  return 0.045 + barrel + shoulder + ridge + sill + recess;
 }
 
 // Outline: (s, t) in [-1, 1]² to the door's plane; corners are rounded, the front edge leans, the top is
@@ -132,7 +131,7 @@ void add_sides_and_back(scene::Mesh& mesh,
   for (std::size_t i = 1; i < rows.size(); ++i) border.emplace_back(1, rows[i]);
   for (std::size_t i = columns.size() - 1; i-- > 0;) border.emplace_back(columns[i], 1);
   for (std::size_t i = rows.size() - 1; i-- > 1;) border.emplace_back(-1, rows[i]);
-  constexpr double k_back = -0.085;  // m
+  constexpr double k_back = -0.095;  // m
   const auto count = static_cast<std::uint32_t>(border.size());
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
   for (const bool front : {true, false})
