@@ -178,6 +178,7 @@ Result<Decoded> decode(const Patterns& patterns,
   LIMN_TRY(const cv::Mat white, read_shot(pictures[static_cast<size_t>(patterns.white())], width, height));
   LIMN_TRY(const cv::Mat black, read_shot(pictures[static_cast<size_t>(patterns.black())], width, height));
   Decoded decoded;
+  cv::subtract(white, black, decoded.contrast);
   const cv::Mat step = least_steps(white, black, options, &decoded.lit);
   AxisBits columns(height, width, patterns.column_bits(), patterns.width);
   AxisBits rows(height, width, patterns.row_bits(), patterns.height);

@@ -26,6 +26,7 @@ struct DecodeOptions {
 struct Decoded {
   cv::Mat px_projector;  ///< CV_32FC2: column, row (pixel centres at integers); NaN where there is none
   cv::Mat variance;      ///< CV_32FC2: of the two coordinates, px^2: a label of n pixels has n^2 / 12
+  cv::Mat contrast;      ///< CV_8U: white minus black, levels
   int lit = 0;           ///< camera pixels with contrast
   int decoded = 0;       ///< of them, with a label (outliers excluded)
   int outliers = 0;      ///< removed

@@ -26,6 +26,7 @@ constexpr double k_inset = 0.06;    // of a square, likewise
 constexpr int k_least_pixels = 12;  // in a cell: three times a plane's unknowns and some
 constexpr double k_least_share = 0.2;  // of a cell's pixels with a label; fewer are a glint or a dark square
 constexpr double k_outlier_px = 3;     // from the cell's plane
+constexpr double k_bright = 0.75;      // of the cell's bright pixels; halfway between ink and paper is 0.5
 constexpr double k_stddev_floor_px = 0.02;
 
 // Pixel of every grid point (column, row of squares' corners, rim included) that corners nearby tell.
@@ -88,7 +89,19 @@ class Grid {
 struct Labelled {
   Vector2d px, label;
   double weight = 0;
+  int contrast = 0;
 };
+
+// Keeps the pixels that are about as bright as the cell's bright ones: a pixel across the edge of ink gets
+// its light from one side, and its label with it.
+void keep_bright(std::vector<Labelled>* pixels) {
+  if (pixels->empty()) return;
+  std::vector<int> levels;
+  for (const Labelled& p : *pixels) levels.push_back(p.contrast);
+  const auto bright = levels.begin() + static_cast<std::ptrdiff_t>(levels.size() * 9 / 10);
+  std::nth_element(levels.begin(), bright, levels.end());
+  std::erase_if(*pixels, [&](const Labelled& p) { return p.contrast < k_bright * *bright; });
+}
 
 // A robust plane through a cell's labels; the means of what fits.
 std::optional<Match> fitted(std::vector<Labelled> pixels) {
@@ -157,8 +170,8 @@ void collect(const std::array<Vector2d, 4>& quad,
       const auto& label = labels.at<cv::Vec2f>(y, x);
       if (std::isnan(label[0])) continue;
       const auto& variance = decoded.variance.at<cv::Vec2f>(y, x);
-      (*cells)[cell].push_back(
-          {Vector2d(x, y), Vector2d(label[0], label[1]), 1.0 / (variance[0] + variance[1])});
+      (*cells)[cell].push_back({Vector2d(x, y), Vector2d(label[0], label[1]),
+                                1.0 / (variance[0] + variance[1]), decoded.contrast.at<uchar>(y, x)});
     }
   }
 }
@@ -245,6 +258,7 @@ std::vector<Match> matches_on_board(const Board& board,
       std::array<int, k_cells * k_cells> areas{};
       collect({*a, *b, *c, *d}, decoded, &cells, &areas);
       for (size_t i = 0; i < cells.size(); ++i) {
+        keep_bright(&cells[i]);
         if (static_cast<double>(cells[i].size()) < k_least_share * areas[i]) continue;
         if (auto match = fitted(std::move(cells[i]))) matches.push_back(*match);
       }
