@@ -108,37 +108,35 @@ Status write_truth(const sim::World& world, const scene::PosedScene& parts, cons
   return write_file(out / "truth.json", json.dump(2) + "\n");
 }
 
-// Photographs of one camera; numbers the shots so that each has its own noise.
-class Studio {
- public:
-  Studio(const sim::World& world, int camera) : world_(world), camera_(camera) {
-    const auto begin = std::chrono::steady_clock::now();
-    samples_ = sim::trace(world_, camera_);
-    trace_s_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  }
-
-  Status shoot(const fs::path& out, const std::string& what, const std::vector<cv::Mat>& shown) {
-    const std::string file = name() + "-" + what + ".png";
-    const auto begin = std::chrono::steady_clock::now();
-    const cv::Mat picture = sim::photograph(world_, samples_, shown, world_.seed + ++shots_);
-    const double shot_ms =
-        1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    LIMN_TRY_STATUS(write_png(out / file, picture));
-    fmt::print("{}  {}x{}, shot in {:.0f} ms\n", (out / file).string(), picture.cols, picture.rows, shot_ms);
-    return {};
-  }
-  void report_trace() const {
-    log_info("{}: {} samples traced in {:.2f} s", name(), samples_.size(), trace_s_);
-  }
-
- private:
-  const std::string& name() const { return world_.rig.cameras[static_cast<std::size_t>(camera_)].name; }
-  const sim::World& world_;
-  int camera_;
-  sim::Samples samples_;
-  double trace_s_ = 0;
-  std::uint64_t shots_ = 0;
+// One camera and what it sees; numbers the shots so that each has its own noise.
+struct Shooting {
+  std::string camera;
+  sim::Samples samples;
+  std::uint64_t shots = 0;
 };
+
+Shooting traced(const sim::World& world, int camera) {
+  const auto begin = std::chrono::steady_clock::now();
+  Shooting shooting{world.rig.cameras[static_cast<std::size_t>(camera)].name, sim::trace(world, camera)};
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  log_info("{}: {} samples traced in {:.2f} s", shooting.camera, shooting.samples.size(), seconds);
+  return shooting;
+}
+
+Status shoot(Shooting& shooting,
+             const sim::World& world,
+             const std::vector<cv::Mat>& shown,
+             const fs::path& out,
+             const std::string& what) {
+  const fs::path file = out / (shooting.camera + "-" + what + ".png");
+  const auto begin = std::chrono::steady_clock::now();
+  const cv::Mat picture = sim::photograph(world, shooting.samples, shown, world.seed + ++shooting.shots);
+  const double shot_ms =
+      1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  LIMN_TRY_STATUS(write_png(file, picture));
+  fmt::print("{}  {}x{}, shot in {:.0f} ms\n", file.string(), picture.cols, picture.rows, shot_ms);
+  return {};
+}
 
 Status shoot_camera(const sim::World& world,
                     const scene::PosedScene& parts,
@@ -148,18 +146,16 @@ Status shoot_camera(const sim::World& world,
   std::vector<cv::Mat> white;
   for (const Imager& projector : world.rig.projectors)
     white.emplace_back(projector.height, projector.width, CV_8U, cv::Scalar(255));
-  Studio studio(world, camera);
-  studio.report_trace();
   sim::World dark = world;  // projectors switched off, their black light too
   for (sim::ProjectorEffects& effects : dark.projector_effects) effects.black_level = 0;
-  LIMN_TRY_STATUS(Studio(dark, camera).shoot(options.out, "ambient", {}));
-  LIMN_TRY_STATUS(studio.shoot(options.out, "white", white));
-  if (!options.show.empty()) LIMN_TRY_STATUS(studio.shoot(options.out, "shown", shown));
-  if (!parts.parts.empty()) {
-    const sim::World still_life = sim::with_parts(world, parts);
-    LIMN_TRY_STATUS(Studio(still_life, camera).shoot(options.out, "still-life", white));
-  }
-  return {};
+  Shooting shooting = traced(world, camera);
+  LIMN_TRY_STATUS(shoot(shooting, dark, {}, options.out, "ambient"));
+  LIMN_TRY_STATUS(shoot(shooting, world, white, options.out, "white"));
+  if (!options.show.empty()) LIMN_TRY_STATUS(shoot(shooting, world, shown, options.out, "shown"));
+  if (parts.parts.empty()) return {};
+  const sim::World still_life = sim::with_parts(world, parts);
+  Shooting with_parts = traced(still_life, camera);
+  return shoot(with_parts, still_life, white, options.out, "still-life");
 }
 
 }  // namespace
