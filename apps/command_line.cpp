@@ -6,6 +6,8 @@
 
 #include "apps/capture.h"
 #include "apps/demo.h"
+#include "apps/detect.h"
+#include "apps/markers.h"
 #include "apps/patterns.h"
 #include "apps/render.h"
 #include "apps/solve.h"
@@ -32,6 +34,41 @@ void add_demo(CLI::App& app, Run& run) {
   command->add_flag("--window", options->window, "also show the pictures in a window; Escape closes it");
   command->add_flag("--keep-captures", options->keep_captures, "keep the calibration's pictures (some 1 GB)");
   command->callback([options, &run] { run = [options] { return finished(run_demo(*options)); }; });
+}
+
+void add_markers(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("markers", "sheets of markers or a calibration board to print, true size");
+  command->footer(
+      "Example: limn markers --family aruco_4x4_50 --ids 0-11 --size-mm 40 --out sheet.pdf\n"
+      "Example: limn markers --board charuco:11x8:25mm --out board.pdf");
+  auto options = std::make_shared<MarkersOptions>();
+  command->add_option("--family", options->family, "such as apriltag_36h11, aruco_4x4_50, artoolkit:hiro.patt")
+      ->capture_default_str();
+  command->add_option("--ids", options->ids, "such as 0-11,15")->capture_default_str();
+  command->add_option("--size-mm", options->size_mm, "side of the black square")->capture_default_str();
+  command->add_option("--board", options->board, "a board instead: charuco:11x8:25mm, chessboard:9x7:75mm");
+  command->add_option("--out", options->out, "file to write: .pdf, .svg; a board also .png")->required();
+  command->callback([options, &run] { run = [options] { return finished(run_markers(*options)); }; });
+}
+
+void add_detect(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("detect", "markers and their poses in pictures");
+  command->footer("Example: limn detect photo.jpg --family aruco_6x6_250 --camera camera0.cameramodel --size-mm 40 --draw out");
+  auto options = std::make_shared<DetectOptions>();
+  command->add_option("images", options->images, "PNG or JPEG pictures")->required();
+  command->add_option("--family", options->families, "what to look for, with commas")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_option("--camera", options->camera, ".cameramodel, OpenCV YAML or ARToolKit camera_para.dat");
+  command->add_option("--size-mm", options->size_mm, "side of the black square; with --camera gives poses");
+  command->add_option("--pose", options->pose, "ippe, or triangle (the method of the 2011 paper)")
+      ->capture_default_str();
+  command->add_option("--csv", options->csv, "file to write: a row a marker");
+  command->add_option("--json", options->json, "file to write: corners, poses, covariances");
+  command->add_option("--draw", options->draw, "folder for pictures with the markers drawn in");
+  command->add_option("--threads", options->threads, "pictures at a time")->capture_default_str();
+  command->add_option("--repeat", options->repeat, "also time: median ms over N detections in memory");
+  command->callback([options, &run] { run = [options] { return finished(run_detect(*options)); }; });
 }
 
 void add_capture(CLI::App& app, Run& run) {
@@ -114,6 +151,8 @@ int run_command_line(int argc, char** argv) {
   app.require_subcommand(1);
   Run run;
   // In the order of a session: add_NAME(app, run).
+  add_markers(app, run);
+  add_detect(app, run);
   add_demo(app, run);
   add_patterns(app, run);
   add_capture(app, run);

@@ -1,0 +1,318 @@
+#include "apps/detect.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgproc.hpp>
+#include <set>
+#include <thread>
+
+#include "core/config.h"
+#include "core/file.h"
+#include "core/log.h"
+#include "core/picture.h"
+#include "core/rig.h"
+#include "tracker/detector.h"
+#include "tracker/marker_pose.h"
+#include "tracker/triangle_pose.h"
+
+namespace limn::apps {
+namespace {
+
+struct Marker {
+  tracker::Detection detection;
+  std::vector<tracker::MarkerPose> poses;
+};
+
+struct Outcome {
+  std::filesystem::path path;
+  int width = 0, height = 0;
+  std::vector<Marker> markers;
+  std::optional<double> ms;
+  std::string problem;  // empty: done
+};
+
+// The camera for a picture of this size. ARToolKit's files are meant to be scaled to the picture (its own
+// programs do); all others say their size for good.
+Result<Imager> camera_for(const Imager& camera, const std::filesystem::path& file, int width, int height) {
+  if (camera.width == 0 || (camera.width == width && camera.height == height)) return camera;
+  const bool same_shape = camera.width * height == camera.height * width;
+  if (file.extension() != ".dat" || !same_shape)
+    return error(
+        "expected {}x{} pixels, the size of {}, found a picture of {}x{}. Use the camera's own pictures or "
+        "calibrate this size.",
+        camera.width, camera.height, file.string(), width, height);
+  Imager scaled = camera;
+  const double s = static_cast<double>(width) / camera.width;
+  scaled.width = width;
+  scaled.height = height;
+  scaled.lens.values[0] *= s;
+  scaled.lens.values[1] *= s;
+  for (const std::size_t i : {2u, 3u}) scaled.lens.values[i] = (scaled.lens.values[i] + 0.5) * s - 0.5;
+  return scaled;
+}
+
+double median_ms(tracker::Detector& detector, const cv::Mat& grey, const Lens* lens, int repeat) {
+  std::vector<double> times;
+  for (int i = 0; i < repeat; ++i) {
+    const auto started = std::chrono::steady_clock::now();
+    detector.detect(grey, lens);
+    times.push_back(
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - started).count());
+  }
+  std::sort(times.begin(), times.end());
+  const std::size_t n = times.size();
+  return n % 2 ? times[n / 2] : 0.5 * (times[n / 2 - 1] + times[n / 2]);
+}
+
+double corner_rms(const Lens& lens, double size_m, const Pose& pose, const tracker::Detection& detection) {
+  double squares = 0;
+  const auto corners = tracker::square_corners(size_m);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto px = lens.project(pose * corners[i]);
+    squares += px ? (*px - detection.corners_px[i]).squaredNorm() : 1e12;
+  }
+  return std::sqrt(squares / 4);
+}
+
+std::vector<tracker::MarkerPose> poses_of(const tracker::Detection& detection,
+                                          const Lens& lens,
+                                          const DetectOptions& options) {
+  const double size_m = options.size_mm * 1e-3;
+  auto poses = tracker::marker_poses(lens, size_m, detection.corners_px, detection.corner_covariance);
+  if (options.pose == "ippe") return poses;
+  const auto pose = tracker::triangle_pose(lens, size_m, detection.corners_px);
+  if (!pose) return {};
+  // The paper's method knows no covariance; that of the refined pose, which it approximates, is the best
+  // guess.
+  tracker::MarkerPose only{*pose, corner_rms(lens, size_m, *pose, detection), Matrix6d::Zero(), 1};
+  if (!poses.empty()) only.covariance = poses[0].covariance;
+  return {only};
+}
+
+// ---- pictures ----
+
+constexpr double k_shift = 16;  // OpenCV's fractional bits: 4
+
+cv::Point fixed(const Eigen::Vector2d& px) {
+  return {static_cast<int>(std::lround(px.x() * k_shift)), static_cast<int>(std::lround(px.y() * k_shift))};
+}
+
+void draw_line(cv::Mat& picture,
+               const Eigen::Vector2d& a,
+               const Eigen::Vector2d& b,
+               const cv::Scalar& colour,
+               int thickness) {
+  cv::line(picture, fixed(a), fixed(b), cv::Scalar(0, 0, 0), thickness + 2, cv::LINE_AA, 4);
+  cv::line(picture, fixed(a), fixed(b), colour, thickness, cv::LINE_AA, 4);
+}
+
+void draw_text(cv::Mat& picture, const std::string& text, const Eigen::Vector2d& centre, double scale) {
+  int baseline = 0;
+  const cv::Size size = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, scale, 1, &baseline);
+  const cv::Point at(static_cast<int>(centre.x()) - size.width / 2,
+                     static_cast<int>(centre.y()) + size.height / 2);
+  cv::putText(picture, text, at, cv::FONT_HERSHEY_SIMPLEX, scale, cv::Scalar(0, 0, 0), 3, cv::LINE_AA);
+  cv::putText(picture, text, at, cv::FONT_HERSHEY_SIMPLEX, scale, cv::Scalar(80, 255, 255), 1, cv::LINE_AA);
+}
+
+// x red, y green, z blue; z points into the paper, so its line leads away from the viewer.
+void draw_axes(cv::Mat& picture, const Lens& lens, const Pose& camera_from_marker, double size_m) {
+  const auto origin = lens.project(camera_from_marker.translation);
+  const std::array<cv::Scalar, 3> colours = {cv::Scalar(60, 60, 255), cv::Scalar(60, 220, 60),
+                                             cv::Scalar(255, 120, 40)};
+  for (int axis : {2, 0, 1}) {
+    const auto tip =
+        lens.project(camera_from_marker * Eigen::Vector3d(0.5 * size_m * Eigen::Vector3d::Unit(axis)));
+    if (origin && tip) draw_line(picture, *origin, *tip, colours[static_cast<std::size_t>(axis)], 1);
+  }
+}
+
+cv::Mat drawn(const cv::Mat& grey, const Outcome& outcome, const Lens* lens, double size_m) {
+  cv::Mat picture;
+  cv::cvtColor(grey, picture, cv::COLOR_GRAY2BGR);
+  for (const Marker& marker : outcome.markers) {
+    const auto& c = marker.detection.corners_px;
+    for (std::size_t i = 0; i < 4; ++i) draw_line(picture, c[i], c[(i + 1) % 4], cv::Scalar(80, 255, 80), 1);
+    if (lens && !marker.poses.empty()) draw_axes(picture, *lens, marker.poses[0].camera_from_marker, size_m);
+    cv::circle(picture, fixed(c[0]), static_cast<int>(3 * k_shift), cv::Scalar(0, 0, 0), 3, cv::LINE_AA, 4);
+    cv::circle(picture, fixed(c[0]), static_cast<int>(3 * k_shift), cv::Scalar(40, 40, 255), -1, cv::LINE_AA,
+               4);
+    const double side = std::min((c[2] - c[0]).norm(), (c[3] - c[1]).norm());
+    const Eigen::Vector2d centre = 0.25 * (c[0] + c[1] + c[2] + c[3]);
+    draw_text(picture, marker.detection.marker.id, centre, std::clamp(side / 110, 0.35, 1.2));
+  }
+  return picture;
+}
+
+// ---- results ----
+
+nlohmann::json json_of(const Marker& marker) {
+  nlohmann::json node;
+  node["family"] = marker.detection.marker.family;
+  node["id"] = marker.detection.marker.id;
+  node["score"] = marker.detection.score;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const auto& px = marker.detection.corners_px[i];
+    node["corners_px"].push_back({px.x(), px.y()});
+    // One number a corner: RMS of the two directions.
+    node["corner_stddev_px"].push_back(std::sqrt(0.5 * marker.detection.corner_covariance[i].trace()));
+  }
+  node["poses"] = nlohmann::json::array();
+  for (const tracker::MarkerPose& pose : marker.poses) {
+    nlohmann::json entry = {{"camera_from_marker", to_json(pose.camera_from_marker)},
+                            {"rms_px", pose.rms_px},
+                            {"weight", pose.weight}};
+    for (int row = 0; row < 6; ++row) {
+      nlohmann::json values = nlohmann::json::array();
+      for (int column = 0; column < 6; ++column) values.push_back(pose.covariance(row, column));
+      entry["covariance"].push_back(values);
+    }
+    node["poses"].push_back(entry);
+  }
+  return node;
+}
+
+std::string json_text(const std::vector<Outcome>& outcomes) {
+  nlohmann::json images = nlohmann::json::array();
+  for (const Outcome& outcome : outcomes) {
+    if (!outcome.problem.empty()) continue;
+    nlohmann::json node = {{"file", outcome.path.filename().string()},
+                           {"size", {outcome.width, outcome.height}}};
+    if (outcome.ms) node["ms"] = *outcome.ms;
+    node["markers"] = nlohmann::json::array();
+    for (const Marker& marker : outcome.markers) node["markers"].push_back(json_of(marker));
+    images.push_back(node);
+  }
+  return nlohmann::json{{"images", images}}.dump(1) + "\n";
+}
+
+std::string csv_text(const std::vector<Outcome>& outcomes, bool with_family) {
+  std::string text = "file,id,x0,y0,x1,y1,x2,y2,x3,y3,score\n";
+  for (const Outcome& outcome : outcomes)
+    for (const Marker& marker : outcome.markers) {
+      const MarkerName& name = marker.detection.marker;
+      text += outcome.path.filename().string() + "," + (with_family ? name.text() : name.id);
+      for (const auto& px : marker.detection.corners_px)
+        text += fmt::format(",{:.4f},{:.4f}", px.x(), px.y());
+      text += fmt::format(",{:.4f}\n", marker.detection.score);
+    }
+  return text;
+}
+
+void print(const Outcome& outcome) {
+  const std::string time = outcome.ms ? fmt::format(", {:.3f} ms", *outcome.ms) : "";
+  fmt::print("{}: {} markers{}\n", outcome.path.string(), outcome.markers.size(), time);
+  for (const Marker& marker : outcome.markers) {
+    const Eigen::Vector2d& px = marker.detection.corners_px[0];
+    fmt::print("  {:<24} ({:8.2f}, {:8.2f})  score {:.2f}", marker.detection.marker.text(), px.x(), px.y(),
+               marker.detection.score);
+    if (!marker.poses.empty()) {
+      const Eigen::Vector3d t = 1e3 * marker.poses[0].camera_from_marker.translation;
+      fmt::print("  at ({:.1f}, {:.1f}, {:.1f}) mm, {:.3f} px", t.x(), t.y(), t.z(), marker.poses[0].rms_px);
+      if (marker.poses.size() > 1) fmt::print(", weight {:.2f}", marker.poses[0].weight);
+    }
+    fmt::print("\n");
+  }
+}
+
+// ---- the work ----
+
+Status detect_in(const DetectOptions& options,
+                 const std::optional<Imager>& camera,
+                 tracker::Detector& detector,
+                 Outcome* outcome) {
+  LIMN_TRY(const cv::Mat grey, read_grey_picture(outcome->path));
+  outcome->width = grey.cols;
+  outcome->height = grey.rows;
+  std::optional<Lens> lens;
+  if (camera) {
+    const auto fitting = camera_for(*camera, options.camera, grey.cols, grey.rows);
+    if (!fitting) return error("{}: {}", outcome->path.string(), fitting.message());
+    lens = fitting->lens;
+  }
+  const Lens* lens_or_none = lens ? &*lens : nullptr;
+  for (tracker::Detection& detection : detector.detect(grey, lens_or_none)) {
+    Marker marker{std::move(detection), {}};
+    if (lens && options.size_mm > 0) marker.poses = poses_of(marker.detection, *lens, options);
+    outcome->markers.push_back(std::move(marker));
+  }
+  if (options.repeat > 0) outcome->ms = median_ms(detector, grey, lens_or_none, options.repeat);
+  if (options.draw.empty()) return {};
+  return write_png(options.draw / (outcome->path.stem().string() + ".png"),
+                   drawn(grey, *outcome, lens_or_none, options.size_mm * 1e-3));
+}
+
+void detect_all(const DetectOptions& options,
+                const std::optional<Imager>& camera,
+                const tracker::Families& families,
+                std::vector<Outcome>* outcomes) {
+  const int count = static_cast<int>(outcomes->size());
+  const int threads = options.repeat > 0 ? 1 : std::clamp(options.threads, 1, std::max(1, count));
+  std::atomic<int> next = 0;
+  std::atomic<int> done = 0;
+  std::mutex progress_mutex;
+  Progress progress("detect", count);
+  const auto work = [&] {
+    tracker::Detector detector(families);
+    for (int i = next++; i < count; i = next++) {
+      Outcome& outcome = (*outcomes)[static_cast<std::size_t>(i)];
+      const Status status = detect_in(options, camera, detector, &outcome);
+      if (!status) outcome.problem = status.message();
+      const std::lock_guard lock(progress_mutex);
+      progress.step(++done);
+    }
+  };
+  std::vector<std::thread> others;
+  for (int i = 1; i < threads; ++i) others.emplace_back(work);
+  work();
+  for (std::thread& thread : others) thread.join();
+}
+
+Status checked(const DetectOptions& options) {
+  if (options.images.empty()) return usage_error("limn detect: expected pictures, found none.");
+  if (options.pose != "ippe" && options.pose != "triangle")
+    return usage_error("--pose: expected ippe or triangle, found '{}'.", options.pose);
+  if (!std::isfinite(options.size_mm) || options.size_mm < 0)
+    return usage_error("--size-mm: expected millimetres (> 0), found {}.", options.size_mm);
+  if (options.size_mm > 0 && options.camera.empty())
+    return usage_error("--size-mm: poses need a camera, too; add --camera X.cameramodel.");
+  if (options.families.empty()) return usage_error("--family: expected at least one family, found none.");
+  return {};
+}
+
+}  // namespace
+
+Status run_detect(const DetectOptions& options) {
+  LIMN_TRY_STATUS(checked(options));
+  const auto families = tracker::Families::load(options.families);
+  if (!families) return usage_error("--family: {}", families.message());
+  std::optional<Imager> camera;
+  if (!options.camera.empty()) {
+    LIMN_TRY(camera, load_imager(options.camera));
+  }
+  if (!options.draw.empty()) LIMN_TRY_STATUS(make_folder(options.draw));
+  std::vector<Outcome> outcomes;
+  for (const auto& path : options.images) outcomes.push_back({path, 0, 0, {}, {}, {}});
+  detect_all(options, camera, *families, &outcomes);
+
+  int failed = 0;
+  for (const Outcome& outcome : outcomes) {
+    if (outcome.problem.empty()) {
+      print(outcome);
+    } else {
+      ++failed;
+      log_warning("{}", outcome.problem);
+    }
+  }
+  const bool with_family = std::set(options.families.begin(), options.families.end()).size() > 1;
+  if (!options.csv.empty()) LIMN_TRY_STATUS(write_file(options.csv, csv_text(outcomes, with_family)));
+  if (!options.json.empty()) LIMN_TRY_STATUS(write_file(options.json, json_text(outcomes)));
+  if (failed > 0) return error("{} of {} pictures could not be worked on.", failed, outcomes.size());
+  return {};
+}
+
+}  // namespace limn::apps
