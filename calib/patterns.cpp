@@ -13,7 +13,7 @@ namespace {
 
 constexpr int k_max_side = 16384;  // 14 bits; no projector is larger
 
-int bits_for(int size) { return std::bit_width(static_cast<unsigned>(size - 1)); }
+int bits_for(int size) { return static_cast<int>(std::bit_width(static_cast<unsigned>(size - 1))); }
 
 // Gray code of each position along an axis, that bit of it, as light.
 std::vector<uchar> stripe(int size, int bit, bool inverse) {

@@ -16,7 +16,8 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr int k_least_corners = 8;  // of a view that helps to calibrate a camera
+constexpr int k_least_corners = 8;   // of a view that helps to calibrate a camera
+constexpr size_t k_least_poses = 3;  // two leave a lens open, and one is left out to judge
 
 Pose to_pose(const cv::Mat& rvec, const cv::Mat& tvec) {
   const Vector3d w(rvec.at<double>(0), rvec.at<double>(1), rvec.at<double>(2));
@@ -57,12 +58,12 @@ Views views_of(const Observations& observations, int camera) {
 Result<CameraSeed> seed_camera(const Observations& observations, int camera, const LensModel& model) {
   const CapturedDevice& device = observations.cameras[static_cast<size_t>(camera)];
   const Views views = views_of(observations, camera);
-  if (views.poses.size() < 2)
+  if (views.poses.size() < k_least_poses)
     return error(
-        "{}: expected the board in at least 3 poses, found it in {}. Capture more poses, with the whole "
+        "{}: expected the board in at least {} poses, found it in {}. Capture more poses, with the whole "
         "board "
         "in the picture and lit.",
-        device.name, views.poses.size());
+        device.name, k_least_poses, views.poses.size());
   cv::Mat matrix = cv::Mat::eye(3, 3, CV_64F), distortion = cv::Mat::zeros(1, 5, CV_64F);
   std::vector<cv::Mat> rotations, translations;
   const bool distorted = model.value_count() > 4;
@@ -148,6 +149,18 @@ Status link(const Observations& observations, const std::vector<CameraSeed>& see
           observations.cameras[camera].name, observations.cameras[0].name);
   }
   return {};
+}
+
+// Poses with too few corners to calibrate with still have a place.
+void place_remaining(const Observations& observations, Seed* into) {
+  const Rig rig{into->cameras, {}, {}, {}, {}};
+  for (int pose = 0; pose < static_cast<int>(into->world_from_board.size()); ++pose) {
+    auto& world_from_board = into->world_from_board[static_cast<size_t>(pose)];
+    if (world_from_board) continue;
+    Observations only = observations;
+    std::erase_if(only.corners, [&](const CornerSeen& corner) { return corner.pose != pose; });
+    if (const auto found = board_pose_seed(only, rig)) world_from_board = *found;
+  }
 }
 
 struct Points {
@@ -303,6 +316,7 @@ Result<Seed> seed(const Observations& observations,
     cameras.push_back(std::move(camera));
   }
   LIMN_TRY_STATUS(link(observations, cameras, &seeded));
+  place_remaining(observations, &seeded);
   for (int i = 0; i < static_cast<int>(observations.projectors.size()); ++i) {
     LIMN_TRY(Imager projector, seed_projector(observations, seeded, i, projector_model));
     const CapturedDevice& device = observations.projectors[static_cast<size_t>(i)];

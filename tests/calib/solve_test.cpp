@@ -247,6 +247,16 @@ TEST(Solve, IsTheSameEveryTime) {
   EXPECT_EQ(a->rig.cameras[0].lens.values, b->rig.cameras[0].lens.values);
 }
 
+TEST(Solve, UsesAPoseOfWhichFewCornersAreSeen) {
+  World world = make_world(1, 1, 6, 0.5);
+  std::erase_if(world.observations.corners,
+                [](const CornerSeen& c) { return c.pose == 4 && c.corner % 17 != 0; });
+  const auto solution = solve(world.observations, without_priors());
+  ASSERT_TRUE(solution.ok()) << solution.message();
+  ASSERT_TRUE(solution->world_from_board[4].has_value());
+  EXPECT_TRUE(pose_near(*solution->world_from_board[4], world.world_from_board[4], 1e-5, 1e-5));
+}
+
 TEST(Solve, SaysWhatIsMissing) {
   World world = make_world(1, 1, 6, 0.5);
   Observations dark = world.observations;
@@ -255,6 +265,9 @@ TEST(Solve, SaysWhatIsMissing) {
   Observations blind = world.observations;
   blind.corners.clear();
   EXPECT_NE(solve(blind).message().find("camera0"), std::string::npos);
+  Observations few = without_pose(without_pose(without_pose(without_pose(world.observations, 0), 1), 2), 3);
+  EXPECT_NE(solve(few).message().find("at least 3 poses, found it in 2"), std::string::npos)
+      << solve(few).message();
   SolveOptions options;
   options.projector_model = "LENSMODEL_CAHVOR";
   EXPECT_NE(solve(world.observations, options).message().find("LENSMODEL_CAHVOR"), std::string::npos);
