@@ -36,6 +36,7 @@ struct ObjectPicture {
 
 /// The judge: exact rays in a world as it stands when this is made, beside the virtual parts at `parts`.
 /// Physical questions ignore the parts.
+/// Borrows the world and its scene's meshes, which must outlive it unchanged: make a new one after a move.
 class Truth {
  public:
   explicit Truth(const World& world, const scene::PosedScene& parts = {});
