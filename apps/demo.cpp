@@ -332,15 +332,18 @@ Result<std::vector<DemoPicture>> shown_session(
   const sim::World& world = room->world();
 
   const auto begun = std::chrono::steady_clock::now();
-  const auto pictures = drawn(&session->renderer, projector_count, place.moment.posed, eye);
+  auto draw = [&](const scene::PosedScene& posed) {
+    return drawn(&session->renderer, projector_count, posed, eye);
+  };
+  LIMN_TRY(const Moment swapped, looked(session, room, {session->scene.slots.at(0).variants.at(1).name}));
+  room->camera_effects(0).srgb = true;  // pictures for people; those that are measured in are linear
+  LIMN_TRY(const cv::Mat unlit, shone(room, {}));
+  const auto pictures = draw(place.moment.posed);
   LIMN_TRY(const cv::Mat lit, shone(room, pictures));
   const cv::Mat composite =
       session->renderer.composite(0, lit, place.moment.posed, projector::Composite::rest);
-  const cv::Mat full =
-      session->renderer.composite(0, place.moment.photograph, place.moment.posed, projector::Composite::full);
-  LIMN_TRY(const Moment swapped, looked(session, room, {session->scene.slots.at(0).variants.at(1).name}));
-  LIMN_TRY(const cv::Mat lit_swapped,
-           shone(room, drawn(&session->renderer, projector_count, swapped.posed, eye)));
+  const cv::Mat full = session->renderer.composite(0, unlit, place.moment.posed, projector::Composite::full);
+  LIMN_TRY(const cv::Mat lit_swapped, shone(room, draw(swapped.posed)));
   const cv::Mat swapped_composite =
       session->renderer.composite(0, lit_swapped, swapped.posed, projector::Composite::rest);
   const Imager eye_left = designers_eye(*place.moment.posed.world_from_prototype, k_p_eye_left);
@@ -359,8 +362,7 @@ Result<std::vector<DemoPicture>> shown_session(
   measured->mask_iou = label_iou(mask, true_mask);
 
   std::vector<DemoPicture> shown = {
-      {"The room, unlit.", "A simulated photograph: a clay door, its markers, the room's own light.",
-       place.moment.photograph},
+      {"The room, unlit.", "A simulated photograph: a clay door, its markers, the room's own light.", unlit},
       {"Lit.", "The same, with the projectors' light: trim line and mirror are painted on.", lit},
       {"On the screen.", "Camera picture plus what light cannot show: the mirror's part beyond the door.",
        composite},
@@ -372,11 +374,15 @@ Result<std::vector<DemoPicture>> shown_session(
       {"Error map.",
        fmt::format("Each dot is aimed light, judged by the ray tracer: green 0, red {} mm or more.",
                    k_max_registration_mm),
-       error_map(place.moment.photograph, world, place.judged)});
+       error_map(unlit, world, place.judged)});
   shown.push_back(
       {"Another mirror.", "After a variant swap: the light and the screen follow.", swapped_composite});
-  shown.push_back({"Seen by the designer.",
-                   "From the designer's eye: white is projected, grey is left to the screen.", mask});
+  shown.push_back(
+      {"From the left.",
+       "The designer has walked to the left: the mirror is painted for that eye and stands off the door.",
+       seen_left});
+  shown.push_back(
+      {"Mask.", "From the designer's eye: white is projected, grey is left to the screen.", mask});
   return shown;
 }
 
@@ -425,7 +431,6 @@ Status run_demo(const DemoOptions& options) {
   sim::VirtualRig room(std::move(world));
   Stages stages;
   LIMN_TRY(Session session, calibrated(options.out, &room, &stages, options.keep_captures));
-  room.camera_effects(0).srgb = true;  // pictures for people; the calibration's were linear
   Measured measured;
   LIMN_TRY(measured.held_out_px, held_out_px(options.out / "rig"));
   const Pose in_place = room.world().world_from_prototype;

@@ -21,7 +21,8 @@ constexpr double k_reach_m = k_dot_spacing_m / 2;  // light nearer to a dot than
 constexpr int k_dot_corners = 12;
 constexpr double k_border_px = 4;  // of a projector's picture, that a dot must stay away from
 constexpr double k_dot_lift_m = 0.0002;
-constexpr double k_min_incidence_cosine = 0.17;  // 80 degrees: beyond it no projector picture is sharp
+constexpr double k_min_incidence_cosine =
+    0.34;  // 70 degrees: beyond, a dot is under two projector pixels wide
 
 // Corners of the disc around a sample, in the tangent plane.
 std::vector<Eigen::Vector3d> rim(const sim::SurfacePoint& sample) {
@@ -50,6 +51,7 @@ bool reached(const sim::World& world,
   const Eigen::Vector3d n_world = world.world_from_prototype.rotation * sample.n;
   if (n_world.dot((p_light - p_world).normalized()) < k_min_incidence_cosine) return false;
   if (!well_inside(projector, p_world)) return false;
+  if (!truth.visible(projector, p_world)) return false;
   for (const Eigen::Vector3d& corner : rim(sample)) {
     if (!truth.visible(projector, world.world_from_prototype * (corner + k_dot_lift_m * sample.n)))
       return false;
