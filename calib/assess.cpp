@@ -27,9 +27,11 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-std::vector<int> scored_poses(const Observations& observations) {
+std::vector<int> scored_poses(const Observations& observations, const Solution& solution) {
   std::set<int> poses;
-  for (const Match& match : observations.matches) poses.insert(match.pose);
+  for (const Match& match : observations.matches) {
+    if (solution.world_from_board[static_cast<size_t>(match.pose)]) poses.insert(match.pose);
+  }
   return {poses.begin(), poses.end()};
 }
 
@@ -144,7 +146,7 @@ std::vector<double> errors_by_projector(const Observations& observations, const 
   return p95;
 }
 
-void note_board(const Observations& observations, std::vector<Fault>* faults) {
+void note_board(const Observations& observations, const Solution& solution, std::vector<Fault>* faults) {
   for (int pose = 0; pose < static_cast<int>(observations.poses.size()); ++pose) {
     const bool seen = std::any_of(observations.corners.begin(), observations.corners.end(),
                                   [&](const CornerSeen& corner) { return corner.pose == pose; });
@@ -153,6 +155,11 @@ void note_board(const Observations& observations, std::vector<Fault>* faults) {
           {"board_not_visible",
            fmt::format("no camera sees the board in {}", observations.poses[static_cast<size_t>(pose)]),
            "a scene capture is fine; otherwise light the board and keep it in the picture"});
+    if (seen && !solution.world_from_board[static_cast<size_t>(pose)])
+      faults->push_back({"board_not_placed",
+                         fmt::format("too few corners, or all on a line, in {}; it was left out",
+                                     observations.poses[static_cast<size_t>(pose)]),
+                         "keep more of the board in the picture and lit"});
   }
 }
 
@@ -236,7 +243,7 @@ Result<HeldOut> held_out(const Observations& observations,
   HeldOut score;
   score.residuals.assign(observations.matches.size(), none);
   score.errors_m.assign(observations.matches.size(), none.x());
-  const std::vector<int> poses = scored_poses(observations);
+  const std::vector<int> poses = scored_poses(observations, solution);
   Score total;
   for (const int pose : poses) {
     const std::string& name = observations.poses[static_cast<size_t>(pose)];
@@ -270,7 +277,7 @@ Result<Assessment> assess(const Observed& observed, const SolveOptions& options,
     assessment.decode_outliers += share.outliers;
   }
   assessment.decoded_share = lit > 0 ? decoded / lit : 0;
-  note_board(observations, &assessment.faults);
+  note_board(observations, solution, &assessment.faults);
   note_geometry(observations, solution, &assessment.faults);
   note_pictures(observed, assessment, &assessment.faults);
   note_odd_poses(assessment.held_out, &assessment.faults);

@@ -300,7 +300,10 @@ Result<Pose> board_pose_seed(const Observations& observations, const Rig& rig) {
   if (p_board.size() < 4 || !cv::solvePnP(p_board, flat, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rvec,
                                           tvec, false, cv::SOLVEPNP_IPPE))
     return error("{}: no pose of the board from {} corners.", camera.name, p_board.size());
-  return camera.imager_from_world.inverse() * to_pose(rvec, tvec);
+  const Pose camera_from_board = to_pose(rvec, tvec);
+  if (!camera_from_board.is_finite() || !(camera_from_board.translation.z() > 0))
+    return error("{}: {} corners of the board, all on a line, give no pose.", camera.name, p_board.size());
+  return camera.imager_from_world.inverse() * camera_from_board;
 }
 
 Result<Seed> seed(const Observations& observations,

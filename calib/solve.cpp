@@ -237,6 +237,7 @@ class Joint {
 
   Result<Solution> run(Unknowns unknowns) {
     unknowns_ = std::move(unknowns);
+    LIMN_TRY_STATUS(check_finite());
     // Three rounds: how much everything scatters is known only after a fit; then it sets the weights.
     double corner_noise = k_first_noise_px, match_noise = k_first_noise_px;
     Solution solution;
@@ -255,6 +256,7 @@ class Joint {
   // Of a single board pose, everything else fixed; from corners alone.
   Result<Pose> refine_board(Unknowns unknowns, int pose, double corner_noise) {
     unknowns_ = std::move(unknowns);
+    LIMN_TRY_STATUS(check_finite());
     ceres::Problem problem(problem_options());
     add_corners(&problem, corner_noise, pose);
     fix_all_but_board(&problem, pose);
@@ -270,6 +272,23 @@ class Joint {
     Status status;
     int iterations = 0;
   };
+
+  // Ceres ends the program on values that are not finite.
+  Status check_finite() const {
+    bool finite = true;
+    for (const auto* lists : {&unknowns_.camera_values, &unknowns_.projector_values}) {
+      for (const auto& values : *lists) {
+        for (const double v : values) finite = finite && std::isfinite(v);
+      }
+    }
+    for (const auto* poses : {&unknowns_.camera_poses, &unknowns_.projector_poses, &unknowns_.board_poses}) {
+      for (const PoseBlock& block : *poses) finite = finite && block.pose().is_finite();
+    }
+    if (finite) return {};
+    return error(
+        "the joint solve has no finite start: the observations do not determine the devices. Capture more "
+        "poses, tilted by 20 to 45 degrees to different sides.");
+  }
 
   static ceres::Problem::Options problem_options() {
     ceres::Problem::Options options;

@@ -321,7 +321,21 @@ TEST(Assess, NoticesABoardThatMovedWhileItWasCaptured) {
   EXPECT_TRUE(named);
 }
 
-TEST(Assess, NoticesPosesWithoutABoardAndWithoutTilt) {
+TEST(Assess, LeavesOutABoardWhoseCornersAreOnALine) {
+  World world = make_world(1, 1, 6, 0.5);
+  add_noise(&world, 0.05, 0.05, test_rng());
+  std::erase_if(world.observations.corners, [](const CornerSeen& c) { return c.pose == 4 && c.corner >= 5; });
+  const auto solution = solve(world.observations);
+  ASSERT_TRUE(solution.ok()) << solution.message();
+  const auto assessment = assess({world.observations, {}, 0, 0}, {}, *solution);
+  ASSERT_TRUE(assessment.ok()) << assessment.message();
+  EXPECT_EQ(assessment->held_out.poses.size(), 5U);
+  ASSERT_FALSE(assessment->faults.empty());
+  EXPECT_EQ(assessment->faults[0].name, "board_not_placed");
+  EXPECT_EQ(assessment->verdict, Verdict::good);
+}
+
+TEST(Assess, NoticesPosesWithoutABoard) {
   World world = make_world(1, 1, 6, 0.5);
   add_noise(&world, 0.05, 0.05, test_rng());
   world.observations = without_pose(world.observations, 2);
