@@ -131,6 +131,12 @@ std::vector<double> fitted_lens_values(const LensModel& model,
       hessian += jacobian.transpose() * jacobian;
       gradient += jacobian.transpose() * (sample.px - px);
     }
+    // Numerator and denominator of OPENCV8 cancel: without a weight the fit puts poles into the picture.
+    constexpr double k_distortion_weight = 1e-2;  // (0.1 px / 1)^2
+    for (Eigen::Index i = 4; i < count; ++i) {
+      hessian(i, i) += k_distortion_weight;
+      gradient[i] -= k_distortion_weight * values[static_cast<std::size_t>(i)];
+    }
     const Eigen::VectorXd step = hessian.ldlt().solve(gradient);
     for (Eigen::Index i = 0; i < count; ++i) values[static_cast<std::size_t>(i)] += step[i];
   }
