@@ -12,19 +12,21 @@
 namespace limn::test {
 namespace {
 
-constexpr int k_few_samples = 9;
-constexpr int k_many_samples = 400;  // coverage of an edge pixel to 0.3 levels of 180
+constexpr int k_few_samples = 5;
+constexpr int k_many_samples = 150;  // coverage of an edge pixel to about a level of 180
 
 // Intersection of a camera direction with the marker's plane, in marker coordinates over its side (0 … 1
 // inside).
 struct MarkerPlane {
-  Pose marker_from_camera;
+  Eigen::Matrix3d rotation;  // marker from camera
+  Eigen::Vector3d origin;    // the camera in the marker
   double size_m;
   explicit MarkerPlane(const PlacedMarker& placed)
-      : marker_from_camera(placed.camera_from_marker.inverse()), size_m(placed.size_m) {}
+      : rotation(placed.camera_from_marker.inverse().rotation_matrix()),
+        origin(placed.camera_from_marker.inverse().translation),
+        size_m(placed.size_m) {}
   std::optional<Eigen::Vector2d> at(const Eigen::Vector3d& d_camera) const {
-    const Eigen::Vector3d d = marker_from_camera.rotation * d_camera;
-    const Eigen::Vector3d& origin = marker_from_camera.translation;
+    const Eigen::Vector3d d = rotation * d_camera;
     const double distance = -origin.z() / d.z();
     if (!(distance > 0)) return std::nullopt;
     return Eigen::Vector2d((origin + distance * d).head<2>() / size_m + Eigen::Vector2d(0.5, 0.5));
