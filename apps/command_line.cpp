@@ -1,6 +1,7 @@
 #include "apps/command_line.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <functional>
 #include <memory>
 
@@ -160,6 +161,13 @@ int run_command_line(int argc, char** argv) {
   add_render(app, run);
   add_simulate(app, run);
 
+  const auto commands = app.get_subcommands({});
+  const auto is_named = [&](const CLI::App* command) { return argc > 1 && command->get_name() == argv[1]; };
+  if (argc > 1 && argv[1][0] != '-' && std::none_of(commands.begin(), commands.end(), is_named)) {
+    std::string known;
+    for (const CLI::App* command : commands) known += " " + command->get_name();
+    return finished(usage_error("unknown command '{}'; expected one of:{}.", argv[1], known));
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& problem) {

@@ -15,22 +15,25 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_dot_radius_m = 0.0022;          // some 4 projector pixels across: sub-pixel centroids
-constexpr double k_dot_spacing_m = 0.0066;         // discs and their light stay apart
+constexpr double k_dot_radius_m = 0.0018;          // some 4 projector pixels across: sub-pixel centroids
+constexpr double k_dot_spacing_m = 0.0075;         // discs and their light stay apart
 constexpr double k_reach_m = k_dot_spacing_m / 2;  // light nearer to a dot than this is the dot's
+constexpr double k_free_radius_m = 0.0026;         // its light with the fringe of the pixels it is drawn in
+constexpr double k_flat_m = 0.001;                 // how far the surface may leave a dot's plane there
 constexpr int k_dot_corners = 12;
-constexpr double k_border_px = 4;  // of a projector's picture, that a dot must stay away from
+constexpr int k_tries_per_dot = 30;  // of random places, to pack dots as close as their spacing allows
+constexpr double k_border_px = 4;    // of a projector's picture, that a dot must stay away from
 constexpr double k_dot_lift_m = 0.0002;
-constexpr double k_min_incidence_cosine =
-    0.34;  // 70 degrees: beyond, a dot is under two projector pixels wide
+// 70 degrees: beyond, a dot is under two projector pixels wide and its centroid measures itself.
+constexpr double k_min_incidence_cosine = 0.34;
 
-// Corners of the disc around a sample, in the tangent plane.
-std::vector<Eigen::Vector3d> rim(const sim::SurfacePoint& sample) {
+// Corners of a disc around a sample, in the tangent plane.
+std::vector<Eigen::Vector3d> rim(const sim::SurfacePoint& sample, double radius_m) {
   const Eigen::Vector3d u = sample.n.unitOrthogonal(), v = sample.n.cross(u);
   std::vector<Eigen::Vector3d> corners;
   for (int i = 0; i < k_dot_corners; ++i) {
     const double angle = 2 * std::numbers::pi * i / k_dot_corners;
-    corners.push_back(sample.p + k_dot_radius_m * (std::cos(angle) * u + std::sin(angle) * v));
+    corners.push_back(sample.p + radius_m * (std::cos(angle) * u + std::sin(angle) * v));
   }
   return corners;
 }
@@ -41,7 +44,7 @@ bool well_inside(const Imager& projector, const Eigen::Vector3d& p_world) {
          px->x() < projector.width - 1 - k_border_px && px->y() < projector.height - 1 - k_border_px;
 }
 
-// Whether the true projector reaches the whole disc, from the front.
+// Whether the true projector reaches the disc with some margin, from the front.
 bool reached(const sim::World& world,
              const sim::Truth& truth,
              const Imager& projector,
@@ -51,10 +54,13 @@ bool reached(const sim::World& world,
   const Eigen::Vector3d n_world = world.world_from_prototype.rotation * sample.n;
   if (n_world.dot((p_light - p_world).normalized()) < k_min_incidence_cosine) return false;
   if (!well_inside(projector, p_world)) return false;
-  if (!truth.visible(projector, p_world)) return false;
-  for (const Eigen::Vector3d& corner : rim(sample)) {
-    if (!truth.visible(projector, world.world_from_prototype * (corner + k_dot_lift_m * sample.n)))
-      return false;
+  std::vector<Eigen::Vector3d> places = rim(sample, k_free_radius_m);
+  places.push_back(sample.p);
+  for (const Eigen::Vector3d& p : places) {
+    const auto px = projector.project(world.world_from_prototype * p);
+    const auto landing = px ? truth.landing(projector, *px) : std::nullopt;
+    if (!landing || landing->object != "prototype") return false;
+    if ((landing->p_object - p).norm() > k_flat_m) return false;
   }
   return true;
 }
@@ -114,7 +120,7 @@ void append_disc(const sim::SurfacePoint& sample, scene::Mesh* mesh) {
     mesh->normals.push_back(sample.n.cast<float>());
   };
   add(sample.p);
-  for (const Eigen::Vector3d& corner : rim(sample)) add(corner);
+  for (const Eigen::Vector3d& corner : rim(sample, k_dot_radius_m)) add(corner);
   for (std::uint32_t i = 0; i < k_dot_corners; ++i) {
     mesh->triangles.push_back({first, first + 1 + i, first + 1 + (i + 1) % k_dot_corners});
     mesh->triangle_materials.push_back(0);
@@ -145,7 +151,8 @@ AimedDots aimed_dots(const sim::World& world, int count, std::uint64_t seed) {
   AimedDots dots;
   dots.mesh.materials = {scene::Material{.base_colour = {1, 1, 1}, .unlit = true, .texture = {}}};
   NearestPoints taken(&dots.p_aimed, k_dot_spacing_m);
-  for (const sim::SurfacePoint& sample : sim::surface_points(prototype_mesh(world), 12 * count, seed)) {
+  for (const sim::SurfacePoint& sample :
+       sim::surface_points(prototype_mesh(world), k_tries_per_dot * count, seed)) {
     if (static_cast<int>(dots.p_aimed.size()) == count) break;
     if (taken.nearest(sample.p, k_dot_spacing_m)) continue;
     const auto reaches = [&](const Imager& projector) { return reached(world, truth, projector, sample); };

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <opencv2/imgproc.hpp>
+#include <opencv2/core.hpp>
 
 #include "tests/support/matchers.h"
 
@@ -34,16 +34,26 @@ sim::World plane_world() {
   return world;
 }
 
-// The discs drawn by hand into the projector's picture, 8-fold sub-pixels, moved by `shift_px`.
+// The discs drawn by hand into the projector's picture (light = value), moved by `shift_px`: 8x8 sub-pixels.
 cv::Mat drawn(const AimedDots& dots, double shift_px) {
-  cv::Mat picture(480, 640, CV_8UC3, cv::Scalar::all(0));
+  constexpr int k_sub = 8;
+  const double radius_px = (dots.mesh.positions[1] - dots.mesh.positions[0]).norm() * k_focal_px;
+  cv::Mat light(480, 640, CV_8U, cv::Scalar(0));
   for (const Eigen::Vector3d& p : dots.p_aimed) {
-    const Eigen::Vector2d px(k_focal_px * p.x() + 319.5 + shift_px, k_focal_px * p.y() + 239.5);
-    const int fraction_bits = 6;
-    const auto fixed = [&](double v) { return cvRound(v * (1 << fraction_bits)); };
-    cv::circle(picture, {fixed(px.x()), fixed(px.y())}, fixed(2.2), cv::Scalar::all(255), cv::FILLED,
-               cv::LINE_AA, fraction_bits);
+    const Eigen::Vector2d centre(k_focal_px * p.x() + 319.5 + shift_px, k_focal_px * p.y() + 239.5);
+    for (int y = static_cast<int>(centre.y()) - 4; y <= centre.y() + 4; ++y) {
+      for (int x = static_cast<int>(centre.x()) - 4; x <= centre.x() + 4; ++x) {
+        int inside = 0;
+        for (int i = 0; i < k_sub * k_sub; ++i) {
+          const Eigen::Vector2d sub((i % k_sub + 0.5) / k_sub - 0.5, (i / k_sub + 0.5) / k_sub - 0.5);
+          inside += (Eigen::Vector2d(x, y) + sub - centre).norm() < radius_px;
+        }
+        if (inside) light.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(255 * inside / (k_sub * k_sub));
+      }
+    }
   }
+  cv::Mat picture;
+  cv::merge(std::vector<cv::Mat>{light, light, light}, picture);
   return picture;
 }
 
@@ -52,7 +62,7 @@ TEST(DemoJudge, DotsLieOnThePrototypeAndApart) {
   ASSERT_EQ(dots.p_aimed.size(), 400u);
   for (std::size_t i = 0; i < dots.p_aimed.size(); ++i) {
     EXPECT_NEAR(dots.p_aimed[i].z(), 0, 1e-9);
-    for (std::size_t j = 0; j < i; ++j) EXPECT_GT((dots.p_aimed[i] - dots.p_aimed[j]).norm(), 0.0065);
+    for (std::size_t j = 0; j < i; ++j) EXPECT_GT((dots.p_aimed[i] - dots.p_aimed[j]).norm(), 0.0075);
   }
 }
 
@@ -62,7 +72,7 @@ TEST(DemoJudge, LightWhereItWasAimedScoresNearZero) {
   const std::vector<cv::Mat> pictures = {drawn(dots, 0)};
   const Registration found = judged_registration(world, dots, pictures);
   EXPECT_EQ(found.unlit, 0);
-  EXPECT_LT(found.rms_mm, 0.08) << "what drawing circles in whole levels leaves";
+  EXPECT_LT(found.rms_mm, 0.03) << "what 8-bit levels and 8x8 sub-pixels leave";
 }
 
 TEST(DemoJudge, AShiftOfOnePixelIsMeasuredInMillimetres) {
@@ -70,7 +80,7 @@ TEST(DemoJudge, AShiftOfOnePixelIsMeasuredInMillimetres) {
   const AimedDots dots = aimed_dots(world, 400, 1);
   const std::vector<cv::Mat> pictures = {drawn(dots, 1)};
   const Registration found = judged_registration(world, dots, pictures);
-  EXPECT_NEAR(found.rms_mm, 1, 0.1);
+  EXPECT_NEAR(found.rms_mm, 1, 0.02);
   EXPECT_GE(found.p95_mm, found.rms_mm);
 }
 

@@ -1,0 +1,220 @@
+// What the program says to bad input, from the outside: exit code 1 for work that failed, 2 for wrong usage,
+// and a message that names the place.
+
+#include "apps/command_line.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+
+#include "core/file.h"
+#include "core/picture.h"
+#include "core/rig.h"
+#include "tests/support/matchers.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Outcome {
+  int code = 0;
+  std::string out, err;
+};
+
+Outcome run(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "limn");
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  Outcome outcome;
+  outcome.code = run_command_line(static_cast<int>(argv.size()), argv.data());
+  outcome.err = testing::internal::GetCapturedStderr();
+  outcome.out = testing::internal::GetCapturedStdout();
+  return outcome;
+}
+
+class CommandLine : public testing::Test {
+ protected:
+  // Expects the exit code and every part in the message.
+  void expect(const std::vector<std::string>& arguments, int code, const std::vector<std::string>& parts) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.code, code) << outcome.err << outcome.out;
+    for (const std::string& part : parts) {
+      EXPECT_NE((outcome.err + outcome.out).find(part), std::string::npos)
+          << "expected \"" << part << "\" in: " << outcome.err << outcome.out;
+    }
+    EXPECT_EQ(outcome.err.find("bug in Limn"), std::string::npos) << outcome.err;
+  }
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  void write(const std::string& name, const std::string& content) {
+    fs::create_directories((folder_ / name).parent_path());
+    ASSERT_TRUE(write_file(folder_ / name, content));
+  }
+  // A rig of one 640x480 camera and one 320x200 projector.
+  void write_rig() {
+    Rig rig;
+    rig.cameras = {{"camera0", 640, 480, Lens::pinhole(600, 600, 319.5, 239.5), Pose()}};
+    rig.projectors = {{"projector0", 320, 200, Lens::pinhole(400, 400, 159.5, 99.5), Pose()}};
+    ASSERT_TRUE(save_rig(rig, folder_ / "rig"));
+  }
+  // A scene of one triangle as the prototype and a slot, whose scene.json the test may spoil.
+  nlohmann::json scene() {
+    write("scene/tri.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    return nlohmann::json::parse(R"({
+      "schema": "limn.scene/1",
+      "prototype": {"mesh": "tri.obj", "units": "m", "markers": [], "albedo": 0.8},
+      "slots": [{"name": "mirror", "marker": "aruco_4x4_50:0", "size_mm": 40, "mode": "view", "stick_to_surface": false,
+                 "marker_from_part": {"rotation_wxyz": [1, 0, 0, 0], "translation_m": [0, 0, 0]},
+                 "variants": [{"name": "a", "mesh": "tri.obj", "units": "m"}]}]})");
+  }
+  void expect_scene_error(const nlohmann::json& spoiled, const std::vector<std::string>& parts) {
+    write_rig();
+    write("scene/scene.json", spoiled.dump());
+    write("poses.json", "{}");
+    expect({"render", "--rig", path("rig"), "--scene", path("scene"), "--poses", path("poses.json"), "--out",
+            path("out")},
+           1, parts);
+    EXPECT_FALSE(fs::exists(folder_ / "out" / "coverage.json"));
+  }
+  fs::path folder_ = test::test_folder();
+};
+
+TEST_F(CommandLine, HelpIsNoErrorAndShowsAnExample) {
+  EXPECT_EQ(run({"--help"}).code, 0);
+  for (const char* command :
+       {"demo", "markers", "detect", "patterns", "capture", "solve", "render", "simulate"}) {
+    const Outcome help = run({command, "--help"});
+    EXPECT_EQ(help.code, 0);
+    EXPECT_NE(help.out.find("Example: limn " + std::string(command)), std::string::npos) << help.out;
+  }
+}
+
+TEST_F(CommandLine, UnknownCommandsAndOptionsAreWrongUsage) {
+  expect({}, 2, {"subcommand"});
+  expect({"levitate"}, 2, {"levitate"});
+  expect({"detect", "--shiny", "x.png"}, 2, {"--shiny"});
+  expect({"detect"}, 2, {"images"});
+}
+
+TEST_F(CommandLine, UnknownFamiliesAndCodesAreWrongUsageAndListWhatExists) {
+  cv::Mat grey(480, 640, CV_8U, cv::Scalar(128));
+  ASSERT_TRUE(write_png(folder_ / "a.png", grey));
+  expect({"detect", path("a.png"), "--family", "aruco_9x9_50"}, 2, {"aruco_9x9_50", "apriltag_36h11"});
+  expect({"markers", "--family", "aruco_9x9_50", "--out", path("a.pdf")}, 2, {"aruco_9x9_50"});
+  expect({"patterns", "--projector", "1280x800", "--code", "morse", "--out", path("p")}, 2,
+         {"morse", "gray"});
+  expect({"patterns", "--projector", "1280", "--out", path("p")}, 2, {"1280"});
+}
+
+TEST_F(CommandLine, MissingAndTruncatedPicturesAreNamed) {
+  expect({"detect", path("nowhere.png")}, 1, {"nowhere.png"});
+  cv::Mat grey(480, 640, CV_8U, cv::Scalar(128));
+  ASSERT_TRUE(write_png(folder_ / "a.png", grey));
+  const std::string whole = read_file(folder_ / "a.png").value();
+  write("a.png", whole.substr(0, whole.size() / 2));
+  expect({"detect", path("a.png")}, 1, {"a.png", "truncated"});
+}
+
+TEST_F(CommandLine, APictureOfTheWrongSizeForItsCameraIsNamedWithBothSizes) {
+  write_rig();
+  cv::Mat grey(100, 100, CV_8U, cv::Scalar(128));
+  ASSERT_TRUE(write_png(folder_ / "a.png", grey));
+  expect({"detect", path("a.png"), "--camera", path("rig/camera0.cameramodel"), "--size-mm", "40"}, 1,
+         {"640x480", "100x100"});
+  write("scene/scene.json", scene().dump());
+  expect({"render", "--rig", path("rig"), "--scene", path("scene"), "--frame", "camera0=" + path("a.png"),
+          "--out", path("out")},
+         1, {"640x480", "100x100"});
+}
+
+TEST_F(CommandLine, ABrokenRigIsNamed) {
+  write("scene/scene.json", scene().dump());
+  write("poses.json", "{}");
+  const auto render = [&](const std::string& rig) {
+    return std::vector<std::string>{"render",           "--rig",       rig,
+                                    "--scene",          path("scene"), "--poses",
+                                    path("poses.json"), "--out",       path("out")};
+  };
+  expect(render(path("nowhere")), 1, {"nowhere", "found nothing"});
+  write("rig/rig.json", "{\"schema\": \"limn.rig/1\", \"cameras\": [");
+  expect(render(path("rig")), 1, {"rig.json:1", "truncated"});
+  write("rig/rig.json", R"({"schema": "limn.rig/1", "cameras": 7, "projectors": []})");
+  expect(render(path("rig")), 1, {"cameras: expected a list, found number 7"});
+}
+
+TEST_F(CommandLine, SpoiledScenesAreNamedWithTheirPath) {
+  auto spoiled = scene();
+  spoiled["prototype"].erase("units");
+  expect_scene_error(spoiled, {"prototype.units", "missing"});
+  spoiled = scene();
+  spoiled["slots"][0]["variants"][0]["units"] = "furlong";
+  expect_scene_error(spoiled, {"furlong"});
+  spoiled = scene();
+  spoiled["slots"][0]["size_mm"] = "forty";
+  expect_scene_error(spoiled, {"slots[0].size_mm", "forty"});
+  spoiled = scene();
+  spoiled["slots"][0]["colour"] = "red";
+  expect_scene_error(spoiled, {"slots[0]", "unknown key \"colour\""});
+  spoiled = scene();
+  spoiled["slots"][0]["variants"][0]["mesh"] = "absent.glb";
+  expect_scene_error(spoiled, {"absent.glb"});
+  spoiled = scene();
+  spoiled["slots"][0]["variants"][0]["mesh"] = "../../etc/passwd";
+  expect_scene_error(spoiled, {"relative path"});
+}
+
+TEST_F(CommandLine, SpoiledMeshesAreNamed) {
+  const auto spoiled = [&](const std::string& content) {
+    auto with_mesh = scene();
+    with_mesh["slots"][0]["variants"][0]["mesh"] = "bad.obj";
+    write("scene/bad.obj", content);
+    return with_mesh;
+  };
+  expect_scene_error(spoiled("v 0 0 0\nv 1 0 0\nv 0 1 0\n"), {"bad.obj", "triangles"});
+  expect_scene_error(spoiled("v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), {"bad.obj"});
+  expect_scene_error(spoiled(""), {"bad.obj"});
+}
+
+TEST_F(CommandLine, UnknownSlotsAndDevicesAreNamed) {
+  write_rig();
+  write("scene/scene.json", scene().dump());
+  write("poses.json", R"({"slots": {"wing": {"world_from_part":
+      {"rotation_wxyz": [1, 0, 0, 0], "translation_m": [0, 0, 1]}, "variant": "a"}}})");
+  expect({"render", "--rig", path("rig"), "--scene", path("scene"), "--poses", path("poses.json"), "--out",
+          path("out")},
+         1, {"wing"});
+  expect({"render", "--rig", path("rig"), "--scene", path("scene"), "--frame", "camera7=a.png", "--out",
+          path("out")},
+         2, {"camera7", "camera0"});
+}
+
+TEST_F(CommandLine, AnOutputFolderThatCannotBeMadeIsNamedAndWhatWasThereStays) {
+  write("taken", "old");
+  expect({"patterns", "--projector", "64x32", "--out", path("taken")}, 1, {"taken"});
+  expect({"patterns", "--projector", "64x32", "--out", path("taken/inside")}, 1, {"taken"});
+  EXPECT_EQ(read_file(folder_ / "taken").value(), "old");
+}
+
+TEST_F(CommandLine, BrokenPlansAndWorldsAreNamed) {
+  expect({"capture", "--plan", path("none.json"), "--out", path("c")}, 1, {"none.json"});
+  write("plan.json", R"({"schema": "limn.plan/1", "world": "w.json", "board": "charuco:1x1", "code": "gray",
+                         "world_from_board": []})");
+  expect({"capture", "--plan", path("plan.json"), "--out", path("c")}, 1, {"plan.json: board"});
+  write("world.json", R"({"schema": "limn.world/1", "cameras": [{"name": "camera0", "size": [0, 4]}]})");
+  expect({"simulate", path("world.json"), "--out", path("s")}, 1, {"world.json"});
+  EXPECT_FALSE(fs::exists(folder_ / "c"));
+}
+
+TEST_F(CommandLine, AnEmptyOrForeignCapturesFolderIsNamed) {
+  expect({"solve", path("none"), "--out", path("rig")}, 1, {"none"});
+  write("captures/capture.json", R"({"schema": "limn.capture/1", "cameras": []})");
+  expect({"solve", path("captures"), "--out", path("rig")}, 1, {"capture.json"});
+  expect({"solve", path("captures"), "--out", path("rig"), "--import", "cuneiform"}, 2, {"cuneiform"});
+  EXPECT_FALSE(fs::exists(folder_ / "rig"));
+}
+
+}  // namespace
+}  // namespace limn::apps
