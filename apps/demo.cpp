@@ -79,6 +79,7 @@ class Stages {
 // What the session knows (never the truth), and the GL that it draws with.
 struct Session {
   Rig rig;
+  double held_out_px;  // of its calibration
   scene::Scene scene;
   std::vector<Body> bodies;
   tracker::Detector detector;
@@ -259,15 +260,19 @@ Result<Session> calibrated(const fs::path& out, sim::VirtualRig* room, Stages* s
   SolveOptions solving;
   solving.captures = captures;
   solving.out = rig_folder;
-  LIMN_TRY_STATUS(stages->time("solve", [&] { return run_solve(solving); }));
+  LIMN_TRY(const calib::Report report, stages->time("solve", [&] { return solved(solving); }));
   if (!keep_captures) fs::remove_all(captures, ignored);
-  LIMN_TRY(Rig rig, load_rig(rig_folder));
+  const Rig& rig = report.solution.rig;
   scene::Scene scene = room->world().scene.value();
   auto bodies = scene::bodies(scene);
   const auto names = tracker::families_of(bodies);
   LIMN_TRY(tracker::Families families, tracker::Families::load(names));
   LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, rig));
-  return Session{std::move(rig), std::move(scene), std::move(bodies), tracker::Detector(std::move(families)),
+  return Session{rig,
+                 report.assessment.held_out.rms_px,
+                 std::move(scene),
+                 std::move(bodies),
+                 tracker::Detector(std::move(families)),
                  std::move(renderer)};
 }
 
@@ -317,11 +322,6 @@ nlohmann::ordered_json json_of(const Measured& measured) {
   json["mask_iou"] = measured.mask_iou;
   for (const auto& [name, seconds] : measured.seconds) json["seconds"][name] = seconds;
   return json;
-}
-
-Result<double> held_out_px(const fs::path& rig_folder) {
-  LIMN_TRY(const std::string text, read_file(rig_folder / "report.json"));
-  return nlohmann::json::parse(text).at("held_out").at("rms_px").get<double>();
 }
 
 // What people look at, and the two measurements that need the session's pictures.
@@ -432,7 +432,7 @@ Status run_demo(const DemoOptions& options) {
   Stages stages;
   LIMN_TRY(Session session, calibrated(options.out, &room, &stages, options.keep_captures));
   Measured measured;
-  LIMN_TRY(measured.held_out_px, held_out_px(options.out / "rig"));
+  measured.held_out_px = session.held_out_px;
   const Pose in_place = room.world().world_from_prototype;
   for (const auto& [name, world_from_prototype] : places_of(in_place)) {
     LIMN_TRY(Place place, judged_place(name, world_from_prototype, &session, &room, &stages));

@@ -65,34 +65,40 @@ void print_table(const calib::Assessment& assessment) {
 
 }  // namespace
 
-Status run_solve(const SolveOptions& options) {
+Result<calib::Report> solved(const SolveOptions& options) {
   const auto begun = Clock::now();
   LIMN_TRY_STATUS(check_models(options));
   LIMN_TRY(const calib::Captures captures, captures_of(options));
-  LIMN_TRY(const calib::Observed observed, calib::observe(captures));
+  LIMN_TRY(calib::Observed observed, calib::observe(captures));
+  const double board_seconds = observed.seconds_board, decode_seconds = observed.seconds_decode;
   calib::SolveOptions solving;
   solving.camera_model = options.camera_model;
   solving.projector_model = options.projector_model;
   const auto solving_begun = Clock::now();
-  LIMN_TRY(const calib::Solution solution, calib::solve(observed.observations, solving));
+  LIMN_TRY(calib::Solution solution, calib::solve(observed.observations, solving));
   const double solve_seconds = seconds_since(solving_begun);
   log_info("solved in {} steps, judging by held-out poses", solution.iterations);
   const auto judging_begun = Clock::now();
-  LIMN_TRY(const calib::Assessment assessment, calib::assess(observed, solving, solution));
-  const calib::Report report{observed,
-                             solution,
-                             assessment,
-                             {{"board", observed.seconds_board},
-                              {"decode", observed.seconds_decode},
-                              {"solve", solve_seconds},
-                              {"assess", seconds_since(judging_begun)},
-                              {"total", seconds_since(begun)}}};
+  LIMN_TRY(calib::Assessment assessment, calib::assess(observed, solving, solution));
+  calib::Report report{std::move(observed),
+                       std::move(solution),
+                       std::move(assessment),
+                       {{"board", board_seconds},
+                        {"decode", decode_seconds},
+                        {"solve", solve_seconds},
+                        {"assess", seconds_since(judging_begun)},
+                        {"total", seconds_since(begun)}}};
   LIMN_TRY_STATUS(calib::write_rig_folder(report, solving, options.out));
+  return report;
+}
+
+Status run_solve(const SolveOptions& options) {
+  LIMN_TRY(const calib::Report report, solved(options));
   if (options.json) {
     fmt::print("{}", calib::report_json(report));
   } else {
-    print_table(assessment);
-    fmt::print("rig and report in {} ({:.1f} s)\n", options.out.string(), seconds_since(begun));
+    print_table(report.assessment);
+    fmt::print("rig and report in {}\n", options.out.string());
   }
   return {};
 }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/report.h"
 #include "core/result.h"
 
 namespace limn::apps {
@@ -23,8 +24,11 @@ struct SolveOptions {
   std::string shots = "*.png";
 };
 
-/// `limn solve`: captures -> rig folder (rig.json, .cameramodel files, report.json, report.html,
-/// observations.json). Nothing is written unless everything is solved.
+/// Captures -> rig folder (rig.json, .cameramodel files, report.json, report.html, observations.json).
+/// Nothing is written unless everything is solved.
+Result<calib::Report> solved(const SolveOptions& options);
+
+/// `limn solve`: as solved(), and prints a table.
 Status run_solve(const SolveOptions& options);
 
 }  // namespace limn::apps

@@ -14,9 +14,9 @@ namespace limn::calib {
 
 /// Everything that a rig folder says about a calibration.
 struct Report {
-  const Observed& observed;
-  const Solution& solution;
-  const Assessment& assessment;
+  Observed observed;
+  Solution solution;
+  Assessment assessment;
   std::vector<std::pair<std::string, double>> seconds;  ///< of each stage, in order
 };
 
