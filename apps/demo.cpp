@@ -1,5 +1,6 @@
 #include "apps/demo.h"
 
+#include <algorithm>
 #include <chrono>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -223,7 +224,7 @@ cv::Mat error_map(const cv::Mat& photograph, const sim::World& world, const Judg
 
 // One place of the door: where it truly is, what the tracker finds, how well the light then fits.
 struct Place {
-  std::string name;
+  std::string name;  // in demo.json
   Moment moment;
   JudgedDots judged;
 };
@@ -285,6 +286,11 @@ struct Measured {
   std::vector<std::pair<std::string, double>> seconds;
 };
 
+std::string readable(std::string name) {
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
+}
+
 std::vector<DemoRow> rows_of(const Measured& measured) {
   std::vector<DemoRow> rows;
   const auto at_most = [&](const std::string& what, double value, const char* unit, double limit) {
@@ -294,10 +300,10 @@ std::vector<DemoRow> rows_of(const Measured& measured) {
   at_most("calibration, held-out pose", measured.held_out_px, "px", k_max_held_out_px);
   for (const Place& place : measured.places) {
     const Registration& found = place.judged.registration;
-    at_most(fmt::format("registration {}, RMS of {} points", place.name, found.points), found.rms_mm, "mm",
-            k_max_registration_mm);
-    rows.push_back(
-        {fmt::format("registration {}, 95 %", place.name), fmt::format("{:.3f} mm", found.p95_mm), "", true});
+    at_most(fmt::format("registration {}, RMS of {} points", readable(place.name), found.points),
+            found.rms_mm, "mm", k_max_registration_mm);
+    rows.push_back({fmt::format("registration {}, 95 %", readable(place.name)),
+                    fmt::format("{:.3f} mm", found.p95_mm), "", true});
   }
   at_most("composite, outline of the mirror, RMS", measured.composite_px, "px", k_max_composite_px);
   rows.push_back({"on/off-surface mask, IoU", fmt::format("{:.4f}", measured.mask_iou),

@@ -21,7 +21,7 @@ h1 { font-weight: 600; margin: 0 0 .3rem; } .lead { color: #a9a69f; margin: 0 0 
 table { border-collapse: collapse; margin: 0 0 2.5rem; } th { text-align: left; color: #a9a69f; font-weight: 500; }
 td, th { padding: .35rem 1.6rem .35rem 0; border-bottom: 1px solid #2b2f36; }
 td.value { font-variant-numeric: tabular-nums; text-align: right; } .good { color: #7fd1a0; } .bad { color: #ff9a7a; }
-.pictures { display: grid; grid-template-columns: repeat(auto-fit, minmax(26rem, 1fr)); gap: 1.6rem; }
+.pictures { display: grid; grid-template-columns: repeat(auto-fit, minmax(34rem, 1fr)); gap: 1.6rem; }
 figure { margin: 0; } img { width: 100%; display: block; border-radius: 4px; background: #000; }
 figcaption { margin-top: .5rem; color: #a9a69f; } figcaption b { color: #e8e6e1; }
 )";
@@ -50,7 +50,7 @@ cv::Mat scaled_for_page(const cv::Mat& picture) {
 }
 
 std::string rows_html(const std::vector<DemoRow>& rows) {
-  std::string html = "<table><tr><th>measured</th><th>value</th><th>at most / at least</th></tr>\n";
+  std::string html = "<table><tr><th>measured</th><th>value</th><th>asked for</th></tr>\n";
   for (const DemoRow& row : rows) {
     const char* colour = row.limit.empty() ? "" : row.good ? " good" : " bad";
     html += fmt::format("<tr><td>{}</td><td class=\"value{}\">{}</td><td>{}</td></tr>\n", escaped(row.what),
