@@ -14,7 +14,7 @@ struct SurfacePoint {
   double distance = 0;  ///< from the point asked for
 };
 
-/// The point of the mesh nearest to p. Looks at every triangle (some 5 ms for 500 000). The mesh must have
+/// The point of the mesh nearest to p. Looks at every triangle. The mesh must have
 /// one.
 SurfacePoint nearest_on(const Mesh& mesh, const Eigen::Vector3d& p);
 
