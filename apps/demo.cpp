@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
@@ -330,84 +329,76 @@ nlohmann::ordered_json json_of(const Measured& measured) {
   return json;
 }
 
-// What people look at, and the two measurements that need the session's pictures.
-Result<std::vector<DemoPicture>> shown_session(
-    Session* session, sim::VirtualRig* room, const Place& place, Measured* measured, Stages* stages) {
-  const Imager eye = designers_eye(*place.moment.posed.world_from_prototype);
+// What the renderer draws and the simulator photographs, for people to look at.
+Result<std::vector<DemoPicture>> shown_session(Session* session, sim::VirtualRig* room, const Place& place) {
+  const scene::PosedScene& posed = place.moment.posed;
+  const Pose& world_from_prototype = *posed.world_from_prototype;
+  const Imager eye = designers_eye(world_from_prototype);
+  const Imager eye_left = designers_eye(world_from_prototype, k_p_eye_left);
+  const Imager true_eye_left = designers_eye(room->world().world_from_prototype, k_p_eye_left);
   const std::size_t projector_count = session->rig.projectors.size();
-  const sim::World& world = room->world();
+  projector::Renderer& renderer = session->renderer;
 
-  const auto begun = std::chrono::steady_clock::now();
-  auto draw = [&](const scene::PosedScene& posed) {
-    return drawn(&session->renderer, projector_count, posed, eye);
-  };
-  LIMN_TRY(const Moment swapped, looked(session, room, {session->scene.slots.at(0).variants.at(1).name}));
+  const std::string other_variant = session->scene.slots.at(0).variants.at(1).name;
+  LIMN_TRY(const Moment swapped, looked(session, room, {other_variant}));
   room->camera_effects(0).srgb = true;  // pictures for people; those that are measured in are linear
   LIMN_TRY(const cv::Mat unlit, shone(room, {}));
-  const auto pictures = draw(place.moment.posed);
+  const auto pictures = drawn(&renderer, projector_count, posed, eye);
   LIMN_TRY(const cv::Mat lit, shone(room, pictures));
-  const cv::Mat composite =
-      session->renderer.composite(0, lit, place.moment.posed, projector::Composite::rest);
-  const cv::Mat full = session->renderer.composite(0, unlit, place.moment.posed, projector::Composite::full);
-  LIMN_TRY(const cv::Mat lit_swapped, shone(room, draw(swapped.posed)));
-  const cv::Mat swapped_composite =
-      session->renderer.composite(0, lit_swapped, swapped.posed, projector::Composite::rest);
-  const Imager eye_left = designers_eye(*place.moment.posed.world_from_prototype, k_p_eye_left);
-  const auto pictures_left = drawn(&session->renderer, projector_count, place.moment.posed, eye_left);
-  const cv::Mat seen_left =
-      seen_from(world, designers_eye(world.world_from_prototype, k_p_eye_left), pictures_left);
-  stages->add("render", seconds_between(begun, std::chrono::steady_clock::now()));
+  const auto pictures_swapped = drawn(&renderer, projector_count, swapped.posed, eye);
+  LIMN_TRY(const cv::Mat lit_swapped, shone(room, pictures_swapped));
+  const auto pictures_left = drawn(&renderer, projector_count, posed, eye_left);
 
-  const sim::Truth truth(world, sim::true_poses(world));
-  measured->composite_px =
-      stages->time("judge", [&] { return composite_error_px(session, world, truth, place.moment); });
-  const cv::Mat mask =
-      merged_masks(session->renderer.coverage(place.moment.posed, eye), {eye.width, eye.height});
-  const cv::Mat true_mask =
-      merged_true_masks(truth, session->scene, designers_eye(world.world_from_prototype));
-  measured->mask_iou = label_iou(mask, true_mask);
-
+  using projector::Composite;
   std::vector<DemoPicture> shown = {
-      {"The room, unlit.", "A simulated photograph: a clay door, its markers, the room's own light.", unlit},
-      {"Lit.", "The same, with the projectors' light: trim line and mirror are painted on.", lit},
-      {"On the screen.", "Camera picture plus what light cannot show: the mirror's part beyond the door.",
-       composite},
-      {"The whole part on the screen.", "The composite `full` over the unlit photograph.", full}};
+      {"unlit", "The room, unlit", "A simulated photograph: a clay door, its markers, the room's own light.",
+       unlit},
+      {"lit", "Lit", "The same, with the projectors' light: trim line and mirror are painted on.", lit},
+      {"composite", "On the screen",
+       "Camera picture plus what light cannot show: the mirror's part beyond the door.",
+       renderer.composite(0, lit, posed, Composite::rest)},
+      {"composite-full", "The whole parts on the screen", "Drawn over the unlit photograph.",
+       renderer.composite(0, unlit, posed, Composite::full)}};
   for (std::size_t i = 0; i < projector_count; ++i) {
-    shown.push_back({session->rig.projectors[i].name + ".", "What this projector gets.", pictures[i]});
+    const std::string& name = session->rig.projectors[i].name;
+    shown.push_back({name, name, "What this projector gets.", pictures[i]});
   }
   shown.push_back(
-      {"Error map.",
+      {"error-map", "Error map",
        fmt::format("Each dot is aimed light, judged by the ray tracer: green 0, red {} mm or more.",
                    k_max_registration_mm),
-       error_map(unlit, world, place.judged)});
+       error_map(unlit, room->world(), place.judged)});
+  shown.push_back({"composite-swapped", "Another mirror", "After a variant swap: light and screen follow.",
+                   renderer.composite(0, lit_swapped, swapped.posed, Composite::rest)});
   shown.push_back(
-      {"Another mirror.", "After a variant swap: the light and the screen follow.", swapped_composite});
-  shown.push_back(
-      {"From the left.",
+      {"from-the-left", "From the left",
        "The designer has walked to the left: the mirror is painted for that eye and stands off the door.",
-       seen_left});
-  shown.push_back(
-      {"Mask.", "From the designer's eye: white is projected, grey is left to the screen.", mask});
+       seen_from(room->world(), true_eye_left, pictures_left)});
+  shown.push_back({"mask", "Mask", "From the designer's eye: white is projected, grey is left to the screen.",
+                   merged_masks(renderer.coverage(posed, eye), {eye.width, eye.height})});
   return shown;
+}
+
+// Overlap of the designer's masks with the ray-traced ones.
+double mask_iou(Session* session, const sim::World& world, const sim::Truth& truth, const Moment& moment) {
+  const Imager eye = designers_eye(*moment.posed.world_from_prototype);
+  const cv::Mat found = merged_masks(session->renderer.coverage(moment.posed, eye), {eye.width, eye.height});
+  const Imager true_eye = designers_eye(world.world_from_prototype);
+  return label_iou(found, merged_true_masks(truth, session->scene, true_eye));
 }
 
 Status write_results(const fs::path& out,
                      const Measured& measured,
                      const std::vector<DemoPicture>& pictures) {
-  for (std::size_t i = 0; i < pictures.size(); ++i) {
-    std::string name = pictures[i].title.substr(0, pictures[i].title.size() - 1);
-    for (char& c : name)
-      c = std::isalnum(static_cast<unsigned char>(c)) ? static_cast<char>(std::tolower(c)) : '-';
-    LIMN_TRY_STATUS(write_png(out / (name + ".png"), pictures[i].picture));
+  for (const DemoPicture& picture : pictures) {
+    LIMN_TRY_STATUS(write_png(out / (picture.file + ".png"), picture.picture));
   }
   LIMN_TRY_STATUS(write_file(out / "demo.json", json_of(measured).dump(2) + "\n"));
   const DemoPage page{
-      "A whole session on a virtual rig whose truth is known: two projectors and a camera were calibrated "
+      "A whole session on a virtual rig whose truth is known. Two projectors and a camera were calibrated "
       "from "
       "simulated captures, the markers were found in a simulated photograph, the parts were painted onto the "
-      "door, and "
-      "a ray tracer that shares no code with the renderer measured where the light fell.",
+      "door, and a ray tracer that shares no code with the renderer measured where the light fell.",
       rows_of(measured), pictures};
   return write_demo_page(page, out / "demo.html");
 }
@@ -445,7 +436,14 @@ Status run_demo(const DemoOptions& options) {
     measured.places.push_back(std::move(place));
   }
   room.move("prototype", in_place);
-  LIMN_TRY(const auto pictures, shown_session(&session, &room, measured.places.front(), &measured, &stages));
+  const Moment& moment = measured.places.front().moment;
+  const sim::World& truth_world = room.world();
+  const sim::Truth truth(truth_world, sim::true_poses(truth_world));
+  measured.composite_px =
+      stages.time("judge", [&] { return composite_error_px(&session, truth_world, truth, moment); });
+  measured.mask_iou = stages.time("judge", [&] { return mask_iou(&session, truth_world, truth, moment); });
+  LIMN_TRY(const auto pictures,
+           stages.time("render", [&] { return shown_session(&session, &room, measured.places.front()); }));
   measured.seconds = stages.seconds();
   LIMN_TRY_STATUS(write_results(options.out, measured, pictures));
   fmt::print("{}\n{}\n", text_table(rows_of(measured)), (options.out / "demo.html").string());

@@ -69,7 +69,7 @@ Status write_demo_page(const DemoPage& page, const std::filesystem::path& path) 
       k_style, escaped(page.headline));
   html += rows_html(page.rows) + "<div class=\"pictures\">\n";
   for (const DemoPicture& picture : page.pictures) {
-    html += fmt::format("<figure><img alt=\"{}\" src=\"{}\"><figcaption><b>{}</b> {}</figcaption></figure>\n",
+    html += fmt::format("<figure><img alt=\"{}\" src=\"{}\"><figcaption><b>{}.</b> {}</figcaption></figure>\n",
                         escaped(picture.title), data_uri(scaled_for_page(picture.picture)),
                         escaped(picture.title), escaped(picture.caption));
   }

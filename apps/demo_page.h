@@ -18,6 +18,7 @@ struct DemoRow {
 };
 
 struct DemoPicture {
+  std::string file;  ///< its name in the output folder, without .png
   std::string title;
   std::string caption;
   cv::Mat picture;  ///< 8-bit BGR or grey

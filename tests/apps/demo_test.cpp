@@ -1,0 +1,43 @@
+// The whole session on the virtual rig, as `limn demo` runs it, against what is asked of it.
+
+#include "apps/demo.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+#include "core/picture.h"
+#include "tests/support/matchers.h"
+
+namespace limn::apps {
+namespace {
+
+TEST(Demo, LandsTheLightWhereItIsAimedAndSaysSo) {
+  const auto folder = test::test_folder();
+  const Status done = run_demo({.out = folder});
+  ASSERT_TRUE(done) << done.message();
+  const auto json = nlohmann::json::parse(read_file(folder / "demo.json").value());
+  EXPECT_LE(json.at("held_out_px"), 0.1);
+  for (const char* place : {"in_place", "moved", "turned"}) {
+    const auto& registration = json.at("registration_mm").at(place);
+    EXPECT_LE(registration.at("rms"), 0.25) << place << ": 0.5 is asked for, 0.11 was measured";
+    EXPECT_LE(registration.at("p95"), 0.4) << place;
+    EXPECT_GE(registration.at("points"), 2000) << place;
+  }
+  EXPECT_LE(json.at("composite_px"), 0.5);
+  EXPECT_GE(json.at("mask_iou"), 0.97);
+  EXPECT_GT(json.at("seconds").at("solve"), 0);
+
+  const std::string page = read_file(folder / "demo.html").value();
+  EXPECT_EQ(page.find("src=\"http"), std::string::npos) << "the page needs no other file";
+  for (const char* name :
+       {"unlit", "lit", "projector0", "projector1", "composite", "error-map", "composite-swapped"}) {
+    EXPECT_TRUE(read_picture(folder / (std::string(name) + ".png"))) << name;
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "demo-captures"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "rig" / "report.html"));
+}
+
+}  // namespace
+}  // namespace limn::apps
