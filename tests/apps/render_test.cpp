@@ -1,0 +1,287 @@
+#include "apps/render.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+
+#include "core/config.h"
+#include "core/file.h"
+#include "core/picture.h"
+#include "core/rig.h"
+#include "scene/scene.h"
+#include "sim/car_door.h"
+#include "tests/support/matchers.h"
+#include "tracker/family.h"
+
+namespace limn::apps {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+// An arrow that stands on its marker: a post of 40 mm side and 120 mm up (towards -z), with a flag at its top
+// that points to the marker's right.
+std::string flag_obj() {
+  return "v -20 -20 0\nv 20 -20 0\nv 20 20 0\nv -20 20 0\nv -20 -20 -120\nv 20 -20 -120\nv 20 20 -120\nv -20 "
+         "20 -120\n"
+         "f 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\nf 5 6 7 8\n"
+         "v 20 0 -120\nv 20 0 -80\nv 70 0 -100\nf 9 10 11\n";
+}
+
+json slot_on(const std::string& name, const std::string& marker) {
+  return {{"name", name},
+          {"marker", marker},
+          {"size_mm", 50},
+          {"marker_from_part", to_json(Pose())},
+          {"variants", {{{"name", "a"}, {"mesh", "flag.obj"}, {"units", "mm"}}}}};
+}
+
+// A classic augmented-reality scene: no prototype.
+fs::path flag_scene(const fs::path& folder, const std::string& marker) {
+  const json scene = {{"schema", "limn.scene/1"}, {"slots", {slot_on("flag", marker)}}};
+  EXPECT_TRUE(make_folder(folder));
+  EXPECT_TRUE(write_file(folder / "flag.obj", flag_obj()));
+  EXPECT_TRUE(write_file(folder / "scene.json", scene.dump()));
+  return folder;
+}
+
+Imager test_camera() {
+  Imager camera{"camera0", 800, 600, {}, Pose()};
+  camera.lens = Lens::create("LENSMODEL_OPENCV4", {900, 900, 400, 310, -0.15, 0.05, 0.001, 0}).value();
+  return camera;
+}
+
+// A photograph of a marker of 50 mm on white paper: every pixel's ray met with its plane, 16 rays a pixel.
+cv::Mat photographed(const MarkerName& name, const Imager& camera, const Pose& camera_from_marker) {
+  const cv::Mat marker = tracker::draw_marker(name, 40).value();
+  const Pose marker_from_camera = camera_from_marker.inverse();
+  cv::Mat picture(camera.height, camera.width, CV_8U);
+  for (int row = 0; row < picture.rows; ++row) {
+    for (int column = 0; column < picture.cols; ++column) {
+      int sum = 0;
+      for (int k = 0; k < 16; ++k) {
+        const Vector2d px(column + (k % 4 + 0.5) / 4 - 0.5, row + (k / 4 + 0.5) / 4 - 0.5);
+        const Vector3d d = marker_from_camera.rotation * *camera.lens.unproject(px);
+        const Vector3d p = marker_from_camera.translation - d * (marker_from_camera.translation.z() / d.z());
+        const int x = static_cast<int>(std::floor((p.x() / 0.05 + 0.5) * marker.cols));
+        const int y = static_cast<int>(std::floor((p.y() / 0.05 + 0.5) * marker.rows));
+        const bool inside = x >= 0 && y >= 0 && x < marker.cols && y < marker.rows;
+        sum += inside ? marker.at<std::uint8_t>(y, x) : 220;
+      }
+      picture.at<std::uint8_t>(row, column) = static_cast<std::uint8_t>(sum / 16);
+    }
+  }
+  return picture;
+}
+
+TEST(Render, StandsAPartOnAMarkerOfAPicture) {
+  const fs::path folder = test::test_folder();
+  Rig rig;
+  rig.cameras = {test_camera()};
+  ASSERT_TRUE(save_rig(rig, folder / "rig"));
+  const Pose camera_from_marker(exp_rotation({0.7, 0.2, 0.3}), {0.03, 0.05, 0.5});
+  const MarkerName name{"aruco_6x6_250", "40"};
+  ASSERT_TRUE(write_png(folder / "picture.png", photographed(name, rig.cameras[0], camera_from_marker)));
+
+  RenderOptions options;
+  options.rig = folder / "rig";
+  options.scene = flag_scene(folder / "scene", name.text());
+  options.frames = {"camera0=" + (folder / "picture.png").string()};
+  options.out = folder / "out";
+  const Status status = run_render(options);
+  ASSERT_TRUE(status) << status.message();
+
+  const cv::Mat out = read_picture(folder / "out" / "composite-camera0.png").value();
+  ASSERT_EQ(out.size(), cv::Size(800, 600));
+  // The flag's tip in the truth: light on one side of it, paper on the other.
+  const auto at = [&](const Vector3d& p_marker) {
+    const Vector2d px = *rig.cameras[0].project(camera_from_marker * p_marker);
+    return out.at<cv::Vec3b>(static_cast<int>(std::lround(px.y())), static_cast<int>(std::lround(px.x())));
+  };
+  const auto is_paper = [](const cv::Vec3b& c) { return c == cv::Vec3b(220, 220, 220); };
+  EXPECT_FALSE(is_paper(at({0.066, 0, -0.1})));
+  EXPECT_TRUE(is_paper(at({0.074, 0, -0.1})));
+  EXPECT_FALSE(is_paper(at({0, 0, -0.118})));
+  EXPECT_TRUE(is_paper(at({-0.03, 0, -0.1})));
+  const json coverage = json::parse(read_file(folder / "out" / "coverage.json").value());
+  EXPECT_EQ(coverage["parts"][0]["part"], "flag");
+  EXPECT_EQ(coverage["parts"][0]["off_surface"], 1);
+  EXPECT_GT(coverage["parts"][0]["viewer_pixels"], 5000);
+  const cv::Mat mask = read_picture(folder / "out" / "mask-flag.png").value();
+  EXPECT_EQ(cv::countNonZero(mask == 128), coverage["parts"][0]["viewer_pixels"].get<int>());
+}
+
+class RenderDoor : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder = test::test_folder();
+    Rig rig;
+    rig.cameras = {test_camera()};
+    rig.cameras[0].imager_from_world = looking_at({0.1, 0.1, 1.2}, {0, 0, 0}, {0, 1, 0});
+    Imager projector = rig.cameras[0];
+    projector.name = "projector0";
+    projector.imager_from_world = looking_at({-0.3, 0.2, 1.1}, {0, 0, 0}, {0, 1, 0});
+    rig.projectors = {projector};
+    ASSERT_TRUE(save_rig(rig, folder / "rig"));
+    ASSERT_TRUE(write_file(folder / "poses.json", poses().dump()));
+    options.rig = folder / "rig" / "rig.json";
+    options.scene = fs::path(LIMN_SOURCE_DIR) / "config/scenes/door";
+    options.poses = folder / "poses.json";
+    options.out = folder / "out";
+  }
+  // The parts on the door where the virtual rig's worlds have them.
+  static json poses() {
+    const scene::Scene scene = sim::car_door_scene();
+    const auto places = sim::car_door_slot_places();
+    const auto part = [&](const std::string& slot) {
+      return to_json(places.at(slot) * scene.find_slot(slot)->marker_from_part);
+    };
+    return {{"world_from_prototype", to_json(Pose())},
+            {"slots",
+             {{"mirror", {{"world_from_part", part("mirror")}, {"variant", "sport"}}},
+              {"trim", {{"world_from_part", part("trim")}}}}}};
+  }
+  fs::path folder;
+  RenderOptions options;
+};
+
+TEST_F(RenderDoor, PosesPlaceEverythingAndEveryPictureIsWritten) {
+  const Status status = run_render(options);
+  ASSERT_TRUE(status) << status.message();
+  const cv::Mat light = read_picture(folder / "out/projector-projector0.png").value();
+  EXPECT_EQ(light.size(), cv::Size(800, 600));
+  EXPECT_GT(cv::countNonZero(light.reshape(1)), 1000);
+  EXPECT_GT(cv::countNonZero(read_picture(folder / "out/composite-camera0.png").value().reshape(1)), 1000);
+  const json coverage = json::parse(read_file(folder / "out/coverage.json").value());
+  ASSERT_EQ(coverage["parts"].size(), 2u);
+  for (const auto& part : coverage["parts"]) {
+    const double on = part["on_surface"], off = part["off_surface"];
+    if (part["viewer_pixels"] > 0) {
+      EXPECT_NEAR(on + off, 1, 1e-9);
+    }
+    const cv::Mat mask = read_picture(folder / "out" / part["mask"].get<std::string>()).value();
+    EXPECT_EQ(mask.size(), cv::Size(1280, 800));  // the scene's own viewer
+  }
+  const json viewer = {
+      {"world_from_viewer", to_json(looking_at({0.2, 0, 1}, {0, 0, 0}, {0, 1, 0}).inverse())},
+      {"size", {320, 200}},
+      {"fov_deg", 45}};
+  ASSERT_TRUE(write_file(folder / "viewer.json", viewer.dump()));
+  options.viewer = folder / "viewer.json";
+  ASSERT_TRUE(run_render(options));
+  EXPECT_EQ(read_picture(folder / "out/mask-mirror.png").value().size(), cv::Size(320, 200));
+}
+
+TEST_F(RenderDoor, MistakesAreErrors) {
+  const auto failed = [](const RenderOptions& wrong, bool usage, const std::string& says) {
+    const Status status = run_render(wrong);
+    ASSERT_FALSE(status) << says;
+    EXPECT_NE(status.message().find(says), std::string::npos) << status.message();
+    EXPECT_EQ(status.error().wrong_usage, usage) << status.message();
+  };
+  RenderOptions wrong = options;
+  wrong.poses.clear();
+  failed(wrong, true, "--poses");
+  wrong.frames = {"camera0"};
+  failed(wrong, true, "CAMERA=PICTURE");
+  wrong.frames = {"camera7=x.png"};
+  failed(wrong, true, "camera0");
+  wrong.frames = {"camera0=" + (folder / "nowhere.png").string()};
+  failed(wrong, false, "nowhere.png");
+  ASSERT_TRUE(write_png(folder / "grey.png", cv::Mat(600, 800, CV_8U, cv::Scalar(90))));
+  ASSERT_TRUE(write_png(folder / "small.png", cv::Mat(60, 80, CV_8U, cv::Scalar(90))));
+  wrong.frames = {"camera0=" + (folder / "small.png").string()};
+  failed(wrong, false, "800x600");
+  wrong.frames = {"camera0=" + (folder / "grey.png").string()};
+  failed(wrong, false, "marker");
+  wrong = options;
+  wrong.scene = folder / "no-scene";
+  failed(wrong, false, "no-scene");
+  wrong = options;
+  wrong.rig = folder / "no-rig";
+  failed(wrong, false, "no-rig");
+}
+
+// A box from `lower` to `upper` (mm) in a material, as OBJ; `first` counts the vertices before.
+std::string box_obj(const Vector3d& lower, const Vector3d& upper, const std::string& material, int first) {
+  std::string text = "usemtl " + material + "\n";
+  for (int k = 0; k < 8; ++k) {
+    text += "v";
+    for (int axis = 0; axis < 3; ++axis) text += fmt::format(" {}", (k >> axis & 1 ? upper : lower)[axis]);
+    text += "\n";
+  }
+  for (const auto& face :
+       {std::array{1, 3, 4, 2}, {5, 6, 8, 7}, {1, 2, 6, 5}, {3, 7, 8, 4}, {1, 5, 7, 3}, {2, 4, 8, 6}}) {
+    text +=
+        fmt::format("f {} {} {} {}\n", first + face[0], first + face[1], first + face[2], first + face[3]);
+  }
+  return text;
+}
+
+// A mirror on a stand, y up from the table, z towards the onlooker: a foot as large as the marker, a post at
+// its back, a frame with a glass.
+void write_standing_mirror(const fs::path& folder) {
+  EXPECT_TRUE(write_file(
+      folder / "mirror.mtl",
+      "newmtl shell\nKd 0.05 0.12 0.3\nnewmtl foot\nKd 0.6 0.05 0.03\nnewmtl glass\nKd 0.6 0.7 0.75\n"));
+  EXPECT_TRUE(write_file(folder / "mirror.obj", "mtllib mirror.mtl\n" +
+                                                    box_obj({-25, 0, -25}, {25, 2, 25}, "foot", 0) +
+                                                    box_obj({-5, 2, -25}, {5, 50, -15}, "shell", 8) +
+                                                    box_obj({-45, 50, -25}, {45, 100, -10}, "shell", 16) +
+                                                    box_obj({-41, 54, -11}, {41, 96, -9}, "glass", 24)));
+}
+
+// How it looks a person judged; what stays is that the foot covers the marker of the photograph, and no more.
+TEST(RenderPhotograph, StandsAMirrorOnAMarker) {
+  const auto data = test::real_data("markers/opencv");
+  if (!data) GTEST_SKIP() << "markers/opencv";
+  const fs::path folder = test::test_folder();
+  auto camera = load_imager(*data / "tutorial_camera_params.yml");
+  ASSERT_TRUE(camera) << camera.message();
+  camera->name = "camera0";
+  camera->width = 640;
+  camera->height = 480;
+  Rig rig;
+  rig.cameras = {*camera};
+  ASSERT_TRUE(save_rig(rig, folder / "rig"));
+  ASSERT_TRUE(make_folder(folder / "scene"));
+  write_standing_mirror(folder / "scene");
+  // Marker: x right, y down the paper, z into it. Part: y up from the paper, z down the paper.
+  const Pose marker_from_part(exp_rotation({-std::numbers::pi / 2, 0, 0}), {0, 0, 0});
+  json scene = {{"schema", "limn.scene/1"}, {"slots", json::array()}};
+  for (const char* id : {"40", "23"}) {
+    scene["slots"].push_back(
+        {{"name", std::string("mirror") + id},
+         {"marker", std::string("aruco_6x6_250:") + id},
+         {"size_mm", 50},
+         {"marker_from_part", to_json(marker_from_part)},
+         {"variants", {{{"name", "classic"}, {"mesh", "mirror.obj"}, {"units", "mm"}}}}});
+  }
+  ASSERT_TRUE(write_file(folder / "scene/scene.json", scene.dump()));
+  RenderOptions options;
+  options.rig = folder / "rig";
+  options.scene = folder / "scene";
+  options.frames = {"camera0=" + (*data / "singlemarkersoriginal.jpg").string()};
+  options.out = folder / "out";
+  const Status status = run_render(options);
+  ASSERT_TRUE(status) << status.message();
+  const cv::Mat mask = read_picture(folder / "out/mask-mirror40.png").value();
+  // Corners of marker 40 by opencv_singlemarkers_6x6_250.csv.
+  const std::vector<cv::Point> marker = {{359, 310}, {404, 310}, {410, 350}, {362, 350}};
+  cv::Mat inside = cv::Mat::zeros(mask.size(), CV_8U);
+  cv::fillConvexPoly(inside, marker, 255);
+  cv::erode(inside, inside, cv::Mat(), {-1, -1}, 2);
+  EXPECT_EQ(cv::countNonZero(inside & (mask == 0)), 0);
+  EXPECT_EQ(cv::countNonZero(mask.rowRange(354, 480)), 0);  // nothing below the marker's lower edge
+  const cv::Rect box = cv::boundingRect(mask);
+  EXPECT_LT(box.y, 270) << box;                       // and 100 mm up from it: some 80 px
+  EXPECT_NEAR(box.x + box.width / 2, 392, 8) << box;  // above the foot at 383, leaning out as uprights do
+}
+
+}  // namespace
+}  // namespace limn::apps
