@@ -13,20 +13,18 @@
 namespace limn::device {
 namespace {
 
-// Makes a window's context current, and what was current before at the end.
-class Current {
+// Remembers the EGL context that is current and makes it current again at the end.
+class ContextKept {
  public:
-  explicit Current(GLFWwindow* window)
+  ContextKept()
       : api_(eglQueryAPI()),
         display_(eglGetCurrentDisplay()),
         context_(eglGetCurrentContext()),
         draw_(eglGetCurrentSurface(EGL_DRAW)),
-        read_(eglGetCurrentSurface(EGL_READ)) {
-    glfwMakeContextCurrent(window);
-  }
-  Current(const Current&) = delete;
-  Current& operator=(const Current&) = delete;
-  ~Current() {
+        read_(eglGetCurrentSurface(EGL_READ)) {}
+  ContextKept(const ContextKept&) = delete;
+  ContextKept& operator=(const ContextKept&) = delete;
+  ~ContextKept() {
     glfwMakeContextCurrent(nullptr);
     if (display_ == EGL_NO_DISPLAY) return;
     eglBindAPI(api_);
@@ -38,6 +36,15 @@ class Current {
   EGLDisplay display_;
   EGLContext context_;
   EGLSurface draw_, read_;
+};
+
+// Makes a window's context current, and what was current before at the end.
+class Current {
+ public:
+  explicit Current(GLFWwindow* window) { glfwMakeContextCurrent(window); }
+
+ private:
+  ContextKept kept_;
 };
 
 std::string glfw_problem() {
@@ -118,9 +125,10 @@ Result<Window> Window::open(const std::string& title, int width, int height) {
         "window: expected a display to open it on, found none ({}). Log in to a desktop or set DISPLAY.",
         glfw_problem());
   }
+  const ContextKept kept;  // GLFW makes the new window's context current for a moment, then none
   auto impl = std::make_unique<Impl>();
-  glfwWindowHint(GLFW_CONTEXT_CREATION_API,
-                 GLFW_EGL_CONTEXT_API);  // one API for windows and headless pictures
+  // One API for windows and headless pictures.
+  glfwWindowHint(GLFW_CONTEXT_CREATION_API, GLFW_EGL_CONTEXT_API);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
