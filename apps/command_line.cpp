@@ -141,6 +141,7 @@ void add_simulate(CLI::App& app, Run& run) {
   command->add_option("--out", options->out, "folder for pictures, truth.json and the true rig")->required();
   command->add_option("--show", options->show, "PROJECTOR=PICTURE to shine; again for another projector");
   command->add_option("--variants", options->variants, "SLOT=VARIANT,… of the still life");
+  command->add_flag("--srgb", options->srgb, "bright for the eye, instead of as the world's cameras encode");
   command->callback([options, &run] { run = [options] { return finished(run_simulate(*options)); }; });
 }
 

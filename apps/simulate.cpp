@@ -167,7 +167,9 @@ Status run_simulate(const SimulateOptions& options) {
   LIMN_TRY_STATUS(make_folder(options.out));
   const scene::PosedScene parts = sim::true_poses(world, variants);
   LIMN_TRY_STATUS(write_truth(world, parts, options.out));
-  for (sim::CameraEffects& effects : world.camera_effects) effects.srgb = true;
+  if (options.srgb) {
+    for (sim::CameraEffects& effects : world.camera_effects) effects.srgb = true;
+  }
   for (std::size_t i = 0; i < world.rig.cameras.size(); ++i)
     LIMN_TRY_STATUS(shoot_camera(world, parts, static_cast<int>(i), options, shown));
   return {};
