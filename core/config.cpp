@@ -19,6 +19,7 @@ struct ConfigNode::File {
 namespace {
 
 constexpr double k_quaternion_tolerance = 1e-3;
+constexpr int k_max_depth = 100;  // our files need 8; printing and freeing deeper ones would eat the stack
 
 // What stands there, short enough for a message.
 std::string found(const Json& json) {
@@ -38,6 +39,27 @@ int edit_distance(const std::string& a, const std::string& b) {
     }
   }
   return row[b.size()];
+}
+
+// Reads JSON; `problem` gets the first key that stands twice in one object, or a nesting too deep to be
+// meant.
+Json parse(const std::string& text, std::optional<std::string>* problem) {
+  std::vector<std::set<std::string>> keys;  // of the objects around the place being read
+  const auto look = [&](int depth, Json::parse_event_t event, Json& value) {
+    if (depth > k_max_depth) {
+      if (!*problem)
+        *problem = fmt::format("expected at most {} levels of brackets, found more.", k_max_depth);
+      return false;
+    }
+    if (event == Json::parse_event_t::object_start) keys.emplace_back();
+    if (event == Json::parse_event_t::object_end) keys.pop_back();
+    if (event == Json::parse_event_t::key && !keys.back().insert(value.get<std::string>()).second &&
+        !*problem)
+      *problem =
+          fmt::format("expected each key once, found \"{}\" twice in one object.", value.get<std::string>());
+    return true;
+  };
+  return Json::parse(text, look, true, true);
 }
 
 std::string joined(const std::vector<std::string>& words) {
@@ -209,8 +231,9 @@ Result<Config> Config::load(const std::filesystem::path& path, const std::string
   LIMN_TRY(const std::string text, read_file(path));
   auto file = std::make_shared<ConfigNode::File>();
   file->path = path;
+  std::optional<std::string> unsound;
   try {
-    file->json = Json::parse(text, nullptr, true, true);
+    file->json = parse(text, &unsound);
   } catch (const Json::parse_error& problem) {
     const auto end = text.begin() + static_cast<std::ptrdiff_t>(std::min(problem.byte, text.size()));
     return error(
@@ -219,6 +242,7 @@ Result<Config> Config::load(const std::filesystem::path& path, const std::string
   } catch (const Json::exception& problem) {
     return error("{}: expected JSON (// comments allowed), found: {}.", path.string(), problem.what());
   }
+  if (unsound) return error("{}: {}", path.string(), *unsound);
   Config config;
   config.file_ = std::move(file);
   if (!config.root().is_object()) {
