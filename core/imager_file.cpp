@@ -46,6 +46,16 @@ Result<std::string> model_of_distortion(std::vector<double>* distortion, const f
   }
 }
 
+// Width or height in pixels; 0 where the file has none.
+Result<int> side_of(const cv::FileNode& node, const fs::path& path) {
+  constexpr int k_max_side = 16384;  // the largest picture side that GL 4.5 must hold
+  if (node.empty()) return 0;
+  const double side = node.isInt() || node.isReal() ? node.real() : 0;
+  if (side >= 1 && side <= k_max_side && side == std::floor(side)) return static_cast<int>(side);
+  return error("{}: {}: expected a whole number of pixels from 1 to {}.", path.string(), node.name(),
+               k_max_side);
+}
+
 Result<Imager> load_opencv(const fs::path& path, const std::string& text) {
   try {
     const cv::FileStorage file(text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
@@ -68,10 +78,9 @@ Result<Imager> load_opencv(const fs::path& path, const std::string& text) {
     values.insert(values.end(), distortion.begin(), distortion.end());
     auto lens = Lens::create(model, values);
     if (!lens) return error("{}: {}", path.string(), lens.message());
-    const cv::FileNode width = first_of({"image_width", "image_Width"});
-    const cv::FileNode height = first_of({"image_height", "image_Height"});
-    return Imager{path.stem().string(), width.empty() ? 0 : static_cast<int>(width.real()),
-                  height.empty() ? 0 : static_cast<int>(height.real()), *lens, Pose()};
+    LIMN_TRY(const int width, side_of(first_of({"image_width", "image_Width"}), path));
+    LIMN_TRY(const int height, side_of(first_of({"image_height", "image_Height"}), path));
+    return Imager{path.stem().string(), width, height, *lens, Pose()};
   } catch (const cv::Exception& problem) {
     return error("{}: expected an OpenCV camera file, found a damaged one ({}).", path.string(), problem.err);
   }

@@ -13,6 +13,8 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
+constexpr int k_max_side = 16384;  // pixels; the largest picture side that GL 4.5 must hold
+
 Imager read_imager(const ConfigNode& node) {
   node.only({"name", "size", "lens", "imager_from_world"});
   Imager imager;
@@ -23,8 +25,9 @@ Imager read_imager(const ConfigNode& node) {
     imager.width = pixels[0].integer();
     imager.height = pixels[1].integer();
   }
-  if (pixels.size() != 2 || imager.width <= 0 || imager.height <= 0) {
-    size.problem("expected [width, height] in pixels, both > 0.");
+  const auto sound = [](int side) { return side > 0 && side <= k_max_side; };
+  if (pixels.size() != 2 || !sound(imager.width) || !sound(imager.height)) {
+    size.problem(fmt::format("expected [width, height] in pixels, both from 1 to {}.", k_max_side));
   }
   const ConfigNode lens = node.at("lens");
   lens.only({"model", "values"});
@@ -80,7 +83,7 @@ Result<Rig> load_rig_json(const fs::path& path) {
   if (const auto node = root.find("covariance")) rig.covariance_json = node->json().dump();
   if (const auto node = root.find("provenance")) rig.provenance_json = node->json().dump();
   LIMN_TRY_STATUS(config.status());
-  if (fs::exists(config.folder() / "response.json")) {
+  if (std::error_code ignored; fs::exists(config.folder() / "response.json", ignored)) {
     LIMN_TRY(rig.responses, load_responses(config.folder() / "response.json"));
   }
   return rig;
@@ -129,7 +132,7 @@ Result<Rig> load_rig(const fs::path& path) {
   if (!fs::is_directory(path, ignored)) {
     return error("{}: expected a rig folder or its rig.json, found nothing. Check the name.", path.string());
   }
-  if (fs::exists(path / "rig.json")) return load_rig_json(path / "rig.json");
+  if (fs::exists(path / "rig.json", ignored)) return load_rig_json(path / "rig.json");
   return load_cameramodels(path);
 }
 
