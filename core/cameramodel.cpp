@@ -4,6 +4,7 @@ extern "C" {
 #include <mrcal/mrcal.h>
 }
 
+#include <sys/mman.h>
 #include <unistd.h>
 
 #include <cstdio>
@@ -18,6 +19,8 @@ namespace limn {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr unsigned k_max_side = 16384;  // pixels; the largest picture side that GL 4.5 must hold
 
 struct FreeModel {
   void operator()(mrcal_cameramodel_t* model) const { std::free(model); }
@@ -94,6 +97,11 @@ Result<Imager> from_mrcal(const mrcal_cameramodel_t& model, const fs::path& path
   const Pose imager_from_world(exp_rotation({rt[0], rt[1], rt[2]}), Eigen::Vector3d(rt[3], rt[4], rt[5]));
   if (!imager_from_world.is_finite())
     return error("{}: extrinsics: expected 6 finite numbers.", path.string());
+  for (const unsigned side : model.imagersize) {
+    if (side > k_max_side)
+      return error("{}: imagersize: expected at most {} pixels a side, found {}.", path.string(), k_max_side,
+                   side);
+  }
   return Imager{path.stem().string(), static_cast<int>(model.imagersize[0]),
                 static_cast<int>(model.imagersize[1]), *lens, imager_from_world};
 }
@@ -114,15 +122,15 @@ Result<Imager> load_cameramodel(const fs::path& path) {
 }
 
 Status save_cameramodel(const Imager& imager, const fs::path& path) {
-  // mrcal writes to a file by name and does not report a full disk: write aside, read back, then replace.
-  const fs::path aside =
-      fs::temp_directory_path() / fmt::format("limn-{}-{}.cameramodel", ::getpid(), imager.name);
+  // mrcal writes to a file by name and does not report a full disk: let it write to memory, then write that.
+  const int memory = ::memfd_create("limn-cameramodel", MFD_CLOEXEC);
+  const fs::path aside = fmt::format("/proc/self/fd/{}", memory);
   StderrCapture complaint;
-  const bool written = mrcal_write_cameramodel_file(aside.c_str(), to_mrcal(imager).get());
-  auto text = read_file(aside);
-  fs::remove(aside);
+  const bool written = memory >= 0 && mrcal_write_cameramodel_file(aside.c_str(), to_mrcal(imager).get());
+  const auto text = read_file(aside);
+  ::close(memory);
   if (!written || !text || text->find("imagersize") == std::string::npos) {
-    return error("{}: mrcal could not write this camera model ({}).", aside.string(), complaint.text());
+    return error("{}: mrcal could not write this camera model ({}).", path.string(), complaint.text());
   }
   return write_file(path, *text);
 }
