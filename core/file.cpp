@@ -35,7 +35,8 @@ int write_all(int fd, std::string_view content) {
 }  // namespace
 
 Result<std::string> read_file(const fs::path& path) {
-  if (fs::is_directory(path)) return error("{}: expected a file, found a folder.", path.string());
+  if (std::error_code ignored; fs::is_directory(path, ignored))
+    return error("{}: expected a file, found a folder.", path.string());
   std::ifstream in(path, std::ios::binary);
   if (!in)
     return error("{}: cannot read this file: {}. Check its name.", path.string(), std::strerror(errno));
@@ -64,7 +65,7 @@ Status make_folder(const fs::path& path) {
   std::error_code problem;
   fs::create_directories(path, problem);
   if (problem) return write_error(path, problem.value());
-  if (!fs::is_directory(path)) return error("{}: expected a folder, found a file.", path.string());
+  if (!fs::is_directory(path, problem)) return error("{}: expected a folder, found a file.", path.string());
   if (::access(path.c_str(), W_OK | X_OK) != 0) return write_error(path, errno);
   return {};
 }
