@@ -7,6 +7,15 @@ namespace {
 
 constexpr std::size_t k_queue_length = 8;  // pictures; 2 MB each at 1920x1080
 
+// An exception must not leave the thread.
+Status stored(const std::filesystem::path& path, const cv::Mat& picture) {
+  try {
+    return write_png(path, picture, {.compression = 1});
+  } catch (const std::exception& problem) {
+    return error("{}: cannot encode this picture: {}.", path.string(), problem.what());
+  }
+}
+
 }  // namespace
 
 PictureWriter::PictureWriter() : thread_([this] { run(); }) {}
@@ -46,7 +55,7 @@ void PictureWriter::run() {
     jobs_.pop_front();
     changed_.notify_all();
     lock.unlock();
-    const Status written = write_png(job.path, job.picture, {.compression = 1});
+    const Status written = stored(job.path, job.picture);
     lock.lock();
     if (!written && !failure_) failure_ = written.error();
     --unwritten_;
