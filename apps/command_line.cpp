@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <filesystem>
 #include <functional>
 #include <memory>
 
@@ -67,8 +68,11 @@ void add_detect(CLI::App& app, Run& run) {
   command->add_option("--csv", options->csv, "file to write: a row a marker");
   command->add_option("--json", options->json, "file to write: corners, poses, covariances");
   command->add_option("--draw", options->draw, "folder for pictures with the markers drawn in");
-  command->add_option("--threads", options->threads, "pictures at a time")->capture_default_str();
-  command->add_option("--repeat", options->repeat, "also time: median ms over N detections in memory");
+  command->add_option("--threads", options->threads, "pictures at a time")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  command->add_option("--repeat", options->repeat, "also time: median ms over N detections in memory")
+      ->check(CLI::Range(0, 1000000));
   command->callback([options, &run] { run = [options] { return finished(run_detect(*options)); }; });
 }
 
@@ -176,6 +180,11 @@ int run_command_line(int argc, char** argv) {
   }
   try {
     return run();
+  } catch (const std::filesystem::filesystem_error& problem) {
+    return finished(error("{}: expected a file or folder that can be looked at, found: {}. Check its name and rights.",
+                          problem.path1().string(), problem.code().message()));
+  } catch (const std::bad_alloc&) {
+    return finished(error("expected enough memory for this work, found none left. Take smaller pictures."));
   } catch (const std::exception& bug) {
     return finished(error("this is a bug in Limn, please report it: {}", bug.what()));
   }
