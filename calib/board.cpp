@@ -55,7 +55,7 @@ bool read_length(const std::string& text, double* metres) {
     if (!text.ends_with(name)) continue;
     if (!read_number(text.substr(0, text.size() - name.size()), metres)) return false;
     *metres *= factor;
-    return std::isfinite(*metres) && *metres > 0;
+    return *metres >= 1e-4 && *metres <= 10;  // nothing smaller prints, nothing larger is a board
   }
   return false;
 }
@@ -72,6 +72,10 @@ std::string default_dictionary(int markers) {
 Status read_charuco_fields(const std::string& text, const std::vector<std::string>& parts, Board* board) {
   const int markers = marker_count(*board);
   board->dictionary = parts.size() > 3 ? parts[3] : default_dictionary(markers);
+  if (board->dictionary.empty())
+    return error(
+        "board '{}': expected at most 1000 markers, the largest dictionary, found {}. Take fewer squares.",
+        text, markers);
   if (!dictionaries().contains(board->dictionary))
     return error("board '{}': expected a dictionary such as aruco_4x4_50 or aruco_5x5_250, found '{}'.", text,
                  board->dictionary);
@@ -143,8 +147,9 @@ Result<Board> Board::parse(const std::string& text) {
                  parts[1]);
   if (!read_length(parts[2], &board.square_m))
     return error(
-        "board '{}': expected the square's side with its unit (mm, cm or m), such as 25mm, found '{}'.", text,
-        parts[2]);
+        "board '{}': expected the square's side with its unit (mm, cm or m), 0.1mm to 10m, such as 25mm, "
+        "found '{}'.",
+        text, parts[2]);
   if (!charuco) {
     ++board.columns;
     ++board.rows;
