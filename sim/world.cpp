@@ -36,6 +36,13 @@ double not_negative(const ConfigNode& node) {
   return value;
 }
 
+// Not negative, and small enough that a blur of it can be worked out.
+double at_most(double most, const ConfigNode& node) {
+  const double value = not_negative(node);
+  if (value > most) node.problem(fmt::format("expected at most {}, found {}.", most, value));
+  return value;
+}
+
 // {"model": …, "values": […]}
 Lens read_lens(const ConfigNode& node) {
   node.only({"model", "values"});
@@ -62,6 +69,10 @@ Pose read_imager_pose(const ConfigNode& node) {
 Imager read_imager(const ConfigNode& node) {
   Imager imager;
   imager.name = node.at("name").text();
+  if (imager.name.empty() || imager.name.starts_with('.') || imager.name.find('/') != std::string::npos)
+    node.at("name").problem(fmt::format(
+        "expected a name without slashes or a dot in front (files are named after it), found '{}'.",
+        imager.name));
   const ConfigNode size = node.at("size");
   std::vector<double> sides = size.numbers(2);
   sides.resize(2, 1);
@@ -78,7 +89,7 @@ CameraEffects read_camera_effects(const ConfigNode& node) {
   CameraEffects effects;
   effects.exposure = node.at("exposure").positive();
   if (const auto v = node.find("colour")) effects.colour = v->boolean();
-  if (const auto v = node.find("psf_px")) effects.psf_px = not_negative(*v);
+  if (const auto v = node.find("psf_px")) effects.psf_px = at_most(100, *v);
   if (const auto v = node.find("vignetting")) effects.vignetting = share(*v);
   if (const auto v = node.find("full_well_e")) effects.full_well_e = not_negative(*v);
   if (const auto v = node.find("read_noise")) effects.read_noise = not_negative(*v);
@@ -90,7 +101,7 @@ CameraEffects read_camera_effects(const ConfigNode& node) {
 void read_defocus(const ConfigNode& node, ProjectorEffects* effects) {
   node.only({"focus_m", "aperture_m"});
   effects->focus_m = node.at("focus_m").positive();
-  effects->aperture_m = not_negative(node.at("aperture_m"));
+  effects->aperture_m = at_most(1, node.at("aperture_m"));
 }
 
 ProjectorEffects read_projector_effects(const ConfigNode& node) {
@@ -207,7 +218,7 @@ Object read_object(const ConfigNode& node, const Pose& world_from_prototype) {
 
 MarkerPaper read_paper(const ConfigNode& node) {
   node.only({"white", "black", "margin"});
-  return {share(node.at("white")), share(node.at("black")), not_negative(node.at("margin"))};
+  return {share(node.at("white")), share(node.at("black")), share(node.at("margin"))};
 }
 
 // Where a slot's marker stands: on the prototype, or somewhere in the world.
