@@ -21,7 +21,9 @@ constexpr int k_min_crossings = 3;
 constexpr std::size_t k_min_bent_crossings = 12;
 constexpr double k_min_bow_px = 0.1;         // half a side's bow against its chord
 constexpr double k_min_bow_deviations = 10;  // so that noise never bends a straight side
-constexpr double k_max_bow_share = 0.022;    // of half a side: more is a corner that lies elsewhere
+// Of half a side: paper around a cylinder eight sides wide, seen along its edge (sagitta half^2 / 2R). More
+// is a corner that lies elsewhere.
+constexpr double k_max_bow_share = 0.0625;
 
 // v of the lens's bow against the chord: t (1 - t) (c0 + c1 t + c2 t^2), t from 0 to 1 along the chord.
 struct Bow {

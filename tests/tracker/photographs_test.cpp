@@ -48,9 +48,17 @@ std::vector<Detection> detections_in(const std::filesystem::path& picture,
   const auto folder##_data = test::real_data("markers/" #folder); \
   if (!folder##_data) GTEST_SKIP() << "no photographs: markers/" #folder
 
-// Every listed marker, once, in its corner order, near its whole-pixel corners; nothing else. 1.5 px, but for
-// one corner of 316 on paper that is not flat (1.53 px).
-constexpr double k_corner_px = 1.55;
+// Every listed marker, once, in its corner order, within 1.5 px of its whole-pixel corners; nothing else.
+constexpr double k_corner_px = 1.5;
+
+// One listed corner of 284, (418, 139), lies 1.8 px inside the marker. The picture's levels say where it is:
+// half of black to white is crossed at y = 137.4 in column 419 (above) and x = 418.0 in row 139 (left,
+// sloping by -0.38 px a row).
+bool is_misplaced_in_list(const Listed& row, std::size_t corner) {
+  return row.file == "gboriginal.png" && row.id == "9" && corner == 0;
+}
+const Eigen::Vector2d k_corner_in_picture(418.6, 137.35);
+
 void expect_listed(const std::filesystem::path& folder, const std::string& csv, const std::string& family) {
   const auto list = read_list(folder / csv);
   ASSERT_FALSE(list.empty());
@@ -61,8 +69,12 @@ void expect_listed(const std::filesystem::path& folder, const std::string& csv, 
         std::find_if(found.begin(), found.end(), [&](const Detection& d) { return d.marker.id == row.id; });
     ASSERT_NE(hit, found.end()) << row.file << ": marker " << row.id << " is missing";
     for (std::size_t k = 0; k < 4; ++k)
-      EXPECT_TRUE(test::near(hit->corners_px[k], row.corners[k], k_corner_px))
-          << row.file << ": marker " << row.id;
+      if (is_misplaced_in_list(row, k)) {
+        EXPECT_TRUE(test::near(hit->corners_px[k], k_corner_in_picture, 0.3));
+      } else {
+        EXPECT_TRUE(test::near(hit->corners_px[k], row.corners[k], k_corner_px))
+            << row.file << ": marker " << row.id;
+      }
   }
 }
 
@@ -144,7 +156,7 @@ TEST(Photographs, ShowHiroAtItsDistance) {
   const auto poses = marker_poses(camera->lens, 0.08, found[0].corners_px, found[0].corner_covariance);
   ASSERT_FALSE(poses.empty());
   // No bound on rms_px: at this file's focal length the wrinkled paper is no square (2.5 px with even
-  // weights).
+  // weights). The file is read as ARToolKit reads version 1: x0, y0, f, s; (p - c) s (1 - f 1e-8 r^2).
   EXPECT_GT(poses[0].camera_from_marker.translation.z(), 0.15);
   EXPECT_LT(poses[0].camera_from_marker.translation.z(), 0.5);
 }
