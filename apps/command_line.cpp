@@ -65,6 +65,8 @@ void add_detect(CLI::App& app, Run& run) {
   command->add_option("--size-mm", options->size_mm, "side of the black square; with --camera gives poses");
   command->add_option("--pose", options->pose, "ippe, or triangle (the method of the 2011 paper)")
       ->capture_default_str();
+  command->add_option("--encoding", options->encoding, "grey levels: linear in light, or srgb (webcams, photographs)")
+      ->capture_default_str();
   command->add_option("--csv", options->csv, "file to write: a row a marker");
   command->add_option("--json", options->json, "file to write: corners, poses, covariances");
   command->add_option("--draw", options->draw, "folder for pictures with the markers drawn in");

@@ -256,8 +256,10 @@ void detect_all(const DetectOptions& options,
   std::atomic<int> done = 0;
   std::mutex progress_mutex;
   Progress progress("detect", count);
+  tracker::DetectorOptions detector_options;
+  if (options.encoding == "srgb") detector_options.encoding = tracker::Encoding::srgb;
   const auto work = [&] {
-    tracker::Detector detector(families);
+    tracker::Detector detector(families, detector_options);
     for (int i = next++; i < count; i = next++) {
       Outcome& outcome = (*outcomes)[static_cast<std::size_t>(i)];
       const Status status = detect_in(options, camera, detector, &outcome);
@@ -276,6 +278,8 @@ Status checked(const DetectOptions& options) {
   if (options.images.empty()) return usage_error("limn detect: expected pictures, found none.");
   if (options.pose != "ippe" && options.pose != "triangle")
     return usage_error("--pose: expected ippe or triangle, found '{}'.", options.pose);
+  if (options.encoding != "linear" && options.encoding != "srgb")
+    return usage_error("--encoding: expected linear or srgb, found '{}'.", options.encoding);
   if (!std::isfinite(options.size_mm) || options.size_mm < 0)
     return usage_error("--size-mm: expected millimetres (> 0), found {}.", options.size_mm);
   if (options.size_mm > 0 && options.camera.empty())

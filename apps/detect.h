@@ -16,6 +16,8 @@ struct DetectOptions {
   std::filesystem::path camera;  ///< anything load_imager reads; empty: no lens, no poses
   double size_mm = 0;            ///< side of the black square; poses need it and the camera
   std::string pose = "ippe";     ///< ippe: both planar branches, refined; triangle: the 2011 paper's method
+  /// linear: grey levels are proportional to light; srgb: webcams, photographs.
+  std::string encoding = "linear";
   std::filesystem::path csv, json, draw;  ///< what to write; empty: nothing. `draw` is a folder
   int threads = 1;                        ///< pictures worked on at a time; with `repeat` always one
   int repeat = 0;  ///< N: also the median time of N detections of the picture in memory

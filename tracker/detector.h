@@ -18,6 +18,8 @@ struct DetectorOptions {
   int min_contrast = 16;
   /// Smallest side, as CandidateOptions.
   double min_side_px = 6;
+  /// How the camera writes light. Wrong, markers shrink, the more the softer their edges.
+  Encoding encoding = Encoding::linear;
 };
 
 /// Finds markers: grey -> local threshold -> boundaries of black regions -> quadrilaterals -> sub-pixel edge
@@ -25,7 +27,7 @@ struct DetectorOptions {
 class Detector {
  public:
   explicit Detector(Families families, DetectorOptions options = {})
-      : families_(std::move(families)), options_(options) {}
+      : families_(std::move(families)), options_(options), refiner_(options.encoding) {}
 
   /// `grey` is 8-bit, one channel, the camera's raw picture; an empty one has no markers. With `lens` sides
   /// are straight in undistorted directions, without one in the picture. Corners are raw pixels either way.

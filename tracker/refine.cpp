@@ -63,7 +63,19 @@ Bow bow_of(const Lens& lens, const Eigen::Vector2d& from, const Eigen::Vector2d&
   return bow;
 }
 
+// IEC 61966-2-1.
+double linear_of_srgb(double encoded) {
+  return encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
+}
+
 }  // namespace
+
+EdgeRefiner::EdgeRefiner(Encoding encoding) {
+  for (std::size_t level = 0; level < light_.size(); ++level) {
+    const double value = static_cast<double>(level);
+    light_[level] = encoding == Encoding::linear ? value : 255 * linear_of_srgb(value / 255);
+  }
+}
 
 // Crossings of one side. First the gradient profile averaged along the side says how wide the edge is (blur,
 // thin margins), then every row's centroid is taken over that window alone.
@@ -111,7 +123,7 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
     const std::uint8_t* pixel = line->flat ? grey.ptr(centre) + u : grey.ptr(u) + centre;
     for (int k = 0; k < 2 * reach; ++k) {
       const std::ptrdiff_t at = (k - reach) * v_stride;
-      const double difference = static_cast<double>(pixel[at]) - static_cast<double>(pixel[at + v_stride]);
+      const double difference = light_[pixel[at]] - light_[pixel[at + v_stride]];
       gradients_.push_back(difference);
       mean[static_cast<std::size_t>(k)] += difference;
     }
@@ -139,14 +151,15 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   while (high < profile && mean[high] > flat_below &&
          !(mean[high - 1] < valley_below && mean[high] > mean[high - 1]))
     ++high;
-  double contrast = 0;
+  double contrast = 0;  // in light
   for (std::size_t k = low; k < high; ++k) contrast += mean[k];
   contrast /= static_cast<double>(crossings_.size());
-  if (contrast < min_contrast) return false;
+  if (!(contrast > 0)) return false;
 
   // Rows beside a corner see the other edge as far as the blur reaches.
   const double blur_trim = std::min(0.2 * (u_high - u_low), 0.5 * static_cast<double>(high - low) + 0.5);
-  double inside_sum = 0;
+  double inside_sum = 0;  // in grey levels, as all that is no position
+  double outside_sum = 0;
   std::size_t kept = 0;
   for (std::size_t i = 0; i < crossings_.size(); ++i) {
     const Crossing& row = crossings_[i];
@@ -164,13 +177,14 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
     const std::uint8_t* pixel = line->flat ? grey.ptr(static_cast<int>(row.v)) + static_cast<int>(row.u)
                                            : grey.ptr(static_cast<int>(row.u)) + static_cast<int>(row.v);
     inside_sum += pixel[(static_cast<std::ptrdiff_t>(high) - reach) * v_stride];
+    outside_sum += pixel[(static_cast<std::ptrdiff_t>(low) - reach) * v_stride];
     crossings_[kept++] = {row.u, v - bow.at(row.u), std::min(1.0, share * share)};
   }
   crossings_.resize(kept);
   if (static_cast<int>(kept) < k_min_crossings) return false;
   line->inside_level = inside_sum / static_cast<double>(kept);
-  line->outside_level = line->inside_level + contrast;
-  return fit_line(line);
+  line->outside_level = outside_sum / static_cast<double>(kept);
+  return line->outside_level - line->inside_level >= min_contrast && fit_line(line);
 }
 
 // Straight, or bent where that explains the crossings much better: a bow of a tenth of a pixel or more, ten

@@ -11,6 +11,12 @@
 
 namespace limn::tracker {
 
+/// What a grey level says about light.
+enum class Encoding {
+  linear,  ///< proportional to it: machine-vision cameras
+  srgb     ///< the sRGB curve: webcams, photographs
+};
+
 /// A quad whose corners are the intersections of its sub-pixel edge lines.
 struct RefinedQuad {
   std::array<Eigen::Vector2d, 4> corners_px;
@@ -28,6 +34,10 @@ struct RefinedQuad {
 /// between calls.
 class EdgeRefiner {
  public:
+  /// Centroids are taken in linear light: a pixel half covered by ink is no middle level of an encoded
+  /// picture.
+  explicit EdgeRefiner(Encoding encoding = Encoding::linear);
+
   /// nullopt when a side shows no edge from light outside to dark inside of at least `min_contrast` levels.
   std::optional<RefinedQuad> refine(const cv::Mat& grey,
                                     const Quad& quad,
@@ -39,6 +49,7 @@ class EdgeRefiner {
     double u, v;    // v(u) across the side's main axis
     double weight;  // relative, from contrast
   };
+  std::array<double, 256> light_;  // of a grey level, 0 ... 255
   std::vector<Crossing> crossings_;
   std::vector<double> gradients_;   // of all rows, reach_ * 2 each
   std::vector<double> deviations_;  // scratch of the robust scale

@@ -35,7 +35,19 @@ struct Sweep {
   bool spin = true;
   Lens lens = pinhole_vga();
   bool give_lens = false;
+  bool srgb_picture = false;
+  Encoding encoding = Encoding::linear;
 };
+
+// Of linear levels (0 ... 255).
+cv::Mat srgb_encoded(cv::Mat grey) {
+  for (int i = 0; i < grey.rows * grey.cols; ++i) {
+    const double light = grey.data[i] / 255.0;
+    const double encoded = light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
+    grey.data[i] = static_cast<std::uint8_t>(std::lround(255 * encoded));
+  }
+  return grey;
+}
 
 struct SweepResult {
   int markers = 0, found = 0, wrong = 0, corners = 0;
@@ -47,7 +59,9 @@ struct SweepResult {
 
 SweepResult swept(const Sweep& sweep, int count) {
   auto rng = test::test_rng();
-  Detector detector(families({"apriltag_36h11", "aruco_4x4_50"}));
+  DetectorOptions options;
+  options.encoding = sweep.encoding;
+  Detector detector(families({"apriltag_36h11", "aruco_4x4_50"}), options);
   SweepResult result;
   double squares = 0;
   for (int i = 0; i < count; ++i) {
@@ -56,8 +70,9 @@ SweepResult swept(const Sweep& sweep, int count) {
         test::placed(sweep.lens, name, {uniform(rng, 120, 520), uniform(rng, 120, 360)},
                      uniform(rng, sweep.low_px, sweep.high_px), sweep.spin ? uniform(rng, 0, 6.28) : 0,
                      uniform(rng, 0, sweep.max_tilt), uniform(rng, 0, 6.28));
-    const cv::Mat grey =
+    cv::Mat grey =
         test::picture_of(sweep.lens, test::plain(640, 480, 100), std::vector{marker}, sweep.picture, rng);
+    if (sweep.srgb_picture) grey = srgb_encoded(grey);
     const auto truth = test::true_corners(sweep.lens, marker);
     ++result.markers;
     for (const Detection& found : detector.detect(grey, sweep.give_lens ? &sweep.lens : nullptr)) {
@@ -104,6 +119,19 @@ TEST(Detector, HasNoBiasWhereSidesRunAlongThePixels) {
   EXPECT_LT(r.rms_px, 0.08);
   EXPECT_LT(r.mean.norm(), 0.015);
   EXPECT_LT(std::abs(r.outward), 0.015);
+}
+
+TEST(Detector, HasNoBiasInPicturesOfAnSrgbCameraWhenToldSo) {
+  Sweep sweep{48, 120, 45_deg, {}};
+  sweep.picture.blur_px = 0.7;
+  sweep.picture.noise_levels = 1;
+  sweep.srgb_picture = true;
+  const SweepResult untold = swept(sweep, 40);
+  sweep.encoding = Encoding::srgb;
+  const SweepResult told = swept(sweep, 40);
+  EXPECT_EQ(told.found, told.markers);
+  EXPECT_LT(std::abs(told.outward), 0.012);
+  EXPECT_LT(untold.outward, -0.05);
 }
 
 TEST(Detector, FindsSmallMarkers) {
