@@ -45,6 +45,23 @@ TEST_F(ConfigFile, AProblemKnowsItsPath) {
   EXPECT_SAYS(message(text, read), "file.json: projectors[0].lens.fx: expected a number > 0, found -1.");
 }
 
+TEST_F(ConfigFile, AKeyThatStandsTwiceIsAProblem) {
+  const auto nothing = [](const ConfigNode&) {};
+  EXPECT_SAYS(message(R"({"schema": "limn.test/1", "a": {"b": 1, "c": 2, "b": 3}})", nothing),
+              "file.json: expected each key once, found \"b\" twice in one object.");
+  EXPECT_EQ(message(R"({"schema": "limn.test/1", "a": {"b": 1}, "c": [{"b": 1}, {"b": 2}]})", nothing), "");
+}
+
+TEST_F(ConfigFile, ANestingTooDeepIsAProblem) {
+  const std::string text = R"({"schema": "limn.test/1", "a": )";
+  for (const int levels : {200, 1000000}) {
+    const std::string nested = std::string(static_cast<std::size_t>(levels), '[') +
+                               std::string(static_cast<std::size_t>(levels), ']');
+    EXPECT_SAYS(message(text + nested + "}", [](const ConfigNode& root) { root.at("a").number(); }),
+                "expected at most 100 levels");
+  }
+}
+
 TEST_F(ConfigFile, TheFirstProblemIsKept) {
   const std::string text = R"({"schema": "limn.test/1", "a": "x", "b": "y"})";
   EXPECT_SAYS(message(text,
