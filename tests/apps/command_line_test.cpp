@@ -216,5 +216,100 @@ TEST_F(CommandLine, AnEmptyOrForeignCapturesFolderIsNamed) {
   EXPECT_FALSE(fs::exists(folder_ / "rig"));
 }
 
+TEST_F(CommandLine, AbsurdNumbersAreWrongUsage) {
+  expect({"detect", "a.png", "--repeat", "-1"}, 2, {"--repeat"});
+  expect({"detect", "a.png", "--threads", "0"}, 2, {"--threads"});
+  expect({"detect", "a.png", "--size-mm", "nan"}, 2, {"--size-mm"});
+  expect({"patterns", "--projector", "99999x99999", "--out", path("p")}, 2, {"16384"});
+  for (const char* board : {"charuco:1000x1000:1mm", "charuco:100x100:1mm", "charuco:5x4:1e300m",
+                            "chessboard:5x4:0mm", "chessboard:5x4:nanmm"})
+    expect({"markers", "--board", board, "--out", path("b.pdf")}, 2, {board, "expected"});
+  for (const char* ids : {"5-1", "0-999999", "0-99999999999", "-1", ",,"})
+    expect({"markers", "--ids", ids, "--out", path("b.pdf")}, 2, {"--ids"});
+  EXPECT_FALSE(fs::exists(folder_ / "b.pdf"));
+}
+
+TEST_F(CommandLine, PathsThatCannotBeLookedAtAreNoBugs) {
+  const std::string longest(5000, 'x');
+  expect({"detect", longest}, 1, {"File name too long"});
+  expect({"simulate", longest, "--out", path("s")}, 1, {"File name too long"});
+  expect({"solve", longest, "--out", path("rig")}, 1, {"File name too long"});
+}
+
+TEST_F(CommandLine, CamerasOfImpossibleSizeAreNamed) {
+  write_rig();
+  cv::Mat grey(480, 640, CV_8U, cv::Scalar(128));
+  ASSERT_TRUE(write_png(folder_ / "a.png", grey));
+  std::string model = read_file(folder_ / "rig/camera0.cameramodel").value();
+  model.replace(model.find("640"), 3, "99999999999");
+  write("huge.cameramodel", model);
+  expect({"detect", path("a.png"), "--camera", path("huge.cameramodel"), "--size-mm", "40"}, 1,
+         {"huge.cameramodel: imagersize", "16384"});
+  for (const char* width : {"-640", "foo", "1e30", "0.5"}) {
+    write("a.yml", std::string("%YAML:1.0\n---\nimage_width: ") + width +
+                       "\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: "
+                       "d\n   data: [ 600., 0., 320., 0., 600., 240., 0., 0., 1. ]\n");
+    expect({"detect", path("a.png"), "--camera", path("a.yml"), "--size-mm", "40"}, 1,
+           {"a.yml: image_width"});
+  }
+}
+
+TEST_F(CommandLine, NamesInAWorldCannotLeaveTheOutputFolder) {
+  for (const char* name : {"../x", "", "..", "a/b"}) {
+    write("world.json", nlohmann::json{{"schema", "limn.world/1"}, {"cameras", {{{"name", name}}}}}.dump());
+    expect({"simulate", path("world.json"), "--out", path("s")}, 1, {"cameras[0].name", "without slashes"});
+  }
+}
+
+// Every value of a rig and a scene replaced by something else: each time a message or a success, never an
+// exception. The output folder cannot be made, so that what loads goes no further.
+TEST_F(CommandLine, ConfigsWithAnyValueSpoiledNeverCrash) {
+  using Json = nlohmann::json;
+  write_rig();
+  write("poses.json", "{}");
+  write("taken", "");
+  Json nested = 1;
+  for (int level = 0; level < 200; ++level) nested = Json::array({nested});
+  const std::vector<Json> wrong = {nullptr,
+                                   true,
+                                   "",
+                                   "x",
+                                   "../../x",
+                                   -1,
+                                   0,
+                                   0.5,
+                                   1e18,
+                                   -1e308,
+                                   Json::array(),
+                                   Json::object(),
+                                   Json{1, 2},
+                                   Json{{"a", 1}},
+                                   nested,
+                                   std::string(5000, 'a')};
+  const std::vector<std::pair<std::string, Json>> files = {
+      {"scene/scene.json", scene()},
+      {"rig/rig.json", Json::parse(read_file(folder_ / "rig/rig.json").value())}};
+  write("scene/scene.json", scene().dump());
+  for (const auto& [name, whole] : files) {
+    const Json leaves = whole.flatten();  // by JSON pointer
+    for (const auto& [pointer, value] : leaves.items()) {
+      for (Json::json_pointer place(pointer); !place.empty(); place = place.parent_pointer()) {
+        for (const Json& bad : wrong) {
+          Json spoiled = whole;
+          spoiled[place] = bad;
+          write(name, spoiled.dump());
+          const Outcome outcome = run({"render", "--rig", path("rig"), "--scene", path("scene"), "--poses",
+                                       path("poses.json"), "--out", path("taken/out")});
+          ASSERT_TRUE(outcome.code == 1 || outcome.code == 2)
+              << outcome.code << name << place.to_string() << " " << bad.dump().substr(0, 80);
+          ASSERT_EQ(outcome.err.find("bug in Limn"), std::string::npos)
+              << name << place.to_string() << " " << bad.dump().substr(0, 80) << outcome.err;
+        }
+      }
+    }
+    write(name, whole.dump());
+  }
+}
+
 }  // namespace
 }  // namespace limn::apps
