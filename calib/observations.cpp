@@ -3,12 +3,15 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <thread>
 
 #include "core/file.h"
 #include "core/frame.h"
@@ -24,9 +27,10 @@ constexpr int k_cells = 2;          // to a square's side, as interfaces.md's he
 constexpr double k_inset_px = 2;    // from a square's edge: pixels across it see the light of one side only
 constexpr double k_inset = 0.06;    // of a square, likewise
 constexpr int k_least_pixels = 12;  // in a cell: three times a plane's unknowns and some
-constexpr double k_least_share = 0.2;  // of a cell's pixels with a label; fewer are a glint or a dark square
-constexpr double k_outlier_px = 3;     // from the cell's plane
-constexpr double k_bright = 0.75;      // of the cell's bright pixels; halfway between ink and paper is 0.5
+constexpr double k_least_share =
+    0.5;  // of a cell's pixels with a label; fewer are a chance selection, and biased
+constexpr double k_outlier_px = 3;  // from the cell's plane
+constexpr double k_bright = 0.75;   // of the cell's bright pixels; halfway between ink and paper is 0.5
 constexpr double k_stddev_floor_px = 0.02;
 
 // Pixel of every grid point (column, row of squares' corners, rim included) that corners nearby tell.
@@ -195,16 +199,17 @@ double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-Status observe_pose(
-    const Captures& captures, int pose, int camera, const DecodeOptions& options, Observed* into) {
+// What one camera saw of one pose.
+Result<Observed> observe_pose(const Captures& captures, int pose, int camera, const DecodeOptions& options) {
   const auto at_pose = static_cast<size_t>(pose), at_camera = static_cast<size_t>(camera);
+  Observed seen;
   const double started = now();
   LIMN_TRY(const cv::Mat lit, lit_picture(captures, at_pose, at_camera));
   const std::vector<BoardCorner> corners = find_board(captures.board, lit);
-  into->seconds_board += now() - started;
-  if (corners.empty()) return {};
+  seen.seconds_board = now() - started;
+  if (corners.empty()) return seen;
   for (const BoardCorner& corner : corners)
-    into->observations.corners.push_back({camera, pose, corner.id, corner.px, corner.stddev_px});
+    seen.observations.corners.push_back({camera, pose, corner.id, corner.px, corner.stddev_px});
   const double decoding = now();
   for (size_t p = 0; p < captures.projectors.size(); ++p) {
     const CapturedDevice& device = captures.cameras[at_camera];
@@ -212,16 +217,25 @@ Status observe_pose(
              decode(captures.patterns[p], captures.poses[at_pose].pictures[p][at_camera], device.width,
                     device.height, options));
     const int projector = static_cast<int>(p);
-    into->decoded.push_back({camera, projector, pose, decoded.lit, decoded.decoded, decoded.outliers});
+    seen.decoded.push_back({camera, projector, pose, decoded.lit, decoded.decoded, decoded.outliers});
     for (Match match : matches_on_board(captures.board, corners, decoded)) {
       match.camera = camera;
       match.projector = projector;
       match.pose = pose;
-      into->observations.matches.push_back(match);
+      seen.observations.matches.push_back(match);
     }
   }
-  into->seconds_decode += now() - decoding;
-  return {};
+  seen.seconds_decode = now() - decoding;
+  return seen;
+}
+
+void append(const Observed& seen, Observed* all) {
+  const auto put = [](const auto& from, auto* to) { to->insert(to->end(), from.begin(), from.end()); };
+  put(seen.observations.corners, &all->observations.corners);
+  put(seen.observations.matches, &all->observations.matches);
+  put(seen.decoded, &all->decoded);
+  all->seconds_board += seen.seconds_board;
+  all->seconds_decode += seen.seconds_decode;
 }
 
 }  // namespace
@@ -231,15 +245,29 @@ Result<Observed> observe(const Captures& captures, const DecodeOptions& options)
   observed.observations.board = captures.board;
   observed.observations.cameras = captures.cameras;
   observed.observations.projectors = captures.projectors;
-  const int poses = static_cast<int>(captures.poses.size()),
-            cameras = static_cast<int>(captures.cameras.size());
-  Progress progress("decode", poses * cameras);
-  for (int pose = 0; pose < poses; ++pose) {
-    observed.observations.poses.push_back(captures.poses[static_cast<size_t>(pose)].name);
-    for (int camera = 0; camera < cameras; ++camera) {
-      LIMN_TRY_STATUS(observe_pose(captures, pose, camera, options, &observed));
-      progress.step(pose * cameras + camera + 1);
+  for (const CapturedPose& pose : captures.poses) observed.observations.poses.push_back(pose.name);
+  const int cameras = static_cast<int>(captures.cameras.size());
+  const int count = static_cast<int>(captures.poses.size()) * cameras;
+  // Each camera and pose on its own, on as many threads as there are cores; put together in their order.
+  std::vector<std::optional<Result<Observed>>> parts(static_cast<size_t>(count));
+  Progress progress("decode", count);
+  std::atomic<int> next = 0;
+  std::mutex telling;
+  int done = 0;
+  const auto work = [&] {
+    for (int i = next++; i < count; i = next++) {
+      parts[static_cast<size_t>(i)] = observe_pose(captures, i / cameras, i % cameras, options);
+      const std::lock_guard lock(telling);
+      progress.step(++done);
     }
+  };
+  std::vector<std::thread> threads;
+  for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i) threads.emplace_back(work);
+  work();
+  for (std::thread& thread : threads) thread.join();
+  for (const auto& part : parts) {
+    LIMN_TRY_STATUS(part->ok() ? Status() : Status(part->error()));
+    append(**part, &observed);
   }
   return observed;
 }

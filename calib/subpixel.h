@@ -1,0 +1,33 @@
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+namespace limn::calib {
+
+/// One axis of Gray code as a camera saw it.
+struct AxisReading {
+  int size = 0;  ///< projector pixels along the axis
+  /// CV_16S, picture minus inverse, levels; most significant bit first.
+  std::vector<cv::Mat> differences;
+  int bits() const { return static_cast<int>(differences.size()); }
+  /// Of the bit whose reading changes between label `edge` - 1 and label `edge`.
+  const cv::Mat& at_edge(int edge) const;
+};
+
+/// What the bits of each pixel say: the projector pixels [low, end) by the signs of its sure bits, and its
+/// coordinate on this axis with a variance. CV_32S, CV_32S, CV_32F, CV_32F; low = end where nothing is known,
+/// NaN likewise.
+struct AxisLabels {
+  cv::Mat low, end, px, variance;
+  AxisLabels(int rows, int cols);
+};
+
+/// Coordinates between whole pixels: where a bit's picture and inverse cross between two camera pixels of
+/// neighbouring labels, the camera looks at the edge between those labels, whatever the blur, the global
+/// light and the surface's colour. Along rows and along columns, pixels between two such places get what
+/// lies between; the two answers are averaged by their variances. Pixels between no two edges keep what they
+/// have. `noise`: of one intensity, levels, standard deviation; `floor_px`: what remains besides noise.
+void refine_between_edges(const AxisReading& reading, double noise, double floor_px, AxisLabels* labels);
+
+}  // namespace limn::calib
