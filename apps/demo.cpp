@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <thread>
 
 #include "apps/capture.h"
@@ -403,8 +404,8 @@ Status write_results(const fs::path& out,
   return write_demo_page(page, out / "demo.html");
 }
 
-Status show_window(const std::vector<DemoPicture>& pictures) {
-  LIMN_TRY(device::Window window, device::Window::open("Limn demo", 1280, 720));
+// One picture after the other; space shows the next at once, Escape ends.
+void show_in(device::Window& window, const std::vector<DemoPicture>& pictures) {
   constexpr double k_seconds_each = 4;
   auto shown_at = std::chrono::steady_clock::time_point();
   for (std::size_t i = 0; window.is_open();) {
@@ -415,7 +416,6 @@ Status show_window(const std::vector<DemoPicture>& pictures) {
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(15));
   }
-  return {};
 }
 
 }  // namespace
@@ -423,6 +423,10 @@ Status show_window(const std::vector<DemoPicture>& pictures) {
 Status run_demo(const DemoOptions& options) {
   LIMN_TRY_STATUS(make_folder(options.out));
   LIMN_TRY(device::GlContext gl, device::GlContext::create());
+  std::optional<device::Window> window;  // first, so that a missing display is told at once
+  if (options.window) {
+    LIMN_TRY(window, device::Window::open("Limn demo", 1280, 720));
+  }
   LIMN_TRY(sim::World world,
            sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture));
   sim::VirtualRig room(std::move(world));
@@ -447,7 +451,7 @@ Status run_demo(const DemoOptions& options) {
   measured.seconds = stages.seconds();
   LIMN_TRY_STATUS(write_results(options.out, measured, pictures));
   fmt::print("{}\n{}\n", text_table(rows_of(measured)), (options.out / "demo.html").string());
-  if (options.window) return show_window(pictures);
+  if (window) show_in(*window, pictures);
   return {};
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <mutex>
@@ -150,10 +151,18 @@ cv::Mat drawn(const cv::Mat& grey, const Outcome& outcome, const Lens* lens, dou
 
 // ---- results ----
 
+// A number where the family counts its markers, the file's name for templates.
+nlohmann::json id_json(const std::string& id) {
+  int number = 0;
+  const auto [end, problem] = std::from_chars(id.data(), id.data() + id.size(), number);
+  if (problem == std::errc() && end == id.data() + id.size()) return number;
+  return id;
+}
+
 nlohmann::json json_of(const Marker& marker) {
   nlohmann::json node;
   node["family"] = marker.detection.marker.family;
-  node["id"] = marker.detection.marker.id;
+  node["id"] = id_json(marker.detection.marker.id);
   node["score"] = marker.detection.score;
   for (std::size_t i = 0; i < 4; ++i) {
     const auto& px = marker.detection.corners_px[i];

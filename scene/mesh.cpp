@@ -8,7 +8,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <assimp/DefaultLogger.hpp>
 #include <assimp/Importer.hpp>
+#include <assimp/LogStream.hpp>
 #include <cctype>
 #include <cmath>
 #include <map>
@@ -256,6 +258,31 @@ Status known_format(const fs::path& path) {
       path.string(), format);
 }
 
+// What assimp warns of while this lives: it drops triangles with a warning and calls the rest a success. One
+// thread at a time, for its logger is global.
+class Complaints {
+ public:
+  Complaints() {
+    Assimp::DefaultLogger::create(nullptr, Assimp::Logger::NORMAL, 0);
+    Assimp::DefaultLogger::get()->attachStream(&stream_, k_severities);
+  }
+  ~Complaints() {
+    Assimp::DefaultLogger::get()->detachStream(&stream_, k_severities);
+    Assimp::DefaultLogger::kill();
+  }
+  Complaints(const Complaints&) = delete;
+  Complaints& operator=(const Complaints&) = delete;
+  const std::string& text() const { return stream_.text; }
+
+ private:
+  static constexpr unsigned k_severities = Assimp::Logger::Err | Assimp::Logger::Warn;
+  struct Stream : Assimp::LogStream {
+    void write(const char* message) override { text += message; }
+    std::string text;
+  };
+  Stream stream_;
+};
+
 }  // namespace
 
 Result<double> metres_per_unit(const std::string& units) {
@@ -279,8 +306,14 @@ Result<Mesh> load_mesh(const fs::path& path, const std::string& units) {
   }
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
+  Complaints complaints;
   const aiScene* scene = importer.ReadFile(
       path.string(), aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_ValidateDataStructure);
+  if (complaints.text().find("out-of-range indices") != std::string::npos) {
+    return error(
+        "{}: expected triangles of the mesh's own vertices, found indices beyond them. Export it again.",
+        path.string());
+  }
   const std::string problem = importer.GetErrorString();
   const bool without_faces =
       problem.find("no faces") != std::string::npos ||

@@ -188,6 +188,29 @@ TEST(Mesh, ObjAndPlyLoadWithNormalsMade) {
   EXPECT_NEAR(ply->normals[3].z(), 1, 1e-6);
 }
 
+// Two triangles over three vertices; the second one's last index is `last`.
+std::string indexed_gltf(std::uint16_t last) {
+  const float corners[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  const std::uint16_t indices[] = {0, 1, 2, 2, 1, last};
+  const std::string buffer = std::string(reinterpret_cast<const char*>(corners), sizeof(corners)) +
+                             std::string(reinterpret_cast<const char*>(indices), sizeof(indices));
+  return R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},
+{"bufferView":1,"componentType":5123,"count":6,"type":"SCALAR"}],
+"bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":12}],
+"buffers":[{"byteLength":48,"uri":"data:application/octet-stream;base64,)" +
+         base64(buffer) + R"("}]})";
+}
+
+TEST(Mesh, AnIndexBeyondTheVerticesIsAnErrorAndNoMissingTriangle) {
+  ASSERT_TRUE(load_mesh(written("whole.gltf", indexed_gltf(0)), "m"));
+  const auto mesh = load_mesh(written("beyond.gltf", indexed_gltf(9)), "m");
+  ASSERT_FALSE(mesh);
+  EXPECT_NE(mesh.message().find("beyond.gltf"), std::string::npos) << mesh.message();
+  EXPECT_NE(mesh.message().find("indices"), std::string::npos) << mesh.message();
+}
+
 TEST(Mesh, BadFilesAreErrorsThatNameThem) {
   auto triangles = cube();
   const std::string whole = binary_stl(triangles);
