@@ -52,7 +52,7 @@ TEST_F(Detect, WritesCornersAndPoses) {
   ASSERT_EQ(image["markers"].size(), 1u);
   const auto& marker = image["markers"][0];
   EXPECT_EQ(marker["family"], "apriltag_36h11");
-  EXPECT_EQ(marker["id"], "7");
+  EXPECT_EQ(marker["id"], 7);
   EXPECT_NEAR(marker["corners_px"][0][0].get<double>(), 99.5, 0.02);
   EXPECT_NEAR(marker["corners_px"][0][1].get<double>(), 79.5, 0.02);
   EXPECT_NEAR(marker["poses"][0]["camera_from_marker"]["translation_m"][2].get<double>(), 0.4, 1e-3);
