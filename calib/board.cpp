@@ -2,27 +2,13 @@
 
 #include <charconv>
 #include <cmath>
-#include <map>
 #include <numeric>
 
 #include "calib/board_dictionary.h"
+#include "core/predefined_family.h"
 
 namespace limn::calib {
 namespace {
-
-const std::map<std::string, int>& dictionaries() {
-  static const std::map<std::string, int> table = {
-      {"aruco_4x4_50", cv::aruco::DICT_4X4_50},          {"aruco_4x4_100", cv::aruco::DICT_4X4_100},
-      {"aruco_4x4_250", cv::aruco::DICT_4X4_250},        {"aruco_4x4_1000", cv::aruco::DICT_4X4_1000},
-      {"aruco_5x5_50", cv::aruco::DICT_5X5_50},          {"aruco_5x5_100", cv::aruco::DICT_5X5_100},
-      {"aruco_5x5_250", cv::aruco::DICT_5X5_250},        {"aruco_5x5_1000", cv::aruco::DICT_5X5_1000},
-      {"aruco_6x6_50", cv::aruco::DICT_6X6_50},          {"aruco_6x6_100", cv::aruco::DICT_6X6_100},
-      {"aruco_6x6_250", cv::aruco::DICT_6X6_250},        {"aruco_6x6_1000", cv::aruco::DICT_6X6_1000},
-      {"aruco_7x7_50", cv::aruco::DICT_7X7_50},          {"aruco_7x7_100", cv::aruco::DICT_7X7_100},
-      {"aruco_7x7_250", cv::aruco::DICT_7X7_250},        {"aruco_7x7_1000", cv::aruco::DICT_7X7_1000},
-      {"aruco_original", cv::aruco::DICT_ARUCO_ORIGINAL}};
-  return table;
-}
 
 std::vector<std::string> split(const std::string& text, char at) {
   std::vector<std::string> parts(1);
@@ -76,7 +62,7 @@ Status read_charuco_fields(const std::string& text, const std::vector<std::strin
     return error(
         "board '{}': expected at most 1000 markers, the largest dictionary, found {}. Take fewer squares.",
         text, markers);
-  if (!dictionaries().contains(board->dictionary))
+  if (!find_predefined_family(board->dictionary))
     return error("board '{}': expected a dictionary such as aruco_4x4_50 or aruco_5x5_250, found '{}'.", text,
                  board->dictionary);
   if (const int has = dictionary_of(*board)->bytesList.rows; has < markers)
@@ -127,7 +113,9 @@ PixelGrid pixel_grid(const Board& board, int least) {
 }  // namespace
 
 cv::Ptr<cv::aruco::Dictionary> dictionary_of(const Board& board) {
-  return cv::aruco::getPredefinedDictionary(dictionaries().at(board.dictionary));
+  const PredefinedFamily* family = find_predefined_family(board.dictionary);
+  LIMN_CHECK(family != nullptr);
+  return cv::aruco::getPredefinedDictionary(family->opencv_dictionary);
 }
 
 Result<Board> Board::parse(const std::string& text) {

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/file.h"
+#include "core/predefined_family.h"
 
 namespace limn::tracker {
 namespace {
@@ -25,26 +26,9 @@ constexpr int k_max_template_size = 64;
 constexpr const char* k_aruco_file = "aruco:";
 constexpr const char* k_artoolkit = "artoolkit:";
 
-const std::vector<std::pair<std::string, int>>& predefined() {
-  static const std::vector<std::pair<std::string, int>> families = {
-      {"aruco_4x4_50", cv::aruco::DICT_4X4_50},           {"aruco_4x4_100", cv::aruco::DICT_4X4_100},
-      {"aruco_4x4_250", cv::aruco::DICT_4X4_250},         {"aruco_4x4_1000", cv::aruco::DICT_4X4_1000},
-      {"aruco_5x5_50", cv::aruco::DICT_5X5_50},           {"aruco_5x5_100", cv::aruco::DICT_5X5_100},
-      {"aruco_5x5_250", cv::aruco::DICT_5X5_250},         {"aruco_5x5_1000", cv::aruco::DICT_5X5_1000},
-      {"aruco_6x6_50", cv::aruco::DICT_6X6_50},           {"aruco_6x6_100", cv::aruco::DICT_6X6_100},
-      {"aruco_6x6_250", cv::aruco::DICT_6X6_250},         {"aruco_6x6_1000", cv::aruco::DICT_6X6_1000},
-      {"aruco_7x7_50", cv::aruco::DICT_7X7_50},           {"aruco_7x7_100", cv::aruco::DICT_7X7_100},
-      {"aruco_7x7_250", cv::aruco::DICT_7X7_250},         {"aruco_7x7_1000", cv::aruco::DICT_7X7_1000},
-      {"aruco_original", cv::aruco::DICT_ARUCO_ORIGINAL}, {"apriltag_16h5", cv::aruco::DICT_APRILTAG_16h5},
-      {"apriltag_25h9", cv::aruco::DICT_APRILTAG_25h9},   {"apriltag_36h10", cv::aruco::DICT_APRILTAG_36h10},
-      {"apriltag_36h11", cv::aruco::DICT_APRILTAG_36h11},
-  };
-  return families;
-}
-
 std::string known_families() {
   std::string list;
-  for (const auto& [name, index] : predefined()) list += name + ", ";
+  for (const PredefinedFamily& family : predefined_families()) list += std::string(family.name) + ", ";
   return list + "aruco:FILE.yml, artoolkit:FILE.patt";
 }
 
@@ -291,10 +275,8 @@ Result<Families> Families::load(std::span<const std::string> names, const std::f
   std::set<std::string> seen;
   for (const std::string& name : names) {
     if (!seen.insert(name).second) continue;
-    const auto known = std::find_if(predefined().begin(), predefined().end(),
-                                    [&](const auto& entry) { return entry.first == name; });
-    if (known != predefined().end()) {
-      families.codes_.push_back(from_opencv(known->first, known->second));
+    if (const PredefinedFamily* known = find_predefined_family(name)) {
+      families.codes_.push_back(from_opencv(name, known->opencv_dictionary));
     } else if (const auto dictionary = file_after(name, k_aruco_file)) {
       LIMN_TRY(CodeFamily family, load_dictionary(folder / *dictionary));
       families.codes_.push_back(std::move(family));

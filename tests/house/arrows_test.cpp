@@ -46,7 +46,7 @@ const std::map<std::string, Rooms>& guests() {
       {"boost/", {"apps"}},
       {"turbojpeg", {"device"}},
       {"opencv2/calib3d", {"calib"}},
-      {"opencv2/aruco", {"calib", "tracker"}},
+      {"opencv2/aruco", {"core", "calib", "tracker"}},
       {"opencv2/videoio", {"device"}},
   };
   return homes;
