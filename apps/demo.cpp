@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
@@ -451,6 +452,7 @@ Status run_demo(const DemoOptions& options) {
   measured.seconds = stages.seconds();
   LIMN_TRY_STATUS(write_results(options.out, measured, pictures));
   fmt::print("{}\n{}\n", text_table(rows_of(measured)), (options.out / "demo.html").string());
+  std::fflush(stdout);
   if (window) show_in(*window, pictures);
   return {};
 }
