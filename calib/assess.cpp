@@ -6,6 +6,7 @@
 #include <numbers>
 #include <set>
 
+#include "calib/propagate.h"
 #include "core/log.h"
 
 namespace limn::calib {
@@ -269,7 +270,11 @@ Result<Assessment> assess(const Observed& observed, const SolveOptions& options,
   Assessment assessment;
   LIMN_TRY(assessment.held_out, held_out(observations, options, solution));
   assessment.devices = device_qualities(observations, solution);
-  assessment.predicted_error_mm = errors_by_projector(observations, assessment.held_out);
+  assessment.held_out_error_mm = errors_by_projector(observations, assessment.held_out);
+  assessment.propagated_error_mm = propagated_error_mm(observations, solution);
+  for (size_t i = 0; i < assessment.held_out_error_mm.size(); ++i)
+    assessment.predicted_error_mm.push_back(
+        std::max(assessment.held_out_error_mm[i], assessment.propagated_error_mm[i]));
   double lit = 0, decoded = 0;
   for (const DecodeShare& share : observed.decoded) {
     lit += share.lit;
@@ -284,7 +289,9 @@ Result<Assessment> assess(const Observed& observed, const SolveOptions& options,
   const double px = assessment.held_out.rms_px;
   const double mm =
       *std::max_element(assessment.predicted_error_mm.begin(), assessment.predicted_error_mm.end());
-  if (px <= k_good_px && mm <= k_good_mm) {
+  const bool parallel = std::any_of(assessment.faults.begin(), assessment.faults.end(),
+                                    [](const Fault& fault) { return fault.name == "little_tilt"; });
+  if (px <= k_good_px && mm <= k_good_mm && !parallel) {
     assessment.verdict = Verdict::good;
   } else if (px <= k_usable_px && mm <= k_usable_mm) {
     assessment.verdict = Verdict::usable;

@@ -53,15 +53,17 @@ struct Assessment {
   Verdict verdict = Verdict::reject;
   std::vector<DeviceQuality> devices;
   HeldOut held_out;
-  /// 95 % of the held-out errors on the board's surface, mm, at the distances of the captured boards: a
-  /// measured error, model error included, not a propagated covariance. One for each projector.
-  std::vector<double> predicted_error_mm;
+  /// 95 % errors on the surface, mm, one for each projector. Held out: measured at the distances of the
+  /// captured boards, model error and the decoding's noise included. Propagated: what the noise lets light
+  /// miss, moved and turned (calib/propagate.h). Predicted: the larger of the two.
+  std::vector<double> held_out_error_mm, propagated_error_mm, predicted_error_mm;
   double decoded_share = 0;  ///< of lit pixels
   int decode_outliers = 0;
   std::vector<Fault> faults;
 };
 
 /// Limits of the verdict. Good: a part's edge lands within a pixel and a millimetre wherever the board was;
+/// both the held-out and the propagated error count, and boards that are all but parallel are never good;
 /// usable: within what an eye at arm's length forgives.
 constexpr double k_good_px = 0.5, k_good_mm = 1.0;
 constexpr double k_usable_px = 1.5, k_usable_mm = 3.0;

@@ -34,14 +34,21 @@ Json held_out_json(const HeldOut& score) {
   return {{"rms_px", rounded(score.rms_px)}, {"worst_px", rounded(score.worst_px)}, {"poses", poses}};
 }
 
-Json error_json(const Report& report) {
+Json by_projector(const Report& report, const std::vector<double>& errors) {
   Json each = Json::object();
-  const auto& errors = report.assessment.predicted_error_mm;
   for (size_t i = 0; i < errors.size(); ++i)
     each[report.observed.observations.projectors[i].name] = rounded(errors[i]);
-  return {{"p95", rounded(*std::max_element(errors.begin(), errors.end()))},
-          {"per_projector", each},
-          {"from", "held-out errors on the board's surface"}};
+  return each;
+}
+
+Json error_json(const Report& report) {
+  const Assessment& a = report.assessment;
+  return {
+      {"p95", rounded(*std::max_element(a.predicted_error_mm.begin(), a.predicted_error_mm.end()))},
+      {"per_projector", by_projector(report, a.predicted_error_mm)},
+      {"held_out", by_projector(report, a.held_out_error_mm)},
+      {"propagated", by_projector(report, a.propagated_error_mm)},
+      {"from", "the larger of the held-out errors and of the noise propagated to moved and turned things"}};
 }
 
 std::string escaped(const std::string& text) {
@@ -145,7 +152,7 @@ std::string projector_figures(const Report& report) {
         field_svg(observations.projectors[i], foretold, poses), quality.name,
         fmt::format("held-out errors x{:.0f}: each pose foretold by a solve that has not seen it; 95 % "
                     "within {:.2f} mm on the board",
-                    k_magnified, report.assessment.predicted_error_mm[i]));
+                    k_magnified, report.assessment.held_out_error_mm[i]));
   }
   return html;
 }

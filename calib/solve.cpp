@@ -2,6 +2,7 @@
 
 #include <ceres/ceres.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -250,6 +251,11 @@ class Joint {
       match_noise = noise_of(solution.match_residuals);
     }
     solution.iterations = iterations;
+    solution.covariance = covariance(corner_noise, match_noise);
+    if (!solution.covariance.allFinite())
+      return error(
+          "the joint solve leaves devices undetermined: their covariance is not finite. Capture more poses, "
+          "tilted by 20 to 45 degrees to different sides.");
     return solution;
   }
 
@@ -367,7 +373,12 @@ class Joint {
     ceres::Solver::Summary summary;
     ceres::Solve(options, problem, &summary);
     const int used = static_cast<int>(summary.iterations.size());
-    if (summary.termination_type == ceres::CONVERGENCE && std::isfinite(summary.final_cost))
+    const bool finite = std::isfinite(summary.final_cost);
+    if (summary.termination_type == ceres::CONVERGENCE && finite) return {{}, used};
+    // A valley: steps that no observation feels. The covariance says how long it is.
+    constexpr double k_unfelt = 1e-4;  // of the cost, in the last step
+    if (summary.termination_type == ceres::NO_CONVERGENCE && finite &&
+        std::abs(summary.iterations.back().cost_change) < k_unfelt * summary.final_cost)
       return {{}, used};
     return {error("the joint solve did not converge in {} steps: {} Check the board's description, leave out "
                   "doubtful "
@@ -378,15 +389,80 @@ class Joint {
 
   Result<int> minimise(double corner_noise, double match_noise) {
     ceres::Problem problem(problem_options());
-    add_corners(&problem, corner_noise, -1);
-    add_matches(&problem, match_noise);
-    add_priors(&problem);
-    set_manifolds(&problem);
-    problem.SetParameterBlockConstant(unknowns_.camera_poses[0].v);
-    if (!options_.bend) problem.SetParameterBlockConstant(unknowns_.bend);
+    fill(&problem, corner_noise, match_noise);
     const Outcome outcome = run_ceres(&problem);
     LIMN_TRY_STATUS(outcome.status);
     return outcome.iterations;
+  }
+
+  void fill(ceres::Problem* problem, double corner_noise, double match_noise) {
+    add_corners(problem, corner_noise, -1);
+    add_matches(problem, match_noise);
+    add_priors(problem);
+    set_manifolds(problem);
+    problem->SetParameterBlockConstant(unknowns_.camera_poses[0].v);
+    if (!options_.bend) problem->SetParameterBlockConstant(unknowns_.bend);
+  }
+
+  // The devices' part of the inverse of J^T J. Few unknowns, many rows: the normal matrix is dense, its sum
+  // runs over the sparse rows.
+  Eigen::MatrixXd covariance(double corner_noise, double match_noise) {
+    ceres::Problem problem(problem_options());
+    fill(&problem, corner_noise, match_noise);
+    std::vector<double*> blocks;
+    std::vector<int> device_columns;  // of each unknown of the devices in `blocks`; -1: fixed
+    int columns = 0;
+    const auto take = [&](double* block, bool is_device) {
+      const bool free = problem.HasParameterBlock(block) && !problem.IsParameterBlockConstant(block);
+      const int size = problem.HasParameterBlock(block) ? problem.ParameterBlockTangentSize(block) : 6;
+      for (int i = 0; i < size && is_device; ++i) device_columns.push_back(free ? columns + i : -1);
+      if (!free) return;
+      blocks.push_back(block);
+      columns += size;
+    };
+    for (size_t i = 0; i < unknowns_.camera_values.size(); ++i) {
+      take(unknowns_.camera_values[i].data(), true);
+      take(unknowns_.camera_poses[i].v, true);
+    }
+    for (size_t i = 0; i < unknowns_.projector_values.size(); ++i) {
+      take(unknowns_.projector_values[i].data(), true);
+      take(unknowns_.projector_poses[i].v, true);
+    }
+    for (PoseBlock& pose : unknowns_.board_poses) take(pose.v, false);
+    take(unknowns_.bend, false);
+    ceres::Problem::EvaluateOptions options;
+    options.parameter_blocks = blocks;
+    ceres::CRSMatrix jacobian;
+    if (!problem.Evaluate(options, nullptr, nullptr, nullptr, &jacobian)) return {};
+    return devices_of(jacobian, device_columns);
+  }
+
+  static Eigen::MatrixXd devices_of(const ceres::CRSMatrix& jacobian, const std::vector<int>& columns) {
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(jacobian.num_cols, jacobian.num_cols);
+    for (size_t row = 0; row + 1 < jacobian.rows.size(); ++row) {
+      const auto from = static_cast<size_t>(jacobian.rows[row]),
+                 to = static_cast<size_t>(jacobian.rows[row + 1]);
+      for (size_t i = from; i < to; ++i) {
+        for (size_t k = from; k < to; ++k)
+          normal(jacobian.cols[i], jacobian.cols[k]) += jacobian.values[i] * jacobian.values[k];
+      }
+    }
+    // Unknowns of very different sizes: scaled to a unit diagonal before the inverse.
+    const Eigen::VectorXd scale =
+        normal.diagonal().cwiseMax(std::numeric_limits<double>::min()).cwiseSqrt().cwiseInverse();
+    const Eigen::MatrixXd scaled = scale.asDiagonal() * normal * scale.asDiagonal();
+    const Eigen::MatrixXd inverse =
+        scale.asDiagonal() * scaled.ldlt().solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols())) *
+        scale.asDiagonal();
+    const auto count = static_cast<Eigen::Index>(columns.size());
+    Eigen::MatrixXd devices = Eigen::MatrixXd::Zero(count, count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      for (Eigen::Index k = 0; k < count; ++k) {
+        const int a = columns[static_cast<size_t>(i)], b = columns[static_cast<size_t>(k)];
+        if (a >= 0 && b >= 0) devices(i, k) = inverse(a, b);
+      }
+    }
+    return devices;
   }
 
   // Standard deviation of one coordinate by the median of |residual| (of a 2-D normal: 1.1774 sigma).
@@ -501,6 +577,13 @@ Status check_board(const Observations& observations) {
 }
 
 }  // namespace
+
+int Solution::projector_at(size_t projector) const {
+  int at = 0;
+  for (const Imager& camera : rig.cameras) at += camera.lens.model.value_count() + 6;
+  for (size_t i = 0; i < projector; ++i) at += rig.projectors[i].lens.model.value_count() + 6;
+  return at;
+}
 
 Result<Solution> solve(const Observations& observations, const SolveOptions& options, const Solution* start) {
   LIMN_TRY(const LensModel camera_model, solvable(options.camera_model));

@@ -46,6 +46,12 @@ struct Solution {
   /// What one coordinate scatters by beyond its own stddev, px: estimated from the residuals.
   double corner_noise_px = 0, match_noise_px = 0;
   int iterations = 0;
+  /// Of the devices' unknowns, from the final Jacobian (robust weights and priors included), board poses and
+  /// bend marginalised: camera 0's values and pose (boxplus's delta), camera 1's …, then the projectors'.
+  /// Camera 0's pose is the world: zeros.
+  Eigen::MatrixXd covariance;
+  /// First index of a projector's values in it.
+  int projector_at(size_t projector) const;
 };
 
 /// One least-squares problem over all cameras, projectors, board poses and the board's bend: cameras see

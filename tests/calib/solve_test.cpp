@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -302,6 +303,78 @@ TEST(Assess, HeldOutErrorIsTheNoiseOfTheCells) {
   EXPECT_NEAR(assessment->predicted_error_mm[0], 0.18, 0.06);
   EXPECT_EQ(assessment->verdict, Verdict::good);
   EXPECT_DOUBLE_EQ(assessment->decoded_share, 0.9);
+}
+
+// Errors of camera 0's values, projector 0's values and its pose, in the covariance's order.
+Eigen::VectorXd device_errors(const Solution& solution, const World& world) {
+  std::vector<double> errors;
+  const auto take = [&](const Imager& found, const Imager& truth) {
+    for (size_t i = 0; i < truth.lens.values.size(); ++i)
+      errors.push_back(found.lens.values[i] - truth.lens.values[i]);
+    const Vector6d pose = boxminus(found.imager_from_world, truth.imager_from_world);
+    errors.insert(errors.end(), pose.begin(), pose.end());
+  };
+  take(solution.rig.cameras[0], world.rig.cameras[0]);
+  take(solution.rig.projectors[0], world.rig.projectors[0]);
+  return Eigen::Map<Eigen::VectorXd>(errors.data(), static_cast<Eigen::Index>(errors.size()));
+}
+
+// Squared errors in units of their covariance are chi-squared: one for each unknown.
+TEST(Solve, ErrorsScatterAsTheCovarianceSays) {
+  const World clean = make_world(1, 1, 6, 0.5);
+  std::mt19937_64 rng = test_rng();
+  double squared = 0;
+  constexpr int k_draws = 15, k_unknowns = 8 + 8 + 6;
+  for (int draw = 0; draw < k_draws; ++draw) {
+    World world = clean;
+    add_noise(&world, 0.1, 0.05, std::mt19937_64(rng()));
+    SolveOptions options = without_priors();
+    options.robust_at = 10;
+    const auto solution = solve(world.observations, options);
+    ASSERT_TRUE(solution.ok()) << solution.message();
+    const Eigen::VectorXd errors = device_errors(*solution, clean);
+    ASSERT_EQ(solution->covariance.rows(), errors.size());
+    // Camera 0's pose is fixed: those six rows are zero, and so are its errors.
+    std::vector<int> free;
+    for (int i = 0; i < errors.size(); ++i) {
+      if (i < 8 || i >= 14) free.push_back(i);
+    }
+    const Eigen::VectorXd e = errors(free);
+    const Eigen::MatrixXd c = solution->covariance(free, free);
+    const Eigen::VectorXd scale = c.diagonal().cwiseSqrt().cwiseInverse();
+    const Eigen::MatrixXd correlation = scale.asDiagonal() * c * scale.asDiagonal();
+    const Eigen::VectorXd pulls = scale.asDiagonal() * e;
+    squared += pulls.dot(correlation.ldlt().solve(pulls)) / (k_draws * k_unknowns);
+  }
+  // 330 degrees of freedom: one standard deviation is 0.08.
+  EXPECT_NEAR(squared, 1.0, 0.25);
+}
+
+TEST(Assess, ParallelBoardsInTheMiddleAreNeverGood) {
+  World healthy = make_world(1, 1, 8, 0.5), parallel = healthy;
+  parallel.observations.corners.clear();
+  parallel.observations.matches.clear();
+  for (int pose = 0; pose < 8; ++pose) {
+    auto& board = parallel.world_from_board[static_cast<size_t>(pose)];
+    const double tilt = 0.04 * (pose % 3);  // at most 5 degrees
+    board = Pose(exp_rotation({tilt, 0.03 * (pose % 2), 0}),
+                 Vector3d(-0.1375 + 0.01 * (pose % 3), -0.1 + 0.008 * (pose % 4), 1.1 + 0.005 * pose));
+    observe_corners(&parallel, 0, pose);
+    observe_matches(&parallel, 0, 0, pose);
+  }
+  std::vector<double> propagated;
+  for (World* world : {&healthy, &parallel}) {
+    add_noise(world, 0.05, 0.05, test_rng());
+    const auto solution = solve(world->observations);
+    ASSERT_TRUE(solution.ok()) << solution.message();
+    const auto assessment = assess({world->observations, {}, 0, 0}, {}, *solution);
+    ASSERT_TRUE(assessment.ok()) << assessment.message();
+    propagated.push_back(assessment->propagated_error_mm[0]);
+    EXPECT_EQ(assessment->verdict == Verdict::good, world == &healthy);
+  }
+  EXPECT_LT(propagated[0], 0.3);
+  EXPECT_GT(propagated[1], 3 * propagated[0]);
+  printf("[ ill-posed] propagated %.3f mm healthy, %.3f mm parallel\n", propagated[0], propagated[1]);
 }
 
 TEST(Assess, NoticesABoardThatMovedWhileItWasCaptured) {
