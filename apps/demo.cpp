@@ -92,6 +92,7 @@ struct Session {
 struct Moment {
   cv::Mat photograph;  // of the room without projected light
   int markers = 0;
+  int false_markers = 0;  // of them, not in the room
   std::vector<Track> tracks;
   scene::PosedScene posed;
 };
@@ -116,6 +117,10 @@ Result<Moment> looked(Session* session, sim::VirtualRig* room, const std::vector
   const Imager& camera = session->rig.cameras.at(0);
   const auto detections = session->detector.detect(to_grey(frame.image), &camera.lens);
   moment.markers = static_cast<int>(detections.size());
+  moment.false_markers =
+      static_cast<int>(std::count_if(detections.begin(), detections.end(), [&](const auto& detection) {
+        return !sim::world_from_marker(room->world(), detection.marker);
+      }));
   moment.tracks = tracker::observed(session->bodies, detections, camera, frame.captured_at);
   moment.posed = scene::posed(session->scene, moment.tracks, variants);
   if (!moment.posed.world_from_prototype || moment.posed.parts.size() != session->scene.slots.size()) {
@@ -306,6 +311,13 @@ std::vector<DemoRow> rows_of(const Measured& measured) {
     rows.push_back({fmt::format("registration {}, 95 %", readable(place.name)),
                     fmt::format("{:.3f} mm", found.p95_mm), "", true});
   }
+  int markers = 0, false_markers = 0;
+  for (const Place& place : measured.places) {
+    markers += place.moment.markers;
+    false_markers += place.moment.false_markers;
+  }
+  rows.push_back({fmt::format("false markers among {}", markers), fmt::format("{}", false_markers), "none",
+                  false_markers == 0});
   at_most("composite, outline of the mirror, RMS", measured.composite_px, "px", k_max_composite_px);
   rows.push_back({"on/off-surface mask, IoU", fmt::format("{:.4f}", measured.mask_iou),
                   fmt::format("at least {}", k_min_mask_iou), measured.mask_iou >= k_min_mask_iou});
@@ -324,6 +336,7 @@ nlohmann::ordered_json json_of(const Measured& measured) {
     const Registration& found = place.judged.registration;
     json["registration_mm"][place.name] = {
         {"rms", found.rms_mm}, {"p95", found.p95_mm}, {"points", found.points}, {"unlit", found.unlit}};
+    json["markers"][place.name] = {{"found", place.moment.markers}, {"false", place.moment.false_markers}};
   }
   json["composite_px"] = measured.composite_px;
   json["mask_iou"] = measured.mask_iou;

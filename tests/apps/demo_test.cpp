@@ -24,6 +24,8 @@ TEST(Demo, LandsTheLightWhereItIsAimedAndSaysSo) {
     EXPECT_LE(registration.at("rms"), 0.25) << place << ": 0.5 is asked for, 0.11 was measured";
     EXPECT_LE(registration.at("p95"), 0.4) << place;
     EXPECT_GE(registration.at("points"), 2000) << place;
+    EXPECT_GE(json.at("markers").at(place).at("found"), 5) << place;
+    EXPECT_EQ(json.at("markers").at(place).at("false"), 0) << place;
   }
   EXPECT_LE(json.at("composite_px"), 0.5);
   EXPECT_GE(json.at("mask_iou"), 0.97);
