@@ -6,6 +6,7 @@
 #include <numeric>
 #include <opencv2/core.hpp>
 #include <random>
+#include <utility>
 
 namespace limn::sim {
 namespace {
@@ -24,10 +25,15 @@ std::vector<PlacedMesh> prototype_mesh(const World& world) {
   return {{prototype->mesh.get(), prototype->world_from_object}};
 }
 
-const scene::Mesh* variant_mesh(const scene::Slot& slot, const std::string& name) {
-  for (const scene::Variant& variant : slot.variants)
-    if (variant.name == name) return &variant.mesh;
-  return nullptr;
+// The slot and the mesh of the chosen variant of a posed part; the world's scene must have both.
+std::pair<const scene::Slot*, const scene::Mesh*> shape_of(const World& world, const scene::PosedPart& part) {
+  LIMN_CHECK(world.scene.has_value());
+  const scene::Slot* slot = world.scene->find_slot(part.slot);
+  LIMN_CHECK(slot != nullptr);
+  const auto variant = std::find_if(slot->variants.begin(), slot->variants.end(),
+                                    [&](const scene::Variant& v) { return v.name == part.variant; });
+  LIMN_CHECK(variant != slot->variants.end());
+  return {slot, &variant->mesh};
 }
 
 // World directions of every pixel centre.
@@ -44,11 +50,7 @@ std::vector<Eigen::Vector3f> world_directions(const Imager& imager) {
 Truth::Truth(const World& world, const scene::PosedScene& parts)
     : world_(world), physical_(physical_meshes(world)), prototype_(prototype_mesh(world)) {
   for (const scene::PosedPart& part : parts.parts) {
-    LIMN_CHECK(world.scene.has_value());
-    const scene::Slot* slot = world.scene->find_slot(part.slot);
-    LIMN_CHECK(slot != nullptr);
-    const scene::Mesh* mesh = variant_mesh(*slot, part.variant);
-    LIMN_CHECK(mesh != nullptr);
+    const auto [slot, mesh] = shape_of(world, part);
     parts_.push_back({part, slot, mesh});
   }
 }
@@ -175,11 +177,7 @@ std::vector<SurfacePoint> surface_points(const scene::Mesh& mesh, int count, std
 World with_parts(const World& world, const scene::PosedScene& parts) {
   World shown = world;
   for (const scene::PosedPart& part : parts.parts) {
-    LIMN_CHECK(world.scene.has_value());
-    const scene::Slot* slot = world.scene->find_slot(part.slot);
-    LIMN_CHECK(slot != nullptr);
-    const scene::Mesh* mesh = variant_mesh(*slot, part.variant);
-    LIMN_CHECK(mesh != nullptr);
+    const auto [slot, mesh] = shape_of(world, part);
     Object object;
     object.name = "part-" + part.slot;
     object.mesh = std::make_shared<scene::Mesh>(*mesh);
