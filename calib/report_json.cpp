@@ -1,0 +1,69 @@
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "calib/report.h"
+
+namespace limn::calib {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// To a thousandth: more digits are noise, and they make files hard to read.
+double rounded(double v) { return std::isfinite(v) ? std::round(v * 1e4) / 1e4 : v; }
+
+Json devices_json(const std::vector<DeviceQuality>& devices) {
+  Json list = Json::array();
+  for (const DeviceQuality& d : devices)
+    list.push_back({{"name", d.name},
+                    {"rms_px", rounded(d.rms_px)},
+                    {"points", d.points},
+                    {"outliers", d.outliers},
+                    {"coverage", rounded(d.coverage)}});
+  return list;
+}
+
+Json held_out_json(const HeldOut& score) {
+  Json poses = Json::array();
+  for (const HeldOutPose& pose : score.poses)
+    poses.push_back({{"pose", pose.pose}, {"rms_px", rounded(pose.rms_px)}, {"cells", pose.cells}});
+  return {{"rms_px", rounded(score.rms_px)}, {"worst_px", rounded(score.worst_px)}, {"poses", poses}};
+}
+
+Json by_projector(const Report& report, const std::vector<double>& errors) {
+  Json each = Json::object();
+  for (size_t i = 0; i < errors.size(); ++i)
+    each[report.observed.observations.projectors[i].name] = rounded(errors[i]);
+  return each;
+}
+
+Json error_json(const Report& report) {
+  const Assessment& a = report.assessment;
+  return {
+      {"p95", rounded(*std::max_element(a.predicted_error_mm.begin(), a.predicted_error_mm.end()))},
+      {"per_projector", by_projector(report, a.predicted_error_mm)},
+      {"held_out", by_projector(report, a.held_out_error_mm)},
+      {"propagated", by_projector(report, a.propagated_error_mm)},
+      {"from", "the larger of the held-out errors and of the noise propagated to moved and turned things"}};
+}
+
+}  // namespace
+
+std::string report_json(const Report& report) {
+  const Assessment& a = report.assessment;
+  Json faults = Json::array(), seconds = Json::object();
+  for (const Fault& fault : a.faults)
+    faults.push_back({{"name", fault.name}, {"evidence", fault.evidence}, {"advice", fault.advice}});
+  for (const auto& [stage, value] : report.seconds) seconds[stage] = std::round(value * 1e3) / 1e3;
+  const Json json = {{"schema", "limn.report/1"},
+                     {"verdict", to_text(a.verdict)},
+                     {"devices", devices_json(a.devices)},
+                     {"held_out", held_out_json(a.held_out)},
+                     {"predicted_error_mm", error_json(report)},
+                     {"decode", {{"share", rounded(a.decoded_share)}, {"outliers", a.decode_outliers}}},
+                     {"faults", faults},
+                     {"seconds", seconds}};
+  return json.dump(2) + "\n";
+}
+
+}  // namespace limn::calib
