@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/faults.h"
 #include "calib/observations.h"
 #include "calib/solve.h"
 #include "core/result.h"
@@ -38,12 +39,6 @@ struct DeviceQuality {
   int points = 0;
   int outliers = 0;
   double coverage = 0;  ///< share of a 10 x 10 grid over the picture with at least one observation
-};
-
-struct Fault {
-  std::string name;      ///< stable, for programs: board_not_visible, little_tilt, …
-  std::string evidence;  ///< with numbers
-  std::string advice;
 };
 
 enum class Verdict { good, usable, reject };
