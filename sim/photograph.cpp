@@ -50,15 +50,21 @@ class Beam {
  private:
   static constexpr int k_pad = 24;  // px of darkness around the panel, for the blur to spill into
 
+  // Light of all display values, CV_32F or CV_32FC3 (BGR), as many channels as the picture has.
+  cv::Mat light_of_values(int channels) const {
+    cv::Mat light(1, 256, CV_32FC(channels));
+    for (int v = 0; v < 256; ++v)
+      for (int c = 0; c < channels; ++c)
+        light.ptr<float>()[v * channels + c] =
+            static_cast<float>(effects_.illuminance_at_1m * light_share(effects_, c, v / 255.0));
+    return light;
+  }
+
   cv::Mat light_of(const cv::Mat& shown, int channel) const {
-    cv::Mat light(1, 256, CV_32F);
-    for (int v = 0; v < 256; ++v) {
-      const double share = std::pow(v / 255.0, effects_.gamma);
-      light.at<float>(v) = static_cast<float>(effects_.illuminance_at_1m *
-                                              (effects_.black_level + (1 - effects_.black_level) * share));
-    }
-    cv::Mat linear;
-    cv::LUT(shown, light, linear);
+    cv::Mat linear = shown;
+    if (shown.channels() == 1 && effects_.channel_gamma != Eigen::Vector3d::Ones())
+      cv::cvtColor(shown, linear, cv::COLOR_GRAY2BGR);
+    cv::LUT(linear, light_of_values(linear.channels()), linear);
     if (linear.channels() == 3 && channel == k_grey)
       cv::transform(linear, linear, cv::Matx13f(0.0722F, 0.7152F, 0.2126F));  // BT.709 luminance of BGR
     else if (linear.channels() == 3)
@@ -258,7 +264,23 @@ void digitise_row(
   }
 }
 
+// Colour filters that overlap.
+void mix(const CameraEffects& effects, cv::Mat* light) {
+  if (effects.sensitivity == Eigen::Matrix3d::Identity()) return;
+  cv::Matx33f matrix;
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) matrix(r, c) = static_cast<float>(effects.sensitivity(r, c));
+  cv::transform(*light, *light, matrix);
+}
+
 }  // namespace
+
+double light_share(const ProjectorEffects& effects, int channel, double value) {
+  const double power = std::pow(value, effects.gamma * effects.channel_gamma[channel]);
+  const double smoothstep = value * value * (3 - 2 * value);
+  const double share = (1 - effects.s_curve) * power + effects.s_curve * smoothstep;
+  return effects.black_level + (1 - effects.black_level) * share;
+}
 
 cv::Mat ideal_light(const World& world, const Samples& samples, std::span<const cv::Mat> shown) {
   LIMN_CHECK(shown.empty() || shown.size() == samples.projectors.size());
@@ -268,6 +290,7 @@ cv::Mat ideal_light(const World& world, const Samples& samples, std::span<const 
   for (int c = 0; c < 3; ++c) channels.push_back(channel_light(world, samples, shown, c));
   cv::Mat light;
   cv::merge(channels, light);
+  mix(world.camera_effects[static_cast<std::size_t>(samples.camera)], &light);
   return light;
 }
 

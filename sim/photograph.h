@@ -9,6 +9,10 @@
 
 namespace limn::sim {
 
+/// Light of a display value (0 … 1) as a share of full white, black level included; channel 0 is blue, 1
+/// green, 2 red.
+double light_share(const ProjectorEffects& effects, int channel, double value);
+
 /// Linear light in every pixel (CV_32FC1, or C3 for a colour camera): no blur, no noise, no exposure. `shown`
 /// holds one 8-bit grey or BGR picture per projector; an empty picture is black, an empty span is all black.
 /// A projector's pixels are little squares, blurred by defocus where the surface is out of focus.

@@ -83,9 +83,20 @@ Imager read_imager(const ConfigNode& node) {
   return imager;
 }
 
+// Three rows of [red, green, blue] for the camera's red, green and blue, as BGR x BGR.
+Eigen::Matrix3d read_sensitivity(const ConfigNode& node) {
+  Eigen::Matrix3d rgb = Eigen::Matrix3d::Identity();
+  const auto rows = node.items();
+  if (rows.size() != 3) node.problem("expected three rows of three numbers.");
+  for (std::size_t i = 0; i < std::min<std::size_t>(rows.size(), 3); ++i)
+    rgb.row(static_cast<Eigen::Index>(i)) = rows[i].vector3();
+  if (rgb.minCoeff() < 0) node.problem("expected numbers that are not negative.");
+  return rgb.reverse();
+}
+
 CameraEffects read_camera_effects(const ConfigNode& node) {
   node.only({"name", "size", "lens", "imager_from_world", "eye_m", "target_m", "colour", "exposure", "psf_px",
-             "vignetting", "full_well_e", "read_noise", "black_level", "encoding"});
+             "vignetting", "full_well_e", "read_noise", "black_level", "encoding", "sensitivity"});
   CameraEffects effects;
   effects.exposure = node.at("exposure").positive();
   if (const auto v = node.find("colour")) effects.colour = v->boolean();
@@ -95,6 +106,7 @@ CameraEffects read_camera_effects(const ConfigNode& node) {
   if (const auto v = node.find("read_noise")) effects.read_noise = not_negative(*v);
   if (const auto v = node.find("black_level")) effects.black_level = not_negative(*v);
   if (const auto v = node.find("encoding")) effects.srgb = v->choice({"linear", "srgb"}) == "srgb";
+  if (const auto v = node.find("sensitivity")) effects.sensitivity = read_sensitivity(*v);
   return effects;
 }
 
@@ -106,10 +118,15 @@ void read_defocus(const ConfigNode& node, ProjectorEffects* effects) {
 
 ProjectorEffects read_projector_effects(const ConfigNode& node) {
   node.only({"name", "size", "lens", "imager_from_world", "eye_m", "target_m", "illuminance_at_1m", "gamma",
-             "black_level", "vignetting", "defocus", "falloff", "incidence"});
+             "channel_gamma", "s_curve", "black_level", "vignetting", "defocus", "falloff", "incidence"});
   ProjectorEffects effects;
   effects.illuminance_at_1m = node.at("illuminance_at_1m").positive();
   if (const auto v = node.find("gamma")) effects.gamma = v->positive();
+  if (const auto v = node.find("channel_gamma")) {
+    effects.channel_gamma = v->vector3().reverse();
+    if (effects.channel_gamma.minCoeff() <= 0) v->problem("expected three numbers that are positive.");
+  }
+  if (const auto v = node.find("s_curve")) effects.s_curve = share(*v);
   if (const auto v = node.find("black_level")) effects.black_level = share(*v);
   if (const auto v = node.find("vignetting")) effects.vignetting = share(*v);
   if (const auto v = node.find("defocus")) read_defocus(*v, &effects);

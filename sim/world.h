@@ -31,18 +31,23 @@ struct CameraEffects {
   double read_noise = 0;   ///< stdev in 8-bit levels of linear signal; 0: off
   double black_level = 0;  ///< 8-bit level of no light
   bool srgb = false;       ///< encodes by the sRGB curve instead of linearly
+  /// What blue, green and red light give in the camera's blue, green and red (rows): a colour camera's
+  /// filters overlap. Identity: off. A grey camera has none.
+  Eigen::Matrix3d sensitivity = Eigen::Matrix3d::Identity();
 };
 
 /// How a projector turns display values into light. Each effect is off at its default.
 struct ProjectorEffects {
-  double illuminance_at_1m = 1;  ///< of full white, 1 m away, head on
-  double gamma = 1;              ///< light = value^gamma; 1: off
-  double black_level = 0;        ///< light of black, as a share of white; 0: off
-  double vignetting = 0;         ///< share of light lost in the panel's corners, quadratic in radius; 0: off
-  double focus_m = 1;            ///< depth of sharp focus
-  double aperture_m = 0;         ///< diameter of the exit pupil, for defocus; 0: off
-  bool falloff = true;           ///< light falls with the square of the distance; false: as at 1 m
-  bool incidence = true;         ///< light falls with the cosine of incidence; false: as head on
+  double illuminance_at_1m = 1;               ///< of full white, 1 m away, head on
+  double gamma = 1;                           ///< light = value^gamma; 1: off
+  Eigen::Vector3d channel_gamma = {1, 1, 1};  ///< of blue, green, red: multiplies gamma; 1: off
+  double s_curve = 0;      ///< share of smoothstep(value) mixed into the response: films, LCDs; 0: off
+  double black_level = 0;  ///< light of black, as a share of white; 0: off
+  double vignetting = 0;   ///< share of light lost in the panel's corners, quadratic in radius; 0: off
+  double focus_m = 1;      ///< depth of sharp focus
+  double aperture_m = 0;   ///< diameter of the exit pupil, for defocus; 0: off
+  bool falloff = true;     ///< light falls with the square of the distance; false: as at 1 m
+  bool incidence = true;   ///< light falls with the cosine of incidence; false: as head on
 };
 
 /// A physical thing. Diffuse: reflects albedo x illuminance.

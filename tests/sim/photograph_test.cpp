@@ -52,6 +52,36 @@ TEST(Photograph, GammaChangesMidTonesOnly) {
   EXPECT_NEAR(f.at(flat(128)) / white, std::pow(128.0 / 255, 2.2), 1e-5);
 }
 
+TEST(Photograph, ChannelsMayHaveResponsesOfTheirOwn) {
+  Fixture f;
+  f.world.camera_effects[0].colour = true;
+  sim::ProjectorEffects& effects = f.world.projector_effects[0];
+  effects.gamma = 2;
+  effects.channel_gamma = {1.2, 1, 0.8};
+  effects.s_curve = 0.25;
+  const auto light = [&](const Pictures& shown) {
+    return sim::ideal_light(f.world, f.samples, shown).at<cv::Vec3f>(120, 160);
+  };
+  const double v = 128.0 / 255, step = v * v * (3 - 2 * v);
+  const Pictures coloured = {cv::Mat(150, 200, CV_8UC3, cv::Scalar::all(128))};
+  for (const Pictures& shown : {flat(128), coloured}) {
+    for (int c = 0; c < 3; ++c) {
+      const double share = 0.75 * std::pow(v, 2 * effects.channel_gamma[c]) + 0.25 * step;
+      EXPECT_NEAR(light(shown)[c] / light(flat(255))[c], share, 1e-5) << c;
+    }
+  }
+}
+
+TEST(Photograph, ACamerasColoursOverlap) {
+  Fixture f;
+  f.world.camera_effects[0].colour = true;
+  f.world.camera_effects[0].sensitivity << 0.9, 0.1, 0, 0, 0.8, 0.2, 0, 0, 1;  // its green sees a little red
+  const Pictures red = {cv::Mat(150, 200, CV_8UC3, cv::Scalar(0, 0, 255))};
+  const auto seen = sim::ideal_light(f.world, f.samples, red).at<cv::Vec3f>(120, 160);
+  EXPECT_EQ(seen[0], 0);
+  EXPECT_NEAR(seen[1] / seen[2], 0.2, 1e-5);
+}
+
 TEST(Photograph, BlackLevelLiftsBlackAndKeepsWhite) {
   Fixture f;
   const float white = f.at(flat(255));

@@ -71,6 +71,19 @@ TEST(World, ValuesArriveWhereTheyBelong) {
   EXPECT_EQ(world->find("box")->mesh->triangles.size(), 12U);
 }
 
+TEST(World, ColoursArriveAsBlueGreenRed) {
+  std::string text = k_small;
+  text.replace(text.find(R"("exposure")"), 0,
+               R"("colour": true, "sensitivity": [[1, 0.2, 0], [0, 1, 0.1], [0, 0, 1]], )");
+  text.replace(text.find(R"("illuminance_at_1m")"), 0, R"("channel_gamma": [1.1, 1, 0.9], "s_curve": 0.3, )");
+  const auto world = loaded(text);
+  ASSERT_TRUE(world) << world.message();
+  EXPECT_EQ(world->camera_effects[0].sensitivity(2, 1), 0.2);  // red sees green
+  EXPECT_EQ(world->camera_effects[0].sensitivity(1, 0), 0.1);  // green sees blue
+  EXPECT_EQ(world->projector_effects[0].channel_gamma, Eigen::Vector3d(0.9, 1, 1.1));
+  EXPECT_EQ(world->projector_effects[0].s_curve, 0.3);
+}
+
 TEST(World, EffectsSwitchOffTogetherButExposureStays) {
   const sim::World world =
       sim::without_effects(sim::load_world(k_worlds / "studio.json", plain_marker).value());
