@@ -4,34 +4,12 @@
 #include <vector>
 
 #include "calib/faults.h"
+#include "calib/held_out.h"
 #include "calib/observations.h"
 #include "calib/solve.h"
 #include "core/result.h"
 
 namespace limn::calib {
-
-/// How well one board pose is foretold by a solve that has not seen it.
-struct HeldOutPose {
-  std::string pose;
-  double rms_px = 0;
-  int cells = 0;
-};
-
-struct HeldOut {
-  double rms_px = 0;    ///< over all cells of all poses; RMS of the 2-vector
-  double worst_px = 0;  ///< of the poses' RMS
-  std::vector<HeldOutPose> poses;
-  /// Parallel to Observations::matches: predicted minus measured projector pixel (NaN where not scored), and
-  /// the same error as a distance on the board's surface, m.
-  std::vector<Eigen::Vector2d> residuals;
-  std::vector<double> errors_m;
-};
-
-/// Leaves out each board pose in turn: solves without it, takes its pose from the camera's corners alone and
-/// predicts the projector pixels of its matches (each the average over a cell of the board).
-Result<HeldOut> held_out(const Observations& observations,
-                         const SolveOptions& options,
-                         const Solution& solution);
 
 struct DeviceQuality {
   std::string name;
