@@ -98,8 +98,10 @@ Result<Assessment> assess(const Observed& observed, const SolveOptions& options,
   Assessment assessment;
   LIMN_TRY(assessment.held_out, held_out(observations, options, solution));
   assessment.devices = device_qualities(observations, solution);
+  const Uncertainty uncertainty{solution.covariance, solution.corner_noise_px};
   assessment.held_out_error_mm = errors_by_projector(observations, assessment.held_out);
-  assessment.propagated_error_mm = propagated_error_mm(observations, solution);
+  assessment.propagated_error_mm = propagated_error_mm(observations, solution, uncertainty);
+  assessment.error_maps = error_maps(observations, solution, uncertainty);
   for (size_t i = 0; i < assessment.held_out_error_mm.size(); ++i)
     assessment.predicted_error_mm.push_back(
         std::max(assessment.held_out_error_mm[i], assessment.propagated_error_mm[i]));

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/error_map.h"
 #include "calib/faults.h"
 #include "calib/held_out.h"
 #include "calib/observations.h"
@@ -30,7 +31,8 @@ struct Assessment {
   /// captured boards, model error and the decoding's noise included. Propagated: what the noise lets light
   /// miss, moved and turned (calib/propagate.h). Predicted: the larger of the two.
   std::vector<double> held_out_error_mm, propagated_error_mm, predicted_error_mm;
-  double decoded_share = 0;  ///< of lit pixels
+  std::vector<ErrorMap> error_maps;  ///< one for each projector, over the volume shared with camera 0
+  double decoded_share = 0;          ///< of lit pixels
   int decode_outliers = 0;
   std::vector<Fault> faults;
 };

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -11,118 +12,217 @@
 namespace limn::calib {
 namespace {
 
+using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double k_moved_m = 0.15;
 constexpr double k_turned = 40 * std::numbers::pi / 180;
-constexpr double k_two_sigma = 1.96;  // of an error along one line; of a round one 1.73
-constexpr int k_grid = 5;             // points along each side of the thing
+constexpr int k_grid = 5;          // points along each side of the thing
+constexpr int k_least_points = 6;  // of a thing that a camera places
+constexpr double k_share = 0.95;
 
-ImagerView view(const Imager& imager) {
-  return {imager.lens.model, imager.lens.values, imager.imager_from_world};
+Matrix3d cross(const Vector3d& v) {
+  Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
 }
 
-// The board's own place, and moved and turned about its middle.
-std::vector<Pose> placements(const Pose& world_from_board, const BoardShape& shape) {
-  const Pose to_middle(Eigen::Quaterniond::Identity(), Vector3d(shape.width_m / 2, shape.height_m / 2, 0));
-  std::vector<Pose> all = {world_from_board};
+// A world point's pixel in an imager and what moves it.
+struct Seen {
+  Vector2d px;
+  Eigen::Matrix<double, 2, 3> by_point;   // world axes
+  Eigen::Matrix<double, 2, 6> by_imager;  // the imager's pose, boxplus's delta
+  Derivatives::Values by_values;
+};
+
+std::optional<Seen> see(const Imager& imager, const Vector3d& p_world) {
+  const Vector3d p = imager.imager_from_world * p_world;
+  if (!imager.lens.project(p)) return std::nullopt;  // it knows where a polynomial has folded back
+  Seen seen;
+  Eigen::Matrix<double, 2, 3, Eigen::RowMajor> by_p;
+  seen.by_values.resize(2, imager.lens.model.value_count());
+  if (!imager.lens.model.project(imager.lens.values, p, &seen.px, by_p.data(), seen.by_values.data()) ||
+      !imager.contains(seen.px))
+    return std::nullopt;
+  seen.by_point = by_p * imager.imager_from_world.rotation_matrix();
+  seen.by_imager << -by_p * cross(imager.imager_from_world.rotation * p_world), by_p;
+  return seen;
+}
+
+// How the pose of a thing (turned about `centre`, then moved) as a camera measures it follows the camera's
+// values and pose and the measured pixels' noise.
+struct Placed {
+  Vector3d centre;
+  MatrixXd by_values;         // 6 x value count
+  Matrix6d by_camera;         // the camera's pose
+  Matrix6d noise_covariance;  // for 1 px^2
+};
+
+std::optional<Placed> placed(const Imager& camera, const Thing& thing) {
+  Placed placed;
+  placed.centre.setZero();
+  for (const Vector3d& p : thing) placed.centre += p / static_cast<double>(thing.size());
+  Matrix6d normal = Matrix6d::Zero(), by_camera = Matrix6d::Zero();
+  MatrixXd by_values = MatrixXd::Zero(6, camera.lens.model.value_count());
+  int points = 0;
+  for (const Vector3d& p : thing) {
+    const auto seen = see(camera, p);
+    if (!seen) continue;
+    Eigen::Matrix<double, 2, 6> by_pose;
+    by_pose << -seen->by_point * cross(p - placed.centre), seen->by_point;
+    normal += by_pose.transpose() * by_pose;
+    by_values += by_pose.transpose() * seen->by_values;
+    by_camera += by_pose.transpose() * seen->by_imager;
+    ++points;
+  }
+  if (points < k_least_points) return std::nullopt;
+  const Vector6d scale = normal.diagonal().cwiseSqrt().cwiseInverse();
+  const Matrix6d scaled = scale.asDiagonal() * normal * scale.asDiagonal();
+  if (!scaled.allFinite() || scaled.determinant() < 1e-12) return std::nullopt;
+  placed.noise_covariance = scale.asDiagonal() * scaled.inverse() * scale.asDiagonal();
+  placed.by_values = -placed.noise_covariance * by_values;
+  placed.by_camera = -placed.noise_covariance * by_camera;
+  return placed;
+}
+
+std::optional<Eigen::Matrix2d> light_covariance(const Solution& solution,
+                                                const Uncertainty& uncertainty,
+                                                const Placed& thing,
+                                                size_t projector,
+                                                const SurfacePlace& place) {
+  const Imager& light = solution.rig.projectors[projector];
+  const auto seen = see(light, place.p_world);
+  const Vector3d p_light = light.imager_from_world.inverse().translation;
+  const Vector3d p_eye = solution.rig.cameras.front().imager_from_world.inverse().translation;
+  if (!seen) return std::nullopt;
+  if (place.n_world.dot(place.p_world - p_light) * place.n_world.dot(place.p_world - p_eye) <= 0)
+    return std::nullopt;  // the projector lights the side that camera 0 does not see
+  Eigen::Matrix<double, 2, 6> by_thing;
+  by_thing << -seen->by_point * cross(place.p_world - thing.centre), seen->by_point;
+  MatrixXd by_unknowns = MatrixXd::Zero(2, uncertainty.covariance.cols());
+  const Eigen::Index camera_values = thing.by_values.cols(), values = seen->by_values.cols();
+  const int at = solution.projector_at(projector);
+  by_unknowns.leftCols(camera_values) = by_thing * thing.by_values;  // camera 0's come first
+  by_unknowns.middleCols(camera_values, 6) = by_thing * thing.by_camera;
+  by_unknowns.middleCols(at, values) = seen->by_values;
+  by_unknowns.middleCols(at + values, 6) = seen->by_imager;
+  // From projector pixels to metres on the surface.
+  const Vector3d u = place.n_world.unitOrthogonal(), v = place.n_world.cross(u);
+  Eigen::Matrix2d px_by_m;
+  px_by_m << seen->by_point * u, seen->by_point * v;
+  if (std::abs(px_by_m.determinant()) < 1e-6) return std::nullopt;  // light that grazes the surface
+  const Eigen::Matrix2d m_by_px = px_by_m.inverse();
+  const Eigen::Matrix2d px_covariance = by_unknowns * uncertainty.covariance * by_unknowns.transpose() +
+                                        uncertainty.measured_px * uncertainty.measured_px * by_thing *
+                                            thing.noise_covariance * by_thing.transpose();
+  return m_by_px * px_covariance * m_by_px.transpose();
+}
+
+// A board-sized sheet: points and the surface's normal there.
+std::vector<SurfacePlace> sheet_places(const Pose& world_from_board, const Board& board) {
+  std::vector<SurfacePlace> places;
+  for (int i = 0; i < k_grid * k_grid; ++i)
+    places.push_back({world_from_board * Vector3d(board.width_m() * (i % k_grid + 0.5) / k_grid,
+                                                  board.height_m() * (i / k_grid + 0.5) / k_grid, 0),
+                      world_from_board.rotation * Vector3d::UnitZ()});
+  return places;
+}
+
+Thing points_of(const std::vector<SurfacePlace>& places) {
+  Thing thing;
+  for (const SurfacePlace& place : places) thing.push_back(place.p_world);
+  return thing;
+}
+
+// In place, moved each way, turned each way.
+std::array<std::vector<Pose>, 3> placements(const Pose& world_from_board, const Board& board) {
+  const Pose to_middle(Eigen::Quaterniond::Identity(),
+                       Vector3d(board.width_m() / 2, board.height_m() / 2, 0));
+  std::array<std::vector<Pose>, 3> all = {{{world_from_board}, {}, {}}};
   for (const double sign : {-1.0, 1.0}) {
     for (int axis = 0; axis < 3; ++axis) {
       Pose moved = world_from_board;
       moved.translation += sign * k_moved_m * Vector3d::Unit(axis);
-      all.push_back(moved);
+      all[1].push_back(moved);
     }
     for (int axis = 0; axis < 2; ++axis)
-      all.push_back(world_from_board * to_middle *
-                    Pose(exp_rotation(sign * k_turned * Vector3d::Unit(axis)), Vector3d::Zero()) *
-                    to_middle.inverse());
+      all[2].push_back(world_from_board * to_middle *
+                       Pose(exp_rotation(sign * k_turned * Vector3d::Unit(axis)), Vector3d::Zero()) *
+                       to_middle.inverse());
   }
   return all;
 }
 
-std::vector<Vector2d> grid_points(const BoardShape& shape) {
-  std::vector<Vector2d> points;
-  for (int i = 0; i < k_grid * k_grid; ++i)
-    points.emplace_back(shape.width_m * (i % k_grid + 0.5) / k_grid,
-                        shape.height_m * (i / k_grid + 0.5) / k_grid);
-  return points;
-}
-
-// How the thing's pose, as the camera measures it, follows the camera's values: 6 x value count. Empty when
-// the camera does not see it.
-MatrixXd pose_by_values(const Imager& camera, const Pose& world_from_thing, const BoardShape& shape) {
-  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
-  MatrixXd product = MatrixXd::Zero(6, camera.lens.model.value_count());
-  for (const Vector2d& xy : grid_points(shape)) {
-    Vector2d px;
-    Derivatives d;
-    if (!predict_corner(view(camera), world_from_thing, shape, Vector2d::Zero(), xy, &px, &d) ||
-        !camera.contains(px))
-      return {};
-    normal += d.board_pose.transpose() * d.board_pose;
-    product += d.board_pose.transpose() * d.camera_values;
-  }
-  return -normal.ldlt().solve(product);
-}
-
-// 95 % errors of the thing's points that the projector reaches, mm.
-void take_placement(const Observations& observations,
-                    const Solution& solution,
-                    const Pose& world_from_thing,
-                    size_t projector,
-                    std::vector<double>* errors) {
-  const BoardShape shape{observations.board.width_m(), observations.board.height_m()};
-  const Imager& camera = solution.rig.cameras.front();
-  const Imager& light = solution.rig.projectors[projector];
-  const MatrixXd by_camera = pose_by_values(camera, world_from_thing, shape);
-  if (by_camera.size() == 0) return;
-  const int at = solution.projector_at(projector), values = light.lens.model.value_count();
-  for (const Vector2d& xy : grid_points(shape)) {
-    Vector2d px;
-    Derivatives d;
-    if (!predict_corner(view(light), world_from_thing, shape, Vector2d::Zero(), xy, &px, &d) ||
-        !light.contains(px))
-      continue;
-    MatrixXd sensitivity = MatrixXd::Zero(2, solution.covariance.cols());
-    sensitivity.leftCols(by_camera.cols()) = d.board_pose * by_camera;  // camera 0's values come first
-    sensitivity.middleCols(at, values) = d.camera_values;               // the imager's: here the projector's
-    sensitivity.middleCols(at + values, 6) = d.camera_pose;
-    const Eigen::Matrix2d px_covariance = sensitivity * solution.covariance * sensitivity.transpose();
-    // From projector pixels to metres on the thing's surface.
-    Eigen::Matrix2d px_by_m;
-    constexpr double k_step = 1e-4;
-    bool near = true;
-    for (int axis = 0; axis < 2; ++axis) {
-      Vector2d moved;
-      near = near && predict_corner(view(light), world_from_thing, shape, Vector2d::Zero(),
-                                    xy + k_step * Vector2d::Unit(axis), &moved);
-      px_by_m.col(axis) = (moved - px) / k_step;
-    }
-    if (!near || std::abs(px_by_m.determinant()) < 1e-6) continue;
-    const Eigen::Matrix2d m_by_px = px_by_m.inverse();
-    const double variance = (m_by_px * px_covariance * m_by_px.transpose()).trace();
-    errors->push_back(1e3 * k_two_sigma * std::sqrt(std::max(0.0, variance)));
-  }
-}
-
 }  // namespace
 
-std::vector<double> propagated_error_mm(const Observations& observations, const Solution& solution) {
-  const BoardShape shape{observations.board.width_m(), observations.board.height_m()};
+std::vector<std::optional<Eigen::Matrix2d>> light_covariances(const Solution& solution,
+                                                              const Uncertainty& uncertainty,
+                                                              const Thing& thing,
+                                                              size_t projector,
+                                                              std::span<const SurfacePlace> places) {
+  std::vector<std::optional<Eigen::Matrix2d>> covariances(places.size());
+  const auto measured = placed(solution.rig.cameras.front(), thing);
+  if (!measured) return covariances;
+  for (size_t i = 0; i < places.size(); ++i)
+    covariances[i] = light_covariance(solution, uncertainty, *measured, projector, places[i]);
+  return covariances;
+}
+
+double p95_of(std::span<const std::vector<Eigen::Matrix2d>> groups) {
+  // A 2-D normal scatter by polar angle in its unit circle: in each direction the radius is Rayleigh.
+  constexpr int k_angles = 16;                  // over a quarter turn; shares are right to 1e-4 for any shape
+  std::vector<std::pair<double, double>> rays;  // variance, weight
+  double largest = 0, total = 0;
+  for (const auto& group : groups) {
+    for (const Eigen::Matrix2d& covariance : group) {
+      const Vector2d variances =
+          Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance, Eigen::EigenvaluesOnly)
+              .eigenvalues()
+              .cwiseMax(0.0);
+      const double weight = 1.0 / (k_angles * static_cast<double>(group.size()));
+      for (int i = 0; i < k_angles; ++i) {
+        const double c = std::cos((i + 0.5) / k_angles * std::numbers::pi / 2);
+        rays.emplace_back(variances[0] * c * c + variances[1] * (1 - c * c), weight);
+      }
+      largest = std::max(largest, variances[1]);
+      total += weight * k_angles;
+    }
+  }
+  if (rays.empty()) return std::numeric_limits<double>::infinity();
+  double low = 0, high = 10 * std::sqrt(largest);
+  constexpr int k_halvings = 40;
+  for (int i = 0; i < k_halvings; ++i) {
+    const double middle = (low + high) / 2;
+    double share = 0;
+    for (const auto& [variance, weight] : rays)
+      share += weight * (variance > 0 ? -std::expm1(-middle * middle / (2 * variance)) : 1.0);
+    (share < k_share * total ? low : high) = middle;
+  }
+  return high;
+}
+
+std::vector<double> propagated_error_mm(const Observations& observations,
+                                        const Solution& solution,
+                                        const Uncertainty& uncertainty) {
   std::vector<double> p95;
-  for (size_t i = 0; i < solution.rig.projectors.size(); ++i) {
-    std::vector<double> errors;
+  for (size_t projector = 0; projector < solution.rig.projectors.size(); ++projector) {
+    std::array<std::vector<Eigen::Matrix2d>, 3> groups;
     for (const auto& board : solution.world_from_board) {
       if (!board) continue;
-      for (const Pose& placed : placements(*board, shape))
-        take_placement(observations, solution, placed, i, &errors);
+      const auto all = placements(*board, observations.board);
+      for (size_t group = 0; group < groups.size(); ++group) {
+        for (const Pose& pose : all[group]) {
+          const std::vector<SurfacePlace> places = sheet_places(pose, observations.board);
+          for (const auto& covariance :
+               light_covariances(solution, uncertainty, points_of(places), projector, places)) {
+            if (covariance) groups[group].push_back(*covariance);
+          }
+        }
+      }
     }
-    std::sort(errors.begin(), errors.end());
-    p95.push_back(errors.empty()
-                      ? std::numeric_limits<double>::infinity()
-                      : errors[static_cast<size_t>(0.95 * static_cast<double>(errors.size() - 1))]);
+    p95.push_back(1e3 * p95_of(groups));
   }
   return p95;
 }

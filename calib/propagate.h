@@ -1,5 +1,8 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "calib/observations.h"
@@ -7,12 +10,40 @@
 
 namespace limn::calib {
 
-/// What the noise of the observations lets light miss, for each projector: 95 % error on the surface, mm, of
-/// a point on a rigid thing whose pose is measured by the same camera. Such a thing (as large as the board)
-/// is put wherever the board was, and there moved by 150 mm and turned by 40 degrees both ways; its pose
-/// follows the camera's errors (linearised), so that what both share cancels. 95 % of the points' own 95 %
-/// errors are at most this. Infinite when a projector reaches none of them. Model errors are not in it: read
-/// it beside the held-out error.
-std::vector<double> propagated_error_mm(const Observations& observations, const Solution& solution);
+/// A rigid thing in the world as camera 0 measures it: its pose from the pixels of these points.
+using Thing = std::vector<Eigen::Vector3d>;
+
+/// What of the rig is uncertain. `covariance`: of the devices' unknowns, in the order of
+/// Solution::covariance. `measured_px`: standard deviation of one coordinate of a thing's points in camera 0.
+struct Uncertainty {
+  Eigen::MatrixXd covariance;
+  double measured_px = 0;
+};
+
+/// Covariance (m^2) of where a projector's light lands that is meant for points on a thing, along two
+/// directions of the surface at each point. The thing's pose follows the camera's errors (linearised), so
+/// that what camera and projector share cancels. A point that the projector does not reach has none; all are
+/// absent when the camera sees fewer than 6 of the thing's points, or only points on a line.
+struct SurfacePlace {
+  Eigen::Vector3d p_world;
+  Eigen::Vector3d n_world;  ///< unit normal of the surface
+};
+std::vector<std::optional<Eigen::Matrix2d>> light_covariances(const Solution& solution,
+                                                              const Uncertainty& uncertainty,
+                                                              const Thing& thing,
+                                                              size_t projector,
+                                                              std::span<const SurfacePlace> places);
+
+/// The distance (m) that 95 % of the light stays within when it scatters around its places by these
+/// covariances; each group counts the same. Infinite when there is nothing.
+double p95_of(std::span<const std::vector<Eigen::Matrix2d>> groups);
+
+/// For each projector: 95 % error on the surface, mm, of points on a rigid thing whose pose is measured by
+/// camera 0. Such a thing (as large as the board) is put wherever the board was, and there moved by 150 mm
+/// and turned by 40 degrees both ways: a third of the light each. Infinite when a projector reaches none of
+/// them.
+std::vector<double> propagated_error_mm(const Observations& observations,
+                                        const Solution& solution,
+                                        const Uncertainty& uncertainty);
 
 }  // namespace limn::calib

@@ -373,7 +373,7 @@ TEST(Assess, ParallelBoardsInTheMiddleAreNeverGood) {
     EXPECT_EQ(assessment->verdict == Verdict::good, world == &healthy);
   }
   EXPECT_LT(propagated[0], 0.3);
-  EXPECT_GT(propagated[1], 3 * propagated[0]);
+  EXPECT_GT(propagated[1], 2 * propagated[0]);  // measuring the thing itself costs both the same
   printf("[ ill-posed] propagated %.3f mm healthy, %.3f mm parallel\n", propagated[0], propagated[1]);
 }
 
