@@ -209,12 +209,15 @@ Status read_axis(const std::vector<std::filesystem::path>& pictures,
                  size_t first,
                  int bits,
                  AxisReading* axis,
-                 DirectLight* direct) {
+                 DirectLight* direct,
+                 SeriesProbe* probe) {
   const cv::Size size = direct->sum.size();
   for (int i = 0; i < bits; ++i) {
     const size_t at = first + 2 * static_cast<size_t>(i);
     LIMN_TRY(const cv::Mat picture, read_shot(pictures[at], size.width, size.height));
     LIMN_TRY(const cv::Mat inverse, read_shot(pictures[at + 1], size.width, size.height));
+    probe->take(static_cast<int>(at), picture);
+    probe->take(static_cast<int>(at) + 1, inverse);
     cv::Mat difference;
     cv::subtract(picture, inverse, difference, cv::noArray(), CV_16S);
     axis->differences.push_back(difference);
@@ -249,6 +252,21 @@ AxisLabels labels_of(const AxisReading& axis, const cv::Mat& step, const DecodeO
   for (int pass = 0; pass < k_settle_passes; ++pass) settle_by_neighbours(axis, step, &labels);
   refine_between_edges(axis, options.noise, options.floor_px, &labels);
   return labels;
+}
+
+// Share of the lit pixels whose finest bit is unsure, on the axis where they are more.
+double unsure_finest(const AxisReading& columns, const AxisReading& rows, const cv::Mat& step, int lit) {
+  double worst = 0;
+  for (const AxisReading* axis : {&columns, &rows}) {
+    int unsure = 0;
+    for (int y = 0; y < step.rows; ++y) {
+      const short* difference = axis->differences.back().ptr<short>(y);
+      const uchar* least = step.ptr<uchar>(y);
+      for (int x = 0; x < step.cols; ++x) unsure += least[x] != k_unlit && std::abs(difference[x]) < least[x];
+    }
+    worst = std::max(worst, static_cast<double>(unsure) / std::max(1, lit));
+  }
+  return worst;
 }
 
 // Puts the axes together where both are known; how many pixels that are.
@@ -286,18 +304,24 @@ Result<Decoded> decode(const Patterns& patterns,
   LIMN_CHECK(static_cast<int>(pictures.size()) == patterns.count());
   LIMN_TRY(const cv::Mat white, read_shot(pictures[static_cast<size_t>(patterns.white())], width, height));
   LIMN_TRY(const cv::Mat black, read_shot(pictures[static_cast<size_t>(patterns.black())], width, height));
+  SeriesProbe probe(patterns, width, height);
+  probe.take(patterns.white(), white);
+  probe.take(patterns.black(), black);
   Decoded decoded;
   cv::subtract(white, black, decoded.contrast);
   const int column_bits = patterns.column_bits(), row_bits = patterns.row_bits();
   AxisReading columns{patterns.width, {}}, rows{patterns.height, {}};
   DirectLight direct{cv::Mat(height, width, CV_16U, cv::Scalar(0))};
-  LIMN_TRY_STATUS(read_axis(pictures, 0, column_bits, &columns, &direct));
-  LIMN_TRY_STATUS(read_axis(pictures, 2 * static_cast<size_t>(column_bits), row_bits, &rows, &direct));
+  LIMN_TRY_STATUS(read_axis(pictures, 0, column_bits, &columns, &direct, &probe));
+  LIMN_TRY_STATUS(
+      read_axis(pictures, 2 * static_cast<size_t>(column_bits), row_bits, &rows, &direct, &probe));
   const cv::Mat step = least_steps(decoded.contrast, direct, options, &decoded.lit);
+  decoded.health = probe.health(pictures);
   const AxisLabels u = labels_of(columns, step, options), v = labels_of(rows, step, options);
   decoded.decoded = join(u, v, &decoded);
   decoded.outliers = remove_outliers(&decoded.px_projector, options.max_from_median);
   decoded.decoded -= decoded.outliers;
+  decoded.health.unsure_finest = unsure_finest(columns, rows, step, decoded.lit);
   return decoded;
 }
 

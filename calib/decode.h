@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calib/patterns.h"
+#include "calib/series_health.h"
 #include "core/result.h"
 
 namespace limn::calib {
@@ -37,6 +38,7 @@ struct Decoded {
   int lit = 0;           ///< camera pixels that the projector lights directly
   int decoded = 0;       ///< of them, with a label (outliers excluded)
   int outliers = 0;      ///< removed
+  SeriesHealth health;   ///< of the pictures themselves
   double share() const { return lit > 0 ? static_cast<double>(decoded) / lit : 0; }
 };
 

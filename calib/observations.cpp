@@ -218,6 +218,10 @@ Result<Observed> observe_pose(const Captures& captures, int pose, int camera, co
                     device.height, options));
     const int projector = static_cast<int>(p);
     seen.decoded.push_back({camera, projector, pose, decoded.lit, decoded.decoded, decoded.outliers});
+    seen.health.push_back(decoded.health);
+    seen.health.back().camera = camera;
+    seen.health.back().projector = projector;
+    seen.health.back().pose = pose;
     for (Match match : matches_on_board(captures.board, corners, decoded)) {
       match.camera = camera;
       match.projector = projector;
@@ -234,6 +238,7 @@ void append(const Observed& seen, Observed* all) {
   put(seen.observations.corners, &all->observations.corners);
   put(seen.observations.matches, &all->observations.matches);
   put(seen.decoded, &all->decoded);
+  put(seen.health, &all->health);
   all->seconds_board += seen.seconds_board;
   all->seconds_decode += seen.seconds_decode;
 }

@@ -56,6 +56,7 @@ struct DecodeShare {
 struct Observed {
   Observations observations;
   std::vector<DecodeShare> decoded;
+  std::vector<SeriesHealth> health;  ///< parallel to decoded
   double seconds_board = 0;
   double seconds_decode = 0;
 };

@@ -41,6 +41,12 @@ Result<Patterns> Patterns::create(const std::string& code, int width, int height
 int Patterns::column_bits() const { return bits_for(width); }
 int Patterns::row_bits() const { return bits_for(height); }
 
+std::vector<PatternGroup> Patterns::groups() const {
+  std::vector<PatternGroup> groups;
+  for (int first = 0; first < count(); first += 2) groups.push_back({first, 2});
+  return groups;
+}
+
 cv::Mat Patterns::picture(int index) const {
   LIMN_CHECK(index >= 0 && index < count());
   if (index >= white()) return cv::Mat(height, width, CV_8U, cv::Scalar(index == white() ? 255 : 0));

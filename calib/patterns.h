@@ -9,6 +9,12 @@
 
 namespace limn::calib {
 
+/// Pictures that follow each other and together light every pixel alike.
+struct PatternGroup {
+  int first = 0;
+  int count = 2;
+};
+
 /// Pictures for a projector from which each of its pixels can be told apart. The one code so far is Gray code
 /// with inverses, in OpenCV's order: the columns' bits, then the rows', most significant first, each picture
 /// followed by its inverse; white and black last.
@@ -25,6 +31,8 @@ struct Patterns {
   int count() const { return 2 * (column_bits() + row_bits()) + 2; }
   int white() const { return count() - 2; }
   int black() const { return count() - 1; }
+  /// Each picture with its inverse, in their order; white and black are the last group.
+  std::vector<PatternGroup> groups() const;
 
   /// Picture number `index`, 8-bit grey, 0 or 255, of the projector's size.
   cv::Mat picture(int index) const;

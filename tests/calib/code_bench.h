@@ -1,0 +1,90 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <opencv2/core.hpp>
+#include <random>
+#include <vector>
+
+#include "calib/patterns.h"
+#include "core/file.h"
+#include "core/picture.h"
+#include "tests/support/matchers.h"
+
+namespace limn::test {
+
+/// A camera before a projector, whose pixels fall on straight lines of the projector's picture: exact light,
+/// then blur, gain and noise.
+struct CodeBench {
+  calib::Patterns patterns = calib::Patterns::create("gray", 64, 64).value();
+  int width = 160, height = 120;
+  double white = 180, black = 20;  // levels
+  double blur = 0.3;               // of the projector, its pixels, standard deviation
+  double noise = 0;                // levels
+  double gamma = 1;                // of the projector: light = value ^ gamma
+  /// Light in the picture number `index` as the camera sees it, 0 to 1, may be changed before it is taken.
+  std::function<void(int index, cv::Mat* light)> changed;
+  std::mt19937_64 rng = test_rng();
+
+  // Where in the projector's picture the middle of a camera pixel falls.
+  double column_at(int x) const { return 5.3 + 0.35 * x; }
+  double row_at(int y) const { return 3.1 + 0.4 * y; }
+
+  /// Light at the camera pixels: the picture's pixels are squares, blurred. CV_64F.
+  cv::Mat light(const cv::Mat& picture) const {
+    cv::Mat linear(picture.size(), CV_64F);
+    for (int y = 0; y < picture.rows; ++y) {
+      for (int x = 0; x < picture.cols; ++x)
+        linear.at<double>(y, x) = std::pow(picture.at<uchar>(y, x) / 255.0, gamma);
+    }
+    const auto columns = weights(width, picture.cols, [&](int x) { return column_at(x); });
+    const auto rows = weights(height, picture.rows, [&](int y) { return row_at(y); });
+    return rows * linear * columns.t();
+  }
+
+  /// All pictures of the code, 8 bits.
+  std::vector<cv::Mat> photographs() {
+    std::normal_distribution<double> scatter(0, 1);
+    std::vector<cv::Mat> photos;
+    for (int i = 0; i < patterns.count(); ++i) {
+      cv::Mat seen = light(patterns.picture(i));
+      if (changed) changed(i, &seen);
+      cv::Mat photo(height, width, CV_8U);
+      for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x)
+          photo.at<uchar>(y, x) = cv::saturate_cast<uchar>(black + (white - black) * seen.at<double>(y, x) +
+                                                           noise * scatter(rng));
+      }
+      photos.push_back(photo);
+    }
+    return photos;
+  }
+
+  std::vector<std::filesystem::path> photograph(const std::filesystem::path& folder) {
+    EXPECT_TRUE(make_folder(folder).ok());
+    std::vector<std::filesystem::path> files;
+    for (const cv::Mat& photo : photographs()) {
+      files.push_back(folder / calib::picture_name(static_cast<int>(files.size())));
+      EXPECT_TRUE(write_png(files.back(), photo, {.compression = 1}).ok());
+    }
+    return files;
+  }
+
+ private:
+  // How much each projector pixel of a line counts for each camera pixel.
+  cv::Mat weights(int camera, int projector, const std::function<double(int)>& place) const {
+    cv::Mat weights(camera, projector, CV_64F);
+    for (int i = 0; i < camera; ++i) {
+      for (int k = 0; k < projector; ++k) {
+        const auto edge = [&](double d) { return 0.5 * (1 + std::erf(d / (blur * std::sqrt(2.0)))); };
+        weights.at<double>(i, k) = edge(k + 0.5 - place(i)) - edge(k - 0.5 - place(i));
+      }
+    }
+    return weights;
+  }
+};
+
+}  // namespace limn::test
