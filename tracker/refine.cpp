@@ -19,11 +19,11 @@ constexpr int k_max_reach = 10;
 constexpr double k_huber = 1.5;  // in robust standard deviations
 constexpr int k_min_crossings = 3;
 constexpr std::size_t k_min_bent_crossings = 12;
-constexpr double k_min_bow_px = 0.1;         // half a side's bow against its chord
-constexpr double k_min_bow_deviations = 10;  // so that noise never bends a straight side
-// Of half a side: paper around a cylinder eight sides wide, seen along its edge (sagitta half^2 / 2R). More
-// is a corner that lies elsewhere.
+constexpr double k_bow_deviations = 3;  // below them a bow is noise: one straight side in 370 shows as much
+// Of half a side: paper around a cylinder eight sides wide, seen along its edge (sagitta half^2 / 2R). Half
+// as much again is a corner that lies elsewhere.
 constexpr double k_max_bow_share = 0.0625;
+constexpr double k_no_bow_share = 1.5 * k_max_bow_share;
 
 // v of the lens's bow against the chord: t (1 - t) (c0 + c1 t + c2 t^2), t from 0 to 1 along the chord.
 struct Bow {
@@ -61,6 +61,32 @@ Bow bow_of(const Lens& lens, const Eigen::Vector2d& from, const Eigen::Vector2d&
   const Eigen::Vector3d c = normal.ldlt().solve(rows.transpose() * bends);
   if (c.allFinite()) bow.c = c;
   return bow;
+}
+
+// How much of a bend is believed, 0 to 1: the non-negative garrote (Breiman 1995), 1 - (k s / b)^2 of a bow b
+// with standard deviation s. It grows steadily with the evidence, so that a corner does not jump between
+// frames whose evidence lies on either side of a limit; a bow that shows clearly keeps its whole size.
+double weight_of_bow(const EdgeRefiner::EdgeLine& bent, double half) {
+  const double bow_share = std::abs(bent.curvature) * half;
+  const double squared = bent.curvature * bent.curvature;
+  const double noise = k_bow_deviations * k_bow_deviations * bent.covariance(2, 2);
+  if (!(squared > noise)) return 0;
+  const double plausible = (k_no_bow_share - bow_share) / (k_no_bow_share - k_max_bow_share);
+  return (1 - noise / squared) * std::clamp(plausible, 0.0, 1.0);
+}
+
+// The mean of both lines; its covariance holds how far they lie apart (Buckland 1997).
+EdgeRefiner::EdgeLine averaged(const EdgeRefiner::EdgeLine& straight,
+                               const EdgeRefiner::EdgeLine& bent,
+                               double bent_weight) {
+  EdgeRefiner::EdgeLine line = straight;
+  const Eigen::Vector3d apart(bent.offset - straight.offset, bent.slope - straight.slope, bent.curvature);
+  line.offset += bent_weight * apart[0];
+  line.slope += bent_weight * apart[1];
+  line.curvature = bent_weight * apart[2];
+  line.covariance = (1 - bent_weight) * straight.covariance + bent_weight * bent.covariance +
+                    bent_weight * (1 - bent_weight) * apart * apart.transpose();
+  return line;
 }
 
 // IEC 61966-2-1.
@@ -187,8 +213,7 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   return line->outside_level - line->inside_level >= min_contrast && fit_line(line);
 }
 
-// Straight, or bent where that explains the crossings much better: a bow of a tenth of a pixel or more, ten
-// standard deviations of itself.
+// A straight line and a bent one, averaged by what speaks for the bow.
 bool EdgeRefiner::fit_line(EdgeLine* line) {
   double u_sum = 0;
   for (const Crossing& c : crossings_) u_sum += c.u;
@@ -198,10 +223,7 @@ bool EdgeRefiner::fit_line(EdgeLine* line) {
   EdgeLine bent = *line;
   if (!(fit_terms(3, &bent) >= 0)) return true;
   const double half = 0.5 * std::abs(crossings_.back().u - crossings_.front().u);
-  const double bow = std::abs(bent.curvature) * half * half;
-  const double deviation = std::sqrt(bent.covariance(2, 2)) * half * half;
-  if (bow > k_min_bow_px && bow > k_min_bow_deviations * deviation && bow < k_max_bow_share * half)
-    *line = bent;
+  *line = averaged(*line, bent, weight_of_bow(bent, half));
   return true;
 }
 

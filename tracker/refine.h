@@ -56,8 +56,8 @@ class EdgeRefiner {
 
  public:
   /// A side's line v = offset + slope * d + curvature * d^2, d = u - u_middle, in the raw picture less the
-  /// lens's bow. The curvature is 0 unless the crossings show it beyond doubt: bent paper, a lens that is not
-  /// given.
+  /// lens's bow. Bent paper and a lens that is not given show as curvature; it is 0 where the crossings show
+  /// none, and grows steadily with the evidence.
   struct EdgeLine {
     bool flat = true;  ///< u is x and v is y; otherwise the other way round
     double u_middle = 0;

@@ -1,5 +1,6 @@
-// How near our corners come: swept over size, blur, white margin and tilt on pictures with exact truth, and,
-// given the folder of the OpenCV photographs, beside their whole-pixel lists. tracker_accuracy [FOLDER]
+// How near our corners come: swept over size, blur, white margin, tilt and bend of the paper on pictures with
+// exact truth, and, given the folder of the OpenCV photographs, beside their whole-pixel lists.
+// tracker_accuracy [FOLDER]
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
@@ -22,7 +23,7 @@ using limn::test::PlacedMarker;
 
 struct Case {
   std::string name;
-  double low_px, high_px, low_tilt_deg, high_tilt_deg, low_blur, high_blur, margin;
+  double low_px, high_px, low_tilt_deg, high_tilt_deg, low_blur, high_blur, margin, bow = 0;
 };
 
 double uniform(std::mt19937_64& rng, double low, double high) {
@@ -46,6 +47,7 @@ void print_case(const Case& c, int count) {
                      uniform(rng, c.low_tilt_deg, c.high_tilt_deg) * std::numbers::pi / 180,
                      uniform(rng, 0, 2 * std::numbers::pi));
     marker.margin = c.margin;
+    marker.bow = c.bow;
     test::PictureOptions options;
     options.noise_levels = 2;
     options.blur_px = uniform(rng, c.low_blur, c.high_blur);
@@ -132,7 +134,10 @@ int main(int argc, char** argv) {
                          {"margin 6 %, blur 0.7, 48-120 px", 48, 120, 0, 60, 0.7, 0.7, 0.06},
                          {"margin 3 %, blur 0.7, 48-120 px", 48, 120, 0, 60, 0.7, 0.7, 0.03},
                          {"margin 1.5 %, blur 0.7, 48-120 px", 48, 120, 0, 60, 0.7, 0.7, 0.015},
-                         {"steep 75-84 deg, blur 0.5", 80, 200, 75, 84, 0.5, 0.5, 0.125}})
+                         {"steep 75-84 deg, blur 0.5", 80, 200, 75, 84, 0.5, 0.5, 0.125},
+                         {"paper bent by 0.3 %, blur 0.5", 48, 120, 0, 40, 0.5, 0.5, 0.125, 0.003},
+                         {"paper bent by 0.6 %, blur 0.5", 48, 120, 0, 40, 0.5, 0.5, 0.125, 0.006},
+                         {"paper bent by 1.2 %, blur 1", 48, 120, 0, 40, 1, 1, 0.125, 0.012}})
     print_case(c, k_count);
   if (argc > 1) print_photographs(argv[1]);
 }

@@ -21,15 +21,18 @@ struct MarkerPlane {
   Eigen::Matrix3d rotation;  // marker from camera
   Eigen::Vector3d origin;    // the camera in the marker
   double size_m;
+  double bow;
   explicit MarkerPlane(const PlacedMarker& placed)
       : rotation(placed.camera_from_marker.inverse().rotation_matrix()),
         origin(placed.camera_from_marker.inverse().translation),
-        size_m(placed.size_m) {}
+        size_m(placed.size_m),
+        bow(placed.bow) {}
   std::optional<Eigen::Vector2d> at(const Eigen::Vector3d& d_camera) const {
     const Eigen::Vector3d d = rotation * d_camera;
     const double distance = -origin.z() / d.z();
     if (!(distance > 0)) return std::nullopt;
-    return Eigen::Vector2d((origin + distance * d).head<2>() / size_m + Eigen::Vector2d(0.5, 0.5));
+    const Eigen::Vector2d p = (origin + distance * d).head<2>() / size_m + Eigen::Vector2d(0.5, 0.5);
+    return Eigen::Vector2d(p.x(), p.y() - 4 * bow * p.x() * (1 - p.x()));
   }
 };
 

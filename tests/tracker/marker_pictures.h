@@ -19,6 +19,9 @@ struct PlacedMarker {
   Pose camera_from_marker;
   double size_m = 0.08;
   double margin = 0.125;  ///< of white paper around it, as share of its side
+  /// How far its upper and lower sides' middles lie below their chords, as share of its side: paper around a
+  /// cylinder, seen along the cylinder's axis from above. The corners stay where they are.
+  double bow = 0;
 };
 
 struct PictureOptions {
