@@ -1,5 +1,8 @@
 #include "apps/capture.h"
 
+#include <functional>
+#include <optional>
+
 #include "apps/picture_writer.h"
 #include "apps/world_markers.h"
 #include "calib/capture.h"
@@ -14,25 +17,17 @@ std::vector<calib::CapturedDevice> devices(const std::vector<Imager>& imagers) {
   return devices;
 }
 
-}  // namespace
-
-sim::Object board_object(const calib::Board& board, const Pose& world_from_board) {
-  const calib::BoardSheet drawn = calib::draw_board(board);
-  const double metres_per_px = 1 / drawn.pixels_per_metre;
-  const Eigen::Vector2d px_centre((drawn.picture.cols - 1) / 2.0, (drawn.picture.rows - 1) / 2.0);
-  const Eigen::Vector2d p_centre = (px_centre - drawn.px_board_origin) * metres_per_px;
-  const Pose board_from_sheet(Eigen::Quaterniond::Identity(), {p_centre.x(), p_centre.y(), 0});
-  return sim::sheet("board", drawn.picture.cols * metres_per_px, drawn.picture.rows * metres_per_px,
-                    drawn.picture, world_from_board * board_from_sheet);
+calib::Captures planned(const Plan& plan, const sim::VirtualRig& rig, const std::filesystem::path& out) {
+  return calib::plan_captures(out, devices(rig.world().rig.cameras), devices(rig.world().rig.projectors),
+                              plan.board);
 }
 
-Status capture_virtually(const Plan& plan, sim::VirtualRig* rig, const std::filesystem::path& out) {
-  const calib::Captures captures = calib::plan_captures(out, devices(rig->world().rig.cameras),
-                                                        devices(rig->world().rig.projectors), plan.board);
-  LIMN_TRY_STATUS(calib::begin_captures(captures));
+// Captures one pose for each call of `set_up`, which changes the stage.
+Status capture_poses(const calib::Captures& captures,
+                     int pose_count,
+                     const std::function<void(int)>& set_up,
+                     sim::VirtualRig* rig) {
   PictureWriter writer;
-  const int pose_count = static_cast<int>(plan.world_from_board.size());
-  rig->clear_stage();
   int done_before = 0;
   std::optional<Progress> progress;
   const calib::Stage stage{
@@ -55,13 +50,52 @@ Status capture_virtually(const Plan& plan, sim::VirtualRig* rig, const std::file
           },
   };
   for (int pose = 0; pose < pose_count; ++pose) {
-    rig->place(board_object(plan.board, plan.world_from_board[static_cast<std::size_t>(pose)]));
+    set_up(pose);
     LIMN_TRY_STATUS(calib::capture_pose(captures, pose, stage));
   }
   rig->darken();
+  return writer.finish();
+}
+
+}  // namespace
+
+sim::Object board_object(const calib::Board& board, const Pose& world_from_board) {
+  const calib::BoardSheet drawn = calib::draw_board(board);
+  const double metres_per_px = 1 / drawn.pixels_per_metre;
+  const Eigen::Vector2d px_centre((drawn.picture.cols - 1) / 2.0, (drawn.picture.rows - 1) / 2.0);
+  const Eigen::Vector2d p_centre = (px_centre - drawn.px_board_origin) * metres_per_px;
+  const Pose board_from_sheet(Eigen::Quaterniond::Identity(), {p_centre.x(), p_centre.y(), 0});
+  return sim::sheet("board", drawn.picture.cols * metres_per_px, drawn.picture.rows * metres_per_px,
+                    drawn.picture, world_from_board * board_from_sheet);
+}
+
+Status capture_virtually(const Plan& plan, sim::VirtualRig* rig, const std::filesystem::path& out) {
+  const calib::Captures captures = planned(plan, *rig, out);
+  LIMN_TRY_STATUS(calib::begin_captures(captures));
+  rig->clear_stage();
+  const auto hold_board = [&](int pose) {
+    rig->place(board_object(plan.board, plan.world_from_board[static_cast<std::size_t>(pose)]));
+  };
+  const Status done =
+      capture_poses(captures, static_cast<int>(plan.world_from_board.size()), hold_board, rig);
   rig->remove("board");
   rig->restore_stage();
-  return writer.finish();
+  return done;
+}
+
+Status capture_prototype(const Plan& plan,
+                         const std::vector<Pose>& world_from_prototype,
+                         sim::VirtualRig* rig,
+                         const std::filesystem::path& out) {
+  const calib::Captures captures = planned(plan, *rig, out);
+  LIMN_TRY_STATUS(calib::begin_captures(captures));
+  const Pose home = rig->world().world_from_prototype;
+  const auto stand = [&](int pose) {
+    rig->move("prototype", world_from_prototype[static_cast<std::size_t>(pose)]);
+  };
+  const Status done = capture_poses(captures, static_cast<int>(world_from_prototype.size()), stand, rig);
+  rig->move("prototype", home);
+  return done;
 }
 
 Status run_capture(const CaptureOptions& options) {

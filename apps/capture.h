@@ -23,4 +23,11 @@ sim::Object board_object(const calib::Board& board, const Pose& world_from_board
 /// Captures every pose of the plan with the board in a virtual rig, whose prototype is put away meanwhile.
 Status capture_virtually(const Plan& plan, sim::VirtualRig* rig, const std::filesystem::path& out);
 
+/// Captures the world's prototype itself, standing at each of the places in turn, without a board: scene
+/// captures (limn scan).
+Status capture_prototype(const Plan& plan,
+                         const std::vector<Pose>& world_from_prototype,
+                         sim::VirtualRig* rig,
+                         const std::filesystem::path& out);
+
 }  // namespace limn::apps

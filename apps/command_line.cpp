@@ -12,6 +12,7 @@
 #include "apps/markers.h"
 #include "apps/patterns.h"
 #include "apps/render.h"
+#include "apps/scan.h"
 #include "apps/solve.h"
 #include "apps/simulate.h"
 #include "core/log.h"
@@ -119,6 +120,34 @@ void add_solve(CLI::App& app, Run& run) {
   command->callback([options, &run] { run = [options] { return finished(run_solve(*options)); }; });
 }
 
+void add_scan(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("scan", "the prototype's surface from scene captures of a calibrated rig");
+  command->footer(
+      "Writes points.ply and mesh.ply (metres, the rig's world), scan.json and pictures. Poses that show the board are\n"
+      "left out. With --moved the prototype may stand elsewhere in each pose.\n"
+      "Example: limn scan captures --rig rig --far 1.8 --out scan\n"
+      "Example: limn scan --plan config/plans/bench.json --rig rig --out scan");
+  auto options = std::make_shared<ScanCommand>();
+  command->add_option("captures", options->captures, "captures folder with the prototype in its pose directories");
+  command->add_option("--plan", options->plan, "instead: take them of this plan's world on the virtual rig");
+  command->add_option("--rig", options->rig, "rig folder")->required();
+  command->add_option("--out", options->out, "folder to write")->required();
+  command->add_option("--poses", options->poses, "poses to use, by name, with commas; else all without the board")
+      ->delimiter(',');
+  command->add_flag("--moved", options->moved, "the prototype was moved between poses: lay them onto the first");
+  command->add_option("--pieces", options->pieces, "keep only so many of the largest connected pieces of each view")
+      ->check(CLI::Range(0, 1000));
+  command->add_option("--near", options->near_m, "leave out what is nearer to the camera, metres");
+  command->add_option("--far", options->far_m, "leave out what is further from the camera, metres (the background)");
+  command->add_option("--voxel-mm", options->voxel_mm, "edge of the mesh's cells; 0: one and a half points")
+      ->check(CLI::Range(0.0, 1000.0));
+  command->add_option("--smooth-px", options->smooth_px, "half the window of the averaging, camera pixels")
+      ->check(CLI::Range(2, 8))
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "print scan.json instead of a line");
+  command->callback([options, &run] { run = [options] { return finished(run_scan(*options)); }; });
+}
+
 void add_render(CLI::App& app, Run& run) {
   auto* command =
       app.add_subcommand("render", "a scene's pictures: for every projector, over camera pictures, and what light shows");
@@ -165,6 +194,7 @@ int run_command_line(int argc, char** argv) {
   add_patterns(app, run);
   add_capture(app, run);
   add_solve(app, run);
+  add_scan(app, run);
   add_render(app, run);
   add_simulate(app, run);
 

@@ -1,8 +1,10 @@
 #include "scene/nearest.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "core/result.h"
 
@@ -42,6 +44,24 @@ Eigen::Vector3d nearest_in_triangle(const Eigen::Vector3d& a,
   return Eigen::Vector3d(beyond_bc, beyond_ac, beyond_ab) / (beyond_ab + beyond_ac + beyond_bc);
 }
 
+constexpr std::uint32_t k_leaf = 4;  // triangles; fewer make more boxes than they save looking
+
+Eigen::Vector3d corner_of(const Mesh& mesh, std::size_t triangle, std::size_t corner) {
+  return mesh.positions[mesh.triangles[triangle][corner]].cast<double>();
+}
+
+Eigen::Vector3d normal_at(const Mesh& mesh, std::size_t triangle, const Eigen::Vector3d& weights) {
+  const auto& [i, j, k] = mesh.triangles[triangle];
+  const Eigen::Vector3f normal = static_cast<float>(weights[0]) * mesh.normals[i] +
+                                 static_cast<float>(weights[1]) * mesh.normals[j] +
+                                 static_cast<float>(weights[2]) * mesh.normals[k];
+  return normal.cast<double>().normalized();
+}
+
+double squared_distance(const Eigen::Vector3f& low, const Eigen::Vector3f& high, const Eigen::Vector3d& p) {
+  return (low.cast<double>() - p).cwiseMax(p - high.cast<double>()).cwiseMax(0).squaredNorm();
+}
+
 }  // namespace
 
 SurfacePoint nearest_on(const Mesh& mesh, const Eigen::Vector3d& p) {
@@ -64,12 +84,88 @@ SurfacePoint nearest_on(const Mesh& mesh, const Eigen::Vector3d& p) {
     found.p = p_here;
     found.triangle = t;
   }
-  const auto& [i, j, k] = mesh.triangles[found.triangle];
-  const Eigen::Vector3f normal = static_cast<float>(weights[0]) * mesh.normals[i] +
-                                 static_cast<float>(weights[1]) * mesh.normals[j] +
-                                 static_cast<float>(weights[2]) * mesh.normals[k];
-  found.d_normal = normal.cast<double>().normalized();
+  found.d_normal = normal_at(mesh, found.triangle, weights);
   found.distance = std::sqrt(best);
+  return found;
+}
+
+SurfaceIndex::SurfaceIndex(const Mesh& mesh) : mesh_(mesh), order_(mesh.triangles.size()) {
+  LIMN_CHECK(!mesh.triangles.empty());
+  std::iota(order_.begin(), order_.end(), 0U);
+  for (std::size_t t = 0; t < order_.size(); ++t) {
+    const Eigen::Vector3d a = corner_of(mesh, t, 0), b = corner_of(mesh, t, 1), c = corner_of(mesh, t, 2);
+    centres_.push_back(((a + b + c) / 3).cast<float>());
+    d_faces_.push_back((b - a).cross(c - a).normalized().cast<float>());
+  }
+  boxes_.reserve(2 * order_.size() / k_leaf + 2);
+  build(0, static_cast<std::uint32_t>(order_.size()));
+}
+
+// Halves by the median of the centres along the longest side; the first child follows its parent.
+std::uint32_t SurfaceIndex::build(std::uint32_t first, std::uint32_t count) {
+  const auto at = static_cast<std::uint32_t>(boxes_.size());
+  Box box{Eigen::Vector3f::Constant(std::numeric_limits<float>::infinity()),
+          Eigen::Vector3f::Constant(-std::numeric_limits<float>::infinity()), first, count};
+  for (std::uint32_t i = first; i < first + count; ++i)
+    for (const std::uint32_t corner : mesh_.triangles[order_[i]]) {
+      box.low = box.low.cwiseMin(mesh_.positions[corner]);
+      box.high = box.high.cwiseMax(mesh_.positions[corner]);
+    }
+  boxes_.push_back(box);
+  if (count <= k_leaf) return at;
+  Eigen::Index axis = 0;
+  (box.high - box.low).maxCoeff(&axis);
+  const auto begin = order_.begin() + first;
+  std::nth_element(begin, begin + count / 2, begin + count, [&](std::uint32_t a, std::uint32_t b) {
+    return centres_[a][axis] != centres_[b][axis] ? centres_[a][axis] < centres_[b][axis] : a < b;
+  });
+  build(first, count / 2);
+  const std::uint32_t second = build(first + count / 2, count - count / 2);
+  boxes_[at].first = second;
+  boxes_[at].count = 0;
+  return at;
+}
+
+std::optional<SurfacePoint> SurfaceIndex::nearest(const Eigen::Vector3d& p,
+                                                  double max_distance,
+                                                  const Eigen::Vector3d* d_facing,
+                                                  double min_cos) const {
+  double best = max_distance * max_distance;
+  std::optional<SurfacePoint> found;
+  Eigen::Vector3d weights = {1, 0, 0};
+  std::uint32_t stack[64];  // halving: as deep as the logarithm of the triangles' number
+  int depth = 0;
+  stack[depth++] = 0;
+  while (depth > 0) {
+    const std::uint32_t at = stack[--depth];
+    const Box& box = boxes_[at];
+    if (squared_distance(box.low, box.high, p) > best) continue;
+    if (box.count == 0) {
+      const Box &a = boxes_[at + 1], &b = boxes_[box.first];
+      const bool a_nearer = squared_distance(a.low, a.high, p) <= squared_distance(b.low, b.high, p);
+      stack[depth++] = a_nearer ? box.first : at + 1;
+      stack[depth++] = a_nearer ? at + 1 : box.first;
+      continue;
+    }
+    for (std::uint32_t i = box.first; i < box.first + box.count; ++i) {
+      const std::size_t t = order_[i];
+      if (d_facing && d_faces_[t].cast<double>().dot(*d_facing) < min_cos) continue;
+      const Eigen::Vector3d a = corner_of(mesh_, t, 0), b = corner_of(mesh_, t, 1),
+                            c = corner_of(mesh_, t, 2);
+      const Eigen::Vector3d here = nearest_in_triangle(a, b, c, p);
+      const Eigen::Vector3d p_here = here[0] * a + here[1] * b + here[2] * c;
+      const double distance = (p_here - p).squaredNorm();
+      if (distance > best || (found && distance == best)) continue;
+      best = distance;
+      weights = here;
+      if (!found) found.emplace();
+      found->p = p_here;
+      found->triangle = t;
+    }
+  }
+  if (!found) return found;
+  found->d_normal = normal_at(mesh_, found->triangle, weights);
+  found->distance = std::sqrt(best);
   return found;
 }
 

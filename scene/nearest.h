@@ -1,6 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
 
 #include "scene/mesh.h"
 
@@ -17,5 +21,32 @@ struct SurfacePoint {
 /// The point of the mesh nearest to p. Looks at every triangle. The mesh must have
 /// one.
 SurfacePoint nearest_on(const Mesh& mesh, const Eigen::Vector3d& p);
+
+/// The same question asked often: triangles in a tree of boxes. Borrows the mesh, which must outlive it
+/// unchanged. Queries are safe from several threads.
+class SurfaceIndex {
+ public:
+  explicit SurfaceIndex(const Mesh& mesh);
+
+  /// The nearest point within `max_distance` (m); nullopt when there is none. With `d_facing` only on
+  /// triangles that turn the same way: geometric normal . d_facing >= min_cos, so that a thin thing's back is
+  /// not taken for its front.
+  std::optional<SurfacePoint> nearest(const Eigen::Vector3d& p,
+                                      double max_distance,
+                                      const Eigen::Vector3d* d_facing = nullptr,
+                                      double min_cos = 0.5) const;
+
+ private:
+  struct Box {
+    Eigen::Vector3f low, high;
+    std::uint32_t first = 0, count = 0;  // of order_; count 0: an inner box, its second child is `first`
+  };
+  std::uint32_t build(std::uint32_t first, std::uint32_t count);
+
+  const Mesh& mesh_;
+  std::vector<std::uint32_t> order_;
+  std::vector<Eigen::Vector3f> centres_, d_faces_;
+  std::vector<Box> boxes_;
+};
 
 }  // namespace limn::scene
