@@ -28,7 +28,7 @@ constexpr double k_inset_px = 2;    // from a square's edge: pixels across it se
 constexpr double k_inset = 0.06;    // of a square, likewise
 constexpr int k_least_pixels = 12;  // in a cell: three times a plane's unknowns and some
 constexpr double k_least_share =
-    0.5;  // of a cell's pixels with a label; fewer are a chance selection, and biased
+    0.5;  // of a cell's bright pixels with a label; fewer are a chance selection, and biased
 constexpr double k_outlier_px = 3;  // from the cell's plane
 constexpr double k_bright = 0.75;   // of the cell's bright pixels; halfway between ink and paper is 0.5
 constexpr double k_stddev_floor_px = 0.02;
@@ -93,19 +93,33 @@ class Grid {
 struct Labelled {
   Vector2d px, label;
   double weight = 0;
-  int contrast = 0;
 };
 
-// Keeps the pixels that are about as bright as the cell's bright ones: a pixel across the edge of ink gets
-// its light from one side, and its label with it.
-void keep_bright(std::vector<Labelled>* pixels) {
-  if (pixels->empty()) return;
-  std::vector<int> levels;
-  for (const Labelled& p : *pixels) levels.push_back(p.contrast);
-  const auto bright = levels.begin() + static_cast<std::ptrdiff_t>(levels.size() * 9 / 10);
-  std::nth_element(levels.begin(), bright, levels.end());
-  std::erase_if(*pixels, [&](const Labelled& p) { return p.contrast < k_bright * *bright; });
-}
+// The labelled pixels of a cell that see paper and nothing but paper around them.
+struct Cell {
+  std::vector<Labelled> pixels;
+  std::vector<int> levels;        // white minus black, of all its pixels
+  std::vector<int> least_levels;  // the least of the 3 x 3 around, likewise
+  std::vector<int> labelled_at;   // index of each labelled pixel in the two
+
+  // Ink in the cell (a marker's) is left out with its fringe: a pixel across its edge gets its light from one
+  // side, and its label with it. False when too few of the rest have labels.
+  bool keep_bright() {
+    if (pixels.empty()) return false;
+    std::vector<int> sorted = levels;
+    const auto bright = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 9 / 10);
+    std::nth_element(sorted.begin(), bright, sorted.end());
+    const double limit = k_bright * *bright;
+    const auto all =
+        std::count_if(least_levels.begin(), least_levels.end(), [&](int level) { return level >= limit; });
+    size_t kept = 0;
+    for (size_t i = 0; i < pixels.size(); ++i) {
+      if (least_levels[static_cast<size_t>(labelled_at[i])] >= limit) pixels[kept++] = pixels[i];
+    }
+    pixels.resize(kept);
+    return static_cast<double>(kept) >= k_least_share * static_cast<double>(all);
+  }
+};
 
 // A robust plane through a cell's labels; the means of what fits.
 std::optional<Match> fitted(std::vector<Labelled> pixels) {
@@ -143,12 +157,12 @@ std::optional<Match> fitted(std::vector<Labelled> pixels) {
   return std::nullopt;
 }
 
-// The labelled pixels of one square, by cell; adds how many pixels each cell has.
-using Cells = std::array<std::vector<Labelled>, k_cells * k_cells>;
+// The pixels of one square, by cell. `least_contrast`: of the 3 x 3 around each pixel.
+using Cells = std::array<Cell, k_cells * k_cells>;
 void collect(const std::array<Vector2d, 4>& quad,
              const Decoded& decoded,
-             Cells* cells,
-             std::array<int, 4>* areas) {
+             const cv::Mat& least_contrast,
+             Cells* cells) {
   std::array<cv::Point2f, 4> from, to = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
   Vector2d low = quad[0], high = quad[0];
   double side = 1e9;
@@ -168,14 +182,16 @@ void collect(const std::array<Vector2d, 4>& quad,
          x <= std::min(labels.cols - 1, static_cast<int>(high.x()) + 1); ++x) {
       const Vector2d s = (h * Eigen::Vector3d(x, y, 1)).hnormalized();
       if (!(s.minCoeff() > inset) || !(s.maxCoeff() < 1 - inset)) continue;
-      const auto cell = static_cast<size_t>(static_cast<int>(s.y() * k_cells) * k_cells +
-                                            static_cast<int>(s.x() * k_cells));
-      ++(*areas)[cell];
+      Cell& cell = (*cells)[static_cast<size_t>(static_cast<int>(s.y() * k_cells) * k_cells +
+                                                static_cast<int>(s.x() * k_cells))];
+      cell.levels.push_back(decoded.contrast.at<uchar>(y, x));
+      cell.least_levels.push_back(least_contrast.at<uchar>(y, x));
       const auto& label = labels.at<cv::Vec2f>(y, x);
       if (std::isnan(label[0])) continue;
       const auto& variance = decoded.variance.at<cv::Vec2f>(y, x);
-      (*cells)[cell].push_back({Vector2d(x, y), Vector2d(label[0], label[1]),
-                                1.0 / (variance[0] + variance[1]), decoded.contrast.at<uchar>(y, x)});
+      cell.labelled_at.push_back(static_cast<int>(cell.levels.size()) - 1);
+      cell.pixels.push_back(
+          {Vector2d(x, y), Vector2d(label[0], label[1]), 1.0 / (variance[0] + variance[1])});
     }
   }
 }
@@ -281,6 +297,8 @@ std::vector<Match> matches_on_board(const Board& board,
                                     const std::vector<BoardCorner>& corners,
                                     const Decoded& decoded) {
   const Grid grid(board, corners);
+  cv::Mat least_contrast;
+  cv::erode(decoded.contrast, least_contrast, cv::Mat());
   std::vector<Match> matches;
   for (int row = 0; row < board.rows; ++row) {
     for (int column = 0; column < board.columns; ++column) {
@@ -288,12 +306,10 @@ std::vector<Match> matches_on_board(const Board& board,
                  &d = grid.at(column, row + 1);
       if (!a || !b || !c || !d) continue;
       Cells cells;
-      std::array<int, k_cells * k_cells> areas{};
-      collect({*a, *b, *c, *d}, decoded, &cells, &areas);
-      for (size_t i = 0; i < cells.size(); ++i) {
-        keep_bright(&cells[i]);
-        if (static_cast<double>(cells[i].size()) < k_least_share * areas[i]) continue;
-        if (auto match = fitted(std::move(cells[i]))) matches.push_back(*match);
+      collect({*a, *b, *c, *d}, decoded, least_contrast, &cells);
+      for (Cell& cell : cells) {
+        if (!cell.keep_bright()) continue;
+        if (auto match = fitted(std::move(cell.pixels))) matches.push_back(*match);
       }
     }
   }

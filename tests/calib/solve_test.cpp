@@ -297,7 +297,7 @@ TEST(Assess, HeldOutErrorIsTheNoiseOfTheCells) {
   EXPECT_GT(score->rms_px, 0.1 * std::sqrt(2.0) * 0.97);  // the 2-vector
   EXPECT_LT(score->rms_px, 0.1 * std::sqrt(2.0) * 1.15);
   // 0.1 px of 1600 px focal length at 1.1 m are 0.07 mm, a Rayleigh's 95 % is 2.45 of that.
-  Observed observed{world.observations, {{0, 0, 0, 1000, 900, 2}}, 0, 0};
+  Observed observed{world.observations, {{0, 0, 0, 1000, 900, 2}}, {}, 0, 0};
   const auto assessment = assess(observed, {}, *solution);
   ASSERT_TRUE(assessment.ok()) << assessment.message();
   EXPECT_NEAR(assessment->predicted_error_mm[0], 0.18, 0.06);
@@ -367,7 +367,7 @@ TEST(Assess, ParallelBoardsInTheMiddleAreNeverGood) {
     add_noise(world, 0.05, 0.05, test_rng());
     const auto solution = solve(world->observations);
     ASSERT_TRUE(solution.ok()) << solution.message();
-    const auto assessment = assess({world->observations, {}, 0, 0}, {}, *solution);
+    const auto assessment = assess({world->observations, {}, {}, 0, 0}, {}, *solution);
     ASSERT_TRUE(assessment.ok()) << assessment.message();
     propagated.push_back(assessment->propagated_error_mm[0]);
     EXPECT_EQ(assessment->verdict == Verdict::good, world == &healthy);
@@ -385,7 +385,7 @@ TEST(Assess, NoticesABoardThatMovedWhileItWasCaptured) {
   }
   const auto solution = solve(world.observations);
   ASSERT_TRUE(solution.ok()) << solution.message();
-  const auto assessment = assess({world.observations, {}, 0, 0}, {}, *solution);
+  const auto assessment = assess({world.observations, {}, {}, 0, 0}, {}, *solution);
   ASSERT_TRUE(assessment.ok()) << assessment.message();
   EXPECT_NE(assessment->verdict, Verdict::good);
   bool named = false;
@@ -400,7 +400,7 @@ TEST(Assess, LeavesOutABoardWhoseCornersAreOnALine) {
   std::erase_if(world.observations.corners, [](const CornerSeen& c) { return c.pose == 4 && c.corner >= 5; });
   const auto solution = solve(world.observations);
   ASSERT_TRUE(solution.ok()) << solution.message();
-  const auto assessment = assess({world.observations, {}, 0, 0}, {}, *solution);
+  const auto assessment = assess({world.observations, {}, {}, 0, 0}, {}, *solution);
   ASSERT_TRUE(assessment.ok()) << assessment.message();
   EXPECT_EQ(assessment->held_out.poses.size(), 5U);
   ASSERT_FALSE(assessment->faults.empty());
@@ -414,7 +414,7 @@ TEST(Assess, NoticesPosesWithoutABoard) {
   world.observations = without_pose(world.observations, 2);
   const auto solution = solve(world.observations);
   ASSERT_TRUE(solution.ok()) << solution.message();
-  const auto assessment = assess({world.observations, {}, 0, 0}, {}, *solution);
+  const auto assessment = assess({world.observations, {}, {}, 0, 0}, {}, *solution);
   ASSERT_TRUE(assessment.ok()) << assessment.message();
   ASSERT_FALSE(assessment->faults.empty());
   EXPECT_EQ(assessment->faults[0].name, "board_not_visible");

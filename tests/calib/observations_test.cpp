@@ -1,0 +1,71 @@
+#include "calib/observations.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <opencv2/imgproc.hpp>
+
+#include "tests/support/matchers.h"
+
+namespace limn::calib {
+namespace {
+
+using Eigen::Vector2d;
+
+// A ChArUco sheet seen head on, each pixel of paper labelled with half its place; ink has no label, and paper
+// beside ink a wrong one, as blur makes it.
+struct Sheet {
+  Board board = Board::parse("charuco:11x8:25mm").value();
+  BoardSheet drawn = draw_board(board, {.square_px = 40});
+  Decoded decoded;
+  std::vector<BoardCorner> corners;
+
+  Sheet() {
+    const cv::Mat& picture = drawn.picture;
+    cv::Mat least;
+    cv::erode(picture, least, cv::Mat());
+    decoded.contrast = 8 + picture * (180 / 255.0);
+    decoded.px_projector.create(picture.size(), CV_32FC2);
+    decoded.variance = cv::Mat(picture.size(), CV_32FC2, cv::Scalar::all(0.01));
+    for (int y = 0; y < picture.rows; ++y) {
+      for (int x = 0; x < picture.cols; ++x) {
+        const float wrong = least.at<uchar>(y, x) > 0 ? 0.0F : 0.5F;
+        const float ink = picture.at<uchar>(y, x) > 0 ? 0.0F : std::numeric_limits<float>::quiet_NaN();
+        decoded.px_projector.at<cv::Vec2f>(y, x) = {0.5F * static_cast<float>(x) + wrong + ink,
+                                                    0.5F * static_cast<float>(y) + wrong + ink};
+      }
+    }
+    for (int id = 0; id < board.corner_count(); ++id)
+      corners.push_back(
+          {id, drawn.px_board_origin + drawn.pixels_per_metre * board.p_corner(id).head<2>(), 0.01});
+  }
+};
+
+TEST(Observations, PaperAroundAMarkerMakesMatches) {
+  const Sheet sheet;
+  const std::vector<Match> matches = matches_on_board(sheet.board, sheet.corners, sheet.decoded);
+  // 44 white squares of four cells, each with a marker over more than half of it.
+  EXPECT_GE(matches.size(), 170U);
+}
+
+TEST(Observations, PaperBesideInkIsLeftOut) {
+  const Sheet sheet;
+  const std::vector<Match> matches = matches_on_board(sheet.board, sheet.corners, sheet.decoded);
+  ASSERT_FALSE(matches.empty());
+  for (const Match& match : matches) ASSERT_TRUE(test::near(match.px_projector, 0.5 * match.px_camera, 1e-4));
+}
+
+TEST(Observations, ACellWhosePaperHasFewLabelsIsNoMatch) {
+  Sheet sheet;
+  for (int y = 0; y < sheet.decoded.px_projector.rows; ++y) {
+    for (int x = 0; x < sheet.decoded.px_projector.cols; ++x) {
+      if ((x + 2 * y) % 5 < 3)
+        sheet.decoded.px_projector.at<cv::Vec2f>(y, x) =
+            cv::Vec2f::all(std::numeric_limits<float>::quiet_NaN());
+    }
+  }
+  EXPECT_TRUE(matches_on_board(sheet.board, sheet.corners, sheet.decoded).empty());
+}
+
+}  // namespace
+}  // namespace limn::calib
