@@ -1,0 +1,67 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "calib/observations.h"
+#include "core/rig.h"
+#include "scene/mesh.h"
+
+namespace limn::test {
+
+/// A camera and a projector with known truth in camera 0's world, and board poses that fill the space that
+/// they share: what calibrations are judged with.
+struct TrueRig {
+  Rig rig;
+  calib::Board board;
+  std::vector<Pose> world_from_board;
+  Eigen::Vector2d bow_m = Eigen::Vector2d::Zero();  ///< of the board, as calib::BoardShape bends it
+  Pose world_from_prototype;                        ///< middle of the space, facing camera and projector
+};
+
+struct RigOptions {
+  double k1 = 0;     ///< of the projector
+  double shift = 0;  ///< of its lens, panel heights
+  double bow_m = 0;  ///< of the board along its width
+  int poses = 12;
+  double tilt = 0.55;    ///< largest of the board's, rad
+  double spread = 1;     ///< of the boards' places over the space; 0: all in the middle
+  double asunder = 0.5;  ///< m from camera to projector
+  unsigned seed = 1;     ///< of the poses
+};
+/// Camera 1280 x 960, projector 800 x 600 with pixels of about 1 mm at the board, 1.3 m away.
+TrueRig make_true_rig(const RigOptions& options);
+
+/// What the rig would observe, without pictures: corners and matches with normal noise (px, one coordinate).
+/// `each`: of how many cells one is taken.
+calib::Observations observed_perfectly(const TrueRig& rig, int each = 1);
+void add_noise(double corner_px, double match_px, std::mt19937_64* rng, calib::Observations* observations);
+
+/// Prototypes, metres, facing -z of their frame: a curved panel, boxes and balls before a plate, a trough.
+enum class Prototype { panel, cluster, concave };
+std::string to_text(Prototype prototype);
+scene::Mesh prototype_mesh(Prototype prototype);
+
+/// How far (mm) light lands from the surface points it is meant for, when the prototype's pose is measured by
+/// the calibrated camera 0 from 24 of its points with `pnp_px` of noise, and the calibrated projector's pixel
+/// of each point is traced with the true projector.
+struct Landed {
+  std::vector<double> in_place_mm, moved_mm, turned_mm;  ///< moved by 150 mm, turned by 40 degrees
+  std::vector<double> pooled_mm() const;
+};
+Landed landed(const TrueRig& truth,
+              const Rig& calibrated,
+              const scene::Mesh& prototype,
+              double pnp_px,
+              int points,
+              std::mt19937_64* rng);
+
+double rms(const std::vector<double>& values);
+double p95(std::vector<double> values);
+/// Share of the values that are at most `limit`.
+double share_within(const std::vector<double>& values, double limit);
+
+}  // namespace limn::test
