@@ -85,6 +85,7 @@ Result<HeldOut> held_out(const Observations& observations,
     if (scored->cells == 0) continue;
     const double rms = std::sqrt(scored->squared / scored->cells);
     score.poses.push_back({name, rms, scored->cells});
+    score.rigs.push_back(left->rig);
     score.worst_px = std::max(score.worst_px, rms);
     total.squared += scored->squared;
     total.cells += scored->cells;

@@ -21,6 +21,7 @@ struct HeldOut {
   double rms_px = 0;    ///< over all cells of all poses; RMS of the 2-vector
   double worst_px = 0;  ///< of the poses' RMS
   std::vector<HeldOutPose> poses;
+  std::vector<Rig> rigs;  ///< parallel to poses: the devices as solved without that pose
   /// Parallel to Observations::matches: predicted minus measured projector pixel (NaN where not scored), and
   /// the same error as a distance on the board's surface, m.
   std::vector<Eigen::Vector2d> residuals;

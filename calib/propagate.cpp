@@ -155,7 +155,41 @@ std::array<std::vector<Pose>, 3> placements(const Pose& world_from_board, const 
   return all;
 }
 
+// The devices' unknowns of one rig as they differ from another's; empty when the lenses are of other models.
+Eigen::VectorXd unknowns_between(const Rig& rig, const Rig& from) {
+  std::vector<double> values;
+  for (const auto devices : {&Rig::cameras, &Rig::projectors}) {
+    if ((rig.*devices).size() != (from.*devices).size()) return {};
+    for (size_t i = 0; i < (rig.*devices).size(); ++i) {
+      const Imager &a = (rig.*devices)[i], &b = (from.*devices)[i];
+      if (!(a.lens.model == b.lens.model)) return {};
+      for (size_t k = 0; k < a.lens.values.size(); ++k) values.push_back(a.lens.values[k] - b.lens.values[k]);
+      const Vector6d pose = boxminus(a.imager_from_world, b.imager_from_world);
+      values.insert(values.end(), pose.data(), pose.data() + 6);
+    }
+  }
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
 }  // namespace
+
+Eigen::MatrixXd jackknife_covariance(const Solution& solution, std::span<const Rig> without) {
+  std::vector<Eigen::VectorXd> moved;
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(solution.covariance.cols());
+  for (const Rig& rig : without) {
+    const Eigen::VectorXd delta = unknowns_between(rig, solution.rig);
+    if (delta.size() != mean.size()) continue;
+    moved.push_back(delta);
+    mean += delta;
+  }
+  MatrixXd covariance = MatrixXd::Zero(mean.size(), mean.size());
+  const auto n = static_cast<double>(moved.size());
+  if (n < 3) return covariance;
+  mean /= n;
+  for (const Eigen::VectorXd& delta : moved)
+    covariance += (n - 1) / n * (delta - mean) * (delta - mean).transpose();
+  return covariance;
+}
 
 std::vector<std::optional<Eigen::Matrix2d>> light_covariances(const Solution& solution,
                                                               const Uncertainty& uncertainty,

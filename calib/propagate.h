@@ -20,6 +20,13 @@ struct Uncertainty {
   double measured_px = 0;
 };
 
+/// The devices' covariance by the jackknife: how far they move when one board pose at a time is left out
+/// (Efron and Tibshirani, An Introduction to the Bootstrap, section 11). Errors that a whole pose shares
+/// count here, which the residuals' scatter does not show: a board that bends, a capture that drifts, a lens
+/// model that is not quite right. `without`: the devices as solved without one pose each; rigs of other lens
+/// models than the solution's are left out. Zero when fewer than 3 remain.
+Eigen::MatrixXd jackknife_covariance(const Solution& solution, std::span<const Rig> without);
+
 /// Covariance (m^2) of where a projector's light lands that is meant for points on a thing, along two
 /// directions of the surface at each point. The thing's pose follows the camera's errors (linearised), so
 /// that what camera and projector share cancels. A point that the projector does not reach has none; all are
