@@ -100,12 +100,25 @@ std::vector<CapturedDevice> read_devices(const ConfigNode& list, const std::set<
   return devices;
 }
 
-Status read_patterns(const ConfigNode& root, Captures* captures) {
-  const fs::path common = root.at("patterns").path_inside();
-  const std::vector<ConfigNode> nodes = root.at("projectors").items();
+// A patterns file that is named but not there is capture.json's mistake.
+fs::path patterns_path(const ConfigNode& node) {
+  fs::path path = node.path_inside();
+  std::error_code ignored;
+  if (!path.empty() && !fs::is_regular_file(path, ignored))
+    node.problem("expected a patterns file, found no " + path.string() + ".");
+  return path;
+}
+
+Status read_patterns(const Config& config, Captures* captures) {
+  const fs::path common = patterns_path(config.root().at("patterns"));
+  std::vector<fs::path> paths;
+  for (const ConfigNode& node : config.root().at("projectors").items()) {
+    const auto own = node.find("patterns");
+    paths.push_back(own ? patterns_path(*own) : common);
+  }
+  LIMN_TRY_STATUS(config.status());
   for (size_t i = 0; i < captures->projectors.size(); ++i) {
-    const auto own = nodes[i].find("patterns");
-    LIMN_TRY(const Patterns patterns, load_patterns(own ? own->path_inside() : common));
+    LIMN_TRY(const Patterns patterns, load_patterns(paths[i]));
     const CapturedDevice& projector = captures->projectors[i];
     if (patterns.width != projector.width || patterns.height != projector.height)
       return error("{}: projectors[{}].size: expected the patterns' {}x{}, found {}x{}.",
@@ -147,8 +160,7 @@ Result<Captures> load_captures(const fs::path& folder, const std::vector<std::st
   auto parsed = Board::parse(board);
   if (!parsed) return error("{}: board: {}", path.string(), parsed.message());
   captures.board = *parsed;
-  LIMN_TRY_STATUS(read_patterns(root, &captures));
-  LIMN_TRY_STATUS(config.status());
+  LIMN_TRY_STATUS(read_patterns(config, &captures));
   LIMN_TRY(const auto names, pose_names(folder, "pose*", skip));
   for (const std::string& name : names) {
     LIMN_TRY(CapturedPose pose, read_pose(captures, name));

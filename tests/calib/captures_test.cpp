@@ -97,6 +97,9 @@ TEST(Captures, SayWhatIsWrongWithTheirFile) {
   EXPECT_NE(with("limn.capture/1", "limn.capture/9").find("limn.capture/9"), std::string::npos);
   EXPECT_NE(with("16", "\"wide\"").find("size"), std::string::npos);
   EXPECT_NE(with("16", "32").find("projectors[0].size"), std::string::npos);
+  for (const char* patterns : {"[]", "\"\"", "\"/dev/zero\"", "\"other.json\""})
+    EXPECT_NE(with("\"patterns.json\"", patterns).find("capture.json: patterns: expected"), std::string::npos)
+        << patterns;
   EXPECT_NE(with("[", " [").find("pose*"), std::string::npos)
       << "nothing wrong but that there are no poses yet";
 }
