@@ -11,6 +11,7 @@
 #include "apps/detect.h"
 #include "apps/markers.h"
 #include "apps/patterns.h"
+#include "apps/recheck.h"
 #include "apps/render.h"
 #include "apps/scan.h"
 #include "apps/solve.h"
@@ -148,6 +149,25 @@ void add_scan(CLI::App& app, Run& run) {
   command->callback([options, &run] { run = [options] { return finished(run_scan(*options)); }; });
 }
 
+void add_recheck(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("recheck", "has a camera or projector of a calibrated rig been nudged? which, how far");
+  command->footer(
+      "Captures of the board in one pose are enough. The device that has moved gets its pose re-solved, its lens is kept;\n"
+      "the rig folder is written in any case, with recheck.json. With one camera and one projector only a board that has\n"
+      "not been touched since an earlier recheck tells which of them it was.\n"
+      "Example: limn recheck captures --rig rig --out rig-repaired\n"
+      "Example: limn recheck captures --rig rig --still rig-repaired/recheck.json --out rig-again\n"
+      "Example: limn recheck --plan config/plans/studio.json --rig rig --out rig-repaired");
+  auto options = std::make_shared<RecheckCommand>();
+  command->add_option("captures", options->captures, "captures folder with the board in view");
+  command->add_option("--plan", options->plan, "instead: capture its first poses (15 s) on the virtual rig, into OUT/captures");
+  command->add_option("--rig", options->rig, "rig folder, rig.json or folder of .cameramodel files")->required();
+  command->add_option("--still", options->still, "an earlier recheck.json: the board stands where it stood then");
+  command->add_option("--out", options->out, "rig folder to write")->required();
+  command->add_flag("--json", options->json, "print recheck.json instead of a table");
+  command->callback([options, &run] { run = [options] { return finished(run_recheck(*options)); }; });
+}
+
 void add_render(CLI::App& app, Run& run) {
   auto* command =
       app.add_subcommand("render", "a scene's pictures: for every projector, over camera pictures, and what light shows");
@@ -195,6 +215,7 @@ int run_command_line(int argc, char** argv) {
   add_capture(app, run);
   add_solve(app, run);
   add_scan(app, run);
+  add_recheck(app, run);
   add_render(app, run);
   add_simulate(app, run);
 

@@ -1,0 +1,131 @@
+#include "apps/recheck.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "apps/world_markers.h"
+#include "core/file.h"
+#include "core/rig.h"
+#include "sim/world.h"
+#include "tests/support/matchers.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace test;
+using calib::RecheckVerdict;
+using Json = nlohmann::json;
+
+Json json_at(const fs::path& path) {
+  return Json::parse(read_file(path).value(), nullptr, true, /*ignore_comments=*/true);
+}
+
+// The bench without its prototype; its projector's target raised by `up_m`.
+fs::path bench_world(const fs::path& path, double up_m) {
+  Json world = json_at(fs::path(LIMN_SOURCE_DIR) / "config/worlds/bench.json");
+  for (const char* key : {"scene", "world_from_prototype", "slot_markers"}) world.erase(key);
+  world["projectors"][0]["target_m"][2] = world["projectors"][0]["target_m"][2].get<double>() + up_m;
+  EXPECT_TRUE(write_file(path, world.dump()).ok());
+  return path;
+}
+
+// A plan of one pose, well in the light.
+fs::path plan_of(const fs::path& world) {
+  Json plan = json_at(fs::path(LIMN_SOURCE_DIR) / "config/plans/bench.json");
+  plan["world"] = world.filename();
+  plan["world_from_board"] = Json::array({plan["world_from_board"][3]});
+  const fs::path path = world.parent_path() / ("plan-" + world.filename().string());
+  EXPECT_TRUE(write_file(path, plan.dump()).ok());
+  return path;
+}
+
+// RMS distance, on the plane y = 0 around the working volume's middle, between the lights of two projectors
+// that are given the same pixels.
+double light_apart_mm(const Imager& a, const Imager& b) {
+  double squares = 0;
+  int count = 0;
+  for (double x = -0.2; x <= 0.2; x += 0.1) {
+    for (double z = 0.2; z <= 0.6; z += 0.1) {
+      const Eigen::Vector3d p(x, 0, z);
+      const auto ray = b.ray(*a.project(p));
+      const Eigen::Vector3d landed = ray->p_origin - ray->p_origin.y() / ray->d.y() * ray->d;
+      squares += (landed - p).squaredNorm();
+      ++count;
+    }
+  }
+  return 1e3 * std::sqrt(squares / count);
+}
+
+TEST(RecheckCommand, FindsAndRepairsANudgeOnTheVirtualRig) {
+  const fs::path folder = test_folder();
+  const fs::path sound_world = bench_world(folder / "sound.json", 0),
+                 nudged_world = bench_world(folder / "nudged.json", 0.00444);
+  const Rig rig = sim::load_world(sound_world, marker_picture).value().rig;
+  const Rig truth = sim::load_world(nudged_world, marker_picture).value().rig;
+  const double turned = angle_between(rig.projectors[0].imager_from_world.rotation,
+                                      truth.projectors[0].imager_from_world.rotation);
+  ASSERT_NEAR(turned * 180 / std::numbers::pi, 0.2, 0.001);
+  ASSERT_TRUE(save_rig(rig, folder / "rig").ok());
+
+  RecheckCommand sound{.rig = folder / "rig", .plan = plan_of(sound_world), .out = folder / "before"};
+  const auto before = rechecked(sound);
+  ASSERT_TRUE(before) << before.message();
+  EXPECT_EQ(before->result.verdict, RecheckVerdict::sound);
+  EXPECT_LE(before->pictures, 150) << "15 s at ten pictures a second";
+  EXPECT_EQ(load_rig(sound.out).value().projectors[0].imager_from_world.matrix(),
+            load_rig(sound.rig).value().projectors[0].imager_from_world.matrix());
+
+  RecheckCommand nudged{.rig = folder / "rig", .plan = plan_of(nudged_world), .out = folder / "after"};
+  const auto undecided = rechecked(nudged);
+  ASSERT_TRUE(undecided) << undecided.message();
+  EXPECT_EQ(undecided->result.verdict, RecheckVerdict::undecided);
+
+  // The same captures, with the board where it stood before.
+  RecheckCommand again{
+      .rig = folder / "rig", .captures = nudged.out / "captures", .out = folder / "repaired"};
+  again.still = sound.out / "recheck.json";
+  const auto after = rechecked(again);
+  ASSERT_TRUE(after) << after.message();
+  ASSERT_EQ(after->result.verdict, RecheckVerdict::nudged);
+  EXPECT_EQ(after->result.candidates[0].device, "projector0");
+  EXPECT_NEAR(after->result.candidates[0].degrees, 0.2, 0.02);
+  const auto repaired = load_rig(again.out);
+  ASSERT_TRUE(repaired) << repaired.message();
+  EXPECT_GT(light_apart_mm(rig.projectors[0], truth.projectors[0]), 3);
+  EXPECT_LT(light_apart_mm(repaired->projectors[0], truth.projectors[0]), 1);
+  EXPECT_EQ(repaired->projectors[0].lens.values, rig.projectors[0].lens.values);
+  EXPECT_TRUE(fs::exists(again.out / "projector0.cameramodel"));
+  EXPECT_EQ(json_at(again.out / "rig.json")["provenance"]["re_solved"]["device"], "projector0");
+  const Json told = json_at(again.out / "recheck.json");
+  EXPECT_EQ(told["verdict"], "nudged");
+  EXPECT_TRUE(told["boards"].contains("pose00"));
+
+  // A reference that knows nothing of this pose, and one that is no recheck.json.
+  Json other = told;
+  other["boards"] = {{"pose77", told["boards"]["pose00"]}};
+  ASSERT_TRUE(write_file(folder / "other.json", other.dump()).ok());
+  again.still = folder / "other.json";
+  EXPECT_NE(rechecked(again).message().find("other.json: boards: expected"), std::string::npos);
+  again.still = again.out / "rig.json";
+  EXPECT_NE(rechecked(again).message().find("limn.recheck/1"), std::string::npos);
+}
+
+TEST(RecheckCommand, WantsCapturesOrAPlan) {
+  const fs::path folder = test_folder();
+  const Rig rig = sim::load_world(bench_world(folder / "world.json", 0), marker_picture).value().rig;
+  ASSERT_TRUE(save_rig(rig, folder / "rig").ok());
+  const auto neither = rechecked({.rig = folder / "rig", .out = folder / "out"});
+  ASSERT_FALSE(neither);
+  EXPECT_TRUE(neither.error().wrong_usage);
+  const auto missing = rechecked({.rig = folder / "rig", .captures = folder / "none", .out = folder / "out"});
+  EXPECT_NE(missing.message().find("capture.json"), std::string::npos);
+  EXPECT_FALSE(fs::exists(folder / "out")) << "nothing is written when nothing was measured";
+}
+
+}  // namespace
+}  // namespace limn::apps
