@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 
+#include "apps/align.h"
 #include "apps/capture.h"
 #include "apps/demo.h"
 #include "apps/detect.h"
@@ -166,6 +167,31 @@ void add_recheck(CLI::App& app, Run& run) {
   command->add_option("--out", options->out, "rig folder to write")->required();
   command->add_flag("--json", options->json, "print recheck.json instead of a table");
   command->callback([options, &run] { run = [options] { return finished(run_recheck(*options)); }; });
+void add_align(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("align", "a CAD mesh onto the scan of the prototype");
+  command->footer(
+      "The start comes from a pose, from picked points, from the prototype's markers, or from a search of the whole scan.\n"
+      "Writes poses.json (for limn render --poses), align.json, residual.ply and pictures of where CAD and scan differ.\n"
+      "PICKS.json: {\"schema\": \"limn.picks/1\", \"pairs\": [{\"cad\": [x, y, z], \"scan_m\": [x, y, z]}, ...]}, cad in --units\n"
+      "Example: limn align --scan scan --mesh door.glb --units m --out aligned\n"
+      "Example: limn align --scan scan/mesh.ply --mesh door.stl --units mm --points picks.json --out aligned\n"
+      "Example: limn align --scan scan --mesh door.glb --units m --scene config/scenes/door --rig rig --frame camera0=picture.png --out aligned");
+  auto options = std::make_shared<AlignCommand>();
+  command->add_option("--scan", options->scan, "PLY, or the folder of limn scan; without it the markers' answer is all");
+  command->add_option("--scan-units", options->scan_units, "of the PLY: m, cm, mm, in, ft")->capture_default_str();
+  command->add_option("--mesh", options->mesh, "the CAD: .glb, .gltf, .obj, .stl, .ply")->required();
+  command->add_option("--units", options->units, "of the CAD: m, cm, mm, in, ft")->required();
+  command->add_option("--start", options->start, "POSES.json with a world_from_prototype");
+  command->add_option("--points", options->points, "PICKS.json: three and more pairs of the same places");
+  command->add_option("--scene", options->scene, "scene whose prototype carries markers; with --rig and --frame");
+  command->add_option("--rig", options->rig, "rig folder, for --frame");
+  command->add_option("--frame", options->frames, "CAMERA=PICTURE, again for another camera");
+  command->add_option("--least-mm", options->least_mm, "smaller differences are not told")
+      ->check(CLI::Range(0.001, 1000.0))
+      ->capture_default_str();
+  command->add_option("--out", options->out, "folder to write")->required();
+  command->add_flag("--json", options->json, "print align.json instead of a line");
+  command->callback([options, &run] { run = [options] { return finished(run_align(*options)); }; });
 }
 
 void add_render(CLI::App& app, Run& run) {
@@ -216,6 +242,7 @@ int run_command_line(int argc, char** argv) {
   add_solve(app, run);
   add_scan(app, run);
   add_recheck(app, run);
+  add_align(app, run);
   add_render(app, run);
   add_simulate(app, run);
 

@@ -104,13 +104,24 @@ SurfaceIndex::SurfaceIndex(const Mesh& mesh) : mesh_(mesh), order_(mesh.triangle
 // Halves by the median of the centres along the longest side; the first child follows its parent.
 std::uint32_t SurfaceIndex::build(std::uint32_t first, std::uint32_t count) {
   const auto at = static_cast<std::uint32_t>(boxes_.size());
-  Box box{Eigen::Vector3f::Constant(std::numeric_limits<float>::infinity()),
-          Eigen::Vector3f::Constant(-std::numeric_limits<float>::infinity()), first, count};
-  for (std::uint32_t i = first; i < first + count; ++i)
+  Box box;
+  box.low.setConstant(std::numeric_limits<float>::infinity());
+  box.high = -box.low;
+  box.first = first;
+  box.count = count;
+  box.d_mean.setZero();
+  for (std::uint32_t i = first; i < first + count; ++i) {
+    box.d_mean += d_faces_[order_[i]];
     for (const std::uint32_t corner : mesh_.triangles[order_[i]]) {
       box.low = box.low.cwiseMin(mesh_.positions[corner]);
       box.high = box.high.cwiseMax(mesh_.positions[corner]);
     }
+  }
+  box.d_mean.normalize();
+  for (std::uint32_t i = first; i < first + count; ++i)
+    box.cos_widest = std::min(box.cos_widest, box.d_mean.dot(d_faces_[order_[i]]));
+  box.cos_widest = std::max(-1.f, box.cos_widest - 1e-5f);  // rounding must not exclude
+  box.sin_widest = std::sqrt(1 - box.cos_widest * box.cos_widest);
   boxes_.push_back(box);
   if (count <= k_leaf) return at;
   Eigen::Index axis = 0;
@@ -133,6 +144,7 @@ std::optional<SurfacePoint> SurfaceIndex::nearest(const Eigen::Vector3d& p,
   double best = max_distance * max_distance;
   std::optional<SurfacePoint> found;
   Eigen::Vector3d weights = {1, 0, 0};
+  const double min_sin = std::sqrt(std::max(0.0, 1 - min_cos * min_cos));
   std::uint32_t stack[64];  // halving: as deep as the logarithm of the triangles' number
   int depth = 0;
   stack[depth++] = 0;
@@ -140,6 +152,11 @@ std::optional<SurfacePoint> SurfaceIndex::nearest(const Eigen::Vector3d& p,
     const std::uint32_t at = stack[--depth];
     const Box& box = boxes_[at];
     if (squared_distance(box.low, box.high, p) > best) continue;
+    if (d_facing) {  // by the sum of two angles; one beyond 180 degrees excludes nothing
+      const double cos_a = box.cos_widest, sin_a = box.sin_widest;
+      const bool beyond = sin_a * min_cos + cos_a * min_sin < 0;
+      if (!beyond && box.d_mean.cast<double>().dot(*d_facing) < cos_a * min_cos - sin_a * min_sin) continue;
+    }
     if (box.count == 0) {
       const Box &a = boxes_[at + 1], &b = boxes_[box.first];
       const bool a_nearer = squared_distance(a.low, a.high, p) <= squared_distance(b.low, b.high, p);

@@ -39,7 +39,9 @@ class SurfaceIndex {
  private:
   struct Box {
     Eigen::Vector3f low, high;
-    std::uint32_t first = 0, count = 0;  // of order_; count 0: an inner box, its second child is `first`
+    std::uint32_t first = 0, count = 0;    // of order_; count 0: an inner box, its second child is `first`
+    Eigen::Vector3f d_mean;                // of its triangles' normals, which
+    float cos_widest = 1, sin_widest = 0;  // turn from it by at most this angle
   };
   std::uint32_t build(std::uint32_t first, std::uint32_t count);
 

@@ -6,13 +6,16 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "apps/align.h"
 #include "apps/capture.h"
 #include "apps/plan.h"
 #include "apps/world_markers.h"
+#include "core/config.h"
 #include "core/file.h"
 #include "core/rig.h"
 #include "scene/nearest.h"
 #include "scene/ply.h"
+#include "scene/posed.h"
 #include "sim/truth.h"
 #include "sim/world.h"
 #include "tests/support/matchers.h"
@@ -22,6 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using Eigen::Vector3d;
+using namespace test::literals;
 
 const fs::path k_plan = fs::path(LIMN_SOURCE_DIR) / "config/plans/bench.json";
 
@@ -64,7 +68,8 @@ Errors errors_on_clay(const scene::Surface& surface, const sim::World& world, st
 
 nlohmann::json read_json(const fs::path& path) { return nlohmann::json::parse(read_file(path).value()); }
 
-TEST(Scan, MeasuresTheVirtualDoorToATenthOfAMillimetreAndSaysSo) {
+// One scan of the virtual door by the true rig, then a CAD laid onto it.
+TEST(Scan, MeasuresTheVirtualDoorToATenthOfAMillimetreAndTheCadIsLaidOntoIt) {
   const fs::path out = test::test_folder();
   const sim::World world = bench();
   ASSERT_TRUE(save_rig(world.rig, out / "rig").ok());
@@ -94,6 +99,95 @@ TEST(Scan, MeasuresTheVirtualDoorToATenthOfAMillimetreAndSaysSo) {
   EXPECT_LT(json["stddev_mm"]["median"], 0.1);
   for (const char* name : {"mesh.png", "shaded-pose00-camera0.png", "deviation-pose00-camera0.png"})
     EXPECT_TRUE(fs::exists(out / "scan" / name)) << name;
+
+  const Pose truth = world.world_from_prototype;
+  const Pose start(exp_rotation({0.1, -0.1, 0.1}) * truth.rotation,
+                   truth.translation + Vector3d(0.03, -0.03, 0.026));
+  const nlohmann::json poses = {{"world_from_prototype", to_json(start)}};
+  ASSERT_TRUE(write_file(out / "start.json", poses.dump()).ok());
+  AlignCommand align;
+  align.scan = out / "scan";
+  align.mesh = fs::path(LIMN_SOURCE_DIR) / "config/scenes/door/door.glb";
+  align.units = "m";
+  align.start = out / "start.json";
+  align.out = out / "aligned";
+  const Status laid = run_align(align);
+  ASSERT_TRUE(laid.ok()) << laid.message();
+  const auto posed = scene::load_poses(out / "aligned/poses.json", *world.scene);
+  ASSERT_TRUE(posed.ok()) << posed.message();
+  EXPECT_TRUE(test::pose_near(*posed->world_from_prototype, truth, 0.05_deg, 0.3_mm));
+  const auto report = read_json(align.out / "align.json");
+  EXPECT_TRUE(report["free_directions"].empty());
+  EXPECT_GE(report["differences"].size(),
+            4U);  // the plates of the markers stand on the clay, up to 3 mm above
+  for (const auto& difference : report["differences"]) {
+    EXPECT_GT(difference["mean_mm"], 0);
+    EXPECT_LT(difference["worst_mm"], 5);
+  }
+  for (const char* name : {"residual.ply", "residual.png", "residual-side.png"})
+    EXPECT_TRUE(fs::exists(align.out / name)) << name;
+
+  align.start.clear();
+  align.units = "mm";
+  align.out = out / "wrong";
+  const Status wrong = run_align(align);
+  ASSERT_FALSE(wrong.ok());
+  EXPECT_NE(wrong.message().find("check --units"), std::string::npos) << wrong.message();
+  EXPECT_FALSE(fs::exists(align.out));
+
+  // Another rig: a projector of another size, then one that has been turned by two degrees.
+  Rig other = world.rig;
+  other.projectors[0].width = 1920;
+  ASSERT_TRUE(save_rig(other, out / "rig-size").ok());
+  other = world.rig;
+  other.projectors[0].imager_from_world =
+      Pose(exp_rotation({0.035, 0, 0}), Vector3d::Zero()) * other.projectors[0].imager_from_world;
+  ASSERT_TRUE(save_rig(other, out / "rig-turned").ok());
+  ScanCommand again;
+  again.captures = out / "scan/captures";
+  again.out = out / "other";
+  again.rig = out / "rig-size";
+  const Status size = run_scan(again);
+  ASSERT_FALSE(size.ok());
+  EXPECT_NE(size.message().find("projector0"), std::string::npos) << size.message();
+  EXPECT_NE(size.message().find("1920x800"), std::string::npos) << size.message();
+  again.rig = out / "rig-turned";
+  const Status turned = run_scan(again);
+  ASSERT_FALSE(turned.ok());
+  EXPECT_NE(turned.message().find("nudged"), std::string::npos) << turned.message();
+  EXPECT_FALSE(fs::exists(again.out));
+}
+
+TEST(Scan, CallsWrongOptionsWrongUsage) {
+  ScanCommand command;
+  command.rig = test::test_folder();
+  command.out = command.rig / "out";
+  Status status = run_scan(command);
+  ASSERT_FALSE(status.ok());
+  EXPECT_TRUE(status.error().wrong_usage);  // neither captures nor a plan
+  command.captures = command.rig;
+  command.near_m = 2;
+  command.far_m = 1;
+  status = run_scan(command);
+  ASSERT_FALSE(status.ok());
+  EXPECT_TRUE(status.error().wrong_usage);
+  EXPECT_FALSE(fs::exists(command.out));
+}
+
+TEST(Align, CallsWrongOptionsWrongUsage) {
+  AlignCommand command;
+  command.mesh = fs::path(LIMN_SOURCE_DIR) / "config/scenes/door/door.glb";
+  command.units = "m";
+  command.out = test::test_folder() / "out";
+  EXPECT_TRUE(run_align(command).error().wrong_usage);  // neither a scan nor markers
+  command.scan = "scan.ply";
+  command.units = "parsec";
+  EXPECT_TRUE(run_align(command).error().wrong_usage);
+  command.units = "m";
+  command.start = "a.json";
+  command.points = "b.json";
+  EXPECT_TRUE(run_align(command).error().wrong_usage);
+  EXPECT_FALSE(fs::exists(command.out));
 }
 
 }  // namespace

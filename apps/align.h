@@ -1,0 +1,32 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+
+namespace limn::apps {
+
+struct AlignCommand {
+  std::filesystem::path scan;  ///< PLY, or the folder of limn scan; empty: the markers' answer alone
+  std::string scan_units = "m";
+  std::filesystem::path mesh;
+  std::string units;
+  std::filesystem::path start;   ///< POSES.json, or {"world_from_prototype": POSE}
+  std::filesystem::path points;  ///< limn.picks/1
+  std::filesystem::path scene;   ///< with rig and frames: its prototype's markers give the start
+  std::filesystem::path rig;
+  std::vector<std::string> frames;  ///< CAMERA=PICTURE
+  double least_mm = 1;              ///< smaller differences are not told
+  std::filesystem::path out;
+  bool json = false;
+};
+
+/// `limn align`: where a CAD mesh stands in the scan: poses.json (POSES.json), align.json with its
+/// covariance, residual.ply, residual.png and residual-side.png, and warnings where the CAD and the scan
+/// differ. Without a start the whole scan is searched. Everything is worked out before the first file is
+/// written.
+Status run_align(const AlignCommand& command);
+
+}  // namespace limn::apps
