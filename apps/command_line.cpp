@@ -167,6 +167,8 @@ void add_recheck(CLI::App& app, Run& run) {
   command->add_option("--out", options->out, "rig folder to write")->required();
   command->add_flag("--json", options->json, "print recheck.json instead of a table");
   command->callback([options, &run] { run = [options] { return finished(run_recheck(*options)); }; });
+}
+
 void add_align(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand("align", "a CAD mesh onto the scan of the prototype");
   command->footer(
