@@ -4,13 +4,16 @@
 
 #include "apps/patterns.h"
 #include "calib/assess.h"
+#include "calib/capture_faults.h"
 #include "calib/captures.h"
+#include "calib/failed_report.h"
 #include "calib/observations.h"
 #include "calib/report.h"
 #include "calib/solve.h"
 #include "core/file.h"
 #include "core/lens.h"
 #include "core/log.h"
+#include "core/rig.h"
 
 namespace limn::apps {
 namespace {
@@ -63,6 +66,23 @@ void print_table(const calib::Assessment& assessment) {
              calib::to_text(assessment.verdict));
 }
 
+// What kept a rig from being made, with the faults that explain it; they also stand in report.json.
+Error explained(const Error& failure, const std::vector<calib::Fault>& faults, const SolveOptions& options) {
+  if (faults.empty()) return failure;
+  if (const auto written = calib::write_failed_report(failure.message, faults, options.out); !written)
+    log_warning("{}", written.message());
+  return error("{}\n{}", failure.message, calib::to_text(faults));
+}
+
+// What the rig says against the one that it replaces.
+void compare_with_earlier(const SolveOptions& options,
+                          const calib::Solution& solution,
+                          calib::Assessment* assessment) {
+  if (!std::filesystem::exists(options.out / "rig.json")) return;
+  const auto earlier = load_rig(options.out);
+  if (earlier) calib::add_faults(calib::faults_against(*earlier, solution.rig), assessment);
+}
+
 }  // namespace
 
 Result<calib::Report> solved(const SolveOptions& options) {
@@ -75,14 +95,17 @@ Result<calib::Report> solved(const SolveOptions& options) {
   solving.camera_model = options.camera_model;
   solving.projector_model = options.projector_model;
   const auto solving_begun = Clock::now();
-  LIMN_TRY(calib::Solution solution, calib::solve(observed.observations, solving));
+  auto solution = calib::solve(observed.observations, solving);
+  if (!solution) return explained(solution.error(), calib::unsolved_faults(observed), options);
   const double solve_seconds = seconds_since(solving_begun);
-  log_info("solved in {} steps, judging by held-out poses", solution.iterations);
+  log_info("solved in {} steps, judging by held-out poses", solution->iterations);
   const auto judging_begun = Clock::now();
-  LIMN_TRY(calib::Assessment assessment, calib::assess(observed, solving, solution));
+  auto assessment = calib::assess(observed, solving, *solution);
+  if (!assessment) return explained(assessment.error(), calib::faults(observed, *solution, {}, {}), options);
+  compare_with_earlier(options, *solution, &*assessment);
   calib::Report report{std::move(observed),
-                       std::move(solution),
-                       std::move(assessment),
+                       std::move(*solution),
+                       std::move(*assessment),
                        {{"board", board_seconds},
                         {"decode", decode_seconds},
                         {"solve", solve_seconds},

@@ -93,6 +93,13 @@ std::string to_text(Verdict verdict) {
   return "reject";
 }
 
+void add_faults(const std::vector<Fault>& faults, Assessment* assessment) {
+  assessment->faults.insert(assessment->faults.end(), faults.begin(), faults.end());
+  const Severity severity = heaviest(faults);
+  if (severity == Severity::reject) assessment->verdict = Verdict::reject;
+  if (severity == Severity::doubt) assessment->verdict = std::max(assessment->verdict, Verdict::usable);
+}
+
 Result<Assessment> assess(const Observed& observed, const SolveOptions& options, const Solution& solution) {
   const Observations& observations = observed.observations;
   Assessment assessment;
@@ -116,11 +123,10 @@ Result<Assessment> assess(const Observed& observed, const SolveOptions& options,
   const double px = assessment.held_out.rms_px;
   const double mm =
       *std::max_element(assessment.predicted_error_mm.begin(), assessment.predicted_error_mm.end());
-  const bool parallel = std::any_of(assessment.faults.begin(), assessment.faults.end(),
-                                    [](const Fault& fault) { return fault.name == "little_tilt"; });
-  if (px <= k_good_px && mm <= k_good_mm && !parallel) {
+  const Severity severity = heaviest(assessment.faults);
+  if (px <= k_good_px && mm <= k_good_mm && severity == Severity::note) {
     assessment.verdict = Verdict::good;
-  } else if (px <= k_usable_px && mm <= k_usable_mm) {
+  } else if (px <= k_usable_px && mm <= k_usable_mm && severity != Severity::reject) {
     assessment.verdict = Verdict::usable;
   }
   return assessment;

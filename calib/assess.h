@@ -43,6 +43,9 @@ struct Assessment {
 constexpr double k_good_px = 0.5, k_good_mm = 1.0;
 constexpr double k_usable_px = 1.5, k_usable_mm = 3.0;
 
+/// Adds faults found elsewhere; the verdict falls as far as they demand.
+void add_faults(const std::vector<Fault>& faults, Assessment* assessment);
+
 Result<Assessment> assess(const Observed& observed, const SolveOptions& options, const Solution& solution);
 
 }  // namespace limn::calib

@@ -1,10 +1,17 @@
 #include "calib/faults.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <set>
+#include <tuple>
+#include <utility>
 
 #include "calib/assess.h"
+#include "calib/board_faults.h"
+#include "calib/capture_faults.h"
 #include "core/log.h"
 
 namespace limn::calib {
@@ -15,6 +22,19 @@ constexpr double k_low_share = 0.5;       // of lit pixels decoded
 constexpr double k_low_coverage = 0.25;
 constexpr double k_odd_pose = 2.5;  // held-out RMS of a pose over the median of the others
 constexpr int k_few_poses = 5;
+// Less of the boards lit, with less of the panel: light lands mostly where nothing was measured.
+constexpr double k_overlap = 0.5, k_panel_used = 0.35;
+constexpr double k_aspect = 0.01;         // of fy / fx from 1: lenses and panels are square to 0.002
+constexpr double k_camera_centre = 0.12;  // of the width; cheap cameras are centred to 0.05
+constexpr double k_turned_deg = 135;      // a picture stands rather on its head than on its side
+constexpr double k_shifted = 0.15;        // picture heights; less is a lens without shift
+// Against an earlier calibration. Swapped projectors stand far apart; a scale shows once directions and
+// lenses are as they were.
+constexpr double k_same_place = 0.05;      // of the distance
+constexpr double k_same_axes = 0.1;        // rad
+constexpr double k_same_direction = 0.01;  // rad, and of the focal lengths: between two calibrations
+constexpr double k_scale = 0.005;
+constexpr double k_zoom = 0.03;  // of the field of view; refocusing breathes by 0.02
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -31,12 +51,12 @@ void note_board(const Observations& observations, const Solution& solution, std:
       faults->push_back(
           {"board_not_visible",
            fmt::format("no camera sees the board in {}", observations.poses[static_cast<size_t>(pose)]),
-           "a scene capture is fine; otherwise light the board and keep it in the picture"});
+           "a scene capture is fine; otherwise light the board and keep it in the picture", Severity::note});
     if (seen && !solution.world_from_board[static_cast<size_t>(pose)])
       faults->push_back({"board_not_placed",
                          fmt::format("too few corners, or all on a line, in {}; it was left out",
                                      observations.poses[static_cast<size_t>(pose)]),
-                         "keep more of the board in the picture and lit"});
+                         "keep more of the board in the picture and lit", Severity::note});
   }
 }
 
@@ -82,7 +102,34 @@ void note_pictures(const Observed& observed,
       faults->push_back(
           {"low_coverage",
            fmt::format("{}: observations in {:.0f} % of the picture", device.name, 100 * device.coverage),
-           "bring the board to the corners of the picture, too"});
+           "bring the board to the corners of the picture, too", Severity::note});
+  }
+}
+
+// How much of the board a projector lights: its matches over those of as many whole boards as cameras see.
+double lit_share(const Observations& observations, int projector) {
+  std::set<std::pair<int, int>> seen;
+  for (const CornerSeen& corner : observations.corners) seen.emplace(corner.camera, corner.pose);
+  std::map<std::tuple<int, int, int>, int> counts;
+  int own = 0, whole = 0;
+  for (const Match& match : observations.matches) {
+    whole = std::max(whole, ++counts[{match.camera, match.pose, match.projector}]);
+    own += match.projector == projector ? 1 : 0;
+  }
+  return static_cast<double>(own) / (static_cast<double>(seen.size()) * std::max(1, whole));
+}
+
+void note_overlap(const Observations& observations,
+                  const std::vector<DeviceQuality>& devices,
+                  std::vector<Fault>* faults) {
+  for (size_t i = observations.cameras.size(); i < devices.size(); ++i) {
+    const double lit = lit_share(observations, static_cast<int>(i - observations.cameras.size()));
+    if (lit > k_overlap || devices[i].coverage > k_panel_used) continue;
+    faults->push_back(
+        {"little_overlap",
+         fmt::format("{} lights {:.0f} % of what cameras see of the boards, with {:.0f} % of its picture",
+                     devices[i].name, 100 * lit, 100 * devices[i].coverage),
+         "turn projector and camera towards the same place, or hold the board where both reach it"});
   }
 }
 
@@ -101,18 +148,184 @@ void note_odd_poses(const HeldOut& score, std::vector<Fault>* faults) {
   }
 }
 
+double aspect(const Imager& imager) { return imager.lens.fy() / imager.lens.fx() - 1; }
+
+void note_lenses(const Solution& solution, std::vector<Fault>* faults) {
+  for (const Imager& projector : solution.rig.projectors) {
+    if (std::abs(aspect(projector)) < k_aspect) continue;
+    faults->push_back({"keystone_or_scaling",
+                       fmt::format("{}: its pixels come out {:.3f} times as wide as high", projector.name,
+                                   1 + aspect(projector)),
+                       "send the projector its native resolution; switch off keystone, zoom and aspect "
+                       "corrections in the projector and the display's settings"});
+  }
+  for (const Imager& camera : solution.rig.cameras) {
+    const double off = std::max(std::abs(camera.lens.cx() - (camera.width - 1) / 2.0),
+                                std::abs(camera.lens.cy() - (camera.height - 1) / 2.0)) /
+                       camera.width;
+    if (std::abs(aspect(camera)) < k_aspect && off < k_camera_centre) continue;
+    faults->push_back(
+        {"wrong_camera_resolution",
+         fmt::format("{}: its pixels come out {:.3f} times as wide as high, its optical axis {:.0f} % of the "
+                     "width from the middle",
+                     camera.name, 1 + aspect(camera), 100 * off),
+         "use a resolution with the sensor's own shape, without stretching, digital zoom or cropping"});
+  }
+}
+
+void note_turned(const Solution& solution, std::vector<Fault>* faults) {
+  const Imager& camera = solution.rig.cameras[0];
+  const Eigen::Vector3d d_down = camera.imager_from_world.rotation.inverse() * Eigen::Vector3d::UnitY();
+  for (const Imager& projector : solution.rig.projectors) {
+    const Eigen::Vector3d d = projector.imager_from_world.rotation * d_down;
+    const double turned = std::abs(std::atan2(d.x(), d.y())) * 180 / std::numbers::pi;
+    // Lenses shift the picture up, away from table or ceiling: for one that hangs, that is down in its own.
+    const double shift = (projector.lens.cy() - (projector.height - 1) / 2.0) / projector.height;
+    if (turned < k_turned_deg || shift > k_shifted) continue;
+    faults->push_back(
+        {"rotated_projection",
+         fmt::format("{}: its picture stands turned by {:.0f} degrees against {}; its lens shift ({:.2f} "
+                     "picture heights) is not that of a projector that hangs",
+                     projector.name, turned, camera.name, shift),
+         "switch off ceiling mounting (flip, rotation) in the projector's menu or the display's settings"});
+  }
+}
+
+// What a fault implies is not named again.
+void erase_implied(std::vector<Fault>* faults) {
+  const auto has = [&](const char* name) {
+    return std::any_of(faults->begin(), faults->end(), [&](const Fault& f) { return f.name == name; });
+  };
+  // Where the board is stretched, or a projector's pixels are bent to fit, the other lenses follow.
+  const bool board = has("wrong_square_size"), panel = has("keystone_or_scaling");
+  std::erase_if(*faults, [&](const Fault& fault) {
+    return (board && (fault.name == "wrong_camera_resolution" || fault.name == "keystone_or_scaling")) ||
+           (panel && fault.name == "wrong_camera_resolution");
+  });
+}
+
+// Of a device against camera 0: its place and its axes.
+struct Stand {
+  std::string name;
+  Eigen::Vector3d p_camera0;
+  Eigen::Quaterniond rotation;
+  double focal = 0;  // of the picture's width
+};
+
+std::vector<Stand> stands(const Rig& rig, const std::vector<Imager>& imagers) {
+  std::vector<Stand> all;
+  for (const Imager& imager : imagers) {
+    const Pose camera0_from_imager = rig.cameras[0].imager_from_world * imager.imager_from_world.inverse();
+    all.push_back({imager.name, camera0_from_imager.translation, camera0_from_imager.rotation,
+                   imager.lens.fx() / imager.width});
+  }
+  return all;
+}
+
+// Whether a stands where b stood.
+bool same_stand(const Stand& a, const Stand& b) {
+  return (a.p_camera0 - b.p_camera0).norm() < k_same_place * b.p_camera0.norm() &&
+         a.rotation.angularDistance(b.rotation) < k_same_axes;
+}
+
+void note_swapped(const std::vector<Stand>& before,
+                  const std::vector<Stand>& now,
+                  std::vector<Fault>* faults) {
+  std::vector<std::string> swaps;
+  for (const Stand& projector : now) {
+    const auto there = std::find_if(before.begin(), before.end(),
+                                    [&](const Stand& stand) { return same_stand(projector, stand); });
+    if (there != before.end() && there->name != projector.name)
+      swaps.push_back(fmt::format("{} stands where {} stood", projector.name, there->name));
+  }
+  if (swaps.empty()) return;
+  faults->push_back({"projectors_swapped", fmt::format("{}", fmt::join(swaps, ", ")),
+                     "give each projector its own display again (cables, display order); if they have really "
+                     "changed places, solve once more",
+                     Severity::reject});
+}
+
+void note_other_pictures(const Rig& earlier, const Rig& now, std::vector<Fault>* faults) {
+  for (const Imager& camera : now.cameras) {
+    const Imager* before = earlier.find(camera.name);
+    if (!before) continue;
+    const double zoom = camera.lens.fx() / camera.width / (before->lens.fx() / before->width);
+    if (std::abs(zoom - 1) < k_zoom) continue;
+    faults->push_back(
+        {"wrong_camera_resolution",
+         fmt::format("{}: its picture ({}x{}) shows {:.3f} times the earlier calibration's field ({}x{})",
+                     camera.name, camera.width, camera.height, 1 / zoom, before->width, before->height),
+         "use the same camera mode as before, without digital zoom or cropping; if zoom or lens were changed "
+         "on purpose, solve once more"});
+  }
+}
+
+// The factor by which all distances have changed while directions and lenses stayed; 1 when they did not.
+double common_scale(const std::vector<Stand>& before, const std::vector<Stand>& now) {
+  double low = 1e9, high = 0;
+  for (size_t i = 0; i < now.size(); ++i) {
+    const double was = before[i].p_camera0.norm(), is = now[i].p_camera0.norm();
+    if (was < 1e-6 || is < 1e-6) return 1;
+    const Eigen::Vector3d cross = (before[i].p_camera0 / was).cross(now[i].p_camera0 / is);
+    if (before[i].name != now[i].name || cross.norm() > k_same_direction ||
+        before[i].rotation.angularDistance(now[i].rotation) > k_same_direction ||
+        std::abs(before[i].focal / now[i].focal - 1) > k_same_direction)
+      return 1;
+    low = std::min(low, is / was);
+    high = std::max(high, is / was);
+  }
+  return now.empty() || high / low - 1 > k_scale / 2 ? 1 : (low + high) / 2;
+}
+
 }  // namespace
 
 std::vector<Fault> faults(const Observed& observed,
                           const Solution& solution,
                           const std::vector<DeviceQuality>& devices,
                           const HeldOut& held_out) {
-  std::vector<Fault> found;
+  std::vector<Fault> found = capture_faults(observed);
   note_board(observed.observations, solution, &found);
   note_geometry(observed.observations, solution, &found);
   note_pictures(observed, devices, &found);
+  note_overlap(observed.observations, devices, &found);
   note_odd_poses(held_out, &found);
+  note_lenses(solution, &found);
+  note_turned(solution, &found);
+  for (const Fault& fault : board_faults(observed.observations, solution)) found.push_back(fault);
+  erase_implied(&found);
   return found;
+}
+
+std::vector<Fault> faults_against(const Rig& earlier, const Rig& now) {
+  std::vector<Fault> found;
+  if (earlier.cameras.empty() || now.cameras.empty() || earlier.projectors.size() != now.projectors.size())
+    return found;
+  const std::vector<Stand> before = stands(earlier, earlier.projectors), after = stands(now, now.projectors);
+  note_swapped(before, after, &found);
+  note_other_pictures(earlier, now, &found);
+  const double scale = common_scale(before, after);
+  if (std::abs(scale - 1) > k_scale)
+    found.push_back({"wrong_square_size",
+                     fmt::format("every distance is {:.4f} times that of the earlier calibration, while all "
+                                 "directions and lenses are the same",
+                                 scale),
+                     "measure the printed squares and give --board or the plan their size; if the earlier "
+                     "board was the wrong one, solve once more",
+                     Severity::reject});
+  return found;
+}
+
+Severity heaviest(const std::vector<Fault>& faults) {
+  Severity worst = Severity::note;
+  for (const Fault& fault : faults) worst = std::max(worst, fault.severity);
+  return worst;
+}
+
+std::string to_text(const std::vector<Fault>& faults) {
+  std::string text;
+  for (const Fault& fault : faults)
+    text += fmt::format("{}{}: {}; {}.", text.empty() ? "" : "\n", fault.name, fault.evidence, fault.advice);
+  return text;
 }
 
 }  // namespace limn::calib

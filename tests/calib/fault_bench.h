@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/board.h"
+#include "calib/captures.h"
+#include "core/result.h"
+#include "sim/world.h"
+
+namespace limn::test {
+
+/// Something moved while a pose was captured.
+struct Nudge {
+  int pose = 0;
+  int shot = 0;  ///< index of the first picture after it, in the series of every projector
+  bool camera = false;
+  Pose world_moved;  ///< world_from_world: of the board, or of the camera
+};
+
+/// A calibration captured on a world of config/ whose devices have 3/8 of their pixels, with a coarser board
+/// of the same size, held as that world's plan says. Everything is as it should be until something is set;
+/// what calib sees of it are capture.json and pictures.
+struct FaultBench {
+  sim::World world;
+  calib::Board board;  ///< as capture.json says
+  std::vector<Pose> world_from_board;
+  std::uint64_t seed = 1;  ///< of the noise
+  std::string code = "gray";
+
+  /// What the display pretends to be, if not the projector's own size.
+  std::optional<cv::Size> mode;
+  /// What the projector's panel shows of a picture (of the mode's size).
+  std::function<cv::Mat(const cv::Mat& picture)> on_panel;
+  /// Which projector a picture for `projector` comes out of; -1: none in the room.
+  std::function<int(int projector)> display_of;
+  /// Changes light or sensor before a picture is taken; geometry stays.
+  std::function<void(int pose, int shot, sim::World* world)> before_shot;
+  /// Of the camera's picture, before it is kept.
+  std::function<cv::Mat(const cv::Mat& photo)> on_photo;
+  /// Of the sheet: where its point (x, y), metres from its middle, truly is.
+  std::function<Eigen::Vector3d(const Eigen::Vector2d& p)> sheet;
+  std::optional<Nudge> nudge;
+
+  /// `name`: "bench" or "studio".
+  static FaultBench create(const std::string& name, int poses);
+  Result<calib::Captures> capture(const std::filesystem::path& folder) const;
+};
+
+}  // namespace limn::test

@@ -1,0 +1,300 @@
+#include "calib/faults.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <opencv2/imgproc.hpp>
+#include <set>
+
+#include "calib/assess.h"
+#include "calib/capture_faults.h"
+#include "calib/observations.h"
+#include "calib/solve.h"
+#include "tests/calib/fault_bench.h"
+#include "tests/support/matchers.h"
+
+// Each test captures on the virtual rig with one thing wrong and reads the report. Run the program for the
+// table of faults, names found and verdicts.
+
+namespace limn::calib {
+namespace {
+
+using namespace test;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Names = std::set<std::string>;
+
+constexpr int k_poses = 5;
+constexpr int k_shots = 38;  // of a series on the bench: 9 + 9 bits, white and black
+
+// What somebody who solves the captures is told.
+struct Told {
+  Names names;
+  std::string verdict;  ///< "failed" when no rig comes of them
+  std::optional<Solution> solution;
+  std::vector<Fault> faults;
+};
+
+Told told_of(const Captures& captures, const std::string& injected, const Rig* earlier) {
+  Told told{{}, "failed", {}, {}};
+  const auto observed = observe(captures);
+  EXPECT_TRUE(observed.ok()) << observed.message();
+  if (!observed) return told;
+  told.faults = unsolved_faults(*observed);
+  if (const auto solution = solve(observed->observations)) {
+    told.faults = faults(*observed, *solution, {}, {});
+    auto assessment = assess(*observed, {}, *solution);
+    if (assessment) {
+      if (earlier) add_faults(faults_against(*earlier, solution->rig), &*assessment);
+      told.verdict = to_text(assessment->verdict);
+      told.faults = assessment->faults;
+    }
+    told.solution = *solution;
+  }
+  std::string names;
+  for (const Fault& fault : told.faults) {
+    if (told.names.insert(fault.name).second) names += " " + fault.name;
+    EXPECT_FALSE(fault.evidence.empty() || fault.advice.empty()) << fault.name;
+  }
+  printf("[ injected ] %-34s ->%s; %s\n", injected.c_str(), names.empty() ? " nothing" : names.c_str(),
+         told.verdict.c_str());
+  return told;
+}
+
+Told told_of(const FaultBench& bench, const std::string& injected, const Rig* earlier = nullptr) {
+  const auto captures = bench.capture(test_folder() / "captures");
+  EXPECT_TRUE(captures.ok()) << captures.message();
+  return captures ? told_of(*captures, injected, earlier) : Told{};
+}
+
+// Named, nothing else but what it implies, and not accepted.
+void expect_named(const Told& told, const std::string& name, const Names& implied = {}) {
+  EXPECT_TRUE(told.names.count(name)) << to_text(told.faults);
+  EXPECT_NE(told.verdict, "good");
+  for (const std::string& other : told.names)
+    EXPECT_TRUE(other == name || implied.count(other)) << to_text(told.faults);
+}
+
+void expect_sound(const Told& told) {
+  EXPECT_EQ(told.names, Names()) << to_text(told.faults);
+  EXPECT_EQ(told.verdict, "good");
+}
+
+FaultBench bench(int poses = k_poses) { return FaultBench::create("bench", poses); }
+
+// The display makes one picture of another by a homography, with bilinear interpolation.
+cv::Mat warped(const cv::Mat& picture, const std::array<cv::Point2f, 4>& corners) {
+  const auto w = static_cast<float>(picture.cols), h = static_cast<float>(picture.rows);
+  const std::array<cv::Point2f, 4> from = {{{0, 0}, {w, 0}, {w, h}, {0, h}}};
+  std::array<cv::Point2f, 4> to = corners;
+  for (cv::Point2f& corner : to) corner = {corner.x * w, corner.y * h};
+  cv::Mat panel;
+  cv::warpPerspective(picture, panel, cv::getPerspectiveTransform(from.data(), to.data()), picture.size(),
+                      cv::INTER_LINEAR);
+  return panel;
+}
+
+std::function<cv::Mat(const cv::Mat&)> flipped(int how) {
+  return [how](const cv::Mat& picture) {
+    cv::Mat panel;
+    cv::flip(picture, panel, how);
+    return panel;
+  };
+}
+
+TEST(SoundCaptures, OfTheBenchHaveNoFault) { expect_sound(told_of(bench(), "nothing, bench")); }
+
+TEST(SoundCaptures, OfTheStudioHaveNoFault) {
+  expect_sound(told_of(FaultBench::create("studio", k_poses), "nothing, studio"));
+}
+
+TEST(SoundCaptures, WithOtherNoiseHaveNoFault) {
+  FaultBench noisy = bench();
+  noisy.seed = 11;
+  noisy.world.camera_effects[0].read_noise = 1.5;
+  noisy.world.camera_effects[0].full_well_e = 4000;
+  expect_sound(told_of(noisy, "nothing, bench, twice the noise"));
+}
+
+TEST(SoundCaptures, PhotographedInARealRoomHaveNoFault) {
+  const auto folder = real_data("graycode");
+  if (!folder) GTEST_SKIP() << "graycode";
+  const auto captures = import_opencv_gray(
+      {*folder, 1024, 768, Board::parse("chessboard:9x7:75mm").value(), "capture_*", "graycode_*.png", {}});
+  ASSERT_TRUE(captures.ok()) << captures.message();
+  expect_sound(told_of(*captures, "nothing, real photographs", nullptr));
+}
+
+TEST(Faults, PatternsOnADisplayThatIsNotInTheRoom) {
+  FaultBench dark = bench(3);
+  dark.display_of = [](int) { return -1; };
+  expect_named(told_of(dark, "patterns on another display"), "wrong_display");
+}
+
+TEST(Faults, BothProjectorsPatternsOnOneDisplay) {
+  FaultBench same = FaultBench::create("studio", 3);
+  same.display_of = [](int) { return 0; };
+  expect_named(told_of(same, "both patterns on one display"), "wrong_display", {"few_poses", "low_coverage"});
+}
+
+TEST(Faults, ProjectorsSwappedSinceTheLastCalibration) {
+  FaultBench studio = FaultBench::create("studio", 4);
+  const Told before = told_of(studio, "nothing, four poses");
+  ASSERT_TRUE(before.solution.has_value());
+  studio.display_of = [](int projector) { return 1 - projector; };
+  const Told after = told_of(studio, "projectors swapped", &before.solution->rig);
+  expect_named(after, "projectors_swapped", {"few_poses"});
+}
+
+TEST(Faults, KeystoneLeftOn) {
+  FaultBench keystone = bench();
+  keystone.on_panel = [](const cv::Mat& picture) {
+    return warped(picture, {{{0.08F, 0}, {0.92F, 0}, {1, 1}, {0, 1}}});
+  };
+  // Its projector is none with a straight axis: poses disagree and the board seems bent.
+  expect_named(told_of(keystone, "keystone"), "keystone_or_scaling", {"odd_pose", "bent_board"});
+}
+
+TEST(Faults, DisplayNotInItsNativeResolution) {
+  FaultBench scaled = bench();
+  scaled.mode = cv::Size(600, 375);
+  expect_named(told_of(scaled, "scaled from 600x375 to 480x300"), "keystone_or_scaling");
+}
+
+TEST(Faults, BoardsAllButParallel) {
+  FaultBench flat = bench();
+  const Pose first = flat.world_from_board[0];
+  for (size_t i = 0; i < flat.world_from_board.size(); ++i) {
+    const auto n = static_cast<double>(i);
+    flat.world_from_board[i] = Pose(Eigen::Quaterniond::Identity(), {0.05 * n - 0.1, 0, 0.02 * n}) * first *
+                               Pose(exp_rotation({0.02 * n, 0.05 - 0.02 * n, 0}), Vector3d::Zero());
+  }
+  // Boards side by side leave most of the picture empty, too.
+  expect_named(told_of(flat, "boards all but parallel"), "little_tilt", {"low_coverage"});
+}
+
+TEST(Faults, ExposureDriftsDown) {
+  FaultBench drift = bench();
+  drift.before_shot = [](int, int shot, sim::World* world) {
+    world->camera_effects[0].exposure = 0.75 * (1 - 0.12 * shot / (k_shots - 1));
+  };
+  expect_named(told_of(drift, "exposure drifts by 12 %"), "exposure_drift");
+}
+
+TEST(Faults, ExposureFollowsTheLight) {
+  FaultBench automatic = bench();
+  automatic.before_shot = [](int, int shot, sim::World* world) {
+    world->camera_effects[0].exposure = shot == k_shots - 2 ? 0.6 : shot == k_shots - 1 ? 1.0 : 0.75;
+  };
+  expect_named(told_of(automatic, "automatic exposure"), "exposure_drift");
+}
+
+TEST(Faults, BoardMovedDuringACapture) {
+  FaultBench moved = bench();
+  moved.nudge = Nudge{2, 20, false, Pose(Eigen::Quaterniond::Identity(), {0.002, 0, 0.001})};
+  const Told told = told_of(moved, "board moved by 2.2 mm");
+  expect_named(told, "moved_during_capture", {"odd_pose"});
+  EXPECT_NE(to_text(told.faults).find("pose02"), std::string::npos);
+}
+
+TEST(Faults, CameraMovedDuringACapture) {
+  FaultBench moved = bench();
+  moved.nudge = Nudge{3, 12, true, Pose(exp_rotation({0, 0, 0.004}), Vector3d::Zero())};
+  expect_named(told_of(moved, "camera turned by 0.23 degrees"), "moved_during_capture", {"odd_pose"});
+}
+
+TEST(Faults, ProjectorOutOfFocus) {
+  FaultBench blurred = bench();
+  blurred.world.projector_effects[0].focus_m = 0.7;
+  blurred.world.projector_effects[0].aperture_m = 0.025;
+  expect_named(told_of(blurred, "projector out of focus"), "defocus");
+}
+
+TEST(Faults, CameraOutOfFocus) {
+  FaultBench blurred = bench();
+  blurred.world.camera_effects[0].psf_px = 1.8;
+  expect_named(told_of(blurred, "camera out of focus"), "defocus");
+}
+
+TEST(Faults, ProjectionMirrored) {
+  FaultBench mirrored = bench(3);
+  mirrored.on_panel = flipped(1);
+  expect_named(told_of(mirrored, "mirrored"), "mirrored_projection");
+}
+
+TEST(Faults, ProjectionTurnedUpsideDown) {
+  FaultBench rotated = bench();
+  rotated.on_panel = flipped(-1);
+  expect_named(told_of(rotated, "turned by 180 degrees"), "rotated_projection");
+}
+
+TEST(Faults, CameraPictureStretched) {
+  FaultBench stretched = bench();
+  stretched.on_photo = [](const cv::Mat& photo) {
+    cv::Mat whole;
+    cv::resize(photo.rowRange(24, photo.rows - 24), whole, photo.size(), 0, 0, cv::INTER_LINEAR);
+    return whole;
+  };
+  expect_named(told_of(stretched, "camera's picture stretched"), "wrong_camera_resolution", {"odd_pose"});
+}
+
+TEST(Faults, CameraPictureOfAnotherSizeNamesTheFile) {
+  FaultBench other = bench(3);
+  const auto folder = test_folder() / "captures";
+  const auto captures = other.capture(folder);
+  ASSERT_TRUE(captures.ok()) << captures.message();
+  Captures smaller = *captures;
+  smaller.cameras[0].width = 640;
+  smaller.cameras[0].height = 480;
+  const auto observed = observe(smaller);
+  ASSERT_FALSE(observed.ok());
+  EXPECT_NE(observed.message().find("expected a picture of 640x480 pixels, found 480x384"), std::string::npos)
+      << observed.message();
+}
+
+TEST(Faults, RoomTooBright) {
+  FaultBench bright = bench();
+  bright.world.room.ambient *= 12;
+  for (sim::Lamp& lamp : bright.world.room.lamps) lamp.illuminance_at_1m *= 12;
+  bright.world.camera_effects[0].exposure *= 0.25;
+  expect_named(told_of(bright, "room 12 times as bright"), "ambient_light");
+}
+
+TEST(Faults, ProjectorHardlyMeetsWhatTheCameraSees) {
+  FaultBench aside = bench();
+  Pose& projector = aside.world.rig.projectors[0].imager_from_world;
+  projector = Pose(exp_rotation({0, 0.5, 0}), Vector3d::Zero()) * projector;
+  expect_named(told_of(aside, "projector turned aside"), "little_overlap", {"low_coverage"});
+}
+
+TEST(Faults, BoardBent) {
+  FaultBench bent = bench();
+  bent.sheet = [](const Vector2d& p) { return Vector3d(p.x(), p.y(), 0.004 * (1 - p.x() * p.x() / 0.04)); };
+  expect_named(told_of(bent, "board bent by 4 mm"), "bent_board");
+}
+
+TEST(Faults, BoardTwisted) {
+  FaultBench twisted = bench();
+  twisted.sheet = [](const Vector2d& p) {
+    return Vector3d(p.x(), p.y(), 0.004 * p.x() * p.y() / 0.2 / 0.13);
+  };
+  expect_named(told_of(twisted, "board twisted by 4 mm"), "bent_board", {"odd_pose"});
+}
+
+TEST(Faults, SquaresWiderThanHigh) {
+  FaultBench stretched = bench();
+  stretched.sheet = [](const Vector2d& p) { return Vector3d(1.02 * p.x(), p.y(), 0); };
+  expect_named(told_of(stretched, "squares 2 % too wide"), "wrong_square_size", {"odd_pose"});
+}
+
+TEST(Faults, SquaresLargerThanInTheLastCalibration) {
+  FaultBench larger = bench(4);
+  const Told before = told_of(larger, "nothing, four poses");
+  ASSERT_TRUE(before.solution.has_value());
+  larger.sheet = [](const Vector2d& p) { return Vector3d(1.03 * p.x(), 1.03 * p.y(), 0); };
+  expect_named(told_of(larger, "squares 3 % too large", &before.solution->rig), "wrong_square_size",
+               {"few_poses"});
+}
+
+}  // namespace
+}  // namespace limn::calib
