@@ -496,7 +496,15 @@ Result<Alignment> aligned(const scene::Mesh& mesh,
                           const AlignOptions& options) {
   const double size = diagonal(mesh.positions);
   const auto points = thinned(scan, options.cell * size);
-  const auto fit = fitted(index, points, start, options.reach * size, options.max_iterations);
+  constexpr int k_goes = 3;
+  constexpr double k_narrower =
+      0.25;  // reach of another go: from far off, far points slow the last millimetres
+  double reach = options.reach * size;
+  auto fit = fitted(index, points, start, reach, options.max_iterations);
+  for (int go = 1; go < k_goes && fit && fit->iterations == options.max_iterations; ++go) {
+    reach *= k_narrower;
+    fit = fitted(index, points, fit->pose, reach, options.max_iterations);
+  }
   if (!fit)
     return error(
         "expected at least {} scan points within {} of the mesh at the start and facing as it does, found "

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "calib/align.h"
 #include "calib/board_finder.h"
 #include "core/log.h"
+#include "scene/nearest.h"
 
 namespace limn::calib {
 namespace {
@@ -108,7 +110,10 @@ Result<RangeView> view_of(const Captures& captures,
   std::vector<DecodedBy> seen;
   for (size_t p = 0; p < projectors.size(); ++p) seen.push_back({projectors[p], &decoded[p]});
   RangeView view = range_view(camera_imager, seen, options.range);
-  if (options.pieces > 0) keep_pieces(options.pieces, &view);
+  if (options.pieces > 0)
+    keep_pieces(options.pieces, &view);
+  else if (options.moved)
+    keep_pieces(1, &view);  // what stands still must not be laid
   scan->seconds_range += seconds_since(decoded_at);
   return view;
 }
@@ -164,6 +169,98 @@ Status standing_still(const std::vector<ScanView>& views) {
   return {};
 }
 
+constexpr double k_same_m = 2e-3;  // of two poses' surfaces, where they are one
+constexpr double k_laid_share =
+    0.7;  // of a pose's points on the first: nearly all but what only one pose saw
+constexpr double k_least_share = 0.3;  // less: nothing says that these are one thing
+
+scene::Mesh mesh_of(const scene::Surface& surface) {
+  scene::Mesh mesh;
+  mesh.positions = surface.positions;
+  mesh.normals = surface.normals;
+  mesh.triangles = surface.triangles;
+  mesh.triangle_materials.assign(mesh.triangles.size(), 0);
+  return mesh;
+}
+
+// Views `from` to `to` as one surface.
+scene::Surface joint_surface(const std::vector<ScanView>& views, size_t from, size_t to) {
+  scene::Surface all;
+  for (size_t i = from; i < to; ++i) {
+    const scene::Surface one = surface_of(views[i].view);
+    const auto first = static_cast<std::uint32_t>(all.positions.size());
+    all.positions.insert(all.positions.end(), one.positions.begin(), one.positions.end());
+    all.normals.insert(all.normals.end(), one.normals.begin(), one.normals.end());
+    all.stddevs.insert(all.stddevs.end(), one.stddevs.begin(), one.stddevs.end());
+    for (const auto& [a, b, c] : one.triangles) all.triangles.push_back({a + first, b + first, c + first});
+  }
+  return all;
+}
+
+double share_laid(const scene::SurfaceIndex& index,
+                  const scene::Surface& surface,
+                  const Alignment& alignment) {
+  const std::vector<float> off = residuals(index, surface, alignment, k_same_m);
+  const auto on = std::count_if(off.begin(), off.end(), [](float r) { return !std::isnan(r); });
+  return static_cast<double>(on) / static_cast<double>(std::max<size_t>(1, off.size()));
+}
+
+// As if the prototype had stood still and the camera had moved.
+void carry(const Pose& first_from_pose, ScanView* seen) {
+  seen->first_from_pose = first_from_pose;
+  seen->view.camera.imager_from_world = seen->view.camera.imager_from_world * first_from_pose.inverse();
+  for (auto& n : cv::Mat_<cv::Vec3f>(seen->view.d_normal)) {
+    const Eigen::Vector3f turned = first_from_pose.rotation.cast<float>() * Eigen::Vector3f(n[0], n[1], n[2]);
+    n = {turned.x(), turned.y(), turned.z()};
+  }
+}
+
+// Lays the surfaces of every later pose onto the first one's: from where they are, else from anywhere.
+Status lay_onto_first(Scan* scan) {
+  const auto same_pose = [&](size_t i) {
+    size_t end = i;
+    while (end < scan->views.size() && scan->views[end].pose == scan->views[i].pose) ++end;
+    return end;
+  };
+  const size_t first_end = same_pose(0);
+  const scene::Surface first = joint_surface(scan->views, 0, first_end);
+  if (first.triangles.empty())
+    return error("{}: no surface was seen to lay the other poses onto.", scan->views[0].pose);
+  const scene::Mesh mesh = mesh_of(first);
+  const scene::SurfaceIndex index(mesh);
+  for (size_t begin = first_end; begin < scan->views.size(); begin = same_pose(begin)) {
+    const scene::Surface surface = joint_surface(scan->views, begin, same_pose(begin));
+    const std::string& name = scan->views[begin].pose;
+    Alignment best;
+    double share = 0;
+    if (const auto near = aligned(mesh, index, surface, Pose())) {
+      best = *near;
+      share = share_laid(index, surface, best);
+    }
+    if (share < k_laid_share) {
+      const auto anywhere = found_anywhere(mesh, index, surface);
+      if (anywhere && share_laid(index, surface, anywhere->alignment) > share) {
+        best = anywhere->alignment;
+        share = share_laid(index, surface, best);
+      }
+    }
+    if (share < k_least_share)
+      return error(
+          "{}: only {:.0f} % of its surface can be laid onto {}'s. Leave out what did not move with the "
+          "prototype "
+          "(--near, --far, --pieces), or the pose (--poses).",
+          name, 100 * share, scan->views[0].pose);
+    for (const std::string& free : best.free_directions)
+      scan->warnings.push_back(
+          fmt::format("{}: its shape does not hold it against a {} (world axes): views may be smeared "
+                      "that way.",
+                      name, free));
+    const size_t end = same_pose(begin);
+    for (size_t i = begin; i < end; ++i) carry(best.world_from_prototype.inverse(), &scan->views[i]);
+  }
+  return {};
+}
+
 Agreement over_all(const std::vector<ScanView>& views, double reach) {
   Agreement sum;
   for (size_t a = 0; a < views.size(); ++a)
@@ -211,7 +308,7 @@ Result<Scan> scanned(const Captures& captures, const Rig& rig, const ScanOptions
       progress.step(static_cast<int>(scan.views.size()));
     }
   }
-  if (!options.moved) LIMN_TRY_STATUS(standing_still(scan.views));
+  LIMN_TRY_STATUS(options.moved ? lay_onto_first(&scan) : standing_still(scan.views));
   const auto begun = std::chrono::steady_clock::now();
   std::vector<RangeView> views;
   for (const ScanView& seen : scan.views) views.push_back(seen.view);

@@ -17,7 +17,8 @@ struct ScanOptions {
   DecodeOptions decode;
   /// Names of the poses to use; empty: all without a visible board.
   std::vector<std::string> poses;
-  /// The prototype stood elsewhere in every pose: each is laid onto the first by its shape.
+  /// The prototype stood elsewhere in every pose: each is laid onto the first by its shape. `pieces` is then
+  /// 1 unless it is more.
   bool moved = false;
   /// Keep that many of the largest connected pieces of each view, after the distance limits; 0: all.
   int pieces = 0;
@@ -31,7 +32,7 @@ struct ScanOptions {
 struct ScanView {
   std::string camera, pose;
   RangeView view;
-  Pose first_from_pose;
+  Pose first_from_pose;  ///< the view's camera has been carried along
 };
 
 /// What the captures say of the prototype's surface, in the rig's world (of the first pose when it moved).
