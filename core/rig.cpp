@@ -54,22 +54,13 @@ std::vector<Imager> read_imagers(const ConfigNode& root,
   return imagers;
 }
 
-Result<std::vector<Response>> load_responses(const fs::path& path) {
-  LIMN_TRY(const Config config, Config::load(path, "limn.response/1"));
-  config.root().only({"schema", "projectors", "provenance"});
-  std::vector<Response> responses;
-  for (const ConfigNode& node : config.root().at("projectors").items()) {
-    node.only({"name", "red", "green", "blue"});
-    responses.push_back({node.at("name").text(), node.at("red").numbers(-1), node.at("green").numbers(-1),
-                         node.at("blue").numbers(-1)});
-    for (const auto* curve : {&responses.back().red, &responses.back().green, &responses.back().blue}) {
-      if (curve->size() < 2 || !std::is_sorted(curve->begin(), curve->end())) {
-        node.problem("expected curves of at least 2 numbers that never fall.");
-      }
-    }
-  }
-  LIMN_TRY_STATUS(config.status());
-  return responses;
+// What was measured beside the rig, if anything.
+Status add_responses(const fs::path& folder, Rig* rig) {
+  if (std::error_code ignored; !fs::exists(folder / "response.json", ignored)) return {};
+  LIMN_TRY(Responses responses, load_responses(folder / "response.json"));
+  rig->responses = std::move(responses.projectors);
+  rig->camera_responses = std::move(responses.cameras);
+  return {};
 }
 
 Result<Rig> load_rig_json(const fs::path& path) {
@@ -83,9 +74,7 @@ Result<Rig> load_rig_json(const fs::path& path) {
   if (const auto node = root.find("covariance")) rig.covariance_json = node->json().dump();
   if (const auto node = root.find("provenance")) rig.provenance_json = node->json().dump();
   LIMN_TRY_STATUS(config.status());
-  if (std::error_code ignored; fs::exists(config.folder() / "response.json", ignored)) {
-    LIMN_TRY(rig.responses, load_responses(config.folder() / "response.json"));
-  }
+  LIMN_TRY_STATUS(add_responses(config.folder(), &rig));
   return rig;
 }
 
@@ -105,6 +94,7 @@ Result<Rig> load_cameramodels(const fs::path& folder) {
     LIMN_TRY(const Imager imager, load_cameramodel(path));
     (imager.name.starts_with("projector") ? rig.projectors : rig.cameras).push_back(imager);
   }
+  LIMN_TRY_STATUS(add_responses(folder, &rig));
   return rig;
 }
 

@@ -7,25 +7,20 @@
 #include "core/cameramodel.h"
 #include "core/imager.h"
 #include "core/imager_file.h"
+#include "core/response.h"
 #include "core/result.h"
 
 namespace limn {
-
-/// How a projector turns a display value into light, per channel: shares of full light (linear, 0 … 1) at
-/// display values that are evenly spaced from 0 to 255. `response.json` (limn.response/1) of a rig folder.
-struct Response {
-  std::string projector;
-  std::vector<double> red, green, blue;
-};
 
 /// Calibrated cameras and projectors in one world.
 struct Rig {
   std::vector<Imager> cameras;
   std::vector<Imager> projectors;
-  std::vector<Response> responses;
+  std::vector<Response> responses;  ///< of projectors; none where none was measured
   /// Kept verbatim from and to rig.json; empty when absent. JSON texts.
   std::string covariance_json;
   std::string provenance_json;
+  std::vector<CameraResponse> camera_responses = {};  ///< none where none was measured
 
   const Imager* find(const std::string& name) const;
 };
