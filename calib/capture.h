@@ -9,7 +9,7 @@
 
 namespace limn::calib {
 
-/// Shows a picture (8-bit grey, the projector's size) on one projector while every other one is black;
+/// Shows a picture (8-bit grey or BGR, the projector's size) on one projector while every other one is black;
 /// returns when it is visible to the next grab.
 using Show = std::function<Status(int projector, const cv::Mat& picture)>;
 /// A picture (8-bit grey or BGR) of one camera, taken after the last show.

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <filesystem>
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+
+namespace limn::calib {
+
+/// What a projector shows in one response picture: a colour, everywhere or on a part of its pixels.
+struct ResponsePicture {
+  enum class Role {
+    black,  ///< several times, for drift and noise
+    white,  ///< likewise
+    share,  ///< white on some of four equal shares of the pixels, which add up in light whatever the response
+    border,  ///< white along the panel's edge: says where the panel ends
+    ramp,    ///< one channel at one value
+    grey,    ///< all channels at one value: do the channels add?
+    check    ///< a colour that is used for nothing but to check what the others foretell
+  };
+  Role role = Role::black;
+  cv::Vec3b bgr = {0, 0, 0};
+  unsigned shares = 15;  ///< bit i: the pixels with (x mod 2) + 2 (y mod 2) = i are lit
+  std::string what() const;
+};
+
+/// Levels of each channel's ramp; with 0 that gives steps of 21.25, between which a smooth response bends
+/// little.
+constexpr int k_ramp_levels = 12;
+/// Width of the border, a share of the panel's smaller side.
+constexpr double k_border = 0.04;
+
+/// The pictures that measure a projector's response, in the order in which they are shown; at most 60.
+const std::vector<ResponsePicture>& response_pictures();
+
+/// Picture number `index` for a projector's size, 8-bit BGR.
+cv::Mat draw_response(int index, int width, int height);
+
+/// A JSON list of what is shown (limn.response_patterns/1), for people and other programs.
+Status save_response_patterns(int width, int height, const std::filesystem::path& path);
+
+}  // namespace limn::calib
