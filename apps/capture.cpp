@@ -6,6 +6,7 @@
 #include "apps/picture_writer.h"
 #include "apps/world_markers.h"
 #include "calib/capture.h"
+#include "calib/response_shots.h"
 #include "core/log.h"
 
 namespace limn::apps {
@@ -22,6 +23,22 @@ calib::Captures planned(const Plan& plan, const sim::VirtualRig& rig, const std:
                               plan.board);
 }
 
+// The rig's devices as calib asks for them; pictures go to `writer`.
+calib::Stage stage_of(sim::VirtualRig* rig, PictureWriter* writer, calib::Tell tell) {
+  return {.show = [rig](int projector, const cv::Mat& picture) -> Status {
+            rig->darken();
+            const auto shown_at = rig->projector(projector).show(picture);
+            return shown_at ? Status() : Status(shown_at.error());
+          },
+          .grab = [rig](int camera) -> Result<cv::Mat> {
+            LIMN_TRY(const Frame frame, rig->camera(camera).next());
+            return frame.image;
+          },
+          .store = [writer](const std::filesystem::path& path,
+                            const cv::Mat& picture) { return writer->store(path, picture); },
+          .tell = std::move(tell)};
+}
+
 // Captures one pose for each call of `set_up`, which changes the stage.
 Status capture_poses(const calib::Captures& captures,
                      int pose_count,
@@ -30,29 +47,28 @@ Status capture_poses(const calib::Captures& captures,
   PictureWriter writer;
   int done_before = 0;
   std::optional<Progress> progress;
-  const calib::Stage stage{
-      .show = [&](int projector, const cv::Mat& picture) -> Status {
-        rig->darken();
-        const auto shown_at = rig->projector(projector).show(picture);
-        return shown_at ? Status() : Status(shown_at.error());
-      },
-      .grab = [&](int camera) -> Result<cv::Mat> {
-        LIMN_TRY(const Frame frame, rig->camera(camera).next());
-        return frame.image;
-      },
-      .store = [&](const std::filesystem::path& path,
-                   const cv::Mat& picture) { return writer.store(path, picture); },
-      .tell =
-          [&](int done, int total) {
-            if (!progress) progress.emplace("capture", total * pose_count);
-            progress->step(done_before + done);
-            if (done == total) done_before += total;
-          },
-  };
+  const calib::Stage stage = stage_of(rig, &writer, [&](int done, int total) {
+    if (!progress) progress.emplace("capture", total * pose_count);
+    progress->step(done_before + done);
+    if (done == total) done_before += total;
+  });
   for (int pose = 0; pose < pose_count; ++pose) {
     set_up(pose);
     LIMN_TRY_STATUS(calib::capture_pose(captures, pose, stage));
   }
+  rig->darken();
+  return writer.finish();
+}
+
+// The response pictures of whatever stands before the rig.
+Status capture_lit(const calib::Captures& captures, sim::VirtualRig* rig) {
+  PictureWriter writer;
+  std::optional<Progress> progress;
+  const calib::Stage stage = stage_of(rig, &writer, [&](int done, int total) {
+    if (!progress) progress.emplace("response", total);
+    progress->step(done);
+  });
+  LIMN_TRY_STATUS(calib::capture_response(captures, stage));
   rig->darken();
   return writer.finish();
 }
@@ -80,7 +96,7 @@ Status capture_virtually(const Plan& plan, sim::VirtualRig* rig, const std::file
       capture_poses(captures, static_cast<int>(plan.world_from_board.size()), hold_board, rig);
   rig->remove("board");
   rig->restore_stage();
-  return done;
+  return done && plan.response ? capture_lit(captures, rig) : done;
 }
 
 Status capture_prototype(const Plan& plan,

@@ -92,10 +92,14 @@ void add_capture(CLI::App& app, Run& run) {
 
 void add_patterns(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand("patterns", "the pictures that a projector shows for calibration");
-  command->footer("Example: limn patterns --projector 1280x800 --out patterns");
+  command->footer(
+      "Example: limn patterns --projector 1280x800 --out patterns\n"
+      "Example: limn patterns --projector 1280x800 --response --out response   (photographs of the prototype then go to "
+      "CAPTURES/response/projector0/camera0/)");
   auto options = std::make_shared<PatternsOptions>();
   command->add_option("--projector", options->projector, "its size, such as 1280x800")->required();
   command->add_option("--code", options->code, "gray")->capture_default_str();
+  command->add_flag("--response", options->response, "instead: pictures that measure the projector's response and colour");
   command->add_option("--out", options->out, "folder for 000.png ... and patterns.json")->required();
   command->callback([options, &run] { run = [options] { return finished(run_patterns(*options)); }; });
 }

@@ -1,9 +1,11 @@
 #include "apps/patterns.h"
 
 #include <charconv>
+#include <functional>
 #include <opencv2/core/mat.hpp>
 
 #include "calib/patterns.h"
+#include "calib/response_patterns.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "core/picture.h"
@@ -21,16 +23,38 @@ Result<PixelSize> parse_pixel_size(const std::string& text) {
   return usage_error("--projector: expected a size such as 1280x800, found '{}'.", text);
 }
 
+namespace {
+
+Status write_pictures(const std::filesystem::path& out,
+                      int count,
+                      const std::function<cv::Mat(int)>& picture) {
+  LIMN_TRY_STATUS(make_folder(out));
+  Progress progress("patterns", count);
+  for (int i = 0; i < count; ++i) {
+    LIMN_TRY_STATUS(write_png(out / calib::picture_name(i), picture(i)));
+    progress.step(i + 1);
+  }
+  return {};
+}
+
+Status write_response(const PatternsOptions& options, const PixelSize& size) {
+  const int count = static_cast<int>(calib::response_pictures().size());
+  LIMN_TRY_STATUS(write_pictures(options.out, count,
+                                 [&](int i) { return calib::draw_response(i, size.width, size.height); }));
+  LIMN_TRY_STATUS(calib::save_response_patterns(size.width, size.height, options.out / "patterns.json"));
+  fmt::print("{} response pictures of {}x{} in {}\n", count, size.width, size.height, options.out.string());
+  return {};
+}
+
+}  // namespace
+
 Status run_patterns(const PatternsOptions& options) {
   LIMN_TRY(const PixelSize size, parse_pixel_size(options.projector));
   const auto patterns = calib::Patterns::create(options.code, size.width, size.height);
   if (!patterns) return usage_error("{}", patterns.message());
-  LIMN_TRY_STATUS(make_folder(options.out));
-  Progress progress("patterns", patterns->count());
-  for (int i = 0; i < patterns->count(); ++i) {
-    LIMN_TRY_STATUS(write_png(options.out / calib::picture_name(i), patterns->picture(i)));
-    progress.step(i + 1);
-  }
+  if (options.response) return write_response(options, size);
+  LIMN_TRY_STATUS(
+      write_pictures(options.out, patterns->count(), [&](int i) { return patterns->picture(i); }));
   LIMN_TRY_STATUS(calib::save_patterns(*patterns, options.out / "patterns.json"));
   fmt::print("{} pictures of {}x{} in {}\n", patterns->count(), size.width, size.height,
              options.out.string());

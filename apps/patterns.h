@@ -10,10 +10,11 @@ namespace limn::apps {
 struct PatternsOptions {
   std::string projector;  ///< its size, "1280x800"
   std::string code = "gray";
+  bool response = false;  ///< the pictures that measure the projector's response instead of a code
   std::filesystem::path out;
 };
 
-/// `limn patterns`: the code's numbered PNGs and patterns.json.
+/// `limn patterns`: the code's (or the response's) numbered PNGs and patterns.json.
 Status run_patterns(const PatternsOptions& options);
 
 /// "1280x800" as numbers; anything else is wrong usage.

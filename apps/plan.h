@@ -17,6 +17,7 @@ struct Plan {
   calib::Board board;
   std::string code = "gray";
   std::vector<Pose> world_from_board;  ///< board frame as in calib/board.h
+  bool response = false;               ///< also the response pictures, of the prototype
 };
 
 /// Reads a plan; `world` is relative to the plan's folder.

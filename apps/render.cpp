@@ -75,15 +75,25 @@ void merge(std::vector<Track> found, std::map<std::string, Track>* tracks) {
   }
 }
 
+// How the camera writes light, as near as the detector can tell apart: by what was measured, else linear.
+tracker::Encoding encoding_of(const Rig& rig, const Imager& camera) {
+  for (const CameraResponse& response : rig.camera_responses) {
+    if (response.camera != camera.name) continue;
+    const double middle = looked_up(response.light, 0.5);  // linear 0.5, sRGB 0.21
+    return middle < 0.5 * (0.5 + linear_of_srgb(0.5)) ? tracker::Encoding::srgb : tracker::Encoding::linear;
+  }
+  return tracker::Encoding::linear;
+}
+
 Result<std::vector<Track>> find_bodies(const scene::Scene& scene, const Rig& rig, const Frames& frames) {
   const std::vector<Body> bodies = scene::bodies(scene);
   const std::vector<std::string> names = tracker::families_of(bodies);
-  LIMN_TRY(tracker::Families families, tracker::Families::load(names, scene.folder));
-  tracker::Detector detector(std::move(families));
+  LIMN_TRY(const tracker::Families families, tracker::Families::load(names, scene.folder));
   std::map<std::string, Track> tracks;
   std::size_t marker_count = 0;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (frames[i].empty()) continue;
+    tracker::Detector detector(families, {.encoding = encoding_of(rig, rig.cameras[i])});
     const auto detections = detector.detect(to_grey(frames[i]), &rig.cameras[i].lens);
     marker_count += detections.size();
     merge(tracker::observed(bodies, detections, rig.cameras[i], Stamp{}), &tracks);

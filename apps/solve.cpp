@@ -9,7 +9,9 @@
 #include "calib/failed_report.h"
 #include "calib/observations.h"
 #include "calib/report.h"
+#include "calib/response.h"
 #include "calib/solve.h"
+#include "calib/vignetting.h"
 #include "core/file.h"
 #include "core/lens.h"
 #include "core/log.h"
@@ -83,12 +85,27 @@ void compare_with_earlier(const SolveOptions& options,
   if (earlier) calib::add_faults(calib::faults_against(*earlier, solution.rig), assessment);
 }
 
+// What the lit boards say of how light falls off towards corners; only cameras whose encoding is known can
+// tell.
+Status measure_vignetting(const calib::Captures& captures,
+                          const calib::Report& report,
+                          Responses* responses) {
+  if (responses->cameras.empty()) return {};
+  LIMN_TRY(const auto light,
+           calib::paper_light(captures, report.observed.observations, report.solution, responses->cameras));
+  calib::add_vignetting(light, captures.cameras, captures.projectors, responses);
+  return {};
+}
+
 }  // namespace
 
 Result<calib::Report> solved(const SolveOptions& options) {
   const auto begun = Clock::now();
   LIMN_TRY_STATUS(check_models(options));
   LIMN_TRY(const calib::Captures captures, captures_of(options));
+  LIMN_TRY(calib::MeasuredResponse response, calib::measured_response(captures));
+  for (const std::string& warning : response.warnings) log_warning("response: {}", warning);
+  const double response_seconds = seconds_since(begun);
   LIMN_TRY(calib::Observed observed, calib::observe(captures));
   const double board_seconds = observed.seconds_board, decode_seconds = observed.seconds_decode;
   calib::SolveOptions solving;
@@ -106,12 +123,16 @@ Result<calib::Report> solved(const SolveOptions& options) {
   calib::Report report{std::move(observed),
                        std::move(*solution),
                        std::move(*assessment),
-                       {{"board", board_seconds},
+                       {{"response", response_seconds},
+                        {"board", board_seconds},
                         {"decode", decode_seconds},
                         {"solve", solve_seconds},
                         {"assess", seconds_since(judging_begun)},
                         {"total", seconds_since(begun)}}};
+  LIMN_TRY_STATUS(measure_vignetting(captures, report, &response.responses));
   LIMN_TRY_STATUS(calib::write_rig_folder(report, solving, options.out));
+  if (!response.responses.projectors.empty())
+    LIMN_TRY_STATUS(save_responses(response.responses, response.mixings, options.out));
   return report;
 }
 

@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "calib/patterns.h"
+#include "calib/response_patterns.h"
+#include "core/file.h"
 #include "core/picture.h"
 #include "tests/support/matchers.h"
 
@@ -24,6 +27,23 @@ TEST(PatternsCommand, WritesNumberedPicturesAndTheirDescription) {
   EXPECT_TRUE(test::image_near(read_picture(out / "022.png").value(), cv::Mat(24, 40, CV_8U, cv::Scalar(255)),
                                0, 0, "white"));
   EXPECT_FALSE(std::filesystem::exists(out / "024.png"));
+}
+
+TEST(PatternsCommand, WritesTheResponsePictures) {
+  const auto out = test::test_folder() / "response";
+  const Status status = run_patterns({.projector = "40x24", .response = true, .out = out});
+  ASSERT_TRUE(status.ok()) << status.message();
+  const int count = static_cast<int>(calib::response_pictures().size());
+  EXPECT_LE(count, 60);
+  for (const int i : {0, 1, 5, 20, count - 1}) {
+    const auto picture = read_picture(out / calib::picture_name(i));
+    ASSERT_TRUE(picture.ok()) << picture.message();
+    EXPECT_TRUE(test::image_near(*picture, calib::draw_response(i, 40, 24), 0, 0, "response"));
+  }
+  EXPECT_FALSE(std::filesystem::exists(out / calib::picture_name(count)));
+  const auto list = nlohmann::json::parse(read_file(out / "patterns.json").value());
+  EXPECT_EQ(list["pictures"].size(), static_cast<std::size_t>(count));
+  EXPECT_EQ(list["pictures"][0]["shows"], "black");
 }
 
 TEST(PatternsCommand, CallsWrongOptionsWrongUsage) {

@@ -2,12 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
 #include "calib/board.h"
 #include "calib/capture.h"
+#include "calib/patterns.h"
+#include "calib/response_patterns.h"
 #include "core/file.h"
 #include "core/picture.h"
 #include "core/rig.h"
@@ -170,6 +173,65 @@ TEST(SolveCommand, ChangesNothingWhenCapturesAreDamaged) {
   fs::remove(shot);
   EXPECT_NE(failure().find("pose03/camera0/007.png"), std::string::npos);
   EXPECT_TRUE(run_solve({.captures = captures, .out = out, .skip_poses = {"pose03"}}).ok());
+}
+
+// A linear camera before a wall, darker on its left, that a projector of gamma 1.8 lights within a frame;
+// each camera pixel sees a mixture of the four projector pixels around it.
+cv::Mat photograph_of_response(const cv::Mat& shown, int width, int height) {
+  cv::Mat photo(height, width, CV_8U);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const double albedo = 0.4 + 0.6 * x / width;
+      double light = 0.04;
+      const int u = (x - 40) / 2, v = (y - 40) / 2;
+      if (u >= 0 && v >= 0 && u + 1 < shown.cols && v + 1 < shown.rows)
+        for (int i = 0; i < 4; ++i) {
+          const auto& bgr = shown.at<cv::Vec3b>(v + i / 2, u + i % 2);
+          const double share = 0.1 * (1 + (x * 7 + y * 3 + i) % 4);  // 0.1, 0.2, 0.3 and 0.4
+          for (int c = 0; c < 3; ++c)
+            light += albedo * share * 0.27 * (0.01 + 0.99 * std::pow(bgr[c] / 255.0, 1.8));
+        }
+      const int dither =
+          (x * 37 + y * 101) % 64;  // instead of noise: what 8 bits need to tell parts of a level
+      photo.at<uchar>(y, x) = cv::saturate_cast<uchar>(255 * light + dither / 64.0 - 0.5);
+    }
+  return photo;
+}
+
+TEST(SolveCommand, MeasuresTheResponseFromPicturesBesideThePoses) {
+  const fs::path captures = own_captures(), out = captures.parent_path() / "rig with response";
+  const Stage stage;
+  const fs::path folder = captures / "response" / "projector0" / "camera0";
+  ASSERT_TRUE(make_folder(folder).ok());
+  for (int i = 0; i < static_cast<int>(calib::response_pictures().size()); ++i) {
+    const cv::Mat shown = calib::draw_response(i, stage.projector.width, stage.projector.height);
+    ASSERT_TRUE(write_png(folder / calib::picture_name(i),
+                          photograph_of_response(shown, stage.camera.width, stage.camera.height))
+                    .ok());
+  }
+  const Status status = run_solve({.captures = captures, .out = out});
+  ASSERT_TRUE(status.ok()) << status.message();
+  const auto rig = load_rig(out);
+  ASSERT_TRUE(rig.ok()) << rig.message();
+  ASSERT_EQ(rig->responses.size(), 1U);
+  double worst = 0;
+  for (int v = 0; v < 256; ++v)
+    worst = std::max(worst, std::abs(rig->responses[0].green[static_cast<size_t>(v)] -
+                                     (0.01 + 0.99 * std::pow(v / 255.0, 1.8))));
+  EXPECT_LT(worst, 0.01);
+  EXPECT_EQ(rig->camera_responses.at(0).encoding, "linear");
+  EXPECT_TRUE(rig->responses[0].vignetting.has_value());
+  EXPECT_TRUE(load_mixing(out / "response.json", "projector0", "camera0").ok());
+
+  const std::string before = read_file(out / "response.json").value(),
+                    old_rig = read_file(out / "rig.json").value();
+  fs::remove(folder / "030.png");
+  const Status broken = run_solve({.captures = captures, .out = out});
+  ASSERT_FALSE(broken.ok());
+  EXPECT_NE(broken.message().find("response/projector0/camera0/030.png"), std::string::npos)
+      << broken.message();
+  EXPECT_EQ(read_file(out / "response.json").value(), before);
+  EXPECT_EQ(read_file(out / "rig.json").value(), old_rig);
 }
 
 TEST(SolveCommand, SaysThatNoBoardIsVisible) {
