@@ -120,8 +120,8 @@ void add_solve(CLI::App& app, Run& run) {
   command->add_option("captures", options->captures, "captures folder")->required();
   command->add_option("--out", options->out, "rig folder to write")->required();
   command->add_option("--skip-poses", options->skip_poses, "poses to leave out, by name, with commas")->delimiter(',');
-  command->add_option("--camera-model", options->camera_model, "mrcal lens model of cameras")->capture_default_str();
-  command->add_option("--projector-model", options->projector_model, "mrcal lens model of projectors")
+  command->add_option("--camera-model", options->camera_model, "mrcal lens model of cameras; auto: by held-out error")->capture_default_str();
+  command->add_option("--projector-model", options->projector_model, "mrcal lens model of projectors; auto: by held-out error")
       ->capture_default_str();
   command->add_flag("--json", options->json, "print report.json instead of a table");
   command->add_option("--import", options->import_format, "read somebody else's captures: opencv-gray");

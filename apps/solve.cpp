@@ -7,6 +7,7 @@
 #include "calib/capture_faults.h"
 #include "calib/captures.h"
 #include "calib/failed_report.h"
+#include "calib/lens_choice.h"
 #include "calib/observations.h"
 #include "calib/report.h"
 #include "calib/response.h"
@@ -48,9 +49,16 @@ Result<calib::Captures> captures_of(const SolveOptions& options) {
 
 Status check_models(const SolveOptions& options) {
   for (const std::string& name : {options.camera_model, options.projector_model}) {
+    if (name == calib::k_auto_lens) continue;
     if (const auto model = LensModel::parse(name); !model) return usage_error("{}", model.message());
   }
   return {};
+}
+
+void print_lenses(const std::vector<calib::LensTrial>& trials) {
+  for (const calib::LensTrial& trial : trials)
+    fmt::print("{:<14} {:<20} held-out {:.3f} px{}\n", trial.device, trial.model, trial.held_out_px,
+               trial.chosen ? ", chosen" : "");
 }
 
 void print_table(const calib::Assessment& assessment) {
@@ -112,8 +120,10 @@ Result<calib::Report> solved(const SolveOptions& options) {
   solving.camera_model = options.camera_model;
   solving.projector_model = options.projector_model;
   const auto solving_begun = Clock::now();
-  auto solution = calib::solve(observed.observations, solving);
-  if (!solution) return explained(solution.error(), calib::unsolved_faults(observed), options);
+  auto choice = calib::solve_choosing_lenses(observed.observations, solving);
+  if (!choice) return explained(choice.error(), calib::unsolved_faults(observed), options);
+  solving = choice->options;
+  calib::Solution* const solution = &choice->solution;
   const double solve_seconds = seconds_since(solving_begun);
   log_info("solved in {} steps, judging by held-out poses", solution->iterations);
   const auto judging_begun = Clock::now();
@@ -128,7 +138,8 @@ Result<calib::Report> solved(const SolveOptions& options) {
                         {"decode", decode_seconds},
                         {"solve", solve_seconds},
                         {"assess", seconds_since(judging_begun)},
-                        {"total", seconds_since(begun)}}};
+                        {"total", seconds_since(begun)}},
+                       std::move(choice->trials)};
   LIMN_TRY_STATUS(measure_vignetting(captures, report, &response.responses));
   LIMN_TRY_STATUS(calib::write_rig_folder(report, solving, options.out));
   if (!response.responses.projectors.empty())
@@ -141,6 +152,7 @@ Status run_solve(const SolveOptions& options) {
   if (options.json) {
     fmt::print("{}", calib::report_json(report));
   } else {
+    print_lenses(report.lens_trials);
     print_table(report.assessment);
     fmt::print("rig and report in {}\n", options.out.string());
   }

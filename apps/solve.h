@@ -13,8 +13,9 @@ struct SolveOptions {
   std::filesystem::path captures;
   std::filesystem::path out;
   std::vector<std::string> skip_poses = {};  ///< names of poses to leave out
-  std::string camera_model = "LENSMODEL_OPENCV4";
-  std::string projector_model = "LENSMODEL_OPENCV4";
+  /// A lens model's name for all cameras, all projectors; "auto": each device's by held-out error.
+  std::string camera_model = "auto";
+  std::string projector_model = "auto";
   bool json = false;  ///< print report.json instead of the table
 
   std::string import_format = {};  ///< "opencv-gray": somebody else's captures; then also

@@ -29,9 +29,13 @@ struct HeldOut {
 };
 
 /// Leaves out each board pose in turn: solves without it, takes its pose from the camera's corners alone and
-/// predicts the projector pixels of its matches (each the average over a cell of the board).
+/// predicts the projector pixels of its matches (each the average over a cell of the board). The solves start
+/// from `solution` and take its noise as weights (solve_again): a start anywhere else ends in the same place
+/// (tests/calib/held_out_test.cpp). `with_errors`: errors_m, too. Uses all cores; the result does not depend
+/// on their number.
 Result<HeldOut> held_out(const Observations& observations,
                          const SolveOptions& options,
-                         const Solution& solution);
+                         const Solution& solution,
+                         bool with_errors = true);
 
 }  // namespace limn::calib

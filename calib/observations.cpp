@@ -13,6 +13,7 @@
 #include <optional>
 #include <thread>
 
+#include "calib/free_points.h"
 #include "core/file.h"
 #include "core/frame.h"
 #include "core/log.h"
@@ -259,6 +260,29 @@ void append(const Observed& seen, Observed* all) {
   all->seconds_decode += seen.seconds_decode;
 }
 
+// A pose in which no camera sees the board shows the scene alone.
+Status observe_scenes(const Captures& captures, const DecodeOptions& options, Observed* observed) {
+  for (size_t pose = 0; pose < captures.poses.size(); ++pose) {
+    const bool has_board =
+        std::any_of(observed->observations.corners.begin(), observed->observations.corners.end(),
+                    [&](const CornerSeen& corner) { return static_cast<size_t>(corner.pose) == pose; });
+    if (has_board) continue;
+    const double started = now();
+    std::vector<std::vector<Decoded>> decoded(captures.cameras.size());
+    for (size_t camera = 0; camera < captures.cameras.size(); ++camera) {
+      const CapturedDevice& device = captures.cameras[camera];
+      for (size_t p = 0; p < captures.projectors.size(); ++p) {
+        LIMN_TRY(Decoded seen, decode(captures.patterns[p], captures.poses[pose].pictures[p][camera],
+                                      device.width, device.height, options));
+        decoded[camera].push_back(std::move(seen));
+      }
+    }
+    add_free_points(decoded, static_cast<int>(pose), {}, &observed->observations);
+    observed->seconds_decode += now() - started;
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<Observed> observe(const Captures& captures, const DecodeOptions& options) {
@@ -290,6 +314,7 @@ Result<Observed> observe(const Captures& captures, const DecodeOptions& options)
     LIMN_TRY_STATUS(part->ok() ? Status() : Status(part->error()));
     append(**part, &observed);
   }
+  LIMN_TRY_STATUS(observe_scenes(captures, options, &observed));
   return observed;
 }
 
@@ -323,12 +348,18 @@ Status save_observations(const Observations& observations, const std::filesystem
                                  {"corner", {"camera", "pose", "corner", "x", "y", "stddev_px"}},
                                  {"match",
                                   {"camera", "projector", "pose", "camera_x", "camera_y", "projector_x",
-                                   "projector_y", "stddev_px", "pixels"}}};
+                                   "projector_y", "stddev_px", "pixels"}},
+                                 {"point", {"camera", "pose", "x", "y"}},
+                                 {"sighting", {"point", "by_projector", "imager", "x", "y", "stddev_px"}}};
   for (const CornerSeen& c : observations.corners)
     json["corners"].push_back({c.camera, c.pose, c.corner, c.px.x(), c.px.y(), c.stddev_px});
   for (const Match& m : observations.matches)
     json["matches"].push_back({m.camera, m.projector, m.pose, m.px_camera.x(), m.px_camera.y(),
                                m.px_projector.x(), m.px_projector.y(), m.stddev_px, m.pixels});
+  for (const FreePoint& p : observations.points)
+    json["points"].push_back({p.camera, p.pose, p.px_camera.x(), p.px_camera.y()});
+  for (const Sighting& s : observations.sightings)
+    json["sightings"].push_back({s.point, s.by_projector ? 1 : 0, s.imager, s.px.x(), s.px.y(), s.stddev_px});
   return write_file(path, json.dump() + "\n");
 }
 

@@ -33,6 +33,22 @@ struct Match {
   int pixels = 0;
 };
 
+/// A point of a scene that no board tells the place of: a camera's pixel. Its distance is an unknown.
+struct FreePoint {
+  int pose = 0;
+  int camera = 0;
+  Eigen::Vector2d px_camera = Eigen::Vector2d::Zero();
+};
+
+/// Where a projector or another camera sees a free point.
+struct Sighting {
+  int point = 0;
+  bool by_projector = true;
+  int imager = 0;  ///< which projector or camera
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  double stddev_px = 0;  ///< of one coordinate
+};
+
 /// Everything measured, as flat arrays; all that the solve sees.
 struct Observations {
   Board board;
@@ -41,6 +57,8 @@ struct Observations {
   std::vector<std::string> poses;
   std::vector<CornerSeen> corners;
   std::vector<Match> matches;
+  std::vector<FreePoint> points;
+  std::vector<Sighting> sightings;  ///< those of a point stand together
 };
 
 /// What became of one series of pictures.
@@ -61,8 +79,9 @@ struct Observed {
   double seconds_decode = 0;
 };
 
-/// The corners and matches of all captures. Where a camera does not see the board nothing is decoded: such
-/// poses are scene captures. An unreadable picture is an error that names it.
+/// The corners and matches of all captures. Poses in which no camera sees the board are scene captures: they
+/// give free points (calib/free_points.h). A camera that does not see the board that another sees gives
+/// nothing. An unreadable picture is an error that names it.
 Result<Observed> observe(const Captures& captures, const DecodeOptions& options = {});
 
 /// The matches on the board's squares of one camera, projector and pose. Squares are placed by their corners

@@ -26,19 +26,19 @@ Eigen::Matrix<double, 3, 6> moved_by_pose(const Vector3d& arm) {
 
 // A camera ray on the board.
 struct Hit {
-  Vector3d d_camera, p_camera, p_world, p_board;
-  double distance = 0;
+  Vector3d p_camera, p_world, p_board;
+  double distance = 0;  // in units of the ray's d
 };
 
 bool cast(const ImagerView& camera,
           const Pose& world_from_board,
           const BoardShape& shape,
           const Vector2d& bend,
-          const Vector2d& px_camera,
+          const Vector3d& d_camera,
           Hit* hit) {
-  if (!camera.model.unproject(camera.values, px_camera, &hit->d_camera)) return false;
-  const Pose board_from_camera = (camera.imager_from_world * world_from_board).inverse();
-  const Vector3d p_origin = board_from_camera.translation, d = board_from_camera.rotation * hit->d_camera;
+  const Pose world_from_camera = camera.imager_from_world.inverse();
+  const Pose board_from_camera = world_from_board.inverse() * world_from_camera;
+  const Vector3d p_origin = board_from_camera.translation, d = board_from_camera.rotation * d_camera;
   if (std::abs(d.z()) < 1e-9) return false;
   double distance = -p_origin.z() / d.z();
   for (int i = 0; i < 20; ++i) {  // Newton on z - sheet(x, y); the sheet is nearly flat
@@ -52,25 +52,35 @@ bool cast(const ImagerView& camera,
   }
   if (!(distance > 0) || !std::isfinite(distance)) return false;
   hit->distance = distance;
-  hit->p_camera = distance * hit->d_camera;
-  hit->p_world = camera.imager_from_world.inverse() * hit->p_camera;
+  hit->p_camera = distance * d_camera;
+  hit->p_world = world_from_camera * hit->p_camera;
   hit->p_board = p_origin + distance * d;
   return true;
 }
 
-// d direction / d values of the camera for a fixed pixel (3 x n).
-bool direction_by_values(const ImagerView& camera, const Vector3d& d, Eigen::Matrix3Xd* derivative) {
-  const auto count = static_cast<Eigen::Index>(camera.values.size());
+// Newton from the ray's d; false when it does not arrive in some steps.
+bool refine_ray(const LensModel& model,
+                std::span<const double> values,
+                const Vector2d& px,
+                bool with_derivatives,
+                Ray* ray) {
+  constexpr double k_tolerance_px = 1e-9;
+  constexpr int k_most_steps = 6;
+  Derivatives::Values by_values(2, static_cast<Eigen::Index>(values.size()));
   Matrix23 by_d;
-  Derivatives::Values by_values(2, count);
-  Vector2d px;
-  if (!camera.model.project(camera.values, d, &px, by_d.data(), by_values.data())) return false;
-  Eigen::Matrix<double, 3, 2> across;
-  across.col(0) = d.unitOrthogonal();
-  across.col(1) = d.cross(across.col(0));
-  const Eigen::Matrix2d inner = by_d * across;
-  *derivative = -across * inner.inverse() * by_values;
-  return derivative->allFinite();
+  Vector2d found;
+  for (int step = 0; step <= k_most_steps; ++step) {
+    if (!model.project(values, ray->d, &found, by_d.data(), with_derivatives ? by_values.data() : nullptr))
+      return false;
+    const Eigen::Matrix2d inverse = by_d.leftCols<2>().inverse();
+    const Vector2d error = px - found;
+    if (error.cwiseAbs().maxCoeff() < k_tolerance_px) {
+      if (with_derivatives) ray->xy_by_values.noalias() = -inverse * by_values;
+      return inverse.allFinite();
+    }
+    ray->d.head<2>() += inverse * error;
+  }
+  return false;
 }
 
 }  // namespace
@@ -112,14 +122,32 @@ bool predict_corner(const ImagerView& camera,
   return true;
 }
 
+bool find_ray(const LensModel& model,
+              std::span<const double> values,
+              const Vector2d& px,
+              bool with_derivatives,
+              Ray* ray) {
+  if (ray->d.z() == 1 && refine_ray(model, values, px, with_derivatives, ray)) return true;
+  Vector3d d;
+  ray->d.setZero();
+  if (!model.unproject(values, px, &d) || !(d.z() > 0)) return false;
+  ray->d = d / d.z();
+  ray->d.z() = 1;
+  if (refine_ray(model, values, px, with_derivatives, ray)) return true;
+  ray->d.setZero();
+  return false;
+}
+
 bool meet_board(const ImagerView& camera,
                 const Pose& world_from_board,
                 const BoardShape& shape,
                 const Vector2d& bend,
                 const Vector2d& px_camera,
                 Vector3d* p_world) {
+  Ray ray;
   Hit hit;
-  if (!cast(camera, world_from_board, shape, bend, px_camera, &hit)) return false;
+  if (!find_ray(camera.model, camera.values, px_camera, false, &ray)) return false;
+  if (!cast(camera, world_from_board, shape, bend, ray.d, &hit)) return false;
   *p_world = hit.p_world;
   return true;
 }
@@ -132,8 +160,21 @@ bool predict_match(const ImagerView& camera,
                    const Vector2d& px_camera,
                    Vector2d* px_projector,
                    Derivatives* derivatives) {
+  Ray ray;
+  return find_ray(camera.model, camera.values, px_camera, derivatives != nullptr, &ray) &&
+         predict_match(camera, projector, world_from_board, shape, bend, ray, px_projector, derivatives);
+}
+
+bool predict_match(const ImagerView& camera,
+                   const ImagerView& projector,
+                   const Pose& world_from_board,
+                   const BoardShape& shape,
+                   const Vector2d& bend,
+                   const Ray& ray,
+                   Vector2d* px_projector,
+                   Derivatives* derivatives) {
   Hit hit;
-  if (!cast(camera, world_from_board, shape, bend, px_camera, &hit)) return false;
+  if (!cast(camera, world_from_board, shape, bend, ray.d, &hit)) return false;
   const Vector3d arm_projector = projector.imager_from_world.rotation * hit.p_world;
   const Vector3d p_projector = arm_projector + projector.imager_from_world.translation;
   if (!(p_projector.z() > 0)) return false;
@@ -144,29 +185,52 @@ bool predict_match(const ImagerView& camera,
   if (!projector.model.project(projector.values, p_projector, px_projector, by_p.data(),
                                derivatives->projector_values.data()))
     return false;
-  Eigen::Matrix3Xd d_by_values;
-  if (!direction_by_values(camera, hit.d_camera, &d_by_values)) return false;
 
   // The point stays on the sheet: n . (its movement relative to the board) = movement of the sheet along
   // z_board.
   const Matrix3d world_from_camera = camera.imager_from_world.rotation_matrix().transpose();
   const Vector2d slope = shape.slope(bend, hit.p_board.x(), hit.p_board.y());
   const Vector3d n_world = world_from_board.rotation * Vector3d(-slope.x(), -slope.y(), 1);
-  const Vector3d d_world = world_from_camera * hit.d_camera;
+  const Vector3d d_world = world_from_camera * ray.d;
   const double rate = n_world.dot(d_world);
   const Vector3d arm_board = hit.p_world - world_from_board.translation;
   const Vector3d arm_camera = hit.p_camera - camera.imager_from_world.translation;
   // A movement m of the ray's point that ignores the board becomes m - d (n.m)/(n.d).
   const Matrix3d along_sheet = Matrix3d::Identity() - d_world * n_world.transpose() / rate;
   const Matrix23 by_world = by_p * projector.imager_from_world.rotation_matrix();
-  const Matrix23 by_free = by_world * along_sheet;
+  const Matrix23 by_camera = by_world * along_sheet * world_from_camera;
 
   derivatives->projector_pose = by_p * moved_by_pose(arm_projector);
-  derivatives->camera_values = by_free * world_from_camera * hit.distance * d_by_values;
-  derivatives->camera_pose = -by_free * world_from_camera * moved_by_pose(arm_camera);
+  derivatives->camera_values.noalias() = hit.distance * by_camera.leftCols<2>() * ray.xy_by_values;
+  derivatives->camera_pose = -by_camera * moved_by_pose(arm_camera);
   const Vector2d by_distance = by_world * d_world / rate;
   derivatives->board_pose = by_distance * (n_world.transpose() * moved_by_pose(arm_board));
   derivatives->bend = by_distance * shape.per_bend(hit.p_board.x(), hit.p_board.y()).transpose();
+  return true;
+}
+
+bool predict_sighting(const ImagerView& camera,
+                      const ImagerView& seeing,
+                      const Ray& ray,
+                      double inverse_depth,
+                      Vector2d* px,
+                      SightingDerivatives* derivatives) {
+  if (!(inverse_depth > 0)) return false;
+  const Vector3d p_camera = ray.d / inverse_depth;
+  const Matrix3d world_from_camera = camera.imager_from_world.rotation_matrix().transpose();
+  const Vector3d arm_camera = p_camera - camera.imager_from_world.translation;
+  const Vector3d arm = seeing.imager_from_world.rotation * (world_from_camera * arm_camera);
+  const Vector3d p = arm + seeing.imager_from_world.translation;
+  if (!(p.z() > 0)) return false;
+  if (!derivatives) return seeing.model.project(seeing.values, p, px);
+  Matrix23 by_p;
+  derivatives->values.resize(2, static_cast<Eigen::Index>(seeing.values.size()));
+  if (!seeing.model.project(seeing.values, p, px, by_p.data(), derivatives->values.data())) return false;
+  const Matrix23 by_camera = by_p * seeing.imager_from_world.rotation_matrix() * world_from_camera;
+  derivatives->pose = by_p * moved_by_pose(arm);
+  derivatives->camera_pose = -by_camera * moved_by_pose(arm_camera);
+  derivatives->camera_values.noalias() = by_camera.leftCols<2>() * ray.xy_by_values / inverse_depth;
+  derivatives->inverse_depth = -by_camera * ray.d / (inverse_depth * inverse_depth);
   return true;
 }
 

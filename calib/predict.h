@@ -27,11 +27,30 @@ struct ImagerView {
   const Pose& imager_from_world;
 };
 
+/// Of the lens models that can be solved: LENSMODEL_OPENCV12's.
+constexpr int k_most_values = 16;
+
+/// Where an imager's pixel looks: the point (x, y, 1) on its ray, imager frame, and how that moves with the
+/// lens' values while the pixel stays (implicit function theorem: project(values, d) = px stays true, so
+/// J_d dd = -J_values dvalues).
+struct Ray {
+  Eigen::Vector3d d = Eigen::Vector3d::Zero();
+  Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor, 2, k_most_values> xy_by_values;
+};
+
+/// Ray of a pixel. Starts from what `ray` holds, if it holds anything: two steps when the values have hardly
+/// moved since. False when the pixel has none (`ray` is empty then).
+bool find_ray(const LensModel& model,
+              std::span<const double> values,
+              const Eigen::Vector2d& px,
+              bool with_derivatives,
+              Ray* ray);
+
 /// Derivatives of a predicted pixel. Poses: by boxplus's delta [rotation; translation]; values: 2 x
 /// value_count.
 struct Derivatives {
   using Pose6 = Eigen::Matrix<double, 2, 6>;
-  using Values = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>;
+  using Values = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor, 2, k_most_values>;
   Values camera_values, projector_values;
   Pose6 camera_pose, projector_pose, board_pose;
   Eigen::Matrix2d bend;
@@ -54,8 +73,7 @@ bool meet_board(const ImagerView& camera,
                 const Eigen::Vector2d& px_camera,
                 Eigen::Vector3d* p_world);
 
-/// Projector pixel of that point. Its derivatives by the camera's values come from the implicit function
-/// theorem: project(values, d) = px stays true, so J_d dd = -J_values dvalues with dd across d.
+/// Projector pixel of that point.
 bool predict_match(const ImagerView& camera,
                    const ImagerView& projector,
                    const Pose& world_from_board,
@@ -64,5 +82,27 @@ bool predict_match(const ImagerView& camera,
                    const Eigen::Vector2d& px_camera,
                    Eigen::Vector2d* px_projector,
                    Derivatives* derivatives = nullptr);
+/// Likewise with the ray of the camera's pixel at hand (with its derivatives when those are wanted).
+bool predict_match(const ImagerView& camera,
+                   const ImagerView& projector,
+                   const Pose& world_from_board,
+                   const BoardShape& shape,
+                   const Eigen::Vector2d& bend,
+                   const Ray& ray,
+                   Eigen::Vector2d* px_projector,
+                   Derivatives* derivatives = nullptr);
+
+/// How another imager (`seeing`) sees the point at 1 / `inverse_depth` along z of a camera's ray.
+struct SightingDerivatives {
+  Derivatives::Values camera_values, values;
+  Derivatives::Pose6 camera_pose, pose;
+  Eigen::Vector2d inverse_depth;
+};
+bool predict_sighting(const ImagerView& camera,
+                      const ImagerView& seeing,
+                      const Ray& ray,
+                      double inverse_depth,
+                      Eigen::Vector2d* px,
+                      SightingDerivatives* derivatives = nullptr);
 
 }  // namespace limn::calib

@@ -22,8 +22,7 @@ std::string provenance(const Report& report, const SolveOptions& options) {
               {"poses", observations.poses},
               {"corners", observations.corners.size()},
               {"matches", observations.matches.size()},
-              {"camera_model", options.camera_model},
-              {"projector_model", options.projector_model},
+              {"lens_models", lens_models(observations, options)},
               {"held_out_px", rounded(report.assessment.held_out.rms_px)}}
       .dump();
 }

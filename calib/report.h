@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calib/assess.h"
+#include "calib/lens_choice.h"
 #include "calib/observations.h"
 #include "calib/solve.h"
 #include "core/result.h"
@@ -18,6 +19,7 @@ struct Report {
   Solution solution;
   Assessment assessment;
   std::vector<std::pair<std::string, double>> seconds;  ///< of each stage, in order
+  std::vector<LensTrial> lens_trials = {};              ///< empty where the models were given
 };
 
 /// report.json, as interfaces.md describes it.

@@ -47,6 +47,24 @@ Json error_json(const Report& report) {
       {"from", "the larger of the held-out errors and of the noise propagated to moved and turned things"}};
 }
 
+// What was tried; with the models given by hand just those.
+Json lenses_json(const Report& report) {
+  Json list = Json::array();
+  for (const LensTrial& trial : report.lens_trials)
+    list.push_back({{"device", trial.device},
+                    {"model", trial.model},
+                    {"held_out_px", rounded(trial.held_out_px)},
+                    {"gain", rounded(trial.gain)},
+                    {"uncertainty", rounded(trial.uncertainty)},
+                    {"chosen", trial.chosen}});
+  if (!report.lens_trials.empty()) return list;
+  for (const auto* imagers : {&report.solution.rig.cameras, &report.solution.rig.projectors}) {
+    for (const Imager& imager : *imagers)
+      list.push_back({{"device", imager.name}, {"model", imager.lens.model.name()}, {"chosen", true}});
+  }
+  return list;
+}
+
 }  // namespace
 
 std::string report_json(const Report& report) {
@@ -59,6 +77,7 @@ std::string report_json(const Report& report) {
                      {"verdict", to_text(a.verdict)},
                      {"devices", devices_json(a.devices)},
                      {"held_out", held_out_json(a.held_out)},
+                     {"lens_models", lenses_json(report)},
                      {"predicted_error_mm", error_json(report)},
                      {"decode", {{"share", rounded(a.decoded_share)}, {"outliers", a.decode_outliers}}},
                      {"faults", faults},

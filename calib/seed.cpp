@@ -307,13 +307,13 @@ Result<Pose> board_pose_seed(const Observations& observations, const Rig& rig) {
 }
 
 Result<Seed> seed(const Observations& observations,
-                  const LensModel& camera_model,
-                  const LensModel& projector_model) {
+                  const std::vector<LensModel>& camera_models,
+                  const std::vector<LensModel>& projector_models) {
   Seed seeded;
   seeded.world_from_board.resize(observations.poses.size());
   std::vector<CameraSeed> cameras;
   for (int i = 0; i < static_cast<int>(observations.cameras.size()); ++i) {
-    LIMN_TRY(CameraSeed camera, seed_camera(observations, i, camera_model));
+    LIMN_TRY(CameraSeed camera, seed_camera(observations, i, camera_models[static_cast<size_t>(i)]));
     const CapturedDevice& device = observations.cameras[static_cast<size_t>(i)];
     seeded.cameras.push_back({device.name, device.width, device.height, camera.lens, Pose()});
     cameras.push_back(std::move(camera));
@@ -321,7 +321,8 @@ Result<Seed> seed(const Observations& observations,
   LIMN_TRY_STATUS(link(observations, cameras, &seeded));
   place_remaining(observations, &seeded);
   for (int i = 0; i < static_cast<int>(observations.projectors.size()); ++i) {
-    LIMN_TRY(Imager projector, seed_projector(observations, seeded, i, projector_model));
+    LIMN_TRY(Imager projector,
+             seed_projector(observations, seeded, i, projector_models[static_cast<size_t>(i)]));
     const CapturedDevice& device = observations.projectors[static_cast<size_t>(i)];
     projector.name = device.name;
     projector.width = device.width;

@@ -19,10 +19,10 @@ struct Seed {
 
 /// Cameras by OpenCV's calibration with a plain lens, linked through boards that two of them see; projectors
 /// by the direct linear transform from points on the boards to their pixels, which holds for any lens shift.
-/// The models say how many values each lens has; values beyond the seed's are 0.
+/// The models (one for each device) say how many values each lens has; values beyond the seed's are 0.
 Result<Seed> seed(const Observations& observations,
-                  const LensModel& camera_model,
-                  const LensModel& projector_model);
+                  const std::vector<LensModel>& camera_models,
+                  const std::vector<LensModel>& projector_models);
 
 /// Pose of the one board whose corners `observations` holds, by PnP on the camera that sees most of them.
 Result<Pose> board_pose_seed(const Observations& observations, const Rig& rig);

@@ -17,6 +17,8 @@ struct SolveOptions {
   /// OPENCV4.
   std::string camera_model = "LENSMODEL_OPENCV4";
   std::string projector_model = "LENSMODEL_OPENCV4";
+  /// One name for each camera, then for each projector, instead of the two above; empty: those count.
+  std::vector<std::string> lens_models = {};
   /// Whether the board may be bent (two unknowns for all poses).
   bool bend = true;
   /// Residuals beyond this many standard deviations are told down (Cauchy).
@@ -43,6 +45,9 @@ struct Solution {
   Eigen::Vector2d bend_m = Eigen::Vector2d::Zero();
   std::vector<Eigen::Vector2d> corner_residuals, match_residuals;
   std::vector<bool> corner_outlier, match_outlier;  ///< beyond 4 standard deviations
+  /// Places of the free points, m, world; none where no sighting tells the distance.
+  std::vector<std::optional<Eigen::Vector3d>> points;
+  std::vector<Eigen::Vector2d> sighting_residuals;
   /// What one coordinate scatters by beyond its own stddev, px: estimated from the residuals.
   double corner_noise_px = 0, match_noise_px = 0;
   int iterations = 0;
@@ -54,17 +59,34 @@ struct Solution {
   int projector_at(size_t projector) const;
 };
 
-/// One least-squares problem over all cameras, projectors, board poses and the board's bend: cameras see
-/// corners; a match says that the camera's ray meets the board where the projector's pixel does. Starts from
-/// nothing but the observations, or from `start` (of the same devices and poses). Deterministic. Errors: too
-/// few poses, a device that saw none, a camera that shares no pose with the others, no convergence.
-Result<Solution> solve(const Observations& observations,
-                       const SolveOptions& options = {},
-                       const Solution* start = nullptr);
+/// One least-squares problem over all cameras, projectors, board poses, the board's bend and free points
+/// (calib/joint.h): cameras see corners; a match says that the camera's ray meets the board where the
+/// projector's pixel does. Starts from nothing but the observations. Without projectors only the cameras are
+/// solved. Deterministic. Errors: too few poses, a device that saw none, a camera that shares no pose with
+/// the others, observations that are not finite, no convergence.
+Result<Solution> solve(const Observations& observations, const SolveOptions& options = {});
+
+/// The same from a solution of the same devices and poses (its lens models may be others: their values start
+/// at 0), with its noise as the weights; so one minimisation does. `left_out`: a pose that does not count
+/// (-1: none). `to_rounding`: further down than any observation feels, for those who compare solutions.
+/// Without covariance, and without what it says of single observations.
+Result<Solution> solve_again(const Observations& observations,
+                             const SolveOptions& options,
+                             const Solution& start,
+                             int left_out = -1,
+                             bool to_rounding = false);
+
+/// `solve` with a start at hand: all its rounds, covariance and residuals.
+Result<Solution> solve_from(const Observations& observations,
+                            const SolveOptions& options,
+                            const Solution& start);
 
 /// Pose of one placement of the board from what cameras see of its corners alone, everything else as in
 /// `solution`.
 Result<Pose> board_pose_from_cameras(const Observations& observations, const Solution& solution, int pose);
+
+/// Names of the lens models: each camera's, then each projector's.
+std::vector<std::string> lens_models(const Observations& observations, const SolveOptions& options);
 
 /// Projector pixel that a solution predicts for a match whose board stands at `world_from_board`.
 std::optional<Eigen::Vector2d> predicted(const Observations& observations,

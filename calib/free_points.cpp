@@ -1,0 +1,181 @@
+#include "calib/free_points.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace limn::calib {
+namespace {
+
+using Eigen::Vector2d;
+
+constexpr double k_least_share = 0.6;  // of a window's pixels with a label
+constexpr double k_stddev_floor_px = 0.02;
+constexpr int k_bin_px = 4;  // of a projector's picture, for finding who else sees its pixel
+
+// What one projector's pixel is in the middle of a window of a camera's picture.
+struct Patch {
+  Vector2d label;
+  Eigen::Matrix2d slope;  // d label / d camera pixel
+  double stddev_px = 0;
+};
+
+std::optional<Patch> patch_at(const cv::Mat& labels, int x, int y, const FreePointOptions& options) {
+  const int half = options.half_window;
+  if (x < half || y < half || x + half >= labels.cols || y + half >= labels.rows) return std::nullopt;
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Matrix<double, 3, 2> product = Eigen::Matrix<double, 3, 2>::Zero();
+  double squares = 0;
+  int count = 0;
+  for (int dy = -half; dy <= half; ++dy) {
+    for (int dx = -half; dx <= half; ++dx) {
+      const auto& label = labels.at<cv::Vec2f>(y + dy, x + dx);
+      if (std::isnan(label[0])) continue;
+      const Eigen::Vector3d at(1, dx, dy);
+      const Vector2d value(label[0], label[1]);
+      normal += at * at.transpose();
+      product += at * value.transpose();
+      squares += value.squaredNorm();
+      ++count;
+    }
+  }
+  const int side = 2 * half + 1;
+  if (count < k_least_share * side * side) return std::nullopt;
+  const Eigen::Matrix3d inverse = normal.inverse();
+  const Eigen::Matrix<double, 3, 2> plane = inverse * product;
+  const double left = std::max(0.0, squares - plane.cwiseProduct(product).sum());
+  const double residual = std::sqrt(left / (2 * (count - 3)));
+  if (!(residual < options.max_residual_px)) return std::nullopt;
+  Patch patch;
+  patch.label = plane.row(0).transpose();
+  patch.slope = plane.bottomRows<2>().transpose();
+  patch.stddev_px = std::hypot(residual * std::sqrt(inverse(0, 0)), k_stddev_floor_px);
+  return patch;
+}
+
+// For each bin of a projector's picture a camera pixel that it lights; -1: none.
+class Reverse {
+ public:
+  Reverse(const cv::Mat& labels, const CapturedDevice& projector)
+      : across_(projector.width / k_bin_px + 1),
+        bins_(static_cast<size_t>(across_ * (projector.height / k_bin_px + 1)), -1) {
+    for (int y = 0; y < labels.rows; ++y) {
+      for (int x = 0; x < labels.cols; ++x) {
+        const auto& label = labels.at<cv::Vec2f>(y, x);
+        if (const auto bin = bin_of(Vector2d(label[0], label[1]))) bins_[*bin] = y * labels.cols + x;
+      }
+    }
+  }
+  int pixel_of(const Vector2d& label) const {
+    const auto bin = bin_of(label);
+    return bin ? bins_[*bin] : -1;
+  }
+
+ private:
+  std::optional<size_t> bin_of(const Vector2d& label) const {
+    if (!(label.x() >= 0 && label.y() >= 0 && label.x() < across_ * k_bin_px)) return std::nullopt;
+    const size_t bin = static_cast<size_t>(static_cast<int>(label.y()) / k_bin_px * across_ +
+                                           static_cast<int>(label.x()) / k_bin_px);
+    return bin < bins_.size() ? std::optional(bin) : std::nullopt;
+  }
+  int across_;
+  std::vector<int> bins_;
+};
+
+// The pixel of another camera that a projector's pixel lights: from a pixel near it along the plane there.
+std::optional<Sighting> sighting_by(const cv::Mat& labels,
+                                    const Reverse& reverse,
+                                    const Vector2d& label,
+                                    double label_stddev,
+                                    const FreePointOptions& options) {
+  const int start = reverse.pixel_of(label);
+  if (start < 0) return std::nullopt;
+  Vector2d px(start % labels.cols, start / labels.cols);
+  for (int step = 0; step < 4; ++step) {
+    const Vector2d middle = px.array().round();
+    const auto patch = patch_at(labels, static_cast<int>(middle.x()), static_cast<int>(middle.y()), options);
+    if (!patch || !(std::abs(patch->slope.determinant()) > 1e-3)) return std::nullopt;
+    const Eigen::Matrix2d inverse = patch->slope.inverse();
+    px = middle + inverse * (label - patch->label);
+    if (!px.allFinite() || !((px - middle).norm() < 4 * k_bin_px)) return std::nullopt;
+    if ((px - middle).cwiseAbs().maxCoeff() <= 1) {
+      Sighting sighting;
+      sighting.by_projector = false;
+      sighting.px = px;
+      sighting.stddev_px = std::hypot(patch->stddev_px, label_stddev) * inverse.norm() / std::sqrt(2.0);
+      return sighting;
+    }
+  }
+  return std::nullopt;
+}
+
+// The pixel of a field that most projectors reach, nearest to the field's middle.
+struct Choice {
+  int x = 0, y = 0, seen = 0;
+  std::vector<std::optional<Patch>> patches;
+};
+
+Choice best_in(const std::vector<Decoded>& decoded, const cv::Rect& field, const FreePointOptions& options) {
+  Choice best;
+  constexpr int k_tries = 3;  // by each axis
+  for (int i = 0; i < k_tries * k_tries; ++i) {
+    const int order[] = {4, 1, 3, 5, 7, 0, 2, 6, 8};  // the middle first
+    Choice tried;
+    tried.x = field.x + field.width * (2 * (order[i] % k_tries) + 1) / (2 * k_tries);
+    tried.y = field.y + field.height * (2 * (order[i] / k_tries) + 1) / (2 * k_tries);
+    for (const Decoded& by : decoded) {
+      tried.patches.push_back(patch_at(by.px_projector, tried.x, tried.y, options));
+      tried.seen += tried.patches.back() ? 1 : 0;
+    }
+    if (tried.seen > best.seen) best = std::move(tried);
+    if (best.seen == static_cast<int>(decoded.size())) break;
+  }
+  return best;
+}
+
+}  // namespace
+
+void add_free_points(const std::vector<std::vector<Decoded>>& decoded,
+                     int pose,
+                     const FreePointOptions& options,
+                     Observations* into) {
+  std::vector<std::vector<Reverse>> reverse;  // only cameras that share the view need it
+  for (size_t camera = 0; decoded.size() > 1 && camera < decoded.size(); ++camera) {
+    reverse.emplace_back();
+    for (size_t p = 0; p < decoded[camera].size(); ++p)
+      reverse.back().emplace_back(decoded[camera][p].px_projector, into->projectors[p]);
+  }
+  for (size_t camera = 0; camera < decoded.size(); ++camera) {
+    const CapturedDevice& device = into->cameras[camera];
+    for (int field = 0; field < options.columns * options.rows; ++field) {
+      const int column = field % options.columns, row = field / options.columns;
+      const cv::Rect place(device.width * column / options.columns, device.height * row / options.rows,
+                           device.width / options.columns, device.height / options.rows);
+      const Choice choice = best_in(decoded[camera], place, options);
+      if (choice.seen == 0) continue;
+      const int point = static_cast<int>(into->points.size());
+      into->points.push_back({pose, static_cast<int>(camera), Vector2d(choice.x, choice.y)});
+      for (size_t p = 0; p < choice.patches.size(); ++p) {
+        if (!choice.patches[p]) continue;
+        const Patch& patch = *choice.patches[p];
+        into->sightings.push_back({point, true, static_cast<int>(p), patch.label, patch.stddev_px});
+      }
+      for (size_t other = 0; other < decoded.size(); ++other) {
+        if (other == camera) continue;
+        for (size_t p = 0; p < choice.patches.size(); ++p) {
+          if (!choice.patches[p]) continue;
+          auto seen = sighting_by(decoded[other][p].px_projector, reverse[other][p], choice.patches[p]->label,
+                                  choice.patches[p]->stddev_px, options);
+          if (!seen) continue;
+          seen->point = point;
+          seen->imager = static_cast<int>(other);
+          into->sightings.push_back(*seen);
+          break;  // one projector's light is enough to find it
+        }
+      }
+    }
+  }
+}
+
+}  // namespace limn::calib
