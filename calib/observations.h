@@ -53,12 +53,23 @@ struct DecodeShare {
   int outliers = 0;
 };
 
+/// A camera pixel with its projector pixel, anywhere in the picture, on the board or off it: what the
+/// epipolar residual is measured on. The solve does not see them.
+struct DensePixel {
+  int camera = 0;
+  int projector = 0;
+  int pose = 0;
+  Eigen::Vector2f px_camera = Eigen::Vector2f::Zero();
+  Eigen::Vector2f px_projector = Eigen::Vector2f::Zero();
+};
+
 struct Observed {
   Observations observations;
   std::vector<DecodeShare> decoded;
   std::vector<SeriesHealth> health;  ///< parallel to decoded
   double seconds_board = 0;
   double seconds_decode = 0;
+  std::vector<DensePixel> dense = {};  ///< on a coarse grid, some 5000 of a picture; none on edges
 };
 
 /// The corners and matches of all captures. Where a camera does not see the board nothing is decoded: such

@@ -30,6 +30,29 @@ Json held_out_json(const HeldOut& score) {
   return {{"rms_px", rounded(score.rms_px)}, {"worst_px", rounded(score.worst_px)}, {"poses", poses}};
 }
 
+Json epipolar_json(const Report& report) {
+  const Observations& observations = report.observed.observations;
+  Json list = Json::array();
+  for (const EpipolarResidual& pair : report.assessment.epipolar)
+    list.push_back({{"camera", observations.cameras[static_cast<size_t>(pair.camera)].name},
+                    {"projector", observations.projectors[static_cast<size_t>(pair.projector)].name},
+                    {"rms_px", rounded(pair.rms_px)},
+                    {"pixels", pair.pixels},
+                    {"outliers", pair.outliers}});
+  return list;
+}
+
+Json pulls_json(const Pulls& pulls) {
+  const auto one = [](const PullStatistics& s) -> Json {
+    return {{"mean", rounded(s.mean)},
+            {"stddev", rounded(s.stddev)},
+            {"beyond_3", rounded(s.beyond_3)},
+            {"count", s.count}};
+  };
+  return {
+      {"corners", one(pulls.corners)}, {"matches", one(pulls.matches)}, {"held_out", one(pulls.held_out)}};
+}
+
 Json by_projector(const Report& report, const std::vector<double>& errors) {
   Json each = Json::object();
   for (size_t i = 0; i < errors.size(); ++i)
@@ -61,6 +84,8 @@ std::string report_json(const Report& report) {
                      {"held_out", held_out_json(a.held_out)},
                      {"predicted_error_mm", error_json(report)},
                      {"decode", {{"share", rounded(a.decoded_share)}, {"outliers", a.decode_outliers}}},
+                     {"epipolar", epipolar_json(report)},
+                     {"pulls", pulls_json(a.pulls)},
                      {"faults", faults},
                      {"seconds", seconds}};
   return json.dump(2) + "\n";
