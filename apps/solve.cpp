@@ -8,6 +8,7 @@
 #include "calib/captures.h"
 #include "calib/failed_report.h"
 #include "calib/observations.h"
+#include "calib/picture_check.h"
 #include "calib/report.h"
 #include "calib/solve.h"
 #include "core/file.h"
@@ -51,7 +52,8 @@ Status check_models(const SolveOptions& options) {
   return {};
 }
 
-void print_table(const calib::Assessment& assessment) {
+void print_report(const calib::Report& report) {
+  const calib::Assessment& assessment = report.assessment;
   fmt::print("{:<14} {:>8} {:>9} {:>9}\n", "device", "RMS px", "outliers", "coverage");
   for (const calib::DeviceQuality& d : assessment.devices)
     fmt::print("{:<14} {:>8.3f} {:>4}/{:<4} {:>7.0f} %\n", d.name, d.rms_px, d.outliers, d.points,
@@ -61,9 +63,9 @@ void print_table(const calib::Assessment& assessment) {
     fmt::print("{:<14} {:>8.3f} {:>9}\n", pose.pose, pose.rms_px, pose.cells);
   for (const calib::Fault& fault : assessment.faults)
     fmt::print("fault {}: {}; {}.\n", fault.name, fault.evidence, fault.advice);
-  fmt::print("held-out {:.3f} px RMS, worst {:.3f} px; decoded {:.0f} %; {}\n", assessment.held_out.rms_px,
-             assessment.held_out.worst_px, 100 * assessment.decoded_share,
-             calib::to_text(assessment.verdict));
+  for (const std::string& sentence : report.words.advice) fmt::print("advice: {}\n", sentence);
+  fmt::print("held-out {:.3f} px RMS, worst {:.3f} px; decoded {:.0f} %\n{}\n", assessment.held_out.rms_px,
+             assessment.held_out.worst_px, 100 * assessment.decoded_share, report.words.verdict);
 }
 
 // What kept a rig from being made, with the faults that explain it; they also stand in report.json.
@@ -89,6 +91,7 @@ Result<calib::Report> solved(const SolveOptions& options) {
   const auto begun = Clock::now();
   LIMN_TRY_STATUS(check_models(options));
   LIMN_TRY(const calib::Captures captures, captures_of(options));
+  LIMN_TRY_STATUS(calib::check_pictures(captures));
   LIMN_TRY(calib::Observed observed, calib::observe(captures));
   const double board_seconds = observed.seconds_board, decode_seconds = observed.seconds_decode;
   calib::SolveOptions solving;
@@ -111,6 +114,9 @@ Result<calib::Report> solved(const SolveOptions& options) {
                         {"solve", solve_seconds},
                         {"assess", seconds_since(judging_begun)},
                         {"total", seconds_since(begun)}}};
+  report.words = calib::in_words(report.observed, report.solution, report.assessment);
+  report.made_at = calib::time_now();
+  report.history = calib::read_history(options.out);
   LIMN_TRY_STATUS(calib::write_rig_folder(report, solving, options.out));
   return report;
 }
@@ -120,7 +126,7 @@ Status run_solve(const SolveOptions& options) {
   if (options.json) {
     fmt::print("{}", calib::report_json(report));
   } else {
-    print_table(report.assessment);
+    print_report(report);
     fmt::print("rig and report in {}\n", options.out.string());
   }
   return {};

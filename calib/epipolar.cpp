@@ -33,6 +33,16 @@ std::optional<Seen> seen_by(const Imager& projector, const Ray& ray, double leng
   return seen;
 }
 
+// Until all are taken, rms_px holds the sum of squares.
+void take(const std::optional<double>& distance, EpipolarScore* score) {
+  ++score->pixels;
+  if (distance && std::abs(*distance) <= k_epipolar_outlier_px) {
+    score->rms_px += *distance * *distance;
+  } else {
+    ++score->outliers;
+  }
+}
+
 }  // namespace
 
 std::optional<double> epipolar_distance(const Imager& camera,
@@ -62,24 +72,20 @@ std::vector<EpipolarResidual> epipolar_residuals(const Rig& rig, const std::vect
   for (const DensePixel& pixel : dense) {
     const auto camera = static_cast<size_t>(pixel.camera), projector = static_cast<size_t>(pixel.projector);
     EpipolarResidual& pair = pairs[camera * projectors + projector];
-    const auto distance =
-        epipolar_distance(rig.cameras[camera], rig.projectors[projector], pixel.px_camera.cast<double>(),
-                          pixel.px_projector.cast<double>());
-    ++pair.pixels;
-    if (distance && std::abs(*distance) <= k_epipolar_outlier_px) {
-      pair.rms_px += *distance * *distance;
-    } else {
-      ++pair.outliers;
-    }
+    take(epipolar_distance(rig.cameras[camera], rig.projectors[projector], pixel.px_camera.cast<double>(),
+                           pixel.px_projector.cast<double>()),
+         pixel.on_board ? &pair.board : &pair.room);
   }
   for (size_t i = 0; i < pairs.size(); ++i) {
-    EpipolarResidual& pair = pairs[i];
-    pair.camera = static_cast<int>(i / projectors);
-    pair.projector = static_cast<int>(i % projectors);
-    const int inliers = pair.pixels - pair.outliers;
-    pair.rms_px = inliers > 0 ? std::sqrt(pair.rms_px / inliers) : 0;
+    pairs[i].camera = static_cast<int>(i / projectors);
+    pairs[i].projector = static_cast<int>(i % projectors);
+    for (EpipolarScore* score : {&pairs[i].board, &pairs[i].room}) {
+      const int inliers = score->pixels - score->outliers;
+      score->rms_px = inliers > 0 ? std::sqrt(score->rms_px / inliers) : 0;
+    }
   }
-  std::erase_if(pairs, [](const EpipolarResidual& pair) { return pair.pixels == 0; });
+  std::erase_if(pairs,
+                [](const EpipolarResidual& pair) { return pair.board.pixels + pair.room.pixels == 0; });
   return pairs;
 }
 

@@ -8,14 +8,20 @@
 
 namespace limn::calib {
 
-/// How far projector pixels lie from the epipolar lines of their camera pixels. It needs neither board nor
-/// surface: any decoded pixel of the room counts, so it judges what the board poses cannot have fitted.
-struct EpipolarResidual {
-  int camera = 0;
-  int projector = 0;
+/// Decoded pixels and how far they lie from the epipolar lines of their camera pixels.
+struct EpipolarScore {
   int pixels = 0;     ///< judged
   int outliers = 0;   ///< of them, beyond k_epipolar_outlier_px, or without a line
   double rms_px = 0;  ///< projector pixels, over the others
+};
+
+/// Of one camera and projector. It needs no surface: the room counts as well as the board, so it judges what
+/// the board poses cannot have fitted; but rooms hold shiny and hollow things whose pixels are wrong.
+struct EpipolarResidual {
+  int camera = 0;
+  int projector = 0;
+  EpipolarScore board;  ///< between the board's corners
+  EpipolarScore room;   ///< everywhere else
 };
 /// What a decoding calls an outlier, too: a label this far from where it belongs is a wrong one.
 constexpr double k_epipolar_outlier_px = 3;

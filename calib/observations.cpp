@@ -230,7 +230,12 @@ bool on_one_surface(const Decoded& decoded, int x, int y) {
 }
 
 // Decoded pixels on a coarse grid over the whole picture.
-void thin_out(const Decoded& decoded, int camera, int projector, int pose, std::vector<DensePixel>* dense) {
+std::vector<DensePixel> thinned(const Decoded& decoded, const std::vector<BoardCorner>& corners) {
+  std::vector<cv::Point2f> px_corners, hull;
+  for (const BoardCorner& corner : corners)
+    px_corners.emplace_back(static_cast<float>(corner.px.x()), static_cast<float>(corner.px.y()));
+  cv::convexHull(px_corners, hull);
+  std::vector<DensePixel> dense;
   constexpr double k_most = 5000;  // of a picture: an RMS to a percent, at some 10 us each
   const cv::Mat& labels = decoded.px_projector;
   const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(labels.cols * labels.rows / k_most))));
@@ -238,10 +243,14 @@ void thin_out(const Decoded& decoded, int camera, int projector, int pose, std::
     for (int x = step / 2; x < labels.cols; x += step) {
       if (!on_one_surface(decoded, x, y)) continue;
       const auto& label = labels.at<cv::Vec2f>(y, x);
-      dense->push_back(
-          {camera, projector, pose, {static_cast<float>(x), static_cast<float>(y)}, {label[0], label[1]}});
+      DensePixel pixel;
+      pixel.px_camera = {static_cast<float>(x), static_cast<float>(y)};
+      pixel.px_projector = {label[0], label[1]};
+      pixel.on_board = cv::pointPolygonTest(hull, {pixel.px_camera.x(), pixel.px_camera.y()}, false) >= 0;
+      dense.push_back(pixel);
     }
   }
+  return dense;
 }
 
 double now() {
@@ -271,7 +280,12 @@ Result<Observed> observe_pose(const Captures& captures, int pose, int camera, co
     seen.health.back().camera = camera;
     seen.health.back().projector = projector;
     seen.health.back().pose = pose;
-    thin_out(decoded, camera, projector, pose, &seen.dense);
+    for (DensePixel pixel : thinned(decoded, corners)) {
+      pixel.camera = camera;
+      pixel.projector = projector;
+      pixel.pose = pose;
+      seen.dense.push_back(pixel);
+    }
     for (Match match : matches_on_board(captures.board, corners, decoded)) {
       match.camera = camera;
       match.projector = projector;

@@ -61,6 +61,7 @@ struct DensePixel {
   int pose = 0;
   Eigen::Vector2f px_camera = Eigen::Vector2f::Zero();
   Eigen::Vector2f px_projector = Eigen::Vector2f::Zero();
+  bool on_board = false;  ///< between the board's corners
 };
 
 struct Observed {

@@ -30,15 +30,18 @@ Json held_out_json(const HeldOut& score) {
   return {{"rms_px", rounded(score.rms_px)}, {"worst_px", rounded(score.worst_px)}, {"poses", poses}};
 }
 
+Json score_json(const EpipolarScore& score) {
+  return {{"rms_px", rounded(score.rms_px)}, {"pixels", score.pixels}, {"outliers", score.outliers}};
+}
+
 Json epipolar_json(const Report& report) {
   const Observations& observations = report.observed.observations;
   Json list = Json::array();
   for (const EpipolarResidual& pair : report.assessment.epipolar)
     list.push_back({{"camera", observations.cameras[static_cast<size_t>(pair.camera)].name},
                     {"projector", observations.projectors[static_cast<size_t>(pair.projector)].name},
-                    {"rms_px", rounded(pair.rms_px)},
-                    {"pixels", pair.pixels},
-                    {"outliers", pair.outliers}});
+                    {"board", score_json(pair.board)},
+                    {"room", score_json(pair.room)}});
   return list;
 }
 
@@ -70,6 +73,28 @@ Json error_json(const Report& report) {
       {"from", "the larger of the held-out errors and of the noise propagated to moved and turned things"}};
 }
 
+Json moved_json(const std::vector<Moved>& devices) {
+  Json list = Json::array();
+  for (const Moved& device : devices)
+    list.push_back({{"name", device.name},
+                    {"degrees", rounded(device.degrees)},
+                    {"mm", rounded(device.mm)},
+                    {"px", rounded(device.px)}});
+  return list;
+}
+
+Json history_json(const History& history) {
+  Json list = Json::array();
+  for (const PastCalibration& past : history.past)
+    list.push_back({{"made_at", past.made_at},
+                    {"verdict", past.verdict},
+                    {"held_out_px", rounded(past.held_out_px)},
+                    {"worst_px", rounded(past.worst_px)},
+                    {"predicted_mm", rounded(past.predicted_mm)},
+                    {"moved", moved_json(past.moved)}});
+  return list;
+}
+
 }  // namespace
 
 std::string report_json(const Report& report) {
@@ -78,8 +103,14 @@ std::string report_json(const Report& report) {
   for (const Fault& fault : a.faults)
     faults.push_back({{"name", fault.name}, {"evidence", fault.evidence}, {"advice", fault.advice}});
   for (const auto& [stage, value] : report.seconds) seconds[stage] = std::round(value * 1e3) / 1e3;
+  const auto since_last = report.history.rig
+                              ? moved(*report.history.rig, report.observed.observations, report.solution)
+                              : std::vector<Moved>();
   const Json json = {{"schema", "limn.report/1"},
+                     {"made_at", report.made_at},
                      {"verdict", to_text(a.verdict)},
+                     {"words", report.words.verdict},
+                     {"advice", report.words.advice},
                      {"devices", devices_json(a.devices)},
                      {"held_out", held_out_json(a.held_out)},
                      {"predicted_error_mm", error_json(report)},
@@ -87,6 +118,8 @@ std::string report_json(const Report& report) {
                      {"epipolar", epipolar_json(report)},
                      {"pulls", pulls_json(a.pulls)},
                      {"faults", faults},
+                     {"moved", moved_json(since_last)},
+                     {"history", history_json(report.history)},
                      {"seconds", seconds}};
   return json.dump(2) + "\n";
 }

@@ -14,7 +14,7 @@ std::vector<DensePixel> dense_of(const World& world) {
   std::vector<DensePixel> dense;
   for (const Match& match : world.observations.matches)
     dense.push_back({match.camera, match.projector, match.pose, match.px_camera.cast<float>(),
-                     match.px_projector.cast<float>()});
+                     match.px_projector.cast<float>(), true});
   return dense;
 }
 
@@ -33,9 +33,9 @@ TEST(Epipolar, IsNothingForTrueLensesHoweverTheyDistort) {
   const auto pairs = epipolar_residuals(world.rig, dense_of(world));
   ASSERT_EQ(pairs.size(), 4U);
   for (const EpipolarResidual& pair : pairs) {
-    EXPECT_GT(pair.pixels, 500);
-    EXPECT_EQ(pair.outliers, 0);
-    EXPECT_LT(pair.rms_px, 1e-3);  // float pixels
+    EXPECT_GT(pair.board.pixels, 500);
+    EXPECT_EQ(pair.board.outliers, 0);
+    EXPECT_LT(pair.board.rms_px, 1e-3);  // float pixels
   }
 }
 
@@ -63,8 +63,22 @@ TEST(Epipolar, TellsWrongPixelsFromNoise) {
     world.observations.matches[i].px_projector += 40 * Vector2d(1, 1);
   const auto pairs = epipolar_residuals(world.rig, dense_of(world));
   ASSERT_EQ(pairs.size(), 1U);
-  EXPECT_NEAR(pairs[0].rms_px, 0.2, 0.02) << "noise of 0.2 px a coordinate is 0.2 px across any line";
-  EXPECT_NEAR(pairs[0].outliers, static_cast<double>(world.observations.matches.size()) / 50, 2);
+  EXPECT_NEAR(pairs[0].board.rms_px, 0.2, 0.02) << "noise of 0.2 px a coordinate is 0.2 px across any line";
+  EXPECT_NEAR(pairs[0].board.outliers, static_cast<double>(world.observations.matches.size()) / 50, 2);
+}
+
+TEST(Epipolar, JudgesTheBoardAndTheRoomApart) {
+  World world = make_world(1, 1, 3, 0.0);
+  add_noise(&world, 0, 0.2, test_rng());
+  auto dense = dense_of(world);
+  for (size_t i = 0; i < dense.size(); i += 3) {
+    dense[i].on_board = false;
+    dense[i].px_projector += Eigen::Vector2f(1, 1);
+  }
+  const auto pairs = epipolar_residuals(world.rig, dense);
+  EXPECT_NEAR(pairs[0].board.rms_px, 0.2, 0.02);
+  EXPECT_GT(pairs[0].room.rms_px, 0.5);
+  EXPECT_NEAR(2 * pairs[0].room.pixels, pairs[0].board.pixels, 3);
 }
 
 TEST(Epipolar, SeesADeviceThatIsTurnedByATenthOfADegree) {
@@ -72,7 +86,7 @@ TEST(Epipolar, SeesADeviceThatIsTurnedByATenthOfADegree) {
   const auto dense = dense_of(world);
   Pose& pose = world.rig.projectors[0].imager_from_world;
   pose = Pose(exp_rotation(Vector3d(0.1_deg, 0, 0)), Vector3d::Zero()) * pose;
-  EXPECT_GT(epipolar_residuals(world.rig, dense)[0].rms_px, 1.0);
+  EXPECT_GT(epipolar_residuals(world.rig, dense)[0].board.rms_px, 1.0);
 }
 
 }  // namespace
