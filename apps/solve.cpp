@@ -1,9 +1,12 @@
 #include "apps/solve.h"
 
+#include <algorithm>
 #include <chrono>
 
+#include "apps/known_lengths.h"
 #include "apps/patterns.h"
 #include "calib/assess.h"
+#include "calib/board_check.h"
 #include "calib/capture_faults.h"
 #include "calib/captures.h"
 #include "calib/failed_report.h"
@@ -52,6 +55,23 @@ Status check_models(const SolveOptions& options) {
   return {};
 }
 
+// The known lengths as light measures them; what is wrong with them is a fault, and nothing with a fault of
+// scale is good.
+Status check_lengths(const calib::Captures& captures,
+                     const std::vector<calib::KnownLength>& lengths,
+                     calib::Report* report) {
+  if (lengths.empty()) return {};
+  LIMN_TRY(const auto marks, seen_marks(captures, report->solution.rig, lengths));
+  const double widened = std::max(1.0, report->assessment.pulls.held_out.stddev);
+  LIMN_TRY(report->known_lengths,
+           calib::measured_lengths(captures, report->solution, marks, lengths, widened));
+  for (const calib::LengthCheck& check : report->known_lengths) {
+    if (const auto fault = calib::fault_of(check, captures.board))
+      calib::add_faults({*fault}, &report->assessment);
+  }
+  return {};
+}
+
 void print_report(const calib::Report& report) {
   const calib::Assessment& assessment = report.assessment;
   fmt::print("{:<14} {:>8} {:>9} {:>9}\n", "device", "RMS px", "outliers", "coverage");
@@ -61,6 +81,12 @@ void print_report(const calib::Report& report) {
   fmt::print("{:<14} {:>8} {:>9}\n", "held-out pose", "RMS px", "cells");
   for (const calib::HeldOutPose& pose : assessment.held_out.poses)
     fmt::print("{:<14} {:>8.3f} {:>9}\n", pose.pose, pose.rms_px, pose.cells);
+  for (const calib::LengthCheck& check : report.known_lengths) {
+    if (!check.views.empty())
+      fmt::print("length {} to {}: expected {:.2f} mm, measured {:.2f} mm, deviation {:.2f} mm\n",
+                 check.known.from, check.known.to, 1e3 * check.known.length_m, 1e3 * check.measured_m,
+                 1e3 * check.stddev_m);
+  }
   for (const calib::Fault& fault : assessment.faults)
     fmt::print("fault {}: {}; {}.\n", fault.name, fault.evidence, fault.advice);
   for (const std::string& sentence : report.words.advice) fmt::print("advice: {}\n", sentence);
@@ -91,8 +117,10 @@ Result<calib::Report> solved(const SolveOptions& options) {
   const auto begun = Clock::now();
   LIMN_TRY_STATUS(check_models(options));
   LIMN_TRY(const calib::Captures captures, captures_of(options));
+  LIMN_TRY(const auto lengths, known_lengths(captures, options.known_lengths));
   LIMN_TRY_STATUS(calib::check_pictures(captures));
   LIMN_TRY(calib::Observed observed, calib::observe(captures));
+  LIMN_TRY_STATUS(calib::check_board(captures, observed.observations));
   const double board_seconds = observed.seconds_board, decode_seconds = observed.seconds_decode;
   calib::SolveOptions solving;
   solving.camera_model = options.camera_model;
@@ -114,6 +142,7 @@ Result<calib::Report> solved(const SolveOptions& options) {
                         {"solve", solve_seconds},
                         {"assess", seconds_since(judging_begun)},
                         {"total", seconds_since(begun)}}};
+  LIMN_TRY_STATUS(check_lengths(captures, lengths, &report));
   report.words = calib::in_words(report.observed, report.solution, report.assessment);
   report.made_at = calib::time_now();
   report.history = calib::read_history(options.out);

@@ -15,6 +15,9 @@ struct SolveOptions {
   std::vector<std::string> skip_poses = {};  ///< names of poses to leave out
   std::string camera_model = "LENSMODEL_OPENCV4";
   std::string projector_model = "LENSMODEL_OPENCV4";
+  /// Lengths that the cameras can see, "apriltag_36h11:3 apriltag_36h11:7 250mm" each, besides
+  /// capture.json's.
+  std::vector<std::string> known_lengths = {};
   bool json = false;  ///< print report.json instead of the table
 
   std::string import_format = {};  ///< "opencv-gray": somebody else's captures; then also

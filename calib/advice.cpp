@@ -214,14 +214,15 @@ void advise_trust(const Observations& observations,
   }
 }
 
-// "at 1.60 m, upper left of camera0's picture"
+// "1.90 mm at worst, 1.60 m from camera0, upper left of its picture"
 std::optional<std::string> worst_place(const Observations& observations, const ErrorMap& map) {
   const double worst = map.worst_mm();
   for (const ErrorMap::Plane& plane : map.planes) {
     for (size_t i = 0; i < plane.p95_mm.size() && worst > 0; ++i) {
       if (plane.p95_mm[i] != worst) continue;
       const int column = static_cast<int>(i) % map.columns, row = static_cast<int>(i) / map.columns;
-      return fmt::format("{:.2f} m from {}, {} of its picture", plane.depth_m, observations.cameras[0].name,
+      return fmt::format("{:.2f} mm at worst, {:.2f} m from {}, {} of its picture", worst, plane.depth_m,
+                         observations.cameras[0].name,
                          place_in_picture((column + 0.5) / map.columns, (row + 0.5) / map.rows));
     }
   }
@@ -240,7 +241,9 @@ std::string reason(const Assessment& assessment, double mm) {
                                   assessment.held_out.rms_px, px_limit, better));
   if (!(mm <= mm_limit)) reasons.push_back(fmt::format("more than {} mm is not {}", mm_limit, better));
   std::vector<std::string> names;
-  for (const Fault& fault : assessment.faults) names.push_back(fault.name);
+  for (const Fault& fault : assessment.faults) {
+    if (fault.severity != Severity::note) names.push_back(fault.name);
+  }
   if (!names.empty()) reasons.push_back("faults were found: " + joined(names));
   return reasons.empty() ? "" : "Why not better: " + joined(reasons) + ".";
 }
@@ -260,7 +263,7 @@ std::string verdict_words(const Observations& observations, const Assessment& as
     return static_cast<size_t>(m.projector) == projector;
   });
   if (const auto place = map == maps.end() ? std::nullopt : worst_place(observations, *map))
-    text += ", worst " + *place;
+    text += " (" + *place + ")";
   const auto& poses = assessment.held_out.poses;
   const auto pose =
       std::max_element(poses.begin(), poses.end(),

@@ -182,12 +182,15 @@ Result<Captures> load_captures(const fs::path& folder, const std::vector<std::st
   const fs::path path = folder / "capture.json";
   LIMN_TRY(const Config config, Config::load(path, "limn.capture/1"));
   const ConfigNode root = config.root();
-  root.only({"schema", "cameras", "projectors", "board", "patterns"});
+  root.only({"schema", "cameras", "projectors", "board", "patterns", "known_lengths"});
   Captures captures;
   captures.folder = folder;
   captures.cameras = read_devices(root.at("cameras"), {"name", "size"});
   captures.projectors = read_devices(root.at("projectors"), {"name", "size", "patterns"});
   const std::string board = root.at("board").text();
+  if (const auto lengths = root.find("known_lengths")) {
+    for (const ConfigNode& length : lengths->items()) captures.known_lengths.push_back(length.text());
+  }
   LIMN_TRY_STATUS(config.status());
   auto parsed = Board::parse(board);
   if (!parsed) return error("{}: board: {}", path.string(), parsed.message());

@@ -146,7 +146,7 @@ Drawing residual_field(int width, int height, const std::vector<FieldPoint>& poi
   }
   svg += outliers + "</g>" + framed(width, height) + "</svg>";
   std::string key = fmt::format(
-      "arrows magnified {:.0f} times, from blue (0) to red ({:.2g} px and more); grey: "
+      "Arrows magnified {:.0f} times, from blue (0) to red ({:.2g} px and more); grey: "
       "nothing observed",
       magnified, most);
   if (any_outlier) key += "; black rings: outliers";

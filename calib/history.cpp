@@ -104,6 +104,7 @@ History read_history(const std::filesystem::path& folder) {
   History history;
   try {
     const Json report = Json::parse(*text);
+    if (report.contains("failure")) return {};  // nothing was solved
     for (const Json& entry : report.value("history", Json::array())) history.past.push_back(past_of(entry));
     history.past.push_back(past_of_report(report));
   } catch (const nlohmann::json::exception&) {

@@ -8,6 +8,7 @@
 #include "calib/advice.h"
 #include "calib/assess.h"
 #include "calib/history.h"
+#include "calib/known_length.h"
 #include "calib/observations.h"
 #include "calib/solve.h"
 #include "core/result.h"
@@ -23,6 +24,7 @@ struct Report {
   Words words = {};                                     ///< the verdict and what to do, in sentences
   std::string made_at = {};                             ///< as PastCalibration::made_at
   History history = {};                                 ///< of the folder that the report is for
+  std::vector<LengthCheck> known_lengths = {};
 };
 
 /// report.json, as interfaces.md describes it.

@@ -73,6 +73,31 @@ Json error_json(const Report& report) {
       {"from", "the larger of the held-out errors and of the noise propagated to moved and turned things"}};
 }
 
+Json lengths_json(const Report& report) {
+  const Observations& observations = report.observed.observations;
+  const auto mm = [](double m) { return rounded(1e3 * m); };
+  Json list = Json::array();
+  for (const LengthCheck& check : report.known_lengths) {
+    Json views = Json::array();
+    for (const LengthView& view : check.views)
+      views.push_back({{"pose", observations.poses[static_cast<size_t>(view.pose)]},
+                       {"camera", observations.cameras[static_cast<size_t>(view.camera)].name},
+                       {"projector", observations.projectors[static_cast<size_t>(view.projector)].name},
+                       {"measured_mm", mm(view.measured_m)},
+                       {"noise_mm", mm(view.noise_m)},
+                       {"calibration_mm", mm(view.calibration_m)}});
+    const auto seen = [&](double m) { return check.views.empty() ? Json() : Json(mm(m)); };
+    list.push_back({{"from", check.known.from},
+                    {"to", check.known.to},
+                    {"expected_mm", mm(check.known.length_m)},
+                    {"measured_mm", seen(check.measured_m)},
+                    {"difference_mm", seen(check.measured_m - check.known.length_m)},
+                    {"stddev_mm", seen(check.stddev_m)},
+                    {"views", views}});
+  }
+  return list;
+}
+
 Json moved_json(const std::vector<Moved>& devices) {
   Json list = Json::array();
   for (const Moved& device : devices)
@@ -117,6 +142,7 @@ std::string report_json(const Report& report) {
                      {"decode", {{"share", rounded(a.decoded_share)}, {"outliers", a.decode_outliers}}},
                      {"epipolar", epipolar_json(report)},
                      {"pulls", pulls_json(a.pulls)},
+                     {"known_lengths", lengths_json(report)},
                      {"faults", faults},
                      {"moved", moved_json(since_last)},
                      {"history", history_json(report.history)},

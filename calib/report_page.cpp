@@ -92,6 +92,10 @@ std::string error_maps_html(const Report& report) {
   const CapturedDevice& camera = observations.cameras.front();
   double most = 0;
   for (const ErrorMap& map : report.assessment.error_maps) most = std::max(most, map.worst_mm());
+  // Beyond what boards have reached the error may grow without end: colours are for the rest.
+  constexpr double k_brightest = 4;  // times the predicted error
+  if (const double predicted = worst_mm(report.assessment); std::isfinite(predicted))
+    most = std::min(most, k_brightest * predicted);
   std::string html;
   for (const ErrorMap& map : report.assessment.error_maps) {
     const std::string& name = observations.projectors[static_cast<size_t>(map.projector)].name;
@@ -108,7 +112,7 @@ std::string error_maps_html(const Report& report) {
   if (html.empty() || !(most > 0)) return "";
   return fmt::format(
       "<p>95 % error of light meant for a thing whose place {} measures, on planes across its "
-      "view; grey: the projector does not reach.</p>{}\n{}",
+      "view; red: that much or more; grey: the projector does not reach.</p>{}\n{}",
       escaped(camera.name), colour_key(most, "mm"), html);
 }
 
@@ -142,7 +146,8 @@ std::string poses_html(const Report& report) {
   std::vector<Bar> bars;
   for (const HeldOutPose& pose : report.assessment.held_out.poses)
     bars.push_back({pose.pose, pose.rms_px, fmt::format("{:.3f} px, {} cells", pose.rms_px, pose.cells)});
-  return bar_chart(bars, k_good_px, fmt::format("good: {} px", k_good_px));
+  return "<div class='wide'>" + bar_chart(bars, k_good_px, fmt::format("good: {} px", k_good_px)) +
+         "</div>\n";
 }
 
 struct Fields {
@@ -236,6 +241,23 @@ std::string trust_tables(const Report& report) {
                       rows);
 }
 
+std::string lengths_table(const Report& report) {
+  std::vector<std::vector<std::string>> rows;
+  for (const LengthCheck& check : report.known_lengths) {
+    const double expected = 1e3 * check.known.length_m, measured = 1e3 * check.measured_m;
+    const std::string name = check.known.from + " to " + check.known.to;
+    if (check.views.empty()) {
+      rows.push_back({name, fmt::format("{:.2f}", expected), "not seen", "", "0"});
+      continue;
+    }
+    rows.push_back({name, fmt::format("{:.2f}", expected),
+                    fmt::format("{:.2f} (deviation {:.2f})", measured, 1e3 * check.stddev_m),
+                    fmt::format("{:+.2f} ({:+.2f} %)", measured - expected, 100 * (measured / expected - 1)),
+                    fmt::format("{}", check.views.size())});
+  }
+  return table({"length", "expected mm", "measured mm", "difference mm", "views"}, rows);
+}
+
 std::string decode_table(const Report& report) {
   const Observations& observations = report.observed.observations;
   std::vector<std::vector<std::string>> rows;
@@ -297,12 +319,12 @@ h2{font-size:19px;font-weight:600;margin:40px 0 10px}.lead{font-size:18px;margin
 .grid{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,460px),1fr));gap:22px;margin:12px 0}
 .small{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(47%,200px),1fr));gap:12px;margin:12px 0}
 figure{margin:0}figure svg{display:block;width:100%;height:auto}figcaption{font-size:14px;margin-top:6px}
-figcaption b{color:#1d2329}.key{width:320px;max-width:100%;display:block}.bars{width:100%;max-width:760px;height:auto}
+figcaption b{color:#1d2329}.key{width:320px;max-width:100%;display:block}.bars{width:760px;max-width:none;height:auto}
 .spark{max-width:420px}ul{padding-left:20px;max-width:60em}li{margin:6px 0}
 .faults{list-style:none;padding:0}.faults li{border-left:4px solid #c43139;background:#fdf3f3;padding:8px 14px;
 border-radius:0 6px 6px 0}.faults em{font-style:normal;color:#5d6670}
 .wide{overflow-x:auto;margin:10px 0}table{border-collapse:collapse;font-size:14px;font-variant-numeric:tabular-nums}
-th{font-weight:500;text-align:left}td,th{padding:5px 22px 5px 0;border-bottom:1px solid #e4e7eb;vertical-align:top}
+th{font-weight:500;text-align:left}th,td{white-space:nowrap}td:nth-child(5){white-space:normal;min-width:12em}td,th{padding:5px 22px 5px 0;border-bottom:1px solid #e4e7eb;vertical-align:top}
 )";
 
 }  // namespace
@@ -322,6 +344,7 @@ std::string report_html(const Report& report) {
   html += section("What each device saw, and what was left over", imagers_html(report));
   html += section("Devices", devices_table(report));
   html += section("Whether the figures can be believed", trust_tables(report));
+  html += section("Known lengths, measured by light", lengths_table(report));
   html += section("Decoding", decode_table(report));
   html += section("Earlier calibrations of this rig", history_html(report));
   return html + "</body></html>\n";

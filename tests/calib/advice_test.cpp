@@ -87,7 +87,8 @@ TEST(Advice, SendsTheBoardWhereTheErrorGrows) {
   map.planes.back().p95_mm[4] = 2.5;
   judged.assessment.error_maps = {map};
   EXPECT_TRUE(says(judged.words(), "projector1: capture farther away, at about 1.50 m"));
-  EXPECT_NE(judged.words().verdict.find("worst 1.50 m from camera0, left of its picture"), std::string::npos)
+  EXPECT_NE(judged.words().verdict.find("(2.50 mm at worst, 1.50 m from camera0, left of its picture)"),
+            std::string::npos)
       << judged.words().verdict;
 }
 

@@ -123,6 +123,8 @@ TEST(Report, HistoryIsLimitedAndSurvivesDamage) {
   EXPECT_EQ(static_cast<int>(history.past.size()), k_history);
   EXPECT_EQ(history.past.back().made_at, "2026-11-20T10:00:00Z");
   EXPECT_FALSE(history.rig);
+  ASSERT_TRUE(write_file(folder / "report.json", R"({"verdict": "reject", "failure": "no board"})").ok());
+  EXPECT_TRUE(read_history(folder).past.empty());
   for (const char* damaged : {"{", "[]", "{\"verdict\": 3}", "{\"verdict\": \"good\", \"held_out\": 1}"}) {
     ASSERT_TRUE(write_file(folder / "report.json", damaged).ok());
     EXPECT_TRUE(read_history(folder).past.empty()) << damaged;
