@@ -123,6 +123,9 @@ void add_solve(CLI::App& app, Run& run) {
   command->add_option("--camera-model", options->camera_model, "mrcal lens model of cameras; auto: by held-out error")->capture_default_str();
   command->add_option("--projector-model", options->projector_model, "mrcal lens model of projectors; auto: by held-out error")
       ->capture_default_str();
+  command->add_option("--known-length", options->known_lengths,
+                      "a measured length, such as 'apriltag_36h11:3 apriltag_36h11:7 250mm'; again for another")
+      ->allow_extra_args(false);
   command->add_flag("--json", options->json, "print report.json instead of a table");
   command->add_option("--import", options->import_format, "read somebody else's captures: opencv-gray");
   command->add_option("--projector", options->projector, "with --import: the projector's size, such as 1024x768");

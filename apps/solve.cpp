@@ -1,14 +1,18 @@
 #include "apps/solve.h"
 
+#include <algorithm>
 #include <chrono>
 
+#include "apps/known_lengths.h"
 #include "apps/patterns.h"
 #include "calib/assess.h"
+#include "calib/board_check.h"
 #include "calib/capture_faults.h"
 #include "calib/captures.h"
 #include "calib/failed_report.h"
 #include "calib/lens_choice.h"
 #include "calib/observations.h"
+#include "calib/picture_check.h"
 #include "calib/report.h"
 #include "calib/response.h"
 #include "calib/solve.h"
@@ -61,7 +65,25 @@ void print_lenses(const std::vector<calib::LensTrial>& trials) {
                trial.chosen ? ", chosen" : "");
 }
 
-void print_table(const calib::Assessment& assessment) {
+// The known lengths as light measures them; what is wrong with them is a fault, and nothing with a fault of
+// scale is good.
+Status check_lengths(const calib::Captures& captures,
+                     const std::vector<calib::KnownLength>& lengths,
+                     calib::Report* report) {
+  if (lengths.empty()) return {};
+  LIMN_TRY(const auto marks, seen_marks(captures, report->solution.rig, lengths));
+  const double widened = std::max(1.0, report->assessment.pulls.held_out.stddev);
+  LIMN_TRY(report->known_lengths,
+           calib::measured_lengths(captures, report->solution, marks, lengths, widened));
+  for (const calib::LengthCheck& check : report->known_lengths) {
+    if (const auto fault = calib::fault_of(check, captures.board))
+      calib::add_faults({*fault}, &report->assessment);
+  }
+  return {};
+}
+
+void print_report(const calib::Report& report) {
+  const calib::Assessment& assessment = report.assessment;
   fmt::print("{:<14} {:>8} {:>9} {:>9}\n", "device", "RMS px", "outliers", "coverage");
   for (const calib::DeviceQuality& d : assessment.devices)
     fmt::print("{:<14} {:>8.3f} {:>4}/{:<4} {:>7.0f} %\n", d.name, d.rms_px, d.outliers, d.points,
@@ -69,11 +91,17 @@ void print_table(const calib::Assessment& assessment) {
   fmt::print("{:<14} {:>8} {:>9}\n", "held-out pose", "RMS px", "cells");
   for (const calib::HeldOutPose& pose : assessment.held_out.poses)
     fmt::print("{:<14} {:>8.3f} {:>9}\n", pose.pose, pose.rms_px, pose.cells);
+  for (const calib::LengthCheck& check : report.known_lengths) {
+    if (!check.views.empty())
+      fmt::print("length {} to {}: expected {:.2f} mm, measured {:.2f} mm, deviation {:.2f} mm\n",
+                 check.known.from, check.known.to, 1e3 * check.known.length_m, 1e3 * check.measured_m,
+                 1e3 * check.stddev_m);
+  }
   for (const calib::Fault& fault : assessment.faults)
     fmt::print("fault {}: {}; {}.\n", fault.name, fault.evidence, fault.advice);
-  fmt::print("held-out {:.3f} px RMS, worst {:.3f} px; decoded {:.0f} %; {}\n", assessment.held_out.rms_px,
-             assessment.held_out.worst_px, 100 * assessment.decoded_share,
-             calib::to_text(assessment.verdict));
+  for (const std::string& sentence : report.words.advice) fmt::print("advice: {}\n", sentence);
+  fmt::print("held-out {:.3f} px RMS, worst {:.3f} px; decoded {:.0f} %\n{}\n", assessment.held_out.rms_px,
+             assessment.held_out.worst_px, 100 * assessment.decoded_share, report.words.verdict);
 }
 
 // What kept a rig from being made, with the faults that explain it; they also stand in report.json.
@@ -111,10 +139,13 @@ Result<calib::Report> solved(const SolveOptions& options) {
   const auto begun = Clock::now();
   LIMN_TRY_STATUS(check_models(options));
   LIMN_TRY(const calib::Captures captures, captures_of(options));
+  LIMN_TRY(const auto lengths, known_lengths(captures, options.known_lengths));
+  LIMN_TRY_STATUS(calib::check_pictures(captures));
   LIMN_TRY(calib::MeasuredResponse response, calib::measured_response(captures));
   for (const std::string& warning : response.warnings) log_warning("response: {}", warning);
   const double response_seconds = seconds_since(begun);
   LIMN_TRY(calib::Observed observed, calib::observe(captures));
+  LIMN_TRY_STATUS(calib::check_board(captures, observed.observations));
   const double board_seconds = observed.seconds_board, decode_seconds = observed.seconds_decode;
   calib::SolveOptions solving;
   solving.camera_model = options.camera_model;
@@ -141,6 +172,10 @@ Result<calib::Report> solved(const SolveOptions& options) {
                         {"total", seconds_since(begun)}},
                        std::move(choice->trials)};
   LIMN_TRY_STATUS(measure_vignetting(captures, report, &response.responses));
+  LIMN_TRY_STATUS(check_lengths(captures, lengths, &report));
+  report.words = calib::in_words(report.observed, report.solution, report.assessment);
+  report.made_at = calib::time_now();
+  report.history = calib::read_history(options.out);
   LIMN_TRY_STATUS(calib::write_rig_folder(report, solving, options.out));
   if (!response.responses.projectors.empty())
     LIMN_TRY_STATUS(save_responses(response.responses, response.mixings, options.out));
@@ -153,7 +188,7 @@ Status run_solve(const SolveOptions& options) {
     fmt::print("{}", calib::report_json(report));
   } else {
     print_lenses(report.lens_trials);
-    print_table(report.assessment);
+    print_report(report);
     fmt::print("rig and report in {}\n", options.out.string());
   }
   return {};

@@ -16,6 +16,9 @@ struct SolveOptions {
   /// A lens model's name for all cameras, all projectors; "auto": each device's by held-out error.
   std::string camera_model = "auto";
   std::string projector_model = "auto";
+  /// Lengths that the cameras can see, "apriltag_36h11:3 apriltag_36h11:7 250mm" each, besides
+  /// capture.json's.
+  std::vector<std::string> known_lengths = {};
   bool json = false;  ///< print report.json instead of the table
 
   std::string import_format = {};  ///< "opencv-gray": somebody else's captures; then also

@@ -106,6 +106,8 @@ Result<Assessment> assess(const Observed& observed, const SolveOptions& options,
   LIMN_TRY(assessment.held_out, held_out(observations, options, solution));
   assessment.devices = device_qualities(observations, solution);
   const Uncertainty uncertainty{solution.covariance, solution.corner_noise_px};
+  assessment.epipolar = epipolar_residuals(solution.rig, observed.dense);
+  assessment.pulls = pulls(observations, solution, assessment.held_out.residuals);
   assessment.held_out_error_mm = errors_by_projector(observations, assessment.held_out);
   assessment.propagated_error_mm = propagated_error_mm(observations, solution, uncertainty);
   assessment.error_maps = error_maps(observations, solution, uncertainty);

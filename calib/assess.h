@@ -3,10 +3,12 @@
 #include <string>
 #include <vector>
 
+#include "calib/epipolar.h"
 #include "calib/error_map.h"
 #include "calib/faults.h"
 #include "calib/held_out.h"
 #include "calib/observations.h"
+#include "calib/pulls.h"
 #include "calib/solve.h"
 #include "core/result.h"
 
@@ -34,6 +36,8 @@ struct Assessment {
   std::vector<ErrorMap> error_maps;  ///< one for each projector, over the volume shared with camera 0
   double decoded_share = 0;          ///< of lit pixels
   int decode_outliers = 0;
+  std::vector<EpipolarResidual> epipolar;  ///< over decoded pixels of the whole picture, board or not
+  Pulls pulls;                             ///< whether the stated deviations are true
   std::vector<Fault> faults;
 };
 

@@ -60,13 +60,45 @@ fs::path level_of(const Captures& captures, const std::string& pose, size_t proj
   return captures.projectors.size() > 1 ? folder / captures.projectors[projector].name : folder;
 }
 
+// Folders in `folder` that belong to no device of these captures.
+Status check_strangers(const fs::path& folder,
+                       const std::vector<CapturedDevice>& devices,
+                       const std::string& pose) {
+  std::vector<std::string> known;
+  for (const CapturedDevice& device : devices) known.push_back(device.name);
+  for (const std::string& name : names_in(folder, "*", true)) {
+    if (name.starts_with(".") || std::find(known.begin(), known.end(), name) != known.end()) continue;
+    return error(
+        "{}: expected folders of the devices in capture.json ({}), found '{}'. Captures of different rigs "
+        "are "
+        "mixed: move {} to its own captures folder, or leave it out with --skip-poses {}.",
+        folder.string(), fmt::join(known, ", "), name, pose, pose);
+  }
+  return {};
+}
+
+// Numbered pictures beyond the patterns' count.
+Status check_surplus(const fs::path& folder, const Patterns& patterns, const std::string& pose) {
+  const fs::path next = folder / picture_name(patterns.count());
+  if (!fs::exists(next)) return {};
+  return error(
+      "{}: expected {} pictures, {} to {}, as patterns.json says, found more. Other patterns were shown: "
+      "capture "
+      "{} again, or leave it out with --skip-poses {}.",
+      next.string(), patterns.count(), picture_name(0), picture_name(patterns.count() - 1), pose, pose);
+}
+
 Result<CapturedPose> read_pose(const Captures& captures, const std::string& name) {
   CapturedPose pose{name, {}};
+  if (captures.projectors.size() > 1)
+    LIMN_TRY_STATUS(check_strangers(captures.folder / name, captures.projectors, name));
   for (size_t i = 0; i < captures.projectors.size(); ++i) {
     pose.pictures.emplace_back();
+    LIMN_TRY_STATUS(check_strangers(level_of(captures, name, i), captures.cameras, name));
     for (const CapturedDevice& camera : captures.cameras) {
       std::vector<fs::path> files;
       const fs::path folder = level_of(captures, name, i) / camera.name;
+      LIMN_TRY_STATUS(check_surplus(folder, captures.patterns[i], name));
       for (int k = 0; k < captures.patterns[i].count(); ++k) {
         files.push_back(folder / picture_name(k));
         if (!fs::exists(files.back()))
@@ -152,12 +184,15 @@ Result<Captures> load_captures(const fs::path& folder, const std::vector<std::st
   const fs::path path = folder / "capture.json";
   LIMN_TRY(const Config config, Config::load(path, "limn.capture/1"));
   const ConfigNode root = config.root();
-  root.only({"schema", "cameras", "projectors", "board", "patterns"});
+  root.only({"schema", "cameras", "projectors", "board", "patterns", "known_lengths"});
   Captures captures;
   captures.folder = folder;
   captures.cameras = read_devices(root.at("cameras"), {"name", "size"});
   captures.projectors = read_devices(root.at("projectors"), {"name", "size", "patterns"});
   const std::string board = root.at("board").text();
+  if (const auto lengths = root.find("known_lengths")) {
+    for (const ConfigNode& length : lengths->items()) captures.known_lengths.push_back(length.text());
+  }
   LIMN_TRY_STATUS(config.status());
   auto parsed = Board::parse(board);
   if (!parsed) return error("{}: board: {}", path.string(), parsed.message());

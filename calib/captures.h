@@ -32,6 +32,8 @@ struct Captures {
   std::vector<Patterns> patterns;  ///< one for each projector
   Board board;
   std::vector<CapturedPose> poses;  ///< by name
+  /// Lengths measured by hand, as calib/known_length.h reads them; "known_lengths" in capture.json.
+  std::vector<std::string> known_lengths = {};
 };
 
 /// A captures folder that is about to be filled: patterns of a code for every projector, no poses yet. An

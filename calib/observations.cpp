@@ -212,6 +212,48 @@ Result<cv::Mat> lit_picture(const Captures& captures, size_t pose, size_t camera
   return mean;
 }
 
+// Whether a pixel and its neighbours see one surface of one colour: a pixel across the edge of ink or of a
+// thing gets its light from two sides, and its label with it.
+bool on_one_surface(const Decoded& decoded, int x, int y) {
+  constexpr int k_near = 2;  // px: as far as a lens blurs
+  if (x < k_near || y < k_near || x + k_near >= decoded.contrast.cols || y + k_near >= decoded.contrast.rows)
+    return false;
+  int least = 255, most = 0;
+  for (int v = y - k_near; v <= y + k_near; ++v) {
+    for (int u = x - k_near; u <= x + k_near; ++u) {
+      if (std::isnan(decoded.px_projector.at<cv::Vec2f>(v, u)[0])) return false;
+      const int contrast = decoded.contrast.at<uchar>(v, u);
+      least = std::min(least, contrast);
+      most = std::max(most, contrast);
+    }
+  }
+  return least >= k_bright * most;
+}
+
+// Decoded pixels on a coarse grid over the whole picture.
+std::vector<DensePixel> thinned(const Decoded& decoded, const std::vector<BoardCorner>& corners) {
+  std::vector<cv::Point2f> px_corners, hull;
+  for (const BoardCorner& corner : corners)
+    px_corners.emplace_back(static_cast<float>(corner.px.x()), static_cast<float>(corner.px.y()));
+  cv::convexHull(px_corners, hull);
+  std::vector<DensePixel> dense;
+  constexpr double k_most = 5000;  // of a picture: an RMS to a percent, at some 10 us each
+  const cv::Mat& labels = decoded.px_projector;
+  const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(labels.cols * labels.rows / k_most))));
+  for (int y = step / 2; y < labels.rows; y += step) {
+    for (int x = step / 2; x < labels.cols; x += step) {
+      if (!on_one_surface(decoded, x, y)) continue;
+      const auto& label = labels.at<cv::Vec2f>(y, x);
+      DensePixel pixel;
+      pixel.px_camera = {static_cast<float>(x), static_cast<float>(y)};
+      pixel.px_projector = {label[0], label[1]};
+      pixel.on_board = cv::pointPolygonTest(hull, {pixel.px_camera.x(), pixel.px_camera.y()}, false) >= 0;
+      dense.push_back(pixel);
+    }
+  }
+  return dense;
+}
+
 double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
@@ -239,6 +281,12 @@ Result<Observed> observe_pose(const Captures& captures, int pose, int camera, co
     seen.health.back().camera = camera;
     seen.health.back().projector = projector;
     seen.health.back().pose = pose;
+    for (DensePixel pixel : thinned(decoded, corners)) {
+      pixel.camera = camera;
+      pixel.projector = projector;
+      pixel.pose = pose;
+      seen.dense.push_back(pixel);
+    }
     for (Match match : matches_on_board(captures.board, corners, decoded)) {
       match.camera = camera;
       match.projector = projector;
@@ -256,6 +304,7 @@ void append(const Observed& seen, Observed* all) {
   put(seen.observations.matches, &all->observations.matches);
   put(seen.decoded, &all->decoded);
   put(seen.health, &all->health);
+  put(seen.dense, &all->dense);
   all->seconds_board += seen.seconds_board;
   all->seconds_decode += seen.seconds_decode;
 }

@@ -71,12 +71,24 @@ struct DecodeShare {
   int outliers = 0;
 };
 
+/// A camera pixel with its projector pixel, anywhere in the picture, on the board or off it: what the
+/// epipolar residual is measured on. The solve does not see them.
+struct DensePixel {
+  int camera = 0;
+  int projector = 0;
+  int pose = 0;
+  Eigen::Vector2f px_camera = Eigen::Vector2f::Zero();
+  Eigen::Vector2f px_projector = Eigen::Vector2f::Zero();
+  bool on_board = false;  ///< between the board's corners
+};
+
 struct Observed {
   Observations observations;
   std::vector<DecodeShare> decoded;
   std::vector<SeriesHealth> health;  ///< parallel to decoded
   double seconds_board = 0;
   double seconds_decode = 0;
+  std::vector<DensePixel> dense = {};  ///< on a coarse grid, some 5000 of a picture; none on edges
 };
 
 /// The corners and matches of all captures. Poses in which no camera sees the board are scene captures: they

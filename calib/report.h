@@ -5,8 +5,11 @@
 #include <utility>
 #include <vector>
 
+#include "calib/advice.h"
 #include "calib/assess.h"
 #include "calib/lens_choice.h"
+#include "calib/history.h"
+#include "calib/known_length.h"
 #include "calib/observations.h"
 #include "calib/solve.h"
 #include "core/result.h"
@@ -20,13 +23,19 @@ struct Report {
   Assessment assessment;
   std::vector<std::pair<std::string, double>> seconds;  ///< of each stage, in order
   std::vector<LensTrial> lens_trials = {};              ///< empty where the models were given
+  Words words = {};                                     ///< the verdict and what to do, in sentences
+  std::string made_at = {};                             ///< as PastCalibration::made_at
+  History history = {};                                 ///< of the folder that the report is for
+  std::vector<LengthCheck> known_lengths = {};
 };
 
 /// report.json, as interfaces.md describes it.
 std::string report_json(const Report& report);
 
-/// report.html: self-contained, pictures first (SVG): where each imager was observed and what was left over
-/// there.
+/// report.html: self-contained, pictures first (SVG): the verdict in words, faults and advice; the predicted
+/// error over the volume; each unseen pose; where each imager was observed and what was left over there; the
+/// figures behind it; earlier calibrations of the rig. What differs from run to run (date, seconds) stands in
+/// one line.
 std::string report_html(const Report& report);
 
 /// Writes the rig folder: rig.json, one .cameramodel for each device, observations.json, report.json,

@@ -8,8 +8,10 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <regex>
 
+#include "apps/world_markers.h"
 #include "calib/board.h"
 #include "calib/capture.h"
 #include "calib/patterns.h"
@@ -51,7 +53,9 @@ struct Stage {
     int column = -1, row = -1;
   };
 
-  std::vector<Sample> samples(int pose, bool with_board) const {
+  std::vector<Sample> samples(int pose, bool with_board) const { return samples(pose, with_board, sheet); }
+
+  std::vector<Sample> samples(int pose, bool with_board, const calib::BoardSheet& shown) const {
     std::vector<Sample> all;
     const Pose board_from_camera = world_from_board(pose).inverse();
     for (int y = 0; y < camera.height * k_samples; ++y) {
@@ -59,11 +63,11 @@ struct Stage {
         const Vector2d px((x + 0.5) / k_samples - 0.5, (y + 0.5) / k_samples - 0.5);
         const Vector3d d = board_from_camera.rotation * *camera.lens.unproject(px);
         const Vector3d p = board_from_camera.translation - board_from_camera.translation.z() / d.z() * d;
-        const Vector2d at = sheet.px_board_origin + sheet.pixels_per_metre * p.head<2>();
+        const Vector2d at = shown.px_board_origin + shown.pixels_per_metre * p.head<2>();
         const int u = static_cast<int>(std::lround(at.x())), v = static_cast<int>(std::lround(at.y()));
-        const bool inside = u >= 0 && v >= 0 && u < sheet.picture.cols && v < sheet.picture.rows;
+        const bool inside = u >= 0 && v >= 0 && u < shown.picture.cols && v < shown.picture.rows;
         Sample sample;
-        sample.albedo = inside && with_board && sheet.picture.at<uchar>(v, u) == 0 ? 0.05F : 0.8F;
+        sample.albedo = inside && with_board && shown.picture.at<uchar>(v, u) == 0 ? 0.05F : 0.8F;
         if (const auto light = projector.project(world_from_board(pose) * p);
             light && projector.contains(*light)) {
           sample.column = static_cast<int>(std::lround(light->x()));
@@ -88,6 +92,28 @@ struct Stage {
     cv::Mat photo;
     light.convertTo(photo, CV_8U);
     return photo;
+  }
+
+  // Two markers, 250 mm from centre to centre, on a sheet that is put where the board would be.
+  calib::BoardSheet bar() const {
+    calib::BoardSheet made{cv::Mat(160, 420, CV_8U, cv::Scalar(255)), 1000, {49.5, -40.5}};
+    for (const int id : {3, 7}) {
+      const cv::Mat marker = marker_picture({"apriltag_36h11", std::to_string(id)}).value();
+      cv::Mat grey;
+      cv::resize(to_grey(marker), grey, {64, 64}, 0, 0, cv::INTER_NEAREST);
+      grey.copyTo(made.picture(cv::Rect(id == 3 ? 53 : 303, 48, 64, 64)));
+    }
+    return made;
+  }
+
+  void capture_bar(const calib::Captures& plan, int pose) const {
+    const std::vector<Sample> seen = samples(pose, true, bar());
+    cv::Mat photo;
+    const Status status = calib::capture_pose(
+        plan, pose,
+        {.show = [&](int, const cv::Mat& shown) { return photo = photograph(seen, shown), Status(); },
+         .grab = [&](int) { return Result<cv::Mat>(photo); }});
+    ASSERT_TRUE(status.ok()) << status.message();
   }
 
   void capture(const fs::path& folder, int poses, bool with_board = true) const {
@@ -286,6 +312,74 @@ TEST(SolveCommand, MeasuresTheResponseFromPicturesBesideThePoses) {
       << broken.message();
   EXPECT_EQ(read_file(out / "response.json").value(), before);
   EXPECT_EQ(read_file(out / "rig.json").value(), old_rig);
+}
+
+TEST(SolveCommand, NamesCopiedPicturesAndTheBoardThatWasReallyThere) {
+  const fs::path captures = own_captures(), out = captures.parent_path() / "new rig";
+  const auto failure = [&] {
+    const Status status = run_solve({.captures = captures, .out = out});
+    EXPECT_FALSE(status.ok());
+    EXPECT_FALSE(fs::exists(out));
+    return status.ok() ? std::string() : status.message();
+  };
+  const fs::path series = captures / "pose02" / "camera0";
+  const std::string whole = read_file(series / "011.png").value();
+  fs::copy_file(series / "004.png", series / "011.png", fs::copy_options::overwrite_existing);
+  const std::string copied = failure();
+  EXPECT_NE(copied.find("pose02/camera0/011.png"), std::string::npos) << copied;
+  EXPECT_NE(copied.find("pose02/camera0/004.png"), std::string::npos) << copied;
+  ASSERT_TRUE(write_file(series / "011.png", whole).ok());
+
+  std::string plan = read_file(captures / "capture.json").value();
+  plan.replace(plan.find("charuco:8x6:40mm"), 16, "charuco:7x5:40mm");
+  ASSERT_TRUE(write_file(captures / "capture.json", plan).ok());
+  const std::string other = failure();
+  EXPECT_NE(other.find("8 squares across"), std::string::npos) << other;
+  EXPECT_NE(other.find("charuco:7x5:40mm"), std::string::npos) << other;
+}
+
+// The board is described as 39 mm a square instead of 40: no residual shows it, the bar does.
+TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
+  const fs::path captures = own_captures(), out = captures.parent_path() / "rig with bar";
+  const Stage stage;
+  const calib::Captures plan = calib::plan_captures(
+      captures, {{stage.camera.name, stage.camera.width, stage.camera.height}},
+      {{stage.projector.name, stage.projector.width, stage.projector.height}}, stage.board);
+  for (const int pose : {6, 7}) stage.capture_bar(plan, pose);
+  SolveOptions options{.captures = captures, .out = out};
+  options.known_lengths = {"apriltag_36h11:3 apriltag_36h11:7 250mm"};
+  const auto right = solved(options);
+  ASSERT_TRUE(right.ok()) << right.message();
+  ASSERT_EQ(right->known_lengths.size(), 1U);
+  const calib::LengthCheck& check = right->known_lengths[0];
+  EXPECT_EQ(check.views.size(), 2U);
+  EXPECT_NEAR(check.measured_m, 0.250, 0.0015);
+  EXPECT_LT(std::abs(check.measured_m - 0.250), 3.5 * check.stddev_m);
+  EXPECT_LT(check.stddev_m, 0.0015);
+  EXPECT_TRUE(std::none_of(right->assessment.faults.begin(), right->assessment.faults.end(),
+                           [](const calib::Fault& fault) { return fault.name == "wrong_scale"; }));
+
+  std::string described = read_file(captures / "capture.json").value();
+  described.replace(described.find("charuco:8x6:40mm\""), 17,
+                    "charuco:8x6:39mm\", \"known_lengths\": [\"apriltag_36h11:3 apriltag_36h11:7 25cm\"]");
+  ASSERT_TRUE(write_file(captures / "capture.json", described).ok());
+  options.known_lengths.clear();
+  const auto wrong = solved(options);
+  ASSERT_TRUE(wrong.ok()) << wrong.message();
+  ASSERT_EQ(wrong->known_lengths.size(), 1U);
+  EXPECT_NEAR(wrong->known_lengths[0].measured_m, 0.250 * 39 / 40, 0.0015);
+  const auto fault = std::find_if(wrong->assessment.faults.begin(), wrong->assessment.faults.end(),
+                                  [](const calib::Fault& f) { return f.name == "wrong_scale"; });
+  ASSERT_NE(fault, wrong->assessment.faults.end());
+  EXPECT_NE(fault->advice.find("instead of 39 mm"), std::string::npos) << fault->advice;
+  EXPECT_NE(wrong->assessment.verdict, calib::Verdict::good);
+
+  options.known_lengths = {"apriltag_36h11:3 apriltag_36h11:8 250mm"};
+  const auto unseen = solved(options);
+  ASSERT_TRUE(unseen.ok()) << unseen.message();
+  EXPECT_EQ(unseen->assessment.faults.back().name, "known_length_not_seen");
+  for (const char* nonsense : {"", "apriltag_36h11:3 250mm", "a:1 b:2 250", "a:1 a:1 250mm", "a:1 b:2 -3mm"})
+    EXPECT_FALSE(calib::parse_known_length(nonsense).ok()) << nonsense;
 }
 
 TEST(SolveCommand, SaysThatNoBoardIsVisible) {

@@ -77,6 +77,33 @@ TEST(Captures, AMissingShotIsNamedUnlessItsPoseIsSkipped) {
   EXPECT_NE(load_captures(folder, {"pose07"}).message().find("pose07"), std::string::npos);
 }
 
+TEST(Captures, OfDifferentRigsAreNotMixed) {
+  for (const int projectors : {1, 2}) {
+    const fs::path folder = test::test_folder() / "captures";
+    const Captures plan = small_plan(folder, projectors);
+    ASSERT_TRUE(begin_captures(plan).ok());
+    int shown = 0;
+    for (const int pose : {0, 1}) ASSERT_TRUE(capture_pose(plan, pose, plain_stage(&shown)).ok());
+    const auto with = [&](const fs::path& stranger) {
+      EXPECT_TRUE(make_folder(stranger).ok());
+      const auto read = load_captures(folder);
+      EXPECT_TRUE(load_captures(folder, {"pose01"}).ok());
+      fs::remove_all(stranger);
+      return read.ok() ? std::string() : read.message();
+    };
+    const fs::path level = projectors == 1 ? folder / "pose01" : folder / "pose01" / "projector1";
+    EXPECT_NE(with(level / "camera1").find("found 'camera1'"), std::string::npos);
+    EXPECT_NE(with(folder / "pose01" / "projector7").find("found 'projector7'"), std::string::npos);
+    EXPECT_EQ(with(folder / "pose01" / ".thumbnails"), "") << "hidden folders are nobody's";
+    EXPECT_EQ(with(folder / "notes"), "") << "nor are those beside the poses";
+    fs::copy(level / "camera0" / "000.png", level / "camera0" / picture_name(plan.patterns.back().count()));
+    const auto surplus = load_captures(folder);
+    ASSERT_FALSE(surplus.ok());
+    EXPECT_NE(surplus.message().find("pose01"), std::string::npos) << surplus.message();
+    EXPECT_NE(surplus.message().find("found more"), std::string::npos) << surplus.message();
+  }
+}
+
 TEST(Captures, SayWhatIsWrongWithTheirFile) {
   const fs::path folder = test::test_folder() / "captures";
   EXPECT_NE(load_captures(folder).message().find("capture.json"), std::string::npos);

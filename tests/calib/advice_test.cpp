@@ -1,0 +1,118 @@
+#include "calib/advice.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/calib/observed_world.h"
+#include "tests/support/matchers.h"
+
+namespace limn::calib {
+namespace {
+
+using namespace test;
+using namespace worlds;
+
+// Words on a world whose solution is the truth and whose figures are as given: no solve is needed.
+struct Judged {
+  World world = make_world(1, 2, 9, 0.0);
+  Assessment assessment;
+
+  Judged() {
+    assessment.verdict = Verdict::usable;
+    assessment.held_out.rms_px = 0.4;
+    assessment.held_out.poses = {{"pose0", 0.3, 10}, {"pose7", 0.61, 10}};
+    assessment.predicted_error_mm = assessment.held_out_error_mm =
+        assessment.propagated_error_mm = {0.8, 1.4};
+  }
+  Words words() const {
+    Solution solution;
+    solution.rig = world.rig;
+    for (const Pose& pose : world.world_from_board) solution.world_from_board.emplace_back(pose);
+    return in_words({world.observations, {}, {}}, solution, assessment);
+  }
+};
+
+bool says(const Words& words, const std::string& text) {
+  return std::any_of(words.advice.begin(), words.advice.end(),
+                     [&](const std::string& sentence) { return sentence.find(text) != std::string::npos; });
+}
+
+TEST(Advice, NamesTheEdgesThatNobodySaw) {
+  Judged judged;
+  // The two projectors' matches everywhere, then none of projector1 near its left edge.
+  auto& matches = judged.world.observations.matches;
+  for (int i = 0; i < 400; ++i) {
+    const Vector2d px(1280 * (i % 20 + 0.5) / 20, 800 * (i / 20 + 0.5) / 20);
+    for (const int projector : {0, 1}) matches.push_back({0, projector, i % 9, {600, 500}, px, 0.02, 100});
+  }
+  EXPECT_FALSE(says(judged.words(), "projector1: add poses"));
+  std::erase_if(matches, [](const Match& m) { return m.projector == 1 && m.px_projector.x() < 320; });
+  EXPECT_TRUE(says(judged.words(), "projector1: add poses near its left edge."));
+  EXPECT_FALSE(says(judged.words(), "projector0: add poses"));
+  std::erase_if(matches, [](const Match& m) { return m.projector == 1 && m.px_projector.y() > 600; });
+  EXPECT_TRUE(says(judged.words(), "projector1: add poses near its left and lower edges."));
+}
+
+TEST(Advice, NamesTheAxisAboutWhichBoardsWereNotTilted) {
+  Judged judged;
+  EXPECT_FALSE(says(judged.words(), "Tilt the board more"));
+  for (size_t i = 0; i < judged.world.world_from_board.size(); ++i)  // about the horizontal axis only
+    judged.world.world_from_board[i].rotation = exp_rotation({0.12 * static_cast<double>(i) - 0.5, 0, 0});
+  EXPECT_TRUE(says(judged.words(), "Tilt the board more about the vertical axis"));
+  EXPECT_FALSE(says(judged.words(), "about the horizontal axis"));
+}
+
+TEST(Advice, AsksForDistancesAndPosesThatAreMissing) {
+  Judged judged;
+  EXPECT_FALSE(says(judged.words(), "nearer and some farther"));
+  EXPECT_FALSE(says(judged.words(), "more poses"));
+  judged.world.world_from_board.resize(5);
+  EXPECT_TRUE(says(judged.words(), "Add 3 more poses"));
+  for (Pose& pose : judged.world.world_from_board) pose = Pose(Eigen::Quaterniond::Identity(), {0, 0, 1.3});
+  EXPECT_TRUE(says(judged.words(), "between 1.30 and 1.30 m"));
+}
+
+TEST(Advice, SendsTheBoardWhereTheErrorGrows) {
+  Judged judged;
+  const auto plane = [](double depth, double mm) {
+    return ErrorMap::Plane{depth, std::vector<double>(12, mm)};
+  };
+  ErrorMap map;
+  map.projector = 1;
+  map.columns = 4;
+  map.rows = 3;
+  map.planes = {plane(0.9, 0.5), plane(1.1, 0.6), plane(1.5, 0.9)};
+  judged.assessment.error_maps = {map};
+  EXPECT_FALSE(says(judged.words(), "capture farther"));
+  map.planes.back().p95_mm[4] = 2.5;
+  judged.assessment.error_maps = {map};
+  EXPECT_TRUE(says(judged.words(), "projector1: capture farther away, at about 1.50 m"));
+  EXPECT_NE(judged.words().verdict.find("(2.50 mm at worst, 1.50 m from camera0, left of its picture)"),
+            std::string::npos)
+      << judged.words().verdict;
+}
+
+TEST(Advice, TheVerdictNamesProjectorPoseAndReason) {
+  Judged judged;
+  const std::string words = judged.words().verdict;
+  EXPECT_EQ(words.rfind("usable: predicted error 1.40 mm on projector1", 0), 0U) << words;
+  EXPECT_NE(words.find("(pose7) to 0.61 px"), std::string::npos) << words;
+  EXPECT_NE(words.find("more than 1 mm is not good"), std::string::npos) << words;
+  judged.assessment.faults = {{"bent_board", "bent", "flatten it"}};
+  EXPECT_NE(judged.words().verdict.find("faults were found: bent_board"), std::string::npos);
+  judged.assessment.verdict = Verdict::good;
+  EXPECT_EQ(judged.words().verdict.find("Why not better"), std::string::npos);
+  judged.assessment.predicted_error_mm[1] = std::numeric_limits<double>::infinity();
+  EXPECT_NE(judged.words().verdict.find("the error of projector1 cannot be told"), std::string::npos);
+}
+
+TEST(Advice, WarnsWhereStatedDeviationsAreTooSmall) {
+  Judged judged;
+  EXPECT_FALSE(says(judged.words(), "Go by the held-out errors"));
+  judged.assessment.pulls.held_out.stddev = 2.0;
+  EXPECT_TRUE(says(judged.words(), "2.0 times as far as the noise explains"));
+}
+
+}  // namespace
+}  // namespace limn::calib
