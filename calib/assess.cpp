@@ -12,6 +12,9 @@ namespace {
 
 using Eigen::Vector2d;
 
+// A left-out board errs by what the rig errs and by its own sag and place, about alike: sqrt(1/2) is the
+// rig's.
+constexpr double k_rig_of_held_out = 0.71;
 constexpr int k_coverage_grid = 10;
 
 // Accumulates one device's points.
@@ -64,17 +67,29 @@ std::vector<DeviceQuality> device_qualities(const Observations& observations, co
   return qualities;
 }
 
-std::vector<double> errors_by_projector(const Observations& observations, const HeldOut& score) {
-  std::vector<std::vector<double>> errors(observations.projectors.size());
+// 95 % of the held-out distances on the boards, mm, for each projector, less what the matches' own noise
+// makes of them: that is no error of the rig.
+std::vector<double> held_out_errors_mm(const Observations& observations, const HeldOut& score) {
+  struct Errors {
+    std::vector<double> mm;
+    double squared = 0, noise = 0;  // px^2
+  };
+  std::vector<Errors> errors(observations.projectors.size());
   for (size_t i = 0; i < observations.matches.size(); ++i) {
-    if (std::isfinite(score.errors_m[i]))
-      errors[static_cast<size_t>(observations.matches[i].projector)].push_back(score.errors_m[i] * 1e3);
+    const Match& match = observations.matches[i];
+    if (!std::isfinite(score.errors_m[i])) continue;
+    Errors& of = errors[static_cast<size_t>(match.projector)];
+    of.mm.push_back(score.errors_m[i] * 1e3);
+    of.squared += score.residuals[i].squaredNorm();
+    of.noise += 2 * match.stddev_px * match.stddev_px;
   }
   std::vector<double> p95;
-  for (auto& list : errors) {
-    std::sort(list.begin(), list.end());
-    p95.push_back(list.empty() ? std::numeric_limits<double>::infinity()
-                               : list[static_cast<size_t>(0.95 * static_cast<double>(list.size() - 1))]);
+  for (Errors& of : errors) {
+    std::sort(of.mm.begin(), of.mm.end());
+    const double rig_share = of.squared > 0 ? std::sqrt(std::max(0.0, 1 - of.noise / of.squared)) : 0;
+    p95.push_back(of.mm.empty()
+                      ? std::numeric_limits<double>::infinity()
+                      : rig_share * of.mm[static_cast<size_t>(0.95 * static_cast<double>(of.mm.size() - 1))]);
   }
   return p95;
 }
@@ -105,15 +120,15 @@ Result<Assessment> assess(const Observed& observed, const SolveOptions& options,
   Assessment assessment;
   LIMN_TRY(assessment.held_out, held_out(observations, options, solution));
   assessment.devices = device_qualities(observations, solution);
-  const Uncertainty uncertainty{solution.covariance, solution.corner_noise_px};
+  const Uncertainty uncertainty = believed(observations, solution, assessment.held_out.rigs);
   assessment.epipolar = epipolar_residuals(solution.rig, observed.dense);
   assessment.pulls = pulls(observations, solution, assessment.held_out.residuals);
-  assessment.held_out_error_mm = errors_by_projector(observations, assessment.held_out);
+  assessment.held_out_error_mm = held_out_errors_mm(observations, assessment.held_out);
   assessment.propagated_error_mm = propagated_error_mm(observations, solution, uncertainty);
   assessment.error_maps = error_maps(observations, solution, uncertainty);
   for (size_t i = 0; i < assessment.held_out_error_mm.size(); ++i)
     assessment.predicted_error_mm.push_back(
-        std::max(assessment.held_out_error_mm[i], assessment.propagated_error_mm[i]));
+        std::max(k_rig_of_held_out * assessment.held_out_error_mm[i], assessment.propagated_error_mm[i]));
   double lit = 0, decoded = 0;
   for (const DecodeShare& share : observed.decoded) {
     lit += share.lit;
@@ -125,8 +140,11 @@ Result<Assessment> assess(const Observed& observed, const SolveOptions& options,
   const double px = assessment.held_out.rms_px;
   const double mm =
       *std::max_element(assessment.predicted_error_mm.begin(), assessment.predicted_error_mm.end());
+  const double on_boards_mm =
+      *std::max_element(assessment.held_out_error_mm.begin(), assessment.held_out_error_mm.end());
+  const bool extrapolates = mm > std::max(k_fine_mm, k_beyond_boards * on_boards_mm);
   const Severity severity = heaviest(assessment.faults);
-  if (px <= k_good_px && mm <= k_good_mm && severity == Severity::note) {
+  if (px <= k_good_px && mm <= k_good_mm && !extrapolates && severity == Severity::note) {
     assessment.verdict = Verdict::good;
   } else if (px <= k_usable_px && mm <= k_usable_mm && severity != Severity::reject) {
     assessment.verdict = Verdict::usable;

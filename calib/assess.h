@@ -29,9 +29,10 @@ struct Assessment {
   Verdict verdict = Verdict::reject;
   std::vector<DeviceQuality> devices;
   HeldOut held_out;
-  /// 95 % errors on the surface, mm, one for each projector. Held out: measured at the distances of the
-  /// captured boards, model error and the decoding's noise included. Propagated: what the noise lets light
-  /// miss, moved and turned (calib/propagate.h). Predicted: the larger of the two.
+  /// 95 % errors on the surface, mm, one for each projector. Held out: on the captured boards, the matches'
+  /// own noise taken off. Propagated: of a thing as large as the panel in place, moved and turned, by the
+  /// covariance that is believed (calib/propagate.h). Predicted: the larger of the rig's share of the first
+  /// and the second.
   std::vector<double> held_out_error_mm, propagated_error_mm, predicted_error_mm;
   std::vector<ErrorMap> error_maps;  ///< one for each projector, over the volume shared with camera 0
   double decoded_share = 0;          ///< of lit pixels
@@ -46,6 +47,10 @@ struct Assessment {
 /// usable: within what an eye at arm's length forgives.
 constexpr double k_good_px = 0.5, k_good_mm = 1.0;
 constexpr double k_usable_px = 1.5, k_usable_mm = 3.0;
+/// Never good either: a predicted error that is many times what the boards show, for then they say little
+/// about the places between and beyond them (all parallel, all in the middle). Healthy sets: 2 to 3 times;
+/// ill-posed: over 10. Below a quarter of a millimetre nobody minds.
+constexpr double k_beyond_boards = 5, k_fine_mm = 0.25;
 
 /// Adds faults found elsewhere; the verdict falls as far as they demand.
 void add_faults(const std::vector<Fault>& faults, Assessment* assessment);

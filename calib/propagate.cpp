@@ -19,8 +19,13 @@ using Eigen::Vector3d;
 
 constexpr double k_moved_m = 0.15;
 constexpr double k_turned = 40 * std::numbers::pi / 180;
-constexpr int k_grid = 5;          // points along each side of the thing
-constexpr int k_least_points = 6;  // of a thing that a camera places
+constexpr int k_panel_grid = 9;               // points along each side of the panel
+constexpr double k_panel_share = 0.7;         // of its width and height: half of its light falls on the thing
+constexpr double k_relief_m = 0.05;           // of the thing, to both sides
+constexpr int k_least_points = 6;             // of a thing that a camera places
+constexpr size_t k_measured_points = 24;      // six markers
+constexpr double k_least_measured_px = 0.03;  // markers' corners tremble by that much in good pictures
+constexpr double k_least_cosine = 0.34;  // 70 degrees: on surfaces that light grazes nobody looks for a part
 constexpr double k_share = 0.95;
 
 Matrix3d cross(const Vector3d& v) {
@@ -97,8 +102,10 @@ std::optional<Eigen::Matrix2d> light_covariance(const Solution& solution,
   const Vector3d p_light = light.imager_from_world.inverse().translation;
   const Vector3d p_eye = solution.rig.cameras.front().imager_from_world.inverse().translation;
   if (!seen) return std::nullopt;
-  if (place.n_world.dot(place.p_world - p_light) * place.n_world.dot(place.p_world - p_eye) <= 0)
-    return std::nullopt;  // the projector lights the side that camera 0 does not see
+  const double towards_light = place.n_world.dot((p_light - place.p_world).normalized());
+  if (std::abs(towards_light) < k_least_cosine ||
+      towards_light * place.n_world.dot(p_eye - place.p_world) < 0)
+    return std::nullopt;  // grazed, or lit on the side that camera 0 does not see
   Eigen::Matrix<double, 2, 6> by_thing;
   by_thing << -seen->by_point * cross(place.p_world - thing.centre), seen->by_point;
   MatrixXd by_unknowns = MatrixXd::Zero(2, uncertainty.covariance.cols());
@@ -120,39 +127,75 @@ std::optional<Eigen::Matrix2d> light_covariance(const Solution& solution,
   return m_by_px * px_covariance * m_by_px.transpose();
 }
 
-// A board-sized sheet: points and the surface's normal there.
-std::vector<SurfacePlace> sheet_places(const Pose& world_from_board, const Board& board) {
+// A thing that fills the middle of the projector's panel at the boards' distance, as far as camera 0 sees it:
+// points of a sheet with some relief that faces the middle between the two. Where the boards stood does not
+// matter: a rig whose boards kept to the middle is judged at the panel's edges, too.
+std::vector<SurfacePlace> panel_places(const Solution& solution, const Board& board, size_t projector) {
+  const Imager &camera = solution.rig.cameras.front(), &light = solution.rig.projectors[projector];
+  Vector3d p_boards = Vector3d::Zero();
+  int boards = 0;
+  for (const auto& world_from_board : solution.world_from_board) {
+    if (!world_from_board) continue;
+    p_boards += *world_from_board * Vector3d(board.width_m() / 2, board.height_m() / 2, 0);
+    ++boards;
+  }
+  p_boards /= std::max(1, boards);
+  const Vector3d p_eyes =
+      (camera.imager_from_world.inverse().translation + light.imager_from_world.inverse().translation) / 2;
+  const Vector3d n = (p_boards - p_eyes).normalized();
+  const auto on_panel = [](int step) { return k_panel_share * ((step + 0.5) / k_panel_grid - 0.5); };
   std::vector<SurfacePlace> places;
-  for (int i = 0; i < k_grid * k_grid; ++i)
-    places.push_back({world_from_board * Vector3d(board.width_m() * (i % k_grid + 0.5) / k_grid,
-                                                  board.height_m() * (i / k_grid + 0.5) / k_grid, 0),
-                      world_from_board.rotation * Vector3d::UnitZ()});
+  for (int i = 0; i < k_panel_grid * k_panel_grid; ++i) {
+    const int column = i % k_panel_grid, row = i / k_panel_grid;
+    const auto ray =
+        light.ray({(0.5 + on_panel(column)) * light.width - 0.5, (0.5 + on_panel(row)) * light.height - 0.5});
+    if (!ray || n.dot(ray->d) <= 0) continue;
+    const double relief = (column + row) % 2 == 0 ? k_relief_m : -k_relief_m;
+    const Vector3d p = ray->p_origin + ray->d * ((n.dot(p_boards - ray->p_origin) + relief) / n.dot(ray->d));
+    if (see(camera, p)) places.push_back({p, n});
+  }
   return places;
 }
 
-Thing points_of(const std::vector<SurfacePlace>& places) {
-  Thing thing;
-  for (const SurfacePlace& place : places) thing.push_back(place.p_world);
-  return thing;
+// Some of the points that camera 0 sees, as far apart as they go: each the farthest from those before.
+Thing measured_points(const Imager& camera, const std::vector<SurfacePlace>& places) {
+  std::vector<std::pair<Vector3d, double>> left;  // and the distance to the nearest chosen
+  for (const SurfacePlace& place : places) {
+    if (see(camera, place.p_world)) left.emplace_back(place.p_world, std::numeric_limits<double>::infinity());
+  }
+  Thing chosen;
+  while (chosen.size() < std::min(k_measured_points, left.size())) {
+    const auto farthest = std::max_element(left.begin(), left.end(),
+                                           [](const auto& a, const auto& b) { return a.second < b.second; });
+    chosen.push_back(farthest->first);
+    for (auto& [p, distance] : left) distance = std::min(distance, (p - chosen.back()).norm());
+  }
+  return chosen;
 }
 
-// In place, moved each way, turned each way.
-std::array<std::vector<Pose>, 3> placements(const Pose& world_from_board, const Board& board) {
-  const Pose to_middle(Eigen::Quaterniond::Identity(),
-                       Vector3d(board.width_m() / 2, board.height_m() / 2, 0));
-  std::array<std::vector<Pose>, 3> all = {{{world_from_board}, {}, {}}};
+// The thing in place, moved each way, turned each way about its middle: world_from_before.
+std::array<std::vector<Pose>, 3> placements(const std::vector<SurfacePlace>& places) {
+  Vector3d centre = Vector3d::Zero();
+  for (const SurfacePlace& place : places) centre += place.p_world / static_cast<double>(places.size());
+  std::array<std::vector<Pose>, 3> all = {{{Pose()}, {}, {}}};
   for (const double sign : {-1.0, 1.0}) {
-    for (int axis = 0; axis < 3; ++axis) {
-      Pose moved = world_from_board;
-      moved.translation += sign * k_moved_m * Vector3d::Unit(axis);
-      all[1].push_back(moved);
+    for (int axis = 0; axis < 3; ++axis)
+      all[1].emplace_back(Eigen::Quaterniond::Identity(), sign * k_moved_m * Vector3d::Unit(axis));
+    for (int axis = 0; axis < 2; ++axis) {
+      const Pose turned(exp_rotation(sign * k_turned * Vector3d::Unit(axis)), Vector3d::Zero());
+      all[2].push_back(Pose(Eigen::Quaterniond::Identity(), centre) * turned *
+                       Pose(Eigen::Quaterniond::Identity(), -centre));
     }
-    for (int axis = 0; axis < 2; ++axis)
-      all[2].push_back(world_from_board * to_middle *
-                       Pose(exp_rotation(sign * k_turned * Vector3d::Unit(axis)), Vector3d::Zero()) *
-                       to_middle.inverse());
   }
   return all;
+}
+
+std::vector<SurfacePlace> placed_anew(const Pose& world_from_before, std::vector<SurfacePlace> places) {
+  for (SurfacePlace& place : places) {
+    place.p_world = world_from_before * place.p_world;
+    place.n_world = world_from_before.rotation * place.n_world;
+  }
+  return places;
 }
 
 // The devices' unknowns of one rig as they differ from another's; empty when the lenses are of other models.
@@ -242,23 +285,40 @@ std::vector<double> propagated_error_mm(const Observations& observations,
                                         const Uncertainty& uncertainty) {
   std::vector<double> p95;
   for (size_t projector = 0; projector < solution.rig.projectors.size(); ++projector) {
+    const std::vector<SurfacePlace> home = panel_places(solution, observations.board, projector);
+    const auto all = placements(home);
     std::array<std::vector<Eigen::Matrix2d>, 3> groups;
-    for (const auto& board : solution.world_from_board) {
-      if (!board) continue;
-      const auto all = placements(*board, observations.board);
-      for (size_t group = 0; group < groups.size(); ++group) {
-        for (const Pose& pose : all[group]) {
-          const std::vector<SurfacePlace> places = sheet_places(pose, observations.board);
-          for (const auto& covariance :
-               light_covariances(solution, uncertainty, points_of(places), projector, places)) {
-            if (covariance) groups[group].push_back(*covariance);
-          }
+    for (size_t group = 0; group < groups.size(); ++group) {
+      for (const Pose& world_from_before : all[group]) {
+        const std::vector<SurfacePlace> places = placed_anew(world_from_before, home);
+        const Thing thing = measured_points(solution.rig.cameras.front(), places);
+        for (const auto& covariance : light_covariances(solution, uncertainty, thing, projector, places)) {
+          if (covariance) groups[group].push_back(*covariance);
         }
       }
     }
     p95.push_back(1e3 * p95_of(groups));
   }
   return p95;
+}
+
+Uncertainty believed(const Observations& observations,
+                     const Solution& solution,
+                     std::span<const Rig> without) {
+  Uncertainty uncertainty{solution.covariance, 0};
+  const auto scatter = propagated_error_mm(observations, solution, uncertainty);
+  const auto jackknife =
+      propagated_error_mm(observations, solution, {jackknife_covariance(solution, without), 0});
+  // Scatter alone is too small by up to a factor of 2 where poses have errors of their own, the jackknife is
+  // too large by as much: the standard deviation in between.
+  double variance = 1;
+  for (size_t i = 0; i < scatter.size(); ++i) {
+    if (std::isfinite(jackknife[i]) && scatter[i] > 0)
+      variance = std::max(variance, jackknife[i] / scatter[i]);
+  }
+  uncertainty.covariance *= variance;
+  uncertainty.measured_px = std::max(solution.corner_noise_px, k_least_measured_px);
+  return uncertainty;
 }
 
 }  // namespace limn::calib
