@@ -50,8 +50,8 @@ bool is_finite(const Unknowns& unknowns) {
 
 // Distance along `ray` (units of its d) of the point nearest to another imager's ray; 0 when they are all but
 // parallel or meet behind.
-double depth_by(const Imager& camera, const Ray& ray, const Imager& seeing, const Vector2d& px) {
-  Ray other;
+double depth_by(const Imager& camera, const LensRay& ray, const Imager& seeing, const Vector2d& px) {
+  LensRay other;
   if (!find_ray(seeing.lens.model, seeing.lens.values, px, false, &other)) return 0;
   const Pose camera_from_seeing = camera.imager_from_world * seeing.imager_from_world.inverse();
   const Vector3d a = ray.d, b = camera_from_seeing.rotation * other.d, o = camera_from_seeing.translation;
@@ -122,7 +122,7 @@ void Joint::add_group(const Group& group, const Unknowns& at, const Noise& noise
     bool seen = false;
     if (is_match) {
       const Match& match = observations_.matches[group.members[i]];
-      Ray& ray = match_rays_[group.members[i]];
+      LensRay& ray = match_rays_[group.members[i]];
       measured = match.px_projector;
       stddev = std::hypot(match.stddev_px, noise.match_px);
       seen = find_ray(camera.lens.model, camera.lens.values, match.px_camera, true, &ray) &&
@@ -197,7 +197,7 @@ void Joint::add_points(const Unknowns& at, const Noise& noise, Normal* normal) {
     const FreePoint& point = observations_.points[index];
     if (inverse_depth == 0 || point.pose == left_out_) continue;
     const Imager& camera = at.cameras[static_cast<size_t>(point.camera)];
-    Ray& ray = point_rays_[index];
+    LensRay& ray = point_rays_[index];
     const bool has_ray = find_ray(camera.lens.model, camera.lens.values, point.px_camera, true, &ray);
     const int n = value_count(camera), camera_at = camera_at_[static_cast<size_t>(point.camera)];
     rows.setZero(static_cast<Eigen::Index>(2 * (end - begin)), normal->gradient.size() + 1);
@@ -379,7 +379,7 @@ void Joint::place_points(Unknowns* unknowns) const {
     const FreePoint& point = observations_.points[index];
     const Imager& camera = unknowns->cameras[static_cast<size_t>(point.camera)];
     const Imager& seeing = sighting.by_projector ? unknowns->projectors[which] : unknowns->cameras[which];
-    Ray ray;
+    LensRay ray;
     if (!find_ray(camera.lens.model, camera.lens.values, point.px_camera, false, &ray)) continue;
     const double depth = depth_by(camera, ray, seeing, sighting.px);
     if (!(depth > 0)) continue;

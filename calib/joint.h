@@ -101,8 +101,8 @@ class Joint {
   std::vector<Group> groups_;
   std::vector<int> camera_at_, projector_at_;  // first index of a device's values among the unknowns
   int bend_at_ = 0;
-  std::vector<bool> free_;                    // of the devices' unknowns and the bend
-  std::vector<Ray> match_rays_, point_rays_;  // where they were last: the next search starts there
+  std::vector<bool> free_;                        // of the devices' unknowns and the bend
+  std::vector<LensRay> match_rays_, point_rays_;  // where they were last: the next search starts there
 };
 
 }  // namespace limn::calib

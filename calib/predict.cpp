@@ -63,7 +63,7 @@ bool refine_ray(const LensModel& model,
                 std::span<const double> values,
                 const Vector2d& px,
                 bool with_derivatives,
-                Ray* ray) {
+                LensRay* ray) {
   constexpr double k_tolerance_px = 1e-9;
   constexpr int k_most_steps = 6;
   Derivatives::Values by_values(2, static_cast<Eigen::Index>(values.size()));
@@ -126,7 +126,7 @@ bool find_ray(const LensModel& model,
               std::span<const double> values,
               const Vector2d& px,
               bool with_derivatives,
-              Ray* ray) {
+              LensRay* ray) {
   if (ray->d.z() == 1 && refine_ray(model, values, px, with_derivatives, ray)) return true;
   Vector3d d;
   ray->d.setZero();
@@ -144,7 +144,7 @@ bool meet_board(const ImagerView& camera,
                 const Vector2d& bend,
                 const Vector2d& px_camera,
                 Vector3d* p_world) {
-  Ray ray;
+  LensRay ray;
   Hit hit;
   if (!find_ray(camera.model, camera.values, px_camera, false, &ray)) return false;
   if (!cast(camera, world_from_board, shape, bend, ray.d, &hit)) return false;
@@ -160,7 +160,7 @@ bool predict_match(const ImagerView& camera,
                    const Vector2d& px_camera,
                    Vector2d* px_projector,
                    Derivatives* derivatives) {
-  Ray ray;
+  LensRay ray;
   return find_ray(camera.model, camera.values, px_camera, derivatives != nullptr, &ray) &&
          predict_match(camera, projector, world_from_board, shape, bend, ray, px_projector, derivatives);
 }
@@ -170,7 +170,7 @@ bool predict_match(const ImagerView& camera,
                    const Pose& world_from_board,
                    const BoardShape& shape,
                    const Vector2d& bend,
-                   const Ray& ray,
+                   const LensRay& ray,
                    Vector2d* px_projector,
                    Derivatives* derivatives) {
   Hit hit;
@@ -211,7 +211,7 @@ bool predict_match(const ImagerView& camera,
 
 bool predict_sighting(const ImagerView& camera,
                       const ImagerView& seeing,
-                      const Ray& ray,
+                      const LensRay& ray,
                       double inverse_depth,
                       Vector2d* px,
                       SightingDerivatives* derivatives) {

@@ -33,18 +33,18 @@ constexpr int k_most_values = 16;
 /// Where an imager's pixel looks: the point (x, y, 1) on its ray, imager frame, and how that moves with the
 /// lens' values while the pixel stays (implicit function theorem: project(values, d) = px stays true, so
 /// J_d dd = -J_values dvalues).
-struct Ray {
+struct LensRay {
   Eigen::Vector3d d = Eigen::Vector3d::Zero();
   Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor, 2, k_most_values> xy_by_values;
 };
 
-/// Ray of a pixel. Starts from what `ray` holds, if it holds anything: two steps when the values have hardly
-/// moved since. False when the pixel has none (`ray` is empty then).
+/// LensRay of a pixel. Starts from what `ray` holds, if it holds anything: two steps when the values have
+/// hardly moved since. False when the pixel has none (`ray` is empty then).
 bool find_ray(const LensModel& model,
               std::span<const double> values,
               const Eigen::Vector2d& px,
               bool with_derivatives,
-              Ray* ray);
+              LensRay* ray);
 
 /// Derivatives of a predicted pixel. Poses: by boxplus's delta [rotation; translation]; values: 2 x
 /// value_count.
@@ -88,7 +88,7 @@ bool predict_match(const ImagerView& camera,
                    const Pose& world_from_board,
                    const BoardShape& shape,
                    const Eigen::Vector2d& bend,
-                   const Ray& ray,
+                   const LensRay& ray,
                    Eigen::Vector2d* px_projector,
                    Derivatives* derivatives = nullptr);
 
@@ -100,7 +100,7 @@ struct SightingDerivatives {
 };
 bool predict_sighting(const ImagerView& camera,
                       const ImagerView& seeing,
-                      const Ray& ray,
+                      const LensRay& ray,
                       double inverse_depth,
                       Eigen::Vector2d* px,
                       SightingDerivatives* derivatives = nullptr);

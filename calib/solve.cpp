@@ -51,7 +51,7 @@ std::vector<std::optional<Eigen::Vector3d>> places_of(const Observations& observ
   for (size_t i = 0; i < observations.points.size(); ++i) {
     const FreePoint& point = observations.points[i];
     const Imager& camera = at.cameras[static_cast<size_t>(point.camera)];
-    Ray ray;
+    LensRay ray;
     const double inverse_depth = at.inverse_depths[i];
     const bool placed =
         inverse_depth > 0 && find_ray(camera.lens.model, camera.lens.values, point.px_camera, false, &ray);

@@ -12,6 +12,8 @@ namespace {
 
 using namespace test;
 using namespace worlds;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
 
 // Words on a world whose solution is the truth and whose figures are as given: no solve is needed.
 struct Judged {

@@ -10,6 +10,8 @@ namespace {
 
 using namespace test;
 using namespace worlds;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
 
 std::vector<DensePixel> dense_of(const World& world) {
   std::vector<DensePixel> dense;

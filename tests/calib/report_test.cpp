@@ -16,6 +16,8 @@ namespace {
 namespace fs = std::filesystem;
 using namespace test;
 using namespace worlds;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
 using nlohmann::json;
 
 // A calibration of a noisy world, as `limn solve` reports it into `folder`.
