@@ -20,7 +20,7 @@ std::vector<calib::CapturedDevice> devices(const std::vector<Imager>& imagers) {
 
 calib::Captures planned(const Plan& plan, const sim::VirtualRig& rig, const std::filesystem::path& out) {
   return calib::plan_captures(out, devices(rig.world().rig.cameras), devices(rig.world().rig.projectors),
-                              plan.board);
+                              plan.board, plan.code, plan.code_options);
 }
 
 // The rig's devices as calib asks for them; pictures go to `writer`.

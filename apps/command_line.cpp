@@ -98,7 +98,13 @@ void add_patterns(CLI::App& app, Run& run) {
       "CAPTURES/response/projector0/camera0/)");
   auto options = std::make_shared<PatternsOptions>();
   command->add_option("--projector", options->projector, "its size, such as 1280x800")->required();
-  command->add_option("--code", options->code, "gray")->capture_default_str();
+  command->add_option("--code", options->code, "gray, phase (finest), xor (for concave surfaces)")->capture_default_str();
+  auto& code = options->code_options;
+  command->add_option("--period", code.period_px, "phase: length of a wave, projector pixels")->capture_default_str();
+  command->add_option("--steps", code.steps, "phase: pictures of a wave")->capture_default_str();
+  command->add_option("--gamma", code.gamma, "phase: of the projector, light = value ^ gamma")->capture_default_str();
+  command->add_option("--stripe", code.base_stripe_px, "xor: widest stripe, 2, 4 or 8 projector pixels")
+      ->capture_default_str();
   command->add_flag("--response", options->response, "instead: pictures that measure the projector's response and colour");
   command->add_option("--out", options->out, "folder for 000.png ... and patterns.json")->required();
   command->callback([options, &run] { run = [options] { return finished(run_patterns(*options)); }; });

@@ -50,7 +50,7 @@ Status write_response(const PatternsOptions& options, const PixelSize& size) {
 
 Status run_patterns(const PatternsOptions& options) {
   LIMN_TRY(const PixelSize size, parse_pixel_size(options.projector));
-  const auto patterns = calib::Patterns::create(options.code, size.width, size.height);
+  const auto patterns = calib::Patterns::create(options.code, size.width, size.height, options.code_options);
   if (!patterns) return usage_error("{}", patterns.message());
   if (options.response) return write_response(options, size);
   LIMN_TRY_STATUS(

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calib/board.h"
+#include "calib/patterns.h"
 #include "core/pose.h"
 #include "core/result.h"
 
@@ -16,6 +17,7 @@ struct Plan {
   std::filesystem::path world;  ///< the virtual rig's world file
   calib::Board board;
   std::string code = "gray";
+  calib::CodeOptions code_options;
   std::vector<Pose> world_from_board;  ///< board frame as in calib/board.h
   bool response = false;               ///< also the response pictures, of the prototype
 };

@@ -30,7 +30,8 @@ double rounded(double v) { return std::round(v * 1e4) / 1e4; }
 size_t affordable_poses(const Plan& plan, const Rig& rig) {
   int pictures = 0;
   for (const Imager& projector : rig.projectors) {
-    if (const auto patterns = calib::Patterns::create(plan.code, projector.width, projector.height))
+    if (const auto patterns =
+            calib::Patterns::create(plan.code, projector.width, projector.height, plan.code_options))
       pictures += patterns->count();
   }
   return static_cast<size_t>(std::max(1.0, k_most_seconds * k_pictures_a_second / std::max(1, pictures)));

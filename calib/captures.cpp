@@ -134,10 +134,12 @@ Status read_patterns(const Config& config, Captures* captures) {
 Captures plan_captures(const fs::path& folder,
                        std::vector<CapturedDevice> cameras,
                        std::vector<CapturedDevice> projectors,
-                       const Board& board) {
+                       const Board& board,
+                       const std::string& code,
+                       const CodeOptions& options) {
   Captures plan{folder, std::move(cameras), std::move(projectors), {}, board, {}};
   for (const CapturedDevice& projector : plan.projectors)
-    plan.patterns.push_back(Patterns::create("gray", projector.width, projector.height).value());
+    plan.patterns.push_back(Patterns::create(code, projector.width, projector.height, options).value());
   return plan;
 }
 

@@ -34,11 +34,14 @@ struct Captures {
   std::vector<CapturedPose> poses;  ///< by name
 };
 
-/// A captures folder that is about to be filled: Gray code patterns for every projector, no poses yet.
+/// A captures folder that is about to be filled: patterns of a code for every projector, no poses yet. An
+/// unknown code, or options out of their range, throw (our bug: whoever reads them from people checks them).
 Captures plan_captures(const std::filesystem::path& folder,
                        std::vector<CapturedDevice> cameras,
                        std::vector<CapturedDevice> projectors,
-                       const Board& board);
+                       const Board& board,
+                       const std::string& code = "gray",
+                       const CodeOptions& options = {});
 
 /// The file of one picture: pose00/camera0/000.png, or pose00/projector0/camera0/000.png with several
 /// projectors.

@@ -2,9 +2,11 @@
 
 #include <filesystem>
 #include <opencv2/core/mat.hpp>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "core/config.h"
 #include "core/result.h"
 
 namespace limn::calib {
@@ -15,38 +17,79 @@ struct PatternGroup {
   int count = 2;
 };
 
-/// Pictures for a projector from which each of its pixels can be told apart. The one code so far is Gray code
-/// with inverses, in OpenCV's order: the columns' bits, then the rows', most significant first, each picture
-/// followed by its inverse; white and black last.
+/// What a code's pictures depend on besides the projector's size.
+struct CodeOptions {
+  /// phase: length of a wave, whole projector pixels, 4 to 256. Shorter is finer until the lens blurs it.
+  int period_px = 16;
+  /// phase: pictures of a wave, 3 to 32. More average noise and cancel more of a wrong response: N steps
+  /// stand its harmonics up to N - 2.
+  int steps = 6;
+  /// phase: of the projector (light = value ^ gamma); the waves are drawn so that their light is sinusoidal.
+  double gamma = 2.2;
+  /// xor: width of the widest stripe, projector pixels: 2, 4 or 8. Narrower keeps light from elsewhere out of
+  /// the bits better, wider stands more blur.
+  int base_stripe_px = 4;
+  bool operator==(const CodeOptions&) const = default;
+};
+
+/// Pictures for a projector from which each of its pixels can be told apart:
+/// - gray: Gray code with inverses, in OpenCV's order: the columns' bits, then the rows', most significant
+///   first, each picture followed by its inverse; white and black last.
+/// - xor: the same, but every bit with stripes wider than base_stripe_px is exchanged with the bit of that
+///   width (XOR; XOR-02 and XOR-04 of Gupta et al., "A practical approach to 3D scanning in the presence of
+///   interreflections, subsurface scattering and defocus", IJCV 2013): no picture has wide stripes, so that
+///   light that comes by way of another surface is the same in a picture and its inverse.
+/// - phase: bits with stripes of half a wave and more, as in gray, then the steps of a sinusoid along the
+///   columns, then along the rows; white and black last. Step k of N is 0.5 + 0.5 cos(2 pi (x / period - k /
+///   N)) of white's light.
 struct Patterns {
   std::string code = "gray";
   int width = 0;
   int height = 0;
+  CodeOptions options;  ///< those of other codes stay at their defaults
 
-  /// Of a known code for a size of 2 to 16384 pixels a side.
-  static Result<Patterns> create(const std::string& code, int width, int height);
+  /// Of a known code for a size of 2 to 16384 pixels a side; options out of their range are an error.
+  static Result<Patterns> create(const std::string& code,
+                                 int width,
+                                 int height,
+                                 const CodeOptions& options = {});
 
-  int column_bits() const;  ///< ceil(log2(width))
-  int row_bits() const;     ///< ceil(log2(height))
-  int count() const { return 2 * (column_bits() + row_bits()) + 2; }
+  /// How many of the finest bits are not shown: labels from pairs alone are 2^this pixels wide. 0 but for
+  /// phase.
+  int lowest_bit() const;
+  int column_bits() const;  ///< pairs for the columns: ceil(log2(width)) - lowest_bit()
+  int row_bits() const;     ///< pairs for the rows
+  /// xor: the bit that all coarser ones are exchanged with; else one beyond all bits.
+  int base_bit() const;
+  int steps() const { return code == "phase" ? options.steps : 0; }  ///< of each axis' sinusoid
+  int first_row_pair() const { return 2 * column_bits(); }           ///< index of its first picture
+  int first_step() const { return 2 * (column_bits() + row_bits()); }
+  int count() const { return first_step() + 2 * steps() + 2; }
   int white() const { return count() - 2; }
   int black() const { return count() - 1; }
-  /// Each picture with its inverse, in their order; white and black are the last group.
+  /// Each picture with its inverse, the steps of the sinusoids; white and black are the last group.
   std::vector<PatternGroup> groups() const;
 
-  /// Picture number `index`, 8-bit grey, 0 or 255, of the projector's size.
+  /// Picture number `index`, 8-bit grey, of the projector's size.
   cv::Mat picture(int index) const;
   bool operator==(const Patterns&) const = default;
 };
 
-/// The codes that exist, for messages: "gray".
+/// The codes that exist, for messages: "gray", "phase", "xor".
 std::vector<std::string> pattern_codes();
+
+/// A code's options from a JSON object that people edit (patterns.json, a plan); absent keys stay at their
+/// defaults. Their range is Patterns::create's business.
+CodeOptions read_code_options(const ConfigNode& node);
+/// The keys of it that a code has: phase "period_px", "steps", "gamma"; xor "base_stripe_px"; gray none.
+std::set<std::string> code_option_keys(const std::string& code);
 
 /// `000.png` and so on: the name of a picture's file.
 std::string picture_name(int index);
 
 /// patterns.json: {"schema": "limn.patterns/1", "code": "gray", "size": [width, height], "pictures": 44}; the
-/// pictures are 000.png … in the order above.
+/// pictures are 000.png … in the order above. phase adds "period_px", "steps" and "gamma", xor
+/// "base_stripe_px"; where they are absent their defaults hold.
 Status save_patterns(const Patterns& patterns, const std::filesystem::path& path);
 Result<Patterns> load_patterns(const std::filesystem::path& path);
 

@@ -2,7 +2,9 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
@@ -212,6 +214,68 @@ void measure_motion(const cv::Mat& first, const cv::Mat& last, double scale, Ser
   health->shift_worst_px = lengths[lengths.size() * 9 / 10];
 }
 
+// Mean of squares without the few that motion or a flash have spoilt.
+double trimmed_square(std::vector<float> residuals) {
+  constexpr double k_trim = 4;  // standard deviations
+  std::vector<float> sizes;
+  for (const float r : residuals) sizes.push_back(std::abs(r));
+  const double limit = k_trim * std::max(1.0, 1.4826 * median(sizes));
+  double sum = 0;
+  size_t count = 0;
+  for (const float r : sizes) {
+    if (r > limit) continue;
+    sum += static_cast<double>(r) * r;
+    ++count;
+  }
+  return sum / static_cast<double>(std::max<size_t>(1, count));
+}
+
+// A picture and its inverse always add up to the same: what they do not is the noise of two intensities. It
+// is a straight line over the light; both its ends come from halves of the samples, dim and bright.
+void measure_noise(const Samples& lit, SeriesHealth* health) {
+  constexpr size_t k_least_sums = 2000;
+  std::vector<float> sums = lit.sum;
+  const auto middle = static_cast<float>(median(sums));
+  std::array<std::vector<float>, 2> residuals;
+  std::array<double, 2> light{}, count{};
+  int pairs = 0;
+  for (const GroupHealth& group : health->groups) pairs += group.count == 2 && group.off < k_odd_group;
+  for (const GroupHealth& group : health->groups) {
+    if (group.count != 2 || group.off >= k_odd_group) continue;
+    const float *a = lit.of(group.first), *b = lit.of(group.first + 1);
+    for (size_t i = 0; i < lit.size(); ++i) {
+      if (std::max(a[i], b[i]) >= k_saturated || std::min(a[i], b[i]) < 1) continue;
+      const size_t half = lit.sum[i] > middle ? 1 : 0;
+      residuals[half].push_back((a[i] + b[i]) / static_cast<float>(group.level) - lit.sum[i]);
+      light[half] += lit.sum[i];
+      ++count[half];
+    }
+  }
+  if (residuals[0].size() < k_least_sums || residuals[1].size() < k_least_sums) return;
+  // The sum that they are compared with is the median of all: pi / 2 times the variance of a mean.
+  const double own = 1 + std::numbers::pi / 2 / pairs - 2.0 / pairs;
+  const double dim = trimmed_square(residuals[0]) / own, bright = trimmed_square(residuals[1]) / own;
+  const double from = light[0] / count[0], to = light[1] / count[1];
+  constexpr double k_rounding = 1.0 / 6;  // of two intensities to whole levels
+  constexpr double k_least_range = 1.3;   // of the light in the halves; below, their difference is chance
+  const double slope = to > k_least_range * from ? std::max(0.0, (bright - dim) / (to - from)) : 0;
+  health->noise.per_level = slope;
+  health->noise.read = std::max(k_rounding, slope > 0 ? dim - slope * from : (dim + bright) / 2) / 2;
+}
+
+void measure_waves(const Samples& lit, const Patterns& patterns, SeriesHealth* health) {
+  if (patterns.steps() == 0) return;
+  const float *white = lit.of(patterns.white()), *black = lit.of(patterns.black());
+  std::vector<float> light;
+  for (size_t i = 0; i < lit.size(); ++i) {
+    float sum = 0;
+    for (int k = 0; k < 2 * patterns.steps(); ++k) sum += lit.of(patterns.first_step() + k)[i];
+    const float mean = sum / static_cast<float>(2 * patterns.steps());
+    if (white[i] - black[i] >= k_lit) light.push_back((mean - black[i]) / (white[i] - black[i]));
+  }
+  if (!light.empty()) health->wave_level = median(light);
+}
+
 void measure_light(const Samples& lit, const Patterns& patterns, SeriesHealth* health) {
   const float *white = lit.of(patterns.white()), *black = lit.of(patterns.black());
   health->white_level = median({white, white + lit.size()});
@@ -269,10 +333,12 @@ SeriesHealth SeriesProbe::health(const std::vector<std::filesystem::path>& files
   for (const PatternGroup& group : groups) health.groups.push_back(health_of(lit, group));
   find_odd(lit, groups, files, &health);
   for (const GroupHealth& group : health.groups) {
-    if (holds(group, health.odd, files)) continue;
+    if (group.count != 2 || holds(group, health.odd, files)) continue;
     health.level_low = std::min(health.level_low, group.level);
     health.level_high = std::max(health.level_high, group.level);
   }
+  measure_noise(lit, &health);
+  measure_waves(lit, patterns_, &health);
   measure_motion(first_, last_, static_cast<double>(width_) / first_.cols, &health);
   return health;
 }

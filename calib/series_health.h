@@ -28,6 +28,13 @@ struct OddPicture {
   std::string finding;
 };
 
+/// Scatter of one intensity over repeated pictures: variance = read + per_level * intensity, levels^2 (the
+/// sensor's own noise with rounding, and the light's).
+struct IntensityNoise {
+  double read = 2.25;
+  double per_level = 0;
+};
+
 /// How sound one series of pictures is (one camera, one projector, one pose): measurements only, taken while
 /// it is decoded, on a sparse grid of pixels. What they mean is for others to judge.
 struct SeriesHealth {
@@ -37,7 +44,10 @@ struct SeriesHealth {
   double black_level = 0;  ///< median under black, levels: room light, the projector's black, the sensor's
   double white_level = 0;  ///< median under white, levels
   std::vector<GroupHealth> groups;       ///< in the order of the series, white and black last
-  double level_low = 1, level_high = 1;  ///< range of the groups' levels without those of odd pictures
+  double level_low = 1, level_high = 1;  ///< range of the pairs' levels without those of odd pictures
+  /// phase: mean light of the sinusoids' steps between black (0) and white (1), median; 0.5 when the
+  /// projector's response is what they were drawn for. Other codes: 0.5.
+  double wave_level = 0.5;
   std::vector<OddPicture> odd;
   /// Of what is seen between the first group and the last, camera pixels: the median over patches with
   /// texture, and the length that a tenth of them exceeds. A patch is 1/10 of the picture's width.
@@ -45,6 +55,7 @@ struct SeriesHealth {
   int shift_patches = 0;  ///< with texture; 0: motion is not measured
   /// Share of the lit pixels whose finest bit is unsure, on the worse axis: defocus.
   double unsure_finest = 0;
+  IntensityNoise noise;  ///< from how the pairs' sums scatter; as it is here when there are too few samples
 };
 
 /// Looks at the pictures of a series as they pass: keeps some thousand pixels of each, and small pictures of

@@ -53,62 +53,73 @@ void fill_between(
   }
 }
 
-// One line's walk, whose pixels come one by one.
-class Walk {
- public:
-  void pass(const AxisReading& reading,
-            const AxisLabels& labels,
-            cv::Point a,
-            cv::Point b,
-            int at,
-            double noise,
-            float floor,
-            float* value,
-            float* weight,
-            size_t step) {
-    const int low_a = labels.low.at<int>(a), end_a = labels.end.at<int>(a);
-    const int low_b = labels.low.at<int>(b), end_b = labels.end.at<int>(b);
-    if (nested(low_a, end_a, low_b, end_b)) return;  // the same label goes on, perhaps a coarser one
-    const Crossing next = crossing(reading, edge_between(low_a, end_a, low_b, end_b), a, b, at, noise);
-    if (last_.edge >= 0 && next.edge >= 0 && next.edge != last_.edge && next.at - last_.at < k_longest)
-      fill_between(last_, next, floor, value, weight, step);
-    last_ = next;
-  }
-
- private:
-  static Crossing crossing(
-      const AxisReading& reading, int edge, cv::Point a, cv::Point b, int at, double noise) {
-    if (edge <= 0) return {};
-    const cv::Mat& difference = reading.at_edge(edge);
-    const float first = difference.at<short>(a), second = difference.at<short>(b);
-    if ((first > 0) == (second > 0)) return {};
-    const float step = first - second, share = first / step;
-    // Each difference holds the noise of two intensities.
-    const auto variance =
-        static_cast<float>(2 * noise * noise) * ((1 - share) * (1 - share) + share * share) / (step * step);
-    return {edge, static_cast<float>(at) + share, variance};
-  }
-
-  Crossing last_;
+// The labels of neighbouring lines or pixels, and where to add what lies between their edges.
+struct Place {
+  const short *low_a, *end_a, *low_b, *end_b;
 };
 
-void along_rows(const AxisReading& reading, const AxisLabels& labels, double noise, float floor, Sums* sums) {
+// Where the difference of the bit that changes at `edge` crosses zero between pixels a and b, `at` along the
+// line.
+Crossing crossing(const AxisReading& reading, int edge, cv::Point a, cv::Point b, int at, float variance) {
+  const cv::Mat& difference = reading.at_edge(edge);
+  const float first = difference.ptr<short>(a.y)[a.x], second = difference.ptr<short>(b.y)[b.x];
+  if ((first > 0) == (second > 0)) return {};
+  const float step = first - second, share = first / step;
+  return {edge, static_cast<float>(at) + share,
+          variance * ((1 - share) * (1 - share) + share * share) / (step * step)};
+}
+
+// Goes from pixel a to pixel b of a line: `last` is the edge passed before.
+void pass(const AxisReading& reading,
+          const DifferenceNoise& noise,
+          const Place& labels,
+          cv::Point a,
+          cv::Point b,
+          int at,
+          float floor,
+          Crossing* last,
+          float* value,
+          float* weight,
+          size_t step) {
+  const int low_a = labels.low_a[a.x], end_a = labels.end_a[a.x];
+  const int low_b = labels.low_b[b.x], end_b = labels.end_b[b.x];
+  if (low_a == low_b && end_a == end_b && low_a != end_a) return;
+  if (nested(low_a, end_a, low_b, end_b)) return;  // the same label goes on, perhaps a coarser one
+  const int edge = edge_between(low_a, end_a, low_b, end_b);
+  const Crossing next = edge > 0 ? crossing(reading, edge, a, b, at, noise.at(a.x, a.y)) : Crossing{};
+  if (last->edge >= 0 && next.edge >= 0 && next.edge != last->edge && next.at - last->at < k_longest)
+    fill_between(*last, next, floor, value, weight, step);
+  *last = next;
+}
+
+void along_rows(const AxisReading& reading,
+                const DifferenceNoise& noise,
+                const AxisLabels& labels,
+                float floor,
+                Sums* sums) {
   for (int y = 0; y < labels.low.rows; ++y) {
-    Walk walk;
+    const short *low = labels.low.ptr<short>(y), *end = labels.end.ptr<short>(y);
+    float *value = sums->value.ptr<float>(y), *weight = sums->weight.ptr<float>(y);
+    Crossing last;
     for (int x = 0; x + 1 < labels.low.cols; ++x)
-      walk.pass(reading, labels, {x, y}, {x + 1, y}, x, noise, floor, sums->value.ptr<float>(y),
-                sums->weight.ptr<float>(y), 1);
+      pass(reading, noise, {low, end, low, end}, {x, y}, {x + 1, y}, x, floor, &last, value, weight, 1);
   }
 }
 
-void along_columns(
-    const AxisReading& reading, const AxisLabels& labels, double noise, float floor, Sums* sums) {
-  std::vector<Walk> walks(static_cast<size_t>(labels.low.cols));
+void along_columns(const AxisReading& reading,
+                   const DifferenceNoise& noise,
+                   const AxisLabels& labels,
+                   float floor,
+                   Sums* sums) {
+  const auto columns = static_cast<size_t>(labels.low.cols);
+  std::vector<Crossing> last(columns);
+  float *value = sums->value.ptr<float>(), *weight = sums->weight.ptr<float>();
   for (int y = 0; y + 1 < labels.low.rows; ++y) {
+    const Place place = {labels.low.ptr<short>(y), labels.end.ptr<short>(y), labels.low.ptr<short>(y + 1),
+                         labels.end.ptr<short>(y + 1)};
     for (int x = 0; x < labels.low.cols; ++x)
-      walks[static_cast<size_t>(x)].pass(reading, labels, {x, y}, {x, y + 1}, y, noise, floor,
-                                         sums->value.ptr<float>() + x, sums->weight.ptr<float>() + x,
-                                         static_cast<size_t>(labels.low.cols));
+      pass(reading, noise, place, {x, y}, {x, y + 1}, y, floor, &last[static_cast<size_t>(x)], value + x,
+           weight + x, columns);
   }
 }
 
@@ -120,17 +131,20 @@ const cv::Mat& AxisReading::at_edge(int edge) const {
 }
 
 AxisLabels::AxisLabels(int rows, int cols)
-    : low(rows, cols, CV_32S, cv::Scalar(0)),
-      end(rows, cols, CV_32S, cv::Scalar(0)),
+    : low(rows, cols, CV_16S, cv::Scalar(0)),
+      end(rows, cols, CV_16S, cv::Scalar(0)),
       px(rows, cols, CV_32F, cv::Scalar(k_nan)),
       variance(rows, cols, CV_32F, cv::Scalar(k_nan)) {}
 
-void refine_between_edges(const AxisReading& reading, double noise, double floor_px, AxisLabels* labels) {
+void refine_between_edges(const AxisReading& reading,
+                          const DifferenceNoise& noise,
+                          double floor_px,
+                          AxisLabels* labels) {
   const auto floor = static_cast<float>(floor_px * floor_px);
   Sums sums{cv::Mat(labels->low.size(), CV_32F, cv::Scalar(0)),
             cv::Mat(labels->low.size(), CV_32F, cv::Scalar(0))};
-  along_rows(reading, *labels, noise, floor, &sums);
-  along_columns(reading, *labels, noise, floor, &sums);
+  along_rows(reading, noise, *labels, floor, &sums);
+  along_columns(reading, noise, *labels, floor, &sums);
   for (int y = 0; y < sums.value.rows; ++y) {
     const float *value = sums.value.ptr<float>(y), *weight = sums.weight.ptr<float>(y);
     float *px = labels->px.ptr<float>(y), *variance = labels->variance.ptr<float>(y);

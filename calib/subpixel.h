@@ -5,9 +5,15 @@
 
 namespace limn::calib {
 
+/// Variance of the difference of two intensities at a pixel: light has noise of its own.
+struct DifferenceNoise {
+  cv::Mat sum;                  ///< CV_16U: white plus black, levels; what any pair adds up to
+  std::vector<float> variance;  ///< levels^2, by that sum (0 to 510)
+  float at(int x, int y) const { return variance[sum.ptr<ushort>(y)[x]]; }
+};
+
 /// One axis of Gray code as a camera saw it.
 struct AxisReading {
-  int size = 0;  ///< projector pixels along the axis
   /// CV_16S, picture minus inverse, levels; most significant bit first.
   std::vector<cv::Mat> differences;
   int bits() const { return static_cast<int>(differences.size()); }
@@ -16,7 +22,7 @@ struct AxisReading {
 };
 
 /// What the bits of each pixel say: the projector pixels [low, end) by the signs of its sure bits, and its
-/// coordinate on this axis with a variance. CV_32S, CV_32S, CV_32F, CV_32F; low = end where nothing is known,
+/// coordinate on this axis with a variance. CV_16S, CV_16S, CV_32F, CV_32F; low = end where nothing is known,
 /// NaN likewise.
 struct AxisLabels {
   cv::Mat low, end, px, variance;
@@ -27,7 +33,10 @@ struct AxisLabels {
 /// neighbouring labels, the camera looks at the edge between those labels, whatever the blur, the global
 /// light and the surface's colour. Along rows and along columns, pixels between two such places get what
 /// lies between; the two answers are averaged by their variances. Pixels between no two edges keep what they
-/// have. `noise`: of one intensity, levels, standard deviation; `floor_px`: what remains besides noise.
-void refine_between_edges(const AxisReading& reading, double noise, double floor_px, AxisLabels* labels);
+/// have. `floor_px`: what remains besides noise.
+void refine_between_edges(const AxisReading& reading,
+                          const DifferenceNoise& noise,
+                          double floor_px,
+                          AxisLabels* labels);
 
 }  // namespace limn::calib

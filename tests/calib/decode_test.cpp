@@ -9,7 +9,7 @@
 
 #include "core/file.h"
 #include "core/picture.h"
-#include "tests/support/matchers.h"
+#include "tests/calib/code_bench.h"
 
 namespace limn::calib {
 namespace {
@@ -17,71 +17,26 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int k_width = 160, k_height = 120;
-
-// Where in the projector's picture the middle of a camera pixel falls.
-double column_at(int x) { return 5.3 + 0.35 * x; }
-double row_at(int y) { return 3.1 + 0.4 * y; }
-
-// A camera of k_width x k_height before a projector of 64 x 64.
-struct Bench {
-  Patterns patterns = Patterns::create("gray", 64, 64).value();
-  double white = 180, black = 20;
-  double blur = 0.3;  // of the projector, its pixels, standard deviation
-  double noise = 0;
-  std::mt19937_64 rng = test::test_rng();
-
-  // Light at a place between the projector's pixels: the picture's pixels are squares, blurred.
-  double light(const cv::Mat& picture, double u, double v) const {
-    double sum = 0, total = 0;
-    for (int y = static_cast<int>(v) - 4; y <= static_cast<int>(v) + 5; ++y) {
-      for (int x = static_cast<int>(u) - 4; x <= static_cast<int>(u) + 5; ++x) {
-        const auto edge = [&](double d) { return 0.5 * (1 + std::erf(d / (blur * std::sqrt(2.0)))); };
-        const double weight =
-            (edge(x + 0.5 - u) - edge(x - 0.5 - u)) * (edge(y + 0.5 - v) - edge(y - 0.5 - v));
-        const bool inside = x >= 0 && y >= 0 && x < picture.cols && y < picture.rows;
-        sum += inside ? weight * picture.at<uchar>(y, x) / 255.0 : 0;
-        total += weight;
-      }
-    }
-    return total > 0 ? sum / total : 0;
-  }
-
-  std::vector<fs::path> photograph(const fs::path& folder) {
-    EXPECT_TRUE(make_folder(folder).ok());
-    std::normal_distribution<double> scatter(0, 1);
-    std::vector<fs::path> files;
-    for (int i = 0; i < patterns.count(); ++i) {
-      const cv::Mat picture = patterns.picture(i);
-      cv::Mat photo(k_height, k_width, CV_8U);
-      for (int y = 0; y < k_height; ++y) {
-        for (int x = 0; x < k_width; ++x) {
-          const double level = black + (white - black) * light(picture, column_at(x), row_at(y));
-          photo.at<uchar>(y, x) = cv::saturate_cast<uchar>(level + noise * scatter(rng));
-        }
-      }
-      files.push_back(folder / picture_name(i));
-      EXPECT_TRUE(write_png(files.back(), photo).ok());
-    }
-    return files;
-  }
-};
+using Bench = test::CodeBench;
 
 // Errors of the labels against the truth.
 struct Errors {
-  double mean = 0, rms = 0, worst = 0, squared_pull = 0;
+  double mean = 0, rms = 0, worst = 0, squared_pull = 0, within_95 = 0;
   int count = 0;
 };
-Errors errors_of(const Decoded& decoded) {
+Errors errors_of(const Decoded& decoded, const Bench& bench) {
   Errors e;
   for (int y = 0; y < k_height; ++y) {
     for (int x = 0; x < k_width; ++x) {
       const auto& label = decoded.px_projector.at<cv::Vec2f>(y, x);
       if (std::isnan(label[0])) continue;
-      const double du = label[0] - column_at(x), dv = label[1] - row_at(y);
+      const double du = label[0] - bench.column_at(x), dv = label[1] - bench.row_at(y);
       const auto& variance = decoded.variance.at<cv::Vec2f>(y, x);
       e.mean += du + dv;
       e.rms += du * du + dv * dv;
       e.squared_pull += (du * du / variance[0] + dv * dv / variance[1]) / 2;
+      for (const double pull : {du / std::sqrt(variance[0]), dv / std::sqrt(variance[1])})
+        e.within_95 += std::abs(pull) < 1.96 ? 0.5 : 0;
       e.worst = std::max({e.worst, std::abs(du), std::abs(dv)});
       ++e.count;
     }
@@ -89,6 +44,7 @@ Errors errors_of(const Decoded& decoded) {
   e.mean /= 2 * e.count;
   e.rms = std::sqrt(e.rms / (2 * e.count));
   e.squared_pull /= e.count;
+  e.within_95 /= e.count;
   return e;
 }
 
@@ -96,7 +52,7 @@ TEST(Decode, LabelsEverySharpPixelWithinHalfAProjectorPixel) {
   Bench bench;
   const auto decoded = decode(bench.patterns, bench.photograph(test::test_folder()), k_width, k_height);
   ASSERT_TRUE(decoded.ok()) << decoded.message();
-  const Errors e = errors_of(*decoded);
+  const Errors e = errors_of(*decoded, bench);
   EXPECT_EQ(decoded->lit, k_width * k_height);
   EXPECT_GT(decoded->share(), 0.99);
   EXPECT_LT(e.worst, 0.56);
@@ -111,30 +67,149 @@ TEST(Decode, DropsUnresolvedFineBitsInsteadOfThePixel) {
   bench.noise = 1.5;
   const auto decoded = decode(bench.patterns, bench.photograph(test::test_folder()), k_width, k_height);
   ASSERT_TRUE(decoded.ok()) << decoded.message();
-  const Errors e = errors_of(*decoded);
+  const Errors e = errors_of(*decoded, bench);
   EXPECT_GT(decoded->share(), 0.8);
   EXPECT_LT(std::abs(e.mean), 0.05);
   EXPECT_LT(e.worst, 4.0);
   EXPECT_LT(e.squared_pull, 1.3);  // the variance says how coarse the labels are
-  double coarse = 0;
-  for (int y = 0; y < k_height; ++y) {
-    for (int x = 0; x < k_width; ++x) coarse += decoded->variance.at<cv::Vec2f>(y, x)[0] > 0.3 ? 1 : 0;
-  }
-  EXPECT_GT(coarse / (k_width * k_height), 0.03);  // most lie between two edges, and are finer
+  EXPECT_GT(decoded->health.unsure_finest, 0.5) << "most pixels have lost their finest bit";
 }
 
-TEST(Decode, FindsPlacesBetweenWholePixelsAndTheirScatter) {
+// Noise alone, so that nothing but it makes the scatter: the variances must be neither hopeful nor cautious,
+// and the noise is what the pictures show.
+TEST(Decode, FindsPlacesBetweenWholePixelsWithTheScatterThatItStates) {
+  struct Case {
+    const char* code;
+    CodeOptions options;
+    double worst_rms;
+  };
+  for (const Case& c : {Case{"gray", {}, 0.06}, Case{"phase", {}, 0.12}, Case{"xor", {}, 0.15},
+                        Case{"xor", {.base_stripe_px = 2}, 0.29}}) {
+    Bench bench;
+    bench.patterns = Patterns::create(c.code, 64, 64, c.options).value();
+    bench.blur = 0.6;
+    bench.noise = 3;
+    bench.gamma = bench.patterns.code == "phase" ? 2.2 : 1;
+    const auto decoded =
+        decode(bench.patterns, bench.photograph(test::test_folder()), k_width, k_height, {.floor_px = 0});
+    ASSERT_TRUE(decoded.ok()) << decoded.message();
+    const Errors e = errors_of(*decoded, bench);
+    printf(
+        "[ sub-pixel] %-5s %d: rms %.4f px, worst %.3f px, squared pull %.2f, %.1f %% within 1.96, noise "
+        "%.2f\n",
+        c.code, c.options.base_stripe_px, e.rms, e.worst, e.squared_pull, 100 * e.within_95,
+        std::sqrt(decoded->health.noise.read + 100 * decoded->health.noise.per_level));
+    EXPECT_GT(decoded->share(), 0.98) << c.code;
+    EXPECT_LT(e.rms, c.worst_rms) << c.code << ": whole pixels scatter by 0.29";
+    EXPECT_LT(std::abs(e.mean), 0.01) << c.code;
+    EXPECT_GT(e.squared_pull, 0.7) << c.code;
+    EXPECT_LT(e.squared_pull, 1.3) << c.code;
+    EXPECT_GT(e.within_95, 0.92) << c.code;
+    EXPECT_LT(e.within_95, 0.98) << c.code;
+    EXPECT_NEAR(std::sqrt(decoded->health.noise.read + 100 * decoded->health.noise.per_level), 3, 0.2)
+        << c.code;
+  }
+}
+
+// Half a period off would be 8 pixels.
+TEST(Decode, PhaseNeverTakesTheNextWave) {
+  for (const double blur : {0.3, 1.6, 2.5}) {
+    Bench bench;
+    bench.patterns = Patterns::create("phase", 64, 64).value();
+    bench.blur = blur;
+    bench.noise = 3;
+    bench.gamma = 2.2;
+    const auto decoded = decode(bench.patterns, bench.photograph(test::test_folder()), k_width, k_height);
+    ASSERT_TRUE(decoded.ok()) << decoded.message();
+    const Errors e = errors_of(*decoded, bench);
+    EXPECT_GT(decoded->share(), 0.97) << blur;
+    EXPECT_LT(e.worst, 1) << blur;
+    EXPECT_LT(e.rms, 0.15) << blur;
+    EXPECT_NEAR(decoded->health.wave_level, 0.5, 0.02);
+  }
+}
+
+TEST(Decode, PhaseSaysThatTheProjectorsResponseIsNotWhatItWasDrawnFor) {
   Bench bench;
+  bench.patterns = Patterns::create("phase", 64, 64, {.steps = 4, .gamma = 2.2}).value();
   bench.blur = 0.6;
-  bench.noise = 1.5;
+  bench.gamma = 1;
   const auto decoded = decode(bench.patterns, bench.photograph(test::test_folder()), k_width, k_height);
   ASSERT_TRUE(decoded.ok()) << decoded.message();
-  const Errors e = errors_of(*decoded);
-  EXPECT_LT(e.rms, 0.05) << "whole pixels scatter by 0.29";
-  EXPECT_LT(std::abs(e.mean), 0.005);
-  EXPECT_GT(e.squared_pull, 0.3);
-  EXPECT_LT(e.squared_pull, 1.5);
-  printf("[ sub-pixel] rms %.4f px, squared pull %.2f\n", e.rms, e.squared_pull);
+  EXPECT_GT(decoded->health.wave_level, 0.6);
+}
+
+// A white V-groove of 60 degrees whose crease runs down the middle of the picture; light falls flatly onto
+// its left wall. Each wall lights the other: diffuse, three bounces, strips along the crease (the form factor
+// between strips at distances s and t from the crease is s t sin^2 / (2 r^3)), spread along them.
+class Groove {
+ public:
+  Groove() : across_(k_width, k_width, CV_64F, cv::Scalar(0)), along_(k_height, k_height, CV_64F) {
+    constexpr double k_sine = 0.866, k_cosine = 0.5, k_albedo = 0.9, k_spread_px = 25;
+    for (int x = 0; x < k_width; ++x) {
+      for (int z = 0; z < k_width; ++z) {
+        const double s = std::abs(x - k_crease), t = std::abs(z - k_crease);
+        const double r = std::sqrt(s * s + t * t - 2 * s * t * k_cosine);
+        if ((x < k_crease) != (z < k_crease))
+          across_.at<double>(x, z) = k_albedo * s * t * k_sine * k_sine / (2 * r * r * r);
+      }
+    }
+    for (int y = 0; y < k_height; ++y) {
+      for (int z = 0; z < k_height; ++z)
+        along_.at<double>(y, z) = std::exp(-(y - z) * (y - z) / (2 * k_spread_px * k_spread_px));
+      along_.row(y) /= cv::sum(along_.row(y))[0];
+    }
+  }
+  void operator()(cv::Mat* light) const {
+    light->colRange(0, k_crease_column) *= k_flat;
+    const cv::Mat direct = light->clone();
+    for (int bounce = 0; bounce < 3; ++bounce) *light = direct + along_ * *light * across_.t();
+  }
+  static constexpr double k_crease = 79.5;
+  static constexpr int k_crease_column = 80;
+  static constexpr int k_scored = 60;  // nearer to the crease, light goes back and forth within a stripe
+
+ private:
+  static constexpr double k_flat = 0.2;  // cosine of incidence over the other wall's
+  cv::Mat across_, along_;
+};
+
+// Share of the left wall's pixels whose coordinates are right, and of those that have any.
+struct WallScore {
+  double right = 0, labelled = 0;
+};
+WallScore left_wall(const std::string& code, const CodeOptions& options) {
+  Bench bench;
+  bench.patterns = Patterns::create(code, 64, 64, options).value();
+  bench.blur = 0.6;
+  bench.noise = 1;
+  bench.white = 170;
+  const Groove groove;
+  bench.changed = [&](int, cv::Mat* light) { groove(light); };
+  const auto decoded = decode(bench.patterns, bench.photograph(test::test_folder()), k_width, k_height);
+  EXPECT_TRUE(decoded.ok()) << decoded.message();
+  WallScore score;
+  for (int y = 0; y < k_height; ++y) {
+    for (int x = 0; x < Groove::k_scored; ++x) {
+      const auto& px = decoded->px_projector.at<cv::Vec2f>(y, x);
+      if (std::isnan(px[0])) continue;
+      score.labelled += 1.0 / (k_height * Groove::k_scored);
+      if (std::abs(px[0] - bench.column_at(x)) < 1 && std::abs(px[1] - bench.row_at(y)) < 1)
+        score.right += 1.0 / (k_height * Groove::k_scored);
+    }
+  }
+  return score;
+}
+
+TEST(Decode, XorHoldsInAGrooveWhoseWallsLightEachOtherAndGrayDoesNot) {
+  const WallScore gray = left_wall("gray", {}), xor4 = left_wall("xor", {}),
+                  xor2 = left_wall("xor", {.base_stripe_px = 2});
+  printf("[ groove   ] right / labelled: gray %.3f / %.3f, xor 4 px %.3f / %.3f, xor 2 px %.3f / %.3f\n",
+         gray.right, gray.labelled, xor4.right, xor4.labelled, xor2.right, xor2.labelled);
+  EXPECT_LT(gray.right, 0.5);
+  EXPECT_GT(xor4.right, 0.9);
+  EXPECT_GT(xor2.right, 0.8) << "stripes of 2 pixels lose more of the dim wall to blur";
+  for (const WallScore& score : {xor4, xor2}) EXPECT_GT(score.right, 0.98 * score.labelled);
 }
 
 // Light from elsewhere lifts every picture by half of what white gains: bits must not look unsure for it.
@@ -152,7 +227,7 @@ TEST(Decode, DoesNotMindGlobalLight) {
   }
   const auto decoded = decode(bench.patterns, files, k_width, k_height);
   ASSERT_TRUE(decoded.ok()) << decoded.message();
-  const Errors e = errors_of(*decoded);
+  const Errors e = errors_of(*decoded, bench);
   EXPECT_GT(decoded->share(), 0.97);
   EXPECT_LT(e.rms, 0.2);
 }
@@ -187,7 +262,7 @@ TEST(Decode, SurvivesNoiseAtLowContrast) {
   bench.noise = 1.5;
   const auto decoded = decode(bench.patterns, bench.photograph(test::test_folder()), k_width, k_height);
   ASSERT_TRUE(decoded.ok()) << decoded.message();
-  const Errors e = errors_of(*decoded);
+  const Errors e = errors_of(*decoded, bench);
   EXPECT_GT(decoded->share(), 0.9);
   EXPECT_LT(e.worst, 3.5);
   EXPECT_LT(e.rms, 0.4);

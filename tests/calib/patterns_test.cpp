@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+#include <opencv2/core.hpp>
+
 #include "core/file.h"
 #include "tests/support/matchers.h"
 
@@ -40,17 +44,69 @@ TEST(Patterns, GiveEveryPixelItsOwnCodeInTheStatedOrder) {
   EXPECT_EQ(patterns.white(), 14);
 }
 
+TEST(Patterns, ExchangedBitsAreGrayCodeWithNarrowStripes) {
+  const Patterns gray = Patterns::create("gray", 64, 32).value();
+  for (const int stripe : {2, 4, 8}) {
+    const Patterns exchanged = Patterns::create("xor", 64, 32, {.base_stripe_px = stripe}).value();
+    ASSERT_EQ(exchanged.count(), gray.count());
+    const int base = exchanged.column_bits() - 1 - exchanged.base_bit();  // pair of the base
+    cv::Mat differing;
+    cv::compare(exchanged.picture(2 * base), gray.picture(2 * base), differing, cv::CMP_NE);
+    EXPECT_EQ(cv::countNonZero(differing), 0);
+    for (int pair = 0; pair < exchanged.column_bits(); ++pair) {
+      const cv::Mat shown = exchanged.picture(2 * pair);
+      for (int x = 0; x < 64; ++x) {
+        const int bit = (gray.picture(2 * pair).at<uchar>(0, x) ^
+                         (pair < base ? gray.picture(2 * base).at<uchar>(0, x) : 0)) != 0;
+        ASSERT_EQ(shown.at<uchar>(0, x) != 0, bit) << pair << " " << x;
+      }
+      int run = 1, longest = 1;
+      for (int x = 1; x < 64; ++x) {
+        run = shown.at<uchar>(0, x) == shown.at<uchar>(0, x - 1) ? run + 1 : 1;
+        longest = std::max(longest, run);
+      }
+      EXPECT_LE(longest, stripe + stripe / 2) << "pair " << pair;
+    }
+  }
+}
+
+TEST(Patterns, WavesAreSinusoidalInLightAndTheirPairsTellThemApart) {
+  const CodeOptions options{.period_px = 20, .steps = 5, .gamma = 1.8};
+  const Patterns patterns = Patterns::create("phase", 100, 60, options).value();
+  EXPECT_EQ(patterns.lowest_bit(), 3);  // labels of 8 pixels; half a wave is 10
+  EXPECT_EQ(patterns.column_bits(), 4);
+  EXPECT_EQ(patterns.count(), 2 * (4 + 3) + 2 * 5 + 2);
+  EXPECT_EQ(patterns.groups().size(), 7U + 2U + 1U);
+  for (int k = 0; k < 5; ++k) {
+    const cv::Mat columns = patterns.picture(patterns.first_step() + k);
+    const cv::Mat rows = patterns.picture(patterns.first_step() + 5 + k);
+    for (int i = 0; i < 60; ++i) {
+      const double light = 0.5 + 0.5 * std::cos(2 * std::numbers::pi * (i / 20.0 - k / 5.0));
+      EXPECT_NEAR(std::pow(columns.at<uchar>(7, i) / 255.0, 1.8), light, 0.005);
+      EXPECT_EQ(rows.at<uchar>(i, 3), columns.at<uchar>(7, i));
+    }
+  }
+}
+
 TEST(Patterns, SurviveTheirFile) {
   const auto path = test::test_folder() / "patterns.json";
-  const Patterns patterns = Patterns::create("gray", 1280, 800).value();
-  ASSERT_TRUE(save_patterns(patterns, path).ok());
-  const auto read = load_patterns(path);
-  ASSERT_TRUE(read.ok()) << read.message();
-  EXPECT_EQ(*read, patterns);
+  for (const auto& [code, options] : {std::pair<std::string, CodeOptions>{"gray", {}},
+                                      {"phase", {.period_px = 24, .steps = 8, .gamma = 1.7}},
+                                      {"xor", {.base_stripe_px = 2}}}) {
+    const Patterns patterns = Patterns::create(code, 1280, 800, options).value();
+    ASSERT_TRUE(save_patterns(patterns, path).ok());
+    const auto read = load_patterns(path);
+    ASSERT_TRUE(read.ok()) << read.message();
+    EXPECT_EQ(*read, patterns);
+  }
 }
 
 TEST(Patterns, SayWhatIsWrong) {
-  EXPECT_NE(Patterns::create("phase", 640, 480).message().find("gray"), std::string::npos);
+  EXPECT_NE(Patterns::create("grey", 640, 480).message().find("gray"), std::string::npos);
+  EXPECT_NE(Patterns::create("phase", 640, 480, {.period_px = 3}).message().find("3"), std::string::npos);
+  EXPECT_FALSE(Patterns::create("phase", 640, 480, {.steps = 2}).ok());
+  EXPECT_FALSE(Patterns::create("phase", 640, 480, {.gamma = 0}).ok());
+  EXPECT_FALSE(Patterns::create("xor", 640, 480, {.base_stripe_px = 3}).ok());
   EXPECT_FALSE(Patterns::create("gray", 1, 480).ok());
   EXPECT_FALSE(Patterns::create("gray", 640, 100000).ok());
   const auto path = test::test_folder() / "patterns.json";
