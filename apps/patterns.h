@@ -11,7 +11,7 @@ namespace limn::apps {
 struct PatternsOptions {
   std::string projector;  ///< its size, "1280x800"
   std::string code = "gray";
-  calib::CodeOptions code_options;
+  calib::CodeOptions code_options = {};
   bool response = false;  ///< the pictures that measure the projector's response instead of a code
   std::filesystem::path out;
 };

@@ -7,9 +7,9 @@
 
 #include "calib/advice.h"
 #include "calib/assess.h"
-#include "calib/lens_choice.h"
 #include "calib/history.h"
 #include "calib/known_length.h"
+#include "calib/lens_choice.h"
 #include "calib/observations.h"
 #include "calib/solve.h"
 #include "core/result.h"
@@ -34,8 +34,8 @@ std::string report_json(const Report& report);
 
 /// report.html: self-contained, pictures first (SVG): the verdict in words, faults and advice; the predicted
 /// error over the volume; each unseen pose; where each imager was observed and what was left over there; the
-/// figures behind it; earlier calibrations of the rig. What differs from run to run (date, seconds) stands in
-/// one line.
+/// figures behind it; earlier calibrations of the rig. Only the date differs from run to run; the stages'
+/// seconds stand in report.json.
 std::string report_html(const Report& report);
 
 /// Writes the rig folder: rig.json, one .cameramodel for each device, observations.json, report.json,

@@ -58,11 +58,7 @@ std::string header(const Report& report) {
   std::string html =
       fmt::format("<h1>Calibration <span class='{0}'>{0}</span></h1>\n<p class='lead'>{1}</p>\n", verdict,
                   escaped(words));
-  std::string stages;
-  for (const auto& [stage, seconds] : report.seconds)
-    stages += fmt::format("{}{} {:.1f} s", stages.empty() ? "" : ", ", stage, seconds);
-  html += fmt::format("<p class='soft'>{} &middot; {}</p>\n<div class='tiles'>\n", escaped(report.made_at),
-                      escaped(stages));
+  html += fmt::format("<p class='soft'>{}</p>\n<div class='tiles'>\n", escaped(report.made_at));
   html += tile(fmt::format("{:.2f}", worst_mm(a)), "mm", "predicted error (95 %), worst projector");
   html += tile(fmt::format("{:.2f}", a.held_out.rms_px), "px", "error on poses the solve has not seen");
   html += tile(fmt::format("{:.2f}", epipolar_px(a)), "px", "off the epipolar lines, on the board");

@@ -54,7 +54,7 @@ TEST(PatternsCommand, CallsWrongOptionsWrongUsage) {
     ASSERT_FALSE(status.ok()) << size;
     EXPECT_TRUE(status.error().wrong_usage) << size;
   }
-  const Status code = run_patterns({.projector = "40x24", .code = "phase", .out = out});
+  const Status code = run_patterns({.projector = "40x24", .code = "rainbow", .out = out});
   ASSERT_FALSE(code.ok());
   EXPECT_TRUE(code.error().wrong_usage);
   EXPECT_NE(code.message().find("gray"), std::string::npos);

@@ -169,11 +169,12 @@ TEST(SolveCommand, FindsTheRigThatTookTheCaptures) {
     EXPECT_TRUE(fs::exists(out / file)) << file;
 
   const auto report = nlohmann::json::parse(read_file(out / "report.json").value());
-  EXPECT_EQ(report["verdict"], "good");
+  // Six boards in a sixth of the camera's picture: what is moved by 150 mm leaves the place they vouch for.
+  EXPECT_EQ(report["verdict"], "usable");
   EXPECT_LT(report["held_out"]["rms_px"], 0.15);
   EXPECT_EQ(report["held_out"]["poses"].size(), 6U);
   EXPECT_GT(report["decode"]["share"], 0.9);
-  EXPECT_LT(report["predicted_error_mm"]["p95"], 1.0);
+  EXPECT_LT(report["predicted_error_mm"]["p95"], 3.0);
   EXPECT_EQ(report["devices"].size(), 2U);
   EXPECT_TRUE(report["seconds"].contains("total"));
 
