@@ -245,6 +245,10 @@ std::string reason(const Assessment& assessment, double mm) {
     if (fault.severity != Severity::note) names.push_back(fault.name);
   }
   if (!names.empty()) reasons.push_back("faults were found: " + joined(names));
+  const double shown =
+      *std::max_element(assessment.held_out_error_mm.begin(), assessment.held_out_error_mm.end());
+  if (mm <= mm_limit && mm > std::max(k_fine_mm, k_beyond_boards * shown))
+    reasons.push_back("the boards say little about the places between and beyond them");
   return reasons.empty() ? "" : "Why not better: " + joined(reasons) + ".";
 }
 

@@ -213,6 +213,19 @@ std::string devices_table(const Report& report) {
                rows);
 }
 
+std::string lenses_table(const Report& report) {
+  std::vector<std::vector<std::string>> rows;
+  for (const LensTrial& trial : report.lens_trials)
+    rows.push_back(
+        {trial.device, trial.model,
+         std::isfinite(trial.held_out_px) ? fmt::format("{:.3f}", trial.held_out_px) : "no solution",
+         trial.gain == 0 && trial.uncertainty == 0
+             ? ""
+             : fmt::format("{:+.0f} % (chance: {:.0f} %)", 100 * trial.gain, 100 * trial.uncertainty),
+         trial.chosen ? "chosen" : ""});
+  return table({"device", "lens model", "unseen poses px", "the richer one's gain", ""}, rows);
+}
+
 std::string trust_tables(const Report& report) {
   const Observations& observations = report.observed.observations;
   const auto score = [](const EpipolarScore& s) {
@@ -339,6 +352,7 @@ std::string report_html(const Report& report) {
   html += section("Each pose, foretold without it", poses_html(report));
   html += section("What each device saw, and what was left over", imagers_html(report));
   html += section("Devices", devices_table(report));
+  html += section("Lens models tried", lenses_table(report));
   html += section("Whether the figures can be believed", trust_tables(report));
   html += section("Known lengths, measured by light", lengths_table(report));
   html += section("Decoding", decode_table(report));

@@ -103,6 +103,9 @@ TEST(Advice, TheVerdictNamesProjectorPoseAndReason) {
   EXPECT_NE(words.find("more than 1 mm is not good"), std::string::npos) << words;
   judged.assessment.faults = {{"bent_board", "bent", "flatten it"}};
   EXPECT_NE(judged.words().verdict.find("faults were found: bent_board"), std::string::npos);
+  judged.assessment.predicted_error_mm = {0.8, 0.9};
+  judged.assessment.held_out_error_mm = {0.05, 0.05};
+  EXPECT_NE(judged.words().verdict.find("the boards say little"), std::string::npos);
   judged.assessment.verdict = Verdict::good;
   EXPECT_EQ(judged.words().verdict.find("Why not better"), std::string::npos);
   judged.assessment.predicted_error_mm[1] = std::numeric_limits<double>::infinity();

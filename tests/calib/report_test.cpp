@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
@@ -43,7 +44,10 @@ World noisy_world() {
 TEST(Report, ThePageIsSelfContainedAndSaysTheVerdictInWords) {
   Report report = reported(noisy_world(), test_folder(), "2026-11-21T10:00:00Z");
   report.assessment.faults = {{"odd <fault>", "a & b", "look \"here\""}};
+  report.lens_trials = {
+      {"camera0", "LENSMODEL_OPENCV8", std::numeric_limits<double>::quiet_NaN(), 0, 0, false}};
   const std::string html = report_html(report);
+  EXPECT_NE(html.find("LENSMODEL_OPENCV8"), std::string::npos);
   for (const char* outside : {"http", "<script", "src=", "@import", "url(", "<link"})
     EXPECT_EQ(html.find(outside), std::string::npos) << outside;
   EXPECT_NE(html.find("Predicted error"), std::string::npos)
