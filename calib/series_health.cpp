@@ -23,7 +23,9 @@ constexpr float k_least_texture = 4;  // levels a pixel, root mean square of a p
 constexpr float k_max_shift = 6;      // reduced pixels; further steps are lost
 constexpr int k_saturated = 254;
 constexpr double k_lit = 10;           // levels between bright and dark
+constexpr double k_lit_noise = 5;      // and times a sum's noise: one dark sample in thousands gets there
 constexpr double k_off = 0.25;         // of the contrast
+constexpr double k_off_noise = 4.5;    // and times a sum's noise
 constexpr double k_same = 0.08;        // mean difference of two pictures of one pattern, of the contrast
 constexpr double k_odd_group = 0.05;   // of samples that are off; motion at edges stays below
 constexpr double k_wrong_group = 0.5;  // likewise: no motion does that
@@ -39,16 +41,22 @@ double median(std::vector<float> values) {
 struct Samples {
   std::vector<cv::Mat> pictures;  // CV_32F, one row each
   std::vector<float> sum, range;
+  float noise = 0;  // of a pair's sum, standard deviation, levels
   size_t size() const { return sum.size(); }
   const float* of(int picture) const { return pictures[static_cast<size_t>(picture)].ptr<float>(); }
 };
 
 bool is_pair(const PatternGroup& group) { return group.count == 2; }
 
-Samples lit_samples(const std::vector<PatternGroup>& groups, const std::vector<cv::Mat>& all) {
-  Samples lit;
-  std::vector<int> places;
-  std::vector<float> sums;
+// What the pairs of each sample add up to, and how far apart a pair gets.
+struct PairSums {
+  std::vector<float> sum, range;
+  float noise = 0;  // standard deviation of one pair's sum, by the median over everything, lit or not
+};
+
+PairSums pair_sums(const std::vector<PatternGroup>& groups, const std::vector<cv::Mat>& all) {
+  PairSums pairs;
+  std::vector<float> sums, deviations;
   for (int at = 0; at < all[0].cols; ++at) {
     sums.clear();
     float range = 0;
@@ -59,10 +67,26 @@ Samples lit_samples(const std::vector<PatternGroup>& groups, const std::vector<c
       sums.push_back(static_cast<float>(a + b));
       range = std::max(range, static_cast<float>(std::abs(a - b)));
     }
-    if (range < k_lit) continue;
-    lit.sum.push_back(static_cast<float>(std::max(1.0, median(sums))));
-    lit.range.push_back(range);
-    places.push_back(at);
+    const auto middle = static_cast<float>(median(sums));
+    for (const float sum : sums) deviations.push_back(std::abs(sum - middle));
+    pairs.sum.push_back(middle);
+    pairs.range.push_back(range);
+  }
+  pairs.noise = static_cast<float>(1.4826 * median(std::move(deviations)));
+  return pairs;
+}
+
+Samples lit_samples(const std::vector<PatternGroup>& groups, const std::vector<cv::Mat>& all) {
+  const PairSums pairs = pair_sums(groups, all);
+  const double least = std::max(k_lit, k_lit_noise * pairs.noise);
+  Samples lit;
+  lit.noise = pairs.noise;
+  std::vector<int> places;
+  for (size_t at = 0; at < pairs.sum.size(); ++at) {
+    if (pairs.range[at] < least) continue;
+    lit.sum.push_back(std::max(1.0F, pairs.sum[at]));
+    lit.range.push_back(pairs.range[at]);
+    places.push_back(static_cast<int>(at));
   }
   for (const cv::Mat& picture : all) {
     cv::Mat row(1, static_cast<int>(places.size()), CV_32F);
@@ -89,7 +113,7 @@ GroupHealth health_of(const Samples& lit, const PatternGroup& group) {
     levels.push_back(sum / lit.sum[i]);
     contrast += high - low;
     range += lit.range[i];
-    off += std::abs(sum - lit.sum[i]) > k_off * lit.range[i] ? 1 : 0;
+    off += std::abs(sum - lit.sum[i]) > std::max(k_off * lit.range[i], k_off_noise * lit.noise) ? 1 : 0;
   }
   health.level = median(levels);
   health.contrast = contrast / range;

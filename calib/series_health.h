@@ -16,7 +16,8 @@ struct GroupHealth {
   int count = 2;        ///< pictures in it
   double level = 1;     ///< median of its sum over what the sum should be: moves with exposure and room light
   double contrast = 0;  ///< mean of |picture - inverse| as a share of the full contrast; blur lowers it
-  double off = 0;       ///< share of samples whose sum is wrong by more than a quarter of their contrast
+  double off =
+      0;  ///< share of samples whose sum is wrong by over a quarter of their contrast and by no noise
 };
 
 /// A picture that does not show what its place in the series says. File name and finding make a sentence:
