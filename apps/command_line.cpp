@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "apps/align.h"
+#include "apps/bench.h"
 #include "apps/capture.h"
 #include "apps/demo.h"
 #include "apps/detect.h"
@@ -79,6 +80,20 @@ void add_detect(CLI::App& app, Run& run) {
   command->add_option("--repeat", options->repeat, "also time: median ms over N detections in memory")
       ->check(CLI::Range(0, 1000000));
   command->callback([options, &run] { run = [options] { return finished(run_detect(*options)); }; });
+}
+
+void add_bench(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("bench", "tables of accuracy and time beside other programs");
+  command->footer(
+      "tracker: generated frames with exact truth; libapriltag and OpenCV aruco on the same frames.\n"
+      "Example: limn bench tracker --frames 4 --detail");
+  auto options = std::make_shared<BenchOptions>();
+  command->add_option("name", options->name, "tracker or calib; what follows it goes to the bench")->required();
+  command->prefix_command();
+  command->callback([command, options, &run] {
+    options->arguments = command->remaining();
+    run = [options] { return finished(run_bench(*options)); };
+  });
 }
 
 void add_capture(CLI::App& app, Run& run) {
@@ -251,6 +266,7 @@ int run_command_line(int argc, char** argv) {
   // In the order of a session: add_NAME(app, run).
   add_markers(app, run);
   add_detect(app, run);
+  add_bench(app, run);
   add_demo(app, run);
   add_patterns(app, run);
   add_capture(app, run);

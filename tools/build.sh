@@ -51,7 +51,7 @@ build() {
   local target="$1" folder="$root/build/release" stamp="$root/build/release/.built-$1"
   local sources=(CMakeLists.txt CMakePresets.json packages.txt tools core scene device calib tracker projector shaders
     sim apps)
-  [ "$target" = all ] && sources+=(tests)
+  case "$target" in all | *_bench) sources+=(tests) ;; esac
   if [ -e "$stamp" ] && [ -z "$(cd "$root" && find "${sources[@]}" -newer "$stamp" -print -quit)" ]; then
     return 0
   fi

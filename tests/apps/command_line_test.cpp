@@ -311,5 +311,11 @@ TEST_F(CommandLine, ConfigsWithAnyValueSpoiledNeverCrash) {
   }
 }
 
+TEST_F(CommandLine, BenchNamesTheBenchesThereAre) { expect({"bench", "tracking"}, 2, {"tracking", "tracker or calib"}); }
+
+TEST_F(CommandLine, BenchSaysWhichProgramIsMissing) {  // none stands beside the test's own
+  expect({"bench", "tracker", "--frames", "1"}, 1, {"tests/bench/tracker_bench", "libapriltag-dev"});
+}
+
 }  // namespace
 }  // namespace limn::apps

@@ -1,202 +1,354 @@
-// Ours beside libapriltag (decimate 1) and OpenCV aruco, one thread each, on the same cluttered pictures with
-// exact truth: time and accuracy in one table. tracker_bench [PICTURES]
+// Ours beside libapriltag (quad_decimate 1 and 2) and OpenCV aruco on the same frames with exact truth.
+// tracker_bench [--frames N] [--seed S] [--only TEXT] [--detail] [--ours] [--save FOLDER] [--photos FOLDER]
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <functional>
+#include <filesystem>
+#include <fstream>
 #include <map>
-#include <opencv2/aruco.hpp>
+#include <numbers>
 #include <opencv2/core/utility.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
-#include "tests/tracker/marker_pictures.h"
+#include "core/picture.h"
+#include "tests/bench/tracker_frames.h"
+#include "tests/bench/tracker_peers.h"
 #include "tracker/detector.h"
-
-extern "C" {
-#include <apriltag/apriltag.h>
-#include <apriltag/tag36h11.h>
-}
+#include "tracker/marker_pose.h"
 
 namespace {
 
 using namespace limn;
-using limn::test::PlacedMarker;
+using test::Condition;
+using test::Found;
+using test::Peer;
+using test::TrackerFrame;
+using test::TrueMarker;
 
-struct Found {
-  int id;
-  std::array<Eigen::Vector2d, 4> corners;
+struct Options {
+  int frames = 4;
+  std::uint64_t seed = 2026;  // kept for reports: development uses another
+  std::string only;
+  bool detail = false;
+  bool ours_alone = false;
+  std::filesystem::path save, photographs;
 };
-using Detect = std::function<std::vector<Found>(const cv::Mat&)>;
 
 struct Tally {
-  std::vector<double> ms;
-  int markers = 0, hits = 0, wrong = 0, corners = 0;
-  double squares = 0;
-};
+  int markers = 0, found = 0, wrong = 0, flips = 0, poses = 0;
+  double squares = 0;  // px^2, of corners
+  double outward = 0;  // px, away from the marker's centre
+  Eigen::Vector2d offset = Eigen::Vector2d::Zero();
+  double pulls = 0;  // mean of both coordinates' squares, of corners that nothing covers
+  int open_corners = 0;
+  std::vector<double> turn_deg, shift_mm;  // pose errors
 
-struct Scene {
-  cv::Mat grey;
-  std::vector<std::pair<int, std::array<Eigen::Vector2d, 4>>> truth;
-};
-
-Scene cluttered(int width, int height, std::mt19937_64& rng) {
-  const Lens lens = Lens::pinhole(width, width, (width - 1) / 2.0, (height - 1) / 2.0);
-  const auto uniform = [&](double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(rng);
-  };
-  Scene scene;
-  std::vector<PlacedMarker> markers;
-  constexpr int k_columns = 4, k_rows = 3;
-  for (int i = 0; i < k_columns * k_rows; ++i) {
-    const int id = std::uniform_int_distribution<int>(0, 586)(rng);
-    const Eigen::Vector2d px((i % k_columns + 0.5) * width / k_columns,
-                             (i / k_columns + 0.5) * height / k_rows);
-    markers.push_back(test::placed(lens, {"apriltag_36h11", std::to_string(id)},
-                                   px + Eigen::Vector2d(uniform(-30, 30), uniform(-30, 30)), uniform(32, 120),
-                                   uniform(0, 6.28), uniform(0, 1.2), uniform(0, 6.28)));
-    scene.truth.emplace_back(id, test::true_corners(lens, markers.back()));
+  int corners() const { return std::max(1, 4 * found); }
+  void add(const Tally& t) {
+    markers += t.markers, found += t.found, wrong += t.wrong, flips += t.flips, poses += t.poses;
+    squares += t.squares, outward += t.outward, offset += t.offset, pulls += t.pulls;
+    open_corners += t.open_corners;
+    turn_deg.insert(turn_deg.end(), t.turn_deg.begin(), t.turn_deg.end());
+    shift_mm.insert(shift_mm.end(), t.shift_mm.begin(), t.shift_mm.end());
   }
-  test::PictureOptions options;
-  options.blur_px = 0.5;
-  options.noise_levels = 2;
-  scene.grey = test::picture_of(lens, test::clutter(width, height, rng), markers, options, rng);
-  return scene;
+  double recall() const { return static_cast<double>(found) / std::max(1, markers); }
+  double rms() const { return std::sqrt(squares / corners()); }
+  double pull() const { return std::sqrt(pulls / std::max(1, open_corners)); }
+};
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
+                   values.end());
+  return values[values.size() / 2];
 }
 
-// Distance of the best assignment of the four corners that keeps their cyclic order: families turn their
-// markers differently.
-double corner_squares(const Found& found, const std::array<Eigen::Vector2d, 4>& truth) {
-  double best = 1e18;
+// The found corners in the truth's order: the cyclic one, in either direction, that lies nearest. Families
+// turn their markers differently.
+Found in_order(const Found& found, const TrueMarker& truth) {
+  Found best = found;
+  double least = 1e18;
   for (std::size_t turn = 0; turn < 4; ++turn)
     for (const bool reversed : {false, true}) {
+      Found turned = found;
       double sum = 0;
-      for (std::size_t i = 0; i < 4; ++i)
-        sum += (found.corners[reversed ? (turn + 4 - i) % 4 : (turn + i) % 4] - truth[i]).squaredNorm();
-      best = std::min(best, sum);
+      for (std::size_t i = 0; i < 4; ++i) {
+        const std::size_t k = reversed ? (turn + 4 - i) % 4 : (turn + i) % 4;
+        turned.corners_px[i] = found.corners_px[k];
+        turned.covariance[i] = found.covariance[k];
+        sum += (turned.corners_px[i] - truth.corners_px[i]).squaredNorm();
+      }
+      if (sum < least) {
+        least = sum;
+        best = turned;
+      }
     }
   return best;
 }
 
-void judge(const std::vector<Found>& found, const Scene& scene, Tally* tally) {
-  std::vector<bool> taken(scene.truth.size(), false);
-  tally->markers += static_cast<int>(scene.truth.size());
-  for (const Found& f : found) {
+double angle_between(const Pose& a, const Pose& b) {
+  return Eigen::AngleAxisd(a.rotation_matrix().transpose() * b.rotation_matrix()).angle();
+}
+
+void judge_pose(const Found& found, const TrueMarker& truth, const TrackerFrame& frame, Tally* tally) {
+  const auto poses =
+      tracker::marker_poses(frame.lens, frame.marker_size_m, found.corners_px, found.covariance);
+  if (poses.empty()) return;
+  ++tally->poses;
+  std::vector<double> turns;
+  for (const auto& pose : poses)
+    turns.push_back(angle_between(pose.camera_from_marker, truth.camera_from_marker));
+  const std::size_t nearest =
+      static_cast<std::size_t>(std::min_element(turns.begin(), turns.end()) - turns.begin());
+  tally->flips += nearest != 0;
+  tally->turn_deg.push_back(turns[nearest] * 180 / std::numbers::pi);
+  tally->shift_mm.push_back(
+      1000 * (poses[nearest].camera_from_marker.translation - truth.camera_from_marker.translation).norm());
+}
+
+void judge_marker(const Found& found, const TrueMarker& truth, const TrackerFrame& frame, Tally* tally) {
+  const auto& c = truth.corners_px;
+  const Eigen::Vector2d centre = 0.25 * (c[0] + c[1] + c[2] + c[3]);
+  ++tally->found;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Eigen::Vector2d e = found.corners_px[i] - c[i];
+    tally->squares += e.squaredNorm();
+    tally->outward += e.dot((c[i] - centre).normalized());
+    tally->offset += e;
+    if (truth.corner_covered[i]) continue;
+    ++tally->open_corners;
+    tally->pulls += 0.5 * e.dot(found.covariance[i].inverse() * e);
+  }
+  judge_pose(found, truth, frame, tally);
+}
+
+Tally judged(const std::vector<Found>& list, const TrackerFrame& frame) {
+  Tally tally;
+  tally.markers = static_cast<int>(frame.markers.size());
+  std::vector<bool> taken(frame.markers.size(), false);
+  for (const Found& raw : list) {
     bool hit = false;
-    for (std::size_t i = 0; i < scene.truth.size() && !hit; ++i) {
-      const double squares = corner_squares(f, scene.truth[i].second);
-      if (taken[i] || scene.truth[i].first != f.id || squares > 4 * 25) continue;
+    for (std::size_t i = 0; i < frame.markers.size() && !hit; ++i) {
+      const TrueMarker& truth = frame.markers[i];
+      if (taken[i] || truth.marker != raw.marker) continue;
+      const Found found = in_order(raw, truth);
+      const double side = (truth.corners_px[0] - truth.corners_px[2]).norm();
+      const double worst = (found.corners_px[0] - truth.corners_px[0]).norm();
+      if (worst > 0.5 * side) continue;
       hit = taken[i] = true;
-      ++tally->hits;
-      tally->corners += 4;
-      tally->squares += squares;
+      judge_marker(found, truth, frame, &tally);
     }
-    tally->wrong += !hit;
+    tally.wrong += !hit;
+  }
+  return tally;
+}
+
+// ---- accuracy ----
+
+using Row = std::vector<Tally>;  // one a peer
+
+void print_rows(const std::vector<Peer>& peers, const std::vector<std::pair<std::string, Row>>& rows) {
+  fmt::print("\n  {:<40}{:>8}", "recall / corner RMS px / wrong", "markers");
+  for (const Peer& peer : peers) fmt::print("{:>22}", peer.name);
+  fmt::print("\n");
+  for (const auto& [name, row] : rows) {
+    fmt::print("  {:<40}{:>8}", name, row[0].markers);
+    for (const Tally& t : row) fmt::print("{:>8.3f}{:>8.3f}{:>6}", t.recall(), t.rms(), t.wrong);
+    fmt::print("\n");
   }
 }
 
-void run(const std::string& name,
-         const Detect& detect,
-         const Scene& scene,
-         std::map<std::string, Tally>* tallies) {
-  Tally& tally = (*tallies)[name];
-  std::vector<Found> found = detect(scene.grey);  // warm
+void print_ours(const std::vector<std::pair<std::string, Row>>& rows) {
+  fmt::print("\n  {:<40}{:>9}{:>9}{:>7}{:>10}{:>10}{:>8}\n", "limn alone", "offset", "outward", "pull",
+             "turn deg", "shift mm", "flips");
+  for (const auto& [name, row] : rows) {
+    const Tally& t = row[0];
+    fmt::print("  {:<40}{:>9.3f}{:>9.3f}{:>7.2f}{:>10.3f}{:>10.3f}{:>7.1f}%\n", name,
+               t.offset.norm() / t.corners(), t.outward / t.corners(), t.pull(), median(t.turn_deg),
+               median(t.shift_mm), 100.0 * t.flips / std::max(1, t.poses));
+  }
+}
+
+void save_frame(const Options& options,
+                const Condition& condition,
+                int number,
+                const TrackerFrame& frame,
+                const Tally& tally) {
+  if (options.save.empty()) return;
+  std::string name = condition.group + " " + condition.name;
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return !std::isalnum(static_cast<unsigned char>(c)); }, '_');
+  std::filesystem::create_directories(options.save);
+  const auto path = options.save / fmt::format("{}_{}_{}of{}.png", name, number, tally.found, tally.markers);
+  cv::imwrite(path.string(), frame.grey);
+}
+
+void bench_accuracy(const Options& options) {
+  const auto families = test::tracker_frame_families();
+  std::vector<Peer> peers = {test::limn_peer(families, 1)};
+  if (!options.ours_alone) {
+    peers.push_back(test::apriltag_peer(families, 1, 1));
+    peers.push_back(test::apriltag_peer(families, 2, 1));
+    peers.push_back(test::opencv_peer(families));
+  }
+  std::vector<std::pair<std::string, Row>> conditions, groups;
+  Row all(peers.size());
+  for (const Condition& condition : test::tracker_conditions()) {
+    const std::string name = condition.group + ": " + condition.name;
+    if (name.find(options.only) == std::string::npos) continue;
+    Row row(peers.size());
+    for (int i = 0; i < options.frames; ++i) {
+      const TrackerFrame frame = test::tracker_frame(condition, options.seed, i);
+      for (std::size_t p = 0; p < peers.size(); ++p) {
+        // The lens goes to ours only where it bends: the others take none.
+        const Tally tally =
+            judged(peers[p].detect(frame.grey, condition.bent_lens ? &frame.lens : nullptr), frame);
+        if (p == 0) save_frame(options, condition, i, frame, tally);
+        row[p].add(tally);
+      }
+    }
+    if (groups.empty() || groups.back().first != condition.group)
+      groups.emplace_back(condition.group, Row(peers.size()));
+    for (std::size_t p = 0; p < peers.size(); ++p) {
+      groups.back().second[p].add(row[p]);
+      all[p].add(row[p]);
+    }
+    conditions.emplace_back(name, std::move(row));
+  }
+  groups.emplace_back("all", std::move(all));
+  if (options.detail) print_rows(peers, conditions);
+  print_rows(peers, groups);
+  print_ours(options.detail ? conditions : groups);
+}
+
+// ---- time ----
+
+double median_ms(const Peer& peer, const cv::Mat& grey) {
+  peer.detect(grey, nullptr);  // warm
   std::vector<double> ms;
   for (int i = 0; i < 3; ++i) {
     const auto started = std::chrono::steady_clock::now();
-    found = detect(scene.grey);
+    peer.detect(grey, nullptr);
     ms.push_back(
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - started).count());
   }
-  std::sort(ms.begin(), ms.end());
-  tally.ms.push_back(ms[1]);
-  judge(found, scene, &tally);
+  return median(ms);
 }
 
-Detect ours() {
-  auto detector = std::make_shared<tracker::Detector>(
-      tracker::Families::load(std::vector<std::string>{"apriltag_36h11"}).value());
-  return [detector](const cv::Mat& grey) {
-    std::vector<Found> found;
-    for (const auto& d : detector->detect(grey)) found.push_back({std::stoi(d.marker.id), d.corners_px});
-    return found;
-  };
-}
-
-Detect apriltag() {
-  std::shared_ptr<apriltag_family_t> family(tag36h11_create(), tag36h11_destroy);
-  std::shared_ptr<apriltag_detector_t> detector(apriltag_detector_create(), apriltag_detector_destroy);
-  apriltag_detector_add_family_bits(detector.get(), family.get(), 2);
-  detector->quad_decimate = 1;
-  detector->nthreads = 1;
-  return [family, detector](const cv::Mat& grey) {
-    image_u8_t picture = {grey.cols, grey.rows, static_cast<int>(grey.step[0]), grey.data};
-    zarray_t* list = apriltag_detector_detect(detector.get(), &picture);
-    std::vector<Found> found;
-    for (int i = 0; i < zarray_size(list); ++i) {
-      apriltag_detection_t* d = nullptr;
-      zarray_get(list, i, &d);
-      Found f{d->id, {}};
-      // Its pixel centres lie at halves.
-      for (int k = 0; k < 4; ++k)
-        f.corners[static_cast<std::size_t>(k)] = {d->p[k][0] - 0.5, d->p[k][1] - 0.5};
-      found.push_back(f);
+void bench_time(const Options& options) {
+  const std::vector<std::string> family = {"apriltag_36h11"};
+  fmt::print("\n  {:<40}{:>8}{:>10}{:>10}{:>10}{:>10}\n", "clutter, 12 markers 32-120 px", "threads", "ms",
+             "x limn", "recall", "RMS px");
+  for (const auto& [width, height] : {std::pair{1280, 720}, std::pair{1920, 1080}})
+    for (const int threads : {1, 2}) {
+      cv::setNumThreads(threads);
+      std::vector<Peer> peers = {test::limn_peer(family, threads)};
+      if (!options.ours_alone) {
+        peers.push_back(test::apriltag_peer(family, 1, threads));
+        peers.push_back(test::apriltag_peer(family, 2, threads));
+        peers.push_back(test::opencv_peer(family));
+      }
+      std::vector<std::vector<double>> ms(peers.size());
+      Row row(peers.size());
+      for (int i = 0; i < std::max(3, options.frames); ++i) {
+        const TrackerFrame frame =
+            test::cluttered_frame(width, height, 1000 * options.seed + static_cast<std::uint64_t>(i));
+        for (std::size_t p = 0; p < peers.size(); ++p) {
+          ms[p].push_back(median_ms(peers[p], frame.grey));
+          row[p].add(judged(peers[p].detect(frame.grey, nullptr), frame));
+        }
+      }
+      for (std::size_t p = 0; p < peers.size(); ++p)
+        fmt::print("  {:<40}{:>8}{:>10.2f}{:>10.1f}{:>10.3f}{:>10.3f}\n",
+                   fmt::format("{}x{} {}", width, height, peers[p].name), threads, median(ms[p]),
+                   median(ms[p]) / median(ms[0]), row[p].recall(), row[p].rms());
     }
-    apriltag_detections_destroy(list);
-    return found;
-  };
+  cv::setNumThreads(1);
 }
 
-Detect opencv() {
-  const auto dictionary = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_APRILTAG_36h11);
-  const auto parameters = cv::aruco::DetectorParameters::create();
-  parameters->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
-  return [dictionary, parameters](const cv::Mat& grey) {
-    std::vector<std::vector<cv::Point2f>> corners;
-    std::vector<int> ids;
-    cv::aruco::detectMarkers(grey, dictionary, corners, ids, parameters);
-    std::vector<Found> found;
-    for (std::size_t i = 0; i < ids.size(); ++i) {
-      Found f{ids[i], {}};
-      for (std::size_t k = 0; k < 4; ++k) f.corners[k] = {corners[i][k].x, corners[i][k].y};
-      found.push_back(f);
-    }
-    return found;
-  };
+// ---- photographs with whole-pixel lists (the OpenCV ones) ----
+
+void add_distances(const std::filesystem::path& csv, const std::string& family, std::vector<double>* all) {
+  std::ifstream stream(csv);
+  std::string line;
+  std::getline(stream, line);
+  std::vector<tracker::Detection> found;
+  while (std::getline(stream, line)) {
+    std::istringstream cells(line);
+    std::string file, id, x, y;
+    std::getline(cells, file, ',');
+    std::getline(cells, id, ',');
+    if (found.empty())
+      found = tracker::Detector(tracker::Families::load(std::vector{family}).value())
+                  .detect(read_grey_picture(csv.parent_path() / file).value());
+    const auto hit =
+        std::find_if(found.begin(), found.end(), [&](const auto& d) { return d.marker.id == id; });
+    for (std::size_t k = 0; k < 4 && std::getline(cells, x, ',') && std::getline(cells, y, ','); ++k)
+      if (hit != found.end())
+        all->push_back((hit->corners_px[k] - Eigen::Vector2d(std::stod(x), std::stod(y))).norm());
+  }
 }
 
-void print_table(const std::string& title, std::map<std::string, Tally>& tallies) {
-  const auto median = [](std::vector<double> v) {
-    std::sort(v.begin(), v.end());
-    return v[v.size() / 2];
-  };
-  const double mine = median(tallies["limn"].ms);
-  fmt::print("{}\n  {:<24}{:>9}{:>8}{:>9}{:>12}{:>7}\n", title, "", "ms", "ratio", "recall", "corner px",
-             "wrong");
-  for (const auto& [name, tally] : tallies)
-    fmt::print("  {:<24}{:>9.2f}{:>8.1f}{:>9.3f}{:>12.3f}{:>7}\n", name, median(tally.ms),
-               median(tally.ms) / mine, static_cast<double>(tally.hits) / tally.markers,
-               std::sqrt(tally.squares / std::max(1, tally.corners)), tally.wrong);
+void bench_photographs(const std::filesystem::path& folder) {
+  std::vector<double> all;
+  for (const char* csv : {"opencv_singlemarkers_6x6_250.csv", "opencv_choriginal_6x6_250.csv",
+                          "opencv_chocclusion_6x6_250.csv"})
+    add_distances(folder / csv, "aruco_6x6_250", &all);
+  add_distances(folder / "opencv_gboriginal_tutorialdict.csv",
+                "aruco:" + (folder / "tutorial_dict.yml").string(), &all);
+  std::sort(all.begin(), all.end());
+  fmt::print("\n  {} corners of photographs, px from whole-pixel lists:", all.size());
+  for (const std::size_t percent : {10, 50, 75, 90, 95, 99, 100})
+    if (!all.empty())
+      fmt::print("  {}%: {:.3f}", percent, all[std::min(all.size() - 1, all.size() * percent / 100)]);
+  fmt::print("\n");
+}
+
+std::optional<Options> parsed(int argc, char** argv) {
+  Options options;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const bool more = i + 1 < argc;
+    if (word == "--detail")
+      options.detail = true;
+    else if (word == "--ours")
+      options.ours_alone = true;
+    else if (word == "--frames" && more)
+      options.frames = std::max(0, std::atoi(argv[++i]));
+    else if (word == "--seed" && more)
+      options.seed = static_cast<std::uint64_t>(std::atoll(argv[++i]));
+    else if (word == "--only" && more)
+      options.only = argv[++i];
+    else if (word == "--save" && more)
+      options.save = argv[++i];
+    else if (word == "--photos" && more)
+      options.photographs = argv[++i];
+    else
+      return std::nullopt;
+  }
+  return options;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   cv::setNumThreads(1);
-  const int pictures = argc > 1 ? std::max(1, std::atoi(argv[1])) : 6;
-  const std::map<std::string, Detect> peers = {
-      {"limn", ours()}, {"libapriltag decimate 1", apriltag()}, {"OpenCV aruco SUBPIX", opencv()}};
-  for (const auto& [width, height] : {std::pair{1920, 1080}, std::pair{1280, 720}}) {
-    std::mt19937_64 rng(static_cast<std::uint64_t>(width));
-    std::map<std::string, Tally> tallies;
-    for (int i = 0; i < pictures; ++i) {
-      const Scene scene = cluttered(width, height, rng);
-      for (const auto& [name, detect] : peers) run(name, detect, scene, &tallies);
-    }
-    print_table(fmt::format("{} cluttered pictures {}x{}, 12 markers 32-120 px, tilt up to 69 degrees",
-                            pictures, width, height),
-                tallies);
+  const auto options = parsed(argc, argv);
+  if (!options) {
+    fmt::print(stderr,
+               "tracker_bench [--frames N (4)] [--seed S] [--only TEXT of a condition] [--detail] [--ours: "
+               "no peers] "
+               "[--save FOLDER for the frames] [--photos FOLDER of OpenCV's photographs]\n");
+    return 2;
   }
+  if (options->frames > 0) bench_accuracy(*options);
+  if (options->only.empty()) bench_time(*options);
+  if (!options->photographs.empty()) bench_photographs(options->photographs);
 }

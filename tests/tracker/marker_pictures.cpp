@@ -36,6 +36,21 @@ struct MarkerPlane {
   }
 };
 
+// A rolling shutter's shear of the picture about a marker's centre.
+struct RowMotion {
+  Eigen::Vector2d px_a_row;
+  double centre_row;
+  RowMotion(const Lens& lens, const PlacedMarker& placed)
+      : px_a_row(placed.row_motion),
+        centre_row(lens.project(placed.camera_from_marker.translation).value().y()) {}
+  Eigen::Vector2d still(const Eigen::Vector2d& seen) const {
+    return seen - (seen.y() - centre_row) * px_a_row;
+  }
+  Eigen::Vector2d seen(const Eigen::Vector2d& still) const {
+    return still + (still.y() - centre_row) / (1 - px_a_row.y()) * px_a_row;
+  }
+};
+
 // 1 white, 0 black, nullopt beside the paper.
 std::optional<double> ink(const cv::Mat& cells, double margin, const Eigen::Vector2d& p) {
   if (p.minCoeff() < -margin || p.maxCoeff() > 1 + margin) return std::nullopt;
@@ -77,8 +92,10 @@ class MarkerPainter {
 
   void paint(cv::Mat& picture, std::mt19937_64& rng) const {
     const cv::Rect box = bounds(lens_, placed_, picture.size());
-    for (int y = box.y; y < box.y + box.height; ++y)
-      for (int x = box.x; x < box.x + box.width; ++x) paint_pixel(picture.at<float>(y, x), x, y, rng);
+    const cv::Mat directions = directions_of(box);
+    for (int y = 0; y < box.height; ++y)
+      for (int x = 0; x < box.width; ++x)
+        paint_pixel(picture.at<float>(box.y + y, box.x + x), directions, x + 1, y + 1, rng);
   }
 
  private:
@@ -88,15 +105,28 @@ class MarkerPainter {
   const PictureOptions& options_;
   cv::Mat cells_;
 
+  // Of the box's pixels and of a frame of one pixel around it; zero where the lens has none.
+  cv::Mat directions_of(const cv::Rect& box) const {
+    cv::Mat directions(box.height + 2, box.width + 2, CV_64FC3);
+    const RowMotion motion(lens_, placed_);
+    for (int y = 0; y < directions.rows; ++y)
+      for (int x = 0; x < directions.cols; ++x) {
+        const auto d = lens_.unproject(motion.still({box.x + x - 1, box.y + y - 1}));
+        directions.at<cv::Vec3d>(y, x) = d ? cv::Vec3d(d->x(), d->y(), d->z()) : cv::Vec3d();
+      }
+    return directions;
+  }
+
+  static Eigen::Vector3d direction(const cv::Mat& directions, int x, int y) {
+    const cv::Vec3d& d = directions.at<cv::Vec3d>(y, x);
+    return {d[0], d[1], d[2]};
+  }
+
   // Directions are linear over a pixel to far better than 1e-4 of it.
-  void paint_pixel(float& pixel, int x, int y, std::mt19937_64& rng) const {
-    const Eigen::Vector2d px(x, y);
-    const auto centre = lens_.unproject(px);
-    const auto right = lens_.unproject(px + Eigen::Vector2d(0.5, 0));
-    const auto below = lens_.unproject(px + Eigen::Vector2d(0, 0.5));
-    if (!centre || !right || !below) return;
-    const Eigen::Vector3d du = 2 * (*right - *centre);
-    const Eigen::Vector3d dv = 2 * (*below - *centre);
+  void paint_pixel(float& pixel, const cv::Mat& directions, int x, int y, std::mt19937_64& rng) const {
+    const Eigen::Vector3d centre = direction(directions, x, y);
+    const Eigen::Vector3d du = 0.5 * (direction(directions, x + 1, y) - direction(directions, x - 1, y));
+    const Eigen::Vector3d dv = 0.5 * (direction(directions, x, y + 1) - direction(directions, x, y - 1));
     std::uniform_real_distribution<double> phase(0, 1);
     const double u0 = phase(rng);
     const double v0 = phase(rng);
@@ -108,7 +138,7 @@ class MarkerPainter {
       // R2 sequence (Roberts 2018): additive recurrence with the plastic number.
       const double u = std::fmod(u0 + i * 0.7548776662466927, 1.0) - 0.5;
       const double v = std::fmod(v0 + i * 0.5698402909980532, 1.0) - 0.5;
-      const auto p = plane_.at(*centre + u * du + v * dv);
+      const auto p = plane_.at(centre + u * du + v * dv);
       const auto white = p ? ink(cells_, placed_.margin, *p) : std::nullopt;
       const double level = white ? options_.black + *white * (options_.white - options_.black) : pixel;
       if (i == 0) first = level;
@@ -134,7 +164,9 @@ std::array<Eigen::Vector2d, 4> true_corners(const Lens& lens, const PlacedMarker
   const std::array<Eigen::Vector3d, 4> corners = {Eigen::Vector3d(-h, -h, 0), Eigen::Vector3d(h, -h, 0),
                                                   Eigen::Vector3d(h, h, 0), Eigen::Vector3d(-h, h, 0)};
   std::array<Eigen::Vector2d, 4> px;
-  for (std::size_t i = 0; i < 4; ++i) px[i] = lens.project(placed.camera_from_marker * corners[i]).value();
+  const RowMotion motion(lens, placed);
+  for (std::size_t i = 0; i < 4; ++i)
+    px[i] = motion.seen(lens.project(placed.camera_from_marker * corners[i]).value());
   return px;
 }
 
@@ -155,23 +187,37 @@ PlacedMarker placed(const Lens& lens,
   return result;
 }
 
+cv::Mat light_of(const Lens& lens,
+                 const cv::Mat& background,
+                 std::span<const PlacedMarker> markers,
+                 const PictureOptions& options,
+                 std::mt19937_64& rng) {
+  cv::Mat light;
+  background.convertTo(light, CV_32F);
+  for (const PlacedMarker& marker : markers) MarkerPainter(lens, marker, options).paint(light, rng);
+  return light;
+}
+
+cv::Mat noisy_grey(const cv::Mat& light, double noise_levels, std::mt19937_64& rng) {
+  cv::Mat noisy = light.clone();
+  if (noise_levels > 0) {
+    std::normal_distribution<float> noise(0, static_cast<float>(noise_levels));
+    for (int y = 0; y < noisy.rows; ++y)
+      for (int x = 0; x < noisy.cols; ++x) noisy.at<float>(y, x) += noise(rng);
+  }
+  cv::Mat grey;
+  noisy.convertTo(grey, CV_8U);  // rounds and saturates
+  return grey;
+}
+
 cv::Mat picture_of(const Lens& lens,
                    const cv::Mat& background,
                    std::span<const PlacedMarker> markers,
                    const PictureOptions& options,
                    std::mt19937_64& rng) {
-  cv::Mat picture;
-  background.convertTo(picture, CV_32F);
-  for (const PlacedMarker& marker : markers) MarkerPainter(lens, marker, options).paint(picture, rng);
-  if (options.blur_px > 0) cv::GaussianBlur(picture, picture, {0, 0}, options.blur_px);
-  if (options.noise_levels > 0) {
-    std::normal_distribution<float> noise(0, static_cast<float>(options.noise_levels));
-    for (int y = 0; y < picture.rows; ++y)
-      for (int x = 0; x < picture.cols; ++x) picture.at<float>(y, x) += noise(rng);
-  }
-  cv::Mat grey;
-  picture.convertTo(grey, CV_8U);  // rounds and saturates
-  return grey;
+  cv::Mat light = light_of(lens, background, markers, options, rng);
+  if (options.blur_px > 0) cv::GaussianBlur(light, light, {0, 0}, options.blur_px);
+  return noisy_grey(light, options.noise_levels, rng);
 }
 
 cv::Mat plain(int width, int height, int grey) { return cv::Mat(height, width, CV_8UC1, cv::Scalar(grey)); }

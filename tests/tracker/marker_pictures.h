@@ -22,6 +22,8 @@ struct PlacedMarker {
   /// How far its upper and lower sides' middles lie below their chords, as share of its side: paper around a
   /// cylinder, seen along the cylinder's axis from above. The corners stay where they are.
   double bow = 0;
+  /// Rolling shutter: px by which the picture moves from one row to the next, still at the centre's row.
+  Eigen::Vector2d row_motion = Eigen::Vector2d::Zero();
 };
 
 struct PictureOptions {
@@ -31,9 +33,20 @@ struct PictureOptions {
   double noise_levels = 0;  ///< standard deviation per pixel
 };
 
-/// Pictures of markers with exact truth: every pixel is the mean over its area (coverage by low-discrepancy
-/// samples, as many as an edge needs), through the true lens; pixel centres at integers. `background` (8-bit
-/// grey) is what is seen beside the papers; later markers cover earlier ones.
+/// The light of markers with exact truth, in grey levels, before blur and noise (CV_32FC1): every pixel is
+/// the mean over its area (coverage by low-discrepancy samples, as many as an edge needs), through the true
+/// lens; pixel centres at integers. `background` (8-bit grey) is what is seen beside the papers; later
+/// markers cover earlier ones.
+cv::Mat light_of(const Lens& lens,
+                 const cv::Mat& background,
+                 std::span<const PlacedMarker> markers,
+                 const PictureOptions& options,
+                 std::mt19937_64& rng);
+
+/// Adds the noise, rounds and saturates.
+cv::Mat noisy_grey(const cv::Mat& light, double noise_levels, std::mt19937_64& rng);
+
+/// The camera's picture of it all: light, blur, noise.
 cv::Mat picture_of(const Lens& lens,
                    const cv::Mat& background,
                    std::span<const PlacedMarker> markers,

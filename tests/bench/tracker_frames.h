@@ -1,0 +1,67 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <vector>
+
+#include "core/lens.h"
+#include "tests/tracker/marker_pictures.h"
+
+namespace limn::test {
+
+enum class Light { even, gradient, steep_gradient, slats, projected };
+enum class Cover { none, corner, edge, bite };
+
+struct Range {
+  double low = 0, high = 0;
+};
+
+/// What one series of frames has in common. Everything is drawn evenly from its range.
+struct Condition {
+  std::string group, name;
+  Range side_px = {60, 120};
+  Range tilt_deg = {0, 50};
+  Range blur_px = {0.4, 0.4};  ///< sigma of a Gaussian after the pixels' own area
+  double motion_px = 0;        ///< length of a straight even motion during the exposure, in any direction
+  double black = 30, white = 210;
+  Light light = Light::even;
+  double margin = 0.125;   ///< white paper around the marker, as share of its side
+  bool dark_card = false;  ///< the paper lies on a dark square card, the card on light ground
+  Cover cover = Cover::none;
+  double cover_share = 0;    ///< width of what covers, as share of the side
+  double bow = 0;            ///< bent paper, as PlacedMarker::bow
+  double row_motion_px = 0;  ///< rolling shutter: motion over 1000 rows, in any direction
+  bool bent_lens = false;
+  int jpeg_quality = 0;  ///< 0: none
+};
+
+/// The conditions of the tracker's benchmark, ordered by group.
+std::vector<Condition> tracker_conditions();
+
+struct TrueMarker {
+  MarkerName marker;
+  std::array<Eigen::Vector2d, 4> corners_px;
+  std::array<bool, 4> corner_covered{};
+  Pose camera_from_marker;
+};
+
+/// A picture and what is in it.
+struct TrackerFrame {
+  cv::Mat grey;
+  Lens lens;
+  double marker_size_m = 0;
+  std::vector<TrueMarker> markers;
+};
+
+/// The markers of all frames come from these families, in turn.
+std::vector<std::string> tracker_frame_families();
+
+/// 1280x960 pixels, 12 markers. Every other frame's background is cluttered. The same for the same numbers.
+TrackerFrame tracker_frame(const Condition& condition, std::uint64_t seed, int number);
+
+/// A cluttered frame of this size with 12 ordinary markers of one family, for timing.
+TrackerFrame cluttered_frame(int width, int height, std::uint64_t seed);
+
+}  // namespace limn::test
