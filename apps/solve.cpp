@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "apps/known_lengths.h"
 #include "apps/patterns.h"
@@ -61,7 +62,9 @@ Status check_models(const SolveOptions& options) {
 
 void print_lenses(const std::vector<calib::LensTrial>& trials) {
   for (const calib::LensTrial& trial : trials)
-    fmt::print("{:<14} {:<20} held-out {:.3f} px{}\n", trial.device, trial.model, trial.held_out_px,
+    fmt::print("{:<14} {:<20} {}{}\n", trial.device, trial.model,
+               std::isfinite(trial.held_out_px) ? fmt::format("held-out {:.3f} px", trial.held_out_px)
+                                                : "no solution",
                trial.chosen ? ", chosen" : "");
 }
 

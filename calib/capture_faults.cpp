@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <opencv2/calib3d.hpp>
 #include <optional>
 #include <tuple>
@@ -22,10 +23,12 @@ constexpr double k_least_lit = 0.002;      // of the picture; the smallest board
 constexpr double k_same_px = 1;            // two projectors' labels of one place never agree by chance
 constexpr double k_same_share = 0.3;       // of the places that both light
 constexpr double k_level_range = 0.03;     // sums of coarse pairs; a camera that is not linear shows 0.017
+constexpr int k_wide_stripe_px = 16;       // blur leaves such stripes all of their contrast
 constexpr double k_white_contrast = 0.15;  // off 1; light from elsewhere adds 0.04 to white
-constexpr double k_lost_pair = 0.5;        // of samples that are off: one frame is missing, not light
-constexpr double k_between = 0.06;         // more samples off under the finest stripes than under wide ones
-constexpr double k_between_level = 0.01;   // and less light there: interpolation before a gamma above 1
+constexpr double k_white_under_narrow = 0.05;  // below 1; sharp captures show 1.36 over stripes of 4 pixels
+constexpr double k_lost_pair = 0.5;            // of samples that are off: one frame is missing, not light
+constexpr double k_between = 0.06;        // more samples off under the finest stripes than under wide ones
+constexpr double k_between_level = 0.01;  // and less light there: interpolation before a gamma above 1
 // A shift of what is seen between the first pictures and the last, as a share of the width: sound captures
 // show up to 0.00005 (noise); and in camera pixels, for small pictures.
 constexpr double k_shift_share = 0.000125, k_shift_px = 0.1;
@@ -38,6 +41,9 @@ constexpr double k_room_share = 0.6;      // of white's light that is the room's
 constexpr double k_rough_aspect = 0.05;   // of fy / fx from 1, from homographies alone
 constexpr size_t k_least_corners = 8;     // for a homography that noise does not turn
 constexpr double k_saturated_share = 0.2;
+// Of the waves' mean light from one half: a gamma that is 12 % off. Beyond it the phase of 3 steps errs by
+// 0.1 pixel in waves of 16; 6 steps stand more.
+constexpr double k_wave_level = 0.025;
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -265,7 +271,7 @@ double level_range(const Seen& seen, const SeriesHealth& health) {
 }
 
 // Contrast of white against black over that of the widest stripes: 1 when nothing answers to how much of the
-// picture is lit.
+// picture is lit. Over narrow stripes, which blur, it is more.
 double white_contrast(const Seen& seen, const SeriesHealth& health) {
   const Pairs pairs = pairs_of(seen, health);
   double widest = 1e-9;
@@ -280,13 +286,15 @@ double white_contrast(const Seen& seen, const SeriesHealth& health) {
 bool note_exposure(const Seen& seen, std::vector<Fault>* faults) {
   const double range = seen.median_of([&](const SeriesHealth& h) { return level_range(seen, h); });
   const double white = seen.median_of([&](const SeriesHealth& h) { return white_contrast(seen, h); });
-  if (range < k_level_range && std::abs(white - 1) < k_white_contrast) return false;
+  const bool narrow = seen.series[0]->widest_stripe_px < k_wide_stripe_px;
+  const bool white_fits = narrow ? white > 1 - k_white_under_narrow : std::abs(white - 1) < k_white_contrast;
+  if (range < k_level_range && white_fits) return false;
   faults->push_back(
       {"exposure_drift",
        fmt::format(
            "{}: pictures and their inverses together change by {:.1f} % within a series; white differs "
-           "from black by {:.2f} of what wide stripes do",
-           seen.both(), 100 * range, white),
+           "from black by {:.2f} of what {} stripes do",
+           seen.both(), 100 * range, white, narrow ? "narrow" : "wide"),
        "switch off automatic exposure, gain and white balance; let camera and projector warm up; keep the "
        "room's light steady"});
   return true;
@@ -326,7 +334,8 @@ Sharpness sharpness(const Seen& seen, const SeriesHealth& health) {
     ++back;
     found.stripe_px *= 2;
   }
-  double full = 0;
+  const bool wide = health.widest_stripe_px >= k_wide_stripe_px;
+  double full = wide ? 0 : health.groups.back().contrast;
   for (size_t i = 0; i < pairs.count; ++i) full = std::max(full, health.groups[i].contrast);
   for (const int axis : {0, 1})
     found.contrast = std::min(found.contrast, health.groups[pairs.finest(axis) - back].contrast / full);
@@ -345,6 +354,33 @@ void note_defocus(const Seen& seen, std::vector<Fault>* faults) {
        "little"});
 }
 
+// The power p for which light of mean 1/2, 0.5 + 0.5 cos, has this mean once it is raised to it: the mean is
+// G(p + 1/2) / (sqrt(pi) G(p + 1)), which falls with p.
+double power_of_waves(double mean) {
+  double low = 0.05, high = 20;
+  for (int i = 0; i < 40; ++i) {
+    const double p = std::sqrt(low * high);
+    const double found = std::exp(std::lgamma(p + 0.5) - std::lgamma(p + 1)) * std::numbers::inv_sqrtpi;
+    (found > mean ? low : high) = p;
+  }
+  return std::sqrt(low * high);
+}
+
+void note_gamma(const Seen& seen, std::vector<Fault>* faults) {
+  const double level = seen.median_of([](const SeriesHealth& h) { return h.wave_level; });
+  if (std::abs(level - 0.5) < k_wave_level) return;
+  const double power = power_of_waves(level);
+  faults->push_back(
+      {"projector_gamma",
+       fmt::format("{}: the waves' mean light is {:.1f} % of white's, sinusoids have 50 %: as if their light "
+                   "were raised to the power {:.2f}",
+                   seen.both(), 100 * level, power),
+       fmt::format("let limn solve measure the projector's response and draw the waves by it (code_options' "
+                   "response), or multiply their gamma by {:.2f}; set the projector to a fixed picture mode "
+                   "and the camera to linear pictures",
+                   power)});
+}
+
 bool note_room_light(const Seen& seen, std::vector<Fault>* faults) {
   const double share = seen.median_of([](const SeriesHealth& h) {
     return std::max(0.0, h.black_level - k_pedestal) / std::max(k_pedestal, h.white_level - k_pedestal);
@@ -361,13 +397,14 @@ bool note_room_light(const Seen& seen, std::vector<Fault>* faults) {
   return true;
 }
 
-void note_saturation(const Seen& seen, std::vector<Fault>* faults) {
+bool note_saturation(const Seen& seen, std::vector<Fault>* faults) {
   const double share = seen.median_of([](const SeriesHealth& h) { return h.saturated; });
-  if (share < k_saturated_share) return;
+  if (share < k_saturated_share) return false;
   faults->push_back(
       {"saturated",
        fmt::format("{}: white drives {:.0f} % of the lit pixels to full scale", seen.both(), 100 * share),
        "shorten the exposure or close the aperture until white is just below saturation"});
+  return true;
 }
 
 void note_odd_pictures(const Seen& seen, std::vector<Fault>* faults) {
@@ -441,7 +478,9 @@ std::vector<Fault> capture_faults(const Observed& observed) {
     note_motion(seen, &faults);
     note_defocus(seen, &faults);
     const bool bright = !unsteady && note_room_light(seen, &faults);
-    note_saturation(seen, &faults);
+    const bool clipped = note_saturation(seen, &faults);
+    // Light that moves, and white that is cut off, make waves look wrong that are not.
+    if (!unsteady && !clipped) note_gamma(seen, &faults);
     // Unsteady light and noise make sums wrong, too.
     if (!unsteady && !bright) note_odd_pictures(seen, &faults);
   }

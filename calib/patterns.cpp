@@ -112,6 +112,10 @@ int Patterns::base_bit() const {
   return std::bit_width(static_cast<unsigned>(options.base_stripe_px)) - 2;
 }
 
+int Patterns::widest_stripe_px() const {
+  return code == "xor" ? options.base_stripe_px : 1 << (bits_for(std::max(width, height)) - 1);
+}
+
 std::vector<PatternGroup> Patterns::groups() const {
   std::vector<PatternGroup> groups;
   for (int first = 0; first < first_step(); first += 2) groups.push_back({first, 2});

@@ -61,6 +61,8 @@ struct Patterns {
   int row_bits() const;     ///< pairs for the rows
   /// xor: the bit that all coarser ones are exchanged with; else one beyond all bits.
   int base_bit() const;
+  /// Width of the widest stripes of its pairs.
+  int widest_stripe_px() const;
   int steps() const { return code == "phase" ? options.steps : 0; }  ///< of each axis' sinusoid
   int first_row_pair() const { return 2 * column_bits(); }           ///< index of its first picture
   int first_step() const { return 2 * (column_bits() + row_bits()); }

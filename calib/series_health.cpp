@@ -354,6 +354,7 @@ SeriesHealth SeriesProbe::health(const std::vector<std::filesystem::path>& files
   health.samples = static_cast<int>(lit.size());
   if (lit.size() == 0) return health;
   measure_light(lit, patterns_, &health);
+  health.widest_stripe_px = patterns_.widest_stripe_px();
   for (const PatternGroup& group : groups) health.groups.push_back(health_of(lit, group));
   find_odd(lit, groups, files, &health);
   for (const GroupHealth& group : health.groups) {

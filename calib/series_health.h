@@ -45,6 +45,7 @@ struct SeriesHealth {
   double black_level = 0;  ///< median under black, levels: room light, the projector's black, the sensor's
   double white_level = 0;  ///< median under white, levels
   std::vector<GroupHealth> groups;       ///< in the order of the series, white and black last
+  int widest_stripe_px = 0;              ///< of the pairs; narrow ones lose contrast to blur, all of them
   double level_low = 1, level_high = 1;  ///< range of the pairs' levels without those of odd pictures
   /// phase: mean light of the sinusoids' steps between black (0) and white (1), median; 0.5 when the
   /// projector's response is what they were drawn for. Other codes: 0.5.

@@ -147,7 +147,7 @@ Result<calib::Captures> FaultBench::capture(const std::filesystem::path& folder)
   for (const Imager& i : world.rig.cameras) cameras.push_back({i.name, i.width, i.height});
   for (const Imager& i : world.rig.projectors)
     projectors.push_back({i.name, mode ? mode->width : i.width, mode ? mode->height : i.height});
-  const calib::Captures plan = calib::plan_captures(folder, cameras, projectors, board);
+  const calib::Captures plan = calib::plan_captures(folder, cameras, projectors, board, code, code_options);
   LIMN_TRY_STATUS(calib::begin_captures(plan));
   std::uint64_t frame = seed * 1000003;
   for (int pose = 0; pose < static_cast<int>(world_from_board.size()); ++pose) {

@@ -32,6 +32,7 @@ struct FaultBench {
   std::vector<Pose> world_from_board;
   std::uint64_t seed = 1;  ///< of the noise
   std::string code = "gray";
+  calib::CodeOptions code_options = {};
 
   /// What the display pretends to be, if not the projector's own size.
   std::optional<cv::Size> mode;

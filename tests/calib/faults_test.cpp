@@ -116,6 +116,22 @@ TEST(SoundCaptures, WithOtherNoiseHaveNoFault) {
   expect_sound(told_of(noisy, "nothing, bench, twice the noise"));
 }
 
+TEST(SoundCaptures, OfOtherCodesHaveNoFault) {
+  for (const char* code : {"phase", "xor"}) {
+    FaultBench other = bench();
+    other.code = code;
+    expect_sound(told_of(other, std::string("nothing, bench, ") + code));
+  }
+}
+
+// 2.2 is what is taken for granted of a projector; nobody's is exactly that.
+TEST(SoundCaptures, OfAProjectorWhoseGammaIsNearlyTheWavesHaveNoFault) {
+  FaultBench near = bench();
+  near.code = "phase";
+  near.world.projector_effects[0].gamma = 2.35;
+  expect_sound(told_of(near, "nothing, waves for gamma 2.2 at 2.35"));
+}
+
 TEST(SoundCaptures, PhotographedInARealRoomHaveNoFault) {
   const auto folder = real_data("graycode");
   if (!folder) GTEST_SKIP() << "graycode";
@@ -189,6 +205,54 @@ TEST(Faults, ExposureFollowsTheLight) {
   expect_named(told_of(automatic, "automatic exposure"), "exposure_drift");
 }
 
+TEST(Faults, ExposureFollowsTheLightOfNarrowStripes) {
+  FaultBench automatic = bench();
+  automatic.code = "xor";
+  automatic.before_shot = [](int, int shot, sim::World* world) {
+    world->camera_effects[0].exposure = shot == k_shots - 2 ? 0.6 : shot == k_shots - 1 ? 1.0 : 0.75;
+  };
+  expect_named(told_of(automatic, "automatic exposure, xor"), "exposure_drift");
+}
+
+TEST(Faults, ProjectorGammaNotWhatTheWavesWereDrawnFor) {
+  for (const double gamma : {1.4, 2.8}) {
+    FaultBench other = bench();
+    other.code = "phase";
+    other.world.projector_effects[0].gamma = gamma;
+    const Told told = told_of(other, fmt::format("waves for gamma 2.2 at {}", gamma));
+    expect_named(told, "projector_gamma");
+    // What the advice multiplies 2.2 by is what makes the waves right.
+    ASSERT_FALSE(told.faults.empty());
+    const std::string& advice = told.faults[0].advice;
+    const size_t at = advice.find("gamma by ");
+    ASSERT_NE(at, std::string::npos) << advice;
+    EXPECT_NEAR(std::stod(advice.substr(at + 9)), gamma / 2.2, 0.02);
+  }
+}
+
+TEST(Faults, WhiteDrivesTheCameraToFullScale) {
+  FaultBench bright = bench();
+  bright.world.camera_effects[0].exposure *= 2.2;
+  expect_named(told_of(bright, "exposure 2.2 times too long"), "saturated");
+}
+
+// The display was late: the camera saw what had been shown before.
+TEST(Faults, OnePictureIsTheOneBefore) {
+  FaultBench late = bench();
+  cv::Mat last;
+  int pose_now = -1, shot_now = -1;
+  late.before_shot = [&](int pose, int shot, sim::World*) { pose_now = pose, shot_now = shot; };
+  late.on_photo = [&](const cv::Mat& photo) {
+    const bool repeated = pose_now == 2 && shot_now == 9;
+    if (!repeated) last = photo.clone();
+    return last.clone();
+  };
+  const Told told = told_of(late, "one picture repeated");
+  expect_named(told, "repeated_pictures", {"low_decode"});  // of that pose: a wide stripe is missing
+  EXPECT_NE(to_text(told.faults).find("pose02, camera0 of projector0: 009.png"), std::string::npos)
+      << to_text(told.faults);
+}
+
 TEST(Faults, BoardMovedDuringACapture) {
   FaultBench moved = bench();
   moved.nudge = Nudge{2, 20, false, Pose(Eigen::Quaterniond::Identity(), {0.002, 0, 0.001})};
@@ -214,6 +278,13 @@ TEST(Faults, CameraOutOfFocus) {
   FaultBench blurred = bench();
   blurred.world.camera_effects[0].psf_px = 1.8;
   expect_named(told_of(blurred, "camera out of focus"), "defocus");
+}
+
+TEST(Faults, CameraOutOfFocusForNarrowStripes) {
+  FaultBench blurred = bench();
+  blurred.code = "xor";
+  blurred.world.camera_effects[0].psf_px = 1.8;
+  expect_named(told_of(blurred, "camera out of focus, xor"), "defocus");
 }
 
 TEST(Faults, ProjectionMirrored) {

@@ -1,0 +1,129 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "apps/capture.h"
+#include "apps/solve.h"
+#include "apps/world_markers.h"
+#include "core/file.h"
+#include "core/rig.h"
+#include "sim/world.h"
+#include "tests/support/matchers.h"
+
+// Every code's whole way on the virtual rig: a plan, its captures, the rig that they give.
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace test;
+using Json = nlohmann::json;
+
+constexpr double k_share = 0.375;  // of each device's pixels by side: 480 x 384 and 480 x 300
+constexpr int k_poses = 6;
+
+Json json_at(const fs::path& path) {
+  return Json::parse(read_file(path).value(), nullptr, true, /*ignore_comments=*/true);
+}
+
+// The bench without its prototype, with fewer pixels.
+Json small_bench() {
+  Json world = json_at(fs::path(LIMN_SOURCE_DIR) / "config/worlds/bench.json");
+  for (const char* key : {"scene", "world_from_prototype", "slot_markers", "objects"}) world.erase(key);
+  world["objects"] = Json::array();
+  world["room"]["lamps"][0].erase("radius_m");  // soft shadows cost half of the tracing
+  for (const char* list : {"cameras", "projectors"}) {
+    for (Json& device : world[list]) {
+      for (Json& side : device["size"]) side = std::lround(k_share * side.get<double>());
+      Json& lens = device["lens"]["values"];
+      for (const int i : {0, 1}) lens[i] = k_share * lens[i].get<double>();
+      for (const int i : {2, 3}) lens[i] = k_share * (lens[i].get<double>() + 0.5) - 0.5;
+    }
+  }
+  return world;
+}
+
+// Where a code's files stand, and what came of them.
+struct Calibrated {
+  Json report;
+  Rig rig, truth;
+  double held_out_px() const { return report["held_out"]["rms_px"]; }
+  std::vector<std::string> faults() const {
+    std::vector<std::string> names;
+    for (const Json& fault : report["faults"]) names.push_back(fault["name"]);
+    return names;
+  }
+};
+
+Calibrated calibrated(const fs::path& folder, const Json& world, const Json& code) {
+  Json plan = json_at(fs::path(LIMN_SOURCE_DIR) / "config/plans/bench.json");
+  plan.update(code);
+  plan["world"] = "world.json";
+  plan["board"] = "chessboard:8x5:43mm";
+  plan["world_from_board"].erase(plan["world_from_board"].begin() + k_poses, plan["world_from_board"].end());
+  EXPECT_TRUE(make_folder(folder).ok());
+  EXPECT_TRUE(write_file(folder / "world.json", world.dump()).ok());
+  EXPECT_TRUE(write_file(folder / "plan.json", plan.dump()).ok());
+  const Status captured = run_capture({folder / "plan.json", folder / "captures"});
+  EXPECT_TRUE(captured.ok()) << captured.message();
+  const Status done = run_solve({.captures = folder / "captures", .out = folder / "rig"});
+  EXPECT_TRUE(done.ok()) << done.message();
+  if (!done.ok()) return {};
+  return {json_at(folder / "rig/report.json"), load_rig(folder / "rig").value(),
+          sim::load_world(folder / "world.json", marker_picture).value().rig};
+}
+
+// RMS distance between the light of the solved projector and of the true one, given the same pixels, on what
+// the true camera sees at depths around the working volume's middle. Places come from the same camera, so
+// that it stands for how a prototype is lit: the solved camera says where a point is, in its own frame.
+double light_apart_mm(const Rig& rig, const Rig& truth) {
+  const Imager &camera = rig.cameras[0], &true_camera = truth.cameras[0];
+  const Imager &projector = rig.projectors[0], &true_projector = truth.projectors[0];
+  double squares = 0;
+  int count = 0;
+  for (double depth = 1.2; depth <= 1.5; depth += 0.1) {
+    for (double v = 0.3; v <= 0.71; v += 0.1) {
+      for (double u = 0.3; u <= 0.71; u += 0.1) {
+        const Eigen::Vector2d px(u * camera.width, v * camera.height);
+        const auto place = [&](const Imager& imager) -> Eigen::Vector3d {
+          const auto ray = imager.ray(px);
+          return ray->p_origin + depth / imager.lens.unproject(px)->z() * ray->d;
+        };
+        const Eigen::Vector3d p = place(camera), p_true = place(true_camera);
+        const auto shown = projector.project(p), wanted = true_projector.project(p_true);
+        const double depth_seen = (true_projector.imager_from_world * p_true).z();
+        squares += (*shown - *wanted).squaredNorm() * std::pow(depth_seen / true_projector.lens.fx(), 2);
+        ++count;
+      }
+    }
+  }
+  return 1e3 * std::sqrt(squares / count);
+}
+
+TEST(Codes, EachGivesARigAsGoodAsGrays) {
+  const fs::path folder = test_folder();
+  const Json world = small_bench();
+  const Calibrated gray = calibrated(folder / "gray", world, {{"code", "gray"}});
+  ASSERT_FALSE(gray.report.is_null());
+  const double gray_mm = light_apart_mm(gray.rig, gray.truth);
+  printf("[ codes    ] gray  held-out %.4f px, light %.3f mm off\n", gray.held_out_px(), gray_mm);
+  EXPECT_EQ(gray.report["verdict"], "good");
+  EXPECT_LT(gray_mm, 0.3);
+  for (const char* code : {"phase", "xor"}) {
+    const Calibrated one = calibrated(folder / code, world, {{"code", code}});
+    ASSERT_FALSE(one.report.is_null()) << code;
+    const double mm = light_apart_mm(one.rig, one.truth);
+    printf("[ codes    ] %-5s held-out %.4f px, light %.3f mm off\n", code, one.held_out_px(), mm);
+    EXPECT_EQ(one.report["verdict"], "good") << code;
+    EXPECT_EQ(one.faults(), std::vector<std::string>()) << code;
+    EXPECT_GT(one.report["decode"]["share"], 0.98) << code;
+    EXPECT_LT(one.held_out_px(), 1.2 * gray.held_out_px()) << code;
+    EXPECT_LT(mm, 1.2 * gray_mm) << code;
+  }
+}
+
+}  // namespace
+}  // namespace limn::apps
