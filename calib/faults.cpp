@@ -196,11 +196,13 @@ void erase_implied(std::vector<Fault>* faults) {
   const auto has = [&](const char* name) {
     return std::any_of(faults->begin(), faults->end(), [&](const Fault& f) { return f.name == name; });
   };
-  // Where the board is stretched, or a projector's pixels are bent to fit, the other lenses follow.
+  // Where the board is stretched, or a projector's pixels are bent to fit, the other lenses follow; a camera
+  // whose pixels are not square bends whatever it looks at.
   const bool board = has("wrong_square_size"), panel = has("keystone_or_scaling");
+  const bool picture = !board && !panel && has("wrong_camera_resolution");
   std::erase_if(*faults, [&](const Fault& fault) {
     return (board && (fault.name == "wrong_camera_resolution" || fault.name == "keystone_or_scaling")) ||
-           (panel && fault.name == "wrong_camera_resolution");
+           (panel && fault.name == "wrong_camera_resolution") || (picture && fault.name == "bent_board");
   });
 }
 

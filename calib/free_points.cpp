@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 
 namespace limn::calib {
@@ -116,7 +117,11 @@ struct Choice {
   std::vector<std::optional<Patch>> patches;
 };
 
-Choice best_in(const std::vector<Decoded>& decoded, const cv::Rect& field, const FreePointOptions& options) {
+// `hull`: of what is left out, camera pixels; may be empty.
+Choice best_in(const std::vector<Decoded>& decoded,
+               const std::vector<cv::Point2f>& hull,
+               const cv::Rect& field,
+               const FreePointOptions& options) {
   Choice best;
   constexpr int k_tries = 3;  // by each axis
   for (int i = 0; i < k_tries * k_tries; ++i) {
@@ -124,6 +129,8 @@ Choice best_in(const std::vector<Decoded>& decoded, const cv::Rect& field, const
     Choice tried;
     tried.x = field.x + field.width * (2 * (order[i] % k_tries) + 1) / (2 * k_tries);
     tried.y = field.y + field.height * (2 * (order[i] / k_tries) + 1) / (2 * k_tries);
+    const cv::Point2f px(static_cast<float>(tried.x), static_cast<float>(tried.y));
+    if (!hull.empty() && cv::pointPolygonTest(hull, px, true) > -2 * options.half_window) continue;
     for (const Decoded& by : decoded) {
       tried.patches.push_back(patch_at(by.px_projector, tried.x, tried.y, options));
       tried.seen += tried.patches.back() ? 1 : 0;
@@ -132,6 +139,24 @@ Choice best_in(const std::vector<Decoded>& decoded, const cv::Rect& field, const
     if (best.seen == static_cast<int>(decoded.size())) break;
   }
   return best;
+}
+
+cv::Rect field_of(const CapturedDevice& camera, int field, const FreePointOptions& options) {
+  const int column = field % options.columns, row = field / options.columns;
+  return {camera.width * column / options.columns, camera.height * row / options.rows,
+          camera.width / options.columns, camera.height / options.rows};
+}
+
+// A new point with what the projectors see of it; its index.
+int add_point(const Choice& choice, int camera, int pose, Observations* into) {
+  const int point = static_cast<int>(into->points.size());
+  into->points.push_back({pose, camera, Vector2d(choice.x, choice.y)});
+  for (size_t p = 0; p < choice.patches.size(); ++p) {
+    if (!choice.patches[p]) continue;
+    const Patch& patch = *choice.patches[p];
+    into->sightings.push_back({point, true, static_cast<int>(p), patch.label, patch.stddev_px});
+  }
+  return point;
 }
 
 }  // namespace
@@ -147,20 +172,11 @@ void add_free_points(const std::vector<std::vector<Decoded>>& decoded,
       reverse.back().emplace_back(decoded[camera][p].px_projector, into->projectors[p]);
   }
   for (size_t camera = 0; camera < decoded.size(); ++camera) {
-    const CapturedDevice& device = into->cameras[camera];
     for (int field = 0; field < options.columns * options.rows; ++field) {
-      const int column = field % options.columns, row = field / options.columns;
-      const cv::Rect place(device.width * column / options.columns, device.height * row / options.rows,
-                           device.width / options.columns, device.height / options.rows);
-      const Choice choice = best_in(decoded[camera], place, options);
+      const Choice choice =
+          best_in(decoded[camera], {}, field_of(into->cameras[camera], field, options), options);
       if (choice.seen == 0) continue;
-      const int point = static_cast<int>(into->points.size());
-      into->points.push_back({pose, static_cast<int>(camera), Vector2d(choice.x, choice.y)});
-      for (size_t p = 0; p < choice.patches.size(); ++p) {
-        if (!choice.patches[p]) continue;
-        const Patch& patch = *choice.patches[p];
-        into->sightings.push_back({point, true, static_cast<int>(p), patch.label, patch.stddev_px});
-      }
+      const int point = add_point(choice, static_cast<int>(camera), pose, into);
       for (size_t other = 0; other < decoded.size(); ++other) {
         if (other == camera) continue;
         for (size_t p = 0; p < choice.patches.size(); ++p) {
@@ -175,6 +191,23 @@ void add_free_points(const std::vector<std::vector<Decoded>>& decoded,
         }
       }
     }
+  }
+}
+
+void add_room_points(const std::vector<Decoded>& decoded,
+                     const std::vector<BoardCorner>& board,
+                     int camera,
+                     int pose,
+                     const FreePointOptions& options,
+                     Observations* into) {
+  std::vector<cv::Point2f> corners, hull;
+  for (const BoardCorner& corner : board)
+    corners.emplace_back(static_cast<float>(corner.px.x()), static_cast<float>(corner.px.y()));
+  cv::convexHull(corners, hull);
+  const CapturedDevice& device = into->cameras[static_cast<size_t>(camera)];
+  for (int field = 0; field < options.columns * options.rows; ++field) {
+    const Choice choice = best_in(decoded, hull, field_of(device, field, options), options);
+    if (choice.seen > 0) add_point(choice, camera, pose, into);
   }
 }
 

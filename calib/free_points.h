@@ -26,4 +26,13 @@ void add_free_points(const std::vector<std::vector<Decoded>>& decoded,
                      const FreePointOptions& options,
                      Observations* into);
 
+/// Likewise what one camera sees around the board: the room reaches the edges of the pictures, where boards
+/// seldom do, and tells the lenses apart there. `decoded`: one for each projector.
+void add_room_points(const std::vector<Decoded>& decoded,
+                     const std::vector<BoardCorner>& board,
+                     int camera,
+                     int pose,
+                     const FreePointOptions& options,
+                     Observations* into);
+
 }  // namespace limn::calib

@@ -212,7 +212,7 @@ void Joint::add_points(const Unknowns& at, const Noise& noise, Normal* normal) {
         robust_weight(k_unseen * k_unseen, normal);
         continue;
       }
-      const double stddev = std::hypot(sighting.stddev_px, noise.match_px);
+      const double stddev = std::hypot(sighting.stddev_px, noise.sighting_px);
       const Vector2d residual = (px - sighting.px) / stddev;
       const double scale = std::sqrt(robust_weight(residual.squaredNorm(), normal)), factor = scale / stddev;
       const auto row = static_cast<Eigen::Index>(2 * (k - begin));

@@ -27,6 +27,7 @@ struct Unknowns {
 struct Noise {
   double corner_px = 0.2;
   double match_px = 0.2;
+  double sighting_px = 0.2;
 };
 
 /// The least-squares problem over all observations, and Levenberg's and Marquardt's way down (Nocedal and

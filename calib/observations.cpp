@@ -258,6 +258,9 @@ double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+// A hundred fields: the lenses' edges want a few points each, and each point costs the solve time.
+constexpr FreePointOptions k_room_points{.columns = 12, .rows = 9};
+
 // What one camera saw of one pose.
 Result<Observed> observe_pose(const Captures& captures, int pose, int camera, const DecodeOptions& options) {
   const auto at_pose = static_cast<size_t>(pose), at_camera = static_cast<size_t>(camera);
@@ -270,11 +273,11 @@ Result<Observed> observe_pose(const Captures& captures, int pose, int camera, co
   for (const BoardCorner& corner : corners)
     seen.observations.corners.push_back({camera, pose, corner.id, corner.px, corner.stddev_px});
   const double decoding = now();
+  std::vector<Decoded> by_projector;
   for (size_t p = 0; p < captures.projectors.size(); ++p) {
     const CapturedDevice& device = captures.cameras[at_camera];
-    LIMN_TRY(const Decoded decoded,
-             decode(captures.patterns[p], captures.poses[at_pose].pictures[p][at_camera], device.width,
-                    device.height, options));
+    LIMN_TRY(Decoded decoded, decode(captures.patterns[p], captures.poses[at_pose].pictures[p][at_camera],
+                                     device.width, device.height, options));
     const int projector = static_cast<int>(p);
     seen.decoded.push_back({camera, projector, pose, decoded.lit, decoded.decoded, decoded.outliers});
     seen.health.push_back(decoded.health);
@@ -293,13 +296,22 @@ Result<Observed> observe_pose(const Captures& captures, int pose, int camera, co
       match.pose = pose;
       seen.observations.matches.push_back(match);
     }
+    by_projector.push_back(std::move(decoded));
   }
+  seen.observations.cameras = captures.cameras;
+  add_room_points(by_projector, corners, camera, pose, k_room_points, &seen.observations);
   seen.seconds_decode = now() - decoding;
   return seen;
 }
 
 void append(const Observed& seen, Observed* all) {
   const auto put = [](const auto& from, auto* to) { to->insert(to->end(), from.begin(), from.end()); };
+  const int points = static_cast<int>(all->observations.points.size());
+  put(seen.observations.points, &all->observations.points);
+  for (Sighting sighting : seen.observations.sightings) {
+    sighting.point += points;
+    all->observations.sightings.push_back(sighting);
+  }
   put(seen.observations.corners, &all->observations.corners);
   put(seen.observations.matches, &all->observations.matches);
   put(seen.decoded, &all->decoded);

@@ -33,7 +33,8 @@ struct Match {
   int pixels = 0;
 };
 
-/// A point of a scene that no board tells the place of: a camera's pixel. Its distance is an unknown.
+/// A point of a scene, or of the room around a board, that no board tells the place of: a camera's pixel. Its
+/// distance is an unknown.
 struct FreePoint {
   int pose = 0;
   int camera = 0;

@@ -23,15 +23,38 @@ ImagerView view(const Imager& imager) {
 }
 
 // Standard deviation of one coordinate by the median of |residual| (of a 2-D normal: 1.1774 sigma).
+double median_noise(std::vector<double> deviations, double otherwise) {
+  if (deviations.empty()) return otherwise;
+  const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
+  std::nth_element(deviations.begin(), middle, deviations.end());
+  return std::max(*middle, k_least_noise_px);
+}
+
 double noise_of(const std::vector<Vector2d>& residuals) {
-  std::vector<double> lengths;
+  std::vector<double> deviations;
   for (const Vector2d& r : residuals) {
-    if (r.allFinite()) lengths.push_back(r.norm());
+    if (r.allFinite()) deviations.push_back(r.norm() / 1.1774);  // Rayleigh's median
   }
-  if (lengths.empty()) return Noise().corner_px;
-  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
-  std::nth_element(lengths.begin(), middle, lengths.end());
-  return std::max(*middle / 1.1774, k_least_noise_px);
+  return median_noise(std::move(deviations), Noise().corner_px);
+}
+
+// A point's own distance takes one of its sightings' degrees of freedom; of the others' sum of squares the
+// median is Wilson's and Hilferty's.
+double sighting_noise(const Observations& observations, const std::vector<Vector2d>& residuals) {
+  std::vector<double> deviations;
+  for (size_t i = 0; i < residuals.size();) {
+    const int point = observations.sightings[i].point;
+    double squares = 0;
+    int degrees = -1;
+    for (; i < residuals.size() && observations.sightings[i].point == point; ++i) {
+      if (!residuals[i].allFinite()) continue;
+      squares += residuals[i].squaredNorm();
+      degrees += 2;
+    }
+    if (degrees < 1) continue;
+    deviations.push_back(std::sqrt(squares / degrees / std::pow(1 - 2.0 / (9 * degrees), 3)));
+  }
+  return median_noise(std::move(deviations), Noise().sighting_px);
 }
 
 Solution solution_at(const Unknowns& unknowns, const Noise& noise, int steps) {
@@ -42,8 +65,13 @@ Solution solution_at(const Unknowns& unknowns, const Noise& noise, int steps) {
   solution.bend_m = unknowns.bend_m;
   solution.corner_noise_px = noise.corner_px;
   solution.match_noise_px = noise.match_px;
+  solution.sighting_noise_px = noise.sighting_px;
   solution.iterations = steps;
   return solution;
+}
+
+Noise noise_of(const Solution& solution) {
+  return {solution.corner_noise_px, solution.match_noise_px, solution.sighting_noise_px};
 }
 
 std::vector<std::optional<Eigen::Vector3d>> places_of(const Observations& observations, const Unknowns& at) {
@@ -115,7 +143,8 @@ Result<Solution> rounds(const Observations& observations,
     solution = solution_at(descent.unknowns, noise, steps);
     add_residuals(observations, descent.unknowns, noise, &solution);
     const Noise found{noise_of(solution.corner_residuals),
-                      observations.matches.empty() ? noise.match_px : noise_of(solution.match_residuals)};
+                      observations.matches.empty() ? noise.match_px : noise_of(solution.match_residuals),
+                      sighting_noise(observations, solution.sighting_residuals)};
     if (is_last) {
       solution.covariance = joint.covariance(descent.unknowns, found);
       break;
@@ -248,7 +277,7 @@ Result<Solution> solve_from(const Observations& observations,
                             const SolveOptions& options,
                             const Solution& start) {
   LIMN_TRY(Unknowns unknowns, unknowns_with_models(observations, options, start));
-  return rounds(observations, options, std::move(unknowns), {start.corner_noise_px, start.match_noise_px});
+  return rounds(observations, options, std::move(unknowns), noise_of(start));
 }
 
 Result<Solution> solve_again(const Observations& observations,
@@ -257,7 +286,7 @@ Result<Solution> solve_again(const Observations& observations,
                              int left_out,
                              bool to_rounding) {
   LIMN_TRY(Unknowns unknowns, unknowns_with_models(observations, options, start));
-  const Noise noise{start.corner_noise_px, start.match_noise_px};
+  const Noise noise = noise_of(start);
   if (left_out >= 0) unknowns.world_from_board[static_cast<size_t>(left_out)].reset();
   Joint joint(observations, options, left_out);
   LIMN_TRY(const Joint::Descent descent,
@@ -275,8 +304,7 @@ Result<Pose> board_pose_from_cameras(const Observations& observations, const Sol
   LIMN_TRY(const Pose first, board_pose_seed(only, solution.rig));
   const SolveOptions options;
   const Joint joint(only, options);
-  return joint.board_pose(unknowns_of(solution), pose, {solution.corner_noise_px, solution.match_noise_px},
-                          first);
+  return joint.board_pose(unknowns_of(solution), pose, noise_of(solution), first);
 }
 
 std::optional<Vector2d> predicted(const Observations& observations,

@@ -49,7 +49,7 @@ struct Solution {
   std::vector<std::optional<Eigen::Vector3d>> points;
   std::vector<Eigen::Vector2d> sighting_residuals;
   /// What one coordinate scatters by beyond its own stddev, px: estimated from the residuals.
-  double corner_noise_px = 0, match_noise_px = 0;
+  double corner_noise_px = 0, match_noise_px = 0, sighting_noise_px = 0;
   int iterations = 0;
   /// Of the devices' unknowns, from the final Jacobian (robust weights and priors included), board poses and
   /// bend marginalised: camera 0's values and pose (boxplus's delta), camera 1's …, then the projectors'.

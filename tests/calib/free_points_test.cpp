@@ -93,5 +93,37 @@ TEST(FreePointsOfAScene, AreSpreadAndAsSharpAsTheyClaim) {
   }
 }
 
+TEST(RoomPoints, SurroundTheBoardAndLeaveItOut) {
+  WorldOptions options;
+  options.cameras = 2;
+  options.poses = 0;
+  World world = make_world(options);
+  const auto decoded = decoded_wall(world, 0.1, test_rng());
+  const std::vector<BoardCorner> board = {
+      {0, {500, 400}, 0.1}, {1, {800, 420}, 0.1}, {2, {820, 600}, 0.1}, {3, {480, 580}, 0.1}};
+  Observations& o = world.observations;
+  o.points.push_back({});  // there may be some already
+  add_room_points(decoded[1], board, 1, 7, {}, &o);
+  ASSERT_GT(o.points.size(), 100U);
+  int left = 0, right = 0;
+  for (size_t i = 1; i < o.points.size(); ++i) {
+    const FreePoint& point = o.points[i];
+    EXPECT_EQ(point.pose, 7);
+    EXPECT_EQ(point.camera, 1);
+    const Vector2d px = point.px_camera;
+    EXPECT_FALSE(px.x() > 500 && px.x() < 800 && px.y() > 420 && px.y() < 580) << px.transpose();
+    left += px.x() < 480 ? 1 : 0;
+    right += px.x() > 820 ? 1 : 0;
+  }
+  EXPECT_GT(left, 30);
+  EXPECT_GT(right, 30);
+  ASSERT_FALSE(o.sightings.empty());
+  EXPECT_EQ(o.sightings.front().point, 1);
+  for (const Sighting& sighting : o.sightings) {
+    const auto p = wall_at(world.rig.cameras[1], o.points[static_cast<size_t>(sighting.point)].px_camera);
+    EXPECT_LT((*world.rig.projectors[0].project(*p) - sighting.px).norm(), 0.3);
+  }
+}
+
 }  // namespace
 }  // namespace limn::calib
