@@ -161,12 +161,11 @@ Result<calib::Report> solved(const SolveOptions& options) {
   const double solve_seconds = seconds_since(solving_begun);
   log_info("solved in {} steps, judging by held-out poses", solution->iterations);
   const auto judging_begun = Clock::now();
-  auto assessment = calib::assess(observed, solving, *solution);
-  if (!assessment) return explained(assessment.error(), calib::faults(observed, *solution, {}, {}), options);
-  compare_with_earlier(options, *solution, &*assessment);
+  calib::Assessment assessment = calib::assess(observed, *solution, std::move(choice->held_out));
+  compare_with_earlier(options, *solution, &assessment);
   calib::Report report{std::move(observed),
                        std::move(*solution),
-                       std::move(*assessment),
+                       std::move(assessment),
                        {{"response", response_seconds},
                         {"board", board_seconds},
                         {"decode", decode_seconds},

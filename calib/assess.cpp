@@ -115,10 +115,10 @@ void add_faults(const std::vector<Fault>& faults, Assessment* assessment) {
   if (severity == Severity::doubt) assessment->verdict = std::max(assessment->verdict, Verdict::usable);
 }
 
-Result<Assessment> assess(const Observed& observed, const SolveOptions& options, const Solution& solution) {
+Assessment assess(const Observed& observed, const Solution& solution, HeldOut held_out) {
   const Observations& observations = observed.observations;
   Assessment assessment;
-  LIMN_TRY(assessment.held_out, held_out(observations, options, solution));
+  assessment.held_out = std::move(held_out);
   assessment.devices = device_qualities(observations, solution);
   const Uncertainty uncertainty = believed(observations, solution, assessment.held_out.rigs);
   assessment.epipolar = epipolar_residuals(solution.rig, observed.dense);
@@ -150,6 +150,11 @@ Result<Assessment> assess(const Observed& observed, const SolveOptions& options,
     assessment.verdict = Verdict::usable;
   }
   return assessment;
+}
+
+Result<Assessment> assess(const Observed& observed, const SolveOptions& options, const Solution& solution) {
+  LIMN_TRY(HeldOut score, held_out(observed.observations, options, solution));
+  return assess(observed, solution, std::move(score));
 }
 
 }  // namespace limn::calib

@@ -55,6 +55,10 @@ constexpr double k_beyond_boards = 5, k_fine_mm = 0.25;
 /// Adds faults found elsewhere; the verdict falls as far as they demand.
 void add_faults(const std::vector<Fault>& faults, Assessment* assessment);
 
+/// `held_out`: of the same solution, with its errors on the boards.
+Assessment assess(const Observed& observed, const Solution& solution, HeldOut held_out);
+
+/// Likewise, leaving one pose out after the other first. Errors: those of held_out.
 Result<Assessment> assess(const Observed& observed, const SolveOptions& options, const Solution& solution);
 
 }  // namespace limn::calib
