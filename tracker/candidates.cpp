@@ -24,35 +24,53 @@ constexpr double k_max_side_rms_px = 0.75;
 constexpr double k_max_side_rms_share = 0.012;  // of the side's length
 constexpr double k_side_trim = 0.1;             // of a side at each end: corners are round
 
-bool is_black(const std::uint8_t* pixel) { return (*pixel & BinaryPicture::k_black) != 0; }
-
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-// First pixel in [x, width) with white on its left, black itself and not visited; width when there is none.
-// Reads words of 8 pixels; the frame's bytes are white.
-int next_start(const std::uint8_t* row, int x, int width) {
+// First corner in [x, count) with black at its lower right alone, not visited; count when there is none. The
+// upper left pixel of a region's top row has one, so every outer boundary runs through such corners. Words of
+// 8 corners.
+int next_start(const std::uint8_t* row, int x, int count) {
   constexpr std::uint64_t k_ones = 0x0101010101010101;
-  while (x < width) {
-    std::uint64_t here = 0;
-    std::uint64_t left = 0;
-    std::memcpy(&here, row + x, 8);
-    std::memcpy(&left, row + x - 1, 8);
-    const std::uint64_t starts = here & ~left & ~(here >> 1) & k_ones;
-    if (starts != 0) return x + __builtin_ctzll(starts) / 8;
+  while (x < count) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, row + x, 8);
+    const std::uint64_t starts = (word >> 3) & ~word & ~(word >> 1) & ~(word >> 2) & ~(word >> 4) & k_ones;
+    if (starts != 0) return std::min(count, x + __builtin_ctzll(starts) / 8);
     x += 8;
   }
-  return width;
+  return count;
+}
+
+constexpr std::array<int, 4> k_dx = {0, 1, 0, -1};  // up, right, down, left
+constexpr std::array<int, 4> k_dy = {-1, 0, 1, 0};
+
+// Where a boundary with black on its right goes on, by 16 * direction + corner code. Diagonal neighbours are
+// connected: left first.
+constexpr std::array<std::uint8_t, 64> next_directions() {
+  using C = CornerCodes;
+  constexpr std::array<int, 4> ahead_left = {C::k_upper_left, C::k_upper_right, C::k_lower_right,
+                                             C::k_lower_left};
+  constexpr std::array<int, 4> ahead_right = {C::k_upper_right, C::k_lower_right, C::k_lower_left,
+                                              C::k_upper_left};
+  std::array<std::uint8_t, 64> next{};
+  for (std::size_t d = 0; d < 4; ++d)
+    for (int code = 0; code < 16; ++code) {
+      const std::size_t turn = code & ahead_left[d] ? 3 : code & ahead_right[d] ? 0 : 1;
+      next[16 * d + static_cast<std::size_t>(code)] = static_cast<std::uint8_t>((d + turn) % 4);
+    }
+  return next;
 }
 
 }  // namespace
 
-void QuadFinder::find(BinaryPicture& binary, const CandidateOptions& options, std::vector<Quad>& quads) {
+void QuadFinder::find(CornerCodes& corners, const CandidateOptions& options, std::vector<Quad>& quads) {
   quads.clear();
-  for (int y = 0; y < binary.height; ++y) {
-    const std::uint8_t* row = binary.at(0, y);
-    for (int x = next_start(row, 0, binary.width); x < binary.width;
-         x = next_start(row, x + 1, binary.width)) {
-      if (!trace(binary, x, y, options.min_side_px) || !find_corners()) continue;
+  for (int y = 0; y < corners.height; ++y) {
+    const std::uint8_t* row = corners.at(0, y);
+    for (int x = next_start(row, 0, corners.width); x < corners.width;
+         x = next_start(row, x + 1, corners.width)) {
+      trace(corners, x, y);
+      if (!may_be_quad(options.min_side_px) || !find_corners()) continue;
       sum_moments();
       Quad quad;
       if (choose_quad(options.min_side_px, &quad)) quads.push_back(quad);
@@ -60,48 +78,58 @@ void QuadFinder::find(BinaryPicture& binary, const CandidateOptions& options, st
   }
 }
 
-// Follows the boundary that runs up the left side of (x, y), black on its right, into boundary_. True when it
-// is a region's outer boundary that could be a quadrilateral.
-bool QuadFinder::trace(BinaryPicture& binary, int x, int y, double min_side_px) {
-  static constexpr std::array<int, 4> k_dx = {0, 1, 0, -1};  // up, right, down, left
-  static constexpr std::array<int, 4> k_dy = {-1, 0, 1, 0};
-  const std::ptrdiff_t stride = binary.stride;
-  // The pixels ahead of a corner of pixels, relative to the one at its lower right, by direction.
-  const std::array<std::ptrdiff_t, 4> ahead_left = {-stride - 1, -stride, 0, -1};
-  const std::array<std::ptrdiff_t, 4> ahead_right = {-stride, 0, -1, -stride - 1};
-  const std::array<std::ptrdiff_t, 4> step = {-stride, 1, stride, -1};
-
-  boundary_.clear();
-  int corner_x = x;  // corner of pixels: the upper left one of pixel (corner_x, corner_y)
-  int corner_y = y + 1;
-  std::uint8_t* pixel = binary.at(corner_x, corner_y);
+// Follows the boundary that runs up to corner (x, y) and on to its right, black on its right, into boundary_.
+void QuadFinder::trace(CornerCodes& corners, int x, int y) {
+  static constexpr std::array<std::uint8_t, 64> k_next = next_directions();
+  constexpr std::size_t k_block = 1024;
+  const std::array<std::ptrdiff_t, 4> step = {-corners.stride, 1, corners.stride, -1};
+  std::uint8_t* const start = corners.at(x, y);
+  std::uint8_t* corner = start;
   std::size_t direction = 0;
-  int low_x = x, high_x = x, low_y = y, high_y = y + 1;
-  long long twice_area = 0;
+  std::size_t count = 0;
+  int px = 2 * x - 1;  // of the corner, in half pixels
+  int py = 2 * y - 1;
   do {
-    if (direction == 0) pixel[ahead_right[0]] |= BinaryPicture::k_visited;
-    twice_area += static_cast<long long>(corner_x) * k_dy[direction] -
-                  static_cast<long long>(corner_y) * k_dx[direction];
-    boundary_.push_back({2 * corner_x + k_dx[direction] - 1, 2 * corner_y + k_dy[direction] - 1});
-    corner_x += k_dx[direction];
-    corner_y += k_dy[direction];
-    pixel += step[direction];
-    low_x = std::min(low_x, corner_x);
-    high_x = std::max(high_x, corner_x);
-    low_y = std::min(low_y, corner_y);
-    high_y = std::max(high_y, corner_y);
-    if (is_black(pixel + ahead_left[direction]))
-      direction = (direction + 3) % 4;
-    else if (!is_black(pixel + ahead_right[direction]))
-      direction = (direction + 1) % 4;
-  } while (corner_x != x || corner_y != y + 1 || direction != 0);
+    if (count + k_block > trail_.size()) trail_.resize(2 * trail_.size() + k_block);
+    for (const std::size_t end = count + k_block; count < end;) {
+      const std::uint8_t code = *corner & 15;
+      // Only where boundaries start.
+      *corner |= static_cast<std::uint8_t>((code == CornerCodes::k_lower_right) * CornerCodes::k_visited);
+      direction = k_next[16 * direction + code];
+      trail_[count++] = {px + k_dx[direction], py + k_dy[direction]};
+      corner += step[direction];
+      px += 2 * k_dx[direction];
+      py += 2 * k_dy[direction];
+      if (corner == start) break;
+    }
+  } while (corner != start);
+  boundary_ = std::span(trail_).first(count);
+}
 
-  const double width = high_x - low_x;
-  const double height = high_y - low_y;
-  const double area = 0.5 * static_cast<double>(twice_area);  // negative around a hole
-  return std::max(width, height) >= min_side_px && std::min(width, height) >= 0.5 * min_side_px &&
-         static_cast<double>(boundary_.size()) <= k_max_roughness * 2 * (width + height) &&
-         area >= k_min_box_share * width * height && area >= 0.5 * min_side_px * min_side_px;
+// Whether the boundary is an outer one and could be a quadrilateral's.
+bool QuadFinder::may_be_quad(double min_side_px) const {
+  const double length = static_cast<double>(boundary_.size());
+  if (length < 3 * min_side_px) return false;
+  int low_x = boundary_[0].x, high_x = low_x, low_y = boundary_[0].y, high_y = low_y;
+  for (const Crack& c : boundary_) {
+    low_x = std::min(low_x, c.x);
+    high_x = std::max(high_x, c.x);
+    low_y = std::min(low_y, c.y);
+    high_y = std::max(high_y, c.y);
+  }
+  const double width = 0.5 * (high_x - low_x);
+  const double height = 0.5 * (high_y - low_y);
+  if (std::max(width, height) < min_side_px || std::min(width, height) < 0.5 * min_side_px ||
+      length > k_max_roughness * 2 * (width + height))
+    return false;
+  long long sum = 0;
+  for (std::size_t i = 0; i < boundary_.size(); ++i) {
+    const Crack& a = boundary_[i];
+    const Crack& b = boundary_[i + 1 == boundary_.size() ? 0 : i + 1];
+    sum += static_cast<long long>(a.x) * b.y - static_cast<long long>(b.x) * a.y;
+  }
+  const double area = static_cast<double>(sum) / 8;  // of half pixels, twice; negative around a hole
+  return area >= k_min_box_share * width * height && area >= 0.5 * min_side_px * min_side_px;
 }
 
 // Indices of boundary points that are corners of its outline (Douglas and Peucker from two far points).
@@ -186,11 +214,14 @@ QuadFinder::Line QuadFinder::line(std::size_t from, std::size_t to) const {
   const double xx = (b.xx - a.xx) / n - x * x;
   const double xy = (b.xy - a.xy) / n - x * y;
   const double yy = (b.yy - a.yy) / n - y * y;
-  const double angle = 0.5 * std::atan2(2 * xy, xx - yy);
+  // The eigenvector of the larger eigenvalue, the way that does not cancel.
+  const double apart = 0.5 * (xx - yy);
+  const double root = std::sqrt(apart * apart + xy * xy);
   Line line;
   line.p = {x, y};
-  line.d = {std::cos(angle), std::sin(angle)};
-  const double spread = 0.5 * (xx + yy - std::hypot(xx - yy, 2 * xy));
+  line.d = apart > 0 ? Eigen::Vector2d(apart + root, xy) : Eigen::Vector2d(xy, root - apart);
+  line.d /= std::max(1e-12, line.d.norm());
+  const double spread = 0.5 * (xx + yy) - root;
   line.squares = n * std::max(0.0, spread);
   line.count = n;
   return line;
@@ -218,6 +249,11 @@ bool QuadFinder::fit_quad(const std::array<std::size_t, 4>& corners,
                           double min_side_px,
                           Quad* quad,
                           double* squares) const {
+  const auto at = [&](std::size_t i) {
+    return Eigen::Vector2d(0.5 * boundary_[corners[i % 4]].x, 0.5 * boundary_[corners[i % 4]].y);
+  };
+  for (std::size_t i = 0; i < 4; ++i)  // the found corners as they are: convex, nearly
+    if (cross(at(i + 1) - at(i), at(i + 2) - at(i + 1)) <= 0) return false;
   std::array<Line, 4> sides;
   *squares = 0;
   double longest = 0;

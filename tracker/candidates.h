@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <span>
 #include <vector>
 
 #include "tracker/threshold.h"
@@ -12,6 +13,7 @@ namespace limn::tracker {
 /// integers, good to about a pixel.
 struct Quad {
   std::array<Eigen::Vector2d, 4> corners_px;
+  double within_px = 3;  ///< how far off a corner may be
 };
 
 struct CandidateOptions {
@@ -24,8 +26,8 @@ struct CandidateOptions {
 /// and keeps those that four straight lines describe. Holds its buffers between calls.
 class QuadFinder {
  public:
-  /// Sets the visited bits of `binary`.
-  void find(BinaryPicture& binary, const CandidateOptions& options, std::vector<Quad>& quads);
+  /// Sets the visited bits of `corners`.
+  void find(CornerCodes& corners, const CandidateOptions& options, std::vector<Quad>& quads);
 
  private:
   struct Crack {  // middle of a boundary crack, in half pixels
@@ -39,11 +41,13 @@ class QuadFinder {
     double squares = 0;    // sum of squared distances, px^2
     double count = 0;
   };
-  std::vector<Crack> boundary_;
+  std::vector<Crack> trail_;  // grows; boundary_ is its used part
+  std::span<Crack> boundary_;
   std::vector<Moments> sums_;
   std::vector<std::size_t> corners_;
 
-  bool trace(BinaryPicture& binary, int x, int y, double min_side_px);
+  void trace(CornerCodes& corners, int x, int y);
+  bool may_be_quad(double min_side_px) const;
   void split(std::size_t from, std::size_t to, double tolerance);
   bool find_corners();
   void sum_moments();

@@ -16,6 +16,8 @@ struct Detection {
   /// Covariance of each corner (px^2), from the residuals of its two edge lines plus what edge lines keep as
   /// systematic error (refine.h).
   std::array<Eigen::Matrix2d, 4> corner_covariance;
+  /// False where a corner itself is covered and only follows from what is seen of its two sides.
+  std::array<bool, 4> corner_visible = {true, true, true, true};
   /// 0 … 1: how clearly the inside says its id (mean margin of the cells, or template correlation).
   double score = 0;
 };

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "tracker/identify.h"
-
 namespace limn::tracker {
 namespace {
 
@@ -13,6 +11,13 @@ double longest_side(const Detection& detection) {
   for (std::size_t i = 0; i < 4; ++i)
     longest = std::max(longest, (detection.corners_px[i] - detection.corners_px[(i + 1) % 4]).norm());
   return longest;
+}
+
+double shortest_side(const Quad& quad) {
+  double shortest = (quad.corners_px[0] - quad.corners_px[3]).norm();
+  for (std::size_t i = 0; i < 3; ++i)
+    shortest = std::min(shortest, (quad.corners_px[i + 1] - quad.corners_px[i]).norm());
+  return shortest;
 }
 
 Eigen::Vector2d centre(const Detection& detection) {
@@ -34,30 +39,79 @@ void add_best_of_square(Detection detection, std::vector<Detection>* detections)
   detections->push_back(std::move(detection));
 }
 
+constexpr double k_refined_contrast = 0.7;  // share of min_contrast that an edge must keep on average
+
+constexpr double k_rough_above_px = 32;  // smaller quads are refined in full at once: it costs as little
+
+constexpr double k_fit_above_px = 24;  // smaller markers have too few pixels for the pattern's fit
+
+// Whether a marker found before takes the place.
+bool is_taken(const Quad& quad, const std::vector<Detection>& detections) {
+  const auto& q = quad.corners_px;
+  const Eigen::Vector2d middle = 0.25 * (q[0] + q[1] + q[2] + q[3]);
+  return std::any_of(detections.begin(), detections.end(),
+                     [&](const Detection& d) { return (centre(d) - middle).norm() < 0.5 * longest_side(d); });
+}
+
 }  // namespace
 
 std::vector<Detection> Detector::detect(const cv::Mat& grey, const Lens* lens) {
   LIMN_CHECK(grey.empty() || grey.type() == CV_8UC1);
   std::vector<Detection> detections;
   if (grey.empty()) return detections;
-  threshold_.apply(grey, options_.min_contrast, binary_);
-  finder_.find(binary_, {options_.min_side_px}, quads_);
-  for (const Quad& quad : quads_) {
-    const auto refined = refiner_.refine(grey, quad, 0.7 * options_.min_contrast, lens);
-    if (!refined) continue;
-    const auto identity = identify(grey, *refined, families_);
-    if (!identity) continue;
-    Detection detection;
-    detection.marker = identity->marker;
-    detection.score = std::clamp(identity->score, 0.0, 1.0);
-    for (std::size_t i = 0; i < 4; ++i) {
-      const std::size_t corner = (i + identity->first_corner) % 4;
-      detection.corners_px[i] = refined->corners_px[corner];
-      detection.corner_covariance[i] = refined->corner_covariance[corner];
-    }
-    add_best_of_square(std::move(detection), &detections);
-  }
+  threshold_.apply(grey, options_.min_contrast, corner_codes_);
+  finder_.find(corner_codes_, {options_.min_side_px}, quads_);
+  for (const Quad& quad : quads_)
+    if (auto found = read(grey, quad, lens, Reading::open))
+      add_best_of_square(std::move(*found), &detections);
+  if (options_.broken_markers) add_broken(grey, lens, &detections);
   return detections;
+}
+
+std::optional<Detection> Detector::read(const cv::Mat& grey,
+                                        const Quad& quad,
+                                        const Lens* lens,
+                                        Reading reading) {
+  if (!may_be_marker(grey, quad, options_.min_contrast)) return std::nullopt;
+  const double min_contrast = k_refined_contrast * options_.min_contrast;
+  Quad nearer = quad;
+  if (shortest_side(quad) > k_rough_above_px) {
+    const auto rough = refiner_.refine(grey, quad, min_contrast, lens, Effort::rough);
+    if (!rough || !identify(grey, *rough, families_, reading)) return std::nullopt;
+    nearer.corners_px = rough->corners_px;
+  }
+  auto refined = refiner_.refine(grey, nearer, min_contrast, lens, Effort::full);
+  if (!refined) return std::nullopt;
+  const auto identity = identify(grey, *refined, families_, reading);
+  if (!identity) return std::nullopt;
+  if (!refined->separate && identity->cells.count > 0 &&
+      shortest_side(Quad{refined->corners_px}) > k_fit_above_px)
+    if (auto fitted = fit_pattern(grey, refiner_.light(), *refined, identity->cells)) refined = fitted;
+  Detection detection;
+  detection.marker = identity->marker;
+  detection.score = std::clamp(identity->score, 0.0, 1.0);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const std::size_t corner = (i + identity->first_corner) % 4;
+    detection.corners_px[i] = refined->corners_px[corner];
+    detection.corner_covariance[i] = refined->corner_covariance[corner];
+    detection.corner_visible[i] = refined->corner_visible[corner];
+  }
+  return detection;
+}
+
+void Detector::add_broken(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections) {
+  constexpr std::size_t k_max_candidates = 400;
+  segment_finder_.find(grey, options_.min_contrast, segments_);
+  joiner_.find(segments_, grey.cols, grey.rows, joined_);
+  const std::size_t regular = detections->size();
+  for (std::size_t i = 0; i < std::min(joined_.size(), k_max_candidates); ++i) {
+    Quad quad = joined_[i].quad;
+    quad.within_px = 5;
+    if (is_taken(quad, {detections->begin(), detections->begin() + static_cast<std::ptrdiff_t>(regular)}))
+      continue;
+    if (auto found = read(grey, quad, lens, Reading::covered))
+      add_best_of_square(std::move(*found), detections);
+  }
 }
 
 }  // namespace limn::tracker

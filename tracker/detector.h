@@ -7,7 +7,10 @@
 #include "tracker/candidates.h"
 #include "tracker/detection.h"
 #include "tracker/family.h"
+#include "tracker/identify.h"
 #include "tracker/refine.h"
+#include "tracker/segment_quads.h"
+#include "tracker/segments.h"
 #include "tracker/threshold.h"
 
 namespace limn::tracker {
@@ -20,10 +23,14 @@ struct DetectorOptions {
   double min_side_px = 6;
   /// How the camera writes light. Wrong, markers shrink, the more the softer their edges.
   Encoding encoding = Encoding::linear;
+  /// Also joins straight edges to quadrilaterals, for markers that fingers, bites or slatted shadows break
+  /// up. Costs about as much again as the rest.
+  bool broken_markers = true;
 };
 
 /// Finds markers: grey -> local threshold -> boundaries of black regions -> quadrilaterals -> sub-pixel edge
-/// lines -> rectified cells -> ids. Holds its buffers, so keep one per thread.
+/// lines -> rectified cells -> ids; what is left: straight edges -> quadrilaterals -> the same. Holds its
+/// buffers, so keep one per thread.
 class Detector {
  public:
   explicit Detector(Families families, DetectorOptions options = {})
@@ -39,10 +46,17 @@ class Detector {
   Families families_;
   DetectorOptions options_;
   Threshold threshold_;
-  BinaryPicture binary_;
+  CornerCodes corner_codes_;
   QuadFinder finder_;
   std::vector<Quad> quads_;
   EdgeRefiner refiner_;
+  SegmentFinder segment_finder_;
+  std::vector<Segment> segments_;
+  SegmentQuadFinder joiner_;
+  std::vector<SegmentQuad> joined_;
+
+  std::optional<Detection> read(const cv::Mat& grey, const Quad& quad, const Lens* lens, Reading reading);
+  void add_broken(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections);
 };
 
 }  // namespace limn::tracker

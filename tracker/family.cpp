@@ -64,16 +64,28 @@ int smallest_distance(const CodeFamily& family) {
   return smallest;
 }
 
-int correctable_errors(const CodeFamily& family) {
-  const int bits = family.cells * family.cells;
-  const int half_distance = std::max(0, (smallest_distance(family) - 1) / 2);
+// Negative when not even a flawless reading of the other bits says which code it is.
+int correctable_errors(const CodeFamily& family, int distance, int hidden) {
+  const int bits = family.cells * family.cells - hidden;
+  const int unique = distance > hidden ? (distance - hidden - 1) / 2 : -1;
   double words_with = 1;  // binomial(bits, errors)
   double words = 0;
   for (int errors = 0;; ++errors) {
     words += words_with;
     words_with *= static_cast<double>(bits - errors) / (errors + 1);
     const double hit = 4 * static_cast<double>(family.codes.size()) * words / std::ldexp(1.0, bits);
-    if (hit > k_max_random_hit || errors > half_distance) return std::max(0, errors - 1);
+    if (hit > k_max_random_hit || errors > unique) return errors - 1;
+  }
+}
+
+// A flawless code is always read, whatever the family's size.
+std::vector<int> correctable_errors(const CodeFamily& family) {
+  const int distance = smallest_distance(family);
+  std::vector<int> errors = {std::max(0, correctable_errors(family, distance, 0))};
+  for (int hidden = 1;; ++hidden) {
+    const int more = correctable_errors(family, distance, hidden);
+    if (more < 0) return errors;
+    errors.push_back(more);
   }
 }
 

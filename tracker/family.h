@@ -18,9 +18,10 @@ namespace limn::tracker {
 struct CodeFamily {
   std::string name;
   int cells = 0;
-  /// Wrong bits that are still corrected: fewer than half the family's distance, and few enough that a quad
-  /// with random cells is taken for a marker once in 5000 times at most (family.cpp).
-  int max_errors = 0;
+  /// Wrong bits that are still corrected, by the number of bits that cannot be read (covered): so few that
+  /// the code is the only one and that a quad with random cells is taken for a marker once in 5000 times at
+  /// most (family.cpp). Ends where not even flawless other bits are enough.
+  std::vector<int> max_errors;
   /// By id, then by k: the code as it is seen when the marker's own top-left corner lies at the k-th corner
   /// of the quad (clockwise). k = 0 is upright.
   std::vector<std::array<std::uint64_t, 4>> codes;

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <vector>
 
+#include "tracker/square_to_quad.h"
+
 namespace limn::tracker {
 namespace {
 
@@ -15,6 +17,10 @@ constexpr int k_max_grid = 9;  // 7 cells and the border
 // clean.
 constexpr double k_border_errors = 0.12;
 constexpr double k_border_errors_few_bits = 0.05;
+// The same where something covers the marker, and margins below which cells then count as hidden.
+constexpr double k_border_errors_covered = 0.25;
+constexpr std::array<double, 4> k_hidden_below = {0, 0.2, 0.4, 0.6};
+constexpr double k_min_score_all_bits = 0.8;  // mean margin where no bit may be hidden
 constexpr int k_few_bits = 25;
 // Mean margin of the cells (0: at the limit, 1: as black or white as beside the edge). Clutter lies below.
 constexpr double k_min_score = 0.35;
@@ -25,30 +31,9 @@ constexpr double k_min_correlation = 0.65;   // of a template, see numbers of th
 constexpr double k_min_rotation_lead = 0.1;  // best rotation over the second best
 constexpr double k_uneven_paper = 1.3;       // brightest side over the second darkest
 constexpr double k_min_template_variance = 0.02;  // stdev a fifteenth of black to white
+constexpr double k_brightest = 2;                 // glare counts no more than this
 constexpr double k_sharpen_below_px = 4;          // cells smaller than this blur into each other
 constexpr double k_sharpening = 0.25;             // Laplacian weight
-
-// Marker square [0,1]^2 to pixels (Heckbert 1989).
-class SquareToQuad {
- public:
-  explicit SquareToQuad(const std::array<Eigen::Vector2d, 4>& q) {
-    const Eigen::Vector2d sum = q[0] - q[1] + q[2] - q[3];
-    const Eigen::Vector2d a = q[1] - q[2];
-    const Eigen::Vector2d b = q[3] - q[2];
-    const double determinant = a.x() * b.y() - b.x() * a.y();
-    const double g = (sum.x() * b.y() - b.x() * sum.y()) / determinant;
-    const double h = (a.x() * sum.y() - sum.x() * a.y()) / determinant;
-    matrix_ << q[1].x() - q[0].x() + g * q[1].x(), q[3].x() - q[0].x() + h * q[3].x(), q[0].x(),
-        q[1].y() - q[0].y() + g * q[1].y(), q[3].y() - q[0].y() + h * q[3].y(), q[0].y(), g, h, 1;
-  }
-  Eigen::Vector2d at(double x, double y) const {
-    const Eigen::Vector3d p = matrix_ * Eigen::Vector3d(x, y, 1);
-    return p.head<2>() / p.z();
-  }
-
- private:
-  Eigen::Matrix3d matrix_;
-};
 
 // Bilinear; the picture's edge goes on outside.
 double sample(const cv::Mat& grey, const Eigen::Vector2d& px) {
@@ -78,19 +63,27 @@ struct Plane {
 
 using Grid = std::array<double, k_max_grid * k_max_grid>;
 
+// Where the limit between black and white lies: the middle, or lower when a shadow crosses, whose white paper
+// must stay lighter than the ink in the light (a shadow 4 times darker against ink 7 times darker than
+// paper).
+constexpr double k_middle = 0.5;
+constexpr std::array<double, 3> k_limits = {k_middle, 0.35, 0.22};
+
 // What one quad shows, as brightness relative to its edges: -1 as dark as inside them, 1 as light as outside.
 struct Reader {
   const cv::Mat& grey;
   SquareToQuad px_from_square;
   Plane light, dark;
   double side_px;
+  double limit;
 
-  Reader(const cv::Mat& picture, const RefinedQuad& quad)
+  Reader(const cv::Mat& picture, const RefinedQuad& quad, double limit_share = k_middle)
       : grey(picture),
         px_from_square(quad.corners_px),
         light(quad.outside_level),
         dark(quad.inside_level),
-        side_px(std::sqrt(area(quad.corners_px))) {}
+        side_px(std::sqrt(area(quad.corners_px))),
+        limit(limit_share) {}
 
   static double area(const std::array<Eigen::Vector2d, 4>& q) {
     const Eigen::Vector2d a = q[2] - q[0];
@@ -101,8 +94,9 @@ struct Reader {
   double relative(double x, double y) const {
     const double high = light.at(x, y);
     const double low = dark.at(x, y);
-    const double half = std::max(1.0, 0.5 * (high - low));
-    return (sample(grey, px_from_square.at(x, y)) - 0.5 * (high + low)) / half;
+    const double half = std::max(1.0, limit * (high - low));
+    const double value = (sample(grey, px_from_square.at(x, y)) - low - limit * (high - low)) / half;
+    return std::clamp(value, -k_brightest, k_brightest);
   }
 
   // Mean over the middle half of cell (row, column) of a grid with `cells` a side.
@@ -176,31 +170,64 @@ struct Nearest {
 
 // Own function so that the processor's own bit count is used where it has one.
 __attribute__((target_clones("popcnt", "default"))) Nearest nearest(
-    const std::vector<std::array<std::uint64_t, 4>>& codes, std::uint64_t seen) {
+    const std::vector<std::array<std::uint64_t, 4>>& codes, std::uint64_t seen, std::uint64_t readable) {
   Nearest best;
   for (std::size_t id = 0; id < codes.size(); ++id)
     for (std::size_t k = 0; k < 4; ++k) {
-      const int errors = __builtin_popcountll(codes[id][k] ^ seen);
+      const int errors = __builtin_popcountll((codes[id][k] ^ seen) & readable);
       if (errors < best.errors) best = {id, k, errors};
     }
   return best;
 }
 
-std::optional<Identity> read_code(const CodeFamily& family, const Bits& bits) {
-  const bool few = family.cells * family.cells <= k_few_bits;
-  const double border_share = few ? k_border_errors_few_bits : k_border_errors;
+SeenCells cells_of(const CodeFamily& family, std::uint64_t code) {
+  SeenCells cells;
+  cells.count = family.cells + 2;
+  int bit = family.cells * family.cells;
+  for (int row = 1; row <= family.cells; ++row)
+    for (int column = 1; column <= family.cells; ++column)
+      cells.white[static_cast<std::size_t>(row * cells.count + column)] = (code >> --bit) & 1;
+  return cells;
+}
+
+// The family's code, when the cells whose margin is below `hidden_below` count as hidden.
+std::optional<Identity> read_code(const CodeFamily& family,
+                                  const Bits& bits,
+                                  double border_share,
+                                  double hidden_below) {
+  const int count = family.cells * family.cells;
   if (bits.border_errors > border_share * bits.border_cells) return std::nullopt;
-  if (bits.mean_margin < (few ? k_min_score_few_bits : k_min_score)) return std::nullopt;
-  const Nearest best = nearest(family.codes, bits.code);
-  if (best.errors > family.max_errors) return std::nullopt;
+  if (bits.mean_margin < (count <= k_few_bits ? k_min_score_few_bits : k_min_score)) return std::nullopt;
+  std::uint64_t readable = 0;
+  for (int i = 0; i < count; ++i)
+    readable |= std::uint64_t{bits.margin[static_cast<std::size_t>(i)] >= hidden_below} << i;
+  const auto hidden = static_cast<std::size_t>(count - std::popcount(readable));
+  if (hidden >= family.max_errors.size()) return std::nullopt;
+  const Nearest best = nearest(family.codes, bits.code, readable);
+  if (best.errors > family.max_errors[hidden]) return std::nullopt;
   double wrong = 0;
-  std::uint64_t differing = family.codes[best.id][best.rotation] ^ bits.code;
+  std::uint64_t differing = (family.codes[best.id][best.rotation] ^ bits.code) & readable;
   for (; differing != 0; differing &= differing - 1)
     wrong += bits.margin[static_cast<std::size_t>(std::countr_zero(differing))];
-  const double all = bits.mean_margin * family.cells * family.cells;
+  const double all = bits.mean_margin * count;
   if (wrong > k_max_wrong_margin * all) return std::nullopt;
-  return Identity{
-      {family.name, std::to_string(best.id)}, best.rotation, bits.mean_margin * (1 - 2 * wrong / all)};
+  return Identity{{family.name, std::to_string(best.id)},
+                  best.rotation,
+                  bits.mean_margin * (1 - 2 * wrong / all),
+                  cells_of(family, family.codes[best.id][best.rotation])};
+}
+
+std::optional<Identity> read_code(const CodeFamily& family, const Bits& bits, Reading reading) {
+  const bool few = family.cells * family.cells <= k_few_bits;
+  if (reading == Reading::open)
+    return read_code(family, bits, few ? k_border_errors_few_bits : k_border_errors, 0);
+  if (family.max_errors.size() == 1) {  // so few bits that all must be seen
+    if (bits.mean_margin < k_min_score_all_bits) return std::nullopt;
+    return read_code(family, bits, k_border_errors, 0);
+  }
+  for (const double hidden_below : k_hidden_below)
+    if (auto found = read_code(family, bits, k_border_errors_covered, hidden_below)) return found;
+  return std::nullopt;
 }
 
 // Border of a template: a quarter of the side; dark at 12 places of its middle ring.
@@ -253,12 +280,12 @@ std::optional<Identity> read_templates(const Reader& reader, const std::vector<T
     const double score = scores[top];
     std::sort(scores.begin(), scores.end());
     if (score < k_min_correlation || score - scores[2] < k_min_rotation_lead) continue;
-    if (!best || score > best->score) best = Identity{{"artoolkit", pattern.id}, top, score};
+    if (!best || score > best->score) best = Identity{{"artoolkit", pattern.id}, top, score, {}};
   }
   return best;
 }
 
-std::optional<Identity> read(const Reader& reader, const Families& families) {
+std::optional<Identity> read_codes(const Reader& reader, const Families& families, Reading reading) {
   std::optional<Identity> best;
   int read_cells = 0;
   Bits bits;
@@ -269,15 +296,62 @@ std::optional<Identity> read(const Reader& reader, const Families& families) {
       bits = bits_of(grid, family.cells);
       read_cells = family.cells;
     }
-    const std::optional<Identity> found = read_code(family, bits);
+    const std::optional<Identity> found = read_code(family, bits, reading);
     if (found && (!best || found->score > best->score)) best = found;
   }
-  return best ? best : read_templates(reader, families.templates());
+  return best;
+}
+
+std::optional<Identity> read(const Reader& reader, const Families& families) {
+  const auto code = read_codes(reader, families, Reading::open);
+  return code ? code : read_templates(reader, families.templates());
+}
+
+// The picture's nearest pixel; its edge goes on outside.
+int pixel_at(const cv::Mat& grey, const Eigen::Vector2d& px) {
+  const int x = static_cast<int>(std::clamp(px.x() + 0.5, 0.0, static_cast<double>(grey.cols - 1)));
+  const int y = static_cast<int>(std::clamp(px.y() + 0.5, 0.0, static_cast<double>(grey.rows - 1)));
+  return grey.ptr(y)[x];
 }
 
 }  // namespace
 
-std::optional<Identity> identify(const cv::Mat& grey, const RefinedQuad& quad, const Families& families) {
+bool may_be_marker(const cv::Mat& grey, const Quad& quad, double min_contrast) {
+  constexpr double k_inset = 0.07;  // within the border of every family (a ninth and more)
+  constexpr int k_border = 20;
+  constexpr int k_inside = 5;  // rows and columns
+  const SquareToQuad px_from_square(quad.corners_px);
+  std::array<int, k_border> border;
+  for (int i = 0; i < k_border / 4; ++i) {
+    const double along = 0.1 + 0.2 * i;
+    const auto at = static_cast<std::size_t>(4 * i);
+    border[at] = pixel_at(grey, px_from_square.at(along, k_inset));
+    border[at + 1] = pixel_at(grey, px_from_square.at(along, 1 - k_inset));
+    border[at + 2] = pixel_at(grey, px_from_square.at(k_inset, along));
+    border[at + 3] = pixel_at(grey, px_from_square.at(1 - k_inset, along));
+  }
+  std::sort(border.begin(), border.end());
+  int lightest = 0;
+  for (int row = 0; row < k_inside; ++row)
+    for (int column = 0; column < k_inside; ++column)
+      lightest = std::max(lightest, pixel_at(grey, px_from_square.at(0.2 + 0.15 * column, 0.2 + 0.15 * row)));
+  const int middle = border[k_border / 2];
+  // Three quarters of the border darker than half way to what is lightest inside.
+  return lightest - middle >= min_contrast && border[k_border * 3 / 4] < middle + 0.6 * (lightest - middle);
+}
+
+std::optional<Identity> identify(const cv::Mat& grey,
+                                 const RefinedQuad& quad,
+                                 const Families& families,
+                                 Reading reading) {
+  if (reading == Reading::covered) {
+    std::optional<Identity> best;
+    for (const double limit : k_limits) {
+      const auto found = read_codes(Reader(grey, quad, limit), families, Reading::covered);
+      if (found && (!best || found->score > best->score)) best = found;
+    }
+    return best;
+  }
   if (const auto found = read(Reader(grey, quad), families)) return found;
   // Something brighter than the paper may stand behind one side: try the second darkest side's paper for all.
   std::array<double, 4> levels = quad.outside_level;

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "tracker/family.h"
+#include "tracker/pattern_fit.h"
 #include "tracker/refine.h"
 
 namespace limn::tracker {
@@ -14,11 +15,25 @@ struct Identity {
   MarkerName marker;
   std::size_t first_corner = 0;  ///< which of the quad's corners is the marker's own top left
   double score = 0;              ///< as Detection::score
+  SeenCells cells = {};          ///< the code's, as the quad should show them; none of a template
+};
+
+/// Whether the inside could be a marker's at all, for a quad good to a few pixels: a dark border around
+/// something lighter, by at least min_contrast levels. Costs a tenth of refining it.
+bool may_be_marker(const cv::Mat& grey, const Quad& quad, double min_contrast);
+
+/// What a reader may count on.
+enum class Reading {
+  open,    ///< all cells are seen, in one light
+  covered  ///< some may be hidden, shadows may cross: codes only, hidden bits count as such
 };
 
 /// Reads the quad's cells through its homography and compares them with every family; the best that is clear
 /// enough. The limit between black and white comes from the levels beside the four edges, as a plane over the
 /// marker, so that a gradient of light does no harm.
-std::optional<Identity> identify(const cv::Mat& grey, const RefinedQuad& quad, const Families& families);
+std::optional<Identity> identify(const cv::Mat& grey,
+                                 const RefinedQuad& quad,
+                                 const Families& families,
+                                 Reading reading = Reading::open);
 
 }  // namespace limn::tracker

@@ -16,7 +16,13 @@ constexpr double k_flat_share = 0.05;
 // table.
 constexpr double k_valley_share = 0.35;
 constexpr int k_max_reach = 10;
-constexpr double k_huber = 1.5;  // in robust standard deviations
+constexpr int k_rough_rows = 12;         // of a side, where the effort is rough
+constexpr double k_huber = 1.5;          // in robust standard deviations
+constexpr double k_reject = 4;           // in the same: what lies beyond belongs to something else
+constexpr double k_min_share = 0.2;      // of the side's contrast: rows with less are covered or show no edge
+constexpr double k_end_px = 3;           // a corner is seen when most rows this near to it are on the line
+constexpr double k_end_share = 0.1;      // or this share of the side
+constexpr double k_min_scale_px = 0.04;  // below which residuals are no reason to reject
 constexpr int k_min_crossings = 3;
 constexpr std::size_t k_min_bent_crossings = 12;
 constexpr double k_bow_deviations = 3;  // below them a bow is noise: one straight side in 370 shows as much
@@ -111,6 +117,7 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
                            double reach_px,
                            double min_contrast,
                            const Lens* lens,
+                           Effort effort,
                            const EdgeLine* before,
                            EdgeLine* line) {
   const Eigen::Vector2d& from = corners[side];
@@ -140,7 +147,8 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   crossings_.clear();
   gradients_.clear();
   std::array<double, 2 * k_max_reach> mean{};
-  for (int u = first; u <= last; ++u) {
+  const int stride = effort == Effort::full ? 1 : 1 + (last - first) / k_rough_rows;
+  for (int u = first; u <= last; u += stride) {
     const double straight =
         before && before->flat == line->flat ? before->at(u) : from[v_axis] + (u - from[u_axis]) * slope;
     const double v = straight + bow.at(u);
@@ -177,8 +185,14 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   while (high < profile && mean[high] > flat_below &&
          !(mean[high - 1] < valley_below && mean[high] > mean[high - 1]))
     ++high;
+  // Flat beyond the window, not the slope of another edge or the end of what was looked at.
+  line->separate = low >= 2 && high + 2 <= profile;
+  for (std::size_t k = 1; k <= 2 && line->separate; ++k)
+    line->separate = std::abs(mean[low - k]) <= flat_below && std::abs(mean[high + k - 1]) <= flat_below;
   double contrast = 0;  // in light
   for (std::size_t k = low; k < high; ++k) contrast += mean[k];
+  // A Gaussian's peak is its area over sigma sqrt(2 pi); v is not the edge's normal when the side leans.
+  line->blur_px = 0.4 * contrast / mean[peak] / std::hypot(1.0, slope);
   contrast /= static_cast<double>(crossings_.size());
   if (!(contrast > 0)) return false;
 
@@ -197,29 +211,34 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
       sum += gradient[k];
       moment += gradient[k] * (static_cast<double>(k) + 0.5 - reach);
     }
-    if (sum < 0.4 * contrast) continue;  // covered, or no edge here
+    if (sum < k_min_share * contrast) continue;  // covered, or no edge here
     const double v = row.v + inward * moment / sum;
     const double share = sum / contrast;
     const std::uint8_t* pixel = line->flat ? grey.ptr(static_cast<int>(row.v)) + static_cast<int>(row.u)
                                            : grey.ptr(static_cast<int>(row.u)) + static_cast<int>(row.v);
     inside_sum += pixel[(static_cast<std::ptrdiff_t>(high) - reach) * v_stride];
     outside_sum += pixel[(static_cast<std::ptrdiff_t>(low) - reach) * v_stride];
-    crossings_[kept++] = {row.u, v - bow.at(row.u), std::min(1.0, share * share)};
+    crossings_[kept++] = {row.u, v - bow.at(row.u), std::min(1.0, share)};
   }
   crossings_.resize(kept);
   if (static_cast<int>(kept) < k_min_crossings) return false;
   line->inside_level = inside_sum / static_cast<double>(kept);
   line->outside_level = outside_sum / static_cast<double>(kept);
-  return line->outside_level - line->inside_level >= min_contrast && fit_line(line);
+  if (line->outside_level - line->inside_level < min_contrast) return false;
+  double variance = 0;
+  if (!fit_line(effort, line, &variance)) return false;
+  see_ends(from[u_axis], to[u_axis], std::max(trim, blur_trim), variance, line);
+  return true;
 }
 
 // A straight line and a bent one, averaged by what speaks for the bow.
-bool EdgeRefiner::fit_line(EdgeLine* line) {
+bool EdgeRefiner::fit_line(Effort effort, EdgeLine* line, double* variance) {
   double u_sum = 0;
   for (const Crossing& c : crossings_) u_sum += c.u;
   line->u_middle = u_sum / static_cast<double>(crossings_.size());
-  if (!(fit_terms(2, line) >= 0)) return false;
-  if (crossings_.size() < k_min_bent_crossings) return true;
+  *variance = fit_terms(2, line);
+  if (!(*variance >= 0)) return false;
+  if (effort == Effort::rough || crossings_.size() < k_min_bent_crossings) return true;
   EdgeLine bent = *line;
   if (!(fit_terms(3, &bent) >= 0)) return true;
   const double half = 0.5 * std::abs(crossings_.back().u - crossings_.front().u);
@@ -227,24 +246,33 @@ bool EdgeRefiner::fit_line(EdgeLine* line) {
   return true;
 }
 
-// Weighted least squares of the first `terms` of offset, slope, curvature, then Huber weights on the
-// residuals' robust scale. The residuals' variance; negative when the crossings do not determine the terms.
+// Weighted least squares of the first `terms` of offset, slope, curvature; then Huber weights on the
+// residuals' robust scale; then without what belongs to something else. The residuals' variance; negative
+// when the crossings do not determine the terms.
 double EdgeRefiner::fit_terms(int terms, EdgeLine* line) {
   line->offset = line->slope = line->curvature = 0;
   double scale = 0;  // 0: no robust weights yet
   double variance = -1;
-  for (int round = 0; round < 4; ++round) {
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  constexpr int k_huber_rounds = 3;
+  constexpr int k_rounds = 5;
+  for (int round = 0; round < k_rounds; ++round) {
+    const double huber = k_huber * scale;
+    const double foreign = k_reject * std::max(scale, k_min_scale_px);
+    std::array<double, 5> powers{};
     Eigen::Vector3d right = Eigen::Vector3d::Zero();
     for (const Crossing& c : crossings_) {
       const double d = c.u - line->u_middle;
-      const double residual = std::abs(c.v - line->at(c.u));
-      const double huber = scale > 0 && residual > k_huber * scale ? k_huber * scale / residual : 1;
-      const double w = c.weight * huber;
-      const Eigen::Vector3d row(1, d, d * d);
-      normal += w * row * row.transpose();
-      right += w * c.v * row;
+      const double residual = c.share * std::abs(c.v - line->at(c.u));
+      if (round >= k_huber_rounds && residual > foreign) continue;
+      const double w = c.share * c.share * (scale > 0 && residual > huber ? huber / residual : 1);
+      const double wd = w * d;
+      const double wdd = wd * d;
+      powers[0] += w, powers[1] += wd, powers[2] += wdd, powers[3] += wdd * d, powers[4] += wdd * d * d;
+      right += c.v * Eigen::Vector3d(w, wd, wdd);
     }
+    Eigen::Matrix3d normal;
+    normal << powers[0], powers[1], powers[2], powers[1], powers[2], powers[3], powers[2], powers[3],
+        powers[4];
     if (terms == 2) {
       normal.row(2).setZero();
       normal.col(2).setZero();
@@ -259,23 +287,42 @@ double EdgeRefiner::fit_terms(int terms, EdgeLine* line) {
     line->curvature = solution[2];
     if (terms == 2) inverse(2, 2) = 0;
     double squares = 0;
-    double weights = 0;
+    double count = 0;
     deviations_.clear();
+    bool clean = true;
     for (const Crossing& c : crossings_) {
-      const double residual = std::abs(c.v - line->at(c.u));
+      const double residual = c.share * std::abs(c.v - line->at(c.u));
       deviations_.push_back(residual);
+      if (round >= k_huber_rounds && residual > foreign) continue;
+      clean = clean && residual <= huber;
       const double bounded = scale > 0 ? std::min(residual, 3 * scale) : residual;
-      squares += c.weight * bounded * bounded;
-      weights += c.weight;
+      squares += bounded * bounded;
+      count += 1;
     }
     const auto middle = deviations_.begin() + static_cast<std::ptrdiff_t>(deviations_.size() / 2);
     std::nth_element(deviations_.begin(), middle, deviations_.end());
     scale = std::max(1.4826 * *middle, 1e-3);
-    const double count = static_cast<double>(crossings_.size());
-    variance = squares / weights * count / std::max(1.0, count - terms);
+    variance = squares / std::max(1.0, count - terms);  // of a row of full contrast
     line->covariance = inverse * variance;
+    if (clean && round > 0) break;  // all weights were 1, and will be
   }
   return variance;
+}
+
+// Whether most rows next to the side's ends lie on the line. Rows nearer than `trim` to an end are not looked
+// at.
+void EdgeRefiner::see_ends(double from, double to, double trim, double variance, EdgeLine* line) const {
+  const double band = std::max(k_end_px, k_end_share * std::abs(to - from));
+  const double near = k_reject * std::max(k_min_scale_px, std::sqrt(variance));
+  double at_from = 0;
+  double at_to = 0;
+  for (const Crossing& c : crossings_) {
+    if (c.share * std::abs(c.v - line->at(c.u)) > near) continue;
+    at_from += std::abs(c.u - from) < trim + band;
+    at_to += std::abs(c.u - to) < trim + band;
+  }
+  line->seen_at_start = at_from >= 0.5 * band;
+  line->seen_at_end = at_to >= 0.5 * band;
 }
 
 namespace {
@@ -326,32 +373,34 @@ double shortest_side(const std::array<Eigen::Vector2d, 4>& corners) {
 
 }  // namespace
 
-std::optional<RefinedQuad> EdgeRefiner::refine(const cv::Mat& grey,
-                                               const Quad& quad,
-                                               double min_contrast,
-                                               const Lens* lens) {
+std::optional<RefinedQuad> EdgeRefiner::refine(
+    const cv::Mat& grey, const Quad& quad, double min_contrast, const Lens* lens, Effort effort) {
   RefinedQuad refined;
   refined.corners_px = quad.corners_px;
   std::array<EdgeLine, 4> lines;
-  constexpr int k_rounds = 2;  // the second one's windows and bow start from the first one's corners
-  for (int round = 0; round < k_rounds; ++round) {
+  // The second one's windows and bow start from the first one's corners.
+  const int rounds = effort == Effort::full ? 2 : 1;
+  for (int round = 0; round < rounds; ++round) {
     const double reach =
         std::clamp(0.22 * shortest_side(refined.corners_px), 2.5, static_cast<double>(k_max_reach));
     const std::array<EdgeLine, 4> before = lines;
     for (std::size_t side = 0; side < 4; ++side) {
-      if (!fit_side(grey, refined.corners_px, side, reach, min_contrast, lens,
+      if (!fit_side(grey, refined.corners_px, side, reach, min_contrast, lens, effort,
                     round > 0 ? &before[side] : nullptr, &lines[side]))
         return std::nullopt;
       refined.outside_level[side] = lines[side].outside_level;
       refined.inside_level[side] = lines[side].inside_level;
+      refined.blur_px[side] = lines[side].blur_px;
     }
     std::array<Eigen::Vector2d, 4> corners = refined.corners_px;
     for (std::size_t i = 0; i < 4; ++i) {
       if (!intersect(lines[(i + 3) % 4], lines[i], &corners[i], &refined.corner_covariance[i]))
         return std::nullopt;
-      if ((corners[i] - quad.corners_px[i]).norm() > 3 + 0.1 * reach) return std::nullopt;
+      if ((corners[i] - quad.corners_px[i]).norm() > quad.within_px + 0.1 * reach) return std::nullopt;
+      refined.corner_visible[i] = lines[(i + 3) % 4].seen_at_end && lines[i].seen_at_start;
     }
     refined.corners_px = corners;
+    refined.separate = std::all_of(lines.begin(), lines.end(), [](const EdgeLine& l) { return l.separate; });
     if (!is_convex(corners)) return std::nullopt;
   }
   return refined;

@@ -17,12 +17,23 @@ enum class Encoding {
   srgb     ///< the sRGB curve: webcams, photographs
 };
 
+enum class Effort {
+  rough,  ///< some rows of each side, once: good to a tenth of a pixel, for reading the cells
+  full
+};
+
 /// A quad whose corners are the intersections of its sub-pixel edge lines.
 struct RefinedQuad {
   std::array<Eigen::Vector2d, 4> corners_px;
   std::array<Eigen::Matrix2d, 4> corner_covariance;
   /// Grey levels on both sides of each edge (of the side from corner i to i + 1), averaged along it.
   std::array<double, 4> outside_level, inside_level;
+  /// How wide each side's edge is, as the sigma of a Gaussian, pixels.
+  std::array<double, 4> blur_px;
+  /// False when another edge stood so near to one of a side's that their blur overlaps: corners may be off.
+  bool separate = true;
+  /// Whether both sides are seen next to the corner.
+  std::array<bool, 4> corner_visible;
 };
 
 /// Finds where each side's edge crosses the rows (steep sides) or columns (flat sides) of the raw picture and
@@ -42,12 +53,16 @@ class EdgeRefiner {
   std::optional<RefinedQuad> refine(const cv::Mat& grey,
                                     const Quad& quad,
                                     double min_contrast,
-                                    const Lens* lens);
+                                    const Lens* lens,
+                                    Effort effort = Effort::full);
+
+  /// Light of a grey level, 0 ... 255.
+  const std::array<double, 256>& light() const { return light_; }
 
  private:
   struct Crossing {
-    double u, v;    // v(u) across the side's main axis
-    double weight;  // relative, from contrast
+    double u, v;   // v(u) across the side's main axis
+    double share;  // of the side's contrast, at most 1: the inverse of its relative deviation
   };
   std::array<double, 256> light_;  // of a grey level, 0 ... 255
   std::vector<Crossing> crossings_;
@@ -64,6 +79,9 @@ class EdgeRefiner {
     double offset = 0, slope = 0, curvature = 0;
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of (offset, slope, curvature)
     double outside_level = 0, inside_level = 0;
+    double blur_px = 0;
+    bool separate = true;                           ///< no other edge within the edge's blur
+    bool seen_at_start = true, seen_at_end = true;  ///< next to the side's corners
 
     double at(double u) const {
       const double d = u - u_middle;
@@ -85,9 +103,11 @@ class EdgeRefiner {
                 double reach_px,
                 double min_contrast,
                 const Lens* lens,
+                Effort effort,
                 const EdgeLine* before,
                 EdgeLine* line);
-  bool fit_line(EdgeLine* line);
+  bool fit_line(Effort effort, EdgeLine* line, double* variance);
+  void see_ends(double from, double to, double trim, double variance, EdgeLine* line) const;
   double fit_terms(int terms, EdgeLine* line);
 };
 

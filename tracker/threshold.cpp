@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "tracker/simd.h"
+
 namespace limn::tracker {
 namespace {
 
@@ -12,19 +14,52 @@ std::size_t index(int x, int y, int width) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
 }
 
-void lowest(const std::uint8_t* a, std::uint8_t* into, int count) {
+LIMN_SIMD void lowest(const std::uint8_t* a, std::uint8_t* into, int count) {
   for (int i = 0; i < count; ++i) into[i] = std::min(into[i], a[i]);
 }
-void highest(const std::uint8_t* a, std::uint8_t* into, int count) {
+LIMN_SIMD void highest(const std::uint8_t* a, std::uint8_t* into, int count) {
   for (int i = 0; i < count; ++i) into[i] = std::max(into[i], a[i]);
+}
+
+// Smallest of every four values, largest of every four others.
+LIMN_SIMD void join_fours(const std::uint8_t* low,
+                          const std::uint8_t* high,
+                          int count,
+                          std::uint8_t* smallest,
+                          std::uint8_t* largest) {
+  static_assert(k_tile == 4);
+  for (int t = 0; t < count; ++t) {
+    smallest[t] = std::min(std::min(low[4 * t], low[4 * t + 1]), std::min(low[4 * t + 2], low[4 * t + 3]));
+    largest[t] = std::max(std::max(high[4 * t], high[4 * t + 1]), std::max(high[4 * t + 2], high[4 * t + 3]));
+  }
+}
+
+LIMN_SIMD void darker(const std::uint8_t* grey, const std::uint8_t* limit, int count, std::uint8_t* black) {
+  for (int x = 0; x < count; ++x) black[x] = grey[x] < limit[x];
+}
+
+// Rows of black pixels start with the white one left of the picture.
+LIMN_SIMD void corner_row(const std::uint8_t* above,
+                          const std::uint8_t* here,
+                          int count,
+                          std::uint8_t* codes) {
+  for (int x = 0; x < count; ++x)
+    codes[x] = static_cast<std::uint8_t>(above[x] | above[x + 1] << 1 | here[x] << 2 | here[x + 1] << 3);
+}
+
+LIMN_SIMD void middle_levels(
+    const std::uint8_t* low, const std::uint8_t* high, int count, int min_contrast, std::uint8_t* middle) {
+  for (int t = 0; t < count; ++t)
+    middle[t] = high[t] - low[t] < min_contrast ? std::uint8_t{0}
+                                                : static_cast<std::uint8_t>((low[t] + high[t] + 1) >> 1);
 }
 
 }  // namespace
 
-void Threshold::apply(const cv::Mat& grey, int min_contrast, BinaryPicture& binary) {
+void Threshold::apply(const cv::Mat& grey, int min_contrast, CornerCodes& corners) {
   measure_tiles(grey);
   widen_tiles();
-  compare(grey, min_contrast, binary);
+  compare(grey, min_contrast, corners);
 }
 
 // A tile at the right or lower end also takes the pixels that are too few for one of their own.
@@ -47,12 +82,7 @@ void Threshold::measure_tiles(const cv::Mat& grey) {
     std::uint8_t* dark = &darkest_[index(0, tile_y, tiles_x_)];
     std::uint8_t* bright = &brightest_[index(0, tile_y, tiles_x_)];
     const int full = grey.cols >= k_tile ? tiles_x_ : 0;
-    for (int t = 0; t < full; ++t) {
-      const std::uint8_t* low = &row_low_[static_cast<std::size_t>(t * k_tile)];
-      const std::uint8_t* high = &row_high_[static_cast<std::size_t>(t * k_tile)];
-      dark[t] = std::min(std::min(low[0], low[1]), std::min(low[2], low[3]));
-      bright[t] = std::max(std::max(high[0], high[1]), std::max(high[2], high[3]));
-    }
+    join_fours(row_low_.data(), row_high_.data(), full, dark, bright);
     if (full == 0) {
       dark[0] = row_low_[0];
       bright[0] = row_high_[0];
@@ -77,43 +107,38 @@ void Threshold::widen_tiles() {
   }
 }
 
-void Threshold::compare(const cv::Mat& grey, int min_contrast, BinaryPicture& binary) {
-  binary.width = grey.cols;
-  binary.height = grey.rows;
-  binary.stride = (grey.cols + 2 * BinaryPicture::k_lead + 7) / 8 * 8;
-  binary.pixels.resize(static_cast<std::size_t>(binary.stride) * static_cast<std::size_t>(grey.rows + 2));
-  std::memset(binary.pixels.data(), 0, static_cast<std::size_t>(binary.stride));
-  std::memset(binary.at(0, grey.rows) - BinaryPicture::k_lead, 0, static_cast<std::size_t>(binary.stride));
-  limit_.resize(static_cast<std::size_t>(std::max(grey.cols, tiles_x_ * k_tile)));
+void Threshold::compare(const cv::Mat& grey, int min_contrast, CornerCodes& corners) {
+  corners.width = grey.cols;
+  corners.height = grey.rows;
+  corners.stride = (grey.cols + 1 + 7) / 8 * 8 + 8;  // words of 8 may be read from every corner
+  corners.codes.assign(static_cast<std::size_t>(corners.stride) * static_cast<std::size_t>(grey.rows + 1), 0);
+  const auto width = static_cast<std::size_t>(grey.cols);
+  const auto tiles = static_cast<std::size_t>(tiles_x_);
+  above_.assign(width + 2, 0);
+  here_.assign(width + 2, 0);
+  limit_.resize(std::max(width, tiles * k_tile));
+  middle_.resize(tiles);
   for (int tile_y = 0; tile_y < tiles_y_; ++tile_y) {
-    const auto tiles = static_cast<std::size_t>(tiles_x_);
-    row_low_.assign(&wide_darkest_[index(0, tile_y, tiles_x_)],
-                    &wide_darkest_[index(0, tile_y, tiles_x_)] + tiles);
-    row_high_.assign(&wide_brightest_[index(0, tile_y, tiles_x_)],
-                     &wide_brightest_[index(0, tile_y, tiles_x_)] + tiles);
+    const std::size_t row = index(0, tile_y, tiles_x_);
+    row_low_.assign(&wide_darkest_[row], &wide_darkest_[row] + tiles);
+    row_high_.assign(&wide_brightest_[row], &wide_brightest_[row] + tiles);
     for (const int neighbour : {tile_y - 1, tile_y + 1}) {
       if (neighbour < 0 || neighbour >= tiles_y_) continue;
       lowest(&wide_darkest_[index(0, neighbour, tiles_x_)], row_low_.data(), tiles_x_);
       highest(&wide_brightest_[index(0, neighbour, tiles_x_)], row_high_.data(), tiles_x_);
     }
-    for (std::size_t t = 0; t < tiles; ++t) {
-      const int low = row_low_[t];
-      const int high = row_high_[t];
-      const int limit = high - low < min_contrast ? 0 : (low + high + 1) / 2;
-      std::memset(&limit_[t * k_tile], limit, k_tile);
-    }
+    middle_levels(row_low_.data(), row_high_.data(), tiles_x_, min_contrast, middle_.data());
+    for (std::size_t t = 0; t < tiles; ++t) std::memset(&limit_[t * k_tile], middle_[t], k_tile);
     for (std::size_t x = tiles * k_tile; x < limit_.size(); ++x) limit_[x] = limit_[tiles * k_tile - 1];
     const int last = tile_y + 1 == tiles_y_ ? grey.rows : (tile_y + 1) * k_tile;
     for (int y = tile_y * k_tile; y < last; ++y) {
-      std::uint8_t* into = binary.at(0, y);
-      const std::uint8_t* from = grey.ptr(y);
-      const std::uint8_t* limit = limit_.data();
-      std::memset(into - BinaryPicture::k_lead, 0, BinaryPicture::k_lead);
-      for (int x = 0; x < grey.cols; ++x) into[x] = from[x] < limit[x] ? BinaryPicture::k_black : 0;
-      std::uint8_t* row_end = binary.at(0, y) - BinaryPicture::k_lead + binary.stride;
-      std::memset(into + grey.cols, 0, static_cast<std::size_t>(row_end - (into + grey.cols)));
+      darker(grey.ptr(y), limit_.data(), grey.cols, here_.data() + 1);
+      corner_row(above_.data(), here_.data(), grey.cols + 1, corners.at(0, y));
+      std::swap(above_, here_);
     }
   }
+  std::fill(here_.begin(), here_.end(), std::uint8_t{0});
+  corner_row(above_.data(), here_.data(), grey.cols + 1, corners.at(0, grey.rows));
 }
 
 }  // namespace limn::tracker

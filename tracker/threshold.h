@@ -6,20 +6,20 @@
 
 namespace limn::tracker {
 
-/// A black-and-white picture with a white frame of one pixel, so that neighbours always exist.
-struct BinaryPicture {
-  static constexpr std::uint8_t k_black = 1;    ///< bit: black
-  static constexpr std::uint8_t k_visited = 2;  ///< bit: the boundary on its left has been traced
+/// A black-and-white picture as codes of its pixels' corners: which of the four pixels about the corner are
+/// black. Beside the picture all is white. Corner (x, y) is the upper left one of pixel (x, y), so there is
+/// one more of them along rows and columns than pixels.
+struct CornerCodes {
+  static constexpr std::uint8_t k_upper_left = 1, k_upper_right = 2, k_lower_left = 4, k_lower_right = 8;
+  static constexpr std::uint8_t k_visited = 16;  ///< bit: the boundary through this corner has been traced
 
-  int width = 0;
+  int width = 0;  ///< of the picture
   int height = 0;
   std::ptrdiff_t stride = 0;
-  std::vector<std::uint8_t> pixels;
+  std::vector<std::uint8_t> codes;
 
-  std::uint8_t* at(int x, int y) { return pixels.data() + (y + 1) * stride + x + k_lead; }
-  const std::uint8_t* at(int x, int y) const { return pixels.data() + (y + 1) * stride + x + k_lead; }
-
-  static constexpr int k_lead = 8;  ///< white bytes before a row, so that words of 8 may be read from x - 1
+  std::uint8_t* at(int x, int y) { return codes.data() + y * stride + x; }
+  const std::uint8_t* at(int x, int y) const { return codes.data() + y * stride + x; }
 };
 
 /// Black where a pixel is darker than the middle of the darkest and the brightest of its surroundings: tiles
@@ -30,18 +30,19 @@ struct BinaryPicture {
 class Threshold {
  public:
   /// `grey` is 8-bit, one channel, not empty.
-  void apply(const cv::Mat& grey, int min_contrast, BinaryPicture& binary);
+  void apply(const cv::Mat& grey, int min_contrast, CornerCodes& corners);
 
  private:
   int tiles_x_ = 0;
   int tiles_y_ = 0;
   std::vector<std::uint8_t> darkest_, brightest_;            // per tile
   std::vector<std::uint8_t> wide_darkest_, wide_brightest_;  // per tile, of a row of three
-  std::vector<std::uint8_t> row_low_, row_high_, limit_;
+  std::vector<std::uint8_t> row_low_, row_high_, middle_, limit_;
+  std::vector<std::uint8_t> above_, here_;  // black pixels of two rows, from column -1
 
   void measure_tiles(const cv::Mat& grey);
   void widen_tiles();
-  void compare(const cv::Mat& grey, int min_contrast, BinaryPicture& binary);
+  void compare(const cv::Mat& grey, int min_contrast, CornerCodes& corners);
 };
 
 }  // namespace limn::tracker

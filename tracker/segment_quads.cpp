@@ -1,0 +1,196 @@
+#include "tracker/segment_quads.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace limn::tracker {
+namespace {
+
+constexpr double k_cell_px = 32;
+constexpr double k_min_length_px = 9;    // of a segment: shorter ones' directions are too vague
+constexpr double k_min_sine = 0.25;      // of a quad's corner: steeper markers show as regions
+constexpr double k_max_opposite = -0.3;  // cosine between opposite sides
+constexpr double k_max_gap_share = 0.9;  // of a segment's length, between its end and the corner
+constexpr double k_gap_px = 6;
+constexpr double k_overlap_px = 3;  // by which a segment may run past the corner
+constexpr double k_overlap_share = 0.08;
+constexpr double k_max_reach_px = 90;     // between the segments of a corner
+constexpr std::size_t k_max_corners = 6;  // that are kept of a segment
+constexpr double k_min_visible = 0.5;     // of the outline
+constexpr double k_min_side_visible = 0.2;
+constexpr double k_min_side_px = 12;
+constexpr double k_same_px = 3;  // quads whose corners all lie nearer are the same
+constexpr std::size_t k_max_quads = 20000;
+
+double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+double max_gap(const Segment& s) { return k_gap_px + k_max_gap_share * s.length; }
+double max_overlap(const Segment& s) { return k_overlap_px + k_overlap_share * s.length; }
+
+// Where the outline turns from one segment to the next; false when it cannot.
+bool corner_of(const Segment& a, const Segment& b, Eigen::Vector2d* px, double* cost) {
+  const double sine = cross(a.direction, b.direction);
+  if (sine < k_min_sine) return false;
+  const double after_a = cross(b.from - a.to, b.direction) / sine;  // from a's end; negative: within a
+  const double into_b = cross(b.from - a.to, a.direction) / sine;   // from b's start; negative: before it
+  if (after_a < -max_overlap(a) || after_a > max_gap(a)) return false;
+  if (into_b < -max_gap(b) || into_b > max_overlap(b)) return false;
+  *px = a.to + after_a * a.direction;
+  *cost = (std::abs(after_a) + std::abs(into_b)) / (a.length + b.length);
+  return true;
+}
+
+bool same(const Quad& a, const Quad& b) {
+  for (std::size_t turn = 0; turn < 4; ++turn) {
+    bool all = true;
+    for (std::size_t i = 0; i < 4 && all; ++i)
+      all = (a.corners_px[i] - b.corners_px[(i + turn) % 4]).squaredNorm() < k_same_px * k_same_px;
+    if (all) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+void SegmentQuadFinder::find(std::span<const Segment> segments,
+                             int width,
+                             int height,
+                             std::vector<SegmentQuad>& quads) {
+  quads.clear();
+  columns_ = static_cast<int>(width / k_cell_px) + 1;
+  rows_ = static_cast<int>(height / k_cell_px) + 1;
+  segments_.clear();
+  for (const Segment& s : segments)
+    if (s.length >= k_min_length_px) segments_.push_back(s);
+  sort_into_cells();
+  join_collinear();
+  sort_into_cells();
+  find_corners();
+  for (std::uint32_t i = 0; i < segments_.size() && quads.size() < k_max_quads; ++i) add_quads(i, quads);
+  std::stable_sort(quads.begin(), quads.end(),
+                   [](const SegmentQuad& a, const SegmentQuad& b) { return a.visible > b.visible; });
+}
+
+int SegmentQuadFinder::cell_of(const Eigen::Vector2d& px) const {
+  const int column = std::clamp(static_cast<int>(px.x() / k_cell_px), 0, columns_ - 1);
+  const int row = std::clamp(static_cast<int>(px.y() / k_cell_px), 0, rows_ - 1);
+  return row * columns_ + column;
+}
+
+void SegmentQuadFinder::sort_into_cells() {
+  std::swap(segments_, unsorted_);
+  cell_begin_.assign(static_cast<std::size_t>(columns_ * rows_) + 2, 0);
+  for (const Segment& s : unsorted_) ++cell_begin_[static_cast<std::size_t>(cell_of(s.from)) + 2];
+  for (std::size_t i = 2; i < cell_begin_.size(); ++i) cell_begin_[i] += cell_begin_[i - 1];
+  segments_.resize(unsorted_.size());
+  for (const Segment& s : unsorted_)
+    segments_[cell_begin_[static_cast<std::size_t>(cell_of(s.from)) + 1]++] = s;
+}
+
+// The segments whose starts lie about `px`.
+template <typename Visit>
+void SegmentQuadFinder::visit_starts(const Eigen::Vector2d& px, double radius, const Visit& visit) const {
+  const Eigen::Vector2d reach(radius, radius);
+  const int low = cell_of(px - reach);
+  const int high = cell_of(px + reach);
+  const int count = high % columns_ - low % columns_;
+  for (int first = low; first + count <= high; first += columns_)
+    for (std::uint32_t i = cell_begin_[static_cast<std::size_t>(first)];
+         i < cell_begin_[static_cast<std::size_t>(first + count) + 1]; ++i)
+      if ((segments_[i].from - px).squaredNorm() <= radius * radius) visit(i);
+}
+
+// Two pieces of one line, what covers it between them: added as one segment more.
+void SegmentQuadFinder::join_collinear() {
+  constexpr double k_max_sine = 0.06;
+  constexpr double k_max_beside_px = 1.5;
+  const std::size_t count = segments_.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const Segment a = segments_[i];
+    const double reach = std::min(k_max_reach_px, a.length + k_gap_px);
+    std::uint32_t nearest = 0;
+    double least = reach;
+    visit_starts(a.to, reach, [&](std::uint32_t j) {
+      const Segment& b = segments_[j];
+      const Eigen::Vector2d apart = b.from - a.to;
+      const double gap = a.direction.dot(apart);
+      if (j == i || gap <= 0 || gap >= least || gap > 0.8 * (a.length + b.length)) return;
+      if (a.direction.dot(b.direction) < 0 || std::abs(cross(a.direction, b.direction)) > k_max_sine) return;
+      const Eigen::Vector2d whole = (b.to - a.from).normalized();
+      if (std::abs(cross(whole, a.to - a.from)) > k_max_beside_px ||
+          std::abs(cross(whole, b.from - a.from)) > k_max_beside_px)
+        return;
+      least = gap;
+      nearest = j;
+    });
+    if (least >= reach) continue;
+    const Segment& b = segments_[nearest];
+    const Segment joined{a.from, b.to, (b.to - a.from).normalized(), (b.to - a.from).norm()};
+    segments_.push_back(joined);  // in no cell yet
+  }
+}
+
+void SegmentQuadFinder::find_corners() {
+  corners_.clear();
+  corner_begin_.clear();
+  for (std::uint32_t i = 0; i < segments_.size(); ++i) {
+    const Segment& a = segments_[i];
+    corner_begin_.push_back(static_cast<std::uint32_t>(corners_.size()));
+    list_.clear();
+    const double reach = std::min(k_max_reach_px, 1.2 * a.length + 2 * k_gap_px);
+    visit_starts(a.to, reach, [&](std::uint32_t j) {
+      Corner corner{j, 0, {}};
+      if (corner_of(a, segments_[j], &corner.px, &corner.cost)) list_.push_back(corner);
+    });
+    const auto kept = list_.begin() + static_cast<std::ptrdiff_t>(std::min(list_.size(), k_max_corners));
+    std::partial_sort(list_.begin(), kept, list_.end(), [](const Corner& x, const Corner& y) {
+      return x.cost < y.cost || (x.cost == y.cost && x.next < y.next);
+    });
+    corners_.insert(corners_.end(), list_.begin(), kept);
+  }
+  corner_begin_.push_back(static_cast<std::uint32_t>(corners_.size()));
+}
+
+std::span<const SegmentQuadFinder::Corner> SegmentQuadFinder::corners_of(std::uint32_t segment) const {
+  return std::span(corners_).subspan(corner_begin_[segment],
+                                     corner_begin_[segment + 1] - corner_begin_[segment]);
+}
+
+// All quadrilaterals whose first segment, of the lowest number, is this one.
+void SegmentQuadFinder::add_quads(std::uint32_t first, std::vector<SegmentQuad>& quads) const {
+  for (const Corner& one : corners_of(first)) {
+    if (one.next <= first) continue;
+    for (const Corner& two : corners_of(one.next)) {
+      if (two.next <= first || segments_[first].direction.dot(segments_[two.next].direction) > k_max_opposite)
+        continue;
+      for (const Corner& three : corners_of(two.next)) {
+        if (three.next <= first) continue;
+        Eigen::Vector2d last;
+        double cost = 0;
+        if (!corner_of(segments_[three.next], segments_[first], &last, &cost)) continue;
+        const std::array<std::uint32_t, 4> sides = {first, one.next, two.next, three.next};
+        SegmentQuad found{{{last, one.px, two.px, three.px}}, 0};
+        double around = 0;
+        double seen = 0;
+        bool plausible = true;
+        for (std::size_t k = 0; k < 4 && plausible; ++k) {
+          const Eigen::Vector2d side = found.quad.corners_px[(k + 1) % 4] - found.quad.corners_px[k];
+          const Segment& s = segments_[sides[k]];
+          const double length = side.norm();
+          plausible =
+              length >= k_min_side_px && side.dot(s.direction) > 0 && s.length >= k_min_side_visible * length;
+          around += length;
+          seen += std::min(length, s.length);
+        }
+        found.visible = seen / around;
+        if (!plausible || found.visible < k_min_visible) continue;
+        if (std::none_of(quads.rbegin(),
+                         quads.rbegin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(quads.size(), 8)),
+                         [&](const SegmentQuad& q) { return same(q.quad, found.quad); }))
+          quads.push_back(found);
+      }
+    }
+  }
+}
+
+}  // namespace limn::tracker

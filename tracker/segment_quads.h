@@ -1,0 +1,52 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "tracker/candidates.h"
+#include "tracker/segments.h"
+
+namespace limn::tracker {
+
+/// A quadrilateral that four straight edges suggest.
+struct SegmentQuad {
+  Quad quad;
+  double visible = 0;  ///< share of its outline that the segments cover
+};
+
+/// Joins straight edges, dark on their right, to quadrilaterals: each side may be seen in part only, and
+/// corners may be hidden (Olson 2011, "AprilTag: a robust and flexible visual fiducial system", joins
+/// segments likewise). Holds its buffers between calls.
+class SegmentQuadFinder {
+ public:
+  /// Best visible first; each once.
+  void find(std::span<const Segment> segments, int width, int height, std::vector<SegmentQuad>& quads);
+
+ private:
+  struct Corner {
+    std::uint32_t next;  // segment that the outline goes on with
+    double cost;         // gaps over lengths
+    Eigen::Vector2d px;
+  };
+  std::vector<Segment>
+      segments_;  // those found, and those joined of two on one line; by cell of their starts
+  std::vector<Segment> unsorted_;
+  std::vector<std::uint32_t> cell_begin_;  // first segment of every cell, and the end
+  std::vector<Corner> corners_;            // of all segments, each one's best first
+  std::vector<std::uint32_t> corner_begin_;
+  std::vector<Corner> list_;
+  int columns_ = 0, rows_ = 0;
+
+  void sort_into_cells();
+  int cell_of(const Eigen::Vector2d& px) const;
+  std::span<const Corner> corners_of(std::uint32_t segment) const;
+  template <typename Visit>
+  void visit_starts(const Eigen::Vector2d& px, double radius, const Visit& visit) const;
+  void join_collinear();
+  void find_corners();
+  void add_quads(std::uint32_t first, std::vector<SegmentQuad>& quads) const;
+};
+
+}  // namespace limn::tracker
