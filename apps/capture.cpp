@@ -18,9 +18,18 @@ std::vector<calib::CapturedDevice> devices(const std::vector<Imager>& imagers) {
   return devices;
 }
 
-calib::Captures planned(const Plan& plan, const sim::VirtualRig& rig, const std::filesystem::path& out) {
-  return calib::plan_captures(out, devices(rig.world().rig.cameras), devices(rig.world().rig.projectors),
-                              plan.board, plan.code, plan.code_options);
+Result<calib::Captures> planned(const Plan& plan,
+                                const sim::VirtualRig& rig,
+                                const std::filesystem::path& out) {
+  calib::Captures captures =
+      calib::plan_captures(out, devices(rig.world().rig.cameras), devices(rig.world().rig.projectors),
+                           plan.board, plan.code, plan.code_options);
+  if (plan.responses.empty()) return captures;
+  for (std::size_t i = 0; i < captures.patterns.size(); ++i) {
+    LIMN_TRY(captures.patterns[i],
+             calib::linearised(captures.patterns[i], plan.responses, captures.projectors[i].name));
+  }
+  return captures;
 }
 
 // The rig's devices as calib asks for them; pictures go to `writer`.
@@ -86,7 +95,7 @@ sim::Object board_object(const calib::Board& board, const Pose& world_from_board
 }
 
 Status capture_virtually(const Plan& plan, sim::VirtualRig* rig, const std::filesystem::path& out) {
-  const calib::Captures captures = planned(plan, *rig, out);
+  LIMN_TRY(const calib::Captures captures, planned(plan, *rig, out));
   LIMN_TRY_STATUS(calib::begin_captures(captures));
   rig->clear_stage();
   const auto hold_board = [&](int pose) {
@@ -103,7 +112,7 @@ Status capture_prototype(const Plan& plan,
                          const std::vector<Pose>& world_from_prototype,
                          sim::VirtualRig* rig,
                          const std::filesystem::path& out) {
-  const calib::Captures captures = planned(plan, *rig, out);
+  LIMN_TRY(const calib::Captures captures, planned(plan, *rig, out));
   LIMN_TRY_STATUS(calib::begin_captures(captures));
   const Pose home = rig->world().world_from_prototype;
   const auto stand = [&](int pose) {

@@ -46,18 +46,33 @@ Status write_response(const PatternsOptions& options, const PixelSize& size) {
   return {};
 }
 
+// The patterns by the response that the options name.
+Result<calib::Patterns> by_response(const PatternsOptions& options, const calib::Patterns& patterns) {
+  if (options.linearise.empty()) return patterns;
+  if (options.code != "phase")
+    return usage_error("--linearise: expected --code phase, found {}, which shows black and white alone.",
+                       options.code);
+  LIMN_TRY(const Responses responses, load_responses(options.linearise));
+  if (options.name.empty() && responses.projectors.size() != 1)
+    return usage_error("--linearise {}: it holds {} projectors; say which with --name.",
+                       options.linearise.string(), responses.projectors.size());
+  const std::string name = options.name.empty() ? responses.projectors[0].projector : options.name;
+  const auto made = calib::linearised(patterns, responses.projectors, name);
+  if (!made) return error("{}: {}", options.linearise.string(), made.message());
+  return made;
+}
+
 }  // namespace
 
 Status run_patterns(const PatternsOptions& options) {
   LIMN_TRY(const PixelSize size, parse_pixel_size(options.projector));
-  const auto patterns = calib::Patterns::create(options.code, size.width, size.height, options.code_options);
-  if (!patterns) return usage_error("{}", patterns.message());
+  const auto plain = calib::Patterns::create(options.code, size.width, size.height, options.code_options);
+  if (!plain) return usage_error("{}", plain.message());
   if (options.response) return write_response(options, size);
-  LIMN_TRY_STATUS(
-      write_pictures(options.out, patterns->count(), [&](int i) { return patterns->picture(i); }));
-  LIMN_TRY_STATUS(calib::save_patterns(*patterns, options.out / "patterns.json"));
-  fmt::print("{} pictures of {}x{} in {}\n", patterns->count(), size.width, size.height,
-             options.out.string());
+  LIMN_TRY(const calib::Patterns patterns, by_response(options, *plain));
+  LIMN_TRY_STATUS(write_pictures(options.out, patterns.count(), [&](int i) { return patterns.picture(i); }));
+  LIMN_TRY_STATUS(calib::save_patterns(patterns, options.out / "patterns.json"));
+  fmt::print("{} pictures of {}x{} in {}\n", patterns.count(), size.width, size.height, options.out.string());
   return {};
 }
 

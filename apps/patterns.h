@@ -11,7 +11,9 @@ namespace limn::apps {
 struct PatternsOptions {
   std::string projector;  ///< its size, "1280x800"
   std::string code = "gray";
-  calib::CodeOptions code_options = {};
+  calib::CodeOptions code_options = calib::CodeOptions();
+  std::filesystem::path linearise = {};  ///< phase: the response.json that the waves are drawn by
+  std::string name = {};                 ///< of the projector in it; may be left out where it holds one alone
   bool response = false;  ///< the pictures that measure the projector's response instead of a code
   std::filesystem::path out;
 };

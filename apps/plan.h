@@ -7,6 +7,7 @@
 #include "calib/board.h"
 #include "calib/patterns.h"
 #include "core/pose.h"
+#include "core/response.h"
 #include "core/result.h"
 
 namespace limn::apps {
@@ -18,6 +19,7 @@ struct Plan {
   calib::Board board;
   std::string code = "gray";
   calib::CodeOptions code_options;
+  std::vector<Response> responses;     ///< measured, for phase; empty: waves are drawn by code_options.gamma
   std::vector<Pose> world_from_board;  ///< board frame as in calib/board.h
   bool response = false;               ///< also the response pictures, of the prototype
 };

@@ -32,25 +32,46 @@ std::vector<uchar> stripe(int size, int bit, int base, bool inverse) {
   return line;
 }
 
-// Display values of a step of the sinusoid.
-std::vector<uchar> wave(int size, int step, const CodeOptions& options) {
-  std::vector<uchar> line(static_cast<size_t>(size));
+// Light of each position in a step of the sinusoid, 0 … 1.
+std::vector<double> wave(int size, int step, const CodeOptions& options) {
+  std::vector<double> line(static_cast<size_t>(size));
   for (int i = 0; i < size; ++i) {
     const double turns = static_cast<double>(i % options.period_px) / options.period_px -
                          static_cast<double>(step) / options.steps;
-    const double light = 0.5 + 0.5 * std::cos(2 * std::numbers::pi * turns);
-    line[static_cast<size_t>(i)] =
-        static_cast<uchar>(std::lround(255 * std::pow(std::max(light, 0.0), 1 / options.gamma)));
+    line[static_cast<size_t>(i)] = std::max(0.0, 0.5 + 0.5 * std::cos(2 * std::numbers::pi * turns));
   }
   return line;
 }
 
-cv::Mat across(std::vector<uchar> line, int height) {
-  return cv::repeat(cv::Mat(1, static_cast<int>(line.size()), CV_8U, line.data()), height, 1);
+// What a display is given for such light between black's and white's; one channel, or BGR.
+std::vector<uchar> displayed(const std::vector<double>& light, const CodeOptions& options) {
+  std::vector<uchar> values;
+  const auto give = [&](double value) { values.push_back(static_cast<uchar>(std::lround(255 * value))); };
+  for (const double l : light) {
+    if (!options.response) {
+      give(std::pow(l, 1 / options.gamma));
+      continue;
+    }
+    for (const auto* curve : {&options.response->blue, &options.response->green, &options.response->red})
+      give(inverse_looked_up(*curve, curve->front() + l * (curve->back() - curve->front())));
+  }
+  return values;
 }
 
-cv::Mat down(std::vector<uchar> line, int width) {
-  return cv::repeat(cv::Mat(static_cast<int>(line.size()), 1, CV_8U, line.data()), 1, width);
+// A line's values, one for each position or three (BGR), side by side over the whole picture …
+cv::Mat across(std::vector<uchar> line, int width, int height) {
+  const int channels = static_cast<int>(line.size()) / width;
+  return cv::repeat(cv::Mat(1, width, CV_8UC(channels), line.data()), height, 1);
+}
+
+// … or one below the other.
+cv::Mat down(std::vector<uchar> line, int width, int height) {
+  const int channels = static_cast<int>(line.size()) / height;
+  return cv::repeat(cv::Mat(height, 1, CV_8UC(channels), line.data()), 1, width);
+}
+
+bool rises(const std::vector<double>& curve) {
+  return curve.size() >= 2 && std::is_sorted(curve.begin(), curve.end()) && curve.back() > curve.front();
 }
 
 Status check(const std::string& code, const CodeOptions& options) {
@@ -62,6 +83,10 @@ Status check(const std::string& code, const CodeOptions& options) {
     return error("expected {} to {} steps of a wave, found {}.", k_min_steps, k_max_steps, options.steps);
   if (code == "phase" && !within(options.gamma, k_min_gamma, k_max_gamma))
     return error("expected a gamma of {} to {}, found {}.", k_min_gamma, k_max_gamma, options.gamma);
+  if (code == "phase" && options.response &&
+      !(rises(options.response->red) && rises(options.response->green) && rises(options.response->blue)))
+    return error(
+        "response: expected curves of at least 2 numbers that never fall and end above their start.");
   if (code == "xor" && options.base_stripe_px != 2 && options.base_stripe_px != 4 &&
       options.base_stripe_px != 8)
     return error("expected stripes of 2, 4 or 8 pixels, found {}.", options.base_stripe_px);
@@ -74,7 +99,10 @@ CodeOptions used(const std::string& code, const CodeOptions& options) {
   if (code == "phase") {
     kept.period_px = options.period_px;
     kept.steps = options.steps;
-    kept.gamma = options.gamma;
+    if (options.response)
+      kept.response = options.response;
+    else
+      kept.gamma = options.gamma;
   }
   if (code == "xor") kept.base_stripe_px = options.base_stripe_px;
   return kept;
@@ -131,14 +159,31 @@ cv::Mat Patterns::picture(int index) const {
   LIMN_CHECK(index >= 0 && index < count());
   if (index >= white()) return cv::Mat(height, width, CV_8U, cv::Scalar(index == white() ? 255 : 0));
   if (index >= first_step() + steps())
-    return down(wave(height, index - first_step() - steps(), options), width);
-  if (index >= first_step()) return across(wave(width, index - first_step(), options), height);
+    return down(displayed(wave(height, index - first_step() - steps(), options), options), width, height);
+  if (index >= first_step())
+    return across(displayed(wave(width, index - first_step(), options), options), width, height);
   const bool inverse = index % 2 == 1;
   const int pair = index / 2;
   if (pair < column_bits())
-    return across(stripe(width, lowest_bit() + column_bits() - 1 - pair, base_bit(), inverse), height);
+    return across(stripe(width, lowest_bit() + column_bits() - 1 - pair, base_bit(), inverse), width, height);
   const int row_pair = pair - column_bits();
-  return down(stripe(height, lowest_bit() + row_bits() - 1 - row_pair, base_bit(), inverse), width);
+  return down(stripe(height, lowest_bit() + row_bits() - 1 - row_pair, base_bit(), inverse), width, height);
+}
+
+Result<Patterns> linearised(const Patterns& patterns,
+                            const std::vector<Response>& responses,
+                            const std::string& projector) {
+  if (patterns.code != "phase") return patterns;
+  std::vector<std::string> names;
+  for (const Response& response : responses) {
+    names.push_back(response.projector);
+    if (response.projector != projector) continue;
+    CodeOptions options = patterns.options;
+    options.response = DisplayCurves{response.red, response.green, response.blue};
+    return Patterns::create(patterns.code, patterns.width, patterns.height, options);
+  }
+  return error("response: expected curves of {}, found those of {}. Measure its response, too.", projector,
+               names.empty() ? "no projector" : fmt::format("{}", fmt::join(names, ", ")));
 }
 
 std::string picture_name(int index) { return fmt::format("{:03d}.png", index); }
@@ -151,7 +196,10 @@ Status save_patterns(const Patterns& patterns, const std::filesystem::path& path
   if (patterns.code == "phase") {
     json["period_px"] = patterns.options.period_px;
     json["steps"] = patterns.options.steps;
-    json["gamma"] = patterns.options.gamma;
+    if (const auto& curves = patterns.options.response)
+      json["response"] = {{"red", curves->red}, {"green", curves->green}, {"blue", curves->blue}};
+    else
+      json["gamma"] = patterns.options.gamma;
   }
   if (patterns.code == "xor") json["base_stripe_px"] = patterns.options.base_stripe_px;
   return write_file(path, json.dump(2) + "\n");
@@ -167,7 +215,7 @@ CodeOptions read_code_options(const ConfigNode& node) {
 }
 
 std::set<std::string> code_option_keys(const std::string& code) {
-  if (code == "phase") return {"period_px", "steps", "gamma"};
+  if (code == "phase") return {"period_px", "steps", "gamma", "response"};
   if (code == "xor") return {"base_stripe_px"};
   return {};
 }
@@ -181,7 +229,12 @@ Result<Patterns> load_patterns(const std::filesystem::path& path) {
   root.only(keys);
   const std::vector<double> size = root.at("size").numbers(2);
   const int pictures = root.at("pictures").integer();
-  const CodeOptions options = read_code_options(root);
+  CodeOptions options = read_code_options(root);
+  if (const auto response = root.find("response")) {
+    response->only({"red", "green", "blue"});
+    options.response = DisplayCurves{response->at("red").numbers(-1), response->at("green").numbers(-1),
+                                     response->at("blue").numbers(-1)};
+  }
   LIMN_TRY_STATUS(config.status());
   const auto patterns = Patterns::create(code, static_cast<int>(size[0]), static_cast<int>(size[1]), options);
   if (!patterns) return error("{}: {}", path.string(), patterns.message());

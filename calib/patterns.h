@@ -2,11 +2,13 @@
 
 #include <filesystem>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "core/config.h"
+#include "core/response.h"
 #include "core/result.h"
 
 namespace limn::calib {
@@ -15,6 +17,12 @@ namespace limn::calib {
 struct PatternGroup {
   int first = 0;
   int count = 2;
+};
+
+/// Light of display values evenly spaced from 0 to 255, per channel, as in core/response.h.
+struct DisplayCurves {
+  std::vector<double> red, green, blue;
+  bool operator==(const DisplayCurves&) const = default;
 };
 
 /// What a code's pictures depend on besides the projector's size.
@@ -26,6 +34,8 @@ struct CodeOptions {
   int steps = 6;
   /// phase: of the projector (light = value ^ gamma); the waves are drawn so that their light is sinusoidal.
   double gamma = 2.2;
+  /// phase: the projector's measured curves, instead of gamma: light is then sinusoidal in every channel.
+  std::optional<DisplayCurves> response = {};
   /// xor: width of the widest stripe, projector pixels: 2, 4 or 8. Narrower keeps light from elsewhere out of
   /// the bits better, wider stands more blur.
   int base_stripe_px = 4;
@@ -72,26 +82,34 @@ struct Patterns {
   /// Each picture with its inverse, the steps of the sinusoids; white and black are the last group.
   std::vector<PatternGroup> groups() const;
 
-  /// Picture number `index`, 8-bit grey, of the projector's size.
+  /// Picture number `index`, 8 bits, of the projector's size; grey, but for the sinusoids of a measured
+  /// response, which are BGR.
   cv::Mat picture(int index) const;
   bool operator==(const Patterns&) const = default;
 };
 
+/// Patterns of the phase code whose waves are drawn by the response of the projector with that name; an error
+/// where it is not among them. Other codes have no grey levels: they stay as they are.
+Result<Patterns> linearised(const Patterns& patterns,
+                            const std::vector<Response>& responses,
+                            const std::string& projector);
+
 /// The codes that exist, for messages: "gray", "phase", "xor".
 std::vector<std::string> pattern_codes();
 
-/// A code's options from a JSON object that people edit (patterns.json, a plan); absent keys stay at their
-/// defaults. Their range is Patterns::create's business.
+/// A code's options, but for "response", from a JSON object that people edit (patterns.json, a plan); absent
+/// keys stay at their defaults. Their range is Patterns::create's business.
 CodeOptions read_code_options(const ConfigNode& node);
-/// The keys of it that a code has: phase "period_px", "steps", "gamma"; xor "base_stripe_px"; gray none.
+/// The keys of it that a code has: phase "period_px", "steps", "gamma" or "response"; xor "base_stripe_px";
+/// gray none.
 std::set<std::string> code_option_keys(const std::string& code);
 
 /// `000.png` and so on: the name of a picture's file.
 std::string picture_name(int index);
 
 /// patterns.json: {"schema": "limn.patterns/1", "code": "gray", "size": [width, height], "pictures": 44}; the
-/// pictures are 000.png … in the order above. phase adds "period_px", "steps" and "gamma", xor
-/// "base_stripe_px"; where they are absent their defaults hold.
+/// pictures are 000.png … in the order above. phase adds "period_px", "steps" and "gamma" (or
+/// "response": {"red", "green", "blue"}), xor "base_stripe_px"; where they are absent their defaults hold.
 Status save_patterns(const Patterns& patterns, const std::filesystem::path& path);
 Result<Patterns> load_patterns(const std::filesystem::path& path);
 

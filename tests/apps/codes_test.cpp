@@ -32,7 +32,7 @@ Json json_at(const fs::path& path) {
 // The bench without its prototype, with fewer pixels.
 Json small_bench() {
   Json world = json_at(fs::path(LIMN_SOURCE_DIR) / "config/worlds/bench.json");
-  for (const char* key : {"scene", "world_from_prototype", "slot_markers", "objects"}) world.erase(key);
+  for (const char* key : {"scene", "world_from_prototype", "slot_markers"}) world.erase(key);
   world["objects"] = Json::array();
   world["room"]["lamps"][0].erase("radius_m");  // soft shadows cost half of the tracing
   for (const char* list : {"cameras", "projectors"}) {
@@ -123,6 +123,39 @@ TEST(Codes, EachGivesARigAsGoodAsGrays) {
     EXPECT_LT(one.held_out_px(), 1.2 * gray.held_out_px()) << code;
     EXPECT_LT(mm, 1.2 * gray_mm) << code;
   }
+}
+
+// Of 3 steps, which hide nothing of a wrong response; it is measured on a wall.
+TEST(Codes, PhaseIsDrawnByTheResponseThatASolveMeasured) {
+  const fs::path folder = test_folder();
+  Json world = small_bench();
+  world["projectors"][0]["gamma"] = 1.5;
+  world["projectors"][0]["channel_gamma"] = {1.2, 1.0, 0.85};
+  world["projectors"][0]["s_curve"] = 0.3;
+  Json with_wall = world;
+  with_wall["objects"].push_back(
+      {{"name", "wall"},
+       {"rectangle_m", {2, 2}},
+       {"world_from_object",
+        {{"rotation_wxyz", {0.707106781, -0.707106781, 0, 0}}, {"translation_m", {0, 0.1, 0.4}}}},
+       {"albedo", 0.8}});
+  const Calibrated gray = calibrated(folder / "gray", with_wall, {{"response", true}});
+  ASSERT_FALSE(gray.report.is_null());
+  const Calibrated without =
+      calibrated(folder / "without", world, {{"code", "phase"}, {"code_options", {{"steps", 3}}}});
+  ASSERT_FALSE(without.report.is_null());
+  const Calibrated with = calibrated(
+      folder / "with", world,
+      {{"code", "phase"}, {"code_options", {{"steps", 3}, {"response", "../gray/rig/response.json"}}}});
+  ASSERT_FALSE(with.report.is_null());
+  printf("[ response ] gamma 2.2: projector %.4f px, held-out %.4f; measured: %.4f px, held-out %.4f\n",
+         without.report["devices"][1]["rms_px"].get<double>(), without.held_out_px(),
+         with.report["devices"][1]["rms_px"].get<double>(), with.held_out_px());
+  EXPECT_EQ(without.faults(), std::vector<std::string>{"projector_gamma"});
+  EXPECT_EQ(without.report["verdict"], "usable");
+  EXPECT_EQ(with.faults(), std::vector<std::string>());
+  EXPECT_EQ(with.report["verdict"], "good");
+  EXPECT_LT(with.report["devices"][1]["rms_px"], 0.5 * without.report["devices"][1]["rms_px"].get<double>());
 }
 
 }  // namespace

@@ -46,6 +46,38 @@ TEST(PatternsCommand, WritesTheResponsePictures) {
   EXPECT_EQ(list["pictures"][0]["shows"], "black");
 }
 
+TEST(PatternsCommand, DrawsWavesByAMeasuredResponse) {
+  const auto folder = test::test_folder();
+  ASSERT_TRUE(make_folder(folder).ok());
+  const auto curve = [](const char* name, const char* values) {
+    return fmt::format(R"({{"name": "{}", "red": {}, "green": {}, "blue": {}}})", name, values, values,
+                       values);
+  };
+  const std::string left = curve("left", "[0, 1]"), right = curve("right", "[0, 0.1, 1]");
+  const auto file = [&](const std::string& projectors) {
+    EXPECT_TRUE(write_file(folder / "response.json",
+                           R"({"schema": "limn.response/1", "projectors": [)" + projectors + "]}")
+                    .ok());
+    return folder / "response.json";
+  };
+  PatternsOptions options{.projector = "40x24", .code = "phase", .out = folder / "patterns"};
+  options.linearise = file(left);
+  const Status status = run_patterns(options);
+  ASSERT_TRUE(status.ok()) << status.message();
+  const auto patterns = calib::load_patterns(options.out / "patterns.json").value();
+  const cv::Mat wave = read_picture(options.out / calib::picture_name(patterns.first_step())).value();
+  EXPECT_EQ(wave.at<cv::Vec3b>(0, 4), cv::Vec3b(128, 128, 128)) << "half the light, a quarter of a wave away";
+
+  options.linearise = file(left + ", " + right);
+  EXPECT_TRUE(run_patterns(options).error().wrong_usage) << "which of them?";
+  options.name = "middle";
+  EXPECT_NE(run_patterns(options).message().find("middle, found those of left, right"), std::string::npos);
+  options.name = "right";
+  EXPECT_TRUE(run_patterns(options).ok());
+  options.code = "gray";
+  EXPECT_TRUE(run_patterns(options).error().wrong_usage);
+}
+
 TEST(PatternsCommand, CallsWrongOptionsWrongUsage) {
   const auto out = test::test_folder() / "patterns";
   for (const char* size :

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -21,10 +22,11 @@ namespace limn::test {
 struct CodeBench {
   calib::Patterns patterns = calib::Patterns::create("gray", 64, 64).value();
   int width = 160, height = 120;
-  double white = 180, black = 20;  // levels
-  double blur = 0.3;               // of the projector, its pixels, standard deviation
-  double noise = 0;                // levels
-  double gamma = 1;                // of the projector: light = value ^ gamma
+  double white = 180, black = 20;                   // levels
+  double blur = 0.3;                                // of the projector, its pixels, standard deviation
+  double noise = 0;                                 // levels
+  double gamma = 1;                                 // of the projector: light = value ^ gamma
+  std::array<double, 3> channel_gamma = {1, 1, 1};  // multiplies it in blue, green, red; the camera is grey
   /// Light in the picture number `index` as the camera sees it, 0 to 1, may be changed before it is taken.
   std::function<void(int index, cv::Mat* light)> changed;
   std::mt19937_64 rng = test_rng();
@@ -38,7 +40,8 @@ struct CodeBench {
     cv::Mat linear(picture.size(), CV_64F);
     for (int y = 0; y < picture.rows; ++y) {
       for (int x = 0; x < picture.cols; ++x)
-        linear.at<double>(y, x) = std::pow(picture.at<uchar>(y, x) / 255.0, gamma);
+        linear.at<double>(y, x) =
+            (light_of(picture, y, x, 0) + light_of(picture, y, x, 1) + light_of(picture, y, x, 2)) / 3;
     }
     const auto columns = weights(width, picture.cols, [&](int x) { return column_at(x); });
     const auto rows = weights(height, picture.rows, [&](int y) { return row_at(y); });
@@ -74,6 +77,12 @@ struct CodeBench {
   }
 
  private:
+  double light_of(const cv::Mat& picture, int y, int x, int channel) const {
+    const uchar* pixel = picture.ptr(y, x);
+    const double value = pixel[picture.channels() == 1 ? 0 : channel] / 255.0;
+    return std::pow(value, gamma * channel_gamma[static_cast<size_t>(channel)]);
+  }
+
   // How much each projector pixel of a line counts for each camera pixel.
   cv::Mat weights(int camera, int projector, const std::function<double(int)>& place) const {
     cv::Mat weights(camera, projector, CV_64F);

@@ -139,6 +139,35 @@ TEST(Decode, PhaseSaysThatTheProjectorsResponseIsNotWhatItWasDrawnFor) {
   EXPECT_GT(decoded->health.wave_level, 0.6);
 }
 
+// 3 steps, because every step more hides another harmonic of a wrong response.
+TEST(Decode, PhaseErrsATenthAsMuchWhenItsWavesAreDrawnByTheProjectorsResponse) {
+  Bench bench;
+  bench.blur = 0.6;
+  bench.gamma = 1.5;
+  bench.channel_gamma = {0.85, 1, 1.25};
+  Response measured{"projector0", {}, {}, {}};
+  for (int v = 0; v < 256; ++v) {
+    const auto light = [&](size_t c) { return std::pow(v / 255.0, bench.gamma * bench.channel_gamma[c]); };
+    measured.blue.push_back(light(0));
+    measured.green.push_back(light(1));
+    measured.red.push_back(light(2));
+  }
+  const auto found = [&](const Patterns& patterns) {
+    bench.patterns = patterns;
+    return decode(patterns, bench.photograph(test::test_folder()), k_width, k_height).value();
+  };
+  const Patterns plain = Patterns::create("phase", 64, 64, {.steps = 3}).value();
+  const Decoded without = found(plain), with = found(linearised(plain, {measured}, "projector0").value());
+  bench.patterns = plain;
+  const Errors e_without = errors_of(without, bench), e = errors_of(with, bench);
+  printf("[ response ] phase of 3 steps: rms %.3f px with gamma 2.2, %.3f px with the response\n",
+         e_without.rms, e.rms);
+  EXPECT_NEAR(with.health.wave_level, 0.5, 0.01);
+  EXPECT_GT(without.health.wave_level, 0.55);
+  EXPECT_LT(e.rms, 0.1 * e_without.rms);
+  EXPECT_LT(e.rms, 0.02);
+}
+
 // A white V-groove of 60 degrees whose crease runs down the middle of the picture; light falls flatly onto
 // its left wall. Each wall lights the other: diffuse, three bounces, strips along the crease (the form factor
 // between strips at distances s and t from the crease is s t sin^2 / (2 r^3)), spread along them.

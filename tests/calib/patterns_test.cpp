@@ -88,6 +88,39 @@ TEST(Patterns, WavesAreSinusoidalInLightAndTheirPairsTellThemApart) {
   }
 }
 
+TEST(Patterns, WavesOfAMeasuredResponseAreSinusoidalInEveryChannel) {
+  Response response{"left", {}, {}, {}};
+  for (int v = 0; v < 200; ++v) {
+    response.red.push_back(0.01 + 0.99 * std::pow(v / 199.0, 2.6));
+    response.green.push_back(0.01 + 0.99 * std::pow(v / 199.0, 1.4));
+    response.blue.push_back(0.01 + 0.8 * v / 199.0);
+  }
+  const Patterns plain = Patterns::create("phase", 64, 32).value();
+  const Patterns patterns = linearised(plain, {response}, "left").value();
+  ASSERT_EQ(patterns.picture(patterns.first_step()).type(), CV_8UC3);
+  for (int k = 0; k < 6; ++k) {
+    const cv::Mat columns = patterns.picture(patterns.first_step() + k);
+    const cv::Mat rows = patterns.picture(patterns.first_step() + 6 + k);
+    for (int i = 0; i < 32; ++i) {
+      const double light = 0.5 + 0.5 * std::cos(2 * std::numbers::pi * (i / 16.0 - k / 6.0));
+      const auto& bgr = columns.at<cv::Vec3b>(7, i);
+      EXPECT_NEAR(looked_up(response.blue, bgr[0] / 255.0), 0.01 + 0.8 * light, 0.005);
+      EXPECT_NEAR(looked_up(response.green, bgr[1] / 255.0), 0.01 + 0.99 * light, 0.005);
+      EXPECT_NEAR(looked_up(response.red, bgr[2] / 255.0), 0.01 + 0.99 * light, 0.006);
+      EXPECT_EQ(rows.at<cv::Vec3b>(i, 3), bgr);
+    }
+  }
+  EXPECT_NE(linearised(plain, {response}, "right").message().find("right, found those of left"),
+            std::string::npos);
+  const Patterns gray = Patterns::create("gray", 64, 32).value();
+  EXPECT_EQ(linearised(gray, {response}, "right").value(), gray);
+  const auto path = test::test_folder() / "patterns.json";
+  ASSERT_TRUE(save_patterns(patterns, path).ok());
+  const auto read = load_patterns(path);
+  ASSERT_TRUE(read.ok()) << read.message();
+  EXPECT_EQ(*read, patterns);
+}
+
 TEST(Patterns, SurviveTheirFile) {
   const auto path = test::test_folder() / "patterns.json";
   for (const auto& [code, options] : {std::pair<std::string, CodeOptions>{"gray", {}},
@@ -106,6 +139,9 @@ TEST(Patterns, SayWhatIsWrong) {
   EXPECT_NE(Patterns::create("phase", 640, 480, {.period_px = 3}).message().find("3"), std::string::npos);
   EXPECT_FALSE(Patterns::create("phase", 640, 480, {.steps = 2}).ok());
   EXPECT_FALSE(Patterns::create("phase", 640, 480, {.gamma = 0}).ok());
+  CodeOptions falling;
+  falling.response = DisplayCurves{{0, 1}, {0, 1}, {1, 0}};
+  EXPECT_FALSE(Patterns::create("phase", 640, 480, falling).ok());
   EXPECT_FALSE(Patterns::create("xor", 640, 480, {.base_stripe_px = 3}).ok());
   EXPECT_FALSE(Patterns::create("gray", 1, 480).ok());
   EXPECT_FALSE(Patterns::create("gray", 640, 100000).ok());
