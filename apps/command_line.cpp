@@ -120,6 +120,7 @@ void add_patterns(CLI::App& app, Run& run) {
   command->add_option("--gamma", code.gamma, "phase: of the projector, light = value ^ gamma")->capture_default_str();
   command->add_option("--linearise", options->linearise, "phase: the rig's response.json, instead of --gamma");
   command->add_option("--name", options->name, "the projector's name in it, where it holds several");
+  command->add_flag("!--no-inverses", code.inverses, "gray, xor: half the pictures, enough for limn recheck");
   command->add_option("--stripe", code.base_stripe_px, "xor: widest stripe, 2, 4 or 8 projector pixels")
       ->capture_default_str();
   command->add_flag("--response", options->response, "instead: pictures that measure the projector's response and colour");

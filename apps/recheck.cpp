@@ -43,6 +43,7 @@ Result<fs::path> captured(const RecheckCommand& command) {
                        command.plan.empty() ? "neither" : "both");
   if (command.plan.empty()) return command.captures;
   LIMN_TRY(Plan plan, load_plan(command.plan));
+  plan.code_options.inverses = false;  // the rig is all but known: sparse pictures, more devices in the time
   LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_picture));
   plan.world_from_board.resize(std::min(plan.world_from_board.size(), affordable_poses(plan, world.rig)));
   sim::VirtualRig rig(std::move(world));

@@ -216,6 +216,7 @@ Pairs pairs_of(const Seen& seen, const SeriesHealth& health) {
   int count = -1;  // without white and black
   for (const GroupHealth& group : health.groups) count += group.count == 2 ? 1 : 0;
   const int lowest = std::max(0, (columns + rows - count) / 2);
+  if (count <= 0) return {1, 1, lowest};  // shown without inverses
   return {static_cast<size_t>(std::max(1, columns - lowest)), static_cast<size_t>(std::max(1, count)),
           lowest};
 }

@@ -348,11 +348,19 @@ struct Series {
   }
 };
 
-// Picture minus inverse of an axis' bits, from picture number `first` on.
-Status read_bits(int first, const Code& code, Series* series, AxisReading* axis) {
+// Picture minus inverse of an axis' bits, from picture number `first` on. `both`: white and black together,
+// which an inverse that is not shown is the picture's complement in.
+Status read_bits(int first, const Code& code, const cv::Mat& both, Series* series, AxisReading* axis) {
+  const int step = series->patterns.pictures_of_bit();
   for (int i = 0; i < code.bits; ++i) {
-    LIMN_TRY(const cv::Mat picture, series->read(first + 2 * i));
-    LIMN_TRY(const cv::Mat inverse, series->read(first + 2 * i + 1));
+    LIMN_TRY(const cv::Mat picture, series->read(first + step * i));
+    cv::Mat inverse;
+    if (series->patterns.options.inverses) {
+      LIMN_TRY(inverse, series->read(first + step * i + 1));
+    } else {
+      cv::subtract(both, picture, inverse, cv::noArray(), CV_16S);
+      inverse.convertTo(inverse, CV_8U);
+    }
     cv::Mat difference;
     cv::subtract(picture, inverse, difference, cv::noArray(), CV_16S);
     axis->differences.push_back(difference);
@@ -408,11 +416,17 @@ LeastSteps least_steps(const DirectLight& direct,
   return steps;
 }
 
-DifferenceNoise difference_noise(const cv::Mat& white, const cv::Mat& black, const IntensityNoise& noise) {
+// Of picture minus inverse. Without inverses it is twice the picture less white and black: three times the
+// variance.
+DifferenceNoise difference_noise(const cv::Mat& white,
+                                 const cv::Mat& black,
+                                 bool inverses,
+                                 const IntensityNoise& noise) {
+  const double times = inverses ? 1 : 3;
   DifferenceNoise differences;
   cv::add(white, black, differences.sum, cv::noArray(), CV_16U);
   for (int sum = 0; sum <= 510; ++sum)
-    differences.variance.push_back(static_cast<float>(2 * noise.read + noise.per_level * sum));
+    differences.variance.push_back(static_cast<float>(times * (2 * noise.read + noise.per_level * sum)));
   return differences;
 }
 
@@ -501,8 +515,10 @@ Result<Decoded> decode(const Patterns& patterns,
       Code{patterns.column_bits(), lowest, patterns.base_bit(), blocks(patterns.width)},
       Code{patterns.row_bits(), lowest, patterns.base_bit(), blocks(patterns.height)}};
   std::array<AxisReading, 2> axes;
-  LIMN_TRY_STATUS(read_bits(0, codes[0], &series, &axes[0]));
-  LIMN_TRY_STATUS(read_bits(patterns.first_row_pair(), codes[1], &series, &axes[1]));
+  cv::Mat both;
+  cv::add(white, black, both, cv::noArray(), CV_16S);
+  LIMN_TRY_STATUS(read_bits(0, codes[0], both, &series, &axes[0]));
+  LIMN_TRY_STATUS(read_bits(patterns.first_row_bit(), codes[1], both, &series, &axes[1]));
   std::vector<PhaseReading> waves;
   for (int axis = 0; axis < 2 && patterns.steps() > 0; ++axis) {
     LIMN_TRY(PhaseReading reading, read_steps(patterns.first_step() + axis * patterns.steps(), &series));
@@ -511,7 +527,8 @@ Result<Decoded> decode(const Patterns& patterns,
   Decoded decoded;
   cv::subtract(white, black, decoded.contrast);
   decoded.health = series.probe.health(pictures);
-  const DifferenceNoise noise = difference_noise(white, black, decoded.health.noise);
+  const DifferenceNoise noise =
+      difference_noise(white, black, patterns.options.inverses, decoded.health.noise);
   const LeastSteps steps = least_steps(series.direct, patterns.code == "xor", noise, options, &decoded);
   std::vector<AxisLabels> labels;
   cv::Mat doubted(height, width, CV_8U, cv::Scalar(0));

@@ -105,6 +105,7 @@ CodeOptions used(const std::string& code, const CodeOptions& options) {
       kept.gamma = options.gamma;
   }
   if (code == "xor") kept.base_stripe_px = options.base_stripe_px;
+  if (code != "phase") kept.inverses = options.inverses;
   return kept;
 }
 
@@ -146,7 +147,7 @@ int Patterns::widest_stripe_px() const {
 
 std::vector<PatternGroup> Patterns::groups() const {
   std::vector<PatternGroup> groups;
-  for (int first = 0; first < first_step(); first += 2) groups.push_back({first, 2});
+  for (int first = 0; options.inverses && first < first_step(); first += 2) groups.push_back({first, 2});
   if (steps() > 0) {
     groups.push_back({first_step(), steps()});
     groups.push_back({first_step() + steps(), steps()});
@@ -162,12 +163,12 @@ cv::Mat Patterns::picture(int index) const {
     return down(displayed(wave(height, index - first_step() - steps(), options), options), width, height);
   if (index >= first_step())
     return across(displayed(wave(width, index - first_step(), options), options), width, height);
-  const bool inverse = index % 2 == 1;
-  const int pair = index / 2;
-  if (pair < column_bits())
-    return across(stripe(width, lowest_bit() + column_bits() - 1 - pair, base_bit(), inverse), width, height);
-  const int row_pair = pair - column_bits();
-  return down(stripe(height, lowest_bit() + row_bits() - 1 - row_pair, base_bit(), inverse), width, height);
+  const bool inverse = index % pictures_of_bit() == 1;
+  const int bit = index / pictures_of_bit();
+  if (bit < column_bits())
+    return across(stripe(width, lowest_bit() + column_bits() - 1 - bit, base_bit(), inverse), width, height);
+  const int row_bit = bit - column_bits();
+  return down(stripe(height, lowest_bit() + row_bits() - 1 - row_bit, base_bit(), inverse), width, height);
 }
 
 Result<Patterns> linearised(const Patterns& patterns,
@@ -202,6 +203,7 @@ Status save_patterns(const Patterns& patterns, const std::filesystem::path& path
       json["gamma"] = patterns.options.gamma;
   }
   if (patterns.code == "xor") json["base_stripe_px"] = patterns.options.base_stripe_px;
+  if (!patterns.options.inverses) json["inverses"] = false;
   return write_file(path, json.dump(2) + "\n");
 }
 
@@ -211,13 +213,14 @@ CodeOptions read_code_options(const ConfigNode& node) {
   if (const auto steps = node.find("steps")) options.steps = steps->integer();
   if (const auto gamma = node.find("gamma")) options.gamma = gamma->positive();
   if (const auto stripe = node.find("base_stripe_px")) options.base_stripe_px = stripe->integer();
+  if (const auto inverses = node.find("inverses")) options.inverses = inverses->boolean();
   return options;
 }
 
 std::set<std::string> code_option_keys(const std::string& code) {
   if (code == "phase") return {"period_px", "steps", "gamma", "response"};
-  if (code == "xor") return {"base_stripe_px"};
-  return {};
+  if (code == "xor") return {"base_stripe_px", "inverses"};
+  return {"inverses"};
 }
 
 Result<Patterns> load_patterns(const std::filesystem::path& path) {

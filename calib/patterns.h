@@ -39,6 +39,10 @@ struct CodeOptions {
   /// xor: width of the widest stripe, projector pixels: 2, 4 or 8. Narrower keeps light from elsewhere out of
   /// the bits better, wider stands more blur.
   int base_stripe_px = 4;
+  /// gray, xor: false leaves the inverses out; white and black then tell what is dark. Half as many pictures,
+  /// for rigs that are all but known (recheck): three times the noise's variance, and light that changes in
+  /// the meantime is not noticed.
+  bool inverses = true;
   bool operator==(const CodeOptions&) const = default;
 };
 
@@ -67,19 +71,21 @@ struct Patterns {
   /// How many of the finest bits are not shown: labels from pairs alone are 2^this pixels wide. 0 but for
   /// phase.
   int lowest_bit() const;
-  int column_bits() const;  ///< pairs for the columns: ceil(log2(width)) - lowest_bit()
-  int row_bits() const;     ///< pairs for the rows
+  int column_bits() const;  ///< bits shown for the columns: ceil(log2(width)) - lowest_bit()
+  int row_bits() const;     ///< and for the rows
   /// xor: the bit that all coarser ones are exchanged with; else one beyond all bits.
   int base_bit() const;
   /// Width of the widest stripes of its pairs.
   int widest_stripe_px() const;
   int steps() const { return code == "phase" ? options.steps : 0; }  ///< of each axis' sinusoid
-  int first_row_pair() const { return 2 * column_bits(); }           ///< index of its first picture
-  int first_step() const { return 2 * (column_bits() + row_bits()); }
+  int pictures_of_bit() const { return options.inverses ? 2 : 1; }
+  int first_row_bit() const { return pictures_of_bit() * column_bits(); }  ///< index of its first picture
+  int first_step() const { return pictures_of_bit() * (column_bits() + row_bits()); }
   int count() const { return first_step() + 2 * steps() + 2; }
   int white() const { return count() - 2; }
   int black() const { return count() - 1; }
-  /// Each picture with its inverse, the steps of the sinusoids; white and black are the last group.
+  /// Each picture with its inverse (where they are shown), the steps of the sinusoids; white and black are
+  /// the last group.
   std::vector<PatternGroup> groups() const;
 
   /// Picture number `index`, 8 bits, of the projector's size; grey, but for the sinusoids of a measured

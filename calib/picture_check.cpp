@@ -178,6 +178,7 @@ Result<bool> adds_up(const Captures& captures, const Place& at, int index) {
   const auto group = std::find_if(groups.begin(), groups.end(), [&](const PatternGroup& g) {
     return index >= g.first && index < g.first + g.count;
   });
+  if (group == groups.end()) return true;  // without an inverse nothing tells
   std::vector<cv::Mat> members;
   for (int i = group->first; i < group->first + group->count; ++i) {
     LIMN_TRY(const cv::Mat member, picture(i));

@@ -264,6 +264,7 @@ void measure_noise(const Samples& lit, SeriesHealth* health) {
   std::array<double, 2> light{}, count{};
   int pairs = 0;
   for (const GroupHealth& group : health->groups) pairs += group.count == 2 && group.off < k_odd_group;
+  if (pairs < 2) return;  // without inverses nothing adds up to the same
   for (const GroupHealth& group : health->groups) {
     if (group.count != 2 || group.off >= k_odd_group) continue;
     const float *a = lit.of(group.first), *b = lit.of(group.first + 1);

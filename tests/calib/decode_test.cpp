@@ -111,6 +111,25 @@ TEST(Decode, FindsPlacesBetweenWholePixelsWithTheScatterThatItStates) {
   }
 }
 
+TEST(Decode, WhiteAndBlackStandForInversesThatAreNotShown) {
+  for (const char* code : {"gray", "xor"}) {
+    Bench bench;
+    bench.patterns = Patterns::create(code, 64, 64, {.inverses = false}).value();
+    ASSERT_EQ(bench.patterns.count(), 6 + 6 + 2);
+    bench.blur = 0.6;
+    bench.noise = 1.5;
+    const auto decoded = decode(bench.patterns, bench.photograph(test::test_folder()), k_width, k_height);
+    ASSERT_TRUE(decoded.ok()) << decoded.message();
+    const Errors e = errors_of(*decoded, bench);
+    EXPECT_GT(decoded->share(), 0.97) << code;
+    EXPECT_LT(e.rms, 0.15) << code;
+    EXPECT_LT(std::abs(e.mean), 0.01) << code;
+    EXPECT_GT(e.squared_pull, 0.6) << code;
+    EXPECT_LT(e.squared_pull, 1.4) << code;
+    EXPECT_TRUE(decoded->health.odd.empty()) << code;
+  }
+}
+
 // Half a period off would be 8 pixels.
 TEST(Decode, PhaseNeverTakesTheNextWave) {
   for (const double blur : {0.3, 1.6, 2.5}) {

@@ -88,6 +88,21 @@ TEST(Patterns, WavesAreSinusoidalInLightAndTheirPairsTellThemApart) {
   }
 }
 
+TEST(Patterns, WithoutInversesAreEverySecondPictureOfThoseWith) {
+  for (const char* code : {"gray", "xor"}) {
+    const Patterns all = Patterns::create(code, 60, 40).value();
+    const Patterns sparse = Patterns::create(code, 60, 40, {.inverses = false}).value();
+    ASSERT_EQ(2 * sparse.first_step(), all.first_step());
+    for (int i = 0; i < sparse.first_step(); ++i)
+      EXPECT_EQ(cv::norm(sparse.picture(i), all.picture(2 * i), cv::NORM_INF), 0) << code << i;
+    EXPECT_EQ(cv::countNonZero(sparse.picture(sparse.black())), 0);
+    EXPECT_EQ(sparse.groups().size(), 1U);
+    const auto path = test::test_folder() / "patterns.json";
+    ASSERT_TRUE(save_patterns(sparse, path).ok());
+    EXPECT_EQ(load_patterns(path).value(), sparse);
+  }
+}
+
 TEST(Patterns, WavesOfAMeasuredResponseAreSinusoidalInEveryChannel) {
   Response response{"left", {}, {}, {}};
   for (int v = 0; v < 200; ++v) {
