@@ -242,7 +242,8 @@ std::string reason(const Assessment& assessment, double mm) {
   if (!(mm <= mm_limit)) reasons.push_back(fmt::format("more than {} mm is not {}", mm_limit, better));
   std::vector<std::string> names;
   for (const Fault& fault : assessment.faults) {
-    if (fault.severity != Severity::note) names.push_back(fault.name);
+    const bool is_named = std::find(names.begin(), names.end(), fault.name) != names.end();
+    if (fault.severity != Severity::note && !is_named) names.push_back(fault.name);
   }
   if (!names.empty()) reasons.push_back("faults were found: " + joined(names));
   const double shown =

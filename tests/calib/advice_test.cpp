@@ -101,8 +101,10 @@ TEST(Advice, TheVerdictNamesProjectorPoseAndReason) {
   EXPECT_EQ(words.rfind("usable: predicted error 1.40 mm on projector1", 0), 0U) << words;
   EXPECT_NE(words.find("(pose7) to 0.61 px"), std::string::npos) << words;
   EXPECT_NE(words.find("more than 1 mm is not good"), std::string::npos) << words;
-  judged.assessment.faults = {{"bent_board", "bent", "flatten it"}};
-  EXPECT_NE(judged.words().verdict.find("faults were found: bent_board"), std::string::npos);
+  judged.assessment.faults = {
+      {"odd_pose", "pose03", ""}, {"odd_pose", "pose04", ""}, {"bent_board", "bent", "flatten it"}};
+  EXPECT_NE(judged.words().verdict.find("faults were found: odd_pose and bent_board"), std::string::npos)
+      << judged.words().verdict;
   judged.assessment.predicted_error_mm = {0.8, 0.9};
   judged.assessment.held_out_error_mm = {0.05, 0.05};
   EXPECT_NE(judged.words().verdict.find("the boards say little"), std::string::npos);
