@@ -107,7 +107,7 @@ std::vector<std::string> pattern_codes();
 /// keys stay at their defaults. Their range is Patterns::create's business.
 CodeOptions read_code_options(const ConfigNode& node);
 /// The keys of it that a code has: phase "period_px", "steps", "gamma" or "response"; xor "base_stripe_px";
-/// gray none.
+/// "inverses" of gray and xor.
 std::set<std::string> code_option_keys(const std::string& code);
 
 /// `000.png` and so on: the name of a picture's file.
@@ -115,7 +115,8 @@ std::string picture_name(int index);
 
 /// patterns.json: {"schema": "limn.patterns/1", "code": "gray", "size": [width, height], "pictures": 44}; the
 /// pictures are 000.png … in the order above. phase adds "period_px", "steps" and "gamma" (or
-/// "response": {"red", "green", "blue"}), xor "base_stripe_px"; where they are absent their defaults hold.
+/// "response": {"red", "green", "blue"}), xor "base_stripe_px", gray and xor "inverses"; where they are
+/// absent their defaults hold.
 Status save_patterns(const Patterns& patterns, const std::filesystem::path& path);
 Result<Patterns> load_patterns(const std::filesystem::path& path);
 
