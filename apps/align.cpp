@@ -7,7 +7,7 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
-#include "calib/align.h"
+#include "calib/surface/align.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/log.h"

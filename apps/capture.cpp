@@ -6,7 +6,7 @@
 #include "apps/picture_writer.h"
 #include "apps/world_markers.h"
 #include "calib/capture.h"
-#include "calib/response_shots.h"
+#include "calib/response/response_shots.h"
 #include "core/log.h"
 
 namespace limn::apps {

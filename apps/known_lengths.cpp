@@ -4,7 +4,7 @@
 #include <cmath>
 #include <set>
 
-#include "calib/decode.h"
+#include "calib/code/decode.h"
 #include "core/marker.h"
 #include "tracker/detector.h"
 

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "calib/known_length.h"
+#include "calib/judge/known_length.h"
 #include "core/rig.h"
 
 namespace limn::apps {

@@ -11,7 +11,7 @@
 #include <optional>
 #include <vector>
 
-#include "calib/board.h"
+#include "calib/board/board.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "core/picture.h"

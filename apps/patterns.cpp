@@ -4,8 +4,8 @@
 #include <functional>
 #include <opencv2/core/mat.hpp>
 
-#include "calib/patterns.h"
-#include "calib/response_patterns.h"
+#include "calib/code/patterns.h"
+#include "calib/response/response_patterns.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "core/picture.h"

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-#include "calib/patterns.h"
+#include "calib/code/patterns.h"
 #include "core/result.h"
 
 namespace limn::apps {

@@ -1,6 +1,6 @@
 #include "apps/plan.h"
 
-#include "calib/patterns.h"
+#include "calib/code/patterns.h"
 #include "core/config.h"
 #include "core/response.h"
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "calib/board.h"
-#include "calib/patterns.h"
+#include "calib/board/board.h"
+#include "calib/code/patterns.h"
 #include "core/pose.h"
 #include "core/response.h"
 #include "core/result.h"
@@ -20,7 +20,7 @@ struct Plan {
   std::string code = "gray";
   calib::CodeOptions code_options;
   std::vector<Response> responses;     ///< measured, for phase; empty: waves are drawn by code_options.gamma
-  std::vector<Pose> world_from_board;  ///< board frame as in calib/board.h
+  std::vector<Pose> world_from_board;  ///< board frame as in calib/board/board.h
   bool response = false;               ///< also the response pictures, of the prototype
 };
 

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "calib/recheck.h"
+#include "calib/judge/recheck.h"
 #include "core/result.h"
 
 namespace limn::apps {

@@ -10,7 +10,7 @@
 #include "apps/picture_writer.h"
 #include "apps/world_markers.h"
 #include "calib/capture.h"
-#include "calib/scan.h"
+#include "calib/surface/scan.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/log.h"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "calib/report.h"
+#include "calib/report/report.h"
 #include "core/result.h"
 
 namespace limn::apps {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "calib/board.h"
-#include "calib/patterns.h"
+#include "calib/board/board.h"
+#include "calib/code/patterns.h"
 #include "core/result.h"
 
 namespace limn::calib {
@@ -32,7 +32,7 @@ struct Captures {
   std::vector<Patterns> patterns;  ///< one for each projector
   Board board;
   std::vector<CapturedPose> poses;  ///< by name
-  /// Lengths measured by hand, as calib/known_length.h reads them; "known_lengths" in capture.json.
+  /// Lengths measured by hand, as calib/judge/known_length.h reads them; "known_lengths" in capture.json.
   std::vector<std::string> known_lengths = {};
 };
 

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "calib/decode.h"
+#include "calib/code/decode.h"
 #include "calib/observations.h"
 
 namespace limn::calib {

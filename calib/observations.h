@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "calib/board_finder.h"
+#include "calib/board/board_finder.h"
 #include "calib/captures.h"
-#include "calib/decode.h"
+#include "calib/code/decode.h"
 #include "core/result.h"
 
 namespace limn::calib {

@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "calib/patterns.h"
-#include "calib/response_patterns.h"
+#include "calib/code/patterns.h"
+#include "calib/response/response_patterns.h"
 #include "core/file.h"
 #include "core/picture.h"
 #include "tests/support/matchers.h"

@@ -11,7 +11,7 @@
 #include <optional>
 
 #include "apps/solve.h"
-#include "calib/board.h"
+#include "calib/board/board.h"
 #include "core/file.h"
 #include "core/rig.h"
 #include "tests/support/matchers.h"

@@ -12,10 +12,10 @@
 #include <regex>
 
 #include "apps/world_markers.h"
-#include "calib/board.h"
+#include "calib/board/board.h"
 #include "calib/capture.h"
-#include "calib/patterns.h"
-#include "calib/response_patterns.h"
+#include "calib/code/patterns.h"
+#include "calib/response/response_patterns.h"
 #include "core/file.h"
 #include "core/picture.h"
 #include "core/rig.h"

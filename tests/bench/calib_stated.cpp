@@ -3,8 +3,8 @@
 // Usage: calib_stated [CASES [FIRST]]
 #include <fmt/core.h>
 
-#include "calib/assess.h"
-#include "calib/propagate.h"
+#include "calib/judge/assess.h"
+#include "calib/judge/propagate.h"
 #include "calib/solve.h"
 #include "tests/calib/true_rig.h"
 

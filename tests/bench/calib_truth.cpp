@@ -14,9 +14,9 @@
 #include <set>
 
 #include "apps/capture.h"
-#include "calib/assess.h"
-#include "calib/board_dictionary.h"
+#include "calib/board/board_dictionary.h"
 #include "calib/capture.h"
+#include "calib/judge/assess.h"
 #include "calib/solve.h"
 #include "sim/photograph.h"
 #include "sim/trace.h"

@@ -1,4 +1,4 @@
-#include "calib/advice.h"
+#include "calib/report/advice.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "calib/align.h"
+#include "calib/surface/align.h"
 
 #include <gtest/gtest.h>
 

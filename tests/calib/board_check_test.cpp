@@ -1,4 +1,4 @@
-#include "calib/board_check.h"
+#include "calib/judge/board_check.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <opencv2/imgproc.hpp>
 
-#include "calib/board_finder.h"
+#include "calib/board/board_finder.h"
 #include "calib/capture.h"
 #include "core/file.h"
 #include "core/picture.h"

@@ -1,4 +1,4 @@
-#include "calib/board.h"
+#include "calib/board/board.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <random>
 #include <set>
 
-#include "calib/board_finder.h"
+#include "calib/board/board_finder.h"
 #include "tests/support/matchers.h"
 
 namespace limn::calib {

@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "calib/patterns.h"
+#include "calib/code/patterns.h"
 #include "core/file.h"
 #include "core/picture.h"
 #include "tests/support/matchers.h"

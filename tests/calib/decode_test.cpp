@@ -1,4 +1,4 @@
-#include "calib/decode.h"
+#include "calib/code/decode.h"
 
 #include <gtest/gtest.h>
 

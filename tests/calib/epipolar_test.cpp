@@ -1,4 +1,4 @@
-#include "calib/epipolar.h"
+#include "calib/judge/epipolar.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "calib/capture.h"
-#include "calib/patterns.h"
+#include "calib/code/patterns.h"
 #include "core/file.h"
 #include "sim/photograph.h"
 #include "sim/trace.h"

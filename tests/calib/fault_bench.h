@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "calib/board.h"
+#include "calib/board/board.h"
 #include "calib/captures.h"
 #include "core/result.h"
 #include "sim/world.h"

@@ -1,4 +1,4 @@
-#include "calib/faults.h"
+#include "calib/judge/faults.h"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
-#include "calib/assess.h"
-#include "calib/capture_faults.h"
+#include "calib/judge/assess.h"
+#include "calib/judge/capture_faults.h"
 #include "calib/observations.h"
 #include "calib/solve.h"
 #include "tests/calib/fault_bench.h"

@@ -1,4 +1,4 @@
-#include "calib/patterns.h"
+#include "calib/code/patterns.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "calib/picture_check.h"
+#include "calib/judge/picture_check.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,11 @@
-#include "calib/propagate.h"
+#include "calib/judge/propagate.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "calib/assess.h"
+#include "calib/judge/assess.h"
 #include "calib/solve.h"
 #include "tests/calib/true_rig.h"
 #include "tests/support/matchers.h"

@@ -1,8 +1,8 @@
-#include "calib/pulls.h"
+#include "calib/judge/pulls.h"
 
 #include <gtest/gtest.h>
 
-#include "calib/assess.h"
+#include "calib/judge/assess.h"
 #include "tests/calib/observed_world.h"
 #include "tests/support/matchers.h"
 

@@ -1,4 +1,4 @@
-#include "calib/recheck.h"
+#include "calib/judge/recheck.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "calib/report.h"
+#include "calib/report/report.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "calib/response.h"
+#include "calib/response/response.h"
 
 #include <gtest/gtest.h>
 
@@ -7,10 +7,10 @@
 #include <functional>
 #include <opencv2/core.hpp>
 
-#include "calib/camera_response.h"
-#include "calib/colour_mixing.h"
-#include "calib/response_patterns.h"
-#include "calib/response_shots.h"
+#include "calib/response/camera_response.h"
+#include "calib/response/colour_mixing.h"
+#include "calib/response/response_patterns.h"
+#include "calib/response/response_shots.h"
 #include "core/file.h"
 #include "core/picture.h"
 #include "sim/photograph.h"

@@ -1,11 +1,11 @@
-#include "calib/series_health.h"
+#include "calib/code/series_health.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
-#include "calib/decode.h"
+#include "calib/code/decode.h"
 #include "tests/calib/code_bench.h"
 
 namespace limn::calib {

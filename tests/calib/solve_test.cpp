@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-#include "calib/assess.h"
+#include "calib/judge/assess.h"
 #include "calib/seed.h"
 #include "tests/calib/observed_world.h"
 #include "tests/support/matchers.h"

@@ -1,4 +1,4 @@
-#include "calib/triangulate.h"
+#include "calib/surface/triangulate.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "calib/vignetting.h"
+#include "calib/response/vignetting.h"
 
 #include <gtest/gtest.h>
 

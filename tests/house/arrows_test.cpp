@@ -88,6 +88,29 @@ TEST(House, RoomsIncludeOnlyWhatTheArrowsAllow) {
   EXPECT_GT(seen, 50) << "the sources were not found";
 }
 
+// A calib file's folder: "calib/judge", or "calib" itself.
+std::string calib_folder(const std::string& path) {
+  const size_t slash = path.find('/', std::string("calib/").size());
+  return slash == std::string::npos ? "calib" : path.substr(0, slash);
+}
+
+TEST(House, CalibsFoldersIncludeOnlyThoseBefore) {
+  const std::map<std::string, int> order = {{"calib/board", 0},   {"calib/code", 0},     {"calib", 1},
+                                            {"calib/surface", 2}, {"calib/response", 2}, {"calib/judge", 3},
+                                            {"calib/report", 4}};
+  int seen = 0;
+  for (const Include& include : includes_of(fs::path(LIMN_SOURCE_DIR) / "calib")) {
+    if (!include.what.starts_with("calib/")) continue;
+    const std::string from = calib_folder(fs::relative(include.file, LIMN_SOURCE_DIR).generic_string());
+    const std::string to = calib_folder(include.what);
+    ASSERT_TRUE(order.contains(from)) << from << ": give this folder its place";
+    ASSERT_TRUE(order.contains(to)) << include.file << " includes " << include.what;
+    ++seen;
+    EXPECT_TRUE(from == to || order.at(to) < order.at(from)) << include.file << " includes " << include.what;
+  }
+  EXPECT_GT(seen, 50) << "the sources were not found";
+}
+
 TEST(House, ThirdPartiesStayInTheirRooms) {
   int seen = 0;
   for (const auto& [room, may] : allowed()) {

@@ -1,0 +1,194 @@
+#include "calib/board/board.h"
+
+#include <charconv>
+#include <cmath>
+#include <numeric>
+
+#include "calib/board/board_dictionary.h"
+#include "core/predefined_family.h"
+
+namespace limn::calib {
+namespace {
+
+std::vector<std::string> split(const std::string& text, char at) {
+  std::vector<std::string> parts(1);
+  for (char c : text) {
+    if (c == at) {
+      parts.emplace_back();
+    } else {
+      parts.back() += c;
+    }
+  }
+  return parts;
+}
+
+// The whole of `text` as a number.
+template <class T>
+bool read_number(const std::string& text, T* value) {
+  const char* end = text.data() + text.size();
+  const auto [rest, problem] = std::from_chars(text.data(), end, *value);
+  return problem == std::errc() && rest == end;
+}
+
+bool read_size(const std::string& text, int* columns, int* rows) {
+  const auto parts = split(text, 'x');
+  return parts.size() == 2 && read_number(parts[0], columns) && read_number(parts[1], rows);
+}
+
+bool read_length(const std::string& text, double* metres) {
+  for (const auto& [unit, factor] : {std::pair{"mm", 1e-3}, std::pair{"cm", 1e-2}, std::pair{"m", 1.0}}) {
+    const std::string name = unit;
+    if (!text.ends_with(name)) continue;
+    if (!read_number(text.substr(0, text.size() - name.size()), metres)) return false;
+    *metres *= factor;
+    return *metres >= 1e-4 && *metres <= 10;  // nothing smaller prints, nothing larger is a board
+  }
+  return false;
+}
+
+int marker_count(const Board& board) { return board.columns * board.rows / 2; }
+
+std::string default_dictionary(int markers) {
+  for (int count : {50, 100, 250, 1000}) {
+    if (markers <= count) return fmt::format("aruco_4x4_{}", count);
+  }
+  return {};
+}
+
+Status read_charuco_fields(const std::string& text, const std::vector<std::string>& parts, Board* board) {
+  const int markers = marker_count(*board);
+  board->dictionary = parts.size() > 3 ? parts[3] : default_dictionary(markers);
+  if (board->dictionary.empty())
+    return error(
+        "board '{}': expected at most 1000 markers, the largest dictionary, found {}. Take fewer squares.",
+        text, markers);
+  if (!find_predefined_family(board->dictionary))
+    return error("board '{}': expected a dictionary such as aruco_4x4_50 or aruco_5x5_250, found '{}'.", text,
+                 board->dictionary);
+  if (const int has = dictionary_of(*board)->bytesList.rows; has < markers)
+    return error("board '{}': needs {} markers, but {} has {}. Take a larger dictionary.", text, markers,
+                 board->dictionary, has);
+  board->marker_share = 0.75;
+  if (parts.size() > 4 && (!read_number(parts[4], &board->marker_share) || !(board->marker_share >= 0.4) ||
+                           !(board->marker_share <= 0.9)))
+    return error("board '{}': expected the marker's share of the square, 0.4 to 0.9, found '{}'.", text,
+                 parts[4]);
+  return {};
+}
+
+bool near_whole(double v) { return std::abs(v - std::round(v)) < 1e-6; }
+
+// Pixels of a square and of a marker's cell: whole cells, equal margins, and a whole number of pixels per
+// metre where one is near, because a PNG's pHYs is a whole number.
+struct PixelGrid {
+  int square = 0;
+  int cell = 0;
+};
+PixelGrid pixel_grid(const Board& board, int least) {
+  if (board.kind == BoardKind::chessboard) {
+    int square = least;
+    while (square < 2 * least && !near_whole(square / board.square_m)) ++square;
+    return {square < 2 * least ? square : least, 0};
+  }
+  const int cells = dictionary_of(board)->markerSize + 2;
+  auto fits = [&](int square) {
+    const double cell = square * board.marker_share / cells;
+    return near_whole(cell) && (square - cells * std::lround(cell)) % 2 == 0;
+  };
+  PixelGrid found;
+  for (int square = least; square < 4 * least; ++square) {
+    if (!fits(square)) continue;
+    const PixelGrid grid{square, static_cast<int>(std::lround(square * board.marker_share / cells))};
+    if (near_whole(square / board.square_m)) return grid;
+    if (found.square == 0) found = grid;
+  }
+  if (found.square > 0) return found;
+  // No whole cells for this share: the nearest ones. The corners stay where they are.
+  int square = least + least % 2;
+  int cell = std::max(1, static_cast<int>(std::lround(square * board.marker_share / cells)));
+  if ((square - cells * cell) % 2 != 0) ++square;
+  return {square, cell};
+}
+
+}  // namespace
+
+cv::Ptr<cv::aruco::Dictionary> dictionary_of(const Board& board) {
+  const PredefinedFamily* family = find_predefined_family(board.dictionary);
+  LIMN_CHECK(family != nullptr);
+  return cv::aruco::getPredefinedDictionary(family->opencv_dictionary);
+}
+
+Result<Board> Board::parse(const std::string& text) {
+  constexpr auto k_forms = "charuco:11x8:25mm, charuco:11x8:25mm:aruco_5x5_100:0.7 or chessboard:9x7:75mm";
+  const auto parts = split(text, ':');
+  Board board;
+  const bool charuco = parts[0] == "charuco";
+  if (!charuco && parts[0] != "chessboard") return error("board '{}': expected {}.", text, k_forms);
+  if (parts.size() < 3 || parts.size() > (charuco ? 5U : 3U))
+    return error("board '{}': expected {}.", text, k_forms);
+  board.kind = charuco ? BoardKind::charuco : BoardKind::chessboard;
+  const int least = charuco ? 3 : 2;
+  if (!read_size(parts[1], &board.columns, &board.rows) || board.columns < least || board.rows < least ||
+      board.columns > 100 || board.rows > 100)
+    return error("board '{}': expected {}, such as 11x8, found '{}'.", text,
+                 charuco ? "the number of squares (3 to 100)" : "the number of inner corners (2 to 100)",
+                 parts[1]);
+  if (!read_length(parts[2], &board.square_m))
+    return error(
+        "board '{}': expected the square's side with its unit (mm, cm or m), 0.1mm to 10m, such as 25mm, "
+        "found '{}'.",
+        text, parts[2]);
+  if (!charuco) {
+    ++board.columns;
+    ++board.rows;
+    return board;
+  }
+  LIMN_TRY_STATUS(read_charuco_fields(text, parts, &board));
+  return board;
+}
+
+std::string Board::text() const {
+  const double mm = square_m * 1e3;
+  if (kind == BoardKind::chessboard)
+    return fmt::format("chessboard:{}x{}:{:.10g}mm", columns - 1, rows - 1, mm);
+  std::string base = fmt::format("charuco:{}x{}:{:.10g}mm", columns, rows, mm);
+  const bool plain_share = marker_share == 0.75;
+  if (!plain_share || dictionary != default_dictionary(marker_count(*this))) base += ":" + dictionary;
+  if (!plain_share) base += fmt::format(":{:.10g}", marker_share);
+  return base;
+}
+
+Eigen::Vector3d Board::p_corner(int id) const {
+  const int column = id % (columns - 1), row = id / (columns - 1);
+  return {(column + 1) * square_m, (row + 1) * square_m, 0};
+}
+
+BoardSheet draw_board(const Board& board, const DrawOptions& options) {
+  const PixelGrid grid = pixel_grid(board, std::max(options.square_px, 8));
+  const int margin = options.margin_px >= 0 ? options.margin_px : grid.square;
+  BoardSheet sheet;
+  sheet.pixels_per_metre = grid.square / board.square_m;
+  sheet.px_board_origin = Eigen::Vector2d::Constant(margin - 0.5);
+  sheet.picture = cv::Mat(2 * margin + board.rows * grid.square, 2 * margin + board.columns * grid.square,
+                          CV_8U, cv::Scalar(255));
+  cv::Ptr<cv::aruco::Dictionary> dictionary;
+  if (board.kind == BoardKind::charuco) dictionary = dictionary_of(board);
+  int id = 0;
+  for (int row = 0; row < board.rows; ++row) {
+    for (int column = 0; column < board.columns; ++column) {
+      cv::Mat square = sheet.picture(
+          cv::Rect(margin + column * grid.square, margin + row * grid.square, grid.square, grid.square));
+      if (board.is_black(column, row)) {
+        square.setTo(0);
+      } else if (dictionary) {
+        const int side = grid.cell * (dictionary->markerSize + 2), gap = (grid.square - side) / 2;
+        cv::Mat marker;
+        dictionary->drawMarker(id++, side, marker);
+        marker.copyTo(square(cv::Rect(gap, gap, side, side)));
+      }
+    }
+  }
+  return sheet;
+}
+
+}  // namespace limn::calib

@@ -1,0 +1,352 @@
+#include "calib/board/board_finder.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <opencv2/aruco.hpp>
+#include <opencv2/calib3d.hpp>
+#include <optional>
+
+#include "calib/board/board_dictionary.h"
+
+namespace limn::calib {
+namespace {
+
+using Eigen::Vector2d;
+
+constexpr double k_reach = 0.42;  // of a square along its edges; half would meet the next junction's blur
+constexpr double k_max_reach_px = 40;      // more pixels only cost time
+constexpr double k_band = 0.2;             // of a square across an edge, on boards without markers
+constexpr double k_min_half_contrast = 3;  // levels; below, noise moves the fit by whole pixels
+constexpr double k_max_residual = 0.35;    // of the half contrast: a covered or glaring junction
+constexpr double k_max_shift = 0.3;        // of a square: the fit has run to another corner
+constexpr double k_min_square_px = 8;      // smaller squares leave too few pixels clear of the blur
+
+// Where a junction is expected: its place and the vectors to the next junctions right and down.
+struct Expected {
+  int id = 0;
+  Vector2d px, right, down;
+  bool black_up_left = true;  // the square between -right and -down
+};
+
+double erf_slope(double x) { return 2 / std::sqrt(std::numbers::pi) * std::exp(-x * x); }
+
+struct Sample {
+  double x = 0, y = 0, value = 0;
+};
+
+// Pixels along the junction's two edges, relative to `px`.
+std::vector<Sample> samples_near(const cv::Mat& grey, const Expected& at, double band) {
+  const double reach_right = std::min(k_reach, k_max_reach_px / at.right.norm());
+  const double reach_down = std::min(k_reach, k_max_reach_px / at.down.norm());
+  Eigen::Matrix2d axes;
+  axes << at.right, at.down;
+  const Eigen::Matrix2d to_square = axes.inverse();
+  const Vector2d half = (at.right.cwiseAbs() * reach_right + at.down.cwiseAbs() * reach_down).eval();
+  const int x0 = std::max(0, static_cast<int>(std::ceil(at.px.x() - half.x())));
+  const int x1 = std::min(grey.cols - 1, static_cast<int>(std::floor(at.px.x() + half.x())));
+  const int y0 = std::max(0, static_cast<int>(std::ceil(at.px.y() - half.y())));
+  const int y1 = std::min(grey.rows - 1, static_cast<int>(std::floor(at.px.y() + half.y())));
+  std::vector<Sample> samples;
+  for (int y = y0; y <= y1; ++y) {
+    for (int x = x0; x <= x1; ++x) {
+      const Vector2d r(x - at.px.x(), y - at.px.y());
+      const Vector2d s = (to_square * r).cwiseAbs();
+      const bool inside = s.x() <= reach_right && s.y() <= reach_down;
+      if (inside && s.minCoeff() <= band)
+        samples.push_back({r.x(), r.y(), static_cast<double>(grey.at<uchar>(y, x))});
+    }
+  }
+  return samples;
+}
+
+// Two blurred edges that cross: value = base + slope . r + half * erf(n1 . (r - c) / s) * erf(n2 . (r - c) /
+// s).
+struct Junction {
+  static constexpr int k_size = 9;
+  using Values = Eigen::Matrix<double, k_size, 1>;  // c.x c.y angle1 angle2 s base slope.x slope.y half
+  Values v;
+
+  double predict(const Sample& p, Values* jacobian) const {
+    const double dx = p.x - v[0], dy = p.y - v[1];
+    const Vector2d n1(std::cos(v[2]), std::sin(v[2])), n2(std::cos(v[3]), std::sin(v[3]));
+    const double u1 = (n1.x() * dx + n1.y() * dy) / v[4], u2 = (n2.x() * dx + n2.y() * dy) / v[4];
+    const double e1 = std::erf(u1), e2 = std::erf(u2);
+    if (jacobian) {
+      const double g1 = v[8] * erf_slope(u1) * e2 / v[4], g2 = v[8] * erf_slope(u2) * e1 / v[4];
+      *jacobian << -g1 * n1.x() - g2 * n2.x(), -g1 * n1.y() - g2 * n2.y(), g1 * (-n1.y() * dx + n1.x() * dy),
+          g2 * (-n2.y() * dx + n2.x() * dy), -(g1 * u1 + g2 * u2), 1, p.x, p.y, e1 * e2;
+    }
+    return v[5] + v[6] * p.x + v[7] * p.y + v[8] * e1 * e2;
+  }
+};
+
+double squared_residual(const Junction& junction, const std::vector<Sample>& samples) {
+  double sum = 0;
+  for (const Sample& p : samples) sum += std::pow(p.value - junction.predict(p, nullptr), 2);
+  return sum;
+}
+
+struct JunctionFit {
+  Junction junction;
+  double residual = 0;  // standard deviation, levels
+  double stddev_px = 0;
+};
+
+// Normal angle of an edge that runs along `along`, on the side of `towards`.
+double normal_angle(const Vector2d& along, const Vector2d& towards) {
+  Vector2d n(-along.y(), along.x());
+  if (n.dot(towards) < 0) n = -n;
+  return std::atan2(n.y(), n.x());
+}
+
+Junction first_guess(const std::vector<Sample>& samples, const Expected& at) {
+  Junction junction;
+  junction.v << 0, 0, normal_angle(at.right, at.down), normal_angle(at.down, at.right), 1.2, 0, 0, 0, 0;
+  double mean = 0, product = 0, weight = 0;
+  for (const Sample& p : samples) mean += p.value / static_cast<double>(samples.size());
+  junction.v[8] = 1;
+  for (const Sample& p : samples) {
+    const double e = junction.predict(p, nullptr);
+    product += e * (p.value - mean);
+    weight += e * e;
+  }
+  junction.v[5] = mean;
+  junction.v[8] = weight > 0 ? product / weight : 0;
+  return junction;
+}
+
+// Levenberg-Marquardt; nullopt when it does not settle.
+std::optional<JunctionFit> fit_junction(const std::vector<Sample>& samples, const Junction& start) {
+  constexpr int n = Junction::k_size;
+  if (samples.size() < 4 * n) return std::nullopt;
+  JunctionFit fit{start};
+  double cost = squared_residual(start, samples), damping = 1e-3;
+  Eigen::Matrix<double, n, n> jtj;
+  for (int iteration = 0; iteration < 40; ++iteration) {
+    jtj.setZero();
+    Junction::Values jtr = Junction::Values::Zero(), row;
+    for (const Sample& p : samples) {
+      const double r = p.value - fit.junction.predict(p, &row);
+      jtj.selfadjointView<Eigen::Lower>().rankUpdate(row);
+      jtr += row * r;
+    }
+    jtj = jtj.selfadjointView<Eigen::Lower>();
+    Eigen::Matrix<double, n, n> damped = jtj;
+    damped.diagonal() *= 1 + damping;
+    damped.diagonal().array() += 1e-9;
+    const Junction::Values step = damped.ldlt().solve(jtr);
+    Junction tried{fit.junction.v + step};
+    tried.v[4] = std::clamp(tried.v[4], 0.2, 20.0);
+    const double tried_cost = tried.v.allFinite() ? squared_residual(tried, samples) : cost + 1;
+    if (tried_cost < cost) {
+      const bool settled = step.head<2>().norm() < 1e-4 && cost - tried_cost < 1e-6 * cost;
+      fit.junction = tried;
+      cost = tried_cost;
+      damping = std::max(damping / 10, 1e-9);
+      if (settled) break;
+    } else {
+      damping *= 10;
+      if (damping > 1e8) break;
+    }
+  }
+  const double variance = cost / static_cast<double>(samples.size() - n);
+  const Eigen::Matrix<double, n, n> covariance =
+      variance * jtj.ldlt().solve(Eigen::Matrix<double, n, n>::Identity());
+  fit.residual = std::sqrt(variance);
+  fit.stddev_px = std::sqrt(covariance.topLeftCorner<2, 2>().trace() / 2);
+  if (!fit.junction.v.allFinite() || !std::isfinite(fit.stddev_px)) return std::nullopt;
+  return fit;
+}
+
+// Share of a square that is clear of markers on both sides of an edge.
+double clear_band(const Board& board) {
+  return board.kind == BoardKind::charuco ? 0.65 * (1 - board.marker_share) / 2 : k_band;
+}
+
+std::optional<BoardCorner> refined(const Board& board, const cv::Mat& grey, Expected at) {
+  const double side = std::min(at.right.norm(), at.down.norm());
+  if (!(side >= k_min_square_px)) return std::nullopt;
+  const Vector2d px_start = at.px;
+  std::optional<JunctionFit> fit;
+  for (int pass = 0; pass < 2; ++pass) {  // the second with its pixels chosen around the place found
+    const std::vector<Sample> samples = samples_near(grey, at, std::max(clear_band(board), 2.5 / side));
+    if (samples.empty()) return std::nullopt;
+    fit = fit_junction(samples, first_guess(samples, at));
+    if (!fit) return std::nullopt;
+    at.px += Vector2d(fit->junction.v[0], fit->junction.v[1]);
+    if (!((at.px - px_start).norm() < k_max_shift * side)) return std::nullopt;
+  }
+  const double half = fit->junction.v[8];
+  const bool sign_fits = (half < 0) == at.black_up_left;
+  if (!sign_fits || std::abs(half) < k_min_half_contrast) return std::nullopt;
+  if (fit->residual > k_max_residual * std::abs(half)) return std::nullopt;
+  const bool seen =
+      at.px.x() >= 2 && at.px.y() >= 2 && at.px.x() <= grey.cols - 3 && at.px.y() <= grey.rows - 3;
+  if (!seen) return std::nullopt;
+  return BoardCorner{at.id, at.px, std::hypot(fit->stddev_px, k_corner_floor_px)};
+}
+
+Vector2d to_vector(const cv::Point2f& p) { return {p.x, p.y}; }
+
+// Vectors to the neighbours from differences on the grid.
+std::vector<Expected> expected_on_grid(const std::vector<cv::Point2f>& grid, int across, int down) {
+  auto at = [&](int column, int row) { return to_vector(grid[static_cast<size_t>(row * across + column)]); };
+  std::vector<Expected> expected;
+  for (int row = 0; row < down; ++row) {
+    for (int column = 0; column < across; ++column) {
+      const int c0 = std::max(column - 1, 0), c1 = std::min(column + 1, across - 1);
+      const int r0 = std::max(row - 1, 0), r1 = std::min(row + 1, down - 1);
+      expected.push_back({row * across + column, at(column, row), (at(c1, row) - at(c0, row)) / (c1 - c0),
+                          (at(column, r1) - at(column, r0)) / (r1 - r0), true});
+    }
+  }
+  return expected;
+}
+
+// Whether the square up-left of the first corner is black in the picture.
+bool first_square_is_black(const cv::Mat& grey, const std::vector<Expected>& corners) {
+  const Expected& first = corners.front();
+  auto level = [&](const Vector2d& px) {
+    const int x = std::clamp(static_cast<int>(std::lround(px.x())), 0, grey.cols - 1);
+    const int y = std::clamp(static_cast<int>(std::lround(px.y())), 0, grey.rows - 1);
+    return grey.at<uchar>(y, x);
+  };
+  const Vector2d a = 0.4 * first.right, b = 0.4 * first.down;
+  return level(first.px - a - b) + level(first.px + a + b) <
+         level(first.px + a - b) + level(first.px - a + b);
+}
+
+// The detector may start at any end of the board: bring the grid into the board's frame.
+std::vector<cv::Point2f> uprighted(const cv::Mat& grey, std::vector<cv::Point2f> grid, int across, int down) {
+  const std::vector<Expected> corners = expected_on_grid(grid, across, down);
+  const Expected& middle = corners[corners.size() / 2];
+  if (middle.right.x() * middle.down.y() - middle.right.y() * middle.down.x() <
+      0) {  // mirrored: turn every row
+    for (int row = 0; row < down; ++row)
+      std::reverse(grid.begin() + row * across, grid.begin() + (row + 1) * across);
+  }
+  const bool black = first_square_is_black(grey, expected_on_grid(grid, across, down));
+  const bool ambiguous = (across + down) % 2 == 0;
+  const bool nearer = grid.front().x + grid.front().y <= grid.back().x + grid.back().y;
+  if (ambiguous ? !nearer : !black) std::reverse(grid.begin(), grid.end());
+  return grid;
+}
+
+std::vector<Expected> find_chessboard(const Board& board, const cv::Mat& grey) {
+  const cv::Size inner(board.columns - 1, board.rows - 1);
+  std::vector<cv::Point2f> grid;
+  if (!cv::findChessboardCorners(grey, inner, grid,
+                                 cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE) &&
+      !cv::findChessboardCornersSB(grey, inner, grid, cv::CALIB_CB_NORMALIZE_IMAGE))
+    return {};
+  std::vector<Expected> expected =
+      expected_on_grid(uprighted(grey, grid, inner.width, inner.height), inner.width, inner.height);
+  // Boards that look the same when turned are printed with either colour first.
+  const bool black_first = first_square_is_black(grey, expected);
+  for (Expected& at : expected)
+    at.black_up_left = board.is_black(at.id % inner.width, at.id / inner.width) == black_first;
+  return expected;
+}
+
+// A marker seen: its square and its corners, in units of squares and in pixels.
+struct SeenMarker {
+  int column = 0, row = 0;
+  std::vector<cv::Point2f> in_squares, px;
+};
+
+std::vector<SeenMarker> find_markers(const Board& board, const cv::Mat& grey) {
+  std::vector<std::vector<cv::Point2f>> quads;
+  std::vector<int> ids;
+  cv::aruco::detectMarkers(grey, dictionary_of(board), quads, ids);
+  std::vector<std::pair<int, int>> squares;
+  for (int row = 0; row < board.rows; ++row) {
+    for (int column = 0; column < board.columns; ++column) {
+      if (!board.is_black(column, row)) squares.emplace_back(column, row);
+    }
+  }
+  std::vector<SeenMarker> seen;
+  const float low = static_cast<float>(1 - board.marker_share) / 2, high = 1 - low;
+  for (size_t i = 0; i < ids.size(); ++i) {
+    if (ids[i] >= static_cast<int>(squares.size())) continue;
+    const auto [column, row] = squares[static_cast<size_t>(ids[i])];
+    const auto x = static_cast<float>(column), y = static_cast<float>(row);
+    seen.push_back({column,
+                    row,
+                    {{x + low, y + low}, {x + high, y + low}, {x + high, y + high}, {x + low, y + high}},
+                    quads[i]});
+  }
+  return seen;
+}
+
+// Without markers that a clutter's false reading has put elsewhere than the rest of the board says.
+std::vector<SeenMarker> consistent(std::vector<SeenMarker> markers) {
+  constexpr double k_tolerance = 0.4;  // squares; lens distortion over the board stays below
+  std::vector<cv::Point2f> px, in_squares;
+  for (const SeenMarker& marker : markers) {
+    px.insert(px.end(), marker.px.begin(), marker.px.end());
+    in_squares.insert(in_squares.end(), marker.in_squares.begin(), marker.in_squares.end());
+  }
+  if (markers.size() < 2) return {};
+  cv::Mat good;
+  if (cv::findHomography(px, in_squares, cv::RANSAC, k_tolerance, good).empty()) return {};
+  std::vector<SeenMarker> kept;
+  for (size_t i = 0; i < markers.size(); ++i) {
+    const int first = static_cast<int>(4 * i);
+    if (cv::countNonZero(good.rowRange(first, first + 4)) == 4) kept.push_back(std::move(markers[i]));
+  }
+  return kept;
+}
+
+// The junction's place by a homography of the nearest markers; nullopt without a marker in a square beside
+// it.
+std::optional<Expected> expected_beside(const Board& board, const std::vector<SeenMarker>& markers, int id) {
+  const int column = id % (board.columns - 1), row = id / (board.columns - 1);
+  auto distance = [&](const SeenMarker& m) {
+    return std::max(std::abs(2 * (m.column - column) - 1), std::abs(2 * (m.row - row) - 1));
+  };
+  std::vector<cv::Point2f> px, in_squares;
+  bool beside = false;
+  for (const SeenMarker& marker : markers) {
+    if (distance(marker) > 3) continue;
+    beside = beside || distance(marker) == 1;
+    px.insert(px.end(), marker.px.begin(), marker.px.end());
+    in_squares.insert(in_squares.end(), marker.in_squares.begin(), marker.in_squares.end());
+  }
+  if (!beside) return std::nullopt;
+  const cv::Mat h = cv::findHomography(in_squares, px, 0);
+  if (h.empty()) return std::nullopt;
+  const auto x = static_cast<float>(column + 1), y = static_cast<float>(row + 1);
+  const std::vector<cv::Point2f> places = {
+      {x, y}, {x + 0.5F, y}, {x - 0.5F, y}, {x, y + 0.5F}, {x, y - 0.5F}};
+  std::vector<cv::Point2f> found;
+  cv::perspectiveTransform(places, found, h);
+  return Expected{id, to_vector(found[0]), to_vector(found[1] - found[2]), to_vector(found[3] - found[4]),
+                  board.is_black(column, row)};
+}
+
+std::vector<Expected> find_charuco(const Board& board, const cv::Mat& grey) {
+  const std::vector<SeenMarker> markers = consistent(find_markers(board, grey));
+  std::vector<Expected> expected;
+  for (int id = 0; id < board.corner_count() && !markers.empty(); ++id) {
+    if (auto at = expected_beside(board, markers, id)) expected.push_back(*at);
+  }
+  return expected;
+}
+
+}  // namespace
+
+std::vector<BoardCorner> find_board(const Board& board, const cv::Mat& grey) {
+  LIMN_CHECK(grey.type() == CV_8U);
+  constexpr size_t k_least = 4;  // fewer do not give a pose
+  std::vector<BoardCorner> corners;
+  for (const Expected& at :
+       board.kind == BoardKind::charuco ? find_charuco(board, grey) : find_chessboard(board, grey)) {
+    if (auto corner = refined(board, grey, at)) corners.push_back(*corner);
+  }
+  if (corners.size() < k_least) corners.clear();
+  return corners;
+}
+
+}  // namespace limn::calib

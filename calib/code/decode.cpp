@@ -1,0 +1,549 @@
+#include "calib/code/decode.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <opencv2/core.hpp>
+
+#include "calib/code/phase.h"
+#include "calib/code/subpixel.h"
+#include "core/picture.h"
+
+namespace limn::calib {
+namespace {
+
+constexpr float k_nan = std::numeric_limits<float>::quiet_NaN();
+constexpr float k_infinite = std::numeric_limits<float>::infinity();
+constexpr int k_unlit = 255;          // in a picture of least steps
+constexpr int k_settle_passes = 2;    // pixels without a label are few and small
+constexpr float k_calm_px = 12;       // range of the neighbours' labels on one surface, projector pixels
+constexpr float k_reach_px = 4;       // how far from their mean a label is looked for
+constexpr int k_wide_stripe_px = 16;  // stripes that blur does not weaken but at their edges
+constexpr float k_neighbours_px =
+    0.5F;  // what a label may differ from its neighbours' mean, besides their slope
+constexpr float k_coarse_var =
+    1;  // px^2: labels of 4 and more, whose middle may be further off than their neighbours
+constexpr float k_neighbours_var = 0.26F;  // px^2: of one of two neighbouring labels
+constexpr float k_max_cost = 8;            // of a label, half squared standard deviations of noise: 4 of them
+
+// An axis' code as it is shown: Gray code, of which bits above `base` may be exchanged with that one.
+struct Code {
+  int bits = 0;    // shown
+  int lowest = 0;  // finest bit shown: labels are blocks of 2^lowest projector pixels
+  int base = 32;
+  int blocks = 0;  // labels on the axis
+
+  unsigned above_base() const { return base < bits ? (1U << bits) - (2U << base) : 0; }
+  unsigned exchanged(unsigned code) const { return (code >> base & 1U) != 0 ? code ^ above_base() : code; }
+  unsigned shown(unsigned block) const {
+    const unsigned gray = block ^ (block >> 1);
+    return base < bits ? exchanged(gray) : gray;
+  }
+  unsigned block(unsigned shown) const {
+    unsigned gray = base < bits ? exchanged(shown) : shown;
+    for (unsigned shift = 1; shift < 16; shift *= 2) gray ^= gray >> shift;
+    return gray;
+  }
+  // Bits that say nothing for sure about the Gray code when these of the shown one are unsure.
+  unsigned unsure(unsigned shown) const {
+    return base < bits && (shown >> base & 1U) != 0 ? shown | above_base() : shown;
+  }
+};
+
+// Signs of all pixels' bits, and which of them are unsure: CV_16U, most significant bit shown first.
+struct BitPlanes {
+  cv::Mat code, unsure;
+};
+
+// Levels by which a pair must differ to be sure; k_unlit where the projector's own light does not reach.
+struct LeastSteps {
+  cv::Mat fine;  // CV_8U: of bits that blur takes
+  cv::Mat wide;  // CV_8U: of wide stripes, and of the bits of xor's base
+};
+
+BitPlanes bit_planes(const AxisReading& axis, const Code& code, const LeastSteps& steps) {
+  const cv::Size size = steps.fine.size();
+  BitPlanes planes{cv::Mat(size, CV_16U, cv::Scalar(0)), cv::Mat(size, CV_16U, cv::Scalar(0))};
+  for (int y = 0; y < size.height; ++y) {
+    ushort *signs = planes.code.ptr<ushort>(y), *unsure = planes.unsure.ptr<ushort>(y);
+    for (int i = 0; i < axis.bits(); ++i) {
+      const int bit = code.bits - 1 - i;
+      const bool wide =
+          code.base < code.bits ? bit >= code.base : (2 << (bit + code.lowest)) >= k_wide_stripe_px;
+      const short* difference = axis.differences[static_cast<size_t>(i)].ptr<short>(y);
+      const uchar* step = (wide ? steps.wide : steps.fine).ptr<uchar>(y);
+      for (int x = 0; x < size.width; ++x) {
+        const auto d = difference[x];
+        const auto magnitude = static_cast<short>(d < 0 ? -d : d);
+        signs[x] = static_cast<ushort>(signs[x] << 1 | (d > 0 ? 1 : 0));
+        unsure[x] = static_cast<ushort>(unsure[x] << 1 | (magnitude < step[x] ? 1 : 0));
+      }
+    }
+  }
+  return planes;
+}
+
+struct Label {
+  int low = 0, end = 0;  // by the signs; low = end: none
+  float centre = k_nan, variance = k_nan;
+};
+
+// The label that the bits give, in blocks; without one when they do not settle it to 2^max_coarse neighbours.
+Label label_of(unsigned shown, unsigned shown_unsure, const Code& code, int max_coarse) {
+  const unsigned gray_unsure = code.unsure(shown_unsure);
+  int coarse = 0;
+  while (coarse < code.bits && (gray_unsure >> coarse) & 1U) ++coarse;
+  if (coarse > max_coarse) return {};
+  const unsigned open = gray_unsure >> coarse;
+  const unsigned block = code.block(shown);
+  const unsigned first = block >> coarse;
+  unsigned other = first;
+  if (open != 0) {
+    if ((open & (open - 1)) != 0) return {};  // two unsure bits above sure ones
+    // flipping a bit of Gray code flips that bit of the number and all finer ones
+    other = first ^ ((open << 1) - 1);
+    if (std::max(first, other) - std::min(first, other) != 1) return {};
+  }
+  const int size = 1 << coarse;
+  const int low = static_cast<int>(std::min(first, other)) * size;
+  const int end = std::min(static_cast<int>(std::max(first, other) + 1) * size, code.blocks);
+  if (low >= code.blocks) return {};  // a code that no projector pixel has
+  const int own = static_cast<int>(first) * size;
+  const double width = end - low;
+  return {own, std::min(own + size, std::max(code.blocks, own)), static_cast<float>((low + end - 1) / 2.0),
+          static_cast<float>(width * width / 12)};
+}
+
+void label_axis(
+    const BitPlanes& planes, const Code& code, const cv::Mat& step, int max_coarse, AxisLabels* labels) {
+  std::vector<ushort> block_of(size_t{1} << code.bits);
+  for (unsigned shown = 0; shown < block_of.size(); ++shown)
+    block_of[shown] = static_cast<ushort>(code.block(shown));
+  for (int y = 0; y < step.rows; ++y) {
+    const ushort *signs = planes.code.ptr<ushort>(y), *unsure = planes.unsure.ptr<ushort>(y);
+    const uchar* least = step.ptr<uchar>(y);
+    short *low = labels->low.ptr<short>(y), *end = labels->end.ptr<short>(y);
+    float *px = labels->px.ptr<float>(y), *variance = labels->variance.ptr<float>(y);
+    for (int x = 0; x < step.cols; ++x) {
+      if (least[x] == k_unlit) continue;
+      Label label;
+      if (unsure[x] == 0) {
+        const int block = block_of[signs[x]];
+        if (block < code.blocks) label = {block, block + 1, static_cast<float>(block), 1.0F / 12};
+      } else {
+        label = label_of(signs[x], unsure[x], code, max_coarse);
+      }
+      if (std::isnan(label.centre)) continue;
+      low[x] = static_cast<short>(label.low);
+      end[x] = static_cast<short>(label.end);
+      px[x] = label.centre;
+      variance[x] = label.variance;
+    }
+  }
+}
+
+// The known coordinates around (x, y), without its own: their mean (NaN when there are few, or they do not
+// belong together) and their range.
+struct Neighbours {
+  float mean = k_nan, range = 0;
+};
+Neighbours around(const cv::Mat& px, int x, int y) {
+  constexpr int k_half = 2, k_least = 6;
+  float low = k_infinite, high = -k_infinite, sum = 0;
+  int count = 0;
+  for (int v = std::max(0, y - k_half); v <= std::min(px.rows - 1, y + k_half); ++v) {
+    const float* row = px.ptr<float>(v);
+    for (int u = std::max(0, x - k_half); u <= std::min(px.cols - 1, x + k_half); ++u) {
+      if (std::isnan(row[u]) || (u == x && v == y)) continue;
+      low = std::min(low, row[u]);
+      high = std::max(high, row[u]);
+      sum += row[u];
+      ++count;
+    }
+  }
+  if (count < k_least || high - low > k_calm_px) return {};
+  return {sum / static_cast<float>(count), high - low};
+}
+
+// Takes away labels that stand alone against calm neighbours, perhaps because noise has turned a bit of a
+// dark pixel, and marks them.
+void doubt(float limit, AxisLabels* labels, cv::Mat* doubted) {
+  const cv::Mat before = labels->px.clone();
+  for (int y = 1; y + 1 < before.rows; ++y) {
+    const float *row = before.ptr<float>(y), *up = before.ptr<float>(y - 1), *down = before.ptr<float>(y + 1);
+    for (int x = 1; x + 1 < before.cols; ++x) {
+      const auto apart = [&](float other) { return std::abs(other - row[x]) > limit ? 1 : 0; };
+      if (apart(row[x - 1]) + apart(row[x + 1]) + apart(up[x]) + apart(down[x]) < 2) continue;
+      const float near = around(before, x, y).mean;
+      if (std::isnan(near) || std::abs(near - row[x]) <= limit) continue;
+      labels->px.ptr<float>(y)[x] = labels->variance.ptr<float>(y)[x] = k_nan;
+      labels->low.ptr<short>(y)[x] = labels->end.ptr<short>(y)[x] = 0;
+      doubted->ptr<uchar>(y)[x] = 1;
+    }
+  }
+}
+
+// How unlikely a label is: every bit that reads the other way must have been turned by noise.
+float cost_of(const AxisReading& axis, unsigned shown, int x, int y, float variance) {
+  float cost = 0;
+  for (int i = 0; i < axis.bits(); ++i) {
+    const float d = axis.differences[static_cast<size_t>(i)].ptr<short>(y)[x];
+    const bool set = (shown >> (axis.bits() - 1 - i) & 1U) != 0;
+    if (set != (d > 0)) cost += d * d / (2 * variance);
+  }
+  return cost;
+}
+
+// Lit pixels whose bits do not settle their label: those near the neighbours' are weighed by their
+// likelihood.
+void settle_by_neighbours(const AxisReading& axis,
+                          const Code& code,
+                          const DifferenceNoise& noise,
+                          const cv::Mat& step,
+                          AxisLabels* labels) {
+  // Exchanged bits are all unsure at the base's edges and leave labels open that lie a stripe apart: there
+  // the neighbours decide. Gray code leaves neighbouring labels open; what the neighbours say would only bias
+  // it.
+  const bool exchanged = code.base < code.bits;
+  const cv::Mat before = labels->px.clone();
+  const float scale = 1.0F / static_cast<float>(1 << code.lowest);
+  for (int y = 0; y < step.rows; ++y) {
+    const uchar* least = step.ptr<uchar>(y);
+    float *px = labels->px.ptr<float>(y), *variance = labels->variance.ptr<float>(y);
+    for (int x = 0; x < step.cols; ++x) {
+      if (least[x] == k_unlit || variance[x] <= k_coarse_var) continue;  // NaN: none
+      const auto [near, range] = around(before, x, y);
+      if (std::isnan(near)) continue;
+      const float doubt =
+          k_neighbours_px * scale + range / 4;  // standard deviation: on a slope near is its middle
+      const float reach = std::max(1.0F, k_reach_px * scale);
+      const int from = std::max(0, static_cast<int>(std::floor(near - reach)));
+      const int to = std::min(code.blocks - 1, static_cast<int>(std::ceil(near + reach)));
+      float total = 0, sum = 0, squares = 0, best = 0;
+      int likeliest = 0;
+      for (int n = from; n <= to; ++n) {
+        const float cost = cost_of(axis, code.shown(static_cast<unsigned>(n)), x, y, noise.at(x, y));
+        if (cost > k_max_cost) continue;
+        const float at = static_cast<float>(n) - near;
+        const float likely = std::exp(-cost - (exchanged ? at * at / (2 * doubt * doubt) : 0));
+        if (likely > best) likeliest = n;
+        best = std::max(best, likely);
+        total += likely;
+        sum += likely * at;
+        squares += likely * at * at;
+      }
+      if (total == 0) continue;
+      const float mean = sum / total;
+      px[x] = near + mean;
+      const float spread = squares / total - mean * mean;
+      variance[x] = spread + 1.0F / 12;
+      if (!exchanged || spread > k_neighbours_var) continue;
+      labels->low.ptr<short>(y)[x] = static_cast<short>(likeliest);  // its edges count, too
+      labels->end.ptr<short>(y)[x] = static_cast<short>(likeliest + 1);
+    }
+  }
+}
+
+// Median of the labels around (x, y), per axis.
+cv::Vec2f local_median(const cv::Mat& labels, int x, int y) {
+  constexpr int k_half = 2;
+  std::array<float, 25> columns{}, rows{};
+  size_t count = 0;
+  for (int v = std::max(0, y - k_half); v <= std::min(labels.rows - 1, y + k_half); ++v) {
+    for (int u = std::max(0, x - k_half); u <= std::min(labels.cols - 1, x + k_half); ++u) {
+      const auto& label = labels.at<cv::Vec2f>(v, u);
+      if (std::isnan(label[0])) continue;
+      columns[count] = label[0];
+      rows[count++] = label[1];
+    }
+  }
+  const auto middle = static_cast<std::ptrdiff_t>(count / 2), end = static_cast<std::ptrdiff_t>(count);
+  std::nth_element(columns.begin(), columns.begin() + middle, columns.begin() + end);
+  std::nth_element(rows.begin(), rows.begin() + middle, rows.begin() + end);
+  return {columns[count / 2], rows[count / 2]};
+}
+
+bool apart(const cv::Vec2f& a, const cv::Vec2f& b, double limit) {
+  return std::abs(a[0] - b[0]) > limit || std::abs(a[1] - b[1]) > limit;
+}
+
+// Whether every labelled pixel of the 3x3 neighbourhood is close: then the median is not needed.
+bool calm(const cv::Mat& labels, int x, int y, double limit) {
+  const auto& own = labels.at<cv::Vec2f>(y, x);
+  int neighbours = 0;
+  for (int v = std::max(0, y - 1); v <= std::min(labels.rows - 1, y + 1); ++v) {
+    for (int u = std::max(0, x - 1); u <= std::min(labels.cols - 1, x + 1); ++u) {
+      const auto& label = labels.at<cv::Vec2f>(v, u);
+      if (std::isnan(label[0])) continue;
+      if (apart(own, label, limit)) return false;
+      ++neighbours;
+    }
+  }
+  return neighbours >= 6;
+}
+
+int remove_outliers(cv::Mat* labels, double limit) {
+  const cv::Mat before = labels->clone();
+  std::atomic<int> removed = 0;
+  cv::parallel_for_(cv::Range(0, before.rows), [&](const cv::Range& range) {
+    int here = 0;
+    for (int y = range.start; y < range.end; ++y) {
+      for (int x = 0; x < before.cols; ++x) {
+        const auto& own = before.at<cv::Vec2f>(y, x);
+        if (std::isnan(own[0]) || calm(before, x, y, limit)) continue;
+        if (!apart(own, local_median(before, x, y), limit)) continue;
+        labels->at<cv::Vec2f>(y, x) = {k_nan, k_nan};
+        ++here;
+      }
+    }
+    removed += here;
+  });
+  return removed;
+}
+
+// Marked pixels whose label went for good.
+int count_unlabelled(const cv::Mat& marked, const cv::Mat& labels) {
+  int count = 0;
+  for (int y = 0; y < marked.rows; ++y) {
+    for (int x = 0; x < marked.cols; ++x)
+      count += marked.ptr<uchar>(y)[x] != 0 && std::isnan(labels.ptr<cv::Vec2f>(y)[x][0]) ? 1 : 0;
+  }
+  return count;
+}
+
+// Whether a pair's stripes are fine enough that light from elsewhere does not follow them, and wide enough
+// that the lens shows them: 4 to 32 projector pixels; all pairs of a small projector, and of xor's the ones
+// that are as fine as its base. `bit` counts from the finest of the projector.
+bool tells_direct_light(int bit, const Code& code) {
+  if (code.base < code.bits) return bit >= code.base;
+  return code.bits <= 5 || (bit >= 1 && bit <= 4);
+}
+
+// How bright the direct light is: the mean size of picture minus inverse over the bits that tell it.
+struct DirectLight {
+  cv::Mat sum;  // CV_16U
+  int bits = 0;
+  void take(const cv::Mat& picture, const cv::Mat& inverse) {
+    cv::Mat magnitude;
+    cv::absdiff(picture, inverse, magnitude);
+    cv::add(sum, magnitude, sum, cv::noArray(), CV_16U);
+    ++bits;
+  }
+};
+
+// One series as it is read.
+struct Series {
+  const Patterns& patterns;
+  const std::vector<std::filesystem::path>& files;
+  cv::Size size;
+  SeriesProbe probe;
+  DirectLight direct;
+
+  Result<cv::Mat> read(int index) {
+    LIMN_TRY(const cv::Mat picture, read_shot(files[static_cast<size_t>(index)], size.width, size.height));
+    probe.take(index, picture);
+    return picture;
+  }
+};
+
+// Picture minus inverse of an axis' bits, from picture number `first` on. `both`: white and black together,
+// which an inverse that is not shown is the picture's complement in.
+Status read_bits(int first, const Code& code, const cv::Mat& both, Series* series, AxisReading* axis) {
+  const int step = series->patterns.pictures_of_bit();
+  for (int i = 0; i < code.bits; ++i) {
+    LIMN_TRY(const cv::Mat picture, series->read(first + step * i));
+    cv::Mat inverse;
+    if (series->patterns.options.inverses) {
+      LIMN_TRY(inverse, series->read(first + step * i + 1));
+    } else {
+      cv::subtract(both, picture, inverse, cv::noArray(), CV_16S);
+      inverse.convertTo(inverse, CV_8U);
+    }
+    cv::Mat difference;
+    cv::subtract(picture, inverse, difference, cv::noArray(), CV_16S);
+    axis->differences.push_back(difference);
+    if (tells_direct_light(code.lowest + code.bits - 1 - i, code)) series->direct.take(picture, inverse);
+  }
+  return {};
+}
+
+Result<PhaseReading> read_steps(int first, Series* series) {
+  PhaseReading reading(series->size.height, series->size.width, series->patterns.options.period_px,
+                       series->patterns.steps());
+  for (int k = 0; k < series->patterns.steps(); ++k) {
+    LIMN_TRY(const cv::Mat picture, series->read(first + k));
+    reading.take(k, picture);
+  }
+  return reading;
+}
+
+// The steps that bits need, from the direct light. A pixel is lit when the projector's own light reaches it:
+// white minus black also holds what the room reflects.
+// Exchanged bits all cross zero at the base's edges, so that there but noise turns what they say together;
+// their stripes lose more than half of their light to blur, and none of it comes from elsewhere.
+LeastSteps least_steps(const DirectLight& direct,
+                       bool exchanged,
+                       const DifferenceNoise& noise,
+                       const DecodeOptions& options,
+                       Decoded* decoded) {
+  constexpr double k_exchanged_noise = 2;     // standard deviations of a difference
+  constexpr double k_exchanged_direct = 0.4;  // contrast of stripes of 2 pixels blurred by 0.6
+  const double min_direct = exchanged ? k_exchanged_direct * options.min_direct : options.min_direct;
+  constexpr double k_lit_noise = 1.4;  // standard deviations of a difference: a mean of several is sure then
+  const cv::Size size = decoded->contrast.size();
+  LeastSteps steps{cv::Mat(size, CV_8U, cv::Scalar(k_unlit)), cv::Mat(size, CV_8U, cv::Scalar(k_unlit))};
+  for (int y = 0; y < size.height; ++y) {
+    const uchar* contrast = decoded->contrast.ptr<uchar>(y);
+    const ushort* sum = direct.sum.ptr<ushort>(y);
+    for (int x = 0; x < size.width; ++x) {
+      const double all = contrast[x];
+      if (all < options.min_contrast) continue;
+      ++decoded->contrasted;
+      const double own = sum[x] / static_cast<double>(direct.bits);
+      const double least_own = std::max(options.min_step, k_lit_noise * std::sqrt(noise.at(x, y)));
+      if (own < min_direct * all || own < least_own) continue;
+      ++decoded->lit;
+      const auto least = [&](double step) {
+        return static_cast<uchar>(std::min(k_unlit - 1.0, std::ceil(std::max(options.min_step, step))));
+      };
+      steps.fine.ptr<uchar>(y)[x] = least(options.min_share * own);
+      steps.wide.ptr<uchar>(y)[x] =
+          least(exchanged ? k_exchanged_noise * std::sqrt(noise.at(x, y)) : options.min_coarse_share * own);
+    }
+  }
+  return steps;
+}
+
+// Of picture minus inverse. Without inverses it is twice the picture less white and black: three times the
+// variance.
+DifferenceNoise difference_noise(const cv::Mat& white,
+                                 const cv::Mat& black,
+                                 bool inverses,
+                                 const IntensityNoise& noise) {
+  const double times = inverses ? 1 : 3;
+  DifferenceNoise differences;
+  cv::add(white, black, differences.sum, cv::noArray(), CV_16U);
+  for (int sum = 0; sum <= 510; ++sum)
+    differences.variance.push_back(static_cast<float>(times * (2 * noise.read + noise.per_level * sum)));
+  return differences;
+}
+
+AxisLabels labels_of(const AxisReading& axis,
+                     const Code& code,
+                     const LeastSteps& steps,
+                     const DifferenceNoise& noise,
+                     const DecodeOptions& options,
+                     cv::Mat* doubted) {
+  AxisLabels labels(steps.fine.rows, steps.fine.cols);
+  const int max_coarse = std::max(0, options.max_coarse_bits - code.lowest);
+  label_axis(bit_planes(axis, code, steps), code, steps.fine, max_coarse, &labels);
+  doubt(static_cast<float>(options.max_from_median), &labels, doubted);
+  for (int pass = 0; pass < k_settle_passes; ++pass)
+    settle_by_neighbours(axis, code, noise, steps.fine, &labels);
+  refine_between_edges(axis, noise, options.floor_px, &labels);
+  return labels;
+}
+
+// From blocks of 2^lowest projector pixels to those pixels.
+void to_pixels(int lowest, AxisLabels* labels) {
+  if (lowest == 0) return;
+  const double block = 1 << lowest;
+  labels->px.convertTo(labels->px, CV_32F, block, (block - 1) / 2);
+  labels->variance *= block * block;
+}
+
+// Share of the lit pixels whose finest bit is unsure, on the axis where they are more.
+double unsure_finest(const AxisReading& columns, const AxisReading& rows, const cv::Mat& step, int lit) {
+  double worst = 0;
+  for (const AxisReading* axis : {&columns, &rows}) {
+    int unsure = 0;
+    for (int y = 0; y < step.rows; ++y) {
+      const short* difference = axis->differences.back().ptr<short>(y);
+      const uchar* least = step.ptr<uchar>(y);
+      for (int x = 0; x < step.cols; ++x) unsure += least[x] != k_unlit && std::abs(difference[x]) < least[x];
+    }
+    worst = std::max(worst, static_cast<double>(unsure) / std::max(1, lit));
+  }
+  return worst;
+}
+
+// Puts the axes together where both are known; how many pixels that are.
+int join(const AxisLabels& u, const AxisLabels& v, Decoded* decoded) {
+  decoded->px_projector = cv::Mat(u.px.size(), CV_32FC2, cv::Scalar(k_nan, k_nan));
+  decoded->variance = decoded->px_projector.clone();
+  int known = 0;
+  for (int y = 0; y < u.px.rows; ++y) {
+    for (int x = 0; x < u.px.cols; ++x) {
+      const cv::Vec2f px(u.px.ptr<float>(y)[x], v.px.ptr<float>(y)[x]);
+      if (std::isnan(px[0]) || std::isnan(px[1])) continue;
+      decoded->px_projector.ptr<cv::Vec2f>(y)[x] = px;
+      decoded->variance.ptr<cv::Vec2f>(y)[x] = {u.variance.ptr<float>(y)[x], v.variance.ptr<float>(y)[x]};
+      ++known;
+    }
+  }
+  return known;
+}
+
+}  // namespace
+
+Result<cv::Mat> read_shot(const std::filesystem::path& path, int width, int height) {
+  LIMN_TRY(cv::Mat picture, read_grey_picture(path));
+  if (picture.cols != width || picture.rows != height)
+    return error("{}: expected a picture of {}x{} pixels, found {}x{}. Capture this pose again.",
+                 path.string(), width, height, picture.cols, picture.rows);
+  return picture;
+}
+
+Result<Decoded> decode(const Patterns& patterns,
+                       const std::vector<std::filesystem::path>& pictures,
+                       int width,
+                       int height,
+                       const DecodeOptions& options) {
+  LIMN_CHECK(static_cast<int>(pictures.size()) == patterns.count());
+  Series series{patterns,
+                pictures,
+                cv::Size(width, height),
+                SeriesProbe(patterns, width, height),
+                {cv::Mat(height, width, CV_16U, cv::Scalar(0))}};
+  LIMN_TRY(const cv::Mat white, series.read(patterns.white()));
+  LIMN_TRY(const cv::Mat black, series.read(patterns.black()));
+  const int lowest = patterns.lowest_bit();
+  const auto blocks = [&](int size) { return (size + (1 << lowest) - 1) >> lowest; };
+  const std::array<Code, 2> codes = {
+      Code{patterns.column_bits(), lowest, patterns.base_bit(), blocks(patterns.width)},
+      Code{patterns.row_bits(), lowest, patterns.base_bit(), blocks(patterns.height)}};
+  std::array<AxisReading, 2> axes;
+  cv::Mat both;
+  cv::add(white, black, both, cv::noArray(), CV_16S);
+  LIMN_TRY_STATUS(read_bits(0, codes[0], both, &series, &axes[0]));
+  LIMN_TRY_STATUS(read_bits(patterns.first_row_bit(), codes[1], both, &series, &axes[1]));
+  std::vector<PhaseReading> waves;
+  for (int axis = 0; axis < 2 && patterns.steps() > 0; ++axis) {
+    LIMN_TRY(PhaseReading reading, read_steps(patterns.first_step() + axis * patterns.steps(), &series));
+    waves.push_back(std::move(reading));
+  }
+  Decoded decoded;
+  cv::subtract(white, black, decoded.contrast);
+  decoded.health = series.probe.health(pictures);
+  const DifferenceNoise noise =
+      difference_noise(white, black, patterns.options.inverses, decoded.health.noise);
+  const LeastSteps steps = least_steps(series.direct, patterns.code == "xor", noise, options, &decoded);
+  std::vector<AxisLabels> labels;
+  cv::Mat doubted(height, width, CV_8U, cv::Scalar(0));
+  for (size_t axis = 0; axis < 2; ++axis) {
+    labels.push_back(labels_of(axes[axis], codes[axis], steps, noise, options, &doubted));
+    to_pixels(lowest, &labels.back());
+    if (!waves.empty()) refine_by_phase(waves[axis], noise, options.floor_px, &labels.back());
+  }
+  decoded.decoded = join(labels[0], labels[1], &decoded);
+  const int contradicted = count_unlabelled(doubted, decoded.px_projector);
+  const int removed = remove_outliers(&decoded.px_projector, options.max_from_median);
+  decoded.decoded -= removed;
+  decoded.outliers = contradicted + removed;
+  decoded.health.unsure_finest = unsure_finest(axes[0], axes[1], steps.fine, decoded.lit);
+  return decoded;
+}
+
+}  // namespace limn::calib

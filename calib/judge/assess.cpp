@@ -1,0 +1,160 @@
+#include "calib/judge/assess.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "calib/judge/propagate.h"
+
+namespace limn::calib {
+namespace {
+
+using Eigen::Vector2d;
+
+// A left-out board errs by what the rig errs and by its own sag and place, about alike: sqrt(1/2) is the
+// rig's.
+constexpr double k_rig_of_held_out = 0.71;
+constexpr int k_coverage_grid = 10;
+
+// Accumulates one device's points.
+struct Tally {
+  DeviceQuality quality;
+  double squared = 0;
+  std::set<int> cells;
+
+  void take(const Vector2d& px, const CapturedDevice& device, const Vector2d& residual, bool outlier) {
+    const int x =
+        std::clamp(static_cast<int>((px.x() + 0.5) / device.width * k_coverage_grid), 0, k_coverage_grid - 1);
+    const int y = std::clamp(static_cast<int>((px.y() + 0.5) / device.height * k_coverage_grid), 0,
+                             k_coverage_grid - 1);
+    cells.insert(y * k_coverage_grid + x);
+    ++quality.points;
+    if (outlier) {
+      ++quality.outliers;
+    } else {
+      squared += residual.squaredNorm();
+    }
+  }
+  DeviceQuality finished(const std::string& name) {
+    quality.name = name;
+    const int inliers = quality.points - quality.outliers;
+    quality.rms_px = inliers > 0 ? std::sqrt(squared / inliers) : 0;
+    quality.coverage = static_cast<double>(cells.size()) / (k_coverage_grid * k_coverage_grid);
+    return quality;
+  }
+};
+
+std::vector<DeviceQuality> device_qualities(const Observations& observations, const Solution& solution) {
+  std::vector<Tally> cameras(observations.cameras.size()), projectors(observations.projectors.size());
+  for (size_t i = 0; i < observations.corners.size(); ++i) {
+    const CornerSeen& seen = observations.corners[i];
+    const auto camera = static_cast<size_t>(seen.camera);
+    cameras[camera].take(seen.px, observations.cameras[camera], solution.corner_residuals[i],
+                         solution.corner_outlier[i]);
+  }
+  for (size_t i = 0; i < observations.matches.size(); ++i) {
+    const Match& match = observations.matches[i];
+    const auto projector = static_cast<size_t>(match.projector);
+    projectors[projector].take(match.px_projector, observations.projectors[projector],
+                               solution.match_residuals[i], solution.match_outlier[i]);
+  }
+  std::vector<DeviceQuality> qualities;
+  for (size_t i = 0; i < cameras.size(); ++i)
+    qualities.push_back(cameras[i].finished(observations.cameras[i].name));
+  for (size_t i = 0; i < projectors.size(); ++i)
+    qualities.push_back(projectors[i].finished(observations.projectors[i].name));
+  return qualities;
+}
+
+// 95 % of the held-out distances on the boards, mm, for each projector, less what the matches' own noise
+// makes of them: that is no error of the rig.
+std::vector<double> held_out_errors_mm(const Observations& observations, const HeldOut& score) {
+  struct Errors {
+    std::vector<double> mm;
+    double squared = 0, noise = 0;  // px^2
+  };
+  std::vector<Errors> errors(observations.projectors.size());
+  for (size_t i = 0; i < observations.matches.size(); ++i) {
+    const Match& match = observations.matches[i];
+    if (!std::isfinite(score.errors_m[i])) continue;
+    Errors& of = errors[static_cast<size_t>(match.projector)];
+    of.mm.push_back(score.errors_m[i] * 1e3);
+    of.squared += score.residuals[i].squaredNorm();
+    of.noise += 2 * match.stddev_px * match.stddev_px;
+  }
+  std::vector<double> p95;
+  for (Errors& of : errors) {
+    std::sort(of.mm.begin(), of.mm.end());
+    const double rig_share = of.squared > 0 ? std::sqrt(std::max(0.0, 1 - of.noise / of.squared)) : 0;
+    p95.push_back(of.mm.empty()
+                      ? std::numeric_limits<double>::infinity()
+                      : rig_share * of.mm[static_cast<size_t>(0.95 * static_cast<double>(of.mm.size() - 1))]);
+  }
+  return p95;
+}
+
+}  // namespace
+
+std::string to_text(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::good:
+      return "good";
+    case Verdict::usable:
+      return "usable";
+    case Verdict::reject:
+      break;
+  }
+  return "reject";
+}
+
+void add_faults(const std::vector<Fault>& faults, Assessment* assessment) {
+  assessment->faults.insert(assessment->faults.end(), faults.begin(), faults.end());
+  const Severity severity = heaviest(faults);
+  if (severity == Severity::reject) assessment->verdict = Verdict::reject;
+  if (severity == Severity::doubt) assessment->verdict = std::max(assessment->verdict, Verdict::usable);
+}
+
+Assessment assess(const Observed& observed, const Solution& solution, HeldOut held_out) {
+  const Observations& observations = observed.observations;
+  Assessment assessment;
+  assessment.held_out = std::move(held_out);
+  assessment.devices = device_qualities(observations, solution);
+  const Uncertainty uncertainty = believed(observations, solution, assessment.held_out.rigs);
+  assessment.epipolar = epipolar_residuals(solution.rig, observed.dense);
+  assessment.pulls = pulls(observations, solution, assessment.held_out.residuals);
+  assessment.held_out_error_mm = held_out_errors_mm(observations, assessment.held_out);
+  assessment.propagated_error_mm = propagated_error_mm(observations, solution, uncertainty);
+  assessment.error_maps = error_maps(observations, solution, uncertainty);
+  for (size_t i = 0; i < assessment.held_out_error_mm.size(); ++i)
+    assessment.predicted_error_mm.push_back(
+        std::max(k_rig_of_held_out * assessment.held_out_error_mm[i], assessment.propagated_error_mm[i]));
+  double lit = 0, decoded = 0;
+  for (const DecodeShare& share : observed.decoded) {
+    lit += share.lit;
+    decoded += share.decoded;
+    assessment.decode_outliers += share.outliers;
+  }
+  assessment.decoded_share = lit > 0 ? decoded / lit : 0;
+  assessment.faults = faults(observed, solution, assessment.devices, assessment.held_out);
+  const double px = assessment.held_out.rms_px;
+  const double mm =
+      *std::max_element(assessment.predicted_error_mm.begin(), assessment.predicted_error_mm.end());
+  const double on_boards_mm =
+      *std::max_element(assessment.held_out_error_mm.begin(), assessment.held_out_error_mm.end());
+  const bool extrapolates = mm > std::max(k_fine_mm, k_beyond_boards * on_boards_mm);
+  const Severity severity = heaviest(assessment.faults);
+  if (px <= k_good_px && mm <= k_good_mm && !extrapolates && severity == Severity::note) {
+    assessment.verdict = Verdict::good;
+  } else if (px <= k_usable_px && mm <= k_usable_mm && severity != Severity::reject) {
+    assessment.verdict = Verdict::usable;
+  }
+  return assessment;
+}
+
+Result<Assessment> assess(const Observed& observed, const SolveOptions& options, const Solution& solution) {
+  LIMN_TRY(HeldOut score, held_out(observed.observations, options, solution));
+  return assess(observed, solution, std::move(score));
+}
+
+}  // namespace limn::calib

@@ -1,0 +1,135 @@
+#include "calib/judge/board_faults.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "core/log.h"
+
+namespace limn::calib {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr int k_least_views = 3;    // of a corner
+constexpr double k_weak_m = 0.01;   // offsets beyond are not expected, standard deviation
+constexpr double k_bend_m = 0.001;  // two parabolas follow a bend of less; beyond, sheets bend in other ways
+constexpr double k_bend_share = 0.003;    // of the board's width, likewise
+constexpr double k_offset_m = 0.0003;     // RMS; light lands off by as much where the board was trusted
+constexpr double k_offset_share = 0.001;  // of the board's width: office printers are true to 0.1 %
+
+// d pixel / d point in the board's frame.
+std::optional<Eigen::Matrix<double, 2, 3>> by_point(const Imager& camera,
+                                                    const Pose& world_from_board,
+                                                    const Vector3d& p_board) {
+  constexpr double k_step = 1e-5;  // m
+  Eigen::Matrix<double, 2, 3> jacobian;
+  const auto at = camera.project(world_from_board * p_board);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto moved = camera.project(world_from_board * (p_board + k_step * Vector3d::Unit(axis)));
+    if (!at || !moved) return std::nullopt;
+    jacobian.col(axis) = (*moved - *at) / k_step;
+  }
+  return jacobian;
+}
+
+struct CornerSums {
+  Matrix3d normal = Matrix3d::Zero();
+  Vector3d right = Vector3d::Zero();
+  int views = 0;
+};
+
+std::vector<CornerSums> corner_sums(const Observations& observations, const Solution& solution) {
+  const Board& board = observations.board;
+  const BoardShape shape{board.width_m(), board.height_m()};
+  std::vector<CornerSums> sums(static_cast<size_t>(board.corner_count()));
+  for (size_t i = 0; i < observations.corners.size(); ++i) {
+    const CornerSeen& seen = observations.corners[i];
+    const auto& world_from_board = solution.world_from_board[static_cast<size_t>(seen.pose)];
+    const Vector2d& residual = solution.corner_residuals[i];
+    if (!world_from_board || !residual.allFinite() || solution.corner_outlier[i]) continue;
+    Vector3d p = board.p_corner(seen.corner);
+    p.z() = shape.z(solution.bend_m, p.x(), p.y());
+    const auto jacobian =
+        by_point(solution.rig.cameras[static_cast<size_t>(seen.camera)], *world_from_board, p);
+    if (!jacobian) continue;
+    CornerSums& sum = sums[static_cast<size_t>(seen.corner)];
+    sum.normal += jacobian->transpose() * *jacobian;
+    sum.right -= jacobian->transpose() * residual;  // predicted minus measured
+    ++sum.views;
+  }
+  return sums;
+}
+
+// fy / fx - 1 of all imagers, the smallest by size; 0 when they do not agree in sign and size.
+double common_stretch(const Rig& rig) {
+  double low = 1e9, high = -1e9;
+  for (const auto* imagers : {&rig.cameras, &rig.projectors}) {
+    for (const Imager& imager : *imagers) {
+      const double stretch = imager.lens.fy() / imager.lens.fx() - 1;
+      low = std::min(low, stretch);
+      high = std::max(high, stretch);
+    }
+  }
+  if (low * high <= 0 || high - low > std::min(std::abs(low), std::abs(high))) return 0;
+  return std::abs(low) < std::abs(high) ? low : high;
+}
+
+}  // namespace
+
+BoardOffsets board_offsets(const Observations& observations, const Solution& solution) {
+  BoardOffsets found;
+  const double noise = std::max(solution.corner_noise_px, 1e-3);
+  double across = 0, out = 0;
+  for (const CornerSums& sum : corner_sums(observations, solution)) {
+    found.offsets.emplace_back(Vector3d::Zero());
+    if (sum.views < k_least_views) continue;
+    const Matrix3d covariance =
+        (sum.normal / (noise * noise) + Matrix3d::Identity() / (k_weak_m * k_weak_m)).inverse();
+    const Vector3d offset = covariance * sum.right / (noise * noise);
+    found.offsets.back() = offset;
+    across += offset.head<2>().squaredNorm() - covariance.topLeftCorner<2, 2>().trace();
+    out += offset.z() * offset.z() - covariance(2, 2);
+    ++found.corners;
+  }
+  if (found.corners == 0) return found;
+  found.across_m = std::sqrt(std::max(0.0, across / found.corners));
+  found.out_m = std::sqrt(std::max(0.0, out / found.corners));
+  return found;
+}
+
+std::vector<Fault> board_faults(const Observations& observations, const Solution& solution) {
+  std::vector<Fault> faults;
+  const double width = observations.board.width_m();
+  const double bend = solution.bend_m.cwiseAbs().maxCoeff();
+  const BoardOffsets offsets = board_offsets(observations, solution);
+  const double allowed = std::max(k_offset_m, k_offset_share * width);
+  if (bend > std::max(k_bend_m, k_bend_share * width) || offsets.out_m > allowed)
+    faults.push_back(
+        {"bent_board",
+         fmt::format(
+             "the board is {:.1f} mm from flat over its width and height (a bend of {:.1f} and {:.1f} "
+             "mm); its corners stand out of that by {:.2f} mm RMS",
+             1e3 * bend, 1e3 * solution.bend_m.x(), 1e3 * solution.bend_m.y(), 1e3 * offsets.out_m),
+         "glue the board onto glass, aluminium or honeycomb and hold it without pressing it"});
+  const double stretch = common_stretch(solution.rig);
+  const bool is_stretched = std::abs(stretch) > 0.01;
+  if (is_stretched || (faults.empty() && offsets.across_m > allowed))
+    faults.push_back(
+        {"wrong_square_size",
+         fmt::format("{}corners lie off their places by {:.2f} mm RMS",
+                     is_stretched
+                         ? fmt::format("every lens wants fy / fx = {:.3f}: squares are not as wide as "
+                                       "high, or ",
+                                       1 + stretch)
+                         : "",
+                     1e3 * offsets.across_m),
+         "measure the printed squares across and down; print at 100 %, without fitting to the page; give "
+         "--board or the plan the measured size"});
+  return faults;
+}
+
+}  // namespace limn::calib

@@ -1,0 +1,491 @@
+#include "calib/judge/capture_faults.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <opencv2/calib3d.hpp>
+#include <optional>
+#include <tuple>
+
+#include "core/log.h"
+
+namespace limn::calib {
+namespace {
+
+using Eigen::Matrix2d;
+using Eigen::Vector2d;
+
+constexpr int k_least_samples = 200;       // of a series' health: medians over fewer say nothing
+constexpr double k_least_lit = 0.002;      // of the picture; the smallest board that can be found fills 2 %
+constexpr double k_same_px = 1;            // two projectors' labels of one place never agree by chance
+constexpr double k_same_share = 0.3;       // of the places that both light
+constexpr double k_level_range = 0.03;     // sums of coarse pairs; a camera that is not linear shows 0.017
+constexpr int k_wide_stripe_px = 16;       // blur leaves such stripes all of their contrast
+constexpr double k_white_contrast = 0.15;  // off 1; light from elsewhere adds 0.04 to white
+constexpr double k_white_under_narrow = 0.05;  // below 1; sharp captures show 1.36 over stripes of 4 pixels
+constexpr double k_lost_pair = 0.5;            // of samples that are off: one frame is missing, not light
+constexpr double k_between = 0.06;        // more samples off under the finest stripes than under wide ones
+constexpr double k_between_level = 0.01;  // and less light there: interpolation before a gamma above 1
+// A shift of what is seen between the first pictures and the last, as a share of the width: sound captures
+// show up to 0.00005 (noise); and in camera pixels, for small pictures.
+constexpr double k_shift_share = 0.000125, k_shift_px = 0.1;
+// Of full contrast, left on stripes of 2 pixels: a blur of 1.2 pixels (standard deviation) leaves 0.15, and
+// from there on edges are found from coarser bits alone.
+constexpr double k_sharp = 0.15;
+constexpr double k_seen_stripe_px = 1.4;  // camera pixels; narrower stripes blur in the sharpest camera
+constexpr double k_pedestal = 16;         // levels that sensors add to black, at most
+constexpr double k_room_share = 0.6;      // of white's light that is the room's
+constexpr double k_rough_aspect = 0.05;   // of fy / fx from 1, from homographies alone
+constexpr size_t k_least_corners = 8;     // for a homography that noise does not turn
+constexpr double k_saturated_share = 0.2;
+// Of the waves' mean light from one half: a gamma that is 12 % off. Beyond it the phase of 3 steps errs by
+// 0.1 pixel in waves of 16; 6 steps stand more.
+constexpr double k_wave_level = 0.025;
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// All that one camera saw of one projector.
+struct Seen {
+  const Observed& observed;
+  int camera = 0, projector = 0;
+  std::vector<const SeriesHealth*> series;  // with enough lit samples
+  std::vector<double> lit;                  // of every series, share of the picture
+  std::vector<Matrix2d> maps;               // for each pose: d projector pixel / d camera pixel
+
+  const std::string& camera_name() const {
+    return observed.observations.cameras[static_cast<size_t>(camera)].name;
+  }
+  const std::string& projector_name() const {
+    return observed.observations.projectors[static_cast<size_t>(projector)].name;
+  }
+  const std::string& pose_name(const SeriesHealth& health) const {
+    return observed.observations.poses[static_cast<size_t>(health.pose)];
+  }
+  std::string both() const { return camera_name() + " of " + projector_name(); }
+  template <typename F>
+  double median_of(F&& value) const {
+    std::vector<double> values;
+    for (const SeriesHealth* health : series) values.push_back(value(*health));
+    return median(std::move(values));
+  }
+};
+
+// The affine map that fits a pose's matches; nullopt when they are few or on a line.
+std::optional<Matrix2d> affine(const std::vector<const Match*>& matches) {
+  if (matches.size() < 6) return std::nullopt;
+  Vector2d from = Vector2d::Zero(), to = Vector2d::Zero();
+  for (const Match* match : matches) {
+    from += match->px_camera;
+    to += match->px_projector;
+  }
+  from /= static_cast<double>(matches.size());
+  to /= static_cast<double>(matches.size());
+  Matrix2d normal = Matrix2d::Zero(), product = Matrix2d::Zero();
+  for (const Match* match : matches) {
+    normal += (match->px_camera - from) * (match->px_camera - from).transpose();
+    product += (match->px_projector - to) * (match->px_camera - from).transpose();
+  }
+  if (!(std::abs(normal.determinant()) > 1e-3 * normal.squaredNorm())) return std::nullopt;
+  return product * normal.inverse();
+}
+
+std::vector<Seen> seen_by_pairs(const Observed& observed) {
+  const Observations& observations = observed.observations;
+  std::vector<Seen> pairs;
+  for (int camera = 0; camera < static_cast<int>(observations.cameras.size()); ++camera) {
+    for (int projector = 0; projector < static_cast<int>(observations.projectors.size()); ++projector) {
+      Seen seen{observed, camera, projector, {}, {}, {}};
+      const CapturedDevice& device = observations.cameras[static_cast<size_t>(camera)];
+      for (const SeriesHealth& health : observed.health) {
+        if (health.camera == camera && health.projector == projector && health.samples >= k_least_samples)
+          seen.series.push_back(&health);
+      }
+      for (const DecodeShare& share : observed.decoded) {
+        if (share.camera == camera && share.projector == projector)
+          seen.lit.push_back(static_cast<double>(share.lit) / device.width / device.height);
+      }
+      std::map<int, std::vector<const Match*>> by_pose;
+      for (const Match& match : observations.matches) {
+        if (match.camera == camera && match.projector == projector) by_pose[match.pose].push_back(&match);
+      }
+      for (const auto& [pose, matches] : by_pose) {
+        if (const auto map = affine(matches)) seen.maps.push_back(*map);
+      }
+      pairs.push_back(std::move(seen));
+    }
+  }
+  return pairs;
+}
+
+void note_dark(const Observed& observed, const std::vector<Seen>& pairs, std::vector<Fault>* faults) {
+  for (size_t projector = 0; projector < observed.observations.projectors.size(); ++projector) {
+    double best = 0;
+    size_t poses = 0, with_labels = 0;
+    for (const Seen& seen : pairs) {
+      if (seen.projector != static_cast<int>(projector)) continue;
+      best = std::max(best, median(seen.lit));
+      poses = std::max(poses, seen.lit.size());
+      with_labels = std::max(with_labels, seen.maps.size());
+    }
+    if (poses == 0 || best >= k_least_lit || 2 * with_labels > poses) continue;
+    faults->push_back(
+        {"wrong_display",
+         fmt::format("the patterns of {} light {:.2f} % of the picture, though the board is seen in {} poses",
+                     observed.observations.projectors[projector].name, 100 * best, poses),
+         "let its patterns go to its own display, switch it on, open its lens, darken the room",
+         Severity::reject});
+  }
+}
+
+// Places that both projectors light, and how many of them have the same label.
+struct Agreement {
+  int places = 0, same = 0;
+};
+
+Agreement agreement(const Observations& observations, int a, int b) {
+  std::map<std::tuple<int, int, long, long>, Vector2d> labels;
+  const auto place = [](const Match& match) {
+    return std::tuple(match.camera, match.pose, std::lround(match.px_camera.x() / 2),
+                      std::lround(match.px_camera.y() / 2));
+  };
+  for (const Match& match : observations.matches) {
+    if (match.projector == a) labels[place(match)] = match.px_projector;
+  }
+  Agreement found;
+  for (const Match& match : observations.matches) {
+    if (match.projector != b) continue;
+    const auto other = labels.find(place(match));
+    if (other == labels.end()) continue;
+    ++found.places;
+    found.same += (other->second - match.px_projector).norm() < k_same_px ? 1 : 0;
+  }
+  return found;
+}
+
+void note_same_light(const Observations& observations, std::vector<Fault>* faults) {
+  const int projectors = static_cast<int>(observations.projectors.size());
+  for (int a = 0; a < projectors; ++a) {
+    for (int b = a + 1; b < projectors; ++b) {
+      const Agreement found = agreement(observations, a, b);
+      if (found.places < k_least_samples / 10 || found.same < k_same_share * found.places) continue;
+      faults->push_back(
+          {"wrong_display",
+           fmt::format("the patterns of {} light what those of {} do: {} of {} places have the same pixel",
+                       observations.projectors[static_cast<size_t>(b)].name,
+                       observations.projectors[static_cast<size_t>(a)].name, found.same, found.places),
+           "give each projector its own display; displays must not be clones of each other",
+           Severity::reject});
+    }
+  }
+}
+
+void note_mirrored(const Seen& seen, std::vector<Fault>* faults) {
+  const auto against = std::count_if(seen.maps.begin(), seen.maps.end(),
+                                     [](const Matrix2d& map) { return map.determinant() < 0; });
+  if (2 * static_cast<size_t>(against) <= seen.maps.size()) return;
+  faults->push_back(
+      {"mirrored_projection",
+       fmt::format("the pixels of {} run against those of {} in {} of {} poses", seen.projector_name(),
+                   seen.camera_name(), against, seen.maps.size()),
+       "switch off rear projection (mirroring) in the projector's menu or the display's settings; likewise "
+       "a camera's mirror mode",
+       Severity::reject});
+}
+
+// Where in a series' groups an axis' finest pair stands. Pairs come first: columns, rows, each from the
+// widest stripes to the finest; phase leaves out as many of the finest for both.
+struct Pairs {
+  size_t columns = 0, count = 0;
+  int lowest = 0;  // finest bit that has a pair
+  size_t finest(int axis) const { return (axis == 0 ? columns : count) - 1; }
+  size_t per_axis(int axis) const { return axis == 0 ? columns : count - columns; }
+};
+
+Pairs pairs_of(const Seen& seen, const SeriesHealth& health) {
+  const CapturedDevice& device = seen.observed.observations.projectors[static_cast<size_t>(seen.projector)];
+  const int columns = static_cast<int>(std::bit_width(static_cast<unsigned>(device.width - 1)));
+  const int rows = static_cast<int>(std::bit_width(static_cast<unsigned>(device.height - 1)));
+  int count = -1;  // without white and black
+  for (const GroupHealth& group : health.groups) count += group.count == 2 ? 1 : 0;
+  const int lowest = std::max(0, (columns + rows - count) / 2);
+  if (count <= 0) return {1, 1, lowest};  // shown without inverses
+  return {static_cast<size_t>(std::max(1, columns - lowest)), static_cast<size_t>(std::max(1, count)),
+          lowest};
+}
+
+// How much more the finest stripes' samples are off than those of stripes four times as wide, and how much
+// darker they are; on the worse axis.
+struct Between {
+  double off = 0, darker = 0;
+};
+
+Between between(const Seen& seen, const SeriesHealth& health) {
+  const Pairs pairs = pairs_of(seen, health);
+  Between worst;
+  for (const int axis : {0, 1}) {
+    if (pairs.per_axis(axis) < 4 || pairs.lowest > 0) continue;
+    const GroupHealth &fine = health.groups[pairs.finest(axis)],
+                      &wide = health.groups[pairs.finest(axis) - 2];
+    const Between here{fine.off - wide.off, wide.level - fine.level};
+    if (here.off > worst.off) worst = here;
+  }
+  return worst;
+}
+
+void note_between(const Seen& seen, std::vector<Fault>* faults) {
+  const double off = seen.median_of([&](const SeriesHealth& h) { return between(seen, h).off; });
+  const double darker = seen.median_of([&](const SeriesHealth& h) { return between(seen, h).darker; });
+  if (off < k_between || darker < k_between_level) return;
+  faults->push_back(
+      {"keystone_or_scaling",
+       fmt::format("{}: under the finest stripes {:.0f} % more pixels than under wide ones miss the light of "
+                   "white and black together (median {:.1f} % of it): the picture is interpolated on its way "
+                   "to the panel",
+                   seen.both(), 100 * off, 100 * darker),
+       "send the projector its native resolution; switch off keystone, zoom, overscan and sharpening in the "
+       "projector and the display's settings"});
+}
+
+// Range of the sums of pairs with wide stripes, which blur does not touch, and of white and black.
+double level_range(const Seen& seen, const SeriesHealth& health) {
+  const Pairs pairs = pairs_of(seen, health);
+  double low = 1, high = 1;
+  const auto take = [&](const GroupHealth& group) {
+    if (group.off > k_lost_pair) return;
+    low = std::min(low, group.level);
+    high = std::max(high, group.level);
+  };
+  for (const int axis : {0, 1}) {
+    const size_t first = pairs.finest(axis) + 1 - pairs.per_axis(axis);
+    for (size_t i = 0; i < (pairs.per_axis(axis) + 1) / 2; ++i) take(health.groups[first + i]);
+  }
+  take(health.groups.back());
+  return high - low;
+}
+
+// Contrast of white against black over that of the widest stripes: 1 when nothing answers to how much of the
+// picture is lit. Over narrow stripes, which blur, it is more.
+double white_contrast(const Seen& seen, const SeriesHealth& health) {
+  const Pairs pairs = pairs_of(seen, health);
+  double widest = 1e-9;
+  for (const int axis : {0, 1}) {
+    const size_t first = pairs.finest(axis) + 1 - pairs.per_axis(axis);
+    for (size_t i = 0; i < std::min<size_t>(3, pairs.per_axis(axis)); ++i)
+      widest = std::max(widest, health.groups[first + i].contrast);
+  }
+  return health.groups.back().contrast / widest;
+}
+
+bool note_exposure(const Seen& seen, std::vector<Fault>* faults) {
+  const double range = seen.median_of([&](const SeriesHealth& h) { return level_range(seen, h); });
+  const double white = seen.median_of([&](const SeriesHealth& h) { return white_contrast(seen, h); });
+  const bool narrow = seen.series[0]->widest_stripe_px < k_wide_stripe_px;
+  const bool white_fits = narrow ? white > 1 - k_white_under_narrow : std::abs(white - 1) < k_white_contrast;
+  if (range < k_level_range && white_fits) return false;
+  faults->push_back(
+      {"exposure_drift",
+       fmt::format(
+           "{}: pictures and their inverses together change by {:.1f} % within a series; white differs "
+           "from black by {:.2f} of what {} stripes do",
+           seen.both(), 100 * range, white, narrow ? "narrow" : "wide"),
+       "switch off automatic exposure, gain and white balance; let camera and projector warm up; keep the "
+       "room's light steady"});
+  return true;
+}
+
+void note_motion(const Seen& seen, std::vector<Fault>* faults) {
+  const CapturedDevice& camera = seen.observed.observations.cameras[static_cast<size_t>(seen.camera)];
+  const double limit = std::max(k_shift_px, k_shift_share * camera.width);
+  for (const SeriesHealth* health : seen.series) {
+    if (health->shift_patches < 4 || health->shift_px < limit) continue;
+    faults->push_back(
+        {"moved_during_capture",
+         fmt::format("{}, {}: what is seen moved by {:.2f} px (some of it {:.2f} px) between the first "
+                     "pictures and the last; {:.2f} px may be noise",
+                     seen.pose_name(*health), seen.both(), health->shift_px, health->shift_worst_px, limit),
+         "put board, camera and projector on firm ground and capture this pose again, or leave it out with "
+         "--skip-poses " +
+             seen.pose_name(*health)});
+  }
+}
+
+// Contrast that stripes which the camera can tell apart have left, on the worse axis, and their width in
+// projector pixels.
+struct Sharpness {
+  double contrast = 1;
+  int stripe_px = 2;
+};
+
+Sharpness sharpness(const Seen& seen, const SeriesHealth& health) {
+  const Pairs pairs = pairs_of(seen, health);
+  std::vector<double> scales;  // camera pixels in a projector pixel
+  for (const Matrix2d& map : seen.maps) scales.push_back(1 / std::sqrt(std::abs(map.determinant())));
+  const double scale = scales.empty() ? 1 : median(scales);
+  size_t back = 0;
+  Sharpness found{1, 2 << pairs.lowest};
+  while (found.stripe_px * scale < k_seen_stripe_px && back + 2 < pairs.per_axis(1)) {
+    ++back;
+    found.stripe_px *= 2;
+  }
+  const bool wide = health.widest_stripe_px >= k_wide_stripe_px;
+  double full = wide ? 0 : health.groups.back().contrast;
+  for (size_t i = 0; i < pairs.count; ++i) full = std::max(full, health.groups[i].contrast);
+  for (const int axis : {0, 1})
+    found.contrast = std::min(found.contrast, health.groups[pairs.finest(axis) - back].contrast / full);
+  return found;
+}
+
+void note_defocus(const Seen& seen, std::vector<Fault>* faults) {
+  const double contrast = seen.median_of([&](const SeriesHealth& h) { return sharpness(seen, h).contrast; });
+  if (contrast >= k_sharp) return;
+  faults->push_back(
+      {"defocus",
+       fmt::format("{}: stripes of {} projector pixels keep {:.0f} % of their contrast, sharp ones over "
+                   "{:.0f} %",
+                   seen.both(), sharpness(seen, *seen.series[0]).stripe_px, 100 * contrast, 100 * k_sharp),
+       "focus the projector at the prototype's distance, then the camera; close the camera's aperture a "
+       "little"});
+}
+
+// The power p for which light of mean 1/2, 0.5 + 0.5 cos, has this mean once it is raised to it: the mean is
+// G(p + 1/2) / (sqrt(pi) G(p + 1)), which falls with p.
+double power_of_waves(double mean) {
+  double low = 0.05, high = 20;
+  for (int i = 0; i < 40; ++i) {
+    const double p = std::sqrt(low * high);
+    const double found = std::exp(std::lgamma(p + 0.5) - std::lgamma(p + 1)) * std::numbers::inv_sqrtpi;
+    (found > mean ? low : high) = p;
+  }
+  return std::sqrt(low * high);
+}
+
+void note_gamma(const Seen& seen, std::vector<Fault>* faults) {
+  const double level = seen.median_of([](const SeriesHealth& h) { return h.wave_level; });
+  if (std::abs(level - 0.5) < k_wave_level) return;
+  const double power = power_of_waves(level);
+  faults->push_back(
+      {"projector_gamma",
+       fmt::format("{}: the waves' mean light is {:.1f} % of white's, sinusoids have 50 %: as if their light "
+                   "were raised to the power {:.2f}",
+                   seen.both(), 100 * level, power),
+       fmt::format("let limn solve measure the projector's response and draw the waves by it (code_options' "
+                   "response), or multiply their gamma by {:.2f}; set the projector to a fixed picture mode "
+                   "and the camera to linear pictures",
+                   power)});
+}
+
+bool note_room_light(const Seen& seen, std::vector<Fault>* faults) {
+  const double share = seen.median_of([](const SeriesHealth& h) {
+    return std::max(0.0, h.black_level - k_pedestal) / std::max(k_pedestal, h.white_level - k_pedestal);
+  });
+  if (share < k_room_share) return false;
+  faults->push_back(
+      {"ambient_light",
+       fmt::format("{}: {:.0f} levels under black, {:.0f} under white (medians): the room gives {:.0f} % of "
+                   "the light",
+                   seen.both(), seen.median_of([](const SeriesHealth& h) { return h.black_level; }),
+                   seen.median_of([](const SeriesHealth& h) { return h.white_level; }), 100 * share),
+       "darken the room, or use a brighter projector picture mode; then raise the exposure until white is "
+       "just below saturation"});
+  return true;
+}
+
+bool note_saturation(const Seen& seen, std::vector<Fault>* faults) {
+  const double share = seen.median_of([](const SeriesHealth& h) { return h.saturated; });
+  if (share < k_saturated_share) return false;
+  faults->push_back(
+      {"saturated",
+       fmt::format("{}: white drives {:.0f} % of the lit pixels to full scale", seen.both(), 100 * share),
+       "shorten the exposure or close the aperture until white is just below saturation"});
+  return true;
+}
+
+void note_odd_pictures(const Seen& seen, std::vector<Fault>* faults) {
+  for (const SeriesHealth* health : seen.series) {
+    if (health->odd.empty()) continue;
+    const OddPicture& odd = health->odd.front();
+    faults->push_back(
+        {"repeated_pictures",
+         fmt::format("{}, {}: {} {}{}", seen.pose_name(*health), seen.both(), odd.file.filename().string(),
+                     odd.finding,
+                     health->odd.size() > 1 ? fmt::format(" (and {} more)", health->odd.size() - 1) : ""),
+         "wait longer between showing and grabbing (the display's delay), and capture this pose again"});
+  }
+}
+
+// fy / fx of a camera from its pictures of the flat board alone, its axis taken to be in the middle.
+std::optional<double> camera_aspect(const Observations& observations, int camera) {
+  std::map<int, std::pair<std::vector<cv::Point3f>, std::vector<cv::Point2f>>> by_pose;
+  for (const CornerSeen& corner : observations.corners) {
+    if (corner.camera != camera) continue;
+    const Eigen::Vector3f p = observations.board.p_corner(corner.corner).cast<float>();
+    auto& [points, px] = by_pose[corner.pose];
+    points.emplace_back(p.x(), p.y(), 0.F);
+    px.emplace_back(static_cast<float>(corner.px.x()), static_cast<float>(corner.px.y()));
+  }
+  std::vector<std::vector<cv::Point3f>> points;
+  std::vector<std::vector<cv::Point2f>> px;
+  for (const auto& [pose, seen] : by_pose) {
+    if (seen.first.size() < k_least_corners) continue;
+    points.push_back(seen.first);
+    px.push_back(seen.second);
+  }
+  if (points.size() < 3) return std::nullopt;
+  const CapturedDevice& device = observations.cameras[static_cast<size_t>(camera)];
+  const cv::Mat k = cv::initCameraMatrix2D(points, px, {device.width, device.height}, 0);
+  const double aspect = k.at<double>(1, 1) / k.at<double>(0, 0);
+  if (!std::isfinite(aspect)) return std::nullopt;
+  return aspect;
+}
+
+void note_camera_shapes(const Observations& observations, std::vector<Fault>* faults) {
+  for (int camera = 0; camera < static_cast<int>(observations.cameras.size()); ++camera) {
+    const auto aspect = camera_aspect(observations, camera);
+    if (!aspect || std::abs(*aspect - 1) < k_rough_aspect) continue;
+    faults->push_back(
+        {"wrong_camera_resolution",
+         fmt::format("{}: its pixels come out about {:.2f} times as wide as high",
+                     observations.cameras[static_cast<size_t>(camera)].name, *aspect),
+         "use a resolution with the sensor's own shape, without stretching, digital zoom or cropping"});
+  }
+}
+
+}  // namespace
+
+std::vector<Fault> unsolved_faults(const Observed& observed) {
+  std::vector<Fault> faults = capture_faults(observed);
+  note_camera_shapes(observed.observations, &faults);
+  return faults;
+}
+
+std::vector<Fault> capture_faults(const Observed& observed) {
+  std::vector<Fault> faults;
+  const std::vector<Seen> pairs = seen_by_pairs(observed);
+  note_dark(observed, pairs, &faults);
+  note_same_light(observed.observations, &faults);
+  for (const Seen& seen : pairs) {
+    note_mirrored(seen, &faults);
+    if (seen.series.empty()) continue;
+    note_between(seen, &faults);
+    const bool unsteady = note_exposure(seen, &faults);
+    note_motion(seen, &faults);
+    note_defocus(seen, &faults);
+    const bool bright = !unsteady && note_room_light(seen, &faults);
+    const bool clipped = note_saturation(seen, &faults);
+    // Light that moves, and white that is cut off, make waves look wrong that are not.
+    if (!unsteady && !clipped) note_gamma(seen, &faults);
+    // Unsteady light and noise make sums wrong, too.
+    if (!unsteady && !bright) note_odd_pictures(seen, &faults);
+  }
+  return faults;
+}
+
+}  // namespace limn::calib

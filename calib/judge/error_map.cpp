@@ -1,0 +1,106 @@
+#include "calib/judge/error_map.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace limn::calib {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr int k_side = 5;  // points along each side of the thing
+
+// Depths along camera 0's axis that the boards span, with a margin.
+std::pair<double, double> depth_range(const Observations& observations,
+                                      const Solution& solution,
+                                      double beyond) {
+  const Board& board = observations.board;
+  const Pose& camera_from_world = solution.rig.cameras.front().imager_from_world;
+  double near = std::numeric_limits<double>::infinity(), far = -near;
+  for (const auto& world_from_board : solution.world_from_board) {
+    if (!world_from_board) continue;
+    for (const Vector2d& corner :
+         {Vector2d(0, 0), Vector2d(board.width_m(), 0), Vector2d(0, board.height_m()),
+          Vector2d(board.width_m(), board.height_m())}) {
+      const double depth =
+          (camera_from_world * (*world_from_board * Vector3d(corner.x(), corner.y(), 0))).z();
+      near = std::min(near, depth);
+      far = std::max(far, depth);
+    }
+  }
+  return {std::max(near - beyond, near / 2), far + beyond};
+}
+
+// A board-sized thing around a point, facing the camera.
+Thing facing(const Imager& camera, const Board& board, const Vector3d& p_camera) {
+  const Pose world_from_camera = camera.imager_from_world.inverse();
+  Thing thing;
+  for (int i = 0; i < k_side * k_side; ++i) {
+    const Vector3d offset(board.width_m() * ((i % k_side + 0.5) / k_side - 0.5),
+                          board.height_m() * ((i / k_side + 0.5) / k_side - 0.5), 0);
+    thing.push_back(world_from_camera * (p_camera + offset));
+  }
+  return thing;
+}
+
+double p95_at(const Observations& observations,
+              const Solution& solution,
+              const Uncertainty& uncertainty,
+              size_t projector,
+              const Vector2d& px,
+              double depth) {
+  const Imager& camera = solution.rig.cameras.front();
+  const auto d = camera.lens.unproject(px);
+  constexpr double k_nothing = std::numeric_limits<double>::quiet_NaN();
+  if (!d || d->z() <= 0) return k_nothing;
+  const Vector3d p_camera = *d * (depth / d->z());
+  const Pose world_from_camera = camera.imager_from_world.inverse();
+  const SurfacePlace place{world_from_camera * p_camera, world_from_camera.rotation * Vector3d::UnitZ()};
+  const auto covariance = light_covariances(
+      solution, uncertainty, facing(camera, observations.board, p_camera), projector, {&place, 1});
+  if (!covariance[0]) return k_nothing;
+  const std::vector<Eigen::Matrix2d> only = {*covariance[0]};
+  return 1e3 * p95_of({&only, 1});
+}
+
+}  // namespace
+
+double ErrorMap::worst_mm() const {
+  double worst = 0;
+  for (const Plane& plane : planes) {
+    for (const double mm : plane.p95_mm) worst = std::isfinite(mm) ? std::max(worst, mm) : worst;
+  }
+  return worst;
+}
+
+std::vector<ErrorMap> error_maps(const Observations& observations,
+                                 const Solution& solution,
+                                 const Uncertainty& uncertainty,
+                                 const ErrorMapOptions& options) {
+  const Imager& camera = solution.rig.cameras.front();
+  const auto [near, far] = depth_range(observations, solution, options.beyond);
+  std::vector<ErrorMap> maps;
+  for (size_t projector = 0; projector < solution.rig.projectors.size(); ++projector) {
+    ErrorMap map;
+    map.projector = static_cast<int>(projector);
+    map.columns = options.columns;
+    map.rows = std::max(1, options.columns * camera.height / camera.width);
+    for (int i = 0; i < options.planes; ++i) {
+      ErrorMap::Plane plane;
+      plane.depth_m = options.planes > 1 ? near + (far - near) * i / (options.planes - 1) : (near + far) / 2;
+      for (int cell = 0; cell < map.columns * map.rows; ++cell) {
+        const Vector2d px((cell % map.columns + 0.5) * camera.width / map.columns - 0.5,
+                          (cell / map.columns + 0.5) * camera.height / map.rows - 0.5);
+        plane.p95_mm.push_back(p95_at(observations, solution, uncertainty, projector, px, plane.depth_m));
+      }
+      map.planes.push_back(std::move(plane));
+    }
+    maps.push_back(std::move(map));
+  }
+  return maps;
+}
+
+}  // namespace limn::calib

@@ -1,0 +1,296 @@
+#include "calib/report/advice.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+namespace limn::calib {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double k_edge = 0.2;           // of a picture's side: what counts as near its edge
+constexpr double k_bare = 0.3;           // of the cells near an edge; with fewer seen the edge is bare
+constexpr int k_edge_cells = 10;         // along an edge
+constexpr double k_wide_tilt_deg = 40;   // span of tilts about an axis that holds a focal length well
+constexpr double k_little_depth = 0.15;  // span of distances over their middle
+constexpr double k_steep = 2;            // the error of the volume's end over that of its middle
+constexpr int k_enough_poses = 8;
+constexpr int k_few_poses = 4;           // of a projector
+constexpr double k_many_outliers = 0.1;  // of a device's points
+constexpr double k_optimistic = 1.5;     // deviation of held-out pulls
+constexpr double k_epipolar_px = 0.5;    // twice what a sound calibration shows (issue: 0.25)
+
+double degrees(double radians) { return radians * 180 / std::numbers::pi; }
+
+// Where in a picture: "upper left", "middle", … by shares of its width and height.
+std::string place_in_picture(double x, double y) {
+  const std::string vertical = y < 1.0 / 3 ? "upper" : y > 2.0 / 3 ? "lower" : "";
+  const std::string horizontal = x < 1.0 / 3 ? "left" : x > 2.0 / 3 ? "right" : "";
+  if (vertical.empty() && horizontal.empty()) return "middle";
+  if (vertical.empty()) return horizontal;
+  if (horizontal.empty()) return vertical + " middle";
+  return vertical + " " + horizontal;
+}
+
+std::string joined(const std::vector<std::string>& parts) {
+  std::string text;
+  for (size_t i = 0; i < parts.size(); ++i)
+    text += (i == 0 ? "" : i + 1 == parts.size() ? " and " : ", ") + parts[i];
+  return text;
+}
+
+// Observed pixels of an imager.
+struct Seen {
+  std::string name;
+  int width = 0, height = 0;
+  std::vector<Vector2d> px;
+};
+
+std::vector<Seen> seen_pixels(const Observations& observations) {
+  std::vector<Seen> all;
+  for (const auto* devices : {&observations.cameras, &observations.projectors}) {
+    for (const CapturedDevice& device : *devices)
+      all.push_back({device.name, device.width, device.height, {}});
+  }
+  for (const CornerSeen& corner : observations.corners)
+    all[static_cast<size_t>(corner.camera)].px.push_back(corner.px);
+  for (const Match& match : observations.matches)
+    all[observations.cameras.size() + static_cast<size_t>(match.projector)].px.push_back(match.px_projector);
+  return all;
+}
+
+// Share of the cells along an edge with something seen: left, right, upper, lower.
+std::array<double, 4> edge_coverage(const Seen& seen) {
+  std::array<std::array<bool, k_edge_cells>, 4> cells{};
+  for (const Vector2d& px : seen.px) {
+    const double x = (px.x() + 0.5) / seen.width, y = (px.y() + 0.5) / seen.height;
+    const auto cell = [](double share) {
+      return static_cast<size_t>(std::clamp(static_cast<int>(share * k_edge_cells), 0, k_edge_cells - 1));
+    };
+    if (x < k_edge) cells[0][cell(y)] = true;
+    if (x > 1 - k_edge) cells[1][cell(y)] = true;
+    if (y < k_edge) cells[2][cell(x)] = true;
+    if (y > 1 - k_edge) cells[3][cell(x)] = true;
+  }
+  std::array<double, 4> shares{};
+  for (size_t side = 0; side < 4; ++side)
+    shares[side] =
+        static_cast<double>(std::count(cells[side].begin(), cells[side].end(), true)) / k_edge_cells;
+  return shares;
+}
+
+void advise_edges(const Observations& observations, std::vector<std::string>* advice) {
+  constexpr std::array k_sides = {"left", "right", "upper", "lower"};
+  for (const Seen& seen : seen_pixels(observations)) {
+    std::vector<std::string> bare;
+    const auto shares = edge_coverage(seen);
+    for (size_t side = 0; side < 4; ++side) {
+      if (shares[side] < k_bare) bare.emplace_back(k_sides[side]);
+    }
+    if (!bare.empty())
+      advice->push_back(fmt::format("{}: add poses near its {} edge{}.", seen.name, joined(bare),
+                                    bare.size() > 1 ? "s" : ""));
+  }
+}
+
+struct Span {
+  double low = 0, high = 0;
+  void take(double v, bool first) {
+    low = first ? v : std::min(low, v);
+    high = first ? v : std::max(high, v);
+  }
+  double width() const { return high - low; }
+};
+
+// How boards stood before camera 0: turned about its vertical and horizontal axis (degrees), and how far (m).
+struct Stances {
+  int poses = 0;
+  Span about_vertical, about_horizontal, distance;
+};
+
+Stances stances(const Observations& observations, const Solution& solution) {
+  Stances s;
+  const Pose& camera_from_world = solution.rig.cameras.front().imager_from_world;
+  for (const auto& board : solution.world_from_board) {
+    if (!board) continue;
+    const Pose camera_from_board = camera_from_world * *board;
+    const Vector3d n = camera_from_board.rotation * Vector3d::UnitZ();
+    const Vector3d middle(observations.board.width_m() / 2, observations.board.height_m() / 2, 0);
+    s.about_vertical.take(degrees(std::atan2(n.x(), n.z())), s.poses == 0);
+    s.about_horizontal.take(degrees(std::atan2(n.y(), n.z())), s.poses == 0);
+    s.distance.take((camera_from_board * middle).z(), s.poses == 0);
+    ++s.poses;
+  }
+  return s;
+}
+
+void advise_stances(const Stances& s, std::vector<std::string>* advice) {
+  const auto tilt = [&](const Span& span, const char* axis) {
+    if (span.width() < k_wide_tilt_deg)
+      advice->push_back(
+          fmt::format("Tilt the board more about the {} axis: its poses span {:.0f} degrees, {:.0f} "
+                      "or more hold the focal lengths.",
+                      axis, span.width(), k_wide_tilt_deg));
+  };
+  tilt(s.about_vertical, "vertical");
+  tilt(s.about_horizontal, "horizontal");
+  const double middle = (s.distance.low + s.distance.high) / 2;
+  if (s.distance.width() < k_little_depth * middle)
+    advice->push_back(
+        fmt::format("Capture some poses nearer and some farther away: all boards stood between {:.2f} and "
+                    "{:.2f} m from the camera.",
+                    s.distance.low, s.distance.high));
+  if (s.poses < k_enough_poses)
+    advice->push_back(
+        fmt::format("Add {} more poses: {} leave little to judge by.", k_enough_poses - s.poses, s.poses));
+}
+
+double worst_of(const ErrorMap::Plane& plane) {
+  double worst = 0;
+  for (const double mm : plane.p95_mm) {
+    if (std::isfinite(mm)) worst = std::max(worst, mm);
+  }
+  return worst;
+}
+
+void advise_depths(const Observations& observations,
+                   const std::vector<ErrorMap>& maps,
+                   std::vector<std::string>* advice) {
+  for (const ErrorMap& map : maps) {
+    if (map.planes.size() < 3) continue;
+    const ErrorMap::Plane &near = map.planes.front(), &far = map.planes.back();
+    const double middle = worst_of(map.planes[map.planes.size() / 2]);
+    const bool far_is_worse = worst_of(far) >= worst_of(near);
+    const ErrorMap::Plane& end = far_is_worse ? far : near;
+    if (!(middle > 0) || worst_of(end) < k_steep * middle || worst_of(end) < k_good_mm) continue;
+    advice->push_back(fmt::format(
+        "{}: capture {}, at about {:.2f} m: light may miss by {:.1f} mm there, by {:.1f} mm in the middle.",
+        observations.projectors[static_cast<size_t>(map.projector)].name,
+        far_is_worse ? "farther away" : "nearer", end.depth_m, worst_of(end), middle));
+  }
+}
+
+void advise_devices(const Observations& observations,
+                    const Assessment& assessment,
+                    std::vector<std::string>* advice) {
+  for (size_t i = 0; i < observations.projectors.size(); ++i) {
+    std::vector<bool> lit(observations.poses.size());
+    for (const Match& match : observations.matches) {
+      if (static_cast<size_t>(match.projector) == i) lit[static_cast<size_t>(match.pose)] = true;
+    }
+    const auto poses = std::count(lit.begin(), lit.end(), true);
+    if (poses < k_few_poses)
+      advice->push_back(fmt::format("{}: it lights the board in {} poses only; show it the board more often.",
+                                    observations.projectors[i].name, poses));
+  }
+  for (const DeviceQuality& device : assessment.devices) {
+    if (device.points > 0 && device.outliers > k_many_outliers * device.points)
+      advice->push_back(
+          fmt::format("{}: {} of its {} points fit nothing; keep board and devices still, and shiny "
+                      "things away.",
+                      device.name, device.outliers, device.points));
+  }
+}
+
+void advise_trust(const Observations& observations,
+                  const Assessment& assessment,
+                  std::vector<std::string>* advice) {
+  if (assessment.pulls.held_out.stddev > k_optimistic)
+    advice->push_back(
+        fmt::format("Go by the held-out errors: unseen poses are missed {:.1f} times as far as the noise "
+                    "explains. A lens model with more values, a flatter board or more poses may help.",
+                    assessment.pulls.held_out.stddev));
+  for (const EpipolarResidual& pair : assessment.epipolar) {
+    if (pair.board.rms_px > k_epipolar_px)
+      advice->push_back(fmt::format(
+          "{} and {}: pixels lie {:.2f} px off their epipolar lines even on the board; fix both devices to "
+          "something stiff and let the projector warm up.",
+          observations.cameras[static_cast<size_t>(pair.camera)].name,
+          observations.projectors[static_cast<size_t>(pair.projector)].name, pair.board.rms_px));
+  }
+}
+
+// "1.90 mm at worst, 1.60 m from camera0, upper left of its picture"
+std::optional<std::string> worst_place(const Observations& observations, const ErrorMap& map) {
+  const double worst = map.worst_mm();
+  for (const ErrorMap::Plane& plane : map.planes) {
+    for (size_t i = 0; i < plane.p95_mm.size() && worst > 0; ++i) {
+      if (plane.p95_mm[i] != worst) continue;
+      const int column = static_cast<int>(i) % map.columns, row = static_cast<int>(i) / map.columns;
+      return fmt::format("{:.2f} mm at worst, {:.2f} m from {}, {} of its picture", worst, plane.depth_m,
+                         observations.cameras[0].name,
+                         place_in_picture((column + 0.5) / map.columns, (row + 0.5) / map.rows));
+    }
+  }
+  return std::nullopt;
+}
+
+// What keeps the verdict from being better.
+std::string reason(const Assessment& assessment, double mm) {
+  if (assessment.verdict == Verdict::good) return "";
+  std::vector<std::string> reasons;
+  const bool reject = assessment.verdict == Verdict::reject;
+  const double px_limit = reject ? k_usable_px : k_good_px, mm_limit = reject ? k_usable_mm : k_good_mm;
+  const char* better = reject ? "usable" : "good";
+  if (!(assessment.held_out.rms_px <= px_limit))
+    reasons.push_back(fmt::format("unseen poses are missed by {:.2f} px (at most {} for {})",
+                                  assessment.held_out.rms_px, px_limit, better));
+  if (!(mm <= mm_limit)) reasons.push_back(fmt::format("more than {} mm is not {}", mm_limit, better));
+  std::vector<std::string> names;
+  for (const Fault& fault : assessment.faults) {
+    const bool is_named = std::find(names.begin(), names.end(), fault.name) != names.end();
+    if (fault.severity != Severity::note && !is_named) names.push_back(fault.name);
+  }
+  if (!names.empty()) reasons.push_back("faults were found: " + joined(names));
+  const double shown =
+      *std::max_element(assessment.held_out_error_mm.begin(), assessment.held_out_error_mm.end());
+  if (mm <= mm_limit && mm > std::max(k_fine_mm, k_beyond_boards * shown))
+    reasons.push_back("the boards say little about the places between and beyond them");
+  return reasons.empty() ? "" : "Why not better: " + joined(reasons) + ".";
+}
+
+std::string verdict_words(const Observations& observations, const Assessment& assessment) {
+  const auto worst =
+      std::max_element(assessment.predicted_error_mm.begin(), assessment.predicted_error_mm.end());
+  const auto projector = static_cast<size_t>(worst - assessment.predicted_error_mm.begin());
+  std::string text = to_text(assessment.verdict) + ": ";
+  if (std::isfinite(*worst)) {
+    text += fmt::format("predicted error {:.2f} mm on {}", *worst, observations.projectors[projector].name);
+  } else {
+    text += fmt::format("the error of {} cannot be told", observations.projectors[projector].name);
+  }
+  const auto& maps = assessment.error_maps;
+  const auto map = std::find_if(maps.begin(), maps.end(), [&](const ErrorMap& m) {
+    return static_cast<size_t>(m.projector) == projector;
+  });
+  if (const auto place = map == maps.end() ? std::nullopt : worst_place(observations, *map))
+    text += " (" + *place + ")";
+  const auto& poses = assessment.held_out.poses;
+  const auto pose =
+      std::max_element(poses.begin(), poses.end(),
+                       [](const HeldOutPose& a, const HeldOutPose& b) { return a.rms_px < b.rms_px; });
+  text += fmt::format("; poses not seen by the solve are foretold to {:.2f} px", assessment.held_out.rms_px);
+  if (pose != poses.end()) text += fmt::format(", the worst ({}) to {:.2f} px", pose->pose, pose->rms_px);
+  const std::string why = reason(assessment, *worst);
+  return text + "." + (why.empty() ? "" : " " + why);
+}
+
+}  // namespace
+
+Words in_words(const Observed& observed, const Solution& solution, const Assessment& assessment) {
+  const Observations& observations = observed.observations;
+  Words words;
+  words.verdict = verdict_words(observations, assessment);
+  advise_edges(observations, &words.advice);
+  advise_stances(stances(observations, solution), &words.advice);
+  advise_depths(observations, assessment.error_maps, &words.advice);
+  advise_devices(observations, assessment, &words.advice);
+  advise_trust(observations, assessment, &words.advice);
+  return words;
+}
+
+}  // namespace limn::calib

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "calib/judge/assess.h"
+#include "calib/observations.h"
+#include "calib/solve.h"
+
+namespace limn::calib {
+
+/// A calibration's worth in plain words.
+struct Words {
+  /// "usable: predicted error 1.4 mm on projector1 (1.9 mm at worst, 1.60 m from camera0, …); …", then why it
+  /// is not better, if it is not.
+  std::string verdict;
+  /// What to do, a sentence each, most useful first: "projector1: add poses near its left edge." Empty when
+  /// nothing would help much.
+  std::vector<std::string> advice;
+};
+
+/// From the data alone: where the imagers' pictures are bare, how the boards were tilted and how far away,
+/// where the predicted error grows, what the pulls and the epipolar residual say.
+Words in_words(const Observed& observed, const Solution& solution, const Assessment& assessment);
+
+}  // namespace limn::calib

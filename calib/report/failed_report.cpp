@@ -1,0 +1,22 @@
+#include "calib/report/failed_report.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+
+namespace limn::calib {
+
+Status write_failed_report(const std::string& failure,
+                           const std::vector<Fault>& faults,
+                           const std::filesystem::path& folder) {
+  if (std::filesystem::exists(folder / "rig.json")) return {};
+  auto list = nlohmann::ordered_json::array();
+  for (const Fault& fault : faults)
+    list.push_back({{"name", fault.name}, {"evidence", fault.evidence}, {"advice", fault.advice}});
+  const nlohmann::ordered_json json = {
+      {"schema", "limn.report/1"}, {"verdict", "reject"}, {"failure", failure}, {"faults", list}};
+  LIMN_TRY_STATUS(make_folder(folder));
+  return write_file(folder / "report.json", json.dump(2) + "\n");
+}
+
+}  // namespace limn::calib

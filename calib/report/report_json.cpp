@@ -1,0 +1,172 @@
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "calib/report/report.h"
+
+namespace limn::calib {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// To a thousandth: more digits are noise, and they make files hard to read.
+double rounded(double v) { return std::isfinite(v) ? std::round(v * 1e4) / 1e4 : v; }
+
+Json devices_json(const std::vector<DeviceQuality>& devices) {
+  Json list = Json::array();
+  for (const DeviceQuality& d : devices)
+    list.push_back({{"name", d.name},
+                    {"rms_px", rounded(d.rms_px)},
+                    {"points", d.points},
+                    {"outliers", d.outliers},
+                    {"coverage", rounded(d.coverage)}});
+  return list;
+}
+
+Json held_out_json(const HeldOut& score) {
+  Json poses = Json::array();
+  for (const HeldOutPose& pose : score.poses)
+    poses.push_back({{"pose", pose.pose}, {"rms_px", rounded(pose.rms_px)}, {"cells", pose.cells}});
+  return {{"rms_px", rounded(score.rms_px)}, {"worst_px", rounded(score.worst_px)}, {"poses", poses}};
+}
+
+Json score_json(const EpipolarScore& score) {
+  return {{"rms_px", rounded(score.rms_px)}, {"pixels", score.pixels}, {"outliers", score.outliers}};
+}
+
+Json epipolar_json(const Report& report) {
+  const Observations& observations = report.observed.observations;
+  Json list = Json::array();
+  for (const EpipolarResidual& pair : report.assessment.epipolar)
+    list.push_back({{"camera", observations.cameras[static_cast<size_t>(pair.camera)].name},
+                    {"projector", observations.projectors[static_cast<size_t>(pair.projector)].name},
+                    {"board", score_json(pair.board)},
+                    {"room", score_json(pair.room)}});
+  return list;
+}
+
+Json pulls_json(const Pulls& pulls) {
+  const auto one = [](const PullStatistics& s) -> Json {
+    return {{"mean", rounded(s.mean)},
+            {"stddev", rounded(s.stddev)},
+            {"beyond_3", rounded(s.beyond_3)},
+            {"count", s.count}};
+  };
+  return {
+      {"corners", one(pulls.corners)}, {"matches", one(pulls.matches)}, {"held_out", one(pulls.held_out)}};
+}
+
+Json by_projector(const Report& report, const std::vector<double>& errors) {
+  Json each = Json::object();
+  for (size_t i = 0; i < errors.size(); ++i)
+    each[report.observed.observations.projectors[i].name] = rounded(errors[i]);
+  return each;
+}
+
+Json error_json(const Report& report) {
+  const Assessment& a = report.assessment;
+  return {
+      {"p95", rounded(*std::max_element(a.predicted_error_mm.begin(), a.predicted_error_mm.end()))},
+      {"per_projector", by_projector(report, a.predicted_error_mm)},
+      {"held_out", by_projector(report, a.held_out_error_mm)},
+      {"propagated", by_projector(report, a.propagated_error_mm)},
+      {"from", "the larger of the held-out errors and of the noise propagated to moved and turned things"}};
+}
+
+// What was tried; with the models given by hand just those.
+Json lenses_json(const Report& report) {
+  Json list = Json::array();
+  for (const LensTrial& trial : report.lens_trials)
+    list.push_back({{"device", trial.device},
+                    {"model", trial.model},
+                    {"held_out_px", rounded(trial.held_out_px)},
+                    {"gain", rounded(trial.gain)},
+                    {"uncertainty", rounded(trial.uncertainty)},
+                    {"chosen", trial.chosen}});
+  if (!report.lens_trials.empty()) return list;
+  for (const auto* imagers : {&report.solution.rig.cameras, &report.solution.rig.projectors}) {
+    for (const Imager& imager : *imagers)
+      list.push_back({{"device", imager.name}, {"model", imager.lens.model.name()}, {"chosen", true}});
+  }
+  return list;
+}
+
+Json lengths_json(const Report& report) {
+  const Observations& observations = report.observed.observations;
+  const auto mm = [](double m) { return rounded(1e3 * m); };
+  Json list = Json::array();
+  for (const LengthCheck& check : report.known_lengths) {
+    Json views = Json::array();
+    for (const LengthView& view : check.views)
+      views.push_back({{"pose", observations.poses[static_cast<size_t>(view.pose)]},
+                       {"camera", observations.cameras[static_cast<size_t>(view.camera)].name},
+                       {"projector", observations.projectors[static_cast<size_t>(view.projector)].name},
+                       {"measured_mm", mm(view.measured_m)},
+                       {"noise_mm", mm(view.noise_m)},
+                       {"calibration_mm", mm(view.calibration_m)}});
+    const auto seen = [&](double m) { return check.views.empty() ? Json() : Json(mm(m)); };
+    list.push_back({{"from", check.known.from},
+                    {"to", check.known.to},
+                    {"expected_mm", mm(check.known.length_m)},
+                    {"measured_mm", seen(check.measured_m)},
+                    {"difference_mm", seen(check.measured_m - check.known.length_m)},
+                    {"stddev_mm", seen(check.stddev_m)},
+                    {"views", views}});
+  }
+  return list;
+}
+
+Json moved_json(const std::vector<Moved>& devices) {
+  Json list = Json::array();
+  for (const Moved& device : devices)
+    list.push_back({{"name", device.name},
+                    {"degrees", rounded(device.degrees)},
+                    {"mm", rounded(device.mm)},
+                    {"px", rounded(device.px)}});
+  return list;
+}
+
+Json history_json(const History& history) {
+  Json list = Json::array();
+  for (const PastCalibration& past : history.past)
+    list.push_back({{"made_at", past.made_at},
+                    {"verdict", past.verdict},
+                    {"held_out_px", rounded(past.held_out_px)},
+                    {"worst_px", rounded(past.worst_px)},
+                    {"predicted_mm", rounded(past.predicted_mm)},
+                    {"moved", moved_json(past.moved)}});
+  return list;
+}
+
+}  // namespace
+
+std::string report_json(const Report& report) {
+  const Assessment& a = report.assessment;
+  Json faults = Json::array(), seconds = Json::object();
+  for (const Fault& fault : a.faults)
+    faults.push_back({{"name", fault.name}, {"evidence", fault.evidence}, {"advice", fault.advice}});
+  for (const auto& [stage, value] : report.seconds) seconds[stage] = std::round(value * 1e3) / 1e3;
+  const auto since_last = report.history.rig
+                              ? moved(*report.history.rig, report.observed.observations, report.solution)
+                              : std::vector<Moved>();
+  const Json json = {{"schema", "limn.report/1"},
+                     {"made_at", report.made_at},
+                     {"verdict", to_text(a.verdict)},
+                     {"words", report.words.verdict},
+                     {"advice", report.words.advice},
+                     {"devices", devices_json(a.devices)},
+                     {"held_out", held_out_json(a.held_out)},
+                     {"lens_models", lenses_json(report)},
+                     {"predicted_error_mm", error_json(report)},
+                     {"decode", {{"share", rounded(a.decoded_share)}, {"outliers", a.decode_outliers}}},
+                     {"epipolar", epipolar_json(report)},
+                     {"pulls", pulls_json(a.pulls)},
+                     {"known_lengths", lengths_json(report)},
+                     {"faults", faults},
+                     {"moved", moved_json(since_last)},
+                     {"history", history_json(report.history)},
+                     {"seconds", seconds}};
+  return json.dump(2) + "\n";
+}
+
+}  // namespace limn::calib

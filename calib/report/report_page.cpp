@@ -1,0 +1,363 @@
+#include <algorithm>
+#include <cmath>
+
+#include "calib/report/drawings.h"
+#include "calib/report/report.h"
+
+namespace limn::calib {
+namespace {
+
+using Eigen::Vector2d;
+
+std::string figure(const std::string& svg, const std::string& title, const std::string& text) {
+  return fmt::format("<figure>{}<figcaption><b>{}</b> {}</figcaption></figure>\n", svg, escaped(title),
+                     escaped(text));
+}
+
+std::string section(const std::string& title, const std::string& content) {
+  if (content.empty()) return "";
+  return fmt::format("<section><h2>{}</h2>\n{}</section>\n", escaped(title), content);
+}
+
+// A table from its head and rows; the first column is text, the others are figures.
+std::string table(const std::vector<std::string>& head, const std::vector<std::vector<std::string>>& rows) {
+  if (rows.empty()) return "";
+  std::string html = "<div class='wide'><table><tr>";
+  for (const std::string& cell : head) html += "<th>" + escaped(cell) + "</th>";
+  html += "</tr>\n";
+  for (const auto& row : rows) {
+    html += "<tr>";
+    for (const std::string& cell : row) html += "<td>" + escaped(cell) + "</td>";
+    html += "</tr>\n";
+  }
+  return html + "</table></div>\n";
+}
+
+std::string tile(const std::string& value, const std::string& unit, const std::string& what) {
+  return fmt::format("<div class='tile'><b>{}</b> {}<span>{}</span></div>\n", escaped(value), escaped(unit),
+                     escaped(what));
+}
+
+double worst_mm(const Assessment& a) {
+  return *std::max_element(a.predicted_error_mm.begin(), a.predicted_error_mm.end());
+}
+
+// The worst of the pairs, on the board.
+double epipolar_px(const Assessment& a) {
+  double worst = 0;
+  for (const EpipolarResidual& pair : a.epipolar) worst = std::max(worst, pair.board.rms_px);
+  return worst;
+}
+
+std::string header(const Report& report) {
+  const Assessment& a = report.assessment;
+  const std::string verdict = to_text(a.verdict);
+  std::string words = report.words.verdict;
+  if (words.starts_with(verdict + ": ")) words = words.substr(verdict.size() + 2);
+  if (!words.empty()) words[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(words[0])));
+  std::string html =
+      fmt::format("<h1>Calibration <span class='{0}'>{0}</span></h1>\n<p class='lead'>{1}</p>\n", verdict,
+                  escaped(words));
+  html += fmt::format("<p class='soft'>{}</p>\n<div class='tiles'>\n", escaped(report.made_at));
+  html += tile(fmt::format("{:.2f}", worst_mm(a)), "mm", "predicted error (95 %), worst projector");
+  html += tile(fmt::format("{:.2f}", a.held_out.rms_px), "px", "error on poses the solve has not seen");
+  html += tile(fmt::format("{:.2f}", epipolar_px(a)), "px", "off the epipolar lines, on the board");
+  html += tile(fmt::format("{:.0f}", 100 * a.decoded_share), "%", "of lit pixels decoded");
+  return html + "</div>\n";
+}
+
+std::string fault_list(const std::vector<Fault>& faults) {
+  if (faults.empty()) return "";
+  std::string html = "<ul class='faults'>\n";
+  for (const Fault& fault : faults)
+    html += fmt::format("<li><b>{}</b> {}.<br><em>What to do:</em> {}.</li>\n", escaped(fault.name),
+                        escaped(fault.evidence), escaped(fault.advice));
+  return html + "</ul>\n";
+}
+
+std::string advice_list(const std::vector<std::string>& advice) {
+  if (advice.empty()) return "";
+  std::string html = "<ul>\n";
+  for (const std::string& sentence : advice) html += "<li>" + escaped(sentence) + "</li>\n";
+  return html + "</ul>\n";
+}
+
+// The predicted error of each projector on planes before camera 0.
+std::string error_maps_html(const Report& report) {
+  const Observations& observations = report.observed.observations;
+  const CapturedDevice& camera = observations.cameras.front();
+  double most = 0;
+  for (const ErrorMap& map : report.assessment.error_maps) most = std::max(most, map.worst_mm());
+  // Beyond what boards have reached the error may grow without end: colours are for the rest.
+  constexpr double k_brightest = 4;  // times the predicted error
+  if (const double predicted = worst_mm(report.assessment); std::isfinite(predicted))
+    most = std::min(most, k_brightest * predicted);
+  std::string html;
+  for (const ErrorMap& map : report.assessment.error_maps) {
+    const std::string& name = observations.projectors[static_cast<size_t>(map.projector)].name;
+    html += "<div class='small'>\n";
+    for (const ErrorMap::Plane& plane : map.planes) {
+      double worst = 0;
+      for (const double mm : plane.p95_mm) worst = std::isfinite(mm) ? std::max(worst, mm) : worst;
+      html += figure(heat_map(camera.width, camera.height, map.columns, plane.p95_mm, most),
+                     fmt::format("{}, {:.2f} m", name, plane.depth_m),
+                     worst > 0 ? fmt::format("at most {:.2f} mm", worst) : "out of reach");
+    }
+    html += "</div>\n";
+  }
+  if (html.empty() || !(most > 0)) return "";
+  return fmt::format(
+      "<p>95 % error of light meant for a thing whose place {} measures, on planes across its "
+      "view; red: that much or more; grey: the projector does not reach.</p>{}\n{}",
+      escaped(camera.name), colour_key(most, "mm"), html);
+}
+
+// Held-out errors on the boards as camera 0 saw them.
+std::string board_errors_html(const Report& report) {
+  const Observations& observations = report.observed.observations;
+  const CapturedDevice& camera = observations.cameras.front();
+  const auto& errors = report.assessment.held_out_error_mm;
+  double most = 0;
+  for (const double mm : errors) most = std::isfinite(mm) ? std::max(most, mm) : most;
+  if (!(most > 0)) return "";
+  std::string html = "<div class='grid'>\n";
+  for (size_t i = 0; i < observations.projectors.size(); ++i) {
+    std::vector<Dot> dots;
+    for (size_t k = 0; k < observations.matches.size(); ++k) {
+      const Match& match = observations.matches[k];
+      const double error = report.assessment.held_out.errors_m[k] * 1e3;
+      if (static_cast<size_t>(match.projector) == i && match.camera == 0 && std::isfinite(error))
+        dots.push_back({match.px_camera, error});
+    }
+    html +=
+        figure(dot_map(camera.width, camera.height, dots, most), observations.projectors[i].name,
+               fmt::format("on all boards, in {}'s picture: 95 % within {:.2f} mm", camera.name, errors[i]));
+  }
+  return "<p>Each board pose foretold by a solve that has not seen it; how far its light lands beside the "
+         "spot, on the board.</p>" +
+         colour_key(most, "mm") + html + "</div>\n";
+}
+
+std::string poses_html(const Report& report) {
+  std::vector<Bar> bars;
+  for (const HeldOutPose& pose : report.assessment.held_out.poses)
+    bars.push_back({pose.pose, pose.rms_px, fmt::format("{:.3f} px, {} cells", pose.rms_px, pose.cells)});
+  return "<div class='wide'>" + bar_chart(bars, k_good_px, fmt::format("good: {} px", k_good_px)) +
+         "</div>\n";
+}
+
+struct Fields {
+  std::vector<FieldPoint> fitted, foretold;
+};
+
+std::string imager_figure(const CapturedDevice& device,
+                          const std::vector<FieldPoint>& points,
+                          const DeviceQuality& quality,
+                          const std::string& what) {
+  const Drawing drawing = residual_field(device.width, device.height, points);
+  return figure(
+      drawing.svg, device.name,
+      fmt::format("{}: {:.3f} px RMS, {} of {} outliers, {:.0f} % covered. {}.", what, quality.rms_px,
+                  quality.outliers, quality.points, 100 * quality.coverage, drawing.key));
+}
+
+std::string imagers_html(const Report& report) {
+  const Observations& observations = report.observed.observations;
+  const Solution& solution = report.solution;
+  std::string html = "<div class='grid'>\n";
+  for (size_t i = 0; i < observations.cameras.size(); ++i) {
+    std::vector<FieldPoint> points;
+    for (size_t k = 0; k < observations.corners.size(); ++k) {
+      const CornerSeen& seen = observations.corners[k];
+      if (static_cast<size_t>(seen.camera) == i)
+        points.push_back({seen.px, solution.corner_residuals[k], solution.corner_outlier[k]});
+    }
+    html += imager_figure(observations.cameras[i], points, report.assessment.devices[i], "board corners");
+  }
+  for (size_t i = 0; i < observations.projectors.size(); ++i) {
+    std::vector<FieldPoint> fitted, foretold;
+    for (size_t k = 0; k < observations.matches.size(); ++k) {
+      const Match& match = observations.matches[k];
+      if (static_cast<size_t>(match.projector) != i) continue;
+      fitted.push_back({match.px_projector, solution.match_residuals[k], solution.match_outlier[k]});
+      const Vector2d& error = report.assessment.held_out.residuals[k];
+      if (error.allFinite()) foretold.push_back({match.px_projector, error, false});
+    }
+    const CapturedDevice& device = observations.projectors[i];
+    html +=
+        imager_figure(device, fitted, report.assessment.devices[observations.cameras.size() + i], "matches");
+    const Drawing drawing = residual_field(device.width, device.height, foretold);
+    html +=
+        figure(drawing.svg, device.name + ", unseen poses",
+               fmt::format("what a solve without the pose foretells: 95 % within {:.2f} mm on the board. {}.",
+                           report.assessment.held_out_error_mm[i], drawing.key));
+  }
+  return html + "</div>\n";
+}
+
+std::string devices_table(const Report& report) {
+  std::vector<std::vector<std::string>> rows;
+  const size_t cameras = report.observed.observations.cameras.size();
+  for (size_t i = 0; i < report.assessment.devices.size(); ++i) {
+    const DeviceQuality& d = report.assessment.devices[i];
+    const Imager& imager =
+        i < cameras ? report.solution.rig.cameras[i] : report.solution.rig.projectors[i - cameras];
+    const bool is_camera = i < cameras;
+    rows.push_back(
+        {d.name, imager.lens.model.name(), fmt::format("{:.3f}", d.rms_px),
+         fmt::format("{} / {}", d.outliers, d.points), fmt::format("{:.0f} %", 100 * d.coverage),
+         is_camera ? "" : fmt::format("{:.2f}", report.assessment.held_out_error_mm[i - cameras]),
+         is_camera ? "" : fmt::format("{:.2f}", report.assessment.propagated_error_mm[i - cameras])});
+  }
+  return table({"device", "lens", "residual px", "outliers", "coverage", "unseen poses mm", "noise mm"},
+               rows);
+}
+
+std::string lenses_table(const Report& report) {
+  std::vector<std::vector<std::string>> rows;
+  for (const LensTrial& trial : report.lens_trials)
+    rows.push_back(
+        {trial.device, trial.model,
+         std::isfinite(trial.held_out_px) ? fmt::format("{:.3f}", trial.held_out_px) : "no solution",
+         trial.gain == 0 && trial.uncertainty == 0
+             ? ""
+             : fmt::format("{:+.0f} % (chance: {:.0f} %)", 100 * trial.gain, 100 * trial.uncertainty),
+         trial.chosen ? "chosen" : ""});
+  return table({"device", "lens model", "unseen poses px", "the richer one's gain", ""}, rows);
+}
+
+std::string trust_tables(const Report& report) {
+  const Observations& observations = report.observed.observations;
+  const auto score = [](const EpipolarScore& s) {
+    return s.pixels == 0 ? std::string("none")
+                         : fmt::format("{:.3f} px ({} of {} beyond {} px)", s.rms_px, s.outliers, s.pixels,
+                                       k_epipolar_outlier_px);
+  };
+  std::vector<std::vector<std::string>> rows;
+  for (const EpipolarResidual& pair : report.assessment.epipolar)
+    rows.push_back({observations.cameras[static_cast<size_t>(pair.camera)].name + " to " +
+                        observations.projectors[static_cast<size_t>(pair.projector)].name,
+                    score(pair.board), score(pair.room)});
+  std::string html = table({"off the epipolar lines", "on the board", "in the room"}, rows);
+  rows.clear();
+  const Pulls& pulls = report.assessment.pulls;
+  for (const auto& [name, s] :
+       {std::pair{"corners", pulls.corners}, {"matches", pulls.matches}, {"unseen poses", pulls.held_out}})
+    rows.push_back({name, fmt::format("{:.2f}", s.mean), fmt::format("{:.2f}", s.stddev),
+                    fmt::format("{:.1f} %", 100 * s.beyond_3), fmt::format("{}", s.count)});
+  return html + table({"residual / stated deviation", "mean (0)", "deviation (1)", "beyond 3 (0.3 %)",
+                       "coordinates"},
+                      rows);
+}
+
+std::string lengths_table(const Report& report) {
+  std::vector<std::vector<std::string>> rows;
+  for (const LengthCheck& check : report.known_lengths) {
+    const double expected = 1e3 * check.known.length_m, measured = 1e3 * check.measured_m;
+    const std::string name = check.known.from + " to " + check.known.to;
+    if (check.views.empty()) {
+      rows.push_back({name, fmt::format("{:.2f}", expected), "not seen", "", "0"});
+      continue;
+    }
+    rows.push_back({name, fmt::format("{:.2f}", expected),
+                    fmt::format("{:.2f} (deviation {:.2f})", measured, 1e3 * check.stddev_m),
+                    fmt::format("{:+.2f} ({:+.2f} %)", measured - expected, 100 * (measured / expected - 1)),
+                    fmt::format("{}", check.views.size())});
+  }
+  return table({"length", "expected mm", "measured mm", "difference mm", "views"}, rows);
+}
+
+std::string decode_table(const Report& report) {
+  const Observations& observations = report.observed.observations;
+  std::vector<std::vector<std::string>> rows;
+  for (const DecodeShare& share : report.observed.decoded) {
+    const double lit = std::max(share.lit, 1);
+    rows.push_back({observations.poses[static_cast<size_t>(share.pose)],
+                    observations.cameras[static_cast<size_t>(share.camera)].name,
+                    observations.projectors[static_cast<size_t>(share.projector)].name,
+                    fmt::format("{}", share.lit), fmt::format("{:.1f} %", 100 * share.decoded / lit),
+                    fmt::format("{:.2f} %", 100 * share.outliers / lit)});
+  }
+  return table({"pose", "camera", "projector", "lit pixels", "decoded", "outliers"}, rows);
+}
+
+std::string moved_text(const std::vector<Moved>& devices) {
+  std::string text;
+  for (const Moved& device : devices)
+    text += fmt::format(
+        "{}{} {:.2f}°, {:.1f} mm{}", text.empty() ? "" : "; ", device.name, device.degrees, device.mm,
+        std::isfinite(device.px) ? fmt::format(" ({:.2f} px on the same points)", device.px) : "");
+  return text;
+}
+
+std::string history_html(const Report& report) {
+  if (report.history.past.empty()) return "";
+  const Assessment& a = report.assessment;
+  std::vector<std::vector<std::string>> rows;
+  std::vector<double> held_out;
+  const auto mm = [](double v) { return std::isfinite(v) ? fmt::format("{:.2f}", v) : std::string(); };
+  for (const PastCalibration& past : report.history.past) {
+    rows.push_back({past.made_at.empty() ? "earlier" : past.made_at, past.verdict,
+                    fmt::format("{:.3f}", past.held_out_px), mm(past.predicted_mm), moved_text(past.moved)});
+    held_out.push_back(past.held_out_px);
+  }
+  const auto now = report.history.rig
+                       ? moved(*report.history.rig, report.observed.observations, report.solution)
+                       : std::vector<Moved>();
+  rows.push_back({report.made_at + " (this one)", to_text(a.verdict),
+                  fmt::format("{:.3f}", a.held_out.rms_px), mm(worst_mm(a)), moved_text(now)});
+  held_out.push_back(a.held_out.rms_px);
+  std::reverse(rows.begin(), rows.end());
+  return figure(sparkline(held_out), "Unseen poses, px RMS,", "oldest to newest") +
+         table({"made", "verdict", "unseen px", "predicted mm",
+                "moved since the one before, seen from camera0"},
+               rows);
+}
+
+constexpr auto k_style = R"(
+:root{color-scheme:light}*{box-sizing:border-box}
+body{background:#fff;color:#1d2329;font:16px/1.5 system-ui,-apple-system,'Segoe UI',Roboto,sans-serif;margin:0 auto;
+max-width:1180px;padding:28px 20px 60px}
+h1{font-weight:600;font-size:28px;margin:0 0 8px}h1 span{border-radius:6px;padding:1px 12px;color:#fff}
+.good{background:#2c8a4b}.usable{background:#b97a06}.reject{background:#c43139}
+h2{font-size:19px;font-weight:600;margin:40px 0 10px}.lead{font-size:18px;margin:0 0 6px;max-width:52em}
+.soft,figcaption,th{color:#5d6670}.soft{margin:0;font-size:14px}p{max-width:60em}
+.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));gap:12px;margin:20px 0 0}
+.tile{background:#f5f6f8;border-radius:8px;padding:12px 14px}.tile b{font-size:26px;font-weight:600}
+.tile span{display:block;color:#5d6670;font-size:14px;line-height:1.35}
+.grid{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,460px),1fr));gap:22px;margin:12px 0}
+.small{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(47%,200px),1fr));gap:12px;margin:12px 0}
+figure{margin:0}figure svg{display:block;width:100%;height:auto}figcaption{font-size:14px;margin-top:6px}
+figcaption b{color:#1d2329}.key{width:320px;max-width:100%;display:block}.bars{width:760px;max-width:none;height:auto}
+.spark{max-width:420px}ul{padding-left:20px;max-width:60em}li{margin:6px 0}
+.faults{list-style:none;padding:0}.faults li{border-left:4px solid #c43139;background:#fdf3f3;padding:8px 14px;
+border-radius:0 6px 6px 0}.faults em{font-style:normal;color:#5d6670}
+.wide{overflow-x:auto;margin:10px 0}table{border-collapse:collapse;font-size:14px;font-variant-numeric:tabular-nums}
+th{font-weight:500;text-align:left}th,td{white-space:nowrap}td:nth-child(5){white-space:normal;min-width:12em}td,th{padding:5px 22px 5px 0;border-bottom:1px solid #e4e7eb;vertical-align:top}
+)";
+
+}  // namespace
+
+std::string report_html(const Report& report) {
+  std::string html = fmt::format(
+      "<!doctype html>\n<html lang='en'><head><meta charset='utf-8'><meta name='viewport' "
+      "content='width=device-width,initial-scale=1'><title>Limn: "
+      "calibration</title>\n<style>{}</style></head><body>\n",
+      k_style);
+  html += header(report);
+  html += section("Faults", fault_list(report.assessment.faults));
+  html += section("What would help", advice_list(report.words.advice));
+  html += section("Where light may miss", error_maps_html(report));
+  html += section("Where light missed on poses not seen by the solve", board_errors_html(report));
+  html += section("Each pose, foretold without it", poses_html(report));
+  html += section("What each device saw, and what was left over", imagers_html(report));
+  html += section("Devices", devices_table(report));
+  html += section("Lens models tried", lenses_table(report));
+  html += section("Whether the figures can be believed", trust_tables(report));
+  html += section("Known lengths, measured by light", lengths_table(report));
+  html += section("Decoding", decode_table(report));
+  html += section("Earlier calibrations of this rig", history_html(report));
+  return html + "</body></html>\n";
+}
+
+}  // namespace limn::calib

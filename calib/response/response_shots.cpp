@@ -1,0 +1,185 @@
+#include "calib/response/response_shots.h"
+
+#include <algorithm>
+#include <opencv2/core.hpp>
+
+#include "calib/code/patterns.h"
+#include "core/file.h"
+#include "core/picture.h"
+
+namespace limn::calib {
+namespace {
+
+namespace fs = std::filesystem;
+using Role = ResponsePicture::Role;
+
+constexpr double k_least_contrast = 10;  // levels, white over black: below it there is more noise than light
+constexpr size_t k_least_lit = 400;      // channels of pixels: a patch of 20 x 20
+
+fs::path folder_of(const Captures& captures, int projector, int camera) {
+  return captures.folder / "response" / captures.projectors[static_cast<size_t>(projector)].name /
+         captures.cameras[static_cast<size_t>(camera)].name;
+}
+
+int index_of(const std::vector<CapturedDevice>& devices, const std::string& name) {
+  for (size_t i = 0; i < devices.size(); ++i)
+    if (devices[i].name == name) return static_cast<int>(i);
+  return -1;
+}
+
+std::string names_of(const std::vector<CapturedDevice>& devices) {
+  std::string names;
+  for (const CapturedDevice& device : devices) names += (names.empty() ? "" : ", ") + device.name;
+  return names;
+}
+
+// Folders in `folder`, each of which must be named after one of the devices; their indices, rising.
+Result<std::vector<int>> devices_in(const fs::path& folder, const std::vector<CapturedDevice>& devices) {
+  std::vector<int> found;
+  std::error_code problem;
+  for (const auto& entry : fs::directory_iterator(folder, problem)) {
+    if (!entry.is_directory()) continue;
+    const int index = index_of(devices, entry.path().filename().string());
+    if (index < 0)
+      return error("{}: expected a folder named after one of {}, found another name. Rename or remove it.",
+                   entry.path().string(), names_of(devices));
+    found.push_back(index);
+  }
+  if (found.empty())
+    return error("{}: expected folders named after {}, found none. See limn patterns --response.",
+                 folder.string(), names_of(devices));
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+Status check_shot(const cv::Mat& shot,
+                  const fs::path& path,
+                  const CapturedDevice& camera,
+                  const cv::Mat& first) {
+  if (shot.cols != camera.width || shot.rows != camera.height)
+    return error("{}: expected {}x{} as the other pictures of {}, found {}x{}. Capture it again.",
+                 path.string(), camera.width, camera.height, camera.name, shot.cols, shot.rows);
+  if (shot.channels() != first.channels())
+    return error("{}: expected {} as 000.png is, found {}. Take all pictures with one camera mode.",
+                 path.string(), first.channels() == 1 ? "grey" : "colour",
+                 shot.channels() == 1 ? "grey" : "colour");
+  return {};
+}
+
+Status check_count(const fs::path& folder) {
+  const size_t count = response_pictures().size();
+  const fs::path beyond = folder / picture_name(static_cast<int>(count));
+  if (!fs::exists(beyond)) return {};
+  return error("{}: expected {} response pictures, 000.png to {}, found more. See limn patterns --response.",
+               beyond.string(), count, picture_name(static_cast<int>(count) - 1));
+}
+
+Error dark(const ResponseShots& shots, size_t lit) {
+  return error(
+      "{}: expected pictures where white is at least {} levels brighter than black in {} places, found {}. "
+      "All "
+      "is dark: is the projector on, does the camera see its light? Expose longer.",
+      shots.folder.string(), k_least_contrast, k_least_lit, lit);
+}
+
+Error saturated(const ResponseShots& shots, size_t unclipped, size_t lit) {
+  return error(
+      "{}: expected light that the camera can tell apart (below level {}), found {} of {} lit places not "
+      "saturated. Expose shorter or close the lens.",
+      shots.folder.string(), k_clipped, unclipped, lit);
+}
+
+}  // namespace
+
+std::vector<size_t> pictures_of(Role role) {
+  std::vector<size_t> indices;
+  for (size_t i = 0; i < response_pictures().size(); ++i)
+    if (response_pictures()[i].role == role) indices.push_back(i);
+  return indices;
+}
+
+std::vector<size_t> ramp_of(int channel) {
+  std::vector<size_t> indices = pictures_of(Role::ramp);
+  std::erase_if(indices, [&](size_t i) { return response_pictures()[i].bgr[channel] == 0; });
+  return indices;
+}
+
+Status capture_response(const Captures& plan, const Stage& stage) {
+  const int projectors = static_cast<int>(plan.projectors.size()),
+            cameras = static_cast<int>(plan.cameras.size());
+  const int pictures = static_cast<int>(response_pictures().size());
+  int done = 0;
+  for (int projector = 0; projector < projectors; ++projector) {
+    const CapturedDevice& device = plan.projectors[static_cast<size_t>(projector)];
+    for (int camera = 0; camera < cameras; ++camera)
+      LIMN_TRY_STATUS(make_folder(folder_of(plan, projector, camera)));
+    for (int i = 0; i < pictures; ++i) {
+      LIMN_TRY_STATUS(stage.show(projector, draw_response(i, device.width, device.height)));
+      for (int camera = 0; camera < cameras; ++camera) {
+        LIMN_TRY(const cv::Mat picture, stage.grab(camera));
+        LIMN_TRY_STATUS(stage.store(folder_of(plan, projector, camera) / picture_name(i), picture));
+        if (stage.tell) stage.tell(++done, projectors * pictures * cameras);
+      }
+    }
+  }
+  return {};
+}
+
+Result<std::vector<ResponsePair>> response_pairs(const Captures& captures) {
+  std::vector<ResponsePair> pairs;
+  const fs::path folder = captures.folder / "response";
+  if (std::error_code ignored; !fs::exists(folder, ignored)) return pairs;
+  LIMN_TRY(const std::vector<int> projectors, devices_in(folder, captures.projectors));
+  for (const int projector : projectors) {
+    const std::string& name = captures.projectors[static_cast<size_t>(projector)].name;
+    LIMN_TRY(const std::vector<int> cameras, devices_in(folder / name, captures.cameras));
+    for (const int camera : cameras) pairs.push_back({projector, camera});
+  }
+  return pairs;
+}
+
+Result<ResponseShots> read_response_shots(const Captures& captures, const ResponsePair& pair) {
+  const CapturedDevice& camera = captures.cameras[static_cast<size_t>(pair.camera)];
+  ResponseShots shots{pair.projector, pair.camera, folder_of(captures, pair.projector, pair.camera), {}};
+  LIMN_TRY_STATUS(check_count(shots.folder));
+  for (size_t i = 0; i < response_pictures().size(); ++i) {
+    const fs::path path = shots.folder / picture_name(static_cast<int>(i));
+    if (std::error_code ignored; !fs::exists(path, ignored))
+      return error("{}: missing; a response needs {} pictures (this one shows {}). Capture it again.",
+                   path.string(), response_pictures().size(), response_pictures()[i].what());
+    LIMN_TRY(cv::Mat shot, read_picture(path));
+    LIMN_TRY_STATUS(check_shot(shot, path, camera, shots.pictures.empty() ? shot : shots.pictures[0]));
+    shots.pictures.push_back(std::move(shot));
+  }
+  return shots;
+}
+
+Result<ResponseSamples> sampled(const ResponseShots& shots, size_t most) {
+  const cv::Mat black = shots.pictures[pictures_of(Role::black)[0]],
+                white = shots.pictures[pictures_of(Role::white)[0]];
+  std::array<size_t, 3> brightest{ramp_of(0).back(), ramp_of(1).back(), ramp_of(2).back()};
+  std::vector<size_t> lit;  // offsets of pixels' channels
+  size_t lit_at_all = 0, saturated_black = 0;
+  for (size_t i = 0; i < black.total() * black.elemSize(); ++i) {
+    if (black.data[i] >= k_clipped) ++saturated_black;
+    if (white.data[i] - black.data[i] < k_least_contrast) continue;
+    ++lit_at_all;
+    const bool clipped = std::any_of(brightest.begin(), brightest.end(), [&](size_t picture) {
+      return shots.pictures[picture].data[i] >= k_clipped;
+    });
+    if (!clipped) lit.push_back(i);
+  }
+  if (saturated_black > black.total() * black.elemSize() / 2)
+    return saturated(shots, black.total() * black.elemSize() - saturated_black,
+                     black.total() * black.elemSize());
+  if (lit_at_all < k_least_lit) return dark(shots, lit_at_all);
+  if (lit.size() < k_least_lit) return saturated(shots, lit.size(), lit_at_all);
+  ResponseSamples samples{shots.camera, shots.projector, std::min(most, lit.size()), {}};
+  for (size_t k = 0; k < samples.count; ++k) {
+    const size_t offset = lit[k * lit.size() / samples.count];
+    for (const cv::Mat& picture : shots.pictures) samples.levels.push_back(picture.data[offset]);
+  }
+  return samples;
+}
+
+}  // namespace limn::calib

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <filesystem>
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <vector>
+
+#include "calib/capture.h"
+#include "calib/captures.h"
+#include "calib/response/response_patterns.h"
+#include "core/result.h"
+
+namespace limn::calib {
+
+/// The photographs of one camera while one projector showed the response pictures.
+struct ResponseShots {
+  int projector = 0;
+  int camera = 0;
+  std::filesystem::path folder;   ///< response/projector0/camera0 of the captures
+  std::vector<cv::Mat> pictures;  ///< 8-bit grey or BGR, all alike, in the order of response_pictures()
+};
+
+/// Every projector shows the response pictures in turn, every camera photographs each of them, into the
+/// captures' response/ folder. What stands before the rig is to be the prototype, and nothing may move.
+Status capture_response(const Captures& plan, const Stage& stage);
+
+/// Of which projectors and cameras the captures hold response pictures; empty when there is no response/
+/// folder. A folder in it that is named after no device is an error.
+struct ResponsePair {
+  int projector = 0;
+  int camera = 0;
+};
+Result<std::vector<ResponsePair>> response_pairs(const Captures& captures);
+
+/// Reads them. A missing, damaged or additional picture, another size than the camera's, or grey beside
+/// colour is an error that names the file.
+Result<ResponseShots> read_response_shots(const Captures& captures, const ResponsePair& pair);
+
+/// Levels of some pixels' channels in all pictures: what the fits work on.
+struct ResponseSamples {
+  int camera = 0;
+  int projector = 0;
+  size_t count = 0;
+  std::vector<uchar> levels;  ///< [sample][picture]
+  const uchar* at(size_t sample) const { return levels.data() + sample * response_pictures().size(); }
+};
+
+/// Levels that the sensor may have cut off.
+constexpr int k_clipped = 251;
+
+/// Pixels that the projector lights, evenly spread, at most `most`. Errors: none is lit (dark), or light is
+/// cut off nearly everywhere (saturated).
+Result<ResponseSamples> sampled(const ResponseShots& shots, size_t most);
+
+/// Indices of the pictures of one role, in their order.
+std::vector<size_t> pictures_of(ResponsePicture::Role role);
+/// Of the ramp of one channel (0 blue, 1 green, 2 red), darkest first.
+std::vector<size_t> ramp_of(int channel);
+
+}  // namespace limn::calib

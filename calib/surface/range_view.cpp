@@ -1,0 +1,704 @@
+#include "calib/surface/range_view.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <numeric>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "calib/surface/triangulate.h"
+
+namespace limn::calib {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Eigen::Vector3f;
+
+constexpr float k_nan = std::numeric_limits<float>::quiet_NaN();
+constexpr double k_degree = std::numbers::pi / 180;
+constexpr double k_code_sigmas = 4;      // of the epipolar residual that the code's noise may take
+constexpr double k_conflict_sigmas = 5;  // two projectors' answers differ by more: one is wrong
+constexpr double k_conflict_m = 0.5e-3;  // and by more than what a good rig leaves
+constexpr double k_step_sigmas = 4;      // of a step between neighbours that noise may take
+constexpr double k_outlier_sigmas = 5;   // of a pixel from its neighbours' fit
+constexpr int k_least_piece = 30;        // pixels; smaller islands are wrong codes or unusable
+constexpr int k_noise_half = 12;  // window for measuring noise: wide, so that the fit takes little of it
+constexpr int k_noise_step = 16;  // pixels between the places where it is measured
+constexpr int k_lag = 7;          // pixels over which the noise may be correlated
+constexpr std::uint8_t k_right = 1, k_down = 2;
+
+size_t flat(const cv::Size& size, int x, int y) {
+  return static_cast<size_t>(y) * static_cast<size_t>(size.width) + static_cast<size_t>(x);
+}
+
+// Directions of a projector's pixels from a coarse map: a start for triangulation needs no more.
+class CoarseRays {
+ public:
+  explicit CoarseRays(const Imager& imager)
+      : columns_((imager.width + k_step - 1) / k_step),
+        rows_((imager.height + k_step - 1) / k_step),
+        d_(direction_map(imager.lens, imager.width, imager.height, k_step)),
+        world_from_imager_(imager.imager_from_world.inverse()) {}
+
+  Ray at(const Vector2d& px) const {
+    const int c = std::clamp(static_cast<int>(px.x() / k_step), 0, std::max(0, columns_ - 2));
+    const int r = std::clamp(static_cast<int>(px.y() / k_step), 0, std::max(0, rows_ - 2));
+    const double u = px.x() / k_step - c, v = px.y() / k_step - r;
+    const auto d = [&](int dc, int dr) {
+      const int column = std::min(c + dc, columns_ - 1), row = std::min(r + dr, rows_ - 1);
+      return d_[static_cast<size_t>(row * columns_ + column)].cast<double>().eval();
+    };
+    const Vector3d sum = (1 - v) * ((1 - u) * d(0, 0) + u * d(1, 0)) + v * ((1 - u) * d(0, 1) + u * d(1, 1));
+    return {world_from_imager_.translation, world_from_imager_.rotation * sum.normalized()};
+  }
+
+ private:
+  static constexpr int k_step = 8;
+  int columns_, rows_;
+  std::vector<Vector3f> d_;
+  Pose world_from_imager_;
+};
+
+// Range and variance per pixel, NaN where there is none.
+struct Ranges {
+  cv::Mat range, variance;  // CV_64F: differences of neighbours are what matters
+  explicit Ranges(const cv::Size& size)
+      : range(size, CV_64F, cv::Scalar(k_nan)), variance(size, CV_64F, cv::Scalar(k_nan)) {}
+};
+
+enum class Verdict : std::uint8_t { nothing, kept, epipolar, angle, unsure };
+
+struct Reading {
+  Verdict verdict = Verdict::nothing;
+  double range = 0, variance = 0;
+  float epipolar_px = k_nan;
+};
+
+Reading read_pixel(const Imager& camera,
+                   const Imager& projector,
+                   const CoarseRays& projector_rays,
+                   const Ray& camera_ray,
+                   const Vector2d& px,
+                   const MeasuredPixel& shown,
+                   const RangeOptions& options) {
+  const Ray projector_ray = projector_rays.at(shown.px);
+  if (!projector_ray.d.allFinite()) return {};
+  const auto start = midpoint(camera_ray, projector_ray);
+  if (!start) return {Verdict::angle};
+  const MeasuredPixel own{px, Vector2d::Constant(options.camera_px * options.camera_px)};
+  const auto found = triangulate(camera, projector, own, shown, *start);
+  if (!found) return {Verdict::angle};
+  Reading reading{Verdict::kept, (found->p_world - camera_ray.p_origin).norm(),
+                  camera_ray.d.dot(found->covariance * camera_ray.d), static_cast<float>(found->epipolar_px)};
+  const double sigma_px = found->epipolar_px / std::max(found->epipolar_sigmas, 1e-9);
+  if (found->epipolar_px > options.max_epipolar_px + k_code_sigmas * sigma_px)
+    reading.verdict = Verdict::epipolar;
+  else if (found->angle < options.min_angle_deg * k_degree)
+    reading.verdict = Verdict::angle;
+  else if (reading.variance > options.max_stddev_m * options.max_stddev_m)
+    reading.verdict = Verdict::unsure;
+  else if (reading.range < options.nearest_m || reading.range > options.farthest_m)
+    reading.verdict = Verdict::unsure;
+  return reading;
+}
+
+void count(const std::vector<Reading>& readings, RangeCounts* counts, std::vector<float>* epipolar) {
+  for (const Reading& reading : readings) {
+    counts->decoded += reading.verdict != Verdict::nothing;
+    counts->epipolar += reading.verdict == Verdict::epipolar;
+    counts->angle += reading.verdict == Verdict::angle;
+    counts->unsure += reading.verdict == Verdict::unsure;
+    if (!std::isnan(reading.epipolar_px)) epipolar->push_back(reading.epipolar_px);
+    if (reading.verdict == Verdict::kept)
+      counts->epipolar_rms_px += static_cast<double>(reading.epipolar_px) * reading.epipolar_px;
+  }
+}
+
+std::vector<Reading> read_all(const RangeView& view, const DecodedBy& seen, const RangeOptions& options) {
+  const cv::Mat& px = seen.decoded->px_projector;
+  const CoarseRays projector_rays(*seen.projector);
+  const Pose world_from_camera = view.camera.imager_from_world.inverse();
+  std::vector<Reading> readings(px.total());
+  cv::parallel_for_(cv::Range(0, px.rows), [&](const cv::Range& rows) {
+    for (int y = rows.start; y < rows.end; ++y) {
+      for (int x = 0; x < px.cols; ++x) {
+        const auto& label = px.at<cv::Vec2f>(y, x);
+        const auto& variance = seen.decoded->variance.at<cv::Vec2f>(y, x);
+        const Vector3f& d = view.d_camera[flat(px.size(), x, y)];
+        if (std::isnan(label[0]) || !d.allFinite()) continue;
+        const Ray ray{world_from_camera.translation,
+                      world_from_camera.rotation * d.cast<double>().normalized()};
+        readings[flat(px.size(), x, y)] =
+            read_pixel(view.camera, *seen.projector, projector_rays, ray, {x, y},
+                       {{label[0], label[1]}, {variance[0], variance[1]}}, options);
+      }
+    }
+  });
+  return readings;
+}
+
+// The answers of all projectors, weighted; where two contradict each other there is none.
+Ranges combined(const RangeView& view,
+                std::span<const DecodedBy> seen,
+                const RangeOptions& options,
+                RangeCounts* counts) {
+  const cv::Size size(view.camera.width, view.camera.height);
+  Ranges all(size);
+  cv::Mat conflict(size, CV_8U, cv::Scalar(0));
+  std::vector<float> epipolar;
+  for (const DecodedBy& one : seen) {
+    const std::vector<Reading> readings = read_all(view, one, options);
+    count(readings, counts, &epipolar);
+    for (size_t i = 0; i < readings.size(); ++i) {
+      if (readings[i].verdict != Verdict::kept) continue;
+      double& range = all.range.ptr<double>()[i];
+      double& variance = all.variance.ptr<double>()[i];
+      if (std::isnan(range)) {
+        range = readings[i].range;
+        variance = readings[i].variance;
+        continue;
+      }
+      const double apart = std::abs(range - readings[i].range);
+      const double sigma = std::sqrt(variance + readings[i].variance);
+      if (apart > k_conflict_m + k_conflict_sigmas * sigma) conflict.ptr()[i] = 1;
+      const double weight = 1 / variance, other = 1 / readings[i].variance;
+      range = (weight * range + other * readings[i].range) / (weight + other);
+      variance = 1 / (weight + other);
+    }
+  }
+  all.range.setTo(k_nan, conflict);
+  counts->conflicts = cv::countNonZero(conflict);
+  const int met = static_cast<int>(epipolar.size()) - counts->epipolar - counts->angle - counts->unsure;
+  counts->epipolar_rms_px = met > 0 ? std::sqrt(counts->epipolar_rms_px / met) : 0;
+  if (!epipolar.empty()) {
+    const auto middle = epipolar.begin() + static_cast<std::ptrdiff_t>(epipolar.size() / 2);
+    std::nth_element(epipolar.begin(), middle, epipolar.end());
+    counts->epipolar_median_px = *middle;
+  }
+  return all;
+}
+
+// Whether two neighbours can be one surface: the step is no larger than an oblique surface and noise make it.
+bool joined(const RangeView& view, const Ranges& ranges, cv::Point a, cv::Point b, double steepest) {
+  const double range_a = ranges.range.at<double>(a), range_b = ranges.range.at<double>(b);
+  if (std::isnan(range_a) || std::isnan(range_b)) return false;
+  const cv::Size size = ranges.range.size();
+  const double apart = (view.d_camera[flat(size, a.x, a.y)] - view.d_camera[flat(size, b.x, b.y)]).norm();
+  const double noise = std::sqrt(ranges.variance.at<double>(a) + ranges.variance.at<double>(b));
+  return std::abs(range_a - range_b) <= std::min(range_a, range_b) * apart * steepest + k_step_sigmas * noise;
+}
+
+cv::Mat links_of(const RangeView& view, const Ranges& ranges, double max_incidence_deg) {
+  const double steepest = std::tan(max_incidence_deg * k_degree);
+  cv::Mat links(ranges.range.size(), CV_8U, cv::Scalar(0));
+  cv::parallel_for_(cv::Range(0, links.rows), [&](const cv::Range& rows) {
+    for (int y = rows.start; y < rows.end; ++y) {
+      for (int x = 0; x < links.cols; ++x) {
+        std::uint8_t& link = links.at<std::uint8_t>(y, x);
+        if (x + 1 < links.cols && joined(view, ranges, {x, y}, {x + 1, y}, steepest)) link |= k_right;
+        if (y + 1 < links.rows && joined(view, ranges, {x, y}, {x, y + 1}, steepest)) link |= k_down;
+      }
+    }
+  });
+  return links;
+}
+
+bool linked(const cv::Mat& links, cv::Point a, cv::Point b) {
+  if (a.y == b.y) return links.at<std::uint8_t>(a.y, std::min(a.x, b.x)) & k_right;
+  return links.at<std::uint8_t>(std::min(a.y, b.y), a.x) & k_down;
+}
+
+// Pixels beside a step in depth see both sides: their code is of one, the other, or neither.
+int drop_edges(const cv::Mat& links, Ranges* ranges) {
+  cv::Mat edge(links.size(), CV_8U, cv::Scalar(0));
+  const auto look = [&](cv::Point a, cv::Point b) {
+    const bool step = !std::isnan(ranges->range.at<double>(a)) && !std::isnan(ranges->range.at<double>(b)) &&
+                      !linked(links, a, b);
+    if (step) edge.at<std::uint8_t>(a) = edge.at<std::uint8_t>(b) = 1;
+  };
+  for (int y = 0; y < links.rows; ++y) {
+    for (int x = 0; x < links.cols; ++x) {
+      if (x + 1 < links.cols) look({x, y}, {x + 1, y});
+      if (y + 1 < links.rows) look({x, y}, {x, y + 1});
+    }
+  }
+  ranges->range.setTo(k_nan, edge);
+  return cv::countNonZero(edge);
+}
+
+cv::Mat valid_in(const cv::Mat& numbers) { return numbers == numbers; }  // NaN differs from itself
+
+// Pixels at the rim of a larger gap (3x3 pixels and more) see the surface with a part of their area only.
+int drop_rims(Ranges* ranges) {
+  const cv::Mat square = cv::Mat::ones(3, 3, CV_8U);
+  const cv::Mat valid = valid_in(ranges->range);
+  cv::Mat gap = ~valid;
+  cv::erode(gap, gap, square);  // small gaps vanish
+  cv::dilate(gap, gap, cv::Mat::ones(5, 5, CV_8U));
+  const cv::Mat rim = gap & valid;
+  ranges->range.setTo(k_nan, rim);
+  return cv::countNonZero(rim);
+}
+
+// Connected pixels get one number, from 1; 0 where `valid` is 0.
+cv::Mat labelled(const cv::Mat& links, const cv::Mat& valid, std::vector<int>* pixels) {
+  cv::Mat label(links.size(), CV_32S, cv::Scalar(0));
+  std::vector<cv::Point> stack;
+  for (int y = 0; y < links.rows; ++y) {
+    for (int x = 0; x < links.cols; ++x) {
+      if (!valid.at<std::uint8_t>(y, x) || label.at<int>(y, x) != 0) continue;
+      pixels->push_back(0);
+      const int number = static_cast<int>(pixels->size());
+      stack.push_back({x, y});
+      label.at<int>(y, x) = number;
+      while (!stack.empty()) {
+        const cv::Point at = stack.back();
+        stack.pop_back();
+        ++pixels->back();
+        for (const cv::Point step : {cv::Point(1, 0), cv::Point(-1, 0), cv::Point(0, 1), cv::Point(0, -1)}) {
+          const cv::Point next = at + step;
+          if (!cv::Rect({}, links.size()).contains(next) || label.at<int>(next) != 0) continue;
+          if (!valid.at<std::uint8_t>(next) || !linked(links, at, next)) continue;
+          label.at<int>(next) = number;
+          stack.push_back(next);
+        }
+      }
+    }
+  }
+  return label;
+}
+
+void drop_islands(const cv::Mat& links, Ranges* ranges) {
+  std::vector<int> pixels;
+  const cv::Mat label = labelled(links, valid_in(ranges->range), &pixels);
+  for (int i = 0; i < static_cast<int>(label.total()); ++i) {
+    const int number = label.ptr<int>()[i];
+    if (number > 0 && pixels[static_cast<size_t>(number - 1)] < k_least_piece)
+      ranges->range.ptr<double>()[i] = k_nan;
+  }
+}
+
+// A quadric of the inverse range around a pixel: q = c0 + c1 x + c2 y + c3 x² + c4 xy + c5 y². Inverse ranges
+// of a plane are all but linear in the picture, and a code's noise is even in them.
+using Six = Eigen::Matrix<double, 6, 1>;
+using SixSix = Eigen::Matrix<double, 6, 6>;
+
+Six terms(double x, double y) {
+  Six t;
+  t << 1, x, y, x * x, x * y, y * y;
+  return t;
+}
+
+struct Neighbour {
+  int dx = 0, dy = 0;
+  double q = 0, sigma = 0, weight = 0;
+};
+
+// The pixels of the window that a path of links outwards joins with its middle.
+class Window {
+ public:
+  explicit Window(int half) : half_(half), side_(2 * half + 1), reached_(static_cast<size_t>(side_ * side_)) {
+    for (int dy = -half; dy <= half; ++dy)
+      for (int dx = -half; dx <= half; ++dx) order_.push_back({dx, dy});
+    std::stable_sort(order_.begin(), order_.end(), [](cv::Point a, cv::Point b) {
+      return std::abs(a.x) + std::abs(a.y) < std::abs(b.x) + std::abs(b.y);
+    });
+  }
+
+  const std::vector<Neighbour>& around(const Ranges& ranges, const cv::Mat& links, cv::Point middle) {
+    found_.clear();
+    std::fill(reached_.begin(), reached_.end(), false);
+    const cv::Rect picture({}, links.size());
+    for (const cv::Point d : order_) {
+      const cv::Point at = middle + d;
+      if (!picture.contains(at) || std::isnan(ranges.range.at<double>(at))) continue;
+      const cv::Point by_x(d.x - (d.x > 0) + (d.x < 0), d.y), by_y(d.x, d.y - (d.y > 0) + (d.y < 0));
+      const bool reached = (d.x == 0 && d.y == 0) ||
+                           (d.x != 0 && reached_[index(by_x)] && linked(links, at, middle + by_x)) ||
+                           (d.y != 0 && reached_[index(by_y)] && linked(links, at, middle + by_y));
+      if (!reached) continue;
+      reached_[index(d)] = true;
+      const double q = 1 / ranges.range.at<double>(at);
+      const double sigma = std::sqrt(ranges.variance.at<double>(at)) * q * q;
+      found_.push_back({d.x, d.y, q, sigma, 1 / (sigma * sigma)});
+    }
+    return found_;
+  }
+  int area() const { return side_ * side_; }
+
+ private:
+  size_t index(cv::Point d) const { return static_cast<size_t>((d.y + half_) * side_ + d.x + half_); }
+  int half_, side_;
+  std::vector<cv::Point> order_;
+  std::vector<bool> reached_;
+  std::vector<Neighbour> found_;
+};
+
+struct Fit {
+  Six coefficients = Six::Zero();
+  double variance = 0;  // of the middle, were the noise independent and as stated
+};
+
+std::optional<Fit> fitted(const std::vector<Neighbour>& around) {
+  SixSix a = SixSix::Zero();
+  Six b = Six::Zero();
+  for (const Neighbour& n : around) {
+    const Six t = terms(n.dx, n.dy);
+    a.selfadjointView<Eigen::Lower>().rankUpdate(t, n.weight);
+    b += n.weight * n.q * t;
+  }
+  const Eigen::LLT<SixSix> factored(a);
+  if (factored.info() != Eigen::Success) return std::nullopt;
+  Fit fit;
+  fit.coefficients = factored.solve(b);
+  fit.variance = factored.solve(Six::Unit(0))[0];
+  if (!fit.coefficients.allFinite() || !(fit.variance > 0)) return std::nullopt;
+  return fit;
+}
+
+double residual(const Neighbour& n, const Fit& fit) { return n.q - terms(n.dx, n.dy).dot(fit.coefficients); }
+
+// How large the noise is beside the stated one, place by place, and how neighbouring pixels share it.
+struct Noise {
+  cv::Mat scale;         // CV_32F, true standard deviation over the stated one, every k_noise_step pixels
+  double inflation = 1;  // of a smoothed middle's variance by the correlation
+
+  double scale_at(int x, int y) const {  // between the nodes, linear
+    const double u = std::clamp(static_cast<double>(x) / k_noise_step - 0.5, 0.0, scale.cols - 1.0);
+    const double v = std::clamp(static_cast<double>(y) / k_noise_step - 0.5, 0.0, scale.rows - 1.0);
+    const int c = std::min(static_cast<int>(u), std::max(0, scale.cols - 2)),
+              r = std::min(static_cast<int>(v), std::max(0, scale.rows - 2));
+    const int c1 = std::min(c + 1, scale.cols - 1), r1 = std::min(r + 1, scale.rows - 1);
+    const double a = u - c, b = v - r;
+    return (1 - b) * ((1 - a) * scale.at<float>(r, c) + a * scale.at<float>(r, c1)) +
+           b * ((1 - a) * scale.at<float>(r1, c) + a * scale.at<float>(r1, c1));
+  }
+};
+
+// Variance of a full window's smoothed middle with correlated noise over that with independent noise.
+double inflation_of(const cv::Mat& correlation, int half) {
+  SixSix a = SixSix::Zero();
+  for (int y = -half; y <= half; ++y)
+    for (int x = -half; x <= half; ++x) a += terms(x, y) * terms(x, y).transpose();
+  const Six first = a.llt().solve(Six::Unit(0));
+  const auto share = [&](int x, int y) { return first.dot(terms(x, y)); };
+  double alone = 0, together = 0;
+  for (int y = -half; y <= half; ++y)
+    for (int x = -half; x <= half; ++x) {
+      alone += share(x, y) * share(x, y);
+      for (int v = -half; v <= half; ++v)
+        for (int u = -half; u <= half; ++u)
+          if (std::abs(u - x) <= k_lag && std::abs(v - y) <= k_lag)
+            together += share(x, y) * share(u, v) * correlation.at<double>(std::abs(v - y), std::abs(u - x));
+    }
+  return std::max(1.0, together / alone);
+}
+
+// Sums over the pairs of a window's normalised residuals by their distance; NaN where there is none.
+struct Pairs {
+  cv::Mat sums = cv::Mat(k_lag + 1, k_lag + 1, CV_64F, cv::Scalar(0)), counts = sums.clone();
+
+  void add(const cv::Mat& residuals) {
+    for (int y = 0; y < residuals.rows; ++y)
+      for (int x = 0; x < residuals.cols; ++x)
+        for (int v = y; v < std::min(residuals.rows, y + k_lag + 1); ++v)
+          for (int u = std::max(0, x - k_lag); u < std::min(residuals.cols, x + k_lag + 1); ++u) {
+            const double product = residuals.at<double>(y, x) * residuals.at<double>(v, u);
+            if (std::isnan(product)) continue;
+            sums.at<double>(v - y, std::abs(u - x)) += product;
+            counts.at<double>(v - y, std::abs(u - x)) += 1;
+          }
+  }
+  // By |dx|, |dy|, 1 at 0; empty when there was too little.
+  cv::Mat correlation() const {
+    constexpr double k_least = 10000;  // residuals
+    if (counts.at<double>(0, 0) < k_least || sums.at<double>(0, 0) <= 0) return {};
+    cv::Mat shares;
+    cv::divide(sums, cv::max(counts, 1), shares);
+    return shares / shares.at<double>(0, 0);
+  }
+};
+
+// Normalised residuals around a place, as a picture; empty where there is too little of one surface.
+cv::Mat residuals_around(const Ranges& ranges, const cv::Mat& links, cv::Point at, Window* window) {
+  const std::vector<Neighbour>& around = window->around(ranges, links, at);
+  if (static_cast<int>(around.size()) < window->area() / 2) return {};
+  const auto fit = fitted(around);
+  if (!fit) return {};
+  cv::Mat picture(2 * k_noise_half + 1, 2 * k_noise_half + 1, CV_64F, cv::Scalar(k_nan));
+  for (const Neighbour& n : around)
+    picture.at<double>(n.dy + k_noise_half, n.dx + k_noise_half) = residual(n, *fit) / n.sigma;
+  return picture;
+}
+
+// The size of residuals, outliers aside (1.4826 median for a normal distribution, no less than their RMS to 4
+// of it).
+double size_of(const cv::Mat& residuals) {
+  std::vector<double> sizes;
+  for (const double r : cv::Mat_<double>(residuals))
+    if (!std::isnan(r)) sizes.push_back(std::abs(r));
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  const double limit = 4 * 1.4826 * *middle;
+  double sum = 0;
+  int count = 0;
+  for (const double size : sizes) {
+    if (size > limit) continue;
+    sum += size * size;
+    ++count;
+  }
+  return std::sqrt(sum / count);
+}
+
+Noise measured_noise(const Ranges& ranges, const cv::Mat& links, int smooth_half) {
+  constexpr int k_every = 3;  // pairs from every third place: they cost the most
+  Window window(k_noise_half);
+  Noise noise;
+  noise.scale = cv::Mat((links.rows + k_noise_step - 1) / k_noise_step,
+                        (links.cols + k_noise_step - 1) / k_noise_step, CV_32F, cv::Scalar(k_nan));
+  Pairs pairs;
+  std::vector<float> scales;
+  int number = 0;
+  for (int r = 0; r < noise.scale.rows; ++r) {
+    for (int c = 0; c < noise.scale.cols; ++c) {
+      const cv::Point at(std::min(links.cols - 1, c * k_noise_step + k_noise_step / 2),
+                         std::min(links.rows - 1, r * k_noise_step + k_noise_step / 2));
+      if (std::isnan(ranges.range.at<double>(at))) continue;
+      const cv::Mat residuals = residuals_around(ranges, links, at, &window);
+      if (residuals.empty()) continue;
+      const double scale = size_of(residuals);
+      noise.scale.at<float>(r, c) = static_cast<float>(scale);
+      scales.push_back(static_cast<float>(scale));
+      if (scale > 0 && number++ % k_every == 0) pairs.add(residuals / scale);
+    }
+  }
+  if (scales.empty()) scales.push_back(1);
+  std::nth_element(scales.begin(), scales.begin() + static_cast<std::ptrdiff_t>(scales.size() / 2),
+                   scales.end());
+  const float common = scales[scales.size() / 2];
+  noise.scale.setTo(common, noise.scale != noise.scale);
+  noise.scale = cv::max(noise.scale, common / 2);
+  const cv::Mat correlation = pairs.correlation();
+  if (!correlation.empty()) noise.inflation = inflation_of(correlation, smooth_half);
+  return noise;
+}
+
+// The fit once more with the outliers of the first one losing weight (Cauchy).
+std::optional<Fit> robustly_fitted(std::vector<Neighbour> around, double scale) {
+  auto fit = fitted(around);
+  if (!fit) return fit;
+  constexpr double k_gentle = 2.5;  // standard deviations at which a neighbour counts half
+  for (Neighbour& n : around) {
+    const double r = residual(n, *fit) / (k_gentle * scale * n.sigma);
+    n.weight /= 1 + r * r;
+  }
+  return fitted(around);
+}
+
+// World normal from the fit's slope: the surface is d(x, y) / q(x, y).
+std::optional<Vector3d> normal_of(const RangeView& view, cv::Point at, const Six& fit) {
+  const cv::Size size = view.range.size();
+  if (at.x < 1 || at.y < 1 || at.x + 1 >= size.width || at.y + 1 >= size.height) return std::nullopt;
+  const auto d = [&](int dx, int dy) {
+    return view.d_camera[flat(size, at.x + dx, at.y + dy)].cast<double>().eval();
+  };
+  const double q = fit[0];
+  const Vector3d along_x = (d(1, 0) - d(-1, 0)) / 2 / q - d(0, 0) * fit[1] / (q * q);
+  const Vector3d along_y = (d(0, 1) - d(0, -1)) / 2 / q - d(0, 0) * fit[2] / (q * q);
+  Vector3d normal = along_x.cross(along_y).normalized();
+  if (normal.dot(d(0, 0)) > 0) normal = -normal;
+  if (!normal.allFinite()) return std::nullopt;
+  return view.camera.imager_from_world.rotation.conjugate() * normal;
+}
+
+struct Smoothed {
+  double range = k_nan, stddev = k_nan;
+  Vector3d d_normal = Vector3d::Zero();
+};
+
+Smoothed smoothed_at(const RangeView& view,
+                     const Ranges& ranges,
+                     const cv::Mat& links,
+                     const Noise& noise,
+                     const RangeOptions& options,
+                     cv::Point at,
+                     Window* window) {
+  constexpr int k_least = 12;  // twice the quadric's unknowns
+  const std::vector<Neighbour> around = window->around(ranges, links, at);
+  if (static_cast<int>(around.size()) < k_least) return {};
+  const double scale = noise.scale_at(at.x, at.y);
+  const auto fit = robustly_fitted(around, scale);
+  if (!fit || !(fit->coefficients[0] > 0)) return {};
+  const Neighbour& own = around.front();
+  const bool outlier = std::abs(residual(own, *fit)) > k_outlier_sigmas * scale * own.sigma;
+  if (outlier && static_cast<int>(around.size()) < window->area() / 2)
+    return {};  // else its neighbours stand for it
+  const auto normal = normal_of(view, at, fit->coefficients);
+  if (!normal) return {};
+  const Vector3d d = view.d_camera[flat(view.range.size(), at.x, at.y)].cast<double>();
+  const double cosine = -normal->dot(view.camera.imager_from_world.rotation.conjugate() * d);
+  if (cosine < std::cos(options.max_incidence_deg * k_degree)) return {};
+  const double range = 1 / fit->coefficients[0];
+  const double variance = fit->variance * noise.inflation * scale * scale;
+  return {range, std::sqrt(variance) * range * range, *normal};
+}
+
+void smooth(const Ranges& ranges, const cv::Mat& links, const RangeOptions& options, RangeView* view) {
+  const Noise noise = measured_noise(ranges, links, options.smooth_px);
+  cv::parallel_for_(cv::Range(0, links.rows), [&](const cv::Range& rows) {
+    Window window(options.smooth_px);
+    for (int y = rows.start; y < rows.end; ++y) {
+      for (int x = 0; x < links.cols; ++x) {
+        if (std::isnan(ranges.range.at<double>(y, x))) continue;
+        const Smoothed s = smoothed_at(*view, ranges, links, noise, options, {x, y}, &window);
+        if (!(s.stddev <= options.max_stddev_m)) continue;
+        view->range.at<float>(y, x) = static_cast<float>(s.range);
+        view->stddev.at<float>(y, x) = static_cast<float>(s.stddev);
+        const Vector3f n = s.d_normal.cast<float>();
+        view->d_normal.at<cv::Vec3f>(y, x) = {n.x(), n.y(), n.z()};
+      }
+    }
+  });
+}
+
+}  // namespace
+
+bool RangeView::has(int x, int y) const { return !std::isnan(range.at<float>(y, x)); }
+
+Vector3d RangeView::p_world(int x, int y) const {
+  const Vector3d d = d_camera[flat(range.size(), x, y)].cast<double>();
+  return camera.imager_from_world.inverse() * (d * static_cast<double>(range.at<float>(y, x)));
+}
+
+RangeView range_view(const Imager& camera, std::span<const DecodedBy> seen, const RangeOptions& options) {
+  RangeView view;
+  view.camera = camera;
+  view.d_camera = direction_map(camera.lens, camera.width, camera.height);
+  const cv::Size size(camera.width, camera.height);
+  view.range = cv::Mat(size, CV_32F, cv::Scalar(k_nan));
+  view.stddev = view.range.clone();
+  view.d_normal = cv::Mat(size, CV_32FC3, cv::Scalar::all(0));
+  Ranges ranges = combined(view, seen, options, &view.counts);
+  view.links = links_of(view, ranges, options.max_incidence_deg);
+  view.counts.edges = drop_edges(view.links, &ranges) + drop_rims(&ranges);
+  view.links = links_of(view, ranges, options.max_incidence_deg);
+  drop_islands(view.links, &ranges);
+  smooth(ranges, view.links, options, &view);
+  restrict_to(valid_in(view.range), &view);
+  return view;
+}
+
+void restrict_to(const cv::Mat& keep, RangeView* view) {
+  const auto kept = [&](int x, int y) { return keep.at<std::uint8_t>(y, x) != 0 && view->has(x, y); };
+  for (int y = 0; y < keep.rows; ++y) {
+    for (int x = 0; x < keep.cols; ++x) {
+      std::uint8_t& link = view->links.at<std::uint8_t>(y, x);
+      if (!kept(x, y)) link = 0;
+      if ((link & k_right) && !kept(x + 1, y)) link &= static_cast<std::uint8_t>(~k_right);
+      if ((link & k_down) && !kept(x, y + 1)) link &= static_cast<std::uint8_t>(~k_down);
+    }
+  }
+  view->range.setTo(k_nan, keep == 0);
+  view->counts.kept = cv::countNonZero(valid_in(view->range));
+}
+
+std::optional<Sight> sight(const RangeView& view, const Vector3d& p_world) {
+  const auto px = view.camera.project(p_world);
+  if (!px) return std::nullopt;
+  const int x = static_cast<int>(std::floor(px->x())), y = static_cast<int>(std::floor(px->y()));
+  if (x < 0 || y < 0 || x + 1 >= view.range.cols || y + 1 >= view.range.rows) return std::nullopt;
+  if ((view.links.at<std::uint8_t>(y, x) & (k_right | k_down)) != (k_right | k_down)) return std::nullopt;
+  if (!(view.links.at<std::uint8_t>(y, x + 1) & k_down) || !(view.links.at<std::uint8_t>(y + 1, x) & k_right))
+    return std::nullopt;
+  const double u = px->x() - x, v = px->y() - y;
+  const double shares[4] = {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v};
+  double inverse = 0, stddev = 0;
+  Vector3d normal = Vector3d::Zero();
+  for (int i = 0; i < 4; ++i) {
+    const int column = x + i % 2, row = y + i / 2;
+    inverse += shares[i] / static_cast<double>(view.range.at<float>(row, column));
+    stddev += shares[i] * static_cast<double>(view.stddev.at<float>(row, column));
+    const auto& n = view.d_normal.at<cv::Vec3f>(row, column);
+    normal += shares[i] * Vector3d(n[0], n[1], n[2]);
+  }
+  const Vector3d p_eye = view.camera.imager_from_world.inverse().translation;
+  const double distance = (p_world - p_eye).norm();
+  const Vector3d d = (p_world - p_eye) / distance;
+  normal.normalize();
+  const double cosine = -normal.dot(d);
+  return Sight{-(1 / inverse - distance) * cosine, stddev * cosine, normal};
+}
+
+scene::Surface surface_of(const RangeView& view) {
+  scene::Surface surface;
+  cv::Mat number(view.range.size(), CV_32S, cv::Scalar(-1));
+  for (int y = 0; y < number.rows; ++y) {
+    for (int x = 0; x < number.cols; ++x) {
+      if (!view.has(x, y)) continue;
+      number.at<int>(y, x) = static_cast<int>(surface.positions.size());
+      const Vector3d p = view.p_world(x, y);
+      const auto& n = view.d_normal.at<cv::Vec3f>(y, x);
+      const Vector3d d = (p - view.camera.imager_from_world.inverse().translation).normalized();
+      surface.positions.push_back(p.cast<float>());
+      surface.normals.emplace_back(n[0], n[1], n[2]);
+      surface.stddevs.push_back(view.stddev.at<float>(y, x) *
+                                static_cast<float>(-d.dot(surface.normals.back().cast<double>())));
+    }
+  }
+  for (int y = 0; y + 1 < number.rows; ++y) {
+    for (int x = 0; x + 1 < number.cols; ++x) {
+      const std::uint8_t link = view.links.at<std::uint8_t>(y, x);
+      const bool quad = (link & k_right) && (link & k_down) &&
+                        (view.links.at<std::uint8_t>(y, x + 1) & k_down) &&
+                        (view.links.at<std::uint8_t>(y + 1, x) & k_right);
+      if (!quad) continue;
+      const auto corner = [&](int u, int v) { return static_cast<std::uint32_t>(number.at<int>(v, u)); };
+      surface.triangles.push_back({corner(x, y), corner(x, y + 1), corner(x + 1, y)});
+      surface.triangles.push_back({corner(x + 1, y), corner(x, y + 1), corner(x + 1, y + 1)});
+    }
+  }
+  return surface;
+}
+
+cv::Mat pieces_of(const RangeView& view, std::vector<double>* areas) {
+  std::vector<int> pixels;
+  cv::Mat label = labelled(view.links, valid_in(view.range), &pixels);
+  std::vector<double> sums(pixels.size(), 0);
+  for (int y = 1; y < label.rows; ++y) {
+    for (int x = 1; x < label.cols; ++x) {
+      if (label.at<int>(y, x) == 0) continue;
+      const Vector3f &d = view.d_camera[flat(label.size(), x, y)],
+                     &left = view.d_camera[flat(label.size(), x - 1, y)],
+                     &up = view.d_camera[flat(label.size(), x, y - 1)];
+      const double range = view.range.at<float>(y, x);
+      const auto& n = view.d_normal.at<cv::Vec3f>(y, x);
+      const Vector3d d_world = view.camera.imager_from_world.rotation.conjugate() * d.cast<double>();
+      const double cosine = std::max(0.05, -d_world.dot(Vector3d(n[0], n[1], n[2])));
+      sums[static_cast<size_t>(label.at<int>(y, x) - 1)] +=
+          range * range * (d - left).norm() * (d - up).norm() / cosine;
+    }
+  }
+  std::vector<int> order(pixels.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return sums[static_cast<size_t>(a)] > sums[static_cast<size_t>(b)]; });
+  std::vector<int> rank(pixels.size());
+  areas->clear();
+  for (const int piece : order) {
+    areas->push_back(sums[static_cast<size_t>(piece)]);
+    rank[static_cast<size_t>(piece)] = static_cast<int>(areas->size());
+  }
+  for (int i = 0; i < static_cast<int>(label.total()); ++i) {
+    int& number = label.ptr<int>()[i];
+    if (number > 0) number = rank[static_cast<size_t>(number - 1)];
+  }
+  return label;
+}
+
+}  // namespace limn::calib
