@@ -279,7 +279,8 @@ Result<Observed> observe_pose(const Captures& captures, int pose, int camera, co
     LIMN_TRY(Decoded decoded, decode(captures.patterns[p], captures.poses[at_pose].pictures[p][at_camera],
                                      device.width, device.height, options));
     const int projector = static_cast<int>(p);
-    seen.decoded.push_back({camera, projector, pose, decoded.lit, decoded.decoded, decoded.outliers});
+    seen.decoded.push_back(
+        {camera, projector, pose, decoded.lit, decoded.decoded, decoded.outliers, decoded.contrasted});
     seen.health.push_back(decoded.health);
     seen.health.back().camera = camera;
     seen.health.back().projector = projector;

@@ -70,6 +70,7 @@ struct DecodeShare {
   int lit = 0;
   int decoded = 0;
   int outliers = 0;
+  int contrasted = 0;  ///< pixels that white alone makes brighter, lit by reflections or not (Decoded)
 };
 
 /// A camera pixel with its projector pixel, anywhere in the picture, on the board or off it: what the

@@ -129,13 +129,15 @@ Assessment assess(const Observed& observed, const Solution& solution, HeldOut he
   for (size_t i = 0; i < assessment.held_out_error_mm.size(); ++i)
     assessment.predicted_error_mm.push_back(
         std::max(k_rig_of_held_out * assessment.held_out_error_mm[i], assessment.propagated_error_mm[i]));
-  double lit = 0, decoded = 0;
+  double lit = 0, decoded = 0, contrasted = 0;
   for (const DecodeShare& share : observed.decoded) {
     lit += share.lit;
     decoded += share.decoded;
+    contrasted += share.contrasted;
     assessment.decode_outliers += share.outliers;
   }
   assessment.decoded_share = lit > 0 ? decoded / lit : 0;
+  assessment.decoded_of_contrasted = contrasted > 0 ? decoded / contrasted : 0;
   assessment.faults = faults(observed, solution, assessment.devices, assessment.held_out);
   const double px = assessment.held_out.rms_px;
   const double mm =

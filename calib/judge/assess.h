@@ -36,6 +36,7 @@ struct Assessment {
   std::vector<double> held_out_error_mm, propagated_error_mm, predicted_error_mm;
   std::vector<ErrorMap> error_maps;  ///< one for each projector, over the volume shared with camera 0
   double decoded_share = 0;          ///< of lit pixels
+  double decoded_of_contrasted = 0;  ///< of all that white makes brighter than black
   int decode_outliers = 0;
   std::vector<EpipolarResidual> epipolar;  ///< over decoded pixels of the whole picture, board or not
   Pulls pulls;                             ///< whether the stated deviations are true

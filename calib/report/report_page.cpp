@@ -276,9 +276,12 @@ std::string decode_table(const Report& report) {
                     observations.cameras[static_cast<size_t>(share.camera)].name,
                     observations.projectors[static_cast<size_t>(share.projector)].name,
                     fmt::format("{}", share.lit), fmt::format("{:.1f} %", 100 * share.decoded / lit),
+                    fmt::format("{:.1f} %", 100.0 * share.decoded / std::max(share.contrasted, 1)),
                     fmt::format("{:.2f} %", 100 * share.outliers / lit)});
   }
-  return table({"pose", "camera", "projector", "lit pixels", "decoded", "outliers"}, rows);
+  return table(
+      {"pose", "camera", "projector", "lit pixels", "decoded", "of all that white brightens", "outliers"},
+      rows);
 }
 
 std::string moved_text(const std::vector<Moved>& devices) {

@@ -1,6 +1,8 @@
 #include "apps/solve.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sched.h>
 
 #include <algorithm>
 #include <cmath>
@@ -174,6 +176,8 @@ TEST(SolveCommand, FindsTheRigThatTookTheCaptures) {
   EXPECT_LT(report["held_out"]["rms_px"], 0.15);
   EXPECT_EQ(report["held_out"]["poses"].size(), 6U);
   EXPECT_GT(report["decode"]["share"], 0.9);
+  EXPECT_GT(report["decode"]["share_of_contrasted"], 0.8);
+  EXPECT_LE(report["decode"]["share_of_contrasted"], report["decode"]["share"]);
   EXPECT_LT(report["predicted_error_mm"]["p95"], 0.5);
   EXPECT_EQ(report["devices"].size(), 2U);
   EXPECT_TRUE(report["seconds"].contains("total"));
@@ -215,10 +219,37 @@ std::map<std::string, std::string> files_of(const fs::path& folder) {
   return files;
 }
 
-TEST(SolveCommand, GivesTheSameBytesForTheSameCaptures) {
+// While it lives, this thread and those that it starts run on one core.
+class OnOneCore {
+ public:
+  OnOneCore() {
+    sched_getaffinity(0, sizeof(before_), &before_);
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    for (int i = 0; i < CPU_SETSIZE && CPU_COUNT(&one) == 0; ++i) {
+      if (CPU_ISSET(i, &before_)) CPU_SET(i, &one);
+    }
+    sched_setaffinity(0, sizeof(one), &one);
+    cv::setNumThreads(1);
+  }
+  ~OnOneCore() {
+    sched_setaffinity(0, sizeof(before_), &before_);
+    cv::setNumThreads(-1);
+  }
+  OnOneCore(const OnOneCore&) = delete;
+  OnOneCore& operator=(const OnOneCore&) = delete;
+
+ private:
+  cpu_set_t before_{};
+};
+
+TEST(SolveCommand, GivesTheSameBytesForTheSameCapturesOnOneCoreAndOnMany) {
   const fs::path captures = captured(), folder = captures.parent_path();
   ASSERT_TRUE(run_solve({.captures = captures, .out = folder / "first"}).ok());
-  ASSERT_TRUE(run_solve({.captures = captures, .out = folder / "second"}).ok());
+  {
+    const OnOneCore alone;
+    ASSERT_TRUE(run_solve({.captures = captures, .out = folder / "second"}).ok());
+  }
   const auto first = files_of(folder / "first"), second = files_of(folder / "second");
   EXPECT_GE(first.size(), 6U);
   ASSERT_EQ(first.size(), second.size());
@@ -393,6 +424,32 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
   EXPECT_EQ(unseen->assessment.faults.back().name, "known_length_not_seen");
   for (const char* nonsense : {"", "apriltag_36h11:3 250mm", "a:1 b:2 250", "a:1 a:1 250mm", "a:1 b:2 -3mm"})
     EXPECT_FALSE(calib::parse_known_length(nonsense).ok()) << nonsense;
+}
+
+// Each pose's stripes are those of another pose: nothing fits anything.
+TEST(SolveCommand, ContradictionsAreRejectedWithFiniteNumbers) {
+  const fs::path captures = own_captures(), out = captures.parent_path() / "contradicted";
+  const auto stripes = [&](int pose) { return captures / fmt::format("pose{:02d}", pose) / "camera0"; };
+  const calib::Patterns patterns = calib::load_patterns(captures / "patterns.json").value();
+  for (int i = 0; i < patterns.white(); ++i) {
+    const std::string name = calib::picture_name(i);
+    fs::rename(stripes(0) / name, captures / "first.png");
+    for (int pose = 0; pose + 1 < 6; ++pose) fs::rename(stripes(pose + 1) / name, stripes(pose) / name);
+    fs::rename(captures / "first.png", stripes(5) / name);
+  }
+  const auto report = solved({.captures = captures, .out = out});
+  if (!report) {
+    EXPECT_GT(report.message().size(), 40U);
+    EXPECT_FALSE(fs::exists(out / "rig.json"));
+    return;
+  }
+  EXPECT_EQ(report->assessment.verdict, calib::Verdict::reject) << report->words.verdict;
+  EXPECT_FALSE(report->assessment.faults.empty());
+  for (const char* file : {"rig.json", "report.json", "projector0.cameramodel"}) {
+    const std::string text = read_file(out / file).value();
+    static const std::regex broken(R"(\b(nan|inf|null)\b)");
+    EXPECT_FALSE(std::regex_search(text, broken)) << file;
+  }
 }
 
 TEST(SolveCommand, SaysThatNoBoardIsVisible) {

@@ -25,7 +25,7 @@ using nlohmann::json;
 Report reported(const World& world, const fs::path& folder, const std::string& made_at) {
   Report report;
   report.observed.observations = world.observations;
-  report.observed.decoded = {{0, 0, 0, 1000, 950, 3}};
+  report.observed.decoded = {{0, 0, 0, 1000, 950, 3, 1900}};
   report.solution = solve(world.observations).value();
   report.assessment = assess(report.observed, {}, report.solution).value();
   report.words = in_words(report.observed, report.solution, report.assessment);
