@@ -8,9 +8,10 @@
 namespace limn::scene {
 namespace {
 
+// A lost body is not where its track says: it is as if it were not seen.
 const Track* find_track(std::span<const Track> tracks, const std::string& body) {
-  const auto found =
-      std::find_if(tracks.begin(), tracks.end(), [&](const Track& t) { return t.body == body; });
+  const auto found = std::find_if(tracks.begin(), tracks.end(),
+                                  [&](const Track& t) { return t.body == body && t.sight != Sight::lost; });
   return found == tracks.end() ? nullptr : &*found;
 }
 

@@ -17,8 +17,8 @@ struct PosedPart {
   Pose world_from_part;
 };
 
-/// A scene at a moment: where everything is and which variant each slot shows. A slot that is not seen is
-/// absent.
+/// A scene at a moment: where everything is and which variant each slot shows. A slot that is not seen, or
+/// whose track is lost, is absent.
 struct PosedScene {
   std::optional<Pose> world_from_prototype;
   std::vector<PosedPart> parts;

@@ -30,8 +30,23 @@ double loss(double square, double huber) {
   return huber > 0 && square > huber * huber ? 2 * huber * std::sqrt(square) - huber * huber : square;
 }
 
-std::optional<Normal> normal_equations(std::span<const PointSight> sights, const Pose& pose, double huber) {
+double prior_cost(const PosePrior* prior, const Pose& pose) {
+  if (!prior) return 0;
+  const Vector6d delta = boxminus(pose, prior->world_from_body);
+  return delta.dot(prior->information * delta);
+}
+
+// The delta's own derivative by a further small step is taken for the identity: a prior is far narrower than
+// a radian.
+std::optional<Normal> normal_equations(std::span<const PointSight> sights,
+                                       const Pose& pose,
+                                       double huber,
+                                       const PosePrior* prior) {
   Normal normal;
+  if (prior) {
+    normal.matrix = prior->information;
+    normal.gradient = prior->information * boxminus(pose, prior->world_from_body);
+  }
   for (const PointSight& sight : sights) {
     Eigen::Vector2d r;
     Eigen::Matrix<double, 2, 6> j;
@@ -100,21 +115,24 @@ double cost(std::span<const PointSight> sights, const Pose& world_from_body, dou
   return sum;
 }
 
-std::optional<PoseFit> fit_pose(std::span<const PointSight> sights, const Pose& start, double huber) {
+std::optional<PoseFit> fit_pose(std::span<const PointSight> sights,
+                                const Pose& start,
+                                double huber,
+                                const PosePrior* prior) {
   if (sights.size() < 3 || !start.is_finite()) return std::nullopt;
   Pose pose = start;
-  double best = cost(sights, pose, huber);
+  double best = cost(sights, pose, huber) + prior_cost(prior, pose);
   if (!std::isfinite(best)) return std::nullopt;
   double damping = 1e-6;
   for (int step = 0; step < k_max_steps; ++step) {
-    const auto normal = normal_equations(sights, pose, huber);
+    const auto normal = normal_equations(sights, pose, huber, prior);
     if (!normal) return std::nullopt;
     Matrix6d damped = normal->matrix;
     damped.diagonal() *= 1 + damping;
     const Vector6d delta = damped.ldlt().solve(-normal->gradient);
     if (!delta.allFinite()) return std::nullopt;
     const Pose next = boxplus(pose, delta);
-    const double next_cost = cost(sights, next, huber);
+    const double next_cost = cost(sights, next, huber) + prior_cost(prior, next);
     if (next_cost <= best) {
       pose = next;
       best = next_cost;
@@ -125,7 +143,7 @@ std::optional<PoseFit> fit_pose(std::span<const PointSight> sights, const Pose& 
       if (damping > 1e8) break;
     }
   }
-  const auto normal = normal_equations(sights, pose, huber);
+  const auto normal = normal_equations(sights, pose, huber, prior);
   if (!normal) return std::nullopt;
   const auto covariance = inverse(normal->matrix);
   if (!covariance || !covariance->allFinite() || !pose.is_finite()) return std::nullopt;

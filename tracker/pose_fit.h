@@ -18,11 +18,18 @@ struct PointSight {
   Eigen::Matrix2d information = Eigen::Matrix2d::Identity();  ///< inverse of the pixel's covariance, px^-2
 };
 
+/// What is known of a pose before its sights: a Gaussian of boxplus(world_from_body, delta).
+struct PosePrior {
+  Pose world_from_body;
+  Matrix6d information;  ///< inverse of its covariance
+};
+
 struct PoseFit {
   Pose world_from_body;
-  Matrix6d covariance;    ///< of boxplus(world_from_body, delta), from the sights' information
-  double chi_square = 0;  ///< sum of squared residuals in standard deviations, robust where they are
-  double rms_px = 0;      ///< per point, sqrt(mean(dx^2 + dy^2))
+  Matrix6d covariance;  ///< of boxplus(world_from_body, delta), from the sights' information
+  double chi_square =
+      0;  ///< sum of squared residuals in standard deviations, robust where they are; the prior's included
+  double rms_px = 0;  ///< per point, sqrt(mean(dx^2 + dy^2))
 };
 
 /// Residual px - project(…) and its derivative by the delta of boxplus; false when the point has no pixel.
@@ -36,7 +43,12 @@ bool residual(const PointSight& sight,
 double cost(std::span<const PointSight> sights, const Pose& world_from_body, double huber);
 
 /// Levenberg-Marquardt on the pixels through the true lenses, from `start`. nullopt when it has no minimum
-/// there: a point falls behind its camera, or the sights do not fix six degrees of freedom. Never NaN.
-std::optional<PoseFit> fit_pose(std::span<const PointSight> sights, const Pose& start, double huber = 0);
+/// there: a point falls behind its camera, or the sights do not fix six degrees of freedom. Never NaN. With a
+/// prior the pose is the nearest mode of the posterior (maximum a posteriori), its covariance the posterior's
+/// there.
+std::optional<PoseFit> fit_pose(std::span<const PointSight> sights,
+                                const Pose& start,
+                                double huber = 0,
+                                const PosePrior* prior = nullptr);
 
 }  // namespace limn::tracker

@@ -67,6 +67,16 @@ TEST(Posed, PartsRideOnTheirMarkersAndUnseenOnesAreAbsent) {
   EXPECT_EQ(posed(scene, tracks).parts[0].variant, "a");
 }
 
+TEST(Posed, LostPartIsAbsentAndAnExtrapolatedOneIsNot) {
+  const Scene scene = two_slots(false);
+  std::array<Track, 2> tracks = {track_of("mirror", Pose{}), track_of("trim", Pose{})};
+  tracks[0].sight = Sight::lost;
+  tracks[1].sight = Sight::extrapolated;
+  const PosedScene out = posed(scene, tracks);
+  ASSERT_EQ(out.parts.size(), 1u);
+  EXPECT_EQ(out.parts[0].slot, "trim");
+}
+
 TEST(Posed, StickingPartIsLaidOntoTheSurfaceAndKeepsItsTurn) {
   Scene scene = two_slots(true);
   const Pose world_from_prototype(exp_rotation({0.3, 1.2, -0.4}), {0.5, -0.2, 2});

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/frame.h"
+#include "core/marker.h"
+#include "core/track.h"
+#include "tracker/motion.h"
+#include "tracker/sighting.h"
+
+namespace limn::tracker {
+
+/// How bodies are expected to move. The defaults are a hand's.
+struct MotionModel {
+  /// Raise it for jerky motion; costs jitter while moving. 3 suits reaches of 0.25 m/s
+  /// (tests/tracker/motion_test).
+  double jerk = 3;        ///< m²/s⁵
+  double turn_jerk = 50;  ///< rad²/s⁵
+  /// Of a body that stands still: what of its pose's change is believed. Raise it for stands that sway; costs
+  /// jitter.
+  double drift = 0.05e-3;      ///< m per square root of a second
+  double turn_drift = 0.9e-3;  ///< rad per square root of a second (0.05°)
+  double starts_per_s = 0.5;   ///< how often a still body begins to move
+  double stops_per_s = 1;      ///< how often a moving one comes to rest
+  /// For so long an unseen body is carried on; then it is lost.
+  double extrapolation_limit_s = 0.3;
+};
+
+MotionNoise still_noise(const MotionModel& model);
+MotionNoise moving_noise(const MotionModel& model);
+
+/// One belief of how a body stands, of the two that a lone flat marker leaves open. Whether it moves is open,
+/// too: both answers are carried with their odds (an interacting multiple model: Blom and Bar-Shalom, "The
+/// interacting multiple model algorithm", 1988).
+struct Branch {
+  Motion still;  ///< may only drift
+  Motion moving;
+  double still_weight = 0.5;  ///< moving: the rest
+  double weight = 1;          ///< of this branch; all branches' add up to 1
+};
+
+/// A picture's own pose of a body, without history.
+struct Fix {
+  Pose world_from_body;
+  Matrix6d covariance;
+  Stamp captured_at;
+};
+
+/// What is known of a body from the pictures up to a moment.
+struct BodyMotion {
+  std::string body;
+  std::vector<Branch> branches;  ///< one or two, as of measured_at; the first is the one to report
+  std::vector<Fix> fixes;        ///< the newest one or two, oldest first, on the reported branch
+  int marker_count = 0;
+  double rms_px = 0;
+  int misfits = 0;    ///< pictures in a row that contradict the motion
+  Stamp measured_at;  ///< of the newest picture that showed the body
+  Stamp looked_at;    ///< of the newest picture
+};
+
+/// What is known after one more moment's pictures (of all cameras that took one): the step of the filter. The
+/// corners themselves are its measurement, with their covariance, so that a marker seen from straight ahead,
+/// whose four corners know little of its tilt, moves its tilt little. `known` is what the step before
+/// returned (at first nothing). Both branches live on with their likelihoods; a body that is not seen keeps
+/// its motion; one unseen for longer than the limit starts afresh when seen again. Pictures older than what
+/// is known change nothing. A picture that contradicts the motion altogether (a false marker) is passed over;
+/// two in a row are believed.
+std::vector<BodyMotion> observed(std::span<const BodyMotion> known,
+                                 std::span<const Body> bodies,
+                                 std::span<const View> views,
+                                 Stamp captured_at,
+                                 const MotionModel& model = {});
+
+}  // namespace limn::tracker

@@ -1,0 +1,108 @@
+#include "tracker/motion.h"
+
+#include <Eigen/Dense>
+#include <cmath>
+
+namespace limn::tracker {
+namespace {
+
+Matrix6d per_axis(double turn, double shift) {
+  Vector6d diagonal;
+  diagonal << turn, turn, turn, shift, shift, shift;
+  return diagonal.asDiagonal();
+}
+
+// Derivative of Exp(w + dw) as Exp(J dw) Exp(w), the left Jacobian of SO(3) (Solà et al., "A micro Lie
+// theory", eq. 145).
+Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& w) {
+  Eigen::Matrix3d cross;
+  cross << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
+  const double a2 = w.squaredNorm();
+  const double a = std::sqrt(a2);
+  const double first = a < 1e-4 ? 0.5 - a2 / 24 : (1 - std::cos(a)) / a2;
+  const double second = a < 1e-4 ? 1. / 6 - a2 / 120 : (a - std::sin(a)) / (a2 * a);
+  return Eigen::Matrix3d::Identity() + first * cross + second * cross * cross;
+}
+
+Matrix18d transition(const Vector6d& delta, double dt) {
+  Matrix18d f = Matrix18d::Identity();
+  const Matrix6d one = Matrix6d::Identity();
+  f.block<6, 6>(0, 6) = dt * one;
+  f.block<6, 6>(0, 12) = 0.5 * dt * dt * one;
+  f.block<6, 6>(6, 12) = dt * one;
+  const Eigen::Matrix3d jacobian = left_jacobian(delta.head<3>());
+  f.block<3, 3>(0, 0) = exp_rotation(delta.head<3>()).toRotationMatrix();
+  f.block<3, 3>(0, 6) = dt * jacobian;
+  f.block<3, 3>(0, 12) = 0.5 * dt * dt * jacobian;
+  return f;
+}
+
+// Integral of white jerk over dt (Bar-Shalom, Li and Kirubarajan, "Estimation with applications to tracking
+// and navigation", 6.2.3), and of white velocity.
+Matrix18d grown(const MotionNoise& noise, double dt) {
+  const Matrix6d q = per_axis(noise.turn_jerk, noise.jerk);
+  const double dt2 = dt * dt, dt3 = dt2 * dt;
+  Matrix18d m = Matrix18d::Zero();
+  m.block<6, 6>(0, 0) = dt2 * dt3 / 20 * q + dt * per_axis(noise.turn_drift, noise.drift);
+  m.block<6, 6>(0, 6) = m.block<6, 6>(6, 0) = dt2 * dt2 / 8 * q;
+  m.block<6, 6>(0, 12) = m.block<6, 6>(12, 0) = dt3 / 6 * q;
+  m.block<6, 6>(6, 6) = dt3 / 3 * q;
+  m.block<6, 6>(6, 12) = m.block<6, 6>(12, 6) = dt2 / 2 * q;
+  m.block<6, 6>(12, 12) = dt * q;
+  return m;
+}
+
+Matrix18d symmetric(const Matrix18d& m) { return 0.5 * (m + m.transpose()); }
+
+Motion moved(const Motion& motion, const Eigen::Matrix<double, 18, 1>& delta) {
+  Motion out = motion;
+  out.world_from_body = boxplus(motion.world_from_body, delta.head<6>());
+  out.velocity += delta.segment<6>(6);
+  out.acceleration += delta.tail<6>();
+  return out;
+}
+
+double log_determinant(const Matrix6d& m) {
+  return 2 * Eigen::LLT<Matrix6d>(m).matrixL().toDenseMatrix().diagonal().array().log().sum();
+}
+
+}  // namespace
+
+Motion propagated(const Motion& motion, double seconds, const MotionNoise& noise) {
+  const Vector6d delta = seconds * motion.velocity + 0.5 * seconds * seconds * motion.acceleration;
+  Motion later = motion;
+  later.world_from_body = boxplus(motion.world_from_body, delta);
+  later.velocity += seconds * motion.acceleration;
+  const Matrix18d f = transition(delta, seconds);
+  later.covariance = symmetric(f * motion.covariance * f.transpose() + grown(noise, seconds));
+  return later;
+}
+
+PosePrior prior_of(const Motion& motion) {
+  return {motion.world_from_body, motion.pose_covariance().llt().solve(Matrix6d::Identity())};
+}
+
+Motion corrected(const Motion& motion, const PoseFit& fit) {
+  const Matrix6d prior = motion.pose_covariance();
+  const Eigen::Matrix<double, 18, 6> gain =
+      prior.llt().solve(motion.covariance.leftCols<6>().transpose()).transpose();
+  Motion after = moved(motion, gain * boxminus(fit.world_from_body, motion.world_from_body));
+  after.covariance = symmetric(motion.covariance + gain * (fit.covariance - prior) * gain.transpose());
+  return after;
+}
+
+Motion mixed(const Motion& a, double weight_a, const Motion& b, double weight_b) {
+  Eigen::Matrix<double, 18, 1> apart;
+  apart << boxminus(b.world_from_body, a.world_from_body), b.velocity - a.velocity,
+      b.acceleration - a.acceleration;
+  Motion out = moved(a, weight_b * apart);
+  out.covariance =
+      weight_a * a.covariance + weight_b * b.covariance + weight_a * weight_b * apart * apart.transpose();
+  return out;
+}
+
+double log_evidence(const Motion& prior, const PoseFit& fit) {
+  return 0.5 * (log_determinant(fit.covariance) - log_determinant(prior.pose_covariance()) - fit.chi_square);
+}
+
+}  // namespace limn::tracker

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/track.h"
+#include "tracker/body_motion.h"
+
+namespace limn::tracker {
+
+/// How a pose is carried from the picture that showed it to a later moment.
+enum class Prediction {
+  hold,     ///< as the newest picture alone said
+  linear,   ///< onwards as from the last picture but one to the last (the 2011 paper's extrapolation)
+  filtered  ///< by the filter's position, velocity and acceleration
+};
+
+/// Every known body as a track at a moment, not before its measured_at (earlier moments get the pose of
+/// then). The covariance grows with the time since. A body in the newest picture is `measured`; one that is
+/// not is `extrapolated`; one unseen for longer than the model's limit before `at` is `lost` and stays where
+/// it was last measured. Pure: the clock is the caller's.
+std::vector<Track> predicted(std::span<const BodyMotion> known,
+                             Stamp at,
+                             Prediction how = Prediction::filtered,
+                             const MotionModel& model = {});
+
+}  // namespace limn::tracker

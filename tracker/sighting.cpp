@@ -1,0 +1,148 @@
+#include "tracker/sighting.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <filesystem>
+#include <limits>
+#include <string>
+
+#include "tracker/marker_pose.h"
+
+namespace limn::tracker {
+namespace {
+
+// Markers that may propose a pose, largest first: the rest add nothing but time.
+constexpr std::size_t k_max_proposers = 6;
+// A marker that cannot be placed at all costs as much as one that is far off.
+constexpr double k_lost_marker_cost = 1e7;
+// Proposals nearer than this to a minimum lead to it: the noise of a small marker's tilt.
+constexpr double k_same_basin = 0.1;
+// Refined poses nearer than this are one minimum: refinement stops far below it.
+constexpr double k_same_minimum = 1e-3;
+// Proposals that are refined in search of a second minimum.
+constexpr int k_max_refined = 3;
+
+using CornerSights = std::array<PointSight, 4>;
+
+CornerSights sights_of(const SeenMarker& seen, const Detection& detection) {
+  CornerSights sights;
+  const auto corners = square_corners(seen.marker->size_m);
+  for (std::size_t i = 0; i < 4; ++i)
+    sights[i] = {&seen.camera->lens, seen.camera->imager_from_world,
+                 seen.marker->body_from_marker * corners[i], detection.corners_px[i],
+                 detection.corner_covariance[i].inverse()};
+  return sights;
+}
+
+// The detection of this marker that agrees best with a pose, and its cost.
+std::pair<const Detection*, double> most_consistent(const SeenMarker& seen, const Pose& world_from_body) {
+  const Detection* best = nullptr;
+  double least = std::numeric_limits<double>::infinity();
+  for (const Detection* detection : seen.detections) {
+    const double value = cost(sights_of(seen, *detection), world_from_body, k_huber);
+    if (value < least) {
+      least = value;
+      best = detection;
+    }
+  }
+  return {best, least};
+}
+
+double cost_of_all(const Sighting& sighting, const Pose& world_from_body) {
+  double sum = 0;
+  for (const SeenMarker& seen : sighting)
+    sum += std::min(k_lost_marker_cost, most_consistent(seen, world_from_body).second);
+  return sum;
+}
+
+double width_px(const SeenMarker& seen) {
+  const auto& c = seen.detections.front()->corners_px;
+  return std::max((c[2] - c[0]).norm(), (c[3] - c[1]).norm());
+}
+
+struct Proposal {
+  Pose world_from_body;
+  double cost = 0;
+};
+
+// Both branches of every detection of the largest markers, as poses of the body, the most suitable first.
+std::vector<Proposal> proposals(const Sighting& sighting) {
+  Sighting largest = sighting;
+  std::stable_sort(largest.begin(), largest.end(),
+                   [](const SeenMarker& a, const SeenMarker& b) { return width_px(a) > width_px(b); });
+  largest.resize(std::min(largest.size(), k_max_proposers));
+  std::vector<Proposal> found;
+  for (const SeenMarker& seen : largest)
+    for (const Detection* detection : seen.detections)
+      for (const MarkerPose& pose : marker_poses(seen.camera->lens, seen.marker->size_m,
+                                                 detection->corners_px, detection->corner_covariance)) {
+        const Pose world_from_body = seen.camera->imager_from_world.inverse() * pose.camera_from_marker *
+                                     seen.marker->body_from_marker.inverse();
+        found.push_back({world_from_body, cost_of_all(sighting, world_from_body)});
+      }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Proposal& a, const Proposal& b) { return a.cost < b.cost; });
+  return found;
+}
+
+bool is_near(const std::vector<PoseFit>& fits, const Pose& pose, double angle) {
+  return std::any_of(fits.begin(), fits.end(), [&](const PoseFit& fit) {
+    return angle_between(fit.world_from_body.rotation, pose.rotation) < angle;
+  });
+}
+
+}  // namespace
+
+Sighting sighting(const Body& body, std::span<const View> views) {
+  Sighting all;
+  for (const View& view : views)
+    for (const BodyMarker& marker : body.markers) {
+      SeenMarker seen{&marker, view.camera, {}};
+      for (const Detection& detection : view.detections)
+        if (is_marker(detection.marker, marker.marker)) seen.detections.push_back(&detection);
+      if (!seen.detections.empty()) all.push_back(std::move(seen));
+    }
+  return all;
+}
+
+ChosenCorners corners_at(const Sighting& sighting, const Pose& world_from_body) {
+  ChosenCorners chosen;
+  for (const SeenMarker& seen : sighting) {
+    const Detection* detection = most_consistent(seen, world_from_body).first;
+    if (!detection) continue;
+    ++chosen.marker_count;
+    for (const PointSight& sight : sights_of(seen, *detection)) chosen.sights.push_back(sight);
+  }
+  return chosen;
+}
+
+std::vector<PoseFit> minima(const Sighting& sighting) {
+  std::vector<PoseFit> found;
+  // A lone marker's proposals are its two minima already.
+  const double basin = sighting.size() == 1 ? k_same_minimum : k_same_basin;
+  int refined = 0;
+  for (const Proposal& proposal : proposals(sighting)) {
+    if (refined == k_max_refined || found.size() == 2) break;
+    if (is_near(found, proposal.world_from_body, basin)) continue;
+    ++refined;
+    const auto fit =
+        fit_pose(corners_at(sighting, proposal.world_from_body).sights, proposal.world_from_body, k_huber);
+    if (fit && !is_near(found, fit->world_from_body, k_same_minimum)) found.push_back(*fit);
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const PoseFit& a, const PoseFit& b) { return a.chi_square < b.chi_square; });
+  return found;
+}
+
+bool is_marker(const MarkerName& found, const MarkerName& wanted) {
+  const auto bare = [](const MarkerName& name) {
+    // aruco:FOLDER/FILE.yml and artoolkit:FOLDER/FILE.patt
+    const auto slash = name.family.find_last_of('/');
+    const bool has_folder = name.family.rfind("aruco:", 0) == 0 && slash != std::string::npos;
+    return MarkerName{has_folder ? "aruco:" + name.family.substr(slash + 1) : name.family,
+                      std::filesystem::path(name.id).filename().string()};
+  };
+  return bare(found) == bare(wanted);
+}
+
+}  // namespace limn::tracker

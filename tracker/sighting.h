@@ -1,0 +1,49 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/imager.h"
+#include "core/marker.h"
+#include "tracker/detection.h"
+#include "tracker/pose_fit.h"
+
+namespace limn::tracker {
+
+/// Residuals beyond this many standard deviations count linearly: a corner under a finger.
+constexpr double k_huber = 3;
+
+/// What one camera saw at a moment.
+struct View {
+  const Imager* camera = nullptr;
+  std::span<const Detection> detections;
+};
+
+/// One marker of a body in one view, with all detections there that carry its name.
+struct SeenMarker {
+  const BodyMarker* marker = nullptr;
+  const Imager* camera = nullptr;
+  std::vector<const Detection*> detections;
+};
+
+/// A body's markers in the pictures of one moment. Borrows bodies, cameras and detections.
+using Sighting = std::vector<SeenMarker>;
+
+Sighting sighting(const Body& body, std::span<const View> views);
+
+/// The corners that a pose of the body speaks for: of a marker found twice in a picture, the detection that
+/// agrees best.
+struct ChosenCorners {
+  std::vector<PointSight> sights;
+  int marker_count = 0;
+};
+ChosenCorners corners_at(const Sighting& sighting, const Pose& world_from_body);
+
+/// The local minima of the body's robust reprojection error, likeliest first, at most two: the second is the
+/// other branch of the planar ambiguity, where there is one. Every marker proposes both of its branches.
+std::vector<PoseFit> minima(const Sighting& sighting);
+
+/// Whether a detection is this marker. Names of files compare without their folders.
+bool is_marker(const MarkerName& found, const MarkerName& wanted);
+
+}  // namespace limn::tracker
