@@ -1,5 +1,6 @@
 #include "scene/nearest.h"
 
+#include <Eigen/Dense>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -65,27 +66,37 @@ double squared_distance(const Eigen::Vector3f& low, const Eigen::Vector3f& high,
 }  // namespace
 
 SurfacePoint nearest_on(const Mesh& mesh, const Eigen::Vector3d& p) {
+  return likeliest_on(mesh, p, Eigen::Matrix3d::Identity());
+}
+
+SurfacePoint likeliest_on(const Mesh& mesh, const Eigen::Vector3d& p, const Eigen::Matrix3d& covariance) {
   LIMN_CHECK(!mesh.triangles.empty());
-  const auto position = [&](std::uint32_t corner) {
-    return Eigen::Vector3d(mesh.positions[corner].cast<double>());
-  };
+  const Eigen::LLT<Eigen::Matrix3d> root(covariance);
+  LIMN_CHECK(root.info() == Eigen::Success);
+  // In whitened coordinates with p as origin the likeliest is the nearest, and barycentric coordinates are
+  // the same.
+  const Eigen::Matrix3d whitened = root.matrixL().solve(Eigen::Matrix3d::Identity());
+  std::vector<Eigen::Vector3d> places;
+  places.reserve(mesh.positions.size());
+  for (const Eigen::Vector3f& position : mesh.positions)
+    places.emplace_back(whitened * (position.cast<double>() - p));
   SurfacePoint found;
   Eigen::Vector3d weights = {1, 0, 0};
   double best = std::numeric_limits<double>::infinity();
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& [i, j, k] = mesh.triangles[t];
-    const Eigen::Vector3d a = position(i), b = position(j), c = position(k);
-    const Eigen::Vector3d here = nearest_in_triangle(a, b, c, p);
-    const Eigen::Vector3d p_here = here[0] * a + here[1] * b + here[2] * c;
-    const double distance = (p_here - p).squaredNorm();
+    const Eigen::Vector3d &a = places[i], &b = places[j], &c = places[k];
+    const Eigen::Vector3d here = nearest_in_triangle(a, b, c, Eigen::Vector3d::Zero());
+    const double distance = (here[0] * a + here[1] * b + here[2] * c).squaredNorm();
     if (!(distance < best)) continue;
     best = distance;
     weights = here;
-    found.p = p_here;
     found.triangle = t;
   }
+  for (std::size_t corner = 0; corner < 3; ++corner)
+    found.p += weights[static_cast<Eigen::Index>(corner)] * corner_of(mesh, found.triangle, corner);
   found.d_normal = normal_at(mesh, found.triangle, weights);
-  found.distance = std::sqrt(best);
+  found.distance = (found.p - p).norm();
   return found;
 }
 

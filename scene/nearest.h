@@ -22,6 +22,11 @@ struct SurfacePoint {
 /// one.
 SurfacePoint nearest_on(const Mesh& mesh, const Eigen::Vector3d& p);
 
+/// The likeliest place on the mesh of a point that was measured at p with a Gaussian error: the nearest by
+/// Mahalanobis' distance, (x - p)^T covariance^-1 (x - p) least. `distance` stays the ordinary one.
+/// Covariance must be positive definite.
+SurfacePoint likeliest_on(const Mesh& mesh, const Eigen::Vector3d& p, const Eigen::Matrix3d& covariance);
+
 /// The same question asked often: triangles in a tree of boxes. Borrows the mesh, which must outlive it
 /// unchanged. Queries are safe from several threads.
 class SurfaceIndex {

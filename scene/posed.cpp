@@ -15,15 +15,37 @@ const Track* find_track(std::span<const Track> tracks, const std::string& body) 
   return found == tracks.end() ? nullptr : &*found;
 }
 
-// The marker laid onto the prototype's surface: centre on the nearest point, z into the surface by the
-// shortest turn, so that its turn about z stays. The side of the surface is the one the marker faces, so that
-// a mesh with its normals inside out serves, too.
-Pose laid_on(const Mesh& prototype, const Pose& prototype_from_marker) {
-  const SurfacePoint point = nearest_on(prototype, prototype_from_marker.translation);
+// What no covariance of corners knows of: how far the mesh, the calibration and a marker's paper are from the
+// true surface. It also keeps a covariance that is exact along some line invertible.
+constexpr double k_unknown_place = 0.2e-3;  // m
+
+// Of the marker's centre in the prototype's frame, from the covariances of both poses.
+Eigen::Matrix3d place_covariance(const Track& prototype, const Track& marker) {
+  const Eigen::Vector3d d = marker.world_from_body.translation - prototype.world_from_body.translation;
+  Eigen::Matrix<double, 3, 6> by_prototype;    // d_world of R^T (p - t), by the delta of the prototype's pose
+  by_prototype << 0, -d.z(), d.y(), -1, 0, 0,  //
+      d.z(), 0, -d.x(), 0, -1, 0,              //
+      -d.y(), d.x(), 0, 0, 0, -1;
+  const Eigen::Matrix3d world = marker.covariance.bottomRightCorner<3, 3>() +
+                                by_prototype * prototype.covariance * by_prototype.transpose() +
+                                k_unknown_place * k_unknown_place * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d world_from_prototype = prototype.world_from_body.rotation_matrix();
+  return world_from_prototype.transpose() * world * world_from_prototype;
+}
+
+// The marker laid onto the prototype's surface, three degrees of freedom instead of six: centre on the
+// likeliest point (a lone marker's depth is uncertain, so it slides along the line of sight), z into the
+// surface by the shortest turn, so that its turn about z stays; the two planar branches differ by just such a
+// turn. The side of the surface is the one the marker faces, so that a mesh with its normals inside out
+// serves, too.
+Pose laid_on(const Mesh& mesh, const Track& prototype, const Track& marker) {
+  const Pose prototype_from_marker = prototype.world_from_body.inverse() * marker.world_from_body;
+  const SurfacePoint point =
+      likeliest_on(mesh, prototype_from_marker.translation, place_covariance(prototype, marker));
   const Eigen::Vector3d d_marker_z = prototype_from_marker.rotation * Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d d_inward = d_marker_z.dot(point.d_normal) > 0 ? point.d_normal : -point.d_normal;
   const auto turn = Eigen::Quaterniond::FromTwoVectors(d_marker_z, d_inward);
-  return Pose(turn * prototype_from_marker.rotation, point.p);
+  return prototype.world_from_body * Pose(turn * prototype_from_marker.rotation, point.p);
 }
 
 std::string chosen_variant(const Slot& slot, std::size_t index, std::span<const std::string> variants) {
@@ -59,12 +81,9 @@ PosedScene posed(const Scene& scene, std::span<const Track> tracks, std::span<co
     const Slot& slot = scene.slots[i];
     const Track* track = find_track(tracks, slot.name);
     if (!track) continue;
-    Pose world_from_marker = track->world_from_body;
-    if (slot.stick_to_surface && prototype) {
-      const Pose& world_from_prototype = prototype->world_from_body;
-      world_from_marker = world_from_prototype *
-                          laid_on(scene.prototype->mesh, world_from_prototype.inverse() * world_from_marker);
-    }
+    const Pose world_from_marker = slot.stick_to_surface && prototype
+                                       ? laid_on(scene.prototype->mesh, *prototype, *track)
+                                       : track->world_from_body;
     out.parts.push_back(
         {slot.name, chosen_variant(slot, i, variants), world_from_marker * slot.marker_from_part});
   }

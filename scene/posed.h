@@ -25,8 +25,9 @@ struct PosedScene {
 };
 
 /// The scene as the tracks (bodies of `bodies(scene)`) place it; `variants[i]` is the chosen variant of slot
-/// i (absent: its first). A part that sticks to the surface is laid onto the prototype's mesh: its marker's z
-/// axis along the inward normal at the mesh point nearest to the marker's centre, turned as the marker is
+/// i (absent: its first). A part that sticks to the surface is laid onto the prototype's mesh: its marker's
+/// centre at the likeliest point of the mesh, by the covariances of its track and the prototype's (a track
+/// without one goes to the nearest point); its z axis along the inward normal there; turned as the marker is
 /// turned.
 PosedScene posed(const Scene& scene,
                  std::span<const Track> tracks,
