@@ -11,6 +11,7 @@
 #include "apps/capture.h"
 #include "apps/demo.h"
 #include "apps/detect.h"
+#include "apps/learn_body.h"
 #include "apps/markers.h"
 #include "apps/patterns.h"
 #include "apps/recheck.h"
@@ -46,15 +47,29 @@ void add_markers(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand("markers", "sheets of markers or a calibration board to print, true size");
   command->footer(
       "Example: limn markers --family aruco_4x4_50 --ids 0-11 --size-mm 40 --out sheet.pdf\n"
-      "Example: limn markers --board charuco:11x8:25mm --out board.pdf");
+      "Example: limn markers --board charuco:11x8:25mm --out board.pdf\n"
+      "Example: limn markers --learn-body photos/*.jpg --camera camera0.cameramodel --family aruco_4x4_50 --size-mm 40 "
+      "--out body.json");
   auto options = std::make_shared<MarkersOptions>();
+  auto learning = std::make_shared<LearnBodyOptions>();
   command->add_option("--family", options->family, "such as apriltag_36h11, aruco_4x4_50, artoolkit:hiro.patt")
       ->capture_default_str();
   command->add_option("--ids", options->ids, "such as 0-11,15")->capture_default_str();
   command->add_option("--size-mm", options->size_mm, "side of the black square")->capture_default_str();
   command->add_option("--board", options->board, "a board instead: charuco:11x8:25mm, chessboard:9x7:75mm");
-  command->add_option("--out", options->out, "file to write: .pdf, .svg; a board also .png")->required();
-  command->callback([options, &run] { run = [options] { return finished(run_markers(*options)); }; });
+  auto* learn = command->add_option("--learn-body", learning->images,
+                                    "instead: where the markers of a rigid thing stand on it, from pictures of it");
+  command->add_option("--camera", learning->camera, "with --learn-body: .cameramodel or another camera file")->needs(learn);
+  command->add_option("--out", options->out, "file to write: .pdf, .svg; a board also .png; a body .json")->required();
+  command->callback([options, learning, &run] {
+    run = [options, learning] {
+      if (learning->images.empty()) return finished(run_markers(*options));
+      learning->family = options->family;
+      learning->size_mm = options->size_mm;
+      learning->out = options->out;
+      return finished(run_learn_body(*learning));
+    };
+  });
 }
 
 void add_detect(CLI::App& app, Run& run) {
@@ -242,6 +257,10 @@ void add_render(CLI::App& app, Run& run) {
   command->add_option("--viewer", options->viewer, "viewer file; without it the scene's viewer, else camera 0");
   command->add_option("--composite", options->composite, "full parts, or rest: only what light cannot show")
       ->check(CLI::IsMember({"full", "rest"}))
+      ->capture_default_str();
+  command->add_option("--marker-light", options->marker_light,
+                      "what projectors do with markers: keep-out leaves them dark, spotlight lights them white")
+      ->check(CLI::IsMember({"as-is", "keep-out", "spotlight"}))
       ->capture_default_str();
   command->add_option("--out", options->out, "folder for the pictures and coverage.json")->required();
   command->callback([options, &run] { run = [options] { return finished(run_render(*options)); }; });

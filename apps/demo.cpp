@@ -121,7 +121,8 @@ Result<Moment> looked(Session* session, sim::VirtualRig* room, const std::vector
       static_cast<int>(std::count_if(detections.begin(), detections.end(), [&](const auto& detection) {
         return !sim::world_from_marker(room->world(), detection.marker);
       }));
-  moment.tracks = tracker::observed(session->bodies, detections, camera, frame.captured_at);
+  const tracker::View view{&camera, detections};
+  moment.tracks = tracker::observed(session->bodies, std::span(&view, 1), frame.captured_at);
   moment.posed = scene::posed(session->scene, moment.tracks, variants);
   if (!moment.posed.world_from_prototype || moment.posed.parts.size() != session->scene.slots.size()) {
     return error(

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -19,6 +18,7 @@
 #include "scene/scene.h"
 #include "tracker/detector.h"
 #include "tracker/family.h"
+#include "tracker/marker_light.h"
 #include "tracker/observed.h"
 
 namespace limn::apps {
@@ -66,15 +66,6 @@ Result<Frames> read_frames(const std::vector<std::string>& arguments, Rig* rig) 
   return frames;
 }
 
-// The surer one of every body that several cameras see.
-void merge(std::vector<Track> found, std::map<std::string, Track>* tracks) {
-  for (Track& track : found) {
-    const auto [known, fresh] = tracks->try_emplace(track.body, track);
-    if (!fresh && track.covariance.trace() < known->second.covariance.trace())
-      known->second = std::move(track);
-  }
-}
-
 // How the camera writes light, as near as the detector can tell apart: by what was measured, else linear.
 tracker::Encoding encoding_of(const Rig& rig, const Imager& camera) {
   for (const CameraResponse& response : rig.camera_responses) {
@@ -89,24 +80,24 @@ Result<std::vector<Track>> find_bodies(const scene::Scene& scene, const Rig& rig
   const std::vector<Body> bodies = scene::bodies(scene);
   const std::vector<std::string> names = tracker::families_of(bodies);
   LIMN_TRY(const tracker::Families families, tracker::Families::load(names, scene.folder));
-  std::map<std::string, Track> tracks;
+  std::vector<std::vector<tracker::Detection>> detections(frames.size());
+  std::vector<tracker::View> views;
   std::size_t marker_count = 0;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (frames[i].empty()) continue;
     tracker::Detector detector(families, {.encoding = encoding_of(rig, rig.cameras[i])});
-    const auto detections = detector.detect(to_grey(frames[i]), &rig.cameras[i].lens);
-    marker_count += detections.size();
-    merge(tracker::observed(bodies, detections, rig.cameras[i], Stamp{}), &tracks);
+    detections[i] = detector.detect(to_grey(frames[i]), &rig.cameras[i].lens);
+    marker_count += detections[i].size();
+    views.push_back({&rig.cameras[i], detections[i]});
   }
+  std::vector<Track> tracks = tracker::observed(bodies, views, Stamp{});
   if (tracks.empty()) {
     return error(
         "frames: expected a marker of the scene's {} bodies, found {} markers of its families and none that "
         "the scene names. Look at light, focus and marker names.",
         bodies.size(), marker_count);
   }
-  std::vector<Track> found;
-  for (auto& [body, track] : tracks) found.push_back(std::move(track));
-  return found;
+  return tracks;
 }
 
 void report_missing(const scene::Scene& scene, const scene::PosedScene& posed) {
@@ -131,6 +122,28 @@ Result<scene::PosedScene> place(const RenderOptions& options,
                track.marker_count == 1 ? "" : "s", track.rms_px);
   }
   return scene::posed(scene, tracks);
+}
+
+// Where markers stand by the scene as posed, be it from frames or from a file.
+std::vector<Track> tracks_of(const scene::Scene& scene, const scene::PosedScene& posed) {
+  std::vector<Track> tracks;
+  const auto add = [&](const std::string& body, const Pose& world_from_body) {
+    tracks.emplace_back();
+    tracks.back().body = body;
+    tracks.back().world_from_body = world_from_body;
+  };
+  if (posed.world_from_prototype) add("prototype", *posed.world_from_prototype);
+  for (const scene::PosedPart& part : posed.parts)
+    if (const scene::Slot* slot = scene.find_slot(part.slot))
+      add(part.slot, part.world_from_part * slot->marker_from_part.inverse());
+  return tracks;
+}
+
+std::optional<tracker::MarkerLight> marker_light_of(const std::string& name) {
+  if (name == "as-is") return tracker::MarkerLight::as_is;
+  if (name == "keep-out") return tracker::MarkerLight::keep_out;
+  if (name == "spotlight") return tracker::MarkerLight::spotlight;
+  return std::nullopt;
 }
 
 Result<Imager> choose_viewer(const RenderOptions& options, const scene::Scene& scene, const Rig& rig) {
@@ -197,6 +210,11 @@ Status run_render(const RenderOptions& options) {
   if (options.composite != "full" && options.composite != "rest") {
     return usage_error("--composite: expected full or rest, found '{}'.", options.composite);
   }
+  const auto marker_light = marker_light_of(options.marker_light);
+  if (!marker_light) {
+    return usage_error("--marker-light: expected as-is, keep-out or spotlight, found '{}'.",
+                       options.marker_light);
+  }
   LIMN_TRY(Rig rig, load_rig(options.rig));
   LIMN_TRY(const scene::Scene scene, scene::load_scene(options.scene));
   LIMN_TRY(const Frames frames, read_frames(options.frames, &rig));
@@ -208,9 +226,13 @@ Status run_render(const RenderOptions& options) {
   LIMN_TRY(const device::GlContext context, device::GlContext::create());
   log_info("render: {}", context.description());
   LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, rig));
+  const std::vector<Body> bodies = scene::bodies(scene);
+  const std::vector<Track> tracks = tracks_of(scene, posed);
   for (std::size_t i = 0; i < rig.projectors.size(); ++i) {
     const auto file = options.out / ("projector-" + rig.projectors[i].name + ".png");
-    LIMN_TRY_STATUS(write_png(file, renderer.projector_picture(i, posed, viewer)));
+    const cv::Mat picture = renderer.projector_picture(i, posed, viewer);
+    const cv::Mat mask = tracker::marker_mask(rig.projectors[i], bodies, tracks);
+    LIMN_TRY_STATUS(write_png(file, tracker::with_marker_light(picture, mask, *marker_light)));
   }
   LIMN_TRY_STATUS(write_composites(&renderer, options, rig, frames, posed));
   return write_coverage(renderer.coverage(posed, viewer), viewer, options.out);

@@ -15,8 +15,7 @@ Matrix6d per_axis(double turn, double shift) {
 // Derivative of Exp(w + dw) as Exp(J dw) Exp(w), the left Jacobian of SO(3) (Solà et al., "A micro Lie
 // theory", eq. 145).
 Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& w) {
-  Eigen::Matrix3d cross;
-  cross << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
+  const Eigen::Matrix3d cross = skew(w);
   const double a2 = w.squaredNorm();
   const double a = std::sqrt(a2);
   const double first = a < 1e-4 ? 0.5 - a2 / 24 : (1 - std::cos(a)) / a2;

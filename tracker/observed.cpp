@@ -4,15 +4,10 @@
 
 namespace limn::tracker {
 
-std::vector<Track> observed(std::span<const Body> bodies,
-                            std::span<const Detection> detections,
-                            const Imager& camera,
-                            Stamp captured_at) {
+std::vector<Track> observed(std::span<const Body> bodies, std::span<const View> views, Stamp captured_at) {
   std::vector<Track> tracks;
-  const View view{&camera, detections};
   for (const Body& body : bodies)
-    if (auto track = world_from_body(body, std::span(&view, 1), captured_at))
-      tracks.push_back(std::move(*track));
+    if (auto track = world_from_body(body, views, captured_at)) tracks.push_back(std::move(*track));
   return tracks;
 }
 

@@ -11,12 +11,6 @@ constexpr int k_max_steps = 60;
 constexpr double k_small_step = 1e-10;     // radians and metres
 constexpr double k_min_condition = 1e-13;  // smallest over largest eigenvalue of the scaled normal matrix
 
-Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
 struct Normal {
   Matrix6d matrix = Matrix6d::Zero();
   Vector6d gradient = Vector6d::Zero();
@@ -82,6 +76,12 @@ double rms(std::span<const PointSight> sights, const Pose& pose) {
 }
 
 }  // namespace
+
+Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
 
 bool residual(const PointSight& sight,
               const Pose& world_from_body,

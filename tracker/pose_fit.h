@@ -32,6 +32,9 @@ struct PoseFit {
   double rms_px = 0;  ///< per point, sqrt(mean(dx^2 + dy^2))
 };
 
+/// [v]x: skew(v) * w = v x w.
+Eigen::Matrix3d skew(const Eigen::Vector3d& v);
+
 /// Residual px - project(…) and its derivative by the delta of boxplus; false when the point has no pixel.
 bool residual(const PointSight& sight,
               const Pose& world_from_body,

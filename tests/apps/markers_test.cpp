@@ -3,11 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <nlohmann/json.hpp>
 #include <set>
 
+#include "apps/learn_body.h"
+#include "core/cameramodel.h"
+#include "core/config.h"
 #include "core/file.h"
 #include "core/picture.h"
 #include "tests/support/matchers.h"
+#include "tests/tracker/marker_pictures.h"
 #include "tracker/detector.h"
 
 namespace limn::apps {
@@ -79,6 +84,62 @@ TEST(Markers, TellWrongUsage) {
   bad = good;
   bad.family = "nonsense";
   EXPECT_TRUE(wrong(bad));
+}
+
+// Pictures of a plate with four markers, one of them bent up, turned before a distorting camera.
+TEST(Markers, LearnABodyFromItsPictures) {
+  using namespace test::literals;
+  auto rng = test::test_rng();
+  const auto folder = test::test_folder();
+  const Imager camera = {
+      "camera0", 800, 600,
+      Lens::create("LENSMODEL_OPENCV4", {900, 902, 402, 297, -0.12, 0.05, 1e-4, -2e-4}).value(), Pose{}};
+  ASSERT_TRUE(save_cameramodel(camera, folder / "camera0.cameramodel"));
+  const std::array<Pose, 4> body_from_marker = {Pose(exp_rotation({0, 0, 0.2}), {-0.05, -0.05, 0}),
+                                                Pose(exp_rotation({0, 0, -0.4}), {0.05, -0.05, 0}),
+                                                Pose(exp_rotation({0.5, 0, 0}), {-0.05, 0.05, -0.01}),
+                                                Pose(exp_rotation({0, 0.3, 1}), {0.05, 0.05, 0.005})};
+  LearnBodyOptions options;
+  options.camera = folder / "camera0.cameramodel";
+  options.family = "aruco_4x4_50";
+  options.size_mm = 50;
+  options.out = folder / "plate.json";
+  for (int picture = 0; picture < 8; ++picture) {
+    const double a = 0.25 * M_PI * picture;
+    const Pose camera_from_body(exp_rotation({0.5 * std::cos(a), 0.5 * std::sin(a), 0.1 * picture}),
+                                {0.01, 0, 0.45});
+    std::vector<test::PlacedMarker> markers;
+    for (std::size_t i = 0; i < 4; ++i)
+      markers.push_back({{"aruco_4x4_50", std::to_string(i)}, camera_from_body * body_from_marker[i], 0.05});
+    options.images.push_back(folder / fmt::format("{}.png", picture));
+    ASSERT_TRUE(
+        write_png(options.images.back(), test::picture_of(camera.lens, test::plain(800, 600, 100), markers,
+                                                          {.blur_px = 0.6, .noise_levels = 2}, rng)));
+  }
+  const Status status = run_learn_body(options);
+  ASSERT_TRUE(status) << status.message();
+  const auto body = nlohmann::json::parse(read_file(options.out).value());
+  EXPECT_EQ(body["schema"], "limn.body/1");
+  EXPECT_EQ(body["pictures"], 8);
+  ASSERT_EQ(body["markers"].size(), 4u);
+  const auto config = Config::load(options.out, "limn.body/1");
+  ASSERT_TRUE(config) << config.message();
+  const auto found = config->root().at("markers").items();
+  const Pose frame =
+      body_from_marker[static_cast<std::size_t>(std::stoi(body["frame"].get<std::string>().substr(13)))];
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Pose expected = frame.inverse() * body_from_marker[i];
+    EXPECT_TRUE(test::pose_near(found[i].at("body_from_marker").pose(), expected, 0.2_deg, 0.15_mm)) << i;
+    EXPECT_LT(found[i].at("stddev_mm").numbers(3)[2], 0.3);
+  }
+  const std::string before = read_file(options.out).value();
+  ASSERT_TRUE(run_learn_body(options));
+  EXPECT_EQ(read_file(options.out).value(), before);
+  options.images.resize(1);
+  options.family = "apriltag_36h11";
+  EXPECT_NE(run_learn_body(options).message().find("two or more markers"), std::string::npos);
+  options.camera.clear();
+  EXPECT_TRUE(run_learn_body(options).error().wrong_usage);
 }
 
 }  // namespace

@@ -177,6 +177,25 @@ TEST_F(RenderDoor, PosesPlaceEverythingAndEveryPictureIsWritten) {
   EXPECT_EQ(read_picture(folder / "out/mask-mirror.png").value().size(), cv::Size(320, 200));
 }
 
+TEST_F(RenderDoor, SparesOrLightsTheMarkers) {
+  const auto light_on_marker = [&](const std::string& how) {
+    options.marker_light = how;
+    EXPECT_TRUE(run_render(options));
+    const cv::Mat light = read_picture(folder / "out/projector-projector0.png").value();
+    const Rig rig = load_rig(options.rig).value();
+    const Pose world_from_marker = sim::car_door_slot_places().at("mirror");
+    const Vector2d px = *rig.projectors[0].project(world_from_marker.translation);
+    const cv::Vec3b c =
+        light.at<cv::Vec3b>(static_cast<int>(std::lround(px.y())), static_cast<int>(std::lround(px.x())));
+    return std::array<int, 3>{c[0], c[1], c[2]};
+  };
+  EXPECT_EQ(light_on_marker("spotlight"), (std::array{255, 255, 255}));
+  EXPECT_EQ(light_on_marker("keep-out"), (std::array{0, 0, 0}));
+  EXPECT_NE(light_on_marker("as-is"), (std::array{255, 255, 255}));
+  options.marker_light = "dim";
+  EXPECT_TRUE(run_render(options).error().wrong_usage);
+}
+
 TEST_F(RenderDoor, MistakesAreErrors) {
   const auto failed = [](const RenderOptions& wrong, bool usage, const std::string& says) {
     const Status status = run_render(wrong);

@@ -213,6 +213,11 @@ Detection detection_of(const World& w, std::size_t marker, double noise, std::mt
           even(std::max(noise, 0.01)), 1};
 }
 
+std::vector<Track> observed_by(const World& w, std::span<const Detection> detections) {
+  const View view{&w.camera, detections};
+  return observed(std::span(&w.body, 1), std::span(&view, 1), Stamp{});
+}
+
 TEST(BodyPose, JoinsItsMarkersAndIsBetterThanOne) {
   auto rng = test::test_rng();
   const World w = world();
@@ -220,8 +225,8 @@ TEST(BodyPose, JoinsItsMarkersAndIsBetterThanOne) {
   for (int i = 0; i < 30; ++i) {
     std::vector<Detection> detections;
     for (std::size_t m = 0; m < 4; ++m) detections.push_back(detection_of(w, m, 0.1, rng));
-    const auto tracks = observed(std::span(&w.body, 1), detections, w.camera, Stamp{});
-    const auto single = observed(std::span(&w.body, 1), std::span(detections).first(1), w.camera, Stamp{});
+    const auto tracks = observed_by(w, detections);
+    const auto single = observed_by(w, std::span(detections).first(1));
     ASSERT_EQ(tracks.size(), 1u);
     ASSERT_EQ(single.size(), 1u);
     EXPECT_EQ(tracks[0].marker_count, 4);
@@ -241,7 +246,7 @@ TEST(BodyPose, ChoosesTheConsistentOneOfTwoEqualMarkers) {
   for (auto& px : wrong.corners_px) px += Eigen::Vector2d(150, 40);
   detections.push_back(wrong);  // first, so that taking the first fails
   for (std::size_t m = 0; m < 4; ++m) detections.push_back(detection_of(w, m, 0.05, rng));
-  const auto tracks = observed(std::span(&w.body, 1), detections, w.camera, Stamp{});
+  const auto tracks = observed_by(w, detections);
   ASSERT_EQ(tracks.size(), 1u);
   EXPECT_EQ(tracks[0].marker_count, 4);
   EXPECT_TRUE(test::pose_near(tracks[0].world_from_body, w.world_from_body, 0.3_deg, 1_mm));
@@ -253,7 +258,7 @@ TEST(BodyPose, BearsACoveredCorner) {
   std::vector<Detection> detections;
   for (std::size_t m = 0; m < 4; ++m) detections.push_back(detection_of(w, m, 0.05, rng));
   detections[1].corners_px[2] += Eigen::Vector2d(6, -4);
-  const auto tracks = observed(std::span(&w.body, 1), detections, w.camera, Stamp{});
+  const auto tracks = observed_by(w, detections);
   ASSERT_EQ(tracks.size(), 1u);
   EXPECT_TRUE(test::pose_near(tracks[0].world_from_body, w.world_from_body, 0.3_deg, 1_mm));
 }
@@ -263,8 +268,8 @@ TEST(BodyPose, IsAbsentWithoutItsMarkers) {
   const World w = world();
   Detection other = detection_of(w, 0, 0, rng);
   other.marker.id = "17";
-  EXPECT_TRUE(observed(std::span(&w.body, 1), std::span(&other, 1), w.camera, Stamp{}).empty());
-  EXPECT_TRUE(observed(std::span(&w.body, 1), {}, w.camera, Stamp{}).empty());
+  EXPECT_TRUE(observed_by(w, std::span(&other, 1)).empty());
+  EXPECT_TRUE(observed_by(w, {}).empty());
 }
 
 TEST(BodyPose, SeesWithTwoCameras) {
@@ -279,6 +284,32 @@ TEST(BodyPose, SeesWithTwoCameras) {
   ASSERT_TRUE(track);
   EXPECT_EQ(track->marker_count, 2);
   EXPECT_TRUE(test::pose_near(track->world_from_body, w.world_from_body, 1_deg, 2_mm));
+}
+
+TEST(BodyPose, OfTwoCamerasHasTheCovarianceOfItsErrors) {
+  auto rng = test::test_rng();
+  const World left = world();
+  World right = left;
+  right.camera.imager_from_world = looking_at({-0.9, 0.1, -1.2}, {0, 0, 0}, {0, -1, 0});
+  double normalised = 0, joint = 0, alone = 0;
+  constexpr int k_rounds = 300;
+  for (int i = 0; i < k_rounds; ++i) {
+    std::vector<Detection> seen_left, seen_right;
+    for (std::size_t m = 0; m < 3; ++m) seen_left.push_back(detection_of(left, m, 0.1, rng));
+    for (std::size_t m = 1; m < 4; ++m) seen_right.push_back(detection_of(right, m, 0.1, rng));
+    const std::array<View, 2> views = {View{&left.camera, seen_left}, View{&right.camera, seen_right}};
+    const auto tracks = observed(std::span(&left.body, 1), views, Stamp{});
+    ASSERT_EQ(tracks.size(), 1u);
+    EXPECT_EQ(tracks[0].marker_count, 6);
+    const Vector6d error = boxminus(tracks[0].world_from_body, left.world_from_body);
+    normalised += error.dot(tracks[0].covariance.inverse() * error) / 6 / k_rounds;
+    joint += error.tail<3>().squaredNorm();
+    alone += boxminus(observed_by(left, seen_left)[0].world_from_body, left.world_from_body)
+                 .tail<3>()
+                 .squaredNorm();
+  }
+  EXPECT_NEAR(normalised, 1, 0.15);
+  EXPECT_LT(joint, 0.25 * alone);  // two lines of sight: depth is no longer weak
 }
 
 }  // namespace

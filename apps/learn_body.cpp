@@ -1,0 +1,101 @@
+#include "apps/learn_body.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "core/config.h"
+#include "core/file.h"
+#include "core/imager_file.h"
+#include "core/log.h"
+#include "core/picture.h"
+#include "tracker/body_learn.h"
+#include "tracker/detector.h"
+
+namespace limn::apps {
+namespace {
+
+constexpr double k_degrees = 180 / std::numbers::pi;
+
+Result<std::vector<tracker::Detection>> found_in(const std::filesystem::path& path,
+                                                 const Imager& camera,
+                                                 tracker::Detector* detector) {
+  LIMN_TRY(const cv::Mat grey, read_grey_picture(path));
+  if (camera.width > 0 && (grey.cols != camera.width || grey.rows != camera.height))
+    return error(
+        "{}: expected a picture of the camera's size {}x{}, found {}x{}. Use pictures of the same camera and "
+        "mode.",
+        path.string(), camera.width, camera.height, grey.cols, grey.rows);
+  return detector->detect(grey, &camera.lens);
+}
+
+// Three standard deviations along the body's axes.
+nlohmann::ordered_json deviations(const Matrix6d& covariance, int first, double scale) {
+  nlohmann::ordered_json values;
+  for (int i = first; i < first + 3; ++i) values.push_back(scale * std::sqrt(covariance(i, i)));
+  return values;
+}
+
+nlohmann::ordered_json json_of(const tracker::LearnedBody& learned, const std::string& name) {
+  nlohmann::ordered_json json = {
+      {"schema", "limn.body/1"},       {"name", name},
+      {"frame", learned.frame.text()}, {"pictures", learned.pictures},
+      {"rms_px", learned.rms_px},      {"markers", nlohmann::ordered_json::array()}};
+  for (const tracker::LearnedMarker& marker : learned.markers)
+    json["markers"].push_back({{"name", marker.marker.marker.text()},
+                               {"size_mm", 1e3 * marker.marker.size_m},
+                               {"body_from_marker", to_json(marker.marker.body_from_marker)},
+                               {"stddev_deg", deviations(marker.covariance, 0, k_degrees)},
+                               {"stddev_mm", deviations(marker.covariance, 3, 1e3)},
+                               {"pictures", marker.pictures}});
+  return json;
+}
+
+void print(const tracker::LearnedBody& learned) {
+  for (const tracker::LearnedMarker& marker : learned.markers) {
+    const Eigen::Vector3d p_mm = 1e3 * marker.marker.body_from_marker.translation;
+    fmt::print("{:<24} at ({:.2f}, {:.2f}, {:.2f}) mm, +- {:.2f} mm, {:.2f} degrees, {} pictures\n",
+               marker.marker.marker.text(), p_mm.x(), p_mm.y(), p_mm.z(),
+               1e3 * std::sqrt(marker.covariance.bottomRightCorner<3, 3>().trace()),
+               k_degrees * std::sqrt(marker.covariance.topLeftCorner<3, 3>().trace()), marker.pictures);
+  }
+  fmt::print("{} markers from {} pictures, {:.3f} px; the frame is {}'s\n", learned.markers.size(),
+             learned.pictures, learned.rms_px, learned.frame.text());
+  for (const MarkerName& marker : learned.unplaced)
+    log_warning(
+        "{}: seen in no picture together with the others; left out. Add a picture that shows it beside one "
+        "of them.",
+        marker.text());
+}
+
+}  // namespace
+
+Status run_learn_body(const LearnBodyOptions& options) {
+  if (options.camera.empty())
+    return usage_error("--learn-body: poses need a camera; add --camera X.cameramodel.");
+  if (!std::isfinite(options.size_mm) || !(options.size_mm > 0))
+    return usage_error("--size-mm: expected millimetres (> 0), found {}.", options.size_mm);
+  if (options.out.extension() != ".json")
+    return usage_error("--out: expected a file that ends in .json, found '{}'.", options.out.string());
+  LIMN_TRY(const Imager camera, load_imager(options.camera));
+  const auto families = tracker::Families::load(std::vector<std::string>{options.family});
+  if (!families) return usage_error("--family: {}", families.message());
+  tracker::Detector detector(*families);
+  std::vector<std::vector<tracker::Detection>> detections;
+  Imager at_origin = camera;  // a body's frame knows no world
+  at_origin.imager_from_world = Pose{};
+  Progress progress("detect", static_cast<int>(options.images.size()));
+  for (const auto& path : options.images) {
+    LIMN_TRY(auto found, found_in(path, camera, &detector));
+    detections.push_back(std::move(found));
+    progress.step(static_cast<int>(detections.size()));
+  }
+  std::vector<tracker::View> views;
+  for (const auto& found : detections) views.push_back({&at_origin, found});
+  const auto learned = tracker::learned_body(views, 1e-3 * options.size_mm);
+  if (!learned) return error("--learn-body: {}", learned.message());
+  print(*learned);
+  return write_file(options.out, json_of(*learned, options.out.stem().string()).dump(1) + "\n");
+}
+
+}  // namespace limn::apps
