@@ -56,6 +56,7 @@ class Detector {
   std::vector<SegmentQuad> joined_;
 
   std::optional<Detection> read(const cv::Mat& grey, const Quad& quad, const Lens* lens, Reading reading);
+  void settle_overlapping_edges(const cv::Mat& grey, const Identity& identity, RefinedQuad* refined) const;
   void add_broken(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections);
 };
 

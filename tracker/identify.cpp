@@ -20,7 +20,6 @@ constexpr double k_border_errors_few_bits = 0.05;
 // The same where something covers the marker, and margins below which cells then count as hidden.
 constexpr double k_border_errors_covered = 0.25;
 constexpr std::array<double, 4> k_hidden_below = {0, 0.2, 0.4, 0.6};
-constexpr double k_min_score_all_bits = 0.8;  // mean margin where no bit may be hidden
 constexpr int k_few_bits = 25;
 // Mean margin of the cells (0: at the limit, 1: as black or white as beside the edge). Clutter lies below.
 constexpr double k_min_score = 0.35;
@@ -69,21 +68,32 @@ using Grid = std::array<double, k_max_grid * k_max_grid>;
 constexpr double k_middle = 0.5;
 constexpr std::array<double, 3> k_limits = {k_middle, 0.35, 0.22};
 
-// What one quad shows, as brightness relative to its edges: -1 as dark as inside them, 1 as light as outside.
+// Fraction of the way from black to white, at one to five places of every cell, border included.
+struct CellSamples {
+  static constexpr std::size_t k_places = 5;
+  int cells = 0;  // a side
+  bool several = false;
+  std::array<double, k_max_grid * k_max_grid * k_places> fraction;
+};
+
+// -1 at black, 0 at the limit, 1 as far above it as black lies below.
+double relative(double fraction, double limit) {
+  return std::clamp((fraction - limit) / limit, -k_brightest, k_brightest);
+}
+
+// What one quad shows, between the levels inside and outside its edges.
 struct Reader {
   const cv::Mat& grey;
   SquareToQuad px_from_square;
   Plane light, dark;
   double side_px;
-  double limit;
 
-  Reader(const cv::Mat& picture, const RefinedQuad& quad, double limit_share = k_middle)
+  Reader(const cv::Mat& picture, const RefinedQuad& quad)
       : grey(picture),
         px_from_square(quad.corners_px),
         light(quad.outside_level),
         dark(quad.inside_level),
-        side_px(std::sqrt(area(quad.corners_px))),
-        limit(limit_share) {}
+        side_px(std::sqrt(area(quad.corners_px))) {}
 
   static double area(const std::array<Eigen::Vector2d, 4>& q) {
     const Eigen::Vector2d a = q[2] - q[0];
@@ -91,49 +101,67 @@ struct Reader {
     return 0.5 * std::abs(a.x() * b.y() - a.y() * b.x());
   }
 
-  double relative(double x, double y) const {
-    const double high = light.at(x, y);
+  double fraction(double x, double y) const {
     const double low = dark.at(x, y);
-    const double half = std::max(1.0, limit * (high - low));
-    const double value = (sample(grey, px_from_square.at(x, y)) - low - limit * (high - low)) / half;
-    return std::clamp(value, -k_brightest, k_brightest);
+    const double range = std::max(2.0, light.at(x, y) - low);
+    return (sample(grey, px_from_square.at(x, y)) - low) / range;
   }
 
-  // Mean over the middle half of cell (row, column) of a grid with `cells` a side.
-  double cell(int row, int column, double cells, bool several) const {
+  // Places in the middle half of cell (row, column) of a grid with `cells` a side.
+  void read_cell(int row, int column, double cells, bool several, double* into) const {
     const double x = (column + 0.5) / cells;
     const double y = (row + 0.5) / cells;
-    if (!several) return relative(x, y);
+    into[0] = fraction(x, y);
+    if (!several) return;
     const double d = 0.2 / cells;
-    return 0.2 * (relative(x, y) + relative(x - d, y - d) + relative(x + d, y - d) + relative(x - d, y + d) +
-                  relative(x + d, y + d));
+    into[1] = fraction(x - d, y - d);
+    into[2] = fraction(x + d, y - d);
+    into[3] = fraction(x - d, y + d);
+    into[4] = fraction(x + d, y + d);
   }
 
-  // All cells, border included.
-  void read(int cells, Grid* grid) const {
-    const bool several = side_px / cells >= k_sharpen_below_px;
+  void read(int cells, CellSamples* samples) const {
+    samples->cells = cells;
+    samples->several = side_px / cells >= k_sharpen_below_px;
+    double* into = samples->fraction.data();
     for (int row = 0; row < cells; ++row)
-      for (int column = 0; column < cells; ++column)
-        (*grid)[static_cast<std::size_t>(row * cells + column)] = cell(row, column, cells, several);
-    if (!several) sharpen(cells, grid);
-  }
-
-  // Takes off what blur brought over from the four neighbours (outside the marker: white).
-  static void sharpen(int cells, Grid* grid) {
-    const Grid before = *grid;
-    const auto value = [&](int row, int column) {
-      const bool outside = row < 0 || column < 0 || row >= cells || column >= cells;
-      return outside ? 1.0 : before[static_cast<std::size_t>(row * cells + column)];
-    };
-    for (int row = 0; row < cells; ++row)
-      for (int column = 0; column < cells; ++column) {
-        const double here = value(row, column);
-        const double around =
-            value(row - 1, column) + value(row + 1, column) + value(row, column - 1) + value(row, column + 1);
-        (*grid)[static_cast<std::size_t>(row * cells + column)] = here + k_sharpening * (4 * here - around);
-      }
+      for (int column = 0; column < cells; ++column, into += CellSamples::k_places)
+        read_cell(row, column, cells, samples->several, into);
   }
 };
+
+double mean_relative(const double* fractions, bool several, double limit) {
+  if (!several) return relative(fractions[0], limit);
+  double sum = 0;
+  for (std::size_t i = 0; i < CellSamples::k_places; ++i) sum += relative(fractions[i], limit);
+  return sum / CellSamples::k_places;
+}
+
+// Takes off what blur brought over from the four neighbours (outside the marker: white).
+void sharpen(int cells, Grid* grid) {
+  const Grid before = *grid;
+  const auto value = [&](int row, int column) {
+    const bool outside = row < 0 || column < 0 || row >= cells || column >= cells;
+    return outside ? 1.0 : before[static_cast<std::size_t>(row * cells + column)];
+  };
+  for (int row = 0; row < cells; ++row)
+    for (int column = 0; column < cells; ++column) {
+      const double here = value(row, column);
+      const double around =
+          value(row - 1, column) + value(row + 1, column) + value(row, column - 1) + value(row, column + 1);
+      (*grid)[static_cast<std::size_t>(row * cells + column)] = here + k_sharpening * (4 * here - around);
+    }
+}
+
+// All cells, border included.
+Grid grid_of(const CellSamples& samples, double limit) {
+  Grid grid;
+  const auto count = static_cast<std::size_t>(samples.cells * samples.cells);
+  for (std::size_t i = 0; i < count; ++i)
+    grid[i] = mean_relative(&samples.fraction[i * CellSamples::k_places], samples.several, limit);
+  if (!samples.several) sharpen(samples.cells, &grid);
+  return grid;
+}
 
 struct Bits {
   std::uint64_t code = 0;
@@ -190,17 +218,16 @@ SeenCells cells_of(const CodeFamily& family, std::uint64_t code) {
   return cells;
 }
 
-// The family's code, when the cells whose margin is below `hidden_below` count as hidden.
-std::optional<Identity> read_code(const CodeFamily& family,
-                                  const Bits& bits,
-                                  double border_share,
-                                  double hidden_below) {
-  const int count = family.cells * family.cells;
-  if (bits.border_errors > border_share * bits.border_cells) return std::nullopt;
-  if (bits.mean_margin < (count <= k_few_bits ? k_min_score_few_bits : k_min_score)) return std::nullopt;
+// Bits whose margin is no smaller.
+std::uint64_t readable_bits(const Bits& bits, int count, double margin) {
   std::uint64_t readable = 0;
   for (int i = 0; i < count; ++i)
-    readable |= std::uint64_t{bits.margin[static_cast<std::size_t>(i)] >= hidden_below} << i;
+    readable |= std::uint64_t{bits.margin[static_cast<std::size_t>(i)] >= margin} << i;
+  return readable;
+}
+
+std::optional<Identity> read_code(const CodeFamily& family, const Bits& bits, std::uint64_t readable) {
+  const int count = family.cells * family.cells;
   const auto hidden = static_cast<std::size_t>(count - std::popcount(readable));
   if (hidden >= family.max_errors.size()) return std::nullopt;
   const Nearest best = nearest(family.codes, bits.code, readable);
@@ -218,15 +245,26 @@ std::optional<Identity> read_code(const CodeFamily& family,
 }
 
 std::optional<Identity> read_code(const CodeFamily& family, const Bits& bits, Reading reading) {
-  const bool few = family.cells * family.cells <= k_few_bits;
-  if (reading == Reading::open)
-    return read_code(family, bits, few ? k_border_errors_few_bits : k_border_errors, 0);
-  if (family.max_errors.size() == 1) {  // so few bits that all must be seen
-    if (bits.mean_margin < k_min_score_all_bits) return std::nullopt;
-    return read_code(family, bits, k_border_errors, 0);
+  const int count = family.cells * family.cells;
+  const bool few = count <= k_few_bits;
+  const bool covered = reading == Reading::covered;
+  // So few bits that clutter shows them by chance: not a second time.
+  if (covered && family.max_errors.size() == 1) return std::nullopt;
+  const double border_share = covered ? k_border_errors_covered
+                              : few   ? k_border_errors_few_bits
+                                      : k_border_errors;
+  const double min_score = few ? k_min_score_few_bits : k_min_score;
+  if (bits.border_errors > border_share * bits.border_cells || bits.mean_margin < min_score)
+    return std::nullopt;
+  const std::uint64_t all = readable_bits(bits, count, 0);
+  if (!covered) return read_code(family, bits, all);
+  std::uint64_t before = 0;
+  for (const double margin : k_hidden_below) {
+    const std::uint64_t readable = readable_bits(bits, count, margin);
+    if (readable == before) continue;
+    before = readable;
+    if (auto found = read_code(family, bits, readable)) return found;
   }
-  for (const double hidden_below : k_hidden_below)
-    if (auto found = read_code(family, bits, k_border_errors_covered, hidden_below)) return found;
   return std::nullopt;
 }
 
@@ -235,10 +273,10 @@ bool has_template_border(const Reader& reader) {
   int light = 0;
   for (int i = 0; i < 3; ++i) {
     const double along = 0.2 + 0.3 * i;
-    light += reader.relative(along, 0.125) > 0;
-    light += reader.relative(along, 0.875) > 0;
-    light += reader.relative(0.125, along) > 0;
-    light += reader.relative(0.875, along) > 0;
+    light += reader.fraction(along, 0.125) > k_middle;
+    light += reader.fraction(along, 0.875) > k_middle;
+    light += reader.fraction(0.125, along) > k_middle;
+    light += reader.fraction(0.875, along) > k_middle;
   }
   return light <= 1;
 }
@@ -255,8 +293,11 @@ std::vector<float> read_inner_half(const Reader& reader, int size) {
   const double cells = 2.0 * size;
   const bool several = reader.side_px / cells > 2;
   for (int row = 0; row < size; ++row)
-    for (int column = 0; column < size; ++column)
-      values.push_back(static_cast<float>(reader.cell(row + size / 2, column + size / 2, cells, several)));
+    for (int column = 0; column < size; ++column) {
+      std::array<double, CellSamples::k_places> fractions;
+      reader.read_cell(row + size / 2, column + size / 2, cells, several, fractions.data());
+      values.push_back(static_cast<float>(mean_relative(fractions.data(), several, k_middle)));
+    }
   values = smoothed(values, size);
   double mean = 0;
   for (const float v : values) mean += v / static_cast<double>(values.size());
@@ -286,18 +327,18 @@ std::optional<Identity> read_templates(const Reader& reader, const std::vector<T
 }
 
 std::optional<Identity> read_codes(const Reader& reader, const Families& families, Reading reading) {
+  const std::size_t limits = reading == Reading::open ? 1 : k_limits.size();
   std::optional<Identity> best;
-  int read_cells = 0;
-  Bits bits;
+  CellSamples samples;
+  std::array<Bits, k_limits.size()> bits;
   for (const CodeFamily& family : families.codes()) {
-    if (family.cells != read_cells) {
-      Grid grid;
-      reader.read(family.cells + 2, &grid);
-      bits = bits_of(grid, family.cells);
-      read_cells = family.cells;
+    const bool is_read = samples.cells == family.cells + 2;
+    if (!is_read) reader.read(family.cells + 2, &samples);
+    for (std::size_t i = 0; i < limits; ++i) {
+      if (!is_read) bits[i] = bits_of(grid_of(samples, k_limits[i]), family.cells);
+      const std::optional<Identity> found = read_code(family, bits[i], reading);
+      if (found && (!best || found->score > best->score)) best = found;
     }
-    const std::optional<Identity> found = read_code(family, bits, reading);
-    if (found && (!best || found->score > best->score)) best = found;
   }
   return best;
 }
@@ -344,14 +385,7 @@ std::optional<Identity> identify(const cv::Mat& grey,
                                  const RefinedQuad& quad,
                                  const Families& families,
                                  Reading reading) {
-  if (reading == Reading::covered) {
-    std::optional<Identity> best;
-    for (const double limit : k_limits) {
-      const auto found = read_codes(Reader(grey, quad, limit), families, Reading::covered);
-      if (found && (!best || found->score > best->score)) best = found;
-    }
-    return best;
-  }
+  if (reading == Reading::covered) return read_codes(Reader(grey, quad), families, reading);
   if (const auto found = read(Reader(grey, quad), families)) return found;
   // Something brighter than the paper may stand behind one side: try the second darkest side's paper for all.
   std::array<double, 4> levels = quad.outside_level;

@@ -15,6 +15,7 @@ constexpr double k_flat_share = 0.05;
 // Below this share a rise means another edge of the same direction behind the first: grey paper, then a white
 // table.
 constexpr double k_valley_share = 0.35;
+constexpr double k_settled_px = 2e-3;
 constexpr int k_max_reach = 10;
 constexpr int k_rough_rows = 12;         // of a side, where the effort is rough
 constexpr double k_huber = 1.5;          // in robust standard deviations
@@ -186,9 +187,9 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
          !(mean[high - 1] < valley_below && mean[high] > mean[high - 1]))
     ++high;
   // Flat beyond the window, not the slope of another edge or the end of what was looked at.
-  line->separate = low >= 2 && high + 2 <= profile;
-  for (std::size_t k = 1; k <= 2 && line->separate; ++k)
-    line->separate = std::abs(mean[low - k]) <= flat_below && std::abs(mean[high + k - 1]) <= flat_below;
+  line->separate = low >= 2 && high + 2 <= profile && std::abs(mean[low - 1]) <= flat_below &&
+                   std::abs(mean[high]) <= flat_below && std::abs(mean[low - 2]) <= 4 * flat_below &&
+                   std::abs(mean[high + 1]) <= 4 * flat_below;
   double contrast = 0;  // in light
   for (std::size_t k = low; k < high; ++k) contrast += mean[k];
   // A Gaussian's peak is its area over sigma sqrt(2 pi); v is not the edge's normal when the side leans.
@@ -253,6 +254,7 @@ double EdgeRefiner::fit_terms(int terms, EdgeLine* line) {
   line->offset = line->slope = line->curvature = 0;
   double scale = 0;  // 0: no robust weights yet
   double variance = -1;
+  const double half = 0.5 * std::abs(crossings_.back().u - crossings_.front().u);
   constexpr int k_huber_rounds = 3;
   constexpr int k_rounds = 5;
   for (int round = 0; round < k_rounds; ++round) {
@@ -282,6 +284,8 @@ double EdgeRefiner::fit_terms(int terms, EdgeLine* line) {
     if (!(normal.determinant() > 1e-9 * normal(0, 0) * normal(0, 0) * normal(2, 2))) return -1;
     Eigen::Matrix3d inverse = normal.inverse();
     const Eigen::Vector3d solution = inverse * right;
+    const double moved = std::abs(solution[0] - line->offset) + half * std::abs(solution[1] - line->slope) +
+                         half * half * std::abs(solution[2] - line->curvature);
     line->offset = solution[0];
     line->slope = solution[1];
     line->curvature = solution[2];
@@ -289,12 +293,12 @@ double EdgeRefiner::fit_terms(int terms, EdgeLine* line) {
     double squares = 0;
     double count = 0;
     deviations_.clear();
-    bool clean = true;
+    double largest = 0;
     for (const Crossing& c : crossings_) {
       const double residual = c.share * std::abs(c.v - line->at(c.u));
       deviations_.push_back(residual);
       if (round >= k_huber_rounds && residual > foreign) continue;
-      clean = clean && residual <= huber;
+      largest = std::max(largest, residual);
       const double bounded = scale > 0 ? std::min(residual, 3 * scale) : residual;
       squares += bounded * bounded;
       count += 1;
@@ -304,7 +308,8 @@ double EdgeRefiner::fit_terms(int terms, EdgeLine* line) {
     scale = std::max(1.4826 * *middle, 1e-3);
     variance = squares / std::max(1.0, count - terms);  // of a row of full contrast
     line->covariance = inverse * variance;
-    if (clean && round > 0) break;  // all weights were 1, and will be
+    // Settled, with nothing to reject in the rounds to come.
+    if (round > 0 && moved < k_settled_px && largest < k_reject * std::max(scale, k_min_scale_px)) break;
   }
   return variance;
 }

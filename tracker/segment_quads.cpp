@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 namespace limn::tracker {
 namespace {
@@ -10,21 +11,25 @@ constexpr double k_cell_px = 32;
 constexpr double k_min_length_px = 9;    // of a segment: shorter ones' directions are too vague
 constexpr double k_min_sine = 0.25;      // of a quad's corner: steeper markers show as regions
 constexpr double k_max_opposite = -0.3;  // cosine between opposite sides
-constexpr double k_max_gap_share = 0.9;  // of a segment's length, between its end and the corner
+constexpr double k_max_gap_share = 0.9;  // of the longer segment's length, from a segment's end to the corner
 constexpr double k_gap_px = 6;
 constexpr double k_overlap_px = 3;  // by which a segment may run past the corner
-constexpr double k_overlap_share = 0.08;
-constexpr double k_max_reach_px = 90;     // between the segments of a corner
-constexpr std::size_t k_max_corners = 6;  // that are kept of a segment
+constexpr double k_overlap_share = 0.2;
+constexpr double k_max_reach_px = 75;     // between the segments of a corner
+constexpr std::size_t k_max_corners = 8;  // that are kept of a segment
 constexpr double k_min_visible = 0.5;     // of the outline
-constexpr double k_min_side_visible = 0.2;
+constexpr double k_min_side_visible = 0.15;
 constexpr double k_min_side_px = 12;
 constexpr double k_same_px = 3;  // quads whose corners all lie nearer are the same
 constexpr std::size_t k_max_quads = 20000;
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-double max_gap(const Segment& s) { return k_gap_px + k_max_gap_share * s.length; }
+// The sides of a quadrilateral are of like lengths: a short piece may belong to a side as long as the next.
+double max_gap(const Segment& a, const Segment& b) {
+  return k_gap_px + k_max_gap_share * std::max(a.length, b.length);
+}
+double reach_of(const Segment& s) { return std::min(k_max_reach_px, 1.2 * s.length + 2 * k_gap_px); }
 double max_overlap(const Segment& s) { return k_overlap_px + k_overlap_share * s.length; }
 
 // Where the outline turns from one segment to the next; false when it cannot.
@@ -33,8 +38,8 @@ bool corner_of(const Segment& a, const Segment& b, Eigen::Vector2d* px, double* 
   if (sine < k_min_sine) return false;
   const double after_a = cross(b.from - a.to, b.direction) / sine;  // from a's end; negative: within a
   const double into_b = cross(b.from - a.to, a.direction) / sine;   // from b's start; negative: before it
-  if (after_a < -max_overlap(a) || after_a > max_gap(a)) return false;
-  if (into_b < -max_gap(b) || into_b > max_overlap(b)) return false;
+  if (after_a < -max_overlap(a) || after_a > max_gap(a, b)) return false;
+  if (into_b < -max_gap(a, b) || into_b > max_overlap(b)) return false;
   *px = a.to + after_a * a.direction;
   *cost = (std::abs(after_a) + std::abs(into_b)) / (a.length + b.length);
   return true;
@@ -62,9 +67,10 @@ void SegmentQuadFinder::find(std::span<const Segment> segments,
   segments_.clear();
   for (const Segment& s : segments)
     if (s.length >= k_min_length_px) segments_.push_back(s);
-  sort_into_cells();
+  sort_into_cells(&Segment::from, &begins_);
   join_collinear();
-  sort_into_cells();
+  sort_into_cells(&Segment::from, &begins_);
+  sort_into_cells(&Segment::to, &ends_);
   find_corners();
   for (std::uint32_t i = 0; i < segments_.size() && quads.size() < k_max_quads; ++i) add_quads(i, quads);
   std::stable_sort(quads.begin(), quads.end(),
@@ -77,27 +83,33 @@ int SegmentQuadFinder::cell_of(const Eigen::Vector2d& px) const {
   return row * columns_ + column;
 }
 
-void SegmentQuadFinder::sort_into_cells() {
-  std::swap(segments_, unsorted_);
-  cell_begin_.assign(static_cast<std::size_t>(columns_ * rows_) + 2, 0);
-  for (const Segment& s : unsorted_) ++cell_begin_[static_cast<std::size_t>(cell_of(s.from)) + 2];
-  for (std::size_t i = 2; i < cell_begin_.size(); ++i) cell_begin_[i] += cell_begin_[i - 1];
-  segments_.resize(unsorted_.size());
-  for (const Segment& s : unsorted_)
-    segments_[cell_begin_[static_cast<std::size_t>(cell_of(s.from)) + 1]++] = s;
+void SegmentQuadFinder::sort_into_cells(Eigen::Vector2d Segment::*point, Cells* cells) const {
+  cells->begin.assign(static_cast<std::size_t>(columns_ * rows_) + 2, 0);
+  for (const Segment& s : segments_) ++cells->begin[static_cast<std::size_t>(cell_of(s.*point)) + 2];
+  for (std::size_t i = 2; i < cells->begin.size(); ++i) cells->begin[i] += cells->begin[i - 1];
+  cells->entries.resize(segments_.size());
+  for (std::uint32_t i = 0; i < segments_.size(); ++i) {
+    const Eigen::Vector2d& px = segments_[i].*point;
+    cells->entries[cells->begin[static_cast<std::size_t>(cell_of(px)) + 1]++] = {px.cast<float>(), i};
+  }
 }
 
-// The segments whose starts lie about `px`.
+// The segments whose points of these cells lie about `px`.
 template <typename Visit>
-void SegmentQuadFinder::visit_starts(const Eigen::Vector2d& px, double radius, const Visit& visit) const {
+void SegmentQuadFinder::visit(const Cells& cells,
+                              const Eigen::Vector2d& px,
+                              double radius,
+                              const Visit& visit) const {
   const Eigen::Vector2d reach(radius, radius);
   const int low = cell_of(px - reach);
   const int high = cell_of(px + reach);
   const int count = high % columns_ - low % columns_;
+  const Eigen::Vector2f centre = px.cast<float>();
+  const auto square = static_cast<float>(radius * radius);
   for (int first = low; first + count <= high; first += columns_)
-    for (std::uint32_t i = cell_begin_[static_cast<std::size_t>(first)];
-         i < cell_begin_[static_cast<std::size_t>(first + count) + 1]; ++i)
-      if ((segments_[i].from - px).squaredNorm() <= radius * radius) visit(i);
+    for (std::uint32_t i = cells.begin[static_cast<std::size_t>(first)];
+         i < cells.begin[static_cast<std::size_t>(first + count) + 1]; ++i)
+      if ((cells.entries[i].px - centre).squaredNorm() <= square) visit(cells.entries[i].segment);
 }
 
 // Two pieces of one line, what covers it between them: added as one segment more.
@@ -110,11 +122,11 @@ void SegmentQuadFinder::join_collinear() {
     const double reach = std::min(k_max_reach_px, a.length + k_gap_px);
     std::uint32_t nearest = 0;
     double least = reach;
-    visit_starts(a.to, reach, [&](std::uint32_t j) {
+    visit(begins_, a.to, reach, [&](std::uint32_t j) {
       const Segment& b = segments_[j];
       const Eigen::Vector2d apart = b.from - a.to;
       const double gap = a.direction.dot(apart);
-      if (j == i || gap <= 0 || gap >= least || gap > 0.8 * (a.length + b.length)) return;
+      if (j == i || gap <= 0 || gap >= least || gap > a.length + b.length) return;
       if (a.direction.dot(b.direction) < 0 || std::abs(cross(a.direction, b.direction)) > k_max_sine) return;
       const Eigen::Vector2d whole = (b.to - a.from).normalized();
       if (std::abs(cross(whole, a.to - a.from)) > k_max_beside_px ||
@@ -130,25 +142,35 @@ void SegmentQuadFinder::join_collinear() {
   }
 }
 
+// Corners within reach of either segment.
 void SegmentQuadFinder::find_corners() {
-  corners_.clear();
-  corner_begin_.clear();
+  found_.clear();
+  const auto add = [&](std::uint32_t i, std::uint32_t j) {
+    Corner corner{i, j, 0, {}};
+    if (corner_of(segments_[i], segments_[j], &corner.px, &corner.cost)) found_.push_back(corner);
+  };
   for (std::uint32_t i = 0; i < segments_.size(); ++i) {
-    const Segment& a = segments_[i];
-    corner_begin_.push_back(static_cast<std::uint32_t>(corners_.size()));
-    list_.clear();
-    const double reach = std::min(k_max_reach_px, 1.2 * a.length + 2 * k_gap_px);
-    visit_starts(a.to, reach, [&](std::uint32_t j) {
-      Corner corner{j, 0, {}};
-      if (corner_of(a, segments_[j], &corner.px, &corner.cost)) list_.push_back(corner);
+    const Segment& here = segments_[i];
+    const double reach = reach_of(here);
+    visit(begins_, here.to, reach, [&](std::uint32_t j) { add(i, j); });
+    visit(ends_, here.from, reach, [&](std::uint32_t j) {
+      const Segment& before = segments_[j];
+      const double short_reach = reach_of(before);
+      if ((before.to - here.from).squaredNorm() > short_reach * short_reach) add(j, i);
     });
-    const auto kept = list_.begin() + static_cast<std::ptrdiff_t>(std::min(list_.size(), k_max_corners));
-    std::partial_sort(list_.begin(), kept, list_.end(), [](const Corner& x, const Corner& y) {
-      return x.cost < y.cost || (x.cost == y.cost && x.next < y.next);
-    });
-    corners_.insert(corners_.end(), list_.begin(), kept);
   }
-  corner_begin_.push_back(static_cast<std::uint32_t>(corners_.size()));
+  std::sort(found_.begin(), found_.end(), [](const Corner& x, const Corner& y) {
+    return std::tie(x.segment, x.cost, x.next) < std::tie(y.segment, y.cost, y.next);
+  });
+  corners_.clear();
+  corner_begin_.assign(segments_.size() + 1, 0);
+  std::size_t next = 0;
+  for (std::uint32_t i = 0; i < segments_.size(); ++i) {
+    corner_begin_[i] = static_cast<std::uint32_t>(corners_.size());
+    for (std::size_t kept = 0; next < found_.size() && found_[next].segment == i; ++next, ++kept)
+      if (kept < k_max_corners) corners_.push_back(found_[next]);
+  }
+  corner_begin_[segments_.size()] = static_cast<std::uint32_t>(corners_.size());
 }
 
 std::span<const SegmentQuadFinder::Corner> SegmentQuadFinder::corners_of(std::uint32_t segment) const {

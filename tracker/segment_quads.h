@@ -26,26 +26,32 @@ class SegmentQuadFinder {
 
  private:
   struct Corner {
-    std::uint32_t next;  // segment that the outline goes on with
-    double cost;         // gaps over lengths
+    std::uint32_t segment, next;  // the outline turns from the one to the other
+    double cost;                  // gaps over lengths
     Eigen::Vector2d px;
   };
-  std::vector<Segment>
-      segments_;  // those found, and those joined of two on one line; by cell of their starts
-  std::vector<Segment> unsorted_;
-  std::vector<std::uint32_t> cell_begin_;  // first segment of every cell, and the end
-  std::vector<Corner> corners_;            // of all segments, each one's best first
+  struct Cells {  // of k_cell_px: the segments by where one of their points lies
+    struct Entry {
+      Eigen::Vector2f px;
+      std::uint32_t segment;
+    };
+    std::vector<std::uint32_t> begin;  // first entry of every cell, and the end
+    std::vector<Entry> entries;
+  };
+  std::vector<Segment> segments_;  // those found, and those joined of two on one line
+  Cells begins_, ends_;
+  std::vector<Corner> found_;
+  std::vector<Corner> corners_;  // of all segments, each one's best first
   std::vector<std::uint32_t> corner_begin_;
-  std::vector<Corner> list_;
   int columns_ = 0, rows_ = 0;
 
-  void sort_into_cells();
   int cell_of(const Eigen::Vector2d& px) const;
-  std::span<const Corner> corners_of(std::uint32_t segment) const;
+  void sort_into_cells(Eigen::Vector2d Segment::*point, Cells* cells) const;
   template <typename Visit>
-  void visit_starts(const Eigen::Vector2d& px, double radius, const Visit& visit) const;
+  void visit(const Cells& cells, const Eigen::Vector2d& px, double radius, const Visit& visit) const;
   void join_collinear();
   void find_corners();
+  std::span<const Corner> corners_of(std::uint32_t segment) const;
   void add_quads(std::uint32_t first, std::vector<SegmentQuad>& quads) const;
 };
 

@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <ctime>
 #include <numbers>
+#include <opencv2/imgproc.hpp>
 #include <string>
 #include <vector>
 
@@ -285,6 +287,94 @@ TEST(Detector, SurvivesOddPictures) {
     for (const int grey : {0, 128, 255})
       EXPECT_TRUE(detector.detect(test::plain(width, height, grey)).empty());
   EXPECT_TRUE(detector.detect(test::plain(640, 480, 0)).empty());
+}
+
+TEST(Detector, FindsMarkersUnderFingersAndSaysWhichCornersAreCovered) {
+  auto rng = test::test_rng();
+  Detector detector(families({"apriltag_36h11"}));
+  for (int i = 0; i < 12; ++i) {
+    const PlacedMarker marker = test::placed(pinhole_vga(), {"apriltag_36h11", std::to_string(i)}, {320, 240},
+                                             uniform(rng, 70, 120), uniform(rng, 0, 6.28), 20_deg, i);
+    cv::Mat light = test::light_of(pinhole_vga(), test::plain(640, 480, 100), std::vector{marker}, {}, rng);
+    const auto truth = test::true_corners(pinhole_vga(), marker);
+    const double side = (truth[1] - truth[0]).norm();
+    cv::circle(light, {static_cast<int>(truth[0].x()), static_cast<int>(truth[0].y())},
+               static_cast<int>(0.15 * side), cv::Scalar(120), -1);
+    const auto found = detector.detect(test::noisy_grey(light, 2, rng));
+    ASSERT_EQ(found.size(), 1u) << i;
+    EXPECT_EQ(found[0].corner_visible, (std::array<bool, 4>{false, true, true, true}));
+    for (std::size_t k = 0; k < 4; ++k) EXPECT_TRUE(test::near(found[0].corners_px[k], truth[k], 0.3));
+  }
+}
+
+TEST(Detector, HasNoBiasWhereTheWhiteMarginIsAPixelWide) {
+  auto rng = test::test_rng();
+  Detector detector(families({"aruco_4x4_50"}));
+  double outward = 0;
+  constexpr int k_count = 15;
+  for (int i = 0; i < k_count; ++i) {
+    PlacedMarker marker = test::placed(pinhole_vga(), {"aruco_4x4_50", std::to_string(i)}, {320, 240},
+                                       uniform(rng, 60, 120), uniform(rng, 0, 6.28), 20_deg, i);
+    marker.margin = 0.015;
+    const auto truth = test::true_corners(pinhole_vga(), marker);
+    const auto found =
+        detector.detect(test::picture_of(pinhole_vga(), test::plain(640, 480, 90), std::vector{marker},
+                                         {.blur_px = 0.5, .noise_levels = 2}, rng));
+    ASSERT_EQ(found.size(), 1u) << i;
+    const Eigen::Vector2d centre = 0.25 * (truth[0] + truth[1] + truth[2] + truth[3]);
+    for (std::size_t k = 0; k < 4; ++k) {
+      EXPECT_TRUE(test::near(found[0].corners_px[k], truth[k], 0.2));
+      outward += (found[0].corners_px[k] - truth[k]).dot((truth[k] - centre).normalized()) / (4 * k_count);
+    }
+  }
+  EXPECT_LT(std::abs(outward), 0.02);  // 0.1 and more by edge lines alone
+}
+
+// Thousands of squares in each other, all that a marker detector takes for one at first.
+cv::Mat nested_squares(int width, int height) {
+  cv::Mat picture = test::plain(width, height, 230);
+  for (int y = 0; y + 60 <= height; y += 60)
+    for (int x = 0; x + 60 <= width; x += 60)
+      for (int inset = 2; inset < 28; inset += 3)
+        cv::rectangle(picture, cv::Rect(x + inset, y + inset, 60 - 2 * inset, 60 - 2 * inset),
+                      cv::Scalar(inset % 2 ? 230 : 20), -1);
+  return picture;
+}
+
+cv::Mat checkerboard(int width, int height, int square) {
+  cv::Mat picture(height, width, CV_8UC1);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) picture.at<std::uint8_t>(y, x) = (x / square + y / square) % 2 ? 20 : 230;
+  return picture;
+}
+
+double detect_seconds(Detector& detector, const cv::Mat& grey) {
+  double least = 1e9;
+  for (int i = 0; i < 2; ++i) {
+    const std::clock_t started = std::clock();
+    EXPECT_TRUE(detector.detect(grey).empty());
+    least = std::min(least, static_cast<double>(std::clock() - started) / CLOCKS_PER_SEC);
+  }
+  return least;
+}
+
+TEST(Detector, TakesNoMoreThanTenTimesAsLongForHostilePictures) {
+  auto rng = test::test_rng();
+  constexpr int k_width = 1280;
+  constexpr int k_height = 720;
+  Detector detector(families({"apriltag_36h11"}));
+  const double ordinary = detect_seconds(detector, test::clutter(k_width, k_height, rng));
+  cv::Mat noise(k_height, k_width, CV_8UC1);
+  for (int i = 0; i < k_width * k_height; ++i) noise.data[i] = static_cast<std::uint8_t>(rng());
+  EXPECT_LT(detect_seconds(detector, noise), 10 * ordinary);
+  EXPECT_LT(detect_seconds(detector, nested_squares(k_width, k_height)), 10 * ordinary);
+  for (const int square : {1, 3, 8, 20})
+    EXPECT_LT(detect_seconds(detector, checkerboard(k_width, k_height, square)), 10 * ordinary) << square;
+}
+
+TEST(Detector, TakesAPictureOfFortyEightMegapixels) {
+  Detector detector(families({"apriltag_36h11"}));
+  EXPECT_TRUE(detector.detect(test::plain(8000, 6000, 128)).empty());
 }
 
 TEST(Detector, FindsAMarkerInAPartOfALargerPicture) {
