@@ -13,6 +13,7 @@
 
 #include "core/file.h"
 #include "core/predefined_family.h"
+#include "tracker/barcode.h"
 
 namespace limn::tracker {
 namespace {
@@ -29,6 +30,7 @@ constexpr const char* k_artoolkit = "artoolkit:";
 std::string known_families() {
   std::string list;
   for (const PredefinedFamily& family : predefined_families()) list += std::string(family.name) + ", ";
+  for (const Barcode& barcode : barcodes()) list += std::string(barcode.name) + ", ";
   return list + "aruco:FILE.yml, artoolkit:FILE.patt";
 }
 
@@ -80,6 +82,8 @@ int correctable_errors(const CodeFamily& family, int distance, int hidden) {
 
 // A flawless code is always read, whatever the family's size.
 std::vector<int> correctable_errors(const CodeFamily& family) {
+  const int bits = family.cells * family.cells;
+  if (4 * static_cast<double>(family.codes.size()) > std::ldexp(k_max_random_hit, bits)) return {0};
   const int distance = smallest_distance(family);
   std::vector<int> errors = {std::max(0, correctable_errors(family, distance, 0))};
   for (int hidden = 1;; ++hidden) {
@@ -103,6 +107,17 @@ CodeFamily from_opencv(const std::string& name, int index) {
         code = (code << 1) | std::uint64_t{bits.at<std::uint8_t>(row, column) != 0};
     family.codes.push_back(four_turns(code, family.cells));
   }
+  family.max_errors = correctable_errors(family);
+  return family;
+}
+
+CodeFamily from_barcode(const Barcode& barcode) {
+  CodeFamily family;
+  family.name = barcode.name;
+  family.cells = barcode.cells;
+  family.border_cells = 0.5 * barcode.cells;
+  for (std::size_t id = 0; id < barcode.ids(); ++id)
+    family.codes.push_back(four_turns(barcode_cells(barcode, id), family.cells));
   family.max_errors = correctable_errors(family);
   return family;
 }
@@ -246,7 +261,18 @@ cv::Mat drawn_cells(int cells, int pixels_per_cell, auto&& grey_of_cell) {
   return picture;
 }
 
+// In half cells.
+cv::Mat drawn_barcode(const CodeFamily& family, std::size_t id, int pixels_per_half) {
+  return drawn_cells(4 * family.cells, pixels_per_half, [&](int row, int column) -> std::uint8_t {
+    const int r = row - family.cells;
+    const int c = column - family.cells;
+    const bool inside = r >= 0 && c >= 0 && r < 2 * family.cells && c < 2 * family.cells;
+    return inside && bit_of(family.codes[id][0], family.cells, r / 2, c / 2) ? 255 : 0;
+  });
+}
+
 cv::Mat drawn_code(const CodeFamily& family, std::size_t id, int pixels_per_cell) {
+  if (family.border_cells != 1) return drawn_barcode(family, id, pixels_per_cell);
   return drawn_cells(family.cells + 2, pixels_per_cell, [&](int row, int column) -> std::uint8_t {
     const bool border = row == 0 || column == 0 || row > family.cells || column > family.cells;
     return !border && bit_of(family.codes[id][0], family.cells, row - 1, column - 1) ? 255 : 0;
@@ -289,6 +315,8 @@ Result<Families> Families::load(std::span<const std::string> names, const std::f
     if (!seen.insert(name).second) continue;
     if (const PredefinedFamily* known = find_predefined_family(name)) {
       families.codes_.push_back(from_opencv(name, known->opencv_dictionary));
+    } else if (const Barcode* barcode = find_barcode(name)) {
+      families.codes_.push_back(from_barcode(*barcode));
     } else if (const auto dictionary = file_after(name, k_aruco_file)) {
       LIMN_TRY(CodeFamily family, load_dictionary(folder / *dictionary));
       families.codes_.push_back(std::move(family));

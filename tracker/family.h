@@ -13,11 +13,12 @@
 
 namespace limn::tracker {
 
-/// Square codes of cells x cells bits inside a black border of one cell. A code is read row by row from the
-/// top left, first bit highest; 1 is white.
+/// Square codes of cells x cells bits inside a black border. A code is read row by row from the top left,
+/// first bit highest; 1 is white.
 struct CodeFamily {
   std::string name;
   int cells = 0;
+  double border_cells = 1;  ///< the border's width in cells; a barcode's (barcode.h) is cells / 2
   /// Wrong bits that are still corrected, by the number of bits that cannot be read (covered): so few that
   /// the code is the only one and that a quad with random cells is taken for a marker once in 5000 times at
   /// most (family.cpp). Ends where not even flawless other bits are enough.
@@ -45,9 +46,9 @@ class Families {
  public:
   /// Names as in interfaces.md: `apriltag_36h11`, `apriltag_25h9`, `apriltag_16h5`, `apriltag_36h10`,
   /// `aruco_4x4_50` … `aruco_7x7_1000`, `aruco_original`, `aruco:FILE.yml` (OpenCV dictionary file),
-  /// `artoolkit:FILE.patt`. Relative files are looked up in `folder`; a family or id that comes from a file
-  /// is named by the file's own name without folders. Errors name unknown families (and list the known ones)
-  /// and broken files.
+  /// `artoolkit_3x3` and the other barcodes (barcode.h), `artoolkit:FILE.patt`. Relative files are looked up
+  /// in `folder`; a family or id that comes from a file is named by the file's own name without folders.
+  /// Errors name unknown families (and list the known ones) and broken files.
   static Result<Families> load(std::span<const std::string> names, const std::filesystem::path& folder = {});
 
   const std::vector<CodeFamily>& codes() const { return codes_; }
@@ -62,7 +63,8 @@ class Families {
 std::vector<std::string> families_of(std::span<const Body> bodies);
 
 /// The marker upright as printed: 8-bit grey, its black border included, no white margin, `pixels_per_cell`
-/// pixels a cell (an ARToolKit template has 2 cells for every value along a side). Relative files as in load.
+/// pixels a cell (an ARToolKit template has 2 cells for every value along a side; of a barcode, whose border
+/// may end at half a cell, it is pixels a half cell). Relative files as in load.
 Result<cv::Mat> draw_marker(const MarkerName& marker,
                             int pixels_per_cell,
                             const std::filesystem::path& folder = {});

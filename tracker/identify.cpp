@@ -26,13 +26,16 @@ constexpr double k_min_score = 0.35;
 constexpr double k_min_score_few_bits = 0.5;
 // Margin that wrong bits may hold together, as share of all: a clear bit that is wrong is no noise.
 constexpr double k_max_wrong_margin = 0.1;
-constexpr double k_min_correlation = 0.65;   // of a template, see numbers of the real Hiro frame in the tests
-constexpr double k_min_rotation_lead = 0.1;  // best rotation over the second best
-constexpr double k_uneven_paper = 1.3;       // brightest side over the second darkest
+constexpr double k_uneven_paper = 1.3;            // brightest side over the second darkest
 constexpr double k_min_template_variance = 0.02;  // stdev a fifteenth of black to white
 constexpr double k_brightest = 2;                 // glare counts no more than this
 constexpr double k_sharpen_below_px = 4;          // cells smaller than this blur into each other
 constexpr double k_sharpening = 0.25;             // Laplacian weight
+// A barcode's every bit is data: nothing in the code tells a marker from clutter, so its light must. Least
+// and mean margin of its cells, share of its border's places that may be light.
+constexpr double k_min_barcode_margin = 0.4;
+constexpr double k_min_barcode_score = 0.75;
+constexpr double k_barcode_border_errors = 0.02;
 
 // Bilinear; the picture's edge goes on outside.
 double sample(const cv::Mat& grey, const Eigen::Vector2d& px) {
@@ -109,8 +112,11 @@ struct Reader {
 
   // Places in the middle half of cell (row, column) of a grid with `cells` a side.
   void read_cell(int row, int column, double cells, bool several, double* into) const {
-    const double x = (column + 0.5) / cells;
-    const double y = (row + 0.5) / cells;
+    read_around((column + 0.5) / cells, (row + 0.5) / cells, cells, several, into);
+  }
+
+  // The same of the cell about (x, y).
+  void read_around(double x, double y, double cells, bool several, double* into) const {
     into[0] = fraction(x, y);
     if (!several) return;
     const double d = 0.2 / cells;
@@ -127,6 +133,22 @@ struct Reader {
     for (int row = 0; row < cells; ++row)
       for (int column = 0; column < cells; ++column, into += CellSamples::k_places)
         read_cell(row, column, cells, samples->several, into);
+  }
+
+  // A family whose border is wider than a cell: the border as one ring of cells, read in its middle.
+  void read_barcode(const CodeFamily& family, CellSamples* samples) const {
+    const double side_cells = family.cells + 2 * family.border_cells;
+    samples->cells = family.cells + 2;
+    samples->several = side_px / side_cells >= k_sharpen_below_px;
+    const auto middle = [&](int i) {
+      if (i == 0) return 0.5 * family.border_cells / side_cells;
+      if (i > family.cells) return 1 - 0.5 * family.border_cells / side_cells;
+      return (family.border_cells + i - 0.5) / side_cells;
+    };
+    double* into = samples->fraction.data();
+    for (int row = 0; row < samples->cells; ++row)
+      for (int column = 0; column < samples->cells; ++column, into += CellSamples::k_places)
+        read_around(middle(column), middle(row), side_cells, samples->several, into);
   }
 };
 
@@ -191,6 +213,8 @@ Bits bits_of(const Grid& grid, int cells) {
   return bits;
 }
 
+bool is_barcode(const CodeFamily& family) { return family.border_cells != 1; }
+
 struct Nearest {
   std::size_t id = 0, rotation = 0;
   int errors = 64;
@@ -210,6 +234,7 @@ __attribute__((target_clones("popcnt", "default"))) Nearest nearest(
 
 SeenCells cells_of(const CodeFamily& family, std::uint64_t code) {
   SeenCells cells;
+  if (is_barcode(family)) return cells;  // half cells, or more than it holds
   cells.count = family.cells + 2;
   int bit = family.cells * family.cells;
   for (int row = 1; row <= family.cells; ++row)
@@ -266,6 +291,41 @@ std::optional<Identity> read_code(const CodeFamily& family, const Bits& bits, Re
     if (auto found = read_code(family, bits, readable)) return found;
   }
   return std::nullopt;
+}
+
+// Whether the whole border is dark, near its outer edge and near the cells, where other families have some.
+bool is_border_dark(const Reader& reader) {
+  constexpr int k_places = 24;  // a side
+  int light = 0;
+  for (const double inset : {0.08, 0.19})
+    for (int i = 0; i < k_places; ++i) {
+      const double along = inset + (1 - 2 * inset) * i / k_places;
+      light += reader.fraction(along, inset) > k_middle;
+      light += reader.fraction(1 - inset, along) > k_middle;
+      light += reader.fraction(1 - along, 1 - inset) > k_middle;
+      light += reader.fraction(inset, 1 - along) > k_middle;
+    }
+  return light <= k_barcode_border_errors * 8 * k_places;
+}
+
+std::optional<Identity> read_barcode(const Reader& reader, const CodeFamily& family) {
+  CellSamples samples;
+  reader.read_barcode(family, &samples);
+  const Bits bits = bits_of(grid_of(samples, k_middle), family.cells);
+  const auto least = std::min_element(bits.margin.begin(), bits.margin.begin() + family.cells * family.cells);
+  if (*least < k_min_barcode_margin || bits.mean_margin < k_min_barcode_score) return std::nullopt;
+  if (!is_border_dark(reader)) return std::nullopt;
+  return read_code(family, bits, Reading::open);
+}
+
+std::optional<Identity> read_barcodes(const Reader& reader, const Families& families) {
+  std::optional<Identity> best;
+  for (const CodeFamily& family : families.codes()) {
+    if (!is_barcode(family)) continue;
+    const auto found = read_barcode(reader, family);
+    if (found && (!best || found->score > best->score)) best = found;
+  }
+  return best;
 }
 
 // Border of a template: a quarter of the side; dark at 12 places of its middle ring.
@@ -332,6 +392,7 @@ std::optional<Identity> read_codes(const Reader& reader, const Families& familie
   CellSamples samples;
   std::array<Bits, k_limits.size()> bits;
   for (const CodeFamily& family : families.codes()) {
+    if (is_barcode(family)) continue;
     const bool is_read = samples.cells == family.cells + 2;
     if (!is_read) reader.read(family.cells + 2, &samples);
     for (std::size_t i = 0; i < limits; ++i) {
@@ -344,8 +405,9 @@ std::optional<Identity> read_codes(const Reader& reader, const Families& familie
 }
 
 std::optional<Identity> read(const Reader& reader, const Families& families) {
-  const auto code = read_codes(reader, families, Reading::open);
-  return code ? code : read_templates(reader, families.templates());
+  if (auto code = read_codes(reader, families, Reading::open)) return code;
+  if (auto code = read_barcodes(reader, families)) return code;
+  return read_templates(reader, families.templates());
 }
 
 // The picture's nearest pixel; its edge goes on outside.
@@ -379,6 +441,10 @@ bool may_be_marker(const cv::Mat& grey, const Quad& quad, double min_contrast) {
   const int middle = border[k_border / 2];
   // Three quarters of the border darker than half way to what is lightest inside.
   return lightest - middle >= min_contrast && border[k_border * 3 / 4] < middle + 0.6 * (lightest - middle);
+}
+
+bool has_quarter_border(const cv::Mat& grey, const RefinedQuad& quad) {
+  return is_border_dark(Reader(grey, quad));
 }
 
 std::optional<Identity> identify(const cv::Mat& grey,

@@ -22,6 +22,14 @@ struct Identity {
 /// something lighter, by at least min_contrast levels. Costs a tenth of refining it.
 bool may_be_marker(const cv::Mat& grey, const Quad& quad, double min_contrast);
 
+/// Least correlation of a template with what a quad shows, and how far its best rotation must lead the
+/// second.
+constexpr double k_min_correlation = 0.65;  // see numbers of the real Hiro frame in the tests
+constexpr double k_min_rotation_lead = 0.1;
+
+/// Whether a black border a quarter of the side wide runs all around: ARToolKit's barcodes and templates.
+bool has_quarter_border(const cv::Mat& grey, const RefinedQuad& quad);
+
 /// What a reader may count on.
 enum class Reading {
   open,    ///< all cells are seen, in one light
