@@ -1,0 +1,184 @@
+#include "tracker/template_training.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "core/picture.h"
+#include "tracker/candidates.h"
+#include "tracker/identify.h"
+#include "tracker/refine.h"
+#include "tracker/square_to_quad.h"
+#include "tracker/threshold.h"
+
+namespace limn::tracker {
+namespace {
+
+constexpr int k_min_contrast = 32;      // levels: a picture to train from is a good one
+constexpr double k_min_search_px = 20;  // side; smaller frames are read by nobody
+constexpr double k_min_side_px = 64;    // two pixels a value
+constexpr double k_min_deviation = 15;  // of the grey values: identify's least, a fifteenth of black to white
+constexpr double k_border = 0.25;       // of the side, as the detector reads it
+
+double area(const std::array<Eigen::Vector2d, 4>& q) {
+  const Eigen::Vector2d a = q[2] - q[0];
+  const Eigen::Vector2d b = q[3] - q[1];
+  return 0.5 * std::abs(a.x() * b.y() - a.y() * b.x());
+}
+
+Eigen::Vector2d centre(const std::array<Eigen::Vector2d, 4>& q) { return 0.25 * (q[0] + q[1] + q[2] + q[3]); }
+
+bool contains(const std::array<Eigen::Vector2d, 4>& q, const Eigen::Vector2d& px) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Eigen::Vector2d side = q[(i + 1) % 4] - q[i];
+    const Eigen::Vector2d to = px - q[i];
+    if (side.x() * to.y() - side.y() * to.x() < 0) return false;
+  }
+  return true;
+}
+
+std::vector<RefinedQuad> frames_in(const cv::Mat& grey) {
+  Threshold threshold;
+  CornerCodes codes;
+  QuadFinder finder;
+  std::vector<Quad> quads;
+  threshold.apply(grey, k_min_contrast, codes);
+  finder.find(codes, {k_min_search_px}, quads);
+  EdgeRefiner refiner;
+  std::vector<RefinedQuad> frames;
+  for (const Quad& quad : quads) {
+    if (!may_be_marker(grey, quad, k_min_contrast)) continue;
+    const auto refined = refiner.refine(grey, quad, k_min_contrast, nullptr);
+    if (refined && has_quarter_border(grey, *refined)) frames.push_back(*refined);
+  }
+  std::sort(frames.begin(), frames.end(), [](const RefinedQuad& a, const RefinedQuad& b) {
+    return area(a.corners_px) > area(b.corners_px);
+  });
+  std::vector<RefinedQuad> outer;
+  for (const RefinedQuad& frame : frames)
+    if (std::none_of(outer.begin(), outer.end(), [&](const RefinedQuad& other) {
+          return contains(other.corners_px, centre(frame.corners_px));
+        }))
+      outer.push_back(frame);
+  return outer;
+}
+
+// Corner 0 the one nearest to the picture's top left.
+RefinedQuad upright(const RefinedQuad& frame) {
+  std::size_t first = 0;
+  for (std::size_t i = 1; i < 4; ++i)
+    if (frame.corners_px[i].sum() < frame.corners_px[first].sum()) first = i;
+  RefinedQuad turned = frame;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const std::size_t from = (i + first) % 4;
+    turned.corners_px[i] = frame.corners_px[from];
+    turned.outside_level[i] = frame.outside_level[from];
+    turned.inside_level[i] = frame.inside_level[from];
+  }
+  return turned;
+}
+
+Error several(const std::vector<RefinedQuad>& frames) {
+  std::string places;
+  for (const RefinedQuad& frame : frames) {
+    const Eigen::Vector2d at = centre(frame.corners_px);
+    places += fmt::format("{}({:.0f}, {:.0f}) {:.0f} px wide", places.empty() ? "" : ", ", at.x(), at.y(),
+                          std::sqrt(area(frame.corners_px)));
+  }
+  return error(
+      "expected one black frame, found {}: at {}. Cut the picture to the marker that is to be trained.",
+      frames.size(), places);
+}
+
+// The frame's inside upright, one pixel a value, as mean over each value's own area.
+cv::Mat rectified(const cv::Mat& picture, const RefinedQuad& frame, double side_px) {
+  const int size = TrainedTemplate::k_size;
+  const int fine = std::clamp(static_cast<int>(std::ceil(side_px / (2 * size))), 4, 16);  // places a value
+  const int count = size * fine;
+  const SquareToQuad px_from_square(frame.corners_px);
+  cv::Mat x(count, count, CV_32F), y(count, count, CV_32F);
+  for (int row = 0; row < count; ++row)
+    for (int column = 0; column < count; ++column) {
+      const auto inner = [&](int i) { return k_border + (1 - 2 * k_border) * (i + 0.5) / count; };
+      const Eigen::Vector2d px = px_from_square.at(inner(column), inner(row));
+      x.at<float>(row, column) = static_cast<float>(px.x());
+      y.at<float>(row, column) = static_cast<float>(px.y());
+    }
+  cv::Mat seen, values;
+  cv::remap(picture, seen, x, y, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  cv::resize(seen, values, {size, size}, 0, 0, cv::INTER_AREA);
+  return values;
+}
+
+double mean(const std::array<double, 4>& levels) {
+  return 0.25 * (levels[0] + levels[1] + levels[2] + levels[3]);
+}
+
+double deviation(const TrainedTemplate& trained) {
+  double sum = 0, squares = 0;
+  const std::size_t count = trained.bgr[0].size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const double grey = (trained.bgr[0][i] + trained.bgr[1][i] + trained.bgr[2][i]) / 3.0;
+    sum += grey;
+    squares += grey * grey;
+  }
+  const double middle = sum / static_cast<double>(count);
+  return std::sqrt(std::max(0.0, squares / static_cast<double>(count) - middle * middle));
+}
+
+}  // namespace
+
+Result<TrainedTemplate> train_template(const cv::Mat& picture) {
+  const cv::Mat grey = to_grey(picture);
+  const std::vector<RefinedQuad> frames = frames_in(grey);
+  if (frames.empty())
+    return error(
+        "expected a black square frame on white, a quarter of its side wide all around, found none. "
+        "Photograph the marker upright, sharp, with white paper around it.");
+  if (frames.size() > 1) return several(frames);
+  const RefinedQuad frame = upright(frames.front());
+  TrainedTemplate trained;
+  trained.corners_px = frame.corners_px;
+  trained.side_px = std::sqrt(area(frame.corners_px));
+  if (trained.side_px < k_min_side_px)
+    return error("the frame is {:.0f} px wide, expected at least {:.0f} (two pixels a value). Go nearer.",
+                 trained.side_px, k_min_side_px);
+  const cv::Mat values = rectified(picture, frame, trained.side_px);
+  const double black = mean(frame.inside_level);
+  const double scale = 255 / (mean(frame.outside_level) - black);
+  const int channels = values.channels();
+  for (std::size_t colour = 0; colour < 3; ++colour)
+    for (int i = 0; i < values.rows * values.cols; ++i) {
+      const int level = values.data[i * channels + (channels == 1 ? 0 : static_cast<int>(colour))];
+      trained.bgr[colour].push_back(cv::saturate_cast<std::uint8_t>(scale * (level - black)));
+    }
+  if (const double found = deviation(trained); found < k_min_deviation)
+    return error(
+        "the frame's inside is even (its grey values deviate by {:.0f} of 255), expected a picture (at least "
+        "{:.0f})",
+        found, k_min_deviation);
+  return trained;
+}
+
+std::string template_text(const TrainedTemplate& trained) {
+  const int size = TrainedTemplate::k_size;
+  std::string text;
+  for (int turns = 0; turns < 4; ++turns) {
+    for (const auto& values : trained.bgr) {
+      cv::Mat block(size, size, CV_8UC1);
+      std::copy(values.begin(), values.end(), block.data);
+      for (int i = 0; i < turns; ++i) cv::rotate(block, block, cv::ROTATE_90_COUNTERCLOCKWISE);
+      for (int row = 0; row < size; ++row) {
+        for (int column = 0; column < size; ++column)
+          text += fmt::format("{:4}", block.at<std::uint8_t>(row, column));
+        text += "\n";
+      }
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace limn::tracker
