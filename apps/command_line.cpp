@@ -49,10 +49,12 @@ void add_markers(CLI::App& app, Run& run) {
       "Example: limn markers --family aruco_4x4_50 --ids 0-11 --size-mm 40 --out sheet.pdf\n"
       "Example: limn markers --board charuco:11x8:25mm --out board.pdf\n"
       "Example: limn markers --learn-body photos/*.jpg --camera camera0.cameramodel --family aruco_4x4_50 --size-mm 40 "
-      "--out body.json");
+      "--out body.json\n"
+      "Example: limn markers --train photo.jpg --out logo.patt\n"
+      "Example: limn markers --compare logo.patt hiro.patt");
   auto options = std::make_shared<MarkersOptions>();
   auto learning = std::make_shared<LearnBodyOptions>();
-  command->add_option("--family", options->family, "such as apriltag_36h11, aruco_4x4_50, artoolkit:hiro.patt")
+  command->add_option("--family", options->family, "such as apriltag_36h11, artoolkit_3x3, artoolkit:hiro.patt")
       ->capture_default_str();
   command->add_option("--ids", options->ids, "such as 0-11,15")->capture_default_str();
   command->add_option("--size-mm", options->size_mm, "side of the black square")->capture_default_str();
@@ -60,7 +62,11 @@ void add_markers(CLI::App& app, Run& run) {
   auto* learn = command->add_option("--learn-body", learning->images,
                                     "instead: where the markers of a rigid thing stand on it, from pictures of it");
   command->add_option("--camera", learning->camera, "with --learn-body: .cameramodel or another camera file")->needs(learn);
-  command->add_option("--out", options->out, "file to write: .pdf, .svg; a board also .png; a body .json")->required();
+  auto* train = command->add_option("--train", options->train, "instead: its one black frame becomes a template");
+  auto* compare = command->add_option("--compare", options->compare, "instead: how well these templates are told apart");
+  command->add_option("--json", options->json, "with --compare: file for the report")->needs(compare);
+  compare->excludes(train);
+  command->add_option("--out", options->out, "file to write: .pdf, .svg; a board .png; a body .json; a template .patt");
   command->callback([options, learning, &run] {
     run = [options, learning] {
       if (learning->images.empty()) return finished(run_markers(*options));

@@ -11,6 +11,7 @@
 #include <optional>
 #include <vector>
 
+#include "apps/markers_templates.h"
 #include "calib/board/board.h"
 #include "core/file.h"
 #include "core/log.h"
@@ -264,6 +265,8 @@ Status write_board(const MarkersOptions& options, const std::string& extension) 
 }  // namespace
 
 Status run_markers(const MarkersOptions& options) {
+  if (!options.compare.empty()) return compare_templates(options.compare, options.json);
+  if (!options.train.empty()) return train_template(options.train, options.out);
   const std::string extension = options.out.extension().string();
   const bool for_board = !options.board.empty();
   if (extension != ".pdf" && extension != ".svg" && !(for_board && extension == ".png"))

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "core/result.h"
 
@@ -9,10 +10,13 @@ namespace limn::apps {
 
 struct MarkersOptions {
   std::string family = "aruco_4x4_50";
-  std::string ids = "0-11";   ///< such as 0-11,15; unused by a template file, which is one marker
-  double size_mm = 40;        ///< side of the black square
-  std::string board;          ///< instead of markers: charuco:11x8:25mm, chessboard:9x7:75mm
-  std::filesystem::path out;  ///< .pdf or .svg; a board also .png
+  std::string ids = "0-11";     ///< such as 0-11,15; unused by a template file, which is one marker
+  double size_mm = 40;          ///< side of the black square
+  std::string board;            ///< instead of markers: charuco:11x8:25mm, chessboard:9x7:75mm
+  std::filesystem::path train;  ///< instead: a picture whose frame becomes the template `out`
+  std::vector<std::filesystem::path> compare;  ///< instead: template files to tell apart
+  std::filesystem::path json;                  ///< of the comparison; empty: none
+  std::filesystem::path out;                   ///< .pdf or .svg; a board also .png; a template .patt
 };
 
 /// Sheets to print on A4 at true size: black squares as vectors, white margin, name, a mark outside the

@@ -142,5 +142,53 @@ TEST(Markers, LearnABodyFromItsPictures) {
   EXPECT_TRUE(run_learn_body(options).error().wrong_usage);
 }
 
+TEST(Markers, PrintedBarcodesAreFound) {
+  const auto folder = test::test_folder();
+  MarkersOptions options;
+  options.family = "artoolkit_3x3";
+  options.ids = "0-5,63";
+  options.out = folder / "sheet.pdf";
+  ASSERT_TRUE(run_markers(options));
+  const std::string render =
+      "pdftoppm -r 127 -png '" + options.out.string() + "' '" + (folder / "page").string() + "' 2>/dev/null";
+  if (std::system(render.c_str()) != 0) GTEST_SKIP() << "no pdftoppm (poppler-utils)";
+  const auto grey = read_grey_picture(folder / "page-1.png");
+  ASSERT_TRUE(grey) << grey.message();
+  std::set<std::string> ids;
+  tracker::Detector detector(tracker::Families::load(std::vector<std::string>{"artoolkit_3x3"}).value());
+  for (const auto& found : detector.detect(*grey)) {
+    ids.insert(found.marker.id);
+    EXPECT_NEAR((found.corners_px[1] - found.corners_px[0]).norm(), 200, 0.3);  // 40 mm at 5 px a mm
+    EXPECT_LT(found.corners_px[0].x(), found.corners_px[1].x());
+    EXPECT_LT(found.corners_px[0].y(), found.corners_px[3].y());
+  }
+  EXPECT_EQ(ids, (std::set<std::string>{"0", "1", "2", "3", "4", "5", "63"}));
+}
+
+TEST(Markers, TrainedTemplatesAreComparedWithOthers) {
+  const auto folder = test::test_folder();
+  cv::Mat picture(400, 400, CV_8UC3, cv::Scalar(230, 230, 230));
+  picture(cv::Rect(100, 100, 200, 200)).setTo(cv::Scalar(20, 20, 20));
+  picture(cv::Rect(150, 150, 100, 100)).setTo(cv::Scalar(200, 220, 240));
+  picture(cv::Rect(150, 150, 40, 70)).setTo(cv::Scalar(20, 20, 20));
+  ASSERT_TRUE(write_png(folder / "photo.png", picture));
+  MarkersOptions train;
+  train.train = folder / "photo.png";
+  train.out = folder / "new.patt";
+  const Status trained = run_markers(train);
+  ASSERT_TRUE(trained) << trained.message();
+  ASSERT_TRUE(write_file(folder / "copy.patt", read_file(train.out).value()));
+  MarkersOptions compare;
+  compare.compare = {folder / "new.patt", folder / "copy.patt"};
+  compare.json = folder / "pairs.json";
+  const Status compared = run_markers(compare);
+  ASSERT_TRUE(compared) << compared.message();
+  const std::string json = read_file(compare.json).value();
+  EXPECT_NE(json.find("\"verdict\": \"confused\""), std::string::npos) << json;
+  train.out = folder / "new.txt";
+  const Status wrong = run_markers(train);
+  EXPECT_TRUE(!wrong && wrong.error().wrong_usage);
+}
+
 }  // namespace
 }  // namespace limn::apps
