@@ -9,8 +9,9 @@ namespace limn::tracker {
 namespace {
 
 // The cracks around a convex region are exactly as many as around its bounding box. Noise on soft edges and
-// small bites add some; regions of clutter have many more.
-constexpr double k_max_roughness = 1.35;
+// small bites add some, and half as many again where all sides run through pixel centres, whose noise then
+// decides pixel by pixel; regions of clutter have many more.
+constexpr double k_max_roughness = 1.75;
 // A quadrilateral's area is at least this share of its bounding box, for the steepest markers along a
 // diagonal.
 constexpr double k_min_box_share = 0.04;

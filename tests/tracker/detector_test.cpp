@@ -125,6 +125,24 @@ TEST(Detector, HasNoBiasWhereSidesRunAlongThePixels) {
   EXPECT_LT(std::abs(r.outward), 0.015);
 }
 
+// Pixels on such sides are half black, half white, and noise decides: a ragged boundary, half as long again.
+TEST(Detector, FindsMarkersWhoseSidesRunThroughPixelCentres) {
+  std::mt19937_64 rng = test::test_rng();
+  const Lens lens = pinhole_vga();
+  Detector detector(families({"aruco_4x4_50"}), {.broken_markers = false});
+  constexpr int k_pictures = 20;
+  int found = 0;
+  for (int i = 0; i < k_pictures; ++i) {
+    const std::vector<PlacedMarker> markers = {
+        test::placed(lens, {"aruco_4x4_50", "7"}, {150, 240}, 120, 0, 0, 0),
+        test::placed(lens, {"aruco_4x4_50", "9"}, {450, 240}, 60, 0, 0, 0)};
+    const cv::Mat grey =
+        test::picture_of(lens, test::plain(640, 480, 100), markers, {.blur_px = 0.7, .noise_levels = 2}, rng);
+    found += static_cast<int>(detector.detect(grey).size());
+  }
+  EXPECT_EQ(found, 2 * k_pictures);
+}
+
 TEST(Detector, HasNoBiasInPicturesOfAnSrgbCameraWhenToldSo) {
   Sweep sweep{48, 120, 45_deg, {}};
   sweep.picture.blur_px = 0.7;
