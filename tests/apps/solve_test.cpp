@@ -109,8 +109,7 @@ struct Stage {
     return made;
   }
 
-  void capture_bar(const calib::Captures& plan, int pose) const {
-    const std::vector<Sample> seen = samples(pose, true, bar());
+  void capture_seen(const calib::Captures& plan, int pose, const std::vector<Sample>& seen) const {
     cv::Mat photo;
     const Status status = calib::capture_pose(
         plan, pose,
@@ -119,20 +118,16 @@ struct Stage {
     ASSERT_TRUE(status.ok()) << status.message();
   }
 
+  void capture_bar(const calib::Captures& plan, int pose) const {
+    capture_seen(plan, pose, samples(pose, true, bar()));
+  }
+
   void capture(const fs::path& folder, int poses, bool with_board = true) const {
     const calib::Captures plan =
         calib::plan_captures(folder, {{camera.name, camera.width, camera.height}},
                              {{projector.name, projector.width, projector.height}}, board);
     ASSERT_TRUE(calib::begin_captures(plan).ok());
-    for (int pose = 0; pose < poses; ++pose) {
-      const std::vector<Sample> seen = samples(pose, with_board);
-      cv::Mat photo;
-      const Status status = calib::capture_pose(
-          plan, pose,
-          {.show = [&](int, const cv::Mat& shown) { return photo = photograph(seen, shown), Status(); },
-           .grab = [&](int) { return Result<cv::Mat>(photo); }});
-      ASSERT_TRUE(status.ok()) << status.message();
-    }
+    for (int pose = 0; pose < poses; ++pose) capture_seen(plan, pose, samples(pose, with_board));
   }
 };
 
