@@ -7,11 +7,17 @@ extern "C" {
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <string_view>
+#include <vector>
 
 #include "core/file.h"
 
@@ -85,40 +91,142 @@ ModelPointer to_mrcal(const Imager& imager) {
   return model;
 }
 
-Result<Imager> from_mrcal(const mrcal_cameramodel_t& model, const fs::path& path) {
-  char name[1024];
-  if (!mrcal_lensmodel_name(name, sizeof name, &model.lensmodel)) {
-    return error("{}: unusable lens model.", path.string());
+// The text: a Python dictionary of strings, numbers and lists. Read by ourselves: mrcal's own reader takes
+// memory and stack as the file tells it to.
+class ModelText {
+ public:
+  explicit ModelText(std::string_view text) : text_(text) {}
+
+  // Whether `mark` comes next; takes it.
+  bool take(char mark) {
+    skip_ignored();
+    if (at_ >= text_.size() || text_[at_] != mark) return false;
+    ++at_;
+    return true;
   }
-  const int count = mrcal_lensmodel_num_params(&model.lensmodel);
-  auto lens = Lens::create(name, std::vector<double>(model.intrinsics, model.intrinsics + count));
+
+  std::optional<std::string_view> quoted() {
+    skip_ignored();
+    if (at_ < text_.size() && text_[at_] == 'b') ++at_;
+    if (at_ >= text_.size() || (text_[at_] != '\'' && text_[at_] != '"')) return std::nullopt;
+    const auto end = text_.find(text_[at_], at_ + 1);
+    if (end == std::string_view::npos) return std::nullopt;
+    const std::string_view inside = text_.substr(at_ + 1, end - at_ - 1);
+    at_ = end + 1;
+    return inside;
+  }
+
+  std::optional<std::vector<double>> numbers() {
+    if (!take('[') && !take('(')) return std::nullopt;
+    std::vector<double> values;
+    while (!take(']') && !take(')')) {
+      skip_ignored();
+      double value = 0;
+      const auto [end, problem] = std::from_chars(text_.data() + at_, text_.data() + text_.size(), value);
+      if (problem != std::errc{}) return std::nullopt;
+      values.push_back(value);
+      at_ = static_cast<std::size_t>(end - text_.data());
+      if (!take(',') && next() != ']' && next() != ')') return std::nullopt;
+    }
+    return values;
+  }
+
+  // A value of any kind; false when it does not end.
+  bool skip_value() {
+    if (quoted()) return true;
+    int depth = 0;
+    for (; at_ < text_.size(); ++at_) {
+      const char c = text_[at_];
+      if (depth == 0 && (c == ',' || c == '}')) return true;
+      if (c == '[' || c == '(') ++depth;
+      if (c == ']' || c == ')') --depth;
+    }
+    return false;
+  }
+
+  std::ptrdiff_t line() const {
+    return 1 + std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at_), '\n');
+  }
+
+ private:
+  std::string_view text_;
+  std::size_t at_ = 0;
+
+  char next() const { return at_ < text_.size() ? text_[at_] : '\0'; }
+  void skip_ignored() {
+    while (at_ < text_.size()) {
+      if (text_[at_] == '#')
+        at_ = std::min(text_.find('\n', at_), text_.size());
+      else if (std::string_view(" \t\r\n").find(text_[at_]) == std::string_view::npos)
+        return;
+      else
+        ++at_;
+    }
+  }
+};
+
+struct ModelFields {
+  std::string lensmodel;
+  std::vector<double> intrinsics, extrinsics, imagersize;
+};
+
+// nullopt where the text is no dictionary; `text` then stands at the place.
+std::optional<ModelFields> fields_of(ModelText& text) {
+  ModelFields fields;
+  if (!text.take('{')) return std::nullopt;
+  while (!text.take('}')) {
+    const auto key = text.quoted();
+    if (!key || !text.take(':')) return std::nullopt;
+    if (*key == "lensmodel") {
+      const auto name = text.quoted();
+      if (!name) return std::nullopt;
+      fields.lensmodel = *name;
+    } else if (*key == "intrinsics" || *key == "extrinsics" || *key == "imagersize") {
+      const auto numbers = text.numbers();
+      if (!numbers) return std::nullopt;
+      (*key == "intrinsics"   ? fields.intrinsics
+       : *key == "extrinsics" ? fields.extrinsics
+                              : fields.imagersize) = *numbers;
+    } else if (!text.skip_value()) {
+      return std::nullopt;
+    }
+    text.take(',');
+  }
+  return fields;
+}
+
+Result<Imager> imager_of(const ModelFields& fields, const fs::path& path) {
+  auto lens = Lens::create(fields.lensmodel, fields.intrinsics);
   if (!lens) return error("{}: {}", path.string(), lens.message());
-  const double* rt = model.rt_cam_ref;
+  const std::vector<double>& rt = fields.extrinsics;
+  const bool is_finite = std::all_of(rt.begin(), rt.end(), [](double v) { return std::isfinite(v); });
+  if (rt.size() != 6 || !is_finite) return error("{}: extrinsics: expected 6 finite numbers.", path.string());
   const Pose imager_from_world(exp_rotation({rt[0], rt[1], rt[2]}), Eigen::Vector3d(rt[3], rt[4], rt[5]));
   if (!imager_from_world.is_finite())
-    return error("{}: extrinsics: expected 6 finite numbers.", path.string());
-  for (const unsigned side : model.imagersize) {
-    if (side > k_max_side)
-      return error("{}: imagersize: expected at most {} pixels a side, found {}.", path.string(), k_max_side,
-                   side);
-  }
-  return Imager{path.stem().string(), static_cast<int>(model.imagersize[0]),
-                static_cast<int>(model.imagersize[1]), *lens, imager_from_world};
+    return error("{}: extrinsics: expected numbers of a place within reach.", path.string());
+  const std::vector<double>& size = fields.imagersize;
+  if (size.size() != 2) return error("{}: imagersize: expected [width, height].", path.string());
+  for (const double side : size)
+    if (!(side >= 0 && side <= k_max_side && side == std::floor(side)))
+      return error("{}: imagersize: expected at most {} whole pixels a side, found {}.", path.string(),
+                   k_max_side, side);
+  return Imager{path.stem().string(), static_cast<int>(size[0]), static_cast<int>(size[1]), *lens,
+                imager_from_world};
 }
 
 }  // namespace
 
 Result<Imager> load_cameramodel(const fs::path& path) {
-  LIMN_TRY(const std::string text, read_file(path));
-  StderrCapture complaint;
-  const ModelPointer model(mrcal_read_cameramodel_string(text.c_str(), static_cast<int>(text.size())));
-  if (!model) {
+  LIMN_TRY(const std::string content, read_file(path));
+  ModelText text(content);
+  const auto fields = fields_of(text);
+  if (!fields || fields->lensmodel.empty()) {
     return error(
-        "{}: expected a mrcal .cameramodel with lensmodel, intrinsics, extrinsics and imagersize, found "
-        "something else or a truncated file ({}).",
-        path.string(), complaint.text());
+        "{}:{}: expected a mrcal .cameramodel with lensmodel, intrinsics, extrinsics and imagersize, found "
+        "something else or a truncated file.",
+        path.string(), text.line());
   }
-  return from_mrcal(*model, path);
+  return imager_of(*fields, path);
 }
 
 Status save_cameramodel(const Imager& imager, const fs::path& path) {

@@ -5,26 +5,38 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <opencv2/core.hpp>
 #include <vector>
 
 #include "core/cameramodel.h"
 #include "core/file.h"
+#include "core/opencv_file.h"
 
 namespace limn {
 namespace {
 
 namespace fs = std::filesystem;
 
+constexpr int k_max_side = 16384;  // pixels; the largest picture side that GL 4.5 must hold
+
 // ---- OpenCV ----
 
-std::vector<double> numbers_of(const cv::FileNode& node) {
-  cv::Mat values;
-  if (!node.empty() && node.isMap()) node >> values;
-  if (values.empty()) return {};
-  values.convertTo(values, CV_64F);
-  const cv::Mat flat = values.reshape(1, 1).clone();
-  return {flat.ptr<double>(), flat.ptr<double>() + flat.cols};
+using Names = std::initializer_list<const char*>;
+
+const OpencvFile::Value* first_of(const OpencvFile& file, Names names) {
+  for (const char* name : names)
+    if (const auto* value = file.find(name)) return value;
+  return nullptr;
+}
+
+// Of a matrix; none where the file has none.
+Result<std::vector<double>> numbers_of(const OpencvFile& file, Names names, const fs::path& path) {
+  const OpencvFile::Value* value = first_of(file, names);
+  if (!value) return std::vector<double>();
+  const auto count = static_cast<double>(value->numbers.size());
+  if (double{1} * value->rows * value->cols != count)
+    return error("{}: {}: expected rows x cols = {} x {} numbers, found {}.", path.string(), *names.begin(),
+                 value->rows, value->cols, count);
+  return value->numbers;
 }
 
 Result<std::string> model_of_distortion(std::vector<double>* distortion, const fs::path& path) {
@@ -47,43 +59,37 @@ Result<std::string> model_of_distortion(std::vector<double>* distortion, const f
 }
 
 // Width or height in pixels; 0 where the file has none.
-Result<int> side_of(const cv::FileNode& node, const fs::path& path) {
-  constexpr int k_max_side = 16384;  // the largest picture side that GL 4.5 must hold
-  if (node.empty()) return 0;
-  const double side = node.isInt() || node.isReal() ? node.real() : 0;
-  if (side >= 1 && side <= k_max_side && side == std::floor(side)) return static_cast<int>(side);
-  return error("{}: {}: expected a whole number of pixels from 1 to {}.", path.string(), node.name(),
-               k_max_side);
+Result<int> side_of(const OpencvFile& file, Names names, const fs::path& path) {
+  for (const char* name : names) {
+    if (!file.find(name)) continue;
+    const int side = file.integer(name).value_or(0);
+    if (side >= 1 && side <= k_max_side) return side;
+    return error("{}: {}: expected a whole number of pixels from 1 to {}.", path.string(), name, k_max_side);
+  }
+  return 0;
 }
 
 Result<Imager> load_opencv(const fs::path& path, const std::string& text) {
-  try {
-    const cv::FileStorage file(text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
-    const auto first_of = [&](std::initializer_list<const char*> names) {
-      for (const char* name : names) {
-        if (!file[name].empty()) return file[name];
-      }
-      return cv::FileNode();
-    };
-    const auto matrix = numbers_of(first_of({"camera_matrix", "cameraMatrix", "Camera_Matrix", "K"}));
-    if (matrix.size() != 9) {
-      return error(
-          "{}: camera_matrix: expected a 3x3 matrix as OpenCV's calibration writes it, found {} numbers.",
-          path.string(), matrix.size());
-    }
-    auto distortion =
-        numbers_of(first_of({"distortion_coefficients", "distCoeffs", "Distortion_Coefficients", "D"}));
-    LIMN_TRY(const std::string model, model_of_distortion(&distortion, path));
-    std::vector<double> values = {matrix[0], matrix[4], matrix[2], matrix[5]};
-    values.insert(values.end(), distortion.begin(), distortion.end());
-    auto lens = Lens::create(model, values);
-    if (!lens) return error("{}: {}", path.string(), lens.message());
-    LIMN_TRY(const int width, side_of(first_of({"image_width", "image_Width"}), path));
-    LIMN_TRY(const int height, side_of(first_of({"image_height", "image_Height"}), path));
-    return Imager{path.stem().string(), width, height, *lens, Pose()};
-  } catch (const cv::Exception& problem) {
-    return error("{}: expected an OpenCV camera file, found a damaged one ({}).", path.string(), problem.err);
+  const auto file = OpencvFile::parse(text);
+  if (!file) return error("{}: expected an OpenCV camera file: {}", path.string(), file.message());
+  LIMN_TRY(const auto matrix,
+           numbers_of(*file, {"camera_matrix", "cameraMatrix", "Camera_Matrix", "K"}, path));
+  if (matrix.size() != 9) {
+    return error(
+        "{}: camera_matrix: expected a 3x3 matrix as OpenCV's calibration writes it, found {} numbers.",
+        path.string(), matrix.size());
   }
+  LIMN_TRY(
+      auto distortion,
+      numbers_of(*file, {"distortion_coefficients", "distCoeffs", "Distortion_Coefficients", "D"}, path));
+  LIMN_TRY(const std::string model, model_of_distortion(&distortion, path));
+  std::vector<double> values = {matrix[0], matrix[4], matrix[2], matrix[5]};
+  values.insert(values.end(), distortion.begin(), distortion.end());
+  auto lens = Lens::create(model, values);
+  if (!lens) return error("{}: {}", path.string(), lens.message());
+  LIMN_TRY(const int width, side_of(*file, {"image_width", "image_Width"}, path));
+  LIMN_TRY(const int height, side_of(*file, {"image_height", "image_Height"}, path));
+  return Imager{path.stem().string(), width, height, *lens, Pose()};
 }
 
 // ---- ARToolKit ----
@@ -124,32 +130,51 @@ struct LensSample {
   Eigen::Vector2d px;
 };
 
-// Lens of `model` that fits the samples best in pixels: Gauss-Newton from a pinhole.
+constexpr int k_value_count = 12;  // of LENSMODEL_OPENCV8
+
+// Lens of `model`, LENSMODEL_OPENCV8, that fits the samples best in pixels: Gauss-Newton from a pinhole.
 std::vector<double> fitted_lens_values(const LensModel& model,
                                        std::vector<double> values,
                                        const std::vector<LensSample>& samples) {
-  using RowMajor = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>;
-  const Eigen::Index count = model.value_count();
+  LIMN_CHECK(model.value_count() == k_value_count);
   for (int iteration = 0; iteration < 20; ++iteration) {
-    Eigen::MatrixXd hessian = Eigen::MatrixXd::Identity(count, count) * 1e-9;
-    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(count);
+    Eigen::Matrix<double, k_value_count, k_value_count> hessian;
+    hessian.setIdentity();
+    hessian *= 1e-9;
+    Eigen::Vector<double, k_value_count> gradient;
+    gradient.setZero();
     for (const LensSample& sample : samples) {
       Eigen::Vector2d px;
-      RowMajor jacobian(2, count);
+      Eigen::Matrix<double, 2, k_value_count, Eigen::RowMajor> jacobian;
       if (!model.project(values, sample.p, &px, nullptr, jacobian.data())) continue;
-      hessian += jacobian.transpose() * jacobian;
-      gradient += jacobian.transpose() * (sample.px - px);
+      hessian.noalias() += jacobian.transpose() * jacobian;
+      gradient.noalias() += jacobian.transpose() * (sample.px - px);
     }
     // Numerator and denominator of OPENCV8 cancel: without a weight the fit puts poles into the picture.
     constexpr double k_distortion_weight = 1e-2;  // (0.1 px / 1)^2
-    for (Eigen::Index i = 4; i < count; ++i) {
+    for (int i = 4; i < k_value_count; ++i) {
       hessian(i, i) += k_distortion_weight;
       gradient[i] -= k_distortion_weight * values[static_cast<std::size_t>(i)];
     }
-    const Eigen::VectorXd step = hessian.ldlt().solve(gradient);
-    for (Eigen::Index i = 0; i < count; ++i) values[static_cast<std::size_t>(i)] += step[i];
+    const Eigen::Vector<double, k_value_count> step = hessian.ldlt().solve(gradient);
+    for (int i = 0; i < k_value_count; ++i) values[static_cast<std::size_t>(i)] += step[i];
+    constexpr double k_settled = 1e-10;
+    if (!step.allFinite() || step.norm() < k_settled) break;
   }
   return values;
+}
+
+// Whether the ideal pixel is a pinhole's, and no corner of the picture is bent beyond its neighbourhood.
+bool is_camera(const ArtoolkitCamera& camera) {
+  const auto& m = camera.matrix;
+  const bool is_pinhole = m[0] > 0 && m[5] > 0 && m[8] == 0 && m[9] == 0 && m[10] == 1;
+  const Eigen::Vector2d size(camera.width, camera.height);
+  for (const Eigen::Vector2d& share :
+       {Eigen::Vector2d(0, 0), Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1), Eigen::Vector2d(1, 1)}) {
+    const Eigen::Vector2d ideal = share.cwiseProduct(size);
+    if (!((observed_pixel(camera, ideal) - ideal).norm() < size.norm())) return false;
+  }
+  return is_pinhole;
 }
 
 // Grid of directions over the picture with the pixels where ARToolKit's model puts them.
@@ -190,8 +215,8 @@ Result<ArtoolkitCamera> parse_artoolkit(const std::string& bytes, const fs::path
     for (int i = 0; i < 12; ++i) camera.matrix.push_back(std::bit_cast<double>(take(8)));
     for (std::size_t i = 0; i < factor_count; ++i) camera.factors.push_back(std::bit_cast<double>(take(8)));
   }
-  bool sane = camera.version != 0 && camera.width > 0 && camera.width < 100000 && camera.height > 0 &&
-              camera.height < 100000;
+  const auto is_side = [](int side) { return side > 0 && side <= k_max_side; };
+  bool sane = camera.version != 0 && is_side(camera.width) && is_side(camera.height);
   for (const double value : camera.matrix) sane = sane && std::isfinite(value);
   for (const double value : camera.factors) sane = sane && std::isfinite(value);
   if (!sane) {
@@ -205,6 +230,12 @@ Result<ArtoolkitCamera> parse_artoolkit(const std::string& bytes, const fs::path
 
 Result<Imager> load_artoolkit(const fs::path& path, const std::string& bytes) {
   LIMN_TRY(const ArtoolkitCamera camera, parse_artoolkit(bytes, path));
+  if (!is_camera(camera))
+    return error(
+        "{}: expected the matrix of a pinhole (positive focal lengths, last row 0 0 1) and a distortion "
+        "within "
+        "a picture's size, found something else. Is it an ARToolKit camera_para.dat?",
+        path.string());
   const auto samples = samples_of(camera);
   const LensModel model = LensModel::parse("LENSMODEL_OPENCV8").value();
   const auto& m = camera.matrix;

@@ -29,6 +29,17 @@ constexpr int k_max_newton_steps = 30;
 constexpr double k_unproject_tolerance_px = 1e-9;
 constexpr double k_accepted_residual_px = 1e-6;
 
+// mrcal takes any grid of a splined lens: its number of values may overflow, and it reads beside one with
+// fewer columns or rows than a spline needs.
+bool has_sound_grid(const mrcal_lensmodel_t& model) {
+  if (model.type != MRCAL_LENSMODEL_SPLINED_STEREOGRAPHIC) return true;
+  constexpr int k_most = 1000;
+  const auto& grid = model.LENSMODEL_SPLINED_STEREOGRAPHIC__config;
+  const auto is_sound = [&](int count) { return count > grid.order && count <= k_most; };
+  return (grid.order == 2 || grid.order == 3) && is_sound(grid.Nx) && is_sound(grid.Ny) &&
+         grid.fov_x_deg > 0 && grid.fov_x_deg < 360;
+}
+
 using Jacobian2x3 = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
 
 // Determinant of d(px)/d(x, y) at (x, y, 1): positive where the lens keeps the picture's orientation.
@@ -96,7 +107,7 @@ Result<LensModel> LensModel::parse(const std::string& name) {
       "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=30_Ny=18_fov_x_deg=100.",
       name);
   if (!mrcal_lensmodel_type_is_valid(mrcal_lensmodel_type_from_name(name.c_str()))) return unknown;
-  if (!mrcal_lensmodel_from_name(&impl->model, name.c_str())) return unknown;
+  if (!mrcal_lensmodel_from_name(&impl->model, name.c_str()) || !has_sound_grid(impl->model)) return unknown;
   const mrcal_lensmodel_metadata_t metadata = mrcal_lensmodel_metadata(&impl->model);
   if (!metadata.has_core || !metadata.has_gradients) return unknown;
   impl->projects_behind = metadata.can_project_behind_camera;

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/file.h"
+#include "core/opencv_file.h"
 #include "core/predefined_family.h"
 #include "tracker/barcode.h"
 
@@ -22,6 +23,7 @@ namespace {
 // a picture, and the border and margin tests of identify.cpp take another factor of 1000.
 constexpr double k_max_random_hit = 2e-4;
 constexpr int k_max_cells = 7;  // 49 bits: OpenCV's largest
+constexpr int k_max_codes = 100000;
 // The largest ARToolKit pattern resolution we expect (ARToolKit's own AR_PATT_SIZE1_MAX).
 constexpr int k_max_template_size = 64;
 constexpr const char* k_aruco_file = "aruco:";
@@ -132,45 +134,34 @@ Result<std::uint64_t> code_of_text(const std::string& text, int cells, const std
   return code;
 }
 
-Result<CodeFamily> parse_dictionary(const cv::FileStorage& storage, const std::filesystem::path& path) {
-  const cv::FileNode count_node = storage["nmarkers"];
-  const cv::FileNode cells_node = storage["markersize"];
-  if (!count_node.isInt() || !cells_node.isInt())
+Result<CodeFamily> load_dictionary(const std::filesystem::path& path) {
+  LIMN_TRY(const std::string text, read_file(path));
+  const auto file = OpencvFile::parse(text);
+  if (!file) return error("{}: expected an OpenCV dictionary file: {}", path.string(), file.message());
+  const auto count = file->integer("nmarkers");
+  const auto cells = file->integer("markersize");
+  if (!count || !cells)
     return error(
         "{}: expected integers nmarkers and markersize, found none. It must be an OpenCV dictionary file.",
         path.string());
-  const int count = static_cast<int>(count_node);
+  if (*cells < 3 || *cells > k_max_cells)
+    return error("{}: markersize: expected 3 to {}, found {}", path.string(), k_max_cells, *cells);
+  if (*count < 1 || *count > k_max_codes)
+    return error("{}: nmarkers: expected 1 to {}, found {}", path.string(), k_max_codes, *count);
   CodeFamily family;
   family.name = k_aruco_file + path.filename().string();
-  family.cells = static_cast<int>(cells_node);
-  if (family.cells < 3 || family.cells > k_max_cells)
-    return error("{}: markersize: expected 3 to {}, found {}", path.string(), k_max_cells, family.cells);
-  if (count < 1 || count > 100000)
-    return error("{}: nmarkers: expected 1 to 100000, found {}", path.string(), count);
-  for (int id = 0; id < count; ++id) {
+  family.cells = *cells;
+  for (int id = 0; id < *count; ++id) {
     const std::string key = "marker_" + std::to_string(id);
-    const cv::FileNode node = storage[key];
-    if (!node.isString())
+    const OpencvFile::Value* bits = file->find(key);
+    if (!bits)
       return error("{}: {}: expected a text of bits because nmarkers is {}, found none", path.string(), key,
-                   count);
-    LIMN_TRY(const std::uint64_t code, code_of_text(node.string(), family.cells, path.string() + ": " + key));
+                   *count);
+    LIMN_TRY(const std::uint64_t code, code_of_text(bits->text, family.cells, path.string() + ": " + key));
     family.codes.push_back(four_turns(code, family.cells));
   }
   family.max_errors = correctable_errors(family);
   return family;
-}
-
-Result<CodeFamily> load_dictionary(const std::filesystem::path& path) {
-  LIMN_TRY(const std::string text, read_file(path));
-  try {
-    const cv::FileStorage storage(text, cv::FileStorage::READ | cv::FileStorage::MEMORY);
-    if (!storage.isOpened())
-      return error("{}: expected an OpenCV dictionary file (YAML, XML or JSON), found something else",
-                   path.string());
-    return parse_dictionary(storage, path);
-  } catch (const cv::Exception& problem) {
-    return error("{}: expected an OpenCV dictionary file: {}", path.string(), problem.err);
-  }
 }
 
 std::vector<double> numbers_in(const std::string& text, bool* only_numbers) {
