@@ -254,6 +254,50 @@ TEST_F(CommandLine, CamerasOfImpossibleSizeAreNamed) {
   }
 }
 
+TEST_F(CommandLine, BrokenDictionariesAndTemplatesAreNamed) {
+  cv::Mat grey(480, 640, CV_8U, cv::Scalar(128));
+  ASSERT_TRUE(write_png(folder_ / "a.png", grey));
+  write("cut.yml", "%YAML:1.0\nnmarkers: 2\nmarkersize: 3\nmarker_0: \"010101010\"\n");
+  expect({"detect", path("a.png"), "--family", "aruco:" + path("cut.yml")}, 2, {"cut.yml", "marker_1"});
+  write("open.xml", "<opencv_storage><nmarkers>1</nmarkers");
+  expect({"detect", path("a.png"), "--family", "aruco:" + path("open.xml")}, 2, {"open.xml", "closing tag"});
+  std::string numbers;
+  for (int i = 0; i < 3071; ++i) numbers += fmt::format(" {}", i % 256);
+  write("few.patt", numbers);
+  expect({"detect", path("a.png"), "--family", "artoolkit:" + path("few.patt")}, 2, {"few.patt", "3071"});
+}
+
+TEST_F(CommandLine, LensesThatAreNoNumbersAreNamed) {
+  cv::Mat grey(480, 640, CV_8U, cv::Scalar(128));
+  ASSERT_TRUE(write_png(folder_ / "a.png", grey));
+  const auto expect_named = [&](const std::string& name, const std::string& content,
+                                const std::string& part) {
+    write(name, content);
+    expect({"detect", path("a.png"), "--camera", path(name), "--size-mm", "40"}, 1, {name, part});
+  };
+  for (const char* bad : {".Nan", ".Inf", "1e999"})
+    expect_named(
+        "a.yml",
+        std::string("%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
+                    "   data: [ 600., 0., ") +
+            bad + ", 0., 600., 240., 0., 0., 1. ]\n",
+        bad[0] == '.' ? "finite" : "numbers");
+  for (const char* bad : {"nan", "inf"})
+    expect_named("b.cameramodel",
+                 std::string("{'lensmodel': 'LENSMODEL_PINHOLE', 'intrinsics': [600, ") + bad +
+                     ", 320, 240], 'extrinsics': [0,0,0,0,0,0], 'imagersize': [640, 480]}",
+                 "finite");
+  write("scene/scene.json", scene().dump());
+  write("poses.json", "{}");
+  write("rig/rig.json",
+        R"({"schema": "limn.rig/1", "projectors": [], "cameras": [{"name": "c", "size": [640, 480],
+            "lens": {"model": "LENSMODEL_PINHOLE", "values": [600, null, 320, 240]},
+            "imager_from_world": {"rotation_wxyz": [1, 0, 0, 0], "translation_m": [0, 0, 0]}}]})");
+  expect({"render", "--rig", path("rig"), "--scene", path("scene"), "--poses", path("poses.json"), "--out",
+          path("out")},
+         1, {"rig.json", "finite number"});
+}
+
 TEST_F(CommandLine, NamesInAWorldCannotLeaveTheOutputFolder) {
   for (const char* name : {"../x", "", "..", "a/b"}) {
     write("world.json", nlohmann::json{{"schema", "limn.world/1"}, {"cameras", {{{"name", name}}}}}.dump());
@@ -311,7 +355,9 @@ TEST_F(CommandLine, ConfigsWithAnyValueSpoiledNeverCrash) {
   }
 }
 
-TEST_F(CommandLine, BenchNamesTheBenchesThereAre) { expect({"bench", "tracking"}, 2, {"tracking", "tracker or calib"}); }
+TEST_F(CommandLine, BenchNamesTheBenchesThereAre) {
+  expect({"bench", "tracking"}, 2, {"tracking", "tracker or calib"});
+}
 
 TEST_F(CommandLine, BenchSaysWhichProgramIsMissing) {  // none stands beside the test's own
   expect({"bench", "tracker", "--frames", "1"}, 1, {"tests/bench/tracker_bench", "libapriltag-dev"});

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "core/file.h"
 #include "core/picture.h"
@@ -96,6 +97,40 @@ TEST_F(Detect, GoesOnAfterABadPicture) {
   ASSERT_FALSE(status);
   EXPECT_NE(status.message().find("2 of 3"), std::string::npos);
   EXPECT_EQ(nlohmann::json::parse(read_file(options.json).value())["images"].size(), 1u);
+}
+
+TEST_F(Detect, ReadsPicturesOfAllDepthsAndChannels) {
+  cv::Mat wide, four;
+  picture_with_marker().convertTo(wide, CV_16U, 257);
+  ASSERT_TRUE(write_png(folder / "wide.png", wide));
+  cv::cvtColor(picture_with_marker(), four, cv::COLOR_GRAY2BGRA);
+  ASSERT_TRUE(write_png(folder / "four.png", four));
+  cv::cvtColor(wide, four, cv::COLOR_GRAY2BGRA);
+  ASSERT_TRUE(write_png(folder / "wide_four.png", four));
+  options.images = {folder / "a.png", folder / "wide.png", folder / "four.png", folder / "wide_four.png"};
+  const Status status = run_detect(options);
+  ASSERT_TRUE(status) << status.message();
+  const auto images = nlohmann::json::parse(read_file(options.json).value())["images"];
+  ASSERT_EQ(images.size(), 4u);
+  for (const auto& image : images) EXPECT_EQ(image["markers"], images[0]["markers"]) << image["file"];
+}
+
+TEST_F(Detect, FindsNothingInPicturesOfNothing) {
+  options.images.clear();
+  for (const auto& [width, height] : {std::pair{1, 1}, {1, 400}, {400, 1}, {2, 2}, {320, 240}})
+    for (const int level : {0, 255}) {
+      options.images.push_back(folder / fmt::format("{}x{}_{}.png", width, height, level));
+      ASSERT_TRUE(write_png(options.images.back(), cv::Mat(height, width, CV_8UC1, cv::Scalar(level))));
+    }
+  cv::Mat noise(240, 320, CV_8UC3);
+  cv::randu(noise, 0, 256);
+  options.images.push_back(folder / "noise.png");
+  ASSERT_TRUE(write_png(options.images.back(), noise));
+  const Status status = run_detect(options);
+  ASSERT_TRUE(status) << status.message();
+  const auto images = nlohmann::json::parse(read_file(options.json).value())["images"];
+  EXPECT_EQ(images.size(), options.images.size());
+  for (const auto& image : images) EXPECT_TRUE(image["markers"].empty()) << image["file"];
 }
 
 TEST_F(Detect, TellsWrongUsage) {

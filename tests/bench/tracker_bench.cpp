@@ -14,6 +14,7 @@
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
+#include <random>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -283,6 +284,28 @@ void bench_time(const Options& options) {
   cv::setNumThreads(1);
 }
 
+// Pictures made against detectors, beside an ordinary one of the same size, for every kind of code.
+void bench_hostile(const Options& options) {
+  constexpr int k_width = 1280;
+  constexpr int k_height = 720;
+  std::mt19937_64 rng(options.seed);
+  const Peer limn =
+      test::limn_peer(std::vector<std::string>{"apriltag_36h11", "aruco_4x4_50", "artoolkit_3x3"}, 1);
+  std::vector<std::pair<std::string, cv::Mat>> pictures = {
+      {"noise", test::noise(k_width, k_height, rng)},
+      {"nested squares", test::nested_squares(k_width, k_height)}};
+  for (const int square : {1, 2, 3, 5, 8, 12, 20, 40})
+    pictures.emplace_back(fmt::format("checkerboard of {} px", square),
+                          test::checkerboard(k_width, k_height, square));
+  const double ordinary =
+      least_ms(limn, test::cluttered_frame(k_width, k_height, 1000 * options.seed).grey, 1);
+  fmt::print("\n  {:<40}{:>18}{:>10.2f}\n", "hostile, 1280x720", "ms; ordinary:", ordinary);
+  for (const auto& [name, grey] : pictures) {
+    const double ms = least_ms(limn, grey, 1);
+    fmt::print("  {:<40}{:>18.2f}{:>9.1f}x\n", name, ms, ms / ordinary);
+  }
+}
+
 // ---- photographs with whole-pixel lists (the OpenCV ones) ----
 
 void add_distances(const std::filesystem::path& csv, const std::string& family, std::vector<double>* all) {
@@ -360,5 +383,6 @@ int main(int argc, char** argv) {
   }
   if (options->frames > 0) bench_accuracy(*options);
   if (options->only.empty()) bench_time(*options);
+  if (options->only.empty()) bench_hostile(*options);
   if (!options->photographs.empty()) bench_photographs(options->photographs);
 }

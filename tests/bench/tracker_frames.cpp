@@ -14,7 +14,6 @@ constexpr int k_width = 1280;
 constexpr int k_height = 960;
 constexpr int k_columns = 4;
 constexpr int k_rows = 3;
-constexpr double k_noise_levels = 2;
 constexpr double k_black_of_dark_card = 35;
 
 using Rng = std::mt19937_64;
@@ -53,16 +52,26 @@ PlacedMarker drawn_marker(const Condition& condition,
   return marker;
 }
 
-std::vector<PlacedMarker> drawn_markers(const Condition& condition, const Lens& lens, Rng& rng) {
+// Of the i-th marker of a frame.
+using NameOf = std::function<MarkerName(int i, Rng& rng)>;
+
+MarkerName benchmark_name(int i, Rng& rng) {
   const std::vector<std::string> families = tracker_frame_families();
+  const std::string& family = families[static_cast<std::size_t>(i) % families.size()];
+  const int ids = family == "apriltag_36h11" ? 587 : 35;
+  return {family, std::to_string(std::uniform_int_distribution<int>(0, ids - 1)(rng))};
+}
+
+std::vector<PlacedMarker> drawn_markers(const Condition& condition,
+                                        const Lens& lens,
+                                        const NameOf& name_of,
+                                        Rng& rng) {
   std::vector<PlacedMarker> markers;
   for (int i = 0; i < k_columns * k_rows; ++i) {
-    const std::string& family = families[static_cast<std::size_t>(i) % families.size()];
-    const int ids = family == "apriltag_36h11" ? 587 : 35;
-    const int id = std::uniform_int_distribution<int>(0, ids - 1)(rng);
+    const MarkerName name = name_of(i, rng);
     const Eigen::Vector2d middle((i % k_columns + 0.5) * k_width / k_columns,
                                  (i / k_columns + 0.5) * k_height / k_rows);
-    markers.push_back(drawn_marker(condition, lens, {family, std::to_string(id)}, middle, rng));
+    markers.push_back(drawn_marker(condition, lens, name, middle, rng));
   }
   return markers;
 }
@@ -207,24 +216,20 @@ cv::Mat photographed(const Condition& condition, cv::Mat light, Rng& rng) {
   if (condition.motion_px > 0)
     cv::filter2D(light, light, -1, motion_kernel(condition.motion_px, any_angle(rng)), {-1, -1}, 0,
                  cv::BORDER_REPLICATE);
-  cv::Mat grey = noisy_grey(light, k_noise_levels, rng);
+  cv::Mat grey = noisy_grey(light, condition.noise_levels, rng);
   if (condition.jpeg_quality == 0) return grey;
   std::vector<std::uint8_t> bytes;
   cv::imencode(".jpg", grey, bytes, {cv::IMWRITE_JPEG_QUALITY, condition.jpeg_quality});
   return cv::imdecode(bytes, cv::IMREAD_GRAYSCALE);
 }
 
-}  // namespace
-
-std::vector<std::string> tracker_frame_families() { return {"apriltag_36h11", "apriltag_25h9"}; }
-
-TrackerFrame tracker_frame(const Condition& condition, std::uint64_t seed, int number) {
+TrackerFrame frame_of(const Condition& condition, std::uint64_t seed, int number, const NameOf& name_of) {
   std::seed_seq words{seed, static_cast<std::uint64_t>(number),
                       static_cast<std::uint64_t>(std::hash<std::string>()(condition.name))};
   Rng rng(words);
   TrackerFrame frame;
   frame.lens = frame_lens(condition);
-  const std::vector<PlacedMarker> markers = drawn_markers(condition, frame.lens, rng);
+  const std::vector<PlacedMarker> markers = drawn_markers(condition, frame.lens, name_of, rng);
   PictureOptions options;
   options.black = condition.black;
   options.white = condition.white;
@@ -240,18 +245,35 @@ TrackerFrame tracker_frame(const Condition& condition, std::uint64_t seed, int n
   return frame;
 }
 
+}  // namespace
+
+std::vector<std::string> tracker_frame_families() { return {"apriltag_36h11", "apriltag_25h9"}; }
+
+TrackerFrame tracker_frame(const Condition& condition, std::uint64_t seed, int number) {
+  return frame_of(condition, seed, number, benchmark_name);
+}
+
+TrackerFrame tracker_frame(const Condition& condition,
+                           std::uint64_t seed,
+                           int number,
+                           std::span<const MarkerName> names) {
+  return frame_of(condition, seed, number, [&](int, Rng& rng) {
+    return names[std::uniform_int_distribution<std::size_t>(0, names.size() - 1)(rng)];
+  });
+}
+
 TrackerFrame cluttered_frame(int width, int height, std::uint64_t seed) {
   Rng rng(seed);
   TrackerFrame frame;
   frame.lens = Lens::pinhole(width, width, (width - 1) / 2.0, (height - 1) / 2.0);
+  Condition ordinary;
+  ordinary.side_px = {32, 120};
+  ordinary.tilt_deg = {0, 69};
   std::vector<PlacedMarker> markers;
   for (int i = 0; i < k_columns * k_rows; ++i) {
     const int id = std::uniform_int_distribution<int>(0, 586)(rng);
     const Eigen::Vector2d middle((i % k_columns + 0.5) * width / k_columns,
                                  (i / k_columns + 0.5) * height / k_rows);
-    Condition ordinary;
-    ordinary.side_px = {32, 120};
-    ordinary.tilt_deg = {0, 69};
     markers.push_back(
         drawn_marker(ordinary, frame.lens, {"apriltag_36h11", std::to_string(id)}, middle, rng));
     frame.markers.push_back({markers.back().marker,
@@ -262,7 +284,7 @@ TrackerFrame cluttered_frame(int width, int height, std::uint64_t seed) {
   }
   PictureOptions options;
   options.blur_px = 0.5;
-  options.noise_levels = k_noise_levels;
+  options.noise_levels = ordinary.noise_levels;
   frame.grey = picture_of(frame.lens, clutter(width, height, rng), markers, options, rng);
   return frame;
 }

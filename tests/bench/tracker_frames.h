@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,7 @@ struct Condition {
   double row_motion_px = 0;  ///< rolling shutter: motion over 1000 rows, in any direction
   bool bent_lens = false;
   int jpeg_quality = 0;  ///< 0: none
+  double noise_levels = 2;
 };
 
 /// The conditions of the tracker's benchmark, ordered by group.
@@ -60,6 +62,11 @@ std::vector<std::string> tracker_frame_families();
 
 /// 1280x960 pixels, 12 markers. Every other frame's background is cluttered. The same for the same numbers.
 TrackerFrame tracker_frame(const Condition& condition, std::uint64_t seed, int number);
+/// The same with markers drawn from these names.
+TrackerFrame tracker_frame(const Condition& condition,
+                           std::uint64_t seed,
+                           int number,
+                           std::span<const MarkerName> names);
 
 /// A cluttered frame of this size with 12 ordinary markers of one family, for timing.
 TrackerFrame cluttered_frame(int width, int height, std::uint64_t seed);

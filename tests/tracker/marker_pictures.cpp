@@ -222,6 +222,30 @@ cv::Mat picture_of(const Lens& lens,
 
 cv::Mat plain(int width, int height, int grey) { return cv::Mat(height, width, CV_8UC1, cv::Scalar(grey)); }
 
+cv::Mat nested_squares(int width, int height) {
+  cv::Mat picture = plain(width, height, 230);
+  for (int y = 0; y + 60 <= height; y += 60)
+    for (int x = 0; x + 60 <= width; x += 60)
+      for (int inset = 2; inset < 28; inset += 3)
+        cv::rectangle(picture, cv::Rect(x + inset, y + inset, 60 - 2 * inset, 60 - 2 * inset),
+                      cv::Scalar(inset % 2 ? 230 : 20), -1);
+  return picture;
+}
+
+cv::Mat checkerboard(int width, int height, int square) {
+  cv::Mat picture(height, width, CV_8UC1);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) picture.at<std::uint8_t>(y, x) = (x / square + y / square) % 2 ? 20 : 230;
+  return picture;
+}
+
+cv::Mat noise(int width, int height, std::mt19937_64& rng) {
+  cv::Mat picture(height, width, CV_8UC1);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) picture.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(rng());
+  return picture;
+}
+
 cv::Mat clutter(int width, int height, std::mt19937_64& rng) {
   cv::Mat picture = plain(width, height, 120);
   const double scale = width / 1280.0;

@@ -69,6 +69,13 @@ PlacedMarker placed(const Lens& lens,
 /// Shapes, stripes, dots, writing and gradients of all sizes: everything but markers.
 cv::Mat clutter(int width, int height, std::mt19937_64& rng);
 
+/// Hostile to detectors: thousands of squares in each other, all that a marker could be at first.
+cv::Mat nested_squares(int width, int height);
+/// Hostile, too: as many small squares that touch at their corners.
+cv::Mat checkerboard(int width, int height, int square);
+/// Every pixel any level.
+cv::Mat noise(int width, int height, std::mt19937_64& rng);
+
 /// Even grey.
 cv::Mat plain(int width, int height, int grey);
 
