@@ -77,9 +77,11 @@ std::optional<Detection> Detector::read(const cv::Mat& grey,
                                         const Lens* lens,
                                         Reading reading) {
   if (!may_be_marker(grey, quad, options_.min_contrast)) return std::nullopt;
+  const bool covered = reading == Reading::covered;
+  if (covered && !may_be_covered_code(grey, quad)) return std::nullopt;
   const double min_contrast = k_refined_contrast * options_.min_contrast;
   std::optional<RefinedQuad> rough;
-  if (shortest_side(quad) > k_rough_above_px) {
+  if (covered || shortest_side(quad) > k_rough_above_px) {
     rough = refiner_.refine(grey, quad, min_contrast, lens, Effort::rough);
     if (!rough || !identify(grey, *rough, families_, reading)) return std::nullopt;
   }

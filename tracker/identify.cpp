@@ -443,6 +443,50 @@ bool may_be_marker(const cv::Mat& grey, const Quad& quad, double min_contrast) {
   return lightest - middle >= min_contrast && border[k_border * 3 / 4] < middle + 0.6 * (lightest - middle);
 }
 
+bool may_be_covered_code(const cv::Mat& grey, const Quad& quad) {
+  constexpr int k_along = 10;
+  constexpr int k_border = 4 * k_along;
+  constexpr int k_max_light = k_border * 7 / 40;  // of codes with fingers, bites, slatted shadow: up to 5
+  constexpr int k_cells = 6;
+  // Between neighbours among the cells, 60 pairs. No code of the families that are read when covered has
+  // fewer than 17, and a quarter may be hidden; two or three edges through a quad make 12.
+  constexpr int k_min_changes = 13;
+  const SquareToQuad px_from_square(quad.corners_px);
+  std::array<int, k_border> border;
+  for (int i = 0; i < k_along; ++i) {
+    constexpr double k_inset = 1.0 / 16;
+    const double along = k_inset + (1 - 2 * k_inset) * i / (k_along - 1);
+    const auto at = static_cast<std::size_t>(4 * i);
+    border[at] = pixel_at(grey, px_from_square.at(along, k_inset));
+    border[at + 1] = pixel_at(grey, px_from_square.at(along, 1 - k_inset));
+    border[at + 2] = pixel_at(grey, px_from_square.at(k_inset, along));
+    border[at + 3] = pixel_at(grey, px_from_square.at(1 - k_inset, along));
+  }
+  std::array<int, k_cells * k_cells> inside;
+  for (int row = 0; row < k_cells; ++row)
+    for (int column = 0; column < k_cells; ++column)
+      inside[static_cast<std::size_t>(row * k_cells + column)] =
+          pixel_at(grey, px_from_square.at((column + 1.5) / (k_cells + 2), (row + 1.5) / (k_cells + 2)));
+  auto sorted = inside;
+  std::nth_element(border.begin(), border.begin() + k_border / 2, border.end());
+  std::nth_element(sorted.begin(), sorted.begin() + 31, sorted.end());
+  const double dark = border[k_border / 2];
+  const double light = sorted[31];  // some of the brightest may be glare
+  const double middle = dark + k_middle * (light - dark);
+  if (std::count_if(border.begin(), border.end(), [&](int level) { return level > middle; }) > k_max_light)
+    return false;
+  return std::any_of(k_limits.begin(), k_limits.end(), [&](double share) {
+    const double limit = dark + share * (light - dark);
+    int changes = 0;
+    for (std::size_t i = 0; i < inside.size(); ++i) {
+      const bool is_light = inside[i] > limit;
+      changes += i % k_cells != k_cells - 1 && is_light != (inside[i + 1] > limit);
+      changes += i + k_cells < inside.size() && is_light != (inside[i + k_cells] > limit);
+    }
+    return changes >= k_min_changes;
+  });
+}
+
 bool has_quarter_border(const cv::Mat& grey, const RefinedQuad& quad) {
   return is_border_dark(Reader(grey, quad));
 }

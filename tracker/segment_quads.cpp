@@ -4,6 +4,8 @@
 #include <cmath>
 #include <tuple>
 
+#include "tracker/simd.h"
+
 namespace limn::tracker {
 namespace {
 
@@ -22,6 +24,7 @@ constexpr double k_min_side_visible = 0.15;
 constexpr double k_min_side_px = 12;
 constexpr double k_same_px = 3;  // quads whose corners all lie nearer are the same
 constexpr std::size_t k_max_quads = 20000;
+constexpr double k_max_collinear_sine = 0.06;
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
@@ -43,6 +46,67 @@ bool corner_of(const Segment& a, const Segment& b, Eigen::Vector2d* px, double* 
   *px = a.to + after_a * a.direction;
   *cost = (std::abs(after_a) + std::abs(into_b)) / (a.length + b.length);
   return true;
+}
+
+// One segment among many: its end that is looked from, its direction and length, and how far it looks.
+struct Probe {
+  float x, y, dx, dy, length, radius;
+};
+
+Probe probe_of(const Segment& s, const Eigen::Vector2d& px, double radius) {
+  return {static_cast<float>(px.x()),          static_cast<float>(px.y()),
+          static_cast<float>(s.direction.x()), static_cast<float>(s.direction.y()),
+          static_cast<float>(s.length),        static_cast<float>(radius)};
+}
+
+// Marks the entries that corner_of may join to the probe, which comes before them (sign 1) or after them
+// (-1).
+LIMN_SIMD void match_corners(const Probe& p,
+                             float sign,
+                             const float* x,
+                             const float* y,
+                             const float* dx,
+                             const float* dy,
+                             const float* length,
+                             int count,
+                             std::uint8_t* matches) {
+  constexpr float k_slack_px = 0.01F;  // of single precision
+  const float own_overlap = k_slack_px + static_cast<float>(k_overlap_px + k_overlap_share * p.length);
+  for (int i = 0; i < count; ++i) {
+    const float ax = x[i] - p.x;
+    const float ay = y[i] - p.y;
+    const float sine = sign * (p.dx * dy[i] - p.dy * dx[i]);
+    // Along the probe to the corner, and along the entry from the corner, times sine.
+    const float own = ax * dy[i] - ay * dx[i];
+    const float other = ax * p.dy - ay * p.dx;
+    const float longer = std::max(p.length, length[i]);
+    const float gap =
+        static_cast<float>(k_gap_px) + k_slack_px + static_cast<float>(k_max_gap_share) * longer;
+    const float overlap =
+        static_cast<float>(k_overlap_px) + k_slack_px + static_cast<float>(k_overlap_share) * length[i];
+    matches[i] = (ax * ax + ay * ay <= p.radius * p.radius) &
+                 (sine >= 0.999F * static_cast<float>(k_min_sine)) & (own >= -own_overlap * sine) &
+                 (own <= gap * sine) & (other >= -gap * sine) & (other <= overlap * sine);
+  }
+}
+
+// Marks the entries that may go on along the probe's line.
+LIMN_SIMD void match_collinear(const Probe& p,
+                               const float* x,
+                               const float* y,
+                               const float* dx,
+                               const float* dy,
+                               int count,
+                               std::uint8_t* matches) {
+  constexpr float k_sine = 1.01F * static_cast<float>(k_max_collinear_sine);
+  for (int i = 0; i < count; ++i) {
+    const float ax = x[i] - p.x;
+    const float ay = y[i] - p.y;
+    const float sine = p.dx * dy[i] - p.dy * dx[i];
+    const float gap = p.dx * ax + p.dy * ay;
+    matches[i] = (ax * ax + ay * ay <= p.radius * p.radius) & (gap > 0) & (std::abs(sine) <= k_sine) &
+                 (p.dx * dx[i] + p.dy * dy[i] > 0);
+  }
 }
 
 bool same(const Quad& a, const Quad& b) {
@@ -87,34 +151,41 @@ void SegmentQuadFinder::sort_into_cells(Eigen::Vector2d Segment::*point, Cells* 
   cells->begin.assign(static_cast<std::size_t>(columns_ * rows_) + 2, 0);
   for (const Segment& s : segments_) ++cells->begin[static_cast<std::size_t>(cell_of(s.*point)) + 2];
   for (std::size_t i = 2; i < cells->begin.size(); ++i) cells->begin[i] += cells->begin[i - 1];
-  cells->entries.resize(segments_.size());
+  cells->segment.resize(segments_.size());
+  for (auto* values : {&cells->x, &cells->y, &cells->dx, &cells->dy, &cells->length})
+    values->resize(segments_.size());
   for (std::uint32_t i = 0; i < segments_.size(); ++i) {
-    const Eigen::Vector2d& px = segments_[i].*point;
-    cells->entries[cells->begin[static_cast<std::size_t>(cell_of(px)) + 1]++] = {px.cast<float>(), i};
+    const Segment& s = segments_[i];
+    const std::size_t at = cells->begin[static_cast<std::size_t>(cell_of(s.*point)) + 1]++;
+    cells->segment[at] = i;
+    cells->x[at] = static_cast<float>((s.*point).x());
+    cells->y[at] = static_cast<float>((s.*point).y());
+    cells->dx[at] = static_cast<float>(s.direction.x());
+    cells->dy[at] = static_cast<float>(s.direction.y());
+    cells->length[at] = static_cast<float>(s.length);
   }
 }
 
-// The segments whose points of these cells lie about `px`.
-template <typename Visit>
-void SegmentQuadFinder::visit(const Cells& cells,
-                              const Eigen::Vector2d& px,
-                              double radius,
-                              const Visit& visit) const {
+// The segments whose points of these cells lie about `px` and that match(first, count, matches) marks.
+template <typename Match, typename Visit>
+void SegmentQuadFinder::visit(
+    const Cells& cells, const Eigen::Vector2d& px, double radius, const Match& match, const Visit& visit) {
   const Eigen::Vector2d reach(radius, radius);
   const int low = cell_of(px - reach);
   const int high = cell_of(px + reach);
-  const int count = high % columns_ - low % columns_;
-  const Eigen::Vector2f centre = px.cast<float>();
-  const auto square = static_cast<float>(radius * radius);
-  for (int first = low; first + count <= high; first += columns_)
-    for (std::uint32_t i = cells.begin[static_cast<std::size_t>(first)];
-         i < cells.begin[static_cast<std::size_t>(first + count) + 1]; ++i)
-      if ((cells.entries[i].px - centre).squaredNorm() <= square) visit(cells.entries[i].segment);
+  const int columns = high % columns_ - low % columns_;
+  for (int first = low; first + columns <= high; first += columns_) {
+    const std::uint32_t begin = cells.begin[static_cast<std::size_t>(first)];
+    const std::uint32_t end = cells.begin[static_cast<std::size_t>(first + columns) + 1];
+    matches_.resize(std::max<std::size_t>(matches_.size(), end - begin));
+    match(begin, static_cast<int>(end - begin), matches_.data());
+    for (std::uint32_t i = begin; i < end; ++i)
+      if (matches_[i - begin]) visit(cells.segment[i]);
+  }
 }
 
 // Two pieces of one line, what covers it between them: added as one segment more.
 void SegmentQuadFinder::join_collinear() {
-  constexpr double k_max_sine = 0.06;
   constexpr double k_max_beside_px = 1.5;
   const std::size_t count = segments_.size();
   for (std::size_t i = 0; i < count; ++i) {
@@ -122,12 +193,19 @@ void SegmentQuadFinder::join_collinear() {
     const double reach = std::min(k_max_reach_px, a.length + k_gap_px);
     std::uint32_t nearest = 0;
     double least = reach;
-    visit(begins_, a.to, reach, [&](std::uint32_t j) {
+    const Probe probe = probe_of(a, a.to, reach);
+    const auto match = [&](std::uint32_t first, int entries, std::uint8_t* matches) {
+      match_collinear(probe, &begins_.x[first], &begins_.y[first], &begins_.dx[first], &begins_.dy[first],
+                      entries, matches);
+    };
+    visit(begins_, a.to, reach, match, [&](std::uint32_t j) {
       const Segment& b = segments_[j];
       const Eigen::Vector2d apart = b.from - a.to;
       const double gap = a.direction.dot(apart);
       if (j == i || gap <= 0 || gap >= least || gap > a.length + b.length) return;
-      if (a.direction.dot(b.direction) < 0 || std::abs(cross(a.direction, b.direction)) > k_max_sine) return;
+      if (a.direction.dot(b.direction) < 0 ||
+          std::abs(cross(a.direction, b.direction)) > k_max_collinear_sine)
+        return;
       const Eigen::Vector2d whole = (b.to - a.from).normalized();
       if (std::abs(cross(whole, a.to - a.from)) > k_max_beside_px ||
           std::abs(cross(whole, b.from - a.from)) > k_max_beside_px)
@@ -152,8 +230,15 @@ void SegmentQuadFinder::find_corners() {
   for (std::uint32_t i = 0; i < segments_.size(); ++i) {
     const Segment& here = segments_[i];
     const double reach = reach_of(here);
-    visit(begins_, here.to, reach, [&](std::uint32_t j) { add(i, j); });
-    visit(ends_, here.from, reach, [&](std::uint32_t j) {
+    const auto match = [](const Cells& cells, const Probe& probe, float sign) {
+      return [&cells, probe, sign](std::uint32_t first, int count, std::uint8_t* matches) {
+        match_corners(probe, sign, &cells.x[first], &cells.y[first], &cells.dx[first], &cells.dy[first],
+                      &cells.length[first], count, matches);
+      };
+    };
+    visit(begins_, here.to, reach, match(begins_, probe_of(here, here.to, reach), 1),
+          [&](std::uint32_t j) { add(i, j); });
+    visit(ends_, here.from, reach, match(ends_, probe_of(here, here.from, reach), -1), [&](std::uint32_t j) {
       const Segment& before = segments_[j];
       const double short_reach = reach_of(before);
       if ((before.to - here.from).squaredNorm() > short_reach * short_reach) add(j, i);
