@@ -61,15 +61,15 @@ Probe probe_of(const Segment& s, const Eigen::Vector2d& px, double radius) {
 
 // Marks the entries that corner_of may join to the probe, which comes before them (sign 1) or after them
 // (-1).
-LIMN_SIMD void match_corners(const Probe& p,
+LIMN_SIMD void match_corners(const Probe p,
                              float sign,
-                             const float* x,
-                             const float* y,
-                             const float* dx,
-                             const float* dy,
-                             const float* length,
+                             const float* __restrict x,
+                             const float* __restrict y,
+                             const float* __restrict dx,
+                             const float* __restrict dy,
+                             const float* __restrict length,
                              int count,
-                             std::uint8_t* matches) {
+                             std::uint8_t* __restrict matches) {
   constexpr float k_slack_px = 0.01F;  // of single precision
   const float own_overlap = k_slack_px + static_cast<float>(k_overlap_px + k_overlap_share * p.length);
   for (int i = 0; i < count; ++i) {
@@ -79,7 +79,7 @@ LIMN_SIMD void match_corners(const Probe& p,
     // Along the probe to the corner, and along the entry from the corner, times sine.
     const float own = ax * dy[i] - ay * dx[i];
     const float other = ax * p.dy - ay * p.dx;
-    const float longer = std::max(p.length, length[i]);
+    const float longer = p.length > length[i] ? p.length : length[i];
     const float gap =
         static_cast<float>(k_gap_px) + k_slack_px + static_cast<float>(k_max_gap_share) * longer;
     const float overlap =
@@ -91,13 +91,13 @@ LIMN_SIMD void match_corners(const Probe& p,
 }
 
 // Marks the entries that may go on along the probe's line.
-LIMN_SIMD void match_collinear(const Probe& p,
-                               const float* x,
-                               const float* y,
-                               const float* dx,
-                               const float* dy,
+LIMN_SIMD void match_collinear(const Probe p,
+                               const float* __restrict x,
+                               const float* __restrict y,
+                               const float* __restrict dx,
+                               const float* __restrict dy,
                                int count,
-                               std::uint8_t* matches) {
+                               std::uint8_t* __restrict matches) {
   constexpr float k_sine = 1.01F * static_cast<float>(k_max_collinear_sine);
   for (int i = 0; i < count; ++i) {
     const float ax = x[i] - p.x;

@@ -1,9 +1,9 @@
 #include "tracker/segments.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstdlib>
-#include <cstring>
+#include <numbers>
 
 #include "tracker/simd.h"
 
@@ -19,23 +19,23 @@ constexpr int k_gap_px = 3;           // that are jumped at once, and more on lo
 constexpr float k_gap_share = 0.2F;
 constexpr int k_max_gap_px = 8;
 
-LIMN_SIMD void halve_row(const std::uint8_t* upper,
-                         const std::uint8_t* lower,
+LIMN_SIMD void halve_row(const std::uint8_t* __restrict upper,
+                         const std::uint8_t* __restrict lower,
                          int width,
-                         std::uint8_t* half) {
+                         std::uint8_t* __restrict half) {
   for (int x = 0; x < width; ++x)
     half[x] = static_cast<std::uint8_t>(
         (upper[2 * x] + upper[2 * x + 1] + lower[2 * x] + lower[2 * x + 1] + 2) >> 2);
 }
 
 // Of the pixels 1 ... width - 2 of the middle row.
-LIMN_SIMD void gradient_row(const std::uint8_t* a,
-                            const std::uint8_t* b,
-                            const std::uint8_t* c,
+LIMN_SIMD void gradient_row(const std::uint8_t* __restrict a,
+                            const std::uint8_t* __restrict b,
+                            const std::uint8_t* __restrict c,
                             int width,
-                            std::int16_t* across,
-                            std::int16_t* down,
-                            std::uint16_t* strength) {
+                            std::int16_t* __restrict across,
+                            std::int16_t* __restrict down,
+                            std::uint16_t* __restrict strength) {
   for (int x = 1; x < width - 1; ++x) {
     const auto gx = static_cast<std::int16_t>((a[x + 1] + 2 * b[x + 1] + c[x + 1]) -
                                               (a[x - 1] + 2 * b[x - 1] + c[x - 1]));
@@ -49,24 +49,63 @@ LIMN_SIMD void gradient_row(const std::uint8_t* a,
   }
 }
 
-LIMN_SIMD void ridge_row(const std::int16_t* across,
-                         const std::int16_t* down,
-                         const std::uint16_t* upper,
-                         const std::uint16_t* middle,
-                         const std::uint16_t* lower,
+// The gradient's way in 256ths of a turn, lowest bit set (Rajan and others 2006, "Efficient approximations
+// for the arctangent function": to a sixth of a 256th).
+LIMN_SIMD void way_row(const std::int16_t* __restrict across,
+                       const std::int16_t* __restrict down,
+                       int width,
+                       std::uint8_t* __restrict way) {
+  for (int x = 1; x < width - 1; ++x) {
+    const int gx = across[x];
+    const int gy = down[x];
+    const int ax = gx < 0 ? -gx : gx;
+    const int ay = gy < 0 ? -gy : gy;
+    const int low = ax < ay ? ax : ay;
+    const int high = ax < ay ? ay : ax;
+    const float share = static_cast<float>(low) / static_cast<float>(high + (high == 0));
+    const int octant = static_cast<int>(share * (32.0F + 11.12F * (1 - share)) + 0.5F);
+    const int quarter = ax < ay ? 64 - octant : octant;
+    const int half = gx < 0 ? 128 - quarter : quarter;
+    way[x] = static_cast<std::uint8_t>((gy < 0 ? 256 - half : half) | 1);
+  }
+}
+
+// Clears what is no maximum across the edge.
+LIMN_SIMD void ridge_row(const std::int16_t* __restrict across,
+                         const std::int16_t* __restrict down,
+                         const std::uint16_t* __restrict upper,
+                         const std::uint16_t* __restrict middle,
+                         const std::uint16_t* __restrict lower,
                          int width,
                          std::uint16_t min_strength,
-                         std::uint8_t* ridge) {
+                         std::uint8_t* __restrict ridge) {
   for (int x = 1; x < width - 1; ++x) {
     const std::uint16_t m = middle[x];
     const auto ax = static_cast<std::int16_t>(across[x] < 0 ? -across[x] : across[x]);
     const auto ay = static_cast<std::int16_t>(down[x] < 0 ? -down[x] : down[x]);
     const bool steep = ax >= ay;
-    const std::uint16_t before = steep ? middle[x - 1] : upper[x];
-    const std::uint16_t after = steep ? middle[x + 1] : lower[x];
-    ridge[x] = static_cast<std::uint8_t>((m >= min_strength) & (m > before) & (m >= after));
+    const std::uint16_t left = middle[x - 1], right = middle[x + 1], above = upper[x], below = lower[x];
+    const std::uint16_t before = steep ? left : above;
+    const std::uint16_t after = steep ? right : below;
+    const bool is_ridge = (m >= min_strength) & (m > before) & (m >= after);
+    ridge[x] = static_cast<std::uint8_t>(ridge[x] * is_ridge);
   }
 }
+
+struct Ways {
+  std::array<float, 256> x, y;
+};
+
+Ways all_ways() {
+  Ways ways;
+  for (std::size_t i = 0; i < 256; ++i) {
+    const double angle = static_cast<double>(i) * std::numbers::pi / 128;
+    ways.x[i] = static_cast<float>(std::cos(angle));
+    ways.y[i] = static_cast<float>(std::sin(angle));
+  }
+  return ways;
+}
+const Ways k_ways = all_ways();
 
 }  // namespace
 
@@ -76,6 +115,7 @@ void SegmentFinder::Line::add(float px, float py) {
 }
 
 void SegmentFinder::Line::fit() {
+  next_fit = n < 5 ? n + 1 : 1.5F * n;
   middle = {x / n, y / n};
   const float sxx = xx / n - middle.x() * middle.x();
   const float sxy = xy / n - middle.x() * middle.y();
@@ -109,22 +149,30 @@ void SegmentFinder::find(const cv::Mat& grey, int min_contrast, std::vector<Segm
 void SegmentFinder::halve(const cv::Mat& grey) {
   width_ = grey.cols / 2;
   height_ = grey.rows / 2;
-  const auto count = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
-  half_.resize(count);
-  across_.resize(count);
-  down_.resize(count);
-  strength_.assign(count, 0);
-  ridge_.assign(count, 0);
+  half_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
   for (int y = 0; y < height_; ++y) halve_row(grey.ptr(2 * y), grey.ptr(2 * y + 1), width_, &half_[at(0, y)]);
 }
 
 void SegmentFinder::find_ridges(int min_strength) {
-  for (int y = 1; y < height_ - 1; ++y)
-    gradient_row(&half_[at(0, y - 1)], &half_[at(0, y)], &half_[at(0, y + 1)], width_, &across_[at(0, y)],
-                 &down_[at(0, y)], &strength_[at(0, y)]);
-  for (int y = 1; y < height_ - 1; ++y)
-    ridge_row(&across_[at(0, y)], &down_[at(0, y)], &strength_[at(0, y - 1)], &strength_[at(0, y)],
-              &strength_[at(0, y + 1)], width_, static_cast<std::uint16_t>(min_strength), &ridge_[at(0, y)]);
+  const auto width = static_cast<std::size_t>(width_);
+  ridge_.assign(half_.size(), 0);
+  across_.resize(2 * width);
+  down_.resize(2 * width);
+  strength_.assign(3 * width, 0);
+  // Row y's gradients, then the ridges of the row before, whose lower neighbour is known by now.
+  const auto strengths = [&](int y) { return &strength_[static_cast<std::size_t>(y % 3) * width]; };
+  const auto gradient_of = [&](int y) { return static_cast<std::size_t>(y % 2) * width; };
+  for (int y = 1; y < height_; ++y) {
+    if (y < height_ - 1)
+      gradient_row(&half_[at(0, y - 1)], &half_[at(0, y)], &half_[at(0, y + 1)], width_,
+                   &across_[gradient_of(y)], &down_[gradient_of(y)], strengths(y));
+    else
+      std::fill_n(strengths(y), width, std::uint16_t{0});
+    if (y == 1) continue;
+    way_row(&across_[gradient_of(y - 1)], &down_[gradient_of(y - 1)], width_, &ridge_[at(0, y - 1)]);
+    ridge_row(&across_[gradient_of(y - 1)], &down_[gradient_of(y - 1)], strengths(y + 1), strengths(y - 1),
+              strengths(y), width_, static_cast<std::uint16_t>(min_strength), &ridge_[at(0, y - 1)]);
+  }
 }
 
 // The segment through an edge pixel, both ways. Its pixels belong to no other.
@@ -132,7 +180,8 @@ bool SegmentFinder::follow(int x, int y, Segment* segment) {
   Line line;
   line.origin_x = x;
   line.origin_y = y;
-  line.direction = Eigen::Vector2f(-down_[at(x, y)], across_[at(x, y)]).normalized();
+  const std::uint8_t way = ridge_[at(x, y)];
+  line.direction = Eigen::Vector2f(-k_ways.y[way], k_ways.x[way]);
   line.add(0, 0);
   ridge_[at(x, y)] = 0;
   const Eigen::Vector2i to = walk(line, {x, y}, 1);
@@ -173,42 +222,38 @@ Eigen::Vector2i SegmentFinder::walk(Line& line, const Eigen::Vector2i& start, in
     const int v_limit = flat ? height_ : width_;
     const std::ptrdiff_t v_stride = flat ? width_ : 1;
     const float offset = static_cast<float>(v_origin) + line.middle[v_axis] - slope * line.middle[u_axis];
-    bool found = false;
-    for (int u = last[u_axis] + forward * (missed + 1);; u += forward) {
+    // The gradient of an edge along the line: dark lies on its right.
+    const float gradient_x = line.direction.y();
+    const float gradient_y = -line.direction.x();
+    const auto belongs = [&](std::uint8_t way_there) {
+      return way_there != 0 &&
+             gradient_x * k_ways.x[way_there] + gradient_y * k_ways.y[way_there] > k_max_turn;
+    };
+    const int gap =
+        line.n < k_min_pixels ? 1 : std::min(k_max_gap_px, k_gap_px + static_cast<int>(k_gap_share * line.n));
+    bool refit = false;
+    for (int u = last[u_axis] + forward * (missed + 1); !refit; u += forward) {
       const float v = offset + slope * static_cast<float>(u - u_origin) + 0.5F;
       const int v_px = static_cast<int>(v);
       if (u < 1 || u >= u_limit - 1 || !(v >= 2) || v_px >= v_limit - 2) return last;
-      const std::size_t middle = flat ? at(u, v_px) : at(v_px, u);
+      std::uint8_t* middle = &ridge_[flat ? at(u, v_px) : at(v_px, u)];
       const int nearer = v - static_cast<float>(v_px) > 0.5F ? 1 : -1;
-      for (const int side : {0, nearer, -nearer}) {
-        const auto i = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(middle) + side * v_stride);
-        if (!ridge_[i]) continue;
-        const float gx = across_[i];
-        const float gy = down_[i];
-        const float along_normal = gx * line.direction.y() - gy * line.direction.x();  // dark on the right
-        if (!(along_normal > 0) ||
-            along_normal * along_normal < k_max_turn * k_max_turn * (gx * gx + gy * gy))
-          continue;
-        ridge_[i] = 0;
-        last[u_axis] = u;
-        last[v_axis] = v_px + side;
-        line.add(static_cast<float>(last.x() - line.origin_x), static_cast<float>(last.y() - line.origin_y));
-        found = true;
-        break;
-      }
-      if (!found) {
-        const int gap = line.n < k_min_pixels ? 1 : k_gap_px + static_cast<int>(k_gap_share * line.n);
-        if (++missed > std::min(k_max_gap_px, gap)) return last;
+      const int side = belongs(*middle)                      ? 0
+                       : belongs(middle[nearer * v_stride])  ? nearer
+                       : belongs(middle[-nearer * v_stride]) ? -nearer
+                                                             : 2;
+      if (side == 2) {
+        if (++missed > gap) return last;
         continue;
       }
+      middle[side * v_stride] = 0;
+      last[u_axis] = u;
+      last[v_axis] = v_px + side;
+      line.add(static_cast<float>(last.x() - line.origin_x), static_cast<float>(last.y() - line.origin_y));
       missed = 0;
-      const int n = static_cast<int>(line.n);
-      if (n >= 3 && (n < 6 || (n < 32 && n % 4 == 0) || n % 16 == 0)) {
-        line.fit();
-        break;  // another slope
-      }
-      found = false;
+      refit = line.n >= line.next_fit;
     }
+    line.fit();  // another slope
   }
 }
 

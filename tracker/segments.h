@@ -26,13 +26,16 @@ class SegmentFinder {
  private:
   int width_ = 0, height_ = 0;
   std::vector<std::uint8_t> half_;           // the picture at half size
-  std::vector<std::int16_t> across_, down_;  // Sobel gradients
-  std::vector<std::uint16_t> strength_;      // |across| + |down|
-  std::vector<std::uint8_t> ridge_;          // 1: an edge pixel that no segment holds yet
+  std::vector<std::int16_t> across_, down_;  // Sobel gradients of a row
+  std::vector<std::uint16_t> strength_;      // |across| + |down|, of three rows
+  // 0, or the way of the gradient of an edge pixel that no segment holds yet: 256ths of a turn, lowest bit
+  // set.
+  std::vector<std::uint8_t> ridge_;
 
   struct Line {  // running fit, half-size pixels from its origin
     int origin_x = 0, origin_y = 0;
     float n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+    float next_fit = 3;
     Eigen::Vector2f middle = Eigen::Vector2f::Zero(), direction;
     void add(float px, float py);
     void fit();
