@@ -10,7 +10,7 @@ namespace limn::tracker {
 namespace {
 
 constexpr double k_cell_px = 32;
-constexpr double k_min_length_px = 9;    // of a segment: shorter ones' directions are too vague
+constexpr double k_min_length_px = 12;   // of a segment: shorter ones' directions are too vague
 constexpr double k_min_sine = 0.25;      // of a quad's corner: steeper markers show as regions
 constexpr double k_max_opposite = -0.3;  // cosine between opposite sides
 constexpr double k_max_gap_share = 0.9;  // of the longer segment's length, from a segment's end to the corner

@@ -14,7 +14,7 @@ namespace {
 constexpr int k_strength_of_level = 2;
 constexpr int k_min_pixels = 5;       // of a segment, at half size
 constexpr float k_max_rms_px = 0.7F;  // rounding to pixels alone gives 0.3
-constexpr float k_max_turn = 0.87F;   // cosine of a pixel's gradient to the line's normal: 30 degrees
+constexpr int k_max_turn = 21;        // of a pixel's gradient to the line's normal, 256ths: 30 degrees
 constexpr int k_gap_px = 3;           // that are jumped at once, and more on longer lines
 constexpr float k_gap_share = 0.2F;
 constexpr int k_max_gap_px = 8;
@@ -92,27 +92,18 @@ LIMN_SIMD void ridge_row(const std::int16_t* __restrict across,
   }
 }
 
-struct Ways {
-  std::array<float, 256> x, y;
-};
-
-Ways all_ways() {
-  Ways ways;
-  for (std::size_t i = 0; i < 256; ++i) {
-    const double angle = static_cast<double>(i) * std::numbers::pi / 128;
-    ways.x[i] = static_cast<float>(std::cos(angle));
-    ways.y[i] = static_cast<float>(std::sin(angle));
-  }
-  return ways;
+// As way_row's.
+int way_of(const Eigen::Vector2f& gradient) {
+  const float ax = std::abs(gradient.x());
+  const float ay = std::abs(gradient.y());
+  const float share = std::min(ax, ay) / std::max(std::max(ax, ay), 1e-9F);
+  const int octant = static_cast<int>(share * (32.0F + 11.12F * (1 - share)) + 0.5F);
+  const int quarter = ax < ay ? 64 - octant : octant;
+  const int half = gradient.x() < 0 ? 128 - quarter : quarter;
+  return gradient.y() < 0 ? 256 - half : half;
 }
-const Ways k_ways = all_ways();
 
 }  // namespace
-
-void SegmentFinder::Line::add(float px, float py) {
-  n += 1, x += px, y += py;
-  xx += px * px, xy += px * py, yy += py * py;
-}
 
 void SegmentFinder::Line::fit() {
   next_fit = n < 5 ? n + 1 : 1.5F * n;
@@ -127,7 +118,12 @@ void SegmentFinder::Line::fit() {
   const float length = axis.norm();
   if (!(length > 0)) return;
   axis /= length;
-  direction = axis.dot(direction) < 0 ? Eigen::Vector2f(-axis) : axis;
+  turn(axis.dot(direction) < 0 ? Eigen::Vector2f(-axis) : axis);
+}
+
+void SegmentFinder::Line::turn(const Eigen::Vector2f& along) {
+  direction = along;
+  first_way = way_of({along.y(), -along.x()}) - k_max_turn;  // dark lies on its right
 }
 
 void SegmentFinder::find(const cv::Mat& grey, int min_contrast, std::vector<Segment>& segments) {
@@ -180,8 +176,8 @@ bool SegmentFinder::follow(int x, int y, Segment* segment) {
   Line line;
   line.origin_x = x;
   line.origin_y = y;
-  const std::uint8_t way = ridge_[at(x, y)];
-  line.direction = Eigen::Vector2f(-k_ways.y[way], k_ways.x[way]);
+  const double angle = ridge_[at(x, y)] * std::numbers::pi / 128;
+  line.turn(Eigen::Vector2f(static_cast<float>(-std::sin(angle)), static_cast<float>(std::cos(angle))));
   line.add(0, 0);
   ridge_[at(x, y)] = 0;
   const Eigen::Vector2i to = walk(line, {x, y}, 1);
@@ -208,7 +204,8 @@ bool SegmentFinder::follow(int x, int y, Segment* segment) {
 
 // Goes on along the line, one pixel of its main axis at a time; the last pixel that belonged to it.
 Eigen::Vector2i SegmentFinder::walk(Line& line, const Eigen::Vector2i& start, int way) {
-  Eigen::Vector2i last = start;
+  int last_x = start.x();
+  int last_y = start.y();
   int missed = 0;
   while (true) {
     const bool flat = std::abs(line.direction.x()) >= std::abs(line.direction.y());
@@ -219,40 +216,48 @@ Eigen::Vector2i SegmentFinder::walk(Line& line, const Eigen::Vector2i& start, in
     const int u_origin = flat ? line.origin_x : line.origin_y;
     const int v_origin = flat ? line.origin_y : line.origin_x;
     const int u_limit = flat ? width_ : height_;
-    const int v_limit = flat ? height_ : width_;
+    const auto v_limit = static_cast<float>((flat ? height_ : width_) - 2);
     const std::ptrdiff_t v_stride = flat ? width_ : 1;
-    const float offset = static_cast<float>(v_origin) + line.middle[v_axis] - slope * line.middle[u_axis];
-    // The gradient of an edge along the line: dark lies on its right.
-    const float gradient_x = line.direction.y();
-    const float gradient_y = -line.direction.x();
-    const auto belongs = [&](std::uint8_t way_there) {
-      return way_there != 0 &&
-             gradient_x * k_ways.x[way_there] + gradient_y * k_ways.y[way_there] > k_max_turn;
+    const std::ptrdiff_t u_step = forward * (flat ? 1 : width_);
+    const float v_step = slope * static_cast<float>(forward);
+    const int first_way = line.first_way;
+    const auto belongs = [first_way](int way_there) {
+      return (way_there & 1) & static_cast<int>(((way_there - first_way) & 255) <= 2 * k_max_turn);
     };
     const int gap =
         line.n < k_min_pixels ? 1 : std::min(k_max_gap_px, k_gap_px + static_cast<int>(k_gap_share * line.n));
-    bool refit = false;
-    for (int u = last[u_axis] + forward * (missed + 1); !refit; u += forward) {
-      const float v = offset + slope * static_cast<float>(u - u_origin) + 0.5F;
-      const int v_px = static_cast<int>(v);
-      if (u < 1 || u >= u_limit - 1 || !(v >= 2) || v_px >= v_limit - 2) return last;
-      std::uint8_t* middle = &ridge_[flat ? at(u, v_px) : at(v_px, u)];
-      const int nearer = v - static_cast<float>(v_px) > 0.5F ? 1 : -1;
-      const int side = belongs(*middle)                      ? 0
-                       : belongs(middle[nearer * v_stride])  ? nearer
-                       : belongs(middle[-nearer * v_stride]) ? -nearer
-                                                             : 2;
-      if (side == 2) {
-        if (++missed > gap) return last;
-        continue;
+    int u = (flat ? last_x : last_y) + forward * (missed + 1);
+    float v = static_cast<float>(v_origin) + line.middle[v_axis] +
+              slope * (static_cast<float>(u - u_origin) - line.middle[u_axis]) + 0.5F;
+    std::uint8_t* row = ridge_.data() + (flat ? u : static_cast<std::ptrdiff_t>(u) * width_);
+    const float next_fit = line.next_fit;
+    Line sums = line;  // what is added on the way, out of reach of the pixels' stores
+    while (sums.n < next_fit) {
+      if (u < 1 || u >= u_limit - 1 || !(v >= 2) || v >= v_limit) {
+        line = sums;
+        return {last_x, last_y};
       }
-      middle[side * v_stride] = 0;
-      last[u_axis] = u;
-      last[v_axis] = v_px + side;
-      line.add(static_cast<float>(last.x() - line.origin_x), static_cast<float>(last.y() - line.origin_y));
-      missed = 0;
-      refit = line.n >= line.next_fit;
+      const int v_px = static_cast<int>(v);
+      std::uint8_t* middle = row + v_px * v_stride;
+      const int nearer = v - static_cast<float>(v_px) > 0.5F ? 1 : -1;
+      const std::ptrdiff_t near_by = nearer * v_stride;
+      const int here = belongs(*middle), near = belongs(middle[near_by]), far = belongs(middle[-near_by]);
+      if (here | near | far) {
+        const int side = here ? 0 : near ? nearer : -nearer;
+        middle[side * v_stride] = 0;
+        last_x = flat ? u : v_px + side;
+        last_y = flat ? v_px + side : u;
+        sums.add(static_cast<float>(last_x - line.origin_x), static_cast<float>(last_y - line.origin_y));
+        missed = 0;
+      } else if (++missed > gap) {
+        line = sums;
+        return {last_x, last_y};
+      }
+      u += forward;
+      v += v_step;
+      row += u_step;
     }
+    line = sums;
     line.fit();  // another slope
   }
 }
