@@ -30,33 +30,36 @@ class QuadFinder {
   void find(CornerCodes& corners, const CandidateOptions& options, std::vector<Quad>& quads);
 
  private:
-  struct Crack {  // middle of a boundary crack, in half pixels
-    int x, y;
+  struct Steps;
+  struct Outline {  // of the boundary traced last; half pixels
+    std::size_t count = 0;
+    int low_x = 0, high_x = 0, low_y = 0, high_y = 0;
+    long long area = 0;  // in half square pixels; negative around a hole
   };
   struct Moments {  // sums over the boundary's points up to an index
     double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
   };
-  struct Line {
-    Eigen::Vector2d p, d;  // centroid, unit direction
+  struct Side {
+    Eigen::Vector2d p, d;  // centroid, unit direction; pixels
     double squares = 0;    // sum of squared distances, px^2
     double count = 0;
+    bool known = false, straight = false;
   };
-  std::vector<Crack> trail_;  // grows; boundary_ is its used part
-  std::span<Crack> boundary_;
+  static constexpr std::size_t k_max_corners = 10;
+  std::vector<float> trail_x_, trail_y_;  // middles of the boundary's cracks, in half pixels
+  std::span<const float> x_, y_;          // the same from a corner on, and that one again at the end
   std::vector<Moments> sums_;
   std::vector<std::size_t> corners_;
+  std::array<std::array<Side, k_max_corners>, k_max_corners> sides_;  // from corner to corner
 
-  void trace(CornerCodes& corners, int x, int y);
-  bool may_be_quad(double min_side_px) const;
-  void split(std::size_t from, std::size_t to, double tolerance);
-  bool find_corners();
+  Outline trace(CornerCodes& corners, const Steps& steps, int x, int y);
+  bool find_corners(std::size_t count);
+  void split(std::size_t from, std::size_t to, float tolerance);
   void sum_moments();
-  Line line(std::size_t from, std::size_t to) const;
-  bool choose_quad(double min_side_px, Quad* quad) const;
-  bool fit_quad(const std::array<std::size_t, 4>& corners,
-                double min_side_px,
-                Quad* quad,
-                double* squares) const;
+  const Side& side(std::size_t from, std::size_t to);
+  bool choose_quad(double min_side_px, Quad* quad);
+  bool fit_quad(const std::array<std::size_t, 4>& corners, double min_side_px, Quad* quad);
+  Eigen::Vector2d point(std::size_t i) const { return {0.5 * x_[i], 0.5 * y_[i]}; }
 };
 
 }  // namespace limn::tracker
