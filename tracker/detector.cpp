@@ -122,7 +122,9 @@ void Detector::settle_overlapping_edges(const cv::Mat& grey,
 
 void Detector::add_broken(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections) {
   constexpr std::size_t k_max_candidates = 400;
-  segment_finder_.find(grey, options_.min_contrast, segments_);
+  known_.clear();
+  for (const Detection& detection : *detections) known_.push_back(detection.corners_px);
+  segment_finder_.find(grey, options_.min_contrast, known_, segments_);
   joiner_.find(segments_, grey.cols, grey.rows, joined_);
   const std::size_t regular = detections->size();
   for (std::size_t i = 0; i < std::min(joined_.size(), k_max_candidates); ++i) {

@@ -50,6 +50,7 @@ class Detector {
   QuadFinder finder_;
   std::vector<Quad> quads_;
   EdgeRefiner refiner_;
+  std::vector<std::array<Eigen::Vector2d, 4>> known_;  // outlines of what is found already
   SegmentFinder segment_finder_;
   std::vector<Segment> segments_;
   SegmentQuadFinder joiner_;
