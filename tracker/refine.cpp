@@ -3,6 +3,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "tracker/simd.h"
 
 namespace limn::tracker {
 namespace {
@@ -145,7 +148,7 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   const int first = std::max(0, static_cast<int>(std::ceil(u_low + trim)));
   const int last = std::min(u_limit - 1, static_cast<int>(std::floor(u_high - trim)));
 
-  crossings_.clear();
+  rows_.clear();
   gradients_.clear();
   std::array<double, 2 * k_max_reach> mean{};
   const int stride = effort == Effort::full ? 1 : 1 + (last - first) / k_rough_rows;
@@ -162,9 +165,9 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
       gradients_.push_back(difference);
       mean[static_cast<std::size_t>(k)] += difference;
     }
-    crossings_.push_back({static_cast<double>(u), static_cast<double>(centre), 0});
+    rows_.push_back({u, centre});
   }
-  if (static_cast<int>(crossings_.size()) < k_min_crossings) return false;
+  if (static_cast<int>(rows_.size()) < k_min_crossings) return false;
 
   // The edge's window [low, high) in the averaged profile. Nearer peaks win over slightly higher ones.
   std::size_t peak = 0;
@@ -194,16 +197,16 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   for (std::size_t k = low; k < high; ++k) contrast += mean[k];
   // A Gaussian's peak is its area over sigma sqrt(2 pi); v is not the edge's normal when the side leans.
   line->blur_px = 0.4 * contrast / mean[peak] / std::hypot(1.0, slope);
-  contrast /= static_cast<double>(crossings_.size());
+  contrast /= static_cast<double>(rows_.size());
   if (!(contrast > 0)) return false;
 
   // Rows beside a corner see the other edge as far as the blur reaches.
   const double blur_trim = std::min(0.2 * (u_high - u_low), 0.5 * static_cast<double>(high - low) + 0.5);
   double inside_sum = 0;  // in grey levels, as all that is no position
   double outside_sum = 0;
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < crossings_.size(); ++i) {
-    const Crossing& row = crossings_[i];
+  crossings_.clear();
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    const Row& row = rows_[i];
     if (row.u < u_low + blur_trim || row.u > u_high - blur_trim) continue;
     const double* gradient = &gradients_[i * profile];
     double sum = 0;
@@ -213,18 +216,16 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
       moment += gradient[k] * (static_cast<double>(k) + 0.5 - reach);
     }
     if (sum < k_min_share * contrast) continue;  // covered, or no edge here
-    const double v = row.v + inward * moment / sum;
-    const double share = sum / contrast;
-    const std::uint8_t* pixel = line->flat ? grey.ptr(static_cast<int>(row.v)) + static_cast<int>(row.u)
-                                           : grey.ptr(static_cast<int>(row.u)) + static_cast<int>(row.v);
+    const double v = row.centre + inward * moment / sum;
+    const std::uint8_t* pixel = line->flat ? grey.ptr(row.centre) + row.u : grey.ptr(row.u) + row.centre;
     inside_sum += pixel[(static_cast<std::ptrdiff_t>(high) - reach) * v_stride];
     outside_sum += pixel[(static_cast<std::ptrdiff_t>(low) - reach) * v_stride];
-    crossings_[kept++] = {row.u, v - bow.at(row.u), std::min(1.0, share)};
+    crossings_.add(row.u, v - bow.at(row.u), std::min(1.0, sum / contrast));
   }
-  crossings_.resize(kept);
-  if (static_cast<int>(kept) < k_min_crossings) return false;
-  line->inside_level = inside_sum / static_cast<double>(kept);
-  line->outside_level = outside_sum / static_cast<double>(kept);
+  if (static_cast<int>(crossings_.u.size()) < k_min_crossings) return false;
+  const auto kept = static_cast<double>(crossings_.u.size());
+  line->inside_level = inside_sum / kept;
+  line->outside_level = outside_sum / kept;
   if (line->outside_level - line->inside_level < min_contrast) return false;
   double variance = 0;
   if (!fit_line(effort, line, &variance)) return false;
@@ -235,46 +236,98 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
 // A straight line and a bent one, averaged by what speaks for the bow.
 bool EdgeRefiner::fit_line(Effort effort, EdgeLine* line, double* variance) {
   double u_sum = 0;
-  for (const Crossing& c : crossings_) u_sum += c.u;
-  line->u_middle = u_sum / static_cast<double>(crossings_.size());
+  for (const double u : crossings_.u) u_sum += u;
+  line->u_middle = u_sum / static_cast<double>(crossings_.u.size());
+  crossings_.d.resize(crossings_.u.size());
+  crossings_.residual.resize(crossings_.u.size());
+  for (std::size_t i = 0; i < crossings_.u.size(); ++i) crossings_.d[i] = crossings_.u[i] - line->u_middle;
   *variance = fit_terms(2, line);
   if (!(*variance >= 0)) return false;
-  if (effort == Effort::rough || crossings_.size() < k_min_bent_crossings) return true;
+  if (effort == Effort::rough || crossings_.u.size() < k_min_bent_crossings) return true;
   EdgeLine bent = *line;
   if (!(fit_terms(3, &bent) >= 0)) return true;
-  const double half = 0.5 * std::abs(crossings_.back().u - crossings_.front().u);
+  const double half = 0.5 * std::abs(crossings_.u.back() - crossings_.u.front());
   *line = averaged(*line, bent, weight_of_bow(bent, half));
   return true;
+}
+
+struct Sums {  // weighted, of crossings: powers of d, and of v times them
+  double w = 0, wd = 0, wdd = 0, wddd = 0, wdddd = 0, v = 0, vd = 0, vdd = 0;
+};
+
+// Weights bounded as Huber's beyond `huber`, none beyond `foreign`.
+LIMN_SIMD Sums weighted_sums(const double* __restrict d,
+                             const double* __restrict v,
+                             const double* __restrict share,
+                             const double* __restrict residual,
+                             std::size_t count,
+                             double huber,
+                             double foreign) {
+  double w0 = 0, w1 = 0, w2 = 0, w3 = 0, w4 = 0, v0 = 0, v1 = 0, v2 = 0;
+#pragma omp simd reduction(+ : w0, w1, w2, w3, w4, v0, v1, v2)
+  for (std::size_t i = 0; i < count; ++i) {
+    const double bounded = residual[i] > huber ? huber / residual[i] : 1.0;
+    const double w = share[i] * share[i] * (residual[i] > foreign ? 0.0 : bounded);
+    const double wd = w * d[i];
+    const double wdd = wd * d[i];
+    const double wddd = wdd * d[i];
+    w0 += w, w1 += wd, w2 += wdd, w3 += wddd, w4 += wddd * d[i];
+    v0 += w * v[i], v1 += wd * v[i], v2 += wdd * v[i];
+  }
+  return {w0, w1, w2, w3, w4, v0, v1, v2};
+}
+
+struct Spread {  // of residuals that are not foreign
+  double squares = 0, count = 0, largest = 0;
+};
+
+LIMN_SIMD Spread new_residuals(const double* __restrict d,
+                               const double* __restrict v,
+                               const double* __restrict share,
+                               std::size_t count,
+                               const Eigen::Vector3d& line,
+                               double bound,
+                               double foreign,
+                               double* __restrict residual) {
+  const double offset = line[0], slope = line[1], curvature = line[2];
+  double squares = 0, kept = 0, largest = 0;
+#pragma omp simd reduction(+ : squares, kept) reduction(max : largest)
+  for (std::size_t i = 0; i < count; ++i) {
+    const double r = share[i] * std::abs(v[i] - (offset + d[i] * (slope + d[i] * curvature)));
+    residual[i] = r;
+    const double counts = r > foreign ? 0.0 : 1.0;
+    const double bounded = counts * (r > bound ? bound : r);
+    squares += bounded * bounded;
+    kept += counts;
+    largest = counts * r > largest ? counts * r : largest;
+  }
+  return {squares, kept, largest};
 }
 
 // Weighted least squares of the first `terms` of offset, slope, curvature; then Huber weights on the
 // residuals' robust scale; then without what belongs to something else. The residuals' variance; negative
 // when the crossings do not determine the terms.
 double EdgeRefiner::fit_terms(int terms, EdgeLine* line) {
+  constexpr double k_all = std::numeric_limits<double>::infinity();
+  constexpr int k_huber_rounds = 3;
+  constexpr int k_rounds = 5;
+  const std::size_t count = crossings_.u.size();
+  const double* d = crossings_.d.data();
+  const double* v = crossings_.v.data();
+  const double* share = crossings_.share.data();
+  double* residual = crossings_.residual.data();
   line->offset = line->slope = line->curvature = 0;
   double scale = 0;  // 0: no robust weights yet
   double variance = -1;
-  const double half = 0.5 * std::abs(crossings_.back().u - crossings_.front().u);
-  constexpr int k_huber_rounds = 3;
-  constexpr int k_rounds = 5;
+  const double half = 0.5 * std::abs(crossings_.u.back() - crossings_.u.front());
+  std::fill_n(residual, count, 0.0);
   for (int round = 0; round < k_rounds; ++round) {
-    const double huber = k_huber * scale;
-    const double foreign = k_reject * std::max(scale, k_min_scale_px);
-    std::array<double, 5> powers{};
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    for (const Crossing& c : crossings_) {
-      const double d = c.u - line->u_middle;
-      const double residual = c.share * std::abs(c.v - line->at(c.u));
-      if (round >= k_huber_rounds && residual > foreign) continue;
-      const double w = c.share * c.share * (scale > 0 && residual > huber ? huber / residual : 1);
-      const double wd = w * d;
-      const double wdd = wd * d;
-      powers[0] += w, powers[1] += wd, powers[2] += wdd, powers[3] += wdd * d, powers[4] += wdd * d * d;
-      right += c.v * Eigen::Vector3d(w, wd, wdd);
-    }
+    const double foreign = round >= k_huber_rounds ? k_reject * std::max(scale, k_min_scale_px) : k_all;
+    const Sums sums =
+        weighted_sums(d, v, share, residual, count, scale > 0 ? k_huber * scale : k_all, foreign);
     Eigen::Matrix3d normal;
-    normal << powers[0], powers[1], powers[2], powers[1], powers[2], powers[3], powers[2], powers[3],
-        powers[4];
+    normal << sums.w, sums.wd, sums.wdd, sums.wd, sums.wdd, sums.wddd, sums.wdd, sums.wddd, sums.wdddd;
+    Eigen::Vector3d right(sums.v, sums.vd, sums.vdd);
     if (terms == 2) {
       normal.row(2).setZero();
       normal.col(2).setZero();
@@ -290,26 +343,17 @@ double EdgeRefiner::fit_terms(int terms, EdgeLine* line) {
     line->slope = solution[1];
     line->curvature = solution[2];
     if (terms == 2) inverse(2, 2) = 0;
-    double squares = 0;
-    double count = 0;
-    deviations_.clear();
-    double largest = 0;
-    for (const Crossing& c : crossings_) {
-      const double residual = c.share * std::abs(c.v - line->at(c.u));
-      deviations_.push_back(residual);
-      if (round >= k_huber_rounds && residual > foreign) continue;
-      largest = std::max(largest, residual);
-      const double bounded = scale > 0 ? std::min(residual, 3 * scale) : residual;
-      squares += bounded * bounded;
-      count += 1;
-    }
-    const auto middle = deviations_.begin() + static_cast<std::ptrdiff_t>(deviations_.size() / 2);
+    const Spread spread =
+        new_residuals(d, v, share, count, solution, scale > 0 ? 3 * scale : k_all, foreign, residual);
+    deviations_.assign(residual, residual + count);
+    const auto middle = deviations_.begin() + static_cast<std::ptrdiff_t>(count / 2);
     std::nth_element(deviations_.begin(), middle, deviations_.end());
     scale = std::max(1.4826 * *middle, 1e-3);
-    variance = squares / std::max(1.0, count - terms);  // of a row of full contrast
+    variance = spread.squares / std::max(1.0, spread.count - terms);  // of a row of full contrast
     line->covariance = inverse * variance;
     // Settled, with nothing to reject in the rounds to come.
-    if (round > 0 && moved < k_settled_px && largest < k_reject * std::max(scale, k_min_scale_px)) break;
+    if (round > 0 && moved < k_settled_px && spread.largest < k_reject * std::max(scale, k_min_scale_px))
+      break;
   }
   return variance;
 }
@@ -321,10 +365,11 @@ void EdgeRefiner::see_ends(double from, double to, double trim, double variance,
   const double near = k_reject * std::max(k_min_scale_px, std::sqrt(variance));
   double at_from = 0;
   double at_to = 0;
-  for (const Crossing& c : crossings_) {
-    if (c.share * std::abs(c.v - line->at(c.u)) > near) continue;
-    at_from += std::abs(c.u - from) < trim + band;
-    at_to += std::abs(c.u - to) < trim + band;
+  for (std::size_t i = 0; i < crossings_.u.size(); ++i) {
+    const double u = crossings_.u[i];
+    if (crossings_.share[i] * std::abs(crossings_.v[i] - line->at(u)) > near) continue;
+    at_from += std::abs(u - from) < trim + band;
+    at_to += std::abs(u - to) < trim + band;
   }
   line->seen_at_start = at_from >= 0.5 * band;
   line->seen_at_end = at_to >= 0.5 * band;

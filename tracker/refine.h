@@ -60,12 +60,23 @@ class EdgeRefiner {
   const std::array<double, 256>& light() const { return light_; }
 
  private:
-  struct Crossing {
-    double u, v;   // v(u) across the side's main axis
-    double share;  // of the side's contrast, at most 1: the inverse of its relative deviation
+  struct Row {  // across a side's main axis
+    int u, centre;
+  };
+  struct Crossings {               // of rows that show the edge
+    std::vector<double> u, v;      // v(u) across the side's main axis
+    std::vector<double> share;     // of the side's contrast, at most 1: the inverse of its relative deviation
+    std::vector<double> d;         // u less the line's u_middle
+    std::vector<double> residual;  // distance from the line, times share
+
+    void clear() { u.clear(), v.clear(), share.clear(); }
+    void add(double at_u, double at_v, double its_share) {
+      u.push_back(at_u), v.push_back(at_v), share.push_back(its_share);
+    }
   };
   std::array<double, 256> light_;  // of a grey level, 0 ... 255
-  std::vector<Crossing> crossings_;
+  std::vector<Row> rows_;
+  Crossings crossings_;
   std::vector<double> gradients_;   // of all rows, reach_ * 2 each
   std::vector<double> deviations_;  // scratch of the robust scale
 
