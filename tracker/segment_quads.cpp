@@ -59,8 +59,11 @@ Probe probe_of(const Segment& s, const Eigen::Vector2d& px, double radius) {
           static_cast<float>(s.length),        static_cast<float>(radius)};
 }
 
+// Entries are looked at by blocks: runs of them are short, and end with some that do not belong.
+constexpr int k_block = 16;
+
 // Marks the entries that corner_of may join to the probe, which comes before them (sign 1) or after them
-// (-1).
+// (-1), and some more behind the last.
 LIMN_SIMD void match_corners(const Probe p,
                              float sign,
                              const float* __restrict x,
@@ -69,25 +72,26 @@ LIMN_SIMD void match_corners(const Probe p,
                              const float* __restrict dy,
                              const float* __restrict length,
                              int count,
-                             std::uint8_t* __restrict matches) {
+                             std::int32_t* __restrict matches) {
   constexpr float k_slack_px = 0.01F;  // of single precision
   const float own_overlap = k_slack_px + static_cast<float>(k_overlap_px + k_overlap_share * p.length);
-  for (int i = 0; i < count; ++i) {
-    const float ax = x[i] - p.x;
-    const float ay = y[i] - p.y;
-    const float sine = sign * (p.dx * dy[i] - p.dy * dx[i]);
-    // Along the probe to the corner, and along the entry from the corner, times sine.
-    const float own = ax * dy[i] - ay * dx[i];
-    const float other = ax * p.dy - ay * p.dx;
-    const float longer = p.length > length[i] ? p.length : length[i];
-    const float gap =
-        static_cast<float>(k_gap_px) + k_slack_px + static_cast<float>(k_max_gap_share) * longer;
-    const float overlap =
-        static_cast<float>(k_overlap_px) + k_slack_px + static_cast<float>(k_overlap_share) * length[i];
-    matches[i] = (ax * ax + ay * ay <= p.radius * p.radius) &
-                 (sine >= 0.999F * static_cast<float>(k_min_sine)) & (own >= -own_overlap * sine) &
-                 (own <= gap * sine) & (other >= -gap * sine) & (other <= overlap * sine);
-  }
+  for (int block = 0; block < count; block += k_block)
+    for (int i = block; i < block + k_block; ++i) {
+      const float ax = x[i] - p.x;
+      const float ay = y[i] - p.y;
+      const float sine = sign * (p.dx * dy[i] - p.dy * dx[i]);
+      // Along the probe to the corner, and along the entry from the corner, times sine.
+      const float own = ax * dy[i] - ay * dx[i];
+      const float other = ax * p.dy - ay * p.dx;
+      const float longer = p.length > length[i] ? p.length : length[i];
+      const float gap =
+          static_cast<float>(k_gap_px) + k_slack_px + static_cast<float>(k_max_gap_share) * longer;
+      const float overlap =
+          static_cast<float>(k_overlap_px) + k_slack_px + static_cast<float>(k_overlap_share) * length[i];
+      matches[i] = (ax * ax + ay * ay <= p.radius * p.radius) &
+                   (sine >= 0.999F * static_cast<float>(k_min_sine)) & (own >= -own_overlap * sine) &
+                   (own <= gap * sine) & (other >= -gap * sine) & (other <= overlap * sine);
+    }
 }
 
 // Marks the entries that may go on along the probe's line.
@@ -97,16 +101,17 @@ LIMN_SIMD void match_collinear(const Probe p,
                                const float* __restrict dx,
                                const float* __restrict dy,
                                int count,
-                               std::uint8_t* __restrict matches) {
+                               std::int32_t* __restrict matches) {
   constexpr float k_sine = 1.01F * static_cast<float>(k_max_collinear_sine);
-  for (int i = 0; i < count; ++i) {
-    const float ax = x[i] - p.x;
-    const float ay = y[i] - p.y;
-    const float sine = p.dx * dy[i] - p.dy * dx[i];
-    const float gap = p.dx * ax + p.dy * ay;
-    matches[i] = (ax * ax + ay * ay <= p.radius * p.radius) & (gap > 0) & (std::abs(sine) <= k_sine) &
-                 (p.dx * dx[i] + p.dy * dy[i] > 0);
-  }
+  for (int block = 0; block < count; block += k_block)
+    for (int i = block; i < block + k_block; ++i) {
+      const float ax = x[i] - p.x;
+      const float ay = y[i] - p.y;
+      const float sine = p.dx * dy[i] - p.dy * dx[i];
+      const float gap = p.dx * ax + p.dy * ay;
+      matches[i] = (ax * ax + ay * ay <= p.radius * p.radius) & (gap > 0) & (std::abs(sine) <= k_sine) &
+                   (p.dx * dx[i] + p.dy * dy[i] > 0);
+    }
 }
 
 bool same(const Quad& a, const Quad& b) {
@@ -153,7 +158,7 @@ void SegmentQuadFinder::sort_into_cells(Eigen::Vector2d Segment::*point, Cells* 
   for (std::size_t i = 2; i < cells->begin.size(); ++i) cells->begin[i] += cells->begin[i - 1];
   cells->segment.resize(segments_.size());
   for (auto* values : {&cells->x, &cells->y, &cells->dx, &cells->dy, &cells->length})
-    values->resize(segments_.size());
+    values->assign(segments_.size() + k_block, 0);
   for (std::uint32_t i = 0; i < segments_.size(); ++i) {
     const Segment& s = segments_[i];
     const std::size_t at = cells->begin[static_cast<std::size_t>(cell_of(s.*point)) + 1]++;
@@ -177,7 +182,7 @@ void SegmentQuadFinder::visit(
   for (int first = low; first + columns <= high; first += columns_) {
     const std::uint32_t begin = cells.begin[static_cast<std::size_t>(first)];
     const std::uint32_t end = cells.begin[static_cast<std::size_t>(first + columns) + 1];
-    matches_.resize(std::max<std::size_t>(matches_.size(), end - begin));
+    matches_.resize(std::max<std::size_t>(matches_.size(), end - begin + k_block));
     match(begin, static_cast<int>(end - begin), matches_.data());
     for (std::uint32_t i = begin; i < end; ++i)
       if (matches_[i - begin]) visit(cells.segment[i]);
@@ -194,7 +199,7 @@ void SegmentQuadFinder::join_collinear() {
     std::uint32_t nearest = 0;
     double least = reach;
     const Probe probe = probe_of(a, a.to, reach);
-    const auto match = [&](std::uint32_t first, int entries, std::uint8_t* matches) {
+    const auto match = [&](std::uint32_t first, int entries, std::int32_t* matches) {
       match_collinear(probe, &begins_.x[first], &begins_.y[first], &begins_.dx[first], &begins_.dy[first],
                       entries, matches);
     };
@@ -231,7 +236,7 @@ void SegmentQuadFinder::find_corners() {
     const Segment& here = segments_[i];
     const double reach = reach_of(here);
     const auto match = [](const Cells& cells, const Probe& probe, float sign) {
-      return [&cells, probe, sign](std::uint32_t first, int count, std::uint8_t* matches) {
+      return [&cells, probe, sign](std::uint32_t first, int count, std::int32_t* matches) {
         match_corners(probe, sign, &cells.x[first], &cells.y[first], &cells.dx[first], &cells.dy[first],
                       &cells.length[first], count, matches);
       };
