@@ -93,38 +93,38 @@ LIMN_SIMD void ridge_row(const std::int16_t* __restrict across,
   }
 }
 
-// As way_row's.
-int way_of(const Eigen::Vector2f& gradient) {
-  const float ax = std::abs(gradient.x());
-  const float ay = std::abs(gradient.y());
-  const float share = std::min(ax, ay) / std::max(std::max(ax, ay), 1e-9F);
-  const int octant = static_cast<int>(share * (32.0F + 11.12F * (1 - share)) + 0.5F);
-  const int quarter = ax < ay ? 64 - octant : octant;
-  const int half = gradient.x() < 0 ? 128 - quarter : quarter;
-  return gradient.y() < 0 ? 256 - half : half;
-}
+struct Ways {  // unit vectors
+  std::array<float, 256> x, y;
+  Ways() {
+    for (std::size_t i = 0; i < 256; ++i) {
+      const double angle = static_cast<double>(i) * std::numbers::pi / 128;
+      x[i] = static_cast<float>(std::cos(angle));
+      y[i] = static_cast<float>(std::sin(angle));
+    }
+  }
+};
 
 }  // namespace
 
 void SegmentFinder::Line::fit() {
   next_fit = n < 5 ? n + 2 : n < 20 ? 1.5F * n : 2 * n;
-  middle = {x / n, y / n};
-  const float sxx = xx / n - middle.x() * middle.x();
-  const float sxy = xy / n - middle.x() * middle.y();
-  const float syy = yy / n - middle.y() * middle.y();
+  const float share = 1 / n;
+  middle = {share * x, share * y};
+  const float sxx = share * xx - middle.x() * middle.x();
+  const float sxy = share * xy - middle.x() * middle.y();
+  const float syy = share * yy - middle.y() * middle.y();
   const float apart = 0.5F * (sxx - syy);
   const float root = std::sqrt(apart * apart + sxy * sxy);
   // The eigenvector of the larger eigenvalue, the way that does not cancel.
   Eigen::Vector2f axis = apart > 0 ? Eigen::Vector2f(apart + root, sxy) : Eigen::Vector2f(sxy, root - apart);
-  const float length = axis.norm();
-  if (!(length > 0)) return;
-  axis /= length;
-  turn(axis.dot(direction) < 0 ? Eigen::Vector2f(-axis) : axis);
-}
-
-void SegmentFinder::Line::turn(const Eigen::Vector2f& along) {
-  direction = along;
-  first_way = way_of({along.y(), -along.x()}) - k_max_turn;  // dark lies on its right
+  const float square = axis.squaredNorm();
+  if (!(square > 0)) return;
+  const float cosine = axis.dot(direction);
+  axis *= (cosine < 0 ? -1.0F : 1.0F) / std::sqrt(square);
+  // The turn is small: its sine will do.
+  constexpr auto k_ways_of_radian = static_cast<float>(128 / std::numbers::pi);
+  way += k_ways_of_radian * (direction.x() * axis.y() - direction.y() * axis.x());
+  direction = axis;
 }
 
 void SegmentFinder::find(const cv::Mat& grey,
@@ -182,7 +182,8 @@ void SegmentFinder::clear(const std::array<Eigen::Vector2d, 4>& quad) {
   const Eigen::Vector2d centre = 0.25 * (quad[0] + quad[1] + quad[2] + quad[3]);
   std::array<cv::Point, 4> wider;
   for (std::size_t i = 0; i < 4; ++i) {
-    const Eigen::Vector2d out = 0.5 * quad[i] + k_around_px * std::sqrt(2.0) * (quad[i] - centre).normalized();
+    const Eigen::Vector2d out =
+        0.5 * quad[i] + k_around_px * std::sqrt(2.0) * (quad[i] - centre).normalized();
     wider[i] = {static_cast<int>(std::lround(out.x())), static_cast<int>(std::lround(out.y()))};
   }
   cv::fillConvexPoly(cv::Mat(height_, width_, CV_8UC1, ridge_.data()), wider, cv::Scalar(0));
@@ -193,8 +194,10 @@ bool SegmentFinder::follow(int x, int y, Segment* segment) {
   Line line;
   line.origin_x = x;
   line.origin_y = y;
-  const double angle = ridge_[at(x, y)] * std::numbers::pi / 128;
-  line.turn(Eigen::Vector2f(static_cast<float>(-std::sin(angle)), static_cast<float>(std::cos(angle))));
+  static const Ways ways;
+  const std::uint8_t way = ridge_[at(x, y)];
+  line.way = way;
+  line.direction = {-ways.y[way], ways.x[way]};  // dark on its right
   line.add(0, 0);
   ridge_[at(x, y)] = 0;
   const Eigen::Vector2i to = walk(line, {x, y}, 1);
@@ -237,7 +240,7 @@ Eigen::Vector2i SegmentFinder::walk(Line& line, const Eigen::Vector2i& start, in
     const std::ptrdiff_t v_stride = flat ? width_ : 1;
     const std::ptrdiff_t u_step = forward * (flat ? 1 : width_);
     const float v_step = slope * static_cast<float>(forward);
-    const int first_way = line.first_way;
+    const int first_way = static_cast<int>(line.way) - k_max_turn;
     const auto belongs = [first_way](int way_there) {
       return (way_there & 1) & static_cast<int>(((way_there - first_way) & 255) <= 2 * k_max_turn);
     };

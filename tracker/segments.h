@@ -43,13 +43,12 @@ class SegmentFinder {
     float n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
     float next_fit = 3;
     Eigen::Vector2f middle = Eigen::Vector2f::Zero(), direction;
-    int first_way = 0;  // of the gradients that belong to it, which are k_ways on from there
+    float way = 0;  // of the gradients of an edge along it
     void add(float px, float py) {
       n += 1, x += px, y += py;
       xx += px * px, xy += px * py, yy += py * py;
     }
     void fit();
-    void turn(const Eigen::Vector2f& along);
   };
 
   void halve(const cv::Mat& grey);
