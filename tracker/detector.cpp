@@ -1,6 +1,7 @@
 #include "tracker/detector.h"
 
 #include <algorithm>
+#include <opencv2/core/utility.hpp>
 #include <utility>
 
 namespace limn::tracker {
@@ -57,41 +58,122 @@ bool is_taken(const Quad& quad, const std::vector<Detection>& detections) {
                      [&](const Detection& d) { return (centre(d) - middle).norm() < 0.5 * longest_side(d); });
 }
 
+bool is_inside(const Eigen::Vector2d& px, const Detection& detection) {
+  constexpr double k_around_px = 3;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Eigen::Vector2d from = detection.corners_px[i];
+    const Eigen::Vector2d side = (detection.corners_px[(i + 1) % 4] - from).normalized();
+    const Eigen::Vector2d to = px - from;
+    if (side.x() * to.y() - side.y() * to.x() < -k_around_px) return false;
+  }
+  return true;
+}
+
+// Calls work(i), i = 0 ... count - 1, at once.
+template <typename Work>
+void at_once(int count, const Work& work) {
+  if (count == 1)
+    work(0);
+  else
+    cv::parallel_for_(
+        cv::Range(0, count),
+        [&](const cv::Range& range) {
+          for (int i = range.start; i < range.end; ++i) work(i);
+        },
+        count);
+}
+
 }  // namespace
 
+Detector::Detector(Families families, DetectorOptions options)
+    : families_(std::move(families)), options_(options) {
+  options_.threads = std::max(1, options_.threads);
+  refiners_.assign(static_cast<std::size_t>(options_.threads), EdgeRefiner(options_.encoding));
+}
+
 std::vector<Detection> Detector::detect(const cv::Mat& grey, const Lens* lens) {
-  LIMN_CHECK(grey.empty() || grey.type() == CV_8UC1);
   std::vector<Detection> detections;
-  if (grey.empty()) return detections;
-  threshold_.apply(grey, options_.min_contrast, corner_codes_);
-  finder_.find(corner_codes_, {options_.min_side_px}, quads_);
-  for (const Quad& quad : quads_)
-    if (auto found = read(grey, quad, lens, Reading::open))
-      add_best_of_square(std::move(*found), &detections);
-  if (options_.broken_markers) add_broken(grey, lens, &detections);
+  detect(grey, lens, &detections);
   return detections;
 }
 
-std::optional<Detection> Detector::read(const cv::Mat& grey,
-                                        const Quad& quad,
-                                        const Lens* lens,
-                                        Reading reading) {
+void Detector::detect(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections) {
+  LIMN_CHECK(grey.empty() || grey.type() == CV_8UC1);
+  detections->clear();
+  if (grey.empty()) return;
+  find_candidates(grey);
+  read_all(grey, lens, Reading::open, detections);
+  if (!options_.broken_markers) return;
+  join_segments(grey, *detections);
+  read_all(grey, lens, Reading::covered, detections);
+}
+
+// Quads and straight edges.
+void Detector::find_candidates(const cv::Mat& grey) {
+  const auto find_quads = [&] {
+    threshold_.apply(grey, options_.min_contrast, corner_codes_);
+    finder_.find(corner_codes_, {options_.min_side_px}, quads_);
+  };
+  const auto find_segments = [&] { segment_finder_.find(grey, options_.min_contrast, segments_); };
+  if (!options_.broken_markers)
+    find_quads();
+  else if (options_.threads == 1)
+    find_quads(), find_segments();
+  else
+    at_once(2, [&](int i) { i == 0 ? find_quads() : find_segments(); });
+}
+
+// The quads that edges suggest where none of these markers are, into quads_.
+void Detector::join_segments(const cv::Mat& grey, const std::vector<Detection>& found) {
+  constexpr std::size_t k_max_candidates = 400;
+  std::erase_if(segments_, [&](const Segment& s) {
+    return std::any_of(found.begin(), found.end(),
+                       [&](const Detection& d) { return is_inside(s.from, d) && is_inside(s.to, d); });
+  });
+  joiner_.find(segments_, grey.cols, grey.rows, joined_);
+  if (joined_.size() > k_max_candidates) joined_.resize(k_max_candidates);
+  quads_.clear();
+  for (const SegmentQuad& joined : joined_) {
+    quads_.push_back(joined.quad);
+    quads_.back().within_px = 5;
+    if (is_taken(quads_.back(), found)) quads_.pop_back();
+  }
+}
+
+// What quads_ show.
+void Detector::read_all(const cv::Mat& grey,
+                        const Lens* lens,
+                        Reading reading,
+                        std::vector<Detection>* detections) {
+  read_.clear();
+  read_.resize(quads_.size());
+  at_once(options_.threads, [&](int thread) {
+    const auto first = static_cast<std::size_t>(thread);
+    for (std::size_t i = first; i < quads_.size(); i += refiners_.size())
+      read_[i] = read(grey, quads_[i], lens, reading, refiners_[first]);
+  });
+  for (std::optional<Detection>& found : read_)
+    if (found) add_best_of_square(std::move(*found), detections);
+}
+
+std::optional<Detection> Detector::read(
+    const cv::Mat& grey, const Quad& quad, const Lens* lens, Reading reading, EdgeRefiner& refiner) const {
   if (!may_be_marker(grey, quad, options_.min_contrast)) return std::nullopt;
   const bool covered = reading == Reading::covered;
   if (covered && !may_be_covered_code(grey, quad)) return std::nullopt;
   const double min_contrast = k_refined_contrast * options_.min_contrast;
   std::optional<RefinedQuad> rough;
   if (covered || shortest_side(quad) > k_rough_above_px) {
-    rough = refiner_.refine(grey, quad, min_contrast, lens, Effort::rough);
+    rough = refiner.refine(grey, quad, min_contrast, lens, Effort::rough);
     if (!rough || !identify(grey, *rough, families_, reading)) return std::nullopt;
   }
   auto refined =
-      refiner_.refine(grey, rough ? Quad{rough->corners_px} : quad, min_contrast, lens, Effort::full);
+      refiner.refine(grey, rough ? Quad{rough->corners_px} : quad, min_contrast, lens, Effort::full);
   if (!refined) refined = rough;
   if (!refined) return std::nullopt;
   const auto identity = identify(grey, *refined, families_, reading);
   if (!identity) return std::nullopt;
-  if (!refined->separate) settle_overlapping_edges(grey, *identity, &*refined);
+  if (!refined->separate) settle_overlapping_edges(grey, *identity, refiner, &*refined);
   Detection detection;
   detection.marker = identity->marker;
   detection.score = std::clamp(identity->score, 0.0, 1.0);
@@ -107,34 +189,18 @@ std::optional<Detection> Detector::read(const cv::Mat& grey,
 // Edges whose blur overlaps with others': by the whole pattern, or else with the doubt that they deserve.
 void Detector::settle_overlapping_edges(const cv::Mat& grey,
                                         const Identity& identity,
+                                        const EdgeRefiner& refiner,
                                         RefinedQuad* refined) const {
   const double blur_px = *std::max_element(refined->blur_px.begin(), refined->blur_px.end());
   const bool may_fit = identity.cells.count > 0 && shortest_side(Quad{refined->corners_px}) > k_fit_above_px;
   if (may_fit)
-    if (auto fitted = fit_pattern(grey, refiner_.light(), *refined, identity.cells)) {
+    if (auto fitted = fit_pattern(grey, refiner.light(), *refined, identity.cells)) {
       *refined = *fitted;
       return;
     }
   const double doubt_px = k_overlap_doubt * blur_px;
   for (Eigen::Matrix2d& covariance : refined->corner_covariance)
     covariance += doubt_px * doubt_px * Eigen::Matrix2d::Identity();
-}
-
-void Detector::add_broken(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections) {
-  constexpr std::size_t k_max_candidates = 400;
-  known_.clear();
-  for (const Detection& detection : *detections) known_.push_back(detection.corners_px);
-  segment_finder_.find(grey, options_.min_contrast, known_, segments_);
-  joiner_.find(segments_, grey.cols, grey.rows, joined_);
-  const std::size_t regular = detections->size();
-  for (std::size_t i = 0; i < std::min(joined_.size(), k_max_candidates); ++i) {
-    Quad quad = joined_[i].quad;
-    quad.within_px = 5;
-    if (is_taken(quad, {detections->begin(), detections->begin() + static_cast<std::ptrdiff_t>(regular)}))
-      continue;
-    if (auto found = read(grey, quad, lens, Reading::covered))
-      add_best_of_square(std::move(*found), detections);
-  }
 }
 
 }  // namespace limn::tracker

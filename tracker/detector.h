@@ -1,6 +1,7 @@
 #pragma once
 
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <vector>
 
 #include "core/lens.h"
@@ -26,6 +27,9 @@ struct DetectorOptions {
   /// Also joins straight edges to quadrilaterals, for markers that fingers, bites or slatted shadows break
   /// up. Costs about as much again as the rest.
   bool broken_markers = true;
+  /// How many threads a picture is shared out to, of OpenCV's pool (cv::setNumThreads limits them). The
+  /// result is the same with any number.
+  int threads = 1;
 };
 
 /// Finds markers: grey -> local threshold -> boundaries of black regions -> quadrilaterals -> sub-pixel edge
@@ -33,12 +37,14 @@ struct DetectorOptions {
 /// buffers, so keep one per thread.
 class Detector {
  public:
-  explicit Detector(Families families, DetectorOptions options = {})
-      : families_(std::move(families)), options_(options), refiner_(options.encoding) {}
+  explicit Detector(Families families, DetectorOptions options = {});
 
   /// `grey` is 8-bit, one channel, the camera's raw picture; an empty one has no markers. With `lens` sides
   /// are straight in undistorted directions, without one in the picture. Corners are raw pixels either way.
   std::vector<Detection> detect(const cv::Mat& grey, const Lens* lens = nullptr);
+
+  /// The same into `detections`, without allocating once its buffers are large enough.
+  void detect(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections);
 
   const Families& families() const { return families_; }
 
@@ -49,16 +55,22 @@ class Detector {
   CornerCodes corner_codes_;
   QuadFinder finder_;
   std::vector<Quad> quads_;
-  EdgeRefiner refiner_;
-  std::vector<std::array<Eigen::Vector2d, 4>> known_;  // outlines of what is found already
+  std::vector<EdgeRefiner> refiners_;  // one a thread
   SegmentFinder segment_finder_;
   std::vector<Segment> segments_;
   SegmentQuadFinder joiner_;
   std::vector<SegmentQuad> joined_;
+  std::vector<std::optional<Detection>> read_;  // what each of quads_ shows
 
-  std::optional<Detection> read(const cv::Mat& grey, const Quad& quad, const Lens* lens, Reading reading);
-  void settle_overlapping_edges(const cv::Mat& grey, const Identity& identity, RefinedQuad* refined) const;
-  void add_broken(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections);
+  void find_candidates(const cv::Mat& grey);
+  void join_segments(const cv::Mat& grey, const std::vector<Detection>& found);
+  void read_all(const cv::Mat& grey, const Lens* lens, Reading reading, std::vector<Detection>* detections);
+  std::optional<Detection> read(
+      const cv::Mat& grey, const Quad& quad, const Lens* lens, Reading reading, EdgeRefiner& refiner) const;
+  void settle_overlapping_edges(const cv::Mat& grey,
+                                const Identity& identity,
+                                const EdgeRefiner& refiner,
+                                RefinedQuad* refined) const;
 };
 
 }  // namespace limn::tracker

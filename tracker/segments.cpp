@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <opencv2/imgproc.hpp>
 
 #include "tracker/simd.h"
 
@@ -127,15 +126,11 @@ void SegmentFinder::Line::fit() {
   direction = axis;
 }
 
-void SegmentFinder::find(const cv::Mat& grey,
-                         int min_contrast,
-                         std::span<const std::array<Eigen::Vector2d, 4>> known,
-                         std::vector<Segment>& segments) {
+void SegmentFinder::find(const cv::Mat& grey, int min_contrast, std::vector<Segment>& segments) {
   segments.clear();
   if (grey.cols < 16 || grey.rows < 16) return;
   halve(grey);
   find_ridges(k_strength_of_level * min_contrast);
-  for (const auto& quad : known) clear(quad);
   // Only every fifth pixel of a row starts one, by turns: each straight run of five has such a pixel, single
   // ones mostly have not.
   for (int y = 1; y < height_ - 1; ++y) {
@@ -174,19 +169,6 @@ void SegmentFinder::find_ridges(int min_strength) {
     ridge_row(&across_[gradient_of(y - 1)], &down_[gradient_of(y - 1)], strengths(y + 1), strengths(y - 1),
               strengths(y), width_, static_cast<std::uint16_t>(min_strength), &ridge_[at(0, y - 1)]);
   }
-}
-
-// No ridges in the quadrilateral and next to it.
-void SegmentFinder::clear(const std::array<Eigen::Vector2d, 4>& quad) {
-  constexpr double k_around_px = 2;  // at half size
-  const Eigen::Vector2d centre = 0.25 * (quad[0] + quad[1] + quad[2] + quad[3]);
-  std::array<cv::Point, 4> wider;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Eigen::Vector2d out =
-        0.5 * quad[i] + k_around_px * std::sqrt(2.0) * (quad[i] - centre).normalized();
-    wider[i] = {static_cast<int>(std::lround(out.x())), static_cast<int>(std::lround(out.y()))};
-  }
-  cv::fillConvexPoly(cv::Mat(height_, width_, CV_8UC1, ridge_.data()), wider, cv::Scalar(0));
 }
 
 // The segment through an edge pixel, both ways. Its pixels belong to no other.

@@ -1,10 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
-#include <span>
 #include <vector>
 
 namespace limn::tracker {
@@ -22,12 +20,8 @@ struct Segment {
 /// that crosses an edge does not end it. Holds its buffers between calls.
 class SegmentFinder {
  public:
-  /// `grey` is 8-bit, one channel. Edges of less than `min_contrast` levels are not followed, nor those in
-  /// and around the convex quadrilaterals `known`.
-  void find(const cv::Mat& grey,
-            int min_contrast,
-            std::span<const std::array<Eigen::Vector2d, 4>> known,
-            std::vector<Segment>& segments);
+  /// `grey` is 8-bit, one channel. Edges of less than `min_contrast` levels are not followed.
+  void find(const cv::Mat& grey, int min_contrast, std::vector<Segment>& segments);
 
  private:
   int width_ = 0, height_ = 0;
@@ -53,7 +47,6 @@ class SegmentFinder {
 
   void halve(const cv::Mat& grey);
   void find_ridges(int min_strength);
-  void clear(const std::array<Eigen::Vector2d, 4>& quad);
   bool follow(int x, int y, Segment* segment);
   Eigen::Vector2i walk(Line& line, const Eigen::Vector2i& start, int way);
   std::size_t at(int x, int y) const {

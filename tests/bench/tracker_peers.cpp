@@ -70,8 +70,8 @@ class Apriltag {
 }  // namespace
 
 Peer limn_peer(std::span<const std::string> families, int threads) {
-  auto detector = std::make_shared<tracker::Detector>(tracker::Families::load(families).value());
-  static_cast<void>(threads);
+  auto detector = std::make_shared<tracker::Detector>(tracker::Families::load(families).value(),
+                                                      tracker::DetectorOptions{.threads = threads});
   return {"limn", [detector](const cv::Mat& grey, const Lens* lens) {
             std::vector<Found> found;
             for (const auto& d : detector->detect(grey, lens))
