@@ -111,7 +111,7 @@ void Detector::detect(const cv::Mat& grey, const Lens* lens, std::vector<Detecti
 // Quads and straight edges.
 void Detector::find_candidates(const cv::Mat& grey) {
   const auto find_quads = [&] {
-    threshold_.apply(grey, options_.min_contrast, corner_codes_);
+    threshold_.apply(grey, {options_.min_contrast}, corner_codes_);
     finder_.find(corner_codes_, {options_.min_side_px}, quads_);
   };
   const auto find_segments = [&] { segment_finder_.find(grey, options_.min_contrast, segments_); };
@@ -123,20 +123,22 @@ void Detector::find_candidates(const cv::Mat& grey) {
     at_once(2, [&](int i) { i == 0 ? find_quads() : find_segments(); });
 }
 
-// The quads that edges suggest where none of these markers are, into quads_.
+// The quads that straight edges suggest where none of these markers are, into quads_.
 void Detector::join_segments(const cv::Mat& grey, const std::vector<Detection>& found) {
-  constexpr std::size_t k_max_candidates = 400;
-  std::erase_if(segments_, [&](const Segment& s) {
-    return std::any_of(found.begin(), found.end(),
-                       [&](const Detection& d) { return is_inside(s.from, d) && is_inside(s.to, d); });
-  });
-  joiner_.find(segments_, grey.cols, grey.rows, joined_);
-  if (joined_.size() > k_max_candidates) joined_.resize(k_max_candidates);
+  constexpr std::size_t k_max_candidates = 400;  // of each kind of edges
   quads_.clear();
-  for (const SegmentQuad& joined : joined_) {
-    quads_.push_back(joined.quad);
-    quads_.back().within_px = 5;
-    if (is_taken(quads_.back(), found)) quads_.pop_back();
+  for (std::vector<Segment>* segments : {&segments_.of_black, &segments_.of_blurred}) {
+    std::erase_if(*segments, [&](const Segment& s) {
+      return std::any_of(found.begin(), found.end(),
+                         [&](const Detection& d) { return is_inside(s.from, d) && is_inside(s.to, d); });
+    });
+    joiner_.find(*segments, grey.cols, grey.rows, joined_);
+    if (joined_.size() > k_max_candidates) joined_.resize(k_max_candidates);
+    for (const SegmentQuad& joined : joined_) {
+      quads_.push_back(joined.quad);
+      quads_.back().within_px = 5;
+      if (is_taken(quads_.back(), found)) quads_.pop_back();
+    }
   }
 }
 
@@ -162,13 +164,15 @@ std::optional<Detection> Detector::read(
   const bool covered = reading == Reading::covered;
   if (covered && !may_be_covered_code(grey, quad)) return std::nullopt;
   const double min_contrast = k_refined_contrast * options_.min_contrast;
+  const Sides sides = covered ? Sides::covered : Sides::whole;
   std::optional<RefinedQuad> rough;
+  Quad start = quad;
   if (covered || shortest_side(quad) > k_rough_above_px) {
-    rough = refiner.refine(grey, quad, min_contrast, lens, Effort::rough);
+    rough = refiner.refine(grey, quad, min_contrast, lens, Effort::rough, sides);
     if (!rough || !identify(grey, *rough, families_, reading)) return std::nullopt;
+    start.corners_px = rough->corners_px;
   }
-  auto refined =
-      refiner.refine(grey, rough ? Quad{rough->corners_px} : quad, min_contrast, lens, Effort::full);
+  auto refined = refiner.refine(grey, start, min_contrast, lens, Effort::full, sides);
   if (!refined) refined = rough;
   if (!refined) return std::nullopt;
   const auto identity = identify(grey, *refined, families_, reading);

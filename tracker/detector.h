@@ -57,7 +57,7 @@ class Detector {
   std::vector<Quad> quads_;
   std::vector<EdgeRefiner> refiners_;  // one a thread
   SegmentFinder segment_finder_;
-  std::vector<Segment> segments_;
+  Segments segments_;
   SegmentQuadFinder joiner_;
   std::vector<SegmentQuad> joined_;
   std::vector<std::optional<Detection>> read_;  // what each of quads_ shows

@@ -148,7 +148,10 @@ Outlines::Extent Outlines::trace(CornerCodes& corners, Start from) {
   return {count_, 0.5 * (high_x - low_x), 0.5 * (high_y - low_y), 0.5 * static_cast<double>(area)};
 }
 
-void Outlines::find_corners(double tolerance_px, std::size_t max_count) {
+void Outlines::find_corners(double tolerance_px, std::size_t max_count, std::size_t min_run) {
+  tolerance_ = static_cast<float>(2 * tolerance_px);
+  max_count_ = max_count;
+  min_run_ = std::max<std::size_t>(2, min_run);
   // The trail twice over, so that it can begin anywhere.
   for (auto* trail : {&trail_x_, &trail_y_}) {
     if (trail->size() < 2 * count_ + 1) trail->resize(2 * count_ + 1);
@@ -160,28 +163,26 @@ void Outlines::find_corners(double tolerance_px, std::size_t max_count) {
   x_ = std::span(trail_x_).subspan(first, count_ + 1);
   y_ = std::span(trail_y_).subspan(first, count_ + 1);
   const std::size_t second = farthest(x_, y_, x_[0], y_[0]);
-  const auto tolerance = static_cast<float>(2 * tolerance_px);
   corners_.clear();
   corners_.push_back(0);
-  split(0, second, tolerance, max_count);
+  split(0, second);
   corners_.push_back(second);
-  split(second, count_, tolerance, max_count);
+  split(second, count_);
 }
 
-// Adds the corners strictly between two indices of the boundary; the last point is the first again. The
-// tolerance is in half pixels.
-void Outlines::split(std::size_t from, std::size_t to, float tolerance, std::size_t max_count) {
-  if (to < from + 2 || corners_.size() > max_count) return;
+// Adds the corners strictly between two indices of the boundary; the last point is the first again.
+void Outlines::split(std::size_t from, std::size_t to) {
+  if (to < from + min_run_ || corners_.size() > max_count_) return;
   const Chord chord{x_[from], y_[from], x_[to] - x_[from], y_[to] - y_[from]};
   const float length = std::hypot(chord.dx, chord.dy);
   if (length == 0) return;
   const float worst = k_nearly * largest_distance(&x_[from], &y_[from], to - from, chord);
-  if (worst <= tolerance * length) return;
+  if (worst <= tolerance_ * length) return;
   std::size_t at = from + 1;
   while (at + 1 < to && chord.distance(x_[at], y_[at]) < worst) ++at;
-  split(from, at, tolerance, max_count);
+  split(from, at);
   corners_.push_back(at);
-  split(at, to, tolerance, max_count);
+  split(at, to);
 }
 
 // Pixels, from the boundary's first point.

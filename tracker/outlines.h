@@ -39,8 +39,8 @@ class Outlines {
   }
 
   /// Finds the boundary's corners (Douglas and Peucker from two far points), no more than `max_count` and
-  /// some.
-  void find_corners(double tolerance_px, std::size_t max_count);
+  /// some; pieces of fewer than `min_run` points are not split further.
+  void find_corners(double tolerance_px, std::size_t max_count, std::size_t min_run = 2);
 
   /// Indices of points, ascending, the first 0. Points are counted from there, and on into a second round.
   std::span<const std::size_t> corners() const { return corners_; }
@@ -74,11 +74,13 @@ class Outlines {
   std::span<const float> x_, y_;  // the same from a corner on, and that one again at the end
   std::vector<Moments> sums_;
   std::vector<std::size_t> corners_;
+  float tolerance_ = 0;  // half pixels
+  std::size_t max_count_ = 0, min_run_ = 2;
 
   static Start first(const CornerCodes& corners);
   static Start next(const CornerCodes& corners, Start after);
   Extent trace(CornerCodes& corners, Start start);
-  void split(std::size_t from, std::size_t to, float tolerance, std::size_t max_count);
+  void split(std::size_t from, std::size_t to);
 };
 
 }  // namespace limn::tracker

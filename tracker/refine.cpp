@@ -27,6 +27,7 @@ constexpr double k_min_share = 0.2;      // of the side's contrast: rows with le
 constexpr double k_end_px = 3;           // a corner is seen when most rows this near to it are on the line
 constexpr double k_end_share = 0.1;      // or this share of the side
 constexpr double k_min_scale_px = 0.04;  // below which residuals are no reason to reject
+constexpr double k_consensus_px = 0.2;   // typical residual of crossings on one line
 constexpr int k_min_crossings = 3;
 constexpr std::size_t k_min_bent_crossings = 12;
 constexpr double k_bow_deviations = 3;  // below them a bow is noise: one straight side in 370 shows as much
@@ -122,6 +123,7 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
                            double min_contrast,
                            const Lens* lens,
                            Effort effort,
+                           Sides sides,
                            const EdgeLine* before,
                            EdgeLine* line) {
   const Eigen::Vector2d& from = corners[side];
@@ -151,7 +153,7 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   rows_.clear();
   gradients_.clear();
   std::array<double, 2 * k_max_reach> mean{};
-  const int stride = effort == Effort::full ? 1 : 1 + (last - first) / k_rough_rows;
+  const int stride = effort == Effort::rough ? 1 + (last - first) / k_rough_rows : 1;
   for (int u = first; u <= last; u += stride) {
     const double straight =
         before && before->flat == line->flat ? before->at(u) : from[v_axis] + (u - from[u_axis]) * slope;
@@ -228,24 +230,26 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   line->outside_level = outside_sum / kept;
   if (line->outside_level - line->inside_level < min_contrast) return false;
   double variance = 0;
-  if (!fit_line(effort, line, &variance)) return false;
+  if (!fit_line(effort, sides, line, &variance)) return false;
   see_ends(from[u_axis], to[u_axis], std::max(trim, blur_trim), variance, line);
   return true;
 }
 
 // A straight line and a bent one, averaged by what speaks for the bow.
-bool EdgeRefiner::fit_line(Effort effort, EdgeLine* line, double* variance) {
+bool EdgeRefiner::fit_line(Effort effort, Sides sides, EdgeLine* line, double* variance) {
   double u_sum = 0;
   for (const double u : crossings_.u) u_sum += u;
   line->u_middle = u_sum / static_cast<double>(crossings_.u.size());
   crossings_.d.resize(crossings_.u.size());
   crossings_.residual.resize(crossings_.u.size());
   for (std::size_t i = 0; i < crossings_.u.size(); ++i) crossings_.d[i] = crossings_.u[i] - line->u_middle;
-  *variance = fit_terms(2, line);
+  const bool covered = sides == Sides::covered;
+  if (covered) find_consensus(line);
+  *variance = fit_terms(2, covered, line);
   if (!(*variance >= 0)) return false;
-  if (effort == Effort::rough || crossings_.u.size() < k_min_bent_crossings) return true;
+  if (covered || effort == Effort::rough || crossings_.u.size() < k_min_bent_crossings) return true;
   EdgeLine bent = *line;
-  if (!(fit_terms(3, &bent) >= 0)) return true;
+  if (!(fit_terms(3, false, &bent) >= 0)) return true;
   const double half = 0.5 * std::abs(crossings_.u.back() - crossings_.u.front());
   *line = averaged(*line, bent, weight_of_bow(bent, half));
   return true;
@@ -304,10 +308,36 @@ LIMN_SIMD Spread new_residuals(const double* __restrict d,
   return {squares, kept, largest};
 }
 
+// The line through two crossings that the most others lie on: least squares would start between a side's own
+// edge and that of what covers a part of it (Torr and Zisserman 2000, "MLESAC").
+void EdgeRefiner::find_consensus(EdgeLine* line) {
+  constexpr std::size_t k_anchors = 9;
+  const std::size_t count = crossings_.u.size();
+  const std::size_t anchors = std::min(count, k_anchors);
+  const auto at = [&](std::size_t i) { return i * (count - 1) / (anchors - 1); };
+  double least = std::numeric_limits<double>::infinity();
+  line->curvature = 0;
+  for (std::size_t i = 0; i < anchors; ++i)
+    for (std::size_t j = i + 1; j < anchors; ++j) {
+      const double run = crossings_.d[at(j)] - crossings_.d[at(i)];
+      if (std::abs(run) < 0.2 * std::abs(crossings_.d.back() - crossings_.d.front())) continue;
+      const double slope = (crossings_.v[at(j)] - crossings_.v[at(i)]) / run;
+      const double offset = crossings_.v[at(i)] - slope * crossings_.d[at(i)];
+      const double bound = 3 * k_consensus_px;
+      const Spread spread = new_residuals(
+          crossings_.d.data(), crossings_.v.data(), crossings_.share.data(), count, {offset, slope, 0}, bound,
+          std::numeric_limits<double>::infinity(), crossings_.residual.data());
+      if (spread.squares >= least) continue;
+      least = spread.squares;
+      line->offset = offset;
+      line->slope = slope;
+    }
+}
+
 // Weighted least squares of the first `terms` of offset, slope, curvature; then Huber weights on the
 // residuals' robust scale; then without what belongs to something else. The residuals' variance; negative
-// when the crossings do not determine the terms.
-double EdgeRefiner::fit_terms(int terms, EdgeLine* line) {
+// when the crossings do not determine the terms. `from_line` starts from the line's own and rejects at once.
+double EdgeRefiner::fit_terms(int terms, bool from_line, EdgeLine* line) {
   constexpr double k_all = std::numeric_limits<double>::infinity();
   constexpr int k_huber_rounds = 3;
   constexpr int k_rounds = 5;
@@ -316,13 +346,20 @@ double EdgeRefiner::fit_terms(int terms, EdgeLine* line) {
   const double* v = crossings_.v.data();
   const double* share = crossings_.share.data();
   double* residual = crossings_.residual.data();
-  line->offset = line->slope = line->curvature = 0;
   double scale = 0;  // 0: no robust weights yet
   double variance = -1;
   const double half = 0.5 * std::abs(crossings_.u.back() - crossings_.u.front());
-  std::fill_n(residual, count, 0.0);
+  if (from_line) {
+    const Eigen::Vector3d start(line->offset, line->slope, line->curvature);
+    new_residuals(d, v, share, count, start, k_all, k_all, residual);
+    scale = k_consensus_px;
+  } else {
+    line->offset = line->slope = line->curvature = 0;
+    std::fill_n(residual, count, 0.0);
+  }
   for (int round = 0; round < k_rounds; ++round) {
-    const double foreign = round >= k_huber_rounds ? k_reject * std::max(scale, k_min_scale_px) : k_all;
+    const bool rejecting = from_line || round >= k_huber_rounds;
+    const double foreign = rejecting ? k_reject * std::max(scale, k_min_scale_px) : k_all;
     const Sums sums =
         weighted_sums(d, v, share, residual, count, scale > 0 ? k_huber * scale : k_all, foreign);
     Eigen::Matrix3d normal;
@@ -423,19 +460,23 @@ double shortest_side(const std::array<Eigen::Vector2d, 4>& corners) {
 
 }  // namespace
 
-std::optional<RefinedQuad> EdgeRefiner::refine(
-    const cv::Mat& grey, const Quad& quad, double min_contrast, const Lens* lens, Effort effort) {
+std::optional<RefinedQuad> EdgeRefiner::refine(const cv::Mat& grey,
+                                               const Quad& quad,
+                                               double min_contrast,
+                                               const Lens* lens,
+                                               Effort effort,
+                                               Sides sides) {
   RefinedQuad refined;
   refined.corners_px = quad.corners_px;
   std::array<EdgeLine, 4> lines;
   // The second one's windows and bow start from the first one's corners.
-  const int rounds = effort == Effort::full ? 2 : 1;
+  const int rounds = effort == Effort::rough ? 1 : 2;
   for (int round = 0; round < rounds; ++round) {
     const double reach =
         std::clamp(0.22 * shortest_side(refined.corners_px), 2.5, static_cast<double>(k_max_reach));
     const std::array<EdgeLine, 4> before = lines;
     for (std::size_t side = 0; side < 4; ++side) {
-      if (!fit_side(grey, refined.corners_px, side, reach, min_contrast, lens, effort,
+      if (!fit_side(grey, refined.corners_px, side, reach, min_contrast, lens, effort, sides,
                     round > 0 ? &before[side] : nullptr, &lines[side]))
         return std::nullopt;
       refined.outside_level[side] = lines[side].outside_level;

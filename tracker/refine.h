@@ -22,6 +22,12 @@ enum class Effort {
   full
 };
 
+/// What the rows of a side show.
+enum class Sides {
+  whole,
+  covered  ///< something may lie over a part: a straight line along most of what is seen
+};
+
 /// A quad whose corners are the intersections of its sub-pixel edge lines.
 struct RefinedQuad {
   std::array<Eigen::Vector2d, 4> corners_px;
@@ -54,7 +60,8 @@ class EdgeRefiner {
                                     const Quad& quad,
                                     double min_contrast,
                                     const Lens* lens,
-                                    Effort effort = Effort::full);
+                                    Effort effort = Effort::full,
+                                    Sides sides = Sides::whole);
 
   /// Light of a grey level, 0 ... 255.
   const std::array<double, 256>& light() const { return light_; }
@@ -115,11 +122,13 @@ class EdgeRefiner {
                 double min_contrast,
                 const Lens* lens,
                 Effort effort,
+                Sides sides,
                 const EdgeLine* before,
                 EdgeLine* line);
-  bool fit_line(Effort effort, EdgeLine* line, double* variance);
+  bool fit_line(Effort effort, Sides sides, EdgeLine* line, double* variance);
   void see_ends(double from, double to, double trim, double variance, EdgeLine* line) const;
-  double fit_terms(int terms, EdgeLine* line);
+  double fit_terms(int terms, bool from_line, EdgeLine* line);
+  void find_consensus(EdgeLine* line);
 };
 
 }  // namespace limn::tracker

@@ -5,6 +5,9 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
+#include "tracker/outlines.h"
+#include "tracker/threshold.h"
+
 namespace limn::tracker {
 
 /// A straight piece of edge, pixels of the whole picture; dark lies on the right of the way from `from` to
@@ -15,43 +18,33 @@ struct Segment {
   double length = 0;
 };
 
-/// Straight edges of the picture at half its size. Pixels whose gradient is a maximum across the edge are
-/// followed along a line that is fitted on the way, over gaps of a few pixels, so that the rim of a shadow
-/// that crosses an edge does not end it. Holds its buffers between calls.
+/// Straight pieces of outlines.
+struct Segments {
+  /// Of what is nearly black, at half the picture's size: a marker's ink remains where shadows, fingers and
+  /// light paper that lies over it are cut off.
+  std::vector<Segment> of_black;
+  /// Of what is darker than the middle, at a quarter: strong blur leaves no black.
+  std::vector<Segment> of_blurred;
+};
+
+/// Holds its buffers between calls.
 class SegmentFinder {
  public:
-  /// `grey` is 8-bit, one channel. Edges of less than `min_contrast` levels are not followed.
-  void find(const cv::Mat& grey, int min_contrast, std::vector<Segment>& segments);
+  /// `grey` is 8-bit, one channel. Surroundings whose levels differ by less than `min_contrast` hold none.
+  void find(const cv::Mat& grey, int min_contrast, Segments& segments);
 
  private:
-  int width_ = 0, height_ = 0;
-  std::vector<std::uint8_t> half_;           // the picture at half size
-  std::vector<std::int16_t> across_, down_;  // Sobel gradients of a row
-  std::vector<std::uint16_t> strength_;      // |across| + |down|, of three rows
-  // 0, or the way of the gradient of an edge pixel that no segment holds yet: 256ths of a turn, lowest bit
-  // set.
-  std::vector<std::uint8_t> ridge_;
+  cv::Mat half_, quarter_;
+  Threshold threshold_;
+  CornerCodes corner_codes_;
+  Outlines outlines_;
 
-  struct Line {  // running fit, half-size pixels from its origin
-    int origin_x = 0, origin_y = 0;
-    float n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
-    float next_fit = 3;
-    Eigen::Vector2f middle = Eigen::Vector2f::Zero(), direction;
-    float way = 0;  // of the gradients of an edge along it
-    void add(float px, float py) {
-      n += 1, x += px, y += py;
-      xx += px * px, xy += px * py, yy += py * py;
-    }
-    void fit();
-  };
-
-  void halve(const cv::Mat& grey);
-  void find_ridges(int min_strength);
-  bool follow(int x, int y, Segment* segment);
-  Eigen::Vector2i walk(Line& line, const Eigen::Vector2i& start, int way);
-  std::size_t at(int x, int y) const {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
-  }
+  void add_outlines(const cv::Mat& picture,
+                    int scale,
+                    double min_side,
+                    const ThresholdOptions& options,
+                    std::vector<Segment>& segments);
+  void add_sides(int scale, double min_side, std::vector<Segment>& segments) const;
 };
 
 }  // namespace limn::tracker

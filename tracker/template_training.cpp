@@ -44,7 +44,7 @@ std::vector<RefinedQuad> frames_in(const cv::Mat& grey) {
   CornerCodes codes;
   QuadFinder finder;
   std::vector<Quad> quads;
-  threshold.apply(grey, k_min_contrast, codes);
+  threshold.apply(grey, {k_min_contrast}, codes);
   finder.find(codes, {k_min_search_px}, quads);
   EdgeRefiner refiner;
   std::vector<RefinedQuad> frames;

@@ -47,19 +47,28 @@ LIMN_SIMD void corner_row(const std::uint8_t* above,
     codes[x] = static_cast<std::uint8_t>(above[x] | above[x + 1] << 1 | here[x] << 2 | here[x + 1] << 3);
 }
 
-LIMN_SIMD void middle_levels(
-    const std::uint8_t* low, const std::uint8_t* high, int count, int min_contrast, std::uint8_t* middle) {
-  for (int t = 0; t < count; ++t)
-    middle[t] = high[t] - low[t] < min_contrast ? std::uint8_t{0}
-                                                : static_cast<std::uint8_t>((low[t] + high[t] + 1) >> 1);
+LIMN_SIMD void middle_levels(const std::uint8_t* low,
+                             const std::uint8_t* high,
+                             int count,
+                             const ThresholdOptions options,
+                             std::uint8_t* middle) {
+  for (int t = 0; t < count; ++t) {
+    const int range = high[t] - low[t];
+    const int level = low[t] + ((range * options.share + 255) >> 8);
+    middle[t] = static_cast<std::uint8_t>(range < options.min_contrast ? 0 : level);
+  }
 }
 
 }  // namespace
 
-void Threshold::apply(const cv::Mat& grey, int min_contrast, CornerCodes& corners) {
+void Threshold::apply(const cv::Mat& grey, const ThresholdOptions& options, CornerCodes& corners) {
   measure_tiles(grey);
   widen_tiles();
-  compare(grey, min_contrast, corners);
+  for (int reach = 1; reach < options.reach; ++reach) {
+    join_rows();
+    widen_tiles();
+  }
+  compare(grey, options, corners);
 }
 
 // A tile at the right or lower end also takes the pixels that are too few for one of their own.
@@ -107,7 +116,19 @@ void Threshold::widen_tiles() {
   }
 }
 
-void Threshold::compare(const cv::Mat& grey, int min_contrast, CornerCodes& corners) {
+// Each tile's extremes over the rows above and below too, as new tiles.
+void Threshold::join_rows() {
+  darkest_ = wide_darkest_;
+  brightest_ = wide_brightest_;
+  for (int y = 0; y < tiles_y_; ++y)
+    for (const int neighbour : {y - 1, y + 1}) {
+      if (neighbour < 0 || neighbour >= tiles_y_) continue;
+      lowest(&wide_darkest_[index(0, neighbour, tiles_x_)], &darkest_[index(0, y, tiles_x_)], tiles_x_);
+      highest(&wide_brightest_[index(0, neighbour, tiles_x_)], &brightest_[index(0, y, tiles_x_)], tiles_x_);
+    }
+}
+
+void Threshold::compare(const cv::Mat& grey, const ThresholdOptions& options, CornerCodes& corners) {
   corners.width = grey.cols;
   corners.height = grey.rows;
   corners.stride = (grey.cols + 1 + 7) / 8 * 8 + 8;  // words of 8 may be read from every corner
@@ -127,7 +148,7 @@ void Threshold::compare(const cv::Mat& grey, int min_contrast, CornerCodes& corn
       lowest(&wide_darkest_[index(0, neighbour, tiles_x_)], row_low_.data(), tiles_x_);
       highest(&wide_brightest_[index(0, neighbour, tiles_x_)], row_high_.data(), tiles_x_);
     }
-    middle_levels(row_low_.data(), row_high_.data(), tiles_x_, min_contrast, middle_.data());
+    middle_levels(row_low_.data(), row_high_.data(), tiles_x_, options, middle_.data());
     for (std::size_t t = 0; t < tiles; ++t) std::memset(&limit_[t * k_tile], middle_[t], k_tile);
     for (std::size_t x = tiles * k_tile; x < limit_.size(); ++x) limit_[x] = limit_[tiles * k_tile - 1];
     const int last = tile_y + 1 == tiles_y_ ? grey.rows : (tile_y + 1) * k_tile;

@@ -22,15 +22,23 @@ struct CornerCodes {
   const std::uint8_t* at(int x, int y) const { return codes.data() + y * stride + x; }
 };
 
-/// Black where a pixel is darker than the middle of the darkest and the brightest of its surroundings: tiles
-/// of 4 x 4 pixels and their 8 neighbours (Olson 2011, "AprilTag: a robust and flexible visual fiducial
-/// system", uses the same neighbourhood). Where these differ by less than min_contrast all is white, so that
-/// flat regions stay empty: a marker's border keeps its outer edge, which is all that is traced. Holds its
-/// buffers between calls.
+struct ThresholdOptions {
+  int min_contrast = 16;
+  /// Of the way from the darkest to the brightest where the limit lies, in 256ths.
+  int share = 128;
+  /// How many tiles of 4 pixels away the surroundings end.
+  int reach = 1;
+};
+
+/// Black where a pixel is darker than the limit between the darkest and the brightest of its surroundings,
+/// tiles of 4 x 4 pixels (Olson 2011, "AprilTag: a robust and flexible visual fiducial system", takes the
+/// middle and one tile around). Where these differ by less than min_contrast all is white, so that flat
+/// regions stay empty: a marker's border keeps its outer edge, which is all that is traced. Holds its buffers
+/// between calls.
 class Threshold {
  public:
   /// `grey` is 8-bit, one channel, not empty.
-  void apply(const cv::Mat& grey, int min_contrast, CornerCodes& corners);
+  void apply(const cv::Mat& grey, const ThresholdOptions& options, CornerCodes& corners);
 
  private:
   int tiles_x_ = 0;
@@ -42,7 +50,8 @@ class Threshold {
 
   void measure_tiles(const cv::Mat& grey);
   void widen_tiles();
-  void compare(const cv::Mat& grey, int min_contrast, CornerCodes& corners);
+  void join_rows();
+  void compare(const cv::Mat& grey, const ThresholdOptions& options, CornerCodes& corners);
 };
 
 }  // namespace limn::tracker
