@@ -26,6 +26,8 @@ Eigen::Vector2d centre(const Detection& detection) {
   return 0.25 * (c[0] + c[1] + c[2] + c[3]);
 }
 
+constexpr double k_around_region_px = 8;  // that the threshold sees beside a marker
+
 // Two readings of one black square.
 bool is_same_square(const Detection& a, const Detection& b) {
   return (centre(a) - centre(b)).norm() < 0.15 * std::min(longest_side(a), longest_side(b));
@@ -106,6 +108,49 @@ void Detector::detect(const cv::Mat& grey, const Lens* lens, std::vector<Detecti
   if (!options_.broken_markers) return;
   join_segments(grey, *detections);
   read_all(grey, lens, Reading::covered, detections);
+}
+
+void Detector::follow(const cv::Mat& grey,
+                      const Lens* lens,
+                      std::span<const Detection> last,
+                      std::vector<Detection>* detections) {
+  LIMN_CHECK(grey.empty() || grey.type() == CV_8UC1);
+  detections->clear();
+  if (grey.empty()) return;
+  for (const Detection& marker : last)
+    if (auto found = found_again(grey, lens, marker)) detections->push_back(std::move(*found));
+}
+
+// First from its old corners at once, then from all quads about there, then from what covers it has left.
+std::optional<Detection> Detector::found_again(const cv::Mat& grey, const Lens* lens, const Detection& last) {
+  const double reach = 0.5 * longest_side(last);
+  Quad quad{last.corners_px, reach};
+  auto found = read(grey, quad, lens, Reading::open, refiners_[0]);
+  if (found && found->marker == last.marker) return found;
+  Eigen::AlignedBox2d box;
+  for (const Eigen::Vector2d& corner : last.corners_px) box.extend(corner);
+  const double around = reach + k_around_region_px;
+  const cv::Rect whole(0, 0, grey.cols, grey.rows);
+  const cv::Rect region = whole & cv::Rect(cv::Point(static_cast<int>(std::floor(box.min().x() - around)),
+                                                     static_cast<int>(std::floor(box.min().y() - around))),
+                                           cv::Point(static_cast<int>(std::ceil(box.max().x() + around)),
+                                                     static_cast<int>(std::ceil(box.max().y() + around))));
+  if (region.empty()) return std::nullopt;
+  const cv::Mat part = grey(region);
+  const Eigen::Vector2d origin(region.x, region.y);
+  const auto read_quads = [&](Reading reading) -> std::optional<Detection> {
+    for (Quad& candidate : quads_) {
+      for (Eigen::Vector2d& corner : candidate.corners_px) corner += origin;
+      found = read(grey, candidate, lens, reading, refiners_[0]);
+      if (found && found->marker == last.marker) return found;
+    }
+    return std::nullopt;
+  };
+  find_candidates(part);
+  if (auto regular = read_quads(Reading::open)) return regular;
+  if (!options_.broken_markers) return std::nullopt;
+  join_segments(part, {});
+  return read_quads(Reading::covered);
 }
 
 // Quads and straight edges.

@@ -2,6 +2,7 @@
 
 #include <opencv2/core/mat.hpp>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/lens.h"
@@ -46,6 +47,13 @@ class Detector {
   /// The same into `detections`, without allocating once its buffers are large enough.
   void detect(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections);
 
+  /// Finds markers again that were at `last`, looking only about there: a marker that moved by more than half
+  /// of its side is lost, and new ones want detect(). In the order of `last`, which `detections` must not be.
+  void follow(const cv::Mat& grey,
+              const Lens* lens,
+              std::span<const Detection> last,
+              std::vector<Detection>* detections);
+
   const Families& families() const { return families_; }
 
  private:
@@ -62,6 +70,7 @@ class Detector {
   std::vector<SegmentQuad> joined_;
   std::vector<std::optional<Detection>> read_;  // what each of quads_ shows
 
+  std::optional<Detection> found_again(const cv::Mat& grey, const Lens* lens, const Detection& last);
   void find_candidates(const cv::Mat& grey);
   void join_segments(const cv::Mat& grey, const std::vector<Detection>& found);
   void read_all(const cv::Mat& grey, const Lens* lens, Reading reading, std::vector<Detection>* detections);

@@ -13,6 +13,7 @@
 #include <numbers>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <random>
 #include <sstream>
@@ -306,6 +307,33 @@ void bench_hostile(const Options& options) {
   }
 }
 
+// The 12 markers of a 1920x1080 clutter frame, found again in the next picture of a still scene.
+void bench_regions(const Options& options) {
+  std::vector<double> ms;
+  std::size_t markers = 0;
+  std::size_t again = 0;
+  for (int i = 0; i < std::max(3, options.frames); ++i) {
+    const TrackerFrame frame =
+        test::cluttered_frame(1920, 1080, 1000 * options.seed + static_cast<std::uint64_t>(i));
+    tracker::Detector detector(tracker::Families::load(std::vector<std::string>{"apriltag_36h11"}).value());
+    const auto last = detector.detect(frame.grey);
+    cv::Mat next;
+    cv::GaussianBlur(frame.grey, next, cv::Size(3, 3), 0.3);
+    std::vector<tracker::Detection> found;
+    double least = 1e9;
+    for (int k = 0; k < 6; ++k) {
+      const double started = now_ms(1);
+      detector.follow(next, nullptr, last, &found);
+      least = std::min(least, now_ms(1) - started);
+    }
+    ms.push_back(least);
+    markers += last.size();
+    again += found.size();
+  }
+  fmt::print("  {:<40}{:>8}{:>10.2f}{:>20.3f}\n", "1920x1080 limn by regions", 1, median(ms),
+             static_cast<double>(again) / static_cast<double>(std::max<std::size_t>(1, markers)));
+}
+
 // ---- photographs with whole-pixel lists (the OpenCV ones) ----
 
 void add_distances(const std::filesystem::path& csv, const std::string& family, std::vector<double>* all) {
@@ -382,7 +410,10 @@ int main(int argc, char** argv) {
     return 2;
   }
   if (options->frames > 0) bench_accuracy(*options);
-  if (options->only.empty()) bench_time(*options);
+  if (options->only.empty()) {
+    bench_time(*options);
+    bench_regions(*options);
+  }
   if (options->only.empty()) bench_hostile(*options);
   if (!options->photographs.empty()) bench_photographs(options->photographs);
 }
