@@ -19,6 +19,7 @@ constexpr double k_flat_share = 0.05;
 // table.
 constexpr double k_valley_share = 0.35;
 constexpr double k_settled_px = 2e-3;
+constexpr double k_near_start_px = 0.1;   // corners that were so near at first need no second round
 constexpr int k_max_reach = 10;
 constexpr int k_rough_rows = 12;         // of a side, where the effort is rough
 constexpr double k_huber = 1.5;          // in robust standard deviations
@@ -484,15 +485,20 @@ std::optional<RefinedQuad> EdgeRefiner::refine(const cv::Mat& grey,
       refined.blur_px[side] = lines[side].blur_px;
     }
     std::array<Eigen::Vector2d, 4> corners = refined.corners_px;
+    double moved = 0;
     for (std::size_t i = 0; i < 4; ++i) {
       if (!intersect(lines[(i + 3) % 4], lines[i], &corners[i], &refined.corner_covariance[i]))
         return std::nullopt;
       if ((corners[i] - quad.corners_px[i]).norm() > quad.within_px + 0.1 * reach) return std::nullopt;
+      moved = std::max(moved, (corners[i] - refined.corners_px[i]).norm());
       refined.corner_visible[i] = lines[(i + 3) % 4].seen_at_end && lines[i].seen_at_start;
     }
     refined.corners_px = corners;
     refined.separate = std::all_of(lines.begin(), lines.end(), [](const EdgeLine& l) { return l.separate; });
     if (!is_convex(corners)) return std::nullopt;
+    const bool straight =
+        std::all_of(lines.begin(), lines.end(), [](const EdgeLine& l) { return l.curvature == 0; });
+    if (straight && moved < k_near_start_px) break;
   }
   return refined;
 }
