@@ -60,13 +60,18 @@ bool is_taken(const Quad& quad, const std::vector<Detection>& detections) {
                      [&](const Detection& d) { return (centre(d) - middle).norm() < 0.5 * longest_side(d); });
 }
 
-bool is_inside(const Eigen::Vector2d& px, const Detection& detection) {
+// Whether both of a segment's ends lie on the marker or next to it.
+bool is_inside(const Segment& segment, const Detection& detection) {
   constexpr double k_around_px = 3;
+  if ((segment.from - detection.corners_px[0]).squaredNorm() > 4 * std::pow(longest_side(detection), 2))
+    return false;
   for (std::size_t i = 0; i < 4; ++i) {
-    const Eigen::Vector2d from = detection.corners_px[i];
-    const Eigen::Vector2d side = (detection.corners_px[(i + 1) % 4] - from).normalized();
-    const Eigen::Vector2d to = px - from;
-    if (side.x() * to.y() - side.y() * to.x() < -k_around_px) return false;
+    const Eigen::Vector2d corner = detection.corners_px[i];
+    const Eigen::Vector2d side = (detection.corners_px[(i + 1) % 4] - corner).normalized();
+    for (const Eigen::Vector2d& end : {segment.from, segment.to}) {
+      const Eigen::Vector2d to = end - corner;
+      if (side.x() * to.y() - side.y() * to.x() < -k_around_px) return false;
+    }
   }
   return true;
 }
@@ -174,8 +179,7 @@ void Detector::join_segments(const cv::Mat& grey, const std::vector<Detection>& 
   quads_.clear();
   for (std::vector<Segment>* segments : {&segments_.of_black, &segments_.of_blurred}) {
     std::erase_if(*segments, [&](const Segment& s) {
-      return std::any_of(found.begin(), found.end(),
-                         [&](const Detection& d) { return is_inside(s.from, d) && is_inside(s.to, d); });
+      return std::any_of(found.begin(), found.end(), [&](const Detection& d) { return is_inside(s, d); });
     });
     joiner_.find(*segments, grey.cols, grey.rows, joined_);
     if (joined_.size() > k_max_candidates) joined_.resize(k_max_candidates);

@@ -12,10 +12,23 @@ namespace {
 
 constexpr float k_nearly = 0.99999F;  // products may be rounded otherwise where they are fused
 
+// The first of the blocks from x on in which a boundary may start, or the end of the last whole one.
+LIMN_SIMD int skip_empty(const std::uint8_t* row, int x, int count) {
+  constexpr int k_block = 64;
+  for (; x + k_block <= count; x += k_block) {
+    std::uint8_t starts = 0;
+    for (int i = 0; i < k_block; ++i)
+      starts = static_cast<std::uint8_t>(starts | (row[x + i] == CornerCodes::k_lower_right));
+    if (starts) break;
+  }
+  return x;
+}
+
 // First corner in [x, count) with black at its lower right alone, not visited; count when there is none. The
 // upper left pixel of a region's top row has one, so every outer boundary runs through such corners. Words of
 // 8 corners.
 int next_start(const std::uint8_t* row, int x, int count) {
+  x = skip_empty(row, x, count);
   constexpr std::uint64_t k_ones = 0x0101010101010101;
   while (x < count) {
     std::uint64_t word = 0;
@@ -174,7 +187,7 @@ void Outlines::find_corners(double tolerance_px, std::size_t max_count, std::siz
 void Outlines::split(std::size_t from, std::size_t to) {
   if (to < from + min_run_ || corners_.size() > max_count_) return;
   const Chord chord{x_[from], y_[from], x_[to] - x_[from], y_[to] - y_[from]};
-  const float length = std::hypot(chord.dx, chord.dy);
+  const float length = std::sqrt(chord.dx * chord.dx + chord.dy * chord.dy);
   if (length == 0) return;
   const float worst = k_nearly * largest_distance(&x_[from], &y_[from], to - from, chord);
   if (worst <= tolerance_ * length) return;
