@@ -142,8 +142,12 @@ void SegmentQuadFinder::find(std::span<const Segment> segments,
   sort_into_cells(&Segment::to, &ends_);
   find_corners();
   for (std::uint32_t i = 0; i < segments_.size() && quads.size() < k_max_quads; ++i) add_quads(i, quads);
-  std::stable_sort(quads.begin(), quads.end(),
-                   [](const SegmentQuad& a, const SegmentQuad& b) { return a.visible > b.visible; });
+  const auto key = [](const SegmentQuad& q) {
+    const auto& c = q.quad.corners_px;
+    return std::tuple(-q.visible, c[0].x(), c[0].y(), c[2].x(), c[2].y());
+  };
+  std::sort(quads.begin(), quads.end(),
+            [&](const SegmentQuad& a, const SegmentQuad& b) { return key(a) < key(b); });
 }
 
 int SegmentQuadFinder::cell_of(const Eigen::Vector2d& px) const {
