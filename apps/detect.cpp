@@ -7,6 +7,7 @@
 #include <cmath>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 #include <set>
 #include <thread>
@@ -58,9 +59,10 @@ Result<Imager> camera_for(const Imager& camera, const std::filesystem::path& fil
 
 double median_ms(tracker::Detector& detector, const cv::Mat& grey, const Lens* lens, int repeat) {
   std::vector<double> times;
+  std::vector<tracker::Detection> found;
   for (int i = 0; i < repeat; ++i) {
     const auto started = std::chrono::steady_clock::now();
-    detector.detect(grey, lens);
+    detector.detect(grey, lens, &found);
     times.push_back(
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - started).count());
   }
@@ -260,12 +262,15 @@ void detect_all(const DetectOptions& options,
                 const tracker::Families& families,
                 std::vector<Outcome>* outcomes) {
   const int count = static_cast<int>(outcomes->size());
-  const int threads = options.repeat > 0 ? 1 : std::clamp(options.threads, 1, std::max(1, count));
+  // Timed pictures come one after the other; threads beyond one a picture share out the picture.
+  const int pictures = options.repeat > 0 ? 1 : std::max(1, count);
+  const int threads = std::clamp(options.threads, 1, pictures);
   std::atomic<int> next = 0;
   std::atomic<int> done = 0;
   std::mutex progress_mutex;
   Progress progress("detect", count);
   tracker::DetectorOptions detector_options;
+  detector_options.threads = std::clamp(options.threads / threads, 1, cv::getNumberOfCPUs());
   if (options.encoding == "srgb") detector_options.encoding = tracker::Encoding::srgb;
   const auto work = [&] {
     tracker::Detector detector(families, detector_options);

@@ -303,6 +303,76 @@ TEST(Detector, SurvivesOddPictures) {
   EXPECT_TRUE(detector.detect(test::plain(640, 480, 0)).empty());
 }
 
+cv::Mat scattered_markers(int moved_px, std::mt19937_64& rng) {
+  std::vector<PlacedMarker> markers;
+  for (int i = 0; i < 6; ++i)
+    markers.push_back(test::placed(pinhole_vga(), {"apriltag_36h11", std::to_string(i)},
+                                   {120.0 + 190 * (i % 3) + moved_px, 130.0 + 210 * (i / 3)}, 60 + 8 * i,
+                                   0.4 * i, 0.1 * i, i));
+  return test::picture_of(pinhole_vga(), test::clutter(640, 480, rng), markers, {.noise_levels = 2}, rng);
+}
+
+void expect_same(const std::vector<Detection>& a, const std::vector<Detection>& b, double within_px) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].marker.id, b[i].marker.id);
+    for (std::size_t k = 0; k < 4; ++k)
+      EXPECT_TRUE(test::near(a[i].corners_px[k], b[i].corners_px[k], within_px));
+  }
+}
+
+TEST(Detector, FindsTheSameWithAnyNumberOfThreads) {
+  auto rng = test::test_rng();
+  const cv::Mat grey = scattered_markers(0, rng);
+  const auto alone = Detector(families({"apriltag_36h11"})).detect(grey);
+  EXPECT_EQ(alone.size(), 6);
+  for (const int threads : {2, 3, 5})
+    expect_same(Detector(families({"apriltag_36h11"}), {.threads = threads}).detect(grey), alone, 0);
+}
+
+TEST(Detector, FollowsMarkersThatMoveByHalfTheirSide) {
+  auto rng = test::test_rng();
+  Detector detector(families({"apriltag_36h11"}));
+  const cv::Mat first = scattered_markers(0, rng);
+  const auto last = detector.detect(first);
+  ASSERT_EQ(last.size(), 6);
+  for (const int moved : {0, 1, 5, 12, 25}) {
+    const cv::Mat grey = scattered_markers(moved, rng);
+    const auto anew = detector.detect(grey);
+    std::vector<Detection> found;
+    detector.follow(grey, nullptr, last, &found);
+    ASSERT_EQ(anew.size(), 6);
+    ASSERT_EQ(found.size(), 6) << moved;
+    for (const Detection& marker : found) {
+      const auto same = std::find_if(anew.begin(), anew.end(),
+                                     [&](const Detection& d) { return d.marker.id == marker.marker.id; });
+      ASSERT_NE(same, anew.end());
+      expect_same({marker}, {*same}, 0.1);
+    }
+  }
+}
+
+TEST(Detector, FollowsMarkersUnderFingersToThePicturesEnd) {
+  auto rng = test::test_rng();
+  Detector detector(families({"apriltag_36h11"}));
+  const cv::Mat first = scattered_markers(0, rng);
+  const auto last = detector.detect(first);
+  cv::Mat covered = first.clone();
+  for (const Detection& marker : last) {
+    const Eigen::Vector2d at = marker.corners_px[0];
+    cv::circle(covered, {static_cast<int>(at.x()), static_cast<int>(at.y())}, 8, cv::Scalar(120), -1);
+  }
+  std::vector<Detection> found;
+  detector.follow(covered, nullptr, last, &found);
+  EXPECT_EQ(found.size(), last.size());
+  detector.follow(cv::Mat(first, cv::Rect(0, 0, 200, 200)), nullptr, last, &found);
+  EXPECT_EQ(found.size(), 1);
+  detector.follow(test::plain(640, 480, 100), nullptr, last, &found);
+  EXPECT_TRUE(found.empty());
+  detector.follow(cv::Mat(), nullptr, last, &found);
+  EXPECT_TRUE(found.empty());
+}
+
 TEST(Detector, FindsMarkersUnderFingersAndSaysWhichCornersAreCovered) {
   auto rng = test::test_rng();
   Detector detector(families({"apriltag_36h11"}));
