@@ -214,18 +214,23 @@ std::optional<Detection> Detector::read(
   if (covered && !may_be_covered_code(grey, quad)) return std::nullopt;
   const double min_contrast = k_refined_contrast * options_.min_contrast;
   const Sides sides = covered ? Sides::covered : Sides::whole;
+  const auto refine = [&](const Quad& start, Effort effort) {
+    return refiner.refine(grey, start, min_contrast, lens, effort, sides);
+  };
   std::optional<RefinedQuad> rough;
   Quad start = quad;
   if (covered || shortest_side(quad) > k_rough_above_px) {
-    rough = refiner.refine(grey, quad, min_contrast, lens, Effort::rough, sides);
+    rough = refine(quad, Effort::rough);
     if (!rough || !identify(grey, *rough, families_, reading)) return std::nullopt;
     start.corners_px = rough->corners_px;
   }
-  auto refined = refiner.refine(grey, start, min_contrast, lens, Effort::full, sides);
-  if (!refined) refined = rough;
-  if (!refined) return std::nullopt;
-  const auto identity = identify(grey, *refined, families_, reading);
-  if (!identity) return std::nullopt;
+  auto refined = refine(start, Effort::full);
+  auto identity = refined ? identify(grey, *refined, families_, reading) : std::nullopt;
+  if (!identity) {  // what a small marker has around it may bend its sides
+    refined = rough ? rough : refine(quad, Effort::rough);
+    identity = refined ? identify(grey, *refined, families_, reading) : std::nullopt;
+    if (!identity) return std::nullopt;
+  }
   if (!refined->separate) settle_overlapping_edges(grey, *identity, refiner, &*refined);
   Detection detection;
   detection.marker = identity->marker;
