@@ -63,8 +63,6 @@ bool is_taken(const Quad& quad, const std::vector<Detection>& detections) {
 // Whether both of a segment's ends lie on the marker or next to it.
 bool is_inside(const Segment& segment, const Detection& detection) {
   constexpr double k_around_px = 3;
-  if ((segment.from - detection.corners_px[0]).squaredNorm() > 4 * std::pow(longest_side(detection), 2))
-    return false;
   for (std::size_t i = 0; i < 4; ++i) {
     const Eigen::Vector2d corner = detection.corners_px[i];
     const Eigen::Vector2d side = (detection.corners_px[(i + 1) % 4] - corner).normalized();
@@ -178,9 +176,12 @@ void Detector::join_segments(const cv::Mat& grey, const std::vector<Detection>& 
   constexpr std::size_t k_max_candidates = 400;  // of each kind of edges
   quads_.clear();
   for (std::vector<Segment>* segments : {&segments_.of_black, &segments_.of_blurred}) {
-    std::erase_if(*segments, [&](const Segment& s) {
-      return std::any_of(found.begin(), found.end(), [&](const Detection& d) { return is_inside(s, d); });
-    });
+    for (const Detection& d : found) {
+      const double square = 4 * std::pow(longest_side(d), 2);
+      std::erase_if(*segments, [&](const Segment& s) {
+        return (s.from - d.corners_px[0]).squaredNorm() < square && is_inside(s, d);
+      });
+    }
     joiner_.find(*segments, grey.cols, grey.rows, joined_);
     if (joined_.size() > k_max_candidates) joined_.resize(k_max_candidates);
     for (const SegmentQuad& joined : joined_) {

@@ -15,6 +15,7 @@ constexpr int k_black_reach = 3;   // tiles of 8 pixels of the whole picture
 // Lengths at half or a quarter of the size.
 constexpr double k_min_side = 5;
 constexpr double k_min_blurred_side = 10;  // cells smaller than a quarter of it would blur into each other
+constexpr double k_min_width = 0.8;        // half of a stroke's: writing, lines
 constexpr double k_corner_px = 1.4;        // distance at which a boundary point makes a corner
 constexpr double k_trim_share = 0.1;
 constexpr double k_max_rms_px = 0.75;
@@ -54,15 +55,17 @@ void SegmentFinder::add_outlines(const cv::Mat& picture,
                                  std::vector<Segment>& segments) {
   threshold_.apply(picture, options, corner_codes_);
   outlines_.for_each(corner_codes_, [&](const Outlines::Extent& outline) {
-    if (std::max(outline.width, outline.height) < min_side) return;
+    if (std::max(outline.width, outline.height) < min_side ||
+        std::abs(outline.area) < k_min_width * static_cast<double>(outline.count))
+      return;
     outlines_.find_corners(k_corner_px, outline.count, static_cast<std::size_t>(min_side));
-    outlines_.sum_moments();
     add_sides(scale, min_side, segments);
   });
 }
 
 // The straight ones of the outline's sides between corners.
-void SegmentFinder::add_sides(int scale, double min_side, std::vector<Segment>& segments) const {
+void SegmentFinder::add_sides(int scale, double min_side, std::vector<Segment>& segments) {
+  bool summed = false;
   const auto corners = outlines_.corners();
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const std::size_t from = corners[i];
@@ -72,6 +75,8 @@ void SegmentFinder::add_sides(int scale, double min_side, std::vector<Segment>& 
     const Eigen::Vector2d start = outlines_.point(from);
     const Eigen::Vector2d end = outlines_.point(to);
     if ((end - start).norm() < min_side) continue;
+    if (!summed) outlines_.sum_moments();
+    summed = true;
     const Outlines::Line line = outlines_.line(from + trim, to - trim);
     if (line.rms() > k_max_rms_px) continue;
     const auto on_line = [&](const Eigen::Vector2d& p) {

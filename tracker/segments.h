@@ -44,7 +44,7 @@ class SegmentFinder {
                     double min_side,
                     const ThresholdOptions& options,
                     std::vector<Segment>& segments);
-  void add_sides(int scale, double min_side, std::vector<Segment>& segments) const;
+  void add_sides(int scale, double min_side, std::vector<Segment>& segments);
 };
 
 }  // namespace limn::tracker
