@@ -144,6 +144,7 @@ Outlines::Extent Outlines::trace(CornerCodes& corners, Start from) {
       const std::size_t step = next + code;
       next = static_cast<std::size_t>(steps_.next[step]);
       corner += steps_.offset[step];
+      __builtin_prefetch(corner + 8 * steps_.offset[step]);  // every row of codes is another cache line
       const int dx = steps_.dx[step];
       const int dy = steps_.dy[step];
       into_x[i] = static_cast<float>(px + dx);

@@ -11,6 +11,7 @@
 #include <fstream>
 #include <map>
 #include <numbers>
+#include <opencv2/calib3d.hpp>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -20,6 +21,7 @@
 #include <string>
 #include <vector>
 
+#include "core/imager_file.h"
 #include "core/picture.h"
 #include "tests/bench/tracker_frames.h"
 #include "tests/bench/tracker_peers.h"
@@ -372,6 +374,50 @@ void bench_photographs(const std::filesystem::path& folder) {
   fmt::print("\n");
 }
 
+// A flat board of OpenCV's photographs: where each marker's top left corner lies on it, in marker sides.
+struct Board {
+  const char* picture;
+  const char* family;
+  const char* camera;
+  Eigen::Vector2d (*place)(int id);
+};
+
+Eigen::Vector2d place_on_grid(int id) { return 1.2 * Eigen::Vector2d(id % 5, id / 5); }
+
+// Of 5 x 7 squares twice as wide as the markers, which stand in the white ones' middles.
+Eigen::Vector2d place_on_charuco(int id) {
+  for (int square = 0, marker = 0;; ++square)
+    if ((square % 5 + square / 5) % 2 == 1 && marker++ == id)
+      return 2 * Eigen::Vector2d(square % 5, square / 5) + Eigen::Vector2d(0.5, 0.5);
+}
+
+// Distances of all found corners from the plane that fits them best, lens undistorted by OpenCV's file.
+void bench_board(const std::filesystem::path& folder, const Board& board) {
+  const std::string family =
+      board.family[0] == '/' ? "aruco:" + (folder / (board.family + 1)).string() : board.family;
+  const auto found = tracker::Detector(tracker::Families::load(std::vector{family}).value())
+                         .detect(read_grey_picture(folder / board.picture).value());
+  const Imager camera = load_imager(folder / board.camera).value();
+  std::vector<cv::Point2d> seen, on_board;
+  for (const auto& d : found)
+    for (std::size_t k = 0; k < 4; ++k) {
+      const auto ray = camera.lens.unproject(d.corners_px[k]);
+      if (!ray) continue;
+      const Eigen::Vector2d at =
+          board.place(std::stoi(d.marker.id)) + Eigen::Vector2d(k == 1 || k == 2, k >= 2);
+      on_board.emplace_back(at.x(), at.y());
+      seen.emplace_back(camera.lens.values[0] * ray->x() / ray->z(),
+                        camera.lens.values[1] * ray->y() / ray->z());
+    }
+  const cv::Mat plane = cv::findHomography(on_board, seen, 0);
+  std::vector<cv::Point2d> fitted;
+  cv::perspectiveTransform(on_board, fitted, plane);
+  std::vector<double> apart;
+  for (std::size_t i = 0; i < seen.size(); ++i) apart.push_back(cv::norm(seen[i] - fitted[i]));
+  fmt::print("  {:<28}{:>3} markers, px from the board's plane: median {:.3f}, worst {:.3f}\n", board.picture,
+             found.size(), median(apart), *std::max_element(apart.begin(), apart.end()));
+}
+
 std::optional<Options> parsed(int argc, char** argv) {
   Options options;
   for (int i = 1; i < argc; ++i) {
@@ -415,5 +461,13 @@ int main(int argc, char** argv) {
     bench_regions(*options);
   }
   if (options->only.empty()) bench_hostile(*options);
-  if (!options->photographs.empty()) bench_photographs(options->photographs);
+  if (!options->photographs.empty()) {
+    bench_photographs(options->photographs);
+    for (const Board& board :
+         {Board{"gboriginal.png", "/tutorial_dict.yml", "tutorial_camera_params.yml", place_on_grid},
+          Board{"choriginal.jpg", "aruco_6x6_250", "tutorial_camera_charuco.yml", place_on_charuco},
+          Board{"chocclusion_original.jpg", "aruco_6x6_250", "tutorial_camera_charuco.yml",
+                place_on_charuco}})
+      bench_board(options->photographs, board);
+  }
 }
