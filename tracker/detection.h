@@ -18,7 +18,8 @@ struct Detection {
   std::array<Eigen::Matrix2d, 4> corner_covariance;
   /// False where a corner itself is covered and only follows from what is seen of its two sides.
   std::array<bool, 4> corner_visible = {true, true, true, true};
-  /// 0 … 1: how clearly the inside says its id (mean margin of the cells, or template correlation).
+  /// Probability that the id is right, 0.9 … 1, for codes, barcodes and templates alike (identify.h): of what
+  /// is as sure as this, so many are right.
   double score = 0;
 };
 

@@ -283,20 +283,20 @@ cv::Mat drawn_template(const TemplatePattern& pattern, int pixels_per_cell) {
 }  // namespace
 
 std::vector<float> smoothed(const std::vector<float>& values, int size) {
-  std::vector<float> result(values.size());
-  const auto at = [&](int row, int column) {
-    return values[static_cast<std::size_t>(std::clamp(row, 0, size - 1) * size +
-                                           std::clamp(column, 0, size - 1))];
-  };
-  for (int row = 0; row < size; ++row)
-    for (int column = 0; column < size; ++column) {
-      float sum = 0;
-      for (int r = -1; r <= 1; ++r)
-        for (int c = -1; c <= 1; ++c)
-          sum += static_cast<float>((2 - std::abs(r)) * (2 - std::abs(c))) * at(row + r, column + c);
-      result[static_cast<std::size_t>(row * size + column)] = sum / 16;
+  const auto count = static_cast<std::size_t>(size);
+  // Along lines of values that lie `step` apart; the lines begin `line` apart. The ends go on outside.
+  const auto smooth_lines = [&](const std::vector<float>& from, std::size_t line, std::size_t step) {
+    std::vector<float> to(from.size());
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t first = i * line;
+      const std::size_t last = first + (count - 1) * step;
+      for (std::size_t at = first; at <= last; at += step)
+        to[at] =
+            0.25f * (from[at == first ? at : at - step] + 2 * from[at] + from[at == last ? at : at + step]);
     }
-  return result;
+    return to;
+  };
+  return smooth_lines(smooth_lines(values, count, 1), 1, count);
 }
 
 Result<Families> Families::load(std::span<const std::string> names, const std::filesystem::path& folder) {

@@ -5,6 +5,9 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <map>
+#include <numeric>
+#include <utility>
 #include <vector>
 
 #include "tracker/square_to_quad.h"
@@ -22,8 +25,8 @@ constexpr double k_border_errors_covered = 0.25;
 constexpr std::array<double, 4> k_hidden_below = {0, 0.2, 0.4, 0.6};
 constexpr int k_few_bits = 25;
 // Mean margin of the cells (0: at the limit, 1: as black or white as beside the edge). Clutter lies below.
-constexpr double k_min_score = 0.35;
-constexpr double k_min_score_few_bits = 0.5;
+constexpr double k_min_margin = 0.35;
+constexpr double k_min_margin_few_bits = 0.5;
 // Margin that wrong bits may hold together, as share of all: a clear bit that is wrong is no noise.
 constexpr double k_max_wrong_margin = 0.1;
 constexpr double k_uneven_paper = 1.3;            // brightest side over the second darkest
@@ -34,7 +37,7 @@ constexpr double k_sharpening = 0.25;             // Laplacian weight
 // A barcode's every bit is data: nothing in the code tells a marker from clutter, so its light must. Least
 // and mean margin of its cells, share of its border's places that may be light.
 constexpr double k_min_barcode_margin = 0.4;
-constexpr double k_min_barcode_score = 0.75;
+constexpr double k_min_mean_barcode_margin = 0.75;
 constexpr double k_barcode_border_errors = 0.02;
 
 // Bilinear; the picture's edge goes on outside.
@@ -152,11 +155,141 @@ struct Reader {
   }
 };
 
+// ---- how sure ----
+
+// What a quad would show, as it is turned in the picture.
+struct Pattern {
+  double border = 0, cells = 0;  // in cells
+  std::uint64_t code = 0;
+  const TemplatePattern* drawn = nullptr;  // instead of a code
+  std::size_t rotation = 0;                // of the template
+
+  bool operator==(const Pattern&) const = default;
+
+  // -1 black … 1 white at a place of the unit square.
+  double at(double x, double y) const {
+    const double side = cells + 2 * border;
+    const int columns = static_cast<int>(cells);
+    const double u = x * side - border;
+    const double v = y * side - border;
+    if (u < 0 || v < 0 || u >= cells || v >= cells) return -1;
+    int column = static_cast<int>(u);
+    int row = static_cast<int>(v);
+    if (!drawn) return (code >> (columns * columns - 1 - (row * columns + column))) & 1 ? 1 : -1;
+    for (std::size_t k = 0; k < rotation; ++k) row = columns - 1 - std::exchange(column, row);
+    return drawn->grey[static_cast<std::size_t>(row * columns + column)] / 127.5 - 1;
+  }
+};
+
+Pattern pattern_of(const CodeFamily& family, std::uint64_t code) {
+  return {family.border_cells, static_cast<double>(family.cells), code, nullptr, 0};
+}
+Pattern pattern_of(const TemplatePattern& drawn, std::size_t rotation) {
+  return {0.5 * drawn.size, static_cast<double>(drawn.size), 0, &drawn, rotation};
+}
+
+// What is read in a quad, and what else it might be.
+struct Readings {
+  struct Accepted {
+    Identity identity;
+    Pattern pattern;
+    double limit = k_middle;  // between black and white
+    double random_hit = 1;    // probability that random cells are read as some marker like that
+  };
+  std::vector<Accepted> accepted;
+  std::vector<Pattern> others;
+};
+
+// The whole square at the same places for every pattern, whatever its cells; smoothed as templates are.
+class SeenSquare {
+ public:
+  SeenSquare(const Reader& reader, double limit);
+  /// How well the pattern explains it: -1 … 1.
+  double correlation(const Pattern& pattern) const;
+
+ private:
+  static constexpr int k_places = 20;  // a side
+  std::vector<float> values_;
+
+  // Of zero mean and unit length.
+  template <class ValueAt>
+  static std::vector<float> normalised(ValueAt value_at);
+};
+
 double mean_relative(const double* fractions, bool several, double limit) {
   if (!several) return relative(fractions[0], limit);
   double sum = 0;
   for (std::size_t i = 0; i < CellSamples::k_places; ++i) sum += relative(fractions[i], limit);
   return sum / CellSamples::k_places;
+}
+
+template <class ValueAt>
+std::vector<float> SeenSquare::normalised(ValueAt value_at) {
+  std::vector<float> values;
+  values.reserve(k_places * k_places);
+  for (int row = 0; row < k_places; ++row)
+    for (int column = 0; column < k_places; ++column)
+      values.push_back(static_cast<float>(value_at((column + 0.5) / k_places, (row + 0.5) / k_places)));
+  values = smoothed(values, k_places);
+  const float mean = std::accumulate(values.begin(), values.end(), 0.0f) / (k_places * k_places);
+  float squares = 1e-9f;
+  for (float& value : values) {
+    value -= mean;
+    squares += value * value;
+  }
+  for (float& value : values) value /= std::sqrt(squares);
+  return values;
+}
+
+SeenSquare::SeenSquare(const Reader& reader, double limit)
+    : values_(normalised([&](double x, double y) { return relative(reader.fraction(x, y), limit); })) {}
+
+double SeenSquare::correlation(const Pattern& pattern) const {
+  const auto shown = normalised([&](double x, double y) { return pattern.at(x, y); });
+  return std::inner_product(shown.begin(), shown.end(), values_.begin(), 0.0);
+}
+
+// Logarithm of the likelihood ratio of a pattern to none: `k_independent` values in Gaussian noise whose
+// strength the residual tells; the floor is what geometry and light leave unexplained at best.
+constexpr double k_independent = 60;
+constexpr double k_residual_floor = 0.03;
+double evidence(double correlation) {
+  const double c = std::clamp(correlation, 0.0, 1.0);
+  return 0.5 * k_independent * std::log((1 + k_residual_floor) / (1 - c * c + k_residual_floor));
+}
+
+// Something that is none of the patterns looked for explains what is seen as well as a pattern of this
+// correlation.
+constexpr double k_unknown_correlation = 0.75;
+
+// The likeliest reading, as sure as it leads over whatever else might be there.
+std::optional<Identity> chosen(const Reader& reader, const Readings& readings) {
+  if (readings.accepted.empty()) return std::nullopt;
+  std::map<double, SeenSquare> seen_by_limit;
+  const auto seen_at = [&](double limit) -> const SeenSquare& {
+    return seen_by_limit.try_emplace(limit, reader, limit).first->second;
+  };
+  const Readings::Accepted* best = nullptr;
+  double most = -2;
+  for (const Readings::Accepted& reading : readings.accepted) {
+    const double alike = seen_at(reading.limit).correlation(reading.pattern);
+    if (alike <= most) continue;
+    most = alike;
+    best = &reading;
+  }
+  const SeenSquare& seen = seen_at(best->limit);
+  double next = 0;
+  const auto compete = [&](const Pattern& other) {
+    if (other != best->pattern) next = std::max(next, seen.correlation(other));
+  };
+  for (const Readings::Accepted& reading : readings.accepted) compete(reading.pattern);
+  for (const Pattern& other : readings.others) compete(other);
+  const double another = std::exp(evidence(next) - evidence(most));
+  const double unknown = best->random_hit * std::exp(evidence(k_unknown_correlation) - evidence(most));
+  Identity identity = best->identity;
+  identity.score = 1 / (1 + another + unknown);
+  if (identity.score < k_min_confidence) return std::nullopt;
+  return identity;
 }
 
 // Takes off what blur brought over from the four neighbours (outside the marker: white).
@@ -251,46 +384,95 @@ std::uint64_t readable_bits(const Bits& bits, int count, double margin) {
   return readable;
 }
 
-std::optional<Identity> read_code(const CodeFamily& family, const Bits& bits, std::uint64_t readable) {
-  const int count = family.cells * family.cells;
-  const auto hidden = static_cast<std::size_t>(count - std::popcount(readable));
-  if (hidden >= family.max_errors.size()) return std::nullopt;
-  const Nearest best = nearest(family.codes, bits.code, readable);
-  if (best.errors > family.max_errors[hidden]) return std::nullopt;
-  double wrong = 0;
-  std::uint64_t differing = (family.codes[best.id][best.rotation] ^ bits.code) & readable;
-  for (; differing != 0; differing &= differing - 1)
-    wrong += bits.margin[static_cast<std::size_t>(std::countr_zero(differing))];
-  const double all = bits.mean_margin * count;
-  if (wrong > k_max_wrong_margin * all) return std::nullopt;
-  return Identity{{family.name, std::to_string(best.id)},
-                  best.rotation,
-                  bits.mean_margin * (1 - 2 * wrong / all),
-                  cells_of(family, family.codes[best.id][best.rotation])};
+double margin_of(const Bits& bits, std::uint64_t chosen) {
+  double sum = 0;
+  for (; chosen != 0; chosen &= chosen - 1)
+    sum += bits.margin[static_cast<std::size_t>(std::countr_zero(chosen))];
+  return sum;
 }
 
-std::optional<Identity> read_code(const CodeFamily& family, const Bits& bits, Reading reading) {
+// The code other than `code` that bits of the least margin together contradict, of any family whose cells lie
+// where this one's do.
+std::uint64_t next_code(const Families& families,
+                        const CodeFamily& family,
+                        const Bits& bits,
+                        std::uint64_t code) {
+  const auto count = static_cast<std::size_t>(family.cells * family.cells);
+  std::array<double, 65> least{};  // of so many bits together
+  std::copy_n(bits.margin.begin(), count, least.begin() + 1);
+  std::sort(least.begin() + 1, least.begin() + 1 + static_cast<std::ptrdiff_t>(count));
+  for (std::size_t i = 1; i <= count; ++i) least[i] += least[i - 1];
+  std::uint64_t next = ~code & ((std::uint64_t{1} << count) - 1);
+  double wrong = least[count] + 1;
+  for (const CodeFamily& like : families.codes()) {
+    if (like.cells != family.cells || like.border_cells != family.border_cells) continue;
+    for (const auto& turns : like.codes)
+      for (const std::uint64_t other : turns) {
+        const std::uint64_t differing = other ^ bits.code;
+        if (other == code || least[static_cast<std::size_t>(std::popcount(differing))] >= wrong) continue;
+        const double margin = margin_of(bits, differing);
+        if (margin >= wrong) continue;
+        wrong = margin;
+        next = other;
+      }
+  }
+  return next;
+}
+
+double random_hit(const CodeFamily& family, int readable, int errors) {
+  double words_with = 1;  // binomial(readable, i)
+  double words = 0;
+  for (int i = 0; i <= errors; ++i) {
+    words += words_with;
+    words_with *= static_cast<double>(readable - i) / (i + 1);
+  }
+  return std::min(1.0, 4 * static_cast<double>(family.codes.size()) * words / std::ldexp(1.0, readable));
+}
+
+bool read_code(const Families& families,
+               const CodeFamily& family,
+               const Bits& bits,
+               double limit,
+               std::uint64_t readable,
+               Readings* readings) {
+  const int count = family.cells * family.cells;
+  const auto hidden = static_cast<std::size_t>(count - std::popcount(readable));
+  if (hidden >= family.max_errors.size()) return false;
+  const Nearest best = nearest(family.codes, bits.code, readable);
+  if (best.errors > family.max_errors[hidden]) return false;
+  const std::uint64_t code = family.codes[best.id][best.rotation];
+  if (margin_of(bits, (code ^ bits.code) & readable) > k_max_wrong_margin * bits.mean_margin * count)
+    return false;
+  const Identity identity{{family.name, std::to_string(best.id)}, best.rotation, 0, cells_of(family, code)};
+  readings->accepted.push_back(
+      {identity, pattern_of(family, code), limit, random_hit(family, std::popcount(readable), best.errors)});
+  readings->others.push_back(pattern_of(family, next_code(families, family, bits, code)));
+  return true;
+}
+
+void read_code(const Families& families,
+               const CodeFamily& family,
+               const Bits& bits,
+               double limit,
+               Reading reading,
+               Readings* readings) {
   const int count = family.cells * family.cells;
   const bool few = count <= k_few_bits;
   const bool covered = reading == Reading::covered;
   // So few bits that clutter shows them by chance: not a second time.
-  if (covered && family.max_errors.size() == 1) return std::nullopt;
+  if (covered && family.max_errors.size() == 1) return;
   const double border_share = covered ? k_border_errors_covered
                               : few   ? k_border_errors_few_bits
                                       : k_border_errors;
-  const double min_score = few ? k_min_score_few_bits : k_min_score;
-  if (bits.border_errors > border_share * bits.border_cells || bits.mean_margin < min_score)
-    return std::nullopt;
-  const std::uint64_t all = readable_bits(bits, count, 0);
-  if (!covered) return read_code(family, bits, all);
+  const double min_margin = few ? k_min_margin_few_bits : k_min_margin;
+  if (bits.border_errors > border_share * bits.border_cells || bits.mean_margin < min_margin) return;
   std::uint64_t before = 0;
   for (const double margin : k_hidden_below) {
     const std::uint64_t readable = readable_bits(bits, count, margin);
     if (readable == before) continue;
     before = readable;
-    if (auto found = read_code(family, bits, readable)) return found;
+    if (read_code(families, family, bits, limit, readable, readings) || !covered) return;
   }
-  return std::nullopt;
 }
 
 // Whether the whole border is dark, near its outer edge and near the cells, where other families have some.
@@ -308,24 +490,31 @@ bool is_border_dark(const Reader& reader) {
   return light <= k_barcode_border_errors * 8 * k_places;
 }
 
-std::optional<Identity> read_barcode(const Reader& reader, const CodeFamily& family) {
+Bits barcode_bits(const Reader& reader, const CodeFamily& family) {
   CellSamples samples;
   reader.read_barcode(family, &samples);
-  const Bits bits = bits_of(grid_of(samples, k_middle), family.cells);
-  const auto least = std::min_element(bits.margin.begin(), bits.margin.begin() + family.cells * family.cells);
-  if (*least < k_min_barcode_margin || bits.mean_margin < k_min_barcode_score) return std::nullopt;
-  if (!is_border_dark(reader)) return std::nullopt;
-  return read_code(family, bits, Reading::open);
+  return bits_of(grid_of(samples, k_middle), family.cells);
 }
 
-std::optional<Identity> read_barcodes(const Reader& reader, const Families& families) {
-  std::optional<Identity> best;
+void read_barcodes(const Reader& reader, const Families& families, Readings* readings) {
   for (const CodeFamily& family : families.codes()) {
     if (!is_barcode(family)) continue;
-    const auto found = read_barcode(reader, family);
-    if (found && (!best || found->score > best->score)) best = found;
+    const Bits bits = barcode_bits(reader, family);
+    const auto least =
+        std::min_element(bits.margin.begin(), bits.margin.begin() + family.cells * family.cells);
+    if (*least < k_min_barcode_margin || bits.mean_margin < k_min_mean_barcode_margin) continue;
+    if (is_border_dark(reader)) read_code(families, family, bits, k_middle, Reading::open, readings);
   }
-  return best;
+}
+
+// Barcodes too blurred to be read: almost any cells are a barcode of fewer.
+void add_rival_barcodes(const Reader& reader, const Families& families, Readings* readings) {
+  for (const CodeFamily& family : families.codes()) {
+    if (!is_barcode(family)) continue;
+    const Bits bits = barcode_bits(reader, family);
+    const Nearest like = nearest(family.codes, bits.code, ~std::uint64_t{0});
+    readings->others.push_back(pattern_of(family, family.codes[like.id][like.rotation]));
+  }
 }
 
 // Border of a template: a quarter of the side; dark at 12 places of its middle ring.
@@ -368,27 +557,38 @@ std::vector<float> read_inner_half(const Reader& reader, int size) {
   return values;
 }
 
-std::optional<Identity> read_templates(const Reader& reader, const std::vector<TemplatePattern>& templates) {
-  if (templates.empty() || !has_template_border(reader)) return std::nullopt;
-  std::optional<Identity> best;
-  for (const TemplatePattern& pattern : templates) {
-    const std::vector<float> seen = read_inner_half(reader, pattern.size);
-    if (seen.empty()) continue;
-    std::array<double, 4> scores;
-    for (std::size_t k = 0; k < 4; ++k) scores[k] = correlation(pattern.rotations[k], seen);
-    const auto top =
-        static_cast<std::size_t>(std::max_element(scores.begin(), scores.end()) - scores.begin());
-    const double score = scores[top];
-    std::sort(scores.begin(), scores.end());
-    if (score < k_min_correlation || score - scores[2] < k_min_rotation_lead) continue;
-    if (!best || score > best->score) best = Identity{{"artoolkit", pattern.id}, top, score, {}};
+void read_templates(const Reader& reader, const std::vector<TemplatePattern>& templates, Readings* readings) {
+  if (templates.empty() || !has_template_border(reader)) return;
+  std::map<int, std::vector<float>> seen;  // by size
+  std::vector<std::pair<double, Pattern>> alike;
+  std::optional<Readings::Accepted> best;
+  double most = 0;
+  for (const TemplatePattern& drawn : templates) {
+    if (!seen.contains(drawn.size)) seen[drawn.size] = read_inner_half(reader, drawn.size);
+    const std::vector<float>& values = seen[drawn.size];
+    if (values.empty()) continue;
+    std::array<double, 4> turns;
+    for (std::size_t k = 0; k < 4; ++k) {
+      turns[k] = correlation(drawn.rotations[k], values);
+      alike.emplace_back(turns[k], pattern_of(drawn, k));
+    }
+    const auto top = static_cast<std::size_t>(std::max_element(turns.begin(), turns.end()) - turns.begin());
+    std::sort(turns.begin(), turns.end());
+    if (turns[3] < k_min_correlation || turns[3] - turns[2] < k_min_rotation_lead) continue;
+    if (turns[3] <= most) continue;
+    most = turns[3];
+    best = {{{"artoolkit", drawn.id}, top, 0, {}}, pattern_of(drawn, top), k_middle, 1};
   }
-  return best;
+  if (best) readings->accepted.push_back(*best);
+  // Of all templates and their turns the two most alike: one of them may be the best.
+  const auto two = alike.begin() + std::min<std::ptrdiff_t>(2, std::ssize(alike));
+  std::partial_sort(alike.begin(), two, alike.end(),
+                    [](const auto& a, const auto& b) { return a.first > b.first; });
+  for (auto other = alike.begin(); other != two; ++other) readings->others.push_back(other->second);
 }
 
-std::optional<Identity> read_codes(const Reader& reader, const Families& families, Reading reading) {
+void read_codes(const Reader& reader, const Families& families, Reading reading, Readings* readings) {
   const std::size_t limits = reading == Reading::open ? 1 : k_limits.size();
-  std::optional<Identity> best;
   CellSamples samples;
   std::array<Bits, k_limits.size()> bits;
   for (const CodeFamily& family : families.codes()) {
@@ -397,17 +597,20 @@ std::optional<Identity> read_codes(const Reader& reader, const Families& familie
     if (!is_read) reader.read(family.cells + 2, &samples);
     for (std::size_t i = 0; i < limits; ++i) {
       if (!is_read) bits[i] = bits_of(grid_of(samples, k_limits[i]), family.cells);
-      const std::optional<Identity> found = read_code(family, bits[i], reading);
-      if (found && (!best || found->score > best->score)) best = found;
+      read_code(families, family, bits[i], k_limits[i], reading, readings);
     }
   }
-  return best;
 }
 
-std::optional<Identity> read(const Reader& reader, const Families& families) {
-  if (auto code = read_codes(reader, families, Reading::open)) return code;
-  if (auto code = read_barcodes(reader, families)) return code;
-  return read_templates(reader, families.templates());
+std::optional<Identity> read(const Reader& reader, const Families& families, Reading reading) {
+  Readings readings;
+  read_codes(reader, families, reading, &readings);
+  if (reading == Reading::open) {
+    read_barcodes(reader, families, &readings);
+    read_templates(reader, families.templates(), &readings);
+    if (!readings.accepted.empty()) add_rival_barcodes(reader, families, &readings);
+  }
+  return chosen(reader, readings);
 }
 
 // The picture's nearest pixel; its edge goes on outside.
@@ -495,15 +698,15 @@ std::optional<Identity> identify(const cv::Mat& grey,
                                  const RefinedQuad& quad,
                                  const Families& families,
                                  Reading reading) {
-  if (reading == Reading::covered) return read_codes(Reader(grey, quad), families, reading);
-  if (const auto found = read(Reader(grey, quad), families)) return found;
+  if (reading == Reading::covered) return read(Reader(grey, quad), families, reading);
+  if (const auto found = read(Reader(grey, quad), families, reading)) return found;
   // Something brighter than the paper may stand behind one side: try the second darkest side's paper for all.
   std::array<double, 4> levels = quad.outside_level;
   std::sort(levels.begin(), levels.end());
   if (levels[3] < k_uneven_paper * levels[1]) return std::nullopt;
   RefinedQuad even = quad;
   even.outside_level.fill(levels[1]);
-  return read(Reader(grey, even), families);
+  return read(Reader(grey, even), families, reading);
 }
 
 }  // namespace limn::tracker

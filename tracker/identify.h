@@ -40,9 +40,14 @@ enum class Reading {
   covered  ///< some may be hidden, shadows may cross: codes only, hidden bits count as such
 };
 
-/// Reads the quad's cells through its homography and compares them with every family; the best that is clear
-/// enough. The limit between black and white comes from the levels beside the four edges, as a plane over the
-/// marker, so that a gradient of light does no harm.
+/// Readings less sure than this are none: the one reject level of codes, barcodes and templates.
+constexpr double k_min_confidence = 0.9;
+
+/// Reads the quad's cells through its homography and compares them with every family. The limit between black
+/// and white comes from the levels beside the four edges, as a plane over the marker, so that a gradient of
+/// light does no harm. Of all that a family accepts the pattern that explains the whole square best is the
+/// marker. Its score is the probability that it is right: against the next best pattern of any family, turn
+/// or template, and against something that nobody looks for. tests/bench/id_bench counts both.
 std::optional<Identity> identify(const cv::Mat& grey,
                                  const RefinedQuad& quad,
                                  const Families& families,

@@ -136,8 +136,12 @@ bool is_same_picture(const MarkerName& found, const MarkerName& truth) {
     return known;
   };
   const cv::Mat& a = picture(found);
-  const cv::Mat& b = picture(truth);
-  return a.size() == b.size() && cv::norm(a, b, cv::NORM_INF) == 0;
+  cv::Mat b = picture(truth).clone();
+  for (int turn = 0; turn < 4; ++turn) {  // aruco_4x4_250:227 is apriltag_16h5:16 turned
+    if (a.size() == b.size() && cv::norm(a, b, cv::NORM_INF) == 0) return true;
+    cv::rotate(b, b, cv::ROTATE_90_CLOCKWISE);
+  }
+  return false;
 }
 
 // ---- judgement ----
@@ -198,7 +202,8 @@ Tally judged(const std::vector<Detection>& detections, const TrackerFrame& frame
     tally.right += right;
     tally.wrong += !right;
     const double off = (detection.corners_px[0] - truth->corners_px[0]).norm();
-    tally.turned += right && off > 0.4 * longest_side(truth->corners_px);
+    tally.turned += right && detection.marker.family == truth->marker.family &&
+                    off > 0.4 * longest_side(truth->corners_px);
     std::size_t bin = k_bins.size() - 1;
     while (detection.score < k_bins[bin]) --bin;
     (right ? tally.bins[bin].right : tally.bins[bin].wrong) += 1;

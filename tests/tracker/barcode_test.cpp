@@ -205,5 +205,30 @@ TEST(Barcode, PhotographsWithoutThemShowNone) {
   EXPECT_GE(pictures, 40);
 }
 
+// Their cells are wider or narrower than those of other families, whose codes they may show by chance: three
+// in a hundred, as long as the first family that accepts them has them.
+TEST(Barcode, AreNotTakenForCodesOfOtherFamilies) {
+  auto rng = test::test_rng();
+  Detector detector(families(
+      {"aruco_4x4_1000", "aruco_6x6_250", "artoolkit_4x4", "artoolkit_3x3", "artoolkit_5x5_bch_22_12_5"}));
+  int read = 0;
+  for (int i = 0; i < 120; ++i) {
+    const bool three = i % 2 == 0;
+    const MarkerName name = three ? MarkerName{"artoolkit_3x3", std::to_string(i % 64)}
+                                  : MarkerName{"artoolkit_5x5_bch_22_12_5", std::to_string(33 * i)};
+    const PlacedMarker marker = test::placed(pinhole_vga(), name, {320, 240}, uniform(rng, 20, 70),
+                                             uniform(rng, 0, 6.28), uniform(rng, 0, 70_deg), i);
+    const auto found = detector.detect(
+        test::picture_of(pinhole_vga(), test::plain(640, 480, 100), std::vector{marker},
+                         {.blur_px = uniform(rng, 0.4, 2.5), .noise_levels = uniform(rng, 2, 12)}, rng));
+    for (const Detection& detection : found) {
+      ++read;
+      EXPECT_EQ(detection.marker, name);
+      EXPECT_GE(detection.score, k_min_confidence);
+    }
+  }
+  EXPECT_GT(read, 60);
+}
+
 }  // namespace
 }  // namespace limn::tracker

@@ -150,5 +150,31 @@ TEST(Templates, AreToldApartByTheDetectorsOwnLimits) {
   EXPECT_TRUE(detector.detect(picture_with({placed(folder / "even.patt", 300, 120, 0, 0)}, rng)).empty());
 }
 
+// Two that differ by the width of a bar: sharp they are told apart, blurred they are doubted.
+TEST(Templates, NearlyAlikeAreDoubtedWhereTheyAreBlurred) {
+  auto rng = test::test_rng();
+  const auto folder = test::test_folder();
+  const auto a = bars(folder, "a.patt", 4);
+  const auto b = bars(folder, "b.patt", 6);
+  Detector detector(Families::load(std::vector{detected_text(a), detected_text(b)}).value());
+  int sharp = 0;
+  int wrong = 0;
+  for (int i = 0; i < 120; ++i) {
+    const auto& file = i % 2 ? a : b;
+    const bool is_sharp = i < 20;
+    const PlacedMarker marker = placed(file, 320, is_sharp ? 140 : 32, 0.3 * i, is_sharp ? 20_deg : 60_deg);
+    const cv::Mat picture =
+        test::picture_of(pinhole_vga(), test::plain(640, 480, 110), std::vector{marker},
+                         {.blur_px = is_sharp ? 0.7 : 2.5, .noise_levels = is_sharp ? 6.0 : 15.0}, rng);
+    for (const Detection& detection : detector.detect(picture)) {
+      const bool right = detection.marker.id == file.filename();
+      sharp += right && is_sharp;
+      wrong += !right;
+    }
+  }
+  EXPECT_EQ(sharp, 20);
+  EXPECT_LE(wrong, 2);  // 15 of 120 when none is rejected
+}
+
 }  // namespace
 }  // namespace limn::tracker
