@@ -46,11 +46,19 @@ constexpr double k_refined_contrast = 0.7;  // share of min_contrast that an edg
 
 constexpr double k_rough_above_px = 32;  // smaller quads are refined in full at once: it costs as little
 
-constexpr double k_fit_above_px = 24;  // smaller markers have too few pixels for the fit
+constexpr double k_fit_above_px = 12;  // smaller markers have too few pixels for the fit
+
+// Cells narrower than so many sigmas of the blur lie within each other's edges.
+constexpr double k_cell_sigmas = 5;
 
 // Error of a corner whose edges overlap, in their blur: measured on sigma 2.5 to 3.5 and motion of 8 to 16
 // px.
 constexpr double k_overlap_doubt = 0.15;
+
+bool is_blurred(const RefinedQuad& quad, const SeenCells& cells) {
+  const double blur_px = *std::max_element(quad.blur_px.begin(), quad.blur_px.end());
+  return shortest_side(Quad{quad.corners_px}) < k_cell_sigmas * blur_px * cells.count;
+}
 
 // Whether a marker found before takes the place.
 bool is_taken(const Quad& quad, const std::vector<Detection>& detections) {
@@ -232,7 +240,8 @@ std::optional<Detection> Detector::read(
     identity = refined ? identify(grey, *refined, families_, reading) : std::nullopt;
     if (!identity) return std::nullopt;
   }
-  if (!refined->separate) settle_overlapping_edges(grey, *identity, refiner, &*refined);
+  if (!refined->separate || is_blurred(*refined, identity->cells))
+    settle_overlapping_edges(grey, *identity, refiner, &*refined);
   Detection detection;
   detection.marker = identity->marker;
   detection.score = std::clamp(identity->score, 0.0, 1.0);

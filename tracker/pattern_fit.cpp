@@ -3,34 +3,45 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <vector>
 
 #include "tracker/square_to_quad.h"
 
 namespace limn::tracker {
 namespace {
 
+constexpr std::size_t k_few_samples = 150;  // while hypotheses of the motion compete
+constexpr std::size_t k_coarse_samples = 300;
+constexpr std::size_t k_moving_samples = 600;
+constexpr std::size_t k_samples = 1200;
 constexpr int k_rounds = 16;
-constexpr int k_even_rounds = 5;                  // where motion is looked for
-constexpr double k_may_move_px = 1.8;             // blur below which motion tells nothing of its own
-constexpr double k_clearly_better = 0.9;          // in mean square residuals: motion against blur alone
-constexpr double k_motion_damping = 1;            // light^2 / px^4: far below what a blurred edge shows
-constexpr double k_max_motion = 144;              // 24 px in all
-constexpr int k_columns = 16;                     // of pixels, along a side
-constexpr double k_depth_cells = 2.4;             // that are looked at inside the border's outer edge
-constexpr double k_ends = 0.06;                   // of a side, left out at both ends
-constexpr double k_no_margin = 1e3;               // cells: no outer edge of the paper in reach
-constexpr double k_max_residual = 0.15;           // of the contrast, RMS: above it the model is wrong
-constexpr double k_min_explained = 0.4;           // on the way
-constexpr double k_min_explained_at_last = 0.75;  // of perfect Gaussian residuals: 0.89
-constexpr double k_settled_px = 0.01;
-constexpr double k_astray_px = 0.1;  // corners that still move so far at last have not settled
-constexpr double k_max_moved_px = 5;
-constexpr double k_systematic_px = 0.02;  // as in refine.cpp
+constexpr double k_may_move_px = 1.0;     // blur below which motion tells nothing of its own
+constexpr double k_clearly_better = 0.9;  // in mean square residuals: motion against blur alone
+constexpr double k_max_motion_px = 30;
+constexpr double k_min_blur_px = 0.28;    // of a pixel's own area
+constexpr double k_no_margin = 1e3;       // cells: no outer edge of the paper in reach
+constexpr double k_max_residual = 0.075;  // of the contrast, RMS: above it the model is wrong
+constexpr double k_min_explained = 0.77;  // of perfect Gaussian residuals: 0.89
+constexpr double k_settled_px = 0.005;
+constexpr double k_roughly_settled_px = 0.05;
+constexpr double k_astray_px = 0.1;     // corners that still move so far at last have not settled
+constexpr double k_max_moved_px = 6;    // and half the motion
+constexpr double k_bend_evidence = 20;  // chi-square of four: flat paper shows as much once in 2000 times
+constexpr double k_max_bend = 0.1;      // of half a side
+constexpr std::size_t k_choice = 3;     // times as many pixels, of which the flat ones are left out
+constexpr int k_flat_stride = 8;        // but one in so many
+constexpr double k_rough_scale = 0.1;   // of the contrast
+constexpr double k_least_scale = 0.5;   // of light
+constexpr double k_bound = 0.15;        // of the contrast: residuals beyond tell no more
+constexpr double k_noise = 0.02;        // of the contrast, RMS: residuals that ask for no motion
+constexpr double k_systematic_px = 0.004;
 
 // Standard normal distribution and density, from a table.
 class Normal {
  public:
+  static constexpr double k_reach = 4;
   struct Value {
     double below, density;
   };
@@ -54,7 +65,7 @@ class Normal {
 
  private:
   static constexpr int k_steps = 1024;
-  static constexpr double k_width = 8.0 / k_steps;
+  static constexpr double k_width = 2 * k_reach / k_steps;
   std::array<Value, k_steps + 1> table_;
 };
 
@@ -63,239 +74,378 @@ const Normal& normal() {
   return table;
 }
 
-// What is unknown of a side. Lengths in cells, levels in light, t from -1 to 1 along the side. Blur is a
-// Gaussian and an even motion; `motion` is the square of half the motion's length across the side, px^2.
+// The cells about one coordinate of a place, seen through a Gaussian: of every cell its share, and the
+// share's first and second derivative by the place in sigmas.
+struct Shares {
+  static constexpr int k_most = SeenCells::k_max + 2;
+  int first = 0, count = 0;  // cells, -1 the paper before the marker
+  std::array<double, k_most> share, slope, bend;
+
+  Shares(double at, double sigma, int cells) {
+    const double reach = Normal::k_reach * sigma;
+    const int from = std::max(0, static_cast<int>(std::ceil(at - reach)));
+    const int to = std::min(cells, static_cast<int>(std::floor(at + reach)));
+    first = from - 1;
+    double below = 1;
+    double density = 0;
+    double turn = 0;
+    for (int line = from; line <= to; ++line) {
+      const double z = (at - line) / sigma;
+      const Normal::Value n = normal().at(z);
+      const auto i = static_cast<std::size_t>(count++);
+      share[i] = below - n.below;
+      slope[i] = density - n.density;
+      bend[i] = turn + z * n.density;
+      below = n.below;
+      density = n.density;
+      turn = -z * n.density;
+    }
+    const auto i = static_cast<std::size_t>(count++);
+    share[i] = below;
+    slope[i] = density;
+    bend[i] = turn;
+  }
+};
+
+// How far pixels blur the cells at a place: sigmas along rows and columns, in cells, and their correlation
+// where the view is skewed.
+struct CellBlur {
+  double x, y, correlation;
+};
+
+// The share of ink at a place, and its derivatives.
+struct Ink {
+  double value = 0, by_x = 0, by_y = 0, by_log_blur = 0;
+};
+
+// A code's cells on endless paper.
+class Pattern {
+ public:
+  explicit Pattern(const SeenCells& cells) : count_(cells.count) {
+    for (int row = 0; row < count_; ++row)
+      for (int column = 0; column < count_; ++column)
+        ink_[static_cast<std::size_t>((row + 1) * k_row + column + 1)] = !cells.is_white(row, column);
+  }
+  int count() const { return count_; }
+
+  // The bivariate normal's first terms in its correlation (tetrachoric series, Pearson 1900).
+  Ink at(double x, double y, const CellBlur& blur) const {
+    Ink seen;
+    const double reach_x = Normal::k_reach * blur.x;
+    const double reach_y = Normal::k_reach * blur.y;
+    if (!(x > -reach_x && y > -reach_y && x < count_ + reach_x && y < count_ + reach_y)) return seen;
+    const Shares columns(x, blur.x, count_);
+    const Shares rows(y, blur.y, count_);
+    double twist = 0;
+    double warp = 0;
+    for (int r = 0; r < rows.count; ++r) {
+      const double* ink = &ink_[static_cast<std::size_t>((rows.first + r + 1) * k_row + columns.first + 1)];
+      double share = 0;
+      double slope = 0;
+      double bend = 0;
+      for (int c = 0; c < columns.count; ++c) {
+        const auto i = static_cast<std::size_t>(c);
+        share += columns.share[i] * ink[c];
+        slope += columns.slope[i] * ink[c];
+        bend += columns.bend[i] * ink[c];
+      }
+      const auto i = static_cast<std::size_t>(r);
+      seen.value += rows.share[i] * share;
+      seen.by_x += rows.share[i] * slope;
+      seen.by_y += rows.slope[i] * share;
+      seen.by_log_blur += rows.share[i] * bend + rows.bend[i] * share;
+      twist += rows.slope[i] * slope;
+      warp += rows.bend[i] * bend;
+    }
+    seen.value += blur.correlation * (twist + 0.5 * blur.correlation * warp);
+    seen.by_log_blur += 2 * blur.correlation * twist;
+    seen.by_x /= blur.x;
+    seen.by_y /= blur.y;
+    return seen;
+  }
+
+ private:
+  static constexpr int k_row = SeenCells::k_max + 2;
+  int count_;
+  std::array<double, static_cast<std::size_t>(k_row* k_row)> ink_{};
+};
+
+// What is unknown. Levels are planes over the marker; margins (cells) and what is behind them one a side.
+// The first eight move the pattern: x += c0 + c1 x + c2 y + x (c6 x + c7 y), y += c3 + c4 x + c5 y + y (c6 x
+// + c7 y), with x and y from -1 to 1 over the marker: a small homography. Bent paper leaves the corners where
+// they are: x += b0 (1 - x^2) + b1 (1 - y^2), y += b2 (1 - x^2) + b3 (1 - y^2).
 enum Unknown : int {
-  at_middle,
-  at_turn,
-  log_blur,
-  motion,  // square of half its length across the side, px^2
-  margin,
-  ground,
-  ground_t,
+  shape = 0,
+  log_blur = 8,
+  motion_x,
+  motion_y,
   paper,
-  paper_t,
-  ink,
-  ink_t,
-  k_unknowns
+  ink = paper + 3,
+  ground = ink + 3,
+  margin = ground + 4,
+  bend = margin + 4,
+  k_unknowns = bend + 4
 };
 using Vector = Eigen::Matrix<double, k_unknowns, 1>;
 using Matrix = Eigen::Matrix<double, k_unknowns, k_unknowns>;
 
-// Pixels to the cells of one side: x along it, y inward; with the gradients of both.
-struct CellMap {
-  Eigen::Matrix3d cells_from_px;
-  explicit CellMap(const std::array<Eigen::Vector2d, 4>& corners, std::size_t side, int count) {
-    const SquareToQuad px_from_square(
-        {corners[side], corners[(side + 1) % 4], corners[(side + 2) % 4], corners[(side + 3) % 4]});
-    cells_from_px = Eigen::Vector3d(count, count, 1).asDiagonal() * px_from_square.matrix().inverse();
-  }
-  struct Place {
-    double x, y, x_a_px, y_a_px;
-  };
-  Place at(const Eigen::Vector2d& px) const {
-    const Eigen::Vector3d p = cells_from_px * px.homogeneous();
-    const Eigen::Vector2d q = p.head<2>() / p.z();
-    const Eigen::RowVector2d w = cells_from_px.block<1, 2>(2, 0);
-    return {q.x(), q.y(), ((cells_from_px.block<1, 2>(0, 0) - q.x() * w) / p.z()).norm(),
-            ((cells_from_px.block<1, 2>(1, 0) - q.y() * w) / p.z()).norm()};
-  }
-};
-
-struct Side {
-  Vector state = Vector::Zero();
-  Matrix covariance = Matrix::Zero();
-  double residual = 0;   // RMS, in light
-  double explained = 0;  // share of the samples that agree with the model
-};
-
-bool is_white(const SeenCells& cells, std::size_t side, int row, int column) {
-  const int last = cells.count - 1;
-  if (row > last || column < 0 || column > last) return column < 0 || column > last;  // beside it: paper
-  switch (side) {
-    case 0:
-      return cells.is_white(row, column);
-    case 1:
-      return cells.is_white(column, last - row);
-    case 2:
-      return cells.is_white(last - row, last - column);
-    default:
-      return cells.is_white(last - column, row);
-  }
-}
-
-// A step from 0 to 1 after blur and motion, and its derivatives; all lengths in one unit.
-struct Response {
-  double value, slope, by_log_blur, by_motion;  // motion: the square of half its length
-};
-Response response(double distance, double blur, double motion_square) {
-  const double half = std::sqrt(motion_square);
-  if (half < 0.3 * blur) {  // as good as a wider Gaussian
-    const double sigma = std::sqrt(blur * blur + motion_square / 3);
-    const double z = distance / sigma;
-    const Normal::Value n = normal().at(z);
-    const double widening = -z * n.density / (sigma * sigma);
-    return {n.below, n.density / sigma, widening * blur * blur, widening / 6};
-  }
-  const double later = (distance + half) / blur;
-  const double earlier = (distance - half) / blur;
-  const Normal::Value a = normal().at(later);
-  const Normal::Value b = normal().at(earlier);
-  const double value = blur / (2 * half) * (later * a.below + a.density - earlier * b.below - b.density);
-  return {value, (a.below - b.below) / (2 * half), blur * (a.density - b.density) / (2 * half),
-          (0.5 * (a.below + b.below) - value) / (2 * motion_square)};
-}
-
-// Whiteness of a row of cells at x, blurred along it.
-double whiteness(const SeenCells& cells, std::size_t side, int row, double x, double blur) {
-  const int first = static_cast<int>(std::floor(x - 3 * blur));
-  const int last = static_cast<int>(std::floor(x + 3 * blur));
-  double value = is_white(cells, side, row, first);
-  for (int column = first + 1; column <= last; ++column) {
-    const int step =
-        static_cast<int>(is_white(cells, side, row, column)) - is_white(cells, side, row, column - 1);
-    if (step != 0) value += step * normal().at((x - column) / blur).below;
-  }
-  return value;
-}
-
-// The model's light at a place, and its derivatives. `motion_along` is the motion along the side, as `motion`
-// across.
-double model(const Vector& state,
-             const SeenCells& cells,
-             std::size_t side,
-             const CellMap::Place& place,
-             double motion_along,
-             Vector* derivative) {
-  constexpr int k_edges = 5;  // of the paper, of the border, and of three rows of cells
-  const double t = 2 * place.x / cells.count - 1;
-  const double y = place.y - state[at_middle] - t * state[at_turn];
-  const double blur_px = std::exp(state[log_blur]);
-  const double blur = blur_px * place.y_a_px;
-  const double moved = state[motion] * place.y_a_px * place.y_a_px;
-  const double blur_along = std::sqrt(blur_px * blur_px + motion_along / 3) * place.x_a_px;
-  const double white = state[paper] + t * state[paper_t];
-  const double black = state[ink] + t * state[ink_t];
-  const double behind = state[ground] + t * state[ground_t];
-  std::array<double, k_edges + 1> level = {behind, white, black};
-  std::array<double, k_edges + 1> share = {0, 1,
-                                           0};  // of white: of the background, margin, border, rows of cells
-  for (int row = 0; row <= 3; ++row) {
-    const auto i = static_cast<std::size_t>(row + 2);
-    share[i] = whiteness(cells, side, row, place.x, blur_along);
-    level[i] = black + share[i] * (white - black);
-  }
-  double value = level[0];
-  double slope = 0;
-  double widening = 0;
-  double by_motion = 0;
-  double in_white = 0;
-  double in_ground = 1;
-  for (std::size_t i = 0; i < k_edges; ++i) {
-    const double edge = i == 0 ? -state[margin] : static_cast<double>(i) - 1;
-    const Response r = response(y - edge, blur, moved);
-    const double step = level[i + 1] - level[i];
-    value += step * r.value;
-    slope += step * r.slope;
-    widening += step * r.by_log_blur;
-    by_motion += step * r.by_motion;
-    in_white += (share[i + 1] - share[i]) * r.value;
-    if (i == 0) {
-      (*derivative)[margin] = step * r.slope;
-      in_ground -= r.value;
-    }
-  }
-  const double in_ink = 1 - in_ground - in_white;
-  (*derivative)[at_middle] = -slope;
-  (*derivative)[at_turn] = -t * slope;
-  (*derivative)[log_blur] = widening;
-  (*derivative)[motion] = by_motion * place.y_a_px * place.y_a_px;
-  (*derivative)[ground] = in_ground;
-  (*derivative)[ground_t] = t * in_ground;
-  (*derivative)[paper] = in_white;
-  (*derivative)[paper_t] = t * in_white;
-  (*derivative)[ink] = in_ink;
-  (*derivative)[ink_t] = t * in_ink;
-  return value;
-}
-
-enum class Step {
-  levels,  // of these alone
-  even,    // all samples count the same: far from the solution most look wrong
-  robust
+struct State {
+  std::array<Eigen::Vector2d, 4> corners;
+  double log_blur = 0;  // sigma, px
+  Eigen::Vector2d motion = Eigen::Vector2d::Zero();
+  Eigen::Vector3d paper = Eigen::Vector3d::Zero(), ink = Eigen::Vector3d::Zero();
+  Eigen::Vector4d ground = Eigen::Vector4d::Zero(), margin = Eigen::Vector4d::Zero();
+  Eigen::Vector4d bend = Eigen::Vector4d::Zero();
 };
 
 struct Sample {
-  CellMap::Place place;
+  Eigen::Vector2d px, place;  // place: -1 to 1 over the marker at first, of the levels' planes
   double light;
 };
 
+// Even motion as so many places, whose spread is that of the motion.
+int places_of(const State& state) {
+  const double length = state.motion.norm();
+  return length == 0 ? 1 : std::clamp(2 + static_cast<int>(length / (1.3 * std::exp(state.log_blur))), 2, 40);
+}
+
+// The model's light at pixels, and its derivatives.
+class Model {
+ public:
+  Model(const Pattern& pattern, const State& state, bool has_ground)
+      : pattern_(pattern), state_(state), has_ground_(has_ground), places_(places_of(state)) {
+    const double count = pattern.count();
+    cells_from_px_ =
+        Eigen::Vector3d(count, count, 1).asDiagonal() * SquareToQuad(state.corners).matrix().inverse();
+    step_ = cells_from_px_.leftCols<2>() * state.motion;
+    blur_px_ = std::exp(state.log_blur);
+  }
+
+  // Whether light changes there.
+  bool shows_edge(const Eigen::Vector2d& px) const {
+    constexpr double k_edge = 0.01;  // of a step's steepest slope
+    const Place place = place_of(px);
+    const Eigen::Vector2d at = place.p.head<2>() / place.p.z();
+    const Ink seen = pattern_.at(at.x(), at.y(), place.blur);
+    return std::max(std::abs(seen.by_x * place.blur.x), std::abs(seen.by_y * place.blur.y)) > k_edge;
+  }
+
+  // `behind` is the sample's share of what lies behind the paper.
+  double at(const Sample& sample, Vector* derivative, double* behind) const {
+    const Place place = place_of(sample.px);
+    const auto& [p, cells_a_px, blur] = place;
+    const Eigen::Vector3d plane(1, sample.place.x(), sample.place.y());
+    const double white = state_.paper.dot(plane);
+    const double black = state_.ink.dot(plane);
+    const double half = 2.0 / pattern_.count();
+    Vector& d = *derivative;
+    double ink_share = 0;
+    std::array<double, 12> by_shape{};
+    double by_log_blur = 0;
+    Eigen::Vector2d by_motion = Eigen::Vector2d::Zero();
+    Ground ground_seen;
+    const double spacing = places_ > 1 ? 1 / std::sqrt(places_ * places_ - 1.0) : 0;
+    for (int i = 0; i < places_; ++i) {
+      const double t = (i - 0.5 * (places_ - 1)) * spacing;
+      const Eigen::Vector3d at = p + t * step_;
+      double x = at.x() / at.z();
+      double y = at.y() / at.z();
+      const double u = half * x - 1;
+      const double v = half * y - 1;
+      const double arch_x = 1 - u * u;
+      const double arch_y = 1 - v * v;
+      x -= (state_.bend[0] * arch_x + state_.bend[1] * arch_y) / half;
+      y -= (state_.bend[2] * arch_x + state_.bend[3] * arch_y) / half;
+      const Ink seen = pattern_.at(x, y, blur);
+      ink_share += seen.value;
+      double by_x = (black - white) * seen.by_x;
+      double by_y = (black - white) * seen.by_y;
+      by_log_blur += (black - white) * seen.by_log_blur;
+      if (has_ground_) add_ground(x, y, blur, white, &by_x, &by_y, &ground_seen);
+      const double both = by_x * u + by_y * v;
+      by_shape[0] -= by_x, by_shape[1] -= by_x * u, by_shape[2] -= by_x * v;
+      by_shape[3] -= by_y, by_shape[4] -= by_y * u, by_shape[5] -= by_y * v;
+      by_shape[6] -= both * u, by_shape[7] -= both * v;
+      by_shape[8] -= by_x * arch_x, by_shape[9] -= by_x * arch_y;
+      by_shape[10] -= by_y * arch_x, by_shape[11] -= by_y * arch_y;
+      by_motion += t * Eigen::Vector2d(by_x, by_y);
+    }
+    const double share = 1.0 / places_;
+    for (int i = 0; i < 8; ++i) d[shape + i] = share / half * by_shape[static_cast<std::size_t>(i)];
+    for (int i = 0; i < 4; ++i) d[bend + i] = share / half * by_shape[static_cast<std::size_t>(8 + i)];
+    d[log_blur] = share * (by_log_blur + ground_seen.by_log_blur);
+    d.segment<4>(margin) = share * ground_seen.by_margin;
+    ink_share *= share;
+    const Eigen::Vector4d ground_share = share * ground_seen.share;
+    const Eigen::Vector2d moved = share * cells_a_px.transpose() * by_motion;
+    d[motion_x] = moved.x();
+    d[motion_y] = moved.y();
+    const double ground_sum = ground_share.sum();
+    const double paper_share = 1 - ink_share - ground_sum;
+    d.segment<3>(paper) = paper_share * plane;
+    d.segment<3>(ink) = ink_share * plane;
+    d.segment<4>(ground) = ground_share;
+    *behind = ground_sum;
+    return black * ink_share + white * paper_share + state_.ground.dot(ground_share);
+  }
+
+ private:
+  const Pattern& pattern_;
+  const State& state_;
+  const bool has_ground_;
+  const int places_;
+  Eigen::Matrix3d cells_from_px_;
+  Eigen::Vector3d step_;  // of the whole motion, homogeneous
+  double blur_px_;
+
+  struct Ground {
+    Eigen::Vector4d share = Eigen::Vector4d::Zero(), by_margin = Eigen::Vector4d::Zero();
+    double by_log_blur = 0;
+  };
+
+  struct Place {
+    Eigen::Vector3d p;  // homogeneous, in cells
+    Eigen::Matrix2d cells_a_px;
+    CellBlur blur;
+  };
+
+  Place place_of(const Eigen::Vector2d& px) const {
+    Place place;
+    place.p = cells_from_px_ * px.homogeneous();
+    const Eigen::Vector2d q = place.p.head<2>() / place.p.z();
+    const Eigen::Matrix2d& m = place.cells_a_px =
+        (cells_from_px_.topLeftCorner<2, 2>() - q * cells_from_px_.block<1, 2>(2, 0)) / place.p.z();
+    const double x_a_px = m.row(0).norm();
+    const double y_a_px = m.row(1).norm();
+    place.blur = {blur_px_ * x_a_px, blur_px_ * y_a_px, m.row(0).dot(m.row(1)) / (x_a_px * y_a_px)};
+    return place;
+  }
+
+  void add_ground(double x,
+                  double y,
+                  const CellBlur& blur,
+                  double white,
+                  double* by_x,
+                  double* by_y,
+                  Ground* seen) const {
+    const double count = pattern_.count();
+    const double z_top = (-state_.margin[0] - y) / blur.y;
+    const double z_right = (x - count - state_.margin[1]) / blur.x;
+    const double z_bottom = (y - count - state_.margin[2]) / blur.y;
+    const double z_left = (-state_.margin[3] - x) / blur.x;
+    if (std::max({z_top, z_right, z_bottom, z_left}) < -Normal::k_reach) return;
+    const Normal::Value top = normal().at(z_top), right = normal().at(z_right),
+                        bottom = normal().at(z_bottom), left = normal().at(z_left);
+    const double between = 1 - left.below - right.below;
+    seen->share += Eigen::Vector4d(between * top.below, right.below, between * bottom.below, left.below);
+    const Eigen::Vector4d step = state_.ground.array() - white;
+    const double across = step[0] * top.below + step[2] * bottom.below;
+    const double by_left = (step[3] - across) * left.density / blur.x;
+    const double by_right = (step[1] - across) * right.density / blur.x;
+    const double by_top = between * step[0] * top.density / blur.y;
+    const double by_bottom = between * step[2] * bottom.density / blur.y;
+    *by_x += by_right - by_left;
+    *by_y += by_bottom - by_top;
+    seen->by_log_blur -= z_left * by_left * blur.x + z_right * by_right * blur.x + z_top * by_top * blur.y +
+                         z_bottom * by_bottom * blur.y;
+    seen->by_margin -= Eigen::Vector4d(by_top, by_right, by_bottom, by_left);
+  }
+};
+
+struct Free {
+  bool motion = false, bend = false;
+  bool levels_alone = false;
+};
+
 struct Fitted {
-  RefinedQuad quad;
-  double squares = 0;  // mean square residuals of all sides
+  State state;
+  double misfit = std::numeric_limits<double>::infinity();  // mean square residual, bounded
+  double explained = 0;                                     // share of the samples that agree with the model
+  double moved_px = 0;                                      // the most that a corner moved in the last round
+  Matrix covariance = Matrix::Zero();
 };
 
 class PatternFit {
  public:
-  PatternFit(const cv::Mat& grey, const std::array<double, 256>& light, const SeenCells& cells, bool moving)
-      : grey_(grey), light_(light), cells_(cells), moving_(moving) {}
+  PatternFit(const cv::Mat& grey,
+             const std::array<double, 256>& light,
+             const SeenCells& cells,
+             const RefinedQuad& start)
+      : grey_(grey), light_(light), pattern_(cells), start_(start) {}
 
-  std::optional<Fitted> fit(const RefinedQuad& start) {
-    std::array<Eigen::Vector2d, 4> corners = start.corners_px;
-    std::array<Side, 4> sides;
-    for (std::size_t s = 0; s < 4; ++s) sides[s] = begun(corners, s, start);
-    double most = k_max_moved_px;  // that a corner moved in the last round
-    const int even_rounds = moving_ ? k_even_rounds : 0;
-    for (int round = 0; round < k_rounds; ++round) {
-      for (std::size_t s = 0; s < 4; ++s) {
-        if (!sample(corners, s, sides[s].state)) return std::nullopt;
-        const double along = 0.5 * (sides[(s + 1) % 4].state[motion] + sides[(s + 3) % 4].state[motion]);
-        if (round == 0 && !step(s, Step::levels, along, &sides[s])) return std::nullopt;
-        if (!step(s, round < even_rounds ? Step::even : Step::robust, along, &sides[s])) return std::nullopt;
+  std::optional<RefinedQuad> fit() {
+    const State begun = this->begun();
+    take_samples(k_coarse_samples);
+    Fitted rough = settled(begun, {}, k_roughly_settled_px);
+    const double blur_px = *std::max_element(start_.blur_px.begin(), start_.blur_px.end());
+    Free free;
+    if (blur_px > k_may_move_px && !is_explained(rough)) {
+      Fitted moving = most_likely_motion(begun);
+      if (moving.misfit < k_clearly_better * rough.misfit) {
+        rough = moving;
+        free.motion = true;
       }
-      const auto before = corners;
-      if (!moved(sides, &corners)) return std::nullopt;
-      most = 0;
-      for (std::size_t i = 0; i < 4; ++i) {
-        most = std::max(most, (corners[i] - before[i]).norm());
-        if (!((corners[i] - start.corners_px[i]).norm() < k_max_moved_px)) return std::nullopt;
-      }
-      for (Side& side : sides) side.state[at_middle] = side.state[at_turn] = 0;
-      if (round > even_rounds + 1 && most < k_settled_px) break;
     }
-    if (most > k_astray_px) return std::nullopt;
-    auto quad = finished(start, corners, sides);
-    if (!quad) return std::nullopt;
-    Fitted fitted{std::move(*quad), 0};
-    for (const Side& side : sides) fitted.squares += side.residual * side.residual;
-    return fitted;
+    take_samples(free.motion ? k_moving_samples : k_samples, &rough.state);
+    Fitted fitted = settled(rough.state, free, k_settled_px);
+    if (is_bent(fitted, free)) {
+      free.bend = true;
+      fitted = settled(fitted.state, free, k_settled_px);
+    }
+    return finished(fitted);
   }
 
  private:
   const cv::Mat& grey_;
   const std::array<double, 256>& light_;
-  const SeenCells& cells_;
-  const bool moving_;  ///< motion is looked for beside blur
+  const Pattern pattern_;
+  const RefinedQuad& start_;
+  bool has_ground_ = false;
+  Eigen::Vector4d margin_;  // at the start
+  double contrast_ = 0;     // at the start
+  double least_scale_ = 0;  // of residuals: far from the solution most look wrong
   std::vector<Sample> samples_;
-  std::vector<double> residuals_, sizes_;
-  std::vector<Vector> derivatives_;
+  std::vector<double> residuals_, sizes_, behind_, weights_;
+  Eigen::Matrix<double, k_unknowns, Eigen::Dynamic> derivatives_;
 
   double light_at(const Eigen::Vector2d& px) const {
     const int x = std::clamp(static_cast<int>(std::lround(px.x())), 0, grey_.cols - 1);
     const int y = std::clamp(static_cast<int>(std::lround(px.y())), 0, grey_.rows - 1);
     return light_[grey_.ptr(y)[x]];
   }
+  double light_of(double level) const {
+    return light_[static_cast<std::size_t>(std::clamp(level, 0.0, 255.0))];
+  }
 
-  // Blur and levels from the refiner's edge; the margin from where the light falls again outside.
-  Side begun(const std::array<Eigen::Vector2d, 4>& corners, std::size_t s, const RefinedQuad& start) const {
-    Side side;
-    const Eigen::Vector2d from = corners[s];
-    const Eigen::Vector2d along = corners[(s + 1) % 4] - from;
+  double px_a_cell(const std::array<Eigen::Vector2d, 4>& corners, std::size_t s) const {
+    const double side = (corners[(s + 1) % 4] - corners[s]).norm();
+    const Eigen::Vector2d far = 0.5 * (corners[(s + 2) % 4] + corners[(s + 3) % 4]);
+    const Eigen::Vector2d along = (corners[(s + 1) % 4] - corners[s]) / side;
+    const Eigen::Vector2d across = far - corners[s];
+    return std::abs(along.x() * across.y() - along.y() * across.x()) / pattern_.count();
+  }
+
+  // Blur and levels from the refiner's edges; margins from where the light falls again outside.
+  State begun() {
+    State state;
+    state.corners = start_.corners_px;
+    const double blur = *std::min_element(start_.blur_px.begin(), start_.blur_px.end());
+    state.log_blur = std::log(std::clamp(blur, 0.4, 5.0));
+    for (std::size_t s = 0; s < 4; ++s) {
+      state.paper[0] += 0.25 * light_of(start_.outside_level[s]);
+      state.ink[0] += 0.25 * light_of(start_.inside_level[s]);
+      find_margin(s, &state);
+    }
+    margin_ = state.margin;
+    contrast_ = state.paper[0] - state.ink[0];
+    return state;
+  }
+
+  void find_margin(std::size_t s, State* state) {
+    const Eigen::Vector2d from = state->corners[s];
+    const Eigen::Vector2d along = state->corners[(s + 1) % 4] - from;
     const Eigen::Vector2d outward = Eigen::Vector2d(along.y(), -along.x()).normalized();
-    const double px_a_cell = 1 / CellMap(corners, s, cells_.count).at(from + 0.5 * along).y_a_px;
-    side.state[log_blur] = std::log(std::clamp(start.blur_px[s], 0.4, 5.0));
-    if (moving_) side.state[motion] = 0.5 * start.blur_px[s] * start.blur_px[s];
-    side.state[margin] = k_no_margin;
+    constexpr int k_columns = 16;
     constexpr int k_reach = 24;  // half pixels
     std::array<double, k_reach> level{};
     for (int d = 0; d < k_reach; ++d)
@@ -305,159 +455,296 @@ class PatternFit {
     std::size_t top = 0;
     while (top + 1 < k_reach && level[top + 1] >= level[top]) ++top;
     const double lowest = *std::min_element(level.begin() + static_cast<std::ptrdiff_t>(top), level.end());
-    const double ink_level = light_[static_cast<std::size_t>(std::clamp(start.inside_level[s], 0.0, 255.0))];
-    if (level[top] - lowest > 0.2 * (level[top] - ink_level))
-      for (std::size_t d = top; d < k_reach; ++d)
-        if (level[d] < 0.5 * (level[top] + lowest)) {
-          side.state[margin] = 0.5 * static_cast<double>(d + 1) / px_a_cell;
-          break;
-        }
-    return side;
+    const auto side = static_cast<Eigen::Index>(s);
+    state->margin[side] = k_no_margin;
+    state->ground[side] = lowest;
+    if (!(level[top] - lowest > 0.2 * (level[top] - light_of(start_.inside_level[s])))) return;
+    for (std::size_t d = top; d < k_reach; ++d)
+      if (level[d] < 0.5 * (level[top] + lowest)) {
+        state->margin[side] = 0.5 * static_cast<double>(d + 1) / px_a_cell(state->corners, s);
+        has_ground_ = true;
+        return;
+      }
   }
 
-  // Pixels about the side: outside as far as the margin and some background, inside the first rows of cells.
-  bool sample(const std::array<Eigen::Vector2d, 4>& corners, std::size_t s, const Vector& state) {
+  // About so many pixels over the marker and what blur mixes with it; those that show an edge of the `known`
+  // pattern come first.
+  void take_samples(std::size_t most, const State* known = nullptr) {
+    least_scale_ = known ? k_least_scale : k_rough_scale * contrast_;
     samples_.clear();
-    const CellMap map(corners, s, cells_.count);
-    const Eigen::Vector2d from = corners[s];
-    const Eigen::Vector2d along = corners[(s + 1) % 4] - from;
-    const bool flat = std::abs(along.x()) >= std::abs(along.y());
-    const int u_axis = flat ? 0 : 1;
-    const int v_axis = 1 - u_axis;
-    const int inward = (flat ? along.x() : -along.y()) > 0 ? 1 : -1;
-    const double y_a_px = map.at(from + 0.5 * along).y_a_px;
-    const double blur_px = std::sqrt(std::exp(2 * state[log_blur]) + state[motion] / 3);
-    const bool has_margin = state[margin] < k_no_margin;
-    const double outside_px = has_margin
-                                  ? std::min(14.0, state[margin] / y_a_px + std::max(2.0, 1.5 * blur_px))
-                                  : std::clamp(2.5 * blur_px, 2.0, 10.0);
-    const double u_low =
-        std::min(from[u_axis], from[u_axis] + along[u_axis]) + k_ends * std::abs(along[u_axis]);
-    const double u_high =
-        std::max(from[u_axis], from[u_axis] + along[u_axis]) - k_ends * std::abs(along[u_axis]);
-    const int stride = std::max(1, static_cast<int>((u_high - u_low) / k_columns));
-    const double lean = std::hypot(1, along[v_axis] / along[u_axis]);
-    const int out = static_cast<int>(std::ceil(outside_px * lean));
-    const int in = static_cast<int>(std::ceil(k_depth_cells / y_a_px * lean));
-    for (int u = static_cast<int>(std::ceil(u_low)); u <= u_high; u += stride) {
-      const int middle =
-          static_cast<int>(std::lround(from[v_axis] + (u - from[u_axis]) / along[u_axis] * along[v_axis]));
-      for (int k = -out; k <= in; ++k) {
-        const int v = middle + k * inward;
-        const int x = flat ? u : v;
-        const int y = flat ? v : u;
-        if (x < 0 || y < 0 || x >= grey_.cols || y >= grey_.rows) continue;
-        const CellMap::Place place = map.at({x, y});
-        if (place.y > k_depth_cells || place.x < 0 || place.x > cells_.count) continue;
-        samples_.push_back({place, light_[grey_.ptr(y)[x]]});
+    const std::array<Eigen::Vector2d, 4>& corners = start_.corners_px;
+    const Eigen::Matrix3d square_from_px = SquareToQuad(corners).matrix().inverse();
+    Eigen::Vector2d low = corners[0];
+    Eigen::Vector2d high = corners[0];
+    for (const Eigen::Vector2d& c : corners) low = low.cwiseMin(c), high = high.cwiseMax(c);
+    const double blur_px = *std::max_element(start_.blur_px.begin(), start_.blur_px.end());
+    const double outside_px = std::clamp(2.5 * blur_px, 2.0, 10.0);
+    const Eigen::Vector2d a = corners[2] - corners[0];
+    const Eigen::Vector2d b = corners[3] - corners[1];
+    const double side_px = std::sqrt(0.5 * std::abs(a.x() * b.y() - a.y() * b.x()));
+    const double out = outside_px / side_px;
+    Eigen::Array4d reach = Eigen::Array4d::Constant(out);
+    if (has_ground_) reach = reach.min(margin_.array() / pattern_.count());
+    const int x0 = std::max(0, static_cast<int>(std::ceil(low.x() - outside_px)));
+    const int y0 = std::max(0, static_cast<int>(std::ceil(low.y() - outside_px)));
+    const int x1 = std::min(grey_.cols - 1, static_cast<int>(std::floor(high.x() + outside_px)));
+    const int y1 = std::min(grey_.rows - 1, static_cast<int>(std::floor(high.y() + outside_px)));
+    const double pixels = side_px * side_px * (1 + 2 * out) * (1 + 2 * out);
+    const bool choose = known && known->motion.isZero();
+    const double wanted = static_cast<double>(choose ? k_choice * most : most);
+    const int stride = std::max(1, static_cast<int>(std::lround(pixels / wanted)));
+    const int lean = std::max(1, static_cast<int>(std::lround(0.618 * stride)));  // from row to row
+    std::optional<Model> model;
+    if (choose) model.emplace(pattern_, *known, has_ground_);
+    int flat = 0;
+    for (int y = y0; y <= y1; ++y)
+      for (int x = x0 + (lean * (y - y0)) % stride; x <= x1; x += stride) {
+        const Eigen::Vector3d p = square_from_px * Eigen::Vector3d(x, y, 1);
+        const Eigen::Vector2d q = p.head<2>() / p.z();
+        // Beside a corner, what is behind the paper has no model.
+        const bool beside_x = q.x() < 0 || q.x() > 1;
+        const bool beside_y = q.y() < 0 || q.y() > 1;
+        if ((beside_x && beside_y) ||
+            !(q.y() > -reach[0] && q.x() < 1 + reach[1] && q.y() < 1 + reach[2] && q.x() > -reach[3]))
+          continue;
+        if (choose && !model->shows_edge(Eigen::Vector2d(x, y)) && ++flat % k_flat_stride != 0) continue;
+        samples_.push_back({Eigen::Vector2d(x, y), 2 * q - Eigen::Vector2d::Ones(), light_[grey_.ptr(y)[x]]});
       }
+  }
+
+  Fitted settled(const State& start, Free free, double settled_px) {
+    Fitted fitted;
+    fitted.state = start;
+    if (!step({.levels_alone = true}, &fitted)) return {};
+    for (int round = 0; round < k_rounds; ++round) {
+      if (!step(free, &fitted)) return {};
+      if (round > 0 && fitted.moved_px < settled_px) break;
     }
-    return samples_.size() >= 4 * k_unknowns;
+    return fitted;
+  }
+
+  // Whether the paper's bend, were it looked for, would be too large for noise.
+  bool is_bent(Fitted fitted, Free free) {
+    free.bend = true;
+    if (!step(free, &fitted)) return false;
+    const Eigen::Vector4d& seen = fitted.state.bend;
+    const Eigen::Matrix4d covariance = fitted.covariance.block<4, 4>(bend, bend);
+    return seen.dot(covariance.ldlt().solve(seen)) > k_bend_evidence;
+  }
+
+  // Whether blur alone leaves no more than noise.
+  static bool is_explained(const Fitted& fitted) {
+    const double contrast = fitted.state.paper[0] - fitted.state.ink[0];
+    return fitted.misfit < k_noise * k_noise * contrast * contrast;
+  }
+
+  // Motions in all directions compete, the better ones on with more rounds and samples.
+  Fitted most_likely_motion(const State& begun) {
+    constexpr int k_directions = 8;
+    std::vector<Fitted> fits;
+    take_samples(k_few_samples);
+    for (int i = 0; i < k_directions; ++i)
+      for (const double length : {7.0, 14.0}) {
+        const double angle = std::numbers::pi * i / k_directions;
+        Fitted fitted;
+        fitted.state = begun;
+        fitted.state.log_blur = std::log(1.5);
+        fitted.state.motion = length * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+        if (step({.levels_alone = true}, &fitted)) fits.push_back(fitted);
+      }
+    keep_best(1, 6, &fits);
+    keep_best(2, 3, &fits);
+    take_samples(k_coarse_samples);
+    keep_best(3, 1, &fits);
+    return fits.empty() ? Fitted{} : fits[0];
+  }
+
+  void keep_best(int rounds, std::size_t most, std::vector<Fitted>* fits) {
+    for (Fitted& fitted : *fits)
+      for (int round = 0; round < rounds; ++round)
+        if (!step({.motion = true}, &fitted)) {
+          fitted.misfit = std::numeric_limits<double>::infinity();
+          break;
+        }
+    std::sort(fits->begin(), fits->end(),
+              [](const Fitted& a, const Fitted& b) { return a.misfit < b.misfit; });
+    while (!fits->empty() && (fits->size() > most || std::isinf(fits->back().misfit))) fits->pop_back();
   }
 
   // One Gauss-Newton step on the samples.
-  bool step(std::size_t s, Step kind, double motion_along, Side* side) {
-    residuals_.clear();
-    derivatives_.resize(samples_.size());
-    for (std::size_t i = 0; i < samples_.size(); ++i)
-      residuals_.push_back(samples_[i].light -
-                           model(side->state, cells_, s, samples_[i].place, motion_along, &derivatives_[i]));
-    sizes_.clear();
-    for (const double r : residuals_) sizes_.push_back(std::abs(r));
-    std::nth_element(sizes_.begin(), sizes_.begin() + static_cast<std::ptrdiff_t>(sizes_.size() / 2),
-                     sizes_.end());
-    const double scale = std::max(0.5, 1.4826 * sizes_[sizes_.size() / 2]);
+  bool step(Free free, Fitted* fitted) {
+    State& state = fitted->state;
+    const Model model(pattern_, state, has_ground_);
+    const std::size_t count = samples_.size();
+    if (count < 2 * k_unknowns) return false;
+    derivatives_.resize(Eigen::NoChange, static_cast<Eigen::Index>(count));
+    residuals_.resize(count);
+    behind_.resize(count);
+    weights_.resize(count);
+    sizes_.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      Vector derivative;
+      residuals_[i] = samples_[i].light - model.at(samples_[i], &derivative, &behind_[i]);
+      derivatives_.col(static_cast<Eigen::Index>(i)) = derivative;
+      sizes_[i] = std::abs(residuals_[i]);
+    }
+    const auto middle = sizes_.begin() + static_cast<std::ptrdiff_t>(count / 2);
+    std::nth_element(sizes_.begin(), middle, sizes_.end());
+    const double scale = std::max(least_scale_, 1.4826 * *middle);
+    // What is behind the paper is one level a side only by chance.
+    double unlike = 0;
+    double unlike_weights = 1e-9;
+    for (std::size_t i = 0; i < count; ++i) {
+      unlike += behind_[i] * residuals_[i] * residuals_[i];
+      unlike_weights += behind_[i];
+    }
+    unlike /= unlike_weights * scale * scale;
     Matrix information = Matrix::Zero();
     Vector right = Vector::Zero();
-    double squares = 0;
     double weights = 0;
-    for (std::size_t i = 0; i < samples_.size(); ++i) {
-      const Vector& derivative = derivatives_[i];
-      const double z = residuals_[i] / (4 * scale);  // Tukey's biweight
-      const double w = kind != Step::robust ? 1 : z * z < 1 ? (1 - z * z) * (1 - z * z) : 0;
-      if (w == 0) continue;
-      information.selfadjointView<Eigen::Lower>().rankUpdate(derivative, w);
+    double agree = 0;
+    double scores = 0;  // squares of the biweight's, and its slopes: a robust mean's variance (Huber 1981)
+    double slopes = 0;
+    double trusted = 0;
+    double misfit = 0;
+    const double bound = k_bound * k_bound * contrast_ * contrast_;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double trust = 1 / (1 + unlike * behind_[i] * behind_[i]);
+      const double z = residuals_[i] / (4 * scale) * std::sqrt(trust);
+      const double robust = z * z < 1 ? (1 - z * z) * (1 - z * z) : 0;  // Tukey's biweight
+      trusted += trust;
+      const double square = residuals_[i] * residuals_[i];
+      misfit += trust * square / (1 + square / bound);
+      const double w = trust * robust;
+      agree += w;
+      weights_[i] = w;
+      auto derivative = derivatives_.col(static_cast<Eigen::Index>(i));
       right += w * residuals_[i] * derivative;
-      squares += w * residuals_[i] * residuals_[i];
+      derivative *= std::sqrt(w);
+      scores += trust * robust * robust * residuals_[i] * residuals_[i];
+      if (z * z < 1) slopes += trust * (1 - z * z) * (1 - 5 * z * z);
       weights += w;
     }
-    side->explained = weights / static_cast<double>(samples_.size());
-    if (side->explained < k_min_explained) return false;
+    fitted->explained = agree / trusted;
+    fitted->misfit = misfit / trusted;
+    information.selfadjointView<Eigen::Lower>().rankUpdate(derivatives_);
     information.triangularView<Eigen::StrictlyUpper>() = information.transpose();
     constexpr double k_fixed = 1e15;
-    const bool has_margin = side->state[margin] < k_no_margin;
-    if (!has_margin)
-      for (const int i : {margin, ground, ground_t}) information(i, i) += k_fixed;
-    if (kind == Step::levels)
-      for (const int i : {at_middle, at_turn, log_blur, motion, margin}) information(i, i) += k_fixed;
-    information(motion, motion) += moving_ ? k_motion_damping : k_fixed;
-    // Levels that nothing shows stay even.
-    for (const int i : {ground_t, paper_t, ink_t})
-      information(i, i) += 1e-3 * static_cast<double>(samples_.size());
+    const auto fix = [&](int from, int number) {
+      for (int i = from; i < from + number; ++i) information(i, i) += k_fixed;
+    };
+    if (free.levels_alone) fix(shape, paper), fix(margin, 4);
+    if (!free.motion) fix(motion_x, 2);
+    if (!free.bend) fix(bend, 4);
+    for (int s = 0; s < 4; ++s)
+      if (state.margin[s] >= k_no_margin) fix(ground + s, 1), fix(margin + s, 1);
+    const double noise = scale * scale;
+    const auto loosely = [&](int from, int number, double deviation) {
+      for (int i = from; i < from + number; ++i) information(i, i) += noise / (deviation * deviation);
+    };
+    loosely(paper, 3, 100), loosely(ink, 3, 100), loosely(ground, 4, 100);
+    loosely(margin, 4, 0.5), loosely(motion_x, 2, 10), loosely(log_blur, 1, 1), loosely(shape, 8, 0.2);
+    loosely(bend, 4, 0.02);
     const Eigen::LDLT<Matrix> solver(information);
     Vector change = solver.solve(right);
     if (!change.allFinite()) return false;
-    change[log_blur] = std::clamp(change[log_blur], -0.5, 0.5);
-    const double reach = 4 + 0.5 * side->state[motion];  // px^2: a square changes fast
-    change[motion] = std::clamp(change[motion], -reach, reach);
-    side->state += change;
-    side->state[motion] = std::clamp(side->state[motion], 0.0, k_max_motion);
-    if (has_margin) side->state[margin] = std::clamp(side->state[margin], 0.02, 3.0);
-    side->state[log_blur] = std::clamp(side->state[log_blur], std::log(0.25), std::log(8.0));
-    side->residual = std::sqrt(squares / weights);
-    const double freedom = std::max(1.0, weights - static_cast<int>(k_unknowns));
-    side->covariance = solver.solve(Matrix::Identity()) * (squares / freedom);
+    const double lost = weights / std::max(1.0, weights - static_cast<int>(k_unknowns));
+    fitted->covariance = solver.solve(Matrix::Identity()) * (lost * weights * scores / (slopes * slopes));
+    return moved(change, fitted);
+  }
+
+  // By how much the shape's covariance is larger for neighbouring residuals that have one cause: from the
+  // sums over blocks of the last step's samples ("sandwich", Liang and Zeger 1986) over that of independent
+  // ones.
+  double correlation(const Matrix& covariance) const {
+    constexpr int k_blocks = 8;  // a side
+    Eigen::Matrix<double, k_unknowns, k_blocks * k_blocks> sums;
+    sums.setZero();
+    Matrix alone = Matrix::Zero();
+    for (std::size_t i = 0; i < samples_.size(); ++i) {
+      const auto block = [&](double place) {
+        return std::clamp(static_cast<int>(std::floor((0.5 * place + 0.5) * k_blocks)), 0, k_blocks - 1);
+      };
+      const Eigen::Vector2d& place = samples_[i].place;
+      // The derivatives hold the weight's root.
+      const Vector pull =
+          std::sqrt(weights_[i]) * residuals_[i] * derivatives_.col(static_cast<Eigen::Index>(i));
+      sums.col(k_blocks * block(place.y()) + block(place.x())) += pull;
+      alone.selfadjointView<Eigen::Lower>().rankUpdate(pull);
+    }
+    const Matrix full = alone.selfadjointView<Eigen::Lower>();
+    const Eigen::Matrix<double, 8, k_unknowns> shape_rows = covariance.topRows<8>();
+    const Eigen::Matrix<double, 8, 8> independent = shape_rows * full * shape_rows.transpose();
+    const Eigen::Matrix<double, 8, k_blocks* k_blocks> moves = shape_rows * sums;
+    return std::max(1.0, independent.ldlt().solve(moves * moves.transpose()).trace() / 8);
+  }
+
+  bool moved(const Vector& change, Fitted* fitted) const {
+    State& state = fitted->state;
+    const SquareToQuad px_from_square(state.corners);
+    const auto before = state.corners;
+    fitted->moved_px = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Eigen::Vector2d at = corner_place(i);
+      const Eigen::Vector2d to = 0.5 * (at + shift_of(at) * change.head<8>() + Eigen::Vector2d::Ones());
+      state.corners[i] = px_from_square.at(to.x(), to.y());
+      if (!state.corners[i].allFinite()) return false;
+      fitted->moved_px = std::max(fitted->moved_px, (state.corners[i] - before[i]).norm());
+      if (!((state.corners[i] - start_.corners_px[i]).norm() < k_max_moved_px + 0.5 * state.motion.norm()))
+        return false;
+    }
+    state.log_blur = std::clamp(state.log_blur + std::clamp(change[log_blur], -0.4, 0.4),
+                                std::log(k_min_blur_px), std::log(8.0));
+    Eigen::Vector2d turn = change.segment<2>(motion_x);
+    if (turn.norm() > 4) turn *= 4 / turn.norm();
+    state.motion += turn;
+    if (state.motion.norm() > k_max_motion_px) return false;
+    state.paper += change.segment<3>(paper);
+    state.ink += change.segment<3>(ink);
+    state.ground += change.segment<4>(ground);
+    state.bend += change.segment<4>(bend);
+    if (!(state.bend.norm() < k_max_bend)) return false;
+    for (int s = 0; s < 4; ++s)
+      if (state.margin[s] < k_no_margin)
+        state.margin[s] = std::clamp(state.margin[s] + std::clamp(change[margin + s], -0.3, 0.3), 0.02, 4.0);
     return true;
   }
 
-  // The corners where the sides' lines now meet.
-  bool moved(const std::array<Side, 4>& sides, std::array<Eigen::Vector2d, 4>* corners) const {
-    std::array<Eigen::Vector2d, 4> from, along;
-    for (std::size_t s = 0; s < 4; ++s) {
-      const auto& c = *corners;
-      const SquareToQuad square({c[s], c[(s + 1) % 4], c[(s + 2) % 4], c[(s + 3) % 4]});
-      const Vector& state = sides[s].state;
-      from[s] = square.at(0, (state[at_middle] - state[at_turn]) / cells_.count);
-      along[s] = square.at(1, (state[at_middle] + state[at_turn]) / cells_.count) - from[s];
-    }
-    for (std::size_t i = 0; i < 4; ++i) {
-      const std::size_t b = (i + 3) % 4;
-      const double sine = along[b].x() * along[i].y() - along[b].y() * along[i].x();
-      const Eigen::Vector2d apart = from[i] - from[b];
-      const double way = (apart.x() * along[i].y() - apart.y() * along[i].x()) / sine;
-      (*corners)[i] = from[b] + way * along[b];
-      if (!(*corners)[i].allFinite()) return false;
-    }
-    return true;
+  // Of the unit square's corner, -1 to 1.
+  static Eigen::Vector2d corner_place(std::size_t i) {
+    return {i == 1 || i == 2 ? 1.0 : -1.0, i >= 2 ? 1.0 : -1.0};
   }
 
-  std::optional<RefinedQuad> finished(const RefinedQuad& start,
-                                      const std::array<Eigen::Vector2d, 4>& corners,
-                                      const std::array<Side, 4>& sides) const {
-    RefinedQuad result = start;
-    result.corners_px = corners;
-    for (const Side& side : sides) {
-      const double contrast = side.state[paper] - side.state[ink];
-      if (!(contrast > 0) || side.residual > k_max_residual * contrast ||
-          side.explained < k_min_explained_at_last)
-        return std::nullopt;
-    }
+  // How the first eight unknowns move a place.
+  static Eigen::Matrix<double, 2, 8> shift_of(const Eigen::Vector2d& p) {
+    const double x = p.x();
+    const double y = p.y();
+    Eigen::Matrix<double, 2, 8> m;
+    m << 1, x, y, 0, 0, 0, x * x, x * y, 0, 0, 0, 1, x, y, x * y, y * y;
+    return m;
+  }
+
+  std::optional<RefinedQuad> finished(const Fitted& fitted) const {
+    const State& state = fitted.state;
+    const double contrast = state.paper[0] - state.ink[0];
+    if (!(fitted.misfit < k_max_residual * k_max_residual * contrast * contrast) || !(contrast > 0) ||
+        fitted.explained < k_min_explained || fitted.moved_px > k_astray_px)
+      return std::nullopt;
+    RefinedQuad result = start_;
+    result.corners_px = state.corners;
+    const SquareToQuad px_from_square(state.corners);
+    const Eigen::Matrix<double, 8, 8> covariance =
+        correlation(fitted.covariance) * fitted.covariance.topLeftCorner<8, 8>();
     for (std::size_t i = 0; i < 4; ++i) {
-      Eigen::Matrix2d normals;
-      Eigen::Vector2d variances;
-      for (int k = 0; k < 2; ++k) {
-        const std::size_t s = k == 0 ? (i + 3) % 4 : i;
-        const double t = k == 0 ? 1 : -1;
-        const Eigen::Vector2d along = corners[(s + 1) % 4] - corners[s];
-        normals.row(k) = Eigen::RowVector2d(-along.y(), along.x()) / along.norm();
-        const double px_a_cell = 1 / CellMap(corners, s, cells_.count).at(corners[i]).y_a_px;
-        const Matrix& c = sides[s].covariance;
-        variances[k] = px_a_cell * px_a_cell *
-                       (c(at_middle, at_middle) + 2 * t * c(at_middle, at_turn) + c(at_turn, at_turn));
-      }
-      const Eigen::Matrix2d inverse = normals.inverse();
-      result.corner_covariance[i] = inverse * variances.asDiagonal() * inverse.transpose() +
-                                    k_systematic_px * k_systematic_px * Eigen::Matrix2d::Identity();
+      const Eigen::Vector2d at = corner_place(i);
+      constexpr double k_step = 1e-4;
+      const auto px = [&](double x, double y) { return px_from_square.at(0.5 * (x + 1), 0.5 * (y + 1)); };
+      Eigen::Matrix2d px_a_place;
+      px_a_place << (px(at.x() + k_step, at.y()) - px(at.x() - k_step, at.y())) / (2 * k_step),
+          (px(at.x(), at.y() + k_step) - px(at.x(), at.y() - k_step)) / (2 * k_step);
+      const Eigen::Matrix<double, 2, 8> by = px_a_place * shift_of(at);
+      result.corner_covariance[i] =
+          by * covariance * by.transpose() + k_systematic_px * k_systematic_px * Eigen::Matrix2d::Identity();
       if (!result.corner_covariance[i].allFinite()) return std::nullopt;
     }
     return result;
@@ -470,13 +757,7 @@ std::optional<RefinedQuad> fit_pattern(const cv::Mat& grey,
                                        const std::array<double, 256>& light,
                                        const RefinedQuad& start,
                                        const SeenCells& cells) {
-  auto still = PatternFit(grey, light, cells, false).fit(start);
-  std::optional<Fitted> moving;
-  if (*std::max_element(start.blur_px.begin(), start.blur_px.end()) > k_may_move_px)
-    moving = PatternFit(grey, light, cells, true).fit(start);
-  if (moving && (!still || moving->squares < k_clearly_better * still->squares)) return moving->quad;
-  if (still) return still->quad;
-  return std::nullopt;
+  return PatternFit(grey, light, cells, start).fit();
 }
 
 }  // namespace limn::tracker

@@ -22,11 +22,13 @@ struct SeenCells {
 };
 
 /// Refines a quad whose code is known where edges lie too near to each other for EdgeRefiner: blur wider than
-/// the cells leave room for, white margins of a pixel. Each side's surroundings are fitted as what they are:
-/// background, margin, border and the first rows of cells, all seen through one Gaussian blur (also that of a
-/// motion across the side), in a light that changes linearly along the side; unknown are the side's line,
-/// blur, margin and levels. nullopt when a side's pixels do not settle them or contradict the model. `light`
-/// is the light of a grey level.
+/// the cells leave room for, motion, small or steep cells, white margins of a pixel. The marker's pixels are
+/// fitted as what they are: a homography's picture of black border, cells, white margin and what lies behind,
+/// seen through one Gaussian and an even straight motion, in light that changes linearly over the marker;
+/// bent paper where the residuals ask for it. Motions in several directions compete before the best is
+/// refined. The covariance comes from the residuals, with neighbouring ones that have one cause counted as
+/// one. nullopt when the pixels do not settle it or contradict the model. `light` is the light of a grey
+/// level.
 std::optional<RefinedQuad> fit_pattern(const cv::Mat& grey,
                                        const std::array<double, 256>& light,
                                        const RefinedQuad& start,

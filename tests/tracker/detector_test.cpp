@@ -38,8 +38,33 @@ struct Sweep {
   bool give_lens = false;
   bool srgb_picture = false;
   Encoding encoding = Encoding::linear;
-  double bow = 0;  ///< of the upper and lower sides, as share of a side
+  double bow = 0;        ///< of the upper and lower sides, as share of a side
+  double motion_px = 0;  ///< even, in any direction
 };
+
+cv::Mat in_motion(const cv::Mat& light, const Eigen::Vector2d& motion) {
+  constexpr int k_shifts = 25;
+  cv::Mat sum(light.size(), light.type(), cv::Scalar(0));
+  for (int i = 0; i < k_shifts; ++i) {
+    const Eigen::Vector2d d = (static_cast<double>(i) / (k_shifts - 1) - 0.5) * motion;
+    cv::Mat shifted;
+    cv::warpAffine(light, shifted, cv::Matx23d(1, 0, d.x(), 0, 1, d.y()), light.size(), cv::INTER_LINEAR,
+                   cv::BORDER_REPLICATE);
+    sum += shifted / k_shifts;
+  }
+  return sum;
+}
+
+cv::Mat picture_of(const Sweep& sweep, const PlacedMarker& marker, std::mt19937_64& rng) {
+  const cv::Mat ground = test::plain(640, 480, 100);
+  if (sweep.motion_px == 0)
+    return test::picture_of(sweep.lens, ground, std::vector{marker}, sweep.picture, rng);
+  const double angle = uniform(rng, 0, 6.28);
+  const cv::Mat light = test::light_of(sweep.lens, ground, std::vector{marker}, sweep.picture, rng);
+  return test::noisy_grey(
+      in_motion(light, sweep.motion_px * Eigen::Vector2d(std::cos(angle), std::sin(angle))),
+      sweep.picture.noise_levels, rng);
+}
 
 // Of linear levels (0 ... 255).
 cv::Mat srgb_encoded(cv::Mat grey) {
@@ -73,8 +98,7 @@ SweepResult swept(const Sweep& sweep, int count) {
                      uniform(rng, sweep.low_px, sweep.high_px), sweep.spin ? uniform(rng, 0, 6.28) : 0,
                      uniform(rng, 0, sweep.max_tilt), uniform(rng, 0, 6.28));
     marker.bow = sweep.bow;
-    cv::Mat grey =
-        test::picture_of(sweep.lens, test::plain(640, 480, 100), std::vector{marker}, sweep.picture, rng);
+    cv::Mat grey = picture_of(sweep, marker, rng);
     if (sweep.srgb_picture) grey = srgb_encoded(grey);
     const auto truth = test::true_corners(sweep.lens, marker);
     ++result.markers;
@@ -187,6 +211,45 @@ TEST(Detector, SaysHowSureItsCornersAre) {
   EXPECT_GE(r.found, 58);
   EXPECT_GT(r.mahalanobis, 0.6);
   EXPECT_LT(r.mahalanobis, 1.6);
+}
+
+TEST(Detector, FindsMovingCornersAndSaysHowSureTheyAre) {
+  for (const double motion : {12.0, 16.0}) {
+    Sweep sweep{60, 120, 45_deg, {}};
+    sweep.picture.noise_levels = 2;
+    sweep.motion_px = motion;
+    const SweepResult r = swept(sweep, 30);
+    EXPECT_GE(r.found, 20) << motion;  // reading the cells is another matter
+    EXPECT_EQ(r.wrong, 0);
+    EXPECT_LT(r.rms_px, 0.1) << motion;
+    EXPECT_LT(r.mean.norm(), 0.02) << motion;
+    EXPECT_GT(r.mahalanobis, 0.6) << motion;
+    EXPECT_LT(r.mahalanobis, 2) << motion;
+  }
+}
+
+TEST(Detector, SaysHowSureTheCornersOfSmallMarkersAre) {
+  Sweep sweep{16, 32, 40_deg, {}};
+  sweep.picture.blur_px = 0.4;
+  sweep.picture.noise_levels = 2;
+  const SweepResult r = swept(sweep, 80);
+  EXPECT_GE(r.found, 78);
+  EXPECT_LT(r.rms_px, 0.035);
+  EXPECT_GT(r.mahalanobis, 0.6);
+  EXPECT_LT(r.mahalanobis, 1.6);
+}
+
+TEST(Detector, SaysHowSureTheCornersOfBlurredMarkersAre) {
+  for (const double blur : {2.5, 3.5}) {
+    Sweep sweep{60, 120, 45_deg, {}};
+    sweep.picture.blur_px = blur;
+    sweep.picture.noise_levels = 2;
+    const SweepResult r = swept(sweep, 40);
+    EXPECT_EQ(r.found, r.markers);
+    EXPECT_LT(r.rms_px, 0.08) << blur;
+    EXPECT_GT(r.mahalanobis, 0.5) << blur;
+    EXPECT_LT(r.mahalanobis, 2) << blur;
+  }
 }
 
 TEST(Detector, FindsTheCornersOfBentPaper) {
