@@ -16,6 +16,7 @@ constexpr std::size_t k_few_samples = 150;  // while hypotheses of the motion co
 constexpr std::size_t k_coarse_samples = 300;
 constexpr std::size_t k_moving_samples = 600;
 constexpr std::size_t k_samples = 1200;
+constexpr std::size_t k_most_samples = 1800;
 constexpr int k_rounds = 16;
 constexpr double k_may_move_px = 1.0;     // blur below which motion tells nothing of its own
 constexpr double k_clearly_better = 0.9;  // in mean square residuals: motion against blur alone
@@ -510,6 +511,12 @@ class PatternFit {
         if (choose && !model->shows_edge(Eigen::Vector2d(x, y)) && ++flat % k_flat_stride != 0) continue;
         samples_.push_back({Eigen::Vector2d(x, y), 2 * q - Eigen::Vector2d::Ones(), light_[grey_.ptr(y)[x]]});
       }
+    // Blurred or small, they all do.
+    if (samples_.size() <= k_most_samples) return;
+    const double every = static_cast<double>(samples_.size()) / static_cast<double>(k_most_samples);
+    for (std::size_t i = 0; i < k_most_samples; ++i)
+      samples_[i] = samples_[static_cast<std::size_t>(every * static_cast<double>(i))];
+    samples_.resize(k_most_samples);
   }
 
   Fitted settled(const State& start, Free free, double settled_px) {
