@@ -364,6 +364,8 @@ struct Fitted {
   double explained = 0;                                     // share of the samples that agree with the model
   double moved_px = 0;                                      // the most that a corner moved in the last round
   Matrix covariance = Matrix::Zero();
+  Eigen::Vector4d bend = Eigen::Vector4d::Zero();  // of the last round, had it been free
+  Eigen::Matrix4d bend_covariance = Eigen::Matrix4d::Identity();
 };
 
 class PatternFit {
@@ -377,7 +379,9 @@ class PatternFit {
   std::optional<RefinedQuad> fit() {
     const State begun = this->begun();
     take_samples(k_coarse_samples);
-    Fitted rough = settled(begun, {}, k_roughly_settled_px);
+    Fitted rough;
+    rough.state = begun;
+    rough = step({.levels_alone = true}, &rough) ? settled(rough.state, {}, k_roughly_settled_px) : Fitted{};
     const double blur_px = *std::max_element(start_.blur_px.begin(), start_.blur_px.end());
     Free free;
     if (blur_px > k_may_move_px && !is_explained(rough)) {
@@ -389,7 +393,7 @@ class PatternFit {
     }
     take_samples(free.motion ? k_moving_samples : k_samples, &rough.state);
     Fitted fitted = settled(rough.state, free, k_settled_px);
-    if (is_bent(fitted, free)) {
+    if (is_bent(fitted)) {
       free.bend = true;
       fitted = settled(fitted.state, free, k_settled_px);
     }
@@ -522,7 +526,6 @@ class PatternFit {
   Fitted settled(const State& start, Free free, double settled_px) {
     Fitted fitted;
     fitted.state = start;
-    if (!step({.levels_alone = true}, &fitted)) return {};
     for (int round = 0; round < k_rounds; ++round) {
       if (!step(free, &fitted)) return {};
       if (round > 0 && fitted.moved_px < settled_px) break;
@@ -531,12 +534,8 @@ class PatternFit {
   }
 
   // Whether the paper's bend, were it looked for, would be too large for noise.
-  bool is_bent(Fitted fitted, Free free) {
-    free.bend = true;
-    if (!step(free, &fitted)) return false;
-    const Eigen::Vector4d& seen = fitted.state.bend;
-    const Eigen::Matrix4d covariance = fitted.covariance.block<4, 4>(bend, bend);
-    return seen.dot(covariance.ldlt().solve(seen)) > k_bend_evidence;
+  static bool is_bent(const Fitted& fitted) {
+    return fitted.bend.dot(fitted.bend_covariance.ldlt().solve(fitted.bend)) > k_bend_evidence;
   }
 
   // Whether blur alone leaves no more than noise.
@@ -642,7 +641,6 @@ class PatternFit {
     };
     if (free.levels_alone) fix(shape, paper), fix(margin, 4);
     if (!free.motion) fix(motion_x, 2);
-    if (!free.bend) fix(bend, 4);
     for (int s = 0; s < 4; ++s)
       if (state.margin[s] >= k_no_margin) fix(ground + s, 1), fix(margin + s, 1);
     const double noise = scale * scale;
@@ -652,11 +650,21 @@ class PatternFit {
     loosely(paper, 3, 100), loosely(ink, 3, 100), loosely(ground, 4, 100);
     loosely(margin, 4, 0.5), loosely(motion_x, 2, 10), loosely(log_blur, 1, 1), loosely(shape, 8, 0.2);
     loosely(bend, 4, 0.02);
+    const double lost = weights / std::max(1.0, weights - static_cast<int>(k_unknowns));
+    const double variance = lost * weights * scores / (slopes * slopes);
+    if (!free.bend) {
+      const Eigen::LDLT<Matrix> bending(information);
+      Eigen::Matrix<double, k_unknowns, 4> of_bend = Eigen::Matrix<double, k_unknowns, 4>::Zero();
+      of_bend.bottomRows<4>().setIdentity();
+      const Eigen::Matrix<double, k_unknowns, 4> inverse = bending.solve(of_bend);
+      fitted->bend = inverse.transpose() * right;
+      fitted->bend_covariance = variance * inverse.bottomRows<4>();
+      fix(bend, 4);
+    }
     const Eigen::LDLT<Matrix> solver(information);
     Vector change = solver.solve(right);
     if (!change.allFinite()) return false;
-    const double lost = weights / std::max(1.0, weights - static_cast<int>(k_unknowns));
-    fitted->covariance = solver.solve(Matrix::Identity()) * (lost * weights * scores / (slopes * slopes));
+    fitted->covariance = solver.solve(Matrix::Identity()) * variance;
     return moved(change, fitted);
   }
 
