@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "tracker/simd.h"
 #include "tracker/square_to_quad.h"
 
 namespace limn::tracker {
@@ -353,6 +354,17 @@ class Model {
   }
 };
 
+LIMN_SIMD void scale_by(const double* __restrict factors, std::size_t count, double* __restrict values) {
+  for (std::size_t i = 0; i < count; ++i) values[i] *= factors[i];
+}
+
+LIMN_SIMD double product(const double* a, const double* b, std::size_t count) {
+  double sum = 0;
+#pragma omp simd reduction(+ : sum)
+  for (std::size_t i = 0; i < count; ++i) sum += a[i] * b[i];
+  return sum;
+}
+
 struct Free {
   bool motion = false, bend = false;
   bool levels_alone = false;
@@ -410,8 +422,10 @@ class PatternFit {
   double contrast_ = 0;     // at the start
   double least_scale_ = 0;  // of residuals: far from the solution most look wrong
   std::vector<Sample> samples_;
-  std::vector<double> residuals_, sizes_, behind_, weights_;
-  Eigen::Matrix<double, k_unknowns, Eigen::Dynamic> derivatives_;
+  std::vector<double> residuals_, sizes_, behind_;
+  std::vector<double> roots_;  // of the weights, then times the residuals
+  Eigen::Matrix<double, Eigen::Dynamic, k_unknowns>
+      derivatives_;  // of the samples, then times their weight's root
 
   double light_at(const Eigen::Vector2d& px) const {
     const int x = std::clamp(static_cast<int>(std::lround(px.x())), 0, grey_.cols - 1);
@@ -583,15 +597,16 @@ class PatternFit {
     const Model model(pattern_, state, has_ground_);
     const std::size_t count = samples_.size();
     if (count < 2 * k_unknowns) return false;
-    derivatives_.resize(Eigen::NoChange, static_cast<Eigen::Index>(count));
+    if (derivatives_.rows() != static_cast<Eigen::Index>(count))
+      derivatives_.resize(static_cast<Eigen::Index>(count), Eigen::NoChange);
     residuals_.resize(count);
     behind_.resize(count);
-    weights_.resize(count);
+    roots_.resize(count);
     sizes_.resize(count);
     for (std::size_t i = 0; i < count; ++i) {
       Vector derivative;
       residuals_[i] = samples_[i].light - model.at(samples_[i], &derivative, &behind_[i]);
-      derivatives_.col(static_cast<Eigen::Index>(i)) = derivative;
+      derivatives_.row(static_cast<Eigen::Index>(i)) = derivative;
       sizes_[i] = std::abs(residuals_[i]);
     }
     const auto middle = sizes_.begin() + static_cast<std::ptrdiff_t>(count / 2);
@@ -623,18 +638,21 @@ class PatternFit {
       misfit += trust * square / (1 + square / bound);
       const double w = trust * robust;
       agree += w;
-      weights_[i] = w;
-      auto derivative = derivatives_.col(static_cast<Eigen::Index>(i));
-      right += w * residuals_[i] * derivative;
-      derivative *= std::sqrt(w);
+      roots_[i] = std::sqrt(w);
       scores += trust * robust * robust * residuals_[i] * residuals_[i];
       if (z * z < 1) slopes += trust * (1 - z * z) * (1 - 5 * z * z);
       weights += w;
     }
     fitted->explained = agree / trusted;
     fitted->misfit = misfit / trusted;
-    information.selfadjointView<Eigen::Lower>().rankUpdate(derivatives_);
-    information.triangularView<Eigen::StrictlyUpper>() = information.transpose();
+    for (int i = 0; i < k_unknowns; ++i) scale_by(roots_.data(), count, derivatives_.col(i).data());
+    for (std::size_t i = 0; i < count; ++i) roots_[i] *= residuals_[i];
+    for (int i = 0; i < k_unknowns; ++i) {
+      const double* column = derivatives_.col(i).data();
+      right[i] = product(column, roots_.data(), count);
+      for (int j = 0; j <= i; ++j)
+        information(i, j) = information(j, i) = product(column, derivatives_.col(j).data(), count);
+    }
     constexpr double k_fixed = 1e15;
     const auto fix = [&](int from, int number) {
       for (int i = from; i < from + number; ++i) information(i, i) += k_fixed;
@@ -673,25 +691,22 @@ class PatternFit {
   // ones.
   double correlation(const Matrix& covariance) const {
     constexpr int k_blocks = 8;  // a side
-    Eigen::Matrix<double, k_unknowns, k_blocks * k_blocks> sums;
+    const auto count = static_cast<Eigen::Index>(samples_.size());
+    const Eigen::Map<const Eigen::VectorXd> pulls(roots_.data(), count);
+    const Eigen::Matrix<double, Eigen::Dynamic, 8> moves =
+        pulls.asDiagonal() * (derivatives_ * covariance.leftCols<8>());
+    Eigen::Matrix<double, k_blocks * k_blocks, 8> sums;
     sums.setZero();
-    Matrix alone = Matrix::Zero();
     for (std::size_t i = 0; i < samples_.size(); ++i) {
       const auto block = [&](double place) {
         return std::clamp(static_cast<int>(std::floor((0.5 * place + 0.5) * k_blocks)), 0, k_blocks - 1);
       };
       const Eigen::Vector2d& place = samples_[i].place;
-      // The derivatives hold the weight's root.
-      const Vector pull =
-          std::sqrt(weights_[i]) * residuals_[i] * derivatives_.col(static_cast<Eigen::Index>(i));
-      sums.col(k_blocks * block(place.y()) + block(place.x())) += pull;
-      alone.selfadjointView<Eigen::Lower>().rankUpdate(pull);
+      sums.row(k_blocks * block(place.y()) + block(place.x())) += moves.row(static_cast<Eigen::Index>(i));
     }
-    const Matrix full = alone.selfadjointView<Eigen::Lower>();
-    const Eigen::Matrix<double, 8, k_unknowns> shape_rows = covariance.topRows<8>();
-    const Eigen::Matrix<double, 8, 8> independent = shape_rows * full * shape_rows.transpose();
-    const Eigen::Matrix<double, 8, k_blocks* k_blocks> moves = shape_rows * sums;
-    return std::max(1.0, independent.ldlt().solve(moves * moves.transpose()).trace() / 8);
+    const Eigen::Matrix<double, 8, 8> independent = moves.transpose() * moves;
+    const Eigen::Matrix<double, 8, 8> together = sums.transpose() * sums;
+    return std::max(1.0, independent.ldlt().solve(together).trace() / 8);
   }
 
   bool moved(const Vector& change, Fitted* fitted) const {
