@@ -12,7 +12,7 @@ namespace {
 
 // What edge lines keep however little noise there is: pixels that are not square, print, paper. From still
 // markers in real pictures (.05 px between poses against .026 px jitter).
-constexpr double k_systematic_px = 0.02;
+constexpr double k_systematic_px = 0.014;
 // The averaged gradient's tails below this share of its peak count as flat.
 constexpr double k_flat_share = 0.05;
 // Below this share a rise means another edge of the same direction behind the first: grey paper, then a white
