@@ -230,7 +230,7 @@ std::optional<Detection> Detector::read(
   Quad start = quad;
   if (covered || shortest_side(quad) > k_rough_above_px) {
     rough = refine(quad, Effort::rough);
-    if (!rough || !identify(grey, *rough, families_, reading)) return std::nullopt;
+    if (!rough || !identify(grey, *rough, families_, reading, Certainty::any)) return std::nullopt;
     start.corners_px = rough->corners_px;
   }
   auto refined = refine(start, Effort::full);

@@ -282,11 +282,11 @@ cv::Mat drawn_template(const TemplatePattern& pattern, int pixels_per_cell) {
 
 }  // namespace
 
-std::vector<float> smoothed(const std::vector<float>& values, int size) {
+void smooth(std::span<float> values, std::span<float> scratch, int size) {
   const auto count = static_cast<std::size_t>(size);
   // Along lines of values that lie `step` apart; the lines begin `line` apart. The ends go on outside.
-  const auto smooth_lines = [&](const std::vector<float>& from, std::size_t line, std::size_t step) {
-    std::vector<float> to(from.size());
+  const auto smooth_lines = [&](std::span<const float> from, std::span<float> to, std::size_t line,
+                                std::size_t step) {
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t first = i * line;
       const std::size_t last = first + (count - 1) * step;
@@ -294,9 +294,15 @@ std::vector<float> smoothed(const std::vector<float>& values, int size) {
         to[at] =
             0.25f * (from[at == first ? at : at - step] + 2 * from[at] + from[at == last ? at : at + step]);
     }
-    return to;
   };
-  return smooth_lines(smooth_lines(values, count, 1), 1, count);
+  smooth_lines(values, scratch, count, 1);
+  smooth_lines(scratch, values, 1, count);
+}
+
+std::vector<float> smoothed(std::vector<float> values, int size) {
+  std::vector<float> scratch(values.size());
+  smooth(values, scratch, size);
+  return values;
 }
 
 Result<Families> Families::load(std::span<const std::string> names, const std::filesystem::path& folder) {

@@ -39,7 +39,9 @@ struct TemplatePattern {
 
 /// A size x size picture blurred by (1 2 1)/4 along rows and columns: templates and what is compared with
 /// them, so that half a cell of misplacement costs little.
-std::vector<float> smoothed(const std::vector<float>& values, int size);
+std::vector<float> smoothed(std::vector<float> values, int size);
+/// The same in place; the scratch is as large.
+void smooth(std::span<float> values, std::span<float> scratch, int size);
 
 /// What the detector looks for.
 class Families {

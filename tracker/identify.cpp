@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <map>
+#include <memory_resource>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -196,8 +197,12 @@ struct Readings {
     double limit = k_middle;  // between black and white
     double random_hit = 1;    // probability that random cells are read as some marker like that
   };
-  std::vector<Accepted> accepted;
-  std::vector<Pattern> others;
+  Certainty certainty = Certainty::weighed;
+  std::pmr::vector<Accepted> accepted;
+  std::pmr::vector<Pattern> others;
+
+  Readings(Certainty wanted, std::pmr::memory_resource* memory)
+      : certainty(wanted), accepted(memory), others(memory) {}
 };
 
 // The whole square at the same places for every pattern, whatever its cells; smoothed as templates are.
@@ -209,11 +214,12 @@ class SeenSquare {
 
  private:
   static constexpr int k_places = 20;  // a side
-  std::vector<float> values_;
+  using Values = std::array<float, k_places * k_places>;
+  Values values_;
 
   // Of zero mean and unit length.
   template <class ValueAt>
-  static std::vector<float> normalised(ValueAt value_at);
+  static Values normalised(ValueAt value_at);
 };
 
 double mean_relative(const double* fractions, bool several, double limit) {
@@ -224,20 +230,21 @@ double mean_relative(const double* fractions, bool several, double limit) {
 }
 
 template <class ValueAt>
-std::vector<float> SeenSquare::normalised(ValueAt value_at) {
-  std::vector<float> values;
-  values.reserve(k_places * k_places);
+SeenSquare::Values SeenSquare::normalised(ValueAt value_at) {
+  Values values, scratch;
   for (int row = 0; row < k_places; ++row)
     for (int column = 0; column < k_places; ++column)
-      values.push_back(static_cast<float>(value_at((column + 0.5) / k_places, (row + 0.5) / k_places)));
-  values = smoothed(values, k_places);
+      values[static_cast<std::size_t>(row * k_places + column)] =
+          static_cast<float>(value_at((column + 0.5) / k_places, (row + 0.5) / k_places));
+  smooth(values, scratch, k_places);
   const float mean = std::accumulate(values.begin(), values.end(), 0.0f) / (k_places * k_places);
   float squares = 1e-9f;
   for (float& value : values) {
     value -= mean;
     squares += value * value;
   }
-  for (float& value : values) value /= std::sqrt(squares);
+  const float scale = 1 / std::sqrt(squares);
+  for (float& value : values) value *= scale;
   return values;
 }
 
@@ -245,7 +252,7 @@ SeenSquare::SeenSquare(const Reader& reader, double limit)
     : values_(normalised([&](double x, double y) { return relative(reader.fraction(x, y), limit); })) {}
 
 double SeenSquare::correlation(const Pattern& pattern) const {
-  const auto shown = normalised([&](double x, double y) { return pattern.at(x, y); });
+  const Values shown = normalised([&](double x, double y) { return pattern.at(x, y); });
   return std::inner_product(shown.begin(), shown.end(), values_.begin(), 0.0);
 }
 
@@ -265,9 +272,13 @@ constexpr double k_unknown_correlation = 0.75;
 // The likeliest reading, as sure as it leads over whatever else might be there.
 std::optional<Identity> chosen(const Reader& reader, const Readings& readings) {
   if (readings.accepted.empty()) return std::nullopt;
-  std::map<double, SeenSquare> seen_by_limit;
+  if (readings.certainty == Certainty::any) return readings.accepted.front().identity;
+  std::array<std::optional<SeenSquare>, k_limits.size()> seen_by_limit;
   const auto seen_at = [&](double limit) -> const SeenSquare& {
-    return seen_by_limit.try_emplace(limit, reader, limit).first->second;
+    const auto i =
+        static_cast<std::size_t>(std::find(k_limits.begin(), k_limits.end(), limit) - k_limits.begin());
+    if (!seen_by_limit[i]) seen_by_limit[i].emplace(reader, limit);
+    return *seen_by_limit[i];
   };
   const Readings::Accepted* best = nullptr;
   double most = -2;
@@ -446,7 +457,8 @@ bool read_code(const Families& families,
   const Identity identity{{family.name, std::to_string(best.id)}, best.rotation, 0, cells_of(family, code)};
   readings->accepted.push_back(
       {identity, pattern_of(family, code), limit, random_hit(family, std::popcount(readable), best.errors)});
-  readings->others.push_back(pattern_of(family, next_code(families, family, bits, code)));
+  if (readings->certainty == Certainty::weighed)
+    readings->others.push_back(pattern_of(family, next_code(families, family, bits, code)));
   return true;
 }
 
@@ -602,13 +614,19 @@ void read_codes(const Reader& reader, const Families& families, Reading reading,
   }
 }
 
-std::optional<Identity> read(const Reader& reader, const Families& families, Reading reading) {
-  Readings readings;
+std::optional<Identity> read(const Reader& reader,
+                             const Families& families,
+                             Reading reading,
+                             Certainty certainty) {
+  std::array<std::byte, 1 << 14> buffer;  // enough for what is read but rarely
+  std::pmr::monotonic_buffer_resource memory(buffer.data(), buffer.size());
+  Readings readings(certainty, &memory);
   read_codes(reader, families, reading, &readings);
   if (reading == Reading::open) {
     read_barcodes(reader, families, &readings);
     read_templates(reader, families.templates(), &readings);
-    if (!readings.accepted.empty()) add_rival_barcodes(reader, families, &readings);
+    if (!readings.accepted.empty() && certainty == Certainty::weighed)
+      add_rival_barcodes(reader, families, &readings);
   }
   return chosen(reader, readings);
 }
@@ -697,16 +715,17 @@ bool has_quarter_border(const cv::Mat& grey, const RefinedQuad& quad) {
 std::optional<Identity> identify(const cv::Mat& grey,
                                  const RefinedQuad& quad,
                                  const Families& families,
-                                 Reading reading) {
-  if (reading == Reading::covered) return read(Reader(grey, quad), families, reading);
-  if (const auto found = read(Reader(grey, quad), families, reading)) return found;
+                                 Reading reading,
+                                 Certainty certainty) {
+  if (reading == Reading::covered) return read(Reader(grey, quad), families, reading, certainty);
+  if (const auto found = read(Reader(grey, quad), families, reading, certainty)) return found;
   // Something brighter than the paper may stand behind one side: try the second darkest side's paper for all.
   std::array<double, 4> levels = quad.outside_level;
   std::sort(levels.begin(), levels.end());
   if (levels[3] < k_uneven_paper * levels[1]) return std::nullopt;
   RefinedQuad even = quad;
   even.outside_level.fill(levels[1]);
-  return read(Reader(grey, even), families, reading);
+  return read(Reader(grey, even), families, reading, certainty);
 }
 
 }  // namespace limn::tracker

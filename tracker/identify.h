@@ -40,6 +40,12 @@ enum class Reading {
   covered  ///< some may be hidden, shadows may cross: codes only, hidden bits count as such
 };
 
+/// What an identity's score is worth.
+enum class Certainty {
+  any,     ///< nothing: some marker could be there, at a part of the cost
+  weighed  ///< see identify()
+};
+
 /// Readings less sure than this are none: the one reject level of codes, barcodes and templates.
 constexpr double k_min_confidence = 0.9;
 
@@ -51,6 +57,7 @@ constexpr double k_min_confidence = 0.9;
 std::optional<Identity> identify(const cv::Mat& grey,
                                  const RefinedQuad& quad,
                                  const Families& families,
-                                 Reading reading = Reading::open);
+                                 Reading reading = Reading::open,
+                                 Certainty certainty = Certainty::weighed);
 
 }  // namespace limn::tracker
