@@ -1,6 +1,7 @@
 #include "tracker/detector.h"
 
 #include <algorithm>
+#include <atomic>
 #include <opencv2/core/utility.hpp>
 #include <utility>
 
@@ -82,11 +83,11 @@ bool is_inside(const Segment& segment, const Detection& detection) {
   return true;
 }
 
-// Calls work(i), i = 0 ... count - 1, at once.
+// Calls work(i), i = 0 ... count - 1, at once where there are threads.
 template <typename Work>
-void at_once(int count, const Work& work) {
-  if (count == 1)
-    work(0);
+void at_once(int count, int threads, const Work& work) {
+  if (threads == 1 || count == 1)
+    for (int i = 0; i < count; ++i) work(i);
   else
     cv::parallel_for_(
         cv::Range(0, count),
@@ -171,33 +172,32 @@ void Detector::find_candidates(const cv::Mat& grey) {
     finder_.find(corner_codes_, {options_.min_side_px}, quads_);
   };
   const auto find_segments = [&] { segment_finder_.find(grey, options_.min_contrast, segments_); };
-  if (!options_.broken_markers)
-    find_quads();
-  else if (options_.threads == 1)
-    find_quads(), find_segments();
-  else
-    at_once(2, [&](int i) { i == 0 ? find_quads() : find_segments(); });
+  at_once(options_.broken_markers ? 2 : 1, options_.threads,
+          [&](int i) { i == 0 ? find_quads() : find_segments(); });
 }
 
 // The quads that straight edges suggest where none of these markers are, into quads_.
 void Detector::join_segments(const cv::Mat& grey, const std::vector<Detection>& found) {
   constexpr std::size_t k_max_candidates = 400;  // of each kind of edges
-  quads_.clear();
-  for (std::vector<Segment>* segments : {&segments_.of_black, &segments_.of_blurred}) {
+  at_once(2, options_.threads, [&](int kind) {
+    std::vector<Segment>& segments = kind == 0 ? segments_.of_black : segments_.of_blurred;
+    Joined& joined = joined_[static_cast<std::size_t>(kind)];
     for (const Detection& d : found) {
       const double square = 4 * std::pow(longest_side(d), 2);
-      std::erase_if(*segments, [&](const Segment& s) {
+      std::erase_if(segments, [&](const Segment& s) {
         return (s.from - d.corners_px[0]).squaredNorm() < square && is_inside(s, d);
       });
     }
-    joiner_.find(*segments, grey.cols, grey.rows, joined_);
-    if (joined_.size() > k_max_candidates) joined_.resize(k_max_candidates);
-    for (const SegmentQuad& joined : joined_) {
-      quads_.push_back(joined.quad);
+    joined.finder.find(segments, grey.cols, grey.rows, joined.quads);
+    if (joined.quads.size() > k_max_candidates) joined.quads.resize(k_max_candidates);
+  });
+  quads_.clear();
+  for (const Joined& joined : joined_)
+    for (const SegmentQuad& candidate : joined.quads) {
+      quads_.push_back(candidate.quad);
       quads_.back().within_px = 5;
       if (is_taken(quads_.back(), found)) quads_.pop_back();
     }
-  }
 }
 
 // What quads_ show.
@@ -207,10 +207,10 @@ void Detector::read_all(const cv::Mat& grey,
                         std::vector<Detection>* detections) {
   read_.clear();
   read_.resize(quads_.size());
-  at_once(options_.threads, [&](int thread) {
-    const auto first = static_cast<std::size_t>(thread);
-    for (std::size_t i = first; i < quads_.size(); i += refiners_.size())
-      read_[i] = read(grey, quads_[i], lens, reading, refiners_[first]);
+  std::atomic<std::size_t> next = 0;
+  at_once(options_.threads, options_.threads, [&](int thread) {
+    for (std::size_t i = next++; i < quads_.size(); i = next++)
+      read_[i] = read(grey, quads_[i], lens, reading, refiners_[static_cast<std::size_t>(thread)]);
   });
   for (std::optional<Detection>& found : read_)
     if (found) add_best_of_square(std::move(*found), detections);

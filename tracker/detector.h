@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <span>
@@ -66,8 +67,11 @@ class Detector {
   std::vector<EdgeRefiner> refiners_;  // one a thread
   SegmentFinder segment_finder_;
   Segments segments_;
-  SegmentQuadFinder joiner_;
-  std::vector<SegmentQuad> joined_;
+  struct Joined {
+    SegmentQuadFinder finder;
+    std::vector<SegmentQuad> quads;
+  };
+  std::array<Joined, 2> joined_;                // of black, of blurred edges
   std::vector<std::optional<Detection>> read_;  // what each of quads_ shows
 
   std::optional<Detection> found_again(const cv::Mat& grey, const Lens* lens, const Detection& last);

@@ -71,10 +71,7 @@ class Normal {
   std::array<Value, k_steps + 1> table_;
 };
 
-const Normal& normal() {
-  static const Normal table;
-  return table;
-}
+const Normal k_normal;
 
 // The cells about one coordinate of a place, seen through a Gaussian: of every cell its share, and the
 // share's first and second derivative by the place in sigmas.
@@ -93,7 +90,7 @@ struct Shares {
     double turn = 0;
     for (int line = from; line <= to; ++line) {
       const double z = (at - line) / sigma;
-      const Normal::Value n = normal().at(z);
+      const Normal::Value n = k_normal.at(z);
       const auto i = static_cast<std::size_t>(count++);
       share[i] = below - n.below;
       slope[i] = density - n.density;
@@ -336,8 +333,8 @@ class Model {
     const double z_bottom = (y - count - state_.margin[2]) / blur.y;
     const double z_left = (-state_.margin[3] - x) / blur.x;
     if (std::max({z_top, z_right, z_bottom, z_left}) < -Normal::k_reach) return;
-    const Normal::Value top = normal().at(z_top), right = normal().at(z_right),
-                        bottom = normal().at(z_bottom), left = normal().at(z_left);
+    const Normal::Value top = k_normal.at(z_top), right = k_normal.at(z_right),
+                        bottom = k_normal.at(z_bottom), left = k_normal.at(z_left);
     const double between = 1 - left.below - right.below;
     seen->share += Eigen::Vector4d(between * top.below, right.below, between * bottom.below, left.below);
     const Eigen::Vector4d step = state_.ground.array() - white;
