@@ -26,8 +26,8 @@ constexpr double k_min_blur_px = 0.28;    // of a pixel's own area
 constexpr double k_no_margin = 1e3;       // cells: no outer edge of the paper in reach
 constexpr double k_max_residual = 0.075;  // of the contrast, RMS: above it the model is wrong
 constexpr double k_min_explained = 0.77;  // of perfect Gaussian residuals: 0.89
-constexpr double k_settled_px = 0.01;
-constexpr double k_roughly_settled_px = 0.05;
+constexpr double k_settled_px = 0.02;     // of a round: the next ones would add a quarter of it
+constexpr double k_roughly_settled_px = 0.03;
 constexpr double k_astray_px = 0.1;     // corners that still move so far at last have not settled
 constexpr double k_max_moved_px = 6;    // and half the motion
 constexpr double k_bend_evidence = 20;  // chi-square of four: flat paper shows as much once in 2000 times
@@ -539,7 +539,7 @@ class PatternFit {
     fitted.state = start;
     for (int round = 0; round < k_rounds; ++round) {
       if (!step(free, &fitted)) return {};
-      if (round > 0 && fitted.moved_px < settled_px) break;
+      if (fitted.moved_px < settled_px) break;
     }
     return fitted;
   }
