@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include "core/file.h"
+#include "core/imager_file.h"
 
 namespace limn::test {
 namespace {
@@ -56,6 +57,15 @@ void check_imager(const Imager& imager) {
     const auto ray = imager.ray({share * imager.width, share * imager.height});
     if (ray) imager.project(ray->p_origin + ray->d);
   }
+}
+
+void check_camera(const std::uint8_t* bytes, std::size_t size, const std::string& name) {
+  const fs::path file = fuzzed_file(bytes, size, name);
+  const auto imager = load_imager(file);
+  if (imager)
+    check_imager(*imager);
+  else
+    check_message(imager.message(), file);
 }
 
 }  // namespace limn::test

@@ -19,6 +19,9 @@ void check_message(const std::string& message, const std::filesystem::path& file
 /// rays that go there and back. Throws otherwise.
 void check_imager(const Imager& imager);
 
+/// Reads the bytes as a camera file of this name and checks the camera, or the message.
+void check_camera(const std::uint8_t* bytes, std::size_t size, const std::string& name);
+
 }  // namespace limn::test
 
 /// libFuzzer's entry: a target reads the bytes, and throws or dies where it should not.
