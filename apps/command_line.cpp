@@ -17,8 +17,8 @@
 #include "apps/recheck.h"
 #include "apps/render.h"
 #include "apps/scan.h"
-#include "apps/simulate.h"
 #include "apps/solve.h"
+#include "apps/simulate.h"
 #include "core/log.h"
 
 namespace limn::apps {
@@ -34,49 +34,39 @@ int finished(const Status& status) {
 }
 
 void add_demo(CLI::App& app, Run& run) {
-  auto* command =
-      app.add_subcommand("demo", "a whole session on the virtual rig: calibrate, track, project, composite");
+  auto* command = app.add_subcommand("demo", "a whole session on the virtual rig: calibrate, track, project, composite");
   command->footer("Example: limn demo --out out   (then open out/demo.html)");
   auto options = std::make_shared<DemoOptions>();
-  command->add_option("--out", options->out, "folder for pictures, demo.html and demo.json")
-      ->capture_default_str();
+  command->add_option("--out", options->out, "folder for pictures, demo.html and demo.json")->capture_default_str();
   command->add_flag("--window", options->window, "also show the pictures in a window; Escape closes it");
   command->add_flag("--keep-captures", options->keep_captures, "keep the calibration's pictures (some 1 GB)");
   command->callback([options, &run] { run = [options] { return finished(run_demo(*options)); }; });
 }
 
 void add_markers(CLI::App& app, Run& run) {
-  auto* command =
-      app.add_subcommand("markers", "sheets of markers or a calibration board to print, true size");
+  auto* command = app.add_subcommand("markers", "sheets of markers or a calibration board to print, true size");
   command->footer(
       "Example: limn markers --family aruco_4x4_50 --ids 0-11 --size-mm 40 --out sheet.pdf\n"
       "Example: limn markers --board charuco:11x8:25mm --out board.pdf\n"
-      "Example: limn markers --learn-body photos/*.jpg --camera camera0.cameramodel --family aruco_4x4_50 "
-      "--size-mm 40 "
+      "Example: limn markers --learn-body photos/*.jpg --camera camera0.cameramodel --family aruco_4x4_50 --size-mm 40 "
       "--out body.json\n"
       "Example: limn markers --train photo.jpg --out logo.patt\n"
       "Example: limn markers --compare logo.patt hiro.patt");
   auto options = std::make_shared<MarkersOptions>();
   auto learning = std::make_shared<LearnBodyOptions>();
-  command
-      ->add_option("--family", options->family, "such as apriltag_36h11, artoolkit_3x3, artoolkit:hiro.patt")
+  command->add_option("--family", options->family, "such as apriltag_36h11, artoolkit_3x3, artoolkit:hiro.patt")
       ->capture_default_str();
   command->add_option("--ids", options->ids, "such as 0-11,15")->capture_default_str();
   command->add_option("--size-mm", options->size_mm, "side of the black square")->capture_default_str();
   command->add_option("--board", options->board, "a board instead: charuco:11x8:25mm, chessboard:9x7:75mm");
-  auto* learn =
-      command->add_option("--learn-body", learning->images,
-                          "instead: where the markers of a rigid thing stand on it, from pictures of it");
-  command->add_option("--camera", learning->camera, "with --learn-body: .cameramodel or another camera file")
-      ->needs(learn);
-  auto* train =
-      command->add_option("--train", options->train, "instead: its one black frame becomes a template");
-  auto* compare =
-      command->add_option("--compare", options->compare, "instead: how well these templates are told apart");
+  auto* learn = command->add_option("--learn-body", learning->images,
+                                    "instead: where the markers of a rigid thing stand on it, from pictures of it");
+  command->add_option("--camera", learning->camera, "with --learn-body: .cameramodel or another camera file")->needs(learn);
+  auto* train = command->add_option("--train", options->train, "instead: its one black frame becomes a template");
+  auto* compare = command->add_option("--compare", options->compare, "instead: how well these templates are told apart");
   command->add_option("--json", options->json, "with --compare: file for the report")->needs(compare);
   compare->excludes(train);
-  command->add_option("--out", options->out,
-                      "file to write: .pdf, .svg; a board .png; a body .json; a template .patt");
+  command->add_option("--out", options->out, "file to write: .pdf, .svg; a board .png; a body .json; a template .patt");
   command->callback([options, learning, &run] {
     run = [options, learning] {
       if (learning->images.empty()) return finished(run_markers(*options));
@@ -90,9 +80,7 @@ void add_markers(CLI::App& app, Run& run) {
 
 void add_detect(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand("detect", "markers and their poses in pictures");
-  command->footer(
-      "Example: limn detect photo.jpg --family aruco_6x6_250 --camera camera0.cameramodel --size-mm 40 "
-      "--draw out");
+  command->footer("Example: limn detect photo.jpg --family aruco_6x6_250 --camera camera0.cameramodel --size-mm 40 --draw out");
   auto options = std::make_shared<DetectOptions>();
   command->add_option("images", options->images, "PNG or JPEG pictures")->required();
   command->add_option("--family", options->families, "what to look for, with commas")
@@ -102,16 +90,12 @@ void add_detect(CLI::App& app, Run& run) {
   command->add_option("--size-mm", options->size_mm, "side of the black square; with --camera gives poses");
   command->add_option("--pose", options->pose, "ippe, or triangle (the method of the 2011 paper)")
       ->capture_default_str();
-  command
-      ->add_option("--encoding", options->encoding,
-                   "grey levels: linear in light, or srgb (webcams, photographs)")
+  command->add_option("--encoding", options->encoding, "grey levels: linear in light, or srgb (webcams, photographs)")
       ->capture_default_str();
   command->add_option("--csv", options->csv, "file to write: a row a marker");
   command->add_option("--json", options->json, "file to write: corners, poses, covariances");
   command->add_option("--draw", options->draw, "folder for pictures with the markers drawn in");
-  command
-      ->add_option("--threads", options->threads,
-                   "pictures at a time; of one picture, or with --repeat: shares of it")
+  command->add_option("--threads", options->threads, "pictures at a time; of one picture, or with --repeat: shares of it")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   command->add_option("--repeat", options->repeat, "also time: median ms over N detections in memory")
@@ -125,8 +109,7 @@ void add_bench(CLI::App& app, Run& run) {
       "tracker: generated frames with exact truth; libapriltag and OpenCV aruco on the same frames.\n"
       "Example: limn bench tracker --frames 4 --detail");
   auto options = std::make_shared<BenchOptions>();
-  command->add_option("name", options->name, "tracker or calib; what follows it goes to the bench")
-      ->required();
+  command->add_option("name", options->name, "tracker or calib; what follows it goes to the bench")->required();
   command->prefix_command();
   command->callback([command, options, &run] {
     options->arguments = command->remaining();
@@ -147,34 +130,27 @@ void add_patterns(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand("patterns", "the pictures that a projector shows for calibration");
   command->footer(
       "Example: limn patterns --projector 1280x800 --out patterns\n"
-      "Example: limn patterns --projector 1280x800 --response --out response   (photographs of the prototype "
-      "then go to "
+      "Example: limn patterns --projector 1280x800 --response --out response   (photographs of the prototype then go to "
       "CAPTURES/response/projector0/camera0/)");
   auto options = std::make_shared<PatternsOptions>();
   command->add_option("--projector", options->projector, "its size, such as 1280x800")->required();
-  command->add_option("--code", options->code, "gray, phase (finest), xor (for concave surfaces)")
-      ->capture_default_str();
+  command->add_option("--code", options->code, "gray, phase (finest), xor (for concave surfaces)")->capture_default_str();
   auto& code = options->code_options;
-  command->add_option("--period", code.period_px, "phase: length of a wave, projector pixels")
-      ->capture_default_str();
+  command->add_option("--period", code.period_px, "phase: length of a wave, projector pixels")->capture_default_str();
   command->add_option("--steps", code.steps, "phase: pictures of a wave")->capture_default_str();
-  command->add_option("--gamma", code.gamma, "phase: of the projector, light = value ^ gamma")
-      ->capture_default_str();
-  command->add_option("--linearise", options->linearise,
-                      "phase: the rig's response.json, instead of --gamma");
+  command->add_option("--gamma", code.gamma, "phase: of the projector, light = value ^ gamma")->capture_default_str();
+  command->add_option("--linearise", options->linearise, "phase: the rig's response.json, instead of --gamma");
   command->add_option("--name", options->name, "the projector's name in it, where it holds several");
   command->add_flag("!--no-inverses", code.inverses, "gray, xor: half the pictures, enough for limn recheck");
   command->add_option("--stripe", code.base_stripe_px, "xor: widest stripe, 2, 4 or 8 projector pixels")
       ->capture_default_str();
-  command->add_flag("--response", options->response,
-                    "instead: pictures that measure the projector's response and colour");
+  command->add_flag("--response", options->response, "instead: pictures that measure the projector's response and colour");
   command->add_option("--out", options->out, "folder for 000.png ... and patterns.json")->required();
   command->callback([options, &run] { run = [options] { return finished(run_patterns(*options)); }; });
 }
 
 void add_solve(CLI::App& app, Run& run) {
-  auto* command =
-      app.add_subcommand("solve", "captures to a calibrated rig with a report that says how far to trust it");
+  auto* command = app.add_subcommand("solve", "captures to a calibrated rig with a report that says how far to trust it");
   command->footer(
       "Example: limn solve captures --out rig\n"
       "Example: limn solve photos --import opencv-gray --projector 1024x768 --board chessboard:9x7:75mm "
@@ -182,61 +158,41 @@ void add_solve(CLI::App& app, Run& run) {
   auto options = std::make_shared<SolveOptions>();
   command->add_option("captures", options->captures, "captures folder")->required();
   command->add_option("--out", options->out, "rig folder to write")->required();
-  command->add_option("--skip-poses", options->skip_poses, "poses to leave out, by name, with commas")
-      ->delimiter(',');
-  command
-      ->add_option("--camera-model", options->camera_model,
-                   "mrcal lens model of cameras; auto: by held-out error")
+  command->add_option("--skip-poses", options->skip_poses, "poses to leave out, by name, with commas")->delimiter(',');
+  command->add_option("--camera-model", options->camera_model, "mrcal lens model of cameras; auto: by held-out error")->capture_default_str();
+  command->add_option("--projector-model", options->projector_model, "mrcal lens model of projectors; auto: by held-out error")
       ->capture_default_str();
-  command
-      ->add_option("--projector-model", options->projector_model,
-                   "mrcal lens model of projectors; auto: by held-out error")
-      ->capture_default_str();
-  command
-      ->add_option("--known-length", options->known_lengths,
-                   "a measured length, such as 'apriltag_36h11:3 apriltag_36h11:7 250mm'; again for another")
+  command->add_option("--known-length", options->known_lengths,
+                      "a measured length, such as 'apriltag_36h11:3 apriltag_36h11:7 250mm'; again for another")
       ->allow_extra_args(false);
   command->add_flag("--json", options->json, "print report.json instead of a table");
   command->add_option("--import", options->import_format, "read somebody else's captures: opencv-gray");
-  command->add_option("--projector", options->projector,
-                      "with --import: the projector's size, such as 1024x768");
-  command->add_option("--board", options->board,
-                      "with --import: such as chessboard:9x7:75mm (inner corners)");
-  command->add_option("--poses", options->poses, "with --import: pattern of the pose folders")
-      ->capture_default_str();
-  command->add_option("--shots", options->shots, "with --import: pattern of the pictures")
-      ->capture_default_str();
+  command->add_option("--projector", options->projector, "with --import: the projector's size, such as 1024x768");
+  command->add_option("--board", options->board, "with --import: such as chessboard:9x7:75mm (inner corners)");
+  command->add_option("--poses", options->poses, "with --import: pattern of the pose folders")->capture_default_str();
+  command->add_option("--shots", options->shots, "with --import: pattern of the pictures")->capture_default_str();
   command->callback([options, &run] { run = [options] { return finished(run_solve(*options)); }; });
 }
 
 void add_scan(CLI::App& app, Run& run) {
-  auto* command =
-      app.add_subcommand("scan", "the prototype's surface from scene captures of a calibrated rig");
+  auto* command = app.add_subcommand("scan", "the prototype's surface from scene captures of a calibrated rig");
   command->footer(
-      "Writes points.ply and mesh.ply (metres, the rig's world), scan.json and pictures. Poses that show the "
-      "board are\n"
+      "Writes points.ply and mesh.ply (metres, the rig's world), scan.json and pictures. Poses that show the board are\n"
       "left out. With --moved the prototype may stand elsewhere in each pose.\n"
       "Example: limn scan captures --rig rig --far 1.8 --out scan\n"
       "Example: limn scan --plan config/plans/bench.json --rig rig --out scan");
   auto options = std::make_shared<ScanCommand>();
-  command->add_option("captures", options->captures,
-                      "captures folder with the prototype in its pose directories");
+  command->add_option("captures", options->captures, "captures folder with the prototype in its pose directories");
   command->add_option("--plan", options->plan, "instead: take them of this plan's world on the virtual rig");
   command->add_option("--rig", options->rig, "rig folder")->required();
   command->add_option("--out", options->out, "folder to write")->required();
-  command
-      ->add_option("--poses", options->poses,
-                   "poses to use, by name, with commas; else all without the board")
+  command->add_option("--poses", options->poses, "poses to use, by name, with commas; else all without the board")
       ->delimiter(',');
-  command->add_flag("--moved", options->moved,
-                    "the prototype was moved between poses: lay them onto the first");
-  command
-      ->add_option("--pieces", options->pieces,
-                   "keep only so many of the largest connected pieces of each view")
+  command->add_flag("--moved", options->moved, "the prototype was moved between poses: lay them onto the first");
+  command->add_option("--pieces", options->pieces, "keep only so many of the largest connected pieces of each view")
       ->check(CLI::Range(0, 1000));
   command->add_option("--near", options->near_m, "leave out what is nearer to the camera, metres");
-  command->add_option("--far", options->far_m,
-                      "leave out what is further from the camera, metres (the background)");
+  command->add_option("--far", options->far_m, "leave out what is further from the camera, metres (the background)");
   command->add_option("--voxel-mm", options->voxel_mm, "edge of the mesh's cells; 0: one and a half points")
       ->check(CLI::Range(0.0, 1000.0));
   command->add_option("--smooth-px", options->smooth_px, "half the window of the averaging, camera pixels")
@@ -247,25 +203,19 @@ void add_scan(CLI::App& app, Run& run) {
 }
 
 void add_recheck(CLI::App& app, Run& run) {
-  auto* command = app.add_subcommand(
-      "recheck", "has a camera or projector of a calibrated rig been nudged? which, how far");
+  auto* command = app.add_subcommand("recheck", "has a camera or projector of a calibrated rig been nudged? which, how far");
   command->footer(
-      "Captures of the board in one pose are enough. The device that has moved gets its pose re-solved, its "
-      "lens is kept;\n"
-      "the rig folder is written in any case, with recheck.json. With one camera and one projector only a "
-      "board that has\n"
+      "Captures of the board in one pose are enough. The device that has moved gets its pose re-solved, its lens is kept;\n"
+      "the rig folder is written in any case, with recheck.json. With one camera and one projector only a board that has\n"
       "not been touched since an earlier recheck tells which of them it was.\n"
       "Example: limn recheck captures --rig rig --out rig-repaired\n"
       "Example: limn recheck captures --rig rig --still rig-repaired/recheck.json --out rig-again\n"
       "Example: limn recheck --plan config/plans/studio.json --rig rig --out rig-repaired");
   auto options = std::make_shared<RecheckCommand>();
   command->add_option("captures", options->captures, "captures folder with the board in view");
-  command->add_option("--plan", options->plan,
-                      "instead: capture its first poses (15 s) on the virtual rig, into OUT/captures");
-  command->add_option("--rig", options->rig, "rig folder, rig.json or folder of .cameramodel files")
-      ->required();
-  command->add_option("--still", options->still,
-                      "an earlier recheck.json: the board stands where it stood then");
+  command->add_option("--plan", options->plan, "instead: capture its first poses (15 s) on the virtual rig, into OUT/captures");
+  command->add_option("--rig", options->rig, "rig folder, rig.json or folder of .cameramodel files")->required();
+  command->add_option("--still", options->still, "an earlier recheck.json: the board stands where it stood then");
   command->add_option("--out", options->out, "rig folder to write")->required();
   command->add_flag("--json", options->json, "print recheck.json instead of a table");
   command->callback([options, &run] { run = [options] { return finished(run_recheck(*options)); }; });
@@ -274,28 +224,20 @@ void add_recheck(CLI::App& app, Run& run) {
 void add_align(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand("align", "a CAD mesh onto the scan of the prototype");
   command->footer(
-      "The start comes from a pose, from picked points, from the prototype's markers, or from a search of "
-      "the whole scan.\n"
-      "Writes poses.json (for limn render --poses), align.json, residual.ply and pictures of where CAD and "
-      "scan differ.\n"
-      "PICKS.json: {\"schema\": \"limn.picks/1\", \"pairs\": [{\"cad\": [x, y, z], \"scan_m\": [x, y, z]}, "
-      "...]}, cad in --units\n"
+      "The start comes from a pose, from picked points, from the prototype's markers, or from a search of the whole scan.\n"
+      "Writes poses.json (for limn render --poses), align.json, residual.ply and pictures of where CAD and scan differ.\n"
+      "PICKS.json: {\"schema\": \"limn.picks/1\", \"pairs\": [{\"cad\": [x, y, z], \"scan_m\": [x, y, z]}, ...]}, cad in --units\n"
       "Example: limn align --scan scan --mesh door.glb --units m --out aligned\n"
-      "Example: limn align --scan scan/mesh.ply --mesh door.stl --units mm --points picks.json --out "
-      "aligned\n"
-      "Example: limn align --scan scan --mesh door.glb --units m --scene config/scenes/door --rig rig "
-      "--frame camera0=picture.png --out aligned");
+      "Example: limn align --scan scan/mesh.ply --mesh door.stl --units mm --points picks.json --out aligned\n"
+      "Example: limn align --scan scan --mesh door.glb --units m --scene config/scenes/door --rig rig --frame camera0=picture.png --out aligned");
   auto options = std::make_shared<AlignCommand>();
-  command->add_option("--scan", options->scan,
-                      "PLY, or the folder of limn scan; without it the markers' answer is all");
-  command->add_option("--scan-units", options->scan_units, "of the PLY: m, cm, mm, in, ft")
-      ->capture_default_str();
+  command->add_option("--scan", options->scan, "PLY, or the folder of limn scan; without it the markers' answer is all");
+  command->add_option("--scan-units", options->scan_units, "of the PLY: m, cm, mm, in, ft")->capture_default_str();
   command->add_option("--mesh", options->mesh, "the CAD: .glb, .gltf, .obj, .stl, .ply")->required();
   command->add_option("--units", options->units, "of the CAD: m, cm, mm, in, ft")->required();
   command->add_option("--start", options->start, "POSES.json with a world_from_prototype");
   command->add_option("--points", options->points, "PICKS.json: three and more pairs of the same places");
-  command->add_option("--scene", options->scene,
-                      "scene whose prototype carries markers; with --rig and --frame");
+  command->add_option("--scene", options->scene, "scene whose prototype carries markers; with --rig and --frame");
   command->add_option("--rig", options->rig, "rig folder, for --frame");
   command->add_option("--frame", options->frames, "CAMERA=PICTURE, again for another camera");
   command->add_option("--least-mm", options->least_mm, "smaller differences are not told")
@@ -307,29 +249,23 @@ void add_align(CLI::App& app, Run& run) {
 }
 
 void add_render(CLI::App& app, Run& run) {
-  auto* command = app.add_subcommand(
-      "render", "a scene's pictures: for every projector, over camera pictures, and what light shows");
+  auto* command =
+      app.add_subcommand("render", "a scene's pictures: for every projector, over camera pictures, and what light shows");
   command->footer(
       "With --poses alone the composites are drawn over black, one for each camera.\n"
       "Example: limn render --rig rig --scene config/scenes/door --frame camera0=picture.png --out rendered\n"
-      "Example: limn render --rig rig --scene config/scenes/door --poses poses.json --viewer pose.json --out "
-      "rendered");
+      "Example: limn render --rig rig --scene config/scenes/door --poses poses.json --viewer pose.json --out rendered");
   auto options = std::make_shared<RenderOptions>();
-  command->add_option("--rig", options->rig, "rig folder, rig.json or folder of .cameramodel files")
-      ->required();
+  command->add_option("--rig", options->rig, "rig folder, rig.json or folder of .cameramodel files")->required();
   command->add_option("--scene", options->scene, "scene folder or its scene.json")->required();
-  command->add_option("--frame", options->frames,
-                      "CAMERA=PICTURE, again for another camera; its markers place the scene");
-  command->add_option("--poses", options->poses,
-                      "POSES.json that places the scene; frames are then only drawn over");
-  command->add_option("--viewer", options->viewer,
-                      "viewer file; without it the scene's viewer, else camera 0");
+  command->add_option("--frame", options->frames, "CAMERA=PICTURE, again for another camera; its markers place the scene");
+  command->add_option("--poses", options->poses, "POSES.json that places the scene; frames are then only drawn over");
+  command->add_option("--viewer", options->viewer, "viewer file; without it the scene's viewer, else camera 0");
   command->add_option("--composite", options->composite, "full parts, or rest: only what light cannot show")
       ->check(CLI::IsMember({"full", "rest"}))
       ->capture_default_str();
-  command
-      ->add_option("--marker-light", options->marker_light,
-                   "what projectors do with markers: keep-out leaves them dark, spotlight lights them white")
+  command->add_option("--marker-light", options->marker_light,
+                      "what projectors do with markers: keep-out leaves them dark, spotlight lights them white")
       ->check(CLI::IsMember({"as-is", "keep-out", "spotlight"}))
       ->capture_default_str();
   command->add_option("--out", options->out, "folder for the pictures and coverage.json")->required();
@@ -384,9 +320,8 @@ int run_command_line(int argc, char** argv) {
   try {
     return run();
   } catch (const std::filesystem::filesystem_error& problem) {
-    return finished(
-        error("{}: expected a file or folder that can be looked at, found: {}. Check its name and rights.",
-              problem.path1().string(), problem.code().message()));
+    return finished(error("{}: expected a file or folder that can be looked at, found: {}. Check its name and rights.",
+                          problem.path1().string(), problem.code().message()));
   } catch (const std::bad_alloc&) {
     return finished(error("expected enough memory for this work, found none left. Take smaller pictures."));
   } catch (const std::exception& bug) {
