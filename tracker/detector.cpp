@@ -130,7 +130,7 @@ void Detector::follow(const cv::Mat& grey,
   detections->clear();
   if (grey.empty()) return;
   for (const Detection& marker : last)
-    if (auto found = found_again(grey, lens, marker)) detections->push_back(std::move(*found));
+    if (auto found = found_again(grey, lens, marker)) add_best_of_square(std::move(*found), detections);
 }
 
 // First from its old corners at once, then from all quads about there, then from what covers it has left.

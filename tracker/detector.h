@@ -27,7 +27,7 @@ struct DetectorOptions {
   /// How the camera writes light. Wrong, markers shrink, the more the softer their edges.
   Encoding encoding = Encoding::linear;
   /// Also joins straight edges to quadrilaterals, for markers that fingers, bites or slatted shadows break
-  /// up. Costs about as much again as the rest.
+  /// up. Costs about half as much again as the rest.
   bool broken_markers = true;
   /// How many threads a picture is shared out to, of OpenCV's pool (cv::setNumThreads limits them). The
   /// result is the same with any number.
@@ -45,11 +45,13 @@ class Detector {
   /// are straight in undistorted directions, without one in the picture. Corners are raw pixels either way.
   std::vector<Detection> detect(const cv::Mat& grey, const Lens* lens = nullptr);
 
-  /// The same into `detections`, without allocating once its buffers are large enough.
+  /// The same into `detections`. Allocates nothing once its buffers are large enough, but where a pattern is
+  /// fitted.
   void detect(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections);
 
   /// Finds markers again that were at `last`, looking only about there: a marker that moved by more than half
-  /// of its side is lost, and new ones want detect(). In the order of `last`, which `detections` must not be.
+  /// of its side is lost, and new ones want detect(). Each square once, in the order of `last`, which
+  /// `detections` must not be.
   void follow(const cv::Mat& grey,
               const Lens* lens,
               std::span<const Detection> last,
