@@ -102,7 +102,7 @@ void at_once(int count, int threads, const Work& work) {
 Detector::Detector(Families families, DetectorOptions options)
     : families_(std::move(families)), options_(options) {
   options_.threads = std::max(1, options_.threads);
-  refiners_.assign(static_cast<std::size_t>(options_.threads), EdgeRefiner(options_.encoding));
+  workers_.assign(static_cast<std::size_t>(options_.threads), {EdgeRefiner(options_.encoding), {}});
 }
 
 std::vector<Detection> Detector::detect(const cv::Mat& grey, const Lens* lens) {
@@ -137,7 +137,7 @@ void Detector::follow(const cv::Mat& grey,
 std::optional<Detection> Detector::found_again(const cv::Mat& grey, const Lens* lens, const Detection& last) {
   const double reach = 0.5 * longest_side(last);
   Quad quad{last.corners_px, reach};
-  auto found = read(grey, quad, lens, Reading::open, refiners_[0]);
+  auto found = read(grey, quad, lens, Reading::open, workers_[0]);
   if (found && found->marker == last.marker) return found;
   Eigen::AlignedBox2d box;
   for (const Eigen::Vector2d& corner : last.corners_px) box.extend(corner);
@@ -153,7 +153,7 @@ std::optional<Detection> Detector::found_again(const cv::Mat& grey, const Lens* 
   const auto read_quads = [&](Reading reading) -> std::optional<Detection> {
     for (Quad& candidate : quads_) {
       for (Eigen::Vector2d& corner : candidate.corners_px) corner += origin;
-      found = read(grey, candidate, lens, reading, refiners_[0]);
+      found = read(grey, candidate, lens, reading, workers_[0]);
       if (found && found->marker == last.marker) return found;
     }
     return std::nullopt;
@@ -210,21 +210,21 @@ void Detector::read_all(const cv::Mat& grey,
   std::atomic<std::size_t> next = 0;
   at_once(options_.threads, options_.threads, [&](int thread) {
     for (std::size_t i = next++; i < quads_.size(); i = next++)
-      read_[i] = read(grey, quads_[i], lens, reading, refiners_[static_cast<std::size_t>(thread)]);
+      read_[i] = read(grey, quads_[i], lens, reading, workers_[static_cast<std::size_t>(thread)]);
   });
   for (std::optional<Detection>& found : read_)
     if (found) add_best_of_square(std::move(*found), detections);
 }
 
 std::optional<Detection> Detector::read(
-    const cv::Mat& grey, const Quad& quad, const Lens* lens, Reading reading, EdgeRefiner& refiner) const {
+    const cv::Mat& grey, const Quad& quad, const Lens* lens, Reading reading, Worker& worker) const {
   if (!may_be_marker(grey, quad, options_.min_contrast)) return std::nullopt;
   const bool covered = reading == Reading::covered;
   if (covered && !may_be_covered_code(grey, quad)) return std::nullopt;
   const double min_contrast = k_refined_contrast * options_.min_contrast;
   const Sides sides = covered ? Sides::covered : Sides::whole;
   const auto refine = [&](const Quad& start, Effort effort) {
-    return refiner.refine(grey, start, min_contrast, lens, effort, sides);
+    return worker.refiner.refine(grey, start, min_contrast, lens, effort, sides);
   };
   std::optional<RefinedQuad> rough;
   Quad start = quad;
@@ -241,7 +241,7 @@ std::optional<Detection> Detector::read(
     if (!identity) return std::nullopt;
   }
   if (!refined->separate || is_blurred(*refined, identity->cells))
-    settle_overlapping_edges(grey, *identity, refiner, &*refined);
+    settle_overlapping_edges(grey, *identity, worker, &*refined);
   Detection detection;
   detection.marker = identity->marker;
   detection.score = std::clamp(identity->score, 0.0, 1.0);
@@ -257,12 +257,12 @@ std::optional<Detection> Detector::read(
 // Edges whose blur overlaps with others': by the whole pattern, or else with the doubt that they deserve.
 void Detector::settle_overlapping_edges(const cv::Mat& grey,
                                         const Identity& identity,
-                                        const EdgeRefiner& refiner,
+                                        Worker& worker,
                                         RefinedQuad* refined) const {
   const double blur_px = *std::max_element(refined->blur_px.begin(), refined->blur_px.end());
   const bool may_fit = identity.cells.count > 0 && shortest_side(Quad{refined->corners_px}) > k_fit_above_px;
   if (may_fit)
-    if (auto fitted = fit_pattern(grey, refiner.light(), *refined, identity.cells)) {
+    if (auto fitted = fit_pattern(grey, worker.refiner.light(), *refined, identity.cells, &worker.fit)) {
       *refined = *fitted;
       return;
     }

@@ -66,7 +66,11 @@ class Detector {
   CornerCodes corner_codes_;
   QuadFinder finder_;
   std::vector<Quad> quads_;
-  std::vector<EdgeRefiner> refiners_;  // one a thread
+  struct Worker {
+    EdgeRefiner refiner;
+    PatternFitBuffers fit;
+  };
+  std::vector<Worker> workers_;  // one a thread
   SegmentFinder segment_finder_;
   Segments segments_;
   struct Joined {
@@ -81,10 +85,10 @@ class Detector {
   void join_segments(const cv::Mat& grey, const std::vector<Detection>& found);
   void read_all(const cv::Mat& grey, const Lens* lens, Reading reading, std::vector<Detection>* detections);
   std::optional<Detection> read(
-      const cv::Mat& grey, const Quad& quad, const Lens* lens, Reading reading, EdgeRefiner& refiner) const;
+      const cv::Mat& grey, const Quad& quad, const Lens* lens, Reading reading, Worker& worker) const;
   void settle_overlapping_edges(const cv::Mat& grey,
                                 const Identity& identity,
-                                const EdgeRefiner& refiner,
+                                Worker& worker,
                                 RefinedQuad* refined) const;
 };
 

@@ -19,8 +19,8 @@ using namespace pattern;
 constexpr std::size_t k_few_samples = 150;  // while hypotheses of the motion compete
 constexpr std::size_t k_coarse_samples = 300;
 constexpr std::size_t k_moving_samples = 600;
-constexpr std::size_t k_samples = 700;
-constexpr std::size_t k_most_samples = 1200;
+constexpr std::size_t k_samples = 400;
+constexpr std::size_t k_most_samples = 600;
 constexpr int k_rounds = 16;
 constexpr double k_may_move_px = 1.0;     // blur below which motion tells nothing of its own
 constexpr double k_clearly_better = 0.9;  // in mean square residuals: motion against blur alone
@@ -43,30 +43,78 @@ constexpr double k_bound = 0.15;        // of the contrast: residuals beyond tel
 constexpr double k_noise = 0.02;        // of the contrast, RMS: residuals that ask for no motion
 constexpr double k_systematic_px = 0.004;
 
-LIMN_SIMD void scale_by(const double* __restrict factors, std::size_t count, double* __restrict values) {
+// Unknowns are taken by fours and samples by sixteens, rounded up with zeros.
+constexpr int k_fours = 4;
+constexpr std::size_t k_sixteens = 16;
+
+LIMN_SIMD void scale_by(const float* __restrict factors, std::size_t count, float* __restrict values) {
   for (std::size_t i = 0; i < count; ++i) values[i] *= factors[i];
 }
 
-LIMN_SIMD double product(const double* a, const double* b, std::size_t count) {
-  double sum = 0;
+// The products of `number` columns, a multiple of four, of `count` values each with one another and with
+// `right`: the lower triangle of `information`, row by row, and what is above it in its blocks of four.
+LIMN_SIMD void add_products(const float* __restrict columns,
+                            int number,
+                            std::size_t count,
+                            const float* __restrict right,
+                            double* __restrict information,
+                            double* __restrict products) {
+  for (int i = 0; i < number; ++i) {
+    const float* a = columns + static_cast<std::size_t>(i) * count;
+    float sum = 0;
 #pragma omp simd reduction(+ : sum)
-  for (std::size_t i = 0; i < count; ++i) sum += a[i] * b[i];
-  return sum;
+    for (std::size_t k = 0; k < count; ++k) sum += a[k] * right[k];
+    products[i] = sum;
+    for (int j = 0; j <= i; j += k_fours) {
+      const float* b0 = columns + static_cast<std::size_t>(j) * count;
+      const float* b1 = b0 + count;
+      const float* b2 = b1 + count;
+      const float* b3 = b2 + count;
+      float s0 = 0, s1 = 0, s2 = 0, s3 = 0;
+#pragma omp simd reduction(+ : s0, s1, s2, s3)
+      for (std::size_t k = 0; k < count; ++k) {
+        s0 += a[k] * b0[k];
+        s1 += a[k] * b1[k];
+        s2 += a[k] * b2[k];
+        s3 += a[k] * b3[k];
+      }
+      double* row = information + i * number + j;
+      row[0] = s0, row[1] = s1, row[2] = s2, row[3] = s3;
+    }
+  }
 }
 
+enum class Bend {
+  none,
+  tested,  // how much there would be
+  fitted
+};
+
 struct Free {
-  bool motion = false, bend = false;
+  bool motion = false;
+  Bend bend = Bend::none;
   bool levels_alone = false;
 };
+
+// The unknowns that take part in a round, ascending.
+struct Active {
+  std::array<int, k_unknowns> unknowns{};
+  int count = 0;
+  int padded() const { return (count + k_fours - 1) / k_fours * k_fours; }
+};
+
+using SomeMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, k_unknowns, k_unknowns>;
+using SomeVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, k_unknowns, 1>;
 
 struct Fitted {
   State state;
   double misfit = std::numeric_limits<double>::infinity();  // mean square residual, bounded
   double explained = 0;                                     // share of the samples that agree with the model
   double moved_px = 0;                                      // the most that a corner moved in the last round
-  Matrix covariance = Matrix::Zero();
-  Eigen::Vector4d bend = Eigen::Vector4d::Zero();  // of the last round, had it been free
-  Eigen::Matrix4d bend_covariance = Eigen::Matrix4d::Identity();
+  // Of the last round: what it fitted, with how much certainty; bend, had it been free, over its covariance.
+  SomeMatrix information;
+  double variance = 0;  // of a sample
+  double bend_evidence = 0;
 };
 
 class PatternFit {
@@ -74,8 +122,9 @@ class PatternFit {
   PatternFit(const cv::Mat& grey,
              const std::array<double, 256>& light,
              const SeenCells& cells,
-             const RefinedQuad& start)
-      : grey_(grey), light_(light), pattern_(cells), start_(start) {}
+             const RefinedQuad& start,
+             PatternFitBuffers* buffers)
+      : grey_(grey), light_(light), pattern_(cells), start_(start), buffers_(*buffers) {}
 
   std::optional<RefinedQuad> fit() {
     const State begun = this->begun();
@@ -84,7 +133,7 @@ class PatternFit {
     rough.state = begun;
     rough = step({.levels_alone = true}, &rough) ? settled(rough.state, {}, k_roughly_settled_px) : Fitted{};
     const double blur_px = *std::max_element(start_.blur_px.begin(), start_.blur_px.end());
-    Free free;
+    Free free{.bend = Bend::tested};
     if (blur_px > k_may_move_px && !is_explained(rough)) {
       Fitted moving = most_likely_motion(begun);
       if (moving.misfit < k_clearly_better * rough.misfit) {
@@ -94,8 +143,8 @@ class PatternFit {
     }
     take_samples(free.motion ? k_moving_samples : k_samples, &rough.state);
     Fitted fitted = settled(rough.state, free, k_settled_px);
-    if (is_bent(fitted)) {
-      free.bend = true;
+    if (fitted.bend_evidence > k_bend_evidence) {
+      free.bend = Bend::fitted;
       fitted = settled(fitted.state, free, k_settled_px);
     }
     return finished(fitted);
@@ -110,11 +159,8 @@ class PatternFit {
   Eigen::Vector4d margin_;  // at the start
   double contrast_ = 0;     // at the start
   double least_scale_ = 0;  // of residuals: far from the solution most look wrong
-  std::vector<Sample> samples_;
-  std::vector<double> residuals_, sizes_, behind_;
-  std::vector<double> roots_;  // of the weights, then times the residuals
-  Eigen::Matrix<double, Eigen::Dynamic, k_unknowns>
-      derivatives_;  // of the samples, then times their weight's root
+  PatternFitBuffers& buffers_;
+  std::vector<Sample>& samples_ = buffers_.samples;
 
   double light_at(const Eigen::Vector2d& px) const {
     const int x = std::clamp(static_cast<int>(std::lround(px.x())), 0, grey_.cols - 1);
@@ -236,11 +282,6 @@ class PatternFit {
     return fitted;
   }
 
-  // Whether the paper's bend, were it looked for, would be too large for noise.
-  static bool is_bent(const Fitted& fitted) {
-    return fitted.bend.dot(fitted.bend_covariance.ldlt().solve(fitted.bend)) > k_bend_evidence;
-  }
-
   // Whether blur alone leaves no more than noise.
   static bool is_explained(const Fitted& fitted) {
     const double contrast = fitted.state.paper[0] - fitted.state.ink[0];
@@ -280,37 +321,70 @@ class PatternFit {
     while (!fits->empty() && (fits->size() > most || std::isinf(fits->back().misfit))) fits->pop_back();
   }
 
+  static std::size_t stride_of(std::size_t count) {
+    return (count + k_sixteens - 1) / k_sixteens * k_sixteens;
+  }
+
+  // Bend comes last.
+  static Active active(Free free, const State& state, bool has_ground) {
+    Active active;
+    const auto add = [&](int from, int number) {
+      for (int i = from; i < from + number; ++i)
+        active.unknowns[static_cast<std::size_t>(active.count++)] = i;
+    };
+    if (!free.levels_alone) add(shape, 8), add(log_blur, 1);
+    if (free.motion) add(motion_x, 2);
+    add(paper, 3);
+    add(ink, 3);
+    for (const int of_side : {int{ground}, int{margin}})
+      for (int s = 0; s < 4 && has_ground; ++s)
+        if (state.margin[s] < k_no_margin && !(free.levels_alone && of_side == margin)) add(of_side + s, 1);
+    if (free.bend != Bend::none) add(bend, 4);
+    return active;
+  }
+
+  // How far an unknown may well be from the guess.
+  static double loose(int unknown) {
+    if (unknown < log_blur) return 0.2;
+    if (unknown < motion_x) return 1;
+    if (unknown < paper) return 10;
+    if (unknown < margin) return 100;
+    return unknown < bend ? 0.5 : 0.02;
+  }
+
   // One Gauss-Newton step on the samples.
   bool step(Free free, Fitted* fitted) {
     State& state = fitted->state;
     const Model model(pattern_, state, has_ground_);
     const std::size_t count = samples_.size();
     if (count < 2 * k_unknowns) return false;
-    if (derivatives_.rows() != static_cast<Eigen::Index>(count))
-      derivatives_.resize(static_cast<Eigen::Index>(count), Eigen::NoChange);
-    residuals_.resize(count);
-    behind_.resize(count);
-    roots_.resize(count);
-    sizes_.resize(count);
+    auto& [samples, residuals, sizes, behind, roots, pulls, derivatives] = buffers_;
+    const Active active = this->active(free, state, has_ground_);
+    const std::size_t stride = stride_of(count);
+    derivatives.assign(static_cast<std::size_t>(active.padded()) * stride, 0);
+    pulls.assign(stride, 0);
+    roots.assign(stride, 0);
+    residuals.resize(count);
+    behind.resize(count);
+    sizes.resize(count);
     for (std::size_t i = 0; i < count; ++i) {
       Vector derivative;
-      residuals_[i] = samples_[i].light - model.at(samples_[i], &derivative, &behind_[i]);
-      derivatives_.row(static_cast<Eigen::Index>(i)) = derivative;
-      sizes_[i] = std::abs(residuals_[i]);
+      residuals[i] = samples[i].light - model.at(samples[i], &derivative, &behind[i]);
+      for (std::size_t a = 0; a < static_cast<std::size_t>(active.count); ++a)
+        derivatives[a * stride + i] = static_cast<float>(derivative[active.unknowns[a]]);
+      sizes[i] = std::abs(residuals[i]);
     }
-    const auto middle = sizes_.begin() + static_cast<std::ptrdiff_t>(count / 2);
-    std::nth_element(sizes_.begin(), middle, sizes_.end());
+    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(count / 2);
+    std::nth_element(sizes.begin(), middle, sizes.end());
     const double scale = std::max(least_scale_, 1.4826 * *middle);
     // What is behind the paper is one level a side only by chance.
     double unlike = 0;
     double unlike_weights = 1e-9;
     for (std::size_t i = 0; i < count; ++i) {
-      unlike += behind_[i] * residuals_[i] * residuals_[i];
-      unlike_weights += behind_[i];
+      unlike += behind[i] * residuals[i] * residuals[i];
+      unlike_weights += behind[i];
     }
     unlike /= unlike_weights * scale * scale;
-    Matrix information = Matrix::Zero();
-    Vector right = Vector::Zero();
     double weights = 0;
     double agree = 0;
     double scores = 0;  // squares of the biweight's, and its slopes: a robust mean's variance (Huber 1981)
@@ -319,72 +393,84 @@ class PatternFit {
     double misfit = 0;
     const double bound = k_bound * k_bound * contrast_ * contrast_;
     for (std::size_t i = 0; i < count; ++i) {
-      const double trust = 1 / (1 + unlike * behind_[i] * behind_[i]);
-      const double z = residuals_[i] / (4 * scale) * std::sqrt(trust);
+      const double trust = 1 / (1 + unlike * behind[i] * behind[i]);
+      const double z = residuals[i] / (4 * scale) * std::sqrt(trust);
       const double robust = z * z < 1 ? (1 - z * z) * (1 - z * z) : 0;  // Tukey's biweight
       trusted += trust;
-      const double square = residuals_[i] * residuals_[i];
+      const double square = residuals[i] * residuals[i];
       misfit += trust * square / (1 + square / bound);
       const double w = trust * robust;
       agree += w;
-      roots_[i] = std::sqrt(w);
-      scores += trust * robust * robust * residuals_[i] * residuals_[i];
+      roots[i] = static_cast<float>(std::sqrt(w));
+      pulls[i] = static_cast<float>(std::sqrt(w) * residuals[i]);
+      scores += trust * robust * robust * residuals[i] * residuals[i];
       if (z * z < 1) slopes += trust * (1 - z * z) * (1 - 5 * z * z);
       weights += w;
     }
     fitted->explained = agree / trusted;
     fitted->misfit = misfit / trusted;
-    for (int i = 0; i < k_unknowns; ++i) scale_by(roots_.data(), count, derivatives_.col(i).data());
-    for (std::size_t i = 0; i < count; ++i) roots_[i] *= residuals_[i];
-    for (int i = 0; i < k_unknowns; ++i) {
-      const double* column = derivatives_.col(i).data();
-      right[i] = product(column, roots_.data(), count);
+    const double lost = weights / std::max(1.0, weights - active.count);
+    fitted->variance = lost * weights * scores / (slopes * slopes);
+    for (std::size_t a = 0; a < static_cast<std::size_t>(active.count); ++a)
+      scale_by(roots.data(), stride, &derivatives[a * stride]);
+    return solved(free, active, scale * scale, fitted);
+  }
+
+  // The change that the weighted derivatives and residuals ask for.
+  bool solved(Free free, const Active& active, double noise, Fitted* fitted) const {
+    constexpr int k_padded = (k_unknowns + k_fours - 1) / k_fours * k_fours;
+    const int padded = active.padded();
+    std::array<double, static_cast<std::size_t>(k_padded * k_padded)> lower;
+    std::array<double, static_cast<std::size_t>(k_padded)> products;
+    add_products(buffers_.derivatives.data(), padded, stride_of(samples_.size()), buffers_.pulls.data(),
+                 lower.data(), products.data());
+    SomeMatrix information(active.count, active.count);
+    SomeVector right(active.count);
+    for (int i = 0; i < active.count; ++i) {
       for (int j = 0; j <= i; ++j)
-        information(i, j) = information(j, i) = product(column, derivatives_.col(j).data(), count);
+        information(i, j) = information(j, i) = lower[static_cast<std::size_t>(i * padded + j)];
+      const double deviation = loose(active.unknowns[static_cast<std::size_t>(i)]);
+      information(i, i) += noise / (deviation * deviation);
+      right[i] = products[static_cast<std::size_t>(i)];
     }
-    constexpr double k_fixed = 1e15;
-    const auto fix = [&](int from, int number) {
-      for (int i = from; i < from + number; ++i) information(i, i) += k_fixed;
-    };
-    if (free.levels_alone) fix(shape, paper), fix(margin, 4);
-    if (!free.motion) fix(motion_x, 2);
-    for (int s = 0; s < 4; ++s)
-      if (state.margin[s] >= k_no_margin) fix(ground + s, 1), fix(margin + s, 1);
-    const double noise = scale * scale;
-    const auto loosely = [&](int from, int number, double deviation) {
-      for (int i = from; i < from + number; ++i) information(i, i) += noise / (deviation * deviation);
-    };
-    loosely(paper, 3, 100), loosely(ink, 3, 100), loosely(ground, 4, 100);
-    loosely(margin, 4, 0.5), loosely(motion_x, 2, 10), loosely(log_blur, 1, 1), loosely(shape, 8, 0.2);
-    loosely(bend, 4, 0.02);
-    const double lost = weights / std::max(1.0, weights - static_cast<int>(k_unknowns));
-    const double variance = lost * weights * scores / (slopes * slopes);
-    if (!free.bend) {
-      const Eigen::LDLT<Matrix> bending(information);
-      Eigen::Matrix<double, k_unknowns, 4> of_bend = Eigen::Matrix<double, k_unknowns, 4>::Zero();
-      of_bend.bottomRows<4>().setIdentity();
-      const Eigen::Matrix<double, k_unknowns, 4> inverse = bending.solve(of_bend);
-      fitted->bend = inverse.transpose() * right;
-      fitted->bend_covariance = variance * inverse.bottomRows<4>();
-      fix(bend, 4);
+    const int number = active.count - (free.bend == Bend::tested ? 4 : 0);
+    fitted->information = information.topLeftCorner(number, number);
+    const Eigen::LDLT<SomeMatrix> solver(fitted->information);
+    const SomeVector some = solver.solve(right.head(number));
+    if (!some.allFinite()) return false;
+    if (free.bend == Bend::tested) {  // what would be left to it (Schur's complement)
+      const Eigen::Matrix<double, Eigen::Dynamic, 4, 0, k_unknowns, 4> beside =
+          information.topRightCorner(number, 4);
+      const Eigen::Matrix4d own =
+          information.bottomRightCorner<4, 4>() - beside.transpose() * solver.solve(beside);
+      const Eigen::Vector4d pull = right.tail<4>() - beside.transpose() * some;
+      fitted->bend_evidence = pull.dot(own.ldlt().solve(pull)) / fitted->variance;
     }
-    const Eigen::LDLT<Matrix> solver(information);
-    Vector change = solver.solve(right);
-    if (!change.allFinite()) return false;
-    fitted->covariance = solver.solve(Matrix::Identity()) * variance;
+    Vector change = Vector::Zero();
+    for (int i = 0; i < number; ++i) change[active.unknowns[static_cast<std::size_t>(i)]] = some[i];
     return moved(change, fitted);
+  }
+
+  // Of the first eight unknowns, had each sample its own noise.
+  static Eigen::Matrix<double, Eigen::Dynamic, 8, 0, k_unknowns, 8> shape_covariance(const Fitted& fitted) {
+    const Eigen::Index number = fitted.information.rows();
+    const Eigen::Matrix<double, Eigen::Dynamic, 8, 0, k_unknowns, 8> ones =
+        Eigen::Matrix<double, Eigen::Dynamic, 8, 0, k_unknowns, 8>::Identity(number, 8);
+    return fitted.variance * fitted.information.ldlt().solve(ones);
   }
 
   // By how much the shape's covariance is larger for neighbouring residuals that have one cause: from the
   // sums over blocks of the last step's samples ("sandwich", Liang and Zeger 1986) over that of independent
   // ones.
-  double correlation(const Matrix& covariance) const {
+  double correlation(const Eigen::Ref<const Eigen::MatrixXd>& covariance) const {
     constexpr int k_blocks = 8;  // a side
-    const auto count = static_cast<Eigen::Index>(samples_.size());
-    const Eigen::Map<const Eigen::VectorXd> pulls(roots_.data(), count);
-    const Eigen::Matrix<double, Eigen::Dynamic, 8> moves =
-        pulls.asDiagonal() * (derivatives_ * covariance.leftCols<8>());
-    Eigen::Matrix<double, k_blocks * k_blocks, 8> sums;
+    const auto stride = static_cast<Eigen::Index>(stride_of(samples_.size()));
+    const Eigen::Map<const Eigen::VectorXf> pulls(buffers_.pulls.data(), stride);
+    const Eigen::Map<const Eigen::MatrixXf> derivatives(buffers_.derivatives.data(), stride,
+                                                        covariance.rows());
+    const Eigen::Matrix<float, Eigen::Dynamic, 8> moves =
+        pulls.asDiagonal() * (derivatives * covariance.cast<float>());
+    Eigen::Matrix<float, k_blocks * k_blocks, 8> sums;
     sums.setZero();
     for (std::size_t i = 0; i < samples_.size(); ++i) {
       const auto block = [&](double place) {
@@ -393,8 +479,8 @@ class PatternFit {
       const Eigen::Vector2d& place = samples_[i].place;
       sums.row(k_blocks * block(place.y()) + block(place.x())) += moves.row(static_cast<Eigen::Index>(i));
     }
-    const Eigen::Matrix<double, 8, 8> independent = moves.transpose() * moves;
-    const Eigen::Matrix<double, 8, 8> together = sums.transpose() * sums;
+    const Eigen::Matrix<double, 8, 8> independent = (moves.transpose() * moves).cast<double>();
+    const Eigen::Matrix<double, 8, 8> together = (sums.transpose() * sums).cast<double>();
     return std::max(1.0, independent.ldlt().solve(together).trace() / 8);
   }
 
@@ -452,8 +538,8 @@ class PatternFit {
     RefinedQuad result = start_;
     result.corners_px = state.corners;
     const SquareToQuad px_from_square(state.corners);
-    const Eigen::Matrix<double, 8, 8> covariance =
-        correlation(fitted.covariance) * fitted.covariance.topLeftCorner<8, 8>();
+    const auto shape_by_all = shape_covariance(fitted);
+    const Eigen::Matrix<double, 8, 8> covariance = correlation(shape_by_all) * shape_by_all.topRows<8>();
     for (std::size_t i = 0; i < 4; ++i) {
       const Eigen::Vector2d at = corner_place(i);
       constexpr double k_step = 1e-4;
@@ -475,8 +561,9 @@ class PatternFit {
 std::optional<RefinedQuad> fit_pattern(const cv::Mat& grey,
                                        const std::array<double, 256>& light,
                                        const RefinedQuad& start,
-                                       const SeenCells& cells) {
-  return PatternFit(grey, light, cells, start).fit();
+                                       const SeenCells& cells,
+                                       PatternFitBuffers* buffers) {
+  return PatternFit(grey, light, cells, start, buffers).fit();
 }
 
 }  // namespace limn::tracker

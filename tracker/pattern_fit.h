@@ -1,9 +1,11 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <optional>
+#include <vector>
 
 #include "tracker/refine.h"
 
@@ -21,6 +23,18 @@ struct SeenCells {
   }
 };
 
+/// The memory of fit_pattern, kept between calls.
+struct PatternFitBuffers {
+  struct Sample {
+    Eigen::Vector2d px, place;  ///< place: -1 to 1 over the marker at first, of the levels' planes
+    double light;
+  };
+  std::vector<Sample> samples;
+  std::vector<double> residuals, sizes, behind;
+  std::vector<float> roots, pulls;  ///< of the weights; residuals times these
+  std::vector<float> derivatives;   ///< one unknown's after the other's, then times the weight's root
+};
+
 /// Refines a quad whose code is known where edges lie too near to each other for EdgeRefiner: blur wider than
 /// the cells leave room for, motion, small or steep cells, white margins of a pixel. The marker's pixels are
 /// fitted as what they are: a homography's picture of black border, cells, white margin and what lies behind,
@@ -28,10 +42,11 @@ struct SeenCells {
 /// bent paper where the residuals ask for it. Motions in several directions compete before the best is
 /// refined. The covariance comes from the residuals, with neighbouring ones that have one cause counted as
 /// one. nullopt when the pixels do not settle it or contradict the model. `light` is the light of a grey
-/// level.
+/// level; what `buffers` hold from other calls makes no difference.
 std::optional<RefinedQuad> fit_pattern(const cv::Mat& grey,
                                        const std::array<double, 256>& light,
                                        const RefinedQuad& start,
-                                       const SeenCells& cells);
+                                       const SeenCells& cells,
+                                       PatternFitBuffers* buffers);
 
 }  // namespace limn::tracker

@@ -52,14 +52,16 @@ struct Shares {
 
   Shares(double at, double sigma, int cells) {
     const double reach = Normal::k_reach * sigma;
-    const int from = std::max(0, static_cast<int>(std::ceil(at - reach)));
-    const int to = std::min(cells, static_cast<int>(std::floor(at + reach)));
+    // Rounded towards zero is right there: below it the lines begin.
+    const int from = std::max(0, static_cast<int>(at - reach) + (at > reach ? 1 : 0));
+    const int to = at + reach < 0 ? -1 : std::min(cells, static_cast<int>(at + reach));
     first = from - 1;
+    const double sigmas = 1 / sigma;
     double below = 1;
     double density = 0;
     double turn = 0;
     for (int line = from; line <= to; ++line) {
-      const double z = (at - line) / sigma;
+      const double z = (at - line) * sigmas;
       const Normal::Value n = k_normal.at(z);
       const auto i = static_cast<std::size_t>(count++);
       share[i] = below - n.below;

@@ -51,7 +51,6 @@ enum Unknown : int {
   k_unknowns = bend + 4
 };
 using Vector = Eigen::Matrix<double, k_unknowns, 1>;
-using Matrix = Eigen::Matrix<double, k_unknowns, k_unknowns>;
 
 /// One guess of it all; motion in pixels.
 struct State {
@@ -63,11 +62,7 @@ struct State {
   Eigen::Vector4d bend = Eigen::Vector4d::Zero();
 };
 
-/// A pixel that takes part.
-struct Sample {
-  Eigen::Vector2d px, place;  // place: -1 to 1 over the marker at first, of the levels' planes
-  double light;
-};
+using Sample = PatternFitBuffers::Sample;
 
 /// The model's light at pixels, and its derivatives.
 class Model {
