@@ -364,9 +364,12 @@ struct Nearest {
   int errors = 64;
 };
 
-// Own function so that the processor's own bit count is used where it has one.
-__attribute__((target_clones("popcnt", "default"))) Nearest nearest(
-    const std::vector<std::array<std::uint64_t, 4>>& codes, std::uint64_t seen, std::uint64_t readable) {
+// With the processor's own bit count where it has one.
+#define LIMN_POPCOUNT __attribute__((target_clones("popcnt", "default")))
+
+LIMN_POPCOUNT Nearest nearest(const std::vector<std::array<std::uint64_t, 4>>& codes,
+                              std::uint64_t seen,
+                              std::uint64_t readable) {
   Nearest best;
   for (std::size_t id = 0; id < codes.size(); ++id)
     for (std::size_t k = 0; k < 4; ++k) {
@@ -404,10 +407,10 @@ double margin_of(const Bits& bits, std::uint64_t chosen) {
 
 // The code other than `code` that bits of the least margin together contradict, of any family whose cells lie
 // where this one's do.
-std::uint64_t next_code(const Families& families,
-                        const CodeFamily& family,
-                        const Bits& bits,
-                        std::uint64_t code) {
+LIMN_POPCOUNT std::uint64_t next_code(const Families& families,
+                                      const CodeFamily& family,
+                                      const Bits& bits,
+                                      std::uint64_t code) {
   const auto count = static_cast<std::size_t>(family.cells * family.cells);
   std::array<double, 65> least{};  // of so many bits together
   std::copy_n(bits.margin.begin(), count, least.begin() + 1);
