@@ -235,7 +235,8 @@ Outlines::Line Outlines::line(std::size_t from, std::size_t to) const {
   line.d /= std::max(1e-12, line.d.norm());
   line.squares = n * std::max(0.0, 0.5 * (xx + yy) - root);
   line.count = n;
-  if (line.d.dot(point(to > size() ? to - size() : to) - point(from)) < 0) line.d = -line.d;
+  const auto point_around = [&](std::size_t i) { return point(i > size() ? i - size() : i); };
+  if (line.d.dot(point_around(to) - point_around(from)) < 0) line.d = -line.d;
   return line;
 }
 
