@@ -137,19 +137,22 @@ std::vector<double> fitted_lens_values(const LensModel& model,
                                        std::vector<double> values,
                                        const std::vector<LensSample>& samples) {
   LIMN_CHECK(model.value_count() == k_value_count);
+  const auto row_count = 2 * static_cast<Eigen::Index>(samples.size());
+  Eigen::Matrix<double, Eigen::Dynamic, k_value_count, Eigen::RowMajor> jacobian(row_count, k_value_count);
+  Eigen::VectorXd residuals(row_count);
   for (int iteration = 0; iteration < 20; ++iteration) {
-    Eigen::Matrix<double, k_value_count, k_value_count> hessian;
-    hessian.setIdentity();
-    hessian *= 1e-9;
-    Eigen::Vector<double, k_value_count> gradient;
-    gradient.setZero();
+    jacobian.setZero();
+    residuals.setZero();
+    Eigen::Index row = 0;
     for (const LensSample& sample : samples) {
       Eigen::Vector2d px;
-      Eigen::Matrix<double, 2, k_value_count, Eigen::RowMajor> jacobian;
-      if (!model.project(values, sample.p, &px, nullptr, jacobian.data())) continue;
-      hessian.noalias() += jacobian.transpose() * jacobian;
-      gradient.noalias() += jacobian.transpose() * (sample.px - px);
+      if (model.project(values, sample.p, &px, nullptr, jacobian.row(row).data()))
+        residuals.segment<2>(row) = sample.px - px;
+      row += 2;
     }
+    Eigen::Matrix<double, k_value_count, k_value_count> hessian = jacobian.transpose() * jacobian;
+    Eigen::Vector<double, k_value_count> gradient = jacobian.transpose() * residuals;
+    hessian.diagonal().array() += 1e-9;
     // Numerator and denominator of OPENCV8 cancel: without a weight the fit puts poles into the picture.
     constexpr double k_distortion_weight = 1e-2;  // (0.1 px / 1)^2
     for (int i = 4; i < k_value_count; ++i) {
@@ -158,8 +161,9 @@ std::vector<double> fitted_lens_values(const LensModel& model,
     }
     const Eigen::Vector<double, k_value_count> step = hessian.ldlt().solve(gradient);
     for (int i = 0; i < k_value_count; ++i) values[static_cast<std::size_t>(i)] += step[i];
-    constexpr double k_settled = 1e-10;
-    if (!step.allFinite() || step.norm() < k_settled) break;
+    constexpr double k_settled_px = 1e-3;  // what the next step moves is far less
+    const double moved_px = std::sqrt(step.dot(hessian * step) / static_cast<double>(samples.size()));
+    if (!(moved_px > k_settled_px)) break;
   }
   return values;
 }
@@ -178,8 +182,7 @@ bool is_camera(const ArtoolkitCamera& camera) {
 }
 
 // Grid of directions over the picture with the pixels where ARToolKit's model puts them.
-std::vector<LensSample> samples_of(const ArtoolkitCamera& camera) {
-  constexpr int k_grid = 24;
+std::vector<LensSample> samples_of(const ArtoolkitCamera& camera, int grid) {
   Eigen::Matrix3d pinhole;
   for (int row = 0; row < 3; ++row) {
     for (int col = 0; col < 3; ++col)
@@ -187,9 +190,10 @@ std::vector<LensSample> samples_of(const ArtoolkitCamera& camera) {
   }
   const Eigen::Matrix3d inverse = pinhole.inverse();
   std::vector<LensSample> samples;
-  for (int row = 0; row <= k_grid; ++row) {
-    for (int col = 0; col <= k_grid; ++col) {
-      const Eigen::Vector2d ideal(camera.width * col / double{k_grid}, camera.height * row / double{k_grid});
+  for (int row = 0; row <= grid; ++row) {
+    for (int col = 0; col <= grid; ++col) {
+      const Eigen::Vector2d ideal(double{1} * camera.width * col / grid,
+                                  double{1} * camera.height * row / grid);
       const Eigen::Vector3d p = inverse * ideal.homogeneous();
       samples.push_back({p / p.z(), observed_pixel(camera, ideal)});
     }
@@ -236,24 +240,23 @@ Result<Imager> load_artoolkit(const fs::path& path, const std::string& bytes) {
         "within "
         "a picture's size, found something else. Is it an ARToolKit camera_para.dat?",
         path.string());
-  const auto samples = samples_of(camera);
   const LensModel model = LensModel::parse("LENSMODEL_OPENCV8").value();
+  constexpr int k_fit_grid = 12;  // 338 numbers for 12 values
   const auto& m = camera.matrix;
-  auto lens = Lens::create(
-      model.name(), fitted_lens_values(model, {m[0], m[5], m[2], m[6], 0, 0, 0, 0, 0, 0, 0, 0}, samples));
+  auto lens =
+      Lens::create(model.name(), fitted_lens_values(model, {m[0], m[5], m[2], m[6], 0, 0, 0, 0, 0, 0, 0, 0},
+                                                    samples_of(camera, k_fit_grid)));
   if (!lens) return error("{}: {}", path.string(), lens.message());
-  double worst_px = 0;
-  for (const LensSample& sample : samples) {
+  // Version 1 is round in pixels, mrcal's models in tangents: 0.18 px for fy/fx = 1.036.
+  constexpr double k_max_refit_px = 0.5;
+  for (const LensSample& sample : samples_of(camera, 2 * k_fit_grid)) {
     const auto px = lens->project(sample.p);
-    worst_px = px ? std::max(worst_px, (*px - sample.px).norm()) : INFINITY;
-  }
-  constexpr double k_max_refit_px =
-      0.5;  // version 1 is round in pixels, mrcal's models in tangents: 0.18 px for fy/fx = 1.036
-  if (!(worst_px <= k_max_refit_px)) {
+    const double refit_px = px ? (*px - sample.px).norm() : INFINITY;
+    if (refit_px <= k_max_refit_px) continue;
     return error(
-        "{}: this ARToolKit distortion (version {}) is {:.2f} px from every LENSMODEL_OPENCV8, expected at "
-        "most {} px. Calibrate the camera with limn calibrate.",
-        path.string(), camera.version, worst_px, k_max_refit_px);
+        "{}: this ARToolKit distortion (version {}) is {:.2f} px from the nearest LENSMODEL_OPENCV8 at pixel "
+        "({:.0f}, {:.0f}), expected at most {} px. Calibrate the camera with limn calibrate.",
+        path.string(), camera.version, refit_px, sample.px.x(), sample.px.y(), k_max_refit_px);
   }
   return Imager{path.stem().string(), camera.width, camera.height, *lens, Pose()};
 }
