@@ -1,17 +1,19 @@
 // Small grey pictures: three bytes, then the levels row by row. The first byte is the width; of the second
-// the lower three bits say how many pixels wide a level is drawn, the others choose the lens and the options;
-// of the third see below.
+// the lower three bits say how many pixels wide a level is drawn, the others choose the lens; the third's
+// lower bits: blurred, srgb, followed, trained from; its upper four all set: larger than most.
 #include <opencv2/imgproc.hpp>
 
 #include "tests/fuzz/fuzz_file.h"
 #include "tracker/detector.h"
 #include "tracker/marker_pose.h"
+#include "tracker/template_training.h"
 
 namespace {
 
 using namespace limn;
 
-constexpr int k_max_pixels = 96 * 96;
+constexpr int k_max_pixels = 80 * 80;
+constexpr int k_max_large_pixels = 160 * 120;
 
 // Pictures of one level a byte, each drawn `scale` x `scale` pixels; blurred so that edges have a slope.
 cv::Mat picture_of(const std::uint8_t* levels, std::size_t count, int width, int scale, bool blurred) {
@@ -53,6 +55,27 @@ void check(const tracker::Detection& detection, const Lens* lens) {
     LIMN_CHECK(pose.camera_from_marker.is_finite() && pose.covariance.allFinite());
 }
 
+// Also where the picture has moved on.
+void check_followed(tracker::Detector& detector,
+                    const cv::Mat& grey,
+                    const Lens* lens,
+                    const std::vector<tracker::Detection>& last) {
+  std::vector<tracker::Detection> found;
+  for (const int moved : {0, 3}) {
+    detector.follow(grey.colRange(std::min(moved, grey.cols), grey.cols), lens, last, &found);
+    LIMN_CHECK(found.size() <= last.size());
+    for (const tracker::Detection& detection : found) check(detection, lens);
+  }
+}
+
+void check_training(const cv::Mat& grey) {
+  const auto trained = tracker::train_template(grey);
+  if (trained)
+    LIMN_CHECK(trained->side_px > 0 && !tracker::template_text(*trained).empty());
+  else
+    LIMN_CHECK(trained.message().find("expected") != std::string::npos);
+}
+
 }  // namespace
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
@@ -60,15 +83,20 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
   if (size < k_head) return 0;
   const int width = std::max<int>(1, bytes[0]);
   const int scale = 1 + bytes[1] % 8;
-  const std::size_t most = static_cast<std::size_t>(k_max_pixels / (scale * scale));
+  const int max_pixels = bytes[2] >> 4 == 15 ? k_max_large_pixels : k_max_pixels;
+  const auto most = static_cast<std::size_t>(max_pixels / (scale * scale));
   const cv::Mat grey = picture_of(bytes + k_head, std::min(size - k_head, most), width, scale, bytes[2] & 1);
-  const std::optional<Lens> lens =
-      grey.empty() || !(bytes[1] & 8) ? std::nullopt : std::optional(lens_for(grey, bytes[1] & 16));
+  if (grey.empty()) return 0;
+  const std::optional<Lens> own_lens =
+      bytes[1] & 8 ? std::optional(lens_for(grey, bytes[1] & 16)) : std::nullopt;
+  const Lens* lens = own_lens ? &*own_lens : nullptr;
   static tracker::Detector linear(families());
   static tracker::Detector srgb(families(),
                                 {.min_contrast = 8, .min_side_px = 3, .encoding = tracker::Encoding::srgb});
   tracker::Detector& detector = bytes[2] & 2 ? srgb : linear;
-  for (const tracker::Detection& detection : detector.detect(grey, lens ? &*lens : nullptr))
-    check(detection, lens ? &*lens : nullptr);
+  const std::vector<tracker::Detection> found = detector.detect(grey, lens);
+  for (const tracker::Detection& detection : found) check(detection, lens);
+  if (bytes[2] & 4) check_followed(detector, grey, lens, found);
+  if (bytes[2] & 8) check_training(grey);
   return 0;
 }
