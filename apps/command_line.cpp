@@ -268,6 +268,19 @@ void add_render(CLI::App& app, Run& run) {
                       "what projectors do with markers: keep-out leaves them dark, spotlight lights them white")
       ->check(CLI::IsMember({"as-is", "keep-out", "spotlight"}))
       ->capture_default_str();
+  command->add_option("--compensation", options->light.compensation,
+                      "what is divided out of the light: none; geometry: distance, incidence, vignetting and the scene's albedo; "
+                      "measured: albedo, colours, ambient and black light as the rig's response pictures saw them")
+      ->check(CLI::IsMember({"none", "geometry", "measured"}))
+      ->capture_default_str();
+  command->add_option("--measured-at", options->light.measured_at,
+                      "POSES.json with the prototype's place in the response pictures; without it, where it stands now");
+  command->add_option("--level", options->light.level,
+                      "brightness of white with compensation: irradiance, 1 is a projector's white head on at 1 m "
+                      "(what four fifths of the prototype can reach)");
+  command->add_option("--black", options->light.black, "even: overlaps of projectors do not show in the dark")
+      ->check(CLI::IsMember({"as-is", "even"}))
+      ->capture_default_str();
   command->add_option("--out", options->out, "folder for the pictures and coverage.json")->required();
   command->callback([options, &run] { run = [options] { return finished(run_render(*options)); }; });
 }

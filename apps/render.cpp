@@ -160,10 +160,12 @@ Result<Imager> choose_viewer(const RenderOptions& options, const scene::Scene& s
 
 Status write_coverage(const std::vector<projector::PartCoverage>& parts,
                       const Imager& viewer,
+                      nlohmann::ordered_json light,
                       const std::filesystem::path& out) {
   nlohmann::ordered_json json;
   json["schema"] = "limn.coverage/1";
   json["viewer"] = {{"name", viewer.name}, {"size", {viewer.width, viewer.height}}};
+  json["light"] = std::move(light);
   json["parts"] = nlohmann::ordered_json::array();
   for (const projector::PartCoverage& part : parts) {
     const std::string mask = "mask-" + part.slot + ".png";
@@ -226,6 +228,8 @@ Status run_render(const RenderOptions& options) {
   LIMN_TRY(const device::GlContext context, device::GlContext::create());
   log_info("render: {}", context.description());
   LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, rig));
+  LIMN_TRY_STATUS(set_light(options.light, options.rig, rig, scene, posed, &renderer));
+  const bool is_balanced = options.light.compensation != "none" || options.light.black != "as-is";
   const std::vector<Body> bodies = scene::bodies(scene);
   const std::vector<Track> tracks = tracks_of(scene, posed);
   for (std::size_t i = 0; i < rig.projectors.size(); ++i) {
@@ -233,9 +237,13 @@ Status run_render(const RenderOptions& options) {
     const cv::Mat picture = renderer.projector_picture(i, posed, viewer);
     const cv::Mat mask = tracker::marker_mask(rig.projectors[i], bodies, tracks);
     LIMN_TRY_STATUS(write_png(file, tracker::with_marker_light(picture, mask, *marker_light)));
+    if (is_balanced)
+      LIMN_TRY_STATUS(
+          write_png(options.out / ("clipped-" + rig.projectors[i].name + ".png"), renderer.clipped(i)));
   }
   LIMN_TRY_STATUS(write_composites(&renderer, options, rig, frames, posed));
-  return write_coverage(renderer.coverage(posed, viewer), viewer, options.out);
+  return write_coverage(renderer.coverage(posed, viewer), viewer, light_report(options.light, rig, renderer),
+                        options.out);
 }
 
 }  // namespace limn::apps

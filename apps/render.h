@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/light.h"
 #include "core/result.h"
 
 namespace limn::apps {
@@ -17,12 +18,14 @@ struct RenderOptions {
   std::string composite = "full";   ///< or "rest": only what light cannot show
   std::string marker_light =
       "as-is";  ///< projectors leave markers dark ("keep-out") or light them ("spotlight")
+  LightArguments light;
   std::filesystem::path out;
 };
 
 /// `limn render`: places the scene by the markers in the frames, or by the poses, and writes
 /// projector-NAME.png, composite-NAME.png (per camera with a frame; with poses alone per camera, over black),
-/// coverage.json and mask-PART.png.
+/// coverage.json, mask-PART.png and, where light is balanced, clipped-NAME.png of what it could not give
+/// (255: brighter, 128: darker).
 Status run_render(const RenderOptions& options);
 
 }  // namespace limn::apps

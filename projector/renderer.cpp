@@ -15,7 +15,7 @@ namespace {
 constexpr int k_response_columns = 1025;
 // Texture units; the sights take three from k_sights_unit on.
 constexpr int k_tangents_unit = 0, k_looks_unit = 1, k_response_unit = 2, k_centre_unit = 3,
-              k_picture_unit = 4, k_sights_unit = 5;
+              k_picture_unit = 4, k_sights_unit = 5, k_mixing_unit = 8, k_albedo_unit = 9;
 // Towards the lamp of shaders/look.glsl in the viewer's frame: above and behind the left shoulder.
 const Eigen::Vector3d k_d_lamp_viewer = Eigen::Vector3d(-0.36, -0.64, -0.68).normalized();
 
@@ -62,6 +62,28 @@ Status check_context() {
                epoxy_gl_version() / 10, epoxy_gl_version() % 10);
 }
 
+Status check_fits(const MeasuredSurface& surface, const Rig& rig) {
+  const Imager& camera = surface.camera;
+  if (surface.mixings.size() != rig.projectors.size()) {
+    return error(
+        "colour mixing: expected that of the rig's {} projectors, found {}. Measure the response of all.",
+        rig.projectors.size(), surface.mixings.size());
+  }
+  for (std::size_t i = 0; i < surface.mixings.size(); ++i) {
+    const ColourMixing& mixing = surface.mixings[i];
+    if (mixing.projector != rig.projectors[i].name || mixing.camera != camera.name) {
+      return error("colour mixing {} of the rig: expected {} seen by {}, found {} seen by {}.", i,
+                   rig.projectors[i].name, camera.name, mixing.projector, mixing.camera);
+    }
+    if (mixing.red.cols != camera.width || mixing.red.rows != camera.height) {
+      return error(
+          "colour mixing of {}: expected maps of {}'s size {}x{}, found {}x{}. Measure the response again.",
+          mixing.projector, camera.name, camera.width, camera.height, mixing.red.cols, mixing.red.rows);
+    }
+  }
+  return {};
+}
+
 // The mask and shares of the part of one owner in what coverage.frag wrote.
 PartCoverage counted(const scene::PosedPart& part, const cv::Mat& seen, std::uint8_t owner) {
   constexpr std::uint8_t k_projected = 2;  // as in shaders/seen.glsl
@@ -91,8 +113,14 @@ struct Renderer::Impl {
   std::vector<std::string> slot_names;
   GpuScene scene;
   Sights sights;
-  Program points, light_centre, light, coverage, parts_centre, composite;
+  Program points, light_centre, light, irradiance, coverage, parts_centre, composite;
   std::vector<GlName> responses;
+  std::vector<cv::Mat> clipped;  // of the projectors' last pictures
+  LightOptions light_options;
+  std::optional<SurfaceMixing> surface;     // its layers are on the GPU
+  std::optional<double> level_by_geometry;  // of the first place that the prototype had
+  std::optional<scene::Prototype> prototype;
+  GlName mixing, albedo;
   GlName vertex_array;  // without attributes, for whole.vert
 
   // What was drawn last, so that the same is not drawn again.
@@ -106,7 +134,11 @@ struct Renderer::Impl {
   std::map<std::tuple<int, int, GLenum>, Canvas> canvases;
 
   Impl(const scene::Scene& scene_in, const Rig& rig_in, Sights sights_in)
-      : rig(rig_in), scene(scene_in), sights(std::move(sights_in)) {
+      : rig(rig_in),
+        scene(scene_in),
+        sights(std::move(sights_in)),
+        clipped(rig_in.projectors.size()),
+        prototype(scene_in.prototype) {
     GLuint name = 0;
     glCreateVertexArrays(1, &name);
     vertex_array = GlName(name, [](GLuint n) { glDeleteVertexArrays(1, &n); });
@@ -115,6 +147,14 @@ struct Renderer::Impl {
       responses.push_back(make_texture(GL_TEXTURE_2D, GL_RGB32F, k_response_columns, 1));
       upload(responses.back(), response_table(find_response(rig, projector.name), k_response_columns));
     }
+    mixing = make_texture(GL_TEXTURE_2D_ARRAY, GL_RGBA16F, 1, 1);
+    const cv::Mat colours = relative_albedo(prototype.value_or(scene::Prototype{}));
+    albedo = make_texture(GL_TEXTURE_2D, GL_RGB32F, colours.cols, colours.rows);
+    for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+      glTextureParameteri(*albedo, filter, GL_LINEAR);
+    for (const GLenum wrap : {GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T})
+      glTextureParameteri(*albedo, wrap, GL_REPEAT);
+    upload(albedo, colours);
   }
 
   Status link_programs();
@@ -124,13 +164,17 @@ struct Renderer::Impl {
   void look_from_eye(const Imager& viewer);
   void look_from_imager(const Imager& imager);
   void set_up(const Program& program, const GpuLens& lens, const Imager* viewer) const;
+  void set_up_light(const Program& program, const scene::PosedScene& posed);
   void draw(const Program& program, const Canvas& into) const;
+  Result<SurfaceMixing> measured(const MeasuredSurface& surface);
 };
 
 Status Renderer::Impl::link_programs() {
   const std::pair<Program*, const char*> wanted[] = {
-      {&points, "points.frag"},     {&light_centre, "light_centre.frag"}, {&light, "light.frag"},
-      {&coverage, "coverage.frag"}, {&parts_centre, "parts_centre.frag"}, {&composite, "composite.frag"}};
+      {&points, "points.frag"},      {&light_centre, "light_centre.frag"},
+      {&light, "light.frag"},        {&irradiance, "irradiance.frag"},
+      {&coverage, "coverage.frag"},  {&parts_centre, "parts_centre.frag"},
+      {&composite, "composite.frag"}};
   for (const auto& [program, file] : wanted) {
     LIMN_TRY(*program, Program::link("whole.vert", file));
   }
@@ -212,6 +256,46 @@ void Renderer::Impl::set_up(const Program& program, const GpuLens& lens, const I
   program.set("u_d_lamp", direction(k_d_lamp_viewer));
 }
 
+void Renderer::Impl::set_up_light(const Program& program, const scene::PosedScene& posed) {
+  if (!level_by_geometry && prototype && posed.world_from_prototype)
+    level_by_geometry = geometric_level(*prototype, rig, *posed.world_from_prototype);
+  const bool by_measurement = light_options.compensation == Compensation::measured;
+  const double level = by_measurement ? surface->level : level_by_geometry.value_or(1);
+  program.set("u_compensation", static_cast<int>(light_options.compensation));
+  program.set("u_even_black", light_options.even_black);
+  program.set("u_level", static_cast<float>(light_options.level.value_or(level)));
+  program.set("u_mean_mixing", by_measurement ? surface->mean : Eigen::Matrix3f(Eigen::Matrix3f::Identity()));
+  program.set("u_witness", sights.witness());
+  program.bind("s_mixing", k_mixing_unit, mixing);
+  program.bind("s_albedo", k_albedo_unit, albedo);
+}
+
+// Takes the surface's layers to the GPU.
+Result<SurfaceMixing> Renderer::Impl::measured(const MeasuredSurface& measured) {
+  const Imager& camera = measured.camera;
+  scene::PosedScene bare;
+  bare.world_from_prototype = measured.world_from_prototype;
+  prepare(bare);
+  look_from_imager(camera);
+  const Canvas& canvas = this->canvas(camera.width, camera.height, GL_R32F);
+  std::vector<cv::Mat> irradiances;
+  for (std::size_t i = 0; i < rig.projectors.size(); ++i) {
+    set_up(irradiance, lens_of(camera), nullptr);
+    irradiance.set("u_projector", static_cast<int>(i));
+    draw(irradiance, canvas);
+    irradiances.push_back(read_back(canvas.framebuffer, camera.width, camera.height, CV_32FC1, GL_RED));
+  }
+  LIMN_TRY(SurfaceMixing found, surface_mixing(measured, irradiances));
+  sights.see_from_witness(scene, runs, scene_from_world, camera, lens_of(camera).baked);
+  mixing = make_texture(GL_TEXTURE_2D_ARRAY, GL_RGBA16F, camera.width, camera.height,
+                        static_cast<int>(found.layers.size()));
+  for (std::size_t i = 0; i < found.layers.size(); ++i)
+    glTextureSubImage3D(*mixing, 0, 0, 0, static_cast<GLint>(i), camera.width, camera.height, 1, GL_RGBA,
+                        GL_FLOAT, found.layers[i].data);
+  found.layers.clear();
+  return found;
+}
+
 void Renderer::Impl::draw(const Program& program, const Canvas& into) const {
   glBindFramebuffer(GL_FRAMEBUFFER, *into.framebuffer);
   glViewport(0, 0, into.width, into.height);
@@ -231,11 +315,23 @@ Renderer::~Renderer() = default;
 
 Result<Renderer> Renderer::create(const scene::Scene& scene, const Rig& rig) {
   LIMN_TRY_STATUS(check_context());
-  LIMN_TRY(Sights sights, Sights::create(rig.projectors));
+  LIMN_TRY(Sights sights, Sights::create(rig));
   auto impl = std::make_unique<Impl>(scene, rig, std::move(sights));
   LIMN_TRY_STATUS(impl->link_programs());
   return Renderer(std::move(impl));
 }
+
+Status Renderer::set_light(const LightOptions& options, const MeasuredSurface* surface) {
+  if (options.compensation == Compensation::measured) {
+    LIMN_CHECK(surface != nullptr);
+    LIMN_TRY_STATUS(check_fits(*surface, impl_->rig));
+    LIMN_TRY(impl_->surface, impl_->measured(*surface));
+  }
+  impl_->light_options = options;
+  return {};
+}
+
+cv::Mat Renderer::clipped(std::size_t index) const { return impl_->clipped.at(index); }
 
 cv::Mat Renderer::projector_picture(std::size_t index, const scene::PosedScene& posed, const Imager& viewer) {
   LIMN_CHECK(index < impl_->rig.projectors.size());
@@ -247,12 +343,17 @@ cv::Mat Renderer::projector_picture(std::size_t index, const scene::PosedScene& 
   for (const Program* program : {&impl_->light_centre, &impl_->light}) {
     impl_->set_up(*program, impl_->sights.projector_lens(index), &viewer);
     program->set("u_projector", static_cast<int>(index));
+    impl_->set_up_light(*program, posed);
   }
   impl_->draw(impl_->light_centre, centre);
   impl_->light.bind("s_centre", k_centre_unit, centre.texture);
   impl_->light.bind("s_response", k_response_unit, impl_->responses[index]);
   impl_->draw(impl_->light, display);
-  return read_back(display.framebuffer, projector.width, projector.height, CV_8UC3, GL_BGR);
+  const cv::Mat shown = read_back(display.framebuffer, projector.width, projector.height, CV_8UC4, GL_BGRA);
+  cv::Mat bgr;
+  cv::cvtColor(shown, bgr, cv::COLOR_BGRA2BGR);
+  cv::extractChannel(shown, impl_->clipped[index], 3);
+  return bgr;
 }
 
 cv::Mat Renderer::surface_points(std::size_t index, const scene::PosedScene& posed) {

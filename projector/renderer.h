@@ -7,6 +7,7 @@
 
 #include "core/result.h"
 #include "core/rig.h"
+#include "projector/compensation.h"
 #include "scene/posed.h"
 #include "scene/scene.h"
 
@@ -42,11 +43,20 @@ class Renderer {
   Renderer& operator=(Renderer&&) noexcept;
   ~Renderer();
 
+  /// How light is balanced from the next picture on; at first by the defaults of LightOptions. `surface` is
+  /// needed for Compensation::measured. Error, and nothing changes: a surface that does not fit the rig or
+  /// shows nothing.
+  Status set_light(const LightOptions& options, const MeasuredSurface* surface = nullptr);
+
   /// What projector `index` of the rig is to show, CV_8UC3 BGR display values by its measured response
   /// (gamma 2.2 without). `view` parts are drawn as seen from the viewer's eye, also beyond its picture;
   /// black elsewhere. Light is shared with the other projectors that reach the same point, so that the sum in
-  /// linear light is the part's colour.
+  /// linear light is the part's colour, as set_light says.
   cv::Mat projector_picture(std::size_t index, const scene::PosedScene& posed, const Imager& viewer);
+
+  /// Where the last projector_picture of `index` could not give what was wanted, CV_8UC1: 255 it should be
+  /// brighter, 128 darker, 0 all is well.
+  cv::Mat clipped(std::size_t index) const;
 
   /// CV_32FC3: the prototype's point (its own frame, m) that each pixel of the projector lights; NaN where
   /// none.

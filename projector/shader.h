@@ -27,6 +27,10 @@ class Program {
   void set(const char* uniform, const Eigen::Vector4f& v) const {
     glProgramUniform4fv(*name_, at(uniform), 1, v.data());
   }
+  void set(const char* uniform, float value) const { glProgramUniform1f(*name_, at(uniform), value); }
+  void set(const char* uniform, const Eigen::Matrix3f& m) const {
+    glProgramUniformMatrix3fv(*name_, at(uniform), 1, GL_FALSE, m.data());
+  }
   void set(const char* uniform, const Eigen::Matrix4f& m) const {
     glProgramUniformMatrix4fv(*name_, at(uniform), 1, GL_FALSE, m.data());
   }

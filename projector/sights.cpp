@@ -39,7 +39,7 @@ bool is_surface_part(const PlacedRun& placed) { return placed.owner != 0 && plac
 
 struct Sights::GpuSight {
   Eigen::Matrix4f sight_from_scene;
-  Eigen::Vector4f focal_centre, p_eye, size, map, quality;
+  Eigen::Vector4f focal_centre, p_eye, size, map, quality, vignetting;
 
   GpuSight(const Twin& twin, int first_layer) {
     sight_from_scene = twin.twin_from_scene.matrix().cast<float>();
@@ -49,27 +49,39 @@ struct Sights::GpuSight {
     size << static_cast<float>(twin.width), static_cast<float>(twin.height), 0, 0;
     map.setZero();
     quality << focal, 0, 0, 0;
+    vignetting.setZero();
   }
   void of_imager(const Imager& imager) {
     size.tail<2>() << static_cast<float>(imager.width), static_cast<float>(imager.height);
     quality.x() = static_cast<float>(imager.lens.fx());
     quality.y() = static_cast<float>(k_soft_border * std::min(imager.width, imager.height));
   }
+  void with_map(const TangentRect& whole, int layer) {
+    const Eigen::Vector2d nodes(k_map_columns - 1, k_map_rows - 1);
+    map << whole.lower.cast<float>(), nodes.cwiseQuotient(whole.upper - whole.lower).cast<float>();
+    quality.z() = static_cast<float>(layer);
+  }
+  void with_response(const Response& response) {
+    if (response.black_level) quality.w() = static_cast<float>(response.black_level->value);
+    if (!response.vignetting) return;
+    const Vignetting& v = *response.vignetting;
+    vignetting << v.tilt.cast<float>(), static_cast<float>(v.r2), static_cast<float>(v.r4);
+  }
 };
 
-Result<Sights> Sights::create(const std::vector<Imager>& projectors) {
+Result<Sights> Sights::create(const Rig& rig) {
   Sights sights;
+  const std::vector<Imager>& projectors = rig.projectors;
   LIMN_TRY(sights.program_, Program::link("ids.vert", "ids.frag"));
   sights.projectors_ = projectors;
-  const int count = std::max(1, static_cast<int>(projectors.size()));
+  sights.responses_ = rig.responses;
+  const int count = static_cast<int>(projectors.size()) + 1;  // with the witness
   sights.pixel_maps_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_RG32F, k_map_columns, k_map_rows, count);
   for (std::size_t i = 0; i < projectors.size(); ++i) {
     GpuLens lens{baked(projectors[i]), {}};
     lens.tangents = make_texture(GL_TEXTURE_2D, GL_RG32F, lens.baked.tangents.cols, lens.baked.tangents.rows);
     upload(lens.tangents, lens.baked.tangents);
-    const cv::Mat map = pixel_map(projectors[i], lens.baked.rect, k_map_columns, k_map_rows);
-    glTextureSubImage3D(*sights.pixel_maps_, 0, 0, 0, static_cast<GLint>(i), map.cols, map.rows, 1, GL_RG,
-                        GL_FLOAT, map.data);
+    sights.upload_pixel_map(static_cast<int>(i), projectors[i], lens.baked.rect);
     const Eigen::Vector2d extent =
         k_oversampling * projectors[i].lens.fx() * (lens.baked.rect.upper - lens.baked.rect.lower);
     sights.ids_width_ = std::clamp(static_cast<int>(extent.x()) + 8, sights.ids_width_, 2 * k_eye_side);
@@ -83,7 +95,7 @@ Result<Sights> Sights::create(const std::vector<Imager>& projectors) {
       make_depth_buffer(std::max(k_eye_side, sights.ids_width_), std::max(k_eye_side, sights.ids_height_));
   sights.framebuffer_ = make_framebuffer();
   glNamedFramebufferRenderbuffer(*sights.framebuffer_, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, *sights.depth_);
-  const std::vector<std::byte> empty((projectors.size() + 1) * sizeof(GpuSight));
+  const std::vector<std::byte> empty((projectors.size() + 2) * sizeof(GpuSight));
   sights.sights_ = make_buffer(empty.data(), empty.size());
   return sights;
 }
@@ -121,8 +133,13 @@ void Sights::draw(const GpuScene& scene,
   glDisable(GL_DEPTH_TEST);
 }
 
-void Sights::send(std::size_t index, const GpuSight& sight) {
-  glNamedBufferSubData(*sights_, static_cast<GLintptr>(index * sizeof(GpuSight)), sizeof(GpuSight), &sight);
+void Sights::send(int index, const GpuSight& sight) {
+  glNamedBufferSubData(*sights_, static_cast<GLintptr>(sizeof(GpuSight)) * index, sizeof(GpuSight), &sight);
+}
+
+void Sights::upload_pixel_map(int layer, const Imager& imager, const TangentRect& rect) {
+  const cv::Mat map = pixel_map(imager, rect, k_map_columns, k_map_rows);
+  glTextureSubImage3D(*pixel_maps_, 0, 0, 0, layer, map.cols, map.rows, 1, GL_RG, GL_FLOAT, map.data);
 }
 
 void Sights::see_from_projectors(const GpuScene& scene,
@@ -141,10 +158,10 @@ void Sights::see_from_projectors(const GpuScene& scene,
     draw(scene, surface_parts, twin, projector_ids_, layer + 1);
     GpuSight sight(twin, layer);
     sight.of_imager(projectors_[i]);
-    const Eigen::Vector2d nodes(k_map_columns - 1, k_map_rows - 1);
-    sight.map << whole.lower.cast<float>(), nodes.cwiseQuotient(whole.upper - whole.lower).cast<float>();
-    sight.quality.z() = static_cast<float>(i);
-    send(i, sight);
+    sight.with_map(whole, static_cast<int>(i));
+    for (const Response& response : responses_)
+      if (response.projector == projectors_[i].name) sight.with_response(response);
+    send(static_cast<int>(i), sight);
   }
 }
 
@@ -160,7 +177,25 @@ void Sights::see_from_imager(const GpuScene& scene,
   draw(scene, only(runs, is_part), twin, eye_ids_, 1);
   GpuSight sight(twin, 0);
   sight.of_imager(imager);
-  send(projectors_.size(), sight);
+  send(eye(), sight);
+}
+
+void Sights::see_from_witness(const GpuScene& scene,
+                              const std::vector<PlacedRun>& runs,
+                              const Pose& scene_from_world,
+                              const Imager& camera,
+                              const BakedLens& lens) {
+  const auto prototype = only(runs, is_prototype);
+  const Pose pose = sight_pose(camera, scene_from_world);
+  const Twin twin = twin_over(pose, intersected(lens.rect, spanned(pose, bounds_of(prototype))),
+                              k_oversampling * camera.lens.fx(), ids_width_, ids_height_);
+  const int layer = 2 * eye();
+  draw(scene, prototype, twin, projector_ids_, layer);
+  upload_pixel_map(eye(), camera, lens.rect);
+  GpuSight sight(twin, layer);
+  sight.of_imager(camera);
+  sight.with_map(lens.rect, eye());
+  send(witness(), sight);
 }
 
 void Sights::see_from_eye(const GpuScene& scene,
@@ -174,7 +209,7 @@ void Sights::see_from_eye(const GpuScene& scene,
   const Twin twin = twin_over(pose, spanned(pose, bounds), 1e9, k_eye_side, k_eye_side);
   draw(scene, only(runs, is_prototype), twin, eye_ids_, 0);
   draw(scene, only(runs, is_part), twin, eye_ids_, 1);
-  send(projectors_.size(), GpuSight(twin, 0));
+  send(eye(), GpuSight(twin, 0));
 }
 
 void Sights::bind(const Program& program, int first_unit) const {

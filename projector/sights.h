@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "core/rig.h"
 #include "projector/bake.h"
 #include "projector/gpu_scene.h"
 #include "projector/shader.h"
@@ -17,10 +18,11 @@ struct GpuLens {
 
 /// Id pictures (shaders/ids.frag) from the eyes of all projectors and of one viewer or camera, and where
 /// those eyes are, as shaders/scene.glsl reads them. Layer 2 i of the projectors' ids is the prototype, 2 i +
-/// 1 the surface parts; layer 0 of the eye's ids is the prototype, 1 the parts.
+/// 1 the surface parts; layer 0 of the eye's ids is the prototype, 1 the parts. After the projectors' comes a
+/// witness: a camera that measured the prototype and keeps its place in the scene's frame.
 class Sights {
  public:
-  static Result<Sights> create(const std::vector<Imager>& projectors);
+  static Result<Sights> create(const Rig& rig);
 
   /// Draws the projectors' ids of a posed scene.
   void see_from_projectors(const GpuScene& scene,
@@ -39,9 +41,17 @@ class Sights {
                     const Eigen::Vector3d& p_eye_scene,
                     const Eigen::Vector3d& d_up_scene);
 
+  /// Draws the prototype's ids from a camera, and keeps them: `scene_from_world` is the camera's, for good.
+  void see_from_witness(const GpuScene& scene,
+                        const std::vector<PlacedRun>& runs,
+                        const Pose& scene_from_world,
+                        const Imager& camera,
+                        const BakedLens& lens);
+
   const GpuLens& projector_lens(std::size_t i) const { return lenses_[i]; }
   /// Index of the eye among the sights of the shaders.
   int eye() const { return static_cast<int>(projectors_.size()); }
+  int witness() const { return eye() + 1; }
   /// Binds ids and sights for a program that includes scene.glsl (and reach.glsl).
   void bind(const Program& program, int first_unit) const;
 
@@ -52,9 +62,11 @@ class Sights {
             const Twin& twin,
             const GlName& ids,
             int layer);
-  void send(std::size_t index, const GpuSight& sight);
+  void send(int index, const GpuSight& sight);
+  void upload_pixel_map(int layer, const Imager& imager, const TangentRect& rect);
 
   std::vector<Imager> projectors_;
+  std::vector<Response> responses_;
   std::vector<GpuLens> lenses_;
   Program program_;
   GlName framebuffer_, depth_, projector_ids_, eye_ids_, pixel_maps_, sights_;

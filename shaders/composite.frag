@@ -13,7 +13,7 @@ vec3 srgb_from_linear(vec3 c) {
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   vec4 part = texelFetch(s_centre, at, 0);
-  if (is_at_edge(at)) {
+  if (is_at_edge(at, k_edge)) {
     part = vec4(0);
     for (int k = 0; k < k_samples * k_samples; ++k) part += part_at(vec2(at) + sample_offset(k));
     part /= float(k_samples * k_samples);

@@ -4,6 +4,7 @@
 #include "reach.glsl"
 #include "look.glsl"
 #include "on_surface.glsl"
+#include "balance.glsl"
 
 uniform usampler2DArray s_eye_ids;
 uniform int u_projector;
@@ -32,7 +33,7 @@ vec4 surface_colour(vec3 p, Hit prototype, vec3 d_normal, float footprint) {
   return hit.id == 0u ? vec4(0) : vec4(look_on_surface(hit, n, footprint), 1);
 }
 
-// rgb: light times coverage; a: coverage, before the light is shared among projectors.
+// rgb: light; a: coverage by what is to be lit.
 vec4 light_at(vec2 px) {
   Sight projector = s_sights[u_projector];
   vec3 d = ray_of(projector, px);
@@ -44,6 +45,6 @@ vec4 light_at(vec2 px) {
   float footprint = prototype.t / projector.quality.x;
   vec4 colour = u_has_view_parts ? view_colour(p, n, footprint) : vec4(0);
   if (colour.a == 0.0 && u_has_surface_parts) colour = surface_colour(p, prototype, n, footprint);
-  if (colour.a == 0.0) return colour;
-  return vec4(colour.rgb * share(u_projector, p, n), 1);
+  if (colour.a == 0.0 && !u_even_black) return colour;
+  return vec4(balanced(u_projector, colour, p, prototype, n), 1);
 }

@@ -19,39 +19,65 @@ vec2 pixel_of(Sight projector, vec2 tangent) {
                  texelFetch(s_pixel_maps, ivec3(first + ivec2(1, 1), layer), 0).xy, node - vec2(first));
 }
 
-// How well projector j lights p, whose triangle has the normal d_normal turned to the side that counts; 0 when it
-// does not: p outside its picture, turned away or in the shadow of the prototype. Pixels a square metre, times the
-// cosine once more against grazing light, fading towards the picture's border.
-float reach(int j, vec3 p, vec3 d_normal) {
+// Gain of a projector's light in its pixel (core/response.h, Vignetting).
+float vignetting(Sight projector, vec2 px) {
+  vec2 half_size = 0.5 * projector.size.zw;
+  vec2 q = (px + 0.5 - half_size) / length(half_size);
+  float q2 = dot(q, q);
+  return 1.0 + dot(projector.vignetting.xy, q) + q2 * (projector.vignetting.z + q2 * projector.vignetting.w);
+}
+
+// How projector j lights p, whose triangle has the normal d_normal turned to the side that counts.
+struct Reach {
+  float quality;     // pixels a square metre, times the cosine once more against grazing light, fading towards the
+                     // picture's border; 0 where its light does not fall on p: turned away, outside, in a shadow
+  float irradiance;  // of white, where 1 m away and head on is 1 (1/m^2); also where p is outside or in a shadow
+};
+
+Reach reach(int j, vec3 p, vec3 d_normal) {
   Sight projector = s_sights[j];
   vec3 to_eye = projector.p_eye.xyz - p;
   float distance_2 = dot(to_eye, to_eye);
   float cosine = dot(d_normal, to_eye) * inversesqrt(distance_2);
-  if (cosine <= 0.0) return 0.0;
   vec3 q = (projector.sight_from_scene * vec4(p, 1)).xyz;
-  if (q.z <= 0.0) return 0.0;
+  if (cosine <= 0.0 || q.z <= 0.0) return Reach(0.0, 0.0);
   vec2 px = pixel_of(projector, q.xy / q.z);
-  vec2 inside = min(px + 0.5, projector.size.zw - 0.5 - px);
+  vec2 last = projector.size.zw - 0.5;
+  float gain = vignetting(projector, clamp(px, vec2(-0.5), last));
+  Reach reach = Reach(0.0, cosine / distance_2 * max(gain, 0.05));
+  vec2 inside = min(px + 0.5, last - px);
   float border = min(inside.x, inside.y);
-  if (border < 0.0 || is_hidden(s_projector_ids, projector, p)) return 0.0;
+  if (border < 0.0 || is_hidden(s_projector_ids, projector, p)) return reach;
   float soft = max(k_least_share, smoothstep(0.0, projector.quality.y, border));
-  return soft * cosine * cosine * projector.quality.x * projector.quality.x / distance_2;
+  reach.quality = soft * cosine * cosine * projector.quality.x * projector.quality.x / distance_2;
+  return reach;
 }
 
 bool is_reached(vec3 p, vec3 d_normal) {
   for (int j = 0; j < u_projector_count; ++j) {
-    if (reach(j, p, d_normal) > 0.0) return true;
+    if (reach(j, p, d_normal).quality > 0.0) return true;
   }
   return false;
 }
 
-// Share of the light at p that projector i gives; the shares of all that reach p sum to one.
-float share(int i, vec3 p, vec3 d_normal) {
+// What projector i is to give at p.
+struct Share {
+  float share;          // of the light there; the shares of all that reach p sum to one
+  float irradiance;     // as Reach
+  float missing_black;  // irradiance that black gives where every projector reaches, and that is missing at p
+};
+
+Share share_of(int i, vec3 p, vec3 d_normal) {
   float own = 0.0, sum = 0.0;
+  Share share = Share(0.0, 0.0, 0.0);
   for (int j = 0; j < u_projector_count; ++j) {
-    float w = reach(j, p, d_normal);
-    sum += w;
-    if (j == i) own = w;
+    Reach reach = reach(j, p, d_normal);
+    sum += reach.quality;
+    if (reach.quality == 0.0) share.missing_black += s_sights[j].quality.w * reach.irradiance;
+    if (j != i) continue;
+    own = reach.quality;
+    share.irradiance = reach.irradiance;
   }
-  return sum > 0.0 ? own / sum : 0.0;
+  share.share = sum > 0.0 ? own / sum : 0.0;
+  return share;
 }

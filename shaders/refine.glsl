@@ -2,10 +2,10 @@
 
 uniform sampler2D s_centre;  // linear light, a: coverage
 
-const float k_edge = 0.02;  // of full light; a smaller step is not seen
+const float k_edge = 0.02;  // of full light; a smaller step beside light is not seen
 const int k_samples = 4;    // a side of a pixel
 
-bool is_at_edge(ivec2 at) {
+bool is_at_edge(ivec2 at, float least) {
   ivec2 last = textureSize(s_centre, 0) - 1;
   vec4 lowest = vec4(1e9), highest = vec4(-1e9);
   for (int y = -1; y <= 1; ++y) {
@@ -15,7 +15,7 @@ bool is_at_edge(ivec2 at) {
       highest = max(highest, c);
     }
   }
-  return any(greaterThan(highest - lowest, vec4(k_edge)));
+  return any(greaterThan(highest - lowest, vec4(least)));
 }
 
 // Place of sample k in the pixel, from its centre.

@@ -26,7 +26,9 @@ struct Sight {
   vec4 p_eye;         // scene frame; w: first layer of its ids
   vec4 size;          // of the pinhole picture; zw: of the imager's own picture
   vec4 map;           // tangents of the first node of the imager's pixel map, nodes per tangent
-  vec4 quality;       // focal length of the imager (px), width of the soft border (px), layer of its pixel map
+  vec4 quality;       // focal length of the imager (px), width of the soft border (px), layer of its pixel map, light of
+                      // black as a share of white
+  vec4 vignetting;    // tilt (xy), r2, r4 of core/response.h
 };
 layout(std430, binding = 5) readonly buffer Sights { Sight s_sights[]; };
 

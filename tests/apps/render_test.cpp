@@ -196,6 +196,32 @@ TEST_F(RenderDoor, SparesOrLightsTheMarkers) {
   EXPECT_TRUE(run_render(options).error().wrong_usage);
 }
 
+TEST_F(RenderDoor, BalancesLightAndSaysWhatItCannotGive) {
+  ASSERT_TRUE(run_render(options));
+  const cv::Mat as_it_is = read_picture(folder / "out/projector-projector0.png").value();
+  EXPECT_FALSE(fs::exists(folder / "out/clipped-projector0.png"));
+  options.light.compensation = "geometry";
+  options.light.level = 1e6;
+  ASSERT_TRUE(run_render(options));
+  const cv::Mat clipped = read_picture(folder / "out/clipped-projector0.png").value();
+  EXPECT_GT(cv::countNonZero(clipped == 255), 1000) << "nothing is a million times as bright";
+  const json light = json::parse(read_file(folder / "out/coverage.json").value())["light"];
+  EXPECT_EQ(light["compensation"], "geometry");
+  EXPECT_GT(light["projectors"][0]["too_bright_wanted"], 0.001);
+  options.light.level = {};
+  ASSERT_TRUE(run_render(options));
+  const cv::Mat balanced = read_picture(folder / "out/projector-projector0.png").value();
+  EXPECT_GT(cv::norm(as_it_is, balanced, cv::NORM_INF), 5);
+
+  options.light.compensation = "measured";
+  const Status status = run_render(options);
+  ASSERT_FALSE(status);
+  EXPECT_NE(status.message().find("response.json"), std::string::npos) << status.message();
+  EXPECT_NE(status.message().find("limn patterns --response"), std::string::npos) << status.message();
+  options.light.level = -1;
+  EXPECT_TRUE(run_render(options).error().wrong_usage);
+}
+
 TEST_F(RenderDoor, MistakesAreErrors) {
   const auto failed = [](const RenderOptions& wrong, bool usage, const std::string& says) {
     const Status status = run_render(wrong);

@@ -14,6 +14,7 @@
 #include "core/file.h"
 #include "core/picture.h"
 #include "sim/photograph.h"
+#include "tests/calib/response_captures.h"
 #include "tests/sim/small_world.h"
 #include "tests/support/matchers.h"
 
@@ -54,38 +55,6 @@ sim::World lit_world(int height = 240) {
   projector = {.illuminance_at_1m = 1.3, .gamma = 2.2, .black_level = 0.005, .vignetting = 0.15};
   projector.aperture_m = 0.004;
   return world;
-}
-
-Captures plan_of(const sim::World& world, const fs::path& folder) {
-  std::vector<CapturedDevice> cameras, projectors;
-  for (const Imager& imager : world.rig.cameras)
-    cameras.push_back({imager.name, imager.width, imager.height});
-  for (const Imager& imager : world.rig.projectors)
-    projectors.push_back({imager.name, imager.width, imager.height});
-  return plan_captures(folder, cameras, projectors, Board::parse("charuco:5x4:25mm").value());
-}
-
-// Photographs of the response pictures, as the world's cameras take them.
-Captures captured(const sim::World& world) {
-  const Captures plan = plan_of(world, test_folder() / "captures");
-  std::vector<sim::Samples> samples;
-  for (size_t i = 0; i < world.rig.cameras.size(); ++i)
-    samples.push_back(sim::trace(world, static_cast<int>(i)));
-  std::vector<cv::Mat> shown(world.rig.projectors.size());
-  std::uint64_t shots = 0;
-  const Status status =
-      capture_response(plan, {.show =
-                                  [&](int projector, const cv::Mat& picture) {
-                                    for (cv::Mat& other : shown) other = cv::Mat();
-                                    shown[static_cast<size_t>(projector)] = picture;
-                                    return Status();
-                                  },
-                              .grab = [&](int camera) -> Result<cv::Mat> {
-                                return sim::photograph(world, samples[static_cast<size_t>(camera)], shown,
-                                                       world.seed + ++shots);
-                              }});
-  EXPECT_TRUE(status.ok()) << status.message();
-  return plan;
 }
 
 // The largest difference of a measured curve from the true one, share of full light.

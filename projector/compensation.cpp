@@ -1,0 +1,180 @@
+#include "projector/compensation.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace limn::projector {
+namespace {
+
+constexpr double k_too_dim = 0.2;        // share of the surface that need not reach white
+constexpr std::size_t k_samples = 4000;  // triangles that are asked for the level
+constexpr float k_least_light = 0.004F;  // of the camera's full scale, that a projector's white must give
+constexpr int k_edge_px = 2;             // beside shadows and silhouettes pixels see two things
+
+// The value that `share` of them lie below.
+double quantile(std::vector<double>* values, double share) {
+  const auto at =
+      values->begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values->size() - 1));
+  std::nth_element(values->begin(), at, values->end());
+  return *at;
+}
+
+// r, g, b of a map's pixel; a grey camera's value for each.
+Eigen::Vector3f colour_at(const cv::Mat& map, int row, int column) {
+  if (map.channels() == 1) return Eigen::Vector3f::Constant(map.at<float>(row, column));
+  const auto& bgr = map.at<cv::Vec3f>(row, column);
+  return {bgr[2], bgr[1], bgr[0]};
+}
+
+// Columns: what red, green and blue look like. Grey: each like all of them together.
+Eigen::Matrix3f mixing_at(const ColourMixing& mixing, int row, int column) {
+  const Eigen::Vector3f red = colour_at(mixing.red, row, column),
+                        green = colour_at(mixing.green, row, column),
+                        blue = colour_at(mixing.blue, row, column);
+  Eigen::Matrix3f m;
+  if (mixing.red.channels() == 1) return (red + green + blue).asDiagonal();
+  m << red, green, blue;
+  return m;
+}
+
+cv::Vec4f known(const Eigen::Vector3f& v) { return {v.x(), v.y(), v.z(), 1}; }
+
+// Where the projector lights the surface well away from the edges of its light.
+cv::Mat lit_inside(const cv::Mat& irradiance) {
+  cv::Mat lit = irradiance > 0;
+  cv::erode(lit, lit, cv::Mat(), {-1, -1}, k_edge_px, cv::BORDER_CONSTANT, cv::Scalar(0));
+  return lit;
+}
+
+// Carries what is known on into its unknown surroundings, so far that light's edges find something there.
+void spread(cv::Mat* layer) {
+  for (int i = 0; i < 2 * k_edge_px; ++i) {
+    cv::Mat around;
+    cv::blur(*layer, around, {3, 3});
+    for (int row = 0; row < layer->rows; ++row)
+      for (int column = 0; column < layer->cols; ++column) {
+        const auto& mean = around.at<cv::Vec4f>(row, column);
+        auto& pixel = layer->at<cv::Vec4f>(row, column);
+        if (pixel[3] == 0 && mean[3] > 0) pixel = mean * (1 / mean[3]);
+      }
+  }
+}
+
+// Irradiance of an unshadowed point by geometry; 0 where the projector does not reach.
+double irradiance_at(const Imager& projector,
+                     const Vignetting& vignetting,
+                     const Eigen::Vector3d& p_world,
+                     const Eigen::Vector3d& n_world) {
+  const Eigen::Vector3d to_eye = projector.imager_from_world.inverse().translation - p_world;
+  const double cosine = n_world.dot(to_eye.normalized());
+  const auto px = projector.project(p_world);
+  if (cosine <= 0 || !px || !projector.contains(*px)) return 0;
+  return cosine / to_eye.squaredNorm() * vignetting.gain(*px, projector.width, projector.height);
+}
+
+Vignetting vignetting_of(const Rig& rig, const Imager& projector) {
+  for (const Response& response : rig.responses)
+    if (response.projector == projector.name && response.vignetting) return *response.vignetting;
+  return {};
+}
+
+}  // namespace
+
+Result<SurfaceMixing> surface_mixing(const MeasuredSurface& surface, std::span<const cv::Mat> irradiance) {
+  const std::size_t count = surface.mixings.size();
+  const cv::Size size(surface.camera.width, surface.camera.height);
+  SurfaceMixing out;
+  for (std::size_t i = 0; i < 3 * count + 1; ++i) out.layers.emplace_back(size, CV_32FC4, cv::Scalar::all(0));
+  std::vector<cv::Mat> lit;
+  for (const cv::Mat& picture : irradiance) lit.push_back(lit_inside(picture));
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  std::size_t seen = 0;
+  std::vector<Eigen::Vector3f> whites;  // of pixels, all projectors on
+  for (int row = 0; row < size.height; ++row)
+    for (int column = 0; column < size.width; ++column) {
+      Eigen::Vector3f white = Eigen::Vector3f::Zero();
+      Eigen::Vector3f offset = Eigen::Vector3f::Zero();
+      int projectors = 0;
+      for (std::size_t i = 0; i < count; ++i) {
+        if (!lit[i].at<uchar>(row, column)) continue;
+        const Eigen::Matrix3f mixing = mixing_at(surface.mixings[i], row, column);
+        const Eigen::Vector3f by_this = mixing.rowwise().sum();
+        if (!mixing.allFinite() || !(by_this.minCoeff() > k_least_light)) continue;
+        const Eigen::Matrix3f at_one = mixing / irradiance[i].at<float>(row, column);
+        for (int c = 0; c < 3; ++c)
+          out.layers[3 * i + static_cast<std::size_t>(c)].at<cv::Vec4f>(row, column) = known(at_one.col(c));
+        sum += at_one.cast<double>();
+        ++seen;
+        white += by_this;
+        offset += colour_at(surface.mixings[i].offset, row, column);
+        ++projectors;
+      }
+      if (projectors == 0) continue;
+      offset /= static_cast<float>(projectors);
+      out.layers.back().at<cv::Vec4f>(row, column) = known(offset);
+      whites.push_back(white + offset);
+    }
+  if (seen == 0) {
+    return error(
+        "colour mixing of camera {}: expected pixels that see the prototype lit, found none where the rig "
+        "and "
+        "the prototype's place say that it is lit. Measure the response again with the prototype in place.",
+        surface.camera.name);
+  }
+  for (cv::Mat& layer : out.layers) spread(&layer);
+  out.mean = (sum / static_cast<double>(seen)).cast<float>();
+  const Eigen::Vector3f mean_white = out.mean.rowwise().sum();
+  std::vector<double> levels;
+  for (const Eigen::Vector3f& white : whites)
+    levels.push_back((white.array() / mean_white.array()).minCoeff());
+  out.level = quantile(&levels, k_too_dim);
+  return out;
+}
+
+double geometric_level(const scene::Prototype& prototype, const Rig& rig, const Pose& world_from_prototype) {
+  const scene::Mesh& mesh = prototype.mesh;
+  const cv::Mat albedo = relative_albedo(prototype);
+  const std::size_t stride = std::max<std::size_t>(1, mesh.triangles.size() / k_samples);
+  std::vector<double> levels;
+  for (std::size_t t = 0; t < mesh.triangles.size(); t += stride) {
+    std::array<Eigen::Vector3d, 3> p;
+    Eigen::Vector2f uv(0, 0);
+    for (std::size_t k = 0; k < 3; ++k) {
+      p[k] = world_from_prototype * mesh.positions[mesh.triangles[t][k]].cast<double>();
+      if (!mesh.uvs.empty()) uv += mesh.uvs[mesh.triangles[t][k]] / 3;
+    }
+    const Eigen::Vector3d n = (p[1] - p[0]).cross(p[2] - p[0]).normalized();
+    const Eigen::Vector3d middle = (p[0] + p[1] + p[2]) / 3;
+    double irradiance = 0;  // of either face: meshes need not be closed
+    for (const Eigen::Vector3d& face : {n, Eigen::Vector3d(-n)}) {
+      double sum = 0;
+      for (const Imager& projector : rig.projectors)
+        sum += irradiance_at(projector, vignetting_of(rig, projector), middle, face);
+      irradiance = std::max(irradiance, sum);
+    }
+    if (!(irradiance > 0)) continue;
+    const auto texel = [](float at, int size) {
+      return std::clamp(static_cast<int>((at - std::floor(at)) * static_cast<float>(size)), 0, size - 1);
+    };
+    const auto& rgb = albedo.at<cv::Vec3f>(texel(1 - uv.y(), albedo.rows), texel(uv.x(), albedo.cols));
+    levels.push_back(irradiance * std::min({rgb[0], rgb[1], rgb[2]}));
+  }
+  return levels.empty() ? 1 : std::max(1e-6, quantile(&levels, k_too_dim));
+}
+
+cv::Mat relative_albedo(const scene::Prototype& prototype) {
+  if (prototype.albedo_picture.empty()) return {1, 1, CV_32FC3, cv::Scalar::all(1)};
+  cv::Mat linear(prototype.albedo_picture.size(), CV_32FC3);
+  for (int row = 0; row < linear.rows; ++row)
+    for (int column = 0; column < linear.cols; ++column)
+      for (int c = 0; c < 3; ++c)
+        linear.at<cv::Vec3f>(row, column)[c] = static_cast<float>(
+            linear_of_srgb(prototype.albedo_picture.at<cv::Vec3b>(row, column)[2 - c] / 255.0));
+  const cv::Scalar mean = cv::mean(linear);
+  return linear / std::max(1e-3, (mean[0] + mean[1] + mean[2]) / 3);
+}
+
+}  // namespace limn::projector

@@ -1,0 +1,80 @@
+// From a part's colour to the light that one projector gives for it: distance, incidence and vignetting divided out, and
+// what the surface does to light (projector/compensation.h).
+
+const int k_as_it_is = 0, k_by_geometry = 1, k_by_measurement = 2;
+uniform int u_compensation;
+uniform float u_level;      // irradiance (1/m^2) that a colour of 1 is to look like on the mean surface
+uniform bool u_even_black;  // gives the black light of projectors that do not reach a point
+uniform int u_witness;      // sight of the camera that measured the surface
+uniform mat3 u_mean_mixing;
+// Layer 3 i + c: what channel c of projector i gives in the camera at an irradiance of 1, a: 0 where unknown; the last
+// one: what is there without projectors.
+uniform sampler2DArray s_mixing;
+uniform sampler2D s_albedo;  // of the prototype, over its mean
+
+struct Surface {
+  mat3 mixing;  // columns: what red, green and blue light of irradiance 1 look like
+  vec3 offset;  // what is there without
+};
+
+vec4 mixing_at(vec2 px, int layer) {
+  ivec2 first = ivec2(floor(px));
+  ivec2 last = textureSize(s_mixing, 0).xy - 1;
+  if (any(lessThan(first, ivec2(0))) || any(greaterThanEqual(first, last))) return vec4(0);
+  vec2 f = px - vec2(first);
+  vec4 a = texelFetch(s_mixing, ivec3(first, layer), 0), b = texelFetch(s_mixing, ivec3(first + ivec2(1, 0), layer), 0);
+  vec4 c = texelFetch(s_mixing, ivec3(first + ivec2(0, 1), layer), 0);
+  vec4 d = texelFetch(s_mixing, ivec3(first + ivec2(1, 1), layer), 0);
+  if (min(min(a.a, b.a), min(c.a, d.a)) < 0.5) return vec4(0);
+  return mix(mix(a, b, f.x), mix(c, d, f.x), f.y);
+}
+
+// As measured for projector i or, where that one was not seen there, for another; else the mean.
+Surface measured_surface(int i, vec3 p) {
+  Surface surface = Surface(u_mean_mixing, vec3(0));
+  Sight witness = s_sights[u_witness];
+  vec3 q = (witness.sight_from_scene * vec4(p, 1)).xyz;
+  if (q.z <= 0.0 || is_hidden(s_projector_ids, witness, p)) return surface;
+  vec2 px = pixel_of(witness, q.xy / q.z);
+  surface.offset = mixing_at(px, 3 * u_projector_count).rgb;
+  for (int k = 0; k < u_projector_count; ++k) {
+    int j = (i + k) % u_projector_count;
+    vec4 red = mixing_at(px, 3 * j);
+    if (red.a == 0.0) continue;
+    surface.mixing = mat3(red.rgb, mixing_at(px, 3 * j + 1).rgb, mixing_at(px, 3 * j + 2).rgb);
+    break;
+  }
+  return surface;
+}
+
+Surface surface_at(int i, vec3 p, Hit prototype) {
+  if (u_compensation == k_by_measurement) return measured_surface(i, p);
+  uint first = 3u * (prototype.id - 1u);
+  vec2 uv = mat3x2(vec2(s_corners[first].w, s_normals[first].w),
+                   vec2(s_corners[first + 1u].w, s_normals[first + 1u].w),
+                   vec2(s_corners[first + 2u].w, s_normals[first + 2u].w)) * prototype.weights;
+  vec3 albedo = texture(s_albedo, vec2(uv.x, 1.0 - uv.y)).rgb;
+  const float k_darkest = 0.02;  // of the mean: what is darker stays dark
+  albedo = max(albedo, vec3(k_darkest));
+  return Surface(mat3(albedo.r, 0, 0, 0, albedo.g, 0, 0, 0, albedo.b), vec3(0));
+}
+
+// Light over black of projector i at the prototype's point p; outside 0 ... 1 where it cannot give what is wanted.
+// `colour` has a: 0 where nothing is to be shown.
+vec3 balanced(int i, vec4 colour, vec3 p, Hit prototype, vec3 d_normal) {
+  Share share = share_of(i, p, d_normal);
+  if (u_compensation == k_as_it_is && !u_even_black) return colour.rgb * share.share;
+  if (share.share == 0.0) return vec3(0);
+  vec3 light = vec3(0);
+  if (colour.a > 0.0) {
+    if (u_compensation == k_as_it_is) {
+      light = colour.rgb * share.share;
+    } else {
+      Surface surface = surface_at(i, p, prototype);
+      vec3 wanted = u_level * u_mean_mixing * colour.rgb - surface.offset;
+      light = share.share / share.irradiance * (inverse(surface.mixing) * wanted);
+    }
+  }
+  if (u_even_black) light += share.share * share.missing_black / share.irradiance;
+  return light;
+}

@@ -1,0 +1,20 @@
+#version 450 core
+// How projector u_projector lights what the eye's pixels see of the prototype: irradiance, or 0 where it does not reach.
+#include "scene.glsl"
+#include "lens.glsl"
+#include "reach.glsl"
+layout(location = 0) out float o_irradiance;
+uniform usampler2DArray s_eye_ids;
+uniform int u_eye, u_projector;
+
+void main() {
+  Sight eye = s_sights[u_eye];
+  vec3 d = ray_of(eye, floor(gl_FragCoord.xy));
+  Hit hit = first_hit(s_eye_ids, eye, 0, d);
+  o_irradiance = 0.0;
+  if (hit.id == 0u) return;
+  vec3 n = flat_normal(hit.id);
+  if (dot(n, d) > 0.0) n = -n;
+  Reach reach = reach(u_projector, eye.p_eye.xyz + hit.t * d, n);
+  if (reach.quality > 0.0) o_irradiance = reach.irradiance;
+}
