@@ -436,6 +436,32 @@ TEST(Detector, FollowsMarkersUnderFingersToThePicturesEnd) {
   EXPECT_TRUE(found.empty());
 }
 
+// Markers of one id, 70 px wide and so steep that each lies within half a side of the next.
+cv::Mat stacked_markers(int count, double moved_px, std::mt19937_64& rng) {
+  std::vector<PlacedMarker> markers;
+  for (int i = 0; i < count; ++i)
+    markers.push_back(test::placed(pinhole_vga(), {"aruco_4x4_50", "7"}, {320, 200 + 36.0 * i + moved_px}, 70,
+                                   0, 68_deg, 0));
+  return test::picture_of(pinhole_vga(), test::plain(640, 480, 100), markers, {.noise_levels = 1}, rng);
+}
+
+TEST(Detector, FollowsNoSquareTwice) {
+  auto rng = test::test_rng();
+  Detector detector(families({"aruco_4x4_50"}));
+  const auto last = detector.detect(stacked_markers(3, 0, rng));
+  ASSERT_EQ(last.size(), 3);
+  std::vector<Detection> found;
+  for (const double moved_px : {0, 12, 24, 36}) {
+    detector.follow(stacked_markers(3, moved_px, rng), nullptr, last, &found);
+    ASSERT_FALSE(found.empty()) << moved_px;
+    for (std::size_t i = 0; i < found.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j)
+        EXPECT_GT((found[i].corners_px[0] - found[j].corners_px[0]).norm(), 25) << moved_px;
+  }
+  detector.follow(stacked_markers(1, 36, rng), nullptr, last, &found);
+  EXPECT_EQ(found.size(), 1);
+}
+
 TEST(Detector, FindsMarkersUnderFingersAndSaysWhichCornersAreCovered) {
   auto rng = test::test_rng();
   Detector detector(families({"apriltag_36h11"}));
