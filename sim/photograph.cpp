@@ -62,15 +62,24 @@ class Beam {
 
   cv::Mat light_of(const cv::Mat& shown, int channel) const {
     cv::Mat linear = shown;
+    if (shown.depth() == CV_32F) return padded(channel_of(shown * effects_.illuminance_at_1m, channel));
     if (shown.channels() == 1 && effects_.channel_gamma != Eigen::Vector3d::Ones())
       cv::cvtColor(shown, linear, cv::COLOR_GRAY2BGR);
     cv::LUT(linear, light_of_values(linear.channels()), linear);
-    if (linear.channels() == 3 && channel == k_grey)
-      cv::transform(linear, linear, cv::Matx13f(0.0722F, 0.7152F, 0.2126F));  // BT.709 luminance of BGR
-    else if (linear.channels() == 3)
-      cv::extractChannel(linear, linear, channel);
-    cv::copyMakeBorder(linear, linear, k_pad, k_pad, k_pad, k_pad, cv::BORDER_CONSTANT, cv::Scalar(0));
-    return linear;
+    return padded(channel_of(linear, channel));
+  }
+
+  static cv::Mat channel_of(cv::Mat light, int channel) {
+    if (light.channels() == 3 && channel == k_grey)
+      cv::transform(light, light, cv::Matx13f(0.0722F, 0.7152F, 0.2126F));  // BT.709 luminance of BGR
+    else if (light.channels() == 3)
+      cv::extractChannel(light, light, channel);
+    return light;
+  }
+
+  static cv::Mat padded(cv::Mat light) {
+    cv::copyMakeBorder(light, light, k_pad, k_pad, k_pad, k_pad, cv::BORDER_CONSTANT, cv::Scalar(0));
+    return light;
   }
 
   cv::Mat blurred(std::size_t level) const {
@@ -129,7 +138,7 @@ std::vector<Beam> beams_of(const World& world,
     const cv::Mat picture = shown.empty() ? cv::Mat() : shown[k];
     if (!picture.empty()) {
       LIMN_CHECK(picture.cols == projector.width && picture.rows == projector.height);
-      LIMN_CHECK(picture.type() == CV_8UC1 || picture.type() == CV_8UC3);
+      LIMN_CHECK(picture.type() == CV_8UC1 || picture.type() == CV_8UC3 || picture.type() == CV_32FC3);
     }
     beams.emplace_back(projector, world.projector_effects.at(k), picture, channel);
     beams.back().prepare(samples.projectors[k]);

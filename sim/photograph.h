@@ -15,6 +15,7 @@ double light_share(const ProjectorEffects& effects, int channel, double value);
 
 /// Linear light in every pixel (CV_32FC1, or C3 for a colour camera): no blur, no noise, no exposure. `shown`
 /// holds one 8-bit grey or BGR picture per projector; an empty picture is black, an empty span is all black.
+/// A CV_32FC3 picture is linear light as it leaves the projector, a share of full white: no gamma, no black.
 /// A projector's pixels are little squares, blurred by defocus where the surface is out of focus.
 cv::Mat ideal_light(const World& world, const Samples& samples, std::span<const cv::Mat> shown);
 

@@ -6,122 +6,18 @@
 #include <limits>
 #include <opencv2/core.hpp>
 
+#include "sim/directions.h"
 #include "sim/ray_scene.h"
+#include "sim/texture.h"
 
 namespace limn::sim {
 namespace {
 
 constexpr int k_sub_samples = 32;       // of a pixel on an edge: an edge's place is then known to 1/64 px
-constexpr int k_direction_step = 8;     // px between exact directions; cubic between them errs below 1e-8 rad
 constexpr float k_same_albedo = 0.02F;  // samples of one pixel that differ by less are one surface
 constexpr float k_same_normal = 0.99F;  // cosine, about 8°
 constexpr float k_same_depth = 1e-3F;   // m, departure from a plane within one pixel
 constexpr int k_lamp_points = 12;       // spread evenly over a lamp's disc
-
-// Where ray directions of any sub-pixel place come from: exact ones on a grid that reaches over the border,
-// cubic interpolation (Catmull-Rom) between them.
-class Directions {
- public:
-  explicit Directions(const Imager& imager)
-      : columns_(imager.width / k_direction_step + 5), rows_(imager.height / k_direction_step + 5) {
-    knots_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_));
-    const Eigen::Matrix3d world_from_imager = imager.imager_from_world.inverse().rotation_matrix();
-    cv::parallel_for_({0, rows_}, [&](const cv::Range& range) {
-      for (int r = range.start; r < range.end; ++r)
-        for (int c = 0; c < columns_; ++c) {
-          const Eigen::Vector2d px((c - 2) * k_direction_step, (r - 2) * k_direction_step);
-          const auto d = imager.lens.unproject(px);
-          knots_[index(r, c)] = d ? Eigen::Vector3d(world_from_imager * *d)
-                                  : Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
-        }
-    });
-  }
-
-  Eigen::Vector3f at(double x, double y) const {
-    const double cx = x / k_direction_step + 2, cy = y / k_direction_step + 2;
-    const int c = static_cast<int>(cx), r = static_cast<int>(cy);
-    const std::array<double, 4> wx = weights(cx - c), wy = weights(cy - r);
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (int j = 0; j < 4; ++j) {
-      Eigen::Vector3d row = Eigen::Vector3d::Zero();
-      for (int i = 0; i < 4; ++i)
-        row += wx[static_cast<std::size_t>(i)] * knots_[index(r - 1 + j, c - 1 + i)];
-      sum += wy[static_cast<std::size_t>(j)] * row;
-    }
-    return sum.normalized().cast<float>();
-  }
-
-  /// Directions of pixels (x0, y), (x0 + 1, y), …
-  void row(double x0, double y, std::span<Eigen::Vector3f> d) const {
-    const double cy = y / k_direction_step + 2;
-    const int r = static_cast<int>(cy);
-    const std::array<double, 4> wy = weights(cy - r);
-    std::vector<Eigen::Vector3d> knots(static_cast<std::size_t>(columns_), Eigen::Vector3d::Zero());
-    for (int c = 0; c < columns_; ++c)
-      for (int j = 0; j < 4; ++j)
-        knots[static_cast<std::size_t>(c)] += wy[static_cast<std::size_t>(j)] * knots_[index(r - 1 + j, c)];
-    for (std::size_t i = 0; i < d.size(); ++i) {
-      const double cx = (x0 + static_cast<double>(i)) / k_direction_step + 2;
-      const auto c = static_cast<std::size_t>(cx);
-      const std::array<double, 4> wx = weights(cx - static_cast<double>(c));
-      const Eigen::Vector3d sum =
-          wx[0] * knots[c - 1] + wx[1] * knots[c] + wx[2] * knots[c + 1] + wx[3] * knots[c + 2];
-      d[i] = sum.normalized().cast<float>();
-    }
-  }
-
- private:
-  std::size_t index(int r, int c) const {
-    return static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(c);
-  }
-  static std::array<double, 4> weights(double t) {
-    return {((-0.5 * t + 1) * t - 0.5) * t, ((1.5 * t - 2.5) * t) * t + 1, ((-1.5 * t + 2) * t + 0.5) * t,
-            ((0.5 * t - 0.5) * t) * t};
-  }
-  int columns_, rows_;
-  std::vector<Eigen::Vector3d> knots_;
-};
-
-const std::array<float, 256>& linear_of_srgb() {
-  static const std::array<float, 256> table = [] {
-    std::array<float, 256> t{};
-    for (std::size_t i = 0; i < t.size(); ++i) {
-      const double v = static_cast<double>(i) / 255;
-      t[i] = static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
-    }
-    return t;
-  }();
-  return table;
-}
-
-// Linear BGR of a texture's pixel; coordinates beyond the border take the border's.
-Eigen::Vector3f texel(const cv::Mat& texture, int x, int y) {
-  const auto& linear = linear_of_srgb();
-  x = std::clamp(x, 0, texture.cols - 1);
-  y = std::clamp(y, 0, texture.rows - 1);
-  const std::uint8_t* p = texture.ptr(y) + x * texture.channels();
-  if (texture.channels() == 1) return Eigen::Vector3f::Constant(linear[p[0]]);
-  return {linear[p[0]], linear[p[1]], linear[p[2]]};
-}
-
-Eigen::Vector3f textured(const cv::Mat& texture, const Eigen::Vector2f& uv, bool sharp) {
-  const float x = uv.x() * static_cast<float>(texture.cols),
-              y = (1 - uv.y()) * static_cast<float>(texture.rows);
-  if (sharp) return texel(texture, static_cast<int>(std::floor(x)), static_cast<int>(std::floor(y)));
-  const int c = static_cast<int>(std::floor(x - 0.5F)), r = static_cast<int>(std::floor(y - 0.5F));
-  const float fx = x - 0.5F - static_cast<float>(c), fy = y - 0.5F - static_cast<float>(r);
-  return (1 - fy) * ((1 - fx) * texel(texture, c, r) + fx * texel(texture, c + 1, r)) +
-         fy * ((1 - fx) * texel(texture, c, r + 1) + fx * texel(texture, c + 1, r + 1));
-}
-
-Eigen::Vector3f material_albedo(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv) {
-  const auto t = static_cast<std::size_t>(triangle);
-  const std::size_t m = mesh.triangle_materials.empty() ? 0 : mesh.triangle_materials[t];
-  const scene::Material& material = mesh.materials[m];
-  const Eigen::Vector3f bgr = material.base_colour.reverse();
-  if (material.texture.empty()) return bgr;
-  return bgr.cwiseProduct(textured(material.texture, uv, false));
-}
 
 // What one ray sees.
 struct Surface {

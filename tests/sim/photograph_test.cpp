@@ -43,6 +43,15 @@ TEST(Photograph, WhiteLightIsIlluminanceTimesGainTimesAlbedo) {
   EXPECT_EQ(f.at({}), 0);
 }
 
+TEST(Photograph, FloatPicturesAreLightAlready) {
+  Fixture f;
+  const float white = f.at(flat(255));
+  f.world.projector_effects[0].gamma = 2.2;
+  f.world.projector_effects[0].black_level = 0.1;
+  const Pictures quarter = {cv::Mat(150, 200, CV_32FC3, cv::Scalar::all(0.25))};
+  EXPECT_NEAR(f.at(quarter), 0.25F * white, 1e-5F);
+}
+
 TEST(Photograph, GammaChangesMidTonesOnly) {
   Fixture f;
   const float white = f.at(flat(255)), middle = f.at(flat(128));

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "core/imager.h"
+
+namespace limn::sim {
+
+/// World directions of any sub-pixel place of an imager, a pixel beyond its border included: exact ones on a
+/// grid, cubic interpolation (Catmull-Rom) between them, which errs below 1e-8 rad.
+class Directions {
+ public:
+  explicit Directions(const Imager& imager);
+
+  /// Unit; NaN where the lens has none.
+  Eigen::Vector3f at(double x, double y) const;
+  /// Directions of pixels (x0, y), (x0 + 1, y), …
+  void row(double x0, double y, std::span<Eigen::Vector3f> d) const;
+
+ private:
+  std::size_t index(int r, int c) const {
+    return static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(c);
+  }
+  int columns_, rows_;
+  std::vector<Eigen::Vector3d> knots_;
+};
+
+}  // namespace limn::sim
