@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "apps/capture.h"
-#include "apps/demo_judge.h"
+#include "apps/judge.h"
 #include "apps/demo_page.h"
 #include "apps/solve.h"
 #include "apps/world_markers.h"

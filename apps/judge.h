@@ -8,23 +8,35 @@
 #include <span>
 #include <vector>
 
+#include "core/imager.h"
 #include "scene/mesh.h"
 #include "sim/world.h"
 
 namespace limn::apps {
 
-/// Small white discs on a prototype, to be projected as a surface part: each is aimed at a point of the
-/// surface.
+/// Small white discs to be projected, each aimed at a point of the prototype's surface. Prototype frame.
 struct AimedDots {
-  scene::Mesh mesh;                      ///< prototype frame; unlit
-  std::vector<Eigen::Vector3d> p_aimed;  ///< centre of each disc, prototype frame
+  scene::Mesh mesh;                      ///< unlit
+  std::vector<Eigen::Vector3d> p_aimed;  ///< where the middle of each disc's light is to land
+  double spacing_m = 0;                  ///< p_aimed are at least this far apart
+
+  // Of discs that float before the surface, else empty: their centres and the eye that sees each before its
+  // p_aimed.
+  std::vector<Eigen::Vector3d> p_centres;
+  Eigen::Vector3d p_eye = Eigen::Vector3d::Zero();
 };
 
-/// About `count` random points on the prototype, at least k_dot_spacing_m apart, with a disc on each. Only
-/// points that some true projector reaches with its whole disc, well inside its picture.
+/// About `count` random points on the prototype with a disc on each. Only points that some true projector
+/// reaches with its whole disc, well inside its picture.
 AimedDots aimed_dots(const sim::World& world, int count, std::uint64_t seed);
 
-/// How far light lands from where it was aimed, on the surface.
+/// About `count` discs that float `height_m` off random points of the prototype and face the viewer's eye,
+/// which sees them before points that some true projector reaches.
+AimedDots floating_dots(
+    const sim::World& world, const Imager& viewer, double height_m, int count, std::uint64_t seed);
+
+/// How far light lands from where it was aimed: on the surface; of floating discs as the eye sees it, in each
+/// disc's plane.
 struct Registration {
   double rms_mm = 0;
   double p95_mm = 0;
@@ -46,5 +58,9 @@ double outline_distance_px(const cv::Mat& found, const cv::Mat& truth);
 /// Intersection over union of two labelled pictures: pixels where both have the same label other than 0, over
 /// pixels where either has one.
 double label_iou(const cv::Mat& found, const cv::Mat& truth);
+
+/// The largest difference of any level between two series of 8-bit pictures; infinite when their number or
+/// sizes differ.
+double worst_difference(std::span<const cv::Mat> a, std::span<const cv::Mat> b);
 
 }  // namespace limn::apps

@@ -1,4 +1,4 @@
-#include "apps/demo_judge.h"
+#include "apps/judge.h"
 
 #include <gtest/gtest.h>
 
@@ -57,7 +57,7 @@ cv::Mat drawn(const AimedDots& dots, double shift_px) {
   return picture;
 }
 
-TEST(DemoJudge, DotsLieOnThePrototypeAndApart) {
+TEST(Judge, DotsLieOnThePrototypeAndApart) {
   const AimedDots dots = aimed_dots(plane_world(), 400, 1);
   ASSERT_EQ(dots.p_aimed.size(), 400u);
   for (std::size_t i = 0; i < dots.p_aimed.size(); ++i) {
@@ -66,7 +66,7 @@ TEST(DemoJudge, DotsLieOnThePrototypeAndApart) {
   }
 }
 
-TEST(DemoJudge, LightWhereItWasAimedScoresNearZero) {
+TEST(Judge, LightWhereItWasAimedScoresNearZero) {
   const sim::World world = plane_world();
   const AimedDots dots = aimed_dots(world, 400, 1);
   const std::vector<cv::Mat> pictures = {drawn(dots, 0)};
@@ -75,7 +75,7 @@ TEST(DemoJudge, LightWhereItWasAimedScoresNearZero) {
   EXPECT_LT(found.rms_mm, 0.03) << "what 8-bit levels and 8x8 sub-pixels leave";
 }
 
-TEST(DemoJudge, AShiftOfOnePixelIsMeasuredInMillimetres) {
+TEST(Judge, AShiftOfOnePixelIsMeasuredInMillimetres) {
   const sim::World world = plane_world();
   const AimedDots dots = aimed_dots(world, 400, 1);
   const std::vector<cv::Mat> pictures = {drawn(dots, 1)};
@@ -84,7 +84,7 @@ TEST(DemoJudge, AShiftOfOnePixelIsMeasuredInMillimetres) {
   EXPECT_GE(found.p95_mm, found.rms_mm);
 }
 
-TEST(DemoJudge, DarknessCountsAsError) {
+TEST(Judge, DarknessCountsAsError) {
   const sim::World world = plane_world();
   const AimedDots dots = aimed_dots(world, 50, 1);
   const std::vector<cv::Mat> pictures = {cv::Mat(480, 640, CV_8UC3, cv::Scalar::all(0))};
@@ -93,7 +93,48 @@ TEST(DemoJudge, DarknessCountsAsError) {
   EXPECT_GT(found.rms_mm, 3);
 }
 
-TEST(DemoJudge, OutlineDistanceOfAShiftedSquare) {
+// An eye before and beside the plane, looking at its middle.
+Imager eye_beside() {
+  const Pose eye_from_world = looking_at({0.5, -0.2, -0.1}, {0, 0, k_distance_m}, -Eigen::Vector3d::UnitY());
+  return viewer_imager(eye_from_world.inverse(), 640, 480, 40);
+}
+
+TEST(Judge, FloatingDotsAreSeenBeforeTheirAimedPoints) {
+  const sim::World world = plane_world();
+  const Imager eye = eye_beside();
+  const AimedDots dots = floating_dots(world, eye, 0.05, 100, 1);
+  ASSERT_GT(dots.p_centres.size(), 50u);
+  for (std::size_t i = 0; i < dots.p_centres.size(); ++i) {
+    EXPECT_NEAR(dots.p_centres[i].z(), -0.05, 1e-6) << "the plane's normal is -z";
+    const auto seen = eye.project(world.world_from_prototype * dots.p_centres[i]);
+    const auto aimed = eye.project(world.world_from_prototype * dots.p_aimed[i]);
+    EXPECT_NEAR((*seen - *aimed).norm(), 0, 1e-3);
+  }
+}
+
+TEST(Judge, LightBesideAFloatingDotIsMeasuredAsTheEyeSeesIt) {
+  const sim::World world = plane_world();
+  const AimedDots dots = floating_dots(world, eye_beside(), 0.05, 100, 1);
+  const std::vector<cv::Mat> right = {drawn(dots, 0)}, beside = {drawn(dots, 1)};
+  EXPECT_LT(judged_registration(world, dots, right).rms_mm, 0.03);
+  const Registration found = judged_registration(world, dots, beside);
+  // 1 mm along x on the plane, foreshortened for an eye 24 degrees off and 5 % nearer in the discs' planes.
+  EXPECT_GT(found.rms_mm, 0.8);
+  EXPECT_LT(found.rms_mm, 0.95);
+}
+
+TEST(Judge, TheWorstDifferenceOfSeriesIsOneLevelOfOnePixel) {
+  const std::vector<cv::Mat> a = {cv::Mat::zeros(4, 5, CV_8UC3), cv::Mat::zeros(6, 7, CV_8UC3)};
+  std::vector<cv::Mat> b = {a[0].clone(), a[1].clone()};
+  EXPECT_EQ(worst_difference(a, b), 0);
+  b[1].at<cv::Vec3b>(2, 3)[1] = 1;
+  EXPECT_EQ(worst_difference(a, b), 1);
+  EXPECT_TRUE(std::isinf(worst_difference(a, std::span(b).first(1))));
+  b[0] = cv::Mat::zeros(5, 4, CV_8UC3);
+  EXPECT_TRUE(std::isinf(worst_difference(a, b)));
+}
+
+TEST(Judge, OutlineDistanceOfAShiftedSquare) {
   cv::Mat truth(200, 200, CV_8U, cv::Scalar(0)), found = truth.clone();
   truth(cv::Rect(50, 50, 80, 80)) = 255;
   found(cv::Rect(52, 50, 80, 80)) = 128;
@@ -102,7 +143,7 @@ TEST(DemoJudge, OutlineDistanceOfAShiftedSquare) {
   EXPECT_TRUE(std::isinf(outline_distance_px(cv::Mat::zeros(200, 200, CV_8U), truth)));
 }
 
-TEST(DemoJudge, LabelsMustAgreeForTheirIntersection) {
+TEST(Judge, LabelsMustAgreeForTheirIntersection) {
   cv::Mat truth(10, 10, CV_8U, cv::Scalar(0)), found = truth.clone();
   truth(cv::Rect(0, 0, 10, 4)) = 255;
   found(cv::Rect(0, 0, 10, 2)) = 255;

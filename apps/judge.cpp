@@ -1,4 +1,4 @@
-#include "apps/demo_judge.h"
+#include "apps/judge.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -15,11 +15,14 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_dot_radius_m = 0.0018;          // some 4 projector pixels across: sub-pixel centroids
-constexpr double k_dot_spacing_m = 0.0075;         // discs and their light stay apart
-constexpr double k_reach_m = k_dot_spacing_m / 2;  // light nearer to a dot than this is the dot's
-constexpr double k_free_radius_m = 0.0026;         // its light with the fringe of the pixels it is drawn in
-constexpr double k_flat_m = 0.001;                 // how far the surface may leave a dot's plane there
+constexpr double k_dot_radius_m = 0.0018;       // some 4 projector pixels across: sub-pixel centroids
+constexpr double k_dot_spacing_m = 0.0075;      // discs and their light stay apart
+constexpr double k_floating_spacing_m = 0.012;  // a floating disc's light is drawn out by the surface's slant
+constexpr double k_free_radius_m = 0.0026;      // its light with the fringe of the pixels it is drawn in
+constexpr double k_floating_free_radius_m = 0.0045;
+constexpr double k_min_sight_cosine =
+    0.6;  // between sight and surface behind a floating disc: so far it is drawn out
+constexpr double k_flat_m = 0.001;  // how far the surface may leave a dot's plane there
 constexpr int k_dot_corners = 12;
 constexpr int k_tries_per_dot = 30;  // of random places, to pack dots as close as their spacing allows
 constexpr double k_border_px = 4;    // of a projector's picture, that a dot must stay away from
@@ -45,16 +48,17 @@ bool well_inside(const Imager& projector, const Eigen::Vector3d& p_world) {
 }
 
 // Whether the true projector reaches the disc with some margin, from the front.
-bool reached(const sim::World& world,
-             const sim::Truth& truth,
-             const Imager& projector,
-             const sim::SurfacePoint& sample) {
+bool reached_by(const sim::World& world,
+                const sim::Truth& truth,
+                const Imager& projector,
+                const sim::SurfacePoint& sample,
+                double free_radius_m) {
   const Eigen::Vector3d p_light = projector.imager_from_world.inverse().translation;
   const Eigen::Vector3d p_world = world.world_from_prototype * sample.p;
   const Eigen::Vector3d n_world = world.world_from_prototype.rotation * sample.n;
   if (n_world.dot((p_light - p_world).normalized()) < k_min_incidence_cosine) return false;
   if (!well_inside(projector, p_world)) return false;
-  std::vector<Eigen::Vector3d> places = rim(sample, k_free_radius_m);
+  std::vector<Eigen::Vector3d> places = rim(sample, free_radius_m);
   places.push_back(sample.p);
   for (const Eigen::Vector3d& p : places) {
     const auto px = projector.project(world.world_from_prototype * p);
@@ -63,6 +67,14 @@ bool reached(const sim::World& world,
     if ((landing->p_object - p).norm() > k_flat_m) return false;
   }
   return true;
+}
+
+bool reached(const sim::World& world,
+             const sim::Truth& truth,
+             const sim::SurfacePoint& sample,
+             double free_radius_m) {
+  return std::any_of(world.rig.projectors.begin(), world.rig.projectors.end(),
+                     [&](const Imager& p) { return reached_by(world, truth, p, sample, free_radius_m); });
 }
 
 // Grid of cells as wide as `spacing`, to find what is near.
@@ -127,6 +139,32 @@ void append_disc(const sim::SurfacePoint& sample, scene::Mesh* mesh) {
   }
 }
 
+AimedDots no_dots(double spacing_m) {
+  AimedDots dots;
+  dots.mesh.materials = {scene::Material{.base_colour = {1, 1, 1}, .unlit = true, .texture = {}}};
+  dots.spacing_m = spacing_m;
+  return dots;
+}
+
+// Where on the prototype the viewer sees p (both in its frame), if on it.
+std::optional<sim::SurfacePoint> seen_behind(const sim::World& world,
+                                             const sim::Truth& truth,
+                                             const Imager& viewer,
+                                             const Eigen::Vector3d& p) {
+  const auto px = viewer.project(world.world_from_prototype * p);
+  const auto landing = px ? truth.landing(viewer, *px) : std::nullopt;
+  if (!landing || landing->object != "prototype") return std::nullopt;
+  return sim::SurfacePoint{landing->p_object,
+                           world.world_from_prototype.rotation.inverse() * landing->n_world};
+}
+
+// The place that counts for a dot when light lands at p: there, or where the eye sees it in the disc's plane.
+Eigen::Vector3d place_of(const AimedDots& dots, std::size_t dot, const Eigen::Vector3d& p) {
+  if (dots.p_centres.empty()) return p;
+  const Eigen::Vector3d n = dots.p_eye - dots.p_centres[dot], d = p - dots.p_eye;
+  return dots.p_eye - d * (n.squaredNorm() / n.dot(d));
+}
+
 cv::Mat outline(const cv::Mat& mask) {
   const cv::Mat inside = mask != 0;
   cv::Mat eroded;
@@ -146,17 +184,44 @@ std::pair<double, int> squared_distances(const cv::Mat& from, const cv::Mat& to)
 
 }  // namespace
 
+AimedDots floating_dots(
+    const sim::World& world, const Imager& viewer, double height_m, int count, std::uint64_t seed) {
+  const sim::Truth truth(world);
+  AimedDots dots = no_dots(k_floating_spacing_m);
+  dots.p_eye = world.world_from_prototype.inverse() * viewer.imager_from_world.inverse().translation;
+  NearestPoints taken(&dots.p_aimed, k_floating_spacing_m);
+  for (const sim::SurfacePoint& sample :
+       sim::surface_points(prototype_mesh(world), k_tries_per_dot * count, seed)) {
+    if (static_cast<int>(dots.p_aimed.size()) == count) break;
+    const Eigen::Vector3d p_centre = sample.p + height_m * sample.n;
+    const auto behind = seen_behind(world, truth, viewer, p_centre);
+    if (!behind || (behind->p - dots.p_eye).norm() < (p_centre - dots.p_eye).norm()) continue;
+    if (behind->n.dot((dots.p_eye - behind->p).normalized()) < k_min_sight_cosine) continue;
+    if (taken.nearest(behind->p, k_floating_spacing_m)) continue;
+    const sim::SurfacePoint disc{p_centre, (dots.p_eye - p_centre).normalized()};
+    const auto corners = rim(disc, k_floating_free_radius_m);
+    const bool whole = std::all_of(corners.begin(), corners.end(), [&](const Eigen::Vector3d& corner) {
+      const auto beside = seen_behind(world, truth, viewer, corner);
+      return beside && (beside->p - behind->p).norm() < k_floating_spacing_m;
+    });
+    if (!whole || !reached(world, truth, *behind, k_floating_free_radius_m)) continue;
+    dots.p_aimed.push_back(behind->p);
+    dots.p_centres.push_back(p_centre);
+    taken.add(dots.p_aimed.size() - 1);
+    append_disc(disc, &dots.mesh);
+  }
+  return dots;
+}
+
 AimedDots aimed_dots(const sim::World& world, int count, std::uint64_t seed) {
   const sim::Truth truth(world);
-  AimedDots dots;
-  dots.mesh.materials = {scene::Material{.base_colour = {1, 1, 1}, .unlit = true, .texture = {}}};
+  AimedDots dots = no_dots(k_dot_spacing_m);
   NearestPoints taken(&dots.p_aimed, k_dot_spacing_m);
   for (const sim::SurfacePoint& sample :
        sim::surface_points(prototype_mesh(world), k_tries_per_dot * count, seed)) {
     if (static_cast<int>(dots.p_aimed.size()) == count) break;
     if (taken.nearest(sample.p, k_dot_spacing_m)) continue;
-    const auto reaches = [&](const Imager& projector) { return reached(world, truth, projector, sample); };
-    if (std::none_of(world.rig.projectors.begin(), world.rig.projectors.end(), reaches)) continue;
+    if (!reached(world, truth, sample, k_free_radius_m)) continue;
     dots.p_aimed.push_back(sample.p);
     taken.add(dots.p_aimed.size() - 1);
     append_disc(sample, &dots.mesh);
@@ -168,7 +233,8 @@ Registration judged_registration(const sim::World& world,
                                  const AimedDots& dots,
                                  std::span<const cv::Mat> projector_pictures) {
   const sim::Truth truth(world);
-  NearestPoints aimed(&dots.p_aimed, k_dot_spacing_m);
+  const double reach_m = dots.spacing_m / 2;  // light nearer to a dot than this is the dot's
+  NearestPoints aimed(&dots.p_aimed, dots.spacing_m);
   for (std::size_t i = 0; i < dots.p_aimed.size(); ++i) aimed.add(i);
   std::vector<double> energy(dots.p_aimed.size(), 0);
   std::vector<Eigen::Vector3d> moment(dots.p_aimed.size(), Eigen::Vector3d::Zero());
@@ -182,20 +248,21 @@ Registration judged_registration(const sim::World& world,
         if (value == 0) continue;
         const auto landing = truth.landing(world.rig.projectors[i], {column, row});
         if (!landing || landing->object != "prototype") continue;
-        const auto dot = aimed.nearest(landing->p_object, k_reach_m);
+        const auto dot = aimed.nearest(landing->p_object, reach_m);
         if (!dot) continue;
         energy[*dot] += light[value];
-        moment[*dot] += light[value] * landing->p_object;
+        moment[*dot] += light[value] * place_of(dots, *dot, landing->p_object);
       }
     }
   }
   Registration found;
   found.points = static_cast<int>(dots.p_aimed.size());
+  const auto& truth_places = dots.p_centres.empty() ? dots.p_aimed : dots.p_centres;
   double sum = 0;
   for (std::size_t i = 0; i < dots.p_aimed.size(); ++i) {
     const bool lit = energy[i] > 0;
     if (!lit) ++found.unlit;
-    const double error_m = lit ? (moment[i] / energy[i] - dots.p_aimed[i]).norm() : k_reach_m;
+    const double error_m = lit ? (moment[i] / energy[i] - truth_places[i]).norm() : reach_m;
     found.errors_mm.push_back(error_m * 1e3);
     sum += error_m * error_m * 1e6;
   }
@@ -219,6 +286,17 @@ double label_iou(const cv::Mat& found, const cv::Mat& truth) {
   const cv::Mat both = (found == truth) & (truth != 0);
   const cv::Mat either = (found != 0) | (truth != 0);
   return static_cast<double>(cv::countNonZero(both)) / std::max(1, cv::countNonZero(either));
+}
+
+double worst_difference(std::span<const cv::Mat> a, std::span<const cv::Mat> b) {
+  if (a.size() != b.size()) return std::numeric_limits<double>::infinity();
+  double worst = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (a[i].size() != b[i].size() || a[i].type() != b[i].type())
+      return std::numeric_limits<double>::infinity();
+    worst = std::max(worst, cv::norm(a[i], b[i], cv::NORM_INF));
+  }
+  return worst;
 }
 
 }  // namespace limn::apps
