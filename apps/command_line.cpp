@@ -9,6 +9,7 @@
 #include "apps/align.h"
 #include "apps/bench.h"
 #include "apps/capture.h"
+#include "apps/check.h"
 #include "apps/demo.h"
 #include "apps/detect.h"
 #include "apps/learn_body.h"
@@ -285,6 +286,20 @@ void add_render(CLI::App& app, Run& run) {
   command->callback([options, &run] { run = [options] { return finished(run_render(*options)); }; });
 }
 
+void add_check(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("check", "is what is drawn right? render checks against the ray-traced truth");
+  command->footer(
+      "A check names a world, poses and limits (config/README.md); without files all of config/checks run. OUT/check.html\n"
+      "shows what was drawn, what was expected and the difference. Exits 1 when a limit is missed.\n"
+      "Example: limn check\n"
+      "Example: limn check config/checks/door-moved.json --out checked");
+  auto options = std::make_shared<CheckOptions>();
+  command->add_option("checks", options->files, "check files (limn.check/1)");
+  command->add_option("--out", options->out, "folder for check.html, check.json and pictures")->capture_default_str();
+  command->add_flag("--json", options->json, "print check.json instead of a table");
+  command->callback([options, &run] { run = [options] { return finished(run_check(*options)); }; });
+}
+
 void add_simulate(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand("simulate", "pictures of the virtual rig, and the truth behind them");
   command->footer("Example: limn simulate config/worlds/studio.json --out simulated --variants mirror=sport");
@@ -316,6 +331,7 @@ int run_command_line(int argc, char** argv) {
   add_recheck(app, run);
   add_align(app, run);
   add_render(app, run);
+  add_check(app, run);
   add_simulate(app, run);
 
   const auto commands = app.get_subcommands({});

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "apps/page.h"
 #include "core/file.h"
 #include "core/picture.h"
 
@@ -25,21 +26,6 @@ td.value { font-variant-numeric: tabular-nums; text-align: right; } .good { colo
 figure { margin: 0; } img { width: 100%; display: block; border-radius: 4px; background: #000; }
 figcaption { margin-top: .5rem; color: #a9a69f; } figcaption b { color: #e8e6e1; }
 )";
-
-std::string escaped(const std::string& text) {
-  std::string html;
-  for (const char c : text) {
-    if (c == '<')
-      html += "&lt;";
-    else if (c == '>')
-      html += "&gt;";
-    else if (c == '&')
-      html += "&amp;";
-    else
-      html += c;
-  }
-  return html;
-}
 
 cv::Mat scaled_for_page(const cv::Mat& picture) {
   if (picture.cols <= k_embedded_width) return picture;
@@ -69,9 +55,10 @@ Status write_demo_page(const DemoPage& page, const std::filesystem::path& path) 
       k_style, escaped(page.headline));
   html += rows_html(page.rows) + "<div class=\"pictures\">\n";
   for (const DemoPicture& picture : page.pictures) {
-    html += fmt::format("<figure><img alt=\"{}\" src=\"{}\"><figcaption><b>{}.</b> {}</figcaption></figure>\n",
-                        escaped(picture.title), data_uri(scaled_for_page(picture.picture)),
-                        escaped(picture.title), escaped(picture.caption));
+    html +=
+        fmt::format("<figure><img alt=\"{}\" src=\"{}\"><figcaption><b>{}.</b> {}</figcaption></figure>\n",
+                    escaped(picture.title), data_uri(scaled_for_page(picture.picture)),
+                    escaped(picture.title), escaped(picture.caption));
   }
   return write_file(path, html + "</div></html>\n");
 }

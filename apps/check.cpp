@@ -1,0 +1,121 @@
+#include "apps/check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "apps/check_file.h"
+#include "apps/check_judge.h"
+#include "apps/check_page.h"
+#include "core/file.h"
+#include "core/log.h"
+#include "core/picture.h"
+#include "device/gl_context.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<std::vector<fs::path>> shipped_checks() {
+  const fs::path folder = fs::path(LIMN_SOURCE_DIR) / "config/checks";
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.path().extension() == ".json") files.push_back(entry.path());
+  if (files.empty()) return error("{}: expected check files, found none.", folder.string());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+// All are read before any is judged: a broken file is told at once.
+Result<std::vector<Check>> read_checks(const std::vector<fs::path>& files) {
+  std::vector<Check> checks;
+  std::map<std::string, std::string> known;
+  for (const fs::path& file : files) {
+    LIMN_TRY(Check check, load_check(file));
+    const auto [earlier, fresh] = known.emplace(check.name, file.string());
+    if (!fresh) {
+      return usage_error(
+          "{}: expected checks of different file names, for their pictures' folders, found {}, too.",
+          file.string(), earlier->second);
+    }
+    checks.push_back(std::move(check));
+  }
+  return checks;
+}
+
+nlohmann::ordered_json json_of(const std::vector<CheckResult>& results, const std::string& renderer) {
+  nlohmann::ordered_json json = {{"schema", "limn.check-report/1"}, {"renderer", renderer}};
+  json["passed"] = std::all_of(results.begin(), results.end(), [](const auto& r) { return r.good(); });
+  json["checks"] = nlohmann::ordered_json::array();
+  for (const CheckResult& result : results) {
+    nlohmann::ordered_json readings = nlohmann::ordered_json::array();
+    for (const CheckReading& reading : result.readings) {
+      readings.push_back({{"measure", reading.limit.measure.name},
+                          {"value", reading.value},
+                          {reading.limit.measure.least ? "at_least" : "at_most", reading.limit.value},
+                          {"passed", reading.good()}});
+    }
+    json["checks"].push_back({{"check", result.name},
+                              {"passed", result.good()},
+                              {"seconds", result.seconds},
+                              {"readings", readings}});
+  }
+  return json;
+}
+
+Status write_pictures(const CheckResult& result, const fs::path& out) {
+  if (result.pictures.empty()) return {};
+  const fs::path folder = out / result.name;
+  LIMN_TRY_STATUS(make_folder(folder));
+  for (const CheckPicture& picture : result.pictures) {
+    LIMN_TRY_STATUS(write_png(folder / (picture.file + "-actual.png"), picture.actual));
+    LIMN_TRY_STATUS(write_png(folder / (picture.file + "-expected.png"), picture.expected));
+    LIMN_TRY_STATUS(write_png(folder / (picture.file + "-difference.png"), picture.difference));
+  }
+  return {};
+}
+
+Status verdict_of(const std::vector<CheckResult>& results, const fs::path& page) {
+  std::string failed;
+  for (const CheckResult& result : results)
+    if (!result.good()) failed += (failed.empty() ? "" : ", ") + result.name;
+  if (failed.empty()) return {};
+  return error("check: expected every limit to be met, found missed ones in {}. {} shows them.", failed,
+               page.string());
+}
+
+}  // namespace
+
+Status run_check(const CheckOptions& options) {
+  std::vector<fs::path> files = options.files;
+  if (files.empty()) {
+    LIMN_TRY(files, shipped_checks());
+  }
+  LIMN_TRY(const std::vector<Check> checks, read_checks(files));
+  LIMN_TRY_STATUS(make_folder(options.out));
+  LIMN_TRY(const device::GlContext context, device::GlContext::create());
+  log_info("check: {}", context.description());
+  std::vector<CheckResult> results;
+  for (const Check& check : checks) {
+    log_info("{} ...", check.name);
+    LIMN_TRY(CheckResult result, judged(check));
+    LIMN_TRY_STATUS(write_pictures(result, options.out));
+    results.push_back(std::move(result));
+  }
+  const auto json = json_of(results, context.description());
+  LIMN_TRY_STATUS(write_file(options.out / "check.json", json.dump(2) + "\n"));
+  const fs::path page = options.out / "check.html";
+  LIMN_TRY_STATUS(write_check_page(results, context.description(), page));
+  if (options.json) {
+    fmt::print("{}\n", json.dump(2));
+  } else {
+    fmt::print("{}{}\n", check_table(results), page.string());
+  }
+  return verdict_of(results, page);
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,262 @@
+#include "apps/check_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "apps/world_markers.h"
+#include "core/config.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+int side_px(const ConfigNode& node, double value) {
+  if (value >= 1 && value <= 16384 && value == std::floor(value)) return static_cast<int>(value);
+  node.problem(fmt::format("expected a whole number of pixels from 1 to 16384, found {}.", value));
+  return 1;
+}
+
+// As a viewer file, or with eye_m and target_m instead of the pose.
+Imager read_viewer(const ConfigNode& node) {
+  node.only({"world_from_viewer", "eye_m", "target_m", "size", "fov_deg"});
+  std::vector<double> size = node.at("size").numbers(2);
+  size.resize(2, 1);
+  const int width = side_px(node.at("size"), size[0]), height = side_px(node.at("size"), size[1]);
+  double fov_deg = node.at("fov_deg").positive();
+  if (fov_deg >= 180) {
+    node.at("fov_deg").problem(fmt::format("expected an angle below 180 degrees, found {}.", fov_deg));
+    fov_deg = 40;
+  }
+  if (const auto pose = node.find("world_from_viewer"))
+    return viewer_imager(pose->pose(), width, height, fov_deg);
+  const Eigen::Vector3d p_eye = node.at("eye_m").vector3(), p_target = node.at("target_m").vector3();
+  const Eigen::Vector3d d = p_target - p_eye;
+  if (d.head<2>().norm() < 1e-6 * std::max(1.0, d.norm())) {
+    node.at("target_m")
+        .problem(
+            "expected a target apart from the eye and not straight above or below it. Give "
+            "world_from_viewer instead.");
+    return viewer_imager({}, width, height, fov_deg);
+  }
+  return viewer_imager(looking_at(p_eye, p_target, Eigen::Vector3d::UnitZ()).inverse(), width, height,
+                       fov_deg);
+}
+
+std::vector<CheckLimit> read_limits(const ConfigNode& node) {
+  std::set<std::string> known;
+  for (const CheckMeasure& measure : check_measures()) known.insert(measure.name);
+  node.only(known);
+  std::vector<CheckLimit> limits;
+  for (const CheckMeasure& measure : check_measures()) {
+    const auto limit = node.find(measure.name);
+    if (!limit) continue;
+    limits.push_back({measure, limit->number()});
+    if (limits.back().value < 0)
+      limit->problem(fmt::format("expected a limit that is not negative, found {}.", limits.back().value));
+  }
+  if (limits.empty()) {
+    std::string names;
+    for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
+    node.problem(fmt::format("expected at least one limit of: {}; found none.", names));
+  }
+  return limits;
+}
+
+// The world with another scene's prototype in it instead of its own.
+void put_on_stage(scene::Scene scene, sim::World* world) {
+  world->scene = std::move(scene);
+  std::erase_if(world->objects, [](const sim::Object& object) { return object.name == "prototype"; });
+  if (!world->scene->prototype) return;
+  sim::Object object;
+  object.name = "prototype";
+  object.mesh = std::make_shared<scene::Mesh>(world->scene->prototype->mesh);
+  object.world_from_object = world->world_from_prototype;
+  object.prototype_from_object = Pose();
+  world->objects.push_back(std::move(object));
+}
+
+const scene::Slot* known_slot(const scene::Scene& scene, const std::string& name, const ConfigNode& node) {
+  const scene::Slot* slot = scene.find_slot(name);
+  if (slot) return slot;
+  std::string names;
+  for (const scene::Slot& known : scene.slots) names += (names.empty() ? "" : ", ") + known.name;
+  node.problem(fmt::format("expected a slot of the scene ({}), found '{}'.", names, name));
+  return nullptr;
+}
+
+struct SlotPlace {
+  std::optional<Pose> world_from_part;
+  std::string variant;
+};
+
+SlotPlace read_slot(const ConfigNode& node, const scene::Slot& slot, const Pose& world_from_prototype) {
+  node.only({"world_from_part", "prototype_from_part", "variant"});
+  SlotPlace place;
+  if (const auto pose = node.find("prototype_from_part"))
+    place.world_from_part = world_from_prototype * pose->pose();
+  if (const auto pose = node.find("world_from_part")) place.world_from_part = pose->pose();
+  if (const auto variant = node.find("variant")) {
+    std::vector<std::string> names;
+    for (const scene::Variant& known : slot.variants) names.push_back(known.name);
+    place.variant = variant->choice(names);
+  }
+  return place;
+}
+
+// Everything where the world has it, but for what the file says.
+scene::PosedScene read_poses(const ConfigNode& node, sim::World* world) {
+  node.only({"world_from_prototype", "slots", "shown"});
+  const scene::Scene& scene = *world->scene;
+  if (const auto pose = node.find("world_from_prototype")) sim::move_prototype(*world, pose->pose());
+  std::vector<std::string> variants(scene.slots.size());
+  std::vector<SlotPlace> places(scene.slots.size());
+  if (const auto slots = node.find("slots")) {
+    for (const std::string& name : slots->keys()) {
+      const scene::Slot* slot = known_slot(scene, name, slots->at(name));
+      if (!slot) continue;
+      const auto i = static_cast<std::size_t>(slot - scene.slots.data());
+      places[i] = read_slot(slots->at(name), *slot, world->world_from_prototype);
+      variants[i] = places[i].variant;
+    }
+  }
+  std::set<std::string> shown;
+  for (const scene::Slot& slot : scene.slots) shown.insert(slot.name);
+  if (const auto names = node.find("shown")) {
+    shown.clear();
+    for (const ConfigNode& name : names->items())
+      if (known_slot(scene, name.text(), name)) shown.insert(name.text());
+  }
+  const scene::PosedScene standing = sim::true_poses(*world, variants);
+  scene::PosedScene posed{world->world_from_prototype, {}};
+  for (std::size_t i = 0; i < scene.slots.size(); ++i) {
+    const scene::Slot& slot = scene.slots[i];
+    if (!shown.contains(slot.name)) continue;
+    const auto found = std::find_if(standing.parts.begin(), standing.parts.end(),
+                                    [&](const scene::PosedPart& part) { return part.slot == slot.name; });
+    if (places[i].world_from_part) {
+      const std::string& variant = places[i].variant;
+      posed.parts.push_back(
+          {slot.name, variant.empty() ? slot.variants.front().name : variant, *places[i].world_from_part});
+    } else if (found != standing.parts.end()) {
+      posed.parts.push_back(*found);
+    } else {
+      node.problem(fmt::format(
+          "expected slots.{}.world_from_part, for no marker of it stands in the world, found none.",
+          slot.name));
+    }
+  }
+  return posed;
+}
+
+Result<scene::PosedScene> poses_of(const std::optional<ConfigNode>& node,
+                                   const fs::path& folder,
+                                   sim::World* world) {
+  if (!node || !node->is_string()) return read_poses(node.value_or(ConfigNode()), world);
+  LIMN_TRY(scene::PosedScene posed, scene::load_poses(folder / node->text(), *world->scene));
+  if (posed.world_from_prototype) sim::move_prototype(*world, *posed.world_from_prototype);
+  posed.world_from_prototype = world->world_from_prototype;
+  return posed;
+}
+
+// Cameras and projectors of the same rig with so much coarser pixels.
+void coarsen(const ConfigNode& node, Rig* rig) {
+  const double share = node.positive();
+  if (share > 1)
+    node.problem(fmt::format("expected a share of the world's resolution, at most 1, found {}.", share));
+  for (std::vector<Imager>* imagers : {&rig->cameras, &rig->projectors}) {
+    for (Imager& imager : *imagers) {
+      const auto coarse = resized(imager, static_cast<int>(std::lround(share * imager.width)),
+                                  static_cast<int>(std::lround(share * imager.height)));
+      if (!coarse) {
+        node.problem(fmt::format("expected one that leaves {} ({}x{}) its shape, found {}.", imager.name,
+                                 imager.width, imager.height, share));
+        return;
+      }
+      imager = *coarse;
+    }
+  }
+}
+
+// Moves the light of a projector by so many of its pixels: what a push against it does.
+void nudge(const ConfigNode& node, Rig* rig) {
+  for (const std::string& name : node.keys()) {
+    const auto projector = std::find_if(rig->projectors.begin(), rig->projectors.end(),
+                                        [&](const Imager& p) { return p.name == name; });
+    if (projector == rig->projectors.end()) {
+      std::string names;
+      for (const Imager& known : rig->projectors) names += (names.empty() ? "" : ", ") + known.name;
+      node.at(name).problem(fmt::format("expected a projector of the world ({}), found '{}'.", names, name));
+      continue;
+    }
+    std::vector<double> px = node.at(name).numbers(2);
+    px.resize(2, 0);
+    projector->lens.values[2] += px[0];  // the principal point
+    projector->lens.values[3] += px[1];
+  }
+}
+
+}  // namespace
+
+const std::vector<CheckMeasure>& check_measures() {
+  static const std::vector<CheckMeasure> measures = {
+      {"texture_mm", "surface light from where it was aimed, RMS", "mm"},
+      {"parallax_mm", "points 50 mm off the surface, seen from the eye, worst", "mm"},
+      {"shone_mean_255", "light on the prototype against the ray tracer, mean of lit pixels", "/255"},
+      {"shone_over4_share", "light on the prototype, pixels more than 4/255 off", ""},
+      {"shone_inner_over4_share", "light on the prototype off edges, pixels more than 4/255 off", ""},
+      {"drawn_mean_255", "parts over a camera picture against the ray tracer, mean of their pixels", "/255"},
+      {"drawn_over4_share", "parts over a camera picture, pixels more than 4/255 off", ""},
+      {"drawn_inner_over4_share", "parts over a camera picture off edges, pixels more than 4/255 off", ""},
+      {"mask_iou", "on/off-surface masks, overlap with the ray tracer's (IoU)", "", true},
+      {"spill_share", "light on what no part asks for, of all light", ""},
+      {"composite_px", "outlines over a camera picture, RMS of the worst part", "px"},
+      {"depth_order_share", "pixels with parts and prototype in the right order", "", true},
+      {"seam_step_p95", "luminance step along projectors' seams, 95 %", ""},
+      {"seam_step_max", "luminance step anywhere, largest", ""},
+      {"rerun_worst_255", "difference of two runs, worst", "/255"},
+  };
+  return measures;
+}
+
+Result<Check> load_check(const fs::path& path) {
+  LIMN_TRY(const Config config, Config::load(path, "limn.check/1"));
+  const ConfigNode root = config.root();
+  root.only({"schema", "about", "world", "scene", "poses", "viewer", "resolution", "nudge", "limits"});
+  Check check;
+  check.name = path.stem().string();
+  check.about = root.at("about").text();
+  const fs::path world_file = (config.folder() / root.at("world").text()).lexically_normal();
+  check.limits = read_limits(root.at("limits"));
+  std::optional<Imager> viewer;
+  if (const auto node = root.find("viewer")) viewer = read_viewer(*node);
+  const auto scene = root.find("scene");
+  const std::string scene_folder = scene ? scene->text() : "";
+  LIMN_TRY_STATUS(config.status());
+
+  LIMN_TRY(check.truth, sim::load_world(world_file, marker_picture));
+  if (!scene_folder.empty()) {
+    LIMN_TRY(scene::Scene other, scene::load_scene((config.folder() / scene_folder).lexically_normal()));
+    put_on_stage(std::move(other), &check.truth);
+  }
+  if (!check.truth.scene || !check.truth.scene->prototype) {
+    return error(
+        "{}: world: expected a world or a scene with a prototype to shine on, found none. Add scene.",
+        path.string());
+  }
+  if (!viewer) viewer = check.truth.scene->viewer ? check.truth.scene->viewer->fixed : std::nullopt;
+  if (!viewer)
+    return error("{}: viewer: expected one, for the scene has none, found nothing.", path.string());
+  check.viewer = *viewer;
+  LIMN_TRY(check.posed, poses_of(root.find("poses"), config.folder(), &check.truth));
+  if (const auto node = root.find("resolution")) coarsen(*node, &check.truth.rig);
+  check.told = {check.truth.rig, *check.truth.scene, check.posed};
+  if (const auto node = root.find("nudge")) nudge(*node, &check.truth.rig);
+  LIMN_TRY_STATUS(config.status());
+  return check;
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,258 @@
+// `limn check`: the shipped checks hold; each measure misses its limit when the renderer is told something
+// wrong; broken files are named.
+
+#include "apps/check.h"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "apps/check_judge.h"
+#include "apps/command_line.h"
+#include "core/file.h"
+#include "core/picture.h"
+#include "device/gl_context.h"
+#include "tests/support/matchers.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path k_config = fs::path(LIMN_SOURCE_DIR) / "config";
+constexpr const char* k_viewer =
+    R"({"eye_m": [-0.2, -1.4, 0.7], "target_m": [0, 0, 0.4], "size": [640, 480], "fov_deg": 34})";
+
+struct Outcome {
+  int code = 0;
+  std::string out, err;
+};
+
+Outcome run(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), {"limn", "check"});
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  Outcome outcome;
+  outcome.code = run_command_line(static_cast<int>(argv.size()), argv.data());
+  outcome.err = testing::internal::GetCapturedStderr();
+  outcome.out = testing::internal::GetCapturedStdout();
+  return outcome;
+}
+
+// A check file in `folder` on a world of config/worlds; `rest`: its members but schema, about and world.
+fs::path written(const fs::path& folder, const std::string& world, const std::string& rest) {
+  const fs::path file = folder / "small.json";
+  const fs::path relative = fs::relative(k_config / "worlds" / (world + ".json"), folder);
+  EXPECT_TRUE(
+      write_file(file, fmt::format(R"({{"schema": "limn.check/1", "about": "a test's", "world": "{}", {}}})",
+                                   relative.string(), rest)));
+  return file;
+}
+
+TEST(Check, ShippedChecksHoldAndCoverEveryMeasure) {
+  const fs::path out = test::test_folder();
+  const Outcome outcome = run({"--json", "--out", out.string()});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(outcome.out);
+  EXPECT_TRUE(json.at("passed").get<bool>());
+  std::set<std::string> unseen;
+  for (const CheckMeasure& measure : check_measures()) unseen.insert(measure.name);
+  for (const auto& check : json.at("checks")) {
+    for (const auto& reading : check.at("readings")) {
+      EXPECT_TRUE(reading.at("passed").get<bool>()) << check.at("check") << " " << reading.dump();
+      unseen.erase(reading.at("measure"));
+    }
+  }
+  EXPECT_TRUE(unseen.empty()) << "no shipped check measures " << *unseen.begin();
+  const std::string page = read_file(out / "check.html").value();
+  EXPECT_EQ(page.find("src=\"http"), std::string::npos) << "the page needs no other file";
+  EXPECT_NE(page.find("door-in-place"), std::string::npos);
+  for (const char* what : {"actual", "expected", "difference"})
+    EXPECT_TRUE(read_picture(out / "door-in-place" / (std::string("shone-") + what + ".png"))) << what;
+}
+
+class CheckJudge : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    context = std::make_unique<device::GlContext>(device::GlContext::create().value());
+  }
+  static void TearDownTestSuite() { context.reset(); }
+
+  static Check check(const std::string& world, const std::string& rest) {
+    auto loaded = load_check(written(test::test_folder(), world, rest));
+    if (!loaded) throw std::runtime_error(loaded.message());
+    return std::move(loaded).value();
+  }
+  // Values by measure.
+  static std::map<std::string, CheckReading> readings(const Check& check) {
+    auto result = judged(check);
+    if (!result) throw std::runtime_error(result.message());
+    std::map<std::string, CheckReading> by_name;
+    for (const CheckReading& reading : result->readings) by_name.emplace(reading.limit.measure.name, reading);
+    return by_name;
+  }
+  // Every limit holds for `good` and is missed for `wrong`.
+  static void expect_missed(const Check& good, const Check& wrong) {
+    for (const auto& [name, reading] : readings(good))
+      EXPECT_TRUE(reading.good()) << name << " " << reading.value;
+    for (const auto& [name, reading] : readings(wrong)) {
+      EXPECT_FALSE(reading.good()) << name << " " << reading.value;
+      EXPECT_GT(reading.strain(), 1) << name;
+    }
+  }
+  static std::unique_ptr<device::GlContext> context;
+};
+
+std::unique_ptr<device::GlContext> CheckJudge::context;
+
+TEST_F(CheckJudge, LightTwoPixelsBesideMissesWhatTheLightIsJudgedBy) {
+  const Check good = check("bench", fmt::format(R"("viewer": {}, "limits": {{"texture_mm": 0.3,
+      "parallax_mm": 1, "shone_mean_255": 2, "shone_over4_share": 0.005, "spill_share": 0.005}})",
+                                                k_viewer));
+  Check wrong = good;
+  wrong.told.rig.projectors[0].lens.values[2] += 2;
+  expect_missed(good, wrong);
+}
+
+TEST_F(CheckJudge, AnotherColourMissesWhatTheLooksAreJudgedBy) {
+  const Check good =
+      check("bench", fmt::format(R"("viewer": {}, "resolution": 0.5, "poses": {{"shown": ["mirror"]}},
+      "limits": {{"shone_mean_255": 2, "shone_inner_over4_share": 0.005, "drawn_mean_255": 4,
+      "drawn_over4_share": 0.005, "drawn_inner_over4_share": 0.005}})",
+                                 k_viewer));
+  Check wrong = good;
+  for (scene::Variant& variant : wrong.told.scene.slots[0].variants)
+    for (scene::Material& material : variant.mesh.materials) material.base_colour *= 0.9F;
+  expect_missed(good, wrong);
+}
+
+TEST_F(CheckJudge, APartElsewhereMissesWhatItsPlaceIsJudgedBy) {
+  const Check good =
+      check("bench", fmt::format(R"("viewer": {}, "resolution": 0.5, "poses": {{"slots": {{"mirror":
+      {{"prototype_from_part": {{"rotation_wxyz": [1, 0, 0, 0], "translation_m": [-0.05, -0.06, -0.01]}}}}}}}},
+      "limits": {{"mask_iou": 0.97, "composite_px": 1, "depth_order_share": 0.99}})",
+                                 k_viewer));
+  Check wrong = good;
+  for (scene::PosedPart& part : wrong.told.posed.parts) part.world_from_part.translation.x() += 0.006;
+  expect_missed(good, wrong);
+}
+
+TEST_F(CheckJudge, AWrongResponseShowsAtTheSeams) {
+  const Check good = check("halves", fmt::format(R"("viewer": {}, "resolution": 0.5,
+      "limits": {{"seam_step_p95": 0.01, "seam_step_max": 0.02}})",
+                                                 k_viewer));
+  Check wrong = good;
+  for (const Imager& projector : wrong.told.rig.projectors) {
+    Response response;
+    response.projector = projector.name;
+    for (int i = 0; i < 256; ++i) response.red.push_back(std::pow(i / 255.0, 1.8));
+    response.green = response.blue = response.red;
+    wrong.told.rig.responses.push_back(response);
+  }
+  expect_missed(good, wrong);
+}
+
+TEST(Check, ALimitThatCannotHoldFailsAndIsNamed) {
+  const fs::path folder = test::test_folder();
+  const fs::path file =
+      written(folder, "bench",
+              fmt::format(R"("viewer": {}, "resolution": 0.25, "limits": {{"mask_iou": 1}})", k_viewer));
+  const Outcome outcome = run({file.string(), "--out", (folder / "out").string()});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_NE(outcome.out.find("MISSED"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.err.find("small"), std::string::npos) << outcome.err;
+  EXPECT_NE(read_file(folder / "out" / "check.html").value().find("1 of 1 failed"), std::string::npos);
+  EXPECT_FALSE(
+      nlohmann::json::parse(read_file(folder / "out" / "check.json").value()).at("passed").get<bool>());
+}
+
+TEST(Check, BrokenFilesAreNamedWithThePlaceInThem) {
+  struct Broken {
+    std::string rest;
+    std::vector<std::string> parts;
+  };
+  const std::string viewer = fmt::format("\"viewer\": {}", k_viewer),
+                    limits = R"("limits": {"mask_iou": 0.98})";
+  const std::vector<Broken> all = {
+      {viewer + R"(, "limits": {"mask_iuo": 0.98})", {"limits", "mask_iuo", "mask_iou"}},
+      {viewer + R"(, "limits": {"mask_iou": NaN})", {"small.json"}},
+      {viewer + R"(, "limits": {"mask_iou": "high"})", {"limits.mask_iou", "finite number", "high"}},
+      {viewer + R"(, "limits": {"composite_px": -1})", {"limits.composite_px", "negative"}},
+      {viewer + R"(, "limits": {})", {"limits", "at least one"}},
+      {viewer, {"limits", "missing"}},
+      {viewer + R"(, "scene": "nowhere", )" + limits, {"nowhere"}},
+      {viewer + R"(, "poses": "nowhere.json", )" + limits, {"nowhere.json"}},
+      {viewer + R"(, "poses": {"slots": {"miror": {}}}, )" + limits, {"poses.slots.miror", "mirror, trim"}},
+      {viewer + R"(, "poses": {"slots": {"mirror": {"variant": "jumbo"}}}, )" + limits,
+       {"poses.slots.mirror.variant", "jumbo"}},
+      {viewer + R"(, "poses": {"shown": ["grille"]}, )" + limits, {"poses.shown[0]", "grille"}},
+      {viewer + R"(, "nudge": {"projector7": [1, 0]}, )" + limits, {"nudge.projector7", "projector0"}},
+      {viewer + R"(, "resolution": 2, )" + limits, {"resolution", "at most 1"}},
+      {R"("viewer": {"eye_m": [0, 0, 1], "target_m": [0, 0, 0], "size": [64, 48], "fov_deg": 40}, )" + limits,
+       {"viewer.target_m"}},
+      {R"("viewer": {"eye_m": [0, -1, 1], "target_m": [0, 0, 0], "size": [64, 48], "fov_deg": 200}, )" +
+           limits,
+       {"viewer.fov_deg", "180"}},
+      {R"("viewer": {"eye_m": [0, -1, 1], "target_m": [0, 0, 0], "size": [0, 48], "fov_deg": 40}, )" + limits,
+       {"viewer.size"}},
+      {R"("viewer": {"eye_m": [0, 3, 1], "target_m": [0, 9, 0], "size": [64, 48], "fov_deg": 40}, )" + limits,
+       {"small", "mask_iou", "found none"}},
+  };
+  const fs::path folder = test::test_folder();
+  for (const Broken& broken : all) {
+    const Outcome outcome =
+        run({written(folder, "bench", broken.rest).string(), "--out", (folder / "out").string()});
+    EXPECT_EQ(outcome.code, 1) << broken.rest;
+    for (const std::string& part : broken.parts)
+      EXPECT_NE(outcome.err.find(part), std::string::npos)
+          << "expected \"" << part << "\" in: " << outcome.err;
+    EXPECT_EQ(outcome.err.find("bug in Limn"), std::string::npos) << outcome.err;
+  }
+  const Outcome absent = run({(folder / "absent.json").string()});
+  EXPECT_EQ(absent.code, 1);
+  EXPECT_NE(absent.err.find("absent.json"), std::string::npos) << absent.err;
+}
+
+TEST(Check, WrongUsageExitsWithTwo) {
+  EXPECT_EQ(run({"--nonsense"}).code, 2);
+  const fs::path a = test::test_folder() / "a", b = test::test_folder() / "b";
+  fs::create_directories(a);
+  fs::create_directories(b);
+  const std::string rest = fmt::format(R"("viewer": {}, "limits": {{"mask_iou": 0.98}})", k_viewer);
+  const Outcome same = run({written(a, "bench", rest).string(), written(b, "bench", rest).string()});
+  EXPECT_EQ(same.code, 2);
+  EXPECT_NE(same.err.find("different file names"), std::string::npos) << same.err;
+}
+
+// A fresh program (this one, asked for one test only) where EGL finds no driver.
+TEST(Check, WithoutEglTheErrorSaysWhatToDo) {
+  if (std::getenv("LIMN_TEST_WITHOUT_EGL")) {
+    const fs::path folder = test::test_folder();
+    const auto file =
+        written(folder, "bench", fmt::format(R"("viewer": {}, "limits": {{"mask_iou": 0.98}})", k_viewer));
+    const Outcome outcome = run({file.string(), "--out", (folder / "out").string()});
+    EXPECT_EQ(outcome.code, 1);
+    EXPECT_NE(outcome.err.find("libegl1"), std::string::npos) << outcome.err;
+    return;
+  }
+  const pid_t child = fork();
+  if (child == 0) {
+    setenv("LIMN_TEST_WITHOUT_EGL", "1", 1);
+    setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nowhere.json", 1);
+    execl("/proc/self/exe", "apps_check_test", "--gtest_filter=Check.WithoutEglTheErrorSaysWhatToDo",
+          nullptr);
+    _exit(99);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+}
+
+}  // namespace
+}  // namespace limn::apps
