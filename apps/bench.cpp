@@ -9,8 +9,8 @@
 namespace limn::apps {
 
 Status run_bench(const BenchOptions& options) {
-  if (options.name != "tracker" && options.name != "calib")
-    return usage_error("bench {}: expected tracker or calib", options.name);
+  if (options.name != "tracker" && options.name != "calib" && options.name != "projector")
+    return usage_error("bench {}: expected tracker, projector or calib", options.name);
   std::error_code problem;
   const auto self = std::filesystem::read_symlink("/proc/self/exe", problem);
   const auto program = self.parent_path() / "tests" / "bench" / (options.name + "_bench");

@@ -45,6 +45,10 @@ bool is_same(const scene::PosedScene& a, const scene::PosedScene& b) {
       });
 }
 
+bool is_same(const LightOptions& a, const LightOptions& b) {
+  return a.compensation == b.compensation && a.even_black == b.even_black && a.level == b.level;
+}
+
 bool is_same_lens(const Imager& a, const Imager& b) {
   return a.width == b.width && a.height == b.height && a.lens.model == b.lens.model &&
          a.lens.values == b.lens.values;
@@ -115,7 +119,16 @@ struct Renderer::Impl {
   Sights sights;
   Program points, light_centre, light, irradiance, coverage, parts_centre, composite;
   std::vector<GlName> responses;
-  std::vector<cv::Mat> clipped;  // of the projectors' last pictures
+  // Of the projectors' last pictures.
+  struct Shown {
+    Canvas display;
+    scene::PosedScene posed;
+    Pose imager_from_world;    // of the viewer
+    cv::Mat picture, clipped;  // once read back
+    bool is_current = false;
+  };
+  std::vector<Shown> shown;
+  PassTimes times;
   LightOptions light_options;
   std::optional<SurfaceMixing> surface;     // its layers are on the GPU
   std::optional<double> level_by_geometry;  // of the first place that the prototype had
@@ -137,7 +150,7 @@ struct Renderer::Impl {
       : rig(rig_in),
         scene(scene_in),
         sights(std::move(sights_in)),
-        clipped(rig_in.projectors.size()),
+        shown(rig_in.projectors.size()),
         prototype(scene_in.prototype) {
     GLuint name = 0;
     glCreateVertexArrays(1, &name);
@@ -204,7 +217,10 @@ void Renderer::Impl::prepare(const scene::PosedScene& posed) {
   runs = scene.placed(posed);
   scene_from_world = GpuScene::scene_from_world(posed);
   scene.place(runs);
-  sights.see_from_projectors(scene, runs, scene_from_world);
+  {
+    const PassTimes::Scope scope(&times, "ids from projectors");
+    sights.see_from_projectors(scene, runs, scene_from_world);
+  }
   eye_kind = EyeKind::none;
   drawn = posed;
 }
@@ -212,6 +228,7 @@ void Renderer::Impl::prepare(const scene::PosedScene& posed) {
 void Renderer::Impl::look_from_eye(const Imager& viewer) {
   if (eye_kind == EyeKind::eye && is_same(eye.imager_from_world, viewer.imager_from_world)) return;
   const Pose scene_from_viewer = scene_from_world * viewer.imager_from_world.inverse();
+  const PassTimes::Scope scope(&times, "ids from the eye");
   sights.see_from_eye(scene, runs, scene_from_viewer.translation,
                       scene_from_viewer.rotation * -Eigen::Vector3d::UnitY());
   eye_kind = EyeKind::eye;
@@ -223,6 +240,7 @@ void Renderer::Impl::look_from_imager(const Imager& imager) {
       is_same(eye.imager_from_world, imager.imager_from_world)) {
     return;
   }
+  const PassTimes::Scope scope(&times, "ids from a camera");
   sights.see_from_imager(scene, runs, scene_from_world, imager, lens_of(imager).baked);
   eye_kind = EyeKind::imager;
   eye = imager;
@@ -327,33 +345,61 @@ Status Renderer::set_light(const LightOptions& options, const MeasuredSurface* s
     LIMN_TRY_STATUS(check_fits(*surface, impl_->rig));
     LIMN_TRY(impl_->surface, impl_->measured(*surface));
   }
+  if (options.compensation == Compensation::measured || !is_same(impl_->light_options, options))
+    for (Impl::Shown& shown : impl_->shown) shown.is_current = false;
   impl_->light_options = options;
   return {};
 }
 
-cv::Mat Renderer::clipped(std::size_t index) const { return impl_->clipped.at(index); }
+cv::Mat Renderer::clipped(std::size_t index) const { return impl_->shown.at(index).clipped; }
 
-cv::Mat Renderer::projector_picture(std::size_t index, const scene::PosedScene& posed, const Imager& viewer) {
+void Renderer::time_passes(bool wanted) { impl_->times.enable(wanted); }
+
+std::vector<PassTime> Renderer::pass_times() { return impl_->times.taken(); }
+
+unsigned Renderer::draw_projector(std::size_t index, const scene::PosedScene& posed, const Imager& viewer) {
   LIMN_CHECK(index < impl_->rig.projectors.size());
   const Imager& projector = impl_->rig.projectors[index];
+  Impl::Shown& shown = impl_->shown[index];
+  if (shown.is_current && is_same(shown.posed, posed) &&
+      is_same(shown.imager_from_world, viewer.imager_from_world))
+    return *shown.display.texture;
   impl_->prepare(posed);
   impl_->look_from_eye(viewer);
   const Canvas& centre = impl_->canvas(projector.width, projector.height, GL_RGBA32F);
-  const Canvas& display = impl_->canvas(projector.width, projector.height, GL_RGBA8);
+  if (!shown.display.texture) shown.display = Canvas(projector.width, projector.height, GL_RGBA8);
   for (const Program* program : {&impl_->light_centre, &impl_->light}) {
     impl_->set_up(*program, impl_->sights.projector_lens(index), &viewer);
     program->set("u_projector", static_cast<int>(index));
     impl_->set_up_light(*program, posed);
   }
-  impl_->draw(impl_->light_centre, centre);
+  {
+    const PassTimes::Scope scope(&impl_->times, "light at pixel centres");
+    impl_->draw(impl_->light_centre, centre);
+  }
   impl_->light.bind("s_centre", k_centre_unit, centre.texture);
   impl_->light.bind("s_response", k_response_unit, impl_->responses[index]);
-  impl_->draw(impl_->light, display);
-  const cv::Mat shown = read_back(display.framebuffer, projector.width, projector.height, CV_8UC4, GL_BGRA);
-  cv::Mat bgr;
-  cv::cvtColor(shown, bgr, cv::COLOR_BGRA2BGR);
-  cv::extractChannel(shown, impl_->clipped[index], 3);
-  return bgr;
+  {
+    const PassTimes::Scope scope(&impl_->times, "edges and response");
+    impl_->draw(impl_->light, shown.display);
+  }
+  shown.posed = posed;
+  shown.imager_from_world = viewer.imager_from_world;
+  shown.picture.release();
+  shown.is_current = true;
+  return *shown.display.texture;
+}
+
+cv::Mat Renderer::projector_picture(std::size_t index, const scene::PosedScene& posed, const Imager& viewer) {
+  draw_projector(index, posed, viewer);
+  Impl::Shown& shown = impl_->shown[index];
+  if (shown.picture.empty()) {
+    const Canvas& display = shown.display;
+    const cv::Mat bgra = read_back(display.framebuffer, display.width, display.height, CV_8UC4, GL_BGRA);
+    cv::cvtColor(bgra, shown.picture, cv::COLOR_BGRA2BGR);
+    cv::extractChannel(bgra, shown.clipped, 3);
+  }
+  return shown.picture.clone();
 }
 
 cv::Mat Renderer::surface_points(std::size_t index, const scene::PosedScene& posed) {

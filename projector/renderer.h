@@ -8,6 +8,7 @@
 #include "core/result.h"
 #include "core/rig.h"
 #include "projector/compensation.h"
+#include "projector/pass_times.h"
 #include "scene/posed.h"
 #include "scene/scene.h"
 
@@ -53,6 +54,16 @@ class Renderer {
   /// black elsewhere. Light is shared with the other projectors that reach the same point, so that the sum in
   /// linear light is the part's colour, as set_light says.
   cv::Mat projector_picture(std::size_t index, const scene::PosedScene& posed, const Imager& viewer);
+
+  /// The same on the GPU alone: draws the picture, if anything has changed since, and returns the name of its
+  /// texture (GL_RGBA8 of the projector's size, first row first; alpha is for clipped()). It keeps its
+  /// content until the next call with this index.
+  unsigned draw_projector(std::size_t index, const scene::PosedScene& posed, const Imager& viewer);
+
+  /// Whether the GPU's time is taken, pass by pass. Costs a little.
+  void time_passes(bool wanted);
+  /// Of all passes since the last call, in their order; waits for the GPU.
+  std::vector<PassTime> pass_times();
 
   /// Where the last projector_picture of `index` could not give what was wanted, CV_8UC1: 255 it should be
   /// brighter, 128 darker, 0 all is well.

@@ -522,6 +522,30 @@ TEST_F(RendererTest, UnlitColourIsExactAndTheResponseIsApplied) {
   EXPECT_EQ(measured[0], std::lround(255 * std::pow(0.9, 1 / 2.6)));
 }
 
+TEST_F(RendererTest, NothingIsDrawnAgainUntilSomethingChanges) {
+  const Scene scene =
+      scene_of(sheet(0.8, 0.6),
+               {slot("panel", scene::Mode::view, coloured(sheet(0.3, 0.2, -0.05), {0.5f, 0.4f, 0.3f}))});
+  Renderer drawn = renderer(scene, two_projectors());
+  drawn.time_passes(true);
+  PosedScene posed = posed_at_origin(scene);
+  const Imager viewer = viewer_from({0.1, -0.2, -1.4});
+  const cv::Mat first = drawn.projector_picture(0, posed, viewer);
+  EXPECT_GT(cv::countNonZero(first.reshape(1)), 1000);
+  EXPECT_FALSE(drawn.pass_times().empty());
+  const cv::Mat again = drawn.projector_picture(0, posed, viewer);
+  EXPECT_TRUE(drawn.pass_times().empty());
+  EXPECT_EQ(cv::norm(first, again, cv::NORM_INF), 0);
+  posed.parts[0].world_from_part.translation.x() += 0.01;
+  EXPECT_GT(cv::norm(first, drawn.projector_picture(0, posed, viewer), cv::NORM_INF), 10);
+  EXPECT_FALSE(drawn.pass_times().empty());
+  const cv::Mat from_there = drawn.projector_picture(0, posed, viewer_from({-0.1, -0.2, -1.4}));
+  EXPECT_GT(cv::norm(from_there, drawn.projector_picture(0, posed, viewer), cv::NORM_INF), 10);
+  const cv::Mat plain = drawn.projector_picture(0, posed, viewer);
+  ASSERT_TRUE(drawn.set_light({.compensation = Compensation::geometry}));
+  EXPECT_GT(cv::norm(plain, drawn.projector_picture(0, posed, viewer), cv::NORM_INF), 5);
+}
+
 TEST_F(RendererTest, TextureStandsTheRightWayUp) {
   // Left half red, top half bright, as seen by a viewer whose picture's down is +y.
   Mesh part = coloured(sheet(0.2, 0.2, -0.001), {1, 1, 1});

@@ -1,0 +1,253 @@
+// What the projectors' pictures cost: milliseconds a pass by GPU timer queries, whole frames of a moving and
+// of a still scene beside yardsticks of the same run, and what compensation gives. Usage: limn bench
+// projector
+// [--frames N (5)]
+#include <epoxy/gl.h>
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <map>
+#include <opencv2/imgproc.hpp>
+
+#include "apps/world_markers.h"
+#include "device/gl_context.h"
+#include "projector/gl.h"
+#include "projector/renderer.h"
+#include "sim/world.h"
+
+namespace limn::test {
+namespace {
+
+using projector::GlName;
+
+constexpr int k_width = 1280, k_height = 800;
+
+double now_ms() {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+// Median time of `work`, the GPU's included.
+double median_ms(int count, const std::function<void()>& work) {
+  std::vector<double> times;
+  for (int i = 0; i <= count; ++i) {
+    const double start = now_ms();
+    work();
+    glFinish();
+    if (i > 0) times.push_back(now_ms() - start);  // the first one warms up
+  }
+  std::nth_element(times.begin(), times.begin() + count / 2, times.end());
+  return times[static_cast<std::size_t>(count / 2)];
+}
+
+GLuint shader_of(GLenum kind, const char* source) {
+  const GLuint shader = glCreateShader(kind);
+  glShaderSource(shader, 1, &source, nullptr);
+  glCompileShader(shader);
+  GLint ok = 0;
+  glGetShaderiv(shader, GL_COMPILE_STATUS, &ok);
+  LIMN_CHECK(ok != 0);
+  return shader;
+}
+
+GlName program_of(const char* vertex, const char* fragment) {
+  const GLuint program = glCreateProgram();
+  for (const GLuint shader : {shader_of(GL_VERTEX_SHADER, vertex), shader_of(GL_FRAGMENT_SHADER, fragment)}) {
+    glAttachShader(program, shader);
+    glDeleteShader(shader);
+  }
+  glLinkProgram(program);
+  return {program, [](GLuint n) { glDeleteProgram(n); }};
+}
+
+// The simplest passes of their kinds, into a picture of the projector's size.
+class Yardsticks {
+ public:
+  explicit Yardsticks(const scene::Mesh& mesh) : triangle_count_(static_cast<int>(mesh.triangles.size())) {
+    std::vector<Eigen::Vector3f> corners;
+    Eigen::AlignedBox3f box;
+    for (const auto& p : mesh.positions) box.extend(p);
+    for (const auto& triangle : mesh.triangles)
+      for (const std::uint32_t i : triangle)  // fills the picture
+        corners.push_back(((mesh.positions[i] - box.center()).cwiseQuotient(box.sizes()) * 1.9F).eval());
+    corners_ = projector::make_buffer(corners.data(), corners.size() * sizeof(corners[0]));
+    GLuint name = 0;
+    glCreateVertexArrays(1, &name);
+    vertices_ = GlName(name, [](GLuint n) { glDeleteVertexArrays(1, &n); });
+    glVertexArrayVertexBuffer(name, 0, *corners_, 0, sizeof(Eigen::Vector3f));
+    glVertexArrayAttribFormat(name, 0, 3, GL_FLOAT, GL_FALSE, 0);
+    glVertexArrayAttribBinding(name, 0, 0);
+    glEnableVertexArrayAttrib(name, 0);
+    triangles_ = program_of(
+        "#version 450 core\nlayout(location = 0) in vec3 a; out vec3 v;\n"
+        "void main() { v = a; gl_Position = vec4(a.xy, 0.4 * a.z, 1); }",
+        "#version 450 core\nin vec3 v; out vec4 o;\nvoid main() { o = vec4(0.5 + 0.5 * v, 1); }");
+    warp_ = program_of(
+        "#version 450 core\nvoid main() { gl_Position = vec4(gl_VertexID == 1 ? 3 : -1, gl_VertexID == 2 ? 3 "
+        ": -1, 0, 1); }",
+        "#version 450 core\nuniform sampler2D s_map, s_picture; out vec4 o;\n"
+        "void main() { o = texture(s_picture, texelFetch(s_map, ivec2(gl_FragCoord.xy), 0).xy); }");
+    for (GlName* texture : {&from_, &into_})
+      *texture = projector::make_texture(GL_TEXTURE_2D, GL_RGBA8, k_width, k_height);
+    glTextureParameteri(*from_, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTextureParameteri(*from_, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    map_ = cv::Mat(k_height, k_width, CV_32FC2);
+    for (int row = 0; row < k_height; ++row)
+      for (int column = 0; column < k_width; ++column)  // some px of a smooth warp
+        map_.at<cv::Vec2f>(row, column) = {static_cast<float>(column + 4 * std::sin(row / 90.0)),
+                                           static_cast<float>(row + 4 * std::cos(column / 110.0))};
+    cv::Mat shares = map_.clone();
+    for (auto& share : cv::Mat_<cv::Vec2f>(shares))
+      share = {(share[0] + 0.5F) / k_width, (share[1] + 0.5F) / k_height};
+    gpu_map_ = projector::make_texture(GL_TEXTURE_2D, GL_RG32F, k_width, k_height);
+    projector::upload(gpu_map_, shares);
+    framebuffer_ = projector::make_framebuffer();
+    depth_ = projector::make_depth_buffer(k_width, k_height);
+    glNamedFramebufferTexture(*framebuffer_, GL_COLOR_ATTACHMENT0, *into_, 0);
+    glNamedFramebufferRenderbuffer(*framebuffer_, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, *depth_);
+  }
+
+  void clear() const {
+    glBindFramebuffer(GL_FRAMEBUFFER, *framebuffer_);
+    glViewport(0, 0, k_width, k_height);
+    glClearColor(0, 0, 0, 1);
+    glClearDepth(1);
+    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+  }
+  void copy() const { picture_ = projector::read_back(framebuffer_, k_width, k_height, CV_8UC4, GL_BGRA); }
+  void draw_triangles() const {
+    clear();
+    glClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
+    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_LESS);
+    glUseProgram(*triangles_);
+    glBindVertexArray(*vertices_);
+    glDrawArrays(GL_TRIANGLES, 0, 3 * triangle_count_);
+    glDisable(GL_DEPTH_TEST);
+  }
+  void draw_warp() const {
+    glBindFramebuffer(GL_FRAMEBUFFER, *framebuffer_);
+    glViewport(0, 0, k_width, k_height);
+    glUseProgram(*warp_);
+    glBindTextureUnit(0, *gpu_map_);
+    glBindTextureUnit(1, *from_);
+    glProgramUniform1i(*warp_, glGetUniformLocation(*warp_, "s_map"), 0);
+    glProgramUniform1i(*warp_, glGetUniformLocation(*warp_, "s_picture"), 1);
+    glBindVertexArray(*vertices_);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+  }
+  void remap() const {
+    static const cv::Mat picture(k_height, k_width, CV_8UC4, cv::Scalar(10, 80, 200, 255));
+    cv::remap(picture, picture_, map_, cv::noArray(), cv::INTER_LINEAR);
+  }
+
+ private:
+  int triangle_count_;
+  GlName corners_, vertices_, triangles_, warp_, from_, into_, gpu_map_, framebuffer_, depth_;
+  cv::Mat map_;
+  mutable cv::Mat picture_;
+};
+
+int run(int frames) {
+  auto context = device::GlContext::create();
+  if (!context) {
+    fmt::print(stderr, "{}\n", context.message());
+    return 1;
+  }
+  auto loaded = sim::load_world(LIMN_SOURCE_DIR "/config/worlds/studio.json", apps::marker_picture);
+  if (!loaded) {
+    fmt::print(stderr, "{}\n", loaded.message());
+    return 1;
+  }
+  const sim::World world = std::move(loaded).value();
+  auto renderer = projector::Renderer::create(*world.scene, world.rig);
+  if (!renderer) {
+    fmt::print(stderr, "{}\n", renderer.message());
+    return 1;
+  }
+  const scene::PosedScene posed = sim::true_poses(world);
+  const Imager viewer = *world.scene->viewer->fixed;
+  std::size_t triangles = world.scene->prototype->mesh.triangles.size();
+  for (const scene::Slot& slot : world.scene->slots) triangles += slot.variants[0].mesh.triangles.size();
+  fmt::print("{}; {} triangles, {}x{}; ms, median of {}\n\n", context->description(), triangles, k_width,
+             k_height, frames);
+
+  const Yardsticks yardsticks(world.scene->prototype->mesh);
+  const double copy = median_ms(frames, [&] { yardsticks.clear(), yardsticks.copy(); });
+  const double draw = median_ms(frames, [&] { yardsticks.draw_triangles(); });
+  const double warp = median_ms(frames, [&] { yardsticks.draw_warp(); });
+  fmt::print("  yardsticks                                  ms\n");
+  fmt::print("  clear and copy                          {:6.2f}\n", copy);
+  fmt::print("  {} triangles                         {:6.2f}\n",
+             world.scene->prototype->mesh.triangles.size(), draw);
+  fmt::print("  warp by a map, whole picture            {:6.2f}\n", warp);
+  fmt::print("  cv::remap                               {:6.2f}\n\n",
+             median_ms(frames, [&] { yardsticks.remap(); }));
+
+  int step = 0;
+  const auto moved = [&] {  // the part, a little, as in a hand
+    scene::PosedScene out = posed;
+    out.parts[0].world_from_part.translation.x() += 1e-3 * (++step % 7);
+    return out;
+  };
+  const auto prototype_moved = [&] {
+    scene::PosedScene out = moved();
+    out.world_from_prototype->translation.x() += 1e-3 * (step % 7);
+    return out;
+  };
+  renderer->time_passes(true);
+  std::map<std::string, std::vector<double>> passes;
+  std::vector<std::string> order;
+  for (int i = 0; i <= frames; ++i) {
+    renderer->draw_projector(0, prototype_moved(), viewer);
+    for (const projector::PassTime& time : renderer->pass_times()) {
+      if (!passes.contains(time.pass)) order.push_back(time.pass);
+      if (i > 0)
+        passes[time.pass].push_back(time.ms);
+      else
+        passes[time.pass];
+    }
+  }
+  renderer->time_passes(false);
+  fmt::print("  passes of a frame with one projector's picture\n");
+  for (const std::string& pass : order) {
+    std::vector<double>& times = passes[pass];
+    std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2),
+                     times.end());
+    fmt::print("  {:<38}  {:6.2f}\n", pass, times[times.size() / 2]);
+  }
+  const double sum = copy + draw + warp;
+  fmt::print("\n  frames                                      ms   of triangles + warp + copy\n");
+  const auto frame = [&](const char* name, double ms) {
+    fmt::print("  {:<38}  {:6.2f}  {:5.2f}\n", name, ms, ms / sum);
+  };
+  frame("prototype and part move",
+        median_ms(frames, [&] { (void)renderer->projector_picture(0, prototype_moved(), viewer); }));
+  frame("a part moves", median_ms(frames, [&] { (void)renderer->projector_picture(0, moved(), viewer); }));
+  const double still = median_ms(frames, [&] { (void)renderer->projector_picture(0, posed, viewer); });
+  frame("nothing moves", still);
+  fmt::print("  nothing moves, of clear and copy                {:5.2f}\n", still / copy);
+  return 0;
+}
+
+}  // namespace
+}  // namespace limn::test
+
+int main(int argc, char** argv) {
+  int frames = 5;
+  for (int i = 1; i < argc; ++i) {
+    const char* value = i + 1 < argc ? argv[i + 1] : "";
+    if (std::strcmp(argv[i], "--frames") != 0 ||
+        std::from_chars(value, value + std::strlen(value), frames).ec != std::errc() || frames < 1) {
+      fmt::print(stderr, "projector_bench: expected --frames N (1 or more), found '{} {}'\n", argv[i], value);
+      return 2;
+    }
+    ++i;
+  }
+  return limn::test::run(frames);
+}
