@@ -117,7 +117,7 @@ struct Renderer::Impl {
   std::vector<std::string> slot_names;
   GpuScene scene;
   Sights sights;
-  Program points, light_centre, light, irradiance, coverage, parts_centre, composite;
+  Program points, blend, light_centre, light, irradiance, coverage, parts_centre, composite;
   std::vector<GlName> responses;
   // Of the projectors' last pictures.
   struct Shown {
@@ -183,11 +183,14 @@ struct Renderer::Impl {
 };
 
 Status Renderer::Impl::link_programs() {
-  const std::pair<Program*, const char*> wanted[] = {
-      {&points, "points.frag"},      {&light_centre, "light_centre.frag"},
-      {&light, "light.frag"},        {&irradiance, "irradiance.frag"},
-      {&coverage, "coverage.frag"},  {&parts_centre, "parts_centre.frag"},
-      {&composite, "composite.frag"}};
+  const std::pair<Program*, const char*> wanted[] = {{&points, "points.frag"},
+                                                     {&blend, "blend.frag"},
+                                                     {&light_centre, "light_centre.frag"},
+                                                     {&light, "light.frag"},
+                                                     {&irradiance, "irradiance.frag"},
+                                                     {&coverage, "coverage.frag"},
+                                                     {&parts_centre, "parts_centre.frag"},
+                                                     {&composite, "composite.frag"}};
   for (const auto& [program, file] : wanted) {
     LIMN_TRY(*program, Program::link("whole.vert", file));
   }
@@ -419,6 +422,17 @@ cv::Mat Renderer::surface_points(std::size_t index, const scene::PosedScene& pos
     }
   }
   return out;
+}
+
+cv::Mat Renderer::blend(std::size_t index, const scene::PosedScene& posed) {
+  LIMN_CHECK(index < impl_->rig.projectors.size());
+  const Imager& projector = impl_->rig.projectors[index];
+  impl_->prepare(posed);
+  const Canvas& canvas = impl_->canvas(projector.width, projector.height, GL_RG32F);
+  impl_->set_up(impl_->blend, impl_->sights.projector_lens(index), nullptr);
+  impl_->blend.set("u_projector", static_cast<int>(index));
+  impl_->draw(impl_->blend, canvas);
+  return read_back(canvas.framebuffer, projector.width, projector.height, CV_32FC2, GL_RG);
 }
 
 cv::Mat Renderer::composite(std::size_t camera,

@@ -73,6 +73,11 @@ class Renderer {
   /// none.
   cv::Mat surface_points(std::size_t index, const scene::PosedScene& posed);
 
+  /// CV_32FC2, for each pixel of the projector: its share of the light at the prototype's point that it
+  /// lights (the shares of all that reach a point sum to one), and the light over its own black, as a share
+  /// of its white, that makes up for the black of projectors that do not reach the point. 0 where none.
+  cv::Mat blend(std::size_t index, const scene::PosedScene& posed);
+
   /// The parts drawn into a camera's own (distorted) picture, 8-bit grey or BGR of the camera's size; sRGB
   /// BGR.
   cv::Mat composite(std::size_t camera,

@@ -81,3 +81,8 @@ Share share_of(int i, vec3 p, vec3 d_normal) {
   share.share = sum > 0.0 ? own / sum : 0.0;
   return share;
 }
+
+// Light over its own black that the projector gives for black that is missing.
+float black_lift(Share share) {
+  return share.share == 0.0 ? 0.0 : share.share * share.missing_black / share.irradiance;
+}

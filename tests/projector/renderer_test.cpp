@@ -449,6 +449,57 @@ TEST_F(RendererTest, LightOfTwoProjectorsSumsToThePartsColour) {
   EXPECT_LT(worst_step, 0.02);  // the bar for seams, docs: 2 % in linear light
 }
 
+TEST_F(RendererTest, BlendSharesTheLightAndMakesUpForMissingBlack) {
+  const Scene scene = scene_of(sheet(1.1, 0.7), {});
+  const PosedScene posed = posed_at_origin(scene);
+  // Side by side, so that a point's pixel in one is 320 pixels beside that in the other.
+  constexpr int k_shift = 320;
+  const double black[2] = {0.004, 0.01};
+  const Vector3d p_eye[2] = {{-0.2, 0, -1}, {0.2, 0, -1}};
+  Rig rig;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Pose projector_from_world(Eigen::Quaterniond::Identity(), -p_eye[i]);
+    rig.projectors.push_back({i == 0 ? "projector0" : "projector1", 640, 400,
+                              Lens::pinhole(800, 800, 320, 200), projector_from_world});
+    rig.responses.push_back({rig.projectors[i].name, {0, 1}, {0, 1}, {0, 1}});
+    rig.responses.back().black_level = Measured{black[i], 0};
+  }
+  Renderer drawing = renderer(scene, rig);
+  const cv::Mat blend[2] = {drawing.blend(0, posed), drawing.blend(1, posed)};
+  const cv::Mat points = drawing.surface_points(0, posed);
+  const auto irradiance = [&](std::size_t i, const Vector3d& p) {
+    return 1 / std::pow((p_eye[i] - p).norm(), 3);
+  };
+  double worst = 0, worst_lift = 0;
+  int both = 0, alone = 0, nowhere = 0;
+  for (int row = 0; row < points.rows; ++row) {
+    for (int column = 0; column < points.cols; ++column) {
+      const auto& q = points.at<cv::Vec3f>(row, column);
+      const auto& own = blend[0].at<cv::Vec2f>(row, column);
+      if (std::isnan(q[0])) {
+        ++nowhere;
+        EXPECT_EQ(own, cv::Vec2f(0, 0));
+      } else if (column >= k_shift) {
+        ++both;
+        const auto& other = blend[1].at<cv::Vec2f>(row, column - k_shift);
+        worst = std::max(worst, std::abs(own[0] + other[0] - 1.0));
+        EXPECT_EQ(own[1], 0);
+      } else {
+        ++alone;
+        const Vector3d p(q[0], q[1], q[2]);
+        worst = std::max(worst, std::abs(own[0] - 1.0));
+        worst_lift =
+            std::max(worst_lift, std::abs(own[1] / (black[1] * irradiance(1, p) / irradiance(0, p)) - 1));
+      }
+    }
+  }
+  EXPECT_GT(both, 100000);
+  EXPECT_GT(alone, 100000);
+  EXPECT_GT(nowhere, 5000);
+  EXPECT_LT(worst, 1e-3);  // a hundredth of a pixel in the soft border
+  EXPECT_LT(worst_lift, 1e-4);
+}
+
 TEST_F(RendererTest, ProjectorInTheOthersShadowGivesAllTheLight) {
   // A post before the plate keeps the right projector's light from a strip of it.
   Mesh mesh = sheet(0.5, 0.4);
