@@ -88,6 +88,21 @@ TEST(Aim, AViewPartBehindThePlaneGetsNoLightAndIsNotSeen) {
   EXPECT_EQ(cv::countNonZero(order.front != -1), 0);
 }
 
+TEST(Aim, WhatThePrototypeHidesFromTheEyeGetsNoLight) {
+  World world = plane_world(scene::Mode::view, sheet_at(0.08, 0.06, 0.05, -0.1));
+  const Imager eye = eye_at({0.5, 0, 0});
+  EXPECT_GT(cv::countNonZero(Aim(world, posed(world), eye).projector_picture(0).cover), 500);
+  // A flap of the prototype half way to the eye, beside the projector's picture.
+  scene::Mesh flapped = *world.objects[0].mesh;
+  const scene::Mesh flap = sheet_at(0.12, 0.12, 0.35, -0.7);
+  flapped.positions.insert(flapped.positions.end(), flap.positions.begin(), flap.positions.end());
+  flapped.normals.insert(flapped.normals.end(), flap.normals.begin(), flap.normals.end());
+  flapped.triangles.insert(flapped.triangles.end(), {{4, 6, 5}, {4, 7, 6}});
+  flapped.triangle_materials.assign(4, 0);
+  world.objects[0].mesh = std::make_shared<scene::Mesh>(flapped);
+  EXPECT_EQ(cv::countNonZero(Aim(world, posed(world), eye).projector_picture(0).cover), 0);
+}
+
 TEST(Aim, SurfacePartsAreLitForEveryEyeWithinTwoMillimetresOnly) {
   for (const double z : {0.0, -0.0015, 0.0015, -0.003, 0.003}) {
     const World world = plane_world(scene::Mode::surface, sheet_at(0.08, 0.06, 0.05, z));

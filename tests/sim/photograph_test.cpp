@@ -45,6 +45,7 @@ TEST(Photograph, WhiteLightIsIlluminanceTimesGainTimesAlbedo) {
 
 TEST(Photograph, FloatPicturesAreLightAlready) {
   Fixture f;
+  f.world.projector_effects[0].illuminance_at_1m = 3;
   const float white = f.at(flat(255));
   f.world.projector_effects[0].gamma = 2.2;
   f.world.projector_effects[0].black_level = 0.1;
