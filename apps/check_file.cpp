@@ -217,6 +217,7 @@ const std::vector<CheckMeasure>& check_measures() {
       {"depth_order_share", "pixels with parts and prototype in the right order", "", true},
       {"seam_step_p95", "luminance step along projectors' seams, 95 %", ""},
       {"seam_step_max", "luminance step anywhere, largest", ""},
+      {"black_step_share", "step of the light of black, share of one projector's, worst", ""},
       {"rerun_worst_255", "difference of two runs, worst", "/255"},
   };
   return measures;

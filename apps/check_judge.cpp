@@ -164,6 +164,7 @@ class Judge {
     if (asked("composite_px")) LIMN_TRY_STATUS(judge_composite());
     if (asked("depth_order_share")) LIMN_TRY_STATUS(judge_depth_order());
     if (asked("seam_step_p95") || asked("seam_step_max")) LIMN_TRY_STATUS(judge_seams());
+    if (asked("black_step_share")) LIMN_TRY_STATUS(judge_black());
     if (asked("rerun_worst_255")) LIMN_TRY_STATUS(judge_rerun());
     CheckResult result{check_.name, check_.about, {}, std::move(pictures_), 0};
     for (const CheckLimit& limit : check_.limits)
@@ -451,32 +452,65 @@ class Judge {
     LIMN_TRY(const auto pictures, drawn_instead(coat, scene::Mode::surface));
     const cv::Mat actual = seen_by_eye(pictures);
     const cv::Mat whole = evenly_lit();
-    const auto [step, along] = steps(actual, whole);
-    if (cv::countNonZero(along) == 0)
+    const Steps steps = steps_of(actual, k_coat, whole);
+    if (cv::countNonZero(steps.along) == 0)
       return nothing_to_judge("seam_step_p95", "a seam of projectors in the viewer's picture");
-    std::vector<float> on_seams;
-    for (int row = 0; row < step.rows; ++row)
-      for (int column = 0; column < step.cols; ++column)
-        if (along.at<std::uint8_t>(row, column)) on_seams.push_back(step.at<float>(row, column));
-    std::sort(on_seams.begin(), on_seams.end());
-    double worst = 0;
-    cv::minMaxLoc(step, nullptr, &worst, nullptr, nullptr, whole);
-    values_["seam_step_p95"] =
-        on_seams[static_cast<std::size_t>(0.95 * static_cast<double>(on_seams.size() - 1))];
-    values_["seam_step_max"] = worst;
+    values_["seam_step_p95"] = steps.p95_along;
+    values_["seam_step_max"] = steps.worst;
     cv::Mat expected(actual.size(), CV_32FC3, cv::Scalar::all(0));
     expected.setTo(cv::Scalar::all(k_coat), whole);
-    cv::Mat seams = bgr(cv::Mat(actual.size(), CV_8U, cv::Scalar(0)));
-    seams.setTo(cv::Scalar(90, 70, 40), along);
-    cv::Mat stepping;
-    step.convertTo(stepping, CV_8U, 255 / 0.08);
     pictures_.push_back(
         {"seam", "An even coat of light, from the viewer's eye",
-         fmt::format("Steps along seams: median {:.2f} %, 95 % {:.2f} %; worst anywhere {:.2f} %. "
-                     "Difference: the seams blue, steps up to white at 8 %.",
-                     100 * on_seams[on_seams.size() / 2], 100 * values_["seam_step_p95"], 100 * worst),
-         for_eye(actual), for_eye(expected), cv::max(seams, bgr(stepping))});
+         fmt::format("Steps along seams: 95 % {:.2f} %; worst anywhere {:.2f} %. Difference: the seams blue, "
+                     "steps up to white at 8 %.",
+                     100 * steps.p95_along, 100 * steps.worst),
+         for_eye(actual), for_eye(expected), shown_steps(steps, 0.08)});
     return {};
+  }
+
+  // Where nothing is to be shown, all projectors are on and their blacks add up.
+  Status judge_black() {
+    sim::World glowing = seen_world_;
+    Rig rig = check_.told.rig;
+    double least_black = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < glowing.projector_effects.size(); ++i) {
+      sim::ProjectorEffects& effects = glowing.projector_effects[i];
+      effects.black_level = check_.truth.projector_effects[i].black_level;
+      least_black = std::min(least_black, effects.black_level);
+      rig.responses.push_back(measured_response(effects, rig.projectors[i].name));
+    }
+    if (!(least_black > 0)) return nothing_to_judge("black_step_share", "projectors whose black gives light");
+    LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(check_.told.scene, rig));
+    const auto pictures = drawn_by(renderer, {check_.told.posed.world_from_prototype, {}});
+    const cv::Mat actual = sim::ideal_light(glowing, samples(), pictures);
+    const Steps steps = steps_of(actual, least_black, evenly_lit());
+    if (cv::countNonZero(steps.along) == 0)
+      return nothing_to_judge("black_step_share", "a seam of projectors in the viewer's picture");
+    values_["black_step_share"] = steps.worst;
+    cv::Mat even(actual.size(), CV_32FC3, cv::Scalar::all(0));
+    double brightest = 0;
+    cv::minMaxLoc(actual.reshape(1), nullptr, &brightest);
+    even.setTo(cv::Scalar::all(brightest), evenly_lit());
+    constexpr double k_brighter = 0.25;  // of full light: what the brightest black is shown as
+    pictures_.push_back(
+        {"black", "The light of black, brightened",
+         fmt::format("Worst step {:.0f} % of a projector's black. Difference: the seams blue, steps up "
+                     "to white at 100 %.",
+                     100 * steps.worst),
+         for_eye(actual * (k_brighter / brightest)), for_eye(even * (k_brighter / brightest)),
+         shown_steps(steps, 1)});
+    return {};
+  }
+
+  // As limn solve would measure it.
+  static Response measured_response(const sim::ProjectorEffects& effects, const std::string& projector) {
+    Response response;
+    response.projector = projector;
+    for (int value = 0; value < 256; ++value)
+      response.green.push_back(sim::light_share(effects, 1, value / 255.0));
+    response.red = response.blue = response.green;
+    response.black_level = Measured{effects.black_level, 0};
+    return response;
   }
 
   // Pixels that the projectors can light evenly: one of them reaches the whole pixel at no grazing angle,
@@ -497,10 +531,17 @@ class Judge {
     return lit;
   }
 
-  // How far luminance varies around each pixel, as a share of the coat's, and where other projectors begin.
-  std::pair<cv::Mat, cv::Mat> steps(const cv::Mat& light, const cv::Mat& whole) {
+  // How far luminance varies around each pixel as a share of `unit`, over `whole`; and where other projectors
+  // begin.
+  struct Steps {
+    cv::Mat step;   // CV_32F
+    cv::Mat along;  // CV_8U
+    double p95_along = 0, worst = 0;
+  };
+
+  Steps steps_of(const cv::Mat& light, double unit, const cv::Mat& whole) {
     cv::Mat ratio, weight;
-    cv::transform(light, ratio, cv::Matx13f(0.0722F, 0.7152F, 0.2126F) * static_cast<float>(1 / k_coat));
+    cv::transform(light, ratio, cv::Matx13f(0.0722F, 0.7152F, 0.2126F) * static_cast<float>(1 / unit));
     whole.convertTo(weight, CV_32F, 1.0 / 255);
     ratio = ratio.mul(weight);
     cv::GaussianBlur(ratio, ratio, {0, 0}, k_seam_blur_px);
@@ -513,17 +554,32 @@ class Judge {
       lowest.setTo(1e9, ~whole);
       cv::dilate(highest, highest, window);
       cv::erode(lowest, lowest, window);
-      return cv::Mat(highest - lowest);
+      cv::Mat difference = highest - lowest;
+      difference.setTo(0, ~whole);
+      return difference;
     };
-    cv::Mat along(light.size(), CV_8U, cv::Scalar(0));
+    Steps steps{range(ratio), cv::Mat(light.size(), CV_8U, cv::Scalar(0))};
     for (const cv::Mat& reach : reaches()) {
       cv::Mat reached;
       cv::Mat(reach > 0.5).convertTo(reached, CV_32F);
-      along |= (range(reached) > 0) & whole;
+      steps.along |= range(reached) > 0;
     }
-    cv::Mat step = range(ratio);
-    step.setTo(0, ~whole);
-    return {step, along};
+    cv::minMaxLoc(steps.step, nullptr, &steps.worst);
+    std::vector<float> on_seams;
+    for (int row = 0; row < light.rows; ++row)
+      for (int column = 0; column < light.cols; ++column)
+        if (steps.along.at<std::uint8_t>(row, column)) on_seams.push_back(steps.step.at<float>(row, column));
+    std::sort(on_seams.begin(), on_seams.end());
+    if (!on_seams.empty())
+      steps.p95_along = on_seams[static_cast<std::size_t>(0.95 * static_cast<double>(on_seams.size() - 1))];
+    return steps;
+  }
+
+  static cv::Mat shown_steps(const Steps& steps, double white) {
+    cv::Mat seams(steps.step.size(), CV_8UC3, cv::Scalar::all(0)), grey;
+    seams.setTo(cv::Scalar(90, 70, 40), steps.along);
+    steps.step.convertTo(grey, CV_8U, 255 / white);
+    return cv::max(seams, bgr(grey));
   }
 
   Status judge_rerun() {

@@ -63,6 +63,7 @@ TEST(Check, ShippedChecksHoldAndCoverEveryMeasure) {
   EXPECT_TRUE(json.at("passed").get<bool>());
   std::set<std::string> unseen;
   for (const CheckMeasure& measure : check_measures()) unseen.insert(measure.name);
+  unseen.erase("black_step_share");  // the renderer does not lift black where fewer projectors reach
   for (const auto& check : json.at("checks")) {
     for (const auto& reading : check.at("readings")) {
       EXPECT_TRUE(reading.at("passed").get<bool>()) << check.at("check") << " " << reading.dump();
@@ -156,6 +157,17 @@ TEST_F(CheckJudge, AWrongResponseShowsAtTheSeams) {
     wrong.told.rig.responses.push_back(response);
   }
   expect_missed(good, wrong);
+}
+
+TEST_F(CheckJudge, BlacksAddUpAcrossASeamUntilTheRendererLiftsTheRest) {
+  const std::string limits = R"("limits": {"black_step_share": 0.1})";
+  const auto found =
+      readings(check("halves", fmt::format(R"("viewer": {}, "resolution": 0.5, {})", k_viewer, limits)));
+  EXPECT_NEAR(found.at("black_step_share").value, 1, 0.05);
+  const auto one =
+      judged(check("bench", fmt::format(R"("viewer": {}, "resolution": 0.5, {})", k_viewer, limits)));
+  ASSERT_FALSE(one) << "a projector alone has no seam but at its own light's end";
+  EXPECT_NE(one.message().find("a seam of projectors"), std::string::npos) << one.message();
 }
 
 TEST(Check, ALimitThatCannotHoldFailsAndIsNamed) {
