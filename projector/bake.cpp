@@ -108,11 +108,10 @@ cv::Mat pixel_map(const Imager& imager, const TangentRect& rect, int columns, in
 cv::Mat response_table(const Response* response, int columns) {
   cv::Mat table(1, columns, CV_32FC3);
   for (int k = 0; k < columns; ++k) {
-    const double root = static_cast<double>(k) / (columns - 1);
+    const double light = std::pow(static_cast<double>(k) / (columns - 1), 2);
     auto& entry = table.at<cv::Vec3f>(0, k);
-    entry = cv::Vec3f::all(static_cast<float>(root));
+    entry = cv::Vec3f::all(static_cast<float>(std::pow(light, 1 / 2.2)));
     if (!response) continue;
-    const double light = std::pow(root, 2.2);
     const std::vector<double>* channels[] = {&response->red, &response->green, &response->blue};
     for (int c = 0; c < 3; ++c) {
       if (channels[c]->size() >= 2) entry[c] = display_value(*channels[c], light);

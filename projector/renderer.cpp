@@ -16,6 +16,9 @@ constexpr int k_response_columns = 1025;
 // Texture units; the sights take three from k_sights_unit on.
 constexpr int k_tangents_unit = 0, k_looks_unit = 1, k_response_unit = 2, k_centre_unit = 3,
               k_picture_unit = 4, k_sights_unit = 5, k_mixing_unit = 8, k_albedo_unit = 9;
+constexpr GLuint k_list_binding = 6;  // of buffers, after the scene's and the sights'
+// Steps of light that ask for more samples: beside light, and between blacks.
+constexpr float k_edge = 0.02F, k_dark_edge = 0.001F;
 // Towards the lamp of shaders/look.glsl in the viewer's frame: above and behind the left shoulder.
 const Eigen::Vector3d k_d_lamp_viewer = Eigen::Vector3d(-0.36, -0.64, -0.68).normalized();
 
@@ -117,7 +120,14 @@ struct Renderer::Impl {
   std::vector<std::string> slot_names;
   GpuScene scene;
   Sights sights;
-  Program points, blend, light_centre, light, irradiance, coverage, parts_centre, composite;
+  Program points, blend, light, irradiance, coverage, composite, edges;
+  // A layer of the parts' light: where there may be some, at pixel centres, by more samples at edges.
+  struct LayerPrograms {
+    Program where, centre, edges;
+  };
+  LayerPrograms light_layer, parts_layer;
+  GlName list;  // of pixels, shaders/listed.glsl
+  int list_room = 0;
   std::vector<GlName> responses;
   // Of the projectors' last pictures.
   struct Shown {
@@ -179,20 +189,31 @@ struct Renderer::Impl {
   void set_up(const Program& program, const GpuLens& lens, const Imager* viewer) const;
   void set_up_light(const Program& program, const scene::PosedScene& posed);
   void draw(const Program& program, const Canvas& into) const;
+  void start_list(int pixels);
+  template <class SetUp>
+  void draw_layer(LayerPrograms& layer, const Canvas& into, float least_step, const SetUp& set_up);
   Result<SurfaceMixing> measured(const MeasuredSurface& surface);
 };
 
 Status Renderer::Impl::link_programs() {
-  const std::pair<Program*, const char*> wanted[] = {{&points, "points.frag"},
-                                                     {&blend, "blend.frag"},
-                                                     {&light_centre, "light_centre.frag"},
-                                                     {&light, "light.frag"},
-                                                     {&irradiance, "irradiance.frag"},
-                                                     {&coverage, "coverage.frag"},
-                                                     {&parts_centre, "parts_centre.frag"},
-                                                     {&composite, "composite.frag"}};
-  for (const auto& [program, file] : wanted) {
+  const std::pair<Program*, const char*> drawn[] = {{&points, "points.frag"},
+                                                    {&blend, "blend.frag"},
+                                                    {&light, "light.frag"},
+                                                    {&irradiance, "irradiance.frag"},
+                                                    {&coverage, "coverage.frag"},
+                                                    {&composite, "composite.frag"}};
+  for (const auto& [program, file] : drawn) {
     LIMN_TRY(*program, Program::link("whole.vert", file));
+  }
+  const std::pair<Program*, const char*> computed[] = {{&edges, "edges.comp"},
+                                                       {&light_layer.where, "light_where.comp"},
+                                                       {&light_layer.centre, "light_centre.comp"},
+                                                       {&light_layer.edges, "light_edges.comp"},
+                                                       {&parts_layer.where, "parts_where.comp"},
+                                                       {&parts_layer.centre, "parts_centre.comp"},
+                                                       {&parts_layer.edges, "parts_edges.comp"}};
+  for (const auto& [program, file] : computed) {
+    LIMN_TRY(*program, Program::link_compute(file));
   }
   return {};
 }
@@ -291,6 +312,61 @@ void Renderer::Impl::set_up_light(const Program& program, const scene::PosedScen
   program.bind("s_albedo", k_albedo_unit, albedo);
 }
 
+// An empty list with room for so many pixels.
+void Renderer::Impl::start_list(int pixels) {
+  if (list_room < pixels) {
+    list = make_buffer(nullptr, sizeof(std::uint32_t) * (static_cast<std::size_t>(pixels) + 4));
+    list_room = pixels;
+  }
+  const std::uint32_t head[] = {0, 0, 1, 1};
+  glNamedBufferSubData(*list, 0, sizeof(head), head);
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_list_binding, *list);
+  glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, *list);
+}
+
+// Draws a layer (linear light, alpha: coverage) into a canvas of GL_RGBA32F. `set_up` gives every program
+// what it needs.
+template <class SetUp>
+void Renderer::Impl::draw_layer(LayerPrograms& layer,
+                                const Canvas& into,
+                                float least_step,
+                                const SetUp& set_up) {
+  const auto over_picture = [&](const Program& program) {
+    program.use();
+    glDispatchCompute(static_cast<GLuint>(into.width + 15) / 16, static_cast<GLuint>(into.height + 3) / 4, 1);
+    glMemoryBarrier(GL_ALL_BARRIER_BITS);
+  };
+  const auto over_list = [&](const Program& program) {
+    constexpr GLintptr k_groups = sizeof(std::uint32_t);  // after the count
+    set_up(program);
+    program.use();
+    glBindImageTexture(0, *into.texture, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
+    glDispatchComputeIndirect(k_groups);
+    glMemoryBarrier(GL_ALL_BARRIER_BITS);
+  };
+  glClearTexImage(*into.texture, 0, GL_RGBA, GL_FLOAT, nullptr);
+  start_list(into.width * into.height);
+  {
+    const PassTimes::Scope scope(&times, "where there may be light");
+    set_up(layer.where);
+    layer.where.set("u_size", into.width, into.height);
+    over_picture(layer.where);
+  }
+  {
+    const PassTimes::Scope scope(&times, "light at pixel centres");
+    over_list(layer.centre);
+  }
+  start_list(into.width * into.height);
+  {
+    const PassTimes::Scope scope(&times, "where edges are");
+    edges.bind("s_centre", k_centre_unit, into.texture);
+    edges.set("u_least_step", least_step);
+    over_picture(edges);
+  }
+  const PassTimes::Scope scope(&times, "light at edges");
+  over_list(layer.edges);
+}
+
 // Takes the surface's layers to the GPU.
 Result<SurfaceMixing> Renderer::Impl::measured(const MeasuredSurface& measured) {
   const Imager& camera = measured.camera;
@@ -371,19 +447,19 @@ unsigned Renderer::draw_projector(std::size_t index, const scene::PosedScene& po
   impl_->look_from_eye(viewer);
   const Canvas& centre = impl_->canvas(projector.width, projector.height, GL_RGBA32F);
   if (!shown.display.texture) shown.display = Canvas(projector.width, projector.height, GL_RGBA8);
-  for (const Program* program : {&impl_->light_centre, &impl_->light}) {
-    impl_->set_up(*program, impl_->sights.projector_lens(index), &viewer);
-    program->set("u_projector", static_cast<int>(index));
-    impl_->set_up_light(*program, posed);
-  }
+  const LightOptions& options = impl_->light_options;
+  const auto set_up = [&](const Program& program) {
+    impl_->set_up(program, impl_->sights.projector_lens(index), &viewer);
+    program.set("u_projector", static_cast<int>(index));
+    impl_->set_up_light(program, posed);
+  };
+  impl_->draw_layer(impl_->light_layer, centre, options.even_black ? k_dark_edge : k_edge, set_up);
   {
-    const PassTimes::Scope scope(&impl_->times, "light at pixel centres");
-    impl_->draw(impl_->light_centre, centre);
-  }
-  impl_->light.bind("s_centre", k_centre_unit, centre.texture);
-  impl_->light.bind("s_response", k_response_unit, impl_->responses[index]);
-  {
-    const PassTimes::Scope scope(&impl_->times, "edges and response");
+    const PassTimes::Scope scope(&impl_->times, "response");
+    set_up(impl_->light);
+    impl_->light.set("u_is_balanced", options.compensation != Compensation::none || options.even_black);
+    impl_->light.bind("s_centre", k_centre_unit, centre.texture);
+    impl_->light.bind("s_response", k_response_unit, impl_->responses[index]);
     impl_->draw(impl_->light, shown.display);
   }
   shown.posed = posed;
@@ -450,11 +526,10 @@ cv::Mat Renderer::composite(std::size_t camera,
   upload(behind, bgr);
   const Canvas& centre = impl_->canvas(bgr.cols, bgr.rows, GL_RGBA32F);
   const Canvas& out = impl_->canvas(bgr.cols, bgr.rows, GL_RGBA8);
-  for (const Program* program : {&impl_->parts_centre, &impl_->composite}) {
-    impl_->set_up(*program, impl_->lens_of(imager), &imager);
-    program->set("u_rest", what == Composite::rest);
-  }
-  impl_->draw(impl_->parts_centre, centre);
+  impl_->draw_layer(impl_->parts_layer, centre, k_edge, [&](const Program& program) {
+    impl_->set_up(program, impl_->lens_of(imager), &imager);
+    program.set("u_rest", what == Composite::rest);
+  });
   impl_->composite.bind("s_centre", k_centre_unit, centre.texture);
   impl_->composite.bind("s_picture", k_picture_unit, behind);
   impl_->draw(impl_->composite, out);

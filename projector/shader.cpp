@@ -1,6 +1,7 @@
 #include "projector/shader.h"
 
 #include <algorithm>
+#include <array>
 #include <sstream>
 #include <vector>
 
@@ -63,20 +64,29 @@ Result<GlName> compile(GLenum stage, const std::string& file) {
 }  // namespace
 
 Result<Program> Program::link(const std::string& vertex_file, const std::string& fragment_file) {
-  LIMN_TRY(const GlName vertex, compile(GL_VERTEX_SHADER, vertex_file));
-  LIMN_TRY(const GlName fragment, compile(GL_FRAGMENT_SHADER, fragment_file));
+  std::array<GlName, 2> shaders;
+  LIMN_TRY(shaders[0], compile(GL_VERTEX_SHADER, vertex_file));
+  LIMN_TRY(shaders[1], compile(GL_FRAGMENT_SHADER, fragment_file));
+  return linked(shaders, vertex_file + " and " + fragment_file);
+}
+
+Result<Program> Program::link_compute(const std::string& file) {
+  std::array<GlName, 1> shaders;
+  LIMN_TRY(shaders[0], compile(GL_COMPUTE_SHADER, file));
+  return linked(shaders, file);
+}
+
+Result<Program> Program::linked(std::span<const GlName> shaders, const std::string& files) {
   Program program;
   program.name_ = GlName(glCreateProgram(), [](GLuint n) { glDeleteProgram(n); });
-  glAttachShader(*program.name_, *vertex);
-  glAttachShader(*program.name_, *fragment);
+  for (const GlName& shader : shaders) glAttachShader(*program.name_, *shader);
   glLinkProgram(*program.name_);
   GLint ok = 0;
   glGetProgramiv(*program.name_, GL_LINK_STATUS, &ok);
   if (ok) return program;
   char message[4096] = "";
   glGetProgramInfoLog(*program.name_, sizeof(message), nullptr, message);
-  return error("shaders/{} and {}: the graphics driver does not link them: {}", vertex_file, fragment_file,
-               message);
+  return error("shaders/{}: the graphics driver does not link: {}", files, message);
 }
 
 }  // namespace limn::projector

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <map>
+#include <span>
 #include <string>
 
 #include "core/result.h"
@@ -14,15 +15,19 @@ namespace limn::projector {
 /// File name -> text of everything in shaders/, put into the program at build time.
 const std::map<std::string, std::string>& embedded_shaders();
 
-/// A linked vertex and fragment shader.
+/// A linked vertex and fragment shader, or a compute shader.
 class Program {
  public:
   /// By file names in shaders/. `#include "x.glsl"` is replaced by the file once, with #line directives, so
   /// that the driver's messages name the true line. Error: the driver's message with file names.
   static Result<Program> link(const std::string& vertex_file, const std::string& fragment_file);
 
+  /// A compute shader, likewise.
+  static Result<Program> link_compute(const std::string& file);
+
   void use() const { glUseProgram(*name_); }
   void set(const char* uniform, int value) const { glProgramUniform1i(*name_, at(uniform), value); }
+  void set(const char* uniform, int x, int y) const { glProgramUniform2i(*name_, at(uniform), x, y); }
   void set_id(const char* uniform, unsigned value) const { glProgramUniform1ui(*name_, at(uniform), value); }
   void set(const char* uniform, const Eigen::Vector4f& v) const {
     glProgramUniform4fv(*name_, at(uniform), 1, v.data());
@@ -43,6 +48,7 @@ class Program {
  private:
   // -1 for a uniform that this program does not use; GL ignores setting it.
   GLint at(const char* uniform) const { return glGetUniformLocation(*name_, uniform); }
+  static Result<Program> linked(std::span<const GlName> shaders, const std::string& files);
   GlName name_;
 };
 

@@ -1,8 +1,7 @@
 #version 450 core
-// Second pass of a composite: more samples at edges, laid over the camera's picture in linear light, out in sRGB.
-#include "parts.glsl"
-#include "refine.glsl"
+// The parts laid over the camera's picture in linear light, out in sRGB.
 layout(location = 0) out vec4 o_srgb;
+uniform sampler2D s_centre;   // the parts, linear light, a: coverage
 uniform sampler2D s_picture;  // sRGB values as stored
 
 vec3 linear_from_srgb(vec3 c) { return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045))); }
@@ -13,11 +12,6 @@ vec3 srgb_from_linear(vec3 c) {
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   vec4 part = texelFetch(s_centre, at, 0);
-  if (is_at_edge(at, k_edge)) {
-    part = vec4(0);
-    for (int k = 0; k < k_samples * k_samples; ++k) part += part_at(vec2(at) + sample_offset(k));
-    part /= float(k_samples * k_samples);
-  }
   vec3 behind = texelFetch(s_picture, at, 0).rgb;
   if (part.a > 0.0) behind = srgb_from_linear(clamp(linear_from_srgb(behind) * (1.0 - part.a) + part.rgb, 0.0, 1.0));
   o_srgb = vec4(behind, 1);

@@ -1,12 +1,11 @@
 #version 450 core
-// Second pass of a projector's picture: more samples at edges, then display values by the projector's response. Alpha
-// says what was clipped.
-#include "light.glsl"
-#include "refine.glsl"
+// A projector's picture from its light: display values by the projector's response. Alpha says what was clipped.
+#include "scene.glsl"
 layout(location = 0) out vec4 o_display;
-uniform sampler2D s_response;  // display value over light^(1/2.2), evenly spaced from 0 to 1
-
-const float k_dark_edge = 0.001;  // of full light: a step between blacks
+uniform sampler2D s_centre;    // linear light, a: coverage
+uniform sampler2D s_response;  // display value over the root of light, evenly spaced from 0 to 1
+uniform int u_projector;
+uniform bool u_is_balanced;    // light counts over black, and bands are dithered
 
 // Even noise of 0 ... 1, the same every time (Jimenez 2014, "Next Generation Post Processing in Call of Duty: Advanced
 // Warfare", interleaved gradient noise).
@@ -14,7 +13,7 @@ float dither(vec2 at) { return fract(52.9829189 * fract(dot(at, vec2(0.06711056,
 
 vec3 display_value(vec3 light) {
   float nodes = float(textureSize(s_response, 0).x);
-  vec3 at = pow(clamp(light, 0.0, 1.0), vec3(1.0 / 2.2)) * (nodes - 1.0);
+  vec3 at = sqrt(clamp(light, 0.0, 1.0)) * (nodes - 1.0);
   vec3 out_value;
   for (int c = 0; c < 3; ++c) {
     int first = min(int(at[c]), int(nodes) - 2);
@@ -27,17 +26,12 @@ vec3 display_value(vec3 light) {
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   vec4 light = texelFetch(s_centre, at, 0);
-  if (is_at_edge(at, u_even_black ? k_dark_edge : k_edge)) {
-    light = vec4(0);
-    for (int k = 0; k < k_samples * k_samples; ++k) light += light_at(vec2(at) + sample_offset(k));
-    light /= float(k_samples * k_samples);
-  }
   // 1: brighter than light can be is wanted, 0.5: darker.
   const float k_tolerance = 0.004;
   float clipped = any(greaterThan(light.rgb, vec3(1.0 + k_tolerance))) ? 1.0
                   : any(lessThan(light.rgb, vec3(-k_tolerance)))       ? 0.5
                                                                        : 0.0;
-  if (u_compensation == k_as_it_is && !u_even_black) {
+  if (!u_is_balanced) {
     o_display = vec4(light.a > 0.0 ? display_value(light.rgb) : vec3(0), clipped);
     return;
   }

@@ -48,3 +48,17 @@ vec4 light_at(vec2 px) {
   if (colour.a == 0.0 && !u_even_black) return colour;
   return vec4(balanced(u_projector, colour, p, prototype, n), 1);
 }
+
+// False only where light_at is 0 for certain: no part is seen there from the viewer's eye, and none lies there.
+bool may_give_light(vec2 px) {
+  Sight projector = s_sights[u_projector];
+  vec3 d = ray_of(projector, px);
+  Hit prototype = first_hit(s_projector_ids, projector, 0, d);
+  if (prototype.id == 0u) return false;
+  vec3 p = projector.p_eye.xyz + prototype.t * d;
+  vec4 share;
+  Sight eye = s_sights[u_eye];
+  return u_even_black ||
+         (u_has_view_parts && ids_around(s_eye_ids, eye, 1, p - eye.p_eye.xyz, share) != uvec4(0)) ||
+         (u_has_surface_parts && may_hold_surface_part(p, u_placement_count));
+}

@@ -1,0 +1,21 @@
+#version 450 core
+// Lists the pixels of a picture of one sample a pixel that need more: beside an edge of coverage or colour.
+#include "listed.glsl"
+layout(local_size_x = 16, local_size_y = 4) in;
+uniform sampler2D s_centre;  // linear light, a: coverage
+uniform float u_least_step;  // of full light; a smaller one is no edge
+
+void main() {
+  ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+  ivec2 last = textureSize(s_centre, 0) - 1;
+  if (any(greaterThan(at, last))) return;
+  vec4 lowest = vec4(1e9), highest = vec4(-1e9);
+  for (int y = -1; y <= 1; ++y) {
+    for (int x = -1; x <= 1; ++x) {
+      vec4 c = texelFetch(s_centre, clamp(at + ivec2(x, y), ivec2(0), last), 0);
+      lowest = min(lowest, c);
+      highest = max(highest, c);
+    }
+  }
+  if (any(greaterThan(highest - lowest, vec4(u_least_step)))) list_pixel(at);
+}

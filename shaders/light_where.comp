@@ -1,0 +1,11 @@
+#version 450 core
+// Lists the pixels of a projector that may give light.
+#include "light.glsl"
+#include "listed.glsl"
+layout(local_size_x = 16, local_size_y = 4) in;
+uniform ivec2 u_size;
+
+void main() {
+  ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+  if (all(lessThan(at, u_size)) && may_give_light(vec2(at))) list_pixel(at);
+}

@@ -1,0 +1,14 @@
+#version 450 core
+// Lists the pixels of a camera that may see a part.
+#include "parts.glsl"
+#include "listed.glsl"
+layout(local_size_x = 16, local_size_y = 4) in;
+uniform ivec2 u_size;
+
+void main() {
+  ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(at, u_size))) return;
+  vec4 share;
+  Sight eye = s_sights[u_eye];
+  if (ids_around(s_eye_ids, eye, 1, ray_of(eye, vec2(at)), share) != uvec4(0)) list_pixel(at);
+}
