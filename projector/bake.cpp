@@ -1,5 +1,6 @@
 #include "projector/bake.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -103,6 +104,27 @@ cv::Mat pixel_map(const Imager& imager, const TangentRect& rect, int columns, in
     }
   }
   return map;
+}
+
+cv::Rect pixels_of(const Imager& imager, const BakedLens& lens, const TangentRect& rect) {
+  constexpr int k_nodes = 17;        // a side: a lens bends lines little between them
+  constexpr double k_margin_px = 4;  // for that, and for what pixels see beside their centres
+  const TangentRect seen = intersected(rect, lens.rect);
+  if (seen.is_empty()) return {};
+  Eigen::AlignedBox2d box;
+  for (int row = 0; row < k_nodes; ++row)
+    for (int column = 0; column < k_nodes; ++column) {
+      const Eigen::Vector2d share(1.0 * column / (k_nodes - 1), 1.0 * row / (k_nodes - 1));
+      const Eigen::Vector2d tangent = seen.lower + (seen.upper - seen.lower).cwiseProduct(share);
+      if (const auto px = imager.lens.project(tangent.homogeneous())) box.extend(*px);
+    }
+  if (box.isEmpty()) return {0, 0, imager.width, imager.height};
+  const auto whole = [](double value) { return static_cast<int>(std::clamp(value, -1e6, 1e6)); };
+  const cv::Point first(whole(std::floor(box.min().x() - k_margin_px)),
+                        whole(std::floor(box.min().y() - k_margin_px)));
+  const cv::Point end(whole(std::ceil(box.max().x() + k_margin_px)),
+                      whole(std::ceil(box.max().y() + k_margin_px)));
+  return cv::Rect(first, end) & cv::Rect(0, 0, imager.width, imager.height);
 }
 
 cv::Mat response_table(const Response* response, int columns) {

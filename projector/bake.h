@@ -24,6 +24,9 @@ BakedLens baked(const Imager& imager);
 /// -1e6 where the lens has none.
 cv::Mat pixel_map(const Imager& imager, const TangentRect& rect, int columns, int rows);
 
+/// The rectangle of pixels, with a margin, whose directions lie in `rect`; empty when none do.
+cv::Rect pixels_of(const Imager& imager, const BakedLens& lens, const TangentRect& rect);
+
 /// CV_32FC3 (r, g, b), 1 row: display value that gives the light (k / (columns - 1))^2 by the measured
 /// response, gamma 2.2 when `response` is null.
 cv::Mat response_table(const Response* response, int columns);

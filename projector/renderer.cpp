@@ -39,13 +39,17 @@ bool is_same(const Pose& a, const Pose& b) {
   return a.rotation.coeffs() == b.rotation.coeffs() && a.translation == b.translation;
 }
 
-bool is_same(const scene::PosedScene& a, const scene::PosedScene& b) {
+bool is_same_prototype(const scene::PosedScene& a, const scene::PosedScene& b) {
   if (a.world_from_prototype.has_value() != b.world_from_prototype.has_value()) return false;
-  if (a.world_from_prototype && !is_same(*a.world_from_prototype, *b.world_from_prototype)) return false;
-  return std::equal(
-      a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(), [](const auto& p, const auto& q) {
-        return p.slot == q.slot && p.variant == q.variant && is_same(p.world_from_part, q.world_from_part);
-      });
+  return !a.world_from_prototype || is_same(*a.world_from_prototype, *b.world_from_prototype);
+}
+
+bool is_same(const scene::PosedScene& a, const scene::PosedScene& b) {
+  return is_same_prototype(a, b) && std::equal(a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(),
+                                               [](const auto& p, const auto& q) {
+                                                 return p.slot == q.slot && p.variant == q.variant &&
+                                                        is_same(p.world_from_part, q.world_from_part);
+                                               });
 }
 
 bool is_same(const LightOptions& a, const LightOptions& b) {
@@ -189,9 +193,14 @@ struct Renderer::Impl {
   void set_up(const Program& program, const GpuLens& lens, const Imager* viewer) const;
   void set_up_light(const Program& program, const scene::PosedScene& posed);
   void draw(const Program& program, const Canvas& into) const;
+  void draw(const Program& program, const Canvas& into, const std::vector<cv::Rect>& places) const;
   void start_list(int pixels);
   template <class SetUp>
-  void draw_layer(LayerPrograms& layer, const Canvas& into, float least_step, const SetUp& set_up);
+  void draw_layer(LayerPrograms& layer,
+                  const Canvas& into,
+                  const std::vector<cv::Rect>& places,
+                  float least_step,
+                  const SetUp& set_up);
   Result<SurfaceMixing> measured(const MeasuredSurface& surface);
 };
 
@@ -243,7 +252,8 @@ void Renderer::Impl::prepare(const scene::PosedScene& posed) {
   scene.place(runs);
   {
     const PassTimes::Scope scope(&times, "ids from projectors");
-    sights.see_from_projectors(scene, runs, scene_from_world);
+    const bool is_prototype_there = drawn && is_same_prototype(*drawn, posed);
+    sights.see_from_projectors(scene, runs, scene_from_world, !is_prototype_there);
   }
   eye_kind = EyeKind::none;
   drawn = posed;
@@ -253,7 +263,7 @@ void Renderer::Impl::look_from_eye(const Imager& viewer) {
   if (eye_kind == EyeKind::eye && is_same(eye.imager_from_world, viewer.imager_from_world)) return;
   const Pose scene_from_viewer = scene_from_world * viewer.imager_from_world.inverse();
   const PassTimes::Scope scope(&times, "ids from the eye");
-  sights.see_from_eye(scene, runs, scene_from_viewer.translation,
+  sights.see_from_eye(scene, runs, scene_from_world, scene_from_viewer.translation,
                       scene_from_viewer.rotation * -Eigen::Vector3d::UnitY());
   eye_kind = EyeKind::eye;
   eye = viewer;
@@ -324,16 +334,23 @@ void Renderer::Impl::start_list(int pixels) {
   glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, *list);
 }
 
-// Draws a layer (linear light, alpha: coverage) into a canvas of GL_RGBA32F. `set_up` gives every program
-// what it needs.
+// Draws a layer (linear light, alpha: coverage) into a canvas of GL_RGBA32F; outside of `places` it is empty.
+// `set_up` gives every program what it needs.
 template <class SetUp>
 void Renderer::Impl::draw_layer(LayerPrograms& layer,
                                 const Canvas& into,
+                                const std::vector<cv::Rect>& places,
                                 float least_step,
                                 const SetUp& set_up) {
-  const auto over_picture = [&](const Program& program) {
+  const auto over_places = [&](const Program& program) {
+    start_list(into.width * into.height * static_cast<int>(std::max<std::size_t>(1, places.size())));
     program.use();
-    glDispatchCompute(static_cast<GLuint>(into.width + 15) / 16, static_cast<GLuint>(into.height + 3) / 4, 1);
+    for (const cv::Rect& place : places) {
+      program.set("u_first", place.x, place.y);
+      program.set("u_end", place.x + place.width, place.y + place.height);
+      glDispatchCompute(static_cast<GLuint>(place.width + 15) / 16, static_cast<GLuint>(place.height + 3) / 4,
+                        1);
+    }
     glMemoryBarrier(GL_ALL_BARRIER_BITS);
   };
   const auto over_list = [&](const Program& program) {
@@ -345,23 +362,20 @@ void Renderer::Impl::draw_layer(LayerPrograms& layer,
     glMemoryBarrier(GL_ALL_BARRIER_BITS);
   };
   glClearTexImage(*into.texture, 0, GL_RGBA, GL_FLOAT, nullptr);
-  start_list(into.width * into.height);
   {
     const PassTimes::Scope scope(&times, "where there may be light");
     set_up(layer.where);
-    layer.where.set("u_size", into.width, into.height);
-    over_picture(layer.where);
+    over_places(layer.where);
   }
   {
     const PassTimes::Scope scope(&times, "light at pixel centres");
     over_list(layer.centre);
   }
-  start_list(into.width * into.height);
   {
     const PassTimes::Scope scope(&times, "where edges are");
     edges.bind("s_centre", k_centre_unit, into.texture);
     edges.set("u_least_step", least_step);
-    over_picture(edges);
+    over_places(edges);
   }
   const PassTimes::Scope scope(&times, "light at edges");
   over_list(layer.edges);
@@ -394,15 +408,29 @@ Result<SurfaceMixing> Renderer::Impl::measured(const MeasuredSurface& measured) 
 }
 
 void Renderer::Impl::draw(const Program& program, const Canvas& into) const {
+  draw(program, into, {cv::Rect(0, 0, into.width, into.height)});
+}
+
+// Black outside of `places`.
+void Renderer::Impl::draw(const Program& program,
+                          const Canvas& into,
+                          const std::vector<cv::Rect>& places) const {
   glBindFramebuffer(GL_FRAMEBUFFER, *into.framebuffer);
   glViewport(0, 0, into.width, into.height);
   glDisable(GL_DEPTH_TEST);
-  glDisable(GL_SCISSOR_TEST);
   glDisable(GL_BLEND);
   glDisable(GL_CULL_FACE);
+  glDisable(GL_SCISSOR_TEST);
+  const GLfloat black[4] = {0, 0, 0, 0};
+  glClearNamedFramebufferfv(*into.framebuffer, GL_COLOR, 0, black);
+  glEnable(GL_SCISSOR_TEST);
   glBindVertexArray(*vertex_array);
   program.use();
-  glDrawArrays(GL_TRIANGLES, 0, 3);
+  for (const cv::Rect& place : places) {
+    glScissor(place.x, place.y, place.width, place.height);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+  }
+  glDisable(GL_SCISSOR_TEST);
 }
 
 Renderer::Renderer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -453,14 +481,20 @@ unsigned Renderer::draw_projector(std::size_t index, const scene::PosedScene& po
     program.set("u_projector", static_cast<int>(index));
     impl_->set_up_light(program, posed);
   };
-  impl_->draw_layer(impl_->light_layer, centre, options.even_black ? k_dark_edge : k_edge, set_up);
+  const std::vector<cv::Rect> places =
+      options.even_black
+          ? std::vector{impl_->sights.prototype_place(index, impl_->runs, impl_->scene_from_world)}
+          : impl_->sights.light_places(
+                index, impl_->runs, impl_->scene_from_world,
+                (impl_->scene_from_world * viewer.imager_from_world.inverse()).translation);
+  impl_->draw_layer(impl_->light_layer, centre, places, options.even_black ? k_dark_edge : k_edge, set_up);
   {
     const PassTimes::Scope scope(&impl_->times, "response");
     set_up(impl_->light);
     impl_->light.set("u_is_balanced", options.compensation != Compensation::none || options.even_black);
     impl_->light.bind("s_centre", k_centre_unit, centre.texture);
     impl_->light.bind("s_response", k_response_unit, impl_->responses[index]);
-    impl_->draw(impl_->light, shown.display);
+    impl_->draw(impl_->light, shown.display, places);
   }
   shown.posed = posed;
   shown.imager_from_world = viewer.imager_from_world;
@@ -526,7 +560,8 @@ cv::Mat Renderer::composite(std::size_t camera,
   upload(behind, bgr);
   const Canvas& centre = impl_->canvas(bgr.cols, bgr.rows, GL_RGBA32F);
   const Canvas& out = impl_->canvas(bgr.cols, bgr.rows, GL_RGBA8);
-  impl_->draw_layer(impl_->parts_layer, centre, k_edge, [&](const Program& program) {
+  const cv::Rect whole(0, 0, bgr.cols, bgr.rows);
+  impl_->draw_layer(impl_->parts_layer, centre, {whole}, k_edge, [&](const Program& program) {
     impl_->set_up(program, impl_->lens_of(imager), &imager);
     program.set("u_rest", what == Composite::rest);
   });

@@ -33,7 +33,30 @@ std::vector<PlacedRun> only(const std::vector<PlacedRun>& runs, bool (*wanted)(c
 
 bool is_prototype(const PlacedRun& placed) { return placed.owner == 0; }
 bool is_part(const PlacedRun& placed) { return placed.owner != 0; }
+bool is_view_part(const PlacedRun& placed) { return placed.owner != 0 && !placed.on_surface; }
 bool is_surface_part(const PlacedRun& placed) { return placed.owner != 0 && placed.on_surface; }
+
+// Corners of a frustum that holds all that an eye sees through a box of the given corners, from the
+// prototype's nearest depth to its farthest. Everything when the box reaches behind the eye.
+std::vector<Eigen::Vector3d> behind(const std::vector<Eigen::Vector3d>& corners,
+                                    const std::vector<Eigen::Vector3d>& prototype,
+                                    const Eigen::Vector3d& p_eye) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& p : corners) middle += p / static_cast<double>(corners.size());
+  const Eigen::Vector3d d = (middle - p_eye).normalized();
+  double nearest = 1e9, farthest = 0;
+  for (const Eigen::Vector3d& p : prototype) {
+    nearest = std::min(nearest, d.dot(p - p_eye));
+    farthest = std::max(farthest, d.dot(p - p_eye));
+  }
+  std::vector<Eigen::Vector3d> out;
+  for (const Eigen::Vector3d& p : corners) {
+    const double depth = d.dot(p - p_eye);
+    if (depth < 0.01 || nearest < 0.01) return prototype;
+    for (const double at : {nearest, farthest}) out.emplace_back(p_eye + at / depth * (p - p_eye));
+  }
+  return out;
+}
 
 }  // namespace
 
@@ -144,7 +167,8 @@ void Sights::upload_pixel_map(int layer, const Imager& imager, const TangentRect
 
 void Sights::see_from_projectors(const GpuScene& scene,
                                  const std::vector<PlacedRun>& runs,
-                                 const Pose& scene_from_world) {
+                                 const Pose& scene_from_world,
+                                 bool prototype_too) {
   const auto prototype = only(runs, is_prototype);
   const auto surface_parts = only(runs, is_surface_part);
   const auto bounds = bounds_of(prototype);
@@ -154,7 +178,7 @@ void Sights::see_from_projectors(const GpuScene& scene,
     const Twin twin = twin_over(pose, intersected(whole, spanned(pose, bounds)),
                                 k_oversampling * projectors_[i].lens.fx(), ids_width_, ids_height_);
     const int layer = 2 * static_cast<int>(i);
-    draw(scene, prototype, twin, projector_ids_, layer);
+    if (prototype_too) draw(scene, prototype, twin, projector_ids_, layer);
     draw(scene, surface_parts, twin, projector_ids_, layer + 1);
     GpuSight sight(twin, layer);
     sight.of_imager(projectors_[i]);
@@ -200,16 +224,54 @@ void Sights::see_from_witness(const GpuScene& scene,
 
 void Sights::see_from_eye(const GpuScene& scene,
                           const std::vector<PlacedRun>& runs,
+                          const Pose& scene_from_world,
                           const Eigen::Vector3d& p_eye_scene,
                           const Eigen::Vector3d& d_up_scene) {
-  const auto bounds = bounds_of(runs);
+  const auto bounds = bounds_of(only(runs, is_view_part));
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3d& p : bounds) box.extend(p);
   const Pose pose = bounds.empty() ? Pose() : looking_at(p_eye_scene, box.center(), d_up_scene);
-  const Twin twin = twin_over(pose, spanned(pose, bounds), 1e9, k_eye_side, k_eye_side);
+  Eigen::AlignedBox3d prototype;
+  for (const Eigen::Vector3d& p : bounds_of(only(runs, is_prototype))) prototype.extend(p);
+  double focal = 1;
+  for (const Imager& projector : projectors_) {
+    const Eigen::Vector3d p_projector = (sight_pose(projector, scene_from_world).inverse()).translation;
+    const double distance = prototype.isEmpty() ? 1 : std::max(0.05, prototype.exteriorDistance(p_projector));
+    const double farthest =
+        prototype.isEmpty() ? 1
+                            : (prototype.center() - p_eye_scene).norm() + 0.5 * prototype.diagonal().norm();
+    focal = std::max(focal, k_oversampling * projector.lens.fx() * farthest / distance);
+  }
+  const Twin twin = twin_over(pose, spanned(pose, bounds), focal, k_eye_side, k_eye_side);
   draw(scene, only(runs, is_prototype), twin, eye_ids_, 0);
   draw(scene, only(runs, is_part), twin, eye_ids_, 1);
   send(eye(), GpuSight(twin, 0));
+}
+
+cv::Rect Sights::prototype_place(std::size_t projector,
+                                 const std::vector<PlacedRun>& runs,
+                                 const Pose& scene_from_world) const {
+  const Pose pose = sight_pose(projectors_[projector], scene_from_world);
+  return pixels_of(projectors_[projector], lenses_[projector].baked,
+                   spanned(pose, bounds_of(only(runs, is_prototype))));
+}
+
+std::vector<cv::Rect> Sights::light_places(std::size_t projector,
+                                           const std::vector<PlacedRun>& runs,
+                                           const Pose& scene_from_world,
+                                           const Eigen::Vector3d& p_eye_scene) const {
+  const Pose pose = sight_pose(projectors_[projector], scene_from_world);
+  const auto prototype = bounds_of(only(runs, is_prototype));
+  const cv::Rect whole = prototype_place(projector, runs, scene_from_world);
+  std::vector<cv::Rect> places;
+  for (const PlacedRun& part : only(runs, is_part)) {
+    std::vector<Eigen::Vector3d> corners = bounds_of({part});
+    if (!part.on_surface) corners = behind(corners, prototype, p_eye_scene);
+    const cv::Rect place =
+        whole & pixels_of(projectors_[projector], lenses_[projector].baked, spanned(pose, corners));
+    if (!place.empty()) places.push_back(place);
+  }
+  return places;
 }
 
 void Sights::bind(const Program& program, int first_unit) const {

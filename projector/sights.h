@@ -1,5 +1,6 @@
 #pragma once
 
+#include <opencv2/core/types.hpp>
 #include <vector>
 
 #include "core/rig.h"
@@ -24,22 +25,35 @@ class Sights {
  public:
   static Result<Sights> create(const Rig& rig);
 
-  /// Draws the projectors' ids of a posed scene.
+  /// Draws the projectors' ids of a posed scene; `prototype_too`: not just the surface parts again.
   void see_from_projectors(const GpuScene& scene,
                            const std::vector<PlacedRun>& runs,
-                           const Pose& scene_from_world);
+                           const Pose& scene_from_world,
+                           bool prototype_too);
   /// Draws the ids from an imager's own eye, over its picture.
   void see_from_imager(const GpuScene& scene,
                        const std::vector<PlacedRun>& runs,
                        const Pose& scene_from_world,
                        const Imager& imager,
                        const BakedLens& lens);
-  /// Draws the ids from an eye, over everything that is there; `d_up_scene` is any direction but the line of
-  /// sight.
+  /// Draws the ids from an eye, over its view parts, as finely as the projectors show them; `d_up_scene` is
+  /// any direction but the line of sight.
   void see_from_eye(const GpuScene& scene,
                     const std::vector<PlacedRun>& runs,
+                    const Pose& scene_from_world,
                     const Eigen::Vector3d& p_eye_scene,
                     const Eigen::Vector3d& d_up_scene);
+
+  /// Rectangles of the projector's picture, outside of which it gives no light for the parts: each part's
+  /// own, where it lies or where the eye sees the prototype behind it.
+  std::vector<cv::Rect> light_places(std::size_t projector,
+                                     const std::vector<PlacedRun>& runs,
+                                     const Pose& scene_from_world,
+                                     const Eigen::Vector3d& p_eye_scene) const;
+  /// The rectangle of the picture that the prototype lies in.
+  cv::Rect prototype_place(std::size_t projector,
+                           const std::vector<PlacedRun>& runs,
+                           const Pose& scene_from_world) const;
 
   /// Draws the prototype's ids from a camera, and keeps them: `scene_from_world` is the camera's, for good.
   void see_from_witness(const GpuScene& scene,

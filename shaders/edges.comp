@@ -3,12 +3,13 @@
 #include "listed.glsl"
 layout(local_size_x = 16, local_size_y = 4) in;
 uniform sampler2D s_centre;  // linear light, a: coverage
+uniform ivec2 u_first, u_end;  // of the rectangle to look through
 uniform float u_least_step;  // of full light; a smaller one is no edge
 
 void main() {
-  ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+  ivec2 at = u_first + ivec2(gl_GlobalInvocationID.xy);
   ivec2 last = textureSize(s_centre, 0) - 1;
-  if (any(greaterThan(at, last))) return;
+  if (any(greaterThanEqual(at, u_end))) return;
   vec4 lowest = vec4(1e9), highest = vec4(-1e9);
   for (int y = -1; y <= 1; ++y) {
     for (int x = -1; x <= 1; ++x) {

@@ -3,9 +3,9 @@
 #include "light.glsl"
 #include "listed.glsl"
 layout(local_size_x = 16, local_size_y = 4) in;
-uniform ivec2 u_size;
+uniform ivec2 u_first, u_end;  // of the rectangle to look through
 
 void main() {
-  ivec2 at = ivec2(gl_GlobalInvocationID.xy);
-  if (all(lessThan(at, u_size)) && may_give_light(vec2(at))) list_pixel(at);
+  ivec2 at = u_first + ivec2(gl_GlobalInvocationID.xy);
+  if (all(lessThan(at, u_end)) && may_give_light(vec2(at))) list_pixel(at);
 }

@@ -22,18 +22,19 @@ Hit surface_part_at(usampler2DArray s_ids, Sight sight, vec3 p, vec3 d_normal) {
   Hit best = k_no_hit, missed = k_no_hit;
   float missed_by = 0.5;  // of a triangle's height
   bool in_middle = false;
-  uint tried = 0u;
+  uvec4 tried = uvec4(0);
   for (int i = 0; i < 5; ++i) {
     vec4 share;
     uvec4 ids = ids_around(s_ids, sight, 1, p + k_heights[i] * k_on_surface * d_normal - sight.p_eye.xyz, share);
     if (i == 0) in_middle = all(notEqual(ids, uvec4(0)));
-    for (int k = 0; k < 4; ++k) {
-      uint id = ids[k];
-      if (id == 0u || id == tried) continue;
-      tried = id;
-      if (s_placements[owner_of(id)].upper.w < 0.5) continue;
+    for (int k = 0; k < 4; ++k)
+      if (any(equal(tried, uvec4(ids[k])))) ids[k] = 0u;
+    uvec4 left = each_once(ids);
+    tried = left.y == 0u ? uvec4(left.x, tried.xyz) : left.z == 0u ? uvec4(left.xy, tried.xy) : left;
+    for (; left.x != 0u; left = uvec4(left.yzw, 0u)) {
+      if (s_placements[owner_of(left.x)].upper.w < 0.5) continue;
       Hit hit;
-      if (!plane_hit(id, p, d_normal, hit) || abs(hit.t) > k_on_surface) continue;
+      if (!plane_hit(left.x, p, d_normal, hit) || abs(hit.t) > k_on_surface) continue;
       float outside = -min(hit.weights.x, min(hit.weights.y, hit.weights.z));
       if (outside <= hit.slack) {
         if (abs(hit.t) < abs(best.t)) best = hit;

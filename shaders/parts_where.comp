@@ -3,11 +3,11 @@
 #include "parts.glsl"
 #include "listed.glsl"
 layout(local_size_x = 16, local_size_y = 4) in;
-uniform ivec2 u_size;
+uniform ivec2 u_first, u_end;  // of the rectangle to look through
 
 void main() {
-  ivec2 at = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(at, u_size))) return;
+  ivec2 at = u_first + ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(at, u_end))) return;
   vec4 share;
   Sight eye = s_sights[u_eye];
   if (ids_around(s_eye_ids, eye, 1, ray_of(eye, vec2(at)), share) != uvec4(0)) list_pixel(at);

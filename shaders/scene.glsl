@@ -104,6 +104,19 @@ uvec4 ids_around(usampler2DArray s_ids, Sight sight, int layer, vec3 d, out vec4
   return ids;
 }
 
+// The same ids, each once, those that are none last: loops over them end early.
+uvec4 each_once(uvec4 ids) {
+  if (ids.y == ids.x) ids.y = 0u;
+  if (ids.z == ids.x || ids.z == ids.y) ids.z = 0u;
+  if (ids.w == ids.x || ids.w == ids.y || ids.w == ids.z) ids.w = 0u;
+  for (int k = 0; k < 3; ++k) {
+    if (ids.x == 0u) ids = ids.yzwx;
+    if (ids.y == 0u) ids = ids.xzwy;
+    if (ids.z == 0u) ids = ids.xywz;
+  }
+  return ids;
+}
+
 // Where the ray meets a triangle that it just misses: its plane, or its nearest point where the plane is too steep
 // to be trusted beyond its triangle.
 Hit beside_hit(uint id, vec3 p_origin, vec3 d, Sight sight) {
@@ -127,11 +140,9 @@ Hit first_hit(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
   uvec4 ids = ids_around(s_ids, sight, layer, d, share);
   Hit best = k_no_hit;
   if (ids == uvec4(0)) return best;
-  for (int k = 0; k < 4; ++k) {
-    uint id = ids[k];
-    if (id == 0u || (k > 0 && id == ids[0]) || (k > 1 && id == ids[1])) continue;
+  for (uvec4 left = each_once(ids); left.x != 0u; left = uvec4(left.yzw, 0u)) {
     Hit hit;
-    if (plane_hit(id, sight.p_eye.xyz, d, hit) && is_inside(hit) && hit.t > 0.0 && hit.t < best.t) best = hit;
+    if (plane_hit(left.x, sight.p_eye.xyz, d, hit) && is_inside(hit) && hit.t > 0.0 && hit.t < best.t) best = hit;
   }
   if (best.id != 0u) return best;
   float cover = dot(share, vec4(notEqual(ids, uvec4(0))));
