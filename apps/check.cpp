@@ -63,6 +63,7 @@ nlohmann::ordered_json json_of(const std::vector<CheckResult>& results, const st
                               {"passed", result.good()},
                               {"seconds", result.seconds},
                               {"readings", readings}});
+    if (!result.problem.empty()) json["checks"].back()["problem"] = result.problem;
   }
   return json;
 }
@@ -80,12 +81,14 @@ Status write_pictures(const CheckResult& result, const fs::path& out) {
 }
 
 Status verdict_of(const std::vector<CheckResult>& results, const fs::path& page) {
-  std::string failed;
-  for (const CheckResult& result : results)
+  std::string failed, problems;
+  for (const CheckResult& result : results) {
     if (!result.good()) failed += (failed.empty() ? "" : ", ") + result.name;
+    if (!result.problem.empty()) problems += "\n  " + result.problem;
+  }
   if (failed.empty()) return {};
-  return error("check: expected every limit to be met, found missed ones in {}. {} shows them.", failed,
-               page.string());
+  return error("check: expected every limit to be met, found otherwise in {}. {} shows them.{}", failed,
+               page.string(), problems);
 }
 
 }  // namespace
@@ -102,9 +105,10 @@ Status run_check(const CheckOptions& options) {
   std::vector<CheckResult> results;
   for (const Check& check : checks) {
     log_info("{} ...", check.name);
-    LIMN_TRY(CheckResult result, judged(check));
-    LIMN_TRY_STATUS(write_pictures(result, options.out));
-    results.push_back(std::move(result));
+    auto result = judged(check);
+    if (!result) result = CheckResult{check.name, check.about, {}, {}, 0, result.message()};
+    LIMN_TRY_STATUS(write_pictures(*result, options.out));
+    results.push_back(std::move(*result));
   }
   const auto json = json_of(results, context.description());
   LIMN_TRY_STATUS(write_file(options.out / "check.json", json.dump(2) + "\n"));

@@ -166,7 +166,7 @@ class Judge {
     if (asked("seam_step_p95") || asked("seam_step_max")) LIMN_TRY_STATUS(judge_seams());
     if (asked("black_step_share")) LIMN_TRY_STATUS(judge_black());
     if (asked("rerun_worst_255")) LIMN_TRY_STATUS(judge_rerun());
-    CheckResult result{check_.name, check_.about, {}, std::move(pictures_), 0};
+    CheckResult result{check_.name, check_.about, {}, std::move(pictures_), 0, ""};
     for (const CheckLimit& limit : check_.limits)
       result.readings.push_back({limit, values_.at(limit.measure.name)});
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
@@ -619,7 +619,8 @@ double CheckReading::strain() const {
 }
 
 bool CheckResult::good() const {
-  return std::all_of(readings.begin(), readings.end(), [](const CheckReading& r) { return r.good(); });
+  return problem.empty() &&
+         std::all_of(readings.begin(), readings.end(), [](const CheckReading& r) { return r.good(); });
 }
 
 Result<CheckResult> judged(const Check& check) {

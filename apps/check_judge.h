@@ -32,6 +32,7 @@ struct CheckResult {
   std::vector<CheckReading> readings;  ///< in the order of check_measures()
   std::vector<CheckPicture> pictures;
   double seconds = 0;
+  std::string problem;  ///< why nothing was measured; empty: it was
   bool good() const;
 };
 
@@ -62,7 +63,8 @@ struct CheckResult {
 /// eye;
 ///   how far its luminance varies within 9 x 9 pixels, as a share of it: 95 % along the lines where another
 ///   set of projectors begins, and the largest anywhere that the projectors can light evenly.
-/// - `black_step_share`: the same of the light of black, with projectors that have the world's black level and
+/// - `black_step_share`: the same of the light of black, with projectors that have the world's black level
+/// and
 ///   responses that say so, no part shown; as a share of the least black.
 /// - `rerun_worst_255`: pictures of two renderers, level by level.
 ///

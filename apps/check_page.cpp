@@ -65,6 +65,12 @@ std::string table_html(std::span<const CheckResult> results) {
       "<table><tr><th>check</th><th>measured</th><th class=\"number\">value</th><th "
       "class=\"number\">limit</th>"
       "<th>verdict</th></tr>\n";
+  for (const CheckResult& result : results) {
+    if (result.problem.empty()) continue;
+    html += fmt::format(
+        "<tr><td><a href=\"#{0}\">{0}</a></td><td colspan=\"3\">{1}</td><td class=\"bad\">FAILED</td></tr>\n",
+        escaped(result.name), escaped(result.problem));
+  }
   for (const Row& row : worst_first(results)) {
     const CheckReading& reading = *row.reading;
     const char* verdict = reading.good() ? "good" : "bad";
@@ -129,12 +135,15 @@ std::string check_table(std::span<const CheckResult> results) {
       measure_width = std::max(measure_width, reading.limit.measure.name.size());
   }
   std::string text;
-  for (const CheckResult& result : results)
+  for (const CheckResult& result : results) {
+    if (!result.problem.empty())
+      text += fmt::format("{:<{}}  FAILED: {}\n", result.name, name_width, result.problem);
     for (const CheckReading& reading : result.readings)
       text += fmt::format("{:<{}}  {:<{}}  {:>12}  {:>20}  {}\n", result.name, name_width,
                           reading.limit.measure.name, measure_width,
                           readable_value(reading.limit.measure, reading.value), limit_text(reading.limit),
                           reading.good() ? "passed" : "MISSED");
+  }
   return text;
 }
 
