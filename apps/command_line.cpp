@@ -269,6 +269,8 @@ void add_render(CLI::App& app, Run& run) {
                       "what projectors do with markers: keep-out leaves them dark, spotlight lights them white")
       ->check(CLI::IsMember({"as-is", "keep-out", "spotlight"}))
       ->capture_default_str();
+  command->add_option("--view", options->view, "viewer file of a virtual camera: writes view.png, prototype and parts");
+  command->add_option("--stereo", options->stereo_mm, "two eyes so many mm apart, side by side in view.png");
   command->add_option("--compensation", options->light.compensation,
                       "what is divided out of the light: none; geometry: distance, incidence, vignetting and the scene's albedo; "
                       "measured: albedo, colours, ambient and black light as the rig's response pictures saw them")

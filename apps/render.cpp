@@ -202,6 +202,25 @@ Status write_composites(projector::Renderer* renderer,
   return {};
 }
 
+// What a virtual camera sees, or two eyes on a line through its middle, the left one's picture on the left.
+Status write_view(const RenderOptions& options,
+                  const scene::PosedScene& posed,
+                  projector::Renderer* renderer) {
+  LIMN_TRY(const Imager camera, scene::load_viewer(options.view));
+  const cv::Scalar background(40, 36, 34);  // a dark room
+  if (!options.stereo_mm)
+    return write_png(options.out / "view.png", renderer->view(camera, posed, background));
+  cv::Mat eyes[2];
+  for (int eye = 0; eye < 2; ++eye) {
+    Imager at_eye = camera;  // moves its eye: an imager's translation is the other way
+    at_eye.imager_from_world.translation.x() += (eye == 0 ? 0.5 : -0.5) * 1e-3 * *options.stereo_mm;
+    eyes[eye] = renderer->view(at_eye, posed, background);
+  }
+  cv::Mat both;
+  cv::hconcat(eyes, 2, both);
+  return write_png(options.out / "view.png", both);
+}
+
 }  // namespace
 
 Status run_render(const RenderOptions& options) {
@@ -216,6 +235,12 @@ Status run_render(const RenderOptions& options) {
   if (!marker_light) {
     return usage_error("--marker-light: expected as-is, keep-out or spotlight, found '{}'.",
                        options.marker_light);
+  }
+  if (options.stereo_mm && options.view.empty())
+    return usage_error("--stereo: expected --view VIEWER.json with it, for the eyes' place.");
+  if (options.stereo_mm && !(std::abs(*options.stereo_mm) < 1000)) {
+    return usage_error("--stereo: expected a base line in millimetres (eyes are some 63 apart), found {}.",
+                       *options.stereo_mm);
   }
   LIMN_TRY(Rig rig, load_rig(options.rig));
   LIMN_TRY(const scene::Scene scene, scene::load_scene(options.scene));
@@ -242,6 +267,7 @@ Status run_render(const RenderOptions& options) {
           write_png(options.out / ("clipped-" + rig.projectors[i].name + ".png"), renderer.clipped(i)));
   }
   LIMN_TRY_STATUS(write_composites(&renderer, options, rig, frames, posed));
+  if (!options.view.empty()) LIMN_TRY_STATUS(write_view(options, posed, &renderer));
   return write_coverage(renderer.coverage(posed, viewer), viewer, light_report(options.light, rig, renderer),
                         options.out);
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,13 +20,15 @@ struct RenderOptions {
   std::string marker_light =
       "as-is";  ///< projectors leave markers dark ("keep-out") or light them ("spotlight")
   LightArguments light;
+  std::filesystem::path view;       ///< viewer file of a virtual camera: writes view.png
+  std::optional<double> stereo_mm;  ///< base line: two eyes beside each other, view.png is twice as wide
   std::filesystem::path out;
 };
 
 /// `limn render`: places the scene by the markers in the frames, or by the poses, and writes
 /// projector-NAME.png, composite-NAME.png (per camera with a frame; with poses alone per camera, over black),
-/// coverage.json, mask-PART.png and, where light is balanced, clipped-NAME.png of what it could not give
-/// (255: brighter, 128: darker).
+/// coverage.json, mask-PART.png, view.png where one is asked for and, where light is balanced,
+/// clipped-NAME.png of what it could not give (255: brighter, 128: darker).
 Status run_render(const RenderOptions& options);
 
 }  // namespace limn::apps

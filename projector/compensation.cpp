@@ -75,6 +75,17 @@ double irradiance_at(const Imager& projector,
   return cosine / to_eye.squaredNorm() * vignetting.gain(*px, projector.width, projector.height);
 }
 
+// Of the albedo picture: linear r, g, b.
+cv::Mat linear_albedo(const scene::Prototype& prototype) {
+  cv::Mat linear(prototype.albedo_picture.size(), CV_32FC3);
+  for (int row = 0; row < linear.rows; ++row)
+    for (int column = 0; column < linear.cols; ++column)
+      for (int c = 0; c < 3; ++c)
+        linear.at<cv::Vec3f>(row, column)[c] = static_cast<float>(
+            linear_of_srgb(prototype.albedo_picture.at<cv::Vec3b>(row, column)[2 - c] / 255.0));
+  return linear;
+}
+
 Vignetting vignetting_of(const Rig& rig, const Imager& projector) {
   for (const Response& response : rig.responses)
     if (response.projector == projector.name && response.vignetting) return *response.vignetting;
@@ -167,14 +178,13 @@ double geometric_level(const scene::Prototype& prototype, const Rig& rig, const 
 
 cv::Mat relative_albedo(const scene::Prototype& prototype) {
   if (prototype.albedo_picture.empty()) return {1, 1, CV_32FC3, cv::Scalar::all(1)};
-  cv::Mat linear(prototype.albedo_picture.size(), CV_32FC3);
-  for (int row = 0; row < linear.rows; ++row)
-    for (int column = 0; column < linear.cols; ++column)
-      for (int c = 0; c < 3; ++c)
-        linear.at<cv::Vec3f>(row, column)[c] = static_cast<float>(
-            linear_of_srgb(prototype.albedo_picture.at<cv::Vec3b>(row, column)[2 - c] / 255.0));
-  const cv::Scalar mean = cv::mean(linear);
-  return linear / std::max(1e-3, (mean[0] + mean[1] + mean[2]) / 3);
+  return linear_albedo(prototype) / std::max(1e-3, mean_albedo_of(prototype));
+}
+
+double mean_albedo_of(const scene::Prototype& prototype) {
+  if (prototype.albedo_picture.empty()) return prototype.albedo;
+  const cv::Scalar mean = cv::mean(linear_albedo(prototype));
+  return (mean[0] + mean[1] + mean[2]) / 3;
 }
 
 }  // namespace limn::projector

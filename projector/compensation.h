@@ -57,5 +57,7 @@ double geometric_level(const scene::Prototype& prototype, const Rig& rig, const 
 /// The prototype's albedo picture as linear light over its mean, CV_32FC3 (r, g, b); one pixel without a
 /// picture.
 cv::Mat relative_albedo(const scene::Prototype& prototype);
+/// That mean, over r, g and b.
+double mean_albedo_of(const scene::Prototype& prototype);
 
 }  // namespace limn::projector

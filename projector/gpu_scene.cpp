@@ -13,7 +13,7 @@ constexpr int k_largest_look = 4096;  // texels a side
 
 struct GpuMaterial {
   Eigen::Vector4f colour;  // a: 1 when unlit
-  Eigen::Vector4f look;    // x: texture layer, -1 when it has none
+  Eigen::Vector4f look;    // texture layer (-1 when it has none), metallic, roughness
 };
 
 struct GpuOwner {
@@ -70,6 +70,7 @@ TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) 
   for (const scene::Material& material : mesh.materials) {
     GpuMaterial gpu{material.base_colour.homogeneous(), Eigen::Vector4f::Constant(-1)};
     gpu.colour.w() = material.unlit ? 1 : 0;
+    gpu.look.segment<2>(1) << material.metallic, material.roughness;
     if (!material.texture.empty() && !mesh.uvs.empty()) {
       gpu.look.x() = static_cast<float>(staging->textures.size());
       staging->textures.push_back(material.texture);

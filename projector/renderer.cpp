@@ -1,5 +1,7 @@
 #include "projector/renderer.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <limits>
 #include <map>
@@ -19,7 +21,9 @@ constexpr int k_tangents_unit = 0, k_looks_unit = 1, k_response_unit = 2, k_cent
 constexpr GLuint k_list_binding = 6;  // of buffers, after the scene's and the sights'
 // Steps of light that ask for more samples: beside light, and between blacks.
 constexpr float k_edge = 0.02F, k_dark_edge = 0.001F;
-// Towards the lamp of shaders/look.glsl in the viewer's frame: above and behind the left shoulder.
+// The light where no room is known: soft, and a lamp, in the viewer's frame above and behind the left
+// shoulder.
+constexpr double k_soft_below = 0.15, k_soft_above = 0.35, k_lamp = 0.65;
 const Eigen::Vector3d k_d_lamp_viewer = Eigen::Vector3d(-0.36, -0.64, -0.68).normalized();
 
 // A picture that is drawn into.
@@ -129,7 +133,7 @@ struct Renderer::Impl {
   struct LayerPrograms {
     Program where, centre, edges;
   };
-  LayerPrograms light_layer, parts_layer;
+  LayerPrograms light_layer, parts_layer, view_layer;
   GlName list;  // of pixels, shaders/listed.glsl
   int list_room = 0;
   std::vector<GlName> responses;
@@ -147,7 +151,9 @@ struct Renderer::Impl {
   std::optional<SurfaceMixing> surface;     // its layers are on the GPU
   std::optional<double> level_by_geometry;  // of the first place that the prototype had
   std::optional<scene::Prototype> prototype;
+  std::optional<scene::RoomLight> room;
   GlName mixing, albedo;
+  float mean_albedo = 0;
   GlName vertex_array;  // without attributes, for whole.vert
 
   // What was drawn last, so that the same is not drawn again.
@@ -165,7 +171,8 @@ struct Renderer::Impl {
         scene(scene_in),
         sights(std::move(sights_in)),
         shown(rig_in.projectors.size()),
-        prototype(scene_in.prototype) {
+        prototype(scene_in.prototype),
+        room(scene_in.light) {
     GLuint name = 0;
     glCreateVertexArrays(1, &name);
     vertex_array = GlName(name, [](GLuint n) { glDeleteVertexArrays(1, &n); });
@@ -175,7 +182,9 @@ struct Renderer::Impl {
       upload(responses.back(), response_table(find_response(rig, projector.name), k_response_columns));
     }
     mixing = make_texture(GL_TEXTURE_2D_ARRAY, GL_RGBA16F, 1, 1);
-    const cv::Mat colours = relative_albedo(prototype.value_or(scene::Prototype{}));
+    const scene::Prototype surface_of = prototype.value_or(scene::Prototype{});
+    const cv::Mat colours = relative_albedo(surface_of);
+    mean_albedo = static_cast<float>(mean_albedo_of(surface_of));
     albedo = make_texture(GL_TEXTURE_2D, GL_RGB32F, colours.cols, colours.rows);
     for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
       glTextureParameteri(*albedo, filter, GL_LINEAR);
@@ -201,16 +210,19 @@ struct Renderer::Impl {
                   const std::vector<cv::Rect>& places,
                   float least_step,
                   const SetUp& set_up);
+  template <class SetUp>
+  cv::Mat laid_over(const cv::Mat& bgr,
+                    const Imager& imager,
+                    const scene::PosedScene& posed,
+                    LayerPrograms& layer,
+                    const SetUp& set_up_layer);
   Result<SurfaceMixing> measured(const MeasuredSurface& surface);
 };
 
 Status Renderer::Impl::link_programs() {
-  const std::pair<Program*, const char*> drawn[] = {{&points, "points.frag"},
-                                                    {&blend, "blend.frag"},
-                                                    {&light, "light.frag"},
-                                                    {&irradiance, "irradiance.frag"},
-                                                    {&coverage, "coverage.frag"},
-                                                    {&composite, "composite.frag"}};
+  const std::pair<Program*, const char*> drawn[] = {
+      {&points, "points.frag"},         {&blend, "blend.frag"},       {&light, "light.frag"},
+      {&irradiance, "irradiance.frag"}, {&coverage, "coverage.frag"}, {&composite, "composite.frag"}};
   for (const auto& [program, file] : drawn) {
     LIMN_TRY(*program, Program::link("whole.vert", file));
   }
@@ -220,7 +232,10 @@ Status Renderer::Impl::link_programs() {
                                                        {&light_layer.edges, "light_edges.comp"},
                                                        {&parts_layer.where, "parts_where.comp"},
                                                        {&parts_layer.centre, "parts_centre.comp"},
-                                                       {&parts_layer.edges, "parts_edges.comp"}};
+                                                       {&parts_layer.edges, "parts_edges.comp"},
+                                                       {&view_layer.where, "view_where.comp"},
+                                                       {&view_layer.centre, "view_centre.comp"},
+                                                       {&view_layer.edges, "view_edges.comp"}};
   for (const auto& [program, file] : computed) {
     LIMN_TRY(*program, Program::link_compute(file));
   }
@@ -298,14 +313,23 @@ void Renderer::Impl::set_up(const Program& program, const GpuLens& lens, const I
   program.set("u_has_view_parts", shown(false));
   program.set("u_has_surface_parts", shown(true));
   if (!viewer) return;
-  const Eigen::Quaterniond scene_from_viewer =
-      (scene_from_world * viewer->imager_from_world.inverse()).rotation;
-  const auto direction = [&](const Eigen::Vector3d& d_viewer) {
-    const Eigen::Vector3f d = (scene_from_viewer * d_viewer).cast<float>();
-    return Eigen::Vector4f(d.x(), d.y(), d.z(), 0);
-  };
-  program.set("u_d_up", direction(-Eigen::Vector3d::UnitY()));
-  program.set("u_d_lamp", direction(k_d_lamp_viewer));
+  const Eigen::Quaterniond world_from_viewer = viewer->imager_from_world.rotation.inverse();
+  scene::RoomLight light{world_from_viewer * -Eigen::Vector3d::UnitY(),
+                         Eigen::Vector3d::Constant(k_soft_below),
+                         Eigen::Vector3d::Constant(k_soft_above),
+                         {{world_from_viewer * k_d_lamp_viewer, Eigen::Vector3d::Constant(k_lamp)}}};
+  if (room) light = *room;
+  const auto vector = [](const Eigen::Vector3d& v) { return Eigen::Vector4f(v.cast<float>().homogeneous()); };
+  program.set("u_is_room_known", room.has_value());
+  program.set("u_d_up", vector(scene_from_world.rotation * light.d_up_world));
+  program.set("u_soft_below", vector(light.below_rgb));
+  program.set("u_soft_above", vector(light.above_rgb));
+  program.set("u_lamp_count", static_cast<int>(light.lamps.size()));
+  for (std::size_t i = 0; i < light.lamps.size(); ++i) {
+    const std::string at = fmt::format("[{}]", i);
+    program.set(("u_d_lamps" + at).c_str(), vector(scene_from_world.rotation * light.lamps[i].d_world));
+    program.set(("u_lamps" + at).c_str(), vector(light.lamps[i].strength_rgb));
+  }
 }
 
 void Renderer::Impl::set_up_light(const Program& program, const scene::PosedScene& posed) {
@@ -379,6 +403,29 @@ void Renderer::Impl::draw_layer(LayerPrograms& layer,
   }
   const PassTimes::Scope scope(&times, "light at edges");
   over_list(layer.edges);
+}
+
+// A layer as the imager sees it, over its picture (BGR).
+template <class SetUp>
+cv::Mat Renderer::Impl::laid_over(const cv::Mat& bgr,
+                                  const Imager& imager,
+                                  const scene::PosedScene& posed,
+                                  LayerPrograms& layer,
+                                  const SetUp& set_up_layer) {
+  prepare(posed);
+  look_from_imager(imager);
+  const GlName behind = make_texture(GL_TEXTURE_2D, GL_RGBA8, bgr.cols, bgr.rows);
+  upload(behind, bgr);
+  const Canvas& centre = canvas(bgr.cols, bgr.rows, GL_RGBA32F);
+  const Canvas& out = canvas(bgr.cols, bgr.rows, GL_RGBA8);
+  draw_layer(layer, centre, {cv::Rect(0, 0, bgr.cols, bgr.rows)}, k_edge, [&](const Program& program) {
+    set_up(program, lens_of(imager), &imager);
+    set_up_layer(program);
+  });
+  composite.bind("s_centre", k_centre_unit, centre.texture);
+  composite.bind("s_picture", k_picture_unit, behind);
+  draw(composite, out);
+  return read_back(out.framebuffer, bgr.cols, bgr.rows, CV_8UC3, GL_BGR);
 }
 
 // Takes the surface's layers to the GPU.
@@ -552,23 +599,18 @@ cv::Mat Renderer::composite(std::size_t camera,
   LIMN_CHECK(camera < impl_->rig.cameras.size());
   const Imager& imager = impl_->rig.cameras[camera];
   LIMN_CHECK(picture.cols == imager.width && picture.rows == imager.height && picture.depth() == CV_8U);
-  impl_->prepare(posed);
-  impl_->look_from_imager(imager);
   cv::Mat bgr = picture;
   if (picture.channels() == 1) cv::cvtColor(picture, bgr, cv::COLOR_GRAY2BGR);
-  const GlName behind = make_texture(GL_TEXTURE_2D, GL_RGBA8, bgr.cols, bgr.rows);
-  upload(behind, bgr);
-  const Canvas& centre = impl_->canvas(bgr.cols, bgr.rows, GL_RGBA32F);
-  const Canvas& out = impl_->canvas(bgr.cols, bgr.rows, GL_RGBA8);
-  const cv::Rect whole(0, 0, bgr.cols, bgr.rows);
-  impl_->draw_layer(impl_->parts_layer, centre, {whole}, k_edge, [&](const Program& program) {
-    impl_->set_up(program, impl_->lens_of(imager), &imager);
-    program.set("u_rest", what == Composite::rest);
+  return impl_->laid_over(bgr, imager, posed, impl_->parts_layer,
+                          [&](const Program& program) { program.set("u_rest", what == Composite::rest); });
+}
+
+cv::Mat Renderer::view(const Imager& imager, const scene::PosedScene& posed, const cv::Scalar& background) {
+  const cv::Mat plain(imager.height, imager.width, CV_8UC3, background);
+  return impl_->laid_over(plain, imager, posed, impl_->view_layer, [&](const Program& program) {
+    program.bind("s_albedo", k_albedo_unit, impl_->albedo);
+    program.set("u_mean_albedo", impl_->mean_albedo);
   });
-  impl_->composite.bind("s_centre", k_centre_unit, centre.texture);
-  impl_->composite.bind("s_picture", k_picture_unit, behind);
-  impl_->draw(impl_->composite, out);
-  return read_back(out.framebuffer, bgr.cols, bgr.rows, CV_8UC3, GL_BGR);
 }
 
 std::vector<PartCoverage> Renderer::coverage(const scene::PosedScene& posed, const Imager& viewer) {

@@ -85,6 +85,10 @@ class Renderer {
                     const scene::PosedScene& posed,
                     Composite what);
 
+  /// The prototype (in its albedo) and the parts as an eye or a virtual camera sees them, sRGB BGR, over
+  /// plain `background`.
+  cv::Mat view(const Imager& imager, const scene::PosedScene& posed, const cv::Scalar& background);
+
   /// For each posed part, pixel by pixel (at pixel centres): does the ray behind it meet the prototype where
   /// at least one projector reaches it? A surface part more than 2 mm off the prototype counts as not.
   std::vector<PartCoverage> coverage(const scene::PosedScene& posed, const Imager& viewer);

@@ -104,6 +104,8 @@ Result<Material> read_material(const aiMaterial& source, const aiScene& scene, c
   int shading = 0;
   material.unlit =
       source.Get(AI_MATKEY_SHADING_MODEL, shading) == AI_SUCCESS && shading == aiShadingMode_Unlit;
+  source.Get(AI_MATKEY_METALLIC_FACTOR, material.metallic);
+  source.Get(AI_MATKEY_ROUGHNESS_FACTOR, material.roughness);
   for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
     aiString name;
     if (source.GetTexture(type, 0, &name) != AI_SUCCESS || name.length == 0) continue;

@@ -16,8 +16,9 @@ namespace limn::scene {
 /// base_colour. v of uv counts up from the picture's bottom row, as in OBJ.
 struct Material {
   Eigen::Vector3f base_colour = {0.8f, 0.8f, 0.8f};
-  bool unlit = false;  ///< KHR_materials_unlit: shown as its base colour
-  cv::Mat texture;     ///< empty: none
+  bool unlit = false;                 ///< KHR_materials_unlit: shown as its base colour
+  float metallic = 0, roughness = 1;  ///< glTF's; not metallic and of roughness 1 is diffuse alone
+  cv::Mat texture;                    ///< empty: none
 };
 
 /// Triangles in metres; coordinates as stored in the file (node transforms applied, no axis swapped).

@@ -57,6 +57,20 @@ struct Viewer {
   std::optional<MarkerName> marker;
 };
 
+/// The room's light that parts are shaded by, linear: a hemisphere of soft light and lamps far away.
+struct RoomLight {
+  struct Lamp {
+    Eigen::Vector3d d_world = Eigen::Vector3d::UnitZ();           ///< unit, towards the lamp
+    Eigen::Vector3d strength_rgb = Eigen::Vector3d::Constant(1);  ///< light of a white surface that faces it
+  };
+  static constexpr std::size_t k_most_lamps = 4;
+  Eigen::Vector3d d_up_world = Eigen::Vector3d::UnitZ();
+  Eigen::Vector3d below_rgb =
+      Eigen::Vector3d::Zero();  ///< light of a white surface that faces down, without lamps
+  Eigen::Vector3d above_rgb = Eigen::Vector3d::Zero();  ///< up
+  std::vector<Lamp> lamps;
+};
+
 /// What is shown: a project folder's scene.json (limn.scene/1), read with everything that it names.
 struct Scene {
   std::filesystem::path folder;
@@ -64,6 +78,7 @@ struct Scene {
   std::vector<Slot> slots;
   std::vector<Control> controls;
   std::optional<Viewer> viewer;
+  std::optional<RoomLight> light;  ///< absent: soft light and a lamp that stand with the viewer
 
   const Slot* find_slot(const std::string& name) const;
 };

@@ -49,10 +49,7 @@ Surface measured_surface(int i, vec3 p) {
 
 Surface surface_at(int i, vec3 p, Hit prototype) {
   if (u_compensation == k_by_measurement) return measured_surface(i, p);
-  uint first = 3u * (prototype.id - 1u);
-  vec2 uv = mat3x2(vec2(s_corners[first].w, s_normals[first].w),
-                   vec2(s_corners[first + 1u].w, s_normals[first + 1u].w),
-                   vec2(s_corners[first + 2u].w, s_normals[first + 2u].w)) * prototype.weights;
+  vec2 uv = uv_of(prototype);
   vec3 albedo = texture(s_albedo, vec2(uv.x, 1.0 - uv.y)).rgb;
   const float k_darkest = 0.02;  // of the mean: what is darker stays dark
   albedo = max(albedo, vec3(k_darkest));

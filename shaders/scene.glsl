@@ -7,7 +7,7 @@ layout(std430, binding = 2) readonly buffer Owners { uvec2 s_owners[]; };   // o
 
 struct Material {
   vec4 colour;  // linear light; a: 1 when unlit
-  vec4 look;    // x: texture layer, -1 when it has none
+  vec4 look;    // texture layer (-1 when it has none), metallic, roughness
 };
 layout(std430, binding = 3) readonly buffer Materials { Material s_materials[]; };
 
@@ -176,4 +176,12 @@ vec3 smooth_normal(Hit hit) {
   uint first = 3u * (hit.id - 1u);
   vec3 n = mat3(s_normals[first].xyz, s_normals[first + 1u].xyz, s_normals[first + 2u].xyz) * hit.weights;
   return turned_to_scene(owner_of(hit.id), normalize(n));
+}
+
+// Texture coordinates, v up.
+vec2 uv_of(Hit hit) {
+  uint first = 3u * (hit.id - 1u);
+  return mat3x2(vec2(s_corners[first].w, s_normals[first].w),
+                vec2(s_corners[first + 1u].w, s_normals[first + 1u].w),
+                vec2(s_corners[first + 2u].w, s_normals[first + 2u].w)) * hit.weights;
 }

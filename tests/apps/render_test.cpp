@@ -222,6 +222,34 @@ TEST_F(RenderDoor, BalancesLightAndSaysWhatItCannotGive) {
   EXPECT_TRUE(run_render(options).error().wrong_usage);
 }
 
+TEST_F(RenderDoor, AVirtualCameraSeesPrototypeAndPartsWithOneEyeOrTwo) {
+  const json viewer = {
+      {"world_from_viewer", to_json(looking_at({0.2, 0.1, 1.2}, {0, 0, 0}, {0, 1, 0}).inverse())},
+      {"size", {400, 300}},
+      {"fov_deg", 40}};
+  ASSERT_TRUE(write_file(folder / "view.json", viewer.dump()));
+  options.view = folder / "view.json";
+  ASSERT_TRUE(run_render(options));
+  const cv::Mat one = read_picture(folder / "out/view.png").value();
+  ASSERT_EQ(one.size(), cv::Size(400, 300));
+  EXPECT_GT(cv::norm(one.at<cv::Vec3b>(150, 200), one.at<cv::Vec3b>(2, 2), cv::NORM_INF),
+            20);  // the door, the room
+  options.stereo_mm = 60;
+  ASSERT_TRUE(run_render(options));
+  const cv::Mat two = read_picture(folder / "out/view.png").value();
+  ASSERT_EQ(two.size(), cv::Size(800, 300));
+  // 1.2 m away the door stands further right in the left eye's picture: focal length x base line / distance.
+  const double expected_px = 200 / std::tan(20 * std::numbers::pi / 180) * 0.06 / 1.17;
+  cv::Mat grey;
+  cv::cvtColor(two, grey, cv::COLOR_BGR2GRAY);
+  cv::Mat left, right;
+  grey.colRange(0, 400).convertTo(left, CV_32F);
+  grey.colRange(400, 800).convertTo(right, CV_32F);
+  EXPECT_NEAR(-cv::phaseCorrelate(left, right).x, expected_px, 3);
+  options.view.clear();
+  EXPECT_TRUE(run_render(options).error().wrong_usage);
+}
+
 TEST_F(RenderDoor, MistakesAreErrors) {
   const auto failed = [](const RenderOptions& wrong, bool usage, const std::string& says) {
     const Status status = run_render(wrong);

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/picture.h"
+#include "core/response.h"
 #include "device/gl_context.h"
 #include "sim/ray_scene.h"
 #include "tests/support/matchers.h"
@@ -595,6 +596,64 @@ TEST_F(RendererTest, NothingIsDrawnAgainUntilSomethingChanges) {
   const cv::Mat plain = drawn.projector_picture(0, posed, viewer);
   ASSERT_TRUE(drawn.set_light({.compensation = Compensation::geometry}));
   EXPECT_GT(cv::norm(plain, drawn.projector_picture(0, posed, viewer), cv::NORM_INF), 5);
+}
+
+// The look of shaders/look.glsl spelled once more: soft light from up, one lamp.
+Vector3d lit(const Vector3d& base,
+             double metallic,
+             double roughness,
+             const Vector3d& n,
+             const Vector3d& d_eye,
+             const scene::RoomLight& room) {
+  const auto soft = [&](double up) -> Vector3d {
+    return room.below_rgb + (0.5 + 0.5 * up) * (room.above_rgb - room.below_rgb);
+  };
+  const Vector3d& d_lamp = room.lamps[0].d_world;
+  const Vector3d& lamp = room.lamps[0].strength_rgb;
+  const double nl = std::max(0.0, n.dot(d_lamp)), nv = n.dot(d_eye);
+  Vector3d colour = (1 - metallic) * base.cwiseProduct(soft(n.dot(room.d_up_world)) + nl * lamp);
+  const Vector3d head_on = (1 - metallic) * Vector3d::Constant(0.04) + metallic * base;
+  const Vector3d mirrored = 2 * nv * n - d_eye;
+  const double up = mirrored.dot(room.d_up_world), t = std::clamp((up + 0.3) / 0.6, 0.0, 1.0);
+  const double horizon = (1 - roughness) * (2 * t * t * (3 - 2 * t) - 1) + roughness * up;
+  const double rx = 1 - roughness, ry = 0.0425 - 0.0275 * roughness, rz = 1.04 - 0.572 * roughness,
+               rw = 0.022 * roughness - 0.04;
+  const double a = std::min(rx * rx, std::exp2(-9.28 * nv)) * rx + ry;
+  const Vector3d share = head_on * (rz - 1.04 * a) + Vector3d::Constant(rw + 1.04 * a);
+  colour += soft(horizon).cwiseProduct(share);
+  const double a2 = std::pow(roughness, 4);
+  const Vector3d h = (d_eye + d_lamp).normalized();
+  const double peak = std::pow(n.dot(h), 2) * (a2 - 1) + 1;
+  const double visible = nl * std::sqrt(nv * nv * (1 - a2) + a2) + nv * std::sqrt(nl * nl * (1 - a2) + a2);
+  const Vector3d fresnel = head_on + (Vector3d::Ones() - head_on) * std::pow(1 - d_eye.dot(h), 5);
+  return colour + nl * a2 / (peak * peak) * 0.5 / visible * fresnel.cwiseProduct(lamp);
+}
+
+TEST_F(RendererTest, MetalAndGlossAreAsInGltf) {
+  for (const auto& [metallic, roughness] : {std::pair(1.0f, 0.3f), {0.0f, 0.4f}, {0.5f, 0.7f}}) {
+    Mesh mesh = coloured(sheet(0.5, 0.4), {0.7f, 0.45f, 0.2f}, false);
+    mesh.materials[0].metallic = metallic;
+    mesh.materials[0].roughness = roughness;
+    Scene scene = scene_of(sheet(0.1, 0.1, 2), {slot("panel", scene::Mode::view, mesh)});
+    scene.light = scene::RoomLight{k_up,
+                                   {0.05, 0.08, 0.1},
+                                   {0.3, 0.28, 0.25},
+                                   {{Vector3d(0.2, -0.5, -1).normalized(), {0.5, 0.45, 0.4}}}};
+    const Rig rig = two_projectors();
+    Renderer drawing = renderer(scene, rig);
+    const cv::Mat seen =
+        drawing.composite(0, cv::Mat::zeros(480, 640, CV_8UC1), posed_at_origin(scene), Composite::full);
+    double worst = 0;
+    for (int row = 140; row <= 340; row += 50)
+      for (int column = 200; column <= 440; column += 40) {
+        const Ray ray = *rig.cameras[0].ray(Vector2d(column, row));
+        const Vector3d wanted = lit({0.7, 0.45, 0.2}, metallic, roughness, {0, 0, -1}, -ray.d, *scene.light);
+        const auto& bgr = seen.at<cv::Vec3b>(row, column);
+        for (int c = 0; c < 3; ++c)
+          worst = std::max(worst, std::abs(bgr[2 - c] - 255 * srgb_of_linear(std::min(1.0, wanted[c]))));
+      }
+    EXPECT_LT(worst, 1) << "of 255, metallic " << metallic << ", roughness " << roughness;
+  }
 }
 
 TEST_F(RendererTest, TextureStandsTheRightWayUp) {

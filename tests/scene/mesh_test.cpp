@@ -84,7 +84,7 @@ std::string textured_gltf(const std::string& image) {
   return R"({"asset":{"version":"2.0"},"extensionsUsed":["KHR_materials_unlit"],"scene":0,"scenes":[{"nodes":[0]}],
 "nodes":[{"translation":[10,20,30],"children":[1]},{"rotation":[0.7071067811865476,0,0,0.7071067811865476],"scale":[2,2,2],"mesh":0}],
 "meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":1},"material":0}]}],
-"materials":[{"extensions":{"KHR_materials_unlit":{}},"pbrMetallicRoughness":{"baseColorFactor":[0.25,0.5,0.75,1],"baseColorTexture":{"index":0}}}],
+"materials":[{"extensions":{"KHR_materials_unlit":{}},"pbrMetallicRoughness":{"metallicFactor":0.75,"roughnessFactor":0.25,"baseColorFactor":[0.25,0.5,0.75,1],"baseColorTexture":{"index":0}}}],
 "textures":[{"source":0}],"images":[{)" +
          image + R"(}],
 "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},
@@ -158,6 +158,8 @@ TEST(Mesh, GltfNodesUnlitAndEmbeddedTexture) {
   EXPECT_NEAR(mesh->normals[0].y(), -1, 1e-5);
   const Material& material = mesh->materials[mesh->triangle_materials[0]];
   EXPECT_TRUE(material.unlit);
+  EXPECT_EQ(material.metallic, 0.75f);
+  EXPECT_EQ(material.roughness, 0.25f);
   EXPECT_TRUE(test::near(material.base_colour.cast<double>(), Vector3d(0.25, 0.5, 0.75), 1e-6));
   ASSERT_EQ(material.texture.type(), CV_8UC3);
   EXPECT_EQ(material.texture.at<cv::Vec3b>(0, 1), cv::Vec3b(200, 100, 50));

@@ -1,0 +1,25 @@
+// Prototype and parts as a virtual camera sees them, linear light, a: coverage.
+#include "scene.glsl"
+#include "lens.glsl"
+#include "look.glsl"
+
+uniform usampler2DArray s_eye_ids;
+uniform int u_eye;
+uniform sampler2D s_albedo;  // of the prototype, over its mean
+uniform float u_mean_albedo;
+
+vec4 view_at(vec2 px) {
+  Sight eye = s_sights[u_eye];
+  vec3 d = ray_of(eye, px);
+  Hit part = first_hit(s_eye_ids, eye, 1, d), prototype = first_hit(s_eye_ids, eye, 0, d);
+  // A part that lies on the surface is seen before it.
+  const float k_on_it = 0.002;
+  if (part.id != 0u && (prototype.id == 0u || part.t < prototype.t + k_on_it)) {
+    return vec4(look_along(d, part, part.t / eye.quality.x), 1);
+  }
+  if (prototype.id == 0u) return vec4(0);
+  vec3 n = smooth_normal(prototype);
+  if (dot(n, d) > 0.0) n = -n;
+  vec2 uv = uv_of(prototype);
+  return vec4(lit(u_mean_albedo * texture(s_albedo, vec2(uv.x, 1.0 - uv.y)).rgb, vec2(0, 1), n, -d), 1);
+}
