@@ -80,9 +80,7 @@ vec2 metallic_roughness(Hit hit) { return s_materials[s_owners[hit.id - 1u].y].l
 vec3 look_along(vec3 d, Hit hit, float footprint) {
   vec3 colour = base_colour(hit, footprint);
   if (is_unlit(hit)) return colour;
-  vec3 n = smooth_normal(hit);
-  if (dot(n, d) > 0.0) n = -n;
-  return lit(colour, metallic_roughness(hit), n, -d);
+  return lit(colour, metallic_roughness(hit), facing_normal(hit, d), -d);
 }
 
 // Colour of a part that lies on the surface, the same for every eye: seen along the prototype's normal, and in light

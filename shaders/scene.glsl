@@ -178,6 +178,15 @@ vec3 smooth_normal(Hit hit) {
   return turned_to_scene(owner_of(hit.id), normalize(n));
 }
 
+// The interpolated normal turned to where d comes from, as its triangle is; at a silhouette it looks aside, not away.
+vec3 facing_normal(Hit hit, vec3 d) {
+  vec3 n = smooth_normal(hit), flat_one = flat_normal(hit.id);
+  if (dot(flat_one, d) > 0.0) flat_one = -flat_one;
+  if (dot(n, flat_one) < 0.0) n = -n;
+  float away = dot(n, d);
+  return away > 0.0 ? normalize(n - away * d) : n;
+}
+
 // Texture coordinates, v up.
 vec2 uv_of(Hit hit) {
   uint first = 3u * (hit.id - 1u);

@@ -18,8 +18,7 @@ vec4 view_at(vec2 px) {
     return vec4(look_along(d, part, part.t / eye.quality.x), 1);
   }
   if (prototype.id == 0u) return vec4(0);
-  vec3 n = smooth_normal(prototype);
-  if (dot(n, d) > 0.0) n = -n;
   vec2 uv = uv_of(prototype);
-  return vec4(lit(u_mean_albedo * texture(s_albedo, vec2(uv.x, 1.0 - uv.y)).rgb, vec2(0, 1), n, -d), 1);
+  return vec4(lit(u_mean_albedo * texture(s_albedo, vec2(uv.x, 1.0 - uv.y)).rgb, vec2(0, 1),
+              facing_normal(prototype, d), -d), 1);
 }

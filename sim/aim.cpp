@@ -149,7 +149,9 @@ Eigen::Vector3f Aim::look_along(const Eigen::Vector3d& d,
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
   const Eigen::Vector3f colour = base_colour(part, nearest.hit);
   if (is_unlit(part, nearest.hit)) return colour;
-  const Eigen::Vector3d n = turned_against(part.rays.shading_normal(nearest.hit), d);
+  const Eigen::Vector3d face = turned_against(part.rays.face_normal(nearest.hit), d);
+  Eigen::Vector3d n = turned_against(part.rays.shading_normal(nearest.hit), -face);
+  if (n.dot(d) > 0) n = (n - n.dot(d) * d).normalized();  // at a silhouette
   const auto above = static_cast<float>(0.5 + 0.5 * n.dot(shading.d_up));
   const auto lamp = static_cast<float>(std::max(0.0, n.dot(shading.d_lamp)));
   return colour * (k_soft_below + (k_soft_above - k_soft_below) * above + k_lamp * lamp);
