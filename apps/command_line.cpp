@@ -265,6 +265,7 @@ void add_render(CLI::App& app, Run& run) {
   command->add_option("--composite", options->composite, "full parts, or rest: only what light cannot show")
       ->check(CLI::IsMember({"full", "rest"}))
       ->capture_default_str();
+  command->add_flag("--undistorted", options->undistorted, "composites without the cameras' lens distortion");
   command->add_option("--marker-light", options->marker_light,
                       "what projectors do with markers: keep-out leaves them dark, spotlight lights them white")
       ->check(CLI::IsMember({"as-is", "keep-out", "spotlight"}))

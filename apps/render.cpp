@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 
 #include "core/config.h"
@@ -111,6 +113,33 @@ void report_missing(const scene::Scene& scene, const scene::PosedScene& posed) {
   }
 }
 
+// What makes pictures that surely are not meant.
+void report_odd(const scene::Scene& scene,
+                const Rig& rig,
+                const scene::PosedScene& posed,
+                const Imager& viewer) {
+  if (!scene.prototype || !posed.world_from_prototype) return;
+  const std::vector<Eigen::Vector3f>& points = scene.prototype->mesh.positions;
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3f& p : points) box.extend(p.cast<double>());
+  const Eigen::Vector3d p_eye =
+      (viewer.imager_from_world * *posed.world_from_prototype).inverse().translation;
+  if (box.contains(p_eye))
+    log_warning("render: the viewer's eye is inside the prototype's bounds; view parts will look wrong");
+  const auto sees = [&](const Imager& imager) {
+    const Pose imager_from_prototype = imager.imager_from_world * *posed.world_from_prototype;
+    return std::any_of(points.begin(), points.end(), [&](const Eigen::Vector3f& p) {
+      const Eigen::Vector3d at = imager_from_prototype * p.cast<double>();
+      const auto px = at.z() > 0 ? imager.lens.project(at) : std::nullopt;
+      return px && imager.contains(*px);
+    });
+  };
+  if (!sees(viewer)) log_warning("render: the viewer does not look at the prototype");
+  for (const Imager& projector : rig.projectors)
+    if (!sees(projector))
+      log_warning("render: {} does not reach the prototype; its picture is black", projector.name);
+}
+
 Result<scene::PosedScene> place(const RenderOptions& options,
                                 const scene::Scene& scene,
                                 const Rig& rig,
@@ -182,6 +211,22 @@ Status write_coverage(const std::vector<projector::PartCoverage>& parts,
   return write_file(out / "coverage.json", json.dump(2) + "\n");
 }
 
+// The picture without the lens's distortion: the same focal length, its principal point in the middle.
+cv::Mat undistorted(const cv::Mat& picture, const Imager& imager) {
+  cv::Mat map(picture.size(), CV_32FC2);
+  for (int row = 0; row < map.rows; ++row)
+    for (int column = 0; column < map.cols; ++column) {
+      const Eigen::Vector3d d((column - 0.5 * (map.cols - 1)) / imager.lens.fx(),
+                              (row - 0.5 * (map.rows - 1)) / imager.lens.fy(), 1);
+      const auto px = imager.lens.project(d);
+      map.at<cv::Vec2f>(row, column) =
+          px ? cv::Vec2f(static_cast<float>(px->x()), static_cast<float>(px->y())) : cv::Vec2f(-10, -10);
+    }
+  cv::Mat out;
+  cv::remap(picture, out, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT);
+  return out;
+}
+
 // With frames, the cameras that have one; with poses alone all cameras, over black.
 Status write_composites(projector::Renderer* renderer,
                         const RenderOptions& options,
@@ -197,7 +242,8 @@ Status write_composites(projector::Renderer* renderer,
     }
     if (behind.empty()) continue;
     const auto file = options.out / ("composite-" + camera.name + ".png");
-    LIMN_TRY_STATUS(write_png(file, renderer->composite(i, behind, posed, what)));
+    const cv::Mat picture = renderer->composite(i, behind, posed, what);
+    LIMN_TRY_STATUS(write_png(file, options.undistorted ? undistorted(picture, camera) : picture));
   }
   return {};
 }
@@ -248,6 +294,7 @@ Status run_render(const RenderOptions& options) {
   LIMN_TRY(const scene::PosedScene posed, place(options, scene, rig, frames));
   LIMN_TRY(const Imager viewer, choose_viewer(options, scene, rig));
   report_missing(scene, posed);
+  report_odd(scene, rig, posed, viewer);
   LIMN_TRY_STATUS(make_folder(options.out));
 
   LIMN_TRY(const device::GlContext context, device::GlContext::create());

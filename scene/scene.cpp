@@ -1,5 +1,6 @@
 #include "scene/scene.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <map>
 #include <opencv2/core.hpp>
@@ -204,9 +205,31 @@ RoomLight read_light(const ConfigNode& node) {
   return light;
 }
 
+// A thing that nobody can stand on a table was most likely drawn in another unit.
+Status check_size(const Mesh& mesh, const std::string& units) {
+  constexpr double k_smallest_m = 1e-3, k_largest_m = 20;
+  constexpr double k_likely_from_m = 0.02, k_likely_to_m = 6;
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& p : mesh.positions) box.extend(p);
+  const double size_m = box.diagonal().cast<double>().norm();
+  if (size_m >= k_smallest_m && size_m <= k_largest_m) return {};
+  const double in_file = size_m / metres_per_unit(units).value();
+  std::string likely;
+  for (const char* unit : {"mm", "cm", "m", "in", "ft"}) {
+    const double as_m = in_file * metres_per_unit(unit).value();
+    if (as_m >= k_likely_from_m && as_m <= k_likely_to_m)
+      likely += fmt::format("{}{} ({:.3g} m)", likely.empty() ? "" : ", ", unit, as_m);
+  }
+  return error("expected a thing of 1 mm to 20 m, found one of {:.3g} m across in units \"{}\". {}", size_m,
+               units, likely.empty() ? "Look at the mesh." : "Is its unit " + likely + "?");
+}
+
 Result<Mesh> load_named_mesh(const MeshFile& file, const fs::path& scene_path) {
   auto mesh = load_mesh(file.path, file.units);
   if (!mesh) return error("{}: {}: {}", scene_path.string(), file.where, mesh.message());
+  if (const Status size = check_size(*mesh, file.units); !size)
+    return error("{}: {} ({}): {}", scene_path.string(), file.where, file.path.filename().string(),
+                 size.message());
   return mesh;
 }
 

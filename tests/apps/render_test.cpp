@@ -222,6 +222,32 @@ TEST_F(RenderDoor, BalancesLightAndSaysWhatItCannotGive) {
   EXPECT_TRUE(run_render(options).error().wrong_usage);
 }
 
+TEST_F(RenderDoor, CompositesMayBeUndistorted) {
+  ASSERT_TRUE(run_render(options));
+  const cv::Mat raw = read_picture(folder / "out/composite-camera0.png").value();
+  options.undistorted = true;
+  ASSERT_TRUE(run_render(options));
+  const cv::Mat straight = read_picture(folder / "out/composite-camera0.png").value();
+  const Imager camera = load_rig(options.rig).value().cameras[0];
+  const Lens pinhole =
+      Lens::pinhole(camera.lens.fx(), camera.lens.fy(), (camera.width - 1) / 2.0, (camera.height - 1) / 2.0);
+  int compared = 0;
+  for (int row = 60; row < raw.rows - 60; row += 20)
+    for (int column = 60; column < raw.cols - 60; column += 20) {
+      const Vector2d at = *pinhole.project(*camera.lens.unproject(Vector2d(column, row)));
+      const cv::Rect around(column - 2, row - 2, 5, 5);
+      double smallest = 0, largest = 0;
+      cv::minMaxLoc(raw(around).clone().reshape(1), &smallest, &largest);
+      if (largest - smallest > 6) continue;  // an edge
+      const cv::Point there(cvRound(at.x()), cvRound(at.y()));
+      if (!cv::Rect({}, straight.size()).contains(there)) continue;
+      EXPECT_LT(cv::norm(raw.at<cv::Vec3b>(row, column), straight.at<cv::Vec3b>(there), cv::NORM_INF), 9);
+      ++compared;
+    }
+  EXPECT_GT(compared, 200);
+  EXPECT_GT(cv::norm(raw, straight, cv::NORM_INF), 30) << "the lens bends something";
+}
+
 TEST_F(RenderDoor, AVirtualCameraSeesPrototypeAndPartsWithOneEyeOrTwo) {
   const json viewer = {
       {"world_from_viewer", to_json(looking_at({0.2, 0.1, 1.2}, {0, 0, 0}, {0, 1, 0}).inverse())},

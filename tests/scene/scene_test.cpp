@@ -104,6 +104,28 @@ TEST(Scene, PrototypeIsOptionalAndAlbedoMayBeAPicture) {
   EXPECT_EQ(with_picture->prototype->albedo_picture.at<cv::Vec3b>(3, 3), cv::Vec3b(1, 2, 3));
 }
 
+TEST(Scene, ThingsOfAnAbsurdSizeAreAskedAbout) {
+  json scene = whole_scene();
+  json& variant = scene["slots"][0]["variants"][0];
+  variant["mesh"] = "mirror.obj";
+  const fs::path folder = folder_with(scene);
+  ASSERT_TRUE(
+      write_file(folder / "mirror.obj", "v 0 0 0\nv 200 0 0\nv 0 100 0\nf 1 2 3\n"));  // in mm, said m
+  const auto large = load_scene(folder);
+  ASSERT_FALSE(large);
+  EXPECT_NE(large.message().find("224 m across"), std::string::npos) << large.message();
+  EXPECT_NE(large.message().find("slots[0].variants[0]"), std::string::npos) << large.message();
+  EXPECT_NE(large.message().find("mm (0.224 m)"), std::string::npos) << large.message();
+  variant["units"] = "mm";
+  folder_with(scene);
+  EXPECT_TRUE(load_scene(folder));
+  ASSERT_TRUE(
+      write_file(folder / "mirror.obj", "v 0 0 0\nv 0.2 0 0\nv 0 0.1 0\nf 1 2 3\n"));  // in m, said mm
+  const auto small = load_scene(folder);
+  ASSERT_FALSE(small);
+  EXPECT_NE(small.message().find(" m (0.224 m)"), std::string::npos) << small.message();
+}
+
 TEST(Scene, MistakesAreErrorsWithTheirPath) {
   struct Mistake {
     const char* patch;  // a JSON patch
