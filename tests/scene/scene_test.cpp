@@ -105,23 +105,20 @@ TEST(Scene, PrototypeIsOptionalAndAlbedoMayBeAPicture) {
 }
 
 TEST(Scene, ThingsOfAnAbsurdSizeAreAskedAbout) {
-  json scene = whole_scene();
-  json& variant = scene["slots"][0]["variants"][0];
-  variant["mesh"] = "mirror.obj";
-  const fs::path folder = folder_with(scene);
-  ASSERT_TRUE(
-      write_file(folder / "mirror.obj", "v 0 0 0\nv 200 0 0\nv 0 100 0\nf 1 2 3\n"));  // in mm, said m
-  const auto large = load_scene(folder);
+  const auto loaded = [](const char* units, const char* mesh) {
+    json scene = whole_scene();
+    scene["slots"][0]["variants"][0] = {{"name", "a"}, {"mesh", "mirror.obj"}, {"units", units}};
+    const fs::path folder = folder_with(scene);
+    EXPECT_TRUE(write_file(folder / "mirror.obj", mesh));
+    return load_scene(folder);
+  };
+  const auto large = loaded("m", "v 0 0 0\nv 200 0 0\nv 0 100 0\nf 1 2 3\n");
   ASSERT_FALSE(large);
   EXPECT_NE(large.message().find("224 m across"), std::string::npos) << large.message();
   EXPECT_NE(large.message().find("slots[0].variants[0]"), std::string::npos) << large.message();
   EXPECT_NE(large.message().find("mm (0.224 m)"), std::string::npos) << large.message();
-  variant["units"] = "mm";
-  folder_with(scene);
-  EXPECT_TRUE(load_scene(folder));
-  ASSERT_TRUE(
-      write_file(folder / "mirror.obj", "v 0 0 0\nv 0.2 0 0\nv 0 0.1 0\nf 1 2 3\n"));  // in m, said mm
-  const auto small = load_scene(folder);
+  EXPECT_TRUE(loaded("mm", "v 0 0 0\nv 200 0 0\nv 0 100 0\nf 1 2 3\n"));
+  const auto small = loaded("mm", "v 0 0 0\nv 0.2 0 0\nv 0 0.1 0\nf 1 2 3\n");
   ASSERT_FALSE(small);
   EXPECT_NE(small.message().find(" m (0.224 m)"), std::string::npos) << small.message();
 }
