@@ -313,7 +313,7 @@ class Judge {
     const auto [low, high] = bounds_of_light();
     const cv::Mat lit = any_channel_over(actual, k_dark) | any_channel_over(high, k_dark);
     if (cv::countNonZero(lit) == 0)
-      return nothing_to_judge("shone_mean_255", "a part on the prototype in the viewer's picture");
+      return nothing_to_judge("shone_…", "a part on the prototype in the viewer's picture");
     const cv::Mat below = low - actual, above = actual - high;
     cv::Mat off = cv::max(below, above);
     off = cv::max(off, 0.0);
@@ -353,14 +353,13 @@ class Judge {
   }
 
   Status judge_drawn() {
-    LIMN_TRY(const Imager* camera, this->camera("drawn_mean_255"));
+    LIMN_TRY(const Imager* camera, this->camera("drawn_…"));
     const cv::Mat black(camera->height, camera->width, CV_8UC3, cv::Scalar::all(0));
     const cv::Mat actual = renderer_->composite(0, black, check_.told.posed, projector::Composite::full);
     const sim::PartPicture seen = aim().seen(world_.rig.cameras.front());
     const cv::Mat expected = for_eye(seen.light);
     const cv::Mat shown = any_channel_over(actual, 0) | (seen.cover > 0);
-    if (cv::countNonZero(shown) == 0)
-      return nothing_to_judge("drawn_mean_255", "a part in camera 0's picture");
+    if (cv::countNonZero(shown) == 0) return nothing_to_judge("drawn_…", "a part in camera 0's picture");
     cv::Mat off, levels, expected_levels;
     cv::absdiff(actual, expected, off);
     off.convertTo(levels, CV_32F);
@@ -454,7 +453,7 @@ class Judge {
     const cv::Mat whole = evenly_lit();
     const Steps steps = steps_of(actual, k_coat, whole);
     if (cv::countNonZero(steps.along) == 0)
-      return nothing_to_judge("seam_step_p95", "a seam of projectors in the viewer's picture");
+      return nothing_to_judge("seam_step_…", "a seam of projectors in the viewer's picture");
     values_["seam_step_p95"] = steps.p95_along;
     values_["seam_step_max"] = steps.worst;
     cv::Mat expected(actual.size(), CV_32FC3, cv::Scalar::all(0));

@@ -282,6 +282,44 @@ TEST(Check, BrokenFilesAreNamedWithThePlaceInThem) {
   EXPECT_NE(absent.err.find("absent.json"), std::string::npos) << absent.err;
 }
 
+// Every value of a check file replaced by something else: each time a message or a success, never an
+// exception.
+TEST(Check, FilesWithAnyValueSpoiledNeverCrash) {
+  using Json = nlohmann::json;
+  const fs::path folder = test::test_folder();
+  const fs::path file = written(folder, "bench",
+                                fmt::format(R"("viewer": {}, "resolution": 0.5,
+      "nudge": {{"projector0": [0.5, -0.25]}}, "limits": {{"mask_iou": 0.98}},
+      "poses": {{"shown": ["mirror"], "world_from_prototype": {{"rotation_wxyz": [1, 0, 0, 0], "translation_m": [1, 2, 3]}},
+        "slots": {{"mirror": {{"variant": "city",
+          "prototype_from_part": {{"rotation_wxyz": [1, 0, 0, 0], "translation_m": [0.1, 0, 0]}}}}}}}})",
+                                            k_viewer));
+  const Json whole = Json::parse(read_file(file).value());
+  ASSERT_TRUE(load_check(file));
+  const std::vector<Json> wrong = {nullptr, "x", -1, 1e18, Json::array(), Json{{"a", 1}}};
+  const Json leaves = whole.flatten();  // by JSON pointer
+  std::set<std::string> places;
+  for (const auto& [pointer, value] : leaves.items())
+    for (Json::json_pointer place(pointer); !place.empty(); place = place.parent_pointer())
+      places.insert(place.to_string());
+  int refused = 0;
+  for (const std::string& place : places) {
+    for (const Json& bad : wrong) {
+      Json spoiled = whole;
+      spoiled[Json::json_pointer(place)] = bad;
+      ASSERT_TRUE(write_file(file, spoiled.dump()));
+      std::optional<Result<Check>> loaded;
+      ASSERT_NO_THROW(loaded = load_check(file)) << place << " " << bad.dump();
+      if (*loaded) continue;
+      ++refused;
+      EXPECT_NE(loaded->message().find(folder.filename().string()),
+                std::string::npos)  // it or a file that it names
+          << place << " " << loaded->message();
+    }
+  }
+  EXPECT_GT(refused, 150);
+}
+
 TEST(Check, WrongUsageExitsWithTwo) {
   EXPECT_EQ(run({"--nonsense"}).code, 2);
   const fs::path a = test::test_folder() / "a", b = test::test_folder() / "b";
