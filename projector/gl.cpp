@@ -53,6 +53,26 @@ void upload(const GlName& texture, const cv::Mat& picture) {
                       bytes ? GL_UNSIGNED_BYTE : GL_FLOAT, whole.data);
 }
 
+void upload(const GlName& texture, const cv::Mat& picture, const cv::Rect& place) {
+  LIMN_CHECK(picture.type() == CV_8UC3 && picture.isContinuous());
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, picture.cols);
+  glTextureSubImage2D(*texture, 0, place.x, place.y, place.width, place.height, GL_BGR, GL_UNSIGNED_BYTE,
+                      picture.ptr(place.y, place.x));
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
+}
+
+void read_back(const GlName& framebuffer, const cv::Rect& place, cv::Mat* picture) {
+  LIMN_CHECK(picture->type() == CV_8UC3 && picture->isContinuous());
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, *framebuffer);
+  glReadBuffer(GL_COLOR_ATTACHMENT0);
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glPixelStorei(GL_PACK_ROW_LENGTH, picture->cols);
+  glReadPixels(place.x, place.y, place.width, place.height, GL_BGR, GL_UNSIGNED_BYTE,
+               picture->ptr(place.y, place.x));
+  glPixelStorei(GL_PACK_ROW_LENGTH, 0);
+}
+
 cv::Mat read_back(const GlName& framebuffer, int width, int height, int type, GLenum format) {
   cv::Mat picture(height, width, type);
   glBindFramebuffer(GL_READ_FRAMEBUFFER, *framebuffer);

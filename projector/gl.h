@@ -39,6 +39,10 @@ GlName make_buffer(const void* data, std::size_t bytes);
 
 /// Fills a GL_TEXTURE_2D of make_texture from a picture of 1-4 channels, 8-bit or float; first row first.
 void upload(const GlName& texture, const cv::Mat& picture);
+/// The same for a rectangle of the picture alone, to the same place of the texture.
+void upload(const GlName& texture, const cv::Mat& picture, const cv::Rect& place);
+/// A rectangle of the colour attachment of a framebuffer to the same place of the picture (CV_8UC3, BGR).
+void read_back(const GlName& framebuffer, const cv::Rect& place, cv::Mat* picture);
 /// The colour attachment of a framebuffer, first row first, as a picture of `type` (CV_8UC3 comes as BGR).
 cv::Mat read_back(const GlName& framebuffer, int width, int height, int type, GLenum format);
 

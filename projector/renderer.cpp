@@ -19,6 +19,7 @@ constexpr int k_response_columns = 1025;
 constexpr int k_tangents_unit = 0, k_looks_unit = 1, k_response_unit = 2, k_centre_unit = 3,
               k_picture_unit = 4, k_sights_unit = 5, k_mixing_unit = 8, k_albedo_unit = 9;
 constexpr GLuint k_list_binding = 6;  // of buffers, after the scene's and the sights'
+constexpr int k_view = 2;             // the overlay of a virtual camera, after those of Composite
 // Steps of light that ask for more samples: beside light, and between blacks.
 constexpr float k_edge = 0.02F, k_dark_edge = 0.001F;
 // The light where no room is known: soft, and a lamp, in the viewer's frame above and behind the left
@@ -215,7 +216,20 @@ struct Renderer::Impl {
                     const Imager& imager,
                     const scene::PosedScene& posed,
                     LayerPrograms& layer,
+                    int kind,
                     const SetUp& set_up_layer);
+  // What was laid over an imager's pictures.
+  struct Overlay {
+    Imager imager;
+    int kind = 0;
+    std::optional<scene::PosedScene> posed;  // of the parts
+    std::vector<cv::Rect> places;            // where there may be some
+    Canvas parts;
+    GlName behind;  // the picture
+    Canvas out;
+  };
+  std::vector<Overlay> overlays;
+  Overlay& overlay_of(const Imager& imager, int kind);
   Result<SurfaceMixing> measured(const MeasuredSurface& surface);
 };
 
@@ -405,27 +419,55 @@ void Renderer::Impl::draw_layer(LayerPrograms& layer,
   over_list(layer.edges);
 }
 
-// A layer as the imager sees it, over its picture (BGR).
+// What an imager sees of a layer, over its picture (BGR); the layer is drawn again only where it has changed.
+// `kind` tells layers of one imager apart.
 template <class SetUp>
 cv::Mat Renderer::Impl::laid_over(const cv::Mat& bgr,
                                   const Imager& imager,
                                   const scene::PosedScene& posed,
                                   LayerPrograms& layer,
+                                  int kind,
                                   const SetUp& set_up_layer) {
-  prepare(posed);
-  look_from_imager(imager);
-  const GlName behind = make_texture(GL_TEXTURE_2D, GL_RGBA8, bgr.cols, bgr.rows);
-  upload(behind, bgr);
-  const Canvas& centre = canvas(bgr.cols, bgr.rows, GL_RGBA32F);
-  const Canvas& out = canvas(bgr.cols, bgr.rows, GL_RGBA8);
-  draw_layer(layer, centre, {cv::Rect(0, 0, bgr.cols, bgr.rows)}, k_edge, [&](const Program& program) {
-    set_up(program, lens_of(imager), &imager);
-    set_up_layer(program);
-  });
-  composite.bind("s_centre", k_centre_unit, centre.texture);
-  composite.bind("s_picture", k_picture_unit, behind);
-  draw(composite, out);
-  return read_back(out.framebuffer, bgr.cols, bgr.rows, CV_8UC3, GL_BGR);
+  Overlay& overlay = overlay_of(imager, kind);
+  if (!overlay.posed || !is_same(*overlay.posed, posed) ||
+      !is_same(overlay.imager.imager_from_world, imager.imager_from_world)) {
+    prepare(posed);
+    look_from_imager(imager);
+    overlay.places =
+        sights.seen_places(imager, lens_of(imager).baked, runs, scene_from_world, kind == k_view);
+    draw_layer(layer, overlay.parts, overlay.places, k_edge, [&](const Program& program) {
+      set_up(program, lens_of(imager), &imager);
+      set_up_layer(program);
+    });
+    overlay.posed = posed;
+    overlay.imager = imager;
+  }
+  cv::Mat out = bgr.clone();
+  for (const cv::Rect& place : overlay.places) upload(overlay.behind, out, place);
+  composite.bind("s_centre", k_centre_unit, overlay.parts.texture);
+  composite.bind("s_picture", k_picture_unit, overlay.behind);
+  {
+    const PassTimes::Scope scope(&times, "over the picture");
+    draw(composite, overlay.out, overlay.places);
+  }
+  for (const cv::Rect& place : overlay.places) read_back(overlay.out.framebuffer, place, &out);
+  return out;
+}
+
+// The one drawn for this imager before, or room for a new one.
+Renderer::Impl::Overlay& Renderer::Impl::overlay_of(const Imager& imager, int kind) {
+  for (Overlay& overlay : overlays)
+    if (overlay.kind == kind && is_same_lens(overlay.imager, imager)) return overlay;
+  constexpr std::size_t k_most = 8;  // cameras and virtual ones of a session
+  if (overlays.size() >= k_most) overlays.erase(overlays.begin());
+  const int width = imager.width, height = imager.height;
+  return overlays.emplace_back(Overlay{imager,
+                                       kind,
+                                       std::nullopt,
+                                       {},
+                                       Canvas(width, height, GL_RGBA32F),
+                                       make_texture(GL_TEXTURE_2D, GL_RGBA8, width, height),
+                                       Canvas(width, height, GL_RGBA8)});
 }
 
 // Takes the surface's layers to the GPU.
@@ -601,13 +643,13 @@ cv::Mat Renderer::composite(std::size_t camera,
   LIMN_CHECK(picture.cols == imager.width && picture.rows == imager.height && picture.depth() == CV_8U);
   cv::Mat bgr = picture;
   if (picture.channels() == 1) cv::cvtColor(picture, bgr, cv::COLOR_GRAY2BGR);
-  return impl_->laid_over(bgr, imager, posed, impl_->parts_layer,
+  return impl_->laid_over(bgr, imager, posed, impl_->parts_layer, static_cast<int>(what),
                           [&](const Program& program) { program.set("u_rest", what == Composite::rest); });
 }
 
 cv::Mat Renderer::view(const Imager& imager, const scene::PosedScene& posed, const cv::Scalar& background) {
   const cv::Mat plain(imager.height, imager.width, CV_8UC3, background);
-  return impl_->laid_over(plain, imager, posed, impl_->view_layer, [&](const Program& program) {
+  return impl_->laid_over(plain, imager, posed, impl_->view_layer, k_view, [&](const Program& program) {
     program.bind("s_albedo", k_albedo_unit, impl_->albedo);
     program.set("u_mean_albedo", impl_->mean_albedo);
   });

@@ -256,6 +256,19 @@ cv::Rect Sights::prototype_place(std::size_t projector,
                    spanned(pose, bounds_of(only(runs, is_prototype))));
 }
 
+std::vector<cv::Rect> Sights::seen_places(const Imager& imager,
+                                          const BakedLens& lens,
+                                          const std::vector<PlacedRun>& runs,
+                                          const Pose& scene_from_world,
+                                          bool prototype_too) const {
+  const Pose pose = sight_pose(imager, scene_from_world);
+  std::vector<cv::Rect> places;
+  for (const PlacedRun& run : prototype_too ? runs : only(runs, is_part))
+    if (const cv::Rect place = pixels_of(imager, lens, spanned(pose, bounds_of({run}))); !place.empty())
+      places.push_back(place);
+  return places;
+}
+
 std::vector<cv::Rect> Sights::light_places(std::size_t projector,
                                            const std::vector<PlacedRun>& runs,
                                            const Pose& scene_from_world,

@@ -50,6 +50,12 @@ class Sights {
                                      const std::vector<PlacedRun>& runs,
                                      const Pose& scene_from_world,
                                      const Eigen::Vector3d& p_eye_scene) const;
+  /// Rectangles of an imager's picture, outside of which it sees none of the parts (and of the prototype).
+  std::vector<cv::Rect> seen_places(const Imager& imager,
+                                    const BakedLens& lens,
+                                    const std::vector<PlacedRun>& runs,
+                                    const Pose& scene_from_world,
+                                    bool prototype_too) const;
   /// The rectangle of the picture that the prototype lies in.
   cv::Rect prototype_place(std::size_t projector,
                            const std::vector<PlacedRun>& runs,

@@ -23,7 +23,7 @@ Hit surface_part_at(usampler2DArray s_ids, Sight sight, vec3 p, vec3 d_normal) {
   float missed_by = 0.5;  // of a triangle's height
   bool in_middle = false;
   uvec4 tried = uvec4(0);
-  for (int i = 0; i < 5; ++i) {
+  for (int i = 0; i < 5 && best.id == 0u; ++i) {
     vec4 share;
     uvec4 ids = ids_around(s_ids, sight, 1, p + k_heights[i] * k_on_surface * d_normal - sight.p_eye.xyz, share);
     if (i == 0) in_middle = all(notEqual(ids, uvec4(0)));

@@ -232,6 +232,20 @@ int run(int frames) {
   const double still = median_ms(frames, [&] { (void)renderer->projector_picture(0, posed, viewer); });
   frame("nothing moves", still);
   fmt::print("  nothing moves, of clear and copy                {:5.2f}\n", still / copy);
+
+  // Composites: the picture is new each time. Their yardstick has the camera's size.
+  const Imager& camera = world.rig.cameras[0];
+  const cv::Mat picture(camera.height, camera.width, CV_8UC3, cv::Scalar(60, 70, 80));
+  const double scale = 1.0 * camera.width * camera.height / (k_width * k_height);
+  fmt::print("\n  composites, {}x{}                        ms   of copies of this size\n", camera.width,
+             camera.height);
+  const auto composite = [&](const char* name, const std::function<scene::PosedScene()>& place) {
+    const double ms = median_ms(
+        frames, [&] { (void)renderer->composite(0, picture, place(), projector::Composite::full); });
+    fmt::print("  {:<38}  {:6.2f}  {:5.2f}\n", name, ms, ms / (copy * scale));
+  };
+  composite("a part moves", moved);
+  composite("nothing moves", [&] { return posed; });
   return 0;
 }
 

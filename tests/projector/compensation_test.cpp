@@ -118,7 +118,9 @@ scene::Scene painted_scene(const cv::Mat& paint) {
   slot.name = "paint";
   slot.mode = scene::Mode::surface;
   scene::Mesh mesh = *bulged(0.0003);
-  mesh.materials[0] = {{1, 1, 1}, true, paint};
+  mesh.materials[0].base_colour = {1, 1, 1};
+  mesh.materials[0].unlit = true;
+  mesh.materials[0].texture = paint;
   slot.variants.push_back({"a", mesh});
   scene.slots.push_back(slot);
   return scene;

@@ -593,6 +593,19 @@ TEST_F(RendererTest, NothingIsDrawnAgainUntilSomethingChanges) {
   EXPECT_FALSE(drawn.pass_times().empty());
   const cv::Mat from_there = drawn.projector_picture(0, posed, viewer_from({-0.1, -0.2, -1.4}));
   EXPECT_GT(cv::norm(from_there, drawn.projector_picture(0, posed, viewer), cv::NORM_INF), 10);
+  // Parts over another picture: only laid over it.
+  const cv::Mat dark = cv::Mat::zeros(480, 640, CV_8UC1), bright(480, 640, CV_8UC1, cv::Scalar(200));
+  const cv::Mat over_dark = drawn.composite(0, dark, posed, Composite::full);
+  (void)drawn.pass_times();
+  const cv::Mat over_bright = drawn.composite(0, bright, posed, Composite::full);
+  EXPECT_EQ(drawn.pass_times().size(), 1u);
+  EXPECT_EQ(over_bright.at<cv::Vec3b>(2, 2), cv::Vec3b(200, 200, 200));
+  EXPECT_EQ(over_bright.at<cv::Vec3b>(240, 320), over_dark.at<cv::Vec3b>(240, 320));
+  EXPECT_NE(over_dark.at<cv::Vec3b>(240, 320), cv::Vec3b(0, 0, 0));
+  posed.parts[0].world_from_part.translation.x() += 0.05;
+  EXPECT_GT(cv::norm(over_dark, drawn.composite(0, dark, posed, Composite::full), cv::NORM_INF), 10);
+  EXPECT_GT(cv::norm(over_dark, drawn.composite(0, dark, posed, Composite::rest), cv::NORM_INF), 10);
+
   const cv::Mat plain = drawn.projector_picture(0, posed, viewer);
   ASSERT_TRUE(drawn.set_light({.compensation = Compensation::geometry}));
   EXPECT_GT(cv::norm(plain, drawn.projector_picture(0, posed, viewer), cv::NORM_INF), 5);
