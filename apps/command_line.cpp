@@ -12,6 +12,8 @@
 #include "apps/check.h"
 #include "apps/demo.h"
 #include "apps/detect.h"
+#include "apps/export.h"
+#include "apps/import.h"
 #include "apps/learn_body.h"
 #include "apps/markers.h"
 #include "apps/patterns.h"
@@ -303,6 +305,47 @@ void add_check(CLI::App& app, Run& run) {
   command->callback([options, &run] { run = [options] { return finished(run_check(*options)); }; });
 }
 
+void add_export(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("export", "warp and blend of every projector for other programs");
+  command->footer(
+      "MPCDI 2.0 (VESA), the maps at the projectors' size, points in metres in the frame of the prototype's mesh, NaN where\n"
+      "a pixel lights nothing. sl: points, each projector's pose and pinhole frustum, and its lens as a distortion map;\n"
+      "a3: points alone; 3d: places (x right, y down, 0 to 1) in the picture of one viewer. Alpha: a projector's share of\n"
+      "the linear light, value = share^(1/gamma). Beta (where black light was measured): display values that make black even.\n"
+      "Example: limn export --mpcdi door.mpcdi --rig rig --scene config/scenes/door --poses poses.json\n"
+      "Example: limn export --warp warps --format exr --rig rig --scene config/scenes/door --poses poses.json");
+  auto options = std::make_shared<ExportOptions>();
+  command->add_option("--mpcdi", options->mpcdi, "archive to write");
+  command->add_option("--profile", options->profile, "of MPCDI: sl (shader lamps), a3 (advanced 3D), 3d (one viewer)")
+      ->check(CLI::IsMember({"sl", "a3", "3d"}))
+      ->capture_default_str();
+  command->add_option("--gamma", options->gamma, "of alpha maps (gammaEmbedded); 1: linear")->capture_default_str();
+  command->add_option("--bits", options->bits, "of alpha and beta maps, 8 or 16")->capture_default_str();
+  command->add_option("--warp", options->warp, "folder for warp-PROJECTOR.pfm or .exr: points as above");
+  command->add_option("--format", options->format, "of --warp: pfm, exr (R, G, B are x, y, z)")
+      ->check(CLI::IsMember({"pfm", "exr"}))
+      ->capture_default_str();
+  command->add_option("--looks", options->looks, "folder for look-SLOT-VARIANT.png: each variant as the viewer sees it");
+  command->add_option("--rig", options->rig, "rig folder, rig.json or folder of .cameramodel files")->required();
+  command->add_option("--scene", options->scene, "scene folder or its scene.json")->required();
+  command->add_option("--poses", options->poses, "POSES.json: where the prototype stands")->required();
+  command->add_option("--viewer", options->viewer, "viewer file for --profile 3d and --looks; without it the scene's");
+  command->add_flag("--json", options->json, "print JSON instead of a line a projector");
+  command->callback([options, &run] { run = [options] { return finished(run_export(*options)); }; });
+}
+
+void add_import(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("import", "what an MPCDI file holds, or what is wrong with it; its projectors as a rig");
+  command->footer(
+      "Reads archives of MPCDI 1 and 2, and XML alone as Christie's Mystique writes it (poses without maps).\n"
+      "Example: limn import theirs.mpcdi --out rig");
+  auto options = std::make_shared<ImportOptions>();
+  command->add_option("file", options->file, "archive (.mpcdi) or XML (.mpcdi.xml)")->required();
+  command->add_option("--out", options->out, "rig folder to write, in the file's own frame (profile sl)");
+  command->add_flag("--json", options->json, "print JSON instead of a line a region");
+  command->callback([options, &run] { run = [options] { return finished(run_import(*options)); }; });
+}
+
 void add_simulate(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand("simulate", "pictures of the virtual rig, and the truth behind them");
   command->footer("Example: limn simulate config/worlds/studio.json --out simulated --variants mirror=sport");
@@ -334,6 +377,8 @@ int run_command_line(int argc, char** argv) {
   add_recheck(app, run);
   add_align(app, run);
   add_render(app, run);
+  add_export(app, run);
+  add_import(app, run);
   add_check(app, run);
   add_simulate(app, run);
 
