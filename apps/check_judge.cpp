@@ -467,38 +467,61 @@ class Judge {
     return {};
   }
 
-  // Where nothing is to be shown, all projectors are on and their blacks add up.
+  // Where nothing is to be shown all projectors are on: their blacks add up. Distance and incidence count,
+  // for they decide how much black arrives.
   Status judge_black() {
     sim::World glowing = seen_world_;
     Rig rig = check_.told.rig;
-    double least_black = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < glowing.projector_effects.size(); ++i) {
       sim::ProjectorEffects& effects = glowing.projector_effects[i];
-      effects.black_level = check_.truth.projector_effects[i].black_level;
-      least_black = std::min(least_black, effects.black_level);
+      effects = {.illuminance_at_1m = 1,
+                 .gamma = k_gamma,
+                 .black_level = check_.truth.projector_effects[i].black_level};
       rig.responses.push_back(measured_response(effects, rig.projectors[i].name));
     }
-    if (!(least_black > 0)) return nothing_to_judge("black_step_share", "projectors whose black gives light");
+    const cv::Mat whole = evenly_lit(), one_black = mean_black(glowing);
+    const double brightest = cv::mean(one_black, whole)[0];
+    if (!(brightest > 0)) return nothing_to_judge("black_step_share", "projectors whose black gives light");
     LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(check_.told.scene, rig));
+    LIMN_TRY_STATUS(renderer.set_light({.even_black = true}));
     const auto pictures = drawn_by(renderer, {check_.told.posed.world_from_prototype, {}});
     const cv::Mat actual = sim::ideal_light(glowing, samples(), pictures);
-    const Steps steps = steps_of(actual, least_black, evenly_lit());
+    const Steps steps = steps_of(actual / one_black, 1, whole);
     if (cv::countNonZero(steps.along) == 0)
       return nothing_to_judge("black_step_share", "a seam of projectors in the viewer's picture");
-    values_["black_step_share"] = steps.worst;
-    cv::Mat even(actual.size(), CV_32FC3, cv::Scalar::all(0));
-    double brightest = 0;
-    cv::minMaxLoc(actual.reshape(1), nullptr, &brightest);
-    even.setTo(cv::Scalar::all(brightest), evenly_lit());
-    constexpr double k_brighter = 0.25;  // of full light: what the brightest black is shown as
+    values_["black_step_share"] = steps.worst_along;
+    const double brightness = 0.1 / brightest;  // for the eye
+    cv::Mat even = one_black * static_cast<double>(reaches().size());
+    even.setTo(0, ~whole);
     pictures_.push_back(
         {"black", "The light of black, brightened",
-         fmt::format("Worst step {:.0f} % of a projector's black. Difference: the seams blue, steps up "
-                     "to white at 100 %.",
-                     100 * steps.worst),
-         for_eye(actual * (k_brighter / brightest)), for_eye(even * (k_brighter / brightest)),
-         shown_steps(steps, 1)});
+         fmt::format(
+             "Steps along seams: 95 % {:.1f} %, worst {:.1f} % of a projector's black. Difference: the seams "
+             "blue, steps up to white at 40 %.",
+             100 * steps.p95_along, 100 * steps.worst_along),
+         for_eye(actual * brightness), for_eye(even * brightness), shown_steps(steps, 0.4)});
     return {};
+  }
+
+  // The light of one projector's black in the viewer's pixels, the mean of all as if each reached all that
+  // faces it (CV_32FC3).
+  cv::Mat mean_black(const sim::World& glowing) {
+    cv::Mat light(check_.viewer.height, check_.viewer.width, CV_32FC3, cv::Scalar::all(0));
+    const std::size_t projectors = glowing.rig.projectors.size();
+    for (std::size_t i = 0; i < projectors; ++i) {
+      const Eigen::Vector3f p_light =
+          glowing.rig.projectors[i].imager_from_world.inverse().translation.cast<float>();
+      const auto black =
+          static_cast<float>(glowing.projector_effects[i].black_level / static_cast<double>(projectors));
+      for (std::size_t k = 0; k < light.total(); ++k) {
+        if (samples().object[k] < 0) continue;
+        const Eigen::Vector3f towards = p_light - samples().p_world[k];
+        const float cosine = samples().n_world[k].dot(towards.normalized());
+        light.at<cv::Vec3f>(static_cast<int>(k)) +=
+            cv::Vec3f::all(black * std::max(0.0F, cosine) / towards.squaredNorm());
+      }
+    }
+    return light;
   }
 
   // As limn solve would measure it.
@@ -535,7 +558,7 @@ class Judge {
   struct Steps {
     cv::Mat step;   // CV_32F
     cv::Mat along;  // CV_8U
-    double p95_along = 0, worst = 0;
+    double p95_along = 0, worst_along = 0, worst = 0;
   };
 
   Steps steps_of(const cv::Mat& light, double unit, const cv::Mat& whole) {
@@ -564,6 +587,7 @@ class Judge {
       steps.along |= range(reached) > 0;
     }
     cv::minMaxLoc(steps.step, nullptr, &steps.worst);
+    cv::minMaxLoc(steps.step, nullptr, &steps.worst_along, nullptr, nullptr, steps.along);
     std::vector<float> on_seams;
     for (int row = 0; row < light.rows; ++row)
       for (int column = 0; column < light.cols; ++column)

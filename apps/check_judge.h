@@ -63,9 +63,10 @@ struct CheckResult {
 /// eye;
 ///   how far its luminance varies within 9 x 9 pixels, as a share of it: 95 % along the lines where another
 ///   set of projectors begins, and the largest anywhere that the projectors can light evenly.
-/// - `black_step_share`: the same of the light of black, with projectors that have the world's black level
-/// and
-///   responses that say so, no part shown; as a share of the least black.
+/// - `black_step_share`: light of black where nothing is shown, evened out by the renderer
+///   (LightOptions::even_black), of projectors with the world's black level, falloff and incidence and
+///   responses that say so; the worst variation along those lines, as a share of the mean black of one
+///   projector there.
 /// - `rerun_worst_255`: pictures of two renderers, level by level.
 ///
 /// Error: nothing to judge by a measure, such as no part in the picture.
