@@ -175,15 +175,21 @@ std::optional<tracker::MarkerLight> marker_light_of(const std::string& name) {
   return std::nullopt;
 }
 
-Result<Imager> choose_viewer(const RenderOptions& options, const scene::Scene& scene, const Rig& rig) {
+Result<Imager> choose_viewer(const RenderOptions& options,
+                             const scene::Scene& scene,
+                             const scene::PosedScene& posed,
+                             const Rig& rig) {
   if (!options.viewer.empty()) return scene::load_viewer(options.viewer);
-  if (scene.viewer && scene.viewer->fixed) return *scene.viewer->fixed;
+  const Eigen::Vector3d d_up_world =
+      rig.cameras.empty() ? Eigen::Vector3d(0, -1, 0)
+                          : rig.cameras[0].imager_from_world.rotation.inverse() * Eigen::Vector3d(0, -1, 0);
+  if (const auto viewer = scene::viewer_of(scene, posed, d_up_world)) return *viewer;
   if (rig.cameras.empty()) {
     return usage_error(
         "--viewer: expected a viewer file, since neither the scene has a viewer nor the rig a camera.");
   }
   if (scene.viewer)
-    log_warning("render: the viewer's marker gives no picture size; {} looks instead", rig.cameras[0].name);
+    log_warning("render: the viewer's marker was not found; {} looks instead", rig.cameras[0].name);
   return rig.cameras[0];
 }
 
@@ -292,7 +298,7 @@ Status run_render(const RenderOptions& options) {
   LIMN_TRY(const scene::Scene scene, scene::load_scene(options.scene));
   LIMN_TRY(const Frames frames, read_frames(options.frames, &rig));
   LIMN_TRY(const scene::PosedScene posed, place(options, scene, rig, frames));
-  LIMN_TRY(const Imager viewer, choose_viewer(options, scene, rig));
+  LIMN_TRY(const Imager viewer, choose_viewer(options, scene, posed, rig));
   report_missing(scene, posed);
   report_odd(scene, rig, posed, viewer);
   LIMN_TRY_STATUS(make_folder(options.out));

@@ -1,5 +1,6 @@
 #include "scene/posed.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 
 #include "core/config.h"
@@ -87,7 +88,28 @@ PosedScene posed(const Scene& scene, std::span<const Track> tracks, std::span<co
     out.parts.push_back(
         {slot.name, chosen_variant(slot, i, variants), world_from_marker * slot.marker_from_part});
   }
+  if (const Track* viewer = scene.viewer ? find_track(tracks, k_viewer_body) : nullptr)
+    out.p_eye_world = viewer->world_from_body * scene.viewer->p_eye_marker;
   return out;
+}
+
+std::optional<Imager> viewer_of(const Scene& scene,
+                                const PosedScene& posed,
+                                const Eigen::Vector3d& d_up_world) {
+  if (scene.viewer && scene.viewer->fixed) return scene.viewer->fixed;
+  if (!posed.p_eye_world) return std::nullopt;
+  Eigen::AlignedBox3d box;
+  if (scene.prototype && posed.world_from_prototype)
+    for (const Eigen::Vector3f& p : scene.prototype->mesh.positions)
+      box.extend(*posed.world_from_prototype * p.cast<double>());
+  else
+    for (const PosedPart& part : posed.parts) box.extend(part.world_from_part.translation);
+  if (box.isEmpty()) return std::nullopt;
+  const Eigen::Vector3d& p_eye = *posed.p_eye_world;
+  const Eigen::Vector3d d = (box.center() - p_eye).normalized();
+  if (!d.allFinite()) return std::nullopt;
+  const Eigen::Vector3d d_up = std::abs(d.dot(d_up_world)) < 0.99 ? d_up_world : d.unitOrthogonal();
+  return viewer_imager(looking_at(p_eye, box.center(), d_up).inverse(), 1280, 800, 40);
 }
 
 Result<PosedScene> load_poses(const std::filesystem::path& path, const Scene& scene) {

@@ -163,8 +163,8 @@ Imager read_viewer_imager(const ConfigNode& node) {
   return viewer_imager(world_from_viewer, read_side(size, sides[0]), read_side(size, sides[1]), fov_deg);
 }
 
-Viewer read_viewer(const ConfigNode& node) {
-  node.only({"fixed", "marker"});
+Viewer read_viewer(const ConfigNode& node, const Scene& scene) {
+  node.only({"fixed", "marker", "size_mm", "eye_mm"});
   Viewer viewer;
   if (const auto fixed = node.find("fixed")) viewer.fixed = read_viewer_imager(*fixed);
   if (const auto marker = node.find("marker")) viewer.marker = read_marker_name(*marker);
@@ -172,6 +172,11 @@ Viewer read_viewer(const ConfigNode& node) {
     node.problem(
         fmt::format("expected either \"fixed\" or \"marker\", found {}.", viewer.fixed ? "both" : "neither"));
   }
+  if (const auto size = node.find("size_mm"))
+    viewer.marker_size_m = 1e-3 * size->positive();
+  else if (!scene.slots.empty())
+    viewer.marker_size_m = scene.slots[0].size_m;
+  if (const auto eye = node.find("eye_mm")) viewer.p_eye_marker = 1e-3 * eye->vector3();
   return viewer;
 }
 
@@ -288,7 +293,7 @@ Result<Scene> load_scene(const fs::path& path) {
   if (const auto controls = root.find("controls")) {
     for (const ConfigNode& item : controls->items()) scene.controls.push_back(read_control(item, scene));
   }
-  if (const auto node = root.find("viewer")) scene.viewer = read_viewer(*node);
+  if (const auto node = root.find("viewer")) scene.viewer = read_viewer(*node, scene);
   if (const auto node = root.find("light")) scene.light = read_light(*node);
   LIMN_TRY_STATUS(config.status());
   LIMN_TRY_STATUS(load_files(reader, file, &scene));
@@ -307,6 +312,8 @@ std::vector<Body> bodies(const Scene& scene) {
   if (scene.prototype && !scene.prototype->markers.empty())
     out.push_back({"prototype", scene.prototype->markers});
   for (const Slot& slot : scene.slots) out.push_back({slot.name, {{slot.marker, slot.size_m, Pose()}}});
+  if (scene.viewer && scene.viewer->marker)
+    out.push_back({k_viewer_body, {{*scene.viewer->marker, scene.viewer->marker_size_m, Pose()}}});
   return out;
 }
 

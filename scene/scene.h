@@ -51,10 +51,13 @@ struct Control {
   std::string gesture;
 };
 
-/// Whose eye `view` parts are drawn for: a fixed imager or one that a marker carries.
+/// Whose eye `view` parts are drawn for: a fixed imager's, or one that stands by a marker (on glasses, on a
+/// cap).
 struct Viewer {
   std::optional<Imager> fixed;
   std::optional<MarkerName> marker;
+  double marker_size_m = 0;
+  Eigen::Vector3d p_eye_marker = Eigen::Vector3d::Zero();  ///< the eye in the marker's frame
 };
 
 /// The room's light that parts are shaded by, linear: a hemisphere of soft light and lamps far away.
@@ -89,7 +92,9 @@ Result<Scene> load_scene(const std::filesystem::path& path);
 /// A viewer file of interfaces.md: {"world_from_viewer": POSE, "size": [w,h], "fov_deg": 40}.
 Result<Imager> load_viewer(const std::filesystem::path& path);
 
-/// What the tracker is to look for: the body "prototype" and one body per slot, named as the slot.
+/// What the tracker is to look for: the body "prototype", one body per slot, named as the slot, and
+/// k_viewer_body where a marker carries the viewer's eye.
 std::vector<Body> bodies(const Scene& scene);
+inline constexpr const char* k_viewer_body = "(viewer)";  ///< no slot's name
 
 }  // namespace limn::scene

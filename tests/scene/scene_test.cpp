@@ -7,6 +7,7 @@
 
 #include "core/file.h"
 #include "core/picture.h"
+#include "scene/posed.h"
 #include "tests/support/matchers.h"
 
 namespace limn::scene {
@@ -102,6 +103,34 @@ TEST(Scene, PrototypeIsOptionalAndAlbedoMayBeAPicture) {
   const auto with_picture = load_scene(folder);
   ASSERT_TRUE(with_picture) << with_picture.message();
   EXPECT_EQ(with_picture->prototype->albedo_picture.at<cv::Vec3b>(3, 3), cv::Vec3b(1, 2, 3));
+}
+
+TEST(Scene, AMarkerMayCarryTheViewersEye) {
+  json worn = whole_scene();
+  worn["viewer"] = {{"marker", "apriltag_36h11:30"}, {"size_mm", 25}, {"eye_mm", {0, 60, 10}}};
+  const auto scene = load_scene(folder_with(worn));
+  ASSERT_TRUE(scene) << scene.message();
+  const auto found = bodies(*scene);
+  ASSERT_EQ(found.size(), 4u);
+  EXPECT_EQ(found[3].name, k_viewer_body);
+  EXPECT_NEAR(found[3].markers[0].size_m, 0.025, 1e-12);
+  Track prototype, cap;
+  prototype.body = "prototype";
+  prototype.world_from_body = Pose(Eigen::Quaterniond::Identity(), {0, 0, 1.5});
+  cap.body = k_viewer_body;
+  cap.world_from_body =
+      Pose(Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitY())), {0.3, -0.2, 0.1});
+  const std::vector<Track> tracks = {prototype, cap};
+  const PosedScene there = posed(*scene, tracks);
+  ASSERT_TRUE(there.p_eye_world);
+  const auto viewer = viewer_of(*scene, there, -Eigen::Vector3d::UnitY());
+  ASSERT_TRUE(viewer);
+  EXPECT_TRUE(test::near(viewer->imager_from_world.inverse().translation,
+                         Eigen::Vector3d(cap.world_from_body * Eigen::Vector3d(0, 0.06, 0.01)), 1e-9));
+  const auto middle = viewer->project(prototype.world_from_body * Eigen::Vector3d(0.001, 0.001, 0));
+  ASSERT_TRUE(middle);
+  EXPECT_TRUE(test::near(*middle, Eigen::Vector2d(639.5, 399.5), 0.1));
+  EXPECT_FALSE(viewer_of(*scene, posed(*scene, std::span(tracks).first(1)), -Eigen::Vector3d::UnitY()));
 }
 
 TEST(Scene, ThingsOfAnAbsurdSizeAreAskedAbout) {
