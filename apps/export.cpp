@@ -225,6 +225,8 @@ Result<Session> load(const ExportOptions& options) {
   if (!session.viewer && (options.profile == "3d" || !options.looks.empty()))
     return usage_error(
         "--viewer: expected a viewer file for --profile 3d and --looks, since the scene has none.");
+  if (session.posed.parts.empty() && !options.looks.empty())
+    return error("{}: slots: expected the place of a part for --looks, found none.", options.poses.string());
   return session;
 }
 

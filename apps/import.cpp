@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
@@ -93,11 +94,20 @@ std::string sentence_of(const ordered_json& region) {
   return text;
 }
 
+// A name for a device, and so for its file, that the rig does not have yet.
+std::string name_of(std::string id, const Rig& rig) {
+  std::replace_if(
+      id.begin(), id.end(), [](char c) { return c == '/' || static_cast<unsigned char>(c) < ' '; }, '_');
+  while (rig.find(id)) id += '_';
+  return id;
+}
+
 // The projectors that a pinhole, or a lens of Limn's, describes.
 Result<Rig> rig_of(const Mpcdi& mpcdi, const std::string& file) {
   Rig rig;
   for (const MpcdiRegion& region : mpcdi.regions) {
-    if (const auto imager = imager_of(region)) {
+    if (auto imager = imager_of(region)) {
+      imager->name = name_of(region.id, rig);
       rig.projectors.push_back(*imager);
       if (!region.lens && !region.distortion.empty())
         log_warning("import: {}: its distortion map is left out; the rig has the frustum's pinhole",

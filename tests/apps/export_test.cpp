@@ -263,6 +263,12 @@ TEST_F(ExportDoor, MistakesAreErrors) {
   wrong.format = "tiff";
   failed(wrong, true, "--format");
   wrong = options;
+  ASSERT_TRUE(write_file(folder / "bare.json",
+                         json{{"world_from_prototype", to_json(Pose())}, {"slots", json::object()}}.dump()));
+  wrong.poses = folder / "bare.json";
+  wrong.looks = folder / "looks";
+  failed(wrong, false, "--looks");
+  wrong = options;
   ASSERT_TRUE(write_file(folder / "nothing.json", json{{"slots", json::object()}}.dump()));
   wrong.poses = folder / "nothing.json";
   failed(wrong, false, "world_from_prototype");
@@ -428,6 +434,31 @@ TEST(Import, TakesProjectorsInChristiesForm) {
   const json report = json::parse(testing::internal::GetCapturedStdout());
   EXPECT_EQ(report["regions"][1]["id"], "Projector 2");
   EXPECT_EQ(report["regions"][1]["frustum_deg"]["pitch"], -45);
+}
+
+// Numbers of the example that Christie publishes: the projector was aimed at the origin, 1.4 m away.
+TEST(Import, AimsAPublishedProjectorWhereItWasAimed) {
+  MpcdiRegion region;
+  region.width = 1400;
+  region.height = 1050;
+  region.frustum =
+      MpcdiFrustum{-54.649008076582298, 30.086445865802251, -35.258246325136348, -26.579532980277939,
+                   26.536123041449411,  20.556835397199524, -20.543387795160175};
+  region.frame = MpcdiFrame{{0.99906, -0.70781, -0.70934}, {1, 0, 0}, {0, 0, -1}, {0, 1, 0}};
+  EXPECT_TRUE(near(*imager_of(region)->project({0, 0, 0}), Vector2d(699.5, 524.5), 5));
+}
+
+TEST(Import, KeepsDevicesInsideTheRigFolder) {
+  const fs::path folder = test::test_folder();
+  std::string xml = christie_xml();
+  xml = std::regex_replace(xml, std::regex("Projector 1"), "../../P");
+  xml = std::regex_replace(xml, std::regex("Projector 2"), ".._.._P");
+  ASSERT_TRUE(make_folder(folder / "a/b"));
+  ASSERT_TRUE(write_file(folder / "head.mpcdi.xml", xml));
+  ASSERT_TRUE(run_import({folder / "head.mpcdi.xml", folder / "a/b/rig"}));
+  EXPECT_EQ(files_in(folder), (std::vector<std::string>{"a", "head.mpcdi.xml"}));
+  EXPECT_EQ(files_in(folder / "a"), std::vector<std::string>{"b"});
+  EXPECT_EQ(load_rig(folder / "a/b/rig")->projectors[1].name, ".._.._P_");
 }
 
 // A small archive of another program, version 1.0, to be broken.
