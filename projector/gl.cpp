@@ -26,6 +26,12 @@ GlName make_framebuffer() {
   return {name, [](GLuint n) { glDeleteFramebuffers(1, &n); }};
 }
 
+GlName make_vertex_array() {
+  GLuint name = 0;
+  glCreateVertexArrays(1, &name);
+  return {name, [](GLuint n) { glDeleteVertexArrays(1, &n); }};
+}
+
 GlName make_depth_buffer(int width, int height) {
   GLuint name = 0;
   glCreateRenderbuffers(1, &name);

@@ -33,6 +33,7 @@ class GlName {
 /// An immutable-size 2D or 2D array texture, nearest filtering, clamped.
 GlName make_texture(GLenum target, GLenum format, int width, int height, int layers = 1, int levels = 1);
 GlName make_framebuffer();
+GlName make_vertex_array();
 GlName make_depth_buffer(int width, int height);
 /// A buffer with this content.
 GlName make_buffer(const void* data, std::size_t bytes);

@@ -56,13 +56,11 @@ GpuScene::GpuScene(const scene::Scene& scene) {
   placements_ = make_buffer(nullptr, 0);
   upload_looks(staging.textures);
 
-  GLuint name = 0;
-  glCreateVertexArrays(1, &name);
-  vertex_array_ = GlName(name, [](GLuint n) { glDeleteVertexArrays(1, &n); });
-  glVertexArrayVertexBuffer(name, 0, *corners_, 0, sizeof(Eigen::Vector4f));
-  glVertexArrayAttribFormat(name, 0, 4, GL_FLOAT, GL_FALSE, 0);
-  glVertexArrayAttribBinding(name, 0, 0);
-  glEnableVertexArrayAttrib(name, 0);
+  vertex_array_ = make_vertex_array();
+  glVertexArrayVertexBuffer(*vertex_array_, 0, *corners_, 0, sizeof(Eigen::Vector4f));
+  glVertexArrayAttribFormat(*vertex_array_, 0, 4, GL_FLOAT, GL_FALSE, 0);
+  glVertexArrayAttribBinding(*vertex_array_, 0, 0);
+  glEnableVertexArrayAttrib(*vertex_array_, 0);
 }
 
 TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) {

@@ -174,9 +174,7 @@ struct Renderer::Impl {
         shown(rig_in.projectors.size()),
         prototype(scene_in.prototype),
         room(scene_in.light) {
-    GLuint name = 0;
-    glCreateVertexArrays(1, &name);
-    vertex_array = GlName(name, [](GLuint n) { glDeleteVertexArrays(1, &n); });
+    vertex_array = make_vertex_array();
     for (const scene::Slot& slot : scene_in.slots) slot_names.push_back(slot.name);
     for (const Imager& projector : rig.projectors) {
       responses.push_back(make_texture(GL_TEXTURE_2D, GL_RGB32F, k_response_columns, 1));

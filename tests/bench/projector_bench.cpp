@@ -76,13 +76,11 @@ class Yardsticks {
       for (const std::uint32_t i : triangle)  // fills the picture
         corners.push_back(((mesh.positions[i] - box.center()).cwiseQuotient(box.sizes()) * 1.9F).eval());
     corners_ = projector::make_buffer(corners.data(), corners.size() * sizeof(corners[0]));
-    GLuint name = 0;
-    glCreateVertexArrays(1, &name);
-    vertices_ = GlName(name, [](GLuint n) { glDeleteVertexArrays(1, &n); });
-    glVertexArrayVertexBuffer(name, 0, *corners_, 0, sizeof(Eigen::Vector3f));
-    glVertexArrayAttribFormat(name, 0, 3, GL_FLOAT, GL_FALSE, 0);
-    glVertexArrayAttribBinding(name, 0, 0);
-    glEnableVertexArrayAttrib(name, 0);
+    vertices_ = projector::make_vertex_array();
+    glVertexArrayVertexBuffer(*vertices_, 0, *corners_, 0, sizeof(Eigen::Vector3f));
+    glVertexArrayAttribFormat(*vertices_, 0, 3, GL_FLOAT, GL_FALSE, 0);
+    glVertexArrayAttribBinding(*vertices_, 0, 0);
+    glEnableVertexArrayAttrib(*vertices_, 0);
     triangles_ = program_of(
         "#version 450 core\nlayout(location = 0) in vec3 a; out vec3 v;\n"
         "void main() { v = a; gl_Position = vec4(a.xy, 0.4 * a.z, 1); }",

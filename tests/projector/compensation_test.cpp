@@ -10,10 +10,10 @@
 
 #include "calib/response/response.h"
 #include "core/picture.h"
-#include "device/gl_context.h"
 #include "projector/renderer.h"
 #include "sim/photograph.h"
 #include "tests/calib/response_captures.h"
+#include "tests/projector/gl_test.h"
 #include "tests/sim/small_world.h"
 #include "tests/support/matchers.h"
 
@@ -157,17 +157,7 @@ double ssim(const cv::Mat& a, const cv::Mat& b, const cv::Mat& where) {
   return (s[0] + s[1] + s[2]) / 3;
 }
 
-class CompensationTest : public testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    auto made = device::GlContext::create();
-    ASSERT_TRUE(made) << made.message();
-    context = std::make_unique<device::GlContext>(std::move(made).value());
-  }
-  static void TearDownTestSuite() { context.reset(); }
-  static std::unique_ptr<device::GlContext> context;
-};
-std::unique_ptr<device::GlContext> CompensationTest::context;
+class CompensationTest : public test::GlTest {};
 
 // The rig with the true responses.
 Rig true_rig(const sim::World& world) {

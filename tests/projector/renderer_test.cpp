@@ -7,8 +7,8 @@
 
 #include "core/picture.h"
 #include "core/response.h"
-#include "device/gl_context.h"
 #include "sim/ray_scene.h"
+#include "tests/projector/gl_test.h"
 #include "tests/support/matchers.h"
 
 namespace limn::projector {
@@ -130,25 +130,14 @@ double pixel_mean(int column, int row, const std::function<double(const Vector2d
   return sum / 8;
 }
 
-class RendererTest : public testing::Test {
+class RendererTest : public test::GlTest {
  protected:
-  static void SetUpTestSuite() {
-    auto made = device::GlContext::create();
-    ASSERT_TRUE(made) << made.message();
-    context = std::make_unique<device::GlContext>(std::move(made).value());
-  }
-  static void TearDownTestSuite() { context.reset(); }
-
   static Renderer renderer(const Scene& scene, const Rig& rig) {
     auto made = Renderer::create(scene, rig);
     if (!made) throw std::runtime_error(made.message());
     return std::move(made).value();
   }
-
-  static std::unique_ptr<device::GlContext> context;
 };
-
-std::unique_ptr<device::GlContext> RendererTest::context;
 
 TEST_F(RendererTest, SurfacePointsOfAPlaneAreOnTheExactRays) {
   const Scene scene = scene_of(sheet(0.5, 0.4), {});
