@@ -17,7 +17,9 @@ namespace {
 constexpr int k_response_columns = 1025;
 // Texture units; the sights take three from k_sights_unit on.
 constexpr int k_tangents_unit = 0, k_looks_unit = 1, k_response_unit = 2, k_centre_unit = 3,
-              k_picture_unit = 4, k_sights_unit = 5, k_mixing_unit = 8, k_albedo_unit = 9;
+              k_picture_unit = 4, k_sights_unit = 5, k_mixing_unit = 8, k_albedo_unit = 9,
+              k_arriving_unit = 10;
+constexpr int k_arriving_side = 256;  // texels of a projector's map of arriving light
 constexpr GLuint k_list_binding = 6;  // of buffers, after the scene's and the sights'
 constexpr int k_view = 2;             // the overlay of a virtual camera, after those of Composite
 // Steps of light that ask for more samples: beside light, and between blacks.
@@ -153,7 +155,8 @@ struct Renderer::Impl {
   std::optional<double> level_by_geometry;  // of the first place that the prototype had
   std::optional<scene::Prototype> prototype;
   std::optional<scene::RoomLight> room;
-  GlName mixing, albedo;
+  GlName mixing, albedo, arriving;
+  std::vector<cv::Mat> arriving_maps;  // as they are in the layers of `arriving`
   float mean_albedo = 0;
   GlName vertex_array;  // without attributes, for whole.vert
 
@@ -181,6 +184,14 @@ struct Renderer::Impl {
       upload(responses.back(), response_table(find_response(rig, projector.name), k_response_columns));
     }
     mixing = make_texture(GL_TEXTURE_2D_ARRAY, GL_RGBA16F, 1, 1);
+    const auto projectors = std::max<std::size_t>(1, rig.projectors.size());
+    arriving = make_texture(GL_TEXTURE_2D_ARRAY, GL_R16F, k_arriving_side, k_arriving_side,
+                            static_cast<int>(projectors));
+    glTextureParameteri(*arriving, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTextureParameteri(*arriving, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    arriving_maps.resize(rig.projectors.size());
+    for (std::size_t i = 0; i < rig.projectors.size(); ++i)
+      set_arriving(i, cv::Mat(k_arriving_side, k_arriving_side, CV_32F, cv::Scalar(1)));
     const scene::Prototype surface_of = prototype.value_or(scene::Prototype{});
     const cv::Mat colours = relative_albedo(surface_of);
     mean_albedo = static_cast<float>(mean_albedo_of(surface_of));
@@ -193,6 +204,7 @@ struct Renderer::Impl {
   }
 
   Status link_programs();
+  bool set_arriving(std::size_t index, const cv::Mat& map);
   const GpuLens& lens_of(const Imager& imager);
   const Canvas& canvas(int width, int height, GLenum format);
   void prepare(const scene::PosedScene& posed);
@@ -252,6 +264,17 @@ Status Renderer::Impl::link_programs() {
     LIMN_TRY(*program, Program::link_compute(file));
   }
   return {};
+}
+
+// CV_32F of the texture's size. False when it is there already.
+bool Renderer::Impl::set_arriving(std::size_t index, const cv::Mat& map) {
+  cv::Mat& known = arriving_maps[index];
+  if (!known.empty() && cv::norm(known, map, cv::NORM_INF) == 0) return false;
+  known = map;
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  glTextureSubImage3D(*arriving, 0, 0, 0, static_cast<GLint>(index), map.cols, map.rows, 1, GL_RED, GL_FLOAT,
+                      map.data);
+  return true;
 }
 
 const GpuLens& Renderer::Impl::lens_of(const Imager& imager) {
@@ -317,6 +340,7 @@ void Renderer::Impl::set_up(const Program& program, const GpuLens& lens, const I
               Eigen::Vector4f(static_cast<float>(lens.baked.step), static_cast<float>(tangents.cols),
                               static_cast<float>(tangents.rows), 0));
   program.bind("s_looks", k_looks_unit, scene.looks());
+  program.bind("s_arriving", k_arriving_unit, arriving);
   program.set("u_placement_count", scene.owner_count());
   const auto shown = [&](bool on_surface) {
     return std::any_of(runs.begin(), runs.end(),
@@ -543,6 +567,21 @@ Status Renderer::set_light(const LightOptions& options, const MeasuredSurface* s
     for (Impl::Shown& shown : impl_->shown) shown.is_current = false;
   impl_->light_options = options;
   return {};
+}
+
+void Renderer::set_arriving(std::size_t index, const cv::Mat& map) {
+  LIMN_CHECK(index < impl_->rig.projectors.size());
+  LIMN_CHECK(map.empty() || map.type() == CV_32FC1 || map.type() == CV_8UC1);
+  cv::Mat whole(k_arriving_side, k_arriving_side, CV_32F, cv::Scalar(1));
+  if (!map.empty()) {
+    map.convertTo(whole, CV_32F, map.depth() == CV_8U ? 1.0 / 255 : 1.0);
+    const bool finer = std::max(map.cols, map.rows) > k_arriving_side;
+    cv::resize(whole, whole, {k_arriving_side, k_arriving_side}, 0, 0,
+               finer ? cv::INTER_AREA : cv::INTER_LINEAR);
+    whole = cv::max(0.0, cv::min(1.0, whole));
+  }
+  if (!impl_->set_arriving(index, whole)) return;
+  for (Impl::Shown& shown : impl_->shown) shown.is_current = false;
 }
 
 cv::Mat Renderer::clipped(std::size_t index) const { return impl_->shown.at(index).clipped; }

@@ -49,6 +49,12 @@ class Renderer {
   /// shows nothing.
   Status set_light(const LightOptions& options, const MeasuredSurface* surface = nullptr);
 
+  /// How much of projector `index`'s light arrives, from the next picture on: 0 … 1
+  /// over its picture, CV_32FC1 or CV_8UC1 (255 is all) of any size, interpolated between its cells' centres;
+  /// empty: all of it, as at first. Where it is blocked the others that reach the point give its light, and
+  /// it keeps 8 % of its own share, to show when the shadow goes. Where no other reaches it shines on.
+  void set_arriving(std::size_t index, const cv::Mat& map);
+
   /// What projector `index` of the rig is to show, CV_8UC3 BGR display values by its measured response
   /// (gamma 2.2 without). `view` parts are drawn as seen from the viewer's eye, also beyond its picture;
   /// black elsewhere. Light is shared with the other projectors that reach the same point, so that the sum in

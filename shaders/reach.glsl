@@ -2,6 +2,7 @@
 
 uniform usampler2DArray s_projector_ids;
 uniform sampler2DArray s_pixel_maps;  // for each projector: pixels over a grid of tangents
+uniform sampler2DArray s_arriving;    // for each projector, over its picture: how much of its light arrives
 uniform int u_projector_count;
 
 const float k_least_share = 1e-4;  // at the very border, so that a projector alone there still gives its light
@@ -32,6 +33,7 @@ struct Reach {
   float quality;     // pixels a square metre, times the cosine once more against grazing light, fading towards the
                      // picture's border; 0 where its light does not fall on p: turned away, outside, in a shadow
   float irradiance;  // of white, where 1 m away and head on is 1 (1/m^2); also where p is outside or in a shadow
+  float arriving;    // of its light on the way to p, 0 ... 1: the rest is in somebody's shadow
 };
 
 Reach reach(int j, vec3 p, vec3 d_normal) {
@@ -40,15 +42,16 @@ Reach reach(int j, vec3 p, vec3 d_normal) {
   float distance_2 = dot(to_eye, to_eye);
   float cosine = dot(d_normal, to_eye) * inversesqrt(distance_2);
   vec3 q = (projector.sight_from_scene * vec4(p, 1)).xyz;
-  if (cosine <= 0.0 || q.z <= 0.0) return Reach(0.0, 0.0);
+  if (cosine <= 0.0 || q.z <= 0.0) return Reach(0.0, 0.0, 1.0);
   vec2 px = pixel_of(projector, q.xy / q.z);
   vec2 last = projector.size.zw - 0.5;
   float gain = vignetting(projector, clamp(px, vec2(-0.5), last));
-  Reach reach = Reach(0.0, cosine / distance_2 * max(gain, 0.05));
+  Reach reach = Reach(0.0, cosine / distance_2 * max(gain, 0.05), 1.0);
   vec2 inside = min(px + 0.5, last - px);
   float border = min(inside.x, inside.y);
   if (border < 0.0 || is_hidden(s_projector_ids, projector, p)) return reach;
   float soft = max(k_least_share, smoothstep(0.0, projector.quality.y, border));
+  reach.arriving = texture(s_arriving, vec3((px + 0.5) / projector.size.zw, projector.quality.z)).r;
   reach.quality = soft * cosine * cosine * projector.quality.x * projector.quality.x / distance_2;
   return reach;
 }
@@ -62,23 +65,33 @@ bool is_reached(vec3 p, vec3 d_normal) {
 
 // What projector i is to give at p.
 struct Share {
-  float share;          // of the light there; the shares of all that reach p sum to one
+  float share;          // of the light there; what arrives of all that reach p sums to one
   float irradiance;     // as Reach
   float missing_black;  // irradiance that black gives where every projector reaches, and that is missing at p
 };
 
+// Where light is blocked others give it, and the blocked projector keeps watch: so little of its share that nothing
+// flashes when the shadow goes, enough for a camera to see that it has gone. Where nobody else reaches it goes on.
+// Weights fall by powers, so that a change of what arrives is as soft where others hardly reach.
+const float k_watch = 0.08;    // of its share
+const float k_blocked = 1e-3;  // weight of a blocked projector against others
+
 Share share_of(int i, vec3 p, vec3 d_normal) {
-  float own = 0.0, sum = 0.0;
+  float own = 0.0, sum = 0.0, own_quality = 0.0, quality = 0.0;
   Share share = Share(0.0, 0.0, 0.0);
   for (int j = 0; j < u_projector_count; ++j) {
     Reach reach = reach(j, p, d_normal);
-    sum += reach.quality;
-    if (reach.quality == 0.0) share.missing_black += s_sights[j].quality.w * reach.irradiance;
+    float weight = reach.quality * pow(k_blocked, 1.0 - reach.arriving);
+    sum += weight;
+    quality += reach.quality;
+    share.missing_black +=
+        s_sights[j].quality.w * reach.irradiance * (reach.quality == 0.0 ? 1.0 : 1.0 - reach.arriving);
     if (j != i) continue;
-    own = reach.quality;
+    own = weight;
+    own_quality = reach.quality;
     share.irradiance = reach.irradiance;
   }
-  share.share = sum > 0.0 ? own / sum : 0.0;
+  share.share = sum > 0.0 ? max(own / sum, k_watch * own_quality / quality) : 0.0;
   return share;
 }
 
