@@ -59,4 +59,9 @@ Result<Frame> PictureCamera::next() {
   return Frame{options_.name, image, shifted(Stamp{}, seconds)};
 }
 
+std::string PictureCamera::description() const {
+  return fmt::format("{} stored pictures, {}x{}, {:g} a second", pictures_.size(), size_.width, size_.height,
+                     options_.frames_per_second);
+}
+
 }  // namespace limn::device

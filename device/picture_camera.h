@@ -26,6 +26,8 @@ class PictureCamera : public CameraSource {
   cv::Size size() const override { return size_; }
   /// Error at the end, for an unreadable picture and for one of another size than the first.
   Result<Frame> next() override;
+  bool is_finite() const override { return !options_.repeat; }
+  std::string description() const override;
 
  private:
   PictureCamera() = default;

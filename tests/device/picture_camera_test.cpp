@@ -23,6 +23,8 @@ TEST(PictureCamera, PlaysAFolderInTheOrderOfNamesAndEnds) {
   auto camera = device::PictureCamera::open(folder, {.name = "left", .frames_per_second = 20});
   ASSERT_TRUE(camera) << camera.message();
   EXPECT_EQ(camera->size(), cv::Size(8, 6));
+  EXPECT_TRUE(camera->is_finite());
+  EXPECT_EQ(camera->description(), "3 stored pictures, 8x6, 20 a second");
   for (int i = 0; i < 3; ++i) {
     const auto frame = camera->next();
     ASSERT_TRUE(frame) << frame.message();
@@ -38,6 +40,7 @@ TEST(PictureCamera, RepeatsWhenAskedTo) {
   ASSERT_TRUE(write_png(picture, flat(7)));
   auto camera = device::PictureCamera::open(picture, {.repeat = true});
   ASSERT_TRUE(camera);
+  EXPECT_FALSE(camera->is_finite());
   const Frame first = camera->next().value(), second = camera->next().value();
   EXPECT_EQ(second.image.at<std::uint8_t>(3, 3), 7);
   EXPECT_GT(second.captured_at, first.captured_at);

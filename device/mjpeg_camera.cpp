@@ -1,0 +1,193 @@
+#include "device/mjpeg_camera.h"
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "device/jpeg.h"
+#include "device/mjpeg_stream.h"
+#include "device/socket.h"
+
+namespace limn::device {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double k_first_pause_s = 0.1, k_longest_pause_s = 2;  // between connections
+constexpr double k_draining_s = 0.1;  // of old bytes, before the newest picture so far must do
+
+struct Address {
+  std::string host, port = "80", path = "/";
+  std::string login;  // NAME:PASSWORD
+  std::string shown;  // for messages: without the login
+};
+
+Result<Address> parse(const std::string& url) {
+  const Error wrong = error("expected a camera's address as http://HOST[:PORT]/PATH, found {}.", url);
+  if (!url.starts_with("http://")) return wrong;
+  Address address;
+  std::string rest = url.substr(7);
+  if (const std::size_t slash = rest.find('/'); slash != std::string::npos) {
+    address.path = rest.substr(slash);
+    rest.resize(slash);
+  }
+  if (const std::size_t at = rest.rfind('@'); at != std::string::npos) {
+    address.login = rest.substr(0, at);
+    rest.erase(0, at + 1);
+  }
+  address.shown = "http://" + rest + address.path;
+  const std::size_t colon = rest.rfind(':');
+  if (colon != std::string::npos && rest.find(']', colon) == std::string::npos) {
+    address.port = rest.substr(colon + 1);
+    rest.resize(colon);
+  }
+  if (rest.size() > 2 && rest.front() == '[' && rest.back() == ']') rest = rest.substr(1, rest.size() - 2);
+  address.host = rest;
+  const bool number =
+      std::all_of(address.port.begin(), address.port.end(), [](char c) { return c >= '0' && c <= '9'; });
+  const bool line_ends = url.find_first_of("\r\n ") != std::string::npos;
+  if (address.host.empty() || address.port.empty() || !number || line_ends) return wrong;
+  return address;
+}
+
+std::string base64(const std::string& bytes) {
+  static constexpr char k_digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  unsigned bits = 0;
+  int count = 0;
+  for (const char c : bytes) {
+    bits = bits << 8 | static_cast<unsigned char>(c);
+    for (count += 8; count >= 6; count -= 6) text += k_digits[bits >> (count - 6) & 63];
+  }
+  if (count > 0) text += k_digits[bits << (6 - count) & 63];
+  while (text.size() % 4 != 0) text += '=';
+  return text;
+}
+
+// HTTP/1.0, so that a server has no reason to send in chunks.
+std::string request(const Address& address) {
+  std::string text = fmt::format("GET {} HTTP/1.0\r\nHost: {}:{}\r\nUser-Agent: limn\r\nAccept: */*\r\n",
+                                 address.path, address.host, address.port);
+  if (!address.login.empty()) text += fmt::format("Authorization: Basic {}\r\n", base64(address.login));
+  return text + "\r\n";
+}
+
+struct Connection {
+  Socket socket;
+  MjpegStream stream;
+};
+
+}  // namespace
+
+struct MjpegCamera::Impl {
+  Address address;
+  MjpegCameraOptions options;
+  cv::Size size;
+  std::optional<Connection> connection;
+  std::string problem = "nothing has come yet.";  // the last one
+  Stamp connect_at = Clock::now();
+  double pause_s = k_first_pause_s;
+  long connections = 0, dropped = 0, damaged = 0;
+
+  Status connect(Stamp deadline);
+  void disconnect(const std::string& why);
+  Status read_waiting(bool* heard);
+  std::optional<Frame> decoded(MjpegPart part);
+  Result<Frame> next();
+};
+
+Status MjpegCamera::Impl::connect(Stamp deadline) {
+  LIMN_TRY(Socket socket, Socket::connect(address.host, address.port, deadline));
+  LIMN_TRY_STATUS(socket.send(request(address)));
+  connection.emplace(Connection{std::move(socket), MjpegStream(options.max_part_bytes)});
+  ++connections;
+  problem = "the connection stands, but no whole picture has come.";
+  return {};
+}
+
+void MjpegCamera::Impl::disconnect(const std::string& why) {
+  if (connection) dropped += connection->stream.dropped();
+  connection.reset();
+  problem = why;
+  connect_at = shifted(Clock::now(), pause_s);
+  pause_s = std::min(2 * pause_s, k_longest_pause_s);
+}
+
+// Everything that has arrived goes to the stream; `heard` is set when that is anything.
+Status MjpegCamera::Impl::read_waiting(bool* heard) {
+  const Stamp until = shifted(Clock::now(), k_draining_s);
+  do {
+    LIMN_TRY(const Socket::Received received, connection->socket.receive());
+    if (received.bytes.empty()) return {};
+    *heard = true;
+    LIMN_TRY_STATUS(connection->stream.feed(received.bytes, received.arrived_at));
+  } while (Clock::now() < until);
+  return {};
+}
+
+std::optional<Frame> MjpegCamera::Impl::decoded(MjpegPart part) {
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(part.jpeg.data());
+  auto image = decode_jpeg({bytes, part.jpeg.size()}, {.grey = options.grey, .size = size});
+  if (!image) {
+    ++damaged;
+    problem = image.message();
+    return std::nullopt;
+  }
+  pause_s = k_first_pause_s;
+  return Frame{options.name, *image, part.arrived_at};
+}
+
+Result<Frame> MjpegCamera::Impl::next() {
+  const Stamp deadline = shifted(Clock::now(), options.limit_s);
+  bool heard = false;
+  while (Clock::now() < deadline) {
+    if (!connection) {
+      std::this_thread::sleep_until(std::min(connect_at, deadline));
+      if (Clock::now() >= deadline) break;
+      if (const Status done = connect(deadline); !done) disconnect(done.message());
+      continue;
+    }
+    const Status read = read_waiting(&heard);
+    if (auto part = connection->stream.take_newest()) {
+      if (auto frame = decoded(std::move(*part))) {
+        if (!read) disconnect(read.message());
+        return std::move(*frame);
+      }
+    }
+    if (!read) {
+      disconnect(read.message());
+    } else if (!connection->socket.wait(deadline) && !heard) {
+      disconnect("the server is silent.");  // a pulled cable looks like this
+    }
+  }
+  return error("{} ({}): expected a picture within {:g} s, found none: {}", options.name, address.shown,
+               options.limit_s, problem);
+}
+
+MjpegCamera::MjpegCamera(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+MjpegCamera::MjpegCamera(MjpegCamera&&) noexcept = default;
+MjpegCamera& MjpegCamera::operator=(MjpegCamera&&) noexcept = default;
+MjpegCamera::~MjpegCamera() = default;
+
+Result<MjpegCamera> MjpegCamera::open(const std::string& url, const MjpegCameraOptions& options) {
+  auto impl = std::make_unique<Impl>();
+  impl->options = options;
+  LIMN_TRY(impl->address, parse(url));
+  LIMN_TRY(const Frame first, impl->next());
+  impl->size = first.image.size();
+  return MjpegCamera(std::move(impl));
+}
+
+const std::string& MjpegCamera::name() const { return impl_->options.name; }
+cv::Size MjpegCamera::size() const { return impl_->size; }
+Result<Frame> MjpegCamera::next() { return impl_->next(); }
+
+std::string MjpegCamera::description() const {
+  const long dropped = impl_->dropped + (impl_->connection ? impl_->connection->stream.dropped() : 0);
+  return fmt::format("MJPEG over HTTP, {}x{}; {} connections, {} pictures skipped for newer ones, {} damaged",
+                     impl_->size.width, impl_->size.height, impl_->connections, dropped, impl_->damaged);
+}
+
+}  // namespace limn::device

@@ -1,0 +1,82 @@
+#include "device/jpeg.h"
+
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "tests/support/matchers.h"
+
+namespace limn::device {
+namespace {
+
+cv::Mat ramp() {
+  cv::Mat picture(48, 64, CV_8UC3);
+  for (int y = 0; y < picture.rows; ++y)
+    for (int x = 0; x < picture.cols; ++x)
+      picture.at<cv::Vec3b>(y, x) = {static_cast<uchar>(3 * x), static_cast<uchar>(5 * y), 60};
+  return picture;
+}
+
+std::vector<uchar> encoded(const cv::Mat& picture) {
+  std::vector<uchar> bytes;
+  cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, 98});
+  return bytes;
+}
+
+// Without the segments of a marker (0xc4: Huffman tables).
+std::vector<uchar> without_segments(const std::vector<uchar>& jpeg, uchar marker) {
+  std::vector<uchar> kept(jpeg.begin(), jpeg.begin() + 2);
+  for (std::size_t at = 2; at + 4 < jpeg.size();) {
+    const std::size_t size =
+        jpeg[at + 1] == 0xda ? jpeg.size() - at : 2u + 256u * jpeg[at + 2] + jpeg[at + 3];
+    if (jpeg[at + 1] != marker)
+      kept.insert(kept.end(), jpeg.begin() + static_cast<long>(at),
+                  jpeg.begin() + static_cast<long>(at + size));
+    at += size;
+  }
+  return kept;
+}
+
+TEST(Jpeg, DecodesColourAndBrightnessAlone) {
+  const auto bytes = encoded(ramp());
+  const auto colour = decode_jpeg(bytes, {.size = {64, 48}});
+  ASSERT_TRUE(colour) << colour.message();
+  EXPECT_TRUE(test::image_near(*colour, ramp(), 2, 16, "colour"));
+  const auto grey = decode_jpeg(bytes, {.grey = true});
+  ASSERT_TRUE(grey);
+  EXPECT_EQ(grey->type(), CV_8UC1);
+  EXPECT_NEAR(grey->at<uchar>(40, 60), 0.114 * 180 + 0.587 * 200 + 0.299 * 60, 4);
+}
+
+TEST(Jpeg, APictureOfOneChannelStaysGrey) {
+  const auto grey = decode_jpeg(encoded(cv::Mat(16, 16, CV_8U, cv::Scalar(90))));
+  ASSERT_TRUE(grey);
+  EXPECT_EQ(grey->type(), CV_8UC1);
+}
+
+TEST(Jpeg, TablesThatWebcamsLeaveOutAreTheStandards) {
+  const auto bytes = encoded(ramp());
+  const auto bare = without_segments(bytes, 0xc4);
+  ASSERT_LT(bare.size() + 400, bytes.size());
+  const auto picture = decode_jpeg(bare);
+  ASSERT_TRUE(picture) << picture.message();
+  EXPECT_TRUE(test::image_near(*picture, ramp(), 2, 16, "bare"));
+}
+
+TEST(Jpeg, NoHalfPictures) {
+  const auto bytes = encoded(ramp());
+  for (const std::size_t size :
+       {std::size_t{0}, std::size_t{3}, std::size_t{200}, bytes.size() / 2, bytes.size() - 20}) {
+    const auto half = decode_jpeg({bytes.data(), size});
+    ASSERT_FALSE(half) << size;
+    EXPECT_NE(half.message().find("truncated or damaged"), std::string::npos) << half.message();
+  }
+}
+
+TEST(Jpeg, AnotherSizeIsNamed) {
+  const auto other = decode_jpeg(encoded(ramp()), {.size = {64, 50}});
+  ASSERT_FALSE(other);
+  EXPECT_NE(other.message().find("64x50, found 64x48"), std::string::npos) << other.message();
+}
+
+}  // namespace
+}  // namespace limn::device
