@@ -1,13 +1,13 @@
 #include "device/mjpeg_camera.h"
 
-#include <algorithm>
 #include <chrono>
 #include <optional>
-#include <thread>
 #include <utility>
 
+#include "device/address.h"
 #include "device/jpeg.h"
 #include "device/mjpeg_stream.h"
+#include "device/retry.h"
 #include "device/socket.h"
 
 namespace limn::device {
@@ -15,42 +15,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double k_first_pause_s = 0.1, k_longest_pause_s = 2;  // between connections
 constexpr double k_draining_s = 0.1;  // of old bytes, before the newest picture so far must do
-
-struct Address {
-  std::string host, port = "80", path = "/";
-  std::string login;  // NAME:PASSWORD
-  std::string shown;  // for messages: without the login
-};
-
-Result<Address> parse(const std::string& url) {
-  const Error wrong = error("expected a camera's address as http://HOST[:PORT]/PATH, found {}.", url);
-  if (!url.starts_with("http://")) return wrong;
-  Address address;
-  std::string rest = url.substr(7);
-  if (const std::size_t slash = rest.find('/'); slash != std::string::npos) {
-    address.path = rest.substr(slash);
-    rest.resize(slash);
-  }
-  if (const std::size_t at = rest.rfind('@'); at != std::string::npos) {
-    address.login = rest.substr(0, at);
-    rest.erase(0, at + 1);
-  }
-  address.shown = "http://" + rest + address.path;
-  const std::size_t colon = rest.rfind(':');
-  if (colon != std::string::npos && rest.find(']', colon) == std::string::npos) {
-    address.port = rest.substr(colon + 1);
-    rest.resize(colon);
-  }
-  if (rest.size() > 2 && rest.front() == '[' && rest.back() == ']') rest = rest.substr(1, rest.size() - 2);
-  address.host = rest;
-  const bool number =
-      std::all_of(address.port.begin(), address.port.end(), [](char c) { return c >= '0' && c <= '9'; });
-  const bool line_ends = url.find_first_of("\r\n ") != std::string::npos;
-  if (address.host.empty() || address.port.empty() || !number || line_ends) return wrong;
-  return address;
-}
 
 std::string base64(const std::string& bytes) {
   static constexpr char k_digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -86,9 +51,7 @@ struct MjpegCamera::Impl {
   MjpegCameraOptions options;
   cv::Size size;
   std::optional<Connection> connection;
-  std::string problem = "nothing has come yet.";  // the last one
-  Stamp connect_at = Clock::now();
-  double pause_s = k_first_pause_s;
+  Retry retry;
   long connections = 0, dropped = 0, damaged = 0;
 
   Status connect(Stamp deadline);
@@ -103,16 +66,14 @@ Status MjpegCamera::Impl::connect(Stamp deadline) {
   LIMN_TRY_STATUS(socket.send(request(address)));
   connection.emplace(Connection{std::move(socket), MjpegStream(options.max_part_bytes)});
   ++connections;
-  problem = "the connection stands, but no whole picture has come.";
+  retry.note("the connection stands, but no whole picture has come.");
   return {};
 }
 
 void MjpegCamera::Impl::disconnect(const std::string& why) {
   if (connection) dropped += connection->stream.dropped();
   connection.reset();
-  problem = why;
-  connect_at = shifted(Clock::now(), pause_s);
-  pause_s = std::min(2 * pause_s, k_longest_pause_s);
+  retry.failed(why);
 }
 
 // Everything that has arrived goes to the stream; `heard` is set when that is anything.
@@ -132,10 +93,10 @@ std::optional<Frame> MjpegCamera::Impl::decoded(MjpegPart part) {
   auto image = decode_jpeg({bytes, part.jpeg.size()}, {.grey = options.grey, .size = size});
   if (!image) {
     ++damaged;
-    problem = image.message();
+    retry.note(image.message());
     return std::nullopt;
   }
-  pause_s = k_first_pause_s;
+  retry.worked();
   return Frame{options.name, *image, part.arrived_at};
 }
 
@@ -144,8 +105,7 @@ Result<Frame> MjpegCamera::Impl::next() {
   bool heard = false;
   while (Clock::now() < deadline) {
     if (!connection) {
-      std::this_thread::sleep_until(std::min(connect_at, deadline));
-      if (Clock::now() >= deadline) break;
+      if (!retry.wait(deadline)) break;
       if (const Status done = connect(deadline); !done) disconnect(done.message());
       continue;
     }
@@ -163,7 +123,7 @@ Result<Frame> MjpegCamera::Impl::next() {
     }
   }
   return error("{} ({}): expected a picture within {:g} s, found none: {}", options.name, address.shown,
-               options.limit_s, problem);
+               options.limit_s, retry.problem());
 }
 
 MjpegCamera::MjpegCamera(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -174,7 +134,7 @@ MjpegCamera::~MjpegCamera() = default;
 Result<MjpegCamera> MjpegCamera::open(const std::string& url, const MjpegCameraOptions& options) {
   auto impl = std::make_unique<Impl>();
   impl->options = options;
-  LIMN_TRY(impl->address, parse(url));
+  LIMN_TRY(impl->address, parse_address(url, "http", "80"));
   LIMN_TRY(const Frame first, impl->next());
   impl->size = first.image.size();
   return MjpegCamera(std::move(impl));

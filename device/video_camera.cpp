@@ -1,0 +1,180 @@
+#include "device/video_camera.h"
+
+#include <algorithm>
+#include <chrono>
+#include <opencv2/videoio.hpp>
+#include <optional>
+#include <vector>
+
+#include "core/picture.h"
+#include "device/address.h"
+#include "device/retry.h"
+#include "device/socket.h"
+#include "device/video_clock.h"
+
+namespace limn::device {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// A frame that came so much later than the quickest waited unread; there is a newer one.
+constexpr double k_old_s = 0.05;
+
+}  // namespace
+
+struct VideoCamera::Impl {
+  VideoCameraOptions options;
+  std::string source;              // path or address
+  std::optional<Address> address;  // of a stream
+  cv::VideoCapture video;
+  cv::Size size;
+  Retry retry;
+  VideoClock clock;
+  long frames = 0, connections = 0, dropped = 0;
+
+  Status connect(Stamp deadline);
+  Status catch_up(Stamp deadline);
+  Result<cv::Mat> retrieved();
+  Result<Frame> next_of_file();
+  Result<Frame> next_of_stream();
+  Result<Frame> grabbed(Stamp deadline);
+};
+
+// The picture of the frame grabbed last.
+Result<cv::Mat> VideoCamera::Impl::retrieved() {
+  cv::Mat image;
+  if (!video.retrieve(image) || image.empty() || image.depth() != CV_8U)
+    return error("expected a frame of 8 bits, found one that cannot be decoded.");
+  if (!size.empty() && image.size() != size)
+    return error("expected {}x{} as at first, found {}x{}. Set it back or start again.", size.width,
+                 size.height, image.cols, image.rows);
+  return options.grey ? to_grey(image) : image;
+}
+
+Result<Frame> VideoCamera::Impl::next_of_file() {
+  if (!video.grab()) return error("{}: all {} frames of {} have been played.", options.name, frames, source);
+  ++frames;
+  auto image = retrieved();
+  if (!image) return error("{}: frame {}: {}", source, frames - 1, image.message());
+  return Frame{options.name, *image, shifted(Stamp{}, video.get(cv::CAP_PROP_POS_MSEC) / 1000)};
+}
+
+// OpenCV says only that it could not: who is not there is told before.
+Status VideoCamera::Impl::connect(Stamp deadline) {
+  LIMN_TRY_STATUS(Socket::connect(address->host, address->port, deadline));
+  const int left_ms = std::max(1, static_cast<int>(1000 * seconds_between(Clock::now(), deadline)));
+  const std::vector<int> limits = {cv::CAP_PROP_OPEN_TIMEOUT_MSEC, left_ms, cv::CAP_PROP_READ_TIMEOUT_MSEC,
+                                   static_cast<int>(1000 * options.limit_s)};
+  if (!video.open(source, cv::CAP_FFMPEG, limits))
+    return error(
+        "no video within the limit. Check the path, the name and password, and that it sends H.264 or "
+        "MJPEG.");
+  ++connections;
+  return catch_up(deadline);
+}
+
+// FFmpeg keeps what it read to find out the format: frames that come quicker than they were sent are from
+// there.
+Status VideoCamera::Impl::catch_up(Stamp deadline) {
+  clock = {};
+  std::optional<double> last_sent_s;
+  Stamp last_read = Clock::now();
+  const Stamp enough = shifted(last_read, 0.5 * seconds_between(last_read, deadline));
+  while (last_read < enough) {
+    if (!video.grab()) return error("the stream broke off as it began.");
+    const double sent_s = video.get(cv::CAP_PROP_POS_MSEC) / 1000;
+    const Stamp read_at = Clock::now();
+    clock.stamp(sent_s, read_at);
+    const bool waited = last_sent_s && sent_s > *last_sent_s &&
+                        seconds_between(last_read, read_at) >= 0.5 * (sent_s - *last_sent_s);
+    if (waited) return {};
+    last_sent_s = sent_s;
+    last_read = read_at;
+  }
+  return {};  // its times tell nothing: stamps are those of reading
+}
+
+// The newest frame of an open stream.
+Result<Frame> VideoCamera::Impl::grabbed(Stamp deadline) {
+  for (;;) {
+    if (!video.grab()) return error("the stream broke off, or was silent.");
+    const Stamp now = Clock::now();
+    const Stamp arrived_at = clock.stamp(video.get(cv::CAP_PROP_POS_MSEC) / 1000, now);
+    if (seconds_between(arrived_at, now) > k_old_s && now < deadline) {
+      ++dropped;
+      continue;
+    }
+    LIMN_TRY(const cv::Mat image, retrieved());
+    return Frame{options.name, image, arrived_at};
+  }
+}
+
+Result<Frame> VideoCamera::Impl::next_of_stream() {
+  const Stamp deadline = shifted(Clock::now(), options.limit_s);
+  while (Clock::now() < deadline) {
+    if (!video.isOpened()) {
+      if (!retry.wait(deadline)) break;
+      if (const Status done = connect(deadline); !done) {
+        video.release();
+        retry.failed(done.message());
+      }
+      continue;
+    }
+    auto frame = grabbed(deadline);
+    if (frame) {
+      retry.worked();
+      ++frames;
+      return frame;
+    }
+    video.release();
+    retry.failed(frame.message());
+  }
+  return error("{} ({}): expected a picture within {:g} s, found none: {}", options.name, address->shown,
+               options.limit_s, retry.problem());
+}
+
+VideoCamera::VideoCamera(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+VideoCamera::VideoCamera(VideoCamera&&) noexcept = default;
+VideoCamera& VideoCamera::operator=(VideoCamera&&) noexcept = default;
+VideoCamera::~VideoCamera() = default;
+
+Result<VideoCamera> VideoCamera::open_file(const std::filesystem::path& path,
+                                           const VideoCameraOptions& options) {
+  auto impl = std::make_unique<Impl>();
+  impl->options = options;
+  impl->source = path.string();
+  std::error_code problem;
+  if (!std::filesystem::is_regular_file(path, problem))
+    return error("{}: expected a video file, found none there. Check the path.", path.string());
+  if (impl->video.open(path.string(), cv::CAP_FFMPEG) && impl->next_of_file()) {
+    impl->size = cv::Size(static_cast<int>(impl->video.get(cv::CAP_PROP_FRAME_WIDTH)),
+                          static_cast<int>(impl->video.get(cv::CAP_PROP_FRAME_HEIGHT)));
+    impl->frames = 0;
+    if (impl->video.open(path.string(), cv::CAP_FFMPEG)) return VideoCamera(std::move(impl));
+  }
+  return error("{}: expected a video, found none that can be decoded. Save it as H.264 or MJPEG.",
+               path.string());
+}
+
+Result<VideoCamera> VideoCamera::open_rtsp(const std::string& url, const VideoCameraOptions& options) {
+  auto impl = std::make_unique<Impl>();
+  impl->options = options;
+  impl->source = url;
+  LIMN_TRY(impl->address, parse_address(url, "rtsp", "554"));
+  LIMN_TRY(const Frame first, impl->next_of_stream());
+  impl->size = first.image.size();
+  return VideoCamera(std::move(impl));
+}
+
+const std::string& VideoCamera::name() const { return impl_->options.name; }
+cv::Size VideoCamera::size() const { return impl_->size; }
+bool VideoCamera::is_finite() const { return !impl_->address; }
+Result<Frame> VideoCamera::next() { return impl_->address ? impl_->next_of_stream() : impl_->next_of_file(); }
+
+std::string VideoCamera::description() const {
+  if (is_finite()) return fmt::format("video file, {}x{}", impl_->size.width, impl_->size.height);
+  return fmt::format("RTSP, {}x{}; {} connections, {} frames skipped for newer ones", impl_->size.width,
+                     impl_->size.height, impl_->connections, impl_->dropped);
+}
+
+}  // namespace limn::device

@@ -1,0 +1,69 @@
+#include "device/open_camera.h"
+
+#include <opencv2/core.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "core/picture.h"
+#include "tests/support/matchers.h"
+
+namespace limn::device {
+namespace {
+
+namespace fs = std::filesystem;
+
+void contains(const std::string& message, const std::string& part) {
+  EXPECT_NE(message.find(part), std::string::npos) << part << " in: " << message;
+}
+
+TEST(OpenCamera, PicturesFoldersAndVideosByTheirPath) {
+  const fs::path folder = test::test_folder();
+  fs::create_directory(folder / "pictures.d");
+  ASSERT_TRUE(write_png(folder / "pictures.d/000.png", cv::Mat(6, 8, CV_8U, cv::Scalar(9))));
+  cv::VideoWriter writer((folder / "clip.avi").string(), cv::CAP_OPENCV_MJPEG,
+                         cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 10, {64, 48});
+  writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(9)));
+  writer.release();
+  for (const char* source : {"pictures.d", "pictures.d/000.png", "clip.avi"}) {
+    auto camera = open_camera({.name = "left", .source = (folder / source).string(), .grey = true});
+    ASSERT_TRUE(camera) << camera.message();
+    const auto frame = (*camera)->next();
+    ASSERT_TRUE(frame) << frame.message();
+    EXPECT_EQ(frame->camera, "left");
+    EXPECT_EQ(frame->image.type(), CV_8UC1);
+  }
+}
+
+TEST(OpenCamera, AnUnknownSourceListsTheForms) {
+  for (const char* source : {"", "webcam", "/nowhere/at/all", "ftp://host/"}) {
+    const auto camera = open_camera({.name = "left", .source = source});
+    ASSERT_FALSE(camera);
+    for (const char* form : {"left: ", "http://", "rtsp://", "folder of pictures"})
+      contains(camera.message(), form);
+  }
+}
+
+TEST(OpenCamera, NetworkSourcesGoToTheirOwnReaders) {
+  const auto mjpeg = open_camera({.source = "http://127.0.0.1:1/x", .limit_s = 0.1});
+  ASSERT_FALSE(mjpeg);
+  contains(mjpeg.message(), "http://127.0.0.1:1/x): expected a picture");
+  const auto secure = open_camera({.source = "https://127.0.0.1/x", .limit_s = 0.1});
+  ASSERT_FALSE(secure);
+  contains(secure.message(), "as http://");
+  const auto rtsp = open_camera({.source = "rtsp://127.0.0.1:1/x", .limit_s = 0.1});
+  ASSERT_FALSE(rtsp);
+  contains(rtsp.message(), "rtsp://127.0.0.1:1/x): expected a picture");
+}
+
+TEST(OpenCamera, SettingsThatASourceHasNotAndOtherSizesAreRefused) {
+  const fs::path picture = test::test_folder() / "one.png";
+  ASSERT_TRUE(write_png(picture, cv::Mat(6, 8, CV_8U, cv::Scalar(9))));
+  const auto set = open_camera({.source = picture.string(), .exposure_ms = 8});
+  ASSERT_FALSE(set);
+  contains(set.message(), "exposure_ms cannot be set");
+  const auto other = open_camera({.source = picture.string(), .size = {640, 480}});
+  ASSERT_FALSE(other);
+  contains(other.message(), "expected 640x480, found 8x6");
+}
+
+}  // namespace
+}  // namespace limn::device
