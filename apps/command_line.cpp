@@ -268,6 +268,11 @@ void add_render(CLI::App& app, Run& run) {
       ->check(CLI::IsMember({"full", "rest"}))
       ->capture_default_str();
   command->add_flag("--undistorted", options->undistorted, "composites without the cameras' lens distortion");
+  command->add_option("--contact-shadow", options->contact_shadow,
+                      "on: in composites and view.png parts darken the prototype around them; off: pixels beside parts keep "
+                      "their values")
+      ->check(CLI::IsMember({"on", "off"}))
+      ->capture_default_str();
   command->add_option("--marker-light", options->marker_light,
                       "what projectors do with markers: keep-out leaves them dark, spotlight lights them white")
       ->check(CLI::IsMember({"as-is", "keep-out", "spotlight"}))

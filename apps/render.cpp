@@ -283,6 +283,9 @@ Status run_render(const RenderOptions& options) {
   if (options.composite != "full" && options.composite != "rest") {
     return usage_error("--composite: expected full or rest, found '{}'.", options.composite);
   }
+  if (options.contact_shadow != "on" && options.contact_shadow != "off") {
+    return usage_error("--contact-shadow: expected on or off, found '{}'.", options.contact_shadow);
+  }
   const auto marker_light = marker_light_of(options.marker_light);
   if (!marker_light) {
     return usage_error("--marker-light: expected as-is, keep-out or spotlight, found '{}'.",
@@ -307,6 +310,7 @@ Status run_render(const RenderOptions& options) {
   log_info("render: {}", context.description());
   LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, rig));
   LIMN_TRY_STATUS(set_light(options.light, options.rig, rig, scene, posed, &renderer));
+  if (options.contact_shadow == "on") renderer.set_contact_shadow(&scene);
   const bool is_balanced = options.light.compensation != "none" || options.light.black != "as-is";
   const std::vector<Body> bodies = scene::bodies(scene);
   const std::vector<Track> tracks = tracks_of(scene, posed);

@@ -21,8 +21,9 @@ struct RenderOptions {
   std::string marker_light =
       "as-is";  ///< projectors leave markers dark ("keep-out") or light them ("spotlight")
   LightArguments light;
-  std::filesystem::path view;       ///< viewer file of a virtual camera: writes view.png
-  std::optional<double> stereo_mm;  ///< base line: two eyes beside each other, view.png is twice as wide
+  std::string contact_shadow = "off";  ///< "on": parts darken the prototype around them, composites and view
+  std::filesystem::path view;          ///< viewer file of a virtual camera: writes view.png
+  std::optional<double> stereo_mm;     ///< base line: two eyes beside each other, view.png is twice as wide
   std::filesystem::path out;
 };
 

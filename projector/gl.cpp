@@ -8,7 +8,7 @@ GlName make_texture(GLenum target, GLenum format, int width, int height, int lay
   GLuint name = 0;
   glCreateTextures(target, 1, &name);
   GlName texture(name, [](GLuint n) { glDeleteTextures(1, &n); });
-  if (target == GL_TEXTURE_2D_ARRAY) {
+  if (target == GL_TEXTURE_2D_ARRAY || target == GL_TEXTURE_3D) {
     glTextureStorage3D(name, levels, format, width, height, layers);
   } else {
     glTextureStorage2D(name, levels, format, width, height);
@@ -17,6 +17,7 @@ GlName make_texture(GLenum target, GLenum format, int width, int height, int lay
   glTextureParameteri(name, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
   glTextureParameteri(name, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
   glTextureParameteri(name, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  if (target == GL_TEXTURE_3D) glTextureParameteri(name, GL_TEXTURE_WRAP_R, GL_CLAMP_TO_EDGE);
   return texture;
 }
 

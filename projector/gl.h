@@ -30,7 +30,7 @@ class GlName {
   void (*free_)(GLuint) = nullptr;
 };
 
-/// An immutable-size 2D or 2D array texture, nearest filtering, clamped.
+/// An immutable-size 2D, 2D array or 3D texture (`layers` deep), nearest filtering, clamped.
 GlName make_texture(GLenum target, GLenum format, int width, int height, int layers = 1, int levels = 1);
 GlName make_framebuffer();
 GlName make_vertex_array();

@@ -157,11 +157,11 @@ void GpuScene::bind() const {
   for (GLuint i = 0; i < std::size(buffers); ++i) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, **buffers[i]);
 }
 
-void append_bounds(const PlacedRun& placed, std::vector<Eigen::Vector3d>* corners) {
+void append_bounds(const PlacedRun& placed, std::vector<Eigen::Vector3d>* corners, double margin_m) {
   for (int k = 0; k < 8; ++k) {
     Eigen::Vector3d p;
     for (int axis = 0; axis < 3; ++axis)
-      p[axis] = (k >> axis & 1 ? placed.run->p_upper : placed.run->p_lower)[axis];
+      p[axis] = k >> axis & 1 ? placed.run->p_upper[axis] + margin_m : placed.run->p_lower[axis] - margin_m;
     corners->push_back(placed.scene_from_owner * p);
   }
 }

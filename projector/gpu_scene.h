@@ -60,7 +60,7 @@ class GpuScene {
   GlName corners_, normals_, owners_, materials_, placements_, looks_, vertex_array_;
 };
 
-/// The eight corners of a run's bounds in the scene's frame, appended.
-void append_bounds(const PlacedRun& placed, std::vector<Eigen::Vector3d>* corners);
+/// The eight corners of a run's bounds, with a margin, in the scene's frame, appended.
+void append_bounds(const PlacedRun& placed, std::vector<Eigen::Vector3d>* corners, double margin_m = 0);
 
 }  // namespace limn::projector

@@ -7,6 +7,7 @@
 #include <map>
 #include <opencv2/imgproc.hpp>
 
+#include "projector/contact_shadow.h"
 #include "projector/gpu_scene.h"
 #include "projector/shader.h"
 #include "projector/sights.h"
@@ -18,7 +19,7 @@ constexpr int k_response_columns = 1025;
 // Texture units; the sights take three from k_sights_unit on.
 constexpr int k_tangents_unit = 0, k_looks_unit = 1, k_response_unit = 2, k_centre_unit = 3,
               k_picture_unit = 4, k_sights_unit = 5, k_mixing_unit = 8, k_albedo_unit = 9,
-              k_arriving_unit = 10;
+              k_arriving_unit = 10, k_distances_unit = 11;
 constexpr int k_arriving_side = 256;  // texels of a projector's map of arriving light
 constexpr GLuint k_list_binding = 6;  // of buffers, after the scene's and the sights'
 constexpr int k_view = 2;             // the overlay of a virtual camera, after those of Composite
@@ -131,6 +132,8 @@ struct Renderer::Impl {
   std::vector<std::string> slot_names;
   GpuScene scene;
   Sights sights;
+  std::optional<ContactShadow> contact_shadow;
+  bool has_contact_shadow = false;
   Program points, blend, light, irradiance, coverage, composite, edges;
   // A layer of the parts' light: where there may be some, at pixel centres, by more samples at edges.
   struct LayerPrograms {
@@ -455,10 +458,14 @@ cv::Mat Renderer::Impl::laid_over(const cv::Mat& bgr,
       !is_same(overlay.imager.imager_from_world, imager.imager_from_world)) {
     prepare(posed);
     look_from_imager(imager);
-    overlay.places =
-        sights.seen_places(imager, lens_of(imager).baked, runs, scene_from_world, kind == k_view);
+    overlay.places = sights.seen_places(imager, lens_of(imager).baked, runs, scene_from_world, kind == k_view,
+                                        has_contact_shadow ? ContactShadow::k_reach : 0);
+    if (has_contact_shadow) contact_shadow->place(posed);
     draw_layer(layer, overlay.parts, overlay.places, k_edge, [&](const Program& program) {
       set_up(program, lens_of(imager), &imager);
+      program.set("s_distances", k_distances_unit);
+      if (has_contact_shadow) contact_shadow->bind(program, k_distances_unit);
+      program.set("u_contact_shadow", has_contact_shadow);
       set_up_layer(program);
     });
     overlay.posed = posed;
@@ -582,6 +589,14 @@ void Renderer::set_arriving(std::size_t index, const cv::Mat& map) {
   }
   if (!impl_->set_arriving(index, whole)) return;
   for (Impl::Shown& shown : impl_->shown) shown.is_current = false;
+}
+
+void Renderer::set_contact_shadow(const scene::Scene* scene) {
+  const bool wanted = scene != nullptr;
+  if (wanted && !impl_->contact_shadow) impl_->contact_shadow.emplace(*scene);
+  if (impl_->has_contact_shadow != wanted)
+    for (Impl::Overlay& overlay : impl_->overlays) overlay.posed.reset();
+  impl_->has_contact_shadow = wanted;
 }
 
 cv::Mat Renderer::clipped(std::size_t index) const { return impl_->shown.at(index).clipped; }

@@ -19,9 +19,9 @@ Pose sight_pose(const Imager& imager, const Pose& scene_from_world) {
   return imager.imager_from_world * scene_from_world.inverse();
 }
 
-std::vector<Eigen::Vector3d> bounds_of(const std::vector<PlacedRun>& runs) {
+std::vector<Eigen::Vector3d> bounds_of(const std::vector<PlacedRun>& runs, double margin_m = 0) {
   std::vector<Eigen::Vector3d> corners;
-  for (const PlacedRun& placed : runs) append_bounds(placed, &corners);
+  for (const PlacedRun& placed : runs) append_bounds(placed, &corners, margin_m);
   return corners;
 }
 
@@ -260,11 +260,13 @@ std::vector<cv::Rect> Sights::seen_places(const Imager& imager,
                                           const BakedLens& lens,
                                           const std::vector<PlacedRun>& runs,
                                           const Pose& scene_from_world,
-                                          bool prototype_too) const {
+                                          bool prototype_too,
+                                          double around_m) const {
   const Pose pose = sight_pose(imager, scene_from_world);
   std::vector<cv::Rect> places;
   for (const PlacedRun& run : prototype_too ? runs : only(runs, is_part))
-    if (const cv::Rect place = pixels_of(imager, lens, spanned(pose, bounds_of({run}))); !place.empty())
+    if (const cv::Rect place = pixels_of(imager, lens, spanned(pose, bounds_of({run}, around_m)));
+        !place.empty())
       places.push_back(place);
   return places;
 }

@@ -50,12 +50,14 @@ class Sights {
                                      const std::vector<PlacedRun>& runs,
                                      const Pose& scene_from_world,
                                      const Eigen::Vector3d& p_eye_scene) const;
-  /// Rectangles of an imager's picture, outside of which it sees none of the parts (and of the prototype).
+  /// Rectangles of an imager's picture, outside of which it sees none of the parts (and of the prototype),
+  /// nor anything within `around_m` of them.
   std::vector<cv::Rect> seen_places(const Imager& imager,
                                     const BakedLens& lens,
                                     const std::vector<PlacedRun>& runs,
                                     const Pose& scene_from_world,
-                                    bool prototype_too) const;
+                                    bool prototype_too,
+                                    double around_m) const;
   /// The rectangle of the picture that the prototype lies in.
   cv::Rect prototype_place(std::size_t projector,
                            const std::vector<PlacedRun>& runs,

@@ -1,5 +1,5 @@
 #version 450 core
-// Lists the pixels of a camera that may see a part.
+// Lists the pixels of a camera that may see a part or its shadow.
 #include "parts.glsl"
 #include "listed.glsl"
 layout(local_size_x = 16, local_size_y = 4) in;
@@ -10,5 +10,9 @@ void main() {
   if (any(greaterThanEqual(at, u_end))) return;
   vec4 share;
   Sight eye = s_sights[u_eye];
-  if (ids_around(s_eye_ids, eye, 1, ray_of(eye, vec2(at)), share) != uvec4(0)) list_pixel(at);
+  vec3 d = ray_of(eye, vec2(at));
+  if (ids_around(s_eye_ids, eye, 1, d, share) != uvec4(0) ||
+      (u_contact_shadow && ids_around(s_eye_ids, eye, 0, d, share) != uvec4(0))) {
+    list_pixel(at);
+  }
 }

@@ -2,6 +2,7 @@
 #include "scene.glsl"
 #include "lens.glsl"
 #include "look.glsl"
+#include "contact.glsl"
 
 uniform usampler2DArray s_eye_ids;
 uniform int u_eye;
@@ -18,7 +19,9 @@ vec4 view_at(vec2 px) {
     return vec4(look_along(d, part, part.t / eye.quality.x), 1);
   }
   if (prototype.id == 0u) return vec4(0);
+  vec3 n = facing_normal(prototype, d);
   vec2 uv = uv_of(prototype);
-  return vec4(lit(u_mean_albedo * texture(s_albedo, vec2(uv.x, 1.0 - uv.y)).rgb, vec2(0, 1),
-              facing_normal(prototype, d), -d), 1);
+  vec3 colour = lit(u_mean_albedo * texture(s_albedo, vec2(uv.x, 1.0 - uv.y)).rgb, vec2(0, 1), n, -d);
+  float shadow = u_contact_shadow ? contact_shadow(eye.p_eye.xyz + prototype.t * d, n) : 0.0;
+  return vec4((1.0 - shadow) * colour, 1);
 }
