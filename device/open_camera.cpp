@@ -4,13 +4,15 @@
 
 #include "device/mjpeg_camera.h"
 #include "device/picture_camera.h"
+#include "device/v4l2_camera.h"
 #include "device/video_camera.h"
 
 namespace limn::device {
 namespace {
 
 constexpr const char* k_forms =
-    "http://HOST/PATH (MJPEG), rtsp://HOST/PATH, a video file, a picture, a folder of pictures";
+    "http://HOST/PATH (MJPEG), rtsp://HOST/PATH, v4l2:/dev/video0, a video file, a picture, a folder of "
+    "pictures";
 
 using Opened = Result<std::unique_ptr<CameraSource>>;
 
@@ -40,18 +42,22 @@ Opened open_path(const CameraWanted& wanted) {
 
 // What has no settings that can be made from here.
 Status without_settings(const CameraWanted& wanted) {
-  for (const auto& [key, value] : {std::pair{"exposure_ms", wanted.exposure_ms},
-                                   {"gain", wanted.gain},
-                                   {"white_balance_k", wanted.white_balance_k}})
-    if (value)
-      return error("{}: {} cannot be set from here for {}. Set it on the camera itself and remove the key.",
-                   wanted.name, key, wanted.source);
-  return {};
+  const SensorSettings& sensor = wanted.sensor;
+  const char* key = sensor.exposure_ms ? "exposure_ms" : sensor.gain ? "gain" : "white_balance_k";
+  if (!sensor.exposure_ms && !sensor.gain && !sensor.white_balance_k) return {};
+  return error("{}: {} cannot be set from here for {}. Set it on the camera itself and remove the key.",
+               wanted.name, key, wanted.source);
 }
 
 Opened opened(const CameraWanted& wanted) {
-  LIMN_TRY_STATUS(without_settings(wanted));
   const std::string& source = wanted.source;
+  if (source.starts_with("v4l2:"))
+    return on_heap(V4l2Camera::open(source.substr(5), {.name = wanted.name,
+                                                       .size = wanted.size,
+                                                       .sensor = wanted.sensor,
+                                                       .grey = wanted.grey,
+                                                       .limit_s = wanted.limit_s}));
+  LIMN_TRY_STATUS(without_settings(wanted));
   if (source.starts_with("http:") || source.starts_with("https:"))
     return on_heap(
         MjpegCamera::open(source, {.name = wanted.name, .grey = wanted.grey, .limit_s = wanted.limit_s}));

@@ -51,13 +51,16 @@ TEST(OpenCamera, NetworkSourcesGoToTheirOwnReaders) {
   contains(secure.message(), "as http://");
   const auto rtsp = open_camera({.source = "rtsp://127.0.0.1:1/x", .limit_s = 0.1});
   ASSERT_FALSE(rtsp);
+  const auto v4l2 = open_camera({.source = "v4l2:/dev/nowhere", .sensor = {.gain = 1}, .limit_s = 0.1});
+  ASSERT_FALSE(v4l2);
+  contains(v4l2.message(), "camera0 (/dev/nowhere): expected a picture");
   contains(rtsp.message(), "rtsp://127.0.0.1:1/x): expected a picture");
 }
 
 TEST(OpenCamera, SettingsThatASourceHasNotAndOtherSizesAreRefused) {
   const fs::path picture = test::test_folder() / "one.png";
   ASSERT_TRUE(write_png(picture, cv::Mat(6, 8, CV_8U, cv::Scalar(9))));
-  const auto set = open_camera({.source = picture.string(), .exposure_ms = 8});
+  const auto set = open_camera({.source = picture.string(), .sensor = {.exposure_ms = 8}});
   ASSERT_FALSE(set);
   contains(set.message(), "exposure_ms cannot be set");
   const auto other = open_camera({.source = picture.string(), .size = {640, 480}});
