@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "device/gige_camera.h"
 #include "device/mjpeg_camera.h"
 #include "device/picture_camera.h"
 #include "device/v4l2_camera.h"
@@ -11,7 +12,8 @@ namespace limn::device {
 namespace {
 
 constexpr const char* k_forms =
-    "http://HOST/PATH (MJPEG), rtsp://HOST/PATH, v4l2:/dev/video0, a video file, a picture, a folder of "
+    "http://HOST/PATH (MJPEG), rtsp://HOST/PATH, v4l2:/dev/video0, gige:ID, a video file, a picture, a "
+    "folder of "
     "pictures";
 
 using Opened = Result<std::unique_ptr<CameraSource>>;
@@ -53,6 +55,12 @@ Opened opened(const CameraWanted& wanted) {
   const std::string& source = wanted.source;
   if (source.starts_with("v4l2:"))
     return on_heap(V4l2Camera::open(source.substr(5), {.name = wanted.name,
+                                                       .size = wanted.size,
+                                                       .sensor = wanted.sensor,
+                                                       .grey = wanted.grey,
+                                                       .limit_s = wanted.limit_s}));
+  if (source.starts_with("gige:"))
+    return on_heap(GigeCamera::open(source.substr(5), {.name = wanted.name,
                                                        .size = wanted.size,
                                                        .sensor = wanted.sensor,
                                                        .grey = wanted.grey,

@@ -18,9 +18,9 @@ struct CameraWanted {
   double limit_s = 2;          ///< next() returns by then, with a frame or an error
 };
 
-/// Opens a camera from its source's text: `http://…` (MJPEG), `rtsp://…`, `v4l2:/dev/video0`, a video file, a
-/// picture or a folder of pictures. Errors: none of these (lists them), settings that such a source has not,
-/// what the source itself says, or another size than wanted.
+/// Opens a camera from its source's text: `http://…` (MJPEG), `rtsp://…`, `v4l2:/dev/video0`, `gige:ID`, a
+/// video file, a picture or a folder of pictures. Errors: none of these (lists them), settings that such a
+/// source has not, what the source itself says, or another size than wanted.
 Result<std::unique_ptr<CameraSource>> open_camera(const CameraWanted& wanted);
 
 }  // namespace limn::device

@@ -361,6 +361,7 @@ struct V4l2Camera::Impl {
   Retry retry;
   std::optional<Session> session;
   Stamp last_stamp;
+  bool heard = false;  // a frame came since next() was called
   long openings = 0, dropped = 0, damaged = 0, odd_stamps = 0;
 
   Status dequeue(v4l2_buffer* buffer, bool* got);
@@ -384,8 +385,11 @@ Status V4l2Camera::Impl::dequeue(v4l2_buffer* buffer, bool* got) {
 // The newest frame; older ones go back unread.
 Result<std::optional<v4l2_buffer>> V4l2Camera::Impl::newest(Stamp deadline) {
   const double left_s = std::max(0.0, seconds_between(Clock::now(), deadline));
-  if (!system.wait(session->device.fd(), left_s)) return error("it sends no frame. {}", advice_for(0));
   std::optional<v4l2_buffer> kept;
+  if (!system.wait(session->device.fd(), left_s)) {
+    if (heard) return kept;
+    return error("it sends no frame. {}", advice_for(0));
+  }
   for (bool got = true; got;) {
     v4l2_buffer buffer{};
     LIMN_TRY_STATUS(dequeue(&buffer, &got));
@@ -396,6 +400,7 @@ Result<std::optional<v4l2_buffer>> V4l2Camera::Impl::newest(Stamp deadline) {
         return refused("queueing a buffer", problem);
     }
     kept = buffer;
+    heard = true;
     if (!system.wait(session->device.fd(), 0)) break;
   }
   return kept;
@@ -444,6 +449,7 @@ Result<std::optional<Frame>> V4l2Camera::Impl::grabbed(Stamp deadline) {
 
 Result<Frame> V4l2Camera::Impl::next() {
   const Stamp deadline = shifted(Clock::now(), options.limit_s);
+  heard = false;
   while (Clock::now() < deadline) {
     if (!session) {
       if (!retry.wait(deadline)) break;

@@ -10,7 +10,7 @@ namespace limn::device {
 struct VideoCameraOptions {
   std::string name = "camera0";  ///< what the frames are called
   bool grey = false;             ///< brightness alone
-  double limit_s = 2;            ///< of a stream: next() returns by then, with a frame or an error
+  double limit_s = 2;  ///< of a stream: next() returns by then (twice that, when it breaks off late)
 };
 
 /// A video, read with OpenCV (FFmpeg): a file, or a network camera's RTSP stream over TCP.

@@ -1,0 +1,344 @@
+#include "device/gige_camera.h"
+
+#include <arv.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <utility>
+
+#include "device/retry.h"
+
+namespace limn::device {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int k_buffers = 4;
+constexpr guint k_socket_frames = 4;    // that the kernel may hold (as far as net.core.rmem_max lets it)
+constexpr double k_oldest_stamp_s = 1;  // an older stamp means that the wall clock was set meanwhile
+
+template <class Object>
+struct Unref {
+  void operator()(Object* object) const { g_object_unref(object); }
+};
+template <class Object>
+using Owned = std::unique_ptr<Object, Unref<Object>>;
+
+// Collects what a call of Aravis complains of.
+class Complaint {
+ public:
+  Complaint() = default;
+  Complaint(const Complaint&) = delete;
+  Complaint& operator=(const Complaint&) = delete;
+  ~Complaint() { g_clear_error(&error_); }
+  GError** operator&() {
+    g_clear_error(&error_);
+    return &error_;
+  }
+  bool any() const { return error_ != nullptr; }
+  std::string text() const { return error_ ? error_->message : "no reason given"; }
+
+ private:
+  GError* error_ = nullptr;
+};
+
+// A pixel format that we read, and what turns it into a picture.
+struct Format {
+  ArvPixelFormat format;
+  const char* name;
+  int type;             // of the raw picture
+  int to_bgr, to_grey;  // cv::ColorConversionCodes; -1: as it is
+};
+
+// GenICam names a Bayer pattern by its first two pixels, OpenCV by the second row's second and third.
+constexpr Format k_formats[] = {
+    {ARV_PIXEL_FORMAT_MONO_8, "Mono8", CV_8UC1, -1, -1},
+    {ARV_PIXEL_FORMAT_BAYER_RG_8, "BayerRG8", CV_8UC1, cv::COLOR_BayerBG2BGR, cv::COLOR_BayerBG2GRAY},
+    {ARV_PIXEL_FORMAT_BAYER_GB_8, "BayerGB8", CV_8UC1, cv::COLOR_BayerGR2BGR, cv::COLOR_BayerGR2GRAY},
+    {ARV_PIXEL_FORMAT_BAYER_GR_8, "BayerGR8", CV_8UC1, cv::COLOR_BayerGB2BGR, cv::COLOR_BayerGB2GRAY},
+    {ARV_PIXEL_FORMAT_BAYER_BG_8, "BayerBG8", CV_8UC1, cv::COLOR_BayerRG2BGR, cv::COLOR_BayerRG2GRAY},
+    {ARV_PIXEL_FORMAT_BGR_8_PACKED, "BGR8", CV_8UC3, -1, cv::COLOR_BGR2GRAY},
+    {ARV_PIXEL_FORMAT_RGB_8_PACKED, "RGB8", CV_8UC3, cv::COLOR_RGB2BGR, cv::COLOR_RGB2GRAY},
+};
+
+// The first of our formats that the camera has: brightness first when `grey`, else last.
+Result<const Format*> chosen_format(ArvCamera* camera, bool grey) {
+  guint count = 0;
+  Complaint complaint;
+  const std::unique_ptr<gint64, void (*)(void*)> has(
+      arv_camera_dup_available_pixel_formats(camera, &count, &complaint), g_free);
+  const auto is_there = [&](const Format& format) {
+    return std::find(has.get(), has.get() + count, static_cast<gint64>(format.format)) != has.get() + count;
+  };
+  const Format* colour = std::find_if(std::begin(k_formats) + 1, std::end(k_formats), is_there);
+  const bool mono = is_there(k_formats[0]);
+  if (mono && (grey || colour == std::end(k_formats))) return &k_formats[0];
+  if (colour != std::end(k_formats)) return colour;
+  return error(
+      "expected a camera with Mono8, 8-bit Bayer, RGB8 or BGR8, found none of them among its {} formats.",
+      count);
+}
+
+CameraSetting judged(
+    const char* name, double asked, double found, const Complaint& complaint, double low, double high) {
+  CameraSetting setting{name, asked, std::nullopt, ""};
+  if (complaint.any()) {
+    setting.problem = fmt::format("{} is refused ({}).", name, complaint.text());
+    return setting;
+  }
+  setting.found = found;
+  if (std::abs(found - asked) > 0.01 * std::max(std::abs(asked), 1.0))
+    setting.problem = fmt::format("{}: asked for {:g}, the camera says {:g}. It takes {:g} to {:g}.", name,
+                                  asked, found, low, high);
+  return setting;
+}
+
+CameraSetting locked_exposure(ArvCamera* camera, double asked_ms) {
+  Complaint complaint;
+  if (arv_camera_is_exposure_auto_available(camera, &complaint))
+    arv_camera_set_exposure_time_auto(camera, ARV_AUTO_OFF, &complaint);
+  double low = 0, high = 0;
+  arv_camera_get_exposure_time_bounds(camera, &low, &high, &complaint);
+  arv_camera_set_exposure_time(camera, 1000 * asked_ms, &complaint);
+  if (complaint.any()) return judged("exposure_ms", asked_ms, 0, complaint, low / 1000, high / 1000);
+  const double found = arv_camera_get_exposure_time(camera, &complaint) / 1000;
+  return judged("exposure_ms", asked_ms, found, complaint, low / 1000, high / 1000);
+}
+
+CameraSetting locked_gain(ArvCamera* camera, double asked) {
+  Complaint complaint;
+  if (arv_camera_is_gain_auto_available(camera, &complaint))
+    arv_camera_set_gain_auto(camera, ARV_AUTO_OFF, &complaint);
+  double low = 0, high = 0;
+  arv_camera_get_gain_bounds(camera, &low, &high, &complaint);
+  arv_camera_set_gain(camera, asked, &complaint);
+  if (complaint.any()) return judged("gain", asked, 0, complaint, low, high);
+  const double found = arv_camera_get_gain(camera, &complaint);
+  return judged("gain", asked, found, complaint, low, high);
+}
+
+std::vector<CameraSetting> locked(ArvCamera* camera, const SensorSettings& wanted) {
+  std::vector<CameraSetting> settings;
+  if (wanted.exposure_ms) settings.push_back(locked_exposure(camera, *wanted.exposure_ms));
+  if (wanted.gain) settings.push_back(locked_gain(camera, *wanted.gain));
+  if (wanted.white_balance_k)
+    settings.push_back({"white_balance_k", *wanted.white_balance_k, std::nullopt,
+                        "white_balance_k is nothing that GigE Vision cameras have: remove the key."});
+  return settings;
+}
+
+// The region as it stands, or one of `size` in the middle of the sensor, read back.
+Result<cv::Size> set_region(ArvCamera* camera, cv::Size size) {
+  Complaint complaint;
+  int x = 0, y = 0, width = 0, height = 0;
+  if (!size.empty()) {
+    int sensor_width = 0, sensor_height = 0;
+    arv_camera_get_sensor_size(camera, &sensor_width, &sensor_height, &complaint);
+    x = std::max(0, (sensor_width - size.width) / 2) & ~15;  // cameras want multiples
+    y = std::max(0, (sensor_height - size.height) / 2) & ~15;
+    if (!complaint.any()) arv_camera_set_region(camera, x, y, size.width, size.height, &complaint);
+    if (complaint.any())
+      return error("expected a region of {}x{} to be taken, found: {}. Use a size that the camera has.",
+                   size.width, size.height, complaint.text());
+  }
+  arv_camera_get_region(camera, &x, &y, &width, &height, &complaint);
+  if (complaint.any()) return error("its region cannot be read: {}.", complaint.text());
+  if (!size.empty() && cv::Size(width, height) != size)
+    return error("expected a region of {}x{}, the camera says {}x{}. Use a size that the camera has.",
+                 size.width, size.height, width, height);
+  return cv::Size(width, height);
+}
+
+struct Session {
+  Owned<ArvCamera> camera;
+  Owned<ArvStream> stream;
+  const Format* format = nullptr;
+  cv::Size size;
+  std::vector<CameraSetting> settings;
+};
+
+Result<Session> begun(const std::string& id, const GigeCameraOptions& options, cv::Size size) {
+  Session session;
+  Complaint complaint;
+  session.camera.reset(arv_camera_new(id.empty() ? nullptr : id.c_str(), &complaint));
+  if (!session.camera)
+    return error("{}. Is it switched on, on this network, and free? limn doctor lists who answers.",
+                 complaint.text());
+  ArvCamera* camera = session.camera.get();
+  // Raw packet sockets need rights that people have not, and see nothing on a loopback.
+  if (arv_camera_is_gv_device(camera))
+    arv_camera_gv_set_stream_options(camera, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
+  LIMN_TRY(session.format, chosen_format(camera, options.grey));
+  arv_camera_set_pixel_format(camera, session.format->format, &complaint);
+  if (complaint.any())
+    return error("its format cannot be set to {}: {}.", session.format->name, complaint.text());
+  LIMN_TRY(session.size, set_region(camera, size));
+  session.settings = locked(camera, options.sensor);
+  const guint payload = arv_camera_get_payload(camera, &complaint);
+  if (!complaint.any()) session.stream.reset(arv_camera_create_stream(camera, nullptr, nullptr, &complaint));
+  if (!session.stream) return error("its stream cannot be opened: {}.", complaint.text());
+  // Cameras send a frame in one burst.
+  if (ARV_IS_GV_STREAM(session.stream.get()))
+    g_object_set(session.stream.get(), "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED,
+                 "socket-buffer-size", static_cast<gint>(k_socket_frames * payload), nullptr);
+  for (int i = 0; i < k_buffers; ++i)
+    arv_stream_push_buffer(session.stream.get(), arv_buffer_new_allocate(payload));
+  arv_camera_set_acquisition_mode(camera, ARV_ACQUISITION_MODE_CONTINUOUS, &complaint);
+  if (!complaint.any()) arv_camera_start_acquisition(camera, &complaint);
+  if (complaint.any()) return error("it cannot be started: {}.", complaint.text());
+  return session;
+}
+
+Result<cv::Mat> decoded(ArvBuffer* buffer, const Format& format, cv::Size size, bool grey) {
+  if (arv_buffer_get_status(buffer) != ARV_BUFFER_STATUS_SUCCESS)
+    return error(
+        "packets of its frames are lost. Raise net.core.rmem_max and the network card's MTU, or use a "
+        "smaller "
+        "region.");
+  std::size_t bytes = 0;
+  const void* data = arv_buffer_get_image_data(buffer, &bytes);
+  const cv::Size found(arv_buffer_get_image_width(buffer), arv_buffer_get_image_height(buffer));
+  if (found != size || arv_buffer_get_image_pixel_format(buffer) != format.format)
+    return error("expected frames of {} {}x{}, found another format of {}x{}. Start again.", format.name,
+                 size.width, size.height, found.width, found.height);
+  if (!data || bytes < static_cast<std::size_t>(size.area()) * CV_ELEM_SIZE(format.type))
+    return error("expected {}x{} pixels, found {} bytes.", size.width, size.height, bytes);
+  const cv::Mat raw(size, format.type, const_cast<void*>(data));
+  const int conversion = grey ? format.to_grey : format.to_bgr;
+  if (conversion < 0) return raw.clone();
+  cv::Mat picture;
+  cv::cvtColor(raw, picture, conversion);
+  return picture;
+}
+
+// Aravis stamps by the wall clock.
+Stamp arrival(ArvBuffer* buffer) {
+  const Stamp now = Clock::now();
+  const double wall_s =
+      std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  const double age_s = wall_s - 1e-9 * static_cast<double>(arv_buffer_get_system_timestamp(buffer));
+  return age_s >= 0 && age_s < k_oldest_stamp_s ? shifted(now, -age_s) : now;
+}
+
+}  // namespace
+
+struct GigeCamera::Impl {
+  std::string id;
+  GigeCameraOptions options;
+  cv::Size size;  // as asked for, or as at first
+  Retry retry;
+  std::optional<Session> session;
+  long openings = 0, dropped = 0, damaged = 0;
+
+  ~Impl() { end(false); }
+  void end(bool lost);
+  ArvBuffer* newest(Stamp deadline);
+  std::optional<Frame> grabbed(ArvBuffer* buffer);
+  Result<Frame> next();
+};
+
+void GigeCamera::Impl::end(bool lost) {
+  if (!session) return;
+  Complaint complaint;
+  if (!lost) arv_camera_stop_acquisition(session->camera.get(), &complaint);  // a lost one is waited for
+  session.reset();
+}
+
+// The newest filled buffer; older ones go back unread. Null when none came in time.
+ArvBuffer* GigeCamera::Impl::newest(Stamp deadline) {
+  ArvStream* stream = session->stream.get();
+  const double left_s = std::max(0.0, seconds_between(Clock::now(), deadline));
+  ArvBuffer* kept = arv_stream_timeout_pop_buffer(stream, static_cast<guint64>(1e6 * left_s));
+  while (ArvBuffer* newer = kept ? arv_stream_try_pop_buffer(stream) : nullptr) {
+    arv_stream_push_buffer(stream, std::exchange(kept, newer));
+    ++dropped;
+  }
+  return kept;
+}
+
+std::optional<Frame> GigeCamera::Impl::grabbed(ArvBuffer* buffer) {
+  double half_exposure_s = 0;
+  for (const CameraSetting& setting : session->settings)
+    if (setting.name == "exposure_ms" && setting.found) half_exposure_s = *setting.found / 2000;
+  auto image = decoded(buffer, *session->format, session->size, options.grey);
+  const Stamp captured_at = shifted(arrival(buffer), -half_exposure_s);
+  arv_stream_push_buffer(session->stream.get(), buffer);
+  if (image) return Frame{options.name, *image, captured_at};
+  ++damaged;
+  retry.note(image.message());
+  return std::nullopt;
+}
+
+Result<Frame> GigeCamera::Impl::next() {
+  const Stamp deadline = shifted(Clock::now(), options.limit_s);
+  bool heard = false;
+  while (Clock::now() < deadline) {
+    if (!session) {
+      if (!retry.wait(deadline)) break;
+      auto fresh = begun(id, options, size);
+      if (!fresh) {
+        retry.failed(fresh.message());
+        continue;
+      }
+      session.emplace(std::move(*fresh));
+      size = session->size;
+      ++openings;
+    }
+    if (ArvBuffer* buffer = newest(deadline)) {
+      heard = true;
+      if (auto frame = grabbed(buffer)) {
+        retry.worked();
+        return std::move(*frame);
+      }
+    } else if (!heard) {
+      end(true);
+      retry.failed("it sends no frame. Check its cable, trigger mode and the firewall.");
+    }
+  }
+  return error("{} (gige:{}): expected a picture within {:g} s, found none: {}", options.name, id,
+               options.limit_s, retry.problem());
+}
+
+GigeCamera::GigeCamera(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+GigeCamera::GigeCamera(GigeCamera&&) noexcept = default;
+GigeCamera& GigeCamera::operator=(GigeCamera&&) noexcept = default;
+GigeCamera::~GigeCamera() = default;
+
+Result<GigeCamera> GigeCamera::open(const std::string& id, const GigeCameraOptions& options) {
+  auto impl = std::make_unique<Impl>();
+  impl->id = id;
+  impl->options = options;
+  impl->size = options.size;
+  auto first = impl->next();
+  // A search takes a second by itself and may have used up the limit; the camera is then there, though.
+  if (!first && impl->session) first = impl->next();
+  if (!first) return first.error();
+  return GigeCamera(std::move(impl));
+}
+
+const std::string& GigeCamera::name() const { return impl_->options.name; }
+cv::Size GigeCamera::size() const { return impl_->size; }
+Result<Frame> GigeCamera::next() { return impl_->next(); }
+
+std::string GigeCamera::description() const {
+  return fmt::format("GigE Vision, {} {}x{}; opened {} times, {} frames skipped for newer ones, {} damaged",
+                     impl_->session ? impl_->session->format->name : "lost", impl_->size.width,
+                     impl_->size.height, impl_->openings, impl_->dropped, impl_->damaged);
+}
+
+std::vector<CameraSetting> GigeCamera::settings() const {
+  return impl_->session ? impl_->session->settings : std::vector<CameraSetting>{};
+}
+
+std::vector<std::string> gige_cameras() {
+  arv_update_device_list();
+  std::vector<std::string> ids;
+  for (unsigned i = 0; i < arv_get_n_devices(); ++i) ids.emplace_back(arv_get_device_id(i));
+  return ids;
+}
+
+}  // namespace limn::device

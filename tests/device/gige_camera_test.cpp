@@ -1,0 +1,133 @@
+// The camera against Aravis' fake one, a program of its own that speaks GigE Vision on the loopback.
+
+#include "device/gige_camera.h"
+
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <opencv2/core.hpp>
+#include <thread>
+
+#include "device/open_camera.h"
+#include "tests/support/matchers.h"
+
+namespace limn::device {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr const char* k_id = "Aravis-Fake-LIMN7";
+
+void contains(const std::string& message, const std::string& part) {
+  EXPECT_NE(message.find(part), std::string::npos) << part << " in: " << message;
+}
+
+// The fake camera's process; it ends as a pulled cable does.
+class FakeCamera {
+ public:
+  FakeCamera() : child_(fork()) {
+    if (child_ != 0) return;
+    execlp("arv-fake-gv-camera-0.8", "arv-fake-gv-camera-0.8", "-i", "127.0.0.1", "-s", "LIMN7", nullptr);
+    _exit(99);
+  }
+  ~FakeCamera() { pull_out(); }
+  FakeCamera(const FakeCamera&) = delete;
+  FakeCamera& operator=(const FakeCamera&) = delete;
+  void pull_out() {
+    if (child_ <= 0) return;
+    kill(child_, SIGKILL);
+    waitpid(child_, nullptr, 0);
+    child_ = -1;
+  }
+
+ private:
+  pid_t child_;
+};
+
+Result<GigeCamera> opened(GigeCameraOptions options = {}) {
+  options.limit_s = 2;
+  auto camera = GigeCamera::open(k_id, options);
+  for (int i = 0; !camera && i < 3; ++i)
+    camera = GigeCamera::open(k_id, options);  // it needs a moment to start
+  return camera;
+}
+
+TEST(GigeCamera, DeliversFramesLockedAndStamped) {
+  const FakeCamera fake;
+  auto camera = opened({.name = "left", .sensor = {.exposure_ms = 20, .gain = 3, .white_balance_k = 5000}});
+  ASSERT_TRUE(camera) << camera.message();
+  EXPECT_EQ(camera->size(), cv::Size(512, 512));
+  Stamp last = Stamp{};
+  for (int i = 0; i < 5; ++i) {
+    const auto frame = camera->next();
+    ASSERT_TRUE(frame) << frame.message();
+    EXPECT_EQ(frame->camera, "left");
+    EXPECT_EQ(frame->image.type(), CV_8UC3);
+    EXPECT_GT(frame->captured_at, last);
+    EXPECT_LT(seconds_between(frame->captured_at, Clock::now()), 0.2);
+    last = frame->captured_at;
+  }
+  const auto settings = camera->settings();
+  ASSERT_EQ(settings.size(), 3u);
+  EXPECT_EQ(settings[0].problem, "");
+  EXPECT_NEAR(settings[0].found.value_or(0), 20, 0.1);
+  EXPECT_EQ(settings[1].problem, "");
+  EXPECT_NEAR(settings[1].found.value_or(0), 3, 0.1);
+  contains(settings[2].problem, "nothing that GigE Vision cameras have");
+  // A reader that was away gets the newest.
+  std::this_thread::sleep_for(std::chrono::milliseconds(600));
+  const Stamp begun = Clock::now();
+  const auto frame = camera->next();
+  ASSERT_TRUE(frame);
+  EXPECT_LT(seconds_between(frame->captured_at, begun), 0.5) << camera->description();
+  EXPECT_EQ(camera->description().find(" 0 frames skipped"), std::string::npos) << camera->description();
+}
+
+TEST(GigeCamera, ARegionAndBrightnessAloneThroughOpenCamera) {
+  const FakeCamera fake;
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  const CameraWanted wanted = {.source = fmt::format("gige:{}", k_id), .size = {320, 240}, .grey = true};
+  auto camera = open_camera(wanted);
+  ASSERT_TRUE(camera) << camera.message();
+  EXPECT_EQ((*camera)->size(), cv::Size(320, 240));
+  contains((*camera)->description(), "Mono8 320x240");
+  const auto frame = (*camera)->next();
+  ASSERT_TRUE(frame) << frame.message();
+  EXPECT_EQ(frame->image.type(), CV_8UC1);
+  EXPECT_EQ(frame->image.size(), cv::Size(320, 240));
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(frame->image, mean, deviation);
+  EXPECT_GT(deviation[0], 5) << "the fake camera's pattern is not flat";
+  const auto ids = gige_cameras();
+  EXPECT_NE(std::find(ids.begin(), ids.end(), k_id), ids.end());
+}
+
+TEST(GigeCamera, APulledCableIsNamedAndTheCameraComesBack) {
+  FakeCamera fake;
+  auto camera = opened();
+  ASSERT_TRUE(camera) << camera.message();
+  fake.pull_out();
+  Result<Frame> frame = camera->next();
+  for (int i = 0; frame && i < 20; ++i) frame = camera->next();
+  ASSERT_FALSE(frame);
+  contains(frame.message(), "it sends no frame");
+  const FakeCamera again;
+  for (int i = 0; !frame && i < 6; ++i) frame = camera->next();
+  EXPECT_TRUE(frame) << frame.message();
+  contains(camera->description(), "opened 2 times");
+}
+
+TEST(GigeCamera, NobodyIsNamed) {
+  const Stamp begun = Clock::now();
+  const auto camera = open_camera({.source = "gige:Nobody-1", .limit_s = 0.5});
+  ASSERT_FALSE(camera);
+  contains(camera.message(), "gige:Nobody-1");
+  contains(camera.message(), "not found");
+  EXPECT_LT(seconds_between(begun, Clock::now()), 5);
+}
+
+}  // namespace
+}  // namespace limn::device
