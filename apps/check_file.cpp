@@ -248,7 +248,8 @@ Result<Check> load_check(const fs::path& path) {
         "{}: world: expected a world or a scene with a prototype to shine on, found none. Add scene.",
         path.string());
   }
-  if (!viewer) viewer = check.truth.scene->viewer ? check.truth.scene->viewer->fixed : std::nullopt;
+  if (const auto& viewers = check.truth.scene->viewers; !viewer && viewers.size() == 1)
+    viewer = viewers[0].fixed;
   if (!viewer)
     return error("{}: viewer: expected one, for the scene has none, found nothing.", path.string());
   check.viewer = *viewer;

@@ -219,8 +219,8 @@ Result<Session> load(const ExportOptions& options) {
                  options.poses.string());
   if (!options.viewer.empty()) {
     LIMN_TRY(session.viewer, scene::load_viewer(options.viewer));
-  } else if (session.scene.viewer) {
-    session.viewer = session.scene.viewer->fixed;
+  } else if (session.scene.viewers.size() == 1) {
+    session.viewer = session.scene.viewers[0].fixed;
   }
   if (!session.viewer && (options.profile == "3d" || !options.looks.empty()))
     return usage_error(

@@ -188,8 +188,8 @@ Result<Imager> choose_viewer(const RenderOptions& options,
     return usage_error(
         "--viewer: expected a viewer file, since neither the scene has a viewer nor the rig a camera.");
   }
-  if (scene.viewer)
-    log_warning("render: the viewer's marker was not found; {} looks instead", rig.cameras[0].name);
+  if (!scene.viewers.empty())
+    log_warning("render: no viewer's marker was not found; {} looks instead", rig.cameras[0].name);
   return rig.cameras[0];
 }
 

@@ -72,6 +72,25 @@ PosedPart read_part(const ConfigNode& node, const Slot& slot) {
   return part;
 }
 
+std::vector<Eye> fixed_eyes(const Scene& scene) {
+  std::vector<Eye> eyes;
+  for (std::size_t i = 0; i < scene.viewers.size(); ++i) {
+    const Viewer& viewer = scene.viewers[i];
+    if (viewer.fixed)
+      eyes.push_back({viewer_body(i), viewer.fixed->imager_from_world.inverse().translation, viewer.weight});
+  }
+  return eyes;
+}
+
+std::optional<Imager> viewer_towards(const Eigen::Vector3d& p_eye,
+                                     const Eigen::Vector3d& p_middle,
+                                     const Eigen::Vector3d& d_up_world) {
+  const Eigen::Vector3d d = (p_middle - p_eye).normalized();
+  if (!d.allFinite()) return std::nullopt;
+  const Eigen::Vector3d d_up = std::abs(d.dot(d_up_world)) < 0.99 ? d_up_world : d.unitOrthogonal();
+  return viewer_imager(looking_at(p_eye, p_middle, d_up).inverse(), 1280, 800, 40);
+}
+
 }  // namespace
 
 PosedScene posed(const Scene& scene, std::span<const Track> tracks, std::span<const std::string> variants) {
@@ -88,16 +107,15 @@ PosedScene posed(const Scene& scene, std::span<const Track> tracks, std::span<co
     out.parts.push_back(
         {slot.name, chosen_variant(slot, i, variants), world_from_marker * slot.marker_from_part});
   }
-  if (const Track* viewer = scene.viewer ? find_track(tracks, k_viewer_body) : nullptr)
-    out.p_eye_world = viewer->world_from_body * scene.viewer->p_eye_marker;
+  out.eyes = fixed_eyes(scene);
+  for (std::size_t i = 0; i < scene.viewers.size(); ++i)
+    if (const Track* track = scene.viewers[i].marker ? find_track(tracks, viewer_body(i)) : nullptr)
+      out.eyes.push_back(
+          {track->body, track->world_from_body * scene.viewers[i].p_eye_marker, scene.viewers[i].weight});
   return out;
 }
 
-std::optional<Imager> viewer_of(const Scene& scene,
-                                const PosedScene& posed,
-                                const Eigen::Vector3d& d_up_world) {
-  if (scene.viewer && scene.viewer->fixed) return scene.viewer->fixed;
-  if (!posed.p_eye_world) return std::nullopt;
+std::optional<Eigen::Vector3d> middle_of(const Scene& scene, const PosedScene& posed) {
   Eigen::AlignedBox3d box;
   if (scene.prototype && posed.world_from_prototype)
     for (const Eigen::Vector3f& p : scene.prototype->mesh.positions)
@@ -105,11 +123,25 @@ std::optional<Imager> viewer_of(const Scene& scene,
   else
     for (const PosedPart& part : posed.parts) box.extend(part.world_from_part.translation);
   if (box.isEmpty()) return std::nullopt;
-  const Eigen::Vector3d& p_eye = *posed.p_eye_world;
-  const Eigen::Vector3d d = (box.center() - p_eye).normalized();
-  if (!d.allFinite()) return std::nullopt;
-  const Eigen::Vector3d d_up = std::abs(d.dot(d_up_world)) < 0.99 ? d_up_world : d.unitOrthogonal();
-  return viewer_imager(looking_at(p_eye, box.center(), d_up).inverse(), 1280, 800, 40);
+  return box.center();
+}
+
+std::optional<Imager> viewer_at(const Eigen::Vector3d& p_eye_world,
+                                const Scene& scene,
+                                const PosedScene& posed,
+                                const Eigen::Vector3d& d_up_world) {
+  const auto p_middle = middle_of(scene, posed);
+  return p_middle ? viewer_towards(p_eye_world, *p_middle, d_up_world) : std::nullopt;
+}
+
+std::optional<Imager> viewer_of(const Scene& scene,
+                                const PosedScene& posed,
+                                const Eigen::Vector3d& d_up_world) {
+  if (scene.viewers.size() == 1 && scene.viewers[0].fixed) return scene.viewers[0].fixed;
+  const auto p_middle = middle_of(scene, posed);
+  if (!p_middle) return std::nullopt;
+  const auto p_eye = followed({}, posed.eyes, *p_middle, 0).p_world();
+  return p_eye ? viewer_towards(*p_eye, *p_middle, d_up_world) : std::nullopt;
 }
 
 Result<PosedScene> load_poses(const std::filesystem::path& path, const Scene& scene) {
@@ -117,6 +149,7 @@ Result<PosedScene> load_poses(const std::filesystem::path& path, const Scene& sc
   const ConfigNode root = config.root();
   root.only({"schema", "world_from_prototype", "slots"});
   PosedScene out;
+  out.eyes = fixed_eyes(scene);
   if (const auto pose = root.find("world_from_prototype")) out.world_from_prototype = pose->pose();
   if (const auto slots = root.find("slots")) {
     for (const std::string& name : slots->keys()) {

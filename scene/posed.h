@@ -7,6 +7,7 @@
 
 #include "core/track.h"
 #include "scene/scene.h"
+#include "scene/viewers.h"
 
 namespace limn::scene {
 
@@ -22,7 +23,7 @@ struct PosedPart {
 struct PosedScene {
   std::optional<Pose> world_from_prototype;
   std::vector<PosedPart> parts;
-  std::optional<Eigen::Vector3d> p_eye_world = {};  ///< of the viewer, where a marker carries it
+  std::vector<Eye> eyes = {};  ///< of the viewers whose markers are seen and of fixed ones
 };
 
 /// The scene as the tracks (bodies of `bodies(scene)`) place it; `variants[i]` is the chosen variant of slot
@@ -34,9 +35,18 @@ PosedScene posed(const Scene& scene,
                  std::span<const Track> tracks,
                  std::span<const std::string> variants = {});
 
-/// The viewer of a scene as posed: its fixed one, or one whose eye is where its marker says and that looks at
-/// the middle of the prototype (of the parts without one), 1280 x 800 pixels and 40 degrees wide, with
-/// `d_up_world` up. nullopt when there is none, or its marker was not seen.
+/// What viewers look at: the middle of the prototype, of the parts without one. nullopt: of nothing.
+std::optional<Eigen::Vector3d> middle_of(const Scene& scene, const PosedScene& posed);
+
+/// A viewer with its eye there, looking at the middle of the scene as posed, 1280 x 800 pixels and 40 degrees
+/// wide, with `d_up_world` up; nullopt when there is nothing to look at.
+std::optional<Imager> viewer_at(const Eigen::Vector3d& p_eye_world,
+                                const Scene& scene,
+                                const PosedScene& posed,
+                                const Eigen::Vector3d& d_up_world);
+
+/// The viewer of a scene as posed: its only one if that is fixed, else viewer_at the eye that the viewers
+/// share once all is calm (for moments in a row: followed). nullopt when there is none, or none was seen.
 std::optional<Imager> viewer_of(const Scene& scene,
                                 const PosedScene& posed,
                                 const Eigen::Vector3d& d_up_world);

@@ -164,8 +164,9 @@ Imager read_viewer_imager(const ConfigNode& node) {
 }
 
 Viewer read_viewer(const ConfigNode& node, const Scene& scene) {
-  node.only({"fixed", "marker", "size_mm", "eye_mm"});
+  node.only({"fixed", "marker", "size_mm", "eye_mm", "weight"});
   Viewer viewer;
+  if (const auto weight = node.find("weight")) viewer.weight = weight->positive();
   if (const auto fixed = node.find("fixed")) viewer.fixed = read_viewer_imager(*fixed);
   if (const auto marker = node.find("marker")) viewer.marker = read_marker_name(*marker);
   if (viewer.fixed.has_value() == viewer.marker.has_value()) {
@@ -178,6 +179,20 @@ Viewer read_viewer(const ConfigNode& node, const Scene& scene) {
     viewer.marker_size_m = scene.slots[0].size_m;
   if (const auto eye = node.find("eye_mm")) viewer.p_eye_marker = 1e-3 * eye->vector3();
   return viewer;
+}
+
+// One, or a list of several.
+std::vector<Viewer> read_viewers(const ConfigNode& node, const Scene& scene) {
+  if (!node.is_array()) return {read_viewer(node, scene)};
+  std::vector<Viewer> viewers;
+  std::set<MarkerName> markers;
+  for (const ConfigNode& item : node.items()) {
+    viewers.push_back(read_viewer(item, scene));
+    const auto& marker = viewers.back().marker;
+    if (marker && !markers.insert(*marker).second)
+      item.at("marker").problem(fmt::format("expected a marker of its own, found {} twice.", marker->text()));
+  }
+  return viewers;
 }
 
 Eigen::Vector3d read_direction(const ConfigNode& node) {
@@ -293,7 +308,7 @@ Result<Scene> load_scene(const fs::path& path) {
   if (const auto controls = root.find("controls")) {
     for (const ConfigNode& item : controls->items()) scene.controls.push_back(read_control(item, scene));
   }
-  if (const auto node = root.find("viewer")) scene.viewer = read_viewer(*node, scene);
+  if (const auto node = root.find("viewer")) scene.viewers = read_viewers(*node, scene);
   if (const auto node = root.find("light")) scene.light = read_light(*node);
   LIMN_TRY_STATUS(config.status());
   LIMN_TRY_STATUS(load_files(reader, file, &scene));
@@ -312,9 +327,13 @@ std::vector<Body> bodies(const Scene& scene) {
   if (scene.prototype && !scene.prototype->markers.empty())
     out.push_back({"prototype", scene.prototype->markers});
   for (const Slot& slot : scene.slots) out.push_back({slot.name, {{slot.marker, slot.size_m, Pose()}}});
-  if (scene.viewer && scene.viewer->marker)
-    out.push_back({k_viewer_body, {{*scene.viewer->marker, scene.viewer->marker_size_m, Pose()}}});
+  for (std::size_t i = 0; i < scene.viewers.size(); ++i) {
+    const Viewer& viewer = scene.viewers[i];
+    if (viewer.marker) out.push_back({viewer_body(i), {{*viewer.marker, viewer.marker_size_m, Pose()}}});
+  }
   return out;
 }
+
+std::string viewer_body(std::size_t viewer) { return fmt::format("(viewer {})", viewer); }
 
 }  // namespace limn::scene

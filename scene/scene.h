@@ -54,6 +54,7 @@ struct Control {
 /// Whose eye `view` parts are drawn for: a fixed imager's, or one that stands by a marker (on glasses, on a
 /// cap).
 struct Viewer {
+  double weight = 1;  ///< among several
   std::optional<Imager> fixed;
   std::optional<MarkerName> marker;
   double marker_size_m = 0;
@@ -80,7 +81,7 @@ struct Scene {
   std::optional<Prototype> prototype;  ///< absent: parts over a camera picture only
   std::vector<Slot> slots;
   std::vector<Control> controls;
-  std::optional<Viewer> viewer;
+  std::vector<Viewer> viewers;     ///< several share one eye (scene/viewers.h)
   std::optional<RoomLight> light;  ///< absent: soft light and a lamp that stand with the viewer
 
   const Slot* find_slot(const std::string& name) const;
@@ -93,8 +94,9 @@ Result<Scene> load_scene(const std::filesystem::path& path);
 Result<Imager> load_viewer(const std::filesystem::path& path);
 
 /// What the tracker is to look for: the body "prototype", one body per slot, named as the slot, and
-/// k_viewer_body where a marker carries the viewer's eye.
+/// viewer_body(i) where a marker carries viewer i's eye.
 std::vector<Body> bodies(const Scene& scene);
-inline constexpr const char* k_viewer_body = "(viewer)";  ///< no slot's name
+/// No slot's name.
+std::string viewer_body(std::size_t viewer);
 
 }  // namespace limn::scene

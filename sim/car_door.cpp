@@ -485,8 +485,9 @@ scene::Scene car_door_scene() {
   trim.variants.push_back({"line", {}});
   scene.slots = {mirror, trim};
   scene.slots[1].variants[0].mesh = trim_mesh(clay, prototype_from_part(scene, "trim", clay));
-  scene.viewer = scene::Viewer{
-      viewer_imager(world_from_viewer(), k_viewer_size[0], k_viewer_size[1], k_viewer_fov_deg), {}};
+  scene.viewers.emplace_back();
+  scene.viewers[0].fixed =
+      viewer_imager(world_from_viewer(), k_viewer_size[0], k_viewer_size[1], k_viewer_fov_deg);
   return scene;
 }
 

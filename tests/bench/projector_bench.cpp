@@ -169,7 +169,7 @@ int run(int frames) {
     return 1;
   }
   const scene::PosedScene posed = sim::true_poses(world);
-  const Imager viewer = *world.scene->viewer->fixed;
+  const Imager viewer = *world.scene->viewers.at(0).fixed;
   std::size_t triangles = world.scene->prototype->mesh.triangles.size();
   for (const scene::Slot& slot : world.scene->slots) triangles += slot.variants[0].mesh.triangles.size();
   fmt::print("{}; {} triangles, {}x{}; ms, median of {}\n\n", context->description(), triangles, k_width,

@@ -76,8 +76,8 @@ TEST(Scene, EveryKeyIsRead) {
   EXPECT_EQ(scene->find_slot("trim")->mode, Mode::surface);
   EXPECT_FALSE(scene->find_slot("grille"));
   EXPECT_EQ(scene->controls[0].gesture, "cover");
-  ASSERT_TRUE(scene->viewer && scene->viewer->fixed);
-  EXPECT_EQ(scene->viewer->fixed->width, 640);
+  ASSERT_TRUE(scene->viewers.size() == 1 && scene->viewers[0].fixed);
+  EXPECT_EQ(scene->viewers[0].fixed->width, 640);
   const auto found = bodies(*scene);
   ASSERT_EQ(found.size(), 3u);
   EXPECT_EQ(found[0].name, "prototype");
@@ -112,17 +112,17 @@ TEST(Scene, AMarkerMayCarryTheViewersEye) {
   ASSERT_TRUE(scene) << scene.message();
   const auto found = bodies(*scene);
   ASSERT_EQ(found.size(), 4u);
-  EXPECT_EQ(found[3].name, k_viewer_body);
+  EXPECT_EQ(found[3].name, viewer_body(0));
   EXPECT_NEAR(found[3].markers[0].size_m, 0.025, 1e-12);
   Track prototype, cap;
   prototype.body = "prototype";
   prototype.world_from_body = Pose(Eigen::Quaterniond::Identity(), {0, 0, 1.5});
-  cap.body = k_viewer_body;
+  cap.body = viewer_body(0);
   cap.world_from_body =
       Pose(Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitY())), {0.3, -0.2, 0.1});
   const std::vector<Track> tracks = {prototype, cap};
   const PosedScene there = posed(*scene, tracks);
-  ASSERT_TRUE(there.p_eye_world);
+  ASSERT_EQ(there.eyes.size(), 1u);
   const auto viewer = viewer_of(*scene, there, -Eigen::Vector3d::UnitY());
   ASSERT_TRUE(viewer);
   EXPECT_TRUE(test::near(viewer->imager_from_world.inverse().translation,
@@ -131,6 +131,32 @@ TEST(Scene, AMarkerMayCarryTheViewersEye) {
   ASSERT_TRUE(middle);
   EXPECT_TRUE(test::near(*middle, Eigen::Vector2d(639.5, 399.5), 0.1));
   EXPECT_FALSE(viewer_of(*scene, posed(*scene, std::span(tracks).first(1)), -Eigen::Vector3d::UnitY()));
+}
+
+TEST(Scene, SeveralViewersShareOneEye) {
+  json watched = whole_scene();
+  const json fixed = watched["viewer"]["fixed"];
+  watched["viewer"] = {{{"fixed", fixed}}, {{"marker", "apriltag_36h11:30"}, {"weight", 2}}};
+  const auto scene = load_scene(folder_with(watched));
+  ASSERT_TRUE(scene) << scene.message();
+  ASSERT_EQ(scene->viewers.size(), 2u);
+  Track prototype, cap;
+  prototype.body = "prototype";
+  cap.body = viewer_body(1);
+  const Eigen::Vector3d p_fixed = scene->viewers[0].fixed->imager_from_world.inverse().translation;
+  cap.world_from_body.translation = p_fixed + Eigen::Vector3d(0.05, 0, 0);
+  const std::vector<Track> tracks = {prototype, cap};
+  const Eigen::Vector3d up = -Eigen::Vector3d::UnitY();
+  const auto both = viewer_of(*scene, posed(*scene, tracks), up);
+  ASSERT_TRUE(both);
+  const Eigen::Vector3d p_both = both->imager_from_world.inverse().translation;
+  EXPECT_GT((p_both - p_fixed).norm(), 0.028);  // nearer to the one of weight 2
+  EXPECT_LT((p_both - cap.world_from_body.translation).norm(), 0.022);
+  const auto alone = viewer_of(*scene, posed(*scene, std::span(tracks).first(1)), up);
+  ASSERT_TRUE(alone);
+  EXPECT_TRUE(test::near(alone->imager_from_world.inverse().translation, p_fixed, 1e-9));
+  watched["viewer"][0] = watched["viewer"][1];
+  EXPECT_NE(load_scene(folder_with(watched)).message().find("viewer[1].marker"), std::string::npos);
 }
 
 TEST(Scene, ThingsOfAnAbsurdSizeAreAskedAbout) {

@@ -194,7 +194,7 @@ TEST(CarDoor, EveryMirrorOverhangsTheDoorInPart) {
   for (const scene::Variant& variant : world.scene->slots[0].variants) {
     const std::vector<std::string> variants = {variant.name};
     const sim::Truth truth(world, sim::true_poses(world, variants));
-    const cv::Mat mask = truth.part_mask(*world.scene->viewer->fixed, "mirror");
+    const cv::Mat mask = truth.part_mask(*world.scene->viewers.at(0).fixed, "mirror");
     const double on = cv::countNonZero(mask == 255), off = cv::countNonZero(mask == 128);
     EXPECT_GT(on / (on + off), 0.15) << variant.name;
     EXPECT_GT(off / (on + off), 0.15) << variant.name;
