@@ -11,6 +11,7 @@
 #include "projector/gpu_scene.h"
 #include "projector/shader.h"
 #include "projector/sights.h"
+#include "projector/treatment.h"
 
 namespace limn::projector {
 namespace {
@@ -20,9 +21,9 @@ constexpr int k_response_columns = 1025;
 constexpr int k_tangents_unit = 0, k_looks_unit = 1, k_response_unit = 2, k_centre_unit = 3,
               k_picture_unit = 4, k_sights_unit = 5, k_mixing_unit = 8, k_albedo_unit = 9,
               k_arriving_unit = 10, k_distances_unit = 11;
-constexpr int k_arriving_side = 256;  // texels of a projector's map of arriving light
-constexpr GLuint k_list_binding = 6;  // of buffers, after the scene's and the sights'
-constexpr int k_view = 2;             // the overlay of a virtual camera, after those of Composite
+constexpr int k_arriving_side = 256;   // texels of a projector's map of arriving light
+constexpr GLuint k_list_binding = 6;   // of buffers, after the scene's and the sights'
+constexpr int k_each = 2, k_view = 3;  // overlays of parts treated each in its way, and of a virtual camera
 // Steps of light that ask for more samples: beside light, and between blacks.
 constexpr float k_edge = 0.02F, k_dark_edge = 0.001F;
 // The light where no room is known: soft, and a lamp, in the viewer's frame above and behind the left
@@ -42,6 +43,25 @@ struct Canvas {
     glNamedFramebufferTexture(*framebuffer, GL_COLOR_ATTACHMENT0, *texture, 0);
   }
 };
+
+// A bit an owner: the parts that a composite draws whole.
+using Whole = std::array<GLuint, 8>;
+
+Whole whole_of(Composite what) {
+  Whole whole{};
+  if (what == Composite::full) whole.fill(~0U);
+  return whole;
+}
+
+Whole whole_of(std::span<const Treatment> treatments, std::span<const std::string> slots) {
+  Whole whole{};
+  for (std::size_t owner = 1; owner <= slots.size() && owner < 32 * whole.size(); ++owner)
+    if (std::any_of(treatments.begin(), treatments.end(), [&](const Treatment& t) {
+          return t.slot == slots[owner - 1] && t.what == Composite::full;
+        }))
+      whole[owner / 32] |= 1U << owner % 32;
+  return whole;
+}
 
 bool is_same(const Pose& a, const Pose& b) {
   return a.rotation.coeffs() == b.rotation.coeffs() && a.translation == b.translation;
@@ -230,11 +250,18 @@ struct Renderer::Impl {
                     const scene::PosedScene& posed,
                     LayerPrograms& layer,
                     int kind,
+                    const Whole& whole,
                     const SetUp& set_up_layer);
+  cv::Mat composite_over(std::size_t camera,
+                         const cv::Mat& picture,
+                         const scene::PosedScene& posed,
+                         int kind,
+                         const Whole& whole);
   // What was laid over an imager's pictures.
   struct Overlay {
     Imager imager;
     int kind = 0;
+    Whole whole{};
     std::optional<scene::PosedScene> posed;  // of the parts
     std::vector<cv::Rect> places;            // where there may be some
     Canvas parts;
@@ -452,9 +479,10 @@ cv::Mat Renderer::Impl::laid_over(const cv::Mat& bgr,
                                   const scene::PosedScene& posed,
                                   LayerPrograms& layer,
                                   int kind,
+                                  const Whole& whole,
                                   const SetUp& set_up_layer) {
   Overlay& overlay = overlay_of(imager, kind);
-  if (!overlay.posed || !is_same(*overlay.posed, posed) ||
+  if (!overlay.posed || overlay.whole != whole || !is_same(*overlay.posed, posed) ||
       !is_same(overlay.imager.imager_from_world, imager.imager_from_world)) {
     prepare(posed);
     look_from_imager(imager);
@@ -470,6 +498,7 @@ cv::Mat Renderer::Impl::laid_over(const cv::Mat& bgr,
     });
     overlay.posed = posed;
     overlay.imager = imager;
+    overlay.whole = whole;
   }
   cv::Mat out = bgr.clone();
   for (const cv::Rect& place : overlay.places) upload(overlay.behind, out, place);
@@ -483,6 +512,20 @@ cv::Mat Renderer::Impl::laid_over(const cv::Mat& bgr,
   return out;
 }
 
+cv::Mat Renderer::Impl::composite_over(std::size_t camera,
+                                       const cv::Mat& picture,
+                                       const scene::PosedScene& posed,
+                                       int kind,
+                                       const Whole& whole) {
+  LIMN_CHECK(camera < rig.cameras.size());
+  const Imager& imager = rig.cameras[camera];
+  LIMN_CHECK(picture.cols == imager.width && picture.rows == imager.height && picture.depth() == CV_8U);
+  cv::Mat bgr = picture;
+  if (picture.channels() == 1) cv::cvtColor(picture, bgr, cv::COLOR_GRAY2BGR);
+  return laid_over(bgr, imager, posed, parts_layer, kind, whole,
+                   [&](const Program& program) { program.set_bits("u_whole", whole); });
+}
+
 // The one drawn for this imager before, or room for a new one.
 Renderer::Impl::Overlay& Renderer::Impl::overlay_of(const Imager& imager, int kind) {
   for (Overlay& overlay : overlays)
@@ -492,6 +535,7 @@ Renderer::Impl::Overlay& Renderer::Impl::overlay_of(const Imager& imager, int ki
   const int width = imager.width, height = imager.height;
   return overlays.emplace_back(Overlay{imager,
                                        kind,
+                                       {},
                                        std::nullopt,
                                        {},
                                        Canvas(width, height, GL_RGBA32F),
@@ -690,18 +734,19 @@ cv::Mat Renderer::composite(std::size_t camera,
                             const cv::Mat& picture,
                             const scene::PosedScene& posed,
                             Composite what) {
-  LIMN_CHECK(camera < impl_->rig.cameras.size());
-  const Imager& imager = impl_->rig.cameras[camera];
-  LIMN_CHECK(picture.cols == imager.width && picture.rows == imager.height && picture.depth() == CV_8U);
-  cv::Mat bgr = picture;
-  if (picture.channels() == 1) cv::cvtColor(picture, bgr, cv::COLOR_GRAY2BGR);
-  return impl_->laid_over(bgr, imager, posed, impl_->parts_layer, static_cast<int>(what),
-                          [&](const Program& program) { program.set("u_rest", what == Composite::rest); });
+  return impl_->composite_over(camera, picture, posed, static_cast<int>(what), whole_of(what));
+}
+
+cv::Mat Renderer::composite(std::size_t camera,
+                            const cv::Mat& picture,
+                            const scene::PosedScene& posed,
+                            std::span<const Treatment> treatments) {
+  return impl_->composite_over(camera, picture, posed, k_each, whole_of(treatments, impl_->slot_names));
 }
 
 cv::Mat Renderer::view(const Imager& imager, const scene::PosedScene& posed, const cv::Scalar& background) {
   const cv::Mat plain(imager.height, imager.width, CV_8UC3, background);
-  return impl_->laid_over(plain, imager, posed, impl_->view_layer, k_view, [&](const Program& program) {
+  return impl_->laid_over(plain, imager, posed, impl_->view_layer, k_view, {}, [&](const Program& program) {
     program.bind("s_albedo", k_albedo_unit, impl_->albedo);
     program.set("u_mean_albedo", impl_->mean_albedo);
   });

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <opencv2/core/mat.hpp>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,8 @@ enum class Composite {
   rest,  ///< only what light cannot show: the picture shows the rest already
   full   ///< the whole parts
 };
+
+struct Treatment;
 
 /// How one part is shown to a viewer.
 struct PartCoverage {
@@ -95,6 +98,13 @@ class Renderer {
                     const cv::Mat& picture,
                     const scene::PosedScene& posed,
                     Composite what);
+
+  /// The same with each slot treated in its own way (projector/treatment.h); one that is not among the
+  /// treatments by `rest`.
+  cv::Mat composite(std::size_t camera,
+                    const cv::Mat& picture,
+                    const scene::PosedScene& posed,
+                    std::span<const Treatment> treatments);
 
   /// The prototype (in its albedo) and the parts as an eye or a virtual camera sees them, sRGB BGR, over
   /// plain `background`.

@@ -29,6 +29,9 @@ class Program {
   void set(const char* uniform, int value) const { glProgramUniform1i(*name_, at(uniform), value); }
   void set(const char* uniform, int x, int y) const { glProgramUniform2i(*name_, at(uniform), x, y); }
   void set_id(const char* uniform, unsigned value) const { glProgramUniform1ui(*name_, at(uniform), value); }
+  void set_bits(const char* uniform, std::span<const GLuint> bits) const {
+    glProgramUniform1uiv(*name_, at(uniform), static_cast<GLsizei>(bits.size()), bits.data());
+  }
   void set(const char* uniform, const Eigen::Vector4f& v) const {
     glProgramUniform4fv(*name_, at(uniform), 1, v.data());
   }

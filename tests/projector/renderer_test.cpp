@@ -7,6 +7,7 @@
 
 #include "core/picture.h"
 #include "core/response.h"
+#include "projector/treatment.h"
 #include "sim/ray_scene.h"
 #include "tests/projector/gl_test.h"
 #include "tests/support/matchers.h"
@@ -371,6 +372,29 @@ TEST_F(RendererTest, CompositeDrawsPartsThroughTheCamerasLens) {
   EXPECT_TRUE(test::image_near(found, expected, 1e-4, 3.2 / 8, "composite"));
   EXPECT_GT(rest_pixels, 3000);
   EXPECT_LT(wrong_rest, 80);  // half-covered pixels of an outline of some 1000
+}
+
+TEST_F(RendererTest, EachPartOfACompositeIsTreatedInItsOwnWay) {
+  const Scene scene = scene_of(
+      sheet(0.5, 0.4), {slot("left", scene::Mode::view, coloured(sheet(0.1, 0.1, -0.01), {0, 1, 0})),
+                        slot("right", scene::Mode::view, coloured(sheet(0.1, 0.1, -0.01), {1, 0, 0}))});
+  PosedScene posed = posed_at_origin(scene);
+  posed.parts[0].world_from_part.translation.x() = -0.1;
+  posed.parts[1].world_from_part.translation.x() = 0.1;
+  Renderer drawing = renderer(scene, two_projectors());
+  const cv::Mat picture(480, 640, CV_8UC3, cv::Scalar::all(90));
+  const cv::Mat full = drawing.composite(0, picture, posed, Composite::full);
+  const cv::Mat rest = drawing.composite(0, picture, posed, Composite::rest);
+  const cv::Rect left(0, 0, 320, 480), right(320, 0, 320, 480);
+  ASSERT_GT(cv::norm(full(left), rest(left), cv::NORM_INF), 30);
+  ASSERT_GT(cv::norm(full(right), rest(right), cv::NORM_INF), 30);
+  for (const bool left_whole : {true, false, true}) {
+    const std::vector<Treatment> treatments = {{"left", left_whole ? Composite::full : Composite::rest, 0},
+                                               {"right", left_whole ? Composite::rest : Composite::full, 0}};
+    const cv::Mat out = drawing.composite(0, picture, posed, treatments);
+    EXPECT_EQ(cv::norm(out(left), (left_whole ? full : rest)(left), cv::NORM_INF), 0);
+    EXPECT_EQ(cv::norm(out(right), (left_whole ? rest : full)(right), cv::NORM_INF), 0);
+  }
 }
 
 TEST_F(RendererTest, WhereNoPartIsTheCompositeIsTheCamerasPicture) {

@@ -1,0 +1,35 @@
+#include "projector/treatment.h"
+
+#include <algorithm>
+
+#include "core/result.h"
+
+namespace limn::projector {
+
+std::vector<Treatment> treated(std::span<const Treatment> before,
+                               std::span<const PartCoverage> coverage,
+                               double seconds,
+                               const TreatmentOptions& options) {
+  LIMN_CHECK(options.full_below <= options.rest_above && options.hold_s >= 0);
+  std::vector<Treatment> after(before.begin(), before.end());
+  for (Treatment& treatment : after) treatment.for_s += seconds;
+  for (const PartCoverage& part : coverage) {
+    if (part.viewer_pixels == 0) continue;
+    const double share = part.on_surface_share;
+    const auto known =
+        std::find_if(after.begin(), after.end(), [&](const Treatment& t) { return t.slot == part.slot; });
+    if (known == after.end()) {
+      const bool is_lit = share >= 0.5 * (options.full_below + options.rest_above);
+      after.push_back({part.slot, is_lit ? Composite::rest : Composite::full, 0});
+      continue;
+    }
+    const bool wants_other =
+        known->what == Composite::rest ? share < options.full_below : share > options.rest_above;
+    if (!wants_other || known->for_s < options.hold_s) continue;
+    known->what = known->what == Composite::rest ? Composite::full : Composite::rest;
+    known->for_s = 0;
+  }
+  return after;
+}
+
+}  // namespace limn::projector

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "projector/renderer.h"
+
+namespace limn::projector {
+
+/// When the screen draws a part whole, and when it leaves to light what light can show.
+struct TreatmentOptions {
+  double full_below = 0.3;  ///< of a part's viewer pixels shown by light: fewer make it `full`,
+  double rest_above = 0.5;  ///< more make it `rest`; between the two it stays as it is
+  double hold_s = 2;        ///< after a change it stays for so long, whatever its coverage
+};
+
+/// How the screen treats the part of a slot.
+struct Treatment {
+  std::string slot;
+  Composite what = Composite::rest;
+  double for_s = 0;  ///< since it has been so
+};
+
+/// The treatments `seconds` later, by the coverage found then. A slot that is met for the first time goes by
+/// the middle of the two limits; one that is absent, or of which the viewer sees nothing, stays as it is, so
+/// that a marker lost for a moment changes nothing. Between two changes of a slot lie hold_s or more.
+std::vector<Treatment> treated(std::span<const Treatment> before,
+                               std::span<const PartCoverage> coverage,
+                               double seconds,
+                               const TreatmentOptions& options = {});
+
+}  // namespace limn::projector

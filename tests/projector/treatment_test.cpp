@@ -1,0 +1,83 @@
+#include "projector/treatment.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <iostream>
+#include <random>
+
+#include "tests/support/matchers.h"
+
+namespace limn::projector {
+namespace {
+
+PartCoverage covered(const std::string& slot, double share, int pixels = 1000) {
+  return {slot, "a", pixels, share, 1 - share, {}};
+}
+
+Composite what_of(const std::vector<Treatment>& treatments, const std::string& slot) {
+  for (const Treatment& treatment : treatments)
+    if (treatment.slot == slot) return treatment.what;
+  ADD_FAILURE() << slot << " has no treatment";
+  return Composite::rest;
+}
+
+TEST(Treatment, GoesByTheMiddleFirstAndStaysBetweenTheLimits) {
+  const TreatmentOptions options{0.3, 0.5, 0};
+  for (const auto& [share, expected] : {std::pair(0.39, Composite::full), {0.41, Composite::rest}}) {
+    const PartCoverage first = covered("mirror", share);
+    auto treatments = treated({}, std::span(&first, 1), 0, options);
+    EXPECT_EQ(what_of(treatments, "mirror"), expected);
+    for (const double later : {0.31, 0.49, 0.35}) {
+      const PartCoverage part = covered("mirror", later);
+      treatments = treated(treatments, std::span(&part, 1), 1, options);
+      EXPECT_EQ(what_of(treatments, "mirror"), expected) << later;
+    }
+  }
+}
+
+TEST(Treatment, EachPartGoesItsOwnWay) {
+  std::vector<PartCoverage> parts = {covered("mirror", 0.8), covered("grille", 0.1)};
+  auto treatments = treated({}, parts, 0);
+  parts = {covered("mirror", 0.1), covered("grille", 0.9)};
+  treatments = treated(treatments, parts, 10);
+  EXPECT_EQ(what_of(treatments, "mirror"), Composite::full);
+  EXPECT_EQ(what_of(treatments, "grille"), Composite::rest);
+}
+
+TEST(Treatment, APartLostFromSightStaysAsItIs) {
+  const PartCoverage lit = covered("mirror", 0.9), unseen = covered("mirror", 0, 0);
+  auto treatments = treated({}, std::span(&lit, 1), 0);
+  treatments = treated(treatments, {}, 10);
+  treatments = treated(treatments, std::span(&unseen, 1), 10);
+  EXPECT_EQ(what_of(treatments, "mirror"), Composite::rest);
+}
+
+// Coverage that jumps about at 60 frames a second, with frames of 5 ms to 100 ms.
+TEST(Treatment, NeverChangesTwiceWithinTheHold) {
+  auto rng = test::test_rng();
+  std::uniform_real_distribution<double> share(0, 1), seconds(0.005, 0.1);
+  const TreatmentOptions options;
+  std::vector<Treatment> treatments;
+  double now = 0, changed_at = -1e9, shortest = 1e9;
+  int changes = 0;
+  for (int frame = 0; frame < 20000; ++frame) {
+    const double step = seconds(rng);
+    now += step;
+    std::vector<PartCoverage> parts = {covered("mirror", share(rng), share(rng) < 0.1 ? 0 : 500)};
+    if (share(rng) < 0.1) parts.clear();
+    const auto after = treated(treatments, parts, step, options);
+    if (!treatments.empty() && after[0].what != treatments[0].what) {
+      shortest = std::min(shortest, now - changed_at);
+      changed_at = now;
+      ++changes;
+    }
+    treatments = after;
+  }
+  EXPECT_GT(changes, 300);
+  EXPECT_GE(shortest, options.hold_s - 1e-9);
+  std::cout << changes << " changes in " << now << " s, at least " << shortest << " s apart\n";
+}
+
+}  // namespace
+}  // namespace limn::projector
