@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/result.h"
+#include "device/desktop.h"
 
 namespace limn::device {
 
@@ -12,8 +13,10 @@ namespace limn::device {
 /// Its own GL context is current only inside its functions; what was current before is current again after.
 class Window {
  public:
-  /// Error without a display (GLFW needs X or Wayland).
+  /// Error without a display (GLFW needs X or Wayland), and while a Desktop is open: pass that one on.
   static Result<Window> open(const std::string& title, int width, int height);
+  /// One of several on a desktop, beside monitors.
+  static Result<Window> open(const Desktop& desktop, const std::string& title, int width, int height);
   Window(Window&&) noexcept;
   Window& operator=(Window&&) noexcept;
   ~Window();

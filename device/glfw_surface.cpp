@@ -1,0 +1,154 @@
+#include "device/glfw_surface.h"
+
+#include <epoxy/egl.h>
+#include <epoxy/gl.h>
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <utility>
+#include <vector>
+
+namespace limn::device {
+namespace {
+
+// Remembers the EGL context that is current and makes it current again at the end.
+class ContextKept {
+ public:
+  ContextKept()
+      : api_(eglQueryAPI()),
+        display_(eglGetCurrentDisplay()),
+        context_(eglGetCurrentContext()),
+        draw_(eglGetCurrentSurface(EGL_DRAW)),
+        read_(eglGetCurrentSurface(EGL_READ)) {}
+  ContextKept(const ContextKept&) = delete;
+  ContextKept& operator=(const ContextKept&) = delete;
+  ~ContextKept() {
+    glfwMakeContextCurrent(nullptr);
+    if (display_ == EGL_NO_DISPLAY) return;
+    eglBindAPI(api_);
+    eglMakeCurrent(display_, draw_, read_, context_);
+  }
+
+ private:
+  EGLenum api_;
+  EGLDisplay display_;
+  EGLContext context_;
+  EGLSurface draw_, read_;
+};
+
+// Makes a window's context current, and what was current before at the end.
+class Current {
+ public:
+  explicit Current(GLFWwindow* window) { glfwMakeContextCurrent(window); }
+
+ private:
+  ContextKept kept_;
+};
+
+}  // namespace
+
+std::string glfw_problem() {
+  const char* text = nullptr;
+  glfwGetError(&text);
+  return text ? text : "no reason given";
+}
+
+Result<GlfwSurface> GlfwSurface::open(const Options& options) {
+  const ContextKept kept;  // GLFW makes the new window's context current for a moment, then none
+  // One API for windows and headless pictures.
+  glfwWindowHint(GLFW_CONTEXT_CREATION_API, GLFW_EGL_CONTEXT_API);
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
+  glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+  glfwWindowHint(GLFW_AUTO_ICONIFY, GLFW_FALSE);  // several full screens stay, whichever has the keys
+  glfwWindowHint(GLFW_REFRESH_RATE, options.monitor ? options.refresh_hz : GLFW_DONT_CARE);
+  GlfwSurface surface;
+  surface.window_ =
+      glfwCreateWindow(options.width, options.height, options.title.c_str(), options.monitor, nullptr);
+  if (!surface.window_)
+    return error("window: expected one with OpenGL 4.5, the display gives none ({}).", glfw_problem());
+  const Current current(surface.window_);
+  glfwSwapInterval(options.waits ? 1 : 0);
+  return surface;
+}
+
+GlfwSurface::GlfwSurface(GlfwSurface&& other) noexcept
+    : window_(std::exchange(other.window_, nullptr)),
+      texture_(std::exchange(other.texture_, 0)),
+      framebuffer_(std::exchange(other.framebuffer_, 0)),
+      size_(other.size_) {}
+
+GlfwSurface& GlfwSurface::operator=(GlfwSurface&& other) noexcept {
+  std::swap(window_, other.window_);
+  std::swap(texture_, other.texture_);
+  std::swap(framebuffer_, other.framebuffer_);
+  std::swap(size_, other.size_);
+  return *this;
+}
+
+GlfwSurface::~GlfwSurface() {
+  if (!window_) return;
+  {
+    const Current current(window_);
+    glDeleteFramebuffers(1, &framebuffer_);
+    glDeleteTextures(1, &texture_);
+  }
+  glfwDestroyWindow(window_);
+}
+
+void GlfwSurface::upload(const cv::Mat& picture) {
+  const cv::Mat whole = picture.isContinuous() ? picture : picture.clone();
+  if (texture_ == 0 || whole.size() != size_) {
+    glDeleteTextures(1, &texture_);
+    glCreateTextures(GL_TEXTURE_2D, 1, &texture_);
+    size_ = whole.size();
+    glTextureStorage2D(texture_, 1, GL_RGBA8, size_.width, size_.height);
+    if (framebuffer_ == 0) glCreateFramebuffers(1, &framebuffer_);
+    glNamedFramebufferTexture(framebuffer_, GL_COLOR_ATTACHMENT0, texture_, 0);
+  }
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  cv::Mat bgr = whole;
+  if (whole.channels() == 1) cv::merge(std::vector<cv::Mat>{whole, whole, whole}, bgr);
+  glTextureSubImage2D(texture_, 0, 0, 0, size_.width, size_.height, GL_BGR, GL_UNSIGNED_BYTE, bgr.data);
+}
+
+// The picture as large as fits, centred. Its first row is the texture's first, so the window's y is turned.
+void GlfwSurface::draw() const {
+  const cv::Size window = pixels();
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  glClearColor(0, 0, 0, 1);
+  glClear(GL_COLOR_BUFFER_BIT);
+  if (framebuffer_ != 0 && size_.width > 0) {
+    const double scale = std::min(1.0 * window.width / size_.width, 1.0 * window.height / size_.height);
+    const int shown_width = static_cast<int>(std::lround(scale * size_.width));
+    const int shown_height = static_cast<int>(std::lround(scale * size_.height));
+    const int left = (window.width - shown_width) / 2, bottom = (window.height - shown_height) / 2;
+    glBlitNamedFramebuffer(framebuffer_, 0, 0, 0, size_.width, size_.height, left, bottom + shown_height,
+                           left + shown_width, bottom, GL_COLOR_BUFFER_BIT, GL_LINEAR);
+  }
+  glfwSwapBuffers(window_);
+}
+
+void GlfwSurface::show(const cv::Mat& picture, bool finished) {
+  LIMN_CHECK(picture.depth() == CV_8U && (picture.channels() == 1 || picture.channels() == 3));
+  const Current current(window_);
+  upload(picture);
+  draw();
+  if (finished) glFinish();
+}
+
+void GlfwSurface::redraw() const {
+  const Current current(window_);
+  draw();
+}
+
+cv::Size GlfwSurface::pixels() const {
+  cv::Size size;
+  glfwGetFramebufferSize(window_, &size.width, &size.height);
+  return size;
+}
+
+}  // namespace limn::device
