@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "apps/coarser.h"
 #include "apps/world_markers.h"
 #include "core/config.h"
 
@@ -162,23 +163,9 @@ Result<scene::PosedScene> poses_of(const std::optional<ConfigNode>& node,
   return posed;
 }
 
-// Cameras and projectors of the same rig with so much coarser pixels.
 void coarsen(const ConfigNode& node, Rig* rig) {
-  const double share = node.positive();
-  if (share > 1)
-    node.problem(fmt::format("expected a share of the world's resolution, at most 1, found {}.", share));
-  for (std::vector<Imager>* imagers : {&rig->cameras, &rig->projectors}) {
-    for (Imager& imager : *imagers) {
-      const auto coarse = resized(imager, static_cast<int>(std::lround(share * imager.width)),
-                                  static_cast<int>(std::lround(share * imager.height)));
-      if (!coarse) {
-        node.problem(fmt::format("expected one that leaves {} ({}x{}) its shape, found {}.", imager.name,
-                                 imager.width, imager.height, share));
-        return;
-      }
-      imager = *coarse;
-    }
-  }
+  const Status done = make_coarser(node.positive(), rig);
+  if (!done) node.problem(done.message());
 }
 
 // Moves the light of a projector by so many of its pixels: what a push against it does.

@@ -15,6 +15,8 @@
 #include "apps/export.h"
 #include "apps/import.h"
 #include "apps/learn_body.h"
+#include "apps/live/live.h"
+#include "apps/live/replay.h"
 #include "apps/markers.h"
 #include "apps/patterns.h"
 #include "apps/recheck.h"
@@ -351,6 +353,50 @@ void add_import(CLI::App& app, Run& run) {
   command->callback([options, &run] { run = [options] { return finished(run_import(*options)); }; });
 }
 
+void add_live(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("live", "the live session: cameras, tracker, prediction, projectors, screen");
+  command->footer(
+      "Without devices the session runs on a virtual rig, on its own clock: the world's, or a room made for rig and scene.\n"
+      "Keys in the window: right/left next/previous variant, tab next slot, b blackout, f freeze, m markers, s save a look,\n"
+      "l/k next/previous look, o what the screen shows, r release, escape ends.\n"
+      "Example: limn live --seconds 5 --out session\n"
+      "Example: limn live --rig rig --scene config/scenes/door --seconds 10 --record recording");
+  auto options = std::make_shared<LiveOptions>();
+  command->add_option("--rig", options->rig, "rig folder, rig.json or folder of .cameramodel files");
+  command->add_option("--scene", options->scene, "scene folder or its scene.json");
+  command->add_option("--world", options->world, "world of the virtual rig (limn.world/1); without rig and scene: the studio");
+  command->add_option("--script", options->script, "what happens in the virtual room (limn.script/1)");
+  command->add_option("--seconds", options->seconds, "of the session's clock; without: the script's, or until it is ended");
+  command->add_option("--resolution", options->resolution, "share of the virtual devices' pixels a side")
+      ->capture_default_str();
+  command->add_option("--record", options->record, "folder for a recording that limn replay runs again");
+  command->add_option("--out", options->out, "folder for poses.csv, telemetry.csv, session.html and the last pictures");
+  command->add_flag("--window", options->window, "show the screen's picture in a window");
+  command->add_option("--prediction", options->prediction, "how poses are carried to the moment of light")
+      ->check(CLI::IsMember({"hold", "linear", "filtered"}))
+      ->capture_default_str();
+  command->add_option("--marker-light", options->marker_light, "what projectors do with markers")
+      ->check(CLI::IsMember({"as-is", "keep-out", "spotlight"}))
+      ->capture_default_str();
+  command->add_option("--extrapolate", options->extrapolate_s, "seconds for which unseen markers are carried on")
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "print JSON instead of lines");
+  command->callback([options, &run] { run = [options] { return finished(run_live(*options)); }; });
+}
+
+void add_replay(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("replay", "a recorded session again: the same poses, on this machine the same pictures");
+  command->footer("Example: limn replay recording --out replayed\nExample: limn replay recording --window --speed 1");
+  auto options = std::make_shared<ReplayOptions>();
+  command->add_option("session", options->session, "folder that limn live --record wrote")->required();
+  command->add_option("--out", options->out, "folder for poses.csv, telemetry.csv, session.html and the last pictures");
+  command->add_option("--speed", options->speed, "times the session's own; 0: as fast as possible")->capture_default_str();
+  command->add_flag("--step", options->step, "wait for enter before each picture");
+  command->add_flag("--window", options->window, "show the screen's picture in a window");
+  command->add_flag("--json", options->json, "print JSON instead of lines");
+  command->callback([options, &run] { run = [options] { return finished(run_replay(*options)); }; });
+}
+
 void add_simulate(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand("simulate", "pictures of the virtual rig, and the truth behind them");
   command->footer("Example: limn simulate config/worlds/studio.json --out simulated --variants mirror=sport");
@@ -385,6 +431,8 @@ int run_command_line(int argc, char** argv) {
   add_export(app, run);
   add_import(app, run);
   add_check(app, run);
+  add_live(app, run);
+  add_replay(app, run);
   add_simulate(app, run);
 
   const auto commands = app.get_subcommands({});

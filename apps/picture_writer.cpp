@@ -5,8 +5,6 @@
 namespace limn::apps {
 namespace {
 
-constexpr std::size_t k_queue_length = 8;  // pictures; 2 MB each at 1920x1080
-
 // An exception must not leave the thread.
 Status stored(const std::filesystem::path& path, const cv::Mat& picture) {
   try {
@@ -18,7 +16,8 @@ Status stored(const std::filesystem::path& path, const cv::Mat& picture) {
 
 }  // namespace
 
-PictureWriter::PictureWriter() : thread_([this] { run(); }) {}
+PictureWriter::PictureWriter(std::size_t most_queued)
+    : most_queued_(most_queued), thread_([this] { run(); }) {}
 
 PictureWriter::~PictureWriter() {
   {
@@ -33,11 +32,20 @@ Status PictureWriter::failure() const { return failure_ ? Status(*failure_) : St
 
 Status PictureWriter::store(const std::filesystem::path& path, const cv::Mat& picture) {
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [&] { return jobs_.size() < k_queue_length; });
+  changed_.wait(lock, [&] { return jobs_.size() < most_queued_; });
   jobs_.push_back({path, picture});
   ++unwritten_;
   changed_.notify_all();
   return failure();
+}
+
+bool PictureWriter::offer(const std::filesystem::path& path, const cv::Mat& picture) {
+  const std::lock_guard lock(mutex_);
+  if (failure_ || jobs_.size() >= most_queued_) return false;
+  jobs_.push_back({path, picture});
+  ++unwritten_;
+  changed_.notify_all();
+  return true;
 }
 
 Status PictureWriter::finish() {

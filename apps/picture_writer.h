@@ -17,13 +17,17 @@ namespace limn::apps {
 /// taken meanwhile. The queue is short: store() waits when the disk is slower than the camera.
 class PictureWriter {
  public:
-  PictureWriter();
+  /// `most_queued` pictures wait at most (8: 16 MB of grey 1920x1080).
+  explicit PictureWriter(std::size_t most_queued = 8);
   ~PictureWriter();  ///< writes what is queued
   PictureWriter(const PictureWriter&) = delete;
   PictureWriter& operator=(const PictureWriter&) = delete;
 
   /// Queues a picture; the error is the first one of an earlier picture.
   Status store(const std::filesystem::path& path, const cv::Mat& picture);
+  /// The same without waiting: false when the queue is full (the disk is too slow) or an earlier picture
+  /// could not be written, and the picture is dropped.
+  bool offer(const std::filesystem::path& path, const cv::Mat& picture);
   /// Waits until all is written; the first error, if any.
   Status finish();
 
@@ -35,6 +39,7 @@ class PictureWriter {
   void run();
   Status failure() const;  // call with mutex_ held
 
+  std::size_t most_queued_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Job> jobs_;

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "apps/camera_encoding.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/log.h"
@@ -66,16 +67,6 @@ Result<Frames> read_frames(const std::vector<std::string>& arguments, Rig* rig) 
     frames[static_cast<std::size_t>(camera - rig->cameras.begin())] = std::move(picture);
   }
   return frames;
-}
-
-// How the camera writes light, as near as the detector can tell apart: by what was measured, else linear.
-tracker::Encoding encoding_of(const Rig& rig, const Imager& camera) {
-  for (const CameraResponse& response : rig.camera_responses) {
-    if (response.camera != camera.name) continue;
-    const double middle = looked_up(response.light, 0.5);  // linear 0.5, sRGB 0.21
-    return middle < 0.5 * (0.5 + linear_of_srgb(0.5)) ? tracker::Encoding::srgb : tracker::Encoding::linear;
-  }
-  return tracker::Encoding::linear;
 }
 
 Result<std::vector<Track>> find_bodies(const scene::Scene& scene, const Rig& rig, const Frames& frames) {

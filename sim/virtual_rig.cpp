@@ -12,7 +12,7 @@ class VirtualRig::Camera : public device::CameraSource {
   Camera(VirtualRig& rig, int index) : rig_(rig), index_(index) {}
   const std::string& name() const override { return imager().name; }
   cv::Size size() const override { return {imager().width, imager().height}; }
-  Result<Frame> next() override { return rig_.grab(index_); }
+  Result<Frame> next() override { return rig_.expose(std::span(&index_, 1)).front(); }
 
  private:
   const Imager& imager() const { return rig_.world_.rig.cameras[static_cast<std::size_t>(index_)]; }
@@ -132,17 +132,23 @@ std::vector<cv::Mat> VirtualRig::pictures_at(Stamp moment) const {
   return pictures;
 }
 
-Result<Frame> VirtualRig::grab(int camera) {
+Stamp VirtualRig::next_exposure() const {
   const Stamp earliest = options_.grab_waits_for_light ? light_settles_at() : now_;
   const double periods = seconds_between(Stamp{}, earliest) / options_.frame_period_s;
-  const Stamp captured_at = shifted(Stamp{}, std::floor(periods + 1) * options_.frame_period_s);
+  return shifted(Stamp{}, std::floor(periods + 1) * options_.frame_period_s);
+}
+
+std::vector<Frame> VirtualRig::expose(std::span<const int> cameras) {
+  const Stamp captured_at = next_exposure();
   const std::vector<cv::Mat> shown = pictures_at(captured_at);
   for (auto& queue : shown_)  // what an earlier picture covered is gone
     while (queue.size() > 1 && queue[1].shown_at <= captured_at) queue.erase(queue.begin());
-  Frame frame{this->camera(camera).name(),
-              photograph(world_, samples(camera), shown, world_.seed + ++frames_), captured_at};
+  std::vector<Frame> frames;
+  for (const int camera : cameras)
+    frames.push_back({this->camera(camera).name(),
+                      photograph(world_, samples(camera), shown, world_.seed + ++frames_), captured_at});
   now_ = shifted(captured_at, options_.camera_delay_s);
-  return frame;
+  return frames;
 }
 
 }  // namespace limn::sim

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -51,6 +52,12 @@ class VirtualRig {
   /// All projectors black.
   void darken();
 
+  /// Frames of these cameras, exposed at one moment, as a trigger line makes them; waits as their next()
+  /// does. None: a frame period passes.
+  std::vector<Frame> expose(std::span<const int> cameras);
+  /// The moment of the next exposure.
+  Stamp next_exposure() const;
+
   Stamp now() const { return now_; }
   void advance(double seconds) { now_ = shifted(now_, seconds); }
 
@@ -65,7 +72,6 @@ class VirtualRig {
     Stamp shown_at;
   };
 
-  Result<Frame> grab(int camera);
   Result<Stamp> show(int projector, const cv::Mat& picture);
   Stamp light_settles_at() const;
   std::vector<cv::Mat> pictures_at(Stamp moment) const;

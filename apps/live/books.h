@@ -1,0 +1,43 @@
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <memory>
+
+#include "apps/live/recording.h"
+#include "apps/live/session.h"
+#include "apps/live/telemetry.h"
+#include "core/result.h"
+
+namespace limn::apps {
+
+/// Everything that a session writes while it runs.
+class Books {
+ public:
+  /// `out`: folder for telemetry.csv and poses.csv; `record`: for the recording; empty: none. With a
+  /// recording `setup` becomes what replay will read of it, to the last bit.
+  static Result<Books> open(const std::filesystem::path& out,
+                            const std::filesystem::path& record,
+                            SessionSetup* setup);
+
+  Telemetry& telemetry() { return telemetry_; }
+  Recorder* recorder() { return recorder_.get(); }  ///< null without one
+
+  /// One picture shown. Says once that the recording ended.
+  void shown(const ShownFrame& frame, const Painted& painted);
+
+  /// Waits for the recording; writes session.json, session.html, the last pictures; prints the summary.
+  Status close(Session* session, bool as_json);
+
+ private:
+  explicit Books(Telemetry telemetry) : telemetry_(std::move(telemetry)) {}
+  void add_poses(const Painted& painted);
+
+  std::filesystem::path out_;
+  Telemetry telemetry_;
+  std::ofstream poses_;
+  std::unique_ptr<Recorder> recorder_;
+  bool told_of_recording_ = false;
+};
+
+}  // namespace limn::apps

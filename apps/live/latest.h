@@ -1,0 +1,38 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <optional>
+
+namespace limn::apps {
+
+/// A mailbox for one value between threads: the newest wins, nothing queues.
+template <class T>
+class Latest {
+ public:
+  /// Replaces what was not taken. `merge(old, new)` may save of it what must not be lost.
+  void put(T value, const std::function<void(const T&, T&)>& merge = {}) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (value_ && merge) merge(*value_, value);
+      value_ = std::move(value);
+    }
+    changed_.notify_all();
+  }
+
+  /// The newest value that was not taken yet; waits for one for so long. nullopt: none came.
+  std::optional<T> take(std::chrono::nanoseconds wait) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, wait, [&] { return value_.has_value(); });
+    return std::exchange(value_, std::nullopt);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::optional<T> value_;
+};
+
+}  // namespace limn::apps

@@ -1,0 +1,154 @@
+#include "apps/live/live.h"
+
+#include <algorithm>
+#include <atomic>
+#include <csignal>
+#include <limits>
+#include <optional>
+
+#include "apps/coarser.h"
+#include "apps/live/books.h"
+#include "apps/live/room.h"
+#include "apps/live/script.h"
+#include "apps/live/session.h"
+#include "apps/live/virtual_session.h"
+#include "apps/live/watcher.h"
+#include "apps/world_markers.h"
+#include "core/log.h"
+#include "device/gl_context.h"
+#include "device/window.h"
+#include "sim/virtual_rig.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Set by SIGINT and SIGTERM.
+std::atomic<bool> g_is_ended = false;
+void end_session(int) { g_is_ended = true; }
+
+Result<tracker::Prediction> prediction_of(const std::string& name) {
+  if (name == "hold") return tracker::Prediction::hold;
+  if (name == "linear") return tracker::Prediction::linear;
+  if (name == "filtered") return tracker::Prediction::filtered;
+  return usage_error("--prediction: expected hold, linear or filtered, found '{}'.", name);
+}
+
+Result<tracker::MarkerLight> marker_light_of(const std::string& name) {
+  if (name == "as-is") return tracker::MarkerLight::as_is;
+  if (name == "keep-out") return tracker::MarkerLight::keep_out;
+  if (name == "spotlight") return tracker::MarkerLight::spotlight;
+  return usage_error("--marker-light: expected as-is, keep-out or spotlight, found '{}'.", name);
+}
+
+Status check_options(const LiveOptions& options) {
+  if (!(options.seconds >= 0) || options.seconds > 1e6)
+    return usage_error("--seconds: expected seconds, 0 for no end, found {}.", options.seconds);
+  if (!(options.extrapolate_s > 0 && options.extrapolate_s <= 5))
+    return usage_error("--extrapolate: expected seconds over 0 and at most 5, found {}.",
+                       options.extrapolate_s);
+  if (options.rig.empty() != options.scene.empty())
+    return usage_error(
+        "expected --rig and --scene together, found one of them. Without both the session is in a "
+        "virtual world.");
+  return {};
+}
+
+// What stands in the virtual room, and what the session is told of it.
+struct Stage {
+  sim::World world;
+  SessionSetup setup;
+};
+
+Result<Stage> virtual_stage(const LiveOptions& options) {
+  Stage stage;
+  if (!options.rig.empty()) {
+    LIMN_TRY(stage.setup.rig, load_rig(options.rig));
+    LIMN_TRY(stage.setup.scene, scene::load_scene(options.scene));
+  }
+  if (options.rig.empty() || !options.world.empty()) {
+    const fs::path world =
+        options.world.empty() ? fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json" : options.world;
+    LIMN_TRY(stage.world, sim::load_world(world, marker_picture));
+    if (!stage.world.scene)
+      return error("{}: scene: expected a scene for a session, found none.", world.string());
+  } else {
+    LIMN_TRY(stage.world, room_for(stage.setup.rig, stage.setup.scene));
+  }
+  if (const Status coarser = make_coarser(options.resolution, &stage.world.rig); !coarser)
+    return usage_error("--resolution: {}", coarser.message());
+  if (options.rig.empty()) {
+    stage.setup.rig = stage.world.rig;
+    stage.setup.scene = *stage.world.scene;
+  } else {
+    LIMN_TRY_STATUS(make_coarser(options.resolution, &stage.setup.rig));
+  }
+  return stage;
+}
+
+// A rig is for the devices that it was measured on.
+Status check_fits(const Rig& rig, const Rig& devices) {
+  for (const auto& [wanted, there] :
+       {std::pair{&rig.cameras, &devices.cameras}, {&rig.projectors, &devices.projectors}}) {
+    for (const Imager& imager : *wanted) {
+      const auto found =
+          std::find_if(there->begin(), there->end(), [&](const Imager& d) { return d.name == imager.name; });
+      std::string names;
+      for (const Imager& d : *there) names += (names.empty() ? "" : ", ") + d.name;
+      if (found == there->end())
+        return error(
+            "rig: {}: expected one of the devices ({}), found none of that name. This rig belongs to other "
+            "devices; name the right one, or run limn calibrate.",
+            imager.name, names.empty() ? "none" : names);
+      if (found->width != imager.width || found->height != imager.height)
+        return error(
+            "rig: {}: expected the device's size {}x{}, found {}x{}. This rig belongs to another device or "
+            "mode; set the mode, or run limn calibrate.",
+            imager.name, found->width, found->height, imager.width, imager.height);
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Status run_live(const LiveOptions& options) {
+  LIMN_TRY_STATUS(check_options(options));
+  LIMN_TRY(const tracker::Prediction prediction, prediction_of(options.prediction));
+  LIMN_TRY(const tracker::MarkerLight marker_light, marker_light_of(options.marker_light));
+  LIMN_TRY(Script script, options.script.empty() ? Result<Script>(Script{}) : load_script(options.script));
+  LIMN_TRY(Stage stage, virtual_stage(options));
+  SessionSetup& setup = stage.setup;
+  LIMN_TRY_STATUS(check_fits(setup.rig, stage.world.rig));
+  setup.watch.motion.extrapolation_limit_s = options.extrapolate_s;
+  setup.paint.motion = setup.watch.motion;
+  setup.paint.prediction = prediction;
+  setup.paint.marker_light = marker_light;
+  log_info("live: no devices are named; the session runs on a virtual rig, on its own clock");
+
+  std::signal(SIGINT, end_session);
+  std::signal(SIGTERM, end_session);
+  const double end_s = options.seconds > 0  ? options.seconds
+                       : script.seconds > 0 ? script.seconds
+                                            : std::numeric_limits<double>::infinity();
+  sim::VirtualRig rig(std::move(stage.world), {.display_delay_s = k_virtual_display_s,
+                                               .camera_delay_s = k_virtual_camera_s,
+                                               .grab_waits_for_light = false});
+  LIMN_TRY(ScriptedRoom room, ScriptedRoom::create(std::move(script), &rig));
+  LIMN_TRY(const device::GlContext context, device::GlContext::create());
+  log_info("live: {}", context.description());
+  LIMN_TRY(Books books, Books::open(options.out, options.record, &setup));
+  LIMN_TRY(Watcher watcher, Watcher::create(setup.scene, setup.rig, setup.watch));
+  LIMN_TRY(Session session, Session::create(setup, &books.telemetry(), books.recorder()));
+  std::optional<device::Window> window;
+  if (options.window) {
+    const Imager& camera = setup.rig.cameras.at(0);
+    const int width = std::min(1280, camera.width);
+    LIMN_TRY(window, device::Window::open("Limn", width, width * camera.height / camera.width));
+  }
+  LIMN_TRY_STATUS(play_virtually(end_s, g_is_ended, &rig, &room, &watcher, &session, &books, &window));
+  return books.close(&session, options.json);
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "core/result.h"
+
+namespace limn::apps {
+
+struct LiveOptions {
+  std::filesystem::path rig;    ///< empty: the virtual world's true one
+  std::filesystem::path scene;  ///< empty: the virtual world's
+  std::filesystem::path world;  ///< of the virtual rig; empty: a room made for rig and scene
+  std::filesystem::path script;
+  double seconds = 0;     ///< of the session's clock; 0: until it is ended
+  double resolution = 1;  ///< share of the virtual cameras' and projectors' pixels a side
+  std::filesystem::path record;
+  std::filesystem::path out;
+  bool window = false;
+  std::string prediction = "filtered";
+  std::string marker_light = "keep-out";
+  double extrapolate_s = 0.3;  ///< for which unseen markers are carried on
+  bool json = false;
+};
+
+/// `limn live`: cameras -> tracker -> prediction to the photon -> projectors and a screen, until the window
+/// is closed, a signal comes or the time is over. With `out`: poses.csv, telemetry.csv, session.json,
+/// session.html and the last pictures. Prints what was measured.
+Status run_live(const LiveOptions& options);
+
+}  // namespace limn::apps

@@ -1,0 +1,197 @@
+#include "apps/live/painter.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "apps/live/feedback.h"
+
+namespace limn::apps {
+namespace {
+
+constexpr double k_sign = 0.7;   // display value of signs: bright ones could hide markers from cameras
+constexpr double k_gamma = 2.2;  // near enough to mix what fades
+const cv::Scalar k_background(40, 36, 34);  // of views: a dark room
+const cv::Scalar k_green(90, 220, 90), k_amber(40, 170, 255), k_red(60, 60, 255);
+
+// base + share of what `with` adds to it, in linear light.
+cv::Mat mixed(const cv::Mat& base, const cv::Mat& with, double share) {
+  std::array<float, 256> light{};
+  for (int i = 0; i < 256; ++i)
+    light[static_cast<std::size_t>(i)] = std::pow(static_cast<float>(i) / 255, 2.2F);
+  cv::Mat out(base.size(), base.type());
+  const auto bytes = [](const cv::Mat& m, int row) { return m.ptr<std::uint8_t>(row); };
+  for (int row = 0; row < base.rows; ++row) {
+    const std::uint8_t *a = bytes(base, row), *b = bytes(with, row);
+    std::uint8_t* c = out.ptr<std::uint8_t>(row);
+    for (int i = 0; i < 3 * base.cols; ++i) {
+      if (a[i] == b[i]) {
+        c[i] = a[i];
+        continue;
+      }
+      const double sum = light[a[i]] + share * (light[b[i]] - light[a[i]]);
+      c[i] = cv::saturate_cast<std::uint8_t>(255 * std::pow(sum, 1 / k_gamma));
+    }
+  }
+  return out;
+}
+
+Imager moved_eye(Imager imager, double right_m) {
+  imager.imager_from_world.translation.x() -= right_m;
+  return imager;
+}
+
+}  // namespace
+
+Result<Painter> Painter::create(const scene::Scene& scene, const Rig& rig, const PaintOptions& options) {
+  LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, rig));
+  return Painter(scene, rig, std::move(renderer), options);
+}
+
+Painter::Painter(const scene::Scene& scene,
+                 const Rig& rig,
+                 projector::Renderer renderer,
+                 const PaintOptions& options)
+    : scene_(scene),
+      rig_(rig),
+      renderer_(std::move(renderer)),
+      options_(options),
+      bodies_(scene::bodies(scene)),
+      d_up_world_(rig.cameras.empty()
+                      ? Eigen::Vector3d(0, -1, 0)
+                      : rig.cameras[0].imager_from_world.rotation.inverse() * Eigen::Vector3d(0, -1, 0)) {
+  for (const Imager& projector : rig.projectors)
+    painted_.projectors.emplace_back(projector.height, projector.width, CV_8UC3, cv::Scalar::all(0));
+}
+
+Imager Painter::viewer_for(const scene::PosedScene& posed) const {
+  if (const auto viewer = scene::viewer_of(scene_, posed, d_up_world_)) return *viewer;
+  if (!rig_.cameras.empty()) return rig_.cameras[0];
+  return rig_.projectors[0];
+}
+
+const Painted& Painter::paint(const Watched& watched, const scene::Staging& staging, Stamp shown_at) {
+  painted_.shown_at = shown_at;
+  if (staging.frozen) return painted_;
+  painted_.tracks = tracker::predicted(watched.motions, shown_at, options_.prediction, options_.motion);
+  painted_.posed = scene::staged(scene_, staging, painted_.tracks);
+  note_changes(painted_.posed, staging, shown_at);
+  const Imager viewer = viewer_for(painted_.posed);
+  for (std::size_t i = 0; i < rig_.projectors.size(); ++i) {
+    cv::Mat& picture = painted_.projectors[i];
+    if (staging.blackout) {
+      picture = cv::Mat::zeros(picture.size(), picture.type());
+      continue;
+    }
+    picture = lit(i, painted_.posed, viewer, shown_at);
+    if (options_.marker_light != tracker::MarkerLight::as_is) {
+      const cv::Mat mask = tracker::marker_mask(rig_.projectors[i], bodies_, painted_.tracks);
+      picture = tracker::with_marker_light(picture, mask, options_.marker_light);
+    }
+  }
+  if (!staging.blackout) draw_feedback(staging);
+  return painted_;
+}
+
+cv::Mat Painter::screen(const Watched& watched, const scene::Staging& staging) {
+  const cv::Mat behind = watched.frames.empty() ? cv::Mat() : watched.frames[0].image;
+  if (staging.screen == scene::Screen::off || behind.empty()) return {};
+  if (staging.screen == scene::Screen::camera) return behind;
+  const Stamp at = watched.frames[0].captured_at;
+  const std::vector<Track> tracks =
+      tracker::predicted(watched.motions, at, options_.prediction, options_.motion);
+  const scene::PosedScene posed = scene::staged(scene_, staging, tracks);
+  if (staging.screen == scene::Screen::rest || staging.screen == scene::Screen::full) {
+    const bool rest = staging.screen == scene::Screen::rest;
+    return renderer_.composite(0, behind, posed,
+                               rest ? projector::Composite::rest : projector::Composite::full);
+  }
+  const Imager viewer = viewer_for(posed);
+  if (staging.screen == scene::Screen::view) return renderer_.view(viewer, posed, k_background);
+  const double half = 0.5e-3 * options_.stereo_mm;
+  const cv::Mat eyes[2] = {renderer_.view(moved_eye(viewer, -half), posed, k_background),
+                           renderer_.view(moved_eye(viewer, half), posed, k_background)};
+  cv::Mat both;
+  cv::hconcat(eyes, 2, both);
+  return both;
+}
+
+// Which parts have gone since the last picture, and which show another variant.
+void Painter::note_changes(const scene::PosedScene& posed, const scene::Staging& staging, Stamp at) {
+  std::map<std::string, scene::PosedPart> now;
+  for (const scene::PosedPart& part : posed.parts) now[part.slot] = part;
+  for (const auto& [slot, part] : last_)
+    if (!now.contains(slot)) fading_[slot] = {part, at};
+  for (const auto& [slot, part] : now) fading_.erase(slot);
+  std::erase_if(fading_, [&](const auto& entry) {
+    return seconds_between(entry.second.lost_at, at) > std::max(options_.fade_s, options_.lost_s);
+  });
+  for (std::size_t i = 0; i < scene_.slots.size(); ++i) {
+    const std::string& slot = scene_.slots[i].name;
+    const std::string& variant = staging.slots[i].variant;
+    const auto shown = variants_.find(slot);
+    if (shown != variants_.end() && shown->second != variant) labels_[slot] = {variant, at};
+    variants_[slot] = variant;
+  }
+  std::erase_if(
+      labels_, [&](const auto& entry) { return seconds_between(entry.second.since, at) > options_.label_s; });
+  last_ = std::move(now);
+}
+
+// A projector's picture of the parts, of those that fade only a share.
+cv::Mat Painter::lit(std::size_t projector, const scene::PosedScene& posed, const Imager& viewer, Stamp at) {
+  cv::Mat picture = renderer_.projector_picture(projector, posed, viewer);
+  for (const auto& [slot, fading] : fading_) {
+    const double share = 1 - seconds_between(fading.lost_at, at) / options_.fade_s;
+    if (share <= 0) continue;
+    scene::PosedScene with = posed;
+    with.parts.push_back(fading.part);
+    picture = mixed(picture, renderer_.projector_picture(projector, with, viewer), share);
+  }
+  return picture;
+}
+
+// The projector that reaches a marker best; null when none does.
+const Imager* Painter::best_projector(const Pose& world_from_marker) const {
+  const Imager* best = nullptr;
+  double most = 0;
+  for (const Imager& projector : rig_.projectors) {
+    const double cosine = head_on(projector, world_from_marker);
+    if (cosine <= most) continue;
+    most = cosine;
+    best = &projector;
+  }
+  return best;
+}
+
+void Painter::draw_feedback(const scene::Staging& staging) {
+  for (const Track& track : painted_.tracks) {
+    const auto body =
+        std::find_if(bodies_.begin(), bodies_.end(), [&](const Body& b) { return b.name == track.body; });
+    if (body == bodies_.end()) continue;
+    const auto fading = fading_.find(track.body);
+    const auto label = labels_.find(track.body);
+    for (const BodyMarker& marker : body->markers) {
+      const Pose world_from_marker = track.world_from_body * marker.body_from_marker;
+      const Imager* projector = best_projector(world_from_marker);
+      if (!projector) continue;
+      cv::Mat* picture = &painted_.projectors[static_cast<std::size_t>(projector - rig_.projectors.data())];
+      if (fading != fading_.end()) {
+        const double age = seconds_between(fading->second.lost_at, painted_.shown_at) / options_.lost_s;
+        draw_ring(*projector, world_from_marker, marker.size_m, k_red, k_sign * std::max(0.0, 1 - age),
+                  picture);
+      } else if (staging.marker_states && track.sight != Sight::lost) {
+        const cv::Scalar& colour = track.sight == Sight::measured ? k_green : k_amber;
+        draw_ring(*projector, world_from_marker, marker.size_m, colour, k_sign, picture);
+      }
+      if (label != labels_.end()) {
+        const double age = seconds_between(label->second.since, painted_.shown_at) / options_.label_s;
+        draw_word(*projector, world_from_marker, marker.size_m, label->second.text,
+                  k_sign * std::min(1.0, 3 * (1 - age)), picture);
+      }
+    }
+  }
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <map>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "apps/live/watcher.h"
+#include "core/result.h"
+#include "core/rig.h"
+#include "projector/renderer.h"
+#include "scene/scene.h"
+#include "scene/staging.h"
+#include "tracker/marker_light.h"
+#include "tracker/predict.h"
+
+namespace limn::apps {
+
+struct PaintOptions {
+  tracker::Prediction prediction = tracker::Prediction::filtered;
+  tracker::MotionModel motion;  ///< as the Watcher's
+  tracker::MarkerLight marker_light = tracker::MarkerLight::keep_out;
+  double fade_s = 0.15;   ///< in which a part's light goes when its marker is lost
+  double label_s = 1.2;   ///< for which a variant's name stands by its marker
+  double lost_s = 1.5;    ///< for which a ring marks where a part was lost
+  double stereo_mm = 63;  ///< between the eyes of Screen::stereo
+};
+
+/// What is shown at a moment.
+struct Painted {
+  std::vector<cv::Mat> projectors;  ///< in the rig's order, CV_8UC3
+  std::vector<Track> tracks;        ///< predicted to shown_at
+  scene::PosedScene posed;          ///< what the tracks and the staging make of the scene
+  Stamp shown_at;
+};
+
+/// The projector side of a session: motions of bodies + staging -> projector pictures and the screen's. Holds
+/// what fades; the same calls give the same pictures. A GL context must be current at every call and at
+/// destruction.
+class Painter {
+ public:
+  static Result<Painter> create(const scene::Scene& scene, const Rig& rig, const PaintOptions& options = {});
+
+  /// Projector pictures for the moment at which their light arrives. Stamps must not go back.
+  const Painted& paint(const Watched& watched, const scene::Staging& staging, Stamp shown_at);
+
+  /// A large screen's picture for the newest frame of camera 0, at that frame's own stamp; empty before the
+  /// first frame and for Screen::off.
+  cv::Mat screen(const Watched& watched, const scene::Staging& staging);
+
+  /// What was painted last.
+  const Painted& painted() const { return painted_; }
+
+ private:
+  struct Fading {
+    scene::PosedPart part;
+    Stamp lost_at;
+  };
+  struct Label {
+    std::string text;
+    Stamp since;
+  };
+  Painter(const scene::Scene& scene,
+          const Rig& rig,
+          projector::Renderer renderer,
+          const PaintOptions& options);
+  Imager viewer_for(const scene::PosedScene& posed) const;
+  void note_changes(const scene::PosedScene& posed, const scene::Staging& staging, Stamp at);
+  cv::Mat lit(std::size_t projector, const scene::PosedScene& posed, const Imager& viewer, Stamp at);
+  void draw_feedback(const scene::Staging& staging);
+  const Imager* best_projector(const Pose& world_from_marker) const;
+
+  scene::Scene scene_;
+  Rig rig_;
+  projector::Renderer renderer_;
+  PaintOptions options_;
+  std::vector<Body> bodies_;
+  Eigen::Vector3d d_up_world_;
+  Painted painted_;
+  std::map<std::string, scene::PosedPart> last_;  // parts as last shown, by slot
+  std::map<std::string, Fading> fading_;
+  std::map<std::string, std::string> variants_;  // last shown
+  std::map<std::string, Label> labels_;
+};
+
+}  // namespace limn::apps

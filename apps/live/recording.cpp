@@ -1,0 +1,195 @@
+#include "apps/live/recording.h"
+
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "core/config.h"
+#include "core/file.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t k_most_queued = 40;  // frames; 240 MB of colour 1920x1080
+
+const std::vector<std::string> k_predictions = {"hold", "linear", "filtered"};
+const std::vector<std::string> k_marker_lights = {"as-is", "keep-out", "spotlight"};
+
+std::int64_t nanoseconds(Stamp at) { return at.time_since_epoch().count(); }
+
+Status copy_folder(const fs::path& from, const fs::path& to) {
+  std::error_code problem;
+  fs::create_directories(to, problem);
+  if (!problem)
+    fs::copy(from, to, fs::copy_options::recursive | fs::copy_options::overwrite_existing, problem);
+  if (!problem) return {};
+  return error("{}: expected a folder that can be copied to {}, found: {}.", from.string(), to.string(),
+               problem.message());
+}
+
+nlohmann::ordered_json setup_json(const SessionSetup& setup) {
+  const tracker::MotionModel& motion = setup.watch.motion;
+  const PaintOptions& paint = setup.paint;
+  return {{"schema", "limn.session/1"},
+          {"rig", "rig"},
+          {"scene", "scene"},
+          {"full_scan_every", setup.watch.full_scan_every},
+          {"motion",
+           {{"jerk", motion.jerk},
+            {"turn_jerk", motion.turn_jerk},
+            {"drift", motion.drift},
+            {"turn_drift", motion.turn_drift},
+            {"starts_per_s", motion.starts_per_s},
+            {"stops_per_s", motion.stops_per_s},
+            {"extrapolation_limit_s", motion.extrapolation_limit_s}}},
+          {"prediction", k_predictions[static_cast<std::size_t>(paint.prediction)]},
+          {"marker_light", k_marker_lights[static_cast<std::size_t>(paint.marker_light)]},
+          {"fade_s", paint.fade_s},
+          {"label_s", paint.label_s},
+          {"lost_s", paint.lost_s},
+          {"stereo_mm", paint.stereo_mm}};
+}
+
+template <class T>
+T read_choice(const ConfigNode& node, const std::vector<std::string>& names) {
+  const std::string name = node.choice(names);
+  const auto found = std::find(names.begin(), names.end(), name);
+  return static_cast<T>(found == names.end() ? 0 : found - names.begin());
+}
+
+}  // namespace
+
+Recorder::Recorder(const fs::path& folder) : folder_(folder), pictures_(k_most_queued) {}
+
+Result<std::unique_ptr<Recorder>> Recorder::create(const fs::path& folder, const SessionSetup& setup) {
+  if (fs::exists(folder / "session.json"))
+    return error(
+        "{}: expected a folder without a session, found one. Name another folder; nothing was changed.",
+        folder.string());
+  LIMN_TRY_STATUS(make_folder(folder));
+  LIMN_TRY_STATUS(save_rig(setup.rig, folder / "rig"));
+  if (!setup.rig.responses.empty() || !setup.rig.camera_responses.empty())
+    LIMN_TRY_STATUS(save_responses({setup.rig.responses, setup.rig.camera_responses}, {}, folder / "rig"));
+  LIMN_TRY_STATUS(copy_folder(setup.scene.folder, folder / "scene"));
+  for (const Imager& camera : setup.rig.cameras)
+    LIMN_TRY_STATUS(make_folder(folder / "frames" / camera.name));
+  std::unique_ptr<Recorder> out(new Recorder(folder));
+  out->events_.open(folder / "events.jsonl");
+  if (!out->events_)
+    return error("{}: expected a file that can be written, found none. Look at rights and space.",
+                 (folder / "events.jsonl").string());
+  LIMN_TRY_STATUS(write_file(folder / "session.json", setup_json(setup).dump(2) + "\n"));
+  return out;
+}
+
+void Recorder::watched(std::span<const Frame> frames) {
+  const std::lock_guard lock(mutex_);
+  if (ended_) return;
+  nlohmann::ordered_json event = {{"watch", nlohmann::ordered_json::array()}};
+  for (const Frame& frame : frames) {
+    const std::string file = fmt::format("frames/{}/{:06}.png", frame.camera, frames_++);
+    if (!pictures_.offer(folder_ / file, frame.image))
+      return end("the disk is full or too slow for the cameras' pictures");
+    event["watch"].push_back(
+        {{"camera", frame.camera}, {"file", file}, {"captured_at_ns", nanoseconds(frame.captured_at)}});
+  }
+  write(event);
+}
+
+void Recorder::edited(const scene::Edit& edit, const std::string& source) {
+  const std::lock_guard lock(mutex_);
+  if (ended_) return;
+  write(
+      {{"edit", {{"action", edit.action}, {"slot", edit.slot}, {"value", edit.value}}}, {"source", source}});
+}
+
+void Recorder::painted(const Painted& painted, std::size_t moments) {
+  const std::lock_guard lock(mutex_);
+  if (ended_) return;
+  write({{"paint", pose_log(painted)},
+         {"moments", moments},
+         {"pictures", fmt::format("{:016x}", fingerprint(painted.projectors))}});
+}
+
+void Recorder::write(const nlohmann::ordered_json& event) {
+  events_ << event.dump() << '\n';
+  if (!events_.flush()) end("the disk is full");
+}
+
+void Recorder::end(const std::string& why) { ended_ = why; }
+
+std::optional<std::string> Recorder::ended() const {
+  const std::lock_guard lock(mutex_);
+  return ended_;
+}
+
+Status Recorder::finish() { return pictures_.finish(); }
+
+std::uint64_t fingerprint(std::span<const cv::Mat> pictures) {
+  std::uint64_t hash = 0xcbf29ce484222325;  // FNV-1a's, over words of eight bytes
+  const auto add = [&](std::uint64_t word) {
+    hash = (hash ^ word) * 0x100000001b3;
+    hash ^= hash >> 29;
+  };
+  for (const cv::Mat& picture : pictures) {
+    const std::size_t length = static_cast<std::size_t>(picture.cols) * picture.elemSize();
+    for (int row = 0; row < picture.rows; ++row) {
+      const std::uint8_t* bytes = picture.ptr(row);
+      for (std::size_t i = 0; i < length; i += 8) {
+        std::uint64_t word = 0;
+        std::memcpy(&word, bytes + i, std::min<std::size_t>(8, length - i));
+        add(word);
+      }
+    }
+    add(length);
+  }
+  return hash;
+}
+
+nlohmann::ordered_json pose_log(const Painted& painted) {
+  nlohmann::ordered_json json = {{"shown_at_ns", nanoseconds(painted.shown_at)}};
+  json["tracks"] = nlohmann::ordered_json::array();
+  for (const Track& track : painted.tracks)
+    json["tracks"].push_back({{"body", track.body},
+                              {"sight", static_cast<int>(track.sight)},
+                              {"world_from_body", to_json(track.world_from_body)}});
+  json["parts"] = nlohmann::ordered_json::array();
+  for (const scene::PosedPart& part : painted.posed.parts)
+    json["parts"].push_back(
+        {{"slot", part.slot}, {"variant", part.variant}, {"world_from_part", to_json(part.world_from_part)}});
+  return json;
+}
+
+Result<SessionSetup> load_setup(const fs::path& folder) {
+  LIMN_TRY(const Config config, Config::load(folder / "session.json", "limn.session/1"));
+  const ConfigNode root = config.root();
+  root.only({"schema", "rig", "scene", "full_scan_every", "motion", "prediction", "marker_light", "fade_s",
+             "label_s", "lost_s", "stereo_mm"});
+  SessionSetup setup;
+  setup.watch.full_scan_every = root.at("full_scan_every").integer();
+  if (setup.watch.full_scan_every < 1) root.at("full_scan_every").problem("expected 1 or more, found less.");
+  const ConfigNode motion = root.at("motion");
+  tracker::MotionModel& model = setup.watch.motion;
+  model.jerk = motion.at("jerk").positive();
+  model.turn_jerk = motion.at("turn_jerk").positive();
+  model.drift = motion.at("drift").positive();
+  model.turn_drift = motion.at("turn_drift").positive();
+  model.starts_per_s = motion.at("starts_per_s").positive();
+  model.stops_per_s = motion.at("stops_per_s").positive();
+  model.extrapolation_limit_s = motion.at("extrapolation_limit_s").positive();
+  setup.paint.motion = model;
+  setup.paint.prediction = read_choice<tracker::Prediction>(root.at("prediction"), k_predictions);
+  setup.paint.marker_light = read_choice<tracker::MarkerLight>(root.at("marker_light"), k_marker_lights);
+  setup.paint.fade_s = root.at("fade_s").positive();
+  setup.paint.label_s = root.at("label_s").positive();
+  setup.paint.lost_s = root.at("lost_s").positive();
+  setup.paint.stereo_mm = root.at("stereo_mm").number();
+  const fs::path rig = root.at("rig").path_inside(), scene = root.at("scene").path_inside();
+  LIMN_TRY_STATUS(config.status());
+  LIMN_TRY(setup.rig, load_rig(rig));
+  LIMN_TRY(setup.scene, scene::load_scene(scene));
+  return setup;
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <mutex>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "apps/live/painter.h"
+#include "apps/picture_writer.h"
+#include "core/frame.h"
+#include "core/result.h"
+#include "core/rig.h"
+#include "scene/staging.h"
+
+namespace limn::apps {
+
+/// What a session's pictures depend on beside frames and edits.
+struct SessionSetup {
+  Rig rig;
+  scene::Scene scene;
+  WatchOptions watch;
+  PaintOptions paint;
+};
+
+/// Writes a session's folder (limn.session/1): rig and scene as they were, frames as PNG, and events.jsonl,
+/// what happened in its order: frames watched, edits, pictures painted with their poses. Frames are written
+/// on a thread of their own; when the disk is full or too slow for them the recording ends there, complete up
+/// to that moment, and says so, and the session goes on. Safe from several threads.
+class Recorder {
+ public:
+  /// Error: the folder cannot be written, or holds a session already.
+  static Result<std::unique_ptr<Recorder>> create(const std::filesystem::path& folder,
+                                                  const SessionSetup& setup);
+
+  /// Frames of one moment, as Watcher::watch takes them.
+  void watched(std::span<const Frame> frames);
+  void edited(const scene::Edit& edit, const std::string& source);
+  /// `moments` counts the calls of watched() that the picture knew of.
+  void painted(const Painted& painted, std::size_t moments);
+
+  /// Why it ended before the session, if it did.
+  std::optional<std::string> ended() const;
+  /// Waits until all is on disk.
+  Status finish();
+
+ private:
+  explicit Recorder(const std::filesystem::path& folder);
+  void write(const nlohmann::ordered_json& event);  // call with mutex_ held
+  void end(const std::string& why);                 // likewise
+
+  std::filesystem::path folder_;
+  PictureWriter pictures_;
+  mutable std::mutex mutex_;
+  std::ofstream events_;
+  std::size_t frames_ = 0;
+  std::optional<std::string> ended_;
+};
+
+/// Of 8-bit pictures, to tell whether two are the same.
+std::uint64_t fingerprint(std::span<const cv::Mat> pictures);
+
+/// A line of events.jsonl that replay compares: shown_at and the tracks, numbers in full.
+nlohmann::ordered_json pose_log(const Painted& painted);
+
+/// Reads what a session was set up with. Error: no session, another schema, a damaged file.
+Result<SessionSetup> load_setup(const std::filesystem::path& folder);
+
+}  // namespace limn::apps

@@ -1,0 +1,204 @@
+#include "apps/live/replay.h"
+
+#include <chrono>
+#include <deque>
+#include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <thread>
+
+#include "apps/live/books.h"
+#include "apps/live/recording.h"
+#include "apps/live/session.h"
+#include "apps/live/watcher.h"
+#include "core/log.h"
+#include "core/picture.h"
+#include "device/gl_context.h"
+#include "device/window.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+Stamp stamp_of(std::int64_t nanoseconds) { return Stamp{} + std::chrono::nanoseconds(nanoseconds); }
+
+// Lines of events.jsonl, as far as they are whole.
+struct Events {
+  std::vector<Json> all;
+  std::optional<std::string> damage;
+};
+
+Result<Events> load_events(const fs::path& path) {
+  std::ifstream file(path);
+  if (!file) return error("{}: expected the recording's events, found no such file.", path.string());
+  Events events;
+  std::string line;
+  while (std::getline(file, line)) {
+    Json event = Json::parse(line, nullptr, false);
+    if (event.is_discarded() || !event.is_object() ||
+        !(event.contains("watch") || event.contains("edit") || event.contains("paint"))) {
+      events.damage = fmt::format("{}:{}: expected an event (watch, edit, paint), found something else",
+                                  path.string(), events.all.size() + 1);
+      break;
+    }
+    events.all.push_back(std::move(event));
+  }
+  return events;
+}
+
+class Replay {
+ public:
+  Replay(const ReplayOptions& options, Watcher watcher, Session session, Books books)
+      : options_(options),
+        watcher_(std::move(watcher)),
+        session_(std::move(session)),
+        books_(std::move(books)) {}
+
+  Status play(const Events& events) {
+    if (options_.window) {
+      LIMN_TRY(window_, device::Window::open("Limn replay", 1280, 720));
+    }
+    Progress progress("replay", static_cast<int>(events.all.size()));
+    int done = 0;
+    for (const Json& event : events.all) {
+      const Status played = play(event);
+      if (!played) return played;
+      progress.step(++done);
+      if (window_ && !window_->is_open()) break;
+    }
+    return {};
+  }
+
+  // Error: what differs from the recording.
+  Status close() {
+    LIMN_TRY_STATUS(books_.close(&session_, options_.json));
+    if (first_pose_)
+      return error("{}: expected the recorded poses, found others in {} of {} pictures, first at {:.3f} s.",
+                   options_.session.string(), other_poses_, pictures_, *first_pose_);
+    if (first_picture_)
+      return error(
+          "{}: expected the recorded projector pictures, found others in {} of {}, first at {:.3f} s "
+          "(poses are identical; another machine or driver draws a little differently).",
+          options_.session.string(), other_pictures_, pictures_, *first_picture_);
+    log_info("replay: {} pictures, poses and pictures identical to the recording's", pictures_);
+    return {};
+  }
+
+ private:
+  Status play(const Json& event) try {
+    if (event.contains("watch")) {
+      unwatched_.push_back(event.at("watch"));
+      return {};
+    }
+    if (event.contains("edit")) return edit(event.at("edit"), event.at("source"));
+    return paint(event);
+  } catch (const nlohmann::json::exception& problem) {
+    return error("{}: expected whole events, found a damaged one ({}).",
+                 (options_.session / "events.jsonl").string(), problem.what());
+  }
+
+  Status watch(const Json& list) {
+    std::vector<Frame> frames;
+    for (const Json& item : list) {
+      const std::string file = item.at("file"), camera = item.at("camera");
+      if (fs::path(file).is_absolute() || file.find("..") != std::string::npos ||
+          !session_.setup().rig.find(camera))
+        return error("{}: expected a frame of one of the rig's cameras inside the folder, found {} of {}.",
+                     options_.session.string(), file, camera);
+      LIMN_TRY(cv::Mat image, read_picture(options_.session / file));
+      frames.push_back({camera, std::move(image), stamp_of(item.at("captured_at_ns"))});
+    }
+    watcher_.watch(frames);
+    ++moments_;
+    return {};
+  }
+
+  // Frames that the picture knew of; a thread of its own watched them, perhaps further than that.
+  Status watch_until(std::size_t moments) {
+    if (moments <= moments_) return {};
+    while (moments_ < moments && !unwatched_.empty()) {
+      LIMN_TRY_STATUS(watch(unwatched_.front()));
+      unwatched_.pop_front();
+    }
+    Watched watched = watcher_.watched();
+    watched.uses.clear();  // what came of them was recorded as edits
+    session_.take(std::move(watched), moments_);
+    return {};
+  }
+
+  Status edit(const Json& json, const std::string& source) {
+    const scene::Edit edit{json.at("action"), json.at("slot"), json.at("value")};
+    return session_.edit(edit, source, session_.watched().captured_at);
+  }
+
+  Status paint(const Json& event) {
+    const Stamp shown_at = stamp_of(event.at("paint").at("shown_at_ns"));
+    LIMN_TRY_STATUS(watch_until(event.at("moments")));
+    wait_for(shown_at);
+    const Painted& painted = session_.paint(shown_at);
+    ++pictures_;
+    const double at_s = seconds_between(Stamp{}, shown_at);
+    if (pose_log(painted) != event.at("paint") && ++other_poses_ == 1) first_pose_ = at_s;
+    const std::string print = fmt::format("{:016x}", fingerprint(painted.projectors));
+    if (print != event.at("pictures") && ++other_pictures_ == 1) first_picture_ = at_s;
+    if (window_)
+      if (const cv::Mat screen = session_.screen(); !screen.empty()) window_->show(screen);
+    ShownFrame shown{.captured_at = session_.watched().captured_at,
+                     .shown_at = shown_at,
+                     .detect_ms = session_.watched().detect_ms,
+                     .filter_ms = session_.watched().filter_ms,
+                     .paint_ms = session_.paint_ms(),
+                     .screen_ms = -1,
+                     .record_ms = -1};
+    for (const Track& track : painted.tracks) shown.lost += track.sight == Sight::lost;
+    books_.shown(shown, painted);
+    return {};
+  }
+
+  void wait_for(Stamp shown_at) {
+    if (options_.step) {
+      fmt::print(stderr, "{:.3f} s; enter for the next picture\n", seconds_between(Stamp{}, shown_at));
+      std::string line;
+      std::getline(std::cin, line);
+      return;
+    }
+    if (options_.speed <= 0) return;
+    const auto now = std::chrono::steady_clock::now();
+    if (!begun_) begun_ = {now, shown_at};
+    const double due_s = seconds_between(begun_->second, shown_at) / options_.speed;
+    std::this_thread::sleep_until(begun_->first + std::chrono::duration<double>(due_s));
+  }
+
+  const ReplayOptions& options_;
+  Watcher watcher_;
+  Session session_;
+  Books books_;
+  std::optional<device::Window> window_;
+  std::optional<std::pair<std::chrono::steady_clock::time_point, Stamp>> begun_;
+  std::deque<Json> unwatched_;
+  std::size_t moments_ = 0, pictures_ = 0, other_poses_ = 0, other_pictures_ = 0;
+  std::optional<double> first_pose_, first_picture_;
+};
+
+}  // namespace
+
+Status run_replay(const ReplayOptions& options) {
+  if (!(options.speed >= 0)) return usage_error("--speed: expected 0 or more, found {}.", options.speed);
+  LIMN_TRY(SessionSetup setup, load_setup(options.session));
+  LIMN_TRY(const Events events, load_events(options.session / "events.jsonl"));
+  LIMN_TRY(const device::GlContext context, device::GlContext::create());
+  LIMN_TRY(Books books, Books::open(options.out, {}, &setup));
+  LIMN_TRY(Watcher watcher, Watcher::create(setup.scene, setup.rig, setup.watch));
+  LIMN_TRY(Session session, Session::create(setup, nullptr, nullptr, false));
+  Replay replay(options, std::move(watcher), std::move(session), std::move(books));
+  const Status played = replay.play(events);
+  LIMN_TRY_STATUS(replay.close());
+  LIMN_TRY_STATUS(played);
+  if (events.damage) return error("{}; what stands before it was replayed.", *events.damage);
+  return {};
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,160 @@
+#include "apps/live/script.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/config.h"
+
+namespace limn::apps {
+namespace {
+
+constexpr double k_hand_albedo = 0.35;
+constexpr double k_hand_above_m = 0.006;
+
+bool is_same(const Pose& a, const Pose& b) {
+  return a.translation == b.translation && a.rotation.coeffs() == b.rotation.coeffs();
+}
+
+double time_of(const ConfigNode& node) {
+  const double seconds = node.number();
+  if (seconds < 0) node.problem(fmt::format("expected seconds (0 or more), found {}.", seconds));
+  return seconds;
+}
+
+void read_span(const ConfigNode& node, double* from_s, double* until_s) {
+  *from_s = time_of(node.at("at_s"));
+  *until_s = time_of(node.at("until_s"));
+  if (*until_s <= *from_s) node.at("until_s").problem("expected a later moment than at_s, found none.");
+}
+
+scene::Edit read_edit(const ConfigNode& node) {
+  node.only({"action", "slot", "value"});
+  scene::Edit edit{node.at("action").text(), "", ""};
+  if (const auto slot = node.find("slot")) edit.slot = slot->text();
+  if (const auto value = node.find("value")) edit.value = value->text();
+  return edit;
+}
+
+void read_event(const ConfigNode& node, Script* script) {
+  if (const auto marker = node.find("sway")) {
+    node.only({"at_s", "until_s", "sway", "amplitude_m", "hz"});
+    Script::Sway sway{marker->text(), 0, 0, node.at("amplitude_m").vector3(), 0.5};
+    if (const auto hz = node.find("hz")) sway.hz = hz->positive();
+    read_span(node, &sway.from_s, &sway.until_s);
+    script->sways.push_back(sway);
+  } else if (const auto moved = node.find("move")) {
+    node.only({"at_s", "move", "home_from_marker"});
+    script->moves.push_back({moved->text(), time_of(node.at("at_s")), node.at("home_from_marker").pose()});
+  } else if (const auto covered = node.find("cover")) {
+    node.only({"at_s", "until_s", "cover"});
+    Script::Cover cover{covered->text(), 0, 0};
+    read_span(node, &cover.from_s, &cover.until_s);
+    script->covers.push_back(cover);
+  } else if (const auto device = node.find("unplug")) {
+    node.only({"at_s", "until_s", "unplug"});
+    Script::Unplug unplug{device->text(), 0, 0};
+    read_span(node, &unplug.from_s, &unplug.until_s);
+    script->unplugs.push_back(unplug);
+  } else if (const auto edit = node.find("edit")) {
+    node.only({"at_s", "edit"});
+    script->edits.push_back({time_of(node.at("at_s")), read_edit(*edit)});
+  } else {
+    node.problem("expected one of sway, move, cover, unplug, edit, found none of them.");
+  }
+}
+
+}  // namespace
+
+bool Script::is_plugged(const std::string& device, double at_s) const {
+  return std::none_of(unplugs.begin(), unplugs.end(), [&](const Unplug& u) {
+    return u.device == device && at_s >= u.from_s && at_s < u.until_s;
+  });
+}
+
+Result<Script> load_script(const std::filesystem::path& path) {
+  LIMN_TRY(const Config config, Config::load(path, "limn.script/1"));
+  const ConfigNode root = config.root();
+  root.only({"schema", "about", "seconds", "events"});
+  Script script;
+  script.seconds = root.at("seconds").positive();
+  for (const ConfigNode& node : root.at("events").items()) read_event(node, &script);
+  LIMN_TRY_STATUS(config.status());
+  std::stable_sort(script.edits.begin(), script.edits.end(),
+                   [](const Script::Action& a, const Script::Action& b) { return a.at_s < b.at_s; });
+  std::stable_sort(script.moves.begin(), script.moves.end(),
+                   [](const Script::Move& a, const Script::Move& b) { return a.at_s < b.at_s; });
+  return script;
+}
+
+Result<ScriptedRoom> ScriptedRoom::create(Script script, sim::VirtualRig* rig) {
+  ScriptedRoom out;
+  out.rig_ = rig;
+  for (const sim::PlacedMarker& placed : rig->world().markers)
+    out.homes_.push_back({placed, rig->world().find(placed.object)->world_from_object});
+  std::vector<std::string> named;
+  for (const auto& sway : script.sways) named.push_back(sway.marker);
+  for (const auto& move : script.moves) named.push_back(move.marker);
+  for (const auto& cover : script.covers) named.push_back(cover.marker);
+  for (const std::string& name : named) {
+    std::string known;
+    bool stands = false;
+    for (const Home& home : out.homes_) {
+      known += (known.empty() ? "" : ", ") + home.placed.marker.text();
+      stands |= home.placed.marker.text() == name;
+    }
+    if (!stands)
+      return error("script: expected a marker that stands in the room ({}), found '{}'.", known, name);
+  }
+  out.script_ = std::move(script);
+  return out;
+}
+
+const ScriptedRoom::Home& ScriptedRoom::home_of(const std::string& marker) const {
+  return *std::find_if(homes_.begin(), homes_.end(),
+                       [&](const Home& home) { return home.placed.marker.text() == marker; });
+}
+
+Pose ScriptedRoom::place_of(const Home& home, double at_s) const {
+  const std::string marker = home.placed.marker.text();
+  Pose home_from_marker;
+  for (const Script::Move& move : script_.moves)
+    if (move.marker == marker && at_s >= move.at_s) home_from_marker = move.home_from_marker;
+  for (const Script::Sway& sway : script_.sways) {
+    if (sway.marker != marker || at_s < sway.from_s) continue;
+    const double swayed_s = std::min(at_s, sway.until_s) - sway.from_s;
+    home_from_marker.translation += std::sin(2 * std::numbers::pi * sway.hz * swayed_s) * sway.amplitude_m;
+  }
+  return home.world_from_object * home_from_marker;
+}
+
+void ScriptedRoom::set(double at_s) {
+  for (const Home& home : homes_) {
+    const Pose place = place_of(home, at_s);
+    if (!is_same(place, rig_->world().find(home.placed.object)->world_from_object))
+      rig_->move(home.placed.object, place);
+  }
+  for (std::size_t i = 0; i < script_.covers.size(); ++i) {
+    const Script::Cover& cover = script_.covers[i];
+    const std::string name = fmt::format("hand{}", i);
+    const bool is_there = rig_->world().find(name) != nullptr;
+    const bool is_due = at_s >= cover.from_s && at_s < cover.until_s;
+    if (is_there == is_due) continue;
+    if (!is_due) {
+      rig_->remove(name);
+      continue;
+    }
+    const Home& home = home_of(cover.marker);
+    const double side = 2 * home.placed.size_m;
+    const Pose above(Eigen::Quaterniond::Identity(), {0, 0, -k_hand_above_m});
+    sim::Object hand = sim::sheet(name, side, side, {}, place_of(home, at_s) * above);
+    hand.albedo.setConstant(k_hand_albedo);
+    rig_->place(hand);
+  }
+}
+
+Pose ScriptedRoom::world_from_marker(const MarkerName& marker, double at_s) const {
+  return place_of(home_of(marker.text()), at_s);
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/pose.h"
+#include "core/result.h"
+#include "scene/staging.h"
+#include "sim/virtual_rig.h"
+
+namespace limn::apps {
+
+/// What happens in a virtual session, and when (limn.script/1; config/README.md says its keys). Times are
+/// seconds of the session's clock.
+struct Script {
+  /// A marker's object goes to and fro: moved along a direction of its own frame. It stays where it then is.
+  struct Sway {
+    std::string marker;
+    double from_s = 0, until_s = 0;
+    Eigen::Vector3d amplitude_m = Eigen::Vector3d::Zero();
+    double hz = 0.5;
+  };
+  /// From then on the marker stands elsewhere: moved and turned in its home's frame. At once.
+  struct Move {
+    std::string marker;
+    double at_s = 0;
+    Pose home_from_marker;
+  };
+  /// A hand rests on a marker.
+  struct Cover {
+    std::string marker;
+    double from_s = 0, until_s = 0;
+  };
+  struct Unplug {
+    std::string device;
+    double from_s = 0, until_s = 0;
+  };
+  struct Action {
+    double at_s = 0;
+    scene::Edit edit;
+  };
+
+  double seconds = 0;
+  std::vector<Sway> sways;
+  std::vector<Move> moves;
+  std::vector<Cover> covers;
+  std::vector<Unplug> unplugs;
+  std::vector<Action> edits;  ///< in the order of time
+
+  bool is_plugged(const std::string& device, double at_s) const;
+};
+
+Result<Script> load_script(const std::filesystem::path& path);
+
+/// Plays a script in a virtual rig: what stands where at a moment.
+class ScriptedRoom {
+ public:
+  /// Error: a marker that does not stand in the room.
+  static Result<ScriptedRoom> create(Script script, sim::VirtualRig* rig);
+
+  const Script& script() const { return script_; }
+  /// Sets the room to a moment.
+  void set(double at_s);
+  /// Where the script has a placed marker at a moment, in the world.
+  Pose world_from_marker(const MarkerName& marker, double at_s) const;
+
+ private:
+  struct Home {
+    sim::PlacedMarker placed;
+    Pose world_from_object;
+  };
+  const Home& home_of(const std::string& marker) const;
+  Pose place_of(const Home& home, double at_s) const;
+
+  Script script_;
+  sim::VirtualRig* rig_ = nullptr;
+  std::vector<Home> homes_;
+};
+
+}  // namespace limn::apps

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/live/painter.h"
+#include "apps/live/recording.h"
+#include "apps/live/telemetry.h"
+#include "apps/live/watcher.h"
+#include "core/result.h"
+#include "scene/staging.h"
+
+namespace limn::apps {
+
+/// The projector side of a live session with all that people can do to it: what was watched and edited ->
+/// pictures. Belongs to the thread whose GL context is current.
+class Session {
+ public:
+  /// Looks are read from the scene's folder `looks` and, with `keeps_looks`, written to it; damaged ones are
+  /// named and left alone. `telemetry` and `recorder` may be null.
+  static Result<Session> create(const SessionSetup& setup,
+                                Telemetry* telemetry,
+                                Recorder* recorder,
+                                bool keeps_looks = true);
+
+  /// What a watcher knows now; its control uses become edits. `moments`: calls of watch() so far.
+  void take(Watched watched, std::size_t moments);
+  /// An edit of a person; one that cannot be done is told, and nothing changes. `source` says whose.
+  Status edit(const scene::Edit& edit, const std::string& source, Stamp at);
+
+  const Painted& paint(Stamp shown_at);
+  cv::Mat screen();
+
+  /// What was painted last.
+  const Painted& painted() const { return painter_.painted(); }
+  const scene::Staging& staging() const { return staging_; }
+  const Watched& watched() const { return watched_; }
+  const SessionSetup& setup() const { return setup_; }
+  /// In milliseconds, of the last paint() and of handing it over to the recording.
+  double paint_ms() const { return paint_ms_; }
+  double record_ms() const { return record_ms_; }
+
+ private:
+  Session(SessionSetup setup, Painter painter, Telemetry* telemetry, Recorder* recorder);
+  void load_looks();
+  Status keep_looks(const scene::Staging& before);
+
+  SessionSetup setup_;
+  Painter painter_;
+  Telemetry* telemetry_;
+  Recorder* recorder_;
+  bool keeps_looks_ = true;
+  scene::Staging staging_;
+  Watched watched_;
+  std::size_t moments_ = 0;
+  double paint_ms_ = 0, record_ms_ = 0;
+};
+
+}  // namespace limn::apps

@@ -1,0 +1,192 @@
+#include "apps/live/virtual_session.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <opencv2/core.hpp>
+
+#include "apps/live/books.h"
+#include "apps/live/keys.h"
+#include "core/log.h"
+
+namespace limn::apps {
+namespace {
+
+double seconds_of(Stamp at) { return seconds_between(Stamp{}, at); }
+double milliseconds_since(std::chrono::steady_clock::time_point begun) {
+  return 1e3 * seconds_between(begun, std::chrono::steady_clock::now());
+}
+
+// RMS distance of the parts' origins from where they truly are when the light arrives, on the prototype; -1
+// when none is shown.
+double placement_mm(const Painted& painted,
+                    const Session& session,
+                    const ScriptedRoom& room,
+                    const sim::World& world) {
+  std::vector<Track> truth;
+  const auto add = [&](const std::string& body, const Pose& world_from_body) {
+    truth.emplace_back();
+    truth.back().body = body;
+    truth.back().world_from_body = world_from_body;
+  };
+  const scene::Scene& scene = session.setup().scene;
+  if (scene.prototype) add("prototype", world.world_from_prototype);
+  const double at_s = seconds_of(painted.shown_at);
+  for (const scene::Slot& slot : scene.slots)
+    if (sim::world_from_marker(world, slot.marker)) add(slot.name, room.world_from_marker(slot.marker, at_s));
+  const scene::PosedScene right = scene::staged(scene, session.staging(), truth);
+  const auto base = [](const scene::PosedScene& posed) {
+    return posed.world_from_prototype ? posed.world_from_prototype->inverse() : Pose{};
+  };
+  double sum = 0;
+  int count = 0;
+  for (const scene::PosedPart& part : painted.posed.parts) {
+    for (const scene::PosedPart& other : right.parts) {
+      if (other.slot != part.slot) continue;
+      const Eigen::Vector3d off = base(painted.posed) * part.world_from_part.translation -
+                                  base(right) * other.world_from_part.translation;
+      sum += off.squaredNorm();
+      ++count;
+    }
+  }
+  return count > 0 ? 1e3 * std::sqrt(sum / count) : -1;
+}
+
+class VirtualLoop {
+ public:
+  VirtualLoop(sim::VirtualRig* rig,
+              ScriptedRoom* room,
+              Watcher* watcher,
+              Session* session,
+              Books* books,
+              std::optional<device::Window>* window)
+      : rig_(rig),
+        room_(room),
+        watcher_(watcher),
+        session_(session),
+        books_(books),
+        window_(window->has_value() ? &**window : nullptr),
+        keys_(session->setup().scene) {}
+
+  Status step() {
+    const Stamp exposed_at = rig_->next_exposure();
+    room_->set(seconds_of(exposed_at));
+    const std::vector<Frame> frames = exposed(exposed_at);
+    ShownFrame shown;
+    if (!frames.empty()) {
+      const auto begun = std::chrono::steady_clock::now();
+      if (books_->recorder()) books_->recorder()->watched(frames);
+      shown.record_ms = milliseconds_since(begun);
+      session_->take(watcher_->watch(frames), ++moments_);
+    }
+    play_edits(exposed_at);
+    const Painted& painted = session_->paint(shifted(rig_->now(), k_virtual_display_s));
+    for (std::size_t i = 0; i < painted.projectors.size(); ++i) {
+      if (!is_plugged(session_->setup().rig.projectors[i].name, rig_->now())) continue;
+      LIMN_TRY(const Stamp shown_at, rig_->projector(static_cast<int>(i)).show(painted.projectors[i]));
+      LIMN_CHECK(shown_at == painted.shown_at);
+    }
+    shown.screen_ms = show_screen();
+    count(painted, frames.size(), shown);
+    return {};
+  }
+
+ private:
+  // Milliseconds; -1 without a window.
+  double show_screen() {
+    if (!window_) return -1;
+    const auto begun = std::chrono::steady_clock::now();
+    const cv::Mat screen = session_->screen();
+    const double ms = milliseconds_since(begun);
+    if (!screen.empty()) window_->show(screen);
+    press(window_->pressed_key());
+    return ms;
+  }
+
+  std::vector<Frame> exposed(Stamp at) {
+    std::vector<int> plugged;
+    const std::vector<Imager>& cameras = rig_->world().rig.cameras;
+    for (std::size_t i = 0; i < cameras.size(); ++i)
+      if (is_plugged(cameras[i].name, at)) plugged.push_back(static_cast<int>(i));
+    return rig_->expose(plugged);
+  }
+
+  // Tells of a device that comes or goes.
+  bool is_plugged(const std::string& device, Stamp at) {
+    const bool is = room_->script().is_plugged(device, seconds_of(at));
+    const bool was = std::find(gone_.begin(), gone_.end(), device) == gone_.end();
+    if (is == was) return is;
+    if (is)
+      std::erase(gone_, device);
+    else
+      gone_.push_back(device);
+    const std::string what =
+        fmt::format("{} {}", device, is ? "is back" : "is gone; the session goes on without it");
+    books_->telemetry().note(at, what);
+    log_warning("live: {:.2f} s: {}", seconds_of(at), what);
+    return is;
+  }
+
+  void play_edits(Stamp at) {
+    const std::vector<Script::Action>& edits = room_->script().edits;
+    for (; played_ < edits.size() && edits[played_].at_s <= seconds_of(at); ++played_) {
+      const Status done = session_->edit(edits[played_].edit, "script", at);
+      if (!done) log_warning("live: {:.2f} s: {}", seconds_of(at), done.message());
+    }
+  }
+
+  void press(int key) {
+    const auto edit = keys_.edit_of(key);
+    const Status done = edit ? session_->edit(*edit, "key", rig_->now()) : Status();
+    if (!done) log_warning("live: {}", done.message());
+  }
+
+  void count(const Painted& painted, std::size_t frames, ShownFrame shown) {
+    const Watched& watched = session_->watched();
+    shown.captured_at = watched.captured_at;
+    shown.shown_at = painted.shown_at;
+    shown.detect_ms = watched.detect_ms;
+    shown.filter_ms = watched.filter_ms;
+    shown.paint_ms = session_->paint_ms();
+    shown.record_ms = session_->record_ms() >= 0 ? shown.record_ms + session_->record_ms() : -1;
+    for (const auto& detections : watched.detections) shown.markers += static_cast<int>(detections.size());
+    for (const Track& track : painted.tracks) shown.lost += track.sight == Sight::lost;
+    shown.missed = static_cast<int>(rig_->world().rig.cameras.size() - frames);
+    shown.placement_mm = placement_mm(painted, *session_, *room_, rig_->world());
+    books_->shown(shown, painted);
+  }
+
+  sim::VirtualRig* rig_;
+  ScriptedRoom* room_;
+  Watcher* watcher_;
+  Session* session_;
+  Books* books_;
+  device::Window* window_;
+  Keys keys_;
+  std::size_t moments_ = 0, played_ = 0;
+  std::vector<std::string> gone_;  // devices
+};
+
+}  // namespace
+
+Status play_virtually(double end_s,
+                      const std::atomic<bool>& is_ended,
+                      sim::VirtualRig* rig,
+                      ScriptedRoom* room,
+                      Watcher* watcher,
+                      Session* session,
+                      Books* books,
+                      std::optional<device::Window>* window) {
+  VirtualLoop loop(rig, room, watcher, session, books, window);
+  std::optional<Progress> progress;
+  if (std::isfinite(end_s)) progress.emplace("live", static_cast<int>(std::ceil(end_s)));
+  while (!is_ended && seconds_of(rig->next_exposure()) <= end_s) {
+    LIMN_TRY_STATUS(loop.step());
+    if (progress) progress->step(static_cast<int>(seconds_of(rig->now())));
+    if (*window && !(*window)->is_open()) break;
+  }
+  return {};
+}
+
+}  // namespace limn::apps

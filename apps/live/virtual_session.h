@@ -1,0 +1,30 @@
+#pragma once
+
+#include <atomic>
+#include <optional>
+
+#include "apps/live/books.h"
+#include "apps/live/script.h"
+#include "apps/live/session.h"
+#include "apps/live/watcher.h"
+#include "core/result.h"
+#include "device/window.h"
+#include "sim/virtual_rig.h"
+
+namespace limn::apps {
+
+/// The virtual rig's delays: 60 ms from a camera's exposure to the light of what was made of it.
+constexpr double k_virtual_camera_s = 0.020, k_virtual_display_s = 0.040;
+
+/// Plays a session on a virtual rig, on its clock: nothing sleeps, every run is the same. In step: expose,
+/// watch, paint, show. Ends at `end_s` of the clock, with `is_ended`, or when the window is closed.
+Status play_virtually(double end_s,
+                      const std::atomic<bool>& is_ended,
+                      sim::VirtualRig* rig,
+                      ScriptedRoom* room,
+                      Watcher* watcher,
+                      Session* session,
+                      Books* books,
+                      std::optional<device::Window>* window);
+
+}  // namespace limn::apps

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "core/frame.h"
+#include "core/result.h"
+#include "core/rig.h"
+#include "scene/scene.h"
+#include "tracker/body_motion.h"
+#include "tracker/detector.h"
+#include "tracker/gesture.h"
+
+namespace limn::apps {
+
+/// A control of the scene (by its index) was used: `steps` is -1 for a turn backwards.
+struct ControlUse {
+  std::size_t control = 0;
+  int steps = 1;
+};
+
+/// What is known after a moment's pictures.
+struct Watched {
+  std::vector<Frame> frames;                                ///< newest of each camera, in the rig's order
+  std::vector<std::vector<tracker::Detection>> detections;  ///< in them
+  std::vector<tracker::BodyMotion> motions;
+  std::vector<ControlUse> uses;  ///< made in this moment
+  Stamp captured_at;
+  double detect_ms = 0, filter_ms = 0;
+};
+
+struct WatchOptions {
+  /// Every how many pictures of a camera all of it is searched; between, markers are followed where they
+  /// were. Higher is faster and finds new markers later.
+  int full_scan_every = 3;
+  tracker::MotionModel motion;
+};
+
+/// The camera side of a session: frames -> markers -> motions of bodies, and gestures of control markers.
+/// The same frames give the same answers; no clock but the frames' stamps.
+class Watcher {
+ public:
+  /// Error: a family that cannot be loaded, a control whose gesture is unknown.
+  static Result<Watcher> create(const scene::Scene& scene, const Rig& rig, const WatchOptions& options = {});
+
+  /// Takes frames of one moment (at most one a camera; cameras without one keep what they saw). The result
+  /// stays valid until the next call.
+  const Watched& watch(std::span<const Frame> frames);
+  const Watched& watched() const { return watched_; }
+
+ private:
+  struct Eye {
+    tracker::Detector detector;
+    std::vector<tracker::GestureReader> gestures;  // one a control
+    int pictures = 0;
+    std::vector<tracker::Detection> followed;
+  };
+  Watcher() = default;
+  void look(std::size_t camera, const Frame& frame);
+  void read_gestures(std::span<const std::size_t> cameras);
+
+  Rig rig_;
+  WatchOptions options_;
+  std::vector<Body> bodies_;
+  std::vector<Eye> eyes_;       // one a camera
+  std::vector<Stamp> used_at_;  // one a control
+  Watched watched_;
+};
+
+}  // namespace limn::apps

@@ -1,0 +1,309 @@
+#include "scene/staging.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <sstream>
+
+#include "core/config.h"
+
+namespace limn::scene {
+namespace {
+
+constexpr double k_moved_m = 0.010, k_moved_rad = 5 * std::numbers::pi / 180;
+constexpr double k_most_nudge_mm = 1000;
+
+std::string list_of(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+  return list.empty() ? "none" : list;
+}
+
+std::vector<std::string> variant_names(const Slot& slot) {
+  std::vector<std::string> names;
+  for (const Variant& variant : slot.variants) names.push_back(variant.name);
+  return names;
+}
+
+std::vector<std::string> look_names(const Staging& staging) {
+  std::vector<std::string> names;
+  for (const Look& look : staging.looks) names.push_back(look.name);
+  return names;
+}
+
+const Track* find_shown(std::span<const Track> tracks, const std::string& body) {
+  const auto found = std::find_if(tracks.begin(), tracks.end(), [&](const Track& track) {
+    return track.body == body && track.sight != Sight::lost;
+  });
+  return found == tracks.end() ? nullptr : &*found;
+}
+
+// The element `steps` after `name`, round and round.
+const std::string& stepped(const std::vector<std::string>& names, const std::string& name, int steps) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  const int count = static_cast<int>(names.size());
+  // Before the first one stands nothing: a step on leads to it, a step back to the last.
+  const int at = found == names.end() ? (steps > 0 ? -1 : 0) : static_cast<int>(found - names.begin());
+  return names[static_cast<std::size_t>(((at + steps) % count + count) % count)];
+}
+
+Result<bool> switched(bool is_on, const Edit& edit) {
+  if (edit.value.empty() || edit.value == "toggle") return !is_on;
+  if (edit.value == "on") return true;
+  if (edit.value == "off") return false;
+  return error("{}: expected on, off or toggle, found '{}'.", edit.action, edit.value);
+}
+
+Result<Eigen::Vector3d> millimetres(const Edit& edit) {
+  std::istringstream text(edit.value);
+  Eigen::Vector3d mm;
+  std::string rest;
+  if (!(text >> mm.x() >> mm.y() >> mm.z()) || text >> rest || !(mm.cwiseAbs().maxCoeff() <= k_most_nudge_mm))
+    return error("nudge: expected three numbers of millimetres, at most {}, found '{}'.", k_most_nudge_mm,
+                 edit.value);
+  return mm;
+}
+
+bool is_file_name(const std::string& name) {
+  return !name.empty() && name.size() <= 64 && name.front() != '.' &&
+         std::all_of(name.begin(), name.end(), [](char c) {
+           return std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' || c == ' ' || c == '.';
+         });
+}
+
+std::string unused_look_name(const Staging& staging) {
+  const std::vector<std::string> names = look_names(staging);
+  for (int i = 1;; ++i) {
+    const std::string name = fmt::format("look-{:02}", i);
+    if (std::find(names.begin(), names.end(), name) == names.end()) return name;
+  }
+}
+
+Pose prototype_from_world(const PosedScene& posed) {
+  return posed.world_from_prototype ? posed.world_from_prototype->inverse() : Pose{};
+}
+
+Result<Staging> with_saved_look(Staging staging, const PosedScene& posed, const Edit& edit) {
+  Look look;
+  look.name = edit.value.empty() ? unused_look_name(staging) : edit.value;
+  if (!is_file_name(look.name))
+    return error("save_look: expected a name of letters, digits, blanks, '-', '_' and '.', found '{}'.",
+                 look.name);
+  for (const PosedPart& part : posed.parts)
+    look.parts.push_back({part.slot, part.variant, prototype_from_world(posed) * part.world_from_part});
+  staging.look = look.name;
+  std::erase_if(staging.looks, [&](const Look& known) { return known.name == look.name; });
+  staging.looks.push_back(std::move(look));
+  return staging;
+}
+
+Result<Staging> with_look(const Scene& scene, Staging staging, const std::string& name) {
+  const auto look = std::find_if(staging.looks.begin(), staging.looks.end(),
+                                 [&](const Look& known) { return known.name == name; });
+  if (look == staging.looks.end())
+    return error("restore_look: expected one of {}, found '{}'.", list_of(look_names(staging)), name);
+  for (const Look::Part& part : look->parts) {
+    for (std::size_t i = 0; i < scene.slots.size(); ++i) {
+      if (scene.slots[i].name != part.slot) continue;
+      staging.slots[i].variant = part.variant;
+      staging.slots[i].pin = Pin{part.prototype_from_part, std::nullopt};
+    }
+  }
+  staging.look = name;
+  return staging;
+}
+
+Result<Staging> with_screen(Staging staging, const Edit& edit) {
+  const std::vector<std::string>& names = screen_names();
+  const std::string name = edit.value.empty() || edit.value == "next"
+                               ? stepped(names, names[static_cast<std::size_t>(staging.screen)], 1)
+                               : edit.value;
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end())
+    return error("screen: expected one of {}, found '{}'.", list_of(names), edit.value);
+  staging.screen = static_cast<Screen>(found - names.begin());
+  return staging;
+}
+
+Result<Staging> edited_slot(const Slot& slot, std::size_t index, Staging staging, const Edit& edit) {
+  Staging::Slot& staged = staging.slots[index];
+  const std::vector<std::string> names = variant_names(slot);
+  if (edit.action == "next_variant") {
+    staged.variant = stepped(names, staged.variant, 1);
+  } else if (edit.action == "previous_variant") {
+    staged.variant = stepped(names, staged.variant, -1);
+  } else if (edit.action == "choose_variant") {
+    if (std::find(names.begin(), names.end(), edit.value) == names.end())
+      return error("choose_variant: expected a variant of slot '{}' ({}), found '{}'.", slot.name,
+                   list_of(names), edit.value);
+    staged.variant = edit.value;
+  } else if (edit.action == "nudge") {
+    LIMN_TRY(const Eigen::Vector3d mm, millimetres(edit));
+    staged.nudge += 1e-3 * mm;
+    if (staged.pin)
+      staged.pin->prototype_from_part =
+          staged.pin->prototype_from_part * Pose(Eigen::Quaterniond::Identity(), 1e-3 * mm);
+  } else {  // release
+    staged.nudge.setZero();
+    staged.pin.reset();
+  }
+  return staging;
+}
+
+}  // namespace
+
+const std::vector<std::string>& screen_names() {
+  static const std::vector<std::string> names = {"rest", "full", "camera", "view", "stereo", "off"};
+  return names;
+}
+
+Staging first_staging(const Scene& scene) {
+  Staging staging;
+  for (const Slot& slot : scene.slots) staging.slots.push_back({slot.variants.front().name, {}, {}});
+  for (Staging::Slot& slot : staging.slots) slot.nudge.setZero();
+  return staging;
+}
+
+const std::vector<Action>& actions() {
+  static const std::vector<Action> all = {
+      {"next_variant", true, "", "the slot's next variant"},
+      {"previous_variant", true, "", "the slot's previous variant"},
+      {"choose_variant", true, "a variant", "a variant by name"},
+      {"nudge", true, "three numbers, mm", "moves the part along its own axes"},
+      {"release", true, "", "the part follows its marker again, without nudges"},
+      {"save_look", false, "a name; empty: look-01 and so on", "keeps variants and places, as JSON and PNG"},
+      {"restore_look", false, "a look", "shows a look until its markers are moved"},
+      {"next_look", false, "", "the look after the one last shown"},
+      {"previous_look", false, "", "the look before it"},
+      {"delete_look", false, "a look", "forgets a look"},
+      {"blackout", false, "on, off or toggle", "bare model: no light"},
+      {"freeze", false, "on, off or toggle", "what is shown stays"},
+      {"marker_states", false, "on, off or toggle", "rings around markers: green seen, amber carried on"},
+      {"screen", false, "rest, full, camera, view, stereo, off or next", "what screens show"},
+  };
+  return all;
+}
+
+Result<Staging> edited(const Scene& scene,
+                       const Staging& staging,
+                       const PosedScene& posed,
+                       const Edit& edit) {
+  const auto action = std::find_if(actions().begin(), actions().end(),
+                                   [&](const Action& a) { return a.name == edit.action; });
+  if (action == actions().end()) {
+    std::vector<std::string> names;
+    for (const Action& known : actions()) names.push_back(known.name);
+    return error("edit: expected an action ({}), found '{}'.", list_of(names), edit.action);
+  }
+  if (action->of_slot) {
+    for (std::size_t i = 0; i < scene.slots.size(); ++i)
+      if (scene.slots[i].name == edit.slot) return edited_slot(scene.slots[i], i, staging, edit);
+    std::vector<std::string> names;
+    for (const Slot& slot : scene.slots) names.push_back(slot.name);
+    return error("{}: expected a slot of the scene ({}), found '{}'.", edit.action, list_of(names),
+                 edit.slot);
+  }
+  Staging out = staging;
+  if (edit.action == "save_look") return with_saved_look(std::move(out), posed, edit);
+  if (edit.action == "restore_look") return with_look(scene, std::move(out), edit.value);
+  if (edit.action == "next_look" || edit.action == "previous_look") {
+    if (staging.looks.empty()) return error("{}: expected a saved look, found none. Save one.", edit.action);
+    const int step = edit.action == "next_look" ? 1 : -1;
+    return with_look(scene, std::move(out), stepped(look_names(staging), staging.look, step));
+  }
+  if (edit.action == "delete_look") {
+    if (std::erase_if(out.looks, [&](const Look& look) { return look.name == edit.value; }) == 0)
+      return error("delete_look: expected one of {}, found '{}'.", list_of(look_names(staging)), edit.value);
+    if (out.look == edit.value) out.look.clear();
+    return out;
+  }
+  if (edit.action == "screen") return with_screen(std::move(out), edit);
+  bool Staging::*const flag = edit.action == "blackout" ? &Staging::blackout
+                              : edit.action == "freeze" ? &Staging::frozen
+                                                        : &Staging::marker_states;
+  LIMN_TRY(out.*flag, switched(staging.*flag, edit));
+  return out;
+}
+
+Staging unpinned(const Scene& scene, const Staging& staging, std::span<const Track> tracks) {
+  Staging out = staging;
+  const Track* prototype = find_shown(tracks, "prototype");
+  if (scene.prototype && !prototype) return out;
+  for (std::size_t i = 0; i < scene.slots.size(); ++i) {
+    std::optional<Pin>& pin = out.slots[i].pin;
+    const Track* track = pin ? find_shown(tracks, scene.slots[i].name) : nullptr;
+    if (!track) continue;
+    const Pose from_world = prototype ? prototype->world_from_body.inverse() : Pose{};
+    const Pose now = from_world * track->world_from_body;
+    if (!pin->prototype_from_marker) {
+      pin->prototype_from_marker = now;
+      continue;
+    }
+    const Pose& then = *pin->prototype_from_marker;
+    if ((now.translation - then.translation).norm() > k_moved_m ||
+        angle_between(now.rotation, then.rotation) > k_moved_rad)
+      pin.reset();
+  }
+  return out;
+}
+
+PosedScene staged(const Scene& scene, const Staging& staging, std::span<const Track> tracks) {
+  std::vector<std::string> variants;
+  for (const Staging::Slot& slot : staging.slots) variants.push_back(slot.variant);
+  PosedScene out = posed(scene, tracks, variants);
+  const bool has_base = out.world_from_prototype.has_value() || !scene.prototype;
+  const Pose world_from_base = out.world_from_prototype.value_or(Pose{});
+  for (std::size_t i = 0; i < scene.slots.size(); ++i) {
+    const Staging::Slot& slot = staging.slots[i];
+    const auto part = std::find_if(out.parts.begin(), out.parts.end(),
+                                   [&](const PosedPart& p) { return p.slot == scene.slots[i].name; });
+    if (slot.pin && has_base) {
+      const PosedPart pinned{scene.slots[i].name, slot.variant,
+                             world_from_base * slot.pin->prototype_from_part};
+      if (part == out.parts.end())
+        out.parts.push_back(pinned);
+      else
+        *part = pinned;
+    } else if (part != out.parts.end()) {
+      part->world_from_part = part->world_from_part * Pose(Eigen::Quaterniond::Identity(), slot.nudge);
+    }
+  }
+  return out;
+}
+
+std::string look_json(const Look& look) {
+  nlohmann::ordered_json json = {{"schema", "limn.look/1"}, {"name", look.name}};
+  json["slots"] = nlohmann::ordered_json::object();
+  for (const Look::Part& part : look.parts)
+    json["slots"][part.slot] = {{"variant", part.variant},
+                                {"prototype_from_part", to_json(part.prototype_from_part)}};
+  return json.dump(2) + "\n";
+}
+
+Result<Look> load_look(const std::filesystem::path& path, const Scene& scene) {
+  LIMN_TRY(const Config config, Config::load(path, "limn.look/1"));
+  const ConfigNode root = config.root();
+  root.only({"schema", "name", "slots"});
+  Look look;
+  look.name = root.at("name").text();
+  if (!is_file_name(look.name))
+    root.at("name").problem(fmt::format("expected a name, found '{}'.", look.name));
+  const ConfigNode slots = root.at("slots");
+  for (const std::string& name : slots.keys()) {
+    const ConfigNode node = slots.at(name);
+    node.only({"variant", "prototype_from_part"});
+    const Slot* slot = scene.find_slot(name);
+    if (!slot) {
+      node.problem("expected a slot of the scene, found another name.");
+      break;
+    }
+    look.parts.push_back(
+        {name, node.at("variant").choice(variant_names(*slot)), node.at("prototype_from_part").pose()});
+  }
+  LIMN_TRY_STATUS(config.status());
+  return look;
+}
+
+}  // namespace limn::scene

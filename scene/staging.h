@@ -1,0 +1,94 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+#include "core/track.h"
+#include "scene/posed.h"
+#include "scene/scene.h"
+
+namespace limn::scene {
+
+/// What a large screen shows.
+enum class Screen {
+  rest,    ///< camera picture and what light cannot show
+  full,    ///< camera picture and whole parts
+  camera,  ///< camera picture alone
+  view,    ///< prototype and parts from the viewer's eye
+  stereo,  ///< the same for two eyes, side by side
+  off
+};
+const std::vector<std::string>& screen_names();  ///< in the order of Screen
+
+/// An arrangement to come back to: which variants, and where they stood on the prototype.
+struct Look {
+  struct Part {
+    std::string slot;
+    std::string variant;
+    Pose prototype_from_part;  ///< world_from_part in a scene without a prototype
+  };
+  std::string name;
+  std::vector<Part> parts;
+};
+
+/// A part held where a look had it, until its marker is moved.
+struct Pin {
+  Pose prototype_from_part;
+  std::optional<Pose> prototype_from_marker;  ///< where the marker stood then; absent until it is seen
+};
+
+/// What the people around the prototype have chosen, on top of what the project's files say.
+struct Staging {
+  struct Slot {
+    std::string variant;
+    Eigen::Vector3d nudge = Eigen::Vector3d::Zero();  ///< along the part's own axes, m
+    std::optional<Pin> pin;
+  };
+  std::vector<Slot> slots;  ///< in the scene's order
+  std::vector<Look> looks;
+  std::string look;            ///< the one last saved or restored; empty: none
+  bool blackout = false;       ///< bare model: projectors give no light
+  bool frozen = false;         ///< what is shown stays as it is
+  bool marker_states = false;  ///< rings around markers say how they are tracked
+  Screen screen = Screen::rest;
+};
+
+/// Each slot's first variant, no looks.
+Staging first_staging(const Scene& scene);
+
+/// One action of a person: by control marker, key, script or another program.
+struct Edit {
+  std::string action;  ///< by its name in actions()
+  std::string slot;    ///< of actions on a slot
+  std::string value;   ///< as the action wants it; may be empty
+};
+
+/// What can be done, for people and programs alike.
+struct Action {
+  std::string name;
+  bool of_slot = false;
+  std::string value;  ///< what Edit::value says; empty: nothing
+  std::string what;
+};
+const std::vector<Action>& actions();
+
+/// The staging after an edit. `posed` is what was shown last: looks are saved from it. Error, and nothing has
+/// changed: an unknown action, slot, variant or look, or a value that is not what the action wants.
+Result<Staging> edited(const Scene& scene, const Staging& staging, const PosedScene& posed, const Edit& edit);
+
+/// The staging once pins have gone of parts whose marker was moved on the prototype by more than 10 mm or 5
+/// degrees since it was first seen under the pin.
+Staging unpinned(const Scene& scene, const Staging& staging, std::span<const Track> tracks);
+
+/// The scene as tracks and people place it: posed() with the chosen variants, nudged, pinned parts where
+/// their look had them.
+PosedScene staged(const Scene& scene, const Staging& staging, std::span<const Track> tracks);
+
+/// limn.look/1 as text, and back. Error: unknown slots or variants, numbers that are no pose.
+std::string look_json(const Look& look);
+Result<Look> load_look(const std::filesystem::path& path, const Scene& scene);
+
+}  // namespace limn::scene

@@ -1,0 +1,291 @@
+#include "apps/live/live.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+
+#include "apps/coarser.h"
+#include "apps/live/replay.h"
+#include "apps/live/room.h"
+#include "apps/live/script.h"
+#include "apps/live/watcher.h"
+#include "apps/world_markers.h"
+#include "core/file.h"
+#include "core/picture.h"
+#include "sim/virtual_rig.h"
+#include "tests/support/matchers.h"
+#include "tracker/predict.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr const char* k_mirror = "aruco_4x4_50:0";  // the marker of the door's slot
+
+sim::World studio(double resolution) {
+  sim::World world =
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture).value();
+  EXPECT_TRUE(make_coarser(resolution, &world.rig).ok());
+  return world;
+}
+
+json script_of(double seconds, const json& events) {
+  return {{"schema", "limn.script/1"}, {"seconds", seconds}, {"events", events}};
+}
+
+fs::path written(const fs::path& path, const json& content) {
+  EXPECT_TRUE(write_file(path, content.dump(2)));
+  return path;
+}
+
+json read_json(const fs::path& path) {
+  const auto text = read_file(path);
+  return text ? json::parse(*text) : json();
+}
+
+std::vector<std::string> lines_of(const fs::path& path) {
+  std::ifstream file(path);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(file, line);) lines.push_back(line);
+  return lines;
+}
+
+// Light on a marker in a hand arrives where the marker then is: 0.5 Hz, 0.25 m/s at most, 60 ms late.
+TEST(Live, PredictionMakesUpForTheLag) {
+  constexpr double k_lag_s = 0.060, k_begins_s = 0.5, k_ends_s = 2.0, k_runs_s = 2.4;
+  constexpr double k_amplitude_m = 0.25 / (2 * M_PI * 0.5);
+  const fs::path folder = test::test_folder();
+  const auto script = load_script(
+      written(folder / "script.json", script_of(k_runs_s, {{{"at_s", k_begins_s},
+                                                            {"until_s", k_ends_s},
+                                                            {"sway", k_mirror},
+                                                            {"amplitude_m", {k_amplitude_m, 0, 0}},
+                                                            {"hz", 0.5}}})));
+  ASSERT_TRUE(script) << script.message();
+  const MarkerName marker = MarkerName::parse(k_mirror).value();
+  sim::World world = studio(1);
+  const Pose world_from_marker = *sim::world_from_marker(world, marker);
+  const Eigen::Vector3d p_eye = world.rig.cameras[0].imager_from_world.inverse().translation;
+  const Pose camera_from_world = looking_at(p_eye, world_from_marker.translation, Eigen::Vector3d::UnitZ());
+  world.rig.cameras[0] = viewer_imager(camera_from_world.inverse(), 640, 320, 11);  // the marker: 62 px
+  world.rig.cameras[0].name = "camera0";
+  sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
+  auto room = ScriptedRoom::create(*script, &rig);
+  ASSERT_TRUE(room) << room.message();
+  auto watcher = Watcher::create(*rig.world().scene, rig.world().rig);
+  ASSERT_TRUE(watcher) << watcher.message();
+  double filtered = 0, held = 0, still = 0, overshoot_m = 0;
+  int moving = 0, resting = 0;
+  while (rig.next_exposure() < shifted(Stamp{}, k_runs_s)) {
+    const double captured_s = seconds_between(Stamp{}, rig.next_exposure());
+    room->set(captured_s);
+    const int camera = 0;
+    const Watched& watched = watcher->watch(rig.expose(std::span(&camera, 1)));
+    const double shown_s = captured_s + k_lag_s;
+    const Eigen::Vector3d p_true = room->world_from_marker(marker, shown_s).translation;
+    const auto off = [&](tracker::Prediction how) {
+      for (const Track& track : tracker::predicted(watched.motions, shifted(Stamp{}, shown_s), how))
+        if (track.body == "mirror") return (track.world_from_body.translation - p_true).norm();
+      return 1.0;
+    };
+    const double now = off(tracker::Prediction::filtered);
+    if (shown_s > 0.3 && shown_s < k_begins_s) {
+      still += now * now;
+      ++resting;
+    }
+    if (shown_s > k_begins_s + 0.3 && shown_s < k_ends_s) {
+      filtered += now * now;
+      held += std::pow(off(tracker::Prediction::hold), 2);
+      ++moving;
+    }
+    if (shown_s >= k_ends_s) overshoot_m = std::max(overshoot_m, now);  // at the turn, where it stops
+  }
+  const double filtered_mm = 1e3 * std::sqrt(filtered / moving), held_mm = 1e3 * std::sqrt(held / moving);
+  std::printf("in motion %.2f mm RMS, without prediction %.2f; after the stop at most %.2f; still %.3f\n",
+              filtered_mm, held_mm, 1e3 * overshoot_m, 1e3 * std::sqrt(still / resting));
+  EXPECT_LE(filtered_mm, 1.5);
+  EXPECT_LE(filtered_mm, 0.15 * held_mm);
+  EXPECT_LE(1e3 * overshoot_m, 3);
+  EXPECT_LE(1e3 * std::sqrt(still / resting), 0.1);
+}
+
+TEST(Live, ASessionIsReplayedToTheLastDigit) {
+  const fs::path folder = test::test_folder();
+  LiveOptions options;
+  options.resolution = 0.5;
+  options.script = written(
+      folder / "script.json",
+      script_of(0.7,
+                {{{"at_s", 0.2},
+                  {"move", k_mirror},
+                  {"home_from_marker", {{"rotation_wxyz", {1, 0, 0, 0}}, {"translation_m", {0.012, 0, 0}}}}},
+                 {{"at_s", 0.4}, {"edit", {{"action", "next_variant"}, {"slot", "mirror"}}}},
+                 {{"at_s", 0.5}, {"edit", {{"action", "marker_states"}}}},
+                 {{"at_s", 0.6}, {"edit", {{"action", "next_variant"}, {"slot", "no"}}}}}));
+  options.record = folder / "recording";
+  options.out = folder / "out";
+  const Status lived = run_live(options);
+  ASSERT_TRUE(lived.ok()) << lived.message();
+  const json summary = read_json(folder / "out/session.json");
+  EXPECT_EQ(summary.at("pictures"), 21);
+  EXPECT_LT(summary.at("placement_mm").at("median").get<double>(), 0.3);
+  EXPECT_NEAR(summary.at("latency_ms").at("median").get<double>(), 60, 1.5);  // the quantiles' bins
+  EXPECT_NE(read_file(folder / "out/session.html").value().find("next_variant mirror (script)"),
+            std::string::npos);
+  EXPECT_TRUE(fs::exists(folder / "out/projector-projector0.png"));
+  const auto poses = lines_of(folder / "out/poses.csv");
+  EXPECT_EQ(poses.size(), 1 + 21u * 2);
+  EXPECT_NE(poses.back().find(",trim,"), std::string::npos);
+
+  ReplayOptions replay;
+  replay.session = folder / "recording";
+  replay.out = folder / "replayed";
+  const Status replayed = run_replay(replay);
+  EXPECT_TRUE(replayed.ok()) << replayed.message();
+  EXPECT_EQ(poses, lines_of(folder / "replayed/poses.csv"));
+
+  // A digit of a pose, a bit of a frame, an end in the middle of a line: named.
+  auto events = lines_of(folder / "recording/events.jsonl");
+  const auto with = [&](const std::vector<std::string>& lines) {
+    std::string text;
+    for (const std::string& line : lines) text += line + "\n";
+    EXPECT_TRUE(write_file(folder / "recording/events.jsonl", text));
+    return run_replay(replay);
+  };
+  auto other = events;
+  other.resize(4);
+  const auto digit = other[1].find("translation_m\":[") + 19;
+  other[1][digit] = other[1][digit] == '1' ? '2' : '1';
+  const Status one_off = with(other);
+  ASSERT_FALSE(one_off.ok());
+  EXPECT_NE(one_off.message().find("1 of 2 pictures"), std::string::npos) << one_off.message();
+  auto cut = events;
+  cut.resize(5);
+  cut.back().resize(20);
+  const Status damaged = with(cut);
+  ASSERT_FALSE(damaged.ok());
+  EXPECT_NE(damaged.message().find("events.jsonl:5"), std::string::npos) << damaged.message();
+}
+
+// A camera goes and comes back: parts are carried on, fade, and are there again.
+TEST(Live, GoesOnWithoutItsCamera) {
+  const fs::path folder = test::test_folder();
+  LiveOptions options;
+  options.resolution = 0.5;
+  options.script = written(folder / "script.json",
+                           script_of(1.6, {{{"at_s", 0.3}, {"until_s", 1.3}, {"unplug", "camera0"}}}));
+  options.out = folder / "out";
+  options.record = folder / "recording";
+  const Status lived = run_live(options);
+  ASSERT_TRUE(lived.ok()) << lived.message();
+  const json summary = read_json(folder / "out/session.json");
+  EXPECT_EQ(summary.at("missed_frames"), 30);
+  EXPECT_GT(summary.at("pictures_with_lost_bodies").get<int>(), 15);
+  int dark = 0;
+  for (const std::string& line : lines_of(folder / "recording/events.jsonl"))
+    if (const json event = json::parse(line); event.contains("paint"))
+      dark += event["paint"]["parts"].empty();
+  EXPECT_GT(dark, 15);
+  // Nothing is left on where nothing is known, and in the end all is there again.
+  EXPECT_GT(cv::countNonZero(read_grey_picture(folder / "out/projector-projector0.png").value()), 1000);
+  EXPECT_NE(read_file(folder / "out/session.html").value().find("camera0 is back"), std::string::npos);
+}
+
+TEST(Live, MakesARoomForARigAndAScene) {
+  const sim::World studio_world = studio(0.5);
+  const auto room = room_for(studio_world.rig, *studio_world.scene);
+  ASSERT_TRUE(room) << room.message();
+  sim::VirtualRig rig(*room, {.grab_waits_for_light = false});
+  auto watcher = Watcher::create(*room->scene, room->rig);
+  ASSERT_TRUE(watcher);
+  const int camera = 0;
+  const Watched& watched = watcher->watch(rig.expose(std::span(&camera, 1)));
+  EXPECT_EQ(watched.motions.size(), 3u);  // the door and both slots
+}
+
+TEST(Live, ReadsWhatControlMarkersSay) {
+  sim::World world = studio(0.5);
+  world.scene->controls = {{MarkerName::parse("aruco_4x4_50:9").value(), "next_variant", "mirror", "cover"}};
+  ASSERT_TRUE(
+      sim::add_marker(world,
+                      {world.scene->controls[0].marker, 0.05,
+                       Pose(Eigen::Quaterniond(0.707106781, -0.707106781, 0, 0), {-0.35, -0.15, 0.45})},
+                      false, marker_picture));
+  const fs::path folder = test::test_folder();
+  const auto script =
+      load_script(written(folder / "script.json",
+                          script_of(2, {{{"at_s", 0.4}, {"until_s", 1.5}, {"cover", "aruco_4x4_50:9"}}})));
+  ASSERT_TRUE(script) << script.message();
+  const scene::Scene scene = *world.scene;
+  sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
+  auto room = ScriptedRoom::create(*script, &rig);
+  auto watcher = Watcher::create(scene, rig.world().rig);
+  ASSERT_TRUE(room);
+  ASSERT_TRUE(watcher);
+  std::vector<double> used_s;
+  for (int i = 0; i < 55; ++i) {
+    const double at_s = seconds_between(Stamp{}, rig.next_exposure());
+    room->set(at_s);
+    const int camera = 0;
+    for (const ControlUse& use : watcher->watch(rig.expose(std::span(&camera, 1))).uses) {
+      EXPECT_EQ(use.control, 0u);
+      EXPECT_EQ(use.steps, 1);
+      used_s.push_back(at_s);
+    }
+  }
+  ASSERT_EQ(used_s.size(), 1u);
+  EXPECT_GT(used_s[0], 0.85);
+  EXPECT_LT(used_s[0], 1.05);
+}
+
+TEST(Live, SaysWhatIsWrong) {
+  const fs::path folder = test::test_folder();
+  const auto message = [](const LiveOptions& options) {
+    const Status status = run_live(options);
+    return status.ok() ? std::string("no error") : status.message();
+  };
+  LiveOptions one;
+  one.rig = folder;
+  EXPECT_NE(message(one).find("--rig and --scene together"), std::string::npos);
+  LiveOptions script;
+  script.script = written(folder / "a.json", script_of(1, {{{"at_s", 0.2}, {"dance", "x"}}}));
+  EXPECT_NE(message(script).find("events[0]: expected one of sway, move, cover, unplug, edit"),
+            std::string::npos)
+      << message(script);
+  script.script =
+      written(folder / "b.json", script_of(1, {{{"at_s", 2}, {"until_s", 1}, {"cover", k_mirror}}}));
+  EXPECT_NE(message(script).find("until_s"), std::string::npos);
+  script.script =
+      written(folder / "c.json", script_of(1, {{{"at_s", 0}, {"until_s", 1}, {"cover", "aruco_4x4_50:44"}}}));
+  EXPECT_NE(message(script).find("a marker that stands in the room"), std::string::npos);
+  LiveOptions other_rig;  // of other devices
+  sim::World world = studio(1);
+  world.rig.projectors[1].width = 1024;
+  ASSERT_TRUE(save_rig(world.rig, folder / "rig"));
+  other_rig.rig = folder / "rig";
+  other_rig.scene = world.scene->folder;
+  other_rig.world = fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json";
+  EXPECT_NE(message(other_rig).find("projector1: expected the device's size 1280x800, found 1024x800"),
+            std::string::npos)
+      << message(other_rig);
+  LiveOptions twice;
+  twice.seconds = 0.04;
+  twice.resolution = 0.5;
+  twice.record = folder / "recording";
+  ASSERT_TRUE(write_file(folder / "recording/session.json", "{}").ok() ||
+              make_folder(folder / "recording").ok());
+  ASSERT_TRUE(write_file(folder / "recording/session.json", "{}"));
+  EXPECT_NE(message(twice).find("expected a folder without a session"), std::string::npos) << message(twice);
+  ReplayOptions replay;
+  replay.session = folder / "none";
+  EXPECT_FALSE(run_replay(replay).ok());
+}
+
+}  // namespace
+}  // namespace limn::apps

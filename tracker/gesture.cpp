@@ -1,0 +1,174 @@
+#include "tracker/gesture.h"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+
+namespace limn::tracker {
+namespace {
+
+constexpr double k_armed_s = 0.2;  // seen for so long before a gesture counts
+constexpr double k_gap_s = 0.15;   // shorter absences are the detector's, not a hand's
+constexpr double k_rest_s = 0.1;   // a turn counts when the marker has come to rest
+constexpr double k_rest_rad = 0.05;
+constexpr double k_neighbour_sides = 5;  // how near another marker stands that an arm hides as well
+constexpr double k_memory_s = 3;
+constexpr double k_patch_sides = 3;  // of what is watched for stillness: a hand's outline is in it
+constexpr int k_patch_cells = 20;
+constexpr int k_few_cells = 4;
+
+double direction(const Detection& detection) {
+  const Eigen::Vector2d d =
+      detection.corners_px[1] + detection.corners_px[2] - detection.corners_px[0] - detection.corners_px[3];
+  return std::atan2(d.y(), d.x());
+}
+
+double wrapped(double angle) { return std::remainder(angle, 2 * std::numbers::pi); }
+
+Eigen::Vector2d centre(const std::array<Eigen::Vector2d, 4>& corners) {
+  return 0.25 * (corners[0] + corners[1] + corners[2] + corners[3]);
+}
+
+double area(const std::array<Eigen::Vector2d, 4>& corners) {
+  double twice = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Eigen::Vector2d &a = corners[i], &b = corners[(i + 1) % 4];
+    twice += a.x() * b.y() - a.y() * b.x();
+  }
+  return 0.5 * std::abs(twice);
+}
+
+// By how much a square is turned away, from how it is foreshortened (as if seen from far away).
+double tilt(const std::array<Eigen::Vector2d, 4>& c) {
+  Eigen::Matrix2d sides;
+  sides << c[1] + c[2] - c[0] - c[3], c[2] + c[3] - c[0] - c[1];
+  const Eigen::Vector2d stretch = sides.jacobiSvd().singularValues();
+  return std::acos(std::clamp(stretch(1) / stretch(0), 0.0, 1.0));
+}
+
+// The marker's place and one side more all around it, as means over cells.
+cv::Mat patch_of(const cv::Mat& grey, const std::array<Eigen::Vector2d, 4>& corners) {
+  const Eigen::Vector2d px = centre(corners);
+  const double half = 0.5 * k_patch_sides * std::sqrt(area(corners));
+  const cv::Rect box =
+      cv::Rect(cvRound(px.x() - half), cvRound(px.y() - half), cvCeil(2 * half), cvCeil(2 * half)) &
+      cv::Rect(0, 0, grey.cols, grey.rows);
+  cv::Mat patch;
+  if (box.width >= k_patch_cells && box.height >= k_patch_cells)
+    cv::resize(grey(box), patch, {k_patch_cells, k_patch_cells}, 0, 0, cv::INTER_AREA);
+  return patch;
+}
+
+bool is_still(const cv::Mat& a, const cv::Mat& b, double levels) {
+  if (a.empty() || b.empty() || a.size() != b.size()) return false;
+  cv::Mat difference;
+  cv::absdiff(a, b, difference);
+  return cv::countNonZero(difference > levels) < k_few_cells;
+}
+
+}  // namespace
+
+GestureReader::GestureReader(MarkerName marker, Gesture gesture, const GestureOptions& options)
+    : marker_(std::move(marker)), gesture_(gesture), options_(options) {}
+
+int GestureReader::read(const cv::Mat& grey, std::span<const Detection> detections, Stamp captured_at) {
+  const auto found = std::find_if(detections.begin(), detections.end(),
+                                  [&](const Detection& d) { return d.marker == marker_; });
+  is_seen_ = found != detections.end();
+  note_neighbours(detections, captured_at);
+  return is_seen_ ? seen(grey, *found, captured_at) : hidden(grey, captured_at);
+}
+
+int GestureReader::seen(const cv::Mat& grey, const Detection& detection, Stamp at) {
+  if (seen_at_ == Stamp{} || seconds_between(seen_at_, at) > k_gap_s) seen_since_ = at;
+  seen_at_ = at;
+  corners_px_ = detection.corners_px;
+  patch_ = patch_of(grey, corners_px_);
+  patch_since_ = at;
+  if (seconds_between(seen_since_, at) >= k_armed_s) is_armed_ = true;
+  if (gesture_ == Gesture::turn) return turned(detection, at);
+  if (gesture_ == Gesture::lay) return laid(detection, at);
+  return 0;
+}
+
+int GestureReader::hidden(const cv::Mat& grey, Stamp at) {
+  if (gesture_ == Gesture::turn) return 0;
+  if (!is_armed_ || is_tipped_) return 0;
+  const double still = still_for(grey, at);
+  if (seconds_between(seen_at_, at) < options_.cover_s || still < options_.still_s || hides_across(at))
+    return 0;
+  is_armed_ = false;
+  return 1;
+}
+
+int GestureReader::turned(const Detection& detection, Stamp at) {
+  const double now = direction(detection);
+  if (!turn_rest_) turn_rest_ = now;
+  if (std::abs(wrapped(now - turn_now_)) > k_rest_rad) {
+    turn_now_ = now;
+    turn_since_ = at;
+  }
+  const double step = options_.turn_deg * std::numbers::pi / 180;
+  const double turn = wrapped(now - *turn_rest_);
+  if (std::abs(turn) < step || seconds_between(turn_since_, at) < k_rest_s) return 0;
+  turn_rest_ = now;
+  return turn > 0 ? 1 : -1;  // y points down: clockwise as seen
+}
+
+int GestureReader::laid(const Detection& detection, Stamp at) {
+  const double now = tilt(detection.corners_px);
+  if (!is_armed_) return 0;
+  if (!tilt_rest_) tilt_rest_ = now;
+  const double tipped = std::abs(now - *tilt_rest_) / (options_.lay_deg * std::numbers::pi / 180);
+  if (tipped < 0.5) is_tipped_ = false;
+  if (tipped < 1 || is_tipped_) {
+    tipped_since_ = at;
+    return 0;
+  }
+  if (seconds_between(tipped_since_, at) < options_.still_s) return 0;
+  is_tipped_ = true;
+  return 1;
+}
+
+void GestureReader::note_neighbours(std::span<const Detection> detections, Stamp at) {
+  for (const Detection& detection : detections) {
+    if (detection.marker == marker_) continue;
+    const Eigen::Vector2d px = centre(detection.corners_px);
+    const auto known = std::find_if(neighbours_.begin(), neighbours_.end(),
+                                    [&](const Neighbour& n) { return n.marker == detection.marker; });
+    if (known == neighbours_.end())
+      neighbours_.push_back({detection.marker, px, at});
+    else
+      *known = {detection.marker, px, at};
+  }
+  if (is_seen_)
+    std::erase_if(neighbours_,
+                  [&](const Neighbour& n) { return seconds_between(n.seen_at, at) > k_memory_s; });
+}
+
+// Whether what hides this marker reaches beyond it on both sides, as an arm does that lies across.
+bool GestureReader::hides_across(Stamp at) const {
+  const double reach = k_neighbour_sides * std::sqrt(area(corners_px_));
+  std::vector<Eigen::Vector2d> hidden;
+  for (const Neighbour& n : neighbours_) {
+    const Eigen::Vector2d d = n.px - centre(corners_px_);
+    if (seconds_between(n.seen_at, at) > k_gap_s && d.norm() < reach) hidden.push_back(d.normalized());
+  }
+  return std::any_of(hidden.begin(), hidden.end(), [&](const Eigen::Vector2d& a) {
+    return std::any_of(hidden.begin(), hidden.end(), [&](const Eigen::Vector2d& b) { return a.dot(b) < 0; });
+  });
+}
+
+// For how long the marker's place has looked as it does.
+double GestureReader::still_for(const cv::Mat& grey, Stamp at) {
+  const cv::Mat now = patch_of(grey, corners_px_);
+  if (!is_still(now, patch_, options_.still_levels)) {
+    patch_ = now;
+    patch_since_ = at;
+  }
+  return seconds_between(patch_since_, at);
+}
+
+}  // namespace limn::tracker
