@@ -316,8 +316,15 @@ Status run_render(const RenderOptions& options) {
   }
   LIMN_TRY_STATUS(write_composites(&renderer, options, rig, frames, posed));
   if (!options.view.empty()) LIMN_TRY_STATUS(write_view(options, posed, &renderer));
-  return write_coverage(renderer.coverage(posed, viewer), viewer, light_report(options.light, rig, renderer),
-                        options.out);
+  const std::vector<projector::PartCoverage> coverage = renderer.coverage(posed, viewer);
+  for (const projector::PartCoverage& part : coverage)
+    if (part.viewer_pixels == 0)
+      log_warning(
+          "render: the viewer sees nothing of '{}': the prototype hides it, the viewer stands behind, or "
+          "looks "
+          "elsewhere",
+          part.slot);
+  return write_coverage(coverage, viewer, light_report(options.light, rig, renderer), options.out);
 }
 
 }  // namespace limn::apps

@@ -14,6 +14,7 @@ struct GlContext::Impl {
   EGLDisplay display = EGL_NO_DISPLAY;
   EGLContext context = EGL_NO_CONTEXT;
   std::string description;
+  bool is_robust = false, is_lost = false;
 
   // The display stays initialised: it is the process's, and other contexts may live on it.
   ~Impl() {
@@ -59,21 +60,26 @@ std::vector<EGLDisplay> candidate_displays() {
   return displays;
 }
 
-EGLContext create_context(EGLDisplay display) {
+// One that tells when it is lost, where the driver has such.
+EGLContext create_context(EGLDisplay display, bool* is_robust) {
   EGLint major = 0, minor = 0;
   if (!eglInitialize(display, &major, &minor) || !eglBindAPI(EGL_OPENGL_API)) return EGL_NO_CONTEXT;
   const EGLint config_wanted[] = {EGL_SURFACE_TYPE, 0, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE};
   EGLConfig config = nullptr;
   EGLint count = 0;
   if (!eglChooseConfig(display, config_wanted, &config, 1, &count) || count < 1) return EGL_NO_CONTEXT;
-  const EGLint context_wanted[] = {EGL_CONTEXT_MAJOR_VERSION,
-                                   4,
-                                   EGL_CONTEXT_MINOR_VERSION,
-                                   5,
-                                   EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                                   EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-                                   EGL_NONE};
-  return eglCreateContext(display, config, EGL_NO_CONTEXT, context_wanted);
+  std::vector<EGLint> wanted = {EGL_CONTEXT_MAJOR_VERSION,       4,
+                                EGL_CONTEXT_MINOR_VERSION,       5,
+                                EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT};
+  std::vector<EGLint> robust = wanted;
+  robust.insert(robust.end(), {EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY, EGL_LOSE_CONTEXT_ON_RESET});
+  for (std::vector<EGLint>* attributes : {&robust, &wanted}) {
+    attributes->push_back(EGL_NONE);
+    const EGLContext context = eglCreateContext(display, config, EGL_NO_CONTEXT, attributes->data());
+    *is_robust = context != EGL_NO_CONTEXT && attributes == &robust;
+    if (context != EGL_NO_CONTEXT) return context;
+  }
+  return EGL_NO_CONTEXT;
 }
 
 }  // namespace
@@ -94,7 +100,7 @@ Result<GlContext> GlContext::create() {
   for (const EGLDisplay display : displays) {
     auto impl = std::make_unique<Impl>();
     impl->display = display;
-    impl->context = create_context(display);
+    impl->context = create_context(display, &impl->is_robust);
     if (impl->context == EGL_NO_CONTEXT) continue;
     if (!eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, impl->context)) continue;
     impl->description = fmt::format("{}, {}", reinterpret_cast<const char*>(glGetString(GL_RENDERER)),
@@ -111,6 +117,13 @@ void GlContext::make_current() const {
   eglBindAPI(EGL_OPENGL_API);
   LIMN_CHECK(eglMakeCurrent(impl_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, impl_->context));
 }
+
+bool GlContext::is_lost() const {
+  if (glGetGraphicsResetStatus() != GL_NO_ERROR) impl_->is_lost = true;  // told until the reset is over
+  return impl_->is_lost;
+}
+
+bool GlContext::is_robust() const { return impl_->is_robust; }
 
 const std::string& GlContext::description() const { return impl_->description; }
 

@@ -20,6 +20,12 @@ class GlContext {
 
   /// Makes it current on the calling thread again, after a window's.
   void make_current() const;
+  /// Whether the driver has given the context up (a GPU reset, its driver replaced). Then nothing is drawn
+  /// any more; calls stay harmless. Let go of what lives in it, then of it, and create another. Must be
+  /// current; always false where the driver cannot tell (is_robust).
+  bool is_lost() const;
+  /// Whether the driver promised to tell.
+  bool is_robust() const;
   /// GL_RENDERER and GL_VERSION, for reports: "llvmpipe (LLVM 15.0.6, 256 bits), 4.5 (Core Profile)
   /// Mesa 22.3.6".
   const std::string& description() const;

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
+#include "core/log.h"
 #include "core/result.h"
 
 namespace limn::projector {
@@ -27,6 +29,13 @@ GlName buffer_of(const std::vector<T>& items) {
   return make_buffer(items.data(), items.size() * sizeof(T));
 }
 
+std::size_t triangles_of(const scene::Scene& scene) {
+  std::size_t count = scene.prototype ? scene.prototype->mesh.triangles.size() : 0;
+  for (const scene::Slot& slot : scene.slots)
+    for (const scene::Variant& variant : slot.variants) count += variant.mesh.triangles.size();
+  return count;
+}
+
 int level_count(int side) { return 1 + static_cast<int>(std::floor(std::log2(side))); }
 
 }  // namespace
@@ -35,11 +44,27 @@ struct GpuScene::Staging {
   std::vector<Eigen::Vector4f> corners, normals;
   std::vector<std::array<std::uint32_t, 2>> owners;
   std::vector<GpuMaterial> materials;
-  std::vector<cv::Mat> textures;
+  std::vector<const scene::Material*> looks;  // those with a texture
 };
+
+Status GpuScene::check_fits(const scene::Scene& scene) {
+  GLint64 largest = 0;
+  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &largest);
+  const std::size_t most = static_cast<std::size_t>(largest) / (3 * sizeof(Eigen::Vector4f));
+  const std::size_t count = triangles_of(scene);
+  if (count <= most) return {};
+  return error(
+      "scene: expected at most {} triangles in the prototype and all variants (the largest buffer of {}), "
+      "found {}. Simplify the largest mesh.",
+      most, reinterpret_cast<const char*>(glGetString(GL_RENDERER)), count);
+}
 
 GpuScene::GpuScene(const scene::Scene& scene) {
   Staging staging;
+  const std::size_t count = triangles_of(scene);
+  staging.corners.reserve(3 * count);
+  staging.normals.reserve(3 * count);
+  staging.owners.reserve(count);
   if (scene.prototype) prototype_ = add(scene.prototype->mesh, 0, &staging);
   for (const scene::Slot& slot : scene.slots) {
     SlotRuns runs{slot.name, slot.mode == scene::Mode::surface, {}};
@@ -49,12 +74,12 @@ GpuScene::GpuScene(const scene::Scene& scene) {
     }
     slots_.push_back(std::move(runs));
   }
-  corners_ = buffer_of(staging.corners);
-  normals_ = buffer_of(staging.normals);
-  owners_ = buffer_of(staging.owners);
+  corners_ = buffer_of(std::exchange(staging.corners, {}));  // freed one by one
+  normals_ = buffer_of(std::exchange(staging.normals, {}));
+  owners_ = buffer_of(std::exchange(staging.owners, {}));
   materials_ = buffer_of(staging.materials);
   placements_ = make_buffer(nullptr, 0);
-  upload_looks(staging.textures);
+  upload_looks(staging.looks);
 
   vertex_array_ = make_vertex_array();
   glVertexArrayVertexBuffer(*vertex_array_, 0, *corners_, 0, sizeof(Eigen::Vector4f));
@@ -70,8 +95,8 @@ TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) 
     gpu.colour.w() = material.unlit ? 1 : 0;
     gpu.look.segment<2>(1) << material.metallic, material.roughness;
     if (!material.texture.empty() && !mesh.uvs.empty()) {
-      gpu.look.x() = static_cast<float>(staging->textures.size());
-      staging->textures.push_back(material.texture);
+      gpu.look.x() = static_cast<float>(staging->looks.size());
+      staging->looks.push_back(&material);
     }
     staging->materials.push_back(gpu);
   }
@@ -98,13 +123,16 @@ TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) 
 
 // One layer a texture, all brought to the size of the largest, so that one sampler serves and uv stays 0
 // to 1.
-void GpuScene::upload_looks(const std::vector<cv::Mat>& textures) {
+void GpuScene::upload_looks(const std::vector<const scene::Material*>& looks) {
+  GLint most = 0;
+  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
+  most = std::min(most, k_largest_look);
   int width = 1, height = 1;
-  for (const cv::Mat& texture : textures) {
-    width = std::min(k_largest_look, std::max(width, texture.cols));
-    height = std::min(k_largest_look, std::max(height, texture.rows));
+  for (const scene::Material* look : looks) {
+    width = std::min(most, std::max(width, look->texture.cols));
+    height = std::min(most, std::max(height, look->texture.rows));
   }
-  const int layers = std::max(1, static_cast<int>(textures.size()));
+  const int layers = std::max(1, static_cast<int>(looks.size()));
   looks_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_SRGB8_ALPHA8, width, height, layers,
                         level_count(std::max(width, height)));
   glTextureParameteri(*looks_, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
@@ -112,13 +140,22 @@ void GpuScene::upload_looks(const std::vector<cv::Mat>& textures) {
   glTextureParameteri(*looks_, GL_TEXTURE_WRAP_S, GL_REPEAT);
   glTextureParameteri(*looks_, GL_TEXTURE_WRAP_T, GL_REPEAT);
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  for (std::size_t i = 0; i < textures.size(); ++i) {
+  for (std::size_t i = 0; i < looks.size(); ++i) {
+    const cv::Mat& texture = looks[i]->texture;
+    const bool is_too_large = texture.cols > most || texture.rows > most;
+    if (is_too_large)
+      log_warning(
+          "{}: expected a texture of at most {} x {} texels, found {} x {}; it is shown reduced to {} x {}. "
+          "Save it smaller.",
+          looks[i]->texture_file, most, most, texture.cols, texture.rows, std::min(most, texture.cols),
+          std::min(most, texture.rows));
     cv::Mat layer;
-    cv::resize(textures[i], layer, cv::Size(width, height), 0, 0, cv::INTER_LINEAR);
+    cv::resize(texture, layer, cv::Size(width, height), 0, 0,
+               is_too_large ? cv::INTER_AREA : cv::INTER_LINEAR);
     glTextureSubImage3D(*looks_, 0, 0, 0, static_cast<GLint>(i), width, height, 1, GL_BGR, GL_UNSIGNED_BYTE,
                         layer.data);
   }
-  if (!textures.empty()) glGenerateTextureMipmap(*looks_);
+  if (!looks.empty()) glGenerateTextureMipmap(*looks_);
 }
 
 Pose GpuScene::scene_from_world(const scene::PosedScene& posed) {

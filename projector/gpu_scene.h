@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "projector/gl.h"
 #include "scene/posed.h"
 
@@ -30,6 +31,9 @@ struct PlacedRun {
 /// All meshes of a scene on the GPU, as shaders/scene.glsl reads them.
 class GpuScene {
  public:
+  /// Error: more triangles than the driver's largest buffer holds.
+  static Status check_fits(const scene::Scene& scene);
+  /// A texture larger than 4096 texels a side, or than the driver's limit, is reduced to it, with a warning.
   explicit GpuScene(const scene::Scene& scene);
 
   /// What a posed scene shows. Rays are cast in the frame "scene": the prototype's where it is placed, else
@@ -53,7 +57,7 @@ class GpuScene {
   };
   struct Staging;
   TriangleRun add(const scene::Mesh& mesh, int owner, Staging* staging);
-  void upload_looks(const std::vector<cv::Mat>& textures);
+  void upload_looks(const std::vector<const scene::Material*>& looks);
 
   std::optional<TriangleRun> prototype_;
   std::vector<SlotRuns> slots_;

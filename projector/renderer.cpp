@@ -602,6 +602,7 @@ Renderer::~Renderer() = default;
 
 Result<Renderer> Renderer::create(const scene::Scene& scene, const Rig& rig) {
   LIMN_TRY_STATUS(check_context());
+  LIMN_TRY_STATUS(GpuScene::check_fits(scene));
   LIMN_TRY(Sights sights, Sights::create(rig));
   auto impl = std::make_unique<Impl>(scene, rig, std::move(sights));
   LIMN_TRY_STATUS(impl->link_programs());

@@ -40,8 +40,9 @@ struct PartCoverage {
 /// is not drawn again.
 class Renderer {
  public:
-  /// Copies scene and rig to the GPU. Error: no current GL context of version 4.5, or a driver that refuses
-  /// shaders.
+  /// Copies scene and rig to the GPU. Error: no current GL context of version 4.5, a driver that refuses
+  /// shaders, or more triangles than it holds. When the context is lost (device::GlContext::is_lost) drop the
+  /// renderer, then the context, and create both anew: nothing in here but caches is lost with them.
   static Result<Renderer> create(const scene::Scene& scene, const Rig& rig);
   Renderer(Renderer&&) noexcept;
   Renderer& operator=(Renderer&&) noexcept;

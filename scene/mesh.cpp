@@ -79,14 +79,17 @@ Result<cv::Mat> embedded_texture(const aiTexture& texture, const fs::path& path)
   return picture;
 }
 
-// A texture named by a mesh: as written there, else by its bare name beside the mesh.
-Result<cv::Mat> texture_beside(const std::string& name, const fs::path& mesh_path) {
+// Where a texture named by a mesh is: as written there, else by its bare name beside the mesh.
+fs::path texture_path(const std::string& name, const fs::path& mesh_path) {
   std::string slashes = name;
   std::replace(slashes.begin(), slashes.end(), '\\', '/');
   const fs::path folder = mesh_path.parent_path();
   const fs::path inside =
       fs::path(slashes).is_relative() ? folder / slashes : folder / fs::path(slashes).filename();
-  const fs::path path = fs::exists(inside) ? inside : folder / fs::path(slashes).filename();
+  return fs::exists(inside) ? inside : folder / fs::path(slashes).filename();
+}
+
+Result<cv::Mat> texture_beside(const fs::path& path, const fs::path& mesh_path) {
   auto picture = read_picture(path);
   if (!picture) return error("{}: its texture cannot be read: {}", mesh_path.string(), picture.message());
   cv::Mat bgr = std::move(picture).value();
@@ -110,8 +113,9 @@ Result<Material> read_material(const aiMaterial& source, const aiScene& scene, c
     aiString name;
     if (source.GetTexture(type, 0, &name) != AI_SUCCESS || name.length == 0) continue;
     const aiTexture* embedded = scene.GetEmbeddedTexture(name.C_Str());
-    LIMN_TRY(material.texture,
-             embedded ? embedded_texture(*embedded, path) : texture_beside(name.C_Str(), path));
+    const fs::path file = embedded ? path : texture_path(name.C_Str(), path);
+    LIMN_TRY(material.texture, embedded ? embedded_texture(*embedded, path) : texture_beside(file, path));
+    material.texture_file = file.string();
     break;
   }
   return material;

@@ -19,6 +19,7 @@ struct Material {
   bool unlit = false;                 ///< KHR_materials_unlit: shown as its base colour
   float metallic = 0, roughness = 1;  ///< glTF's; not metallic and of roughness 1 is diffuse alone
   cv::Mat texture;                    ///< empty: none
+  std::string texture_file = {};      ///< that it came from, for messages
 };
 
 /// Triangles in metres; coordinates as stored in the file (node transforms applied, no axis swapped).

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <iostream>
 
 #include "tests/support/matchers.h"
 
@@ -37,6 +38,16 @@ TEST(GlContext, TwoLiveSideBySide) {
   }
   first->make_current();
   EXPECT_NE(glGetString(GL_VERSION), nullptr);
+}
+
+TEST(GlContext, TellsWhetherItIsLost) {
+  const auto context = GlContext::create();
+  ASSERT_TRUE(context) << context.message();
+  EXPECT_FALSE(context->is_lost());
+  GLint strategy = 0;
+  glGetIntegerv(GL_RESET_NOTIFICATION_STRATEGY, &strategy);
+  EXPECT_EQ(strategy == GL_LOSE_CONTEXT_ON_RESET, context->is_robust());
+  std::cout << context->description() << (context->is_robust() ? ": tells" : ": does not tell") << "\n";
 }
 
 // A fresh program (this one, asked for one test only) where EGL finds no driver.
