@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "device/glfw_surface.h"
+#include "device/offscreen_display.h"
 
 namespace limn::device {
 namespace {
@@ -61,11 +62,7 @@ Status MonitorDisplay::Impl::begin(const Handle& monitor) {
 }
 
 Result<Stamp> MonitorDisplay::Impl::show(const cv::Mat& picture) {
-  if (picture.size() != options.size || picture.depth() != CV_8U ||
-      (picture.channels() != 1 && picture.channels() != 3))
-    return error("{}: expected an 8-bit grey or BGR picture of {}x{}, found {}x{} with {} channels.",
-                 options.name, options.size.width, options.size.height, picture.cols, picture.rows,
-                 picture.channels());
+  LIMN_TRY_STATUS(fits(picture, options.name, options.size));
   const auto monitor = found_monitor(options);
   // A window whose monitor has gone would stand on another one.
   if (!monitor || (surface && glfwGetWindowMonitor(surface->window()) != monitor->second)) surface.reset();

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "device/gl_context.h"
+#include "device/open_display.h"
 #include "device/window.h"
 #include "tests/support/matchers.h"
 
@@ -134,6 +135,18 @@ TEST_F(AMonitor, LightLeavesAfterTheSwapByTheLatency) {
   ASSERT_TRUE(shown_at);
   EXPECT_GE(seconds_between(begun, *shown_at), 0.4);
   EXPECT_LE(seconds_between(Clock::now(), *shown_at), 0.4);
+}
+
+TEST_F(AMonitor, AndAWindowAreOpenedByName) {
+  auto display = open_display({.name = "left", .monitor = first_.name}, &*desktop_);
+  ASSERT_TRUE(display) << display.message();
+  EXPECT_EQ((*display)->size(), first_.size);
+  auto window = open_display({.name = "screen", .monitor = "window", .size = {1920, 1080}}, &*desktop_);
+  ASSERT_TRUE(window) << window.message();
+  EXPECT_EQ((*window)->size(), cv::Size(1920, 1080));
+  EXPECT_TRUE((*window)->show(quarters({1920, 1080}, 50)));
+  EXPECT_FALSE((*window)->show(quarters({1920, 1000}, 50)));
+  EXPECT_FALSE(open_display({.monitor = "window"}, &*desktop_));
 }
 
 TEST_F(AMonitor, OfAnotherNameOrSizeIsRefused) {

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <utility>
+
+#include "device/display.h"
+
+namespace limn::device {
+
+/// A display without light: it keeps the picture that it was shown last.
+class OffscreenDisplay : public Display {
+ public:
+  OffscreenDisplay(std::string name, cv::Size size, double latency_s = 0)
+      : name_(std::move(name)), size_(size), latency_s_(latency_s) {}
+
+  const std::string& name() const override { return name_; }
+  cv::Size size() const override { return size_; }
+  Result<Stamp> show(const cv::Mat& picture) override;
+  const cv::Mat& picture() const { return picture_; }
+
+ private:
+  std::string name_;
+  cv::Size size_;
+  double latency_s_;
+  cv::Mat picture_;
+};
+
+/// Error unless a display of that name and size can show the picture: 8-bit grey or BGR.
+Status fits(const cv::Mat& picture, const std::string& name, cv::Size size);
+
+}  // namespace limn::device
