@@ -12,6 +12,7 @@
 #include "apps/check.h"
 #include "apps/demo.h"
 #include "apps/detect.h"
+#include "apps/doctor.h"
 #include "apps/export.h"
 #include "apps/import.h"
 #include "apps/learn_body.h"
@@ -409,6 +410,21 @@ void add_simulate(CLI::App& app, Run& run) {
   command->callback([options, &run] { run = [options] { return finished(run_simulate(*options)); }; });
 }
 
+void add_doctor(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("doctor", "displays, cameras, OpenGL, clock, packages: what works, what to do");
+  command->footer(
+      "Exits 1 when something does not work that is there or that the devices file or --show asks for.\n"
+      "Example: limn doctor --show 10\n"
+      "Example: limn doctor --devices config/devices/studio.json --rig rig");
+  auto options = std::make_shared<DoctorOptions>();
+  auto* devices = command->add_option("--devices", options->devices, "devices file (limn.devices/1) to test");
+  command->add_option("--rig", options->rig, "rig folder whose names and sizes they must have")->needs(devices);
+  command->add_option("--show", options->show_s, "seconds for which each output shows its own number and colour")
+      ->check(CLI::Range(0.0, 3600.0));
+  command->add_flag("--json", options->json, "print JSON instead of lines");
+  command->callback([options, &run] { run = [options] { return finished(run_doctor(*options)); }; });
+}
+
 }  // namespace
 
 int run_command_line(int argc, char** argv) {
@@ -434,6 +450,7 @@ int run_command_line(int argc, char** argv) {
   add_live(app, run);
   add_replay(app, run);
   add_simulate(app, run);
+  add_doctor(app, run);
 
   const auto commands = app.get_subcommands({});
   const auto is_named = [&](const CLI::App* command) { return argc > 1 && command->get_name() == argv[1]; };

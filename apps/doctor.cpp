@@ -1,0 +1,355 @@
+#include "apps/doctor.h"
+
+#include <time.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "apps/devices.h"
+#include "core/file.h"
+#include "core/log.h"
+#include "device/gige_camera.h"
+#include "device/gl_context.h"
+#include "device/v4l2_camera.h"
+
+namespace limn::apps {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using State = Finding::State;
+using Findings = std::vector<Finding>;
+
+// An error's own words say what to do.
+Finding failed(const std::string& area, const std::string& name, const std::string& message) {
+  return {area, name, State::fails, message, ""};
+}
+
+// The names in a packages.txt.
+std::vector<std::string> packages_in(const std::string& text) {
+  std::vector<std::string> names;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    line = line.substr(0, line.find('#'));
+    std::istringstream words(line);
+    for (std::string word; words >> word;) names.push_back(word);
+  }
+  return names;
+}
+
+// Names of the packages that Debian's status file says are installed.
+std::set<std::string> installed_in(const std::string& text) {
+  std::set<std::string> names;
+  std::istringstream lines(text);
+  std::string package;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("Package: ")) package = line.substr(9);
+    if (line == "Status: install ok installed" || line == "Status: hold ok installed") names.insert(package);
+  }
+  return names;
+}
+
+Finding packages(const DoctorOptions& options) {
+  const std::filesystem::path list =
+      options.packages.empty() ? std::filesystem::path(LIMN_SOURCE_DIR) / "packages.txt" : options.packages;
+  const auto wanted = read_file(list);
+  const auto status = read_file(options.installed);
+  if (!wanted || !status)
+    return {"packages", "Debian", State::note,
+            fmt::format("cannot be looked up: {}", wanted ? status.message() : wanted.message()), ""};
+  const auto names = packages_in(*wanted);
+  const auto there = installed_in(*status);
+  std::string missing;
+  for (const std::string& name : names)
+    if (!there.contains(name)) missing += fmt::format(" {}", name);
+  if (missing.empty())
+    return {"packages", "Debian", State::works,
+            fmt::format("all {} of packages.txt are installed", names.size()), ""};
+  return {"packages", "Debian", State::fails, fmt::format("missing:{}", missing),
+          fmt::format("apt-get install --no-install-recommends --no-remove{}", missing)};
+}
+
+Finding clock_of_session() {
+  constexpr double k_coarsest_s = 1e-4;  // prediction wants better than a tenth of a millisecond
+  timespec resolution{};
+  clock_getres(CLOCK_MONOTONIC, &resolution);
+  double step_s = 1;
+  bool backwards = false;
+  Stamp last = Clock::now();
+  for (int i = 0; i < 20000; ++i) {
+    const Stamp now = Clock::now();
+    backwards = backwards || now < last;
+    if (now > last) step_s = std::min(step_s, seconds_between(last, now));
+    last = now;
+  }
+  const bool works = !backwards && step_s < k_coarsest_s;
+  const std::string text =
+      fmt::format("{}, resolution {} ns, smallest step {:.0f} ns", backwards ? "runs backwards" : "monotonic",
+                  resolution.tv_sec * 1'000'000'000 + resolution.tv_nsec, 1e9 * step_s);
+  return {"clock", "monotonic", works ? State::works : State::fails, text,
+          works ? "" : "Choose another clocksource (/sys/devices/system/clocksource)."};
+}
+
+Finding gl() {
+  const auto context = device::GlContext::create();
+  if (!context) return failed("gl", "OpenGL 4.5", context.message());
+  const std::string& text = context->description();
+  const bool software = text.find("llvmpipe") != std::string::npos ||
+                        text.find("softpipe") != std::string::npos ||
+                        text.find("swrast") != std::string::npos;
+  return {
+      "gl", "OpenGL 4.5", State::works, text + (software ? ": software" : ": hardware"),
+      software ? "Pictures are right but slow: for a live session install the graphics card's driver." : ""};
+}
+
+Finding described(const device::Monitor& monitor) {
+  std::string text =
+      fmt::format("{}x{} at {} Hz", monitor.size.width, monitor.size.height, monitor.refresh_hz);
+  if (monitor.size_mm.area() > 0)
+    text += fmt::format(", {}x{} mm", monitor.size_mm.width, monitor.size_mm.height);
+  text += fmt::format(", at {},{} of the desktop", monitor.position.x, monitor.position.y);
+  const bool largest = monitor.size == monitor.largest;
+  return {"displays", monitor.name, State::works, text,
+          largest
+              ? ""
+              : fmt::format(
+                    "It has {}x{}, too: a projector that is fed another size than its own blurs patterns.",
+                    monitor.largest.width, monitor.largest.height)};
+}
+
+Findings displays(const Result<device::Desktop>& desktop, bool asked_for) {
+  if (!desktop)
+    return {{"displays", "desktop", asked_for ? State::fails : State::note, desktop.message(), ""}};
+  Findings findings;
+  for (const device::Monitor& monitor : desktop->monitors()) findings.push_back(described(monitor));
+  if (findings.empty())
+    findings.push_back({"displays", "desktop", asked_for ? State::fails : State::note,
+                        "a desktop without a monitor.", "Plug one in and switch it on."});
+  return findings;
+}
+
+// What a camera delivered in about a second.
+struct Rate {
+  int frames = 0;
+  double per_second = 0;  // by the stamps; 0: unknown
+};
+
+Result<Rate> measured(device::CameraSource& camera) {
+  constexpr int k_most = 120;
+  const Stamp until = shifted(Clock::now(), 1);
+  Rate rate;
+  Stamp first, last;
+  while (rate.frames < k_most && Clock::now() < until) {
+    const auto frame = camera.next();
+    if (!frame && (rate.frames == 0 || !camera.is_finite())) return frame.error();
+    if (!frame) break;
+    last = frame->captured_at;
+    if (rate.frames++ == 0) first = last;
+  }
+  if (rate.frames > 1 && last > first) rate.per_second = (rate.frames - 1) / seconds_between(first, last);
+  return rate;
+}
+
+std::string shown(const device::CameraSetting& setting) {
+  if (!setting.found) return fmt::format(", {} asked {:g}", setting.name, setting.asked);
+  return fmt::format(", {} {:g} (asked {:g})", setting.name, *setting.found, setting.asked);
+}
+
+// Opens the camera, grabs from it and compares what was asked with what it says.
+Finding tested(const std::string& area, const device::CameraWanted& wanted) {
+  auto camera = device::open_camera(wanted);
+  if (!camera) return failed(area, wanted.name, camera.message());
+  const auto rate = measured(**camera);
+  if (!rate) return failed(area, wanted.name, rate.message());
+  const cv::Size size = (*camera)->size();
+  std::string text = fmt::format("{}: {}x{}", wanted.source, size.width, size.height);
+  if (rate->per_second > 0) text += fmt::format(", {:.1f} frames a second", rate->per_second);
+  std::string problems;
+  for (const device::CameraSetting& setting : (*camera)->settings()) {
+    text += shown(setting);
+    if (!setting.problem.empty())
+      problems += fmt::format("{}{}", problems.empty() ? "" : " ", setting.problem);
+  }
+  text += fmt::format(" [{}]", (*camera)->description());
+  return {area, wanted.name, problems.empty() ? State::works : State::fails, text, problems};
+}
+
+// What is plugged in or answers, whatever the file names. A camera of the file is tested as the file wants
+// it.
+Findings cameras(const Devices& devices) {
+  const auto named = [&](const std::string& source) {
+    return std::any_of(devices.cameras.begin(), devices.cameras.end(),
+                       [&](const device::CameraWanted& camera) { return camera.source == source; });
+  };
+  Findings findings;
+  for (const device::V4l2Found& found : device::v4l2_cameras()) {
+    const std::string source = fmt::format("v4l2:{}", found.path);
+    if (named(source)) continue;
+    if (!found.problem.empty()) findings.push_back(failed("cameras", found.path, found.problem));
+    if (found.problem.empty()) findings.push_back(tested("cameras", {.name = found.card, .source = source}));
+  }
+  for (const std::string& id : device::gige_cameras())
+    if (!named(fmt::format("gige:{}", id)))
+      findings.push_back({"cameras", id, State::note, fmt::format("answers as gige:{}", id), ""});
+  if (findings.empty() && devices.cameras.empty())
+    findings.push_back({"cameras", "none", State::note, "no camera is plugged in or answers",
+                        "Plug one in, or name a network camera in a devices file (config/README.md)."});
+  return findings;
+}
+
+// What a display shows of itself: its number, its colour, a line around the edge, and a patch whose pixels
+// take turns (grey and even where pixels are lit one by one, with a pattern in it where something scales).
+cv::Mat sign(cv::Size size, int number, const std::string& name, const cv::Scalar& colour) {
+  cv::Mat picture(size, CV_8UC3, colour);
+  const auto write = [&](const std::string& text, double height, double baseline) {
+    const double scale = height * size.height / 22;  // Hershey's capitals are 22 pixels high
+    const int thickness = std::max(1, static_cast<int>(2 * scale));
+    const int width = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, scale, thickness, nullptr).width;
+    const double fit = std::min(1.0, 0.9 * size.width / std::max(1, width));
+    cv::putText(picture, text,
+                {static_cast<int>((size.width - fit * width) / 2), static_cast<int>(baseline * size.height)},
+                cv::FONT_HERSHEY_SIMPLEX, fit * scale, cv::Scalar(),
+                std::max(1, static_cast<int>(fit * thickness)), cv::LINE_AA);
+  };
+  write(std::to_string(number), 0.45, 0.6);
+  write(fmt::format("{} {}x{}", name, size.width, size.height), 0.06, 0.75);
+  cv::rectangle(picture, cv::Rect({}, size), cv::Scalar::all(255));
+  const cv::Rect patch(size.width * 2 / 5, size.height * 4 / 5, size.width / 5, size.height / 8);
+  for (int y = patch.y; y < patch.br().y; ++y)
+    for (int x = patch.x; x < patch.br().x; ++x)
+      picture.at<cv::Vec3b>(y, x) = (x + y) % 2 ? cv::Vec3b(255, 255, 255) : cv::Vec3b(0, 0, 0);
+  return picture;
+}
+
+struct Colour {
+  const char* name;
+  cv::Scalar bgr;
+};
+
+// Shows every display its number and colour until the time is over; the moment's last word on each.
+Findings show_signs(const std::vector<std::unique_ptr<device::Display>>& shown, double seconds) {
+  static const std::array<Colour, 6> k_colours = {{{"red", {60, 60, 255}},
+                                                   {"green", {60, 255, 60}},
+                                                   {"blue", {255, 100, 60}},
+                                                   {"yellow", {40, 255, 255}},
+                                                   {"magenta", {255, 60, 255}},
+                                                   {"cyan", {255, 255, 40}}}};
+  Findings findings(shown.size());
+  const Stamp until = shifted(Clock::now(), seconds);
+  do {
+    for (std::size_t i = 0; i < shown.size(); ++i) {
+      const Colour& colour = k_colours[i % k_colours.size()];
+      device::Display& display = *shown[i];
+      const auto done =
+          display.show(sign(display.size(), static_cast<int>(i) + 1, display.name(), colour.bgr));
+      findings[i] = {"displays", display.name(), State::works,
+                     fmt::format("shows the number {} on {}", i + 1, colour.name), ""};
+      if (!done) findings[i] = failed("displays", display.name(), done.message());
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  } while (Clock::now() < until);
+  return findings;
+}
+
+void add(Findings* findings, const Findings& more) {
+  findings->insert(findings->end(), more.begin(), more.end());
+}
+
+// The displays of the file, or all monitors. Those that cannot be opened are told.
+Findings signs(const DoctorOptions& options, const Devices& devices, const Result<device::Desktop>& desktop) {
+  const device::Desktop* there = desktop ? &*desktop : nullptr;
+  std::vector<device::DisplayWanted> wanted = devices.displays;
+  if (options.devices.empty() && options.show_s > 0 && there)
+    for (const device::Monitor& monitor : there->monitors())
+      wanted.push_back({.name = monitor.name, .monitor = monitor.name});
+  Findings findings;
+  std::vector<std::unique_ptr<device::Display>> shown;
+  for (device::DisplayWanted& one : wanted) {
+    one.waits = shown.empty();
+    auto display = device::open_display(one, there);
+    if (!display) {
+      findings.push_back(failed("devices", one.name, display.message()));
+      continue;
+    }
+    if (options.show_s <= 0)
+      findings.push_back(
+          {"devices", one.name, State::works,
+           fmt::format("{}: {}x{}", one.monitor, (*display)->size().width, (*display)->size().height), ""});
+    shown.push_back(std::move(*display));
+  }
+  if (options.show_s > 0) add(&findings, show_signs(shown, options.show_s));
+  return findings;
+}
+
+Result<Devices> wanted_devices(const DoctorOptions& options) {
+  if (options.devices.empty()) return Devices{};
+  LIMN_TRY(const Devices devices, load_devices(options.devices));
+  if (options.rig.empty()) return devices;
+  LIMN_TRY(const Rig rig, load_rig(options.rig));
+  return matched(devices, rig);
+}
+
+const char* word(State state) {
+  return state == State::works ? "works" : state == State::fails ? "does not" : "note";
+}
+
+void print_lines(const Findings& findings) {
+  for (const Finding& finding : findings) {
+    fmt::print("{:<9}{:<10}{:<14} {}\n", word(finding.state), finding.area, finding.name, finding.text);
+    if (!finding.advice.empty()) fmt::print("{:<34}-> {}\n", "", finding.advice);
+  }
+}
+
+void print_json(const Findings& findings) {
+  nlohmann::ordered_json report = {
+      {"schema", "limn.doctor/1"}, {"works", true}, {"findings", nlohmann::json::array()}};
+  for (const Finding& finding : findings) {
+    if (finding.state == State::fails) report["works"] = false;
+    report["findings"].push_back(nlohmann::ordered_json{{"area", finding.area},
+                                                        {"name", finding.name},
+                                                        {"state", word(finding.state)},
+                                                        {"text", finding.text},
+                                                        {"advice", finding.advice}});
+  }
+  fmt::print("{}\n", report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
+}  // namespace
+
+std::vector<Finding> examined(const DoctorOptions& options) {
+  Findings findings = {packages(options), clock_of_session(), gl()};
+  auto devices = wanted_devices(options);
+  if (!devices) findings.push_back(failed("devices", "file", devices.message()));
+  const Devices wanted = devices ? *devices : Devices{};
+  const bool desktop_asked_for =
+      (options.devices.empty() && options.show_s > 0) ||
+      std::any_of(wanted.displays.begin(), wanted.displays.end(), device::needs_desktop);
+  const auto desktop = device::Desktop::open();
+  add(&findings, displays(desktop, desktop_asked_for));
+  add(&findings, cameras(wanted));
+  for (const device::CameraWanted& camera : wanted.cameras) findings.push_back(tested("devices", camera));
+  add(&findings, signs(options, wanted, desktop));
+  return findings;
+}
+
+Status run_doctor(const DoctorOptions& options) {
+  if (!options.rig.empty() && options.devices.empty())
+    return usage_error("--rig: expected --devices with it, whose names and sizes it is compared with.");
+  const Findings findings = examined(options);
+  if (options.json) print_json(findings);
+  if (!options.json) print_lines(findings);
+  const auto failures = std::count_if(findings.begin(), findings.end(),
+                                      [](const Finding& finding) { return finding.state == State::fails; });
+  if (failures == 0) return {};
+  return error("{} of {} do not work; the lines above say what to do.", failures, findings.size());
+}
+
+}  // namespace limn::apps
