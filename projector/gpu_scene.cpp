@@ -18,12 +18,6 @@ struct GpuMaterial {
   Eigen::Vector4f look;    // texture layer (-1 when it has none), metallic, roughness
 };
 
-struct GpuOwner {
-  Eigen::Matrix4f owner_from_scene = Eigen::Matrix4f::Identity();
-  Eigen::Vector4f lower = Eigen::Vector4f::Zero();  // w: 1 when it is shown
-  Eigen::Vector4f upper = Eigen::Vector4f::Zero();  // w: 1 when its mode is surface
-};
-
 template <class T>
 GlName buffer_of(const std::vector<T>& items) {
   return make_buffer(items.data(), items.size() * sizeof(T));
@@ -78,7 +72,8 @@ GpuScene::GpuScene(const scene::Scene& scene) {
   normals_ = buffer_of(std::exchange(staging.normals, {}));
   owners_ = buffer_of(std::exchange(staging.owners, {}));
   materials_ = buffer_of(staging.materials);
-  placements_ = make_buffer(nullptr, 0);
+  owners_shown_.resize(static_cast<std::size_t>(owner_count()));
+  placements_ = buffer_of(owners_shown_);
   upload_looks(staging.looks);
 
   vertex_array_ = make_vertex_array();
@@ -162,31 +157,31 @@ Pose GpuScene::scene_from_world(const scene::PosedScene& posed) {
   return posed.world_from_prototype ? posed.world_from_prototype->inverse() : Pose();
 }
 
-std::vector<PlacedRun> GpuScene::placed(const scene::PosedScene& posed) const {
+void GpuScene::placed(const scene::PosedScene& posed, std::vector<PlacedRun>* runs) const {
   const Pose from_world = scene_from_world(posed);
-  std::vector<PlacedRun> runs;
-  if (prototype_ && posed.world_from_prototype) runs.push_back({0, &*prototype_, Pose(), false});
+  runs->clear();
+  if (prototype_ && posed.world_from_prototype) runs->push_back({0, &*prototype_, Pose(), false});
   for (const scene::PosedPart& part : posed.parts) {
     for (std::size_t i = 0; i < slots_.size(); ++i) {
       if (slots_[i].name != part.slot) continue;
       const auto variant = slots_[i].variants.find(part.variant);
       LIMN_CHECK(variant != slots_[i].variants.end());
-      runs.push_back({static_cast<int>(i) + 1, &variant->second, from_world * part.world_from_part,
-                      slots_[i].on_surface});
+      runs->push_back({static_cast<int>(i) + 1, &variant->second, from_world * part.world_from_part,
+                       slots_[i].on_surface});
     }
   }
-  return runs;
 }
 
 void GpuScene::place(const std::vector<PlacedRun>& runs) {
-  std::vector<GpuOwner> owners(static_cast<std::size_t>(owner_count()));
+  std::fill(owners_shown_.begin(), owners_shown_.end(), GpuOwner());
   for (const PlacedRun& placed : runs) {
-    GpuOwner& owner = owners[static_cast<std::size_t>(placed.owner)];
+    GpuOwner& owner = owners_shown_[static_cast<std::size_t>(placed.owner)];
     owner.owner_from_scene = placed.scene_from_owner.inverse().matrix().cast<float>();
     owner.lower << placed.run->p_lower.cast<float>(), 1.f;
     owner.upper << placed.run->p_upper.cast<float>(), placed.on_surface ? 1.f : 0.f;
   }
-  placements_ = buffer_of(owners);
+  glNamedBufferSubData(*placements_, 0, static_cast<GLsizeiptr>(owners_shown_.size() * sizeof(GpuOwner)),
+                       owners_shown_.data());
 }
 
 void GpuScene::bind() const {
@@ -194,13 +189,15 @@ void GpuScene::bind() const {
   for (GLuint i = 0; i < std::size(buffers); ++i) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, **buffers[i]);
 }
 
-void append_bounds(const PlacedRun& placed, std::vector<Eigen::Vector3d>* corners, double margin_m) {
-  for (int k = 0; k < 8; ++k) {
+std::array<Eigen::Vector3d, 8> bounds_of(const PlacedRun& placed, double margin_m) {
+  std::array<Eigen::Vector3d, 8> corners;
+  for (std::size_t k = 0; k < 8; ++k) {
     Eigen::Vector3d p;
     for (int axis = 0; axis < 3; ++axis)
       p[axis] = k >> axis & 1 ? placed.run->p_upper[axis] + margin_m : placed.run->p_lower[axis] - margin_m;
-    corners->push_back(placed.scene_from_owner * p);
+    corners[k] = placed.scene_from_owner * p;
   }
+  return corners;
 }
 
 }  // namespace limn::projector

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -38,7 +39,7 @@ class GpuScene {
 
   /// What a posed scene shows. Rays are cast in the frame "scene": the prototype's where it is placed, else
   /// the world.
-  std::vector<PlacedRun> placed(const scene::PosedScene& posed) const;
+  void placed(const scene::PosedScene& posed, std::vector<PlacedRun>* runs) const;
   static Pose scene_from_world(const scene::PosedScene& posed);
   /// Sends the places to the GPU.
   void place(const std::vector<PlacedRun>& runs);
@@ -56,15 +57,21 @@ class GpuScene {
     std::map<std::string, TriangleRun> variants;
   };
   struct Staging;
+  struct GpuOwner {
+    Eigen::Matrix4f owner_from_scene = Eigen::Matrix4f::Identity();
+    Eigen::Vector4f lower = Eigen::Vector4f::Zero();  // w: 1 when it is shown
+    Eigen::Vector4f upper = Eigen::Vector4f::Zero();  // w: 1 when its mode is surface
+  };
   TriangleRun add(const scene::Mesh& mesh, int owner, Staging* staging);
   void upload_looks(const std::vector<const scene::Material*>& looks);
 
   std::optional<TriangleRun> prototype_;
   std::vector<SlotRuns> slots_;
+  std::vector<GpuOwner> owners_shown_;
   GlName corners_, normals_, owners_, materials_, placements_, looks_, vertex_array_;
 };
 
-/// The eight corners of a run's bounds, with a margin, in the scene's frame, appended.
-void append_bounds(const PlacedRun& placed, std::vector<Eigen::Vector3d>* corners, double margin_m = 0);
+/// The corners of a run's bounds, with a margin, in the scene's frame.
+std::array<Eigen::Vector3d, 8> bounds_of(const PlacedRun& placed, double margin_m = 0);
 
 }  // namespace limn::projector

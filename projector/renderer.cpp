@@ -178,6 +178,7 @@ struct Renderer::Impl {
   std::optional<double> level_by_geometry;  // of the first place that the prototype had
   std::optional<scene::Prototype> prototype;
   std::optional<scene::RoomLight> room;
+  scene::RoomLight viewer_light;  // where no room is known
   GlName mixing, albedo, arriving;
   std::vector<cv::Mat> arriving_maps;  // as they are in the layers of `arriving`
   float mean_albedo = 0;
@@ -186,6 +187,7 @@ struct Renderer::Impl {
   // What was drawn last, so that the same is not drawn again.
   std::optional<scene::PosedScene> drawn;
   std::vector<PlacedRun> runs;
+  std::vector<cv::Rect> light_places;  // of the projector drawn last
   Pose scene_from_world;
   enum class EyeKind { none, imager, eye };
   EyeKind eye_kind = EyeKind::none;
@@ -200,6 +202,10 @@ struct Renderer::Impl {
         shown(rig_in.projectors.size()),
         prototype(scene_in.prototype),
         room(scene_in.light) {
+    viewer_light.below_rgb.setConstant(k_soft_below);
+    viewer_light.above_rgb.setConstant(k_soft_above);
+    viewer_light.lamps.resize(1);
+    viewer_light.lamps[0].strength_rgb.setConstant(k_lamp);
     vertex_array = make_vertex_array();
     for (const scene::Slot& slot : scene_in.slots) slot_names.push_back(slot.name);
     for (const Imager& projector : rig.projectors) {
@@ -233,7 +239,7 @@ struct Renderer::Impl {
   void prepare(const scene::PosedScene& posed);
   void look_from_eye(const Imager& viewer);
   void look_from_imager(const Imager& imager);
-  void set_up(const Program& program, const GpuLens& lens, const Imager* viewer) const;
+  void set_up(const Program& program, const GpuLens& lens, const Imager* viewer);
   void set_up_light(const Program& program, const scene::PosedScene& posed);
   void draw(const Program& program, const Canvas& into) const;
   void draw(const Program& program, const Canvas& into, const std::vector<cv::Rect>& places) const;
@@ -327,7 +333,7 @@ const Canvas& Renderer::Impl::canvas(int width, int height, GLenum format) {
 
 void Renderer::Impl::prepare(const scene::PosedScene& posed) {
   if (drawn && is_same(*drawn, posed)) return;
-  runs = scene.placed(posed);
+  scene.placed(posed, &runs);
   scene_from_world = GpuScene::scene_from_world(posed);
   scene.place(runs);
   {
@@ -361,7 +367,7 @@ void Renderer::Impl::look_from_imager(const Imager& imager) {
 }
 
 // `viewer` gives the lamp its place (shaders/look.glsl); null for programs without looks.
-void Renderer::Impl::set_up(const Program& program, const GpuLens& lens, const Imager* viewer) const {
+void Renderer::Impl::set_up(const Program& program, const GpuLens& lens, const Imager* viewer) {
   scene.bind();
   sights.bind(program, k_sights_unit);
   program.bind("s_tangents", k_tangents_unit, lens.tangents);
@@ -380,11 +386,9 @@ void Renderer::Impl::set_up(const Program& program, const GpuLens& lens, const I
   program.set("u_has_surface_parts", shown(true));
   if (!viewer) return;
   const Eigen::Quaterniond world_from_viewer = viewer->imager_from_world.rotation.inverse();
-  scene::RoomLight light{world_from_viewer * -Eigen::Vector3d::UnitY(),
-                         Eigen::Vector3d::Constant(k_soft_below),
-                         Eigen::Vector3d::Constant(k_soft_above),
-                         {{world_from_viewer * k_d_lamp_viewer, Eigen::Vector3d::Constant(k_lamp)}}};
-  if (room) light = *room;
+  viewer_light.d_up_world = world_from_viewer * -Eigen::Vector3d::UnitY();
+  viewer_light.lamps[0].d_world = world_from_viewer * k_d_lamp_viewer;
+  const scene::RoomLight& light = room ? *room : viewer_light;
   const auto vector = [](const Eigen::Vector3d& v) { return Eigen::Vector4f(v.cast<float>().homogeneous()); };
   program.set("u_is_room_known", room.has_value());
   program.set("u_d_up", vector(scene_from_world.rotation * light.d_up_world));
@@ -667,12 +671,13 @@ unsigned Renderer::draw_projector(std::size_t index, const scene::PosedScene& po
     program.set("u_projector", static_cast<int>(index));
     impl_->set_up_light(program, posed);
   };
-  const std::vector<cv::Rect> places =
-      options.even_black
-          ? std::vector{impl_->sights.prototype_place(index, impl_->runs, impl_->scene_from_world)}
-          : impl_->sights.light_places(
-                index, impl_->runs, impl_->scene_from_world,
-                (impl_->scene_from_world * viewer.imager_from_world.inverse()).translation);
+  std::vector<cv::Rect>& places = impl_->light_places;
+  if (options.even_black)
+    places.assign(1, impl_->sights.prototype_place(index, impl_->runs, impl_->scene_from_world));
+  else
+    impl_->sights.light_places(index, impl_->runs, impl_->scene_from_world,
+                               (impl_->scene_from_world * viewer.imager_from_world.inverse()).translation,
+                               &places);
   impl_->draw_layer(impl_->light_layer, centre, places, options.even_black ? k_dark_edge : k_edge, set_up);
   {
     const PassTimes::Scope scope(&impl_->times, "response");

@@ -1,6 +1,7 @@
 #include "projector/sights.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace limn::projector {
@@ -19,43 +20,56 @@ Pose sight_pose(const Imager& imager, const Pose& scene_from_world) {
   return imager.imager_from_world * scene_from_world.inverse();
 }
 
-std::vector<Eigen::Vector3d> bounds_of(const std::vector<PlacedRun>& runs, double margin_m = 0) {
-  std::vector<Eigen::Vector3d> corners;
-  for (const PlacedRun& placed : runs) append_bounds(placed, &corners, margin_m);
-  return corners;
-}
-
-std::vector<PlacedRun> only(const std::vector<PlacedRun>& runs, bool (*wanted)(const PlacedRun&)) {
-  std::vector<PlacedRun> kept;
-  std::copy_if(runs.begin(), runs.end(), std::back_inserter(kept), wanted);
-  return kept;
-}
-
 bool is_prototype(const PlacedRun& placed) { return placed.owner == 0; }
+bool is_any(const PlacedRun&) { return true; }
 bool is_part(const PlacedRun& placed) { return placed.owner != 0; }
 bool is_view_part(const PlacedRun& placed) { return placed.owner != 0 && !placed.on_surface; }
 bool is_surface_part(const PlacedRun& placed) { return placed.owner != 0 && placed.on_surface; }
 
-// Corners of a frustum that holds all that an eye sees through a box of the given corners, from the
-// prototype's nearest depth to its farthest. Everything when the box reaches behind the eye.
-std::vector<Eigen::Vector3d> behind(const std::vector<Eigen::Vector3d>& corners,
-                                    const std::vector<Eigen::Vector3d>& prototype,
-                                    const Eigen::Vector3d& p_eye) {
+// The tangents that the wanted runs span; empty when there are none.
+TangentRect spanned_by(const Pose& twin_from_scene,
+                       const std::vector<PlacedRun>& runs,
+                       bool (*wanted)(const PlacedRun&)) {
+  TangentRect rect = spanned(twin_from_scene, {});
+  for (const PlacedRun& run : runs)
+    if (wanted(run)) rect = united(rect, spanned(twin_from_scene, bounds_of(run)));
+  return rect;
+}
+
+Eigen::AlignedBox3d box_of(const std::vector<PlacedRun>& runs, bool (*wanted)(const PlacedRun&)) {
+  Eigen::AlignedBox3d box;
+  for (const PlacedRun& run : runs)
+    if (wanted(run))
+      for (const Eigen::Vector3d& p : bounds_of(run)) box.extend(p);
+  return box;
+}
+
+// The tangents of a frustum that holds all that an eye sees through a part's box, from the prototype's
+// nearest depth to its farthest. The prototype's when the box reaches behind the eye.
+TangentRect spanned_behind(const Pose& twin_from_scene,
+                           const PlacedRun& part,
+                           const std::vector<PlacedRun>& runs,
+                           const Eigen::Vector3d& p_eye) {
+  const std::array<Eigen::Vector3d, 8> corners = bounds_of(part);
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& p : corners) middle += p / static_cast<double>(corners.size());
   const Eigen::Vector3d d = (middle - p_eye).normalized();
   double nearest = 1e9, farthest = 0;
-  for (const Eigen::Vector3d& p : prototype) {
-    nearest = std::min(nearest, d.dot(p - p_eye));
-    farthest = std::max(farthest, d.dot(p - p_eye));
+  for (const PlacedRun& run : runs) {
+    if (!is_prototype(run)) continue;
+    for (const Eigen::Vector3d& p : bounds_of(run)) {
+      nearest = std::min(nearest, d.dot(p - p_eye));
+      farthest = std::max(farthest, d.dot(p - p_eye));
+    }
   }
-  std::vector<Eigen::Vector3d> out;
-  for (const Eigen::Vector3d& p : corners) {
-    const double depth = d.dot(p - p_eye);
-    if (depth < 0.01 || nearest < 0.01) return prototype;
-    for (const double at : {nearest, farthest}) out.emplace_back(p_eye + at / depth * (p - p_eye));
+  std::array<Eigen::Vector3d, 16> out;
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    const double depth = d.dot(corners[k] - p_eye);
+    if (depth < 0.01 || nearest < 0.01) return spanned_by(twin_from_scene, runs, is_prototype);
+    out[2 * k] = p_eye + nearest / depth * (corners[k] - p_eye);
+    out[2 * k + 1] = p_eye + farthest / depth * (corners[k] - p_eye);
   }
-  return out;
+  return spanned(twin_from_scene, out);
 }
 
 }  // namespace
@@ -125,6 +139,7 @@ Result<Sights> Sights::create(const Rig& rig) {
 
 void Sights::draw(const GpuScene& scene,
                   const std::vector<PlacedRun>& runs,
+                  bool (*wanted)(const PlacedRun&),
                   const Twin& twin,
                   const GlName& ids,
                   int layer) {
@@ -147,6 +162,7 @@ void Sights::draw(const GpuScene& scene,
   glBindVertexArray(scene.vertex_array());
   program_.use();
   for (const PlacedRun& placed : runs) {
+    if (!wanted(placed)) continue;
     const Eigen::Matrix4d clip_from_owner =
         clip_from_twin(twin) * (twin.twin_from_scene * placed.scene_from_owner).matrix();
     program_.set("u_clip_from_owner", Eigen::Matrix4f(clip_from_owner.cast<float>()));
@@ -169,17 +185,14 @@ void Sights::see_from_projectors(const GpuScene& scene,
                                  const std::vector<PlacedRun>& runs,
                                  const Pose& scene_from_world,
                                  bool prototype_too) {
-  const auto prototype = only(runs, is_prototype);
-  const auto surface_parts = only(runs, is_surface_part);
-  const auto bounds = bounds_of(prototype);
   for (std::size_t i = 0; i < projectors_.size(); ++i) {
     const Pose pose = sight_pose(projectors_[i], scene_from_world);
     const TangentRect& whole = lenses_[i].baked.rect;
-    const Twin twin = twin_over(pose, intersected(whole, spanned(pose, bounds)),
+    const Twin twin = twin_over(pose, intersected(whole, spanned_by(pose, runs, is_prototype)),
                                 k_oversampling * projectors_[i].lens.fx(), ids_width_, ids_height_);
     const int layer = 2 * static_cast<int>(i);
-    if (prototype_too) draw(scene, prototype, twin, projector_ids_, layer);
-    draw(scene, surface_parts, twin, projector_ids_, layer + 1);
+    if (prototype_too) draw(scene, runs, is_prototype, twin, projector_ids_, layer);
+    draw(scene, runs, is_surface_part, twin, projector_ids_, layer + 1);
     GpuSight sight(twin, layer);
     sight.of_imager(projectors_[i]);
     sight.with_map(whole, static_cast<int>(i));
@@ -195,10 +208,10 @@ void Sights::see_from_imager(const GpuScene& scene,
                              const Imager& imager,
                              const BakedLens& lens) {
   const Pose pose = sight_pose(imager, scene_from_world);
-  const TangentRect rect = intersected(lens.rect, spanned(pose, bounds_of(runs)));
+  const TangentRect rect = intersected(lens.rect, spanned_by(pose, runs, is_any));
   const Twin twin = twin_over(pose, rect, k_oversampling * imager.lens.fx(), k_eye_side, k_eye_side);
-  draw(scene, only(runs, is_prototype), twin, eye_ids_, 0);
-  draw(scene, only(runs, is_part), twin, eye_ids_, 1);
+  draw(scene, runs, is_prototype, twin, eye_ids_, 0);
+  draw(scene, runs, is_part, twin, eye_ids_, 1);
   GpuSight sight(twin, 0);
   sight.of_imager(imager);
   send(eye(), sight);
@@ -209,12 +222,11 @@ void Sights::see_from_witness(const GpuScene& scene,
                               const Pose& scene_from_world,
                               const Imager& camera,
                               const BakedLens& lens) {
-  const auto prototype = only(runs, is_prototype);
   const Pose pose = sight_pose(camera, scene_from_world);
-  const Twin twin = twin_over(pose, intersected(lens.rect, spanned(pose, bounds_of(prototype))),
+  const Twin twin = twin_over(pose, intersected(lens.rect, spanned_by(pose, runs, is_prototype)),
                               k_oversampling * camera.lens.fx(), ids_width_, ids_height_);
   const int layer = 2 * eye();
-  draw(scene, prototype, twin, projector_ids_, layer);
+  draw(scene, runs, is_prototype, twin, projector_ids_, layer);
   upload_pixel_map(eye(), camera, lens.rect);
   GpuSight sight(twin, layer);
   sight.of_imager(camera);
@@ -227,12 +239,9 @@ void Sights::see_from_eye(const GpuScene& scene,
                           const Pose& scene_from_world,
                           const Eigen::Vector3d& p_eye_scene,
                           const Eigen::Vector3d& d_up_scene) {
-  const auto bounds = bounds_of(only(runs, is_view_part));
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Vector3d& p : bounds) box.extend(p);
-  const Pose pose = bounds.empty() ? Pose() : looking_at(p_eye_scene, box.center(), d_up_scene);
-  Eigen::AlignedBox3d prototype;
-  for (const Eigen::Vector3d& p : bounds_of(only(runs, is_prototype))) prototype.extend(p);
+  const Eigen::AlignedBox3d box = box_of(runs, is_view_part);
+  const Pose pose = box.isEmpty() ? Pose() : looking_at(p_eye_scene, box.center(), d_up_scene);
+  const Eigen::AlignedBox3d prototype = box_of(runs, is_prototype);
   double focal = 1;
   for (const Imager& projector : projectors_) {
     const Eigen::Vector3d p_projector = (sight_pose(projector, scene_from_world).inverse()).translation;
@@ -242,9 +251,9 @@ void Sights::see_from_eye(const GpuScene& scene,
                             : (prototype.center() - p_eye_scene).norm() + 0.5 * prototype.diagonal().norm();
     focal = std::max(focal, k_oversampling * projector.lens.fx() * farthest / distance);
   }
-  const Twin twin = twin_over(pose, spanned(pose, bounds), focal, k_eye_side, k_eye_side);
-  draw(scene, only(runs, is_prototype), twin, eye_ids_, 0);
-  draw(scene, only(runs, is_part), twin, eye_ids_, 1);
+  const Twin twin = twin_over(pose, spanned_by(pose, runs, is_view_part), focal, k_eye_side, k_eye_side);
+  draw(scene, runs, is_prototype, twin, eye_ids_, 0);
+  draw(scene, runs, is_part, twin, eye_ids_, 1);
   send(eye(), GpuSight(twin, 0));
 }
 
@@ -252,8 +261,7 @@ cv::Rect Sights::prototype_place(std::size_t projector,
                                  const std::vector<PlacedRun>& runs,
                                  const Pose& scene_from_world) const {
   const Pose pose = sight_pose(projectors_[projector], scene_from_world);
-  return pixels_of(projectors_[projector], lenses_[projector].baked,
-                   spanned(pose, bounds_of(only(runs, is_prototype))));
+  return pixels_of(projectors_[projector], lenses_[projector].baked, spanned_by(pose, runs, is_prototype));
 }
 
 std::vector<cv::Rect> Sights::seen_places(const Imager& imager,
@@ -264,29 +272,29 @@ std::vector<cv::Rect> Sights::seen_places(const Imager& imager,
                                           double around_m) const {
   const Pose pose = sight_pose(imager, scene_from_world);
   std::vector<cv::Rect> places;
-  for (const PlacedRun& run : prototype_too ? runs : only(runs, is_part))
-    if (const cv::Rect place = pixels_of(imager, lens, spanned(pose, bounds_of({run}, around_m)));
-        !place.empty())
-      places.push_back(place);
-  return places;
-}
-
-std::vector<cv::Rect> Sights::light_places(std::size_t projector,
-                                           const std::vector<PlacedRun>& runs,
-                                           const Pose& scene_from_world,
-                                           const Eigen::Vector3d& p_eye_scene) const {
-  const Pose pose = sight_pose(projectors_[projector], scene_from_world);
-  const auto prototype = bounds_of(only(runs, is_prototype));
-  const cv::Rect whole = prototype_place(projector, runs, scene_from_world);
-  std::vector<cv::Rect> places;
-  for (const PlacedRun& part : only(runs, is_part)) {
-    std::vector<Eigen::Vector3d> corners = bounds_of({part});
-    if (!part.on_surface) corners = behind(corners, prototype, p_eye_scene);
-    const cv::Rect place =
-        whole & pixels_of(projectors_[projector], lenses_[projector].baked, spanned(pose, corners));
+  for (const PlacedRun& run : runs) {
+    if (!prototype_too && is_prototype(run)) continue;
+    const cv::Rect place = pixels_of(imager, lens, spanned(pose, bounds_of(run, around_m)));
     if (!place.empty()) places.push_back(place);
   }
   return places;
+}
+
+void Sights::light_places(std::size_t projector,
+                          const std::vector<PlacedRun>& runs,
+                          const Pose& scene_from_world,
+                          const Eigen::Vector3d& p_eye_scene,
+                          std::vector<cv::Rect>* places) const {
+  const Pose pose = sight_pose(projectors_[projector], scene_from_world);
+  const cv::Rect whole = prototype_place(projector, runs, scene_from_world);
+  places->clear();
+  for (const PlacedRun& part : runs) {
+    if (!is_part(part)) continue;
+    const TangentRect rect =
+        part.on_surface ? spanned(pose, bounds_of(part)) : spanned_behind(pose, part, runs, p_eye_scene);
+    const cv::Rect place = whole & pixels_of(projectors_[projector], lenses_[projector].baked, rect);
+    if (!place.empty()) places->push_back(place);
+  }
 }
 
 void Sights::bind(const Program& program, int first_unit) const {

@@ -46,10 +46,11 @@ class Sights {
 
   /// Rectangles of the projector's picture, outside of which it gives no light for the parts: each part's
   /// own, where it lies or where the eye sees the prototype behind it.
-  std::vector<cv::Rect> light_places(std::size_t projector,
-                                     const std::vector<PlacedRun>& runs,
-                                     const Pose& scene_from_world,
-                                     const Eigen::Vector3d& p_eye_scene) const;
+  void light_places(std::size_t projector,
+                    const std::vector<PlacedRun>& runs,
+                    const Pose& scene_from_world,
+                    const Eigen::Vector3d& p_eye_scene,
+                    std::vector<cv::Rect>* places) const;
   /// Rectangles of an imager's picture, outside of which it sees none of the parts (and of the prototype),
   /// nor anything within `around_m` of them.
   std::vector<cv::Rect> seen_places(const Imager& imager,
@@ -81,6 +82,7 @@ class Sights {
   struct GpuSight;
   void draw(const GpuScene& scene,
             const std::vector<PlacedRun>& runs,
+            bool (*wanted)(const PlacedRun&),
             const Twin& twin,
             const GlName& ids,
             int layer);

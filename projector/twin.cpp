@@ -15,6 +15,10 @@ TangentRect intersected(const TangentRect& a, const TangentRect& b) {
   return {a.lower.cwiseMax(b.lower), a.upper.cwiseMin(b.upper)};
 }
 
+TangentRect united(const TangentRect& a, const TangentRect& b) {
+  return {a.lower.cwiseMin(b.lower), a.upper.cwiseMax(b.upper)};
+}
+
 Twin twin_over(
     const Pose& twin_from_scene, const TangentRect& rect, double focal, int max_width, int max_height) {
   Twin twin;

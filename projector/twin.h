@@ -17,6 +17,9 @@ struct TangentRect {
 /// The part of both.
 TangentRect intersected(const TangentRect& a, const TangentRect& b);
 
+/// The least that holds both; of none is spanned() of no points.
+TangentRect united(const TangentRect& a, const TangentRect& b);
+
 /// A pinhole picture rasterised in place of an imager's distorted one; whose eye it has. Frame as an
 /// imager's; pixel (0,0) is the centre of the top-left pixel: px = focal * (x, y) / z + centre.
 struct Twin {

@@ -1,0 +1,133 @@
+// What drawing a projector's picture asks of the heap once the renderer's buffers have grown to it, and what
+// a large mesh asks while it goes to the GPU.
+#include <gtest/gtest.h>
+#include <malloc.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cstdlib>
+#include <functional>
+#include <iostream>
+#include <new>
+
+#include "device/gl_context.h"
+#include "projector/renderer.h"
+
+namespace {
+// Of this thread: drivers have their own.
+thread_local long allocations = 0, bytes_now = 0, bytes_most = 0;
+
+void* counted(std::size_t size) {
+  ++allocations;
+  void* memory = std::malloc(size);
+  if (!memory) throw std::bad_alloc();
+  bytes_now += static_cast<long>(malloc_usable_size(memory));
+  bytes_most = std::max(bytes_most, bytes_now);
+  return memory;
+}
+void returned(void* memory) {
+  bytes_now -= static_cast<long>(malloc_usable_size(memory));
+  std::free(memory);
+}
+}  // namespace
+
+void* operator new(std::size_t size) { return counted(size); }
+void operator delete(void* memory) noexcept { returned(memory); }
+void operator delete(void* memory, std::size_t) noexcept { returned(memory); }
+
+namespace limn::projector {
+namespace {
+
+using Eigen::Vector3d;
+
+scene::Mesh grid(double width, double height, double z, int cells) {
+  scene::Mesh mesh;
+  for (int row = 0; row <= cells; ++row)
+    for (int column = 0; column <= cells; ++column) {
+      mesh.positions.push_back(
+          Vector3d((1.0 * column / cells - 0.5) * width, (1.0 * row / cells - 0.5) * height, z)
+              .cast<float>());
+      mesh.normals.push_back(-Eigen::Vector3f::UnitZ());
+    }
+  const auto at = [&](int column, int row) { return static_cast<std::uint32_t>(row * (cells + 1) + column); };
+  for (int row = 0; row < cells; ++row)
+    for (int column = 0; column < cells; ++column) {
+      mesh.triangles.push_back({at(column, row), at(column, row + 1), at(column + 1, row)});
+      mesh.triangles.push_back({at(column + 1, row), at(column, row + 1), at(column + 1, row + 1)});
+    }
+  mesh.triangle_materials.assign(mesh.triangles.size(), 0);
+  return mesh;
+}
+
+scene::Scene scene_of(int cells) {
+  scene::Scene scene;
+  scene.prototype = scene::Prototype{grid(0.5, 0.4, 0, cells), {}, 0.8, {}};
+  for (const auto& [name, mode] : {std::pair("mirror", scene::Mode::view), {"trim", scene::Mode::surface}}) {
+    scene::Slot slot;
+    slot.name = name;
+    slot.mode = mode;
+    slot.variants.push_back({"a", grid(0.1, 0.1, mode == scene::Mode::view ? -0.03 : 0, 4)});
+    scene.slots.push_back(slot);
+  }
+  return scene;
+}
+
+Rig two_projectors() {
+  Rig rig;
+  for (const double x : {-0.3, 0.3})
+    rig.projectors.push_back({x < 0 ? "projector0" : "projector1", 320, 200,
+                              Lens::pinhole(450, 450, 160, 100),
+                              looking_at({x, -0.1, -1}, {0, 0, 0}, {0, -1, 0})});
+  return rig;
+}
+
+class Allocation : public testing::Test {
+ protected:
+  device::GlContext context_ = device::GlContext::create().value();
+};
+
+TEST_F(Allocation, StopsAfterTheFirstPictures) {
+  auto drawing = Renderer::create(scene_of(8), two_projectors());
+  ASSERT_TRUE(drawing) << drawing.message();
+  const Imager viewer =
+      viewer_imager(looking_at({0.1, -0.2, -1}, {0, 0, 0}, {0, -1, 0}).inverse(), 320, 240, 35);
+  scene::PosedScene posed{Pose(), {{"mirror", "a", Pose()}, {"trim", "a", Pose()}}};
+  const auto asked = [&](const std::function<void(int)>& move) {
+    long count = 0;
+    for (int frame = 0; frame < 6; ++frame) {
+      move(frame);
+      const long before = allocations;
+      for (std::size_t i = 0; i < 2; ++i) drawing->draw_projector(i, posed, viewer);
+      count = allocations - before;
+    }
+    return count;  // of the last frame
+  };
+  const long still = asked([](int) {});
+  const long part_moves =
+      asked([&](int frame) { posed.parts[0].world_from_part.translation.x() = 1e-3 * frame; });
+  const long all_moves =
+      asked([&](int frame) { posed.world_from_prototype->translation.x() = 1e-3 * frame; });
+  std::cout << "allocations a frame of two projectors: still " << still << ", a part moves " << part_moves
+            << ", the prototype moves " << all_moves << "\n";
+  EXPECT_EQ(still, 0);
+  EXPECT_EQ(part_moves, 0);
+  EXPECT_EQ(all_moves, 0);
+}
+
+TEST_F(Allocation, OfALargeMeshIsBoundedByItsTriangles) {
+  const scene::Scene scene = scene_of(316);
+  const auto triangles = static_cast<double>(scene.prototype->mesh.triangles.size());
+  ASSERT_GT(triangles, 199000);
+  const Rig rig = two_projectors();
+  ASSERT_TRUE(Renderer::create(scene_of(2), rig));  // the driver's own first things
+  const long before = bytes_now;
+  bytes_most = bytes_now;
+  const auto drawing = Renderer::create(scene, rig);
+  ASSERT_TRUE(drawing) << drawing.message();
+  const double most = static_cast<double>(bytes_most - before) / triangles;
+  std::cout << "bytes a triangle: at most " << most << "\n";
+  EXPECT_LT(most, 115);  // 104 of them corners, normals and owners, once
+}
+
+}  // namespace
+}  // namespace limn::projector
