@@ -186,6 +186,20 @@ void nudge(const ConfigNode& node, Rig* rig) {
   }
 }
 
+Hand read_hand(const ConfigNode& node, const Rig& rig) {
+  node.only({"before", "at", "aim_m"});
+  std::vector<std::string> names;
+  for (const Imager& projector : rig.projectors) names.push_back(projector.name);
+  Hand hand;
+  const auto found = std::find(names.begin(), names.end(), node.at("before").choice(names));
+  if (found != names.end()) hand.projector = static_cast<std::size_t>(found - names.begin());
+  hand.p_aim = node.at("aim_m").vector3();
+  hand.at = node.at("at").positive();
+  if (hand.at >= 1)
+    node.at("at").problem(fmt::format("expected a share of the way below 1, found {}.", hand.at));
+  return hand;
+}
+
 }  // namespace
 
 const std::vector<CheckMeasure>& check_measures() {
@@ -205,6 +219,9 @@ const std::vector<CheckMeasure>& check_measures() {
       {"seam_step_p95", "luminance step along projectors' seams, 95 %", ""},
       {"seam_step_max", "luminance step anywhere, largest", ""},
       {"black_step_share", "step of the light of black, share of one projector's, worst", ""},
+      {"refill_share", "light lost to a hand's shadow that is back within 3 frames", "", true},
+      {"refill_flash_share", "light over what was there without the hand, worst", ""},
+      {"refill_still_255", "change of the projectors' pictures over 30 frames without a hand", "/255"},
       {"rerun_worst_255", "difference of two runs, worst", "/255"},
   };
   return measures;
@@ -213,7 +230,8 @@ const std::vector<CheckMeasure>& check_measures() {
 Result<Check> load_check(const fs::path& path) {
   LIMN_TRY(const Config config, Config::load(path, "limn.check/1"));
   const ConfigNode root = config.root();
-  root.only({"schema", "about", "world", "scene", "poses", "viewer", "resolution", "nudge", "limits"});
+  root.only({"schema", "about", "world", "scene", "poses", "viewer", "resolution", "nudge", "hand", "clay",
+             "limits"});
   Check check;
   check.name = path.stem().string();
   check.about = root.at("about").text();
@@ -242,6 +260,11 @@ Result<Check> load_check(const fs::path& path) {
   check.viewer = *viewer;
   LIMN_TRY(check.posed, poses_of(root.find("poses"), config.folder(), &check.truth));
   if (const auto node = root.find("resolution")) coarsen(*node, &check.truth.rig);
+  if (const auto node = root.find("hand")) check.hand = read_hand(*node, check.truth.rig);
+  if (const auto node = root.find("clay")) {
+    const Eigen::Vector3d rgb = node->vector3();
+    if (sim::Object* prototype = check.truth.find("prototype")) prototype->albedo = rgb.reverse();
+  }
   check.told = {check.truth.rig, *check.truth.scene, check.posed};
   if (const auto node = root.find("nudge")) nudge(*node, &check.truth.rig);
   LIMN_TRY_STATUS(config.status());

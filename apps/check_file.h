@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/refill.h"
 #include "core/result.h"
 #include "core/rig.h"
 #include "scene/posed.h"
@@ -40,6 +41,7 @@ struct Check {
   std::string about;
   std::vector<CheckLimit> limits;
   Imager viewer;
+  Hand hand;  ///< that shades in `refill_…`
 
   sim::World truth;         ///< with the injected nudges
   scene::PosedScene posed;  ///< where the parts truly are

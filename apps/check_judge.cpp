@@ -10,6 +10,7 @@
 #include <set>
 
 #include "apps/judge.h"
+#include "apps/refill.h"
 #include "core/log.h"
 #include "projector/renderer.h"
 #include "scene/drawn.h"
@@ -165,6 +166,8 @@ class Judge {
     if (asked("depth_order_share")) LIMN_TRY_STATUS(judge_depth_order());
     if (asked("seam_step_p95") || asked("seam_step_max")) LIMN_TRY_STATUS(judge_seams());
     if (asked("black_step_share")) LIMN_TRY_STATUS(judge_black());
+    if (asked("refill_share") || asked("refill_flash_share") || asked("refill_still_255"))
+      LIMN_TRY_STATUS(judge_refill());
     if (asked("rerun_worst_255")) LIMN_TRY_STATUS(judge_rerun());
     CheckResult result{check_.name, check_.about, {}, std::move(pictures_), 0, ""};
     for (const CheckLimit& limit : check_.limits)
@@ -232,17 +235,33 @@ class Judge {
     return reaches_;
   }
 
-  // The scene's prototype with one part instead of the scene's own, drawn by a renderer of its own.
-  Result<std::vector<cv::Mat>> drawn_instead(const scene::Mesh& mesh, scene::Mode mode) const {
+  // The scene's prototype with one part instead of the scene's own, and where that is.
+  std::pair<scene::Scene, scene::PosedScene> shown_instead(const scene::Mesh& mesh, scene::Mode mode) const {
     scene::Scene scene = check_.told.scene;
     scene::Slot slot;
     slot.name = "judged";
     slot.mode = mode;
     slot.variants = {{"judged", mesh}};
     scene.slots = {slot};
-    LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, check_.told.rig));
     const Pose& world_from_prototype = *check_.told.posed.world_from_prototype;
-    return drawn_by(renderer, {world_from_prototype, {{"judged", "judged", world_from_prototype}}});
+    return {scene, {world_from_prototype, {{"judged", "judged", world_from_prototype}}}};
+  }
+
+  // That, drawn by a renderer of its own.
+  Result<std::vector<cv::Mat>> drawn_instead(const scene::Mesh& mesh, scene::Mode mode) const {
+    const auto [scene, posed] = shown_instead(mesh, mode);
+    LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, check_.told.rig));
+    return drawn_by(renderer, posed);
+  }
+
+  // Even light over the whole prototype.
+  scene::Mesh coat() const {
+    scene::Mesh coat = check_.told.scene.prototype->mesh;
+    coat.materials = {scene::Material{
+        .base_colour = Eigen::Vector3f::Constant(float(k_coat)), .unlit = true, .texture = {}}};
+    coat.triangle_materials.assign(coat.triangles.size(), 0);
+    coat.uvs.clear();
+    return coat;
   }
 
   Status judge_texture() {
@@ -443,12 +462,7 @@ class Judge {
   }
 
   Status judge_seams() {
-    scene::Mesh coat = check_.told.scene.prototype->mesh;
-    coat.materials = {scene::Material{
-        .base_colour = Eigen::Vector3f::Constant(float(k_coat)), .unlit = true, .texture = {}}};
-    coat.triangle_materials.assign(coat.triangles.size(), 0);
-    coat.uvs.clear();
-    LIMN_TRY(const auto pictures, drawn_instead(coat, scene::Mode::surface));
+    LIMN_TRY(const auto pictures, drawn_instead(coat(), scene::Mode::surface));
     const cv::Mat actual = seen_by_eye(pictures);
     const cv::Mat whole = evenly_lit();
     const Steps steps = steps_of(actual, k_coat, whole);
@@ -603,6 +617,30 @@ class Judge {
     seams.setTo(cv::Scalar(90, 70, 40), steps.along);
     steps.step.convertTo(grey, CV_8U, 255 / white);
     return cv::max(seams, bgr(grey));
+  }
+
+  // In the world as it is, room, noise and all.
+  Status judge_refill() {
+    const auto [scene, posed] = check_.told.posed.parts.empty()
+                                    ? shown_instead(coat(), scene::Mode::surface)
+                                    : std::pair(check_.told.scene, check_.told.posed);
+    const auto reading =
+        judged_refill(check_.truth, scene, posed, check_.viewer, check_.hand, check_.truth.seed);
+    if (!reading) return error("{}: {}", check_.name, reading.message());
+    values_["refill_share"] = reading->share;
+    values_["refill_flash_share"] = reading->flash;
+    values_["refill_still_255"] = reading->still_levels;
+    std::string shares;
+    for (const RefillFrame& frame : reading->frames)
+      shares += fmt::format("{} {} {:.0f} %", shares.empty() ? "" : ",", frame.phase, 100 * frame.share);
+    pictures_.push_back(
+        {"refill", "Light with a hand before a projector",
+         fmt::format("Expected: without the hand. Back of what the shadow takes, frame by frame:{}. "
+                     "Brighter by {:.1f} % at most. Difference: 32 times.",
+                     shares, 100 * reading->flash),
+         for_eye(reading->refilled), for_eye(reading->before),
+         grown(cv::abs(reading->refilled - reading->before))});
+    return {};
   }
 
   Status judge_rerun() {

@@ -67,6 +67,9 @@ struct CheckResult {
 ///   (LightOptions::even_black), of projectors with the world's black level, falloff and incidence and
 ///   responses that say so; the worst variation along those lines, as a share of the mean black of one
 ///   projector there.
+/// - `refill_…`: a session with a hand in it (apps/refill.h) on the world as it is, with its room, its
+/// cameras' noise
+///   and its projectors' effects; an even coat where no part is shown.
 /// - `rerun_worst_255`: pictures of two renderers, level by level.
 ///
 /// Error: nothing to judge by a measure, such as no part in the picture.

@@ -154,7 +154,7 @@ struct Renderer::Impl {
   Sights sights;
   std::optional<ContactShadow> contact_shadow;
   bool has_contact_shadow = false;
-  Program points, blend, light, irradiance, coverage, composite, edges;
+  Program points, blend, light, irradiance, lit, coverage, composite, edges;
   // A layer of the parts' light: where there may be some, at pixel centres, by more samples at edges.
   struct LayerPrograms {
     Program where, centre, edges;
@@ -281,8 +281,9 @@ struct Renderer::Impl {
 
 Status Renderer::Impl::link_programs() {
   const std::pair<Program*, const char*> drawn[] = {
-      {&points, "points.frag"},         {&blend, "blend.frag"},       {&light, "light.frag"},
-      {&irradiance, "irradiance.frag"}, {&coverage, "coverage.frag"}, {&composite, "composite.frag"}};
+      {&points, "points.frag"},         {&blend, "blend.frag"}, {&light, "light.frag"},
+      {&irradiance, "irradiance.frag"}, {&lit, "lit.frag"},     {&coverage, "coverage.frag"},
+      {&composite, "composite.frag"}};
   for (const auto& [program, file] : drawn) {
     LIMN_TRY(*program, Program::link("whole.vert", file));
   }
@@ -734,6 +735,26 @@ cv::Mat Renderer::blend(std::size_t index, const scene::PosedScene& posed) {
   impl_->blend.set("u_projector", static_cast<int>(index));
   impl_->draw(impl_->blend, canvas);
   return read_back(canvas.framebuffer, projector.width, projector.height, CV_32FC2, GL_RG);
+}
+
+LitPatches Renderer::lit_patches(std::size_t camera, const scene::PosedScene& posed, int side_px) {
+  LIMN_CHECK(camera < impl_->rig.cameras.size() && side_px > 0);
+  const Imager& imager = impl_->rig.cameras[camera];
+  impl_->prepare(posed);
+  impl_->look_from_imager(imager);
+  const Canvas& canvas =
+      impl_->canvas(std::max(1, imager.width / side_px), std::max(1, imager.height / side_px), GL_RGBA32F);
+  const auto drawn = [&](int projector) {
+    impl_->set_up(impl_->lit, impl_->lens_of(imager), nullptr);
+    impl_->lit.set("u_projector", projector);
+    impl_->lit.set("u_side", static_cast<float>(side_px));
+    impl_->draw(impl_->lit, canvas);
+    return read_back(canvas.framebuffer, canvas.width, canvas.height, CV_32FC4, GL_RGBA);
+  };
+  LitPatches patches{side_px, impl_->scene_from_world, drawn(-1), {}};
+  for (std::size_t i = 0; i < impl_->rig.projectors.size(); ++i)
+    patches.by_projector.push_back(drawn(static_cast<int>(i)));
+  return patches;
 }
 
 cv::Mat Renderer::composite(std::size_t camera,

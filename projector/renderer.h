@@ -8,6 +8,7 @@
 
 #include "core/result.h"
 #include "core/rig.h"
+#include "projector/arriving.h"
 #include "projector/compensation.h"
 #include "projector/pass_times.h"
 #include "scene/posed.h"
@@ -53,10 +54,10 @@ class Renderer {
   /// shows nothing.
   Status set_light(const LightOptions& options, const MeasuredSurface* surface = nullptr);
 
-  /// How much of projector `index`'s light arrives, from the next picture on: 0 … 1
+  /// How much of projector `index`'s light arrives (arriving.h estimates it), from the next picture on: 0 … 1
   /// over its picture, CV_32FC1 or CV_8UC1 (255 is all) of any size, interpolated between its cells' centres;
   /// empty: all of it, as at first. Where it is blocked the others that reach the point give its light, and
-  /// it keeps 8 % of its own share, to show when the shadow goes. Where no other reaches it shines on.
+  /// it keeps at most 7 % of the light, to show when the shadow goes. Where no other reaches it shines on.
   void set_arriving(std::size_t index, const cv::Mat& map);
 
   /// View parts of `scene`, the one given to create, darken the prototype around them in composites and views
@@ -87,6 +88,10 @@ class Renderer {
   /// CV_32FC3: the prototype's point (its own frame, m) that each pixel of the projector lights; NaN where
   /// none.
   cv::Mat surface_points(std::size_t index, const scene::PosedScene& posed);
+
+  /// The patches of camera `camera`'s picture, `side_px` pixels a side, that light falls on: what
+  /// ArrivingLight watches. Ask again when the prototype has moved.
+  LitPatches lit_patches(std::size_t camera, const scene::PosedScene& posed, int side_px);
 
   /// CV_32FC2, for each pixel of the projector: its share of the light at the prototype's point that it
   /// lights (the shares of all that reach a point sum to one), and the light over its own black, as a share

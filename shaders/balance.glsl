@@ -72,6 +72,6 @@ vec3 balanced(int i, vec4 colour, vec3 p, Hit prototype, vec3 d_normal) {
       light = share.share / share.irradiance * (inverse(surface.mixing) * wanted);
     }
   }
-  if (u_even_black) light += black_lift(share);
+  light += black_lift(share, u_even_black ? share.missing_black : share.blocked_black);
   return light;
 }

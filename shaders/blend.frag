@@ -16,5 +16,5 @@ void main() {
   vec3 n = flat_normal(hit.id);
   if (dot(n, d) > 0.0) n = -n;
   Share share = share_of(u_projector, projector.p_eye.xyz + hit.t * d, n);
-  o_blend = vec2(share.share, black_lift(share));
+  o_blend = vec2(share.share, black_lift(share, share.missing_black));
 }

@@ -68,34 +68,43 @@ struct Share {
   float share;          // of the light there; what arrives of all that reach p sums to one
   float irradiance;     // as Reach
   float missing_black;  // irradiance that black gives where every projector reaches, and that is missing at p
+  float blocked_black;  // of it, what would arrive but for somebody's shadow
 };
 
-// Where light is blocked others give it, and the blocked projector keeps watch: so little of its share that nothing
-// flashes when the shadow goes, enough for a camera to see that it has gone. Where nobody else reaches it goes on.
-// Weights fall by powers, so that a change of what arrives is as soft where others hardly reach.
-const float k_watch = 0.08;    // of its share
-const float k_blocked = 1e-3;  // weight of a blocked projector against others
+// Where light is blocked others give it, and the blocked projector keeps watch: so little that nothing flashes when the
+// shadow goes, enough for a camera to see that it has gone. Where nobody else reaches it goes on. Weights fall by
+// powers, so that a change of what arrives is as soft where others hardly reach.
+const float k_blocked = 1e-3;   // weight of a blocked projector against others
+const float k_watch = 0.07;     // of the light, all that keep watch together
+const float k_well_in = 0.25;   // share of the light above which a projector keeps its watch whole
 
 Share share_of(int i, vec3 p, vec3 d_normal) {
-  float own = 0.0, sum = 0.0, own_quality = 0.0, quality = 0.0;
-  Share share = Share(0.0, 0.0, 0.0);
+  float own = 0.0, sum = 0.0, own_quality = 0.0, quality = 0.0, own_blocked = 0.0, blocked = 0.0;
+  Share share = Share(0.0, 0.0, 0.0, 0.0);
   for (int j = 0; j < u_projector_count; ++j) {
     Reach reach = reach(j, p, d_normal);
+    bool is_reached = reach.quality > 0.0;
     float weight = reach.quality * pow(k_blocked, 1.0 - reach.arriving);
     sum += weight;
     quality += reach.quality;
-    share.missing_black +=
-        s_sights[j].quality.w * reach.irradiance * (reach.quality == 0.0 ? 1.0 : 1.0 - reach.arriving);
+    if (is_reached) blocked += 1.0 - reach.arriving;
+    float black = s_sights[j].quality.w * reach.irradiance;
+    if (is_reached) share.blocked_black += black * (1.0 - reach.arriving);
+    if (!is_reached) share.missing_black += black;
     if (j != i) continue;
     own = weight;
     own_quality = reach.quality;
+    own_blocked = 1.0 - reach.arriving;
     share.irradiance = reach.irradiance;
   }
-  share.share = sum > 0.0 ? max(own / sum, k_watch * own_quality / quality) : 0.0;
+  share.missing_black += share.blocked_black;
+  if (sum == 0.0) return share;
+  float watch = k_watch * own_blocked / max(1.0, blocked) * min(1.0, own_quality / (k_well_in * quality));
+  share.share = max(own / sum, watch);
   return share;
 }
 
 // Light over its own black that the projector gives for black that is missing.
-float black_lift(Share share) {
-  return share.share == 0.0 ? 0.0 : share.share * share.missing_black / share.irradiance;
+float black_lift(Share share, float missing) {
+  return share.share == 0.0 ? 0.0 : share.share * missing / share.irradiance;
 }

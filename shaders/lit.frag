@@ -1,0 +1,28 @@
+#version 450 core
+// What lights the middle of each square patch of the eye's picture. rgb: pixel of projector u_projector and its irradiance
+// there, 0 where it does not reach; for no projector (-1) the prototype's point in the scene's frame. a: 0 where the eye
+// sees no prototype.
+#include "scene.glsl"
+#include "lens.glsl"
+#include "reach.glsl"
+layout(location = 0) out vec4 o_lit;
+uniform usampler2DArray s_eye_ids;
+uniform int u_eye, u_projector;
+uniform float u_side;  // of a patch, pixels
+
+void main() {
+  Sight eye = s_sights[u_eye];
+  vec3 d = ray_of(eye, (floor(gl_FragCoord.xy) + 0.5) * u_side - 0.5);
+  Hit hit = first_hit(s_eye_ids, eye, 0, d);
+  o_lit = vec4(0);
+  if (hit.id == 0u) return;
+  vec3 p = eye.p_eye.xyz + hit.t * d;
+  o_lit = vec4(p, 1);
+  if (u_projector < 0) return;
+  vec3 n = flat_normal(hit.id);
+  if (dot(n, d) > 0.0) n = -n;
+  Sight projector = s_sights[u_projector];
+  Reach reach = reach(u_projector, p, n);
+  vec3 q = (projector.sight_from_scene * vec4(p, 1)).xyz;
+  o_lit.xyz = reach.quality > 0.0 ? vec3(pixel_of(projector, q.xy / q.z), reach.irradiance) : vec3(0);
+}
