@@ -111,11 +111,9 @@ Finding gl() {
 }
 
 Finding described(const device::Monitor& monitor) {
-  std::string text =
-      fmt::format("{}x{} at {} Hz", monitor.size.width, monitor.size.height, monitor.refresh_hz);
-  if (monitor.size_mm.area() > 0)
-    text += fmt::format(", {}x{} mm", monitor.size_mm.width, monitor.size_mm.height);
-  text += fmt::format(", at {},{} of the desktop", monitor.position.x, monitor.position.y);
+  const std::string text =
+      fmt::format("{}x{} at {} Hz, at {},{} of the desktop", monitor.size.width, monitor.size.height,
+                  monitor.refresh_hz, monitor.position.x, monitor.position.y);
   const bool largest = monitor.size == monitor.largest;
   return {"displays", monitor.name, State::works, text,
           largest

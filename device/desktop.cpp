@@ -24,7 +24,6 @@ Monitor described(GLFWmonitor* monitor) {
     if (modes[i].width * modes[i].height > found.largest.area())
       found.largest = {modes[i].width, modes[i].height};
   glfwGetMonitorPos(monitor, &found.position.x, &found.position.y);
-  glfwGetMonitorPhysicalSize(monitor, &found.size_mm.width, &found.size_mm.height);
   return found;
 }
 

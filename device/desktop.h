@@ -17,7 +17,6 @@ struct Monitor {
   cv::Size largest;  ///< of the modes it has: what it is built for, mostly
   int refresh_hz = 0;
   cv::Point position;  ///< of its top left pixel on the desktop
-  cv::Size size_mm;    ///< as it says of itself; 0 of many projectors
 };
 
 /// The desktop that windows and monitors belong to (X or Wayland, through GLFW). One at a time in a program;
