@@ -2,12 +2,15 @@
 
 #include "device/gige_camera.h"
 
+#include <fcntl.h>
 #include <signal.h>
+#include <sys/file.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <opencv2/core.hpp>
 #include <thread>
 
@@ -28,7 +31,12 @@ void contains(const std::string& message, const std::string& part) {
 // The fake camera's process; it ends as a pulled cable does.
 class FakeCamera {
  public:
-  FakeCamera() : child_(fork()) {
+  FakeCamera() {
+    // They all want the same port: tests that run side by side take turns.
+    const auto path = std::filesystem::temp_directory_path() / "limn-fake-gige-camera.lock";
+    turn_ = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    flock(turn_, LOCK_EX);
+    child_ = fork();
     if (child_ != 0) return;
     execlp("arv-fake-gv-camera-0.8", "arv-fake-gv-camera-0.8", "-i", "127.0.0.1", "-s", "LIMN7", nullptr);
     _exit(99);
@@ -41,10 +49,12 @@ class FakeCamera {
     kill(child_, SIGKILL);
     waitpid(child_, nullptr, 0);
     child_ = -1;
+    close(turn_);
   }
 
  private:
-  pid_t child_;
+  int turn_ = -1;
+  pid_t child_ = -1;
 };
 
 Result<GigeCamera> opened(GigeCameraOptions options = {}) {

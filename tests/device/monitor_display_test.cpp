@@ -100,7 +100,8 @@ TEST_F(AMonitor, IsListedAndADesktopIsTheOnlyOne) {
   contains(second.message(), "Pass that one on");
   EXPECT_FALSE(Window::open("Limn", 32, 32));
   desktop_.reset();
-  EXPECT_TRUE(Desktop::open());
+  const auto again = Desktop::open();
+  EXPECT_TRUE(again) << again.message();
 }
 
 TEST_F(AMonitor, IsLitPixelForPixel) {
