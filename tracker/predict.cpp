@@ -52,11 +52,13 @@ Believed believed(const BodyMotion& known, double seconds, Prediction how, const
 std::vector<Track> predicted(std::span<const BodyMotion> known,
                              Stamp at,
                              Prediction how,
-                             const MotionModel& model) {
+                             const MotionModel& model,
+                             std::optional<Stamp> decided_at) {
   std::vector<Track> tracks;
   for (const BodyMotion& motion : known) {
     const double unseen = std::max(0.0, seconds_between(motion.measured_at, at));
-    const bool lost = unseen > model.extrapolation_limit_s;
+    const bool lost =
+        seconds_between(motion.measured_at, decided_at.value_or(at)) > model.extrapolation_limit_s;
     const Believed now = believed(motion, lost ? 0 : unseen, how, model);
     Track track;
     track.body = motion.body;

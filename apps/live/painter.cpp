@@ -65,19 +65,32 @@ Painter::Painter(const scene::Scene& scene,
     painted_.projectors.emplace_back(projector.height, projector.width, CV_8UC3, cv::Scalar::all(0));
 }
 
-Imager Painter::viewer_for(const scene::PosedScene& posed) const {
-  if (const auto viewer = scene::viewer_of(scene_, posed, d_up_world_)) return *viewer;
-  if (!rig_.cameras.empty()) return rig_.cameras[0];
-  return rig_.projectors[0];
+// The only viewer if it is fixed, else one at the eye that all viewers share, which moves calmly.
+Imager Painter::viewer_for(const scene::PosedScene& posed, Stamp at) {
+  if (scene_.viewers.size() == 1 && scene_.viewers[0].fixed) return *scene_.viewers[0].fixed;
+  const auto p_middle = scene::middle_of(scene_, posed);
+  if (!scene_.viewers.empty() && p_middle) {
+    const double seconds = eye_at_ == Stamp{} ? 0 : std::max(0.0, seconds_between(eye_at_, at));
+    shared_eye_ = scene::followed(shared_eye_, posed.eyes, *p_middle, seconds);
+    eye_at_ = std::max(eye_at_, at);
+    if (const auto p_eye = shared_eye_.p_world())
+      if (const auto viewer = scene::viewer_at(*p_eye, scene_, posed, d_up_world_)) return *viewer;
+  }
+  return rig_.cameras.empty() ? rig_.projectors[0] : rig_.cameras[0];
 }
 
-const Painted& Painter::paint(const Watched& watched, const scene::Staging& staging, Stamp shown_at) {
+const Painted& Painter::paint(const Watched& watched,
+                              const scene::Staging& staging,
+                              Stamp now,
+                              Stamp shown_at) {
+  painted_.painted_at = now;
   painted_.shown_at = shown_at;
   if (staging.frozen) return painted_;
-  painted_.tracks = tracker::predicted(watched.motions, shown_at, options_.prediction, options_.motion);
+  painted_.tracks = tracker::predicted(watched.motions, shown_at, options_.prediction, options_.motion, now);
   painted_.posed = scene::staged(scene_, staging, painted_.tracks);
   note_changes(painted_.posed, staging, shown_at);
-  const Imager viewer = viewer_for(painted_.posed);
+  const Imager viewer = viewer_for(painted_.posed, shown_at);
+  viewer_ = viewer;
   for (std::size_t i = 0; i < rig_.projectors.size(); ++i) {
     cv::Mat& picture = painted_.projectors[i];
     if (staging.blackout) {
@@ -102,12 +115,15 @@ cv::Mat Painter::screen(const Watched& watched, const scene::Staging& staging) {
   const std::vector<Track> tracks =
       tracker::predicted(watched.motions, at, options_.prediction, options_.motion);
   const scene::PosedScene posed = scene::staged(scene_, staging, tracks);
-  if (staging.screen == scene::Screen::rest || staging.screen == scene::Screen::full) {
-    const bool rest = staging.screen == scene::Screen::rest;
-    return renderer_.composite(0, behind, posed,
-                               rest ? projector::Composite::rest : projector::Composite::full);
+  if (staging.screen == scene::Screen::full)
+    return renderer_.composite(0, behind, posed, projector::Composite::full);
+  if (staging.screen == scene::Screen::rest) {
+    const double seconds = treated_at_ == Stamp{} ? 0 : std::max(0.0, seconds_between(treated_at_, at));
+    treatments_ = projector::treated(treatments_, renderer_.coverage(posed, rig_.cameras[0]), seconds);
+    treated_at_ = at;
+    return renderer_.composite(0, behind, posed, treatments_);
   }
-  const Imager viewer = viewer_for(posed);
+  const Imager viewer = viewer_.width > 0 ? viewer_ : rig_.cameras[0];
   if (staging.screen == scene::Screen::view) return renderer_.view(viewer, posed, k_background);
   const double half = 0.5e-3 * options_.stereo_mm;
   const cv::Mat eyes[2] = {renderer_.view(moved_eye(viewer, -half), posed, k_background),
@@ -119,11 +135,17 @@ cv::Mat Painter::screen(const Watched& watched, const scene::Staging& staging) {
 
 // Which parts have gone since the last picture, and which show another variant.
 void Painter::note_changes(const scene::PosedScene& posed, const scene::Staging& staging, Stamp at) {
-  std::map<std::string, scene::PosedPart> now;
-  for (const scene::PosedPart& part : posed.parts) now[part.slot] = part;
-  for (const auto& [slot, part] : last_)
-    if (!now.contains(slot)) fading_[slot] = {part, at};
-  for (const auto& [slot, part] : now) fading_.erase(slot);
+  const auto find = [](const scene::PosedScene& where, const std::string& slot) {
+    return std::find_if(where.parts.begin(), where.parts.end(),
+                        [&](const scene::PosedPart& part) { return part.slot == slot; });
+  };
+  for (const scene::PosedPart& part : last_.parts)
+    if (find(posed, part.slot) == posed.parts.end()) fading_[part.slot] = {part, at};
+  for (const scene::PosedPart& part : posed.parts) fading_.erase(part.slot);
+  if (posed.world_from_prototype)
+    gone_.reset();
+  else if (last_.world_from_prototype)
+    gone_ = {last_, at};
   std::erase_if(fading_, [&](const auto& entry) {
     return seconds_between(entry.second.lost_at, at) > std::max(options_.fade_s, options_.lost_s);
   });
@@ -136,12 +158,17 @@ void Painter::note_changes(const scene::PosedScene& posed, const scene::Staging&
   }
   std::erase_if(
       labels_, [&](const auto& entry) { return seconds_between(entry.second.since, at) > options_.label_s; });
-  last_ = std::move(now);
+  last_ = posed;
 }
 
 // A projector's picture of the parts, of those that fade only a share.
 cv::Mat Painter::lit(std::size_t projector, const scene::PosedScene& posed, const Imager& viewer, Stamp at) {
   cv::Mat picture = renderer_.projector_picture(projector, posed, viewer);
+  if (gone_) {
+    const double share = 1 - seconds_between(gone_->lost_at, at) / options_.fade_s;
+    return share <= 0 ? picture
+                      : mixed(picture, renderer_.projector_picture(projector, gone_->posed, viewer), share);
+  }
   for (const auto& [slot, fading] : fading_) {
     const double share = 1 - seconds_between(fading.lost_at, at) / options_.fade_s;
     if (share <= 0) continue;

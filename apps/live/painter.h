@@ -11,6 +11,7 @@
 #include "core/result.h"
 #include "core/rig.h"
 #include "projector/renderer.h"
+#include "projector/treatment.h"
 #include "scene/scene.h"
 #include "scene/staging.h"
 #include "tracker/marker_light.h"
@@ -33,7 +34,7 @@ struct Painted {
   std::vector<cv::Mat> projectors;  ///< in the rig's order, CV_8UC3
   std::vector<Track> tracks;        ///< predicted to shown_at
   scene::PosedScene posed;          ///< what the tracks and the staging make of the scene
-  Stamp shown_at;
+  Stamp painted_at, shown_at;
 };
 
 /// The projector side of a session: motions of bodies + staging -> projector pictures and the screen's. Holds
@@ -43,8 +44,9 @@ class Painter {
  public:
   static Result<Painter> create(const scene::Scene& scene, const Rig& rig, const PaintOptions& options = {});
 
-  /// Projector pictures for the moment at which their light arrives. Stamps must not go back.
-  const Painted& paint(const Watched& watched, const scene::Staging& staging, Stamp shown_at);
+  /// Projector pictures for the moment at which their light arrives; what is lost is judged by `now`. Stamps
+  /// must not go back.
+  const Painted& paint(const Watched& watched, const scene::Staging& staging, Stamp now, Stamp shown_at);
 
   /// A large screen's picture for the newest frame of camera 0, at that frame's own stamp; empty before the
   /// first frame and for Screen::off.
@@ -58,6 +60,10 @@ class Painter {
     scene::PosedPart part;
     Stamp lost_at;
   };
+  struct Gone {
+    scene::PosedScene posed;
+    Stamp lost_at;
+  };
   struct Label {
     std::string text;
     Stamp since;
@@ -66,7 +72,7 @@ class Painter {
           const Rig& rig,
           projector::Renderer renderer,
           const PaintOptions& options);
-  Imager viewer_for(const scene::PosedScene& posed) const;
+  Imager viewer_for(const scene::PosedScene& posed, Stamp at);
   void note_changes(const scene::PosedScene& posed, const scene::Staging& staging, Stamp at);
   cv::Mat lit(std::size_t projector, const scene::PosedScene& posed, const Imager& viewer, Stamp at);
   void draw_feedback(const scene::Staging& staging);
@@ -79,8 +85,14 @@ class Painter {
   std::vector<Body> bodies_;
   Eigen::Vector3d d_up_world_;
   Painted painted_;
-  std::map<std::string, scene::PosedPart> last_;  // parts as last shown, by slot
-  std::map<std::string, Fading> fading_;
+  Imager viewer_;  // of what was painted last
+  scene::SharedEye shared_eye_;
+  Stamp eye_at_;
+  std::vector<projector::Treatment> treatments_;
+  Stamp treated_at_;
+  scene::PosedScene last_;                       // as last shown
+  std::map<std::string, Fading> fading_;         // parts whose marker was lost, by slot
+  std::optional<Gone> gone_;                     // all, since the prototype was lost
   std::map<std::string, std::string> variants_;  // last shown
   std::map<std::string, Label> labels_;
 };

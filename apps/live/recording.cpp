@@ -148,7 +148,8 @@ std::uint64_t fingerprint(std::span<const cv::Mat> pictures) {
 }
 
 nlohmann::ordered_json pose_log(const Painted& painted) {
-  nlohmann::ordered_json json = {{"shown_at_ns", nanoseconds(painted.shown_at)}};
+  nlohmann::ordered_json json = {{"painted_at_ns", nanoseconds(painted.painted_at)},
+                                 {"shown_at_ns", nanoseconds(painted.shown_at)}};
   json["tracks"] = nlohmann::ordered_json::array();
   for (const Track& track : painted.tracks)
     json["tracks"].push_back({{"body", track.body},

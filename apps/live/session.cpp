@@ -129,9 +129,9 @@ Status Session::keep_looks(const scene::Staging& before) {
   return picture.empty() ? Status() : write_png(folder / (newest.name + ".png"), picture);
 }
 
-const Painted& Session::paint(Stamp shown_at) {
+const Painted& Session::paint(Stamp now, Stamp shown_at) {
   const auto begun = std::chrono::steady_clock::now();
-  const Painted& painted = painter_.paint(watched_, staging_, shown_at);
+  const Painted& painted = painter_.paint(watched_, staging_, now, shown_at);
   paint_ms_ = milliseconds_since(begun);
   const auto recording = std::chrono::steady_clock::now();
   if (recorder_) recorder_->painted(painted, moments_);

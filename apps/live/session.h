@@ -32,7 +32,8 @@ class Session {
   /// An edit of a person; one that cannot be done is told, and nothing changes. `source` says whose.
   Status edit(const scene::Edit& edit, const std::string& source, Stamp at);
 
-  const Painted& paint(Stamp shown_at);
+  /// The projectors' pictures for a moment to come.
+  const Painted& paint(Stamp now, Stamp shown_at);
   cv::Mat screen();
 
   /// What was painted last.

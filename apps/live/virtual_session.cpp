@@ -81,7 +81,7 @@ class VirtualLoop {
       session_->take(watcher_->watch(frames), ++moments_);
     }
     play_edits(exposed_at);
-    const Painted& painted = session_->paint(shifted(rig_->now(), k_virtual_display_s));
+    const Painted& painted = session_->paint(rig_->now(), shifted(rig_->now(), k_virtual_display_s));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i) {
       if (!is_plugged(session_->setup().rig.projectors[i].name, rig_->now())) continue;
       LIMN_TRY(const Stamp shown_at, rig_->projector(static_cast<int>(i)).show(painted.projectors[i]));

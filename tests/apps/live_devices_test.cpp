@@ -1,0 +1,146 @@
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstdio>
+#include <opencv2/core.hpp>
+#include <thread>
+
+#include "apps/coarser.h"
+#include "apps/live/device_session.h"
+#include "apps/live/latest.h"
+#include "apps/live/replay.h"
+#include "apps/world_markers.h"
+#include "core/file.h"
+#include "core/picture.h"
+#include "device/gl_context.h"
+#include "device/picture_camera.h"
+#include "sim/virtual_rig.h"
+#include "tests/support/matchers.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Remembers what it was shown; its light leaves 20 ms later.
+class Canvas : public device::Display {
+ public:
+  Canvas(std::string name, cv::Size size) : name_(std::move(name)), size_(size) {}
+  const std::string& name() const override { return name_; }
+  cv::Size size() const override { return size_; }
+  Result<Stamp> show(const cv::Mat& picture) override {
+    if (picture.size() != size_) return error("{}: expected its size, found another.", name_);
+    shown = picture.clone();
+    ++count;
+    return shifted(std::chrono::steady_clock::now(), 0.020);
+  }
+  cv::Mat shown;
+  int count = 0;
+
+ private:
+  std::string name_;
+  cv::Size size_;
+};
+
+// A camera whose cable is out for a while.
+class LooseCamera : public device::CameraSource {
+ public:
+  LooseCamera(device::PictureCamera camera, int from, int until)
+      : camera_(std::move(camera)), from_(from), until_(until) {}
+  const std::string& name() const override { return camera_.name(); }
+  cv::Size size() const override { return camera_.size(); }
+  Result<Frame> next() override {
+    ++asked_;
+    if (asked_ >= from_ && asked_ < until_) return error("camera0: the cable is out.");
+    return camera_.next();
+  }
+
+ private:
+  device::PictureCamera camera_;
+  int from_, until_, asked_ = 0;
+};
+
+TEST(Latest, TheNewestWinsAndNothingQueues) {
+  Latest<int> box;
+  EXPECT_FALSE(box.take(std::chrono::milliseconds(1)));
+  std::thread writer([&] {
+    for (int i = 1; i <= 1000; ++i) box.put(i);
+  });
+  writer.join();
+  EXPECT_EQ(box.take(std::chrono::milliseconds(1)), 1000);
+  EXPECT_FALSE(box.take(std::chrono::milliseconds(1)));
+  box.put(3);
+  box.put(4, [](const int& old, int& next) { next += old; });
+  EXPECT_EQ(box.take(std::chrono::milliseconds(1)), 7);
+}
+
+// Threads as of a real rig, on stored pictures of the studio at their pace; a recording of it replays as the
+// threads ran.
+TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
+  const fs::path folder = test::test_folder();
+  sim::World world =
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture).value();
+  ASSERT_TRUE(make_coarser(0.5, &world.rig).ok());
+  SessionSetup setup;
+  setup.rig = world.rig;
+  setup.scene = *world.scene;
+  sim::VirtualRig room(std::move(world), {.grab_waits_for_light = false});
+  ASSERT_TRUE(make_folder(folder / "pictures").ok());
+  for (int i = 0; i < 3; ++i)
+    ASSERT_TRUE(write_png(folder / "pictures" / fmt::format("{}.png", i), room.camera(0).next()->image).ok());
+
+  const auto context = device::GlContext::create();
+  ASSERT_TRUE(context) << context.message();
+  auto books = Books::open(folder / "out", folder / "recording", &setup);
+  ASSERT_TRUE(books) << books.message();
+  auto watcher = Watcher::create(setup.scene, setup.rig, setup.watch);
+  ASSERT_TRUE(watcher) << watcher.message();
+  auto session = Session::create(setup, &books->telemetry(), books->recorder());
+  ASSERT_TRUE(session) << session.message();
+  SessionDevices devices;
+  devices.cameras.push_back(std::make_unique<LooseCamera>(
+      device::PictureCamera::open(folder / "pictures", {.frames_per_second = 20, .repeat = true}).value(), 8,
+      16));
+  const Imager& first = setup.rig.projectors[0];
+  auto canvas = std::make_unique<Canvas>(first.name, cv::Size(first.width, first.height));
+  const Canvas& projector = *canvas;
+  devices.projectors.push_back(std::move(canvas));
+  devices.projectors.push_back(nullptr);  // the second was not found
+  auto wide = std::make_unique<Canvas>("screen", cv::Size(640, 480));
+  const Canvas& screen = *wide;
+  devices.screens.push_back(std::move(wide));
+
+  const std::atomic<bool> is_ended = false;
+  std::optional<device::Window> none;
+  const auto begun = std::chrono::steady_clock::now();
+  const Status played = play_on_devices(&devices, 2.5, is_ended, &*watcher, &*session, &*books, &none);
+  const double took_s = seconds_between(begun, std::chrono::steady_clock::now());
+  ASSERT_TRUE(played.ok()) << played.message();
+  EXPECT_LT(took_s, 2.5 + 1 + 0.6);  // its end, and a picture that was being painted on a slow machine
+  EXPECT_GE(projector.count, 3);
+  EXPECT_GT(cv::countNonZero(projector.shown.reshape(1)), 1000);
+  EXPECT_GT(cv::countNonZero(screen.shown.reshape(1)), 1000);
+  EXPECT_EQ(cv::countNonZero(screen.shown.row(10).reshape(1)), 0);  // bars above a wider picture
+  ASSERT_TRUE(books->close(&*session, false).ok());
+  const std::string page = read_file(folder / "out/session.html").value();
+  EXPECT_NE(page.find("camera0 is gone; the session goes on without it: camera0: the cable is out"),
+            std::string::npos);
+  EXPECT_NE(page.find("camera0 is back"), std::string::npos);
+
+  ReplayOptions replay;
+  replay.session = folder / "recording";
+  const Status replayed = run_replay(replay);
+  EXPECT_TRUE(replayed.ok()) << replayed.message();
+}
+
+TEST(LiveDevices, SaysWhatIsMissing) {
+  SessionDevices devices;
+  const std::atomic<bool> is_ended = false;
+  std::optional<device::Window> none;
+  const Status played = play_on_devices(&devices, 1, is_ended, nullptr, nullptr, nullptr, &none);
+  ASSERT_FALSE(played.ok());
+  EXPECT_NE(played.message().find("a camera that works"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace limn::apps
