@@ -361,10 +361,12 @@ void add_live(CLI::App& app, Run& run) {
       "Keys in the window: right/left next/previous variant, tab next slot, b blackout, f freeze, m markers, s save a look,\n"
       "l/k next/previous look, o what the screen shows, r release, escape ends.\n"
       "Example: limn live --seconds 5 --out session\n"
+      "Example: limn live --devices devices.json --rig rig --scene config/scenes/door --out session\n"
       "Example: limn live --rig rig --scene config/scenes/door --seconds 10 --record recording");
   auto options = std::make_shared<LiveOptions>();
   command->add_option("--rig", options->rig, "rig folder, rig.json or folder of .cameramodel files");
   command->add_option("--scene", options->scene, "scene folder or its scene.json");
+  command->add_option("--devices", options->devices, "the cameras and displays (limn.devices/1); without: a virtual rig");
   command->add_option("--world", options->world, "world of the virtual rig (limn.world/1); without rig and scene: the studio");
   command->add_option("--script", options->script, "what happens in the virtual room (limn.script/1)");
   command->add_option("--seconds", options->seconds, "of the session's clock; without: the script's, or until it is ended");

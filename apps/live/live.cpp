@@ -7,7 +7,9 @@
 #include <optional>
 
 #include "apps/coarser.h"
+#include "apps/devices.h"
 #include "apps/live/books.h"
+#include "apps/live/device_session.h"
 #include "apps/live/room.h"
 #include "apps/live/script.h"
 #include "apps/live/session.h"
@@ -16,6 +18,8 @@
 #include "apps/world_markers.h"
 #include "core/log.h"
 #include "device/gl_context.h"
+#include "device/open_camera.h"
+#include "device/open_display.h"
 #include "device/window.h"
 #include "sim/virtual_rig.h"
 
@@ -23,6 +27,8 @@ namespace limn::apps {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double k_camera_limit_s = 0.5;  // so that the session ends in under a second
 
 // Set by SIGINT and SIGTERM.
 std::atomic<bool> g_is_ended = false;
@@ -48,6 +54,13 @@ Status check_options(const LiveOptions& options) {
   if (!(options.extrapolate_s > 0 && options.extrapolate_s <= 5))
     return usage_error("--extrapolate: expected seconds over 0 and at most 5, found {}.",
                        options.extrapolate_s);
+  if (!options.devices.empty() && options.rig.empty())
+    return usage_error("--devices: expected --rig and --scene with it, found neither.");
+  if (!options.devices.empty() && (!options.world.empty() || !options.script.empty() || options.window))
+    return usage_error(
+        "--devices: expected no --world, --script and --window with it, which are of the virtual rig. A "
+        "window is "
+        "a display of the devices file.");
   if (options.rig.empty() != options.scene.empty())
     return usage_error(
         "expected --rig and --scene together, found one of them. Without both the session is in a "
@@ -111,24 +124,22 @@ Status check_fits(const Rig& rig, const Rig& devices) {
   return {};
 }
 
-}  // namespace
+// What options say of a session, beside where it takes place.
+Status set_up(const LiveOptions& options, SessionSetup* setup) {
+  LIMN_TRY(setup->paint.prediction, prediction_of(options.prediction));
+  LIMN_TRY(setup->paint.marker_light, marker_light_of(options.marker_light));
+  setup->watch.motion.extrapolation_limit_s = options.extrapolate_s;
+  setup->paint.motion = setup->watch.motion;
+  return {};
+}
 
-Status run_live(const LiveOptions& options) {
-  LIMN_TRY_STATUS(check_options(options));
-  LIMN_TRY(const tracker::Prediction prediction, prediction_of(options.prediction));
-  LIMN_TRY(const tracker::MarkerLight marker_light, marker_light_of(options.marker_light));
+Status play_in_virtual_room(const LiveOptions& options) {
   LIMN_TRY(Script script, options.script.empty() ? Result<Script>(Script{}) : load_script(options.script));
   LIMN_TRY(Stage stage, virtual_stage(options));
   SessionSetup& setup = stage.setup;
   LIMN_TRY_STATUS(check_fits(setup.rig, stage.world.rig));
-  setup.watch.motion.extrapolation_limit_s = options.extrapolate_s;
-  setup.paint.motion = setup.watch.motion;
-  setup.paint.prediction = prediction;
-  setup.paint.marker_light = marker_light;
+  LIMN_TRY_STATUS(set_up(options, &setup));
   log_info("live: no devices are named; the session runs on a virtual rig, on its own clock");
-
-  std::signal(SIGINT, end_session);
-  std::signal(SIGTERM, end_session);
   const double end_s = options.seconds > 0  ? options.seconds
                        : script.seconds > 0 ? script.seconds
                                             : std::numeric_limits<double>::infinity();
@@ -149,6 +160,61 @@ Status run_live(const LiveOptions& options) {
   }
   LIMN_TRY_STATUS(play_virtually(end_s, g_is_ended, &rig, &room, &watcher, &session, &books, &window));
   return books.close(&session, options.json);
+}
+
+// Opens what can be opened; what cannot is told of and left out.
+SessionDevices opened(const Devices& devices, const Rig& rig, const device::Desktop* desktop) {
+  SessionDevices out;
+  for (device::CameraWanted wanted : devices.cameras) {
+    wanted.limit_s = k_camera_limit_s;
+    auto camera = device::open_camera(wanted);
+    if (!camera) log_warning("live: {}: {} The session goes on without it.", wanted.name, camera.message());
+    out.cameras.push_back(camera ? std::move(*camera) : nullptr);
+  }
+  out.projectors.resize(rig.projectors.size());
+  for (const device::DisplayWanted& wanted : devices.displays) {
+    auto display = device::open_display(wanted, desktop);
+    if (!display) log_warning("live: {}: {} The session goes on without it.", wanted.name, display.message());
+    const auto projector = std::find_if(rig.projectors.begin(), rig.projectors.end(),
+                                        [&](const Imager& p) { return p.name == wanted.name; });
+    auto opened = display ? std::move(*display) : nullptr;
+    if (projector != rig.projectors.end())
+      out.projectors[static_cast<std::size_t>(projector - rig.projectors.begin())] = std::move(opened);
+    else
+      out.screens.push_back(std::move(opened));
+  }
+  return out;
+}
+
+Status play_with_devices(const LiveOptions& options) {
+  LIMN_TRY(const Devices named, load_devices(options.devices));
+  SessionSetup setup;
+  LIMN_TRY(setup.rig, load_rig(options.rig));
+  LIMN_TRY(setup.scene, scene::load_scene(options.scene));
+  LIMN_TRY(const Devices devices, matched(named, setup.rig));
+  LIMN_TRY_STATUS(set_up(options, &setup));
+  std::optional<device::Desktop> desktop;
+  if (std::any_of(devices.displays.begin(), devices.displays.end(), device::needs_desktop)) {
+    LIMN_TRY(desktop, device::Desktop::open());
+  }
+  SessionDevices open = opened(devices, setup.rig, desktop ? &*desktop : nullptr);
+  LIMN_TRY(const device::GlContext context, device::GlContext::create());
+  log_info("live: {}", context.description());
+  LIMN_TRY(Books books, Books::open(options.out, options.record, &setup));
+  LIMN_TRY(Watcher watcher, Watcher::create(setup.scene, setup.rig, setup.watch));
+  LIMN_TRY(Session session, Session::create(setup, &books.telemetry(), books.recorder()));
+  std::optional<device::Window> none;  // screens are devices
+  LIMN_TRY_STATUS(play_on_devices(&open, options.seconds, g_is_ended, &watcher, &session, &books, &none));
+  return books.close(&session, options.json);
+}
+
+}  // namespace
+
+Status run_live(const LiveOptions& options) {
+  LIMN_TRY_STATUS(check_options(options));
+  std::signal(SIGINT, end_session);
+  std::signal(SIGTERM, end_session);
+  return options.devices.empty() ? play_in_virtual_room(options) : play_with_devices(options);
 }
 
 }  // namespace limn::apps

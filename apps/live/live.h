@@ -10,6 +10,7 @@ namespace limn::apps {
 struct LiveOptions {
   std::filesystem::path rig;    ///< empty: the virtual world's true one
   std::filesystem::path scene;  ///< empty: the virtual world's
+  std::filesystem::path devices;  ///< limn.devices/1; empty: the virtual rig
   std::filesystem::path world;  ///< of the virtual rig; empty: a room made for rig and scene
   std::filesystem::path script;
   double seconds = 0;     ///< of the session's clock; 0: until it is ended
@@ -23,7 +24,7 @@ struct LiveOptions {
   bool json = false;
 };
 
-/// `limn live`: cameras -> tracker -> prediction to the photon -> projectors and a screen, until the window
+/// `limn live`, on devices or on the virtual rig: cameras -> tracker -> prediction to the photon -> projectors and a screen, until the window
 /// is closed, a signal comes or the time is over. With `out`: poses.csv, telemetry.csv, session.json,
 /// session.html and the last pictures. Prints what was measured.
 Status run_live(const LiveOptions& options);
