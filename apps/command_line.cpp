@@ -381,6 +381,7 @@ void add_live(CLI::App& app, Run& run) {
   command->add_option("--marker-light", options->marker_light, "what projectors do with markers")
       ->check(CLI::IsMember({"as-is", "keep-out", "spotlight"}))
       ->capture_default_str();
+  command->add_flag("!--no-refill", options->refill, "leave light that is lost to somebody's shadow lost");
   command->add_option("--extrapolate", options->extrapolate_s, "seconds for which unseen markers are carried on")
       ->capture_default_str();
   command->add_flag("--json", options->json, "print JSON instead of lines");

@@ -128,6 +128,7 @@ Status check_fits(const Rig& rig, const Rig& devices) {
 Status set_up(const LiveOptions& options, SessionSetup* setup) {
   LIMN_TRY(setup->paint.prediction, prediction_of(options.prediction));
   LIMN_TRY(setup->paint.marker_light, marker_light_of(options.marker_light));
+  setup->paint.refill = options.refill;
   setup->watch.motion.extrapolation_limit_s = options.extrapolate_s;
   setup->paint.motion = setup->watch.motion;
   return {};

@@ -8,10 +8,10 @@
 namespace limn::apps {
 
 struct LiveOptions {
-  std::filesystem::path rig;    ///< empty: the virtual world's true one
-  std::filesystem::path scene;  ///< empty: the virtual world's
+  std::filesystem::path rig;      ///< empty: the virtual world's true one
+  std::filesystem::path scene;    ///< empty: the virtual world's
   std::filesystem::path devices;  ///< limn.devices/1; empty: the virtual rig
-  std::filesystem::path world;  ///< of the virtual rig; empty: a room made for rig and scene
+  std::filesystem::path world;    ///< of the virtual rig; empty: a room made for rig and scene
   std::filesystem::path script;
   double seconds = 0;     ///< of the session's clock; 0: until it is ended
   double resolution = 1;  ///< share of the virtual cameras' and projectors' pixels a side
@@ -20,13 +20,14 @@ struct LiveOptions {
   bool window = false;
   std::string prediction = "filtered";
   std::string marker_light = "keep-out";
+  bool refill = true;          ///< light lost to a shadow is given by other projectors
   double extrapolate_s = 0.3;  ///< for which unseen markers are carried on
   bool json = false;
 };
 
-/// `limn live`, on devices or on the virtual rig: cameras -> tracker -> prediction to the photon -> projectors and a screen, until the window
-/// is closed, a signal comes or the time is over. With `out`: poses.csv, telemetry.csv, session.json,
-/// session.html and the last pictures. Prints what was measured.
+/// `limn live`, on devices or on the virtual rig: cameras -> tracker -> prediction to the photon ->
+/// projectors and a screen, until the window is closed, a signal comes or the time is over. With `out`:
+/// poses.csv, telemetry.csv, session.json, session.html and the last pictures. Prints what was measured.
 Status run_live(const LiveOptions& options);
 
 }  // namespace limn::apps

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/live/shadow_watch.h"
 #include "apps/live/watcher.h"
 #include "core/result.h"
 #include "core/rig.h"
@@ -27,6 +28,7 @@ struct PaintOptions {
   double label_s = 1.2;   ///< for which a variant's name stands by its marker
   double lost_s = 1.5;    ///< for which a ring marks where a part was lost
   double stereo_mm = 63;  ///< between the eyes of Screen::stereo
+  bool refill = true;     ///< light lost to a shadow is given by other projectors
 };
 
 /// What is shown at a moment.
@@ -83,6 +85,7 @@ class Painter {
   projector::Renderer renderer_;
   PaintOptions options_;
   std::vector<Body> bodies_;
+  ShadowWatch shadows_;
   Eigen::Vector3d d_up_world_;
   Painted painted_;
   Imager viewer_;  // of what was painted last

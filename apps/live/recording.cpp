@@ -48,7 +48,8 @@ nlohmann::ordered_json setup_json(const SessionSetup& setup) {
           {"fade_s", paint.fade_s},
           {"label_s", paint.label_s},
           {"lost_s", paint.lost_s},
-          {"stereo_mm", paint.stereo_mm}};
+          {"stereo_mm", paint.stereo_mm},
+          {"refill", paint.refill}};
 }
 
 template <class T>
@@ -166,7 +167,7 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   LIMN_TRY(const Config config, Config::load(folder / "session.json", "limn.session/1"));
   const ConfigNode root = config.root();
   root.only({"schema", "rig", "scene", "full_scan_every", "motion", "prediction", "marker_light", "fade_s",
-             "label_s", "lost_s", "stereo_mm"});
+             "label_s", "lost_s", "stereo_mm", "refill"});
   SessionSetup setup;
   setup.watch.full_scan_every = root.at("full_scan_every").integer();
   if (setup.watch.full_scan_every < 1) root.at("full_scan_every").problem("expected 1 or more, found less.");
@@ -186,6 +187,7 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   setup.paint.label_s = root.at("label_s").positive();
   setup.paint.lost_s = root.at("lost_s").positive();
   setup.paint.stereo_mm = root.at("stereo_mm").number();
+  setup.paint.refill = root.at("refill").boolean();
   const fs::path rig = root.at("rig").path_inside(), scene = root.at("scene").path_inside();
   LIMN_TRY_STATUS(config.status());
   LIMN_TRY(setup.rig, load_rig(rig));

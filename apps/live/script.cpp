@@ -11,6 +11,8 @@ namespace {
 
 constexpr double k_hand_albedo = 0.35;
 constexpr double k_hand_above_m = 0.006;
+// A hand in a projector's light: so far along the way to the prototype's middle, and its size.
+constexpr double k_block_at = 0.6, k_block_width_m = 0.09, k_block_height_m = 0.18;
 
 bool is_same(const Pose& a, const Pose& b) {
   return a.translation == b.translation && a.rotation.coeffs() == b.rotation.coeffs();
@@ -51,6 +53,11 @@ void read_event(const ConfigNode& node, Script* script) {
     Script::Cover cover{covered->text(), 0, 0};
     read_span(node, &cover.from_s, &cover.until_s);
     script->covers.push_back(cover);
+  } else if (const auto blocked = node.find("block")) {
+    node.only({"at_s", "until_s", "block"});
+    Script::Block block{blocked->text(), 0, 0};
+    read_span(node, &block.from_s, &block.until_s);
+    script->blocks.push_back(block);
   } else if (const auto device = node.find("unplug")) {
     node.only({"at_s", "until_s", "unplug"});
     Script::Unplug unplug{device->text(), 0, 0};
@@ -60,7 +67,7 @@ void read_event(const ConfigNode& node, Script* script) {
     node.only({"at_s", "edit"});
     script->edits.push_back({time_of(node.at("at_s")), read_edit(*edit)});
   } else {
-    node.problem("expected one of sway, move, cover, unplug, edit, found none of them.");
+    node.problem("expected one of sway, move, cover, block, unplug, edit, found none of them.");
   }
 }
 
@@ -106,6 +113,9 @@ Result<ScriptedRoom> ScriptedRoom::create(Script script, sim::VirtualRig* rig) {
     if (!stands)
       return error("script: expected a marker that stands in the room ({}), found '{}'.", known, name);
   }
+  for (const Script::Block& block : script.blocks)
+    if (!rig->world().rig.find(block.projector))
+      return error("script: expected a projector of the room, found '{}'.", block.projector);
   out.script_ = std::move(script);
   return out;
 }
@@ -136,21 +146,32 @@ void ScriptedRoom::set(double at_s) {
   }
   for (std::size_t i = 0; i < script_.covers.size(); ++i) {
     const Script::Cover& cover = script_.covers[i];
-    const std::string name = fmt::format("hand{}", i);
-    const bool is_there = rig_->world().find(name) != nullptr;
-    const bool is_due = at_s >= cover.from_s && at_s < cover.until_s;
-    if (is_there == is_due) continue;
-    if (!is_due) {
-      rig_->remove(name);
-      continue;
-    }
     const Home& home = home_of(cover.marker);
-    const double side = 2 * home.placed.size_m;
     const Pose above(Eigen::Quaterniond::Identity(), {0, 0, -k_hand_above_m});
-    sim::Object hand = sim::sheet(name, side, side, {}, place_of(home, at_s) * above);
-    hand.albedo.setConstant(k_hand_albedo);
-    rig_->place(hand);
+    put(fmt::format("cover{}", i), at_s >= cover.from_s && at_s < cover.until_s,
+        sim::sheet({}, 2 * home.placed.size_m, 2 * home.placed.size_m, {}, place_of(home, at_s) * above));
   }
+  for (std::size_t i = 0; i < script_.blocks.size(); ++i) {
+    const Script::Block& block = script_.blocks[i];
+    const Imager& projector = *rig_->world().rig.find(block.projector);
+    const Eigen::Vector3d p_light = projector.imager_from_world.inverse().translation;
+    const Eigen::Vector3d p_aim = rig_->world().world_from_prototype.translation;
+    Pose place = looking_at(p_light, p_aim, Eigen::Vector3d::UnitZ()).inverse();
+    place.translation = p_light + k_block_at * (p_aim - p_light);
+    put(fmt::format("block{}", i), at_s >= block.from_s && at_s < block.until_s,
+        sim::sheet({}, k_block_width_m, k_block_height_m, {}, place));
+  }
+}
+
+// Puts a hand there, or takes it away.
+void ScriptedRoom::put(const std::string& name, bool is_due, const sim::Object& hand) {
+  const bool is_there = rig_->world().find(name) != nullptr;
+  if (is_there && !is_due) rig_->remove(name);
+  if (is_there == is_due || !is_due) return;
+  sim::Object object = hand;
+  object.name = name;
+  object.albedo.setConstant(k_hand_albedo);
+  rig_->place(object);
 }
 
 Pose ScriptedRoom::world_from_marker(const MarkerName& marker, double at_s) const {

@@ -32,6 +32,11 @@ struct Script {
     std::string marker;
     double from_s = 0, until_s = 0;
   };
+  /// A hand is held into a projector's light.
+  struct Block {
+    std::string projector;
+    double from_s = 0, until_s = 0;
+  };
   struct Unplug {
     std::string device;
     double from_s = 0, until_s = 0;
@@ -45,6 +50,7 @@ struct Script {
   std::vector<Sway> sways;
   std::vector<Move> moves;
   std::vector<Cover> covers;
+  std::vector<Block> blocks;
   std::vector<Unplug> unplugs;
   std::vector<Action> edits;  ///< in the order of time
 
@@ -72,6 +78,7 @@ class ScriptedRoom {
   };
   const Home& home_of(const std::string& marker) const;
   Pose place_of(const Home& home, double at_s) const;
+  void put(const std::string& name, bool is_due, const sim::Object& hand);
 
   Script script_;
   sim::VirtualRig* rig_ = nullptr;

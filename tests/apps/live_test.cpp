@@ -197,6 +197,27 @@ TEST(Live, GoesOnWithoutItsCamera) {
   EXPECT_NE(read_file(folder / "out/session.html").value().find("camera0 is back"), std::string::npos);
 }
 
+// A hand in one projector's light: the other gives what is lost. Without a hand nothing changes.
+TEST(Live, RefillsASomebodysShadow) {
+  const fs::path folder = test::test_folder();
+  const auto light = [&](const std::string& name, bool refill, const json& events) {
+    LiveOptions options;
+    options.resolution = 0.5;
+    options.refill = refill;
+    options.script = written(folder / (name + ".json"), script_of(0.9, events));
+    options.out = folder / name;
+    EXPECT_TRUE(run_live(options).ok());
+    return read_picture(options.out / "projector-projector1.png").value();
+  };
+  const json hand = {{{"at_s", 0.5}, {"until_s", 2}, {"block", "projector0"}}};
+  const cv::Mat calm = light("calm", true, json::array()), calm_off = light("calm-off", false, json::array());
+  EXPECT_EQ(cv::norm(calm, calm_off, cv::NORM_INF), 0);
+  const cv::Mat with = light("with", true, hand), without = light("without", false, hand);
+  const double more = cv::sum(cv::sum(with))[0] / cv::sum(cv::sum(without))[0];
+  std::printf("a hand before projector0: projector1's display values are %.2f times what they were\n", more);
+  EXPECT_GT(more, 1.02);
+}
+
 TEST(Live, MakesARoomForARigAndAScene) {
   const sim::World studio_world = studio(0.5);
   const auto room = room_for(studio_world.rig, *studio_world.scene);
@@ -255,7 +276,7 @@ TEST(Live, SaysWhatIsWrong) {
   EXPECT_NE(message(one).find("--rig and --scene together"), std::string::npos);
   LiveOptions script;
   script.script = written(folder / "a.json", script_of(1, {{{"at_s", 0.2}, {"dance", "x"}}}));
-  EXPECT_NE(message(script).find("events[0]: expected one of sway, move, cover, unplug, edit"),
+  EXPECT_NE(message(script).find("events[0]: expected one of sway, move, cover, block, unplug, edit"),
             std::string::npos)
       << message(script);
   script.script =
