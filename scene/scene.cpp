@@ -7,6 +7,7 @@
 #include <set>
 
 #include "core/config.h"
+#include "core/log.h"
 #include "core/picture.h"
 
 namespace limn::scene {
@@ -270,6 +271,50 @@ Status load_albedo_picture(const fs::path& path, const fs::path& scene_path, Pro
   return {};
 }
 
+double longest_side(const Mesh& mesh) {
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& p : mesh.positions) box.extend(p);
+  return static_cast<double>(box.sizes().maxCoeff());
+}
+
+// Units of a mesh that nobody gave: glTF is in metres; of others the one that makes it as large as parts are.
+std::string guessed_units(const fs::path& path, const Mesh& as_metres) {
+  if (path.extension() == ".glb" || path.extension() == ".gltf") return "m";
+  constexpr double k_least_m = 0.01, k_most_m = 3;
+  for (const char* units : {"mm", "cm", "m", "in"}) {
+    const double size = longest_side(as_metres) * metres_per_unit(units).value();
+    if (size >= k_least_m && size <= k_most_m) return units;
+  }
+  return "m";
+}
+
+// Meshes that were laid into the slot's folder, slots/NAME/, beside the variants that scene.json lists.
+Status add_dropped(const fs::path& scene_folder, Slot* slot) {
+  std::error_code none;
+  std::set<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(scene_folder / "slots" / slot->name, none))
+    for (const char* end : {".glb", ".gltf", ".obj", ".stl", ".ply"})
+      if (entry.path().extension() == end) files.insert(entry.path());
+  for (const fs::path& file : files) {
+    const std::string name = file.stem().string();
+    if (std::any_of(slot->variants.begin(), slot->variants.end(),
+                    [&](const Variant& known) { return known.name == name; }))
+      return error(
+          "{}: expected the name of no other variant of slot '{}', found '{}' twice. Rename the file.",
+          file.string(), slot->name, name);
+    LIMN_TRY(const Mesh as_metres, load_mesh(file, "m"));
+    const std::string units = guessed_units(file, as_metres);
+    LIMN_TRY(Mesh mesh, load_mesh(file, units));
+    if (const Status size = check_size(mesh, units); !size)
+      return error("{}: {}", file.string(), size.message());
+    log_info(
+        "{}: a variant of slot '{}', taken to be in {} ({:.0f} mm long); list it in scene.json if it is not",
+        file.filename().string(), slot->name, units, 1e3 * longest_side(mesh));
+    slot->variants.push_back({name, std::move(mesh)});
+  }
+  return {};
+}
+
 Status load_files(const Reader& reader, const fs::path& path, Scene* scene) {
   if (scene->prototype) {
     LIMN_TRY(scene->prototype->mesh, load_named_mesh(*reader.prototype_mesh, path));
@@ -282,6 +327,7 @@ Status load_files(const Reader& reader, const fs::path& path, Scene* scene) {
     for (Variant& variant : slot.variants) {
       LIMN_TRY(variant.mesh, load_named_mesh(reader.part_meshes[next++], path));
     }
+    LIMN_TRY_STATUS(add_dropped(scene->folder, &slot));
   }
   return {};
 }

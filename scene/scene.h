@@ -87,7 +87,8 @@ struct Scene {
   const Slot* find_slot(const std::string& name) const;
 };
 
-/// `path` is the scene.json or its folder.
+/// `path` is the scene.json or its folder. Meshes in its folder slots/NAME/ are variants of slot NAME, too,
+/// called as their files; their units are guessed and told.
 Result<Scene> load_scene(const std::filesystem::path& path);
 
 /// A viewer file of interfaces.md: {"world_from_viewer": POSE, "size": [w,h], "fov_deg": 40}.

@@ -8,6 +8,7 @@
 
 #include "apps/live/keys.h"
 #include "apps/live/latest.h"
+#include "apps/live/scene_watch.h"
 #include "core/log.h"
 
 namespace limn::apps {
@@ -76,7 +77,8 @@ class DeviceLoop {
         watcher_(watcher),
         session_(session),
         books_(books),
-        keys_(session->setup().scene) {
+        keys_(session->setup().scene),
+        files_(session->setup().scene.folder) {
     for (const auto& camera : devices_->cameras)
       if (camera) threads_.emplace_back([this, &camera = *camera] { grab(&camera); });
     threads_.emplace_back([this] { watch(); });
@@ -91,6 +93,7 @@ class DeviceLoop {
 
   void step(device::Window* window) {
     if (auto seen = seen_.take(k_wait)) session_->take(std::move(seen->watched), seen->moments);
+    load_edited_files();
     ShownFrame shown;
     shown.missed = static_cast<int>(missed_.exchange(0));
     const Stamp painting_at = now();
@@ -186,6 +189,17 @@ class DeviceLoop {
   // The picture as large as the screen takes it, with black bars.
   static cv::Mat fitted(const cv::Mat& picture, cv::Size size);
 
+  // Parts that were edited while the session runs; a file that is broken keeps the old ones.
+  void load_edited_files() {
+    auto scene = files_.news();
+    if (!scene) return;
+    const Status shown = *scene ? session_->show(std::move(**scene), now()) : Status(scene->error());
+    if (shown) return;
+    const std::string what = shown.message() + " The parts stay as they were.";
+    books_->telemetry().note(now(), what);
+    log_warning("live: {}", what);
+  }
+
   void press(int key) {
     const auto edit = keys_.edit_of(key);
     const Status done = edit ? session_->edit(*edit, "key", now()) : Status();
@@ -211,6 +225,7 @@ class DeviceLoop {
   Session* session_;
   Books* books_;
   Keys keys_;
+  SceneWatch files_;
   Notices notices_;
   std::vector<Health> health_;  // of projectors, then screens
   Latest<Frames> frames_;

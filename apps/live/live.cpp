@@ -213,6 +213,7 @@ Status play_with_devices(const LiveOptions& options) {
 
 Status run_live(const LiveOptions& options) {
   LIMN_TRY_STATUS(check_options(options));
+  g_is_ended = false;
   std::signal(SIGINT, end_session);
   std::signal(SIGTERM, end_session);
   return options.devices.empty() ? play_in_virtual_room(options) : play_with_devices(options);

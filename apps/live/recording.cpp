@@ -98,6 +98,14 @@ void Recorder::watched(std::span<const Frame> frames) {
   write(event);
 }
 
+void Recorder::shown(const scene::Scene& scene) {
+  const std::lock_guard lock(mutex_);
+  if (ended_) return;
+  const std::string copy = fmt::format("scene-{}", ++scenes_);
+  if (!copy_folder(scene.folder, folder_ / copy)) return end("the scene's files could not be copied");
+  write({{"scene", copy}});
+}
+
 void Recorder::edited(const scene::Edit& edit, const std::string& source) {
   const std::lock_guard lock(mutex_);
   if (ended_) return;

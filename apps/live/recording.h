@@ -39,6 +39,8 @@ class Recorder {
 
   /// Frames of one moment, as Watcher::watch takes them.
   void watched(std::span<const Frame> frames);
+  /// The scene's files have changed: they are copied as they are now.
+  void shown(const scene::Scene& scene);
   void edited(const scene::Edit& edit, const std::string& source);
   /// `moments` counts the calls of watched() that the picture knew of.
   void painted(const Painted& painted, std::size_t moments);
@@ -57,7 +59,7 @@ class Recorder {
   PictureWriter pictures_;
   mutable std::mutex mutex_;
   std::ofstream events_;
-  std::size_t frames_ = 0;
+  std::size_t frames_ = 0, scenes_ = 1;
   std::optional<std::string> ended_;
 };
 

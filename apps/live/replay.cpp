@@ -39,9 +39,11 @@ Result<Events> load_events(const fs::path& path) {
   while (std::getline(file, line)) {
     Json event = Json::parse(line, nullptr, false);
     if (event.is_discarded() || !event.is_object() ||
-        !(event.contains("watch") || event.contains("edit") || event.contains("paint"))) {
-      events.damage = fmt::format("{}:{}: expected an event (watch, edit, paint), found something else",
-                                  path.string(), events.all.size() + 1);
+        !(event.contains("watch") || event.contains("edit") || event.contains("paint") ||
+          event.contains("scene"))) {
+      events.damage =
+          fmt::format("{}:{}: expected an event (watch, edit, scene, paint), found something else",
+                      path.string(), events.all.size() + 1);
       break;
     }
     events.all.push_back(std::move(event));
@@ -93,6 +95,7 @@ class Replay {
       unwatched_.push_back(event.at("watch"));
       return {};
     }
+    if (event.contains("scene")) return show(event.at("scene"));
     if (event.contains("edit")) return edit(event.at("edit"), event.at("source"));
     return paint(event);
   } catch (const nlohmann::json::exception& problem) {
@@ -127,6 +130,14 @@ class Replay {
     watched.uses.clear();  // what came of them was recorded as edits
     session_.take(std::move(watched), moments_);
     return {};
+  }
+
+  Status show(const std::string& folder) {
+    if (folder.empty() || folder.find_first_of("/\\.") != std::string::npos)
+      return error("{}: expected a scene's folder inside the recording, found '{}'.",
+                   options_.session.string(), folder);
+    LIMN_TRY(scene::Scene scene, scene::load_scene(options_.session / folder));
+    return session_.show(std::move(scene), session_.watched().captured_at);
   }
 
   Status edit(const Json& json, const std::string& source) {

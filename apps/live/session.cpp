@@ -31,6 +31,34 @@ scene::Edit edit_of(const scene::Control& control, int steps) {
   return edit;
 }
 
+std::vector<std::string> variant_names(const scene::Slot& slot) {
+  std::vector<std::string> names;
+  for (const scene::Variant& variant : slot.variants) names.push_back(variant.name);
+  return names;
+}
+
+// Whether the same markers carry the same bodies and act alike.
+bool is_carried_alike(const scene::Scene& a, const scene::Scene& b) {
+  const auto carriers = [](const scene::Scene& scene) {
+    std::string text;
+    for (const Body& body : scene::bodies(scene)) {
+      text += body.name + ":";
+      for (const BodyMarker& marker : body.markers) {
+        const Eigen::Quaterniond& q = marker.body_from_marker.rotation;
+        const Eigen::Vector3d& t = marker.body_from_marker.translation;
+        text += fmt::format(" {} {} {} {} {} {} {} {} {}", marker.marker.text(), marker.size_m, q.w(), q.x(),
+                            q.y(), q.z(), t.x(), t.y(), t.z());
+      }
+      text += "\n";
+    }
+    for (const scene::Control& control : scene.controls)
+      text +=
+          fmt::format("{} {} {} {}\n", control.marker.text(), control.action, control.slot, control.gesture);
+    return text;
+  };
+  return carriers(a) == carriers(b);
+}
+
 }  // namespace
 
 Result<Session> Session::create(const SessionSetup& setup,
@@ -101,6 +129,31 @@ Status Session::edit(const scene::Edit& edit, const std::string& source, Stamp a
     telemetry_->note(at, fmt::format("{}{}{}{}{} ({})", edit.action, edit.slot.empty() ? "" : " ", edit.slot,
                                      edit.value.empty() ? "" : " ", edit.value, source));
   return keeps_looks_ ? keep_looks(changed) : Status();
+}
+
+Status Session::show(scene::Scene scene, Stamp at) {
+  if (!is_carried_alike(setup_.scene, scene))
+    return error(
+        "{}: expected the markers, slots and controls that the session began with, found others. Begin a "
+        "new session to take them; this one goes on with the parts as they were.",
+        (scene.folder / "scene.json").string());
+  LIMN_TRY(Painter painter, Painter::create(scene, setup_.rig, setup_.paint));
+  for (std::size_t i = 0; i < scene.slots.size(); ++i) {
+    const std::vector<std::string> now = variant_names(scene.slots[i]),
+                                   before = variant_names(setup_.scene.slots[i]);
+    const auto is_in = [](const std::vector<std::string>& names, const std::string& name) {
+      return std::find(names.begin(), names.end(), name) != names.end();
+    };
+    std::string& shown = staging_.slots[i].variant;
+    for (const std::string& name : now)
+      if (!is_in(before, name)) shown = name;
+    if (!is_in(now, shown)) shown = now.front();
+  }
+  if (recorder_) recorder_->shown(scene);
+  if (telemetry_) telemetry_->note(at, "the scene's files have changed; it was loaded anew");
+  painter_ = std::move(painter);
+  setup_.scene = std::move(scene);
+  return {};
 }
 
 // Looks that were saved or deleted, on disk.

@@ -32,6 +32,11 @@ class Session {
   /// An edit of a person; one that cannot be done is told, and nothing changes. `source` says whose.
   Status edit(const scene::Edit& edit, const std::string& source, Stamp at);
 
+  /// Shows another scene from now on, with the same markers and controls: parts that were edited, added or
+  /// taken away; a new variant is shown at once. Error, and nothing changes: markers or controls differ, or
+  /// it cannot be drawn.
+  Status show(scene::Scene scene, Stamp at);
+
   /// The projectors' pictures for a moment to come.
   const Painted& paint(Stamp now, Stamp shown_at);
   cv::Mat screen();

@@ -8,6 +8,7 @@
 
 #include "apps/live/books.h"
 #include "apps/live/keys.h"
+#include "apps/live/scene_watch.h"
 #include "core/log.h"
 
 namespace limn::apps {
@@ -67,7 +68,8 @@ class VirtualLoop {
         session_(session),
         books_(books),
         window_(window->has_value() ? &**window : nullptr),
-        keys_(session->setup().scene) {}
+        keys_(session->setup().scene),
+        files_(session->setup().scene.folder) {}
 
   Status step() {
     const Stamp exposed_at = rig_->next_exposure();
@@ -81,6 +83,7 @@ class VirtualLoop {
       session_->take(watcher_->watch(frames), ++moments_);
     }
     play_edits(exposed_at);
+    load_edited_files();
     const Painted& painted = session_->paint(rig_->now(), shifted(rig_->now(), k_virtual_display_s));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i) {
       if (!is_plugged(session_->setup().rig.projectors[i].name, rig_->now())) continue;
@@ -136,6 +139,17 @@ class VirtualLoop {
     }
   }
 
+  // Parts that were edited while the session runs; a file that is broken keeps the old ones.
+  void load_edited_files() {
+    auto scene = files_.news();
+    if (!scene) return;
+    const Status shown = *scene ? session_->show(std::move(**scene), rig_->now()) : Status(scene->error());
+    if (shown) return;
+    const std::string what = shown.message() + " The parts stay as they were.";
+    books_->telemetry().note(rig_->now(), what);
+    log_warning("live: {}", what);
+  }
+
   void press(int key) {
     const auto edit = keys_.edit_of(key);
     const Status done = edit ? session_->edit(*edit, "key", rig_->now()) : Status();
@@ -164,6 +178,7 @@ class VirtualLoop {
   Books* books_;
   device::Window* window_;
   Keys keys_;
+  SceneWatch files_;
   std::size_t moments_ = 0, played_ = 0;
   std::vector<std::string> gone_;  // devices
 };

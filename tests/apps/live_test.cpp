@@ -2,15 +2,19 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
+#include <thread>
 
 #include "apps/coarser.h"
 #include "apps/live/replay.h"
 #include "apps/live/room.h"
+#include "apps/live/scene_watch.h"
 #include "apps/live/script.h"
 #include "apps/live/watcher.h"
 #include "apps/world_markers.h"
@@ -216,6 +220,75 @@ TEST(Live, RefillsASomebodysShadow) {
   const double more = cv::sum(cv::sum(with))[0] / cv::sum(cv::sum(without))[0];
   std::printf("a hand before projector0: projector1's display values are %.2f times what they were\n", more);
   EXPECT_GT(more, 1.02);
+}
+
+// A part is dropped into its slot's folder, then spoilt, while the session runs.
+TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
+  const fs::path folder = test::test_folder(), config = fs::path(LIMN_SOURCE_DIR) / "config";
+  fs::copy(config / "scenes/door", folder / "door");
+  std::string world = read_file(config / "worlds/studio.json").value();
+  const std::string named = "../scenes/door";
+  world.replace(world.find(named), named.size(), "door");
+  ASSERT_TRUE(write_file(folder / "world.json", world));
+  fs::create_directories(folder / "door/slots/mirror");
+  const fs::path dropped = folder / "door/slots/mirror/new.glb";
+
+  SceneWatch watch(folder / "door");
+  const auto news = [&] {
+    const auto begun = std::chrono::steady_clock::now();
+    for (;;) {
+      auto scene = watch.news();
+      const double waited_s = seconds_between(begun, std::chrono::steady_clock::now());
+      if (!scene && waited_s < 20) continue;
+      std::printf("after %.0f ms\n", 1e3 * waited_s);
+      return scene;
+    }
+  };
+  fs::copy_file(folder / "door/mirror-sport.glb", dropped);
+  const auto there = news();
+  ASSERT_TRUE(there.has_value() && *there);
+  EXPECT_EQ((*there)->find_slot("mirror")->variants.back().name, "new");
+  fs::resize_file(dropped, 1000);
+  const auto broken = news();
+  ASSERT_TRUE(broken.has_value());
+  ASSERT_FALSE(*broken);
+  EXPECT_NE(broken->message().find("new.glb"), std::string::npos) << broken->message();
+  fs::remove(dropped);
+
+  LiveOptions options;
+  options.resolution = 0.5;
+  options.world = folder / "world.json";
+  options.seconds = 1e5;  // ended below
+  options.out = folder / "out";
+  options.record = folder / "recording";
+  std::thread person([&] {
+    const auto wait_for_pictures = [&](std::size_t more) {
+      const fs::path events = options.record / "events.jsonl";
+      const std::size_t before = lines_of(events).size();
+      for (int i = 0; i < 400 && lines_of(events).size() < before + more; ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    };
+    wait_for_pictures(4);
+    fs::copy_file(folder / "door/mirror-sport.glb", dropped);
+    wait_for_pictures(16);
+    fs::resize_file(dropped, 1000);
+    wait_for_pictures(16);
+    std::raise(SIGTERM);
+  });
+  const Status lived = run_live(options);
+  person.join();
+  ASSERT_TRUE(lived.ok()) << lived.message();
+  const std::string page = read_file(folder / "out/session.html").value();
+  EXPECT_NE(page.find("loaded anew"), std::string::npos);
+  EXPECT_NE(page.find("The parts stay as they were"), std::string::npos);
+  std::string last;
+  for (const std::string& line : lines_of(folder / "out/poses.csv"))
+    if (line.find(",mirror,") != std::string::npos) last = line;
+  EXPECT_NE(last.find(",mirror,new,"), std::string::npos) << last;
+  ReplayOptions replay;
+  replay.session = folder / "recording";
+  const Status replayed = run_replay(replay);
+  EXPECT_TRUE(replayed.ok()) << replayed.message();
 }
 
 TEST(Live, MakesARoomForARigAndAScene) {
