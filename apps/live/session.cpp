@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "apps/live/contact_sheet.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "core/picture.h"
@@ -156,30 +157,33 @@ Status Session::show(scene::Scene scene, Stamp at) {
   return {};
 }
 
-// Looks that were saved or deleted, on disk.
+// Looks that were saved or deleted, on disk, and the page of all.
 Status Session::keep_looks(const scene::Staging& before) {
-  const fs::path folder = setup_.scene.folder / "looks";
-  const auto has = [](const scene::Staging& staging, const std::string& name) {
-    return std::any_of(staging.looks.begin(), staging.looks.end(),
-                       [&](const scene::Look& look) { return look.name == name; });
+  const auto text_of = [](const scene::Staging& staging, const std::string& name) {
+    for (const scene::Look& look : staging.looks)
+      if (look.name == name) return scene::look_json(look);
+    return std::string();
   };
+  const fs::path folder = setup_.scene.folder / "looks";
+  bool has_changed = false;
   for (const scene::Look& look : before.looks) {
-    if (has(staging_, look.name)) continue;
+    if (!text_of(staging_, look.name).empty()) continue;
+    has_changed = true;
     std::error_code ignored;
     for (const char* end : {".json", ".png"}) fs::remove(folder / (look.name + end), ignored);
   }
-  if (staging_.looks.empty()) return {};
-  const scene::Look& newest = staging_.looks.back();
-  const auto same = [&](const scene::Look& look) {
-    return scene::look_json(look) == scene::look_json(newest);
-  };
-  if (std::any_of(before.looks.begin(), before.looks.end(), same)) return {};
-  LIMN_TRY_STATUS(make_folder(folder));
-  LIMN_TRY_STATUS(write_file(folder / (newest.name + ".json"), scene::look_json(newest)));
-  scene::Staging shown = staging_;
-  shown.screen = scene::Screen::view;
-  const cv::Mat picture = painter_.screen(watched_, shown);
-  return picture.empty() ? Status() : write_png(folder / (newest.name + ".png"), picture);
+  for (const scene::Look& look : staging_.looks) {
+    const std::string text = scene::look_json(look);
+    if (text == text_of(before, look.name)) continue;
+    has_changed = true;
+    LIMN_TRY_STATUS(make_folder(folder));
+    LIMN_TRY_STATUS(write_file(folder / (look.name + ".json"), text));
+    scene::Staging shown = staging_;
+    shown.screen = scene::Screen::view;
+    const cv::Mat picture = painter_.screen(watched_, shown);
+    if (!picture.empty()) LIMN_TRY_STATUS(write_png(folder / (look.name + ".png"), picture));
+  }
+  return has_changed ? write_contact_sheet(staging_.looks, folder, folder / "looks.html") : Status();
 }
 
 const Painted& Session::paint(Stamp now, Stamp shown_at) {

@@ -53,6 +53,8 @@ void Quantiles::add(double value) {
   if (!(value >= 0)) return;
   const double bin = value <= k_least ? 0 : std::log(value / k_least) / std::log(k_growth) + 1;
   ++bins_[static_cast<std::size_t>(std::clamp(bin, 0.0, static_cast<double>(bins_.size() - 1)))];
+  least_ = count_ == 0 ? value : std::min(least_, value);
+  most_ = count_ == 0 ? value : std::max(most_, value);
   ++count_;
   sum_ += value;
 }
@@ -64,7 +66,8 @@ double Quantiles::at(double share) const {
   for (std::size_t i = 0; i < bins_.size(); ++i) {
     seen += bins_[i];
     if (seen >= std::max<std::size_t>(1, wanted))
-      return i == 0 ? 0 : k_least * std::pow(k_growth, static_cast<double>(i) - 0.5);
+      return std::clamp(i == 0 ? 0 : k_least * std::pow(k_growth, static_cast<double>(i) - 0.5), least_,
+                        most_);
   }
   return NAN;
 }

@@ -12,7 +12,7 @@
 
 namespace limn::apps {
 
-/// Quantiles of many values >= 0 in fixed memory: a histogram whose bins grow by 2 %.
+/// Quantiles of many values >= 0 in fixed memory, within 1 %: a histogram whose bins grow by 2 %.
 class Quantiles {
  public:
   void add(double value);
@@ -24,7 +24,7 @@ class Quantiles {
  private:
   std::array<std::size_t, 1000> bins_{};
   std::size_t count_ = 0;
-  double sum_ = 0;
+  double sum_ = 0, least_ = 0, most_ = 0;
 };
 
 /// One picture's way from the camera to the light.

@@ -222,6 +222,54 @@ TEST(Live, RefillsASomebodysShadow) {
   EXPECT_GT(more, 1.02);
 }
 
+// Looks are files beside the scene, and a page for a review.
+TEST(Live, KeepsLooks) {
+  const fs::path folder = test::test_folder(), config = fs::path(LIMN_SOURCE_DIR) / "config";
+  fs::copy(config / "scenes/door", folder / "door");
+  std::string world = read_file(config / "worlds/studio.json").value();
+  const std::string named = "../scenes/door";
+  world.replace(world.find(named), named.size(), "door");
+  ASSERT_TRUE(write_file(folder / "world.json", world));
+  LiveOptions options;
+  options.resolution = 0.5;
+  options.world = folder / "world.json";
+  const auto edit = [](double at_s, const std::string& action, const std::string& value) {
+    return json{{"at_s", at_s}, {"edit", {{"action", action}, {"value", value}}}};
+  };
+  options.script =
+      written(folder / "script.json",
+              script_of(0.35, {edit(0.1, "save_look", "calm"),
+                               {{"at_s", 0.13}, {"edit", {{"action", "next_variant"}, {"slot", "mirror"}}}},
+                               edit(0.2, "save_look", "bold"),
+                               edit(0.24, "save_look", "third"),
+                               edit(0.27, "delete_look", "third")}));
+  ASSERT_TRUE(run_live(options).ok());
+  const fs::path looks = folder / "door/looks";
+  const json calm = read_json(looks / "calm.json"), bold = read_json(looks / "bold.json");
+  EXPECT_NE(calm.at("slots").at("mirror").at("variant"), bold.at("slots").at("mirror").at("variant"));
+  const cv::Mat calm_picture = read_picture(looks / "calm.png").value(),
+                bold_picture = read_picture(looks / "bold.png").value();
+  EXPECT_GT(cv::norm(calm_picture, bold_picture, cv::NORM_INF), 50);
+  EXPECT_FALSE(fs::exists(looks / "third.json"));
+  const std::string page = read_file(looks / "looks.html").value();
+  EXPECT_NE(page.find("<b>calm</b>"), std::string::npos);
+  EXPECT_EQ(page.find("<b>third</b>"), std::string::npos);
+
+  // The next session knows them.
+  options.script = written(folder / "next.json", script_of(0.2, json::array({edit(0.1, "restore_look", "bold")})));
+  options.out = folder / "out";
+  ASSERT_TRUE(run_live(options).ok());
+  const auto poses = lines_of(folder / "out/poses.csv");
+  const auto& translation = bold.at("slots").at("mirror").at("prototype_from_part").at("translation_m");
+  EXPECT_NE(
+      poses[poses.size() - 2].find(fmt::format(
+          ",mirror,{},{:.4f},{:.4f},{:.4f},", bold.at("slots").at("mirror").at("variant").get<std::string>(),
+          1e3 * translation[0].get<double>(), 1e3 * translation[1].get<double>(),
+          1e3 * translation[2].get<double>())),
+      std::string::npos)
+      << poses[poses.size() - 2];
+}
+
 // A part is dropped into its slot's folder, then spoilt, while the session runs.
 TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
   const fs::path folder = test::test_folder(), config = fs::path(LIMN_SOURCE_DIR) / "config";
