@@ -159,13 +159,6 @@ std::vector<Track> tracks_of(const scene::Scene& scene, const scene::PosedScene&
   return tracks;
 }
 
-std::optional<tracker::MarkerLight> marker_light_of(const std::string& name) {
-  if (name == "as-is") return tracker::MarkerLight::as_is;
-  if (name == "keep-out") return tracker::MarkerLight::keep_out;
-  if (name == "spotlight") return tracker::MarkerLight::spotlight;
-  return std::nullopt;
-}
-
 Result<Imager> choose_viewer(const RenderOptions& options,
                              const scene::Scene& scene,
                              const scene::PosedScene& posed,
@@ -277,7 +270,7 @@ Status run_render(const RenderOptions& options) {
   if (options.contact_shadow != "on" && options.contact_shadow != "off") {
     return usage_error("--contact-shadow: expected on or off, found '{}'.", options.contact_shadow);
   }
-  const auto marker_light = marker_light_of(options.marker_light);
+  const auto marker_light = tracker::marker_light_of(options.marker_light);
   if (!marker_light) {
     return usage_error("--marker-light: expected as-is, keep-out or spotlight, found '{}'.",
                        options.marker_light);

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "core/imager.h"
 #include "core/marker.h"
@@ -32,6 +35,11 @@ enum class MarkerLight {
   keep_out,  ///< no light: the room's own shows them
   spotlight  ///< even white: in a dark room the projector itself shows them
 };
+
+/// as-is, keep-out, spotlight: what people call them, in the order of MarkerLight.
+const std::vector<std::string>& marker_light_names();
+/// nullopt for another word.
+std::optional<MarkerLight> marker_light_of(const std::string& name);
 
 /// The picture (8-bit, display values) with the markers of a mask treated so.
 cv::Mat with_marker_light(const cv::Mat& picture, const cv::Mat& mask, MarkerLight how);

@@ -41,13 +41,6 @@ Result<tracker::Prediction> prediction_of(const std::string& name) {
   return usage_error("--prediction: expected hold, linear or filtered, found '{}'.", name);
 }
 
-Result<tracker::MarkerLight> marker_light_of(const std::string& name) {
-  if (name == "as-is") return tracker::MarkerLight::as_is;
-  if (name == "keep-out") return tracker::MarkerLight::keep_out;
-  if (name == "spotlight") return tracker::MarkerLight::spotlight;
-  return usage_error("--marker-light: expected as-is, keep-out or spotlight, found '{}'.", name);
-}
-
 Status check_options(const LiveOptions& options) {
   if (!(options.seconds >= 0) || options.seconds > 1e6)
     return usage_error("--seconds: expected seconds, 0 for no end, found {}.", options.seconds);
@@ -127,7 +120,11 @@ Status check_fits(const Rig& rig, const Rig& devices) {
 // What options say of a session, beside where it takes place.
 Status set_up(const LiveOptions& options, SessionSetup* setup) {
   LIMN_TRY(setup->paint.prediction, prediction_of(options.prediction));
-  LIMN_TRY(setup->paint.marker_light, marker_light_of(options.marker_light));
+  const auto marker_light = tracker::marker_light_of(options.marker_light);
+  if (!marker_light)
+    return usage_error("--marker-light: expected as-is, keep-out or spotlight, found '{}'.",
+                       options.marker_light);
+  setup->paint.marker_light = *marker_light;
   setup->paint.refill = options.refill;
   setup->watch.motion.extrapolation_limit_s = options.extrapolate_s;
   setup->paint.motion = setup->watch.motion;

@@ -14,7 +14,6 @@ namespace fs = std::filesystem;
 constexpr std::size_t k_most_queued = 40;  // frames; 240 MB of colour 1920x1080
 
 const std::vector<std::string> k_predictions = {"hold", "linear", "filtered"};
-const std::vector<std::string> k_marker_lights = {"as-is", "keep-out", "spotlight"};
 
 std::int64_t nanoseconds(Stamp at) { return at.time_since_epoch().count(); }
 
@@ -44,7 +43,7 @@ nlohmann::ordered_json setup_json(const SessionSetup& setup) {
             {"stops_per_s", motion.stops_per_s},
             {"extrapolation_limit_s", motion.extrapolation_limit_s}}},
           {"prediction", k_predictions[static_cast<std::size_t>(paint.prediction)]},
-          {"marker_light", k_marker_lights[static_cast<std::size_t>(paint.marker_light)]},
+          {"marker_light", tracker::marker_light_names()[static_cast<std::size_t>(paint.marker_light)]},
           {"fade_s", paint.fade_s},
           {"label_s", paint.label_s},
           {"lost_s", paint.lost_s},
@@ -190,7 +189,8 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   model.extrapolation_limit_s = motion.at("extrapolation_limit_s").positive();
   setup.paint.motion = model;
   setup.paint.prediction = read_choice<tracker::Prediction>(root.at("prediction"), k_predictions);
-  setup.paint.marker_light = read_choice<tracker::MarkerLight>(root.at("marker_light"), k_marker_lights);
+  setup.paint.marker_light =
+      read_choice<tracker::MarkerLight>(root.at("marker_light"), tracker::marker_light_names());
   setup.paint.fade_s = root.at("fade_s").positive();
   setup.paint.label_s = root.at("label_s").positive();
   setup.paint.lost_s = root.at("lost_s").positive();

@@ -60,6 +60,16 @@ std::vector<std::string> lines_of(const fs::path& path) {
   return lines;
 }
 
+// The studio and its scene, to be changed: world.json and door/.
+void copy_studio_to(const fs::path& folder) {
+  const fs::path config = fs::path(LIMN_SOURCE_DIR) / "config";
+  fs::copy(config / "scenes/door", folder / "door");
+  std::string world = read_file(config / "worlds/studio.json").value();
+  const std::string named = "../scenes/door";
+  world.replace(world.find(named), named.size(), "door");
+  ASSERT_TRUE(write_file(folder / "world.json", world));
+}
+
 // Light on a marker in a hand arrives where the marker then is: 0.5 Hz, 0.25 m/s at most, 60 ms late.
 TEST(Live, PredictionMakesUpForTheLag) {
   constexpr double k_lag_s = 0.060, k_begins_s = 0.5, k_ends_s = 2.0, k_runs_s = 2.4;
@@ -208,12 +218,12 @@ TEST(Live, RefillsASomebodysShadow) {
     LiveOptions options;
     options.resolution = 0.5;
     options.refill = refill;
-    options.script = written(folder / (name + ".json"), script_of(0.9, events));
+    options.script = written(folder / (name + ".json"), script_of(0.6, events));
     options.out = folder / name;
     EXPECT_TRUE(run_live(options).ok());
     return read_picture(options.out / "projector-projector1.png").value();
   };
-  const json hand = {{{"at_s", 0.5}, {"until_s", 2}, {"block", "projector0"}}};
+  const json hand = {{{"at_s", 0.3}, {"until_s", 2}, {"block", "projector0"}}};
   const cv::Mat calm = light("calm", true, json::array()), calm_off = light("calm-off", false, json::array());
   EXPECT_EQ(cv::norm(calm, calm_off, cv::NORM_INF), 0);
   const cv::Mat with = light("with", true, hand), without = light("without", false, hand);
@@ -224,12 +234,8 @@ TEST(Live, RefillsASomebodysShadow) {
 
 // Looks are files beside the scene, and a page for a review.
 TEST(Live, KeepsLooks) {
-  const fs::path folder = test::test_folder(), config = fs::path(LIMN_SOURCE_DIR) / "config";
-  fs::copy(config / "scenes/door", folder / "door");
-  std::string world = read_file(config / "worlds/studio.json").value();
-  const std::string named = "../scenes/door";
-  world.replace(world.find(named), named.size(), "door");
-  ASSERT_TRUE(write_file(folder / "world.json", world));
+  const fs::path folder = test::test_folder();
+  copy_studio_to(folder);
   LiveOptions options;
   options.resolution = 0.5;
   options.world = folder / "world.json";
@@ -256,7 +262,8 @@ TEST(Live, KeepsLooks) {
   EXPECT_EQ(page.find("<b>third</b>"), std::string::npos);
 
   // The next session knows them.
-  options.script = written(folder / "next.json", script_of(0.2, json::array({edit(0.1, "restore_look", "bold")})));
+  options.script =
+      written(folder / "next.json", script_of(0.2, json::array({edit(0.1, "restore_look", "bold")})));
   options.out = folder / "out";
   ASSERT_TRUE(run_live(options).ok());
   const auto poses = lines_of(folder / "out/poses.csv");
@@ -272,12 +279,8 @@ TEST(Live, KeepsLooks) {
 
 // A part is dropped into its slot's folder, then spoilt, while the session runs.
 TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
-  const fs::path folder = test::test_folder(), config = fs::path(LIMN_SOURCE_DIR) / "config";
-  fs::copy(config / "scenes/door", folder / "door");
-  std::string world = read_file(config / "worlds/studio.json").value();
-  const std::string named = "../scenes/door";
-  world.replace(world.find(named), named.size(), "door");
-  ASSERT_TRUE(write_file(folder / "world.json", world));
+  const fs::path folder = test::test_folder();
+  copy_studio_to(folder);
   fs::create_directories(folder / "door/slots/mirror");
   const fs::path dropped = folder / "door/slots/mirror/new.glb";
 
