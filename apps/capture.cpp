@@ -3,9 +3,7 @@
 #include <functional>
 #include <optional>
 
-#include "apps/picture_writer.h"
 #include "apps/world_markers.h"
-#include "calib/capture.h"
 #include "calib/response/response_shots.h"
 #include "core/log.h"
 
@@ -16,36 +14,6 @@ std::vector<calib::CapturedDevice> devices(const std::vector<Imager>& imagers) {
   std::vector<calib::CapturedDevice> devices;
   for (const Imager& imager : imagers) devices.push_back({imager.name, imager.width, imager.height});
   return devices;
-}
-
-Result<calib::Captures> planned(const Plan& plan,
-                                const sim::VirtualRig& rig,
-                                const std::filesystem::path& out) {
-  calib::Captures captures =
-      calib::plan_captures(out, devices(rig.world().rig.cameras), devices(rig.world().rig.projectors),
-                           plan.board, plan.code, plan.code_options);
-  if (plan.responses.empty()) return captures;
-  for (std::size_t i = 0; i < captures.patterns.size(); ++i) {
-    LIMN_TRY(captures.patterns[i],
-             calib::linearised(captures.patterns[i], plan.responses, captures.projectors[i].name));
-  }
-  return captures;
-}
-
-// The rig's devices as calib asks for them; pictures go to `writer`.
-calib::Stage stage_of(sim::VirtualRig* rig, PictureWriter* writer, calib::Tell tell) {
-  return {.show = [rig](int projector, const cv::Mat& picture) -> Status {
-            rig->darken();
-            const auto shown_at = rig->projector(projector).show(picture);
-            return shown_at ? Status() : Status(shown_at.error());
-          },
-          .grab = [rig](int camera) -> Result<cv::Mat> {
-            LIMN_TRY(const Frame frame, rig->camera(camera).next());
-            return frame.image;
-          },
-          .store = [writer](const std::filesystem::path& path,
-                            const cv::Mat& picture) { return writer->store(path, picture); },
-          .tell = std::move(tell)};
 }
 
 // Captures one pose for each call of `set_up`, which changes the stage.
@@ -69,7 +37,37 @@ Status capture_poses(const calib::Captures& captures,
   return writer.finish();
 }
 
-// The response pictures of whatever stands before the rig.
+}  // namespace
+
+Result<calib::Captures> planned(const Plan& plan,
+                                const sim::VirtualRig& rig,
+                                const std::filesystem::path& out) {
+  calib::Captures captures =
+      calib::plan_captures(out, devices(rig.world().rig.cameras), devices(rig.world().rig.projectors),
+                           plan.board, plan.code, plan.code_options);
+  if (plan.responses.empty()) return captures;
+  for (std::size_t i = 0; i < captures.patterns.size(); ++i) {
+    LIMN_TRY(captures.patterns[i],
+             calib::linearised(captures.patterns[i], plan.responses, captures.projectors[i].name));
+  }
+  return captures;
+}
+
+calib::Stage stage_of(sim::VirtualRig* rig, PictureWriter* writer, calib::Tell tell) {
+  return {.show = [rig](int projector, const cv::Mat& picture) -> Status {
+            rig->darken();
+            const auto shown_at = rig->projector(projector).show(picture);
+            return shown_at ? Status() : Status(shown_at.error());
+          },
+          .grab = [rig](int camera) -> Result<cv::Mat> {
+            LIMN_TRY(const Frame frame, rig->camera(camera).next());
+            return frame.image;
+          },
+          .store = [writer](const std::filesystem::path& path,
+                            const cv::Mat& picture) { return writer->store(path, picture); },
+          .tell = std::move(tell)};
+}
+
 Status capture_lit(const calib::Captures& captures, sim::VirtualRig* rig) {
   PictureWriter writer;
   std::optional<Progress> progress;
@@ -81,8 +79,6 @@ Status capture_lit(const calib::Captures& captures, sim::VirtualRig* rig) {
   rig->darken();
   return writer.finish();
 }
-
-}  // namespace
 
 sim::Object board_object(const calib::Board& board, const Pose& world_from_board) {
   const calib::BoardSheet drawn = calib::draw_board(board);

@@ -8,6 +8,7 @@
 
 #include "apps/align.h"
 #include "apps/bench.h"
+#include "apps/calibrate.h"
 #include "apps/capture.h"
 #include "apps/check.h"
 #include "apps/demo.h"
@@ -178,6 +179,20 @@ void add_solve(CLI::App& app, Run& run) {
   command->add_option("--poses", options->poses, "with --import: pattern of the pose folders")->capture_default_str();
   command->add_option("--shots", options->shots, "with --import: pattern of the pictures")->capture_default_str();
   command->callback([options, &run] { run = [options] { return finished(run_solve(*options)); }; });
+}
+
+void add_calibrate(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("calibrate", "the wizard: where to hold the board next, captures, solve, report");
+  command->footer(
+      "In the terminal, so far on the virtual rig of the plan's world. OUT/captures keeps every picture: the same command\n"
+      "goes on where it was left. Ends when more poses no longer help and the rig is good, or the plan has no more.\n"
+      "Example: limn calibrate --plan config/plans/bench.json --out rig");
+  auto options = std::make_shared<CalibrateOptions>();
+  command->add_option("--plan", options->plan, "plan file (limn.plan/1)")->required();
+  command->add_option("--out", options->out, "rig folder to write, with the captures in it")->required();
+  command->add_flag("--all", options->all, "take every pose of the plan, although fewer are enough");
+  command->add_flag("--json", options->json, "print JSON instead of lines");
+  command->callback([options, &run] { run = [options] { return finished(run_calibrate(*options)); }; });
 }
 
 void add_scan(CLI::App& app, Run& run) {
@@ -443,6 +458,7 @@ int run_command_line(int argc, char** argv) {
   add_patterns(app, run);
   add_capture(app, run);
   add_solve(app, run);
+  add_calibrate(app, run);
   add_scan(app, run);
   add_recheck(app, run);
   add_align(app, run);

@@ -380,6 +380,23 @@ Result<Observed> observe(const Captures& captures, const DecodeOptions& options)
   return observed;
 }
 
+Observed joined(Observed first, Observed more) {
+  const int poses = static_cast<int>(first.observations.poses.size());
+  const auto shift = [poses](auto* of_poses) {
+    for (auto& seen : *of_poses) seen.pose += poses;
+  };
+  shift(&more.observations.corners);
+  shift(&more.observations.matches);
+  shift(&more.observations.points);
+  shift(&more.decoded);
+  shift(&more.health);
+  shift(&more.dense);
+  append(more, &first);
+  auto& names = first.observations.poses;
+  names.insert(names.end(), more.observations.poses.begin(), more.observations.poses.end());
+  return first;
+}
+
 std::vector<Match> matches_on_board(const Board& board,
                                     const std::vector<BoardCorner>& corners,
                                     const Decoded& decoded) {

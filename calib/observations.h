@@ -98,6 +98,10 @@ struct Observed {
 /// nothing. An unreadable picture is an error that names it.
 Result<Observed> observe(const Captures& captures, const DecodeOptions& options = {});
 
+/// Both together: the poses of `more`, captures of the same board and devices, come after those of `first`.
+/// The same as observe() on all their poses at once, but for the order of observations.
+Observed joined(Observed first, Observed more);
+
 /// The matches on the board's squares of one camera, projector and pose. Squares are placed by their corners
 /// (a homography each; those at the board's rim by extrapolation), so that no lens is needed. In each half
 /// square a plane is fitted to the labels, robustly, and the means of what fits are the match.

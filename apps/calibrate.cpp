@@ -1,0 +1,435 @@
+#include "apps/calibrate.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "apps/board_place.h"
+#include "apps/capture.h"
+#include "apps/plan.h"
+#include "apps/solve.h"
+#include "apps/world_markers.h"
+#include "calib/held_out.h"
+#include "calib/judge/board_check.h"
+#include "calib/judge/capture_faults.h"
+#include "calib/judge/picture_check.h"
+#include "calib/observations.h"
+#include "calib/solve.h"
+#include "core/config.h"
+#include "core/file.h"
+#include "core/log.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+using Say = std::function<void(const std::string&)>;
+
+constexpr double k_settled = 0.05;               // of the predicted error, over two poses
+constexpr const char* k_taken_by = "plan.json";  // beside capture.json
+
+// Every leaf of two plans that differs, the first alone: "plan.board: captured with …, this plan says …".
+std::string difference(const nlohmann::json& then, const nlohmann::json& now) {
+  const auto leaves_then = then.flatten(), leaves_now = now.flatten();
+  std::set<std::string> keys;
+  for (const auto* leaves : {&leaves_then, &leaves_now})
+    for (const auto& leaf : leaves->items()) keys.insert(leaf.key());
+  const auto told = [](const nlohmann::json& leaves, const std::string& key) {
+    return leaves.contains(key) ? leaves[key].dump() : std::string("nothing");
+  };
+  for (const std::string& key : keys) {
+    if (told(leaves_then, key) == told(leaves_now, key)) continue;
+    std::string name = key.substr(1);
+    std::replace(name.begin(), name.end(), '/', '.');
+    return fmt::format("{}: captured with {}, this plan says {}", name, told(leaves_then, key),
+                       told(leaves_now, key));
+  }
+  return "";
+}
+
+// A plan may have grown at its end: what was captured is still its beginning.
+nlohmann::json beginning(nlohmann::json now, const nlohmann::json& then) {
+  const nlohmann::json::json_pointer poses("/plan/world_from_board");
+  if (!now.contains(poses) || !then.contains(poses)) return now;
+  auto& list = now[poses];
+  const std::size_t count = then[poses].size();
+  if (list.size() > count) list.erase(list.begin() + static_cast<std::ptrdiff_t>(count), list.end());
+  return now;
+}
+
+// Makes the captures folder, or finds that this plan made it.
+Status opened(const calib::Captures& captures, const std::string& plan_json) {
+  const fs::path taken_by = captures.folder / k_taken_by, begun = captures.folder / "capture.json";
+  if (fs::exists(begun)) {
+    if (!fs::exists(taken_by))
+      return error("{}: expected captures of limn calibrate, found others (no {}). Choose another --out.",
+                   captures.folder.string(), k_taken_by);
+    LIMN_TRY(const Config config, Config::load(taken_by, "limn.captured_plan/1"));
+    const nlohmann::json then = config.root().json();
+    const std::string differs = difference(then, beginning(nlohmann::json::parse(plan_json), then));
+    if (!differs.empty())
+      return error(
+          "{}: expected captures of this plan, found those of another: {}. Choose another --out, or "
+          "calibrate with the plan that began them.",
+          captures.folder.string(), differs);
+  }
+  LIMN_TRY_STATUS(make_folder(captures.folder));
+  LIMN_TRY_STATUS(write_file(taken_by, plan_json));
+  return fs::exists(begun) ? Status() : calib::begin_captures(captures);
+}
+
+// One pose of the captures, with the files that it has or will have.
+calib::CapturedPose files_of(const calib::Captures& captures, int pose) {
+  calib::CapturedPose files{fmt::format("pose{:02d}", pose), {}};
+  for (std::size_t projector = 0; projector < captures.projectors.size(); ++projector) {
+    auto& of_projector = files.pictures.emplace_back(captures.cameras.size());
+    for (std::size_t camera = 0; camera < captures.cameras.size(); ++camera) {
+      for (int i = 0; i < captures.patterns[projector].count(); ++i)
+        of_projector[camera].push_back(
+            calib::picture_path(captures, pose, static_cast<int>(projector), static_cast<int>(camera), i));
+    }
+  }
+  return files;
+}
+
+std::vector<fs::path> all_of(const calib::CapturedPose& pose) {
+  std::vector<fs::path> files;
+  for (const auto& of_projector : pose.pictures)
+    for (const auto& of_camera : of_projector) files.insert(files.end(), of_camera.begin(), of_camera.end());
+  return files;
+}
+
+// Files are written whole or not at all; an empty one is what a power cut leaves.
+bool is_complete(const calib::CapturedPose& pose) {
+  const auto files = all_of(pose);
+  return std::all_of(files.begin(), files.end(), [](const fs::path& file) {
+    std::error_code absent;
+    const auto size = fs::file_size(file, absent);
+    return !absent && size > 0;
+  });
+}
+
+// What is left of an interrupted pose: the board may stand elsewhere, so nothing of it can be used.
+void remove_pictures(const calib::CapturedPose& pose) {
+  for (const fs::path& file : all_of(pose)) {
+    std::error_code absent;
+    fs::remove(file, absent);
+  }
+}
+
+// How long each projector was waited for, on the cameras' clock.
+class CaptureClock {
+ public:
+  CaptureClock(std::size_t projectors, std::function<Stamp()> now)
+      : seconds_(projectors), now_(std::move(now)), since_(now_()) {}
+  void showing(int projector) {
+    stop();
+    showing_ = projector;
+  }
+  void stop() {
+    const Stamp now = now_();
+    if (showing_ >= 0) seconds_[static_cast<std::size_t>(showing_)] += seconds_between(since_, now);
+    since_ = now;
+    showing_ = -1;
+  }
+  const std::vector<double>& seconds() const { return seconds_; }
+  double total() const {
+    double sum = 0;
+    for (const double s : seconds_) sum += s;
+    return sum;
+  }
+
+ private:
+  std::vector<double> seconds_;
+  std::function<Stamp()> now_;
+  Stamp since_;
+  int showing_ = -1;
+};
+
+Status capture(const calib::Captures& captures, int pose, const Surroundings& around, CaptureClock* clock) {
+  calib::Stage stage = around.stage;
+  stage.show = [&](int projector, const cv::Mat& picture) {
+    clock->showing(projector);
+    return around.stage.show(projector, picture);
+  };
+  clock->stop();
+  Status done = calib::capture_pose(captures, pose, stage);
+  clock->stop();
+  const Status written = around.written();
+  return done ? written : done;
+}
+
+// The solve after each pose: one lens model for all, for models are chosen when all poses are there.
+Result<calib::Assessment> judged(const calib::Observed& observed) {
+  const calib::SolveOptions options;
+  LIMN_TRY(const calib::Solution solution, calib::solve(observed.observations, options));
+  return calib::assess(observed, options, solution);
+}
+
+double predicted_mm(const calib::Assessment& assessment) {
+  return *std::max_element(assessment.predicted_error_mm.begin(), assessment.predicted_error_mm.end());
+}
+
+std::string line_of(const PoseJudged& judged) {
+  const std::string name = judged.pose + (judged.before ? " (captured before): " : ": ");
+  if (!judged.assessment) return name + "no rig yet: " + judged.unsolved;
+  std::vector<std::string> seen;
+  for (const calib::DeviceQuality& device : judged.assessment->devices)
+    seen.push_back(fmt::format("{} {:.0f} %", device.name, 100 * device.coverage));
+  return fmt::format("{}held-out {:.3f} px, predicted {:.2f} mm (95 %), boards over {}; {}", name,
+                     judged.assessment->held_out.rms_px, predicted_mm(*judged.assessment),
+                     fmt::join(seen, ", "),
+                     judged.more_helps.empty() ? "enough" : "more poses help: " + judged.more_helps);
+}
+
+// Says faults when they come and when they go, not at each pose.
+class FaultTeller {
+ public:
+  explicit FaultTeller(const Say& say) : say_(say) {}
+  void tell(const std::vector<calib::Fault>& faults) {
+    std::set<std::string> names;
+    for (const calib::Fault& fault : faults) {
+      const bool is_new = names.insert(fault.name).second && !told_.contains(fault.name);
+      if (is_new) say_(fmt::format("fault {}: {}; {}.", fault.name, fault.evidence, fault.advice));
+    }
+    for (const std::string& name : told_)
+      if (!names.contains(name)) say_(fmt::format("fault {} is gone", name));
+    told_ = std::move(names);
+  }
+
+ private:
+  const Say& say_;
+  std::set<std::string> told_;
+};
+
+// Faults that another pose may cure; the others are cured by hands.
+bool wants_poses(const calib::Fault& fault) {
+  return fault.name == "few_poses" || fault.name == "little_tilt" || fault.name == "low_coverage";
+}
+
+// A run of the wizard, from pose to pose.
+class Run {
+ public:
+  Run(const calib::Captures& captures, const Surroundings& around, const Say& say)
+      : captures_(captures),
+        around_(around),
+        say_(say),
+        faults_(say),
+        clock_(captures.projectors.size(), around.now) {}
+
+  Status pose(int number, const std::string& place) {
+    const calib::CapturedPose files = files_of(captures_, number);
+    PoseJudged judged;
+    judged.pose = files.name;
+    judged.before = is_complete(files);
+    if (!judged.before) {
+      say_(fmt::format("{}: hold the board {}", files.name, place));
+      remove_pictures(files);
+      LIMN_TRY_STATUS(around_.hold(number));
+      const double before_s = clock_.total();
+      LIMN_TRY_STATUS(capture(captures_, number, around_, &clock_));
+      judged.capture_s = clock_.total() - before_s;
+    }
+    LIMN_TRY_STATUS(observe(files));
+    judge(&judged);
+    say_(line_of(judged));
+    faults_.tell(judged.assessment ? judged.assessment->faults : calib::unsolved_faults(*observed_));
+    return {};
+  }
+
+  bool is_enough() const { return !poses_.empty() && poses_.back().more_helps.empty(); }
+  std::vector<PoseJudged> poses() const { return poses_; }
+  std::vector<std::pair<std::string, double>> capture_s() const {
+    std::vector<std::pair<std::string, double>> named;
+    for (std::size_t i = 0; i < captures_.projectors.size(); ++i)
+      named.emplace_back(captures_.projectors[i].name, clock_.seconds()[i]);
+    return named;
+  }
+
+ private:
+  Status observe(const calib::CapturedPose& files) {
+    calib::Captures alone = captures_;
+    alone.poses = {files};
+    LIMN_TRY_STATUS(calib::check_pictures(alone));
+    LIMN_TRY(calib::Observed seen, calib::observe(alone));
+    LIMN_TRY_STATUS(calib::check_board(alone, seen.observations));
+    observed_ = observed_ ? calib::joined(std::move(*observed_), std::move(seen)) : std::move(seen);
+    return {};
+  }
+
+  void judge(PoseJudged* judged) {
+    auto assessment = apps::judged(*observed_);
+    if (assessment) judged->assessment = std::move(*assessment);
+    if (!judged->assessment) judged->unsolved = assessment.message();
+    poses_.push_back(*judged);
+    judged->more_helps = poses_.back().more_helps = apps::more_helps(poses_);
+  }
+
+  const calib::Captures& captures_;
+  const Surroundings& around_;
+  const Say& say_;
+  FaultTeller faults_;
+  CaptureClock clock_;
+  std::optional<calib::Observed> observed_;
+  std::vector<PoseJudged> poses_;
+};
+
+// The rig as limn solve makes it of the complete poses.
+Result<calib::Report> solve_all(const CalibrateOptions& options, const calib::Captures& captures, int poses) {
+  SolveOptions solving{.captures = captures.folder, .out = options.out};
+  for (int pose = 0; pose < poses; ++pose) {
+    const calib::CapturedPose files = files_of(captures, pose);
+    if (!is_complete(files) && fs::is_directory(captures.folder / files.name))
+      solving.skip_poses.push_back(files.name);
+  }
+  return solved(solving);
+}
+
+// What decides what is captured: the plan and its world, without the path between them.
+Result<std::string> plan_text(const fs::path& plan_path, const fs::path& world_path) {
+  ordered_json all = {{"schema", "limn.captured_plan/1"}};
+  for (const auto& [name, path] : {std::pair("plan", plan_path), std::pair("world", world_path)}) {
+    LIMN_TRY(const std::string text, read_file(path));
+    all[name] = ordered_json::parse(text, nullptr, true, true);
+  }
+  all["plan"].erase("world");
+  return all.dump(2) + "\n";
+}
+
+ordered_json to_json(const PoseJudged& judged) {
+  ordered_json json = {{"pose", judged.pose}, {"captured_before", judged.before}};
+  if (!judged.before) json["capture_s"] = judged.capture_s;
+  if (!judged.assessment) {
+    json["unsolved"] = judged.unsolved;
+    return json;
+  }
+  const calib::Assessment& assessment = *judged.assessment;
+  json["verdict"] = calib::to_text(assessment.verdict);
+  json["held_out_px"] = assessment.held_out.rms_px;
+  json["predicted_mm"] = predicted_mm(assessment);
+  for (const calib::DeviceQuality& device : assessment.devices)
+    json["coverage"][device.name] = device.coverage;
+  json["faults"] = ordered_json::array();
+  for (const calib::Fault& fault : assessment.faults) json["faults"].push_back(fault.name);
+  json["more_helps"] = judged.more_helps;
+  return json;
+}
+
+std::string to_json(const Calibrated& done) {
+  ordered_json json = {{"verdict", calib::to_text(done.report.assessment.verdict)},
+                       {"held_out_px", done.report.assessment.held_out.rms_px},
+                       {"predicted_mm", predicted_mm(done.report.assessment)},
+                       {"poses", ordered_json::array()},
+                       {"capture_s", ordered_json::object()},
+                       {"seconds", done.seconds}};
+  for (const PoseJudged& judged : done.poses) json["poses"].push_back(to_json(judged));
+  for (const auto& [projector, seconds] : done.capture_s) json["capture_s"][projector] = seconds;
+  return json.dump(2) + "\n";
+}
+
+void say_end(const CalibrateOptions& options, const Calibrated& done, const Say& say) {
+  for (const calib::Fault& fault : done.report.assessment.faults)
+    say(fmt::format("fault {}: {}; {}.", fault.name, fault.evidence, fault.advice));
+  for (const std::string& sentence : done.report.words.advice) say("advice: " + sentence);
+  std::vector<std::string> times;
+  for (const auto& [projector, seconds] : done.capture_s)
+    times.push_back(fmt::format("{} {:.1f} s", projector, seconds));
+  const auto taken = std::count_if(done.poses.begin(), done.poses.end(),
+                                   [](const PoseJudged& judged) { return !judged.before; });
+  say(fmt::format("captured {} of {} poses in this run, at the cameras' pace: {}", taken, done.poses.size(),
+                  fmt::join(times, ", ")));
+  say(done.report.words.verdict);
+  say(fmt::format("rig and report in {} ({:.0f} s)", options.out.string(), done.seconds));
+}
+
+// The virtual rig as the wizard's surroundings; all cameras expose at one moment.
+Surroundings virtual_surroundings(const Plan& plan, sim::VirtualRig* rig, PictureWriter* writer) {
+  Surroundings around;
+  around.stage = stage_of(rig, writer, nullptr);
+  const auto frames = std::make_shared<std::vector<cv::Mat>>(rig->world().rig.cameras.size());
+  around.stage.grab = [rig, frames](int camera) -> Result<cv::Mat> {
+    cv::Mat& wanted = frames->at(static_cast<std::size_t>(camera));
+    if (wanted.empty()) {
+      std::vector<int> all;
+      for (int i = 0; i < static_cast<int>(frames->size()); ++i) all.push_back(i);
+      std::size_t i = 0;
+      for (Frame& frame : rig->expose(all)) frames->at(i++) = std::move(frame.image);
+    }
+    return std::exchange(wanted, cv::Mat());
+  };
+  around.hold = [&plan, rig](int pose) -> Status {
+    rig->place(board_object(plan.board, plan.world_from_board[static_cast<std::size_t>(pose)]));
+    return {};
+  };
+  around.written = [writer] { return writer->finish(); };
+  around.now = [rig] { return rig->now(); };
+  return around;
+}
+
+}  // namespace
+
+std::string more_helps(const std::vector<PoseJudged>& poses) {
+  if (poses.empty() || !poses.back().assessment) return "too few for a rig";
+  const calib::Assessment& last = *poses.back().assessment;
+  for (const calib::Fault& fault : last.faults)
+    if (wants_poses(fault)) return fault.name;
+  if (last.verdict != calib::Verdict::good) return "the rig is " + calib::to_text(last.verdict);
+  const double mm = predicted_mm(last);
+  if (mm <= calib::k_fine_mm) return "";
+  const auto earlier = poses.size() < 3 ? nullptr : &poses[poses.size() - 3].assessment;
+  if (earlier == nullptr || !*earlier) return "the predicted error may still fall";
+  const bool has_settled = mm > (1 - k_settled) * predicted_mm(**earlier);
+  return has_settled ? "" : "the predicted error still falls";
+}
+
+Result<Calibrated> calibrated(const CalibrateOptions& options,
+                              const std::string& plan_json,
+                              const calib::Captures& captures,
+                              const std::vector<std::string>& places,
+                              const Surroundings& surroundings,
+                              const std::function<void(const std::string&)>& say) {
+  const auto begun = std::chrono::steady_clock::now();
+  const int count = static_cast<int>(places.size());
+  LIMN_TRY_STATUS(opened(captures, plan_json));
+  Run run(captures, surroundings, say);
+  std::optional<calib::Report> report;
+  for (int pose = 0; pose < count; ++pose) {
+    LIMN_TRY_STATUS(run.pose(pose, places[static_cast<std::size_t>(pose)]));
+    const bool is_next_there = pose + 1 < count && is_complete(files_of(captures, pose + 1));
+    if (options.all || is_next_there || pose + 1 == count || !run.is_enough()) continue;
+    LIMN_TRY(report, solve_all(options, captures, count));
+    if (report->assessment.verdict == calib::Verdict::good) break;
+    report.reset();
+  }
+  if (!report) {
+    LIMN_TRY(report, solve_all(options, captures, count));
+  }
+  return Calibrated{run.poses(), std::move(*report), run.capture_s(),
+                    std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count()};
+}
+
+Status run_calibrate(const CalibrateOptions& options) {
+  LIMN_TRY(const Plan plan, load_plan(options.plan));
+  LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_picture));
+  LIMN_TRY(const std::string text, plan_text(options.plan, plan.world));
+  sim::VirtualRig rig(std::move(world));
+  LIMN_TRY(const calib::Captures captures, planned(plan, rig, options.out / "captures"));
+  const auto places = places_in_words(rig.world().rig.cameras[0], plan.board, plan.world_from_board);
+  const Say say = [&](const std::string& line) {
+    if (options.json) return log_info("{}", line);
+    fmt::print("{}\n", line);
+    std::fflush(stdout);
+  };
+  PictureWriter writer;
+  rig.clear_stage();
+  LIMN_TRY(const Calibrated done,
+           calibrated(options, text, captures, places, virtual_surroundings(plan, &rig, &writer), say));
+  say_end(options, done, say);
+  if (options.json) fmt::print("{}", to_json(done));
+  return {};
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,172 @@
+#include "apps/calibrate.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "apps/board_place.h"
+#include "core/file.h"
+#include "core/rig.h"
+#include "tests/support/matchers.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using Eigen::Vector3d;
+using nlohmann::json;
+
+json read_json(const fs::path& path) { return json::parse(read_file(path).value(), nullptr, true, true); }
+
+// Pixels a side by `share`; the same field of view.
+void shrink(double share, json* imager) {
+  for (auto& side : (*imager)["size"]) side = static_cast<int>(share * side.get<int>());
+  auto& values = (*imager)["lens"]["values"];
+  for (std::size_t i = 0; i < 2; ++i) values[i] = share * values[i].get<double>();
+  for (std::size_t i = 2; i < 4; ++i) values[i] = share * (values[i].get<double>() + 0.5) - 0.5;
+}
+
+// The bench's plan and world with fewer pixels, in `folder`.
+fs::path small_plan(const fs::path& folder) {
+  const fs::path config = fs::path(LIMN_SOURCE_DIR) / "config";
+  json world = read_json(config / "worlds/bench.json"), plan = read_json(config / "plans/bench.json");
+  world["scene"] = (config / "scenes/door").string();
+  shrink(0.625, &world["cameras"][0]);
+  shrink(0.25, &world["projectors"][0]);
+  plan["world"] = "world.json";
+  plan["board"] = "charuco:8x6:55mm";
+  EXPECT_TRUE(write_file(folder / "world.json", world.dump(2)).ok());
+  EXPECT_TRUE(write_file(folder / "plan.json", plan.dump(2)).ok());
+  return folder / "plan.json";
+}
+
+// What `limn calibrate --json` prints.
+json calibrated_json(const CalibrateOptions& options) {
+  testing::internal::CaptureStdout();
+  const Status status = run_calibrate(options);
+  const std::string printed = testing::internal::GetCapturedStdout();
+  EXPECT_TRUE(status.ok()) << status.message();
+  return status.ok() ? json::parse(printed) : json();
+}
+
+std::size_t pictures_in(const fs::path& folder) {
+  std::size_t count = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(folder))
+    count += entry.path().extension() == ".png" ? 1 : 0;
+  return count;
+}
+
+// One wizard's life: from nothing, left in the middle of a pose, another plan.
+TEST(Calibrate, GoesFromNothingToAGoodRigAndOnFromWhereItWasLeft) {
+  const fs::path folder = test::test_folder(), plan = small_plan(folder), out = folder / "rig";
+  const CalibrateOptions options{.plan = plan, .out = out, .json = true};
+  const json first = calibrated_json(options);
+  ASSERT_FALSE(first.is_null());
+  EXPECT_EQ(first["verdict"], "good");
+  const auto rig = load_rig(out);
+  ASSERT_TRUE(rig.ok()) << rig.message();
+  EXPECT_NEAR(rig->projectors[0].lens.fx(), 380, 4);
+  EXPECT_TRUE(fs::exists(out / "report.html"));
+  EXPECT_EQ(read_json(out / "report.json")["verdict"], "good");
+
+  // It stopped when poses no longer helped: good, with poses left.
+  const json& poses = first["poses"];
+  ASSERT_GE(poses.size(), 5U);
+  EXPECT_LT(poses.size(), 9U);
+  EXPECT_TRUE(poses[0].contains("unsolved"));
+  EXPECT_FALSE(poses[0].contains("verdict"));
+  for (std::size_t i = 3; i < poses.size(); ++i) {
+    EXPECT_FALSE(poses[i]["captured_before"].get<bool>());
+    EXPECT_LT(poses[i]["held_out_px"].get<double>(), 0.5);
+    EXPECT_GT(poses[i]["coverage"]["projector0"].get<double>(), 0.2);
+    EXPECT_EQ(poses[i]["more_helps"].get<std::string>().empty(), i + 1 == poses.size()) << poses[i];
+  }
+  // 36 pictures a pose, one every two frames of 1/30 s, and what the last one waits.
+  const double capture_s = first["capture_s"]["projector0"];
+  EXPECT_NEAR(capture_s, static_cast<double>(poses.size()) * 36 * 2 / 30.0, 1);
+  const fs::path captures = out / "captures";
+  ASSERT_EQ(pictures_in(captures), poses.size() * 36);
+
+  // Left within pose 2: what is complete stays as it is, pose 2 is captured again as a whole.
+  const auto written_at = [&](const char* file) { return fs::last_write_time(captures / file); };
+  const auto kept = written_at("pose01/camera0/035.png"), torn = written_at("pose02/camera0/000.png");
+  fs::remove(captures / "pose02/camera0/035.png");
+  fs::remove(out / "rig.json");
+  const json second = calibrated_json(options);
+  ASSERT_FALSE(second.is_null());
+  EXPECT_EQ(second["verdict"], "good");
+  ASSERT_EQ(second["poses"].size(), poses.size());
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    EXPECT_EQ(second["poses"][i]["captured_before"].get<bool>(), i != 2) << i;
+  EXPECT_EQ(written_at("pose01/camera0/035.png"), kept);
+  EXPECT_GT(written_at("pose02/camera0/000.png"), torn);
+  EXPECT_TRUE(fs::exists(captures / "pose02/camera0/035.png"));
+  EXPECT_NEAR(second["capture_s"]["projector0"].get<double>(), 36 * 2 / 30.0, 0.2);
+  EXPECT_TRUE(fs::exists(out / "rig.json"));
+
+  // Another plan: refused with what differs, and nothing changes.
+  json other = read_json(plan);
+  other["board"] = "charuco:8x6:56mm";
+  ASSERT_TRUE(write_file(plan, other.dump(2)).ok());
+  const Status refused = run_calibrate(options);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.message().find("plan.board"), std::string::npos) << refused.message();
+  EXPECT_NE(refused.message().find("charuco:8x6:55mm"), std::string::npos) << refused.message();
+  EXPECT_NE(refused.message().find("charuco:8x6:56mm"), std::string::npos) << refused.message();
+  EXPECT_EQ(pictures_in(captures), poses.size() * 36);
+}
+
+TEST(Calibrate, LeavesCapturesOfOthersAlone) {
+  const fs::path folder = test::test_folder(), plan = small_plan(folder);
+  ASSERT_TRUE(make_folder(folder / "rig/captures").ok());
+  ASSERT_TRUE(write_file(folder / "rig/captures/capture.json", "{}").ok());
+  const Status refused = run_calibrate({.plan = plan, .out = folder / "rig"});
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.message().find("Choose another --out"), std::string::npos) << refused.message();
+  EXPECT_EQ(read_file(folder / "rig/captures/capture.json").value(), "{}");
+}
+
+PoseJudged judged(double predicted_mm, calib::Verdict verdict = calib::Verdict::good) {
+  PoseJudged pose;
+  pose.assessment.emplace();
+  pose.assessment->verdict = verdict;
+  pose.assessment->predicted_error_mm = {predicted_mm / 2, predicted_mm};
+  return pose;
+}
+
+TEST(Calibrate, PosesHelpUntilTheRigIsGoodAndItsErrorFallsNoMore) {
+  EXPECT_FALSE(more_helps({}).empty());
+  EXPECT_FALSE(more_helps({PoseJudged{}}).empty());
+  EXPECT_FALSE(more_helps({judged(0.1, calib::Verdict::usable)}).empty());
+  EXPECT_FALSE(more_helps({judged(0.8)}).empty()) << "nothing to compare with";
+  EXPECT_FALSE(more_helps({judged(0.8), judged(0.7), judged(0.7)}).empty()) << "fell by an eighth";
+  EXPECT_TRUE(more_helps({judged(0.8), judged(0.79), judged(0.78)}).empty());
+  EXPECT_TRUE(more_helps({judged(0.8), judged(0.4), judged(0.2)}).empty()) << "fine enough";
+  PoseJudged bare = judged(0.2);
+  bare.assessment->faults = {{"low_coverage", "", "", calib::Severity::note}};
+  EXPECT_EQ(more_helps({bare}), "low_coverage");
+}
+
+TEST(Calibrate, TellsPlacesAsTheCameraSeesThem) {
+  const Imager camera{"camera0", 640, 480, Lens::pinhole(600, 600, 319.5, 239.5), Pose()};
+  const calib::Board board = calib::Board::parse("charuco:8x6:40mm").value();
+  // The board's middle at p, turned by r about the camera's axes.
+  const auto held = [&](const Vector3d& r, const Vector3d& p) {
+    return Pose(exp_rotation(r), p) *
+           Pose(Eigen::Quaterniond::Identity(), {-board.width_m() / 2, -board.height_m() / 2, 0});
+  };
+  const auto words = places_in_words(
+      camera, board,
+      {held({0, 0, 0}, {0, 0, 1}), held({0.5, 0, 0}, {-0.5, 0, 1.5}),  // its upper edge goes nearer
+       held({0, 0.5, 0}, {0, 0.5, 2}),                                 // its right edge goes nearer
+       held({0, 0, 0.5}, {0, 0, 1}), held({0, 0, 0}, {3, 0, 1})});
+  EXPECT_EQ(words[0], "middle, near (1.00 m), facing the camera");
+  EXPECT_EQ(words[1].substr(0, 20), "left, near (1.58 m),");
+  EXPECT_EQ(words[2], "low (2.06 m), tilted 32 degrees down and left");
+  EXPECT_NE(words[3].find("turned 29 degrees clockwise"), std::string::npos) << words[3];
+  EXPECT_EQ(words[4].substr(0, 19), "outside its picture");
+}
+
+}  // namespace
+}  // namespace limn::apps
