@@ -55,6 +55,7 @@ void add_markers(CLI::App& app, Run& run) {
   command->footer(
       "Example: limn markers --family aruco_4x4_50 --ids 0-11 --size-mm 40 --out sheet.pdf\n"
       "Example: limn markers --board charuco:11x8:25mm --out board.pdf\n"
+      "Example: limn markers --size-mm 40 --mount holder.stl   (a 3D-printable holder, its pose in holder.json)\n"
       "Example: limn markers --learn-body photos/*.jpg --camera camera0.cameramodel --family aruco_4x4_50 --size-mm 40 "
       "--out body.json\n"
       "Example: limn markers --train photo.jpg --out logo.patt\n"
@@ -73,6 +74,11 @@ void add_markers(CLI::App& app, Run& run) {
   auto* compare = command->add_option("--compare", options->compare, "instead: how well these templates are told apart");
   command->add_option("--json", options->json, "with --compare: file for the report")->needs(compare);
   compare->excludes(train);
+  auto* mount = command->add_option("--mount", options->mount, "a 3D-printable holder for a marker of --size-mm: .stl (mm), "
+                                    "its pose beside it; with --out the sheet, too");
+  command->add_option("--paper-mm", options->paper_mm, "with --mount: thickness of paper and glue")
+      ->needs(mount)
+      ->capture_default_str();
   command->add_option("--out", options->out, "file to write: .pdf, .svg; a board .png; a body .json; a template .patt");
   command->callback([options, learning, &run] {
     run = [options, learning] {

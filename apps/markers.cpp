@@ -11,6 +11,7 @@
 #include <optional>
 #include <vector>
 
+#include "apps/marker_mount.h"
 #include "apps/markers_templates.h"
 #include "calib/board/board.h"
 #include "core/file.h"
@@ -122,9 +123,11 @@ struct Grid {
 };
 
 // White margin of an eighth of the side: a cell or more of every family.
+double margin_mm(double size_mm) { return std::max(3.0, size_mm / 8); }
+
 Result<Grid> grid_for(double size_mm) {
   Grid grid{};
-  grid.margin = std::max(3.0, size_mm / 8);
+  grid.margin = margin_mm(size_mm);
   grid.pitch_x = size_mm + 2 * grid.margin;
   grid.pitch_y = grid.pitch_x + k_label;
   grid.columns = static_cast<int>((k_page_width - 2 * k_edge) / grid.pitch_x);
@@ -267,6 +270,12 @@ Status write_board(const MarkersOptions& options, const std::string& extension) 
 Status run_markers(const MarkersOptions& options) {
   if (!options.compare.empty()) return compare_templates(options.compare, options.json);
   if (!options.train.empty()) return train_template(options.train, options.out);
+  if (!options.mount.empty()) {
+    if (!options.board.empty()) return usage_error("--mount: holds a marker; leave --board out.");
+    LIMN_TRY_STATUS(
+        run_mount({options.size_mm, margin_mm(options.size_mm), options.paper_mm, options.mount}));
+    if (options.out.empty()) return {};
+  }
   const std::string extension = options.out.extension().string();
   const bool for_board = !options.board.empty();
   if (extension != ".pdf" && extension != ".svg" && !(for_board && extension == ".png"))
