@@ -18,6 +18,7 @@ constexpr double k_memory_s = 3;
 constexpr double k_patch_sides = 3;  // of what is watched for stillness: a hand's outline is in it
 constexpr int k_patch_cells = 20;
 constexpr int k_few_cells = 4;
+constexpr double k_tremor_px = 1;  // of a hand that rests
 
 double direction(const Detection& detection) {
   const Eigen::Vector2d d =
@@ -61,11 +62,16 @@ cv::Mat patch_of(const cv::Mat& grey, const std::array<Eigen::Vector2d, 4>& corn
   return patch;
 }
 
-bool is_still(const cv::Mat& a, const cv::Mat& b, double levels) {
+// Whether nothing has moved by more than a tremor: a step of brightness that shifts by k_tremor_px changes
+// the mean of the cell that it runs through by that share of the cell.
+bool is_still(const cv::Mat& a, const cv::Mat& b, double levels, double cell_px) {
   if (a.empty() || b.empty() || a.size() != b.size()) return false;
-  cv::Mat difference;
-  cv::absdiff(a, b, difference);
-  return cv::countNonZero(difference > levels) < k_few_cells;
+  cv::Mat change, brightest, darkest;
+  cv::absdiff(a, b, change);
+  cv::dilate(b, brightest, {});
+  cv::erode(b, darkest, {});
+  const cv::Mat allowed = (brightest - darkest) * (k_tremor_px / cell_px) + levels;
+  return cv::countNonZero(change > allowed) < k_few_cells;
 }
 
 }  // namespace
@@ -164,7 +170,8 @@ bool GestureReader::hides_across(Stamp at) const {
 // For how long the marker's place has looked as it does.
 double GestureReader::still_for(const cv::Mat& grey, Stamp at) {
   const cv::Mat now = patch_of(grey, corners_px_);
-  if (!is_still(now, patch_, options_.still_levels)) {
+  const double cell_px = k_patch_sides * std::sqrt(area(corners_px_)) / k_patch_cells;
+  if (!is_still(now, patch_, options_.still_levels, cell_px)) {
     patch_ = now;
     patch_since_ = at;
   }

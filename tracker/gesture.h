@@ -24,8 +24,8 @@ struct GestureOptions {
   double still_s = 0.35;  ///< and what covers it is still for so long; shorter: arms at work act
   double turn_deg = 30;   ///< one step
   double lay_deg = 50;    ///< from how it stood
-  /// Grey levels by which what is still may change, seen in cells of a seventh of the marker's side: noise
-  /// and the tremor of a hand that rests.
+  /// Grey levels by which what is still may change, seen in cells of a seventh of the marker's side, beside
+  /// what the tremor of a resting hand does: noise.
   double still_levels = 6;
 };
 

@@ -72,14 +72,14 @@ void Books::add_poses(const Painted& painted) {
 }
 
 Status Books::close(Session* session, bool as_json) {
-  if (recorder_) LIMN_TRY_STATUS(recorder_->finish());
+  const Status recorded = recorder_ ? recorder_->finish() : Status();
   nlohmann::ordered_json json = {{"schema", "limn.live/1"}};
   json.update(telemetry_.summary());
   if (as_json)
     fmt::print("{}\n", json.dump(2));
   else
     print_summary(json);
-  if (out_.empty()) return {};
+  if (out_.empty()) return recorded;
   const std::vector<cv::Mat>& pictures = session->painted().projectors;
   for (std::size_t i = 0; i < pictures.size(); ++i)
     LIMN_TRY_STATUS(
@@ -87,7 +87,8 @@ Status Books::close(Session* session, bool as_json) {
   if (const cv::Mat screen = session->screen(); !screen.empty())
     LIMN_TRY_STATUS(write_png(out_ / "screen.png", screen));
   LIMN_TRY_STATUS(write_file(out_ / "session.json", json.dump(2) + "\n"));
-  return telemetry_.write_page(out_ / "session.html", "A session of Limn");
+  LIMN_TRY_STATUS(telemetry_.write_page(out_ / "session.html", "A session of Limn"));
+  return recorded;
 }
 
 }  // namespace limn::apps

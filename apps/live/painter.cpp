@@ -19,7 +19,7 @@ const cv::Scalar k_green(90, 220, 90), k_amber(40, 170, 255), k_red(60, 60, 255)
 cv::Mat mixed(const cv::Mat& base, const cv::Mat& with, double share) {
   std::array<float, 256> light{};
   for (int i = 0; i < 256; ++i)
-    light[static_cast<std::size_t>(i)] = std::pow(static_cast<float>(i) / 255, 2.2F);
+    light[static_cast<std::size_t>(i)] = static_cast<float>(std::pow(i / 255.0, k_gamma));
   cv::Mat out(base.size(), base.type());
   const auto bytes = [](const cv::Mat& m, int row) { return m.ptr<std::uint8_t>(row); };
   for (int row = 0; row < base.rows; ++row) {
@@ -86,7 +86,8 @@ const Painted& Painter::paint(const Watched& watched,
                               Stamp shown_at) {
   painted_.painted_at = now;
   painted_.shown_at = shown_at;
-  if (staging.frozen) return painted_;
+  if (staging.frozen && !staging.blackout && !is_black_) return painted_;
+  is_black_ = staging.blackout;
   painted_.tracks = tracker::predicted(watched.motions, shown_at, options_.prediction, options_.motion, now);
   painted_.posed = scene::staged(scene_, staging, painted_.tracks);
   note_changes(painted_.posed, staging, shown_at);

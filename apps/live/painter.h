@@ -88,6 +88,7 @@ class Painter {
   ShadowWatch shadows_;
   Eigen::Vector3d d_up_world_;
   Painted painted_;
+  bool is_black_ = false;  // by blackout, which goes before a freeze
   Imager viewer_;  // of what was painted last
   scene::SharedEye shared_eye_;
   Stamp eye_at_;

@@ -423,8 +423,7 @@ TEST(Live, SaysWhatIsWrong) {
   twice.seconds = 0.04;
   twice.resolution = 0.5;
   twice.record = folder / "recording";
-  ASSERT_TRUE(write_file(folder / "recording/session.json", "{}").ok() ||
-              make_folder(folder / "recording").ok());
+  ASSERT_TRUE(make_folder(folder / "recording").ok());
   ASSERT_TRUE(write_file(folder / "recording/session.json", "{}"));
   EXPECT_NE(message(twice).find("expected a folder without a session"), std::string::npos) << message(twice);
   ReplayOptions replay;
