@@ -93,20 +93,20 @@ class DeviceLoop {
 
   void step(device::Window* window) {
     if (auto seen = seen_.take(k_wait)) session_->take(std::move(seen->watched), seen->moments);
-    load_edited_files();
-    ShownFrame shown;
-    shown.missed = static_cast<int>(missed_.exchange(0));
+    session_->show_news(&files_, now());
     const Stamp painting_at = now();
     const Painted& painted = session_->paint(painting_at, shifted(painting_at, paint_s_ + display_s_));
-    paint_s_ += k_blend * (1e-3 * session_->paint_ms() - paint_s_);
+    ShownFrame shown = session_->measured();
+    paint_s_ += k_blend * (1e-3 * shown.paint_ms - paint_s_);
     show(painted);
+    shown.missed = static_cast<int>(missed_.exchange(0));
     const Stamp begun = now();
     const bool wants_screen = window || !devices_->screens.empty();
     const cv::Mat screen = wants_screen ? session_->screen() : cv::Mat();
     shown.screen_ms = wants_screen ? milliseconds_since(begun) : -1;
     if (!screen.empty()) show_screen(screen, window);
     if (window) press(window->pressed_key());
-    count(painted, shown);
+    if (session_->watched().captured_at != Stamp{}) books_->shown(shown, painted);  // something was seen
     for (const std::string& what : notices_.take()) {
       books_->telemetry().note(now(), what);
       log_warning("live: {}", what);
@@ -189,35 +189,10 @@ class DeviceLoop {
   // The picture as large as the screen takes it, with black bars.
   static cv::Mat fitted(const cv::Mat& picture, cv::Size size);
 
-  // Parts that were edited while the session runs; a file that is broken keeps the old ones.
-  void load_edited_files() {
-    auto scene = files_.news();
-    if (!scene) return;
-    const Status shown = *scene ? session_->show(std::move(**scene), now()) : Status(scene->error());
-    if (shown) return;
-    const std::string what = shown.message() + " The parts stay as they were.";
-    books_->telemetry().note(now(), what);
-    log_warning("live: {}", what);
-  }
-
   void press(int key) {
     const auto edit = keys_.edit_of(key);
     const Status done = edit ? session_->edit(*edit, "key", now()) : Status();
     if (!done) log_warning("live: {}", done.message());
-  }
-
-  void count(const Painted& painted, ShownFrame shown) {
-    const Watched& watched = session_->watched();
-    if (watched.captured_at == Stamp{}) return;  // nothing was seen yet
-    shown.captured_at = watched.captured_at;
-    shown.shown_at = painted.shown_at;
-    shown.detect_ms = watched.detect_ms;
-    shown.filter_ms = watched.filter_ms;
-    shown.paint_ms = session_->paint_ms();
-    shown.record_ms = session_->record_ms();
-    for (const auto& detections : watched.detections) shown.markers += static_cast<int>(detections.size());
-    for (const Track& track : painted.tracks) shown.lost += track.sight == Sight::lost;
-    books_->shown(shown, painted);
   }
 
   SessionDevices* devices_;

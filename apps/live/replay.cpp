@@ -157,15 +157,7 @@ class Replay {
     if (print != event.at("pictures") && ++other_pictures_ == 1) first_picture_ = at_s;
     if (window_)
       if (const cv::Mat screen = session_.screen(); !screen.empty()) window_->show(screen);
-    ShownFrame shown{.captured_at = session_.watched().captured_at,
-                     .shown_at = shown_at,
-                     .detect_ms = session_.watched().detect_ms,
-                     .filter_ms = session_.watched().filter_ms,
-                     .paint_ms = session_.paint_ms(),
-                     .screen_ms = -1,
-                     .record_ms = -1};
-    for (const Track& track : painted.tracks) shown.lost += track.sight == Sight::lost;
-    books_.shown(shown, painted);
+    books_.shown(session_.measured(), painted);
     return {};
   }
 

@@ -157,6 +157,16 @@ Status Session::show(scene::Scene scene, Stamp at) {
   return {};
 }
 
+void Session::show_news(SceneWatch* files, Stamp at) {
+  auto scene = files->news();
+  if (!scene) return;
+  const Status shown = *scene ? show(std::move(**scene), at) : Status(scene->error());
+  if (shown) return;
+  const std::string what = shown.message() + " The parts stay as they were.";
+  if (telemetry_) telemetry_->note(at, what);
+  log_warning("live: {}", what);
+}
+
 // Looks that were saved or deleted, on disk, and the page of all.
 Status Session::keep_looks(const scene::Staging& before) {
   const auto text_of = [](const scene::Staging& staging, const std::string& name) {
@@ -194,6 +204,20 @@ const Painted& Session::paint(Stamp now, Stamp shown_at) {
   if (recorder_) recorder_->painted(painted, moments_);
   record_ms_ = recorder_ ? milliseconds_since(recording) : -1;
   return painted;
+}
+
+ShownFrame Session::measured() const {
+  const Painted& painted = painter_.painted();
+  ShownFrame out{.captured_at = watched_.captured_at,
+                 .shown_at = painted.shown_at,
+                 .detect_ms = watched_.detect_ms,
+                 .filter_ms = watched_.filter_ms,
+                 .paint_ms = paint_ms_,
+                 .screen_ms = -1,
+                 .record_ms = record_ms_};
+  for (const auto& detections : watched_.detections) out.markers += static_cast<int>(detections.size());
+  for (const Track& track : painted.tracks) out.lost += track.sight == Sight::lost;
+  return out;
 }
 
 cv::Mat Session::screen() { return painter_.screen(watched_, staging_); }

@@ -9,6 +9,7 @@
 
 #include "apps/live/painter.h"
 #include "apps/live/recording.h"
+#include "apps/live/scene_watch.h"
 #include "apps/live/telemetry.h"
 #include "apps/live/watcher.h"
 #include "core/result.h"
@@ -37,6 +38,9 @@ class Session {
   /// it cannot be drawn.
   Status show(scene::Scene scene, Stamp at);
 
+  /// The same, when `files` have changed; what cannot be loaded is told of and the parts stay as they were.
+  void show_news(SceneWatch* files, Stamp at);
+
   /// The projectors' pictures for a moment to come.
   const Painted& paint(Stamp now, Stamp shown_at);
   cv::Mat screen();
@@ -46,9 +50,9 @@ class Session {
   const scene::Staging& staging() const { return staging_; }
   const Watched& watched() const { return watched_; }
   const SessionSetup& setup() const { return setup_; }
-  /// In milliseconds, of the last paint() and of handing it over to the recording.
-  double paint_ms() const { return paint_ms_; }
-  double record_ms() const { return record_ms_; }
+  /// What the last paint() was made of and cost: stamps, times, markers, lost bodies; the rest is the
+  /// caller's. record_ms is -1 without a recording.
+  ShownFrame measured() const;
 
  private:
   Session(SessionSetup setup, Painter painter, Telemetry* telemetry, Recorder* recorder);

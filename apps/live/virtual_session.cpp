@@ -75,23 +75,27 @@ class VirtualLoop {
     const Stamp exposed_at = rig_->next_exposure();
     room_->set(seconds_of(exposed_at));
     const std::vector<Frame> frames = exposed(exposed_at);
-    ShownFrame shown;
+    double frames_ms = 0;  // to hand over to the recording
     if (!frames.empty()) {
       const auto begun = std::chrono::steady_clock::now();
       if (books_->recorder()) books_->recorder()->watched(frames);
-      shown.record_ms = milliseconds_since(begun);
+      frames_ms = milliseconds_since(begun);
       session_->take(watcher_->watch(frames), ++moments_);
     }
     play_edits(exposed_at);
-    load_edited_files();
+    session_->show_news(&files_, rig_->now());
     const Painted& painted = session_->paint(rig_->now(), shifted(rig_->now(), k_virtual_display_s));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i) {
       if (!is_plugged(session_->setup().rig.projectors[i].name, rig_->now())) continue;
       LIMN_TRY(const Stamp shown_at, rig_->projector(static_cast<int>(i)).show(painted.projectors[i]));
       LIMN_CHECK(shown_at == painted.shown_at);
     }
+    ShownFrame shown = session_->measured();
+    if (shown.record_ms >= 0) shown.record_ms += frames_ms;
+    shown.missed = static_cast<int>(rig_->world().rig.cameras.size() - frames.size());
+    shown.placement_mm = placement_mm(painted, *session_, *room_, rig_->world());
     shown.screen_ms = show_screen();
-    count(painted, frames.size(), shown);
+    books_->shown(shown, painted);
     return {};
   }
 
@@ -139,36 +143,10 @@ class VirtualLoop {
     }
   }
 
-  // Parts that were edited while the session runs; a file that is broken keeps the old ones.
-  void load_edited_files() {
-    auto scene = files_.news();
-    if (!scene) return;
-    const Status shown = *scene ? session_->show(std::move(**scene), rig_->now()) : Status(scene->error());
-    if (shown) return;
-    const std::string what = shown.message() + " The parts stay as they were.";
-    books_->telemetry().note(rig_->now(), what);
-    log_warning("live: {}", what);
-  }
-
   void press(int key) {
     const auto edit = keys_.edit_of(key);
     const Status done = edit ? session_->edit(*edit, "key", rig_->now()) : Status();
     if (!done) log_warning("live: {}", done.message());
-  }
-
-  void count(const Painted& painted, std::size_t frames, ShownFrame shown) {
-    const Watched& watched = session_->watched();
-    shown.captured_at = watched.captured_at;
-    shown.shown_at = painted.shown_at;
-    shown.detect_ms = watched.detect_ms;
-    shown.filter_ms = watched.filter_ms;
-    shown.paint_ms = session_->paint_ms();
-    shown.record_ms = session_->record_ms() >= 0 ? shown.record_ms + session_->record_ms() : -1;
-    for (const auto& detections : watched.detections) shown.markers += static_cast<int>(detections.size());
-    for (const Track& track : painted.tracks) shown.lost += track.sight == Sight::lost;
-    shown.missed = static_cast<int>(rig_->world().rig.cameras.size() - frames);
-    shown.placement_mm = placement_mm(painted, *session_, *room_, rig_->world());
-    books_->shown(shown, painted);
   }
 
   sim::VirtualRig* rig_;
