@@ -15,6 +15,7 @@
 #include "apps/detect.h"
 #include "apps/doctor.h"
 #include "apps/export.h"
+#include "apps/foresee.h"
 #include "apps/import.h"
 #include "apps/learn_body.h"
 #include "apps/live/live.h"
@@ -137,6 +138,15 @@ void add_capture(CLI::App& app, Run& run) {
   command->add_option("--plan", options->plan, "plan file (limn.plan/1)")->required();
   command->add_option("--out", options->out, "captures folder to make")->required();
   command->callback([options, &run] { run = [options] { return finished(run_capture(*options)); }; });
+}
+
+void add_plan(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("plan", "what a described rig would reach in mm, before anything is bought");
+  command->footer("Example: limn plan config/described/bench.json");
+  auto options = std::make_shared<ForeseeOptions>();
+  command->add_option("described", options->described, "the rig (limn.described/1)")->required();
+  command->add_flag("--json", options->json, "print JSON instead of a table");
+  command->callback([options, &run] { run = [options] { return finished(run_foresee(*options)); }; });
 }
 
 void add_patterns(CLI::App& app, Run& run) {
@@ -461,6 +471,7 @@ int run_command_line(int argc, char** argv) {
   add_detect(app, run);
   add_bench(app, run);
   add_demo(app, run);
+  add_plan(app, run);
   add_patterns(app, run);
   add_capture(app, run);
   add_solve(app, run);
