@@ -389,10 +389,10 @@ void add_live(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand("live", "the live session: cameras, tracker, prediction, projectors, screen");
   command->footer(
       "Without devices the session runs on a virtual rig, on its own clock: the world's, or a room made for rig and scene.\n"
-      "Keys in the window: right/left next/previous variant, tab next slot, b blackout, f freeze, m markers, s save a look,\n"
-      "l/k next/previous look, o what the screen shows, r release, escape ends.\n"
+      "Keys in the operator's window, also of clickers and pedals: right/left next/previous variant, tab next slot, b blackout,\n"
+      "f freeze, m markers, s save a look, l/k next/previous look, o what the screen shows, r release, escape asks to end.\n"
       "Example: limn live --seconds 5 --out session\n"
-      "Example: limn live --devices devices.json --rig rig --scene config/scenes/door --out session\n"
+      "Example: limn live --devices devices.json --rig rig --scene config/scenes/door --out session --window\n"
       "Example: limn live --rig rig --scene config/scenes/door --seconds 10 --record recording");
   auto options = std::make_shared<LiveOptions>();
   command->add_option("--rig", options->rig, "rig folder, rig.json or folder of .cameramodel files");
@@ -405,7 +405,7 @@ void add_live(CLI::App& app, Run& run) {
       ->capture_default_str();
   command->add_option("--record", options->record, "folder for a recording that limn replay runs again");
   command->add_option("--out", options->out, "folder for poses.csv, telemetry.csv, session.html and the last pictures");
-  command->add_flag("--window", options->window, "show the screen's picture in a window");
+  command->add_flag("--window", options->window, "the operator's window: pictures, devices, parts, looks, telemetry; keys");
   command->add_option("--prediction", options->prediction, "how poses are carried to the moment of light")
       ->check(CLI::IsMember({"hold", "linear", "filtered"}))
       ->capture_default_str();

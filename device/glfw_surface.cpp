@@ -145,6 +145,18 @@ void GlfwSurface::redraw() const {
   draw();
 }
 
+void GlfwSurface::draw_with(const std::function<void(cv::Size)>& paint) const {
+  const Current current(window_);
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  paint(pixels());
+  glfwSwapBuffers(window_);
+}
+
+void GlfwSurface::in_context(const std::function<void()>& work) const {
+  const Current current(window_);
+  work();
+}
+
 cv::Size GlfwSurface::pixels() const {
   cv::Size size;
   glfwGetFramebufferSize(window_, &size.width, &size.height);

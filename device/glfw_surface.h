@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <opencv2/core/mat.hpp>
 #include <string>
 #include <utility>
@@ -32,6 +33,10 @@ class GlfwSurface {
   /// Uploads an 8-bit grey or BGR picture and draws it. With `finished`, waits until the driver has swapped.
   void show(const cv::Mat& picture, bool finished = false);
   void redraw() const;
+  /// Calls `paint` with its context current and its framebuffer bound, then swaps.
+  void draw_with(const std::function<void(cv::Size pixels)>& paint) const;
+  /// Calls `work` with its context current.
+  void in_context(const std::function<void()>& work) const;
   /// Pixels that it draws on.
   cv::Size pixels() const;
   GLFWwindow* window() const { return window_; }

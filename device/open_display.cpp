@@ -35,8 +35,10 @@ constexpr int k_window_width = 960;  // a larger one would hide the operator's
 
 Opened open_window(const DisplayWanted& wanted, const Desktop& desktop) {
   const int width = std::min(wanted.size.width, k_window_width);
-  LIMN_TRY(Window window,
-           Window::open(desktop, wanted.name, width, width * wanted.size.height / wanted.size.width));
+  LIMN_TRY(Window window, Window::open(desktop, {.title = wanted.name,
+                                                 .width = width,
+                                                 .height = width * wanted.size.height / wanted.size.width,
+                                                 .waits = wanted.waits}));
   return Opened(std::make_unique<WindowDisplay>(std::move(window), wanted));
 }
 

@@ -6,7 +6,6 @@
 #include <opencv2/imgproc.hpp>
 #include <thread>
 
-#include "apps/live/keys.h"
 #include "apps/live/latest.h"
 #include "apps/live/scene_watch.h"
 #include "core/log.h"
@@ -34,56 +33,31 @@ struct Seen {
   std::size_t moments = 0;
 };
 
-// What people are told of: devices that come and go. From several threads.
-class Notices {
- public:
-  void put(const std::string& what) {
-    const std::lock_guard lock(mutex_);
-    all_.push_back(what);
-  }
-  std::vector<std::string> take() {
-    const std::lock_guard lock(mutex_);
-    return std::exchange(all_, {});
-  }
-
- private:
-  std::mutex mutex_;
-  std::vector<std::string> all_;
-};
-
-// Whether a device works, said once for each change.
-class Health {
- public:
-  Health(std::string device, Notices* notices) : device_(std::move(device)), notices_(notices) {}
-  void works() {
-    if (!works_) notices_->put(device_ + " is back");
-    works_ = true;
-  }
-  void fails(const std::string& why) {
-    if (works_) notices_->put(fmt::format("{} is gone; the session goes on without it: {}", device_, why));
-    works_ = false;
-  }
-
- private:
-  std::string device_;
-  Notices* notices_;
-  bool works_ = true;
-};
-
 class DeviceLoop {
  public:
-  DeviceLoop(SessionDevices* devices, Watcher* watcher, Session* session, Books* books)
+  DeviceLoop(SessionDevices* devices, Watcher* watcher, Session* session, Books* books, OperatorDesk* desk)
       : devices_(devices),
         watcher_(watcher),
         session_(session),
         books_(books),
-        keys_(session->setup().scene),
+        desk_(desk),
         files_(session->setup().scene.folder) {
-    for (const auto& camera : devices_->cameras)
-      if (camera) threads_.emplace_back([this, &camera = *camera] { grab(&camera); });
+    const auto added = [this](const auto& all, const char* kind) {
+      std::vector<std::size_t> numbers;
+      for (const auto& device : all) numbers.push_back(device ? health_.add({device->name(), kind}) : 0);
+      return numbers;
+    };
+    const std::vector<std::size_t> cameras = added(devices_->cameras, "camera");
+    projectors_ = added(devices_->projectors, "projector");
+    screens_ = added(devices_->screens, "screen");
+    for (const DeviceState& missing : devices_->missing) {
+      health_.add(missing);
+      books_->telemetry().note(now(), fmt::format("{} is missing: {}", missing.name, missing.why));
+    }
+    for (std::size_t i = 0; i < cameras.size(); ++i)
+      if (devices_->cameras[i])
+        threads_.emplace_back([this, i, number = cameras[i]] { grab(devices_->cameras[i].get(), number); });
     threads_.emplace_back([this] { watch(); });
-    for (const auto* displays : {&devices_->projectors, &devices_->screens})
-      for (const auto& display : *displays) health_.emplace_back(display ? display->name() : "", &notices_);
   }
 
   ~DeviceLoop() {
@@ -91,7 +65,8 @@ class DeviceLoop {
     for (std::thread& thread : threads_) thread.join();
   }
 
-  void step(device::Window* window) {
+  // False: the operator ends the session.
+  bool step() {
     if (auto seen = seen_.take(k_wait)) session_->take(std::move(seen->watched), seen->moments);
     session_->show_news(&files_, now());
     const Stamp painting_at = now();
@@ -101,30 +76,32 @@ class DeviceLoop {
     show(painted);
     shown.missed = static_cast<int>(missed_.exchange(0));
     const Stamp begun = now();
-    const bool wants_screen = window || !devices_->screens.empty();
+    const bool wants_screen = !devices_->screens.empty() || (desk_ && desk_->is_due());
     const cv::Mat screen = wants_screen ? session_->screen() : cv::Mat();
     shown.screen_ms = wants_screen ? milliseconds_since(begun) : -1;
-    if (!screen.empty()) show_screen(screen, window);
-    if (window) press(window->pressed_key());
-    if (session_->watched().captured_at != Stamp{}) books_->shown(shown, painted);  // something was seen
-    for (const std::string& what : notices_.take()) {
+    if (!screen.empty()) show_screen(screen);
+    if (session_->watched().captured_at != Stamp{}) {  // something was seen
+      books_->shown(shown, painted);
+      if (desk_) desk_->shown(shown);
+    }
+    for (const std::string& what : health_.news()) {
       books_->telemetry().note(now(), what);
       log_warning("live: {}", what);
     }
+    return !desk_ || desk_->serve(session_, &books_->telemetry(), health_, screen, now());
   }
 
  private:
-  void grab(device::CameraSource* camera) try {
-    Health health(camera->name(), &notices_);
+  void grab(device::CameraSource* camera, std::size_t number) try {
     std::optional<double> offset_s;  // from the source's clock to the session's
     while (!is_stopping_) {
       Result<Frame> frame = camera->next();
       if (!frame) {
-        health.fails(frame.message());
+        health_.fails(number, frame.message());
         std::this_thread::sleep_for(k_retry);
         continue;
       }
-      health.works();
+      health_.works(number);
       if (!offset_s) {
         const double ahead_s = seconds_between(frame->captured_at, now());
         offset_s = std::abs(ahead_s) > k_other_clock_s ? ahead_s : 0;
@@ -138,7 +115,7 @@ class DeviceLoop {
       });
     }
   } catch (const std::exception& bug) {
-    notices_.put(fmt::format("{}: this is a bug in Limn, please report it: {}", camera->name(), bug.what()));
+    health_.note(fmt::format("{}: this is a bug in Limn, please report it: {}", camera->name(), bug.what()));
   }
 
   void watch() try {
@@ -156,7 +133,7 @@ class DeviceLoop {
       });
     }
   } catch (const std::exception& bug) {
-    notices_.put(fmt::format("the tracker stopped: this is a bug in Limn, please report it: {}", bug.what()));
+    health_.note(fmt::format("the tracker stopped: this is a bug in Limn, please report it: {}", bug.what()));
   }
 
   void show(const Painted& painted) {
@@ -167,42 +144,34 @@ class DeviceLoop {
       const Stamp begun = now();
       const Result<Stamp> shown_at = display->show(painted.projectors[i]);
       if (!shown_at) {
-        health_[i].fails(shown_at.message());
+        health_.fails(projectors_[i], shown_at.message());
         continue;
       }
-      health_[i].works();
+      health_.works(projectors_[i]);
       latest_s = std::max(latest_s, seconds_between(begun, *shown_at));
     }
     if (latest_s > 0) display_s_ += k_blend * (latest_s - display_s_);
   }
 
-  void show_screen(const cv::Mat& screen, device::Window* window) {
-    if (window) window->show(screen);
+  void show_screen(const cv::Mat& screen) {
     for (std::size_t i = 0; i < devices_->screens.size(); ++i) {
       if (!devices_->screens[i]) continue;
-      Health& health = health_[devices_->projectors.size() + i];
       const Result<Stamp> shown_at = devices_->screens[i]->show(fitted(screen, devices_->screens[i]->size()));
-      shown_at ? health.works() : health.fails(shown_at.message());
+      shown_at ? health_.works(screens_[i]) : health_.fails(screens_[i], shown_at.message());
     }
   }
 
   // The picture as large as the screen takes it, with black bars.
   static cv::Mat fitted(const cv::Mat& picture, cv::Size size);
 
-  void press(int key) {
-    const auto edit = keys_.edit_of(key);
-    const Status done = edit ? session_->edit(*edit, "key", now()) : Status();
-    if (!done) log_warning("live: {}", done.message());
-  }
-
   SessionDevices* devices_;
   Watcher* watcher_;
   Session* session_;
   Books* books_;
-  Keys keys_;
+  OperatorDesk* desk_;
   SceneWatch files_;
-  Notices notices_;
-  std::vector<Health> health_;  // of projectors, then screens
+  DeviceHealth health_;
+  std::vector<std::size_t> projectors_, screens_;  // as health_ calls them
   Latest<Frames> frames_;
   Latest<Seen> seen_;
   std::atomic<bool> is_stopping_ = false;
@@ -230,7 +199,7 @@ Status play_on_devices(SessionDevices* devices,
                        Watcher* watcher,
                        Session* session,
                        Books* books,
-                       std::optional<device::Window>* window) {
+                       OperatorDesk* desk) {
   const auto any = [](const auto& all) {
     return std::any_of(all.begin(), all.end(), [](const auto& device) { return device != nullptr; });
   };
@@ -239,10 +208,9 @@ Status play_on_devices(SessionDevices* devices,
   if (!any(devices->projectors))
     return error("live: expected a projector that works, found none. Run limn doctor.");
   const Stamp begun = now();
-  DeviceLoop loop(devices, watcher, session, books);
+  DeviceLoop loop(devices, watcher, session, books, desk);
   while (!is_ended && !(seconds > 0 && seconds_between(begun, now()) >= seconds)) {
-    loop.step(*window ? &**window : nullptr);
-    if (*window && !(*window)->is_open()) break;
+    if (!loop.step()) break;
   }
   return {};
 }

@@ -2,16 +2,16 @@
 
 #include <atomic>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "apps/live/books.h"
+#include "apps/live/device_health.h"
+#include "apps/live/operator_desk.h"
 #include "apps/live/session.h"
 #include "apps/live/watcher.h"
 #include "core/result.h"
 #include "device/camera_source.h"
 #include "device/display.h"
-#include "device/window.h"
 
 namespace limn::apps {
 
@@ -21,19 +21,21 @@ struct SessionDevices {
   std::vector<std::unique_ptr<device::CameraSource>> cameras;  ///< of the rig's names
   std::vector<std::unique_ptr<device::Display>> projectors;    ///< in the rig's order
   std::vector<std::unique_ptr<device::Display>> screens;       ///< show what Staging::screen says
+  std::vector<DeviceState> missing = {};                       ///< what could not be opened, and why
 };
 
 /// Plays a session on devices, in real time, until `seconds` are over (0: no end), `is_ended`, or the window
-/// is closed; at least a camera and a projector must be there. A thread for each camera takes its newest
-/// frame, one thread watches, this one (its GL context current) paints and shows. Newest wins, nothing
-/// queues: what was not taken in time is dropped and counted. Devices that fail are told of, once, and tried
-/// again. Sources with stamps of their own (pictures, videos) are played at their pace.
+/// the operator ends it (`desk` may be null); at least a camera and a projector must be there. A thread for
+/// each camera takes its newest frame, one thread watches, this one (its GL context current) paints and
+/// shows. Newest wins, nothing queues: what was not taken in time is dropped and counted. Devices that fail
+/// are told of, once, and tried again. Sources with stamps of their own (pictures, videos) are played at
+/// their pace.
 Status play_on_devices(SessionDevices* devices,
                        double seconds,
                        const std::atomic<bool>& is_ended,
                        Watcher* watcher,
                        Session* session,
                        Books* books,
-                       std::optional<device::Window>* window);
+                       OperatorDesk* desk);
 
 }  // namespace limn::apps

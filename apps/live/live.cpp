@@ -10,6 +10,7 @@
 #include "apps/devices.h"
 #include "apps/live/books.h"
 #include "apps/live/device_session.h"
+#include "apps/live/operator_desk.h"
 #include "apps/live/room.h"
 #include "apps/live/script.h"
 #include "apps/live/session.h"
@@ -17,10 +18,10 @@
 #include "apps/live/watcher.h"
 #include "apps/world_markers.h"
 #include "core/log.h"
+#include "device/desktop.h"
 #include "device/gl_context.h"
 #include "device/open_camera.h"
 #include "device/open_display.h"
-#include "device/window.h"
 #include "sim/virtual_rig.h"
 
 namespace limn::apps {
@@ -49,11 +50,8 @@ Status check_options(const LiveOptions& options) {
                        options.extrapolate_s);
   if (!options.devices.empty() && options.rig.empty())
     return usage_error("--devices: expected --rig and --scene with it, found neither.");
-  if (!options.devices.empty() && (!options.world.empty() || !options.script.empty() || options.window))
-    return usage_error(
-        "--devices: expected no --world, --script and --window with it, which are of the virtual rig. A "
-        "window is "
-        "a display of the devices file.");
+  if (!options.devices.empty() && (!options.world.empty() || !options.script.empty()))
+    return usage_error("--devices: expected no --world and --script with it, which are of the virtual rig.");
   if (options.rig.empty() != options.scene.empty())
     return usage_error(
         "expected --rig and --scene together, found one of them. Without both the session is in a "
@@ -150,31 +148,37 @@ Status play_in_virtual_room(const LiveOptions& options) {
   LIMN_TRY(Books books, Books::open(options.out, options.record, &setup));
   LIMN_TRY(Watcher watcher, Watcher::create(setup.scene, setup.rig, setup.watch));
   LIMN_TRY(Session session, Session::create(setup, &books.telemetry(), books.recorder()));
-  std::optional<device::Window> window;
+  std::optional<OperatorDesk> desk;
   if (options.window) {
-    const Imager& camera = setup.rig.cameras.at(0);
-    const int width = std::min(1280, camera.width);
-    LIMN_TRY(window, device::Window::open("Limn", width, width * camera.height / camera.width));
+    LIMN_TRY(const device::Desktop desktop, device::Desktop::open());
+    LIMN_TRY(desk, OperatorDesk::open(desktop, setup.scene));
   }
-  LIMN_TRY_STATUS(play_virtually(end_s, g_is_ended, &rig, &room, &watcher, &session, &books, &window));
+  LIMN_TRY_STATUS(
+      play_virtually(end_s, g_is_ended, &rig, &room, &watcher, &session, &books, desk ? &*desk : nullptr));
+  desk.reset();
   return books.close(&session, options.json);
 }
 
 // Opens what can be opened; what cannot is told of and left out.
 SessionDevices opened(const Devices& devices, const Rig& rig, const device::Desktop* desktop) {
   SessionDevices out;
+  const auto miss = [&out](const std::string& name, const char* kind, const std::string& why) {
+    log_warning("live: {}: {} The session goes on without it.", name, why);
+    out.missing.push_back({.name = name, .kind = kind, .works = false, .why = why});
+  };
   for (device::CameraWanted wanted : devices.cameras) {
     wanted.limit_s = k_camera_limit_s;
     auto camera = device::open_camera(wanted);
-    if (!camera) log_warning("live: {}: {} The session goes on without it.", wanted.name, camera.message());
+    if (!camera) miss(wanted.name, "camera", camera.message());
     out.cameras.push_back(camera ? std::move(*camera) : nullptr);
   }
   out.projectors.resize(rig.projectors.size());
   for (const device::DisplayWanted& wanted : devices.displays) {
     auto display = device::open_display(wanted, desktop);
-    if (!display) log_warning("live: {}: {} The session goes on without it.", wanted.name, display.message());
     const auto projector = std::find_if(rig.projectors.begin(), rig.projectors.end(),
                                         [&](const Imager& p) { return p.name == wanted.name; });
+    if (!display)
+      miss(wanted.name, projector != rig.projectors.end() ? "projector" : "screen", display.message());
     auto opened = display ? std::move(*display) : nullptr;
     if (projector != rig.projectors.end())
       out.projectors[static_cast<std::size_t>(projector - rig.projectors.begin())] = std::move(opened);
@@ -192,7 +196,8 @@ Status play_with_devices(const LiveOptions& options) {
   LIMN_TRY(const Devices devices, matched(named, setup.rig));
   LIMN_TRY_STATUS(set_up(options, &setup));
   std::optional<device::Desktop> desktop;
-  if (std::any_of(devices.displays.begin(), devices.displays.end(), device::needs_desktop)) {
+  if (options.window ||
+      std::any_of(devices.displays.begin(), devices.displays.end(), device::needs_desktop)) {
     LIMN_TRY(desktop, device::Desktop::open());
   }
   SessionDevices open = opened(devices, setup.rig, desktop ? &*desktop : nullptr);
@@ -201,8 +206,13 @@ Status play_with_devices(const LiveOptions& options) {
   LIMN_TRY(Books books, Books::open(options.out, options.record, &setup));
   LIMN_TRY(Watcher watcher, Watcher::create(setup.scene, setup.rig, setup.watch));
   LIMN_TRY(Session session, Session::create(setup, &books.telemetry(), books.recorder()));
-  std::optional<device::Window> none;  // screens are devices
-  LIMN_TRY_STATUS(play_on_devices(&open, options.seconds, g_is_ended, &watcher, &session, &books, &none));
+  std::optional<OperatorDesk> desk;
+  if (options.window) {
+    LIMN_TRY(desk, OperatorDesk::open(*desktop, setup.scene));
+  }
+  LIMN_TRY_STATUS(play_on_devices(&open, options.seconds, g_is_ended, &watcher, &session, &books,
+                                  desk ? &*desk : nullptr));
+  desk.reset();
   return books.close(&session, options.json);
 }
 

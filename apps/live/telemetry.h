@@ -47,6 +47,8 @@ class Telemetry {
   void add(const ShownFrame& frame);
   /// Something worth telling: a device gone, a look saved. The last 500 are kept.
   void note(Stamp at, const std::string& what);
+  /// The notes kept, with the seconds of the session's clock.
+  const std::vector<std::pair<double, std::string>>& notes() const { return notes_; }
 
   nlohmann::ordered_json summary() const;
   /// A page for people: the summary, how times went over the session, what happened.

@@ -7,7 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "apps/live/books.h"
-#include "apps/live/keys.h"
+#include "apps/live/device_health.h"
 #include "apps/live/scene_watch.h"
 #include "core/log.h"
 
@@ -61,17 +61,22 @@ class VirtualLoop {
               Watcher* watcher,
               Session* session,
               Books* books,
-              std::optional<device::Window>* window)
+              OperatorDesk* desk)
       : rig_(rig),
         room_(room),
         watcher_(watcher),
         session_(session),
         books_(books),
-        window_(window->has_value() ? &**window : nullptr),
-        keys_(session->setup().scene),
-        files_(session->setup().scene.folder) {}
+        desk_(desk),
+        files_(session->setup().scene.folder) {
+    for (const Imager& camera : rig->world().rig.cameras)
+      cameras_.push_back(health_.add({camera.name, "camera"}));
+    for (const Imager& projector : session->setup().rig.projectors)
+      projectors_.push_back(health_.add({projector.name, "projector"}));
+  }
 
-  Status step() {
+  // False: the operator ends the session.
+  Result<bool> step() {
     const Stamp exposed_at = rig_->next_exposure();
     room_->set(seconds_of(exposed_at));
     const std::vector<Frame> frames = exposed(exposed_at);
@@ -86,7 +91,7 @@ class VirtualLoop {
     session_->show_news(&files_, rig_->now());
     const Painted& painted = session_->paint(rig_->now(), shifted(rig_->now(), k_virtual_display_s));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i) {
-      if (!is_plugged(session_->setup().rig.projectors[i].name, rig_->now())) continue;
+      if (!is_plugged(session_->setup().rig.projectors[i].name, projectors_[i], rig_->now())) continue;
       LIMN_TRY(const Stamp shown_at, rig_->projector(static_cast<int>(i)).show(painted.projectors[i]));
       LIMN_CHECK(shown_at == painted.shown_at);
     }
@@ -94,44 +99,33 @@ class VirtualLoop {
     if (shown.record_ms >= 0) shown.record_ms += frames_ms;
     shown.missed = static_cast<int>(rig_->world().rig.cameras.size() - frames.size());
     shown.placement_mm = placement_mm(painted, *session_, *room_, rig_->world());
-    shown.screen_ms = show_screen();
+    const auto begun = std::chrono::steady_clock::now();
+    const bool wants_screen = desk_ && desk_->is_due();
+    const cv::Mat screen = wants_screen ? session_->screen() : cv::Mat();
+    shown.screen_ms = wants_screen ? milliseconds_since(begun) : -1;
     books_->shown(shown, painted);
-    return {};
+    if (!desk_) return true;
+    desk_->shown(shown);
+    return desk_->serve(session_, &books_->telemetry(), health_, screen, rig_->now());
   }
 
  private:
-  // Milliseconds; -1 without a window.
-  double show_screen() {
-    if (!window_) return -1;
-    const auto begun = std::chrono::steady_clock::now();
-    const cv::Mat screen = session_->screen();
-    const double ms = milliseconds_since(begun);
-    if (!screen.empty()) window_->show(screen);
-    press(window_->pressed_key());
-    return ms;
-  }
-
   std::vector<Frame> exposed(Stamp at) {
     std::vector<int> plugged;
     const std::vector<Imager>& cameras = rig_->world().rig.cameras;
     for (std::size_t i = 0; i < cameras.size(); ++i)
-      if (is_plugged(cameras[i].name, at)) plugged.push_back(static_cast<int>(i));
+      if (is_plugged(cameras[i].name, cameras_[i], at)) plugged.push_back(static_cast<int>(i));
     return rig_->expose(plugged);
   }
 
   // Tells of a device that comes or goes.
-  bool is_plugged(const std::string& device, Stamp at) {
+  bool is_plugged(const std::string& device, std::size_t number, Stamp at) {
     const bool is = room_->script().is_plugged(device, seconds_of(at));
-    const bool was = std::find(gone_.begin(), gone_.end(), device) == gone_.end();
-    if (is == was) return is;
-    if (is)
-      std::erase(gone_, device);
-    else
-      gone_.push_back(device);
-    const std::string what =
-        fmt::format("{} {}", device, is ? "is back" : "is gone; the session goes on without it");
-    books_->telemetry().note(at, what);
-    log_warning("live: {:.2f} s: {}", seconds_of(at), what);
+    is ? health_.works(number) : health_.fails(number, "");
+    for (const std::string& what : health_.news()) {
+      books_->telemetry().note(at, what);
+      log_warning("live: {:.2f} s: {}", seconds_of(at), what);
+    }
     return is;
   }
 
@@ -143,22 +137,16 @@ class VirtualLoop {
     }
   }
 
-  void press(int key) {
-    const auto edit = keys_.edit_of(key);
-    const Status done = edit ? session_->edit(*edit, "key", rig_->now()) : Status();
-    if (!done) log_warning("live: {}", done.message());
-  }
-
   sim::VirtualRig* rig_;
   ScriptedRoom* room_;
   Watcher* watcher_;
   Session* session_;
   Books* books_;
-  device::Window* window_;
-  Keys keys_;
+  OperatorDesk* desk_;
   SceneWatch files_;
+  DeviceHealth health_;
+  std::vector<std::size_t> cameras_, projectors_;  // as health_ calls them
   std::size_t moments_ = 0, played_ = 0;
-  std::vector<std::string> gone_;  // devices
 };
 
 }  // namespace
@@ -170,14 +158,14 @@ Status play_virtually(double end_s,
                       Watcher* watcher,
                       Session* session,
                       Books* books,
-                      std::optional<device::Window>* window) {
-  VirtualLoop loop(rig, room, watcher, session, books, window);
+                      OperatorDesk* desk) {
+  VirtualLoop loop(rig, room, watcher, session, books, desk);
   std::optional<Progress> progress;
   if (std::isfinite(end_s)) progress.emplace("live", static_cast<int>(std::ceil(end_s)));
   while (!is_ended && seconds_of(rig->next_exposure()) <= end_s) {
-    LIMN_TRY_STATUS(loop.step());
+    LIMN_TRY(const bool goes_on, loop.step());
     if (progress) progress->step(static_cast<int>(seconds_of(rig->now())));
-    if (*window && !(*window)->is_open()) break;
+    if (!goes_on) break;
   }
   return {};
 }

@@ -1,14 +1,13 @@
 #pragma once
 
 #include <atomic>
-#include <optional>
 
 #include "apps/live/books.h"
+#include "apps/live/operator_desk.h"
 #include "apps/live/script.h"
 #include "apps/live/session.h"
 #include "apps/live/watcher.h"
 #include "core/result.h"
-#include "device/window.h"
 #include "sim/virtual_rig.h"
 
 namespace limn::apps {
@@ -17,7 +16,8 @@ namespace limn::apps {
 constexpr double k_virtual_camera_s = 0.020, k_virtual_display_s = 0.040;
 
 /// Plays a session on a virtual rig, on its clock: nothing sleeps, every run is the same. In step: expose,
-/// watch, paint, show. Ends at `end_s` of the clock, with `is_ended`, or when the window is closed.
+/// watch, paint, show. Ends at `end_s` of the clock, with `is_ended`, or when the operator ends it (`desk`
+/// may be null).
 Status play_virtually(double end_s,
                       const std::atomic<bool>& is_ended,
                       sim::VirtualRig* rig,
@@ -25,6 +25,6 @@ Status play_virtually(double end_s,
                       Watcher* watcher,
                       Session* session,
                       Books* books,
-                      std::optional<device::Window>* window);
+                      OperatorDesk* desk);
 
 }  // namespace limn::apps

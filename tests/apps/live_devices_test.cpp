@@ -111,9 +111,8 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
   devices.screens.push_back(std::move(wide));
 
   const std::atomic<bool> is_ended = false;
-  std::optional<device::Window> none;
   const auto begun = std::chrono::steady_clock::now();
-  const Status played = play_on_devices(&devices, 2.5, is_ended, &*watcher, &*session, &*books, &none);
+  const Status played = play_on_devices(&devices, 2.5, is_ended, &*watcher, &*session, &*books, nullptr);
   const double took_s = seconds_between(begun, std::chrono::steady_clock::now());
   ASSERT_TRUE(played.ok()) << played.message();
   EXPECT_LT(took_s, 2.5 + 1 + 0.6);  // its end, and a picture that was being painted on a slow machine
@@ -136,8 +135,7 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
 TEST(LiveDevices, SaysWhatIsMissing) {
   SessionDevices devices;
   const std::atomic<bool> is_ended = false;
-  std::optional<device::Window> none;
-  const Status played = play_on_devices(&devices, 1, is_ended, nullptr, nullptr, nullptr, &none);
+  const Status played = play_on_devices(&devices, 1, is_ended, nullptr, nullptr, nullptr, nullptr);
   ASSERT_FALSE(played.ok());
   EXPECT_NE(played.message().find("a camera that works"), std::string::npos);
 }

@@ -107,7 +107,8 @@ TEST_F(AMonitor, IsListedAndADesktopIsTheOnlyOne) {
 TEST_F(AMonitor, IsLitPixelForPixel) {
   const auto context = GlContext::create();
   ASSERT_TRUE(context) << context.message();
-  auto window = Window::open(*desktop_, "beside", 64, 48);  // what else is open does not matter
+  auto window = Window::open(
+      *desktop_, {.title = "beside", .width = 64, .height = 48});  // what else is open does not matter
   ASSERT_TRUE(window) << window.message();
   auto display =
       MonitorDisplay::open(*desktop_, {.name = "left", .monitor = first_.name, .size = first_.size});

@@ -1,0 +1,129 @@
+#include "apps/live/operator_desk.h"
+
+#include <algorithm>
+
+#include "apps/camera_encoding.h"
+#include "core/log.h"
+
+namespace limn::apps {
+namespace {
+
+constexpr int k_width = 1600, k_height = 1000;
+constexpr int k_escape = 256;  // GLFW's code
+constexpr std::size_t k_recent = 600, k_notices = 100;
+constexpr double k_pace_s = 1;  // over which devices' pictures are counted
+
+std::string list_of(const std::vector<BodyMarker>& markers) {
+  std::string text;
+  for (const BodyMarker& marker : markers) text += (text.empty() ? "" : ", ") + marker.marker.text();
+  return text;
+}
+
+std::vector<OperatorView::Picture> cameras_of(const Session& session) {
+  std::vector<OperatorView::Picture> out;
+  const Watched& watched = session.watched();
+  const std::vector<Imager>& cameras = session.setup().rig.cameras;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    out.push_back({.name = cameras[i].name, .picture = {}});
+    out.back().is_linear = encoding_of(session.setup().rig, cameras[i]) == tracker::Encoding::linear;
+    if (i >= watched.frames.size()) continue;
+    out.back().picture = watched.frames[i].image;
+    for (const tracker::Detection& detection : watched.detections[i])
+      out.back().found.push_back({detection.marker.id, detection.corners_px});
+  }
+  return out;
+}
+
+std::vector<OperatorView::Body> bodies_of(const Session& session) {
+  std::vector<OperatorView::Body> out;
+  for (const Body& body : scene::bodies(session.setup().scene)) {
+    out.push_back({body.name, list_of(body.markers), std::nullopt});
+    for (const Track& track : session.painted().tracks)
+      if (track.body == body.name) out.back().track = track;
+  }
+  return out;
+}
+
+std::vector<OperatorView::Slot> slots_of(const Session& session, const std::string& chosen) {
+  std::vector<OperatorView::Slot> out;
+  const std::vector<scene::Slot>& slots = session.setup().scene.slots;
+  for (std::size_t i = 0; i < slots.size(); ++i) {
+    const scene::Staging::Slot& staged = session.staging().slots[i];
+    out.push_back({slots[i].name, {}, slots[i].name == chosen, staged.pin || !staged.nudge.isZero()});
+    for (const scene::Variant& variant : slots[i].variants) out.back().variants.push_back(variant.name);
+  }
+  return out;
+}
+
+}  // namespace
+
+Result<OperatorDesk> OperatorDesk::open(const device::Desktop& desktop, const scene::Scene& scene) {
+  LIMN_TRY(GuiWindow window, GuiWindow::open(desktop, "Limn", k_width, k_height));
+  return OperatorDesk(std::move(window), scene);
+}
+
+void OperatorDesk::shown(const ShownFrame& frame) {
+  recent_.push_back(frame);
+  if (recent_.size() > k_recent) recent_.pop_front();
+  if (frame.screen_ms >= 0) screen_s_ = 1e-3 * frame.screen_ms;
+}
+
+bool OperatorDesk::serve(
+    Session* session, Telemetry* telemetry, const DeviceHealth& health, const cv::Mat& screen, Stamp now) {
+  if (!begun_at_) begun_at_ = paced_at_ = now;
+  if (!screen.empty()) screen_ = screen;
+  const auto edit = [&](const scene::Edit& what, const char* source) {
+    const Status done = session->edit(what, source, now);
+    if (done) return;
+    telemetry->note(now, done.message());
+    log_warning("live: {}", done.message());
+  };
+  for (const int key : window_.pressed_keys()) {
+    if (key == k_escape) panel_.ask_to_end();
+    if (const auto wanted = keys_.edit_of(key)) edit(*wanted, "key");
+  }
+  if (!is_due()) return window_.is_wanted();
+  const OperatorView view = view_of(*session, *telemetry, health, now);
+  OperatorAsked asked;
+  window_.draw([&](Gui& gui) { asked = panel_.draw(gui, view); });
+  for (const scene::Edit& wanted : asked.edits) edit(wanted, "operator");
+  return !asked.ends && window_.is_wanted();
+}
+
+OperatorView OperatorDesk::view_of(const Session& session,
+                                   const Telemetry& telemetry,
+                                   const DeviceHealth& health,
+                                   Stamp now) {
+  OperatorView view;
+  view.at_s = seconds_between(*begun_at_, now);
+  view.cameras = cameras_of(session);
+  const std::vector<Imager>& projectors = session.setup().rig.projectors;
+  for (std::size_t i = 0; i < projectors.size(); ++i)
+    view.projectors.push_back({.name = projectors[i].name, .picture = session.painted().projectors[i]});
+  view.screen = {.name = "screen", .picture = screen_};
+  view.devices = devices_of(health, now);
+  view.bodies = bodies_of(session);
+  view.slots = slots_of(session, keys_.slot());
+  view.staging = session.staging();
+  view.recent = {recent_.begin(), recent_.end()};
+  const auto& notes = telemetry.notes();
+  const double begun_s = seconds_between(Stamp{}, *begun_at_);
+  for (std::size_t i = notes.size() > k_notices ? notes.size() - k_notices : 0; i < notes.size(); ++i)
+    view.notices.push_back({notes[i].first - begun_s, notes[i].second});
+  return view;
+}
+
+std::vector<OperatorView::Device> OperatorDesk::devices_of(const DeviceHealth& health, Stamp now) {
+  const double seconds = seconds_between(paced_at_, now);
+  const bool is_over = seconds >= k_pace_s;
+  std::vector<OperatorView::Device> out;
+  for (const DeviceState& state : health.all()) {
+    Pace& pace = paces_[state.name];
+    if (is_over) pace = {state.pictures, static_cast<double>(state.pictures - pace.pictures) / seconds};
+    out.push_back({state, pace.per_second});
+  }
+  if (is_over) paced_at_ = now;
+  return out;
+}
+
+}  // namespace limn::apps

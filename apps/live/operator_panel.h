@@ -1,0 +1,42 @@
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "apps/live/operator_view.h"
+#include "apps/window/gui.h"
+
+namespace limn::apps {
+
+/// The operator's window, drawn: OperatorView -> ImGui -> what the person asked for. Holds only what belongs
+/// to looking: which picture is large, a name half typed.
+class OperatorPanel {
+ public:
+  /// Within a frame of `gui`.
+  OperatorAsked draw(Gui& gui, const OperatorView& view);
+  /// Asks whether the session is to end; asked again, goes on.
+  void ask_to_end() { asks_to_end_ = !asks_to_end_; }
+
+ private:
+  void draw_bar(const Gui& gui, const OperatorView& view);
+  void draw_pictures(Gui& gui, const OperatorView& view, ImVec2 size);
+  bool draw_picture(Gui& gui,
+                    const OperatorView::Picture& picture,
+                    const OperatorView& view,
+                    ImVec2 corner,
+                    ImVec2 size,
+                    bool is_large);
+  void draw_slots(const Gui& gui, const OperatorView& view);
+  void draw_looks(const Gui& gui, const OperatorView& view);
+  void draw_question(const Gui& gui);
+  void ask(const std::string& action, const std::string& slot = "", const std::string& value = "") {
+    asked_.edits.push_back({action, slot, value});
+  }
+
+  OperatorAsked asked_;
+  std::string large_;  // a picture's name; empty: the first
+  std::array<char, 65> look_{};
+  bool asks_to_end_ = false;
+};
+
+}  // namespace limn::apps

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/live/device_health.h"
+#include "apps/live/telemetry.h"
+#include "core/track.h"
+#include "scene/staging.h"
+
+namespace limn::apps {
+
+/// What the operator sees of a session at a moment.
+struct OperatorView {
+  struct Found {
+    std::string marker;  ///< its id
+    std::array<Eigen::Vector2d, 4> corners_px;
+  };
+  struct Picture {
+    std::string name;
+    cv::Mat picture;  ///< 8-bit grey or BGR; empty: none yet
+    std::vector<Found> found = {};
+    bool is_linear = false;  ///< its values are proportional to light
+  };
+  struct Device {
+    DeviceState state;
+    std::optional<double> per_second;  ///< pictures, by the session's clock; none yet: absent
+  };
+  struct Body {
+    std::string name;
+    std::string markers;         ///< their names
+    std::optional<Track> track;  ///< absent: not seen yet
+  };
+  struct Slot {
+    std::string name;
+    std::vector<std::string> variants;
+    bool is_chosen = false;  ///< the keys' slot
+    bool is_held = false;    ///< by a look or a nudge, not where its marker puts it
+  };
+  struct Notice {
+    double at_s = 0;
+    std::string text;
+  };
+  double at_s = 0;  ///< of the session's clock, since it began
+  std::vector<Picture> cameras, projectors;
+  Picture screen;
+  std::vector<Device> devices;
+  std::vector<Body> bodies;
+  std::vector<Slot> slots;
+  scene::Staging staging;
+  std::vector<ShownFrame> recent;  ///< pictures shown, the newest last
+  std::vector<Notice> notices;     ///< the newest last
+};
+
+/// What a person asked for.
+struct OperatorAsked {
+  std::vector<scene::Edit> edits;
+  bool ends = false;  ///< the session
+};
+
+}  // namespace limn::apps
