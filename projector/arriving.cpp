@@ -5,6 +5,9 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+
+#include "projector/light_levels.h"
+
 namespace limn::projector {
 namespace {
 
@@ -30,32 +33,6 @@ constexpr std::uint8_t k_no_label = 255, k_unlike = 254, k_dark = 253;  // besid
 constexpr float k_infinity = 1e30F;
 constexpr std::size_t k_all_sets = 4;         // projectors; of more no three are blocked in one place
 constexpr std::size_t k_most_projectors = 7;  // whose sets are labels
-
-cv::Mat light_of_display(const Rig& rig, const std::string& projector) {
-  cv::Mat light(1, 256, CV_32FC3);
-  const auto found = std::find_if(rig.responses.begin(), rig.responses.end(),
-                                  [&](const Response& r) { return r.projector == projector; });
-  for (int v = 0; v < 256; ++v) {
-    const double at = v / 255.0;
-    cv::Vec3f& bgr = light.at<cv::Vec3f>(v);
-    bgr = cv::Vec3f::all(static_cast<float>(std::pow(at, 2.2)));
-    if (found == rig.responses.end()) continue;
-    bgr = {static_cast<float>(looked_up(found->blue, at)), static_cast<float>(looked_up(found->green, at)),
-           static_cast<float>(looked_up(found->red, at))};
-  }
-  return light;
-}
-
-cv::Mat light_of_levels(const Rig& rig, const std::string& camera) {
-  cv::Mat light(1, 256, CV_32F);
-  const auto found = std::find_if(rig.camera_responses.begin(), rig.camera_responses.end(),
-                                  [&](const CameraResponse& r) { return r.camera == camera; });
-  const bool measured = found != rig.camera_responses.end() && found->light.size() == 256;
-  for (int v = 0; v < 256; ++v)
-    light.at<float>(v) =
-        static_cast<float>(measured ? found->light[static_cast<std::size_t>(v)] : linear_of_srgb(v / 255.0));
-  return light;
-}
 
 double median(std::vector<double> values, double otherwise) {
   if (values.empty()) return otherwise;
@@ -94,12 +71,6 @@ cv::Mat too_bright(const cv::Mat& levels, const cv::Size& patches) {
   if (bright.channels() == 1) return bright;
   cv::split(bright, channels);
   return channels[0] | channels[1] | channels[2];
-}
-
-cv::Mat luminance(const cv::Mat& light) {
-  cv::Mat out;
-  cv::transform(light, out, cv::Matx13f(0.0722F, 0.7152F, 0.2126F));  // BT.709
-  return out;
 }
 
 // Blocked cells and those around them get 0, two cells further all is 1.

@@ -5,6 +5,7 @@
 #include <map>
 #include <opencv2/core.hpp>
 #include <set>
+#include <span>
 
 #include "core/config.h"
 #include "core/log.h"
@@ -288,47 +289,70 @@ std::string guessed_units(const fs::path& path, const Mesh& as_metres) {
   return "m";
 }
 
-// Meshes that were laid into the slot's folder, slots/NAME/, beside the variants that scene.json lists.
-Status add_dropped(const fs::path& scene_folder, Slot* slot) {
+// A mesh that was laid into a slot's folder.
+Result<Mesh> load_dropped(const fs::path& file, const Slot& slot) {
+  const std::string name = file.stem().string();
+  if (std::any_of(slot.variants.begin(), slot.variants.end(),
+                  [&](const Variant& known) { return known.name == name; }))
+    return error("{}: expected the name of no other variant of slot '{}', found '{}' twice. Rename the file.",
+                 file.string(), slot.name, name);
+  LIMN_TRY(const Mesh as_metres, load_mesh(file, "m"));
+  const std::string units = guessed_units(file, as_metres);
+  LIMN_TRY(Mesh mesh, load_mesh(file, units));
+  if (const Status size = check_size(mesh, units); !size)
+    return error("{}: {}", file.string(), size.message());
+  log_info(
+      "{}: a variant of slot '{}', taken to be in {} ({:.0f} mm long); list it in scene.json if it is not",
+      file.filename().string(), slot.name, units, 1e3 * longest_side(mesh));
+  return mesh;
+}
+
+// The variants that scene.json lists, and meshes beside them in slots/NAME/.
+Status load_variants(std::span<const MeshFile> listed,
+                     const fs::path& path,
+                     const fs::path& scene_folder,
+                     Slot* slot,
+                     std::vector<LeftOut>* left_out) {
+  std::vector<Variant> variants;
+  const auto add = [&](const std::string& name, Result<Mesh> mesh) -> Status {
+    if (mesh)
+      variants.push_back({name, std::move(*mesh)});
+    else if (left_out)
+      left_out->push_back({slot->name, name, mesh.message()});
+    else
+      return mesh.error();
+    return {};
+  };
+  for (std::size_t i = 0; i < listed.size(); ++i)
+    LIMN_TRY_STATUS(add(slot->variants[i].name, load_named_mesh(listed[i], path)));
   std::error_code none;
   std::set<fs::path> files;
   for (const auto& entry : fs::directory_iterator(scene_folder / "slots" / slot->name, none))
     for (const char* end : {".glb", ".gltf", ".obj", ".stl", ".ply"})
       if (entry.path().extension() == end) files.insert(entry.path());
-  for (const fs::path& file : files) {
-    const std::string name = file.stem().string();
-    if (std::any_of(slot->variants.begin(), slot->variants.end(),
-                    [&](const Variant& known) { return known.name == name; }))
-      return error(
-          "{}: expected the name of no other variant of slot '{}', found '{}' twice. Rename the file.",
-          file.string(), slot->name, name);
-    LIMN_TRY(const Mesh as_metres, load_mesh(file, "m"));
-    const std::string units = guessed_units(file, as_metres);
-    LIMN_TRY(Mesh mesh, load_mesh(file, units));
-    if (const Status size = check_size(mesh, units); !size)
-      return error("{}: {}", file.string(), size.message());
-    log_info(
-        "{}: a variant of slot '{}', taken to be in {} ({:.0f} mm long); list it in scene.json if it is not",
-        file.filename().string(), slot->name, units, 1e3 * longest_side(mesh));
-    slot->variants.push_back({name, std::move(mesh)});
-  }
+  for (const fs::path& file : files) LIMN_TRY_STATUS(add(file.stem().string(), load_dropped(file, *slot)));
+  slot->variants = std::move(variants);
   return {};
 }
 
-Status load_files(const Reader& reader, const fs::path& path, Scene* scene) {
+Status load_files(const Reader& reader, const fs::path& path, Scene* scene, std::vector<LeftOut>* left_out) {
   if (scene->prototype) {
     LIMN_TRY(scene->prototype->mesh, load_named_mesh(*reader.prototype_mesh, path));
     if (reader.albedo_picture) {
       LIMN_TRY_STATUS(load_albedo_picture(*reader.albedo_picture, path, &*scene->prototype));
     }
   }
-  std::size_t next = 0;
+  std::span<const MeshFile> listed = reader.part_meshes;
   for (Slot& slot : scene->slots) {
-    for (Variant& variant : slot.variants) {
-      LIMN_TRY(variant.mesh, load_named_mesh(reader.part_meshes[next++], path));
-    }
-    LIMN_TRY_STATUS(add_dropped(scene->folder, &slot));
+    const auto own = listed.first(slot.variants.size());
+    listed = listed.subspan(own.size());
+    LIMN_TRY_STATUS(load_variants(own, path, scene->folder, &slot, left_out));
   }
+  std::erase_if(scene->controls, [&](const Control& control) {
+    const Slot* slot = scene->find_slot(control.slot);
+    return slot && slot->variants.empty();
+  });
+  std::erase_if(scene->slots, [](const Slot& slot) { return slot.variants.empty(); });
   return {};
 }
 
@@ -340,7 +364,7 @@ const Slot* Scene::find_slot(const std::string& name) const {
   return found == slots.end() ? nullptr : &*found;
 }
 
-Result<Scene> load_scene(const fs::path& path) {
+Result<Scene> load_scene(const fs::path& path, std::vector<LeftOut>* left_out) {
   std::error_code code;
   const fs::path file = fs::is_directory(path, code) ? path / "scene.json" : path;
   LIMN_TRY(const Config config, Config::load(file, "limn.scene/1"));
@@ -357,7 +381,7 @@ Result<Scene> load_scene(const fs::path& path) {
   if (const auto node = root.find("viewer")) scene.viewers = read_viewers(*node, scene);
   if (const auto node = root.find("light")) scene.light = read_light(*node);
   LIMN_TRY_STATUS(config.status());
-  LIMN_TRY_STATUS(load_files(reader, file, &scene));
+  LIMN_TRY_STATUS(load_files(reader, file, &scene, left_out));
   return scene;
 }
 

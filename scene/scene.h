@@ -87,9 +87,15 @@ struct Scene {
   const Slot* find_slot(const std::string& name) const;
 };
 
+/// A variant whose mesh cannot be loaded, and why.
+struct LeftOut {
+  std::string slot, variant, why;
+};
+
 /// `path` is the scene.json or its folder. Meshes in its folder slots/NAME/ are variants of slot NAME, too,
-/// called as their files; their units are guessed and told.
-Result<Scene> load_scene(const std::filesystem::path& path);
+/// called as their files; their units are guessed and told. A variant that cannot be loaded is an error; with
+/// `left_out` it is named there and left out instead, and a slot that has no other, with its controls, too.
+Result<Scene> load_scene(const std::filesystem::path& path, std::vector<LeftOut>* left_out = nullptr);
 
 /// A viewer file of interfaces.md: {"world_from_viewer": POSE, "size": [w,h], "fov_deg": 40}.
 Result<Imager> load_viewer(const std::filesystem::path& path);

@@ -345,7 +345,9 @@ Object* World::find(const std::string& object) {
   return const_cast<Object*>(std::as_const(*this).find(object));
 }
 
-Result<World> load_world(const std::filesystem::path& path, const MarkerPicture& marker_picture) {
+Result<World> load_world(const std::filesystem::path& path,
+                         const MarkerPicture& marker_picture,
+                         std::vector<scene::LeftOut>* left_out) {
   LIMN_TRY(const Config config, Config::load(path, "limn.world/1"));
   const ConfigNode root = config.root();
   root.only({"schema", "seed", "scene", "world_from_prototype", "slot_markers", "marker_paper", "cameras",
@@ -373,7 +375,7 @@ Result<World> load_world(const std::filesystem::path& path, const MarkerPicture&
   }
   LIMN_TRY_STATUS(config.status());
   if (!scene_folder.empty()) {
-    LIMN_TRY(world.scene, scene::load_scene(scene_folder.lexically_normal()));
+    LIMN_TRY(world.scene, scene::load_scene(scene_folder.lexically_normal(), left_out));
     LIMN_TRY_STATUS(add_scene(world, places, marker_picture, paper, path.string()));
   }
   return world;

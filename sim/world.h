@@ -105,7 +105,10 @@ using MarkerPicture = std::function<Result<cv::Mat>(const MarkerName&)>;
 
 /// Reads a limn.world/1 file and the scene that it names; `marker_picture` draws its markers. The prototype
 /// becomes the object "prototype", its markers "marker-FAMILY:ID", the table "table".
-Result<World> load_world(const std::filesystem::path& path, const MarkerPicture& marker_picture);
+/// `left_out`: as scene::load_scene's.
+Result<World> load_world(const std::filesystem::path& path,
+                         const MarkerPicture& marker_picture,
+                         std::vector<scene::LeftOut>* left_out = nullptr);
 
 /// The same world seen by ideal devices: no blur, noise, vignetting, gamma, black level; exposure is kept.
 World without_effects(World world);

@@ -63,18 +63,19 @@ Status check_options(const LiveOptions& options) {
 struct Stage {
   sim::World world;
   SessionSetup setup;
+  std::vector<scene::LeftOut> left_out;
 };
 
 Result<Stage> virtual_stage(const LiveOptions& options) {
   Stage stage;
   if (!options.rig.empty()) {
     LIMN_TRY(stage.setup.rig, load_rig(options.rig));
-    LIMN_TRY(stage.setup.scene, scene::load_scene(options.scene));
+    LIMN_TRY(stage.setup.scene, scene::load_scene(options.scene, &stage.left_out));
   }
   if (options.rig.empty() || !options.world.empty()) {
     const fs::path world =
         options.world.empty() ? fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json" : options.world;
-    LIMN_TRY(stage.world, sim::load_world(world, marker_picture));
+    LIMN_TRY(stage.world, sim::load_world(world, marker_picture, &stage.left_out));
     if (!stage.world.scene)
       return error("{}: scene: expected a scene for a session, found none.", world.string());
   } else {
@@ -141,11 +142,13 @@ Status play_in_virtual_room(const LiveOptions& options) {
                                             : std::numeric_limits<double>::infinity();
   sim::VirtualRig rig(std::move(stage.world), {.display_delay_s = k_virtual_display_s,
                                                .camera_delay_s = k_virtual_camera_s,
+                                               .frame_period_s = options.frame_period_s,
                                                .grab_waits_for_light = false});
   LIMN_TRY(ScriptedRoom room, ScriptedRoom::create(std::move(script), &rig));
   LIMN_TRY(const device::GlContext context, device::GlContext::create());
   log_info("live: {}", context.description());
   LIMN_TRY(Books books, Books::open(options.out, options.record, &setup));
+  tell(stage.left_out, {}, &books.telemetry());
   LIMN_TRY(Watcher watcher, Watcher::create(setup.scene, setup.rig, setup.watch));
   LIMN_TRY(Session session, Session::create(setup, &books.telemetry(), books.recorder()));
   std::optional<OperatorDesk> desk;
@@ -192,7 +195,8 @@ Status play_with_devices(const LiveOptions& options) {
   LIMN_TRY(const Devices named, load_devices(options.devices));
   SessionSetup setup;
   LIMN_TRY(setup.rig, load_rig(options.rig));
-  LIMN_TRY(setup.scene, scene::load_scene(options.scene));
+  std::vector<scene::LeftOut> left_out;
+  LIMN_TRY(setup.scene, scene::load_scene(options.scene, &left_out));
   LIMN_TRY(const Devices devices, matched(named, setup.rig));
   LIMN_TRY_STATUS(set_up(options, &setup));
   std::optional<device::Desktop> desktop;
@@ -204,6 +208,7 @@ Status play_with_devices(const LiveOptions& options) {
   LIMN_TRY(const device::GlContext context, device::GlContext::create());
   log_info("live: {}", context.description());
   LIMN_TRY(Books books, Books::open(options.out, options.record, &setup));
+  tell(left_out, {}, &books.telemetry());
   LIMN_TRY(Watcher watcher, Watcher::create(setup.scene, setup.rig, setup.watch));
   LIMN_TRY(Session session, Session::create(setup, &books.telemetry(), books.recorder()));
   std::optional<OperatorDesk> desk;

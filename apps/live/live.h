@@ -13,8 +13,9 @@ struct LiveOptions {
   std::filesystem::path devices;  ///< limn.devices/1; empty: the virtual rig
   std::filesystem::path world;    ///< of the virtual rig; empty: a room made for rig and scene
   std::filesystem::path script;
-  double seconds = 0;     ///< of the session's clock; 0: until it is ended
-  double resolution = 1;  ///< share of the virtual cameras' and projectors' pixels a side
+  double seconds = 0;                ///< of the session's clock; 0: until it is ended
+  double resolution = 1;             ///< share of the virtual cameras' and projectors' pixels a side
+  double frame_period_s = 1 / 30.0;  ///< of the virtual rig's cameras
   std::filesystem::path record;
   std::filesystem::path out;
   bool window = false;

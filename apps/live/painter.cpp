@@ -59,6 +59,7 @@ Painter::Painter(const scene::Scene& scene,
       options_(options),
       bodies_(scene::bodies(scene)),
       shadows_(rig),
+      drifts_(rig),
       d_up_world_(rig.cameras.empty()
                       ? Eigen::Vector3d(0, -1, 0)
                       : rig.cameras[0].imager_from_world.rotation.inverse() * Eigen::Vector3d(0, -1, 0)) {
@@ -94,7 +95,8 @@ const Painted& Painter::paint(const Watched& watched,
   const Imager viewer = viewer_for(painted_.posed, shown_at);
   viewer_ = viewer;
   const bool refill = options_.refill && rig_.projectors.size() > 1;
-  if (refill) shadows_.look(watched, painted_.posed, &renderer_);
+  if (refill) shadows_.look(watched, painted_.posed, shown_, &renderer_);
+  drifts_.look(watched, painted_.posed, shown_, &renderer_);
   for (std::size_t i = 0; i < rig_.projectors.size(); ++i) {
     cv::Mat& picture = painted_.projectors[i];
     if (staging.blackout) {
@@ -108,7 +110,7 @@ const Painted& Painter::paint(const Watched& watched,
     }
   }
   if (!staging.blackout) draw_feedback(staging);
-  if (refill) shadows_.showed(painted_.projectors, shown_at);
+  shown_.add(painted_.projectors, shown_at);
   return painted_;
 }
 

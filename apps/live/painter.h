@@ -7,7 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "apps/live/drift_watch.h"
 #include "apps/live/shadow_watch.h"
+#include "apps/live/shown_pictures.h"
 #include "apps/live/watcher.h"
 #include "core/result.h"
 #include "core/rig.h"
@@ -56,6 +58,8 @@ class Painter {
 
   /// What was painted last.
   const Painted& painted() const { return painted_; }
+  /// A device that was nudged.
+  const std::optional<Drift>& drift() const { return drifts_.drift(); }
 
  private:
   struct Fading {
@@ -85,7 +89,9 @@ class Painter {
   projector::Renderer renderer_;
   PaintOptions options_;
   std::vector<Body> bodies_;
+  ShownPictures shown_;
   ShadowWatch shadows_;
+  DriftWatch drifts_;
   Eigen::Vector3d d_up_world_;
   Painted painted_;
   bool is_black_ = false;  // by blackout, which goes before a freeze

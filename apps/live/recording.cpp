@@ -199,7 +199,8 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   const fs::path rig = root.at("rig").path_inside(), scene = root.at("scene").path_inside();
   LIMN_TRY_STATUS(config.status());
   LIMN_TRY(setup.rig, load_rig(rig));
-  LIMN_TRY(setup.scene, scene::load_scene(scene));
+  std::vector<scene::LeftOut> left_out;  // as the session left it out
+  LIMN_TRY(setup.scene, scene::load_scene(scene, &left_out));
   return setup;
 }
 

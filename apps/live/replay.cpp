@@ -136,7 +136,8 @@ class Replay {
     if (folder.empty() || folder.find_first_of("/\\.") != std::string::npos)
       return error("{}: expected a scene's folder inside the recording, found '{}'.",
                    options_.session.string(), folder);
-    LIMN_TRY(scene::Scene scene, scene::load_scene(options_.session / folder));
+    std::vector<scene::LeftOut> left_out;  // as the session left it out
+    LIMN_TRY(scene::Scene scene, scene::load_scene(options_.session / folder, &left_out));
     return session_.show(std::move(scene), session_.watched().captured_at);
   }
 

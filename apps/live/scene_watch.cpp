@@ -30,7 +30,7 @@ SceneWatch::Files SceneWatch::listed() const {
   return files;
 }
 
-std::optional<Result<scene::Scene>> SceneWatch::news() {
+std::optional<Result<SceneNews>> SceneWatch::news() {
   if (loading_.valid()) {
     if (loading_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return std::nullopt;
     return loading_.get();
@@ -45,7 +45,11 @@ std::optional<Result<scene::Scene>> SceneWatch::news() {
   }
   if (seen_ == loaded_ || now - changed_at_ < k_left_alone) return std::nullopt;
   loaded_ = seen_;
-  loading_ = std::async(std::launch::async, [folder = folder_] { return scene::load_scene(folder); });
+  loading_ = std::async(std::launch::async, [folder = folder_]() -> Result<SceneNews> {
+    SceneNews news;
+    LIMN_TRY(news.scene, scene::load_scene(folder, &news.left_out));
+    return news;
+  });
   return std::nullopt;
 }
 

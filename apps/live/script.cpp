@@ -9,6 +9,8 @@
 namespace limn::apps {
 namespace {
 
+constexpr double k_never_s = 1e9;
+constexpr double k_most_periods = 1000;
 constexpr double k_hand_albedo = 0.35;
 constexpr double k_hand_above_m = 0.006;
 // A hand in a projector's light: so far along the way to the prototype's middle, and its size.
@@ -63,12 +65,47 @@ void read_event(const ConfigNode& node, Script* script) {
     Script::Unplug unplug{device->text(), 0, 0};
     read_span(node, &unplug.from_s, &unplug.until_s);
     script->unplugs.push_back(unplug);
+  } else if (const auto nudged = node.find("nudge")) {
+    node.only({"at_s", "until_s", "nudge", "degrees", "mm"});
+    Script::Nudge nudge{nudged->text(), time_of(node.at("at_s")), k_never_s, {}};
+    if (node.find("until_s")) read_span(node, &nudge.from_s, &nudge.until_s);
+    if (const auto turn = node.find("degrees"))
+      nudge.home_from_device.rotation = exp_rotation(turn->vector3() * std::numbers::pi / 180);
+    if (const auto shift = node.find("mm")) nudge.home_from_device.translation = 1e-3 * shift->vector3();
+    script->nudges.push_back(nudge);
   } else if (const auto edit = node.find("edit")) {
     node.only({"at_s", "edit"});
     script->edits.push_back({time_of(node.at("at_s")), read_edit(*edit)});
   } else {
-    node.problem("expected one of sway, move, cover, block, unplug, edit, found none of them.");
+    node.problem("expected one of sway, move, cover, block, unplug, nudge, edit, found none of them.");
   }
+}
+
+// The same events again and again, `period_s` apart, until the end.
+Script repeated(const Script& once, double period_s) {
+  Script all;
+  all.seconds = once.seconds;
+  const auto later = [](const auto& events, double by_s, auto* out) {
+    for (auto event : events) {
+      if constexpr (requires { event.from_s; }) {
+        event.from_s += by_s;
+        event.until_s += by_s;
+      } else {
+        event.at_s += by_s;
+      }
+      out->push_back(std::move(event));
+    }
+  };
+  for (double by_s = 0; by_s < once.seconds; by_s += period_s) {
+    later(once.sways, by_s, &all.sways);
+    later(once.moves, by_s, &all.moves);
+    later(once.covers, by_s, &all.covers);
+    later(once.blocks, by_s, &all.blocks);
+    later(once.unplugs, by_s, &all.unplugs);
+    later(once.nudges, by_s, &all.nudges);
+    later(once.edits, by_s, &all.edits);
+  }
+  return all;
 }
 
 }  // namespace
@@ -82,11 +119,19 @@ bool Script::is_plugged(const std::string& device, double at_s) const {
 Result<Script> load_script(const std::filesystem::path& path) {
   LIMN_TRY(const Config config, Config::load(path, "limn.script/1"));
   const ConfigNode root = config.root();
-  root.only({"schema", "about", "seconds", "events"});
-  Script script;
-  script.seconds = root.at("seconds").positive();
-  for (const ConfigNode& node : root.at("events").items()) read_event(node, &script);
+  root.only({"schema", "about", "seconds", "again_every_s", "events"});
+  Script once;
+  once.seconds = root.at("seconds").positive();
+  for (const ConfigNode& node : root.at("events").items()) read_event(node, &once);
+  double period_s = once.seconds;
+  if (const auto again = root.find("again_every_s")) {
+    period_s = again->positive();
+    if (once.seconds > k_most_periods * period_s)
+      again->problem(fmt::format("expected at least {} s for {} s, found {}.", once.seconds / k_most_periods,
+                                 once.seconds, period_s));
+  }
   LIMN_TRY_STATUS(config.status());
+  Script script = repeated(once, period_s);
   std::stable_sort(script.edits.begin(), script.edits.end(),
                    [](const Script::Action& a, const Script::Action& b) { return a.at_s < b.at_s; });
   std::stable_sort(script.moves.begin(), script.moves.end(),
@@ -116,6 +161,12 @@ Result<ScriptedRoom> ScriptedRoom::create(Script script, sim::VirtualRig* rig) {
   for (const Script::Block& block : script.blocks)
     if (!rig->world().rig.find(block.projector))
       return error("script: expected a projector of the room, found '{}'.", block.projector);
+  for (const Script::Nudge& nudge : script.nudges) {
+    const Imager* imager = rig->world().rig.find(nudge.device);
+    if (!imager)
+      return error("script: expected a camera or projector of the room, found '{}'.", nudge.device);
+    out.devices_.emplace_back(nudge.device, imager->imager_from_world);
+  }
   out.script_ = std::move(script);
   return out;
 }
@@ -139,6 +190,7 @@ Pose ScriptedRoom::place_of(const Home& home, double at_s) const {
 }
 
 void ScriptedRoom::set(double at_s) {
+  nudge(at_s);
   for (const Home& home : homes_) {
     const Pose place = place_of(home, at_s);
     if (!is_same(place, rig_->world().find(home.placed.object)->world_from_object))
@@ -146,29 +198,46 @@ void ScriptedRoom::set(double at_s) {
   }
   for (std::size_t i = 0; i < script_.covers.size(); ++i) {
     const Script::Cover& cover = script_.covers[i];
-    const Home& home = home_of(cover.marker);
-    const Pose above(Eigen::Quaterniond::Identity(), {0, 0, -k_hand_above_m});
-    put(fmt::format("cover{}", i), at_s >= cover.from_s && at_s < cover.until_s,
-        sim::sheet({}, 2 * home.placed.size_m, 2 * home.placed.size_m, {}, place_of(home, at_s) * above));
+    put(fmt::format("cover{}", i), at_s >= cover.from_s && at_s < cover.until_s, [&] {
+      const Home& home = home_of(cover.marker);
+      const Pose above(Eigen::Quaterniond::Identity(), {0, 0, -k_hand_above_m});
+      return sim::sheet({}, 2 * home.placed.size_m, 2 * home.placed.size_m, {}, place_of(home, at_s) * above);
+    });
   }
   for (std::size_t i = 0; i < script_.blocks.size(); ++i) {
     const Script::Block& block = script_.blocks[i];
-    const Imager& projector = *rig_->world().rig.find(block.projector);
-    const Eigen::Vector3d p_light = projector.imager_from_world.inverse().translation;
-    const Eigen::Vector3d p_aim = rig_->world().world_from_prototype.translation;
-    Pose place = looking_at(p_light, p_aim, Eigen::Vector3d::UnitZ()).inverse();
-    place.translation = p_light + k_block_at * (p_aim - p_light);
-    put(fmt::format("block{}", i), at_s >= block.from_s && at_s < block.until_s,
-        sim::sheet({}, k_block_width_m, k_block_height_m, {}, place));
+    put(fmt::format("block{}", i), at_s >= block.from_s && at_s < block.until_s, [&] {
+      const Imager& projector = *rig_->world().rig.find(block.projector);
+      const Eigen::Vector3d p_light = projector.imager_from_world.inverse().translation;
+      const Eigen::Vector3d p_aim = rig_->world().world_from_prototype.translation;
+      Pose place = looking_at(p_light, p_aim, Eigen::Vector3d::UnitZ()).inverse();
+      place.translation = p_light + k_block_at * (p_aim - p_light);
+      return sim::sheet({}, k_block_width_m, k_block_height_m, {}, place);
+    });
   }
 }
 
-// Puts a hand there, or takes it away.
-void ScriptedRoom::put(const std::string& name, bool is_due, const sim::Object& hand) {
+// Devices that were nudged, and those put back.
+void ScriptedRoom::nudge(double at_s) {
+  for (const auto& [name, imager_from_world] : devices_) {
+    Pose place = imager_from_world;
+    for (const Script::Nudge& nudge : script_.nudges)
+      if (nudge.device == name && at_s >= nudge.from_s && at_s < nudge.until_s)
+        place = nudge.home_from_device.inverse() * imager_from_world;
+    if (is_same(place, rig_->world().rig.find(name)->imager_from_world)) continue;
+    Rig& rig = rig_->edit().rig;
+    for (std::vector<Imager>* imagers : {&rig.cameras, &rig.projectors})
+      for (Imager& imager : *imagers)
+        if (imager.name == name) imager.imager_from_world = place;
+  }
+}
+
+// Puts a hand there, or takes it away. One that is not due is never drawn: there may be thousands.
+void ScriptedRoom::put(const std::string& name, bool is_due, const std::function<sim::Object()>& hand) {
   const bool is_there = rig_->world().find(name) != nullptr;
   if (is_there && !is_due) rig_->remove(name);
   if (is_there == is_due || !is_due) return;
-  sim::Object object = hand;
+  sim::Object object = hand();
   object.name = name;
   object.albedo.setConstant(k_hand_albedo);
   rig_->place(object);

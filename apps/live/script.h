@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -41,6 +42,12 @@ struct Script {
     std::string device;
     double from_s = 0, until_s = 0;
   };
+  /// A camera or projector is knocked out of its place, where the rig has it, and later put back.
+  struct Nudge {
+    std::string device;
+    double from_s = 0, until_s = 0;
+    Pose home_from_device;
+  };
   struct Action {
     double at_s = 0;
     scene::Edit edit;
@@ -52,6 +59,7 @@ struct Script {
   std::vector<Cover> covers;
   std::vector<Block> blocks;
   std::vector<Unplug> unplugs;
+  std::vector<Nudge> nudges;
   std::vector<Action> edits;  ///< in the order of time
 
   bool is_plugged(const std::string& device, double at_s) const;
@@ -62,7 +70,7 @@ Result<Script> load_script(const std::filesystem::path& path);
 /// Plays a script in a virtual rig: what stands where at a moment.
 class ScriptedRoom {
  public:
-  /// Error: a marker that does not stand in the room.
+  /// Error: a marker or device that does not stand in the room.
   static Result<ScriptedRoom> create(Script script, sim::VirtualRig* rig);
 
   const Script& script() const { return script_; }
@@ -77,12 +85,14 @@ class ScriptedRoom {
     Pose world_from_object;
   };
   const Home& home_of(const std::string& marker) const;
+  void nudge(double at_s);
   Pose place_of(const Home& home, double at_s) const;
-  void put(const std::string& name, bool is_due, const sim::Object& hand);
+  void put(const std::string& name, bool is_due, const std::function<sim::Object()>& hand);
 
   Script script_;
   sim::VirtualRig* rig_ = nullptr;
   std::vector<Home> homes_;
+  std::vector<std::pair<std::string, Pose>> devices_;  // imager_from_world, where nothing was nudged
 };
 
 }  // namespace limn::apps

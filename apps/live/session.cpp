@@ -62,6 +62,14 @@ bool is_carried_alike(const scene::Scene& a, const scene::Scene& b) {
 
 }  // namespace
 
+void tell(std::span<const scene::LeftOut> left_out, Stamp at, Telemetry* telemetry) {
+  for (const scene::LeftOut& part : left_out) {
+    const std::string what = fmt::format("{} of slot {} is left out: {}", part.variant, part.slot, part.why);
+    if (telemetry) telemetry->note(at, what);
+    log_warning("live: {}", what);
+  }
+}
+
 Result<Session> Session::create(const SessionSetup& setup,
                                 Telemetry* telemetry,
                                 Recorder* recorder,
@@ -158,13 +166,26 @@ Status Session::show(scene::Scene scene, Stamp at) {
 }
 
 void Session::show_news(SceneWatch* files, Stamp at) {
-  auto scene = files->news();
-  if (!scene) return;
-  const Status shown = *scene ? show(std::move(**scene), at) : Status(scene->error());
+  auto news = files->news();
+  if (!news) return;
+  const Status shown = *news ? show_if_whole(std::move(**news), at) : Status(news->error());
   if (shown) return;
   const std::string what = shown.message() + " The parts stay as they were.";
   if (telemetry_) telemetry_->note(at, what);
   log_warning("live: {}", what);
+}
+
+// A part that is shown and cannot be loaded any more stays; one that never could be is no reason.
+Status Session::show_if_whole(SceneNews news, Stamp at) {
+  for (const scene::LeftOut& left_out : news.left_out) {
+    const scene::Slot* slot = setup_.scene.find_slot(left_out.slot);
+    if (!slot) continue;
+    for (const std::string& name : variant_names(*slot))
+      if (name == left_out.variant) return error("{}", left_out.why);
+  }
+  LIMN_TRY_STATUS(show(std::move(news.scene), at));
+  tell(news.left_out, at, telemetry_);
+  return {};
 }
 
 // Looks that were saved or deleted, on disk, and the page of all.
@@ -203,7 +224,19 @@ const Painted& Session::paint(Stamp now, Stamp shown_at) {
   const auto recording = std::chrono::steady_clock::now();
   if (recorder_) recorder_->painted(painted, moments_);
   record_ms_ = recorder_ ? milliseconds_since(recording) : -1;
+  tell_of_drift(now);
   return painted;
+}
+
+void Session::tell_of_drift(Stamp at) {
+  const std::optional<Drift>& drift = painter_.drift();
+  const bool is_news =
+      drift.has_value() != told_drift_.has_value() || (drift && drift->devices != told_drift_->devices);
+  if (!is_news) return;
+  told_drift_ = drift;
+  const std::string what = drift ? sentence(*drift) : "all light is where the rig says again";
+  if (telemetry_) telemetry_->note(at, what);
+  log_warning("live: {}", what);
 }
 
 ShownFrame Session::measured() const {

@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,9 @@
 #include "scene/staging.h"
 
 namespace limn::apps {
+
+/// Names parts that could not be loaded. `telemetry` may be null.
+void tell(std::span<const scene::LeftOut> left_out, Stamp at, Telemetry* telemetry);
 
 /// The projector side of a live session with all that people can do to it: what was watched and edited ->
 /// pictures. Belongs to the thread whose GL context is current.
@@ -57,6 +61,8 @@ class Session {
  private:
   Session(SessionSetup setup, Painter painter, Telemetry* telemetry, Recorder* recorder);
   void load_looks();
+  void tell_of_drift(Stamp at);
+  Status show_if_whole(SceneNews news, Stamp at);
   Status keep_looks(const scene::Staging& before);
 
   SessionSetup setup_;
@@ -67,6 +73,7 @@ class Session {
   scene::Staging staging_;
   Watched watched_;
   std::size_t moments_ = 0;
+  std::optional<Drift> told_drift_;
   double paint_ms_ = 0, record_ms_ = 0;
 };
 

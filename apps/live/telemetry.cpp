@@ -149,6 +149,8 @@ nlohmann::ordered_json Telemetry::summary() const {
                                                {"p99", measure.all.at(0.99)},
                                                {"mean", measure.all.mean()}};
   }
+  json["notes"] = nlohmann::ordered_json::array();
+  for (const auto& [at_s, what] : notes_) json["notes"].push_back({{"at_s", at_s}, {"what", what}});
   return json;
 }
 

@@ -12,6 +12,7 @@ namespace limn::apps {
 namespace {
 
 constexpr double k_once_s = 0.4;  // two cameras that see one gesture within it
+constexpr double k_trembles_m = 0.5e-3, k_trembles_rad = 1e-3;
 
 double milliseconds_since(std::chrono::steady_clock::time_point begun) {
   return 1e3 * seconds_between(begun, std::chrono::steady_clock::now());
@@ -36,6 +37,11 @@ std::vector<std::string> families_of(const scene::Scene& scene, std::vector<Body
 }
 
 }  // namespace
+
+bool is_elsewhere(const Pose& before, const Pose& now) {
+  return (before.translation - now.translation).norm() > k_trembles_m ||
+         angle_between(before.rotation, now.rotation) > k_trembles_rad;
+}
 
 Result<Watcher> Watcher::create(const scene::Scene& scene, const Rig& rig, const WatchOptions& options) {
   LIMN_CHECK(options.full_scan_every > 0);

@@ -30,6 +30,9 @@ struct Watched {
   double detect_ms = 0, filter_ms = 0;
 };
 
+/// Whether a still body's pose has changed by more than it trembles (0.5 mm, 1 mrad).
+bool is_elsewhere(const Pose& before, const Pose& now);
+
 struct WatchOptions {
   /// Every how many pictures of a camera all of it is searched; between, markers are followed where they
   /// were. Higher is faster and finds new markers later.

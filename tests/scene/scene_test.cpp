@@ -235,6 +235,31 @@ TEST(Scene, MissingAndTruncatedFilesAreErrors) {
   EXPECT_FALSE(load_scene(folder));
 }
 
+// A session begins with the parts that there are.
+TEST(Scene, PartsThatCannotBeLoadedAreLeftOutWhenThatIsAskedFor) {
+  const fs::path door = fs::path(LIMN_SOURCE_DIR) / "config/scenes/door", folder = test::test_folder() / "door";
+  fs::copy(door, folder);
+  fs::create_directories(folder / "slots/mirror");
+  ASSERT_TRUE(write_file(folder / "slots/mirror/half.glb", "glTF"));
+  fs::remove(folder / "mirror-sport.glb");
+  EXPECT_FALSE(load_scene(folder));
+  std::vector<LeftOut> left_out;
+  const auto scene = load_scene(folder, &left_out);
+  ASSERT_TRUE(scene) << scene.message();
+  EXPECT_EQ(scene->find_slot("mirror")->variants.size(), 2u);
+  ASSERT_EQ(left_out.size(), 2u);
+  EXPECT_EQ(left_out[0].slot, "mirror");
+  EXPECT_NE(left_out[0].why.find("mirror-sport.glb"), std::string::npos) << left_out[0].why;
+  EXPECT_EQ(left_out[1].variant, "half");
+
+  fs::remove(folder / "trim-line.glb");
+  left_out.clear();
+  const auto without_trim = load_scene(folder, &left_out);
+  ASSERT_TRUE(without_trim) << without_trim.message();
+  EXPECT_EQ(without_trim->find_slot("trim"), nullptr);
+  EXPECT_EQ(left_out.size(), 3u);
+}
+
 TEST(Scene, TheDoorOfTheConfigFolderLoads) {
   const auto scene = load_scene(fs::path(LIMN_SOURCE_DIR) / "config/scenes/door");
   ASSERT_TRUE(scene) << scene.message();
