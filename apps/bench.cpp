@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -9,14 +11,15 @@
 namespace limn::apps {
 
 Status run_bench(const BenchOptions& options) {
-  if (options.name != "tracker" && options.name != "calib" && options.name != "projector")
-    return usage_error("bench {}: expected tracker, projector or calib", options.name);
+  constexpr std::array k_names = {"tracker", "calib", "projector", "live"};
+  if (std::find(k_names.begin(), k_names.end(), options.name) == k_names.end())
+    return usage_error("bench: expected {}, found '{}'.", fmt::join(k_names, ", "), options.name);
   std::error_code problem;
   const auto self = std::filesystem::read_symlink("/proc/self/exe", problem);
   const auto program = self.parent_path() / "tests" / "bench" / (options.name + "_bench");
   if (problem || !std::filesystem::exists(program))
     return error(
-        "bench {}: expected the program {}, found none. Build the target {}_bench (tracker needs "
+        "bench {}: expected the program {}, found none. Build the target {}_bench (tracker and live need "
         "libapriltag-dev, see packages.txt); ./limn bench does so.",
         options.name, program.string(), options.name);
   std::vector<std::string> words = options.arguments;

@@ -1,0 +1,237 @@
+// What a live session costs beside its rendering: processor time for each 1280x1024 frame (JPEG decoded,
+// markers found, poses, filter, hand-over) beside what libapriltag needs to detect in the same frames, what a
+// recording adds to a frame's time, and whether memory grows. Usage: limn bench live [--frames N (60)]
+#include <fmt/core.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <cstring>
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "apps/live/latest.h"
+#include "apps/live/recording.h"
+#include "apps/live/script.h"
+#include "apps/live/session.h"
+#include "apps/live/watcher.h"
+#include "apps/world_markers.h"
+#include "core/picture.h"
+#include "device/gl_context.h"
+#include "device/jpeg.h"
+#include "sim/virtual_rig.h"
+#include "tests/bench/tracker_peers.h"
+#include "tracker/predict.h"
+
+namespace limn::test {
+namespace {
+
+namespace fs = std::filesystem;
+using apps::Session;
+using apps::SessionSetup;
+using apps::Watched;
+using apps::Watcher;
+
+constexpr double k_lag_s = 0.06;
+
+double processor_ms() {
+  timespec time{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
+}
+
+double wall_ms() {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+double resident_mib() {
+  std::ifstream file("/proc/self/statm");
+  double all = 0, resident = 0;
+  file >> all >> resident;
+  return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 20);
+}
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
+                   values.end());
+  return values[values.size() / 2];
+}
+
+// The studio, seen by a camera of 1280x1024.
+sim::World studio() {
+  sim::World world =
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_picture).value();
+  Imager& camera = world.rig.cameras[0];
+  constexpr int k_width = 1280, k_height = 1024;
+  camera.lens = Lens::pinhole(1467, 1467, 0.5 * (k_width - 1), 0.5 * (k_height - 1));
+  camera.width = k_width;
+  camera.height = k_height;
+  return world;
+}
+
+struct Shot {
+  std::vector<std::uint8_t> jpeg;
+  Stamp captured_at;
+};
+
+// A session's frames as a camera would send them: lit by the session's own pictures, a marker in a hand.
+std::vector<Shot> shots(int count, SessionSetup* setup) {
+  sim::World world = studio();
+  setup->rig = world.rig;
+  setup->scene = *world.scene;
+  sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
+  apps::Script script;
+  script.sways.push_back({"aruco_4x4_50:0", 0, 1e9, {0.05, 0, 0}, 0.5});
+  auto room = apps::ScriptedRoom::create(script, &rig).value();
+  auto watcher = Watcher::create(setup->scene, setup->rig).value();
+  auto session = Session::create(*setup, nullptr, nullptr, false).value();
+  std::vector<Shot> out;
+  for (int i = 0; i < count; ++i) {
+    room.set(seconds_between(Stamp{}, rig.next_exposure()));
+    const int camera = 0;
+    const auto frames = rig.expose(std::span(&camera, 1));
+    out.push_back({{}, frames[0].captured_at});
+    cv::imencode(".jpg", frames[0].image, out.back().jpeg, {cv::IMWRITE_JPEG_QUALITY, 90});
+    session.take(watcher.watch(frames), static_cast<std::size_t>(i) + 1);
+    const auto& painted = session.paint(rig.now(), shifted(rig.now(), 0.04));
+    for (std::size_t k = 0; k < painted.projectors.size(); ++k)
+      (void)rig.projector(static_cast<int>(k)).show(painted.projectors[k]).value();
+  }
+  return out;
+}
+
+cv::Mat decoded(const Shot& shot) { return device::decode_jpeg(shot.jpeg).value(); }
+
+void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup) {
+  const std::string family = "apriltag_36h11";
+  const Peer apriltag = apriltag_peer(std::span(&family, 1), 2, 1);
+  auto watcher = Watcher::create(setup.scene, setup.rig, setup.watch).value();
+  apps::Latest<std::vector<Frame>> frames;
+  apps::Latest<Watched> seen;
+  std::vector<double> decode, watch, hand, theirs;
+  std::size_t markers = 0;
+  for (const Shot& shot : shots) {
+    const double begun = processor_ms();
+    cv::Mat image = decoded(shot);
+    const double was_decoded = processor_ms();
+    frames.put({{setup.rig.cameras[0].name, std::move(image), shot.captured_at}});
+    const auto taken = frames.take({});
+    const double was_taken = processor_ms();
+    const Watched& watched = watcher.watch(*taken);
+    const double was_watched = processor_ms();
+    seen.put(watched);
+    const auto known = seen.take({});
+    const auto tracks = tracker::predicted(known->motions, shifted(shot.captured_at, k_lag_s));
+    const double was_handed = processor_ms();
+    markers += watched.detections[0].size();
+    decode.push_back(was_decoded - begun);
+    watch.push_back(was_watched - was_taken);
+    hand.push_back(was_taken - was_decoded + was_handed - was_watched);
+    LIMN_CHECK(!tracks.empty());
+    cv::Mat grey;
+    cv::cvtColor(taken->front().image, grey, cv::COLOR_BGR2GRAY);
+    const double peer_begun = processor_ms();
+    (void)apriltag.detect(grey, nullptr);
+    theirs.push_back(processor_ms() - peer_begun);
+  }
+  const double ours = median(decode) + median(watch) + median(hand);
+  fmt::print("{} frames of 1280x1024, {:.1f} markers each; median processor ms\n", shots.size(),
+             static_cast<double>(markers) / static_cast<double>(shots.size()));
+  fmt::print("decode {:.2f}, markers to motions {:.2f}, hand-over and prediction {:.2f}: {:.2f}\n",
+             median(decode), median(watch), median(hand), ours);
+  fmt::print(
+      "libapriltag (36h11, decimate 2, one thread), detection alone: {:.2f}; ours, of that: {:.2f} "
+      "(without decoding {:.2f})\n",
+      median(theirs), ours / median(theirs), (ours - median(decode)) / median(theirs));
+}
+
+// Milliseconds of the wall for each frame of a session: decode, watch, paint.
+double session_ms(const std::vector<Shot>& shots, SessionSetup setup, const fs::path& record) {
+  std::unique_ptr<apps::Recorder> recorder;
+  if (!record.empty()) recorder = apps::Recorder::create(record, setup).value();
+  auto watcher = Watcher::create(setup.scene, setup.rig, setup.watch).value();
+  auto session = Session::create(setup, nullptr, recorder.get(), false).value();
+  std::vector<double> times;
+  std::size_t moments = 0;
+  for (const Shot& shot : shots) {
+    const double begun = wall_ms();
+    const std::vector<Frame> frames = {{setup.rig.cameras[0].name, decoded(shot), shot.captured_at}};
+    if (recorder) recorder->watched(frames);
+    session.take(watcher.watch(frames), ++moments);
+    session.paint(shifted(shot.captured_at, 0.02), shifted(shot.captured_at, k_lag_s));
+    times.push_back(wall_ms() - begun);
+  }
+  if (recorder) {
+    const auto ended = recorder->ended();
+    fmt::print("{}", ended ? "the recording ended: " + *ended + "\n" : "");
+    (void)recorder->finish();
+  }
+  return median(times);
+}
+
+void print_recording(const std::vector<Shot>& shots, const SessionSetup& setup) {
+  const fs::path folder = fs::temp_directory_path() / fmt::format("limn-bench-live-{}", getpid());
+  std::vector<double> without, with;
+  for (int i = 0; i < 3; ++i) {
+    without.push_back(session_ms(shots, setup, {}));
+    with.push_back(session_ms(shots, setup, folder));
+    fs::remove_all(folder);
+  }
+  fmt::print("a frame of the session, decoded, watched, painted: {:.1f} ms; recorded {:.1f} ms: {:+.1f} %\n",
+             median(without), median(with), 100 * (median(with) / median(without) - 1));
+}
+
+void print_memory(const std::vector<Shot>& shots, const SessionSetup& setup) {
+  constexpr int k_rounds = 20;
+  auto watcher = Watcher::create(setup.scene, setup.rig, setup.watch).value();
+  double first_mib = 0;
+  double at_s = 0;
+  for (int round = 0; round < k_rounds; ++round) {
+    for (const Shot& shot : shots) {
+      at_s += 1 / 30.0;
+      const std::vector<Frame> frames = {
+          {setup.rig.cameras[0].name, decoded(shot), shifted(shot.captured_at, at_s)}};
+      (void)watcher.watch(frames);
+    }
+    if (round == 0) first_mib = resident_mib();
+  }
+  fmt::print("memory after {} and {} frames of one watcher: {:.1f} and {:.1f} MiB\n", shots.size(),
+             k_rounds * static_cast<int>(shots.size()), first_mib, resident_mib());
+}
+
+int run(int argc, char** argv) {
+  int count = 60;
+  for (int i = 1; i < argc; ++i) {
+    const bool is_frames = std::strcmp(argv[i], "--frames") == 0 && i + 1 < argc;
+    const char* text = is_frames ? argv[++i] : "";
+    const auto parsed = std::from_chars(text, text + std::strlen(text), count);
+    if (!is_frames || parsed.ec != std::errc() || *parsed.ptr != '\0' || count < 3 || count > 10000) {
+      fmt::print(stderr, "live_bench: expected --frames N (3 to 10000), found '{}'.\n", argv[i]);
+      return 2;
+    }
+  }
+  const auto context = device::GlContext::create();
+  if (!context) {
+    fmt::print(stderr, "live_bench: {}\n", context.message());
+    return 1;
+  }
+  SessionSetup setup;
+  const std::vector<Shot> frames = shots(count, &setup);
+  print_cost(frames, setup);
+  print_recording(frames, setup);
+  print_memory(frames, setup);
+  return 0;
+}
+
+}  // namespace
+}  // namespace limn::test
+
+int main(int argc, char** argv) { return limn::test::run(argc, argv); }
