@@ -167,21 +167,24 @@ Staging first_staging(const Scene& scene) {
 }
 
 const std::vector<Action>& actions() {
+  using enum Takes;
   static const std::vector<Action> all = {
-      {"next_variant", true, "", "the slot's next variant"},
-      {"previous_variant", true, "", "the slot's previous variant"},
-      {"choose_variant", true, "a variant", "a variant by name"},
-      {"nudge", true, "three numbers, mm", "moves the part along its own axes"},
-      {"release", true, "", "the part follows its marker again, without nudges"},
-      {"save_look", false, "a name; empty: look-01 and so on", "keeps variants and places, as JSON and PNG"},
-      {"restore_look", false, "a look", "shows a look until its markers are moved"},
-      {"next_look", false, "", "the look after the one last shown"},
-      {"previous_look", false, "", "the look before it"},
-      {"delete_look", false, "a look", "forgets a look"},
-      {"blackout", false, "on, off or toggle", "bare model: no light"},
-      {"freeze", false, "on, off or toggle", "what is shown stays"},
-      {"marker_states", false, "on, off or toggle", "rings around markers: green seen, amber carried on"},
-      {"screen", false, "rest, full, camera, view, stereo, off or next", "what screens show"},
+      {"next_variant", true, nothing, "", "the slot's next variant"},
+      {"previous_variant", true, nothing, "", "the slot's previous variant"},
+      {"choose_variant", true, text, "a variant", "a variant by name"},
+      {"nudge", true, millimetres, "three numbers, mm", "moves the part along its own axes"},
+      {"release", true, nothing, "", "the part follows its marker again, without nudges"},
+      {"save_look", false, maybe_text, "a name; empty: look-01 and so on",
+       "keeps variants and places, as JSON and PNG"},
+      {"restore_look", false, text, "a look", "shows a look until its markers are moved"},
+      {"next_look", false, nothing, "", "the look after the one last shown"},
+      {"previous_look", false, nothing, "", "the look before it"},
+      {"delete_look", false, text, "a look", "forgets a look"},
+      {"blackout", false, on_off, "on, off or toggle", "bare model: no light"},
+      {"freeze", false, on_off, "on, off or toggle", "what is shown stays"},
+      {"marker_states", false, on_off, "on, off or toggle",
+       "rings around markers: green seen, amber carried on"},
+      {"screen", false, maybe_text, "rest, full, camera, view, stereo, off or next", "what screens show"},
   };
   return all;
 }

@@ -66,11 +66,21 @@ struct Edit {
   std::string value;   ///< as the action wants it; may be empty
 };
 
+/// What an action takes as its value.
+enum class Takes {
+  nothing,
+  text,         ///< required
+  maybe_text,   ///< or nothing
+  millimetres,  ///< three numbers, "1 0 -2.5"
+  on_off        ///< "on", "off", "toggle"; nothing: toggle
+};
+
 /// What can be done, for people and programs alike.
 struct Action {
   std::string name;
   bool of_slot = false;
-  std::string value;  ///< what Edit::value says; empty: nothing
+  Takes takes = Takes::nothing;
+  std::string value;  ///< what Edit::value says, in words; empty: nothing
   std::string what;
 };
 const std::vector<Action>& actions();

@@ -35,12 +35,18 @@ struct Seen {
 
 class DeviceLoop {
  public:
-  DeviceLoop(SessionDevices* devices, Watcher* watcher, Session* session, Books* books, OperatorDesk* desk)
+  DeviceLoop(SessionDevices* devices,
+             Watcher* watcher,
+             Session* session,
+             Books* books,
+             OperatorDesk* desk,
+             OscPort* osc)
       : devices_(devices),
         watcher_(watcher),
         session_(session),
         books_(books),
         desk_(desk),
+        osc_(osc),
         files_(session->setup().scene.folder) {
     const auto added = [this](const auto& all, const char* kind) {
       std::vector<std::size_t> numbers;
@@ -69,11 +75,13 @@ class DeviceLoop {
   bool step() {
     if (auto seen = seen_.take(k_wait)) session_->take(std::move(seen->watched), seen->moments);
     session_->show_news(&files_, now());
+    if (osc_) osc_->hear(session_, &books_->telemetry(), now());
     const Stamp painting_at = now();
     const Painted& painted = session_->paint(painting_at, shifted(painting_at, paint_s_ + display_s_));
     ShownFrame shown = session_->measured();
     paint_s_ += k_blend * (1e-3 * shown.paint_ms - paint_s_);
     show(painted);
+    if (osc_) osc_->tell(*session_);
     shown.missed = static_cast<int>(missed_.exchange(0));
     const Stamp begun = now();
     const bool wants_screen = !devices_->screens.empty() || (desk_ && desk_->is_due());
@@ -169,6 +177,7 @@ class DeviceLoop {
   Session* session_;
   Books* books_;
   OperatorDesk* desk_;
+  OscPort* osc_;
   SceneWatch files_;
   DeviceHealth health_;
   std::vector<std::size_t> projectors_, screens_;  // as health_ calls them
@@ -199,7 +208,8 @@ Status play_on_devices(SessionDevices* devices,
                        Watcher* watcher,
                        Session* session,
                        Books* books,
-                       OperatorDesk* desk) {
+                       OperatorDesk* desk,
+                       OscPort* osc) {
   const auto any = [](const auto& all) {
     return std::any_of(all.begin(), all.end(), [](const auto& device) { return device != nullptr; });
   };
@@ -208,7 +218,7 @@ Status play_on_devices(SessionDevices* devices,
   if (!any(devices->projectors))
     return error("live: expected a projector that works, found none. Run limn doctor.");
   const Stamp begun = now();
-  DeviceLoop loop(devices, watcher, session, books, desk);
+  DeviceLoop loop(devices, watcher, session, books, desk, osc);
   while (!is_ended && !(seconds > 0 && seconds_between(begun, now()) >= seconds)) {
     if (!loop.step()) break;
   }

@@ -7,6 +7,7 @@
 #include "apps/live/books.h"
 #include "apps/live/device_health.h"
 #include "apps/live/operator_desk.h"
+#include "apps/live/osc_port.h"
 #include "apps/live/session.h"
 #include "apps/live/watcher.h"
 #include "core/result.h"
@@ -25,17 +26,18 @@ struct SessionDevices {
 };
 
 /// Plays a session on devices, in real time, until `seconds` are over (0: no end), `is_ended`, or the window
-/// the operator ends it (`desk` may be null); at least a camera and a projector must be there. A thread for
-/// each camera takes its newest frame, one thread watches, this one (its GL context current) paints and
-/// shows. Newest wins, nothing queues: what was not taken in time is dropped and counted. Devices that fail
-/// are told of, once, and tried again. Sources with stamps of their own (pictures, videos) are played at
-/// their pace.
+/// the operator ends it (`desk` and `osc` may be null); at least a camera and a projector must be there. A
+/// thread for each camera takes its newest frame, one thread watches, this one (its GL context current)
+/// paints and shows. Newest wins, nothing queues: what was not taken in time is dropped and counted. Devices
+/// that fail are told of, once, and tried again. Sources with stamps of their own (pictures, videos) are
+/// played at their pace.
 Status play_on_devices(SessionDevices* devices,
                        double seconds,
                        const std::atomic<bool>& is_ended,
                        Watcher* watcher,
                        Session* session,
                        Books* books,
-                       OperatorDesk* desk);
+                       OperatorDesk* desk,
+                       OscPort* osc);
 
 }  // namespace limn::apps

@@ -11,6 +11,7 @@
 #include "apps/live/books.h"
 #include "apps/live/device_session.h"
 #include "apps/live/operator_desk.h"
+#include "apps/live/osc_port.h"
 #include "apps/live/room.h"
 #include "apps/live/script.h"
 #include "apps/live/session.h"
@@ -147,6 +148,7 @@ Status play_in_virtual_room(const LiveOptions& options) {
   LIMN_TRY(ScriptedRoom room, ScriptedRoom::create(std::move(script), &rig));
   LIMN_TRY(const device::GlContext context, device::GlContext::create());
   log_info("live: {}", context.description());
+  LIMN_TRY(OscPort osc, OscPort::open(options.osc, options.osc_to));
   LIMN_TRY(Books books, Books::open(options.out, options.record, &setup));
   tell(stage.left_out, {}, &books.telemetry());
   LIMN_TRY(Watcher watcher, Watcher::create(setup.scene, setup.rig, setup.watch));
@@ -156,8 +158,8 @@ Status play_in_virtual_room(const LiveOptions& options) {
     LIMN_TRY(const device::Desktop desktop, device::Desktop::open());
     LIMN_TRY(desk, OperatorDesk::open(desktop, setup.scene));
   }
-  LIMN_TRY_STATUS(
-      play_virtually(end_s, g_is_ended, &rig, &room, &watcher, &session, &books, desk ? &*desk : nullptr));
+  LIMN_TRY_STATUS(play_virtually(end_s, g_is_ended, &rig, &room, &watcher, &session, &books,
+                                 desk ? &*desk : nullptr, &osc));
   desk.reset();
   return books.close(&session, options.json);
 }
@@ -207,6 +209,7 @@ Status play_with_devices(const LiveOptions& options) {
   SessionDevices open = opened(devices, setup.rig, desktop ? &*desktop : nullptr);
   LIMN_TRY(const device::GlContext context, device::GlContext::create());
   log_info("live: {}", context.description());
+  LIMN_TRY(OscPort osc, OscPort::open(options.osc, options.osc_to));
   LIMN_TRY(Books books, Books::open(options.out, options.record, &setup));
   tell(left_out, {}, &books.telemetry());
   LIMN_TRY(Watcher watcher, Watcher::create(setup.scene, setup.rig, setup.watch));
@@ -216,7 +219,7 @@ Status play_with_devices(const LiveOptions& options) {
     LIMN_TRY(desk, OperatorDesk::open(*desktop, setup.scene));
   }
   LIMN_TRY_STATUS(play_on_devices(&open, options.seconds, g_is_ended, &watcher, &session, &books,
-                                  desk ? &*desk : nullptr));
+                                  desk ? &*desk : nullptr, &osc));
   desk.reset();
   return books.close(&session, options.json);
 }

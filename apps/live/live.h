@@ -23,6 +23,8 @@ struct LiveOptions {
   std::string marker_light = "keep-out";
   bool refill = true;          ///< light lost to a shadow is given by other projectors
   double extrapolate_s = 0.3;  ///< for which unseen markers are carried on
+  std::string osc;             ///< PORT or ADDRESS:PORT where other programs are heard; empty: not
+  std::string osc_to;          ///< HOST:PORT that is told what changes; empty: nobody
   bool json = false;
 };
 

@@ -105,11 +105,12 @@ void Recorder::shown(const scene::Scene& scene) {
   write({{"scene", copy}});
 }
 
-void Recorder::edited(const scene::Edit& edit, const std::string& source) {
+void Recorder::edited(const scene::Edit& edit, const std::string& source, std::size_t moments) {
   const std::lock_guard lock(mutex_);
   if (ended_) return;
-  write(
-      {{"edit", {{"action", edit.action}, {"slot", edit.slot}, {"value", edit.value}}}, {"source", source}});
+  write({{"edit", {{"action", edit.action}, {"slot", edit.slot}, {"value", edit.value}}},
+         {"source", source},
+         {"moments", moments}});
 }
 
 void Recorder::painted(const Painted& painted, std::size_t moments) {

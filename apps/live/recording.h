@@ -41,8 +41,9 @@ class Recorder {
   void watched(std::span<const Frame> frames);
   /// The scene's files have changed: they are copied as they are now.
   void shown(const scene::Scene& scene);
-  void edited(const scene::Edit& edit, const std::string& source);
-  /// `moments` counts the calls of watched() that the picture knew of.
+  /// `moments` counts the calls of watched() that the session knew of.
+  void edited(const scene::Edit& edit, const std::string& source, std::size_t moments);
+  /// Likewise.
   void painted(const Painted& painted, std::size_t moments);
 
   /// Why it ended before the session, if it did.

@@ -96,7 +96,10 @@ class Replay {
       return {};
     }
     if (event.contains("scene")) return show(event.at("scene"));
-    if (event.contains("edit")) return edit(event.at("edit"), event.at("source"));
+    if (event.contains("edit")) {
+      LIMN_TRY_STATUS(watch_until(event.value("moments", moments_)));
+      return edit(event.at("edit"), event.at("source"));
+    }
     return paint(event);
   } catch (const nlohmann::json::exception& problem) {
     return error("{}: expected whole events, found a damaged one ({}).",

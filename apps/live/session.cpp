@@ -133,7 +133,7 @@ void Session::take(Watched watched, std::size_t moments) {
 Status Session::edit(const scene::Edit& edit, const std::string& source, Stamp at) {
   LIMN_TRY(scene::Staging changed, scene::edited(setup_.scene, staging_, painter_.painted().posed, edit));
   std::swap(staging_, changed);
-  if (recorder_) recorder_->edited(edit, source);
+  if (recorder_) recorder_->edited(edit, source, moments_);
   if (telemetry_)
     telemetry_->note(at, fmt::format("{}{}{}{}{} ({})", edit.action, edit.slot.empty() ? "" : " ", edit.slot,
                                      edit.value.empty() ? "" : " ", edit.value, source));

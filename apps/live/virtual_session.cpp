@@ -61,13 +61,15 @@ class VirtualLoop {
               Watcher* watcher,
               Session* session,
               Books* books,
-              OperatorDesk* desk)
+              OperatorDesk* desk,
+              OscPort* osc)
       : rig_(rig),
         room_(room),
         watcher_(watcher),
         session_(session),
         books_(books),
         desk_(desk),
+        osc_(osc),
         files_(session->setup().scene.folder) {
     for (const Imager& camera : rig->world().rig.cameras)
       cameras_.push_back(health_.add({camera.name, "camera"}));
@@ -89,12 +91,14 @@ class VirtualLoop {
     }
     play_edits(exposed_at);
     session_->show_news(&files_, rig_->now());
+    if (osc_) osc_->hear(session_, &books_->telemetry(), rig_->now());
     const Painted& painted = session_->paint(rig_->now(), shifted(rig_->now(), k_virtual_display_s));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i) {
       if (!is_plugged(session_->setup().rig.projectors[i].name, projectors_[i], rig_->now())) continue;
       LIMN_TRY(const Stamp shown_at, rig_->projector(static_cast<int>(i)).show(painted.projectors[i]));
       LIMN_CHECK(shown_at == painted.shown_at);
     }
+    if (osc_) osc_->tell(*session_);
     ShownFrame shown = session_->measured();
     if (shown.record_ms >= 0) shown.record_ms += frames_ms;
     shown.missed = static_cast<int>(rig_->world().rig.cameras.size() - frames.size());
@@ -143,6 +147,7 @@ class VirtualLoop {
   Session* session_;
   Books* books_;
   OperatorDesk* desk_;
+  OscPort* osc_;
   SceneWatch files_;
   DeviceHealth health_;
   std::vector<std::size_t> cameras_, projectors_;  // as health_ calls them
@@ -158,8 +163,9 @@ Status play_virtually(double end_s,
                       Watcher* watcher,
                       Session* session,
                       Books* books,
-                      OperatorDesk* desk) {
-  VirtualLoop loop(rig, room, watcher, session, books, desk);
+                      OperatorDesk* desk,
+                      OscPort* osc) {
+  VirtualLoop loop(rig, room, watcher, session, books, desk, osc);
   std::optional<Progress> progress;
   if (std::isfinite(end_s)) progress.emplace("live", static_cast<int>(std::ceil(end_s)));
   while (!is_ended && seconds_of(rig->next_exposure()) <= end_s) {

@@ -4,6 +4,7 @@
 
 #include "apps/live/books.h"
 #include "apps/live/operator_desk.h"
+#include "apps/live/osc_port.h"
 #include "apps/live/script.h"
 #include "apps/live/session.h"
 #include "apps/live/watcher.h"
@@ -17,7 +18,7 @@ constexpr double k_virtual_camera_s = 0.020, k_virtual_display_s = 0.040;
 
 /// Plays a session on a virtual rig, on its clock: nothing sleeps, every run is the same. In step: expose,
 /// watch, paint, show. Ends at `end_s` of the clock, with `is_ended`, or when the operator ends it (`desk`
-/// may be null).
+/// and `osc` may be null).
 Status play_virtually(double end_s,
                       const std::atomic<bool>& is_ended,
                       sim::VirtualRig* rig,
@@ -25,6 +26,7 @@ Status play_virtually(double end_s,
                       Watcher* watcher,
                       Session* session,
                       Books* books,
-                      OperatorDesk* desk);
+                      OperatorDesk* desk,
+                      OscPort* osc);
 
 }  // namespace limn::apps

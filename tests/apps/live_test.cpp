@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -12,10 +13,12 @@
 #include <thread>
 
 #include "apps/coarser.h"
+#include "apps/live/osc.h"
 #include "apps/live/replay.h"
 #include "apps/live/room.h"
 #include "apps/live/scene_watch.h"
 #include "apps/live/script.h"
+#include "apps/live/udp_socket.h"
 #include "apps/live/watcher.h"
 #include "apps/world_markers.h"
 #include "core/file.h"
@@ -185,6 +188,63 @@ TEST(Live, ASessionIsReplayedToTheLastDigit) {
   const Status damaged = with(cut);
   ASSERT_FALSE(damaged.ok());
   EXPECT_NE(damaged.message().find("events.jsonl:5"), std::string::npos) << damaged.message();
+}
+
+// Another program's edits come at any moment, are in the recording, and come again at the same one.
+TEST(Live, HearsAndTellsByOscAndIsReplayed) {
+  const fs::path folder = test::test_folder();
+  auto told = UdpSocket::hearing({"127.0.0.1", "0"});
+  ASSERT_TRUE(told) << told.message();
+  copy_studio_to(folder);
+  LiveOptions options;
+  options.resolution = 0.5;
+  options.world = folder / "world.json";
+  options.seconds = 1e5;  // ended below
+  options.osc = "127.0.0.1:47312";
+  options.osc_to = fmt::format("127.0.0.1:{}", told->port());
+  options.record = folder / "recording";
+  options.out = folder / "out";
+  bool was_told = false;
+  std::thread other([&] {
+    auto mouth = UdpSocket::sending({"127.0.0.1", "47312"});
+    const auto has_told = [&](const std::string& wanted) {
+      std::array<std::uint8_t, 2048> bytes;
+      while (const auto length = told->next(bytes))
+        if (std::string(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(*length)).find(wanted) !=
+            std::string::npos)
+          return true;
+      return false;
+    };
+    // Said again until it was heard; what comes once it is told of was heard as well.
+    const auto say = [&](const std::string& path, const std::vector<OscValue>& values,
+                         const std::string& answer) {
+      for (int i = 0; i < 600; ++i) {
+        mouth->send(osc_message(path, values));
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        if (has_told(answer)) return true;
+      }
+      return false;
+    };
+    was_told = say("/limn/choose_variant", {"mirror", "sport"}, "sport") &&
+               say("/limn/save_look", {"heard"}, "heard");
+    mouth->send(osc_message("/limn/restore_look", {"heard"}));
+    mouth->send(osc_message("/limn/restore_look", {"never"}));
+    was_told = was_told && say("/limn/save_look", {"last"}, "last");
+    std::raise(SIGTERM);
+  });
+  const Status lived = run_live(options);
+  other.join();
+  ASSERT_TRUE(lived.ok()) << lived.message();
+  EXPECT_TRUE(was_told);
+  const std::string page = read_file(folder / "out/session.html").value();
+  EXPECT_NE(page.find("choose_variant mirror sport (osc)"), std::string::npos);
+  EXPECT_NE(page.find("restore_look heard (osc)"), std::string::npos);
+  EXPECT_NE(page.find("OSC refused: restore_look: expected one of heard, found 'never'"), std::string::npos);
+  EXPECT_TRUE(fs::exists(folder / "door/looks/heard.json"));
+  ReplayOptions replay;
+  replay.session = folder / "recording";
+  const Status replayed = run_replay(replay);
+  EXPECT_TRUE(replayed.ok()) << replayed.message();
 }
 
 // A camera goes and comes back: parts are carried on, fade, and are there again.

@@ -46,6 +46,7 @@ const std::map<std::string, Rooms>& guests() {
       {"boost/", {"apps"}},
       {"turbojpeg", {"device"}},
       {"zip.h", {"apps"}},
+      {"lo/", {"apps"}},
       {"pugixml", {"apps"}},
       {"OpenEXR/", {"apps"}},
       {"opencv2/calib3d", {"calib"}},

@@ -1,0 +1,229 @@
+#include "apps/live/osc.h"
+
+#include <lo/lo.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <optional>
+
+namespace limn::apps {
+namespace {
+
+const std::string k_root = "/limn/";
+constexpr std::size_t k_longest_text = 200;  // bytes
+
+struct FreeMessage {
+  void operator()(lo_message message) const { lo_message_free(message); }
+};
+using Message = std::unique_ptr<std::remove_pointer_t<lo_message>, FreeMessage>;
+
+std::string arguments_of(const scene::Action& action) {
+  std::vector<std::string> words;
+  if (action.of_slot) words.push_back("slot (text)");
+  switch (action.takes) {
+    case scene::Takes::nothing:
+      break;
+    case scene::Takes::text:
+      words.push_back(action.value + " (text)");
+      break;
+    case scene::Takes::maybe_text:
+      words.push_back(action.value + " (text, may be left out)");
+      break;
+    case scene::Takes::millimetres:
+      words.push_back("three numbers, mm");
+      break;
+    case scene::Takes::on_off:
+      words.push_back("on, off or toggle (text; or true, false, a number: 0 is off; left out: toggle)");
+      break;
+  }
+  std::string all;
+  for (const std::string& word : words) all += (all.empty() ? "" : "; ") + word;
+  return all.empty() ? "none" : all;
+}
+
+bool is_printable(const std::string& text) {
+  return std::none_of(text.begin(), text.end(), [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return byte < 0x20 || byte == 0x7f;
+  });
+}
+
+// One argument, of the types that are understood.
+struct Argument {
+  char type;
+  const void* value;
+
+  std::optional<double> number() const {
+    switch (type) {
+      case LO_INT32:
+        return as<std::int32_t>();
+      case LO_INT64:
+        return static_cast<double>(as<std::int64_t>());
+      case LO_FLOAT:
+        return as<float>();
+      case LO_DOUBLE:
+        return as<double>();
+      default:
+        return std::nullopt;
+    }
+  }
+  std::optional<std::string> text() const {
+    if (type != LO_STRING && type != LO_SYMBOL) return std::nullopt;
+    return std::string(reinterpret_cast<const char*>(value));
+  }
+  // liblo's values lie at multiples of 4 bytes, whatever they are.
+  template <class T>
+  T as() const {
+    T out;
+    std::memcpy(&out, value, sizeof out);
+    return out;
+  }
+};
+
+// What is still to be read of a message's arguments.
+struct Reader {
+  std::string path;
+  std::vector<Argument> arguments;
+  std::size_t next = 0;
+
+  bool is_at_end() const { return next == arguments.size(); }
+
+  Result<std::string> text(const std::string& what) {
+    const auto found = is_at_end() ? std::nullopt : arguments[next].text();
+    if (!found) return error("{}: expected {} as text, found {}.", path, what, found_here());
+    if (found->size() > k_longest_text || !is_printable(*found))
+      return error("{}: expected {} of at most {} printable bytes, found {} bytes.", path, what,
+                   k_longest_text, found->size());
+    ++next;
+    return *found;
+  }
+
+  Result<double> number() {
+    const auto found = is_at_end() ? std::nullopt : arguments[next].number();
+    if (!found) return error("{}: expected three numbers of millimetres, found {}.", path, found_here());
+    if (!std::isfinite(*found)) return error("{}: expected finite numbers, found {}.", path, *found);
+    ++next;
+    return *found;
+  }
+
+  std::string found_here() const {
+    return is_at_end() ? std::string("no more arguments")
+                       : fmt::format("an argument of type '{}'", arguments[next].type);
+  }
+};
+
+Result<std::string> switch_of(Reader* reader) {
+  if (reader->is_at_end()) return std::string();
+  const Argument& argument = reader->arguments[reader->next];
+  if (argument.text()) return reader->text("on, off or toggle");
+  const auto number = argument.type == LO_TRUE    ? std::optional<double>(1)
+                      : argument.type == LO_FALSE ? std::optional<double>(0)
+                                                  : argument.number();
+  if (!number || !std::isfinite(*number))
+    return error("{}: expected on, off, toggle, true, false or a number, found {}.", reader->path,
+                 number ? fmt::format("{}", *number) : reader->found_here());
+  ++reader->next;
+  return std::string(*number == 0 ? "off" : "on");
+}
+
+Result<std::string> value_of(scene::Takes takes, const std::string& what, Reader* reader) {
+  switch (takes) {
+    case scene::Takes::nothing:
+      return std::string();
+    case scene::Takes::text:
+      return reader->text(what);
+    case scene::Takes::maybe_text:
+      return reader->is_at_end() ? Result<std::string>(std::string()) : reader->text(what);
+    case scene::Takes::millimetres: {
+      LIMN_TRY(const double x, reader->number());
+      LIMN_TRY(const double y, reader->number());
+      LIMN_TRY(const double z, reader->number());
+      return fmt::format("{} {} {}", x, y, z);
+    }
+    case scene::Takes::on_off:
+      return switch_of(reader);
+  }
+  LIMN_CHECK(false);
+}
+
+}  // namespace
+
+std::vector<OscAddress> osc_heard() {
+  std::vector<OscAddress> all;
+  for (const scene::Action& action : scene::actions())
+    all.push_back({k_root + action.name, arguments_of(action), action.what});
+  return all;
+}
+
+const std::vector<OscAddress>& osc_told() {
+  static const std::vector<OscAddress> all = {
+      {"/limn/state/variant", "slot (text); variant (text)", "which variant a slot shows"},
+      {"/limn/state/pose", "slot (text); x, y, z in mm; quaternion w, x, y, z",
+       "where the part is on the prototype (its mesh's frame; the world's without a prototype)"},
+      {"/limn/state/lost", "slot (text)", "the part is not shown: its marker is not seen"},
+      {"/limn/state/prototype", "x, y, z in mm; quaternion w, x, y, z",
+       "where the prototype is in the world"},
+      {"/limn/state/look", "name (text; empty: none)", "the look last saved or restored"},
+      {"/limn/state/looks", "number from 0; how many there are; name (text)", "a look, of all that are kept"},
+      {"/limn/state/blackout", "0 or 1", "no light"},
+      {"/limn/state/freeze", "0 or 1", "what is shown stays"},
+      {"/limn/state/marker_states", "0 or 1", "rings around markers"},
+      {"/limn/state/screen", "rest, full, camera, view, stereo or off (text)", "what screens show"},
+  };
+  return all;
+}
+
+Result<scene::Edit> edit_of_osc(std::span<const std::uint8_t> datagram) {
+  if (datagram.size() > k_longest_osc)
+    return error("expected a message of at most {} bytes, found {}.", k_longest_osc, datagram.size());
+  std::vector<std::uint8_t> bytes(datagram.begin(), datagram.end());
+  if (bytes.size() >= 8 && std::equal(bytes.begin(), bytes.begin() + 8, "#bundle"))
+    return error("expected a message, found a bundle. Send its messages one by one.");
+  int problem = 0;
+  const Message message(bytes.empty() ? nullptr
+                                      : lo_message_deserialise(bytes.data(), bytes.size(), &problem));
+  if (!message || bytes.front() != '/')
+    return error("expected a message of Open Sound Control 1.0, found {} other bytes.", bytes.size());
+  Reader reader{reinterpret_cast<const char*>(bytes.data()), {}};
+  const auto& actions = scene::actions();
+  const auto action = std::find_if(actions.begin(), actions.end(), [&](const scene::Action& known) {
+    return reader.path == k_root + known.name;
+  });
+  if (action == actions.end())
+    return error("expected an address of docs/osc.md ({}{} and so on), found '{}'.", k_root,
+                 actions.front().name,
+                 is_printable(reader.path) ? reader.path.substr(0, k_longest_text) : "?");
+  const char* types = lo_message_get_types(message.get());
+  lo_arg** values = lo_message_get_argv(message.get());
+  for (int i = 0; i < lo_message_get_argc(message.get()); ++i)
+    reader.arguments.push_back({types[i], values[i]});
+  scene::Edit edit{action->name, "", ""};
+  if (action->of_slot) {
+    LIMN_TRY(edit.slot, reader.text("a slot"));
+  }
+  LIMN_TRY(edit.value, value_of(action->takes, action->value, &reader));
+  if (!reader.is_at_end())
+    return error("{}: expected {} arguments at most, found {}.", reader.path, reader.next,
+                 reader.arguments.size());
+  return edit;
+}
+
+std::vector<std::uint8_t> osc_message(const std::string& path, const std::vector<OscValue>& arguments) {
+  const Message message(lo_message_new());
+  LIMN_CHECK(message != nullptr);
+  for (const OscValue& argument : arguments) {
+    if (const int* whole = std::get_if<int>(&argument))
+      lo_message_add_int32(message.get(), *whole);
+    else if (const float* number = std::get_if<float>(&argument))
+      lo_message_add_float(message.get(), *number);
+    else
+      lo_message_add_string(message.get(), std::get<std::string>(argument).c_str());
+  }
+  std::vector<std::uint8_t> bytes(lo_message_length(message.get(), path.c_str()));
+  lo_message_serialise(message.get(), path.c_str(), bytes.data(), nullptr);
+  return bytes;
+}
+
+}  // namespace limn::apps
