@@ -492,9 +492,9 @@ void print_table(const Foreseen& foreseen, const Described& described) {
              "steep", "coverage", "lux");
   for (const auto* imagers : {&foreseen.cameras, &foreseen.projectors}) {
     for (const ForeseenImager& imager : *imagers)
-      fmt::print("{:<14} {:>8.2f} {:>9.2f} {:>14.2f} {:>5.0f} ° {:>7.0f} % {:>7}\n", imager.name,
+      fmt::print("{:<14} {:>8.2f} {:>9.2f} {:>14.2f} {:>5.0f} ° {:>7.0f} %{}\n", imager.name,
                  imager.distance_m, imager.pixel_mm, imager.surface_mm, imager.steep_deg,
-                 100 * imager.coverage, imager.lux > 0 ? fmt::format("{:.0f}", imager.lux) : "");
+                 100 * imager.coverage, imager.lux > 0 ? fmt::format(" {:>7.0f}", imager.lux) : "");
   }
   for (const ForeseenPair& pair : foreseen.pairs)
     fmt::print("{} and {}: {:.0f} degrees apart, both reach {:.0f} % of the volume\n", pair.camera,
