@@ -1,6 +1,7 @@
 #include "apps/calibrate.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -10,6 +11,8 @@
 #include "apps/capture.h"
 #include "apps/plan.h"
 #include "apps/solve.h"
+#include "apps/wizard/device_checks.h"
+#include "apps/wizard/wizard_window.h"
 #include "apps/world_markers.h"
 #include "calib/held_out.h"
 #include "calib/judge/board_check.h"
@@ -20,6 +23,7 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/log.h"
+#include "device/desktop.h"
 
 namespace limn::apps {
 namespace {
@@ -28,8 +32,9 @@ namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 using Say = std::function<void(const std::string&)>;
 
-constexpr double k_settled = 0.05;               // of the predicted error, over two poses
-constexpr const char* k_taken_by = "plan.json";  // beside capture.json
+constexpr double k_settled = 0.05;  // of the predicted error, over two poses
+constexpr const char *k_taken_by = "plan.json", *k_latency = "latency.json";  // beside capture.json
+constexpr double k_guard_s = 0.001;                                           // beyond a measured latency
 
 // Every leaf of two plans that differs, the first alone: "plan.board: captured with …, this plan says …".
 std::string difference(const nlohmann::json& then, const nlohmann::json& now) {
@@ -149,9 +154,17 @@ class CaptureClock {
   int showing_ = -1;
 };
 
-Status capture(const calib::Captures& captures, int pose, const Surroundings& around, CaptureClock* clock) {
+// Ends early, with an error, when a person wishes to repeat or to leave.
+Status capture(const calib::Captures& captures,
+               int pose,
+               const Surroundings& around,
+               const std::atomic<WizardWish>* wish,
+               CaptureClock* clock) {
   calib::Stage stage = around.stage;
-  stage.show = [&](int projector, const cv::Mat& picture) {
+  stage.show = [&](int projector, const cv::Mat& picture) -> Status {
+    const WizardWish now = wish ? wish->load() : WizardWish::none;
+    if (now == WizardWish::check || now == WizardWish::repeat || now == WizardWish::leave)
+      return error("calibrate: stopped in pose {}.", pose);
     clock->showing(projector);
     return around.stage.show(projector, picture);
   };
@@ -167,10 +180,6 @@ Result<calib::Assessment> judged(const calib::Observed& observed) {
   const calib::SolveOptions options;
   LIMN_TRY(const calib::Solution solution, calib::solve(observed.observations, options));
   return calib::assess(observed, options, solution);
-}
-
-double predicted_mm(const calib::Assessment& assessment) {
-  return *std::max_element(assessment.predicted_error_mm.begin(), assessment.predicted_error_mm.end());
 }
 
 std::string line_of(const PoseJudged& judged) {
@@ -213,11 +222,11 @@ bool wants_poses(const calib::Fault& fault) {
 // A run of the wizard, from pose to pose.
 class Run {
  public:
-  Run(const calib::Captures& captures, const Surroundings& around, const Say& say)
+  Run(const calib::Captures& captures, const Surroundings& around, const WizardAudience& audience)
       : captures_(captures),
         around_(around),
-        say_(say),
-        faults_(say),
+        audience_(audience),
+        faults_(audience.say),
         clock_(captures.projectors.size(), around.now) {}
 
   Status pose(int number, const std::string& place) {
@@ -226,21 +235,23 @@ class Run {
     judged.pose = files.name;
     judged.before = is_complete(files);
     if (!judged.before) {
-      say_(fmt::format("{}: hold the board {}", files.name, place));
-      remove_pictures(files);
-      LIMN_TRY_STATUS(around_.hold(number));
       const double before_s = clock_.total();
-      LIMN_TRY_STATUS(capture(captures_, number, around_, &clock_));
+      LIMN_TRY_STATUS(take(number, place, files));
       judged.capture_s = clock_.total() - before_s;
     }
+    if (audience_.judges) audience_.judges(number);
     LIMN_TRY_STATUS(observe(files));
     judge(&judged);
-    say_(line_of(judged));
-    faults_.tell(judged.assessment ? judged.assessment->faults : calib::unsolved_faults(*observed_));
+    audience_.say(line_of(judged));
+    const auto faults = judged.assessment ? judged.assessment->faults : calib::unsolved_faults(*observed_);
+    faults_.tell(faults);
+    if (audience_.judged) audience_.judged(judged, observed_->observations, faults);
     return {};
   }
 
   bool is_enough() const { return !poses_.empty() && poses_.back().more_helps.empty(); }
+  // Whether no more poses are wanted; the wish is followed then.
+  bool is_to_finish() { return followed(WizardWish::finish); }
   std::vector<PoseJudged> poses() const { return poses_; }
   std::vector<std::pair<std::string, double>> capture_s() const {
     std::vector<std::pair<std::string, double>> named;
@@ -250,6 +261,49 @@ class Run {
   }
 
  private:
+  bool followed(WizardWish wish) {
+    const WizardWish wanted = wish;
+    if (!audience_.wish || !audience_.wish->compare_exchange_strong(wish, WizardWish::none)) return false;
+    are_checked_ &= wanted != WizardWish::check;
+    return true;
+  }
+
+  void step(WizardStep which, WizardState state, const std::string& words) {
+    if (audience_.step) audience_.step(which, state, words);
+  }
+
+  // Devices, once in a run; their latencies are kept beside the captures.
+  Status check() {
+    LIMN_TRY(const CheckedDevices checked, checked_devices(captures_, around_, audience_));
+    are_checked_ = true;
+    ordered_json json = {{"schema", "limn.latency/1"}, {"projectors", ordered_json::array()}};
+    for (std::size_t i = 0; i < checked.latency.size(); ++i)
+      if (checked.latency[i])
+        json["projectors"].push_back({{"name", captures_.projectors[i].name},
+                                      {"latency_ms", 1e3 * checked.latency[i]->seconds},
+                                      {"within_ms", 1e3 * checked.latency[i]->within_s}});
+    return write_file(captures_.folder / k_latency, json.dump(2) + "\n");
+  }
+
+  // The pictures of a pose, from the beginning as often as that is wished for.
+  Status take(int number, const std::string& place, const calib::CapturedPose& files) {
+    for (bool is_again = true; is_again;) {
+      audience_.say(fmt::format("{}: hold the board {}", files.name, place));
+      if (audience_.aims) audience_.aims(number);
+      step(WizardStep::board, WizardState::runs, files.name);
+      remove_pictures(files);
+      LIMN_TRY_STATUS(around_.hold(number));
+      if (!are_checked_) LIMN_TRY_STATUS(check());
+      const Status done = capture(captures_, number, around_, audience_.wish, &clock_);
+      if (audience_.wish && *audience_.wish == WizardWish::leave)
+        return error("calibrate: left in {}. What was captured is kept; the same command goes on from there.",
+                     files.name);
+      is_again = followed(WizardWish::check) || followed(WizardWish::repeat);
+      if (!is_again) LIMN_TRY_STATUS(done);
+    }
+    return {};
+  }
+
   Status observe(const calib::CapturedPose& files) {
     calib::Captures alone = captures_;
     alone.poses = {files};
@@ -270,8 +324,9 @@ class Run {
 
   const calib::Captures& captures_;
   const Surroundings& around_;
-  const Say& say_;
+  const WizardAudience& audience_;
   FaultTeller faults_;
+  bool are_checked_ = false;  // the devices
   CaptureClock clock_;
   std::optional<calib::Observed> observed_;
   std::vector<PoseJudged> poses_;
@@ -324,9 +379,11 @@ std::string to_json(const Calibrated& done) {
                        {"predicted_mm", predicted_mm(done.report.assessment)},
                        {"poses", ordered_json::array()},
                        {"capture_s", ordered_json::object()},
+                       {"latency_ms", ordered_json::object()},
                        {"seconds", done.seconds}};
   for (const PoseJudged& judged : done.poses) json["poses"].push_back(to_json(judged));
   for (const auto& [projector, seconds] : done.capture_s) json["capture_s"][projector] = seconds;
+  for (const auto& [projector, seconds] : done.latency_s) json["latency_ms"][projector] = 1e3 * seconds;
   return json.dump(2) + "\n";
 }
 
@@ -345,31 +402,144 @@ void say_end(const CalibrateOptions& options, const Calibrated& done, const Say&
   say(fmt::format("rig and report in {} ({:.0f} s)", options.out.string(), done.seconds));
 }
 
-// The virtual rig as the wizard's surroundings; all cameras expose at one moment.
-Surroundings virtual_surroundings(const Plan& plan, sim::VirtualRig* rig, PictureWriter* writer) {
-  Surroundings around;
-  around.stage = stage_of(rig, writer, nullptr);
-  const auto frames = std::make_shared<std::vector<cv::Mat>>(rig->world().rig.cameras.size());
-  around.stage.grab = [rig, frames](int camera) -> Result<cv::Mat> {
-    cv::Mat& wanted = frames->at(static_cast<std::size_t>(camera));
+// A virtual rig's devices with what is known of their latencies.
+struct VirtualStage {
+  sim::VirtualRig* rig = nullptr;
+  std::vector<double> latency_s;  // of the projectors
+  std::vector<cv::Mat> frames;    // of one exposure of all cameras, not grabbed yet
+  Stamp lit_at;                   // what was shown last is on the surface
+
+  Status show(int projector, const cv::Mat& picture) {
+    rig->darken();
+    lit_at = shifted(rig->now(), latency_s.at(static_cast<std::size_t>(projector)) + k_guard_s);
+    frames.assign(frames.size(), cv::Mat());
+    const auto shown = rig->projector(projector).show(picture);
+    return shown ? Status() : Status(shown.error());
+  }
+
+  cv::Mat grab(int camera) {
+    cv::Mat& wanted = frames.at(static_cast<std::size_t>(camera));
     if (wanted.empty()) {
+      rig->advance(std::max(0.0, seconds_between(rig->now(), lit_at)));
       std::vector<int> all;
-      for (int i = 0; i < static_cast<int>(frames->size()); ++i) all.push_back(i);
+      for (int i = 0; i < static_cast<int>(frames.size()); ++i) all.push_back(i);
       std::size_t i = 0;
-      for (Frame& frame : rig->expose(all)) frames->at(i++) = std::move(frame.image);
+      for (Frame& frame : rig->expose(all)) frames[i++] = std::move(frame.image);
     }
     return std::exchange(wanted, cv::Mat());
+  }
+
+  FlashStage flashes(int projector, int camera) {
+    rig->darken();
+    const auto show = [r = rig, projector](bool white) -> Result<Stamp> {
+      const Stamp at = r->now();
+      const cv::Mat picture(r->projector(projector).size(), CV_8UC1, cv::Scalar(white ? 255 : 0));
+      LIMN_TRY([[maybe_unused]] const Stamp shown_at, r->projector(projector).show(picture));
+      return at;
+    };
+    return {.show = show,
+            .next = [r = rig, camera] { return r->camera(camera).next(); },
+            .wait = [r = rig](double seconds) { r->advance(seconds); }};
+  }
+};
+
+// The virtual rig (that does not wait for light by itself) as the wizard's surroundings.
+Surroundings virtual_surroundings(const Plan& plan, sim::VirtualRig* rig, PictureWriter* writer) {
+  const auto stage = std::make_shared<VirtualStage>();
+  stage->rig = rig;
+  stage->latency_s.resize(rig->world().rig.projectors.size(), FlashOptions().limit_s);
+  stage->frames.resize(rig->world().rig.cameras.size());
+  return {.hold = [&plan, rig](int pose) -> Status {
+            rig->place(board_object(plan.board, plan.world_from_board[static_cast<std::size_t>(pose)]));
+            return {};
+          },
+          .stage = {.show = [stage](int p, const cv::Mat& picture) { return stage->show(p, picture); },
+                    .grab = [stage](int camera) -> Result<cv::Mat> { return stage->grab(camera); },
+                    .store = [writer](const fs::path& path,
+                                      const cv::Mat& picture) { return writer->store(path, picture); }},
+          .written = [writer] { return writer->finish(); },
+          .now = [rig] { return rig->now(); },
+          .flashes = [stage](int projector, int camera) { return stage->flashes(projector, camera); },
+          .use_latency =
+              [stage](int projector, double seconds) {
+                stage->latency_s.at(static_cast<std::size_t>(projector)) = seconds;
+              }};
+}
+
+// What an earlier run, or this one, has measured; empty where none has.
+Result<std::vector<std::pair<std::string, double>>> kept_latencies(const fs::path& path) {
+  std::vector<std::pair<std::string, double>> latency_s;
+  if (!fs::exists(path)) return latency_s;
+  LIMN_TRY(const Config config, Config::load(path, "limn.latency/1"));
+  for (const ConfigNode& node : config.root().at("projectors").items())
+    latency_s.emplace_back(node.at("name").text(), 1e-3 * node.at("latency_ms").number());
+  LIMN_TRY_STATUS(config.status());
+  return latency_s;
+}
+
+// Into the rig's provenance.
+Status add_to_rig(const std::vector<std::pair<std::string, double>>& latency_s, const fs::path& folder) {
+  if (latency_s.empty()) return {};
+  LIMN_TRY(Rig rig, load_rig(folder));
+  ordered_json provenance =
+      rig.provenance_json.empty() ? ordered_json::object() : ordered_json::parse(rig.provenance_json);
+  for (const auto& [projector, seconds] : latency_s)
+    provenance["display_latency_ms"][projector] = 1e3 * seconds;
+  rig.provenance_json = provenance.dump();
+  return save_rig(rig, folder);
+}
+
+// The board's outline in each camera's picture, for each pose.
+std::vector<std::vector<std::vector<Eigen::Vector2d>>> outlines(const Plan& plan,
+                                                                const std::vector<Imager>& cameras) {
+  const double width = plan.board.width_m(), height = plan.board.height_m();
+  const Eigen::Vector3d corners[] = {{0, 0, 0}, {width, 0, 0}, {width, height, 0}, {0, height, 0}};
+  std::vector<std::vector<std::vector<Eigen::Vector2d>>> all;
+  for (const Pose& world_from_board : plan.world_from_board) {
+    auto& pose = all.emplace_back();
+    for (const Imager& camera : cameras) {
+      auto& outline = pose.emplace_back();
+      for (const Eigen::Vector3d& p_board : corners) {
+        const auto px = camera.project(world_from_board * p_board);
+        if (px) outline.push_back(*px);
+      }
+      if (outline.size() < std::size(corners)) outline.clear();
+    }
+  }
+  return all;
+}
+
+std::string devices_in_words(const calib::Captures& captures) {
+  const auto counted = [](std::size_t count, const char* what) {
+    return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
   };
-  around.hold = [&plan, rig](int pose) -> Status {
-    rig->place(board_object(plan.board, plan.world_from_board[static_cast<std::size_t>(pose)]));
-    return {};
-  };
-  around.written = [writer] { return writer->finish(); };
-  around.now = [rig] { return rig->now(); };
-  return around;
+  return fmt::format("virtual rig: {}, {}", counted(captures.cameras.size(), "camera"),
+                     counted(captures.projectors.size(), "projector"));
+}
+
+// None where lines are wanted, or where there is no display.
+std::optional<GuiWindow> window_for(const CalibrateOptions& options) {
+  constexpr int k_width = 1600, k_height = 1000;
+  if (options.terminal || options.json) return std::nullopt;
+  const auto desktop = device::Desktop::open();
+  auto window = desktop ? GuiWindow::open(*desktop, "Limn calibration", k_width, k_height)
+                        : Result<GuiWindow>(desktop.error());
+  if (window) return std::move(*window);
+  log_info("calibrate: {} The wizard goes on in the terminal.", window.message());
+  return std::nullopt;
 }
 
 }  // namespace
+
+std::string to_text(WizardStep step) {
+  static const std::array<const char*, k_wizard_steps> names = {
+      "devices", "outputs", "exposure and focus", "display latency", "board", "solve", "result"};
+  return names.at(static_cast<std::size_t>(step));
+}
+
+double predicted_mm(const calib::Assessment& assessment) {
+  return *std::max_element(assessment.predicted_error_mm.begin(), assessment.predicted_error_mm.end());
+}
 
 std::string more_helps(const std::vector<PoseJudged>& poses) {
   if (poses.empty() || !poses.back().assessment) return "too few for a rig";
@@ -390,24 +560,31 @@ Result<Calibrated> calibrated(const CalibrateOptions& options,
                               const calib::Captures& captures,
                               const std::vector<std::string>& places,
                               const Surroundings& surroundings,
-                              const std::function<void(const std::string&)>& say) {
+                              const WizardAudience& audience) {
   const auto begun = std::chrono::steady_clock::now();
   const int count = static_cast<int>(places.size());
   LIMN_TRY_STATUS(opened(captures, plan_json));
-  Run run(captures, surroundings, say);
+  Run run(captures, surroundings, audience);
+  const auto solved_all = [&] {
+    if (audience.step) audience.step(WizardStep::solve, WizardState::runs, "");
+    return solve_all(options, captures, count);
+  };
   std::optional<calib::Report> report;
   for (int pose = 0; pose < count; ++pose) {
     LIMN_TRY_STATUS(run.pose(pose, places[static_cast<std::size_t>(pose)]));
+    if (run.is_to_finish()) break;
     const bool is_next_there = pose + 1 < count && is_complete(files_of(captures, pose + 1));
     if (options.all || is_next_there || pose + 1 == count || !run.is_enough()) continue;
-    LIMN_TRY(report, solve_all(options, captures, count));
+    LIMN_TRY(report, solved_all());
     if (report->assessment.verdict == calib::Verdict::good) break;
     report.reset();
   }
   if (!report) {
-    LIMN_TRY(report, solve_all(options, captures, count));
+    LIMN_TRY(report, solved_all());
   }
-  return Calibrated{run.poses(), std::move(*report), run.capture_s(),
+  LIMN_TRY(const auto latency_s, kept_latencies(captures.folder / k_latency));
+  LIMN_TRY_STATUS(add_to_rig(latency_s, options.out));
+  return Calibrated{run.poses(), std::move(*report), run.capture_s(), latency_s,
                     std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count()};
 }
 
@@ -415,7 +592,7 @@ Status run_calibrate(const CalibrateOptions& options) {
   LIMN_TRY(const Plan plan, load_plan(options.plan));
   LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_picture));
   LIMN_TRY(const std::string text, plan_text(options.plan, plan.world));
-  sim::VirtualRig rig(std::move(world));
+  sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
   LIMN_TRY(const calib::Captures captures, planned(plan, rig, options.out / "captures"));
   const auto places = places_in_words(rig.world().rig.cameras[0], plan.board, plan.world_from_board);
   const Say say = [&](const std::string& line) {
@@ -425,8 +602,17 @@ Status run_calibrate(const CalibrateOptions& options) {
   };
   PictureWriter writer;
   rig.clear_stage();
+  const Surroundings around = virtual_surroundings(plan, &rig, &writer);
+  const WizardWork work = [&](const Surroundings& where, const WizardAudience& audience) {
+    return calibrated(options, text, captures, places, where, audience);
+  };
+  std::optional<GuiWindow> window = window_for(options);
   LIMN_TRY(const Calibrated done,
-           calibrated(options, text, captures, places, virtual_surroundings(plan, &rig, &writer), say));
+           window ? calibrated_in_window(&*window,
+                                         {captures, places, outlines(plan, rig.world().rig.cameras),
+                                          devices_in_words(captures)},
+                                         around, say, work)
+                  : work(around, {.say = say}));
   say_end(options, done, say);
   if (options.json) fmt::print("{}", to_json(done));
   return {};

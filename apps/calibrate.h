@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -7,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "apps/wizard/display_latency.h"
+#include "apps/wizard/light_check.h"
 #include "calib/capture.h"
 #include "calib/captures.h"
 #include "calib/report/report.h"
@@ -19,7 +22,8 @@ struct CalibrateOptions {
   std::filesystem::path plan;
   std::filesystem::path out;  ///< the rig folder; its captures/ keeps every picture
   bool all = false;           ///< take every pose of the plan, although fewer are enough
-  bool json = false;          ///< print one JSON at the end; the lines go to stderr
+  bool terminal = false;      ///< lines instead of a window
+  bool json = false;          ///< print one JSON at the end; the lines go to stderr, there is no window
 };
 
 /// What the wizard needs from outside: functions, so that a virtual rig and devices in a room are alike.
@@ -28,6 +32,11 @@ struct Surroundings {
   calib::Stage stage;
   std::function<Status()> written;  ///< returns when every picture that was stored is on the disk
   std::function<Stamp()> now;       ///< of the cameras' clock
+  /// One projector and one camera, the others dark.
+  std::function<FlashStage(int projector, int camera)> flashes;
+  /// From now on a picture is on the surface so long after it was shown; before, the longest that is
+  /// measured.
+  std::function<void(int projector, double seconds)> use_latency;
 };
 
 /// What the captures up to one pose are worth.
@@ -41,14 +50,48 @@ struct PoseJudged {
   std::string more_helps;  ///< why more poses help; empty: they are enough
 };
 
+/// The wizard's steps, in their order.
+enum class WizardStep { devices, outputs, exposure, latency, board, solve, result };
+constexpr std::size_t k_wizard_steps = 7;
+std::string to_text(WizardStep step);
+enum class WizardState { waits, runs, done, fails };
+
+/// What a person asks of a running wizard.
+enum class WizardWish {
+  none,
+  check,   ///< look at outputs, exposure and latency again, then take the pictures of this pose again
+  repeat,  ///< take the pictures of this pose again
+  finish,  ///< take no more poses: solve
+  leave    ///< stop; what was captured stays, the next run goes on from there
+};
+
+/// Who watches the wizard; functions may be empty, but for `say`.
+struct WizardAudience {
+  std::function<void(const std::string& line)> say;
+  std::function<void(WizardStep step, WizardState state, const std::string& words)> step = nullptr;
+  std::function<void(const std::vector<LightSeen>&)> lit = nullptr;
+  std::function<void(int pose)> aims = nullptr;    ///< a pose's pictures are taken from now on
+  std::function<void(int pose)> judges = nullptr;  ///< it is decoded and judged from now on
+  /// Observations are of all poses so far.
+  std::function<void(const PoseJudged&, const calib::Observations&, const std::vector<calib::Fault>&)>
+      judged = nullptr;
+  std::atomic<WizardWish>* wish = nullptr;  ///< none again once it is followed
+};
+
 /// What a run of the wizard gave.
 struct Calibrated {
   std::vector<PoseJudged> poses;
   calib::Report report;  ///< as limn solve writes it
   /// Of the captures taken by this run, on the cameras' clock: by name of the projector.
   std::vector<std::pair<std::string, double>> capture_s;
+  /// Measured, from show to light, by name of the projector; those of an earlier run where this one captured
+  /// nothing.
+  std::vector<std::pair<std::string, double>> latency_s;
   double seconds = 0;  ///< the run, by the wall
 };
+
+/// The largest of its projectors' predicted errors.
+double predicted_mm(const calib::Assessment& assessment);
 
 /// Why more poses help after the last of `poses`, in a few words; empty when they are enough: the rig is good
 /// without a fault that only more poses cure, and the predicted error is a quarter of a millimetre at most or
@@ -56,18 +99,20 @@ struct Calibrated {
 std::string more_helps(const std::vector<PoseJudged>& poses);
 
 /// The sequence: pose after pose of `captures` (planned, its folder is options.out / "captures"; begun or
-/// not) is captured unless it is there already, decoded, solved and judged, with a line each through `say`;
-/// then the rig is solved as limn solve does it. `places`: where each pose's board is to be held, in words.
-/// Captures that another plan made are an error that says what differs; `plan_json` describes this one.
-/// Whatever fails, pictures on the disk stay there, and the next run goes on from them.
+/// not) is captured unless it is there already, decoded, solved and judged, with a line each to `audience`;
+/// before the first one that is captured the devices are checked (wizard/device_checks.h). Then the rig is
+/// solved as limn solve does it. `places`: where each pose's board is to be held, in words. Captures that
+/// another plan made are an error that says what differs; `plan_json` describes this one. Whatever fails,
+/// pictures on the disk stay there, and the next run goes on from them; leaving is an error, too.
 Result<Calibrated> calibrated(const CalibrateOptions& options,
                               const std::string& plan_json,
                               const calib::Captures& captures,
                               const std::vector<std::string>& places,
                               const Surroundings& surroundings,
-                              const std::function<void(const std::string&)>& say);
+                              const WizardAudience& audience);
 
-/// `limn calibrate`: on the virtual rig of the plan's world.
+/// `limn calibrate`: on the virtual rig of the plan's world; in a window where a display is there and neither
+/// `terminal` nor `json` is asked for.
 Status run_calibrate(const CalibrateOptions& options);
 
 }  // namespace limn::apps

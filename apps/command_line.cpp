@@ -200,14 +200,15 @@ void add_solve(CLI::App& app, Run& run) {
 void add_calibrate(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand("calibrate", "the wizard: where to hold the board next, captures, solve, report");
   command->footer(
-      "In the terminal, so far on the virtual rig of the plan's world. OUT/captures keeps every picture: the same command\n"
-      "goes on where it was left. Ends when more poses no longer help and the rig is good, or the plan has no more.\n"
+      "In a window where there is a display, so far on the virtual rig of the plan's world. OUT/captures keeps every picture:\n"
+      "the same command goes on where it was left. Ends when more poses no longer help and the rig is good, or the plan has no more.\n"
       "Example: limn calibrate --plan config/plans/bench.json --out rig");
   auto options = std::make_shared<CalibrateOptions>();
   command->add_option("--plan", options->plan, "plan file (limn.plan/1)")->required();
   command->add_option("--out", options->out, "rig folder to write, with the captures in it")->required();
   command->add_flag("--all", options->all, "take every pose of the plan, although fewer are enough");
-  command->add_flag("--json", options->json, "print JSON instead of lines");
+  command->add_flag("--terminal", options->terminal, "lines in the terminal instead of the window");
+  command->add_flag("--json", options->json, "print JSON instead of lines, without a window");
   command->callback([options, &run] { run = [options] { return finished(run_calibrate(*options)); }; });
 }
 

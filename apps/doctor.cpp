@@ -3,18 +3,17 @@
 #include <time.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <set>
 #include <sstream>
 #include <thread>
 
 #include "apps/devices.h"
+#include "apps/output_sign.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "device/gige_camera.h"
@@ -203,53 +202,17 @@ Findings cameras(const Devices& devices) {
   return findings;
 }
 
-// What a display shows of itself: its number, its colour, a line around the edge, and a patch whose pixels
-// take turns (grey and even where pixels are lit one by one, with a pattern in it where something scales).
-cv::Mat sign(cv::Size size, int number, const std::string& name, const cv::Scalar& colour) {
-  cv::Mat picture(size, CV_8UC3, colour);
-  const auto write = [&](const std::string& text, double height, double baseline) {
-    const double scale = height * size.height / 22;  // Hershey's capitals are 22 pixels high
-    const int thickness = std::max(1, static_cast<int>(2 * scale));
-    const int width = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, scale, thickness, nullptr).width;
-    const double fit = std::min(1.0, 0.9 * size.width / std::max(1, width));
-    cv::putText(picture, text,
-                {static_cast<int>((size.width - fit * width) / 2), static_cast<int>(baseline * size.height)},
-                cv::FONT_HERSHEY_SIMPLEX, fit * scale, cv::Scalar(),
-                std::max(1, static_cast<int>(fit * thickness)), cv::LINE_AA);
-  };
-  write(std::to_string(number), 0.45, 0.6);
-  write(fmt::format("{} {}x{}", name, size.width, size.height), 0.06, 0.75);
-  cv::rectangle(picture, cv::Rect({}, size), cv::Scalar::all(255));
-  const cv::Rect patch(size.width * 2 / 5, size.height * 4 / 5, size.width / 5, size.height / 8);
-  for (int y = patch.y; y < patch.br().y; ++y)
-    for (int x = patch.x; x < patch.br().x; ++x)
-      picture.at<cv::Vec3b>(y, x) = (x + y) % 2 ? cv::Vec3b(255, 255, 255) : cv::Vec3b(0, 0, 0);
-  return picture;
-}
-
-struct Colour {
-  const char* name;
-  cv::Scalar bgr;
-};
-
 // Shows every display its number and colour until the time is over; the moment's last word on each.
 Findings show_signs(const std::vector<std::unique_ptr<device::Display>>& shown, double seconds) {
-  static const std::array<Colour, 6> k_colours = {{{"red", {60, 60, 255}},
-                                                   {"green", {60, 255, 60}},
-                                                   {"blue", {255, 100, 60}},
-                                                   {"yellow", {40, 255, 255}},
-                                                   {"magenta", {255, 60, 255}},
-                                                   {"cyan", {255, 255, 40}}}};
   Findings findings(shown.size());
   const Stamp until = shifted(Clock::now(), seconds);
   do {
     for (std::size_t i = 0; i < shown.size(); ++i) {
-      const Colour& colour = k_colours[i % k_colours.size()];
       device::Display& display = *shown[i];
-      const auto done =
-          display.show(sign(display.size(), static_cast<int>(i) + 1, display.name(), colour.bgr));
+      const int number = static_cast<int>(i) + 1;
+      const auto done = display.show(output_sign(display.size(), number, display.name()));
       findings[i] = {"displays", display.name(), State::works,
-                     fmt::format("shows the number {} on {}", i + 1, colour.name), ""};
+                     fmt::format("shows the number {} on {}", number, sign_colour(number)), ""};
       if (!done) findings[i] = failed("displays", display.name(), done.message());
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(50));

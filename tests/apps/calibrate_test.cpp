@@ -8,6 +8,7 @@
 #include "apps/board_place.h"
 #include "core/file.h"
 #include "core/rig.h"
+#include "tests/apps/small_plan.h"
 #include "tests/support/matchers.h"
 
 namespace limn::apps {
@@ -16,30 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 using Eigen::Vector3d;
 using nlohmann::json;
-
-json read_json(const fs::path& path) { return json::parse(read_file(path).value(), nullptr, true, true); }
-
-// Pixels a side by `share`; the same field of view.
-void shrink(double share, json* imager) {
-  for (auto& side : (*imager)["size"]) side = static_cast<int>(share * side.get<int>());
-  auto& values = (*imager)["lens"]["values"];
-  for (std::size_t i = 0; i < 2; ++i) values[i] = share * values[i].get<double>();
-  for (std::size_t i = 2; i < 4; ++i) values[i] = share * (values[i].get<double>() + 0.5) - 0.5;
-}
-
-// The bench's plan and world with fewer pixels, in `folder`.
-fs::path small_plan(const fs::path& folder) {
-  const fs::path config = fs::path(LIMN_SOURCE_DIR) / "config";
-  json world = read_json(config / "worlds/bench.json"), plan = read_json(config / "plans/bench.json");
-  world["scene"] = (config / "scenes/door").string();
-  shrink(0.625, &world["cameras"][0]);
-  shrink(0.25, &world["projectors"][0]);
-  plan["world"] = "world.json";
-  plan["board"] = "charuco:8x6:55mm";
-  EXPECT_TRUE(write_file(folder / "world.json", world.dump(2)).ok());
-  EXPECT_TRUE(write_file(folder / "plan.json", plan.dump(2)).ok());
-  return folder / "plan.json";
-}
+using test::read_json;
+using test::small_plan;
 
 // What `limn calibrate --json` prints.
 json calibrated_json(const CalibrateOptions& options) {
@@ -67,6 +46,10 @@ TEST(Calibrate, GoesFromNothingToAGoodRigAndOnFromWhereItWasLeft) {
   const auto rig = load_rig(out);
   ASSERT_TRUE(rig.ok()) << rig.message();
   EXPECT_NEAR(rig->projectors[0].lens.fx(), 380, 4);
+  // The rig's latency, within 2 ms of the virtual projector's; the captures waited no longer than for it.
+  EXPECT_NEAR(first["latency_ms"]["projector0"].get<double>(), 33, 2);
+  EXPECT_NEAR(read_json(out / "rig.json")["provenance"]["display_latency_ms"]["projector0"].get<double>(), 33,
+              2);
   EXPECT_TRUE(fs::exists(out / "report.html"));
   EXPECT_EQ(read_json(out / "report.json")["verdict"], "good");
 
@@ -121,7 +104,7 @@ TEST(Calibrate, LeavesCapturesOfOthersAlone) {
   const fs::path folder = test::test_folder(), plan = small_plan(folder);
   ASSERT_TRUE(make_folder(folder / "rig/captures").ok());
   ASSERT_TRUE(write_file(folder / "rig/captures/capture.json", "{}").ok());
-  const Status refused = run_calibrate({.plan = plan, .out = folder / "rig"});
+  const Status refused = run_calibrate({.plan = plan, .out = folder / "rig", .terminal = true});
   ASSERT_FALSE(refused.ok());
   EXPECT_NE(refused.message().find("Choose another --out"), std::string::npos) << refused.message();
   EXPECT_EQ(read_file(folder / "rig/captures/capture.json").value(), "{}");

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "apps/calibrate.h"
+#include "apps/wizard/display_latency.h"
+#include "apps/wizard/light_check.h"
+#include "core/result.h"
+
+namespace limn::apps {
+
+/// What the wizard found out before the first pose.
+struct CheckedDevices {
+  std::vector<LightSeen> light;  ///< projector by projector, of every camera
+  std::vector<std::optional<DisplayLatency>>
+      latency;  ///< of each projector; none: no camera sees it, or it jitters
+};
+
+/// Outputs identify themselves, exposure and focus are judged, latencies measured and handed to the
+/// surroundings, a line each to the audience. What is wrong is told with what to do; only a device that fails
+/// is an error.
+Result<CheckedDevices> checked_devices(const calib::Captures& captures,
+                                       const Surroundings& surroundings,
+                                       const WizardAudience& audience);
+
+}  // namespace limn::apps

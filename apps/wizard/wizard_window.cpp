@@ -1,0 +1,223 @@
+#include "apps/wizard/wizard_window.h"
+
+#include <chrono>
+#include <future>
+#include <mutex>
+#include <thread>
+
+#include "apps/wizard/wizard_panel.h"
+#include "calib/board/board_finder.h"
+#include "core/picture.h"
+
+namespace limn::apps {
+namespace {
+
+using State = WizardState;
+
+// What worker and window share.
+class Stand {
+ public:
+  explicit Stand(const WizardPlan& plan) : plan_(plan) {
+    step(WizardStep::devices) = {State::done, plan.devices};
+    for (const calib::CapturedDevice& camera : plan.captures.cameras)
+      view_.cameras.push_back({.name = camera.name, .width = camera.width, .height = camera.height});
+    for (const calib::CapturedDevice& projector : plan.captures.projectors)
+      view_.projectors.push_back({projector.name, projector.width, projector.height, {}});
+    view_.poses = static_cast<int>(plan.places.size());
+  }
+
+  WizardView view() const {
+    const std::lock_guard lock(mutex_);
+    return view_;
+  }
+
+  void wish(WizardWish wish) {
+    wish_ = wish;
+    if (wish != WizardWish::leave) return;
+    const std::lock_guard lock(mutex_);
+    view_.is_leaving = true;
+  }
+
+  WizardAudience audience(const std::function<void(const std::string&)>& say) {
+    return {.say = say,
+            .step =
+                [this](WizardStep which, State state, const std::string& words) {
+                  const std::lock_guard lock(mutex_);
+                  const bool is_pose = which == WizardStep::board;
+                  step(which) = {state,
+                                 is_pose ? fmt::format("pose {} of {}", view_.pose + 1, view_.poses) : words};
+                  view_.is_capturing &= which != WizardStep::solve;
+                },
+            .lit =
+                [this](const std::vector<LightSeen>& light) {
+                  const std::lock_guard lock(mutex_);
+                  view_.light = light;
+                },
+            .aims = [this](int pose) { aims(pose); },
+            .judges = [this](int pose) { judges(pose); },
+            .judged = [this](const PoseJudged& judged, const calib::Observations& observations,
+                             const std::vector<calib::Fault>& faults) { take(judged, observations, faults); },
+            .wish = &wish_};
+  }
+
+  // The same surroundings, with the pictures passing by here.
+  Surroundings watched(Surroundings around) {
+    const auto grab = around.stage.grab;
+    around.stage.grab = [this, grab](int camera) -> Result<cv::Mat> {
+      LIMN_TRY(const cv::Mat picture, grab(camera));
+      const std::lock_guard lock(mutex_);
+      view_.cameras[static_cast<std::size_t>(camera)].picture = picture;
+      return picture;
+    };
+    around.stage.tell = [this](int done, int total) {
+      const std::lock_guard lock(mutex_);
+      view_.pictures = done;
+      view_.pictures_of = total;
+    };
+    around.flashes = [this, flashes = around.flashes](int projector, int camera) {
+      FlashStage flash = flashes(projector, camera);
+      flash.next = [this, next = flash.next, camera]() -> Result<Frame> {
+        LIMN_TRY(Frame frame, next());
+        const std::lock_guard lock(mutex_);
+        view_.cameras[static_cast<std::size_t>(camera)].picture = frame.image;
+        return frame;
+      };
+      return flash;
+    };
+    around.hold = [this, around](int pose) -> Status {
+      LIMN_TRY_STATUS(around.hold(pose));
+      return find_board(around.stage);
+    };
+    return around;
+  }
+
+  void end(const Result<Calibrated>& done) {
+    const std::lock_guard lock(mutex_);
+    view_.is_over = true;
+    view_.is_capturing = false;
+    if (!done) {
+      for (WizardView::Step& step : view_.steps)
+        if (step.state == State::runs) step.state = State::fails;
+      view_.failure = done.message();
+      return;
+    }
+    const calib::Report& report = done->report;
+    for (WizardView::Step& step : view_.steps)
+      if (step.state != State::fails) step.state = State::done;
+    step(WizardStep::board).words = fmt::format("{} poses", done->poses.size());
+    step(WizardStep::solve).words = fmt::format("held-out {:.3f} px", report.assessment.held_out.rms_px);
+    step(WizardStep::result).words = calib::to_text(report.assessment.verdict);
+    view_.worth = report.assessment.verdict;
+    view_.verdict = report.words.verdict;
+    view_.faults = report.assessment.faults;
+    view_.to_do = report.words.advice;
+    view_.maps = report.assessment.error_maps;
+    view_.advice.clear();
+  }
+
+ private:
+  void aims(int pose) {
+    const std::lock_guard lock(mutex_);
+    const auto at = static_cast<std::size_t>(pose);
+    view_.pose = pose;
+    view_.place = plan_.places[at];
+    view_.is_capturing = true;
+    view_.pictures = 0;
+    for (std::size_t i = 0; i < view_.cameras.size(); ++i) {
+      view_.cameras[i].target = plan_.targets[at][i];
+      view_.cameras[i].corners.clear();
+    }
+  }
+
+  void judges(int pose) {
+    const std::lock_guard lock(mutex_);
+    view_.pose = pose;
+    view_.place = plan_.places[static_cast<std::size_t>(pose)];
+    view_.is_capturing = false;
+  }
+
+  void take(const PoseJudged& judged,
+            const calib::Observations& observations,
+            const std::vector<calib::Fault>& faults) {
+    const std::lock_guard lock(mutex_);
+    WizardView::Judged row{judged.pose, std::nullopt, std::nullopt};
+    if (judged.assessment) {
+      row.held_out_px = judged.assessment->held_out.rms_px;
+      row.predicted_mm = predicted_mm(*judged.assessment);
+    }
+    view_.judged.push_back(row);
+    view_.advice = !judged.assessment          ? "No rig yet: " + judged.unsolved
+                   : judged.more_helps.empty() ? "These poses are enough."
+                                               : "More poses help: " + judged.more_helps + ".";
+    view_.faults = faults;
+    std::vector<std::vector<Eigen::Vector2d>> cameras(view_.cameras.size()),
+        projectors(view_.projectors.size());
+    for (const calib::CornerSeen& corner : observations.corners)
+      cameras[static_cast<std::size_t>(corner.camera)].push_back(corner.px);
+    for (const calib::Match& match : observations.matches)
+      projectors[static_cast<std::size_t>(match.projector)].push_back(match.px_projector);
+    for (std::size_t i = 0; i < cameras.size(); ++i)
+      view_.cameras[i].seen = cells_of(cameras[i], view_.cameras[i].width, view_.cameras[i].height);
+    for (std::size_t i = 0; i < projectors.size(); ++i)
+      view_.projectors[i].seen =
+          cells_of(projectors[i], view_.projectors[i].width, view_.projectors[i].height);
+  }
+
+  // The board as it is held, in white light.
+  Status find_board(const calib::Stage& stage) {
+    const calib::CapturedDevice& first = plan_.captures.projectors.at(0);
+    LIMN_TRY_STATUS(stage.show(0, cv::Mat(first.height, first.width, CV_8UC1, cv::Scalar(255))));
+    for (std::size_t i = 0; i < plan_.captures.cameras.size(); ++i) {
+      LIMN_TRY(const cv::Mat picture, stage.grab(static_cast<int>(i)));
+      std::vector<Eigen::Vector2d> corners;
+      for (const calib::BoardCorner& corner : calib::find_board(plan_.captures.board, to_grey(picture)))
+        corners.push_back(corner.px);
+      const std::lock_guard lock(mutex_);
+      view_.cameras[i].corners = std::move(corners);
+    }
+    return {};
+  }
+
+  WizardView::Step& step(WizardStep which) { return view_.steps.at(static_cast<std::size_t>(which)); }
+
+  const WizardPlan& plan_;
+  mutable std::mutex mutex_;
+  WizardView view_;
+  std::atomic<WizardWish> wish_ = WizardWish::none;
+};
+
+}  // namespace
+
+Result<Calibrated> calibrated_in_window(GuiWindow* window,
+                                        const WizardPlan& plan,
+                                        const Surroundings& surroundings,
+                                        const std::function<void(const std::string&)>& say,
+                                        const WizardWork& work) {
+  Stand stand(plan);
+  auto running = std::async(std::launch::async, [&]() -> Result<Calibrated> {
+    try {
+      Result<Calibrated> done = work(stand.watched(surroundings), stand.audience(say));
+      stand.end(done);
+      return done;
+    } catch (const std::exception& bug) {
+      stand.end(error("this is a bug in Limn, please report it: {}", bug.what()));
+      throw;
+    }
+  });
+  for (bool is_closed = false; !is_closed;) {
+    window->pressed_keys();
+    if (!window->is_due()) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      continue;
+    }
+    const WizardView view = stand.view();
+    WizardWish wish = WizardWish::none;
+    window->draw([&](Gui& gui) { wish = draw_wizard(gui, view); });
+    if (!window->is_wanted()) wish = WizardWish::leave;
+    is_closed = wish == WizardWish::leave && (view.is_over || !window->is_wanted());
+    if (wish != WizardWish::none && !view.is_over) stand.wish(wish);
+  }
+  return running.get();
+}
+
+}  // namespace limn::apps

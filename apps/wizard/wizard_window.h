@@ -1,0 +1,35 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "apps/calibrate.h"
+#include "apps/window/gui_window.h"
+#include "apps/wizard/wizard_view.h"
+#include "core/result.h"
+
+namespace limn::apps {
+
+/// What the wizard's window is told beforehand.
+struct WizardPlan {
+  calib::Captures captures;         ///< planned
+  std::vector<std::string> places;  ///< where each pose's board is to be held, in words
+  /// The same as the board's outline in each camera's picture, pixels; empty where it would not be seen.
+  std::vector<std::vector<std::vector<Eigen::Vector2d>>> targets;  ///< [pose][camera]
+  std::string devices;                                             ///< what was found, in words
+};
+
+/// The wizard's work, as calibrated() with these surroundings and this audience.
+using WizardWork = std::function<Result<Calibrated>(const Surroundings&, const WizardAudience&)>;
+
+/// Does the work in a thread of its own while the window shows it, until the person closes the window. `say`
+/// gets the lines, too. Closed early, the work is left: its error comes back.
+Result<Calibrated> calibrated_in_window(GuiWindow* window,
+                                        const WizardPlan& plan,
+                                        const Surroundings& surroundings,
+                                        const std::function<void(const std::string&)>& say,
+                                        const WizardWork& work);
+
+}  // namespace limn::apps
