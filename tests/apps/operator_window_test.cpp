@@ -190,9 +190,9 @@ std::string session_with(LiveOptions options,
   std::thread person([&acts] {
     test::XPerson x;
     for (int i = 0; i < 300 && !x.finds("Limn"); ++i) std::this_thread::sleep_for(milliseconds(100));
-    std::this_thread::sleep_for(milliseconds(1000));
+    std::this_thread::sleep_for(milliseconds(2000));
     acts(&x);
-    std::this_thread::sleep_for(milliseconds(1500));
+    std::this_thread::sleep_for(milliseconds(3000));  // a picture at least, on a busy machine
     x.close();
   });
   const Status played = run_live(options);
@@ -216,8 +216,9 @@ TEST(OperatorWindow, KeysAndClicksReachAVirtualSession) {
   const std::string page = session_with(options, test::test_folder(), [](test::XPerson* x) {
     press_keys(x);
     x->move(30, 25);  // Blackout
-    std::this_thread::sleep_for(milliseconds(500));
+    std::this_thread::sleep_for(milliseconds(1000));
     x->button(30, 25, true);
+    std::this_thread::sleep_for(milliseconds(1000));
     x->button(30, 25, false);
   });
   EXPECT_NE(page.find("next_variant mirror (key)"), std::string::npos);
