@@ -2,10 +2,21 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 
 #include "core/marker.h"
 
 namespace limn::tracker {
+
+/// What the fit of a marker's whole pattern made of its corners, where blur mixes neighbouring edges
+/// (pattern_fit.h): it changes little from picture to picture, so that Detector::follow need not fit each.
+struct PatternShift {
+  std::array<Eigen::Vector2d, 4> px;          ///< corners by the pattern minus corners by the sides alone
+  std::array<Eigen::Matrix2d, 4> covariance;  ///< of the corners, as fitted (px^2)
+  std::array<double, 4> side_px;              ///< when it was fitted
+  double blur_px = 0;                         ///< likewise, as the sides alone showed it
+  int age = 0;                                ///< pictures since
+};
 
 /// A marker found in a picture.
 struct Detection {
@@ -21,6 +32,7 @@ struct Detection {
   /// Probability that the id is right, 0.9 … 1, for codes, barcodes and templates alike (identify.h): of what
   /// is as sure as this, so many are right.
   double score = 0;
+  std::optional<PatternShift> by_pattern;
 };
 
 }  // namespace limn::tracker

@@ -56,9 +56,32 @@ constexpr double k_cell_sigmas = 5;
 // px.
 constexpr double k_overlap_doubt = 0.15;
 
+double blur_of(const RefinedQuad& quad) {
+  return *std::max_element(quad.blur_px.begin(), quad.blur_px.end());
+}
+
 bool is_blurred(const RefinedQuad& quad, const SeenCells& cells) {
-  const double blur_px = *std::max_element(quad.blur_px.begin(), quad.blur_px.end());
-  return shortest_side(Quad{quad.corners_px}) < k_cell_sigmas * blur_px * cells.count;
+  return shortest_side(Quad{quad.corners_px}) < k_cell_sigmas * blur_of(quad) * cells.count;
+}
+
+// A shift is kept for so many pictures, and while the blur and all sides are as when it was fitted.
+constexpr int k_keep_pictures = 30;
+constexpr double k_like_blur = 0.15, k_like_side = 0.03;
+
+double side_of(const RefinedQuad& quad, std::size_t i) {
+  return (quad.corners_px[(i + 1) % 4] - quad.corners_px[i]).norm();
+}
+
+// Corner i of the marker is corner_of(i) of the quadrilateral that showed it.
+std::size_t corner_of(const Identity& identity, std::size_t i) { return (i + identity.first_corner) % 4; }
+
+bool still_holds(const PatternShift& shift, const Identity& identity, const RefinedQuad& quad) {
+  if (shift.age >= k_keep_pictures) return false;
+  if (std::abs(blur_of(quad) - shift.blur_px) > k_like_blur * shift.blur_px) return false;
+  for (std::size_t i = 0; i < 4; ++i)
+    if (std::abs(side_of(quad, corner_of(identity, i)) - shift.side_px[i]) > k_like_side * shift.side_px[i])
+      return false;
+  return true;
 }
 
 // Whether a marker found before takes the place.
@@ -67,6 +90,18 @@ bool is_taken(const Quad& quad, const std::vector<Detection>& detections) {
   const Eigen::Vector2d middle = 0.25 * (q[0] + q[1] + q[2] + q[3]);
   return std::any_of(detections.begin(), detections.end(),
                      [&](const Detection& d) { return (centre(d) - middle).norm() < 0.5 * longest_side(d); });
+}
+
+// Whether it is the square of a marker found before: another one may lie inside or around it.
+bool is_known(const Quad& quad, const std::vector<Detection>& detections) {
+  const auto& q = quad.corners_px;
+  const Eigen::Vector2d middle = 0.25 * (q[0] + q[1] + q[2] + q[3]);
+  const double side = shortest_side(quad);
+  return std::any_of(detections.begin(), detections.end(), [&](const Detection& d) {
+    const double longest = longest_side(d);
+    return (centre(d) - middle).norm() < 0.15 * longest && side > 0.5 * shortest_side(Quad{d.corners_px}) &&
+           side < 1.2 * longest;
+  });
 }
 
 // Whether both of a segment's ends lie on the marker or next to it.
@@ -112,10 +147,16 @@ std::vector<Detection> Detector::detect(const cv::Mat& grey, const Lens* lens) {
 }
 
 void Detector::detect(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections) {
-  LIMN_CHECK(grey.empty() || grey.type() == CV_8UC1);
   detections->clear();
+  detect_more(grey, lens, detections);
+}
+
+void Detector::detect_more(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections) {
+  LIMN_CHECK(grey.empty() || grey.type() == CV_8UC1);
   if (grey.empty()) return;
   find_candidates(grey);
+  if (!detections->empty())
+    std::erase_if(quads_, [&](const Quad& quad) { return is_known(quad, *detections); });
   read_all(grey, lens, Reading::open, detections);
   if (!options_.broken_markers) return;
   join_segments(grey, *detections);
@@ -137,7 +178,9 @@ void Detector::follow(const cv::Mat& grey,
 std::optional<Detection> Detector::found_again(const cv::Mat& grey, const Lens* lens, const Detection& last) {
   const double reach = 0.5 * longest_side(last);
   Quad quad{last.corners_px, reach};
-  auto found = read(grey, quad, lens, Reading::open, workers_[0]);
+  std::optional<PatternShift> shift = last.by_pattern;
+  if (shift) ++shift->age;
+  auto found = read(grey, quad, lens, Reading::open, workers_[0], shift ? &*shift : nullptr);
   if (found && found->marker == last.marker) return found;
   Eigen::AlignedBox2d box;
   for (const Eigen::Vector2d& corner : last.corners_px) box.extend(corner);
@@ -216,8 +259,12 @@ void Detector::read_all(const cv::Mat& grey,
     if (found) add_best_of_square(std::move(*found), detections);
 }
 
-std::optional<Detection> Detector::read(
-    const cv::Mat& grey, const Quad& quad, const Lens* lens, Reading reading, Worker& worker) const {
+std::optional<Detection> Detector::read(const cv::Mat& grey,
+                                        const Quad& quad,
+                                        const Lens* lens,
+                                        Reading reading,
+                                        Worker& worker,
+                                        const PatternShift* last) const {
   if (!may_be_marker(grey, quad, options_.min_contrast)) return std::nullopt;
   const bool covered = reading == Reading::covered;
   if (covered && !may_be_covered_code(grey, quad)) return std::nullopt;
@@ -240,13 +287,13 @@ std::optional<Detection> Detector::read(
     identity = refined ? identify(grey, *refined, families_, reading) : std::nullopt;
     if (!identity) return std::nullopt;
   }
-  if (!refined->separate || is_blurred(*refined, identity->cells))
-    settle_overlapping_edges(grey, *identity, worker, &*refined);
   Detection detection;
+  if (!refined->separate || is_blurred(*refined, identity->cells))
+    detection.by_pattern = settle_overlapping_edges(grey, *identity, worker, last, &*refined);
   detection.marker = identity->marker;
   detection.score = std::clamp(identity->score, 0.0, 1.0);
   for (std::size_t i = 0; i < 4; ++i) {
-    const std::size_t corner = (i + identity->first_corner) % 4;
+    const std::size_t corner = corner_of(*identity, i);
     detection.corners_px[i] = refined->corners_px[corner];
     detection.corner_covariance[i] = refined->corner_covariance[corner];
     detection.corner_visible[i] = refined->corner_visible[corner];
@@ -255,20 +302,37 @@ std::optional<Detection> Detector::read(
 }
 
 // Edges whose blur overlaps with others': by the whole pattern, or else with the doubt that they deserve.
-void Detector::settle_overlapping_edges(const cv::Mat& grey,
-                                        const Identity& identity,
-                                        Worker& worker,
-                                        RefinedQuad* refined) const {
-  const double blur_px = *std::max_element(refined->blur_px.begin(), refined->blur_px.end());
+std::optional<PatternShift> Detector::settle_overlapping_edges(const cv::Mat& grey,
+                                                               const Identity& identity,
+                                                               Worker& worker,
+                                                               const PatternShift* last,
+                                                               RefinedQuad* refined) const {
+  if (last && still_holds(*last, identity, *refined)) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      const std::size_t corner = corner_of(identity, i);
+      refined->corners_px[corner] += last->px[i];
+      refined->corner_covariance[corner] += last->covariance[i];
+    }
+    return *last;
+  }
   const bool may_fit = identity.cells.count > 0 && shortest_side(Quad{refined->corners_px}) > k_fit_above_px;
   if (may_fit)
     if (auto fitted = fit_pattern(grey, worker.refiner.light(), *refined, identity.cells, &worker.fit)) {
+      PatternShift shift;
+      shift.blur_px = blur_of(*refined);
+      for (std::size_t i = 0; i < 4; ++i) {
+        const std::size_t corner = corner_of(identity, i);
+        shift.px[i] = fitted->corners_px[corner] - refined->corners_px[corner];
+        shift.covariance[i] = fitted->corner_covariance[corner];
+        shift.side_px[i] = side_of(*refined, corner);
+      }
       *refined = *fitted;
-      return;
+      return shift;
     }
-  const double doubt_px = k_overlap_doubt * blur_px;
+  const double doubt_px = k_overlap_doubt * blur_of(*refined);
   for (Eigen::Matrix2d& covariance : refined->corner_covariance)
     covariance += doubt_px * doubt_px * Eigen::Matrix2d::Identity();
+  return std::nullopt;
 }
 
 }  // namespace limn::tracker

@@ -49,9 +49,13 @@ class Detector {
   /// fitted.
   void detect(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections);
 
+  /// Adds the markers that stand beside the `detections` there are: those of follow() need not be read twice.
+  void detect_more(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections);
+
   /// Finds markers again that were at `last`, looking only about there: a marker that moved by more than half
-  /// of its side is lost, and new ones want detect(). Each square once, in the order of `last`, which
-  /// `detections` must not be.
+  /// of its side is lost, and new ones want detect_more(). Each square once, in the order of `last`, which
+  /// `detections` must not be. A pattern is fitted anew now and then, and when the marker's view or blur
+  /// changes; between, corners keep their distance from what the sides alone say.
   void follow(const cv::Mat& grey,
               const Lens* lens,
               std::span<const Detection> last,
@@ -84,12 +88,17 @@ class Detector {
   void find_candidates(const cv::Mat& grey);
   void join_segments(const cv::Mat& grey, const std::vector<Detection>& found);
   void read_all(const cv::Mat& grey, const Lens* lens, Reading reading, std::vector<Detection>* detections);
-  std::optional<Detection> read(
-      const cv::Mat& grey, const Quad& quad, const Lens* lens, Reading reading, Worker& worker) const;
-  void settle_overlapping_edges(const cv::Mat& grey,
-                                const Identity& identity,
+  std::optional<Detection> read(const cv::Mat& grey,
+                                const Quad& quad,
+                                const Lens* lens,
+                                Reading reading,
                                 Worker& worker,
-                                RefinedQuad* refined) const;
+                                const PatternShift* last = nullptr) const;
+  std::optional<PatternShift> settle_overlapping_edges(const cv::Mat& grey,
+                                                       const Identity& identity,
+                                                       Worker& worker,
+                                                       const PatternShift* last,
+                                                       RefinedQuad* refined) const;
 };
 
 }  // namespace limn::tracker

@@ -90,20 +90,19 @@ const Watched& Watcher::watch(std::span<const Frame> frames) {
   return watched_;
 }
 
-// Markers are followed where they were; all of the picture is searched now and then, and when one is gone.
+// Markers are followed where they were; all of the picture is searched for others now and then, and when one
+// is gone.
 void Watcher::look(std::size_t camera, const Frame& frame) {
   Eye& eye = eyes_[camera];
   const Lens* lens = &rig_.cameras[camera].lens;
   std::vector<tracker::Detection>& detections = watched_.detections[camera];
   watched_.frames[camera] = frame;
   const cv::Mat grey = to_grey(frame.image);
-  bool search = eye.pictures++ % options_.full_scan_every == 0;
-  if (!search) {
-    eye.detector.follow(grey, lens, detections, &eye.followed);
-    search = eye.followed.size() < detections.size();
-    if (!search) std::swap(detections, eye.followed);
-  }
-  if (search) eye.detector.detect(grey, lens, &detections);
+  eye.detector.follow(grey, lens, detections, &eye.followed);
+  const bool search =
+      eye.pictures++ % options_.full_scan_every == 0 || eye.followed.size() < detections.size();
+  std::swap(detections, eye.followed);
+  if (search) eye.detector.detect_more(grey, lens, &detections);
 }
 
 // A control is used when one camera sees the gesture and none of the others sees the marker uncovered.

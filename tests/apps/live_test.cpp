@@ -461,7 +461,7 @@ TEST(Live, SaysWhatIsWrong) {
   EXPECT_NE(message(one).find("--rig and --scene together"), std::string::npos);
   LiveOptions script;
   script.script = written(folder / "a.json", script_of(1, {{{"at_s", 0.2}, {"dance", "x"}}}));
-  EXPECT_NE(message(script).find("events[0]: expected one of sway, move, cover, block, unplug, edit"),
+  EXPECT_NE(message(script).find("events[0]: expected one of sway, move, cover, block, unplug, nudge, edit"),
             std::string::npos)
       << message(script);
   script.script =

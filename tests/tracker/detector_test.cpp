@@ -436,6 +436,45 @@ TEST(Detector, FollowsMarkersUnderFingersToThePicturesEnd) {
   EXPECT_TRUE(found.empty());
 }
 
+// A blurred marker that is followed: its pattern need not be fitted in each picture.
+TEST(Detector, KeepsWhatThePatternSaidOfTheCorners) {
+  auto rng = test::test_rng();
+  Detector detector(families({"apriltag_36h11"}));
+  std::vector<Detection> last, found;
+  double kept = 0, by_sides = 0;
+  int fits = 0, count = 0;
+  for (int i = 0; i < 40; ++i) {
+    const std::vector<PlacedMarker> marker = {
+        test::placed(pinhole_vga(), {"apriltag_36h11", "3"}, {320 + 0.37 * i, 240}, 40, 0.2, 20_deg, 0)};
+    const cv::Mat grey = test::picture_of(pinhole_vga(), test::plain(640, 480, 200), marker,
+                                          {.blur_px = 1.2, .noise_levels = 1}, rng);
+    if (i == 0)
+      detector.detect(grey, nullptr, &found);
+    else
+      detector.follow(grey, nullptr, last, &found);
+    ASSERT_EQ(found.size(), 1u) << i;
+    ASSERT_TRUE(found[0].by_pattern) << i;
+    if (found[0].by_pattern->age == 0) {
+      ++fits;
+    } else {
+      const auto anew = detector.detect(grey);
+      ASSERT_EQ(anew.size(), 1u);
+      for (std::size_t k = 0; k < 4; ++k) {
+        kept += (found[0].corners_px[k] - anew[0].corners_px[k]).squaredNorm();
+        by_sides += anew[0].by_pattern->px[k].squaredNorm();
+        ++count;
+      }
+    }
+    last = found;
+  }
+  std::printf("fitted in %d of 40 pictures; between, off by %.3f px, the sides alone by %.3f px RMS\n", fits,
+              std::sqrt(kept / count), std::sqrt(by_sides / count));
+  EXPECT_GE(fits, 2);
+  EXPECT_LE(fits, 8);
+  EXPECT_LT(std::sqrt(kept / count), 0.08);
+  EXPECT_LT(kept, 0.25 * by_sides);
+}
+
 // Markers of one id, 70 px wide and so steep that each lies within half a side of the next.
 cv::Mat stacked_markers(int count, double moved_px, std::mt19937_64& rng) {
   std::vector<PlacedMarker> markers;
