@@ -8,6 +8,7 @@
 
 #include "apps/live/latest.h"
 #include "apps/live/scene_watch.h"
+#include "apps/live/source_clock.h"
 #include "core/log.h"
 
 namespace limn::apps {
@@ -15,7 +16,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double k_other_clock_s = 60;  // stamps so far from now are of a source's own clock
 constexpr auto k_retry = std::chrono::milliseconds(100);
 constexpr auto k_wait = std::chrono::milliseconds(50);  // for news, before the next picture is painted anyway
 constexpr double k_blend = 0.1;                         // of a new time into the expected one
@@ -101,7 +101,7 @@ class DeviceLoop {
 
  private:
   void grab(device::CameraSource* camera, std::size_t number) try {
-    std::optional<double> offset_s;  // from the source's clock to the session's
+    SourceClock clock;
     while (!is_stopping_) {
       Result<Frame> frame = camera->next();
       if (!frame) {
@@ -109,13 +109,20 @@ class DeviceLoop {
         std::this_thread::sleep_for(k_retry);
         continue;
       }
-      health_.works(number);
-      if (!offset_s) {
-        const double ahead_s = seconds_between(frame->captured_at, now());
-        offset_s = std::abs(ahead_s) > k_other_clock_s ? ahead_s : 0;
+      if (frame->image.size() != camera->size()) {
+        const cv::Size size = camera->size();
+        health_.fails(number,
+                      fmt::format("expected pictures of {}x{}, found one of {}x{}. Set the mode that the "
+                                  "rig was measured in.",
+                                  size.width, size.height, frame->image.cols, frame->image.rows));
+        continue;
       }
-      frame->captured_at = shifted(frame->captured_at, *offset_s);
-      if (*offset_s != 0) std::this_thread::sleep_until(frame->captured_at);
+      health_.works(number);
+      const SourceClock::Time time = clock.on_session_clock(frame->captured_at, now());
+      if (time.has_stepped)
+        health_.note(camera->name() + "'s clock has stepped; its pictures count from now on");
+      frame->captured_at = time.captured_at;
+      if (clock.is_other()) std::this_thread::sleep_until(frame->captured_at);
       Frames frames;
       frames.emplace(frame->camera, std::move(*frame));
       frames_.put(std::move(frames), [this](const Frames& old, Frames& newest) {

@@ -9,6 +9,7 @@
 #include "apps/live/device_session.h"
 #include "apps/live/latest.h"
 #include "apps/live/replay.h"
+#include "apps/live/source_clock.h"
 #include "apps/world_markers.h"
 #include "core/file.h"
 #include "core/picture.h"
@@ -72,6 +73,29 @@ TEST(Latest, TheNewestWinsAndNothingQueues) {
   box.put(3);
   box.put(4, [](const int& old, int& next) { next += old; });
   EXPECT_EQ(box.take(std::chrono::milliseconds(1)), 7);
+}
+
+TEST(SourceClock, StampsComeOntoTheSessionsClockAlsoWhenTheirClockSteps) {
+  const Stamp begun = shifted(Stamp{}, 5000);
+  SourceClock own;  // the session's clock, 30 ms on the way
+  for (int i = 0; i < 5; ++i) {
+    const Stamp now = shifted(begun, 0.1 * i);
+    const auto time = own.on_session_clock(shifted(now, -0.03), now);
+    EXPECT_NEAR(seconds_between(time.captured_at, now), 0.03, 1e-9);
+    EXPECT_FALSE(time.has_stepped);
+  }
+  EXPECT_FALSE(own.is_other());
+  for (const double step_s : {3600.0, -7200.0, 20.0}) {
+    const auto time = own.on_session_clock(shifted(begun, 1 + step_s), shifted(begun, 1));
+    EXPECT_TRUE(time.has_stepped);
+    EXPECT_EQ(time.captured_at, shifted(begun, 1));
+    const auto next = own.on_session_clock(shifted(begun, 1.1 + step_s), shifted(begun, 1.1));
+    EXPECT_FALSE(next.has_stepped);
+    EXPECT_NEAR(seconds_between(shifted(begun, 1.1), next.captured_at), 0, 1e-6);
+  }
+  SourceClock video;
+  EXPECT_EQ(video.on_session_clock(Stamp{}, begun).captured_at, begun);
+  EXPECT_TRUE(video.is_other());
 }
 
 // Threads as of a real rig, on stored pictures of the studio at their pace; a recording of it replays as the
