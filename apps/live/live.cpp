@@ -131,6 +131,15 @@ Status set_up(const LiveOptions& options, SessionSetup* setup) {
   return {};
 }
 
+Session::Drawing drawing_in(std::optional<device::GlContext>* context) {
+  return {[context] { return !*context || (*context)->is_lost(); },
+          [context]() -> Status {
+            context->reset();
+            LIMN_TRY(*context, device::GlContext::create());
+            return {};
+          }};
+}
+
 Status play_in_virtual_room(const LiveOptions& options) {
   LIMN_TRY(Script script, options.script.empty() ? Result<Script>(Script{}) : load_script(options.script));
   LIMN_TRY(Stage stage, virtual_stage(options));
@@ -146,13 +155,15 @@ Status play_in_virtual_room(const LiveOptions& options) {
                                                .frame_period_s = options.frame_period_s,
                                                .grab_waits_for_light = false});
   LIMN_TRY(ScriptedRoom room, ScriptedRoom::create(std::move(script), &rig));
-  LIMN_TRY(const device::GlContext context, device::GlContext::create());
-  log_info("live: {}", context.description());
+  std::optional<device::GlContext> context;
+  LIMN_TRY(context, device::GlContext::create());
+  log_info("live: {}", context->description());
   LIMN_TRY(OscPort osc, OscPort::open(options.osc, options.osc_to));
   LIMN_TRY(Books books, Books::open(options.out, options.record, &setup));
   tell(stage.left_out, {}, &books.telemetry());
   LIMN_TRY(Watcher watcher, Watcher::create(setup.scene, setup.rig, setup.watch));
   LIMN_TRY(Session session, Session::create(setup, &books.telemetry(), books.recorder()));
+  session.survive_losses(drawing_in(&context));
   std::optional<OperatorDesk> desk;
   if (options.window) {
     LIMN_TRY(const device::Desktop desktop, device::Desktop::open());
@@ -207,13 +218,15 @@ Status play_with_devices(const LiveOptions& options) {
     LIMN_TRY(desktop, device::Desktop::open());
   }
   SessionDevices open = opened(devices, setup.rig, desktop ? &*desktop : nullptr);
-  LIMN_TRY(const device::GlContext context, device::GlContext::create());
-  log_info("live: {}", context.description());
+  std::optional<device::GlContext> context;
+  LIMN_TRY(context, device::GlContext::create());
+  log_info("live: {}", context->description());
   LIMN_TRY(OscPort osc, OscPort::open(options.osc, options.osc_to));
   LIMN_TRY(Books books, Books::open(options.out, options.record, &setup));
   tell(left_out, {}, &books.telemetry());
   LIMN_TRY(Watcher watcher, Watcher::create(setup.scene, setup.rig, setup.watch));
   LIMN_TRY(Session session, Session::create(setup, &books.telemetry(), books.recorder()));
+  session.survive_losses(drawing_in(&context));
   std::optional<OperatorDesk> desk;
   if (options.window) {
     LIMN_TRY(desk, OperatorDesk::open(*desktop, setup.scene));

@@ -13,6 +13,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr double k_renew_every_s = 1;  // a context that was lost
+
 double milliseconds_since(std::chrono::steady_clock::time_point begun) {
   return 1e3 * seconds_between(begun, std::chrono::steady_clock::now());
 }
@@ -97,6 +99,7 @@ Result<Session> Session::create(const SessionSetup& setup,
 Session::Session(SessionSetup setup, Painter painter, Telemetry* telemetry, Recorder* recorder)
     : setup_(std::move(setup)),
       painter_(std::move(painter)),
+      painted_(painter_->painted()),
       telemetry_(telemetry),
       recorder_(recorder),
       staging_(scene::first_staging(setup_.scene)) {}
@@ -131,7 +134,7 @@ void Session::take(Watched watched, std::size_t moments) {
 }
 
 Status Session::edit(const scene::Edit& edit, const std::string& source, Stamp at) {
-  LIMN_TRY(scene::Staging changed, scene::edited(setup_.scene, staging_, painter_.painted().posed, edit));
+  LIMN_TRY(scene::Staging changed, scene::edited(setup_.scene, staging_, painted_.posed, edit));
   std::swap(staging_, changed);
   if (recorder_) recorder_->edited(edit, source, moments_);
   if (telemetry_)
@@ -211,7 +214,7 @@ Status Session::keep_looks(const scene::Staging& before) {
     LIMN_TRY_STATUS(write_file(folder / (look.name + ".json"), text));
     scene::Staging shown = staging_;
     shown.screen = scene::Screen::view;
-    const cv::Mat picture = painter_.screen(watched_, shown);
+    const cv::Mat picture = painter_ ? painter_->screen(watched_, shown) : cv::Mat();
     if (!picture.empty()) LIMN_TRY_STATUS(write_png(folder / (look.name + ".png"), picture));
   }
   return has_changed ? write_contact_sheet(staging_.looks, folder, folder / "looks.html") : Status();
@@ -219,17 +222,49 @@ Status Session::keep_looks(const scene::Staging& before) {
 
 const Painted& Session::paint(Stamp now, Stamp shown_at) {
   const auto begun = std::chrono::steady_clock::now();
-  const Painted& painted = painter_.paint(watched_, staging_, now, shown_at);
+  if (painter_) painter_->paint(watched_, staging_, now, shown_at);
+  if (painter_ && !(drawing_.is_lost && drawing_.is_lost()))
+    painted_ = painter_->painted();
+  else
+    draw_anew(now, shown_at);
   paint_ms_ = milliseconds_since(begun);
   const auto recording = std::chrono::steady_clock::now();
-  if (recorder_) recorder_->painted(painted, moments_);
+  if (recorder_) recorder_->painted(painted_, moments_);
   record_ms_ = recorder_ ? milliseconds_since(recording) : -1;
   tell_of_drift(now);
-  return painted;
+  return painted_;
+}
+
+// The GL context is gone, and what was drawn in it: the picture before it stays until there is another.
+void Session::draw_anew(Stamp now, Stamp shown_at) {
+  if (!painter_ && seconds_between(renewed_at_, now) < k_renew_every_s) return;
+  const bool was_drawing = painter_.has_value();
+  painter_.reset();
+  renewed_at_ = now;
+  Status renewed = drawing_.renew();
+  if (renewed) {
+    auto painter = Painter::create(setup_.scene, setup_.rig, setup_.paint);
+    if (painter) {
+      painter_ = std::move(*painter);
+      painted_ = painter_->paint(watched_, staging_, now, shown_at);
+    } else {
+      renewed = painter.error();
+    }
+  }
+  if (!renewed && !was_drawing) return;
+  const std::string what =
+      renewed ? "the graphics card lost what it drew; it was drawn anew"
+              : fmt::format(
+                    "the graphics card lost what it drew; the last picture stays until it can draw "
+                    "again: {}",
+                    renewed.message());
+  if (telemetry_) telemetry_->note(now, what);
+  log_warning("live: {}", what);
 }
 
 void Session::tell_of_drift(Stamp at) {
-  const std::optional<Drift>& drift = painter_.drift();
+  if (!painter_) return;
+  const std::optional<Drift>& drift = painter_->drift();
   const bool is_news =
       drift.has_value() != told_drift_.has_value() || (drift && drift->devices != told_drift_->devices);
   if (!is_news) return;
@@ -240,7 +275,7 @@ void Session::tell_of_drift(Stamp at) {
 }
 
 ShownFrame Session::measured() const {
-  const Painted& painted = painter_.painted();
+  const Painted& painted = painted_;
   ShownFrame out{.captured_at = watched_.captured_at,
                  .shown_at = painted.shown_at,
                  .detect_ms = watched_.detect_ms,
@@ -253,6 +288,6 @@ ShownFrame Session::measured() const {
   return out;
 }
 
-cv::Mat Session::screen() { return painter_.screen(watched_, staging_); }
+cv::Mat Session::screen() { return painter_ ? painter_->screen(watched_, staging_) : cv::Mat(); }
 
 }  // namespace limn::apps

@@ -32,6 +32,15 @@ class Session {
                                 Recorder* recorder,
                                 bool keeps_looks = true);
 
+  /// How a GL context that the driver took away is noticed, and replaced by another.
+  struct Drawing {
+    std::function<bool()> is_lost;
+    std::function<Status()> renew;  ///< called when nothing lives in the old one any more
+  };
+  /// What is drawn while the context is lost is never shown: the last good picture stays, all is drawn anew
+  /// in the next context, tried once a second, and people are told.
+  void survive_losses(Drawing drawing) { drawing_ = std::move(drawing); }
+
   /// What a watcher knows now; its control uses become edits. `moments`: calls of watch() so far.
   void take(Watched watched, std::size_t moments);
   /// An edit of a person; one that cannot be done is told, and nothing changes. `source` says whose.
@@ -50,7 +59,7 @@ class Session {
   cv::Mat screen();
 
   /// What was painted last.
-  const Painted& painted() const { return painter_.painted(); }
+  const Painted& painted() const { return painted_; }
   const scene::Staging& staging() const { return staging_; }
   const Watched& watched() const { return watched_; }
   const SessionSetup& setup() const { return setup_; }
@@ -62,11 +71,15 @@ class Session {
   Session(SessionSetup setup, Painter painter, Telemetry* telemetry, Recorder* recorder);
   void load_looks();
   void tell_of_drift(Stamp at);
+  void draw_anew(Stamp now, Stamp shown_at);
   Status show_if_whole(SceneNews news, Stamp at);
   Status keep_looks(const scene::Staging& before);
 
   SessionSetup setup_;
-  Painter painter_;
+  Drawing drawing_;
+  std::optional<Painter> painter_;  // none while the context is lost
+  Painted painted_;
+  Stamp renewed_at_;
   Telemetry* telemetry_;
   Recorder* recorder_;
   bool keeps_looks_ = true;

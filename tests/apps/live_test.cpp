@@ -18,11 +18,14 @@
 #include "apps/live/room.h"
 #include "apps/live/scene_watch.h"
 #include "apps/live/script.h"
+#include "apps/live/session.h"
+#include "apps/live/telemetry.h"
 #include "apps/live/udp_socket.h"
 #include "apps/live/watcher.h"
 #include "apps/world_markers.h"
 #include "core/file.h"
 #include "core/picture.h"
+#include "device/gl_context.h"
 #include "sim/virtual_rig.h"
 #include "tests/support/matchers.h"
 #include "tracker/predict.h"
@@ -245,6 +248,51 @@ TEST(Live, HearsAndTellsByOscAndIsReplayed) {
   replay.session = folder / "recording";
   const Status replayed = run_replay(replay);
   EXPECT_TRUE(replayed.ok()) << replayed.message();
+}
+
+// The driver takes the GL context away: what was shown stays, and is drawn anew when there is another.
+TEST(Live, DrawsAnewWhenTheGraphicsCardLostIt) {
+  const sim::World world = studio(0.34);
+  SessionSetup setup{world.rig, *world.scene, {}, {}};
+  setup.paint.refill = false;
+  sim::VirtualRig rig(world, {.grab_waits_for_light = false});
+  std::optional<device::GlContext> context = device::GlContext::create().value();
+  Telemetry telemetry = Telemetry::create({}).value();
+  auto watcher = Watcher::create(setup.scene, setup.rig);
+  auto session = Session::create(setup, &telemetry, nullptr, false);
+  ASSERT_TRUE(watcher && session);
+  bool is_lost = false, can_renew = false;
+  session->survive_losses({[&] { return is_lost; },
+                           [&]() -> Status {
+                             if (!can_renew) return error("there is no card.");
+                             context.reset();
+                             context = device::GlContext::create().value();
+                             is_lost = false;
+                             return {};
+                           }});
+  const int camera = 0;
+  session->take(watcher->watch(rig.expose(std::span(&camera, 1))), 1);
+  const Stamp now = rig.now(), shown_at = shifted(now, 0.03);
+  const cv::Mat good = session->paint(now, shown_at).projectors[0].clone();
+  ASSERT_GT(cv::countNonZero(good.reshape(1)), 100);
+  const auto is_good = [&](const Painted& painted) {
+    return cv::norm(painted.projectors[0], good, cv::NORM_INF) == 0;
+  };
+  is_lost = true;
+  for (const double later_s : {0.03, 0.06, 0.5, 1.2})
+    EXPECT_TRUE(is_good(session->paint(shifted(now, later_s), shifted(shown_at, later_s))));
+  EXPECT_TRUE(session->screen().empty());
+  can_renew = true;
+  rig.advance(3);
+  session->take(watcher->watch(rig.expose(std::span(&camera, 1))), 2);
+  const cv::Mat anew = session->paint(rig.now(), shifted(rig.now(), 0.03)).projectors[0];
+  EXPECT_LT(cv::norm(anew, good, cv::NORM_L1) / static_cast<double>(anew.total()), 1);  // but for noise
+  EXPECT_FALSE(is_lost);
+  EXPECT_FALSE(session->screen().empty());
+  const json notes = telemetry.summary().at("notes");
+  ASSERT_EQ(notes.size(), 2u) << notes.dump();
+  EXPECT_NE(notes[0].at("what").get<std::string>().find("there is no card"), std::string::npos);
+  EXPECT_NE(notes[1].at("what").get<std::string>().find("drawn anew"), std::string::npos);
 }
 
 // A camera goes and comes back: parts are carried on, fade, and are there again.
