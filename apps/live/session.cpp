@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "apps/live/contact_sheet.h"
+#include "apps/live/swapped_cameras.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "core/picture.h"
@@ -13,6 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr double k_compare_cameras_every_s = 2;
 constexpr double k_renew_every_s = 1;  // a context that was lost
 
 double milliseconds_since(std::chrono::steady_clock::time_point begun) {
@@ -131,6 +133,24 @@ void Session::take(Watched watched, std::size_t moments) {
     if (!done) log_warning("live: {}: {}", control.marker.text(), done.message());
   }
   watched_.uses.clear();
+  tell_of_swapped_cameras();
+}
+
+void Session::tell_of_swapped_cameras() {
+  if (told_swapped_ || setup_.rig.cameras.size() < 2 ||
+      seconds_between(compared_cameras_at_, watched_.captured_at) < k_compare_cameras_every_s)
+    return;
+  compared_cameras_at_ = watched_.captured_at;
+  const auto swapped =
+      swapped_cameras(setup_.rig, scene::bodies(setup_.scene), watched_.detections, watched_.captured_at);
+  if (!swapped) return;
+  told_swapped_ = true;
+  const std::string what = fmt::format(
+      "{} and {} seem to be exchanged: each sees what the other should. Exchange their cables, or their "
+      "addresses in the devices file.",
+      swapped->first, swapped->second);
+  if (telemetry_) telemetry_->note(watched_.captured_at, what);
+  log_warning("live: {}", what);
 }
 
 Status Session::edit(const scene::Edit& edit, const std::string& source, Stamp at) {

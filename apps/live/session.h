@@ -71,6 +71,7 @@ class Session {
   Session(SessionSetup setup, Painter painter, Telemetry* telemetry, Recorder* recorder);
   void load_looks();
   void tell_of_drift(Stamp at);
+  void tell_of_swapped_cameras();
   void draw_anew(Stamp now, Stamp shown_at);
   Status show_if_whole(SceneNews news, Stamp at);
   Status keep_looks(const scene::Staging& before);
@@ -87,6 +88,8 @@ class Session {
   Watched watched_;
   std::size_t moments_ = 0;
   std::optional<Drift> told_drift_;
+  Stamp compared_cameras_at_;
+  bool told_swapped_ = false;
   double paint_ms_ = 0, record_ms_ = 0;
 };
 

@@ -19,6 +19,7 @@
 #include "apps/live/scene_watch.h"
 #include "apps/live/script.h"
 #include "apps/live/session.h"
+#include "apps/live/swapped_cameras.h"
 #include "apps/live/telemetry.h"
 #include "apps/live/udp_socket.h"
 #include "apps/live/watcher.h"
@@ -449,6 +450,47 @@ TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
   replay.session = folder / "recording";
   const Status replayed = run_replay(replay);
   EXPECT_TRUE(replayed.ok()) << replayed.message();
+}
+
+// A second camera beside the first, and their cables exchanged.
+TEST(Live, KnowsCamerasThatWereExchanged) {
+  sim::World world = studio(0.5);
+  Imager second = world.rig.cameras[0];
+  second.name = "camera1";
+  second.imager_from_world = looking_at({0.6, -1.5, 0.6}, {0, 0, 0.42}, Eigen::Vector3d::UnitZ());
+  world.rig.cameras.push_back(second);
+  world.camera_effects.push_back(world.camera_effects[0]);
+  const std::vector<Body> bodies = scene::bodies(*world.scene);
+  sim::VirtualRig rig(world, {.grab_waits_for_light = false});
+  const int cameras[] = {0, 1};
+  std::vector<Frame> frames = rig.expose(cameras);
+  const auto found = [&] {
+    auto watcher = Watcher::create(*world.scene, world.rig);
+    EXPECT_TRUE(watcher) << watcher.message();
+    const Watched& watched = watcher->watch(frames);
+    EXPECT_GT(watched.detections[0].size(), 3u);
+    EXPECT_GT(watched.detections[1].size(), 3u);
+    return swapped_cameras(world.rig, bodies, watched.detections, watched.captured_at);
+  };
+  EXPECT_FALSE(found());
+  std::swap(frames[0].image, frames[1].image);
+  const auto swapped = found();
+  ASSERT_TRUE(swapped);
+  EXPECT_EQ(swapped->first, "camera0");
+  EXPECT_EQ(swapped->second, "camera1");
+
+  const auto context = device::GlContext::create();
+  Telemetry telemetry = Telemetry::create({}).value();
+  auto session = Session::create({world.rig, *world.scene, {}, {}}, &telemetry, nullptr, false);
+  auto watcher = Watcher::create(*world.scene, world.rig);
+  ASSERT_TRUE(context && session && watcher);
+  for (const int moment : {1, 2}) {  // told once
+    for (Frame& frame : frames) frame.captured_at = shifted(frame.captured_at, 5);
+    session->take(watcher->watch(frames), static_cast<std::size_t>(moment));
+  }
+  const json notes = telemetry.summary().at("notes");
+  ASSERT_EQ(notes.size(), 1u) << notes.dump();
+  EXPECT_EQ(notes[0].at("what").get<std::string>().find("camera0 and camera1 seem to be exchanged"), 0u);
 }
 
 TEST(Live, MakesARoomForARigAndAScene) {
