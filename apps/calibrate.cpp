@@ -1,17 +1,24 @@
 #include "apps/calibrate.h"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <thread>
 
 #include "apps/board_place.h"
 #include "apps/capture.h"
+#include "apps/devices.h"
 #include "apps/plan.h"
 #include "apps/solve.h"
 #include "apps/wizard/device_checks.h"
+#include "apps/wizard/device_stage.h"
+#include "apps/wizard/guided_poses.h"
+#include "apps/wizard/virtual_stage.h"
 #include "apps/wizard/wizard_window.h"
 #include "apps/world_markers.h"
 #include "calib/held_out.h"
@@ -24,6 +31,8 @@
 #include "core/file.h"
 #include "core/log.h"
 #include "device/desktop.h"
+#include "device/open_camera.h"
+#include "device/open_display.h"
 
 namespace limn::apps {
 namespace {
@@ -292,7 +301,10 @@ class Run {
       if (audience_.aims) audience_.aims(number);
       step(WizardStep::board, WizardState::runs, files.name);
       remove_pictures(files);
-      LIMN_TRY_STATUS(around_.hold(number));
+      if (const Status held = around_.hold(number, nullptr); !held) {
+        if (followed(WizardWish::check) || followed(WizardWish::repeat)) continue;
+        return held;
+      }
       if (!are_checked_) LIMN_TRY_STATUS(check());
       const Status done = capture(captures_, number, around_, audience_.wish, &clock_);
       if (audience_.wish && *audience_.wish == WizardWish::leave)
@@ -402,70 +414,6 @@ void say_end(const CalibrateOptions& options, const Calibrated& done, const Say&
   say(fmt::format("rig and report in {} ({:.0f} s)", options.out.string(), done.seconds));
 }
 
-// A virtual rig's devices with what is known of their latencies.
-struct VirtualStage {
-  sim::VirtualRig* rig = nullptr;
-  std::vector<double> latency_s;  // of the projectors
-  std::vector<cv::Mat> frames;    // of one exposure of all cameras, not grabbed yet
-  Stamp lit_at;                   // what was shown last is on the surface
-
-  Status show(int projector, const cv::Mat& picture) {
-    rig->darken();
-    lit_at = shifted(rig->now(), latency_s.at(static_cast<std::size_t>(projector)) + k_guard_s);
-    frames.assign(frames.size(), cv::Mat());
-    const auto shown = rig->projector(projector).show(picture);
-    return shown ? Status() : Status(shown.error());
-  }
-
-  cv::Mat grab(int camera) {
-    cv::Mat& wanted = frames.at(static_cast<std::size_t>(camera));
-    if (wanted.empty()) {
-      rig->advance(std::max(0.0, seconds_between(rig->now(), lit_at)));
-      std::vector<int> all;
-      for (int i = 0; i < static_cast<int>(frames.size()); ++i) all.push_back(i);
-      std::size_t i = 0;
-      for (Frame& frame : rig->expose(all)) frames[i++] = std::move(frame.image);
-    }
-    return std::exchange(wanted, cv::Mat());
-  }
-
-  FlashStage flashes(int projector, int camera) {
-    rig->darken();
-    const auto show = [r = rig, projector](bool white) -> Result<Stamp> {
-      const Stamp at = r->now();
-      const cv::Mat picture(r->projector(projector).size(), CV_8UC1, cv::Scalar(white ? 255 : 0));
-      LIMN_TRY([[maybe_unused]] const Stamp shown_at, r->projector(projector).show(picture));
-      return at;
-    };
-    return {.show = show,
-            .next = [r = rig, camera] { return r->camera(camera).next(); },
-            .wait = [r = rig](double seconds) { r->advance(seconds); }};
-  }
-};
-
-// The virtual rig (that does not wait for light by itself) as the wizard's surroundings.
-Surroundings virtual_surroundings(const Plan& plan, sim::VirtualRig* rig, PictureWriter* writer) {
-  const auto stage = std::make_shared<VirtualStage>();
-  stage->rig = rig;
-  stage->latency_s.resize(rig->world().rig.projectors.size(), FlashOptions().limit_s);
-  stage->frames.resize(rig->world().rig.cameras.size());
-  return {.hold = [&plan, rig](int pose) -> Status {
-            rig->place(board_object(plan.board, plan.world_from_board[static_cast<std::size_t>(pose)]));
-            return {};
-          },
-          .stage = {.show = [stage](int p, const cv::Mat& picture) { return stage->show(p, picture); },
-                    .grab = [stage](int camera) -> Result<cv::Mat> { return stage->grab(camera); },
-                    .store = [writer](const fs::path& path,
-                                      const cv::Mat& picture) { return writer->store(path, picture); }},
-          .written = [writer] { return writer->finish(); },
-          .now = [rig] { return rig->now(); },
-          .flashes = [stage](int projector, int camera) { return stage->flashes(projector, camera); },
-          .use_latency =
-              [stage](int projector, double seconds) {
-                stage->latency_s.at(static_cast<std::size_t>(projector)) = seconds;
-              }};
-}
-
 // What an earlier run, or this one, has measured; empty where none has.
 Result<std::vector<std::pair<std::string, double>>> kept_latencies(const fs::path& path) {
   std::vector<std::pair<std::string, double>> latency_s;
@@ -490,12 +438,13 @@ Status add_to_rig(const std::vector<std::pair<std::string, double>>& latency_s, 
 }
 
 // The board's outline in each camera's picture, for each pose.
-std::vector<std::vector<std::vector<Eigen::Vector2d>>> outlines(const Plan& plan,
+std::vector<std::vector<std::vector<Eigen::Vector2d>>> outlines(const calib::Board& board,
+                                                                const std::vector<Pose>& world_from_boards,
                                                                 const std::vector<Imager>& cameras) {
-  const double width = plan.board.width_m(), height = plan.board.height_m();
+  const double width = board.width_m(), height = board.height_m();
   const Eigen::Vector3d corners[] = {{0, 0, 0}, {width, 0, 0}, {width, height, 0}, {0, height, 0}};
   std::vector<std::vector<std::vector<Eigen::Vector2d>>> all;
-  for (const Pose& world_from_board : plan.world_from_board) {
+  for (const Pose& world_from_board : world_from_boards) {
     auto& pose = all.emplace_back();
     for (const Imager& camera : cameras) {
       auto& outline = pose.emplace_back();
@@ -509,24 +458,149 @@ std::vector<std::vector<std::vector<Eigen::Vector2d>>> outlines(const Plan& plan
   return all;
 }
 
-std::string devices_in_words(const calib::Captures& captures) {
+std::string devices_in_words(const calib::Captures& captures, const char* where) {
   const auto counted = [](std::size_t count, const char* what) {
     return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
   };
-  return fmt::format("virtual rig: {}, {}", counted(captures.cameras.size(), "camera"),
+  return fmt::format("{}{}, {}", where, counted(captures.cameras.size(), "camera"),
                      counted(captures.projectors.size(), "projector"));
 }
 
 // None where lines are wanted, or where there is no display.
-std::optional<GuiWindow> window_for(const CalibrateOptions& options) {
+std::optional<GuiWindow> window_for(const CalibrateOptions& options, const Result<device::Desktop>& desktop) {
   constexpr int k_width = 1600, k_height = 1000;
   if (options.terminal || options.json) return std::nullopt;
-  const auto desktop = device::Desktop::open();
   auto window = desktop ? GuiWindow::open(*desktop, "Limn calibration", k_width, k_height)
                         : Result<GuiWindow>(desktop.error());
   if (window) return std::move(*window);
   log_info("calibrate: {} The wizard goes on in the terminal.", window.message());
   return std::nullopt;
+}
+
+// The wizard with its surroundings, in a window or in the terminal; prints the end.
+Status played(const CalibrateOptions& options,
+              const std::string& plan_json,
+              const WizardPlan& plan,
+              const Surroundings& around,
+              std::optional<GuiWindow> window,
+              std::atomic<WizardWish>* wish,
+              MainErrands* errands) {
+  const Say say = [&](const std::string& line) {
+    if (options.json) return log_info("{}", line);
+    fmt::print("{}\n", line);
+    std::fflush(stdout);
+  };
+  const WizardWork work = [&](const Surroundings& where, const WizardAudience& audience) {
+    return calibrated(options, plan_json, plan.captures, plan.places, where, audience);
+  };
+  LIMN_TRY(const Calibrated done, window
+                                      ? calibrated_in_window(&*window, plan, around, say, wish, errands, work)
+                                      : work(around, {.say = say}));
+  say_end(options, done, say);
+  if (options.json) fmt::print("{}", to_json(done));
+  return {};
+}
+
+Status calibrate_virtually(const CalibrateOptions& options) {
+  LIMN_TRY(const Plan plan, load_plan(options.plan));
+  LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_picture));
+  LIMN_TRY(const std::string text, plan_text(options.plan, plan.world));
+  sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
+  const std::vector<Imager> cameras = rig.world().rig.cameras;
+  LIMN_TRY(const calib::Captures captures, planned(plan, rig, options.out / "captures"));
+  PictureWriter writer;
+  rig.clear_stage();
+  std::atomic<WizardWish> wish = WizardWish::none;
+  MainErrands errands;
+  return played(
+      options, text,
+      {captures, places_in_words(cameras[0], plan.board, plan.world_from_board),
+       outlines(plan.board, plan.world_from_board, cameras), devices_in_words(captures, "virtual rig: ")},
+      virtual_surroundings(plan, &rig, &writer), window_for(options, device::Desktop::open()), &wish,
+      &errands);
+}
+
+// A display of the main thread, for another one.
+class ErrandDisplay : public device::Display {
+ public:
+  ErrandDisplay(std::unique_ptr<device::Display> display, MainErrands* errands)
+      : display_(std::move(display)), errands_(errands) {}
+  const std::string& name() const override { return display_->name(); }
+  cv::Size size() const override { return display_->size(); }
+  Result<Stamp> show(const cv::Mat& picture) override {
+    std::optional<Result<Stamp>> shown;
+    errands_->run([&] { shown = display_->show(picture); });
+    return *shown;
+  }
+
+ private:
+  std::unique_ptr<device::Display> display_;
+  MainErrands* errands_;
+};
+
+// Cameras and projectors of a devices file; every one must work.
+Result<DeviceStage::Devices> opened(const Devices& named, const Result<device::Desktop>& desktop) {
+  DeviceStage::Devices open{
+      .cameras = {},
+      .projectors = {},
+      .now = [] { return std::chrono::time_point_cast<Stamp::duration>(std::chrono::steady_clock::now()); },
+      .wait = [](double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }};
+  for (const device::CameraWanted& wanted : named.cameras) {
+    LIMN_TRY(auto camera, device::open_camera(wanted));
+    open.cameras.push_back(std::move(camera));
+  }
+  for (device::DisplayWanted wanted : named.displays) {
+    if (!wanted.name.starts_with("projector")) continue;
+    wanted.latency_s = 0;  // is measured
+    LIMN_TRY(auto display, device::open_display(wanted, desktop ? &*desktop : nullptr));
+    open.projectors.push_back(std::move(display));
+  }
+  if (open.cameras.empty() || open.projectors.empty())
+    return error("{}: expected a camera and a display whose name begins with projector, found none.",
+                 named.file.string());
+  return open;
+}
+
+// What decides what devices capture.
+std::string devices_text(const CalibrateOptions& options, const calib::Captures& captures) {
+  ordered_json all = {{"schema", "limn.captured_plan/1"},
+                      {"plan", {{"board", options.board}, {"code", options.code}}}};
+  for (const auto* devices : {&captures.cameras, &captures.projectors})
+    for (const calib::CapturedDevice& device : *devices)
+      all["devices"][device.name] = {device.width, device.height};
+  return all.dump(2) + "\n";
+}
+
+Status calibrate_devices(const CalibrateOptions& options) {
+  const auto board = calib::Board::parse(options.board);
+  if (!board) return usage_error("--board: {}", board.message());
+  LIMN_TRY(const Devices named, load_devices(options.devices));
+  const Result<device::Desktop> desktop = device::Desktop::open();
+  LIMN_TRY(DeviceStage::Devices devices, opened(named, desktop));
+  const auto captured = [](const auto& all) {
+    std::vector<calib::CapturedDevice> list;
+    for (const auto& device : all)
+      list.push_back({device->name(), device->size().width, device->size().height});
+    return list;
+  };
+  const calib::Captures captures = calib::plan_captures(options.out / "captures", captured(devices.cameras),
+                                                        captured(devices.projectors), *board, options.code);
+  const calib::CapturedDevice& first = captures.cameras.front();
+  const Imager assumed = assumed_camera(first.name, first.width, first.height);
+  const std::vector<Pose> poses = guided_poses(assumed, *board);
+  auto targets = outlines(*board, poses, {assumed});
+  for (auto& pose : targets) pose.resize(captures.cameras.size());  // nothing is known of the others
+  std::atomic<WizardWish> wish = WizardWish::none;
+  MainErrands errands;
+  std::optional<GuiWindow> window = window_for(options, desktop);
+  if (window)
+    for (auto& display : devices.projectors)
+      display = std::make_unique<ErrandDisplay>(std::move(display), &errands);
+  DeviceStage stage(std::move(devices), *board, &wish);
+  PictureWriter writer;
+  return played(options, devices_text(options, captures),
+                {captures, places_in_words(assumed, *board, poses), targets, devices_in_words(captures, "")},
+                stage.surroundings(&writer), std::move(window), &wish, &errands);
 }
 
 }  // namespace
@@ -549,6 +623,8 @@ std::string more_helps(const std::vector<PoseJudged>& poses) {
   if (last.verdict != calib::Verdict::good) return "the rig is " + calib::to_text(last.verdict);
   const double mm = predicted_mm(last);
   if (mm <= calib::k_fine_mm) return "";
+  if (!calib::rests_on_enough_poses(last, static_cast<int>(poses.size())))
+    return "few leave little to judge by";
   const auto earlier = poses.size() < 3 ? nullptr : &poses[poses.size() - 3].assessment;
   if (earlier == nullptr || !*earlier) return "the predicted error may still fall";
   const bool has_settled = mm > (1 - k_settled) * predicted_mm(**earlier);
@@ -571,8 +647,9 @@ Result<Calibrated> calibrated(const CalibrateOptions& options,
   };
   std::optional<calib::Report> report;
   for (int pose = 0; pose < count; ++pose) {
-    LIMN_TRY_STATUS(run.pose(pose, places[static_cast<std::size_t>(pose)]));
+    const Status done = run.pose(pose, places[static_cast<std::size_t>(pose)]);
     if (run.is_to_finish()) break;
+    LIMN_TRY_STATUS(done);
     const bool is_next_there = pose + 1 < count && is_complete(files_of(captures, pose + 1));
     if (options.all || is_next_there || pose + 1 == count || !run.is_enough()) continue;
     LIMN_TRY(report, solved_all());
@@ -589,33 +666,14 @@ Result<Calibrated> calibrated(const CalibrateOptions& options,
 }
 
 Status run_calibrate(const CalibrateOptions& options) {
-  LIMN_TRY(const Plan plan, load_plan(options.plan));
-  LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_picture));
-  LIMN_TRY(const std::string text, plan_text(options.plan, plan.world));
-  sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
-  LIMN_TRY(const calib::Captures captures, planned(plan, rig, options.out / "captures"));
-  const auto places = places_in_words(rig.world().rig.cameras[0], plan.board, plan.world_from_board);
-  const Say say = [&](const std::string& line) {
-    if (options.json) return log_info("{}", line);
-    fmt::print("{}\n", line);
-    std::fflush(stdout);
-  };
-  PictureWriter writer;
-  rig.clear_stage();
-  const Surroundings around = virtual_surroundings(plan, &rig, &writer);
-  const WizardWork work = [&](const Surroundings& where, const WizardAudience& audience) {
-    return calibrated(options, text, captures, places, where, audience);
-  };
-  std::optional<GuiWindow> window = window_for(options);
-  LIMN_TRY(const Calibrated done,
-           window ? calibrated_in_window(&*window,
-                                         {captures, places, outlines(plan, rig.world().rig.cameras),
-                                          devices_in_words(captures)},
-                                         around, say, work)
-                  : work(around, {.say = say}));
-  say_end(options, done, say);
-  if (options.json) fmt::print("{}", to_json(done));
-  return {};
+  if (options.plan.empty() == options.devices.empty())
+    return usage_error(
+        "calibrate: expected either --plan (a virtual rig) or --devices with --board, found {}.",
+        options.plan.empty() ? "neither" : "both");
+  const std::vector<std::string>& codes = calib::pattern_codes();
+  if (std::find(codes.begin(), codes.end(), options.code) == codes.end())
+    return usage_error("--code: expected {}, found '{}'.", fmt::join(codes, ", "), options.code);
+  return options.devices.empty() ? calibrate_virtually(options) : calibrate_devices(options);
 }
 
 }  // namespace limn::apps

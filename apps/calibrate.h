@@ -10,6 +10,7 @@
 
 #include "apps/wizard/display_latency.h"
 #include "apps/wizard/light_check.h"
+#include "calib/board/board_finder.h"
 #include "calib/capture.h"
 #include "calib/captures.h"
 #include "calib/report/report.h"
@@ -19,16 +20,22 @@
 namespace limn::apps {
 
 struct CalibrateOptions {
-  std::filesystem::path plan;
-  std::filesystem::path out;  ///< the rig folder; its captures/ keeps every picture
-  bool all = false;           ///< take every pose of the plan, although fewer are enough
-  bool terminal = false;      ///< lines instead of a window
-  bool json = false;          ///< print one JSON at the end; the lines go to stderr, there is no window
+  std::filesystem::path plan = {};     ///< of a virtual rig
+  std::filesystem::path devices = {};  ///< limn.devices/1, instead of a plan
+  std::string board = {};              ///< with devices: `charuco:11x8:25mm`
+  std::string code = "gray";           ///< with devices
+  std::filesystem::path out;           ///< the rig folder; its captures/ keeps every picture
+  bool all = false;                    ///< take every pose of the plan, although fewer are enough
+  bool terminal = false;               ///< lines instead of a window
+  bool json = false;  ///< print one JSON at the end; the lines go to stderr, there is no window
 };
 
 /// What the wizard needs from outside: functions, so that a virtual rig and devices in a room are alike.
 struct Surroundings {
-  std::function<Status(int pose)> hold;  ///< returns when the board is where this pose wants it, and still
+  /// Told of the board in a camera's picture while it is waited for; may be empty.
+  using Seen = std::function<void(int camera, const cv::Mat&, const std::vector<calib::BoardCorner>&)>;
+  /// Returns when the board is where this pose wants it, and still.
+  std::function<Status(int pose, const Seen& seen)> hold;
   calib::Stage stage;
   std::function<Status()> written;  ///< returns when every picture that was stored is on the disk
   std::function<Stamp()> now;       ///< of the cameras' clock
@@ -94,8 +101,8 @@ struct Calibrated {
 double predicted_mm(const calib::Assessment& assessment);
 
 /// Why more poses help after the last of `poses`, in a few words; empty when they are enough: the rig is good
-/// without a fault that only more poses cure, and the predicted error is a quarter of a millimetre at most or
-/// fell by less than a twentieth over the last two poses.
+/// without a fault that only more poses cure, and the predicted error is a quarter of a millimetre at most
+/// or, with as many poses as the report asks for, fell by less than a twentieth over the last two.
 std::string more_helps(const std::vector<PoseJudged>& poses);
 
 /// The sequence: pose after pose of `captures` (planned, its folder is options.out / "captures"; begun or
@@ -111,8 +118,8 @@ Result<Calibrated> calibrated(const CalibrateOptions& options,
                               const Surroundings& surroundings,
                               const WizardAudience& audience);
 
-/// `limn calibrate`: on the virtual rig of the plan's world; in a window where a display is there and neither
-/// `terminal` nor `json` is asked for.
+/// `limn calibrate`: on the virtual rig of the plan's world, or on devices; in a window where a display is
+/// there and neither `terminal` nor `json` is asked for.
 Status run_calibrate(const CalibrateOptions& options);
 
 }  // namespace limn::apps

@@ -200,11 +200,16 @@ void add_solve(CLI::App& app, Run& run) {
 void add_calibrate(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand("calibrate", "the wizard: where to hold the board next, captures, solve, report");
   command->footer(
-      "In a window where there is a display, so far on the virtual rig of the plan's world. OUT/captures keeps every picture:\n"
-      "the same command goes on where it was left. Ends when more poses no longer help and the rig is good, or the plan has no more.\n"
-      "Example: limn calibrate --plan config/plans/bench.json --out rig");
+      "In a window where there is a display. OUT/captures keeps every picture: the same command goes on where it was left. Ends\n"
+      "when more poses no longer help and the rig is good, or there are no more. With --devices a pose is captured when the board\n"
+      "is held still.\n"
+      "Example: limn calibrate --plan config/plans/bench.json --out rig\n"
+      "Example: limn calibrate --devices devices.json --board charuco:11x8:25mm --out rig");
   auto options = std::make_shared<CalibrateOptions>();
-  command->add_option("--plan", options->plan, "plan file (limn.plan/1)")->required();
+  command->add_option("--plan", options->plan, "plan file (limn.plan/1): on its virtual rig");
+  auto* devices = command->add_option("--devices", options->devices, "instead: the cameras and projectors (limn.devices/1)");
+  command->add_option("--board", options->board, "with --devices: the board, as limn markers --board prints it")->needs(devices);
+  command->add_option("--code", options->code, "with --devices: gray, phase, xor")->needs(devices)->capture_default_str();
   command->add_option("--out", options->out, "rig folder to write, with the captures in it")->required();
   command->add_flag("--all", options->all, "take every pose of the plan, although fewer are enough");
   command->add_flag("--terminal", options->terminal, "lines in the terminal instead of the window");

@@ -252,7 +252,9 @@ void draw_light(const Gui& gui, const WizardView& view) {
 
 void draw_faults(const Gui& gui, const WizardView& view) {
   if (view.faults.empty() && view.to_do.empty()) return;
-  heading(gui, view.faults.empty() ? "Advice" : "To put right");
+  heading(gui, !view.faults.empty()                 ? "To put right"
+               : view.worth == calib::Verdict::good ? "To make it better still"
+                                                    : "Advice");
   for (const calib::Fault& fault : view.faults) {
     std::string advice = fault.advice + ".";
     advice[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(advice[0])));

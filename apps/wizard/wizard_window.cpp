@@ -7,17 +7,18 @@
 
 #include "apps/wizard/wizard_panel.h"
 #include "calib/board/board_finder.h"
-#include "core/picture.h"
 
 namespace limn::apps {
 namespace {
 
 using State = WizardState;
 
+constexpr auto k_pause = std::chrono::milliseconds(2);  // errands wait no longer
+
 // What worker and window share.
 class Stand {
  public:
-  explicit Stand(const WizardPlan& plan) : plan_(plan) {
+  Stand(const WizardPlan& plan, std::atomic<WizardWish>* wish) : plan_(plan), wish_(wish) {
     step(WizardStep::devices) = {State::done, plan.devices};
     for (const calib::CapturedDevice& camera : plan.captures.cameras)
       view_.cameras.push_back({.name = camera.name, .width = camera.width, .height = camera.height});
@@ -32,7 +33,7 @@ class Stand {
   }
 
   void wish(WizardWish wish) {
-    wish_ = wish;
+    *wish_ = wish;
     if (wish != WizardWish::leave) return;
     const std::lock_guard lock(mutex_);
     view_.is_leaving = true;
@@ -57,7 +58,7 @@ class Stand {
             .judges = [this](int pose) { judges(pose); },
             .judged = [this](const PoseJudged& judged, const calib::Observations& observations,
                              const std::vector<calib::Fault>& faults) { take(judged, observations, faults); },
-            .wish = &wish_};
+            .wish = wish_};
   }
 
   // The same surroundings, with the pictures passing by here.
@@ -84,9 +85,15 @@ class Stand {
       };
       return flash;
     };
-    around.hold = [this, around](int pose) -> Status {
-      LIMN_TRY_STATUS(around.hold(pose));
-      return find_board(around.stage);
+    around.hold = [this, hold = around.hold](int pose, const Surroundings::Seen&) {
+      return hold(pose,
+                  [this](int camera, const cv::Mat& picture, const std::vector<calib::BoardCorner>& corners) {
+                    const std::lock_guard lock(mutex_);
+                    WizardView::Camera& shown = view_.cameras.at(static_cast<std::size_t>(camera));
+                    shown.picture = picture;
+                    shown.corners.clear();
+                    for (const calib::BoardCorner& corner : corners) shown.corners.push_back(corner.px);
+                  });
     };
     return around;
   }
@@ -163,27 +170,12 @@ class Stand {
           cells_of(projectors[i], view_.projectors[i].width, view_.projectors[i].height);
   }
 
-  // The board as it is held, in white light.
-  Status find_board(const calib::Stage& stage) {
-    const calib::CapturedDevice& first = plan_.captures.projectors.at(0);
-    LIMN_TRY_STATUS(stage.show(0, cv::Mat(first.height, first.width, CV_8UC1, cv::Scalar(255))));
-    for (std::size_t i = 0; i < plan_.captures.cameras.size(); ++i) {
-      LIMN_TRY(const cv::Mat picture, stage.grab(static_cast<int>(i)));
-      std::vector<Eigen::Vector2d> corners;
-      for (const calib::BoardCorner& corner : calib::find_board(plan_.captures.board, to_grey(picture)))
-        corners.push_back(corner.px);
-      const std::lock_guard lock(mutex_);
-      view_.cameras[i].corners = std::move(corners);
-    }
-    return {};
-  }
-
   WizardView::Step& step(WizardStep which) { return view_.steps.at(static_cast<std::size_t>(which)); }
 
   const WizardPlan& plan_;
   mutable std::mutex mutex_;
   WizardView view_;
-  std::atomic<WizardWish> wish_ = WizardWish::none;
+  std::atomic<WizardWish>* wish_;
 };
 
 }  // namespace
@@ -192,8 +184,10 @@ Result<Calibrated> calibrated_in_window(GuiWindow* window,
                                         const WizardPlan& plan,
                                         const Surroundings& surroundings,
                                         const std::function<void(const std::string&)>& say,
+                                        std::atomic<WizardWish>* wish,
+                                        MainErrands* errands,
                                         const WizardWork& work) {
-  Stand stand(plan);
+  Stand stand(plan, wish);
   auto running = std::async(std::launch::async, [&]() -> Result<Calibrated> {
     try {
       Result<Calibrated> done = work(stand.watched(surroundings), stand.audience(say));
@@ -205,18 +199,20 @@ Result<Calibrated> calibrated_in_window(GuiWindow* window,
     }
   });
   for (bool is_closed = false; !is_closed;) {
+    errands->serve();
     window->pressed_keys();
     if (!window->is_due()) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      std::this_thread::sleep_for(k_pause);
       continue;
     }
     const WizardView view = stand.view();
-    WizardWish wish = WizardWish::none;
-    window->draw([&](Gui& gui) { wish = draw_wizard(gui, view); });
-    if (!window->is_wanted()) wish = WizardWish::leave;
-    is_closed = wish == WizardWish::leave && (view.is_over || !window->is_wanted());
-    if (wish != WizardWish::none && !view.is_over) stand.wish(wish);
+    WizardWish asked = WizardWish::none;
+    window->draw([&](Gui& gui) { asked = draw_wizard(gui, view); });
+    if (!window->is_wanted()) asked = WizardWish::leave;
+    is_closed = asked == WizardWish::leave && (view.is_over || !window->is_wanted());
+    if (asked != WizardWish::none && !view.is_over) stand.wish(asked);
   }
+  while (running.wait_for(k_pause) != std::future_status::ready) errands->serve();
   return running.get();
 }
 

@@ -7,6 +7,7 @@
 
 #include "apps/calibrate.h"
 #include "apps/window/gui_window.h"
+#include "apps/wizard/main_errands.h"
 #include "apps/wizard/wizard_view.h"
 #include "core/result.h"
 
@@ -24,12 +25,15 @@ struct WizardPlan {
 /// The wizard's work, as calibrated() with these surroundings and this audience.
 using WizardWork = std::function<Result<Calibrated>(const Surroundings&, const WizardAudience&)>;
 
-/// Does the work in a thread of its own while the window shows it, until the person closes the window. `say`
-/// gets the lines, too. Closed early, the work is left: its error comes back.
+/// Does the work in a thread of its own while the window shows it, until the person closes the window; what
+/// the work wants done in this thread meanwhile comes by `errands`. `say` gets the lines, too. `wish`: the
+/// person's. Closed early, the work is left: its error comes back.
 Result<Calibrated> calibrated_in_window(GuiWindow* window,
                                         const WizardPlan& plan,
                                         const Surroundings& surroundings,
                                         const std::function<void(const std::string&)>& say,
+                                        std::atomic<WizardWish>* wish,
+                                        MainErrands* errands,
                                         const WizardWork& work);
 
 }  // namespace limn::apps

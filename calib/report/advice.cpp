@@ -128,7 +128,7 @@ Stances stances(const Observations& observations, const Solution& solution) {
   return s;
 }
 
-void advise_stances(const Stances& s, std::vector<std::string>* advice) {
+void advise_stances(const Stances& s, const Assessment& assessment, std::vector<std::string>* advice) {
   const auto tilt = [&](const Span& span, const char* axis) {
     if (span.width() < k_wide_tilt_deg)
       advice->push_back(
@@ -144,7 +144,7 @@ void advise_stances(const Stances& s, std::vector<std::string>* advice) {
         fmt::format("Capture some poses nearer and some farther away: all boards stood between {:.2f} and "
                     "{:.2f} m from the camera.",
                     s.distance.low, s.distance.high));
-  if (s.poses < k_enough_poses)
+  if (!rests_on_enough_poses(assessment, s.poses))
     advice->push_back(
         fmt::format("Add {} more poses: {} leave little to judge by.", k_enough_poses - s.poses, s.poses));
 }
@@ -281,12 +281,19 @@ std::string verdict_words(const Observations& observations, const Assessment& as
 
 }  // namespace
 
+bool rests_on_enough_poses(const Assessment& assessment, int poses) {
+  const std::vector<double>& mm = assessment.predicted_error_mm;
+  const bool is_fine = assessment.verdict == Verdict::good && !mm.empty() &&
+                       *std::max_element(mm.begin(), mm.end()) <= k_fine_mm;
+  return is_fine || poses >= k_enough_poses;
+}
+
 Words in_words(const Observed& observed, const Solution& solution, const Assessment& assessment) {
   const Observations& observations = observed.observations;
   Words words;
   words.verdict = verdict_words(observations, assessment);
   advise_edges(observations, &words.advice);
-  advise_stances(stances(observations, solution), &words.advice);
+  advise_stances(stances(observations, solution), assessment, &words.advice);
   advise_depths(observations, assessment.error_maps, &words.advice);
   advise_devices(observations, assessment, &words.advice);
   advise_trust(observations, assessment, &words.advice);

@@ -124,7 +124,10 @@ TEST(Calibrate, PosesHelpUntilTheRigIsGoodAndItsErrorFallsNoMore) {
   EXPECT_FALSE(more_helps({judged(0.1, calib::Verdict::usable)}).empty());
   EXPECT_FALSE(more_helps({judged(0.8)}).empty()) << "nothing to compare with";
   EXPECT_FALSE(more_helps({judged(0.8), judged(0.7), judged(0.7)}).empty()) << "fell by an eighth";
-  EXPECT_TRUE(more_helps({judged(0.8), judged(0.79), judged(0.78)}).empty());
+  std::vector<PoseJudged> settled(7, judged(0.79));
+  EXPECT_FALSE(more_helps(settled).empty()) << "too few to judge by";
+  settled.push_back(judged(0.78));
+  EXPECT_TRUE(more_helps(settled).empty());
   EXPECT_TRUE(more_helps({judged(0.8), judged(0.4), judged(0.2)}).empty()) << "fine enough";
   PoseJudged bare = judged(0.2);
   bare.assessment->faults = {{"low_coverage", "", "", calib::Severity::note}};

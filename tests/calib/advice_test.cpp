@@ -71,6 +71,11 @@ TEST(Advice, AsksForDistancesAndPosesThatAreMissing) {
   EXPECT_FALSE(says(judged.words(), "more poses"));
   judged.world.world_from_board.resize(5);
   EXPECT_TRUE(says(judged.words(), "Add 3 more poses"));
+  Judged fine = judged;
+  fine.assessment.verdict = Verdict::good;
+  EXPECT_TRUE(says(fine.words(), "Add 3 more poses")) << "0.8 and 1.4 mm";
+  fine.assessment.predicted_error_mm = {0.1, 0.2};
+  EXPECT_FALSE(says(fine.words(), "more poses"));
   for (Pose& pose : judged.world.world_from_board) pose = Pose(Eigen::Quaterniond::Identity(), {0, 0, 1.3});
   EXPECT_TRUE(says(judged.words(), "between 1.30 and 1.30 m"));
 }

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <vector>
+
+#include "apps/calibrate.h"
+#include "apps/picture_writer.h"
+#include "apps/wizard/still_board.h"
+#include "device/camera_source.h"
+#include "device/display.h"
+
+namespace limn::apps {
+
+/// Cameras and projectors in a room as the wizard's surroundings. Displays must be opened without a latency
+/// of their own: it is measured.
+class DeviceStage {
+ public:
+  struct Devices {
+    std::vector<std::unique_ptr<device::CameraSource>> cameras;
+    std::vector<std::unique_ptr<device::Display>> projectors;
+    std::function<Stamp()> now;                ///< the cameras' clock
+    std::function<void(double seconds)> wait;  ///< lets that clock go on
+  };
+  /// `wish`: any ends the waiting for a board; may be null.
+  DeviceStage(Devices devices, const calib::Board& board, const std::atomic<WizardWish>* wish);
+
+  /// This must stay where it is as long as they are used; pictures go to `writer`.
+  Surroundings surroundings(PictureWriter* writer);
+
+ private:
+  Status hold(const Surroundings::Seen& seen);
+  Status show(std::size_t projector, const cv::Mat& picture);
+  Status light_all(int level);
+  Result<cv::Mat> grab(std::size_t camera);
+  Result<Frame> next(std::size_t camera);
+
+  Devices devices_;
+  calib::Board board_;
+  const std::atomic<WizardWish>* wish_;
+  std::vector<double> latency_s_;  // of the projectors
+  std::vector<bool> is_black_;
+  std::vector<StillBoard> boards_;  // as each camera sees it
+  std::vector<Stamp> captured_at_;  // the newest frame of each camera
+  std::vector<double> period_s_;    // of each camera's frames
+  Stamp lit_at_;                    // what was shown last is on the surface
+};
+
+}  // namespace limn::apps

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <utility>
+
+namespace limn::apps {
+
+/// What one other thread wants done in the main thread, where windows and monitors live.
+class MainErrands {
+ public:
+  /// Of the other thread: returns when the main thread has done it.
+  void run(const std::function<void()>& errand) {
+    std::unique_lock lock(mutex_);
+    errand_ = &errand;
+    done_.wait(lock, [this] { return errand_ == nullptr; });
+  }
+
+  /// Of the main thread: does what is wanted, if anything is.
+  void serve() {
+    const std::lock_guard lock(mutex_);
+    if (!errand_) return;
+    (*errand_)();
+    errand_ = nullptr;
+    done_.notify_one();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable done_;
+  const std::function<void()>* errand_ = nullptr;
+};
+
+}  // namespace limn::apps

@@ -1,0 +1,175 @@
+#include "apps/wizard/device_stage.h"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
+
+#include "apps/board_place.h"
+#include "apps/capture.h"
+#include "apps/plan.h"
+#include "apps/wizard/guided_poses.h"
+#include "apps/world_markers.h"
+#include "core/file.h"
+#include "sim/virtual_rig.h"
+#include "tests/apps/small_plan.h"
+#include "tests/support/matchers.h"
+
+namespace limn::apps {
+namespace {
+
+using State = StillBoard::State;
+
+// Corners of a board that hangs at x, trembling by so much.
+std::vector<calib::BoardCorner> corners_at(double x, double tremble) {
+  std::vector<calib::BoardCorner> corners;
+  for (int i = 0; i < 20; ++i)
+    corners.push_back({i, {x + 40 * (i % 5) + tremble, 40.0 * (i / 5) - tremble}, 0.1});
+  return corners;
+}
+
+TEST(StillBoard, IsStillWhenItRestsInANewPlace) {
+  StillBoard board;
+  double at_s = 0;
+  const auto take = [&](double x, double tremble) {
+    at_s += 1 / 30.0;
+    return board.take(corners_at(x, tremble), shifted(Stamp{}, at_s));
+  };
+  EXPECT_EQ(board.take({}, Stamp{}), State::unseen);
+  for (int i = 0; i < 60; ++i) EXPECT_EQ(take(2.0 * i, 0), State::moving) << i;
+  int waited = 0;
+  while (take(120, waited % 2 ? 0.1 : -0.1) == State::moving) ASSERT_LT(++waited, 60);
+  EXPECT_NEAR(waited / 30.0, 0.8, 0.1);
+  EXPECT_EQ(take(120, 0), State::still);
+  board.captured();
+  EXPECT_EQ(take(120, 0), State::known);
+  EXPECT_EQ(take(125, 0), State::moving);
+  for (int i = 0; i < 40; ++i) take(125, 0);
+  EXPECT_EQ(take(125, 0), State::known) << "5 pixels are no other place";
+  for (int i = 0; i < 40; ++i) take(190, 0);
+  EXPECT_EQ(take(190, 0), State::still);
+  for (int i = 0; i < 40; ++i) EXPECT_NE(take(190, i % 2 ? 1 : -1), State::still) << "a hand that trembles";
+}
+
+// A room with a person who carries the board to where the wizard wants it.
+struct Room {
+  Plan plan;
+  sim::VirtualRig rig;
+  Pose from, to;
+  int steps_left = 0;  // of the person
+
+  explicit Room(const Plan& wanted)
+      : plan(wanted),
+        rig(sim::load_world(wanted.world, marker_picture).value(),
+            {.frame_period_s = 0.1, .grab_waits_for_light = false}) {
+    rig.clear_stage();
+    from = to = plan.world_from_board[0];
+    from.translation.z() += 0.5;
+  }
+  void go(const Pose& place) {
+    from = to;
+    to = place;
+    steps_left = k_steps;
+  }
+  void step() {
+    if (steps_left == 0) return;
+    const double share = 1 - 1.0 * --steps_left / k_steps;
+    Pose now = to;
+    now.translation = from.translation + share * (to.translation - from.translation);
+    now.rotation = from.rotation.slerp(share, to.rotation);
+    rig.place(board_object(plan.board, now));
+  }
+  static constexpr int k_steps = 4;
+};
+
+class RoomCamera : public device::CameraSource {
+ public:
+  explicit RoomCamera(Room* room) : room_(room) {}
+  const std::string& name() const override { return room_->rig.camera(0).name(); }
+  cv::Size size() const override { return room_->rig.camera(0).size(); }
+  Result<Frame> next() override {
+    room_->step();
+    return room_->rig.camera(0).next();
+  }
+
+ private:
+  Room* room_;
+};
+
+// Tells when it has swapped, not when its light leaves.
+class RoomProjector : public device::Display {
+ public:
+  RoomProjector(Room* room, int* moved) : room_(room), moved_(moved) {}
+  const std::string& name() const override { return room_->rig.projector(0).name(); }
+  cv::Size size() const override { return room_->rig.projector(0).size(); }
+  Result<Stamp> show(const cv::Mat& picture) override {
+    const Stamp at = room_->rig.now();
+    double least = 0, most = 0;
+    cv::minMaxLoc(picture.reshape(1), &least, &most);
+    *moved_ += least < most && room_->steps_left > 0;  // a pattern
+    LIMN_TRY([[maybe_unused]] const Stamp lit_at, room_->rig.projector(0).show(picture));
+    return at;
+  }
+
+ private:
+  Room* room_;
+  int* moved_;
+};
+
+TEST(DeviceStage, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
+  const std::filesystem::path folder = test::test_folder();
+  Room room(load_plan(test::small_plan(folder)).value());
+  int moved = 0;
+  DeviceStage::Devices devices{.cameras = {},
+                               .projectors = {},
+                               .now = [&] { return room.rig.now(); },
+                               .wait = [&](double seconds) { room.rig.advance(seconds); }};
+  devices.cameras.push_back(std::make_unique<RoomCamera>(&room));
+  devices.projectors.push_back(std::make_unique<RoomProjector>(&room, &moved));
+  DeviceStage stage(std::move(devices), room.plan.board, nullptr);
+  PictureWriter writer;
+  const CalibrateOptions options{.out = folder / "rig"};
+  const calib::Captures captures = planned(room.plan, room.rig, options.out / "captures").value();
+  const auto places =
+      places_in_words(room.rig.world().rig.cameras[0], room.plan.board, room.plan.world_from_board);
+  std::string lines;
+  const auto done = calibrated(
+      options, "{\"schema\": \"limn.captured_plan/1\"}", captures, places, stage.surroundings(&writer),
+      {.say = [&](const std::string& line) { lines += line + "\n"; },
+       .aims = [&](int pose) { room.go(room.plan.world_from_board[static_cast<std::size_t>(pose)]); }});
+  ASSERT_TRUE(done) << done.message();
+  EXPECT_EQ(moved, 0) << "patterns shown while the board moved";
+  EXPECT_EQ(done->report.assessment.verdict, calib::Verdict::good) << lines;
+  ASSERT_EQ(done->latency_s.size(), 1U) << lines;
+  EXPECT_NEAR(done->latency_s[0].second, 0.033, 0.0025);
+}
+
+TEST(GuidedPoses, AreSeenWholeAndTiltedToAllSides) {
+  const calib::Board board = calib::Board::parse("charuco:11x8:25mm").value();
+  for (const cv::Size size : {cv::Size(1280, 1024), cv::Size(1920, 1080), cv::Size(640, 480)}) {
+    const Imager camera = assumed_camera("camera0", size.width, size.height);
+    const std::vector<Pose> poses = guided_poses(camera, board);
+    ASSERT_GE(poses.size(), 10U);
+    double least[2] = {1, 1}, most[2] = {-1, -1};
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      for (const auto& [x, y] : {std::pair(0.0, 0.0),
+                                 {board.width_m(), 0.0},
+                                 {0.0, board.height_m()},
+                                 {board.width_m(), board.height_m()}}) {
+        const auto px = camera.project(poses[i] * Eigen::Vector3d(x, y, 0));
+        EXPECT_TRUE(px && camera.contains(*px)) << i << " at " << size;
+      }
+      const Eigen::Vector3d n = poses[i].rotation * Eigen::Vector3d::UnitZ();
+      for (int axis = 0; axis < 2; ++axis) {
+        least[axis] = std::min(least[axis], n[axis]);
+        most[axis] = std::max(most[axis], n[axis]);
+      }
+    }
+    for (int axis = 0; axis < 2; ++axis) {
+      EXPECT_LT(least[axis], -0.3);
+      EXPECT_GT(most[axis], 0.3);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace limn::apps
