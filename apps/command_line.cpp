@@ -396,7 +396,8 @@ void add_live(CLI::App& app, Run& run) {
   command->footer(
       "Without devices the session runs on a virtual rig, on its own clock: the world's, or a room made for rig and scene.\n"
       "Keys in the operator's window, also of clickers and pedals: right/left next/previous variant, tab next slot, b blackout,\n"
-      "f freeze, m markers, s save a look, l/k next/previous look, o what the screen shows, r release, escape asks to end.\n"
+      "f freeze, m markers, s save a look, l/k next/previous look, o what the screen shows, r release, a pair with the marker that glows,\n"
+      "v the look before and back, x both beside a line, g grid, escape asks to end.\n"
       "Example: limn live --seconds 5 --out session\n"
       "Example: limn live --devices devices.json --rig rig --scene config/scenes/door --out session --window\n"
       "Example: limn live --rig rig --scene config/scenes/door --seconds 10 --record recording\n"

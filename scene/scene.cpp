@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <set>
 #include <span>
@@ -289,22 +290,39 @@ std::string guessed_units(const fs::path& path, const Mesh& as_metres) {
   return "m";
 }
 
-// A mesh that was laid into a slot's folder.
-Result<Mesh> load_dropped(const fs::path& file, const Slot& slot) {
+// What people have said, by variant.
+Result<std::map<std::string, std::string>> load_units(const fs::path& file) {
+  std::map<std::string, std::string> units;
+  std::error_code none;
+  if (!fs::exists(file, none)) return units;
+  LIMN_TRY(const Config config, Config::load(file, "limn.units/1"));
+  config.root().only({"schema", "units"});
+  const ConfigNode node = config.root().at("units");
+  for (const std::string& name : node.keys())
+    units[name] = node.at(name).choice({"m", "cm", "mm", "in", "ft"});
+  LIMN_TRY_STATUS(config.status());
+  return units;
+}
+
+// A mesh that was laid into a slot's folder; `told`: units by variant, as people have said.
+Result<Variant> load_dropped(const fs::path& file,
+                             const Slot& slot,
+                             const std::map<std::string, std::string>& told) {
   const std::string name = file.stem().string();
   if (std::any_of(slot.variants.begin(), slot.variants.end(),
                   [&](const Variant& known) { return known.name == name; }))
     return error("{}: expected the name of no other variant of slot '{}', found '{}' twice. Rename the file.",
                  file.string(), slot.name, name);
   LIMN_TRY(const Mesh as_metres, load_mesh(file, "m"));
-  const std::string units = guessed_units(file, as_metres);
+  const auto known = told.find(name);
+  const bool is_guess = known == told.end();
+  const std::string units = is_guess ? guessed_units(file, as_metres) : known->second;
   LIMN_TRY(Mesh mesh, load_mesh(file, units));
   if (const Status size = check_size(mesh, units); !size)
     return error("{}: {}", file.string(), size.message());
-  log_info(
-      "{}: a variant of slot '{}', taken to be in {} ({:.0f} mm long); list it in scene.json if it is not",
-      file.filename().string(), slot.name, units, 1e3 * longest_side(mesh));
-  return mesh;
+  Variant variant{name, std::move(mesh), Variant::Dropped{units, is_guess}};
+  if (is_guess) log_info("{}", units_question(slot, variant));
+  return variant;
 }
 
 // The variants that scene.json lists, and meshes beside them in slots/NAME/.
@@ -314,23 +332,31 @@ Status load_variants(std::span<const MeshFile> listed,
                      Slot* slot,
                      std::vector<LeftOut>* left_out) {
   std::vector<Variant> variants;
-  const auto add = [&](const std::string& name, Result<Mesh> mesh) -> Status {
-    if (mesh)
-      variants.push_back({name, std::move(*mesh)});
-    else if (left_out)
-      left_out->push_back({slot->name, name, mesh.message()});
-    else
-      return mesh.error();
+  const auto leave_out = [&](const std::string& name, const Error& why) -> Status {
+    if (!left_out) return why;
+    left_out->push_back({slot->name, name, why.message});
     return {};
   };
-  for (std::size_t i = 0; i < listed.size(); ++i)
-    LIMN_TRY_STATUS(add(slot->variants[i].name, load_named_mesh(listed[i], path)));
+  for (std::size_t i = 0; i < listed.size(); ++i) {
+    auto mesh = load_named_mesh(listed[i], path);
+    if (mesh)
+      variants.push_back({slot->variants[i].name, std::move(*mesh)});
+    else
+      LIMN_TRY_STATUS(leave_out(slot->variants[i].name, mesh.error()));
+  }
   std::error_code none;
   std::set<fs::path> files;
+  LIMN_TRY(const auto told, load_units(scene_folder / "slots" / slot->name / "units.json"));
   for (const auto& entry : fs::directory_iterator(scene_folder / "slots" / slot->name, none))
     for (const char* end : {".glb", ".gltf", ".obj", ".stl", ".ply"})
       if (entry.path().extension() == end) files.insert(entry.path());
-  for (const fs::path& file : files) LIMN_TRY_STATUS(add(file.stem().string(), load_dropped(file, *slot)));
+  for (const fs::path& file : files) {
+    auto variant = load_dropped(file, *slot, told);
+    if (variant)
+      variants.push_back(std::move(*variant));
+    else
+      LIMN_TRY_STATUS(leave_out(file.stem().string(), variant.error()));
+  }
   slot->variants = std::move(variants);
   return {};
 }
@@ -385,6 +411,21 @@ Result<Scene> load_scene(const fs::path& path, std::vector<LeftOut>* left_out) {
   return scene;
 }
 
+std::string units_question(const Slot& slot, const Variant& variant) {
+  if (!variant.dropped || !variant.dropped->is_guess) return {};
+  return fmt::format("{} of slot '{}' is taken to be in {}, {:.0f} mm long. Is it? If not: units {} {} UNIT",
+                     variant.name, slot.name, variant.dropped->units, 1e3 * longest_side(variant.mesh),
+                     slot.name, variant.name);
+}
+
+std::string units_json(const Slot& slot, const std::string& variant, const std::string& units) {
+  nlohmann::ordered_json all = nlohmann::ordered_json::object();
+  for (const Variant& known : slot.variants)
+    if (known.dropped && !known.dropped->is_guess) all[known.name] = known.dropped->units;
+  all[variant] = units;
+  return nlohmann::ordered_json({{"schema", "limn.units/1"}, {"units", all}}).dump(2) + "\n";
+}
+
 Result<Imager> load_viewer(const fs::path& path) {
   LIMN_TRY(const Config config, Config::load(path, ""));
   Imager viewer = read_viewer_imager(config.root());
@@ -405,5 +446,9 @@ std::vector<Body> bodies(const Scene& scene) {
 }
 
 std::string viewer_body(std::size_t viewer) { return fmt::format("(viewer {})", viewer); }
+
+std::string loose_body(const MarkerName& marker) { return "(marker " + marker.text() + ")"; }
+
+bool is_loose_body(const std::string& body) { return body.rfind("(marker ", 0) == 0; }
 
 }  // namespace limn::scene

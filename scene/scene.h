@@ -28,8 +28,14 @@ enum class Mode {
 };
 
 struct Variant {
+  /// A mesh that was dropped into the slot's folder.
+  struct Dropped {
+    std::string units;
+    bool is_guess = true;  ///< nobody has said that unit
+  };
   std::string name;
   Mesh mesh;
+  std::optional<Dropped> dropped = {};
 };
 
 /// A place for one part, carried by one marker.
@@ -93,9 +99,16 @@ struct LeftOut {
 };
 
 /// `path` is the scene.json or its folder. Meshes in its folder slots/NAME/ are variants of slot NAME, too,
-/// called as their files; their units are guessed and told. A variant that cannot be loaded is an error; with
-/// `left_out` it is named there and left out instead, and a slot that has no other, with its controls, too.
+/// called as their files; their units are those of slots/NAME/units.json (limn.units/1), else guessed and
+/// told. A variant that cannot be loaded is an error; with `left_out` it is named there and left out instead,
+/// and a slot that has no other, with its controls, too.
 Result<Scene> load_scene(const std::filesystem::path& path, std::vector<LeftOut>* left_out = nullptr);
+
+/// A question for people about a dropped variant whose unit is a guess, and how to answer it; empty for
+/// others.
+std::string units_question(const Slot& slot, const Variant& variant);
+/// slots/NAME/units.json with one more answer.
+std::string units_json(const Slot& slot, const std::string& variant, const std::string& units);
 
 /// A viewer file of interfaces.md: {"world_from_viewer": POSE, "size": [w,h], "fov_deg": 40}.
 Result<Imager> load_viewer(const std::filesystem::path& path);
@@ -105,5 +118,8 @@ Result<Imager> load_viewer(const std::filesystem::path& path);
 std::vector<Body> bodies(const Scene& scene);
 /// No slot's name.
 std::string viewer_body(std::size_t viewer);
+/// The body of a marker that carries nothing in the scene; no slot's name either.
+std::string loose_body(const MarkerName& marker);
+bool is_loose_body(const std::string& body);
 
 }  // namespace limn::scene

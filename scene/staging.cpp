@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <set>
 #include <sstream>
 
 #include "core/config.h"
@@ -13,7 +14,7 @@ namespace limn::scene {
 namespace {
 
 constexpr double k_moved_m = 0.010, k_moved_rad = 5 * std::numbers::pi / 180;
-constexpr double k_most_nudge_mm = 1000;
+constexpr double k_most_nudge_mm = 1000, k_most_split_mm = 5000;
 
 std::string list_of(const std::vector<std::string>& names) {
   std::string list;
@@ -66,6 +67,16 @@ Result<Eigen::Vector3d> millimetres(const Edit& edit) {
   return mm;
 }
 
+Result<double> millimetre(const Edit& edit) {
+  std::istringstream text(edit.value);
+  double mm = 0;
+  std::string rest;
+  if (!(text >> mm) || text >> rest || !(std::abs(mm) <= k_most_split_mm))
+    return error("{}: expected a number of millimetres, at most {}, found '{}'.", edit.action,
+                 k_most_split_mm, edit.value);
+  return mm;
+}
+
 bool is_file_name(const std::string& name) {
   return !name.empty() && name.size() <= 64 && name.front() != '.' &&
          std::all_of(name.begin(), name.end(), [](char c) {
@@ -85,6 +96,12 @@ Pose prototype_from_world(const PosedScene& posed) {
   return posed.world_from_prototype ? posed.world_from_prototype->inverse() : Pose{};
 }
 
+void remember_look(const std::string& name, Staging* staging) {
+  if (staging->look == name) return;
+  staging->other_look = staging->look;
+  staging->look = name;
+}
+
 Result<Staging> with_saved_look(Staging staging, const PosedScene& posed, const Edit& edit) {
   Look look;
   look.name = edit.value.empty() ? unused_look_name(staging) : edit.value;
@@ -93,17 +110,20 @@ Result<Staging> with_saved_look(Staging staging, const PosedScene& posed, const 
                  look.name);
   for (const PosedPart& part : posed.parts)
     look.parts.push_back({part.slot, part.variant, prototype_from_world(posed) * part.world_from_part});
-  staging.look = look.name;
+  remember_look(look.name, &staging);
   std::erase_if(staging.looks, [&](const Look& known) { return known.name == look.name; });
   staging.looks.push_back(std::move(look));
   return staging;
 }
 
-Result<Staging> with_look(const Scene& scene, Staging staging, const std::string& name) {
+Result<Staging> with_look(const Scene& scene,
+                          Staging staging,
+                          const std::string& action,
+                          const std::string& name) {
   const auto look = std::find_if(staging.looks.begin(), staging.looks.end(),
                                  [&](const Look& known) { return known.name == name; });
   if (look == staging.looks.end())
-    return error("restore_look: expected one of {}, found '{}'.", list_of(look_names(staging)), name);
+    return error("{}: expected one of {}, found '{}'.", action, list_of(look_names(staging)), name);
   for (const Look::Part& part : look->parts) {
     for (std::size_t i = 0; i < scene.slots.size(); ++i) {
       if (scene.slots[i].name != part.slot) continue;
@@ -111,8 +131,32 @@ Result<Staging> with_look(const Scene& scene, Staging staging, const std::string
       staging.slots[i].pin = Pin{part.prototype_from_part, std::nullopt};
     }
   }
-  staging.look = name;
+  remember_look(name, &staging);
   return staging;
+}
+
+std::set<std::string> families_of(const Scene& scene) {
+  std::set<std::string> families;
+  for (const Body& body : bodies(scene))
+    for (const BodyMarker& marker : body.markers) families.insert(marker.marker.family);
+  return families;
+}
+
+// What else uses a marker, in words.
+std::optional<std::string> user_of(const Scene& scene,
+                                   const Staging& staging,
+                                   const MarkerName& marker,
+                                   std::size_t but_slot) {
+  for (std::size_t i = 0; i < scene.slots.size(); ++i)
+    if (i != but_slot && carrier(scene, staging, i) == marker) return "slot '" + scene.slots[i].name + "'";
+  for (const Body& body : bodies(scene)) {
+    if (scene.find_slot(body.name)) continue;
+    for (const BodyMarker& known : body.markers)
+      if (known.marker == marker) return body.name == "prototype" ? "the prototype" : "a viewer";
+  }
+  for (const Control& control : scene.controls)
+    if (control.marker == marker) return "the control of " + control.action;
+  return std::nullopt;
 }
 
 Result<Staging> with_screen(Staging staging, const Edit& edit) {
@@ -127,7 +171,52 @@ Result<Staging> with_screen(Staging staging, const Edit& edit) {
   return staging;
 }
 
-Result<Staging> edited_slot(const Slot& slot, std::size_t index, Staging staging, const Edit& edit) {
+Status check_carrier(const Scene& scene, const Staging& staging, const MarkerName& marker, std::size_t slot) {
+  const std::set<std::string> families = families_of(scene);
+  if (!families.count(marker.family))
+    return error("expected a marker of the scene's families ({}), found {}.",
+                 list_of({families.begin(), families.end()}), marker.text());
+  if (const auto user = user_of(scene, staging, marker, slot))
+    return error("expected a marker that carries nothing, found {}, which {} uses.", marker.text(), *user);
+  return {};
+}
+
+Result<Staging> paired(const Scene& scene, std::size_t index, Staging staging, const Edit& edit) {
+  if (edit.value.empty())
+    return error(
+        "pair: expected a marker that lies still and carries nothing, found none. Lay one down for a "
+        "second.");
+  auto marker = MarkerName::parse(edit.value);
+  if (!marker) return error("{}: {}", edit.action, marker.message());
+  if (const Status can = check_carrier(scene, staging, *marker, index); !can)
+    return error("{}: {}", edit.action, can.message());
+  Staging::Slot& slot = staging.slots[index];
+  slot.pin.reset();
+  if (*marker == scene.slots[index].marker)
+    slot.marker.reset();
+  else
+    slot.marker = std::move(*marker);
+  return staging;
+}
+
+// The pure part: the unit itself is kept beside the part's file.
+Status check_units(const Slot& slot, const Edit& edit) {
+  const auto blank = edit.value.rfind(' ');
+  const std::string name = edit.value.substr(0, blank),
+                    units = blank == std::string::npos ? "" : edit.value.substr(blank + 1);
+  std::vector<std::string> dropped;
+  for (const Variant& variant : slot.variants)
+    if (variant.dropped) dropped.push_back(variant.name);
+  if (std::find(dropped.begin(), dropped.end(), name) == dropped.end())
+    return error("units: expected a part that was dropped into slot '{}' ({}) and its unit, found '{}'.",
+                 slot.name, list_of(dropped), edit.value);
+  if (!metres_per_unit(units))
+    return error("units: expected m, cm, mm, in or ft after the part's name, found '{}'.", units);
+  return {};
+}
+
+Result<Staging> edited_slot(const Scene& scene, std::size_t index, Staging staging, const Edit& edit) {
+  const Slot& slot = scene.slots[index];
   Staging::Slot& staged = staging.slots[index];
   const std::vector<std::string> names = variant_names(slot);
   if (edit.action == "next_variant") {
@@ -145,6 +234,12 @@ Result<Staging> edited_slot(const Slot& slot, std::size_t index, Staging staging
     if (staged.pin)
       staged.pin->prototype_from_part =
           staged.pin->prototype_from_part * Pose(Eigen::Quaterniond::Identity(), 1e-3 * mm);
+  } else if (edit.action == "pair") {
+    return paired(scene, index, std::move(staging), edit);
+  } else if (edit.action == "unpair") {
+    return paired(scene, index, std::move(staging), {edit.action, edit.slot, slot.marker.text()});
+  } else if (edit.action == "units") {
+    LIMN_TRY_STATUS(check_units(slot, edit));
   } else {  // release
     staged.nudge.setZero();
     staged.pin.reset();
@@ -161,7 +256,7 @@ const std::vector<std::string>& screen_names() {
 
 Staging first_staging(const Scene& scene) {
   Staging staging;
-  for (const Slot& slot : scene.slots) staging.slots.push_back({slot.variants.front().name, {}, {}});
+  for (const Slot& slot : scene.slots) staging.slots.push_back({slot.variants.front().name, {}, {}, {}});
   for (Staging::Slot& slot : staging.slots) slot.nudge.setZero();
   return staging;
 }
@@ -174,14 +269,22 @@ const std::vector<Action>& actions() {
       {"choose_variant", true, text, "a variant", "a variant by name"},
       {"nudge", true, millimetres, "three numbers, mm", "moves the part along its own axes"},
       {"release", true, nothing, "", "the part follows its marker again, without nudges"},
+      {"pair", true, maybe_text, "a marker; empty: the one that glows",
+       "the part is carried by that marker from now on"},
+      {"unpair", true, nothing, "", "the scene's own marker carries the part again"},
+      {"units", true, text, "a variant and m, cm, mm, in or ft", "the unit of a part that was dropped in"},
       {"save_look", false, maybe_text, "a name; empty: look-01 and so on",
        "keeps variants and places, as JSON and PNG"},
       {"restore_look", false, text, "a look", "shows a look until its markers are moved"},
       {"next_look", false, nothing, "", "the look after the one last shown"},
       {"previous_look", false, nothing, "", "the look before it"},
+      {"flip", false, maybe_text, "a look; empty: the one shown before", "shows the other of two looks"},
+      {"split", false, on_off, "on, off or toggle", "left of a line the look shown before"},
+      {"split_at", false, number, "mm to the right of the prototype's middle", "where that line is"},
       {"delete_look", false, text, "a look", "forgets a look"},
       {"blackout", false, on_off, "on, off or toggle", "bare model: no light"},
       {"freeze", false, on_off, "on, off or toggle", "what is shown stays"},
+      {"grid", false, on_off, "on, off or toggle", "lines on the prototype, every 10 mm"},
       {"marker_states", false, on_off, "on, off or toggle",
        "rings around markers: green seen, amber carried on"},
       {"screen", false, maybe_text, "rest, full, camera, view, stereo, off or next", "what screens show"},
@@ -202,7 +305,7 @@ Result<Staging> edited(const Scene& scene,
   }
   if (action->of_slot) {
     for (std::size_t i = 0; i < scene.slots.size(); ++i)
-      if (scene.slots[i].name == edit.slot) return edited_slot(scene.slots[i], i, staging, edit);
+      if (scene.slots[i].name == edit.slot) return edited_slot(scene, i, staging, edit);
     std::vector<std::string> names;
     for (const Slot& slot : scene.slots) names.push_back(slot.name);
     return error("{}: expected a slot of the scene ({}), found '{}'.", edit.action, list_of(names),
@@ -210,24 +313,102 @@ Result<Staging> edited(const Scene& scene,
   }
   Staging out = staging;
   if (edit.action == "save_look") return with_saved_look(std::move(out), posed, edit);
-  if (edit.action == "restore_look") return with_look(scene, std::move(out), edit.value);
+  if (edit.action == "restore_look") return with_look(scene, std::move(out), edit.action, edit.value);
   if (edit.action == "next_look" || edit.action == "previous_look") {
     if (staging.looks.empty()) return error("{}: expected a saved look, found none. Save one.", edit.action);
     const int step = edit.action == "next_look" ? 1 : -1;
-    return with_look(scene, std::move(out), stepped(look_names(staging), staging.look, step));
+    return with_look(scene, std::move(out), edit.action, stepped(look_names(staging), staging.look, step));
+  }
+  if (edit.action == "flip") {
+    if (edit.value.empty() && staging.other_look.empty())
+      return error("flip: expected two looks shown before, found {}. Save or restore another.",
+                   staging.look.empty() ? "none" : "one");
+    return with_look(scene, std::move(out), edit.action,
+                     edit.value.empty() ? staging.other_look : edit.value);
+  }
+  if (edit.action == "split_at") {
+    LIMN_TRY(out.split_mm, millimetre(edit));
+    return out;
+  }
+  if (edit.action == "split") {
+    LIMN_TRY(out.split, switched(staging.split, edit));
+    if (out.split && staging.other_look.empty())
+      return error("split: expected a look shown before the present one, found none. Save or restore two.");
+    return out;
   }
   if (edit.action == "delete_look") {
     if (std::erase_if(out.looks, [&](const Look& look) { return look.name == edit.value; }) == 0)
       return error("delete_look: expected one of {}, found '{}'.", list_of(look_names(staging)), edit.value);
     if (out.look == edit.value) out.look.clear();
+    if (out.other_look == edit.value) {
+      out.other_look.clear();
+      out.split = false;
+    }
     return out;
   }
   if (edit.action == "screen") return with_screen(std::move(out), edit);
   bool Staging::*const flag = edit.action == "blackout" ? &Staging::blackout
                               : edit.action == "freeze" ? &Staging::frozen
+                              : edit.action == "grid"   ? &Staging::grid
                                                         : &Staging::marker_states;
   LIMN_TRY(out.*flag, switched(staging.*flag, edit));
   return out;
+}
+
+const MarkerName& carrier(const Scene& scene, const Staging& staging, std::size_t slot) {
+  return staging.slots[slot].marker ? *staging.slots[slot].marker : scene.slots[slot].marker;
+}
+
+std::vector<Track> carried(const Scene& scene, const Staging& staging, std::span<const Track> tracks) {
+  std::vector<Track> out;
+  for (const Track& track : tracks) {
+    const Slot* own = scene.find_slot(track.body);
+    bool is_taken = false;
+    for (std::size_t i = 0; i < scene.slots.size(); ++i) {
+      const MarkerName& marker = carrier(scene, staging, i);
+      if (own ? own->marker != marker : track.body != loose_body(marker)) continue;
+      out.push_back(track);
+      out.back().body = scene.slots[i].name;
+      is_taken = true;
+    }
+    if (!own && !is_taken) out.push_back(track);
+  }
+  return out;
+}
+
+std::optional<Staging> left_of_split(const Scene& scene, const Staging& staging) {
+  if (!staging.split) return std::nullopt;
+  auto left = with_look(scene, staging, "split", staging.other_look);
+  if (!left) return std::nullopt;
+  return std::move(*left);
+}
+
+std::string pairings_json(const Scene& scene, const Staging& staging) {
+  nlohmann::ordered_json slots = nlohmann::ordered_json::object();
+  for (std::size_t i = 0; i < scene.slots.size(); ++i)
+    if (staging.slots[i].marker) slots[scene.slots[i].name] = staging.slots[i].marker->text();
+  if (slots.empty()) return {};
+  return nlohmann::ordered_json({{"schema", "limn.pairings/1"}, {"slots", slots}}).dump(2) + "\n";
+}
+
+Result<Staging> with_pairings(const std::filesystem::path& path, const Scene& scene, Staging staging) {
+  LIMN_TRY(const Config config, Config::load(path, "limn.pairings/1"));
+  const ConfigNode root = config.root();
+  root.only({"schema", "slots"});
+  const ConfigNode slots = root.at("slots");
+  for (const std::string& name : slots.keys()) {
+    const Slot* slot = scene.find_slot(name);
+    const auto marker = MarkerName::parse(slots.at(name).text());
+    if (!slot) slots.at(name).problem("expected a slot of the scene, found another name.");
+    if (!marker) slots.at(name).problem(marker.message());
+    if (slot && marker) staging.slots[static_cast<std::size_t>(slot - scene.slots.data())].marker = *marker;
+  }
+  for (std::size_t i = 0; i < scene.slots.size(); ++i)  // all together: they may have changed places
+    if (const auto& marker = staging.slots[i].marker)
+      if (const Status can = check_carrier(scene, staging, *marker, i); !can)
+        slots.at(scene.slots[i].name).problem(can.message());
+  LIMN_TRY_STATUS(config.status());
+  return staging;
 }
 
 Staging unpinned(const Scene& scene, const Staging& staging, std::span<const Track> tracks) {

@@ -46,13 +46,18 @@ struct Staging {
     std::string variant;
     Eigen::Vector3d nudge = Eigen::Vector3d::Zero();  ///< along the part's own axes, m
     std::optional<Pin> pin;
+    std::optional<MarkerName> marker;  ///< carries the part instead of the scene's own
   };
   std::vector<Slot> slots;  ///< in the scene's order
   std::vector<Look> looks;
   std::string look;            ///< the one last saved or restored; empty: none
+  std::string other_look;      ///< the one before it, which flip comes back to
   bool blackout = false;       ///< bare model: projectors give no light
   bool frozen = false;         ///< what is shown stays as it is
   bool marker_states = false;  ///< rings around markers say how they are tracked
+  bool grid = false;           ///< lines on the prototype, every 10 mm
+  bool split = false;          ///< left of a line the other look, right of it what is shown else
+  double split_mm = 0;         ///< where the line is, along the prototype's x, from its middle
   Screen screen = Screen::rest;
 };
 
@@ -71,6 +76,7 @@ enum class Takes {
   nothing,
   text,         ///< required
   maybe_text,   ///< or nothing
+  number,       ///< "12.5"
   millimetres,  ///< three numbers, "1 0 -2.5"
   on_off        ///< "on", "off", "toggle"; nothing: toggle
 };
@@ -89,13 +95,27 @@ const std::vector<Action>& actions();
 /// changed: an unknown action, slot, variant or look, or a value that is not what the action wants.
 Result<Staging> edited(const Scene& scene, const Staging& staging, const PosedScene& posed, const Edit& edit);
 
+/// The marker that carries a slot's part.
+const MarkerName& carrier(const Scene& scene, const Staging& staging, std::size_t slot);
+
+/// Tracks by what they carry: a slot's is its carrier's, under the slot's name; loose markers keep theirs.
+std::vector<Track> carried(const Scene& scene, const Staging& staging, std::span<const Track> tracks);
+
 /// The staging once pins have gone of parts whose marker was moved on the prototype by more than 10 mm or 5
-/// degrees since it was first seen under the pin.
+/// degrees since it was first seen under the pin. Tracks as of carried().
 Staging unpinned(const Scene& scene, const Staging& staging, std::span<const Track> tracks);
 
-/// The scene as tracks and people place it: posed() with the chosen variants, nudged, pinned parts where
-/// their look had them.
+/// The scene as tracks (carried()) and people place it: posed() with the chosen variants, nudged, pinned
+/// parts where their look had them.
 PosedScene staged(const Scene& scene, const Staging& staging, std::span<const Track> tracks);
+
+/// What is left of a line shows the other look: the same staging as it. Nothing without one.
+std::optional<Staging> left_of_split(const Scene& scene, const Staging& staging);
+
+/// limn.pairings/1: the slots that other markers than the scene's carry. As text, empty when there are none;
+/// and into a staging. Errors: unknown slots, families that the scene does not use, a marker used twice.
+std::string pairings_json(const Scene& scene, const Staging& staging);
+Result<Staging> with_pairings(const std::filesystem::path& path, const Scene& scene, Staging staging);
 
 /// limn.look/1 as text, and back. Error: unknown slots or variants, numbers that are no pose.
 std::string look_json(const Look& look);

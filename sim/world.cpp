@@ -257,6 +257,26 @@ std::vector<SlotPlace> read_slot_places(const ConfigNode& node) {
   return places;
 }
 
+// A marker that carries nothing in the scene.
+struct LoosePlace {
+  BodyMarker marker;
+  bool on_prototype = false;
+};
+
+std::vector<LoosePlace> read_loose_places(const ConfigNode& node) {
+  std::vector<LoosePlace> places;
+  for (const ConfigNode& item : node.items()) {
+    item.only({"name", "size_mm", "prototype_from_marker", "world_from_marker"});
+    const auto name = MarkerName::parse(item.at("name").text());
+    if (!name) item.at("name").problem(name.message());
+    const auto on_prototype = item.find("prototype_from_marker");
+    places.push_back({{name ? *name : MarkerName{}, 1e-3 * item.at("size_mm").positive(),
+                       on_prototype ? on_prototype->pose() : item.at("world_from_marker").pose()},
+                      on_prototype.has_value()});
+  }
+  return places;
+}
+
 // The marker's picture, fine enough, with its white margin around it.
 struct Plate {
   cv::Mat picture;
@@ -350,8 +370,8 @@ Result<World> load_world(const std::filesystem::path& path,
                          std::vector<scene::LeftOut>* left_out) {
   LIMN_TRY(const Config config, Config::load(path, "limn.world/1"));
   const ConfigNode root = config.root();
-  root.only({"schema", "seed", "scene", "world_from_prototype", "slot_markers", "marker_paper", "cameras",
-             "projectors", "room", "objects"});
+  root.only({"schema", "seed", "scene", "world_from_prototype", "slot_markers", "loose_markers",
+             "marker_paper", "cameras", "projectors", "room", "objects"});
   World world;
   read_devices(root, &world);
   world.room = read_room(root.at("room"));
@@ -367,6 +387,8 @@ Result<World> load_world(const std::filesystem::path& path,
   MarkerPaper paper;
   if (const auto node = root.find("marker_paper")) paper = read_paper(*node);
   std::vector<SlotPlace> places;
+  std::vector<LoosePlace> loose;
+  if (const auto markers = root.find("loose_markers")) loose = read_loose_places(*markers);
   std::filesystem::path scene_folder;
   if (const auto node = root.find("scene")) {
     scene_folder = config.folder() / node->text();
@@ -378,6 +400,8 @@ Result<World> load_world(const std::filesystem::path& path,
     LIMN_TRY(world.scene, scene::load_scene(scene_folder.lexically_normal(), left_out));
     LIMN_TRY_STATUS(add_scene(world, places, marker_picture, paper, path.string()));
   }
+  for (const LoosePlace& place : loose)
+    LIMN_TRY_STATUS(add_plate(world, place.marker, place.on_prototype, marker_picture, paper));
   return world;
 }
 

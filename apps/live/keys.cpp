@@ -31,6 +31,8 @@ std::optional<scene::Edit> Keys::edit_of(int key) {
       return of_slot("previous_variant");
     case 'R':
       return of_slot("release");
+    case 'A':
+      return of_slot("pair");
     case 'B':
     case '.':
       return scene::Edit{"blackout", "", ""};
@@ -44,6 +46,12 @@ std::optional<scene::Edit> Keys::edit_of(int key) {
       return scene::Edit{"next_look", "", ""};
     case 'K':
       return scene::Edit{"previous_look", "", ""};
+    case 'V':
+      return scene::Edit{"flip", "", ""};
+    case 'X':
+      return scene::Edit{"split", "", ""};
+    case 'G':
+      return scene::Edit{"grid", "", ""};
     case 'O':
       return scene::Edit{"screen", "", "next"};
     default:

@@ -11,6 +11,7 @@ namespace limn::apps {
 ///   right, page down, n: next variant    left, page up, p: previous    tab: next slot
 ///   b, full stop: blackout    f: freeze    m: markers' states    s: save a look    l, k: next, previous look
 ///   o: what the screen shows    r: the part follows its marker again
+///   a: pair the part with the marker that glows    v: the look before, and back    x: both, beside a line    g: grid
 class Keys {
  public:
   explicit Keys(const scene::Scene& scene);

@@ -225,6 +225,8 @@ void OperatorPanel::draw_bar(const Gui& gui, const OperatorView& view) {
   if (toggle("Freeze", staging.frozen, colour::k_warn, size)) ask("freeze");
   ImGui::SameLine();
   if (toggle("Marker rings", staging.marker_states, colour::k_blue, size)) ask("marker_states");
+  ImGui::SameLine();
+  if (toggle("Grid", staging.grid, colour::k_blue, size)) ask("grid");
   ImGui::SameLine(0, 1.5F * gui.em());
   ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, {10, 0.45F * gui.em()});
   ImGui::AlignTextToFramePadding();

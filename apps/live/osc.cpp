@@ -31,6 +31,9 @@ std::string arguments_of(const scene::Action& action) {
     case scene::Takes::maybe_text:
       words.push_back(action.value + " (text, may be left out)");
       break;
+    case scene::Takes::number:
+      words.push_back(action.value + " (a number)");
+      break;
     case scene::Takes::millimetres:
       words.push_back("three numbers, mm");
       break;
@@ -102,7 +105,7 @@ struct Reader {
 
   Result<double> number() {
     const auto found = is_at_end() ? std::nullopt : arguments[next].number();
-    if (!found) return error("{}: expected three numbers of millimetres, found {}.", path, found_here());
+    if (!found) return error("{}: expected a number of millimetres, found {}.", path, found_here());
     if (!std::isfinite(*found)) return error("{}: expected finite numbers, found {}.", path, *found);
     ++next;
     return *found;
@@ -136,6 +139,10 @@ Result<std::string> value_of(scene::Takes takes, const std::string& what, Reader
       return reader->text(what);
     case scene::Takes::maybe_text:
       return reader->is_at_end() ? Result<std::string>(std::string()) : reader->text(what);
+    case scene::Takes::number: {
+      LIMN_TRY(const double number, reader->number());
+      return fmt::format("{}", number);
+    }
     case scene::Takes::millimetres: {
       LIMN_TRY(const double x, reader->number());
       LIMN_TRY(const double y, reader->number());

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "apps/live/aids.h"
 #include "apps/live/feedback.h"
 
 namespace limn::apps {
@@ -13,7 +14,9 @@ namespace {
 constexpr double k_sign = 0.7;   // display value of signs: bright ones could hide markers from cameras
 constexpr double k_gamma = 2.2;  // near enough to mix what fades
 const cv::Scalar k_background(40, 36, 34);  // of views: a dark room
-const cv::Scalar k_green(90, 220, 90), k_amber(40, 170, 255), k_red(60, 60, 255);
+const cv::Scalar k_green(90, 220, 90), k_amber(40, 170, 255), k_red(60, 60, 255), k_blue(255, 190, 110);
+constexpr double k_waits_s = 1;          // a marker that lies still for so long may be paired
+constexpr double k_other_waiting = 0.4;  // light of those that are not next, as a share
 
 // base + share of what `with` adds to it, in linear light.
 cv::Mat mixed(const cv::Mat& base, const cv::Mat& with, double share) {
@@ -44,6 +47,20 @@ Imager moved_eye(Imager imager, double right_m) {
 
 }  // namespace
 
+std::vector<LooseMarker> waiting_markers(const scene::Scene& scene,
+                                         const scene::Staging& staging,
+                                         const Watched& watched) {
+  std::vector<LooseMarker> waiting;
+  for (const LooseMarker& loose : watched.loose) {
+    bool carries = false;
+    for (std::size_t i = 0; i < scene.slots.size(); ++i)
+      carries |= scene::carrier(scene, staging, i) == loose.marker;
+    if (!carries && seconds_between(loose.still_since, watched.captured_at) >= k_waits_s)
+      waiting.push_back(loose);
+  }
+  return waiting;
+}
+
 Result<Painter> Painter::create(const scene::Scene& scene, const Rig& rig, const PaintOptions& options) {
   LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, rig));
   return Painter(scene, rig, std::move(renderer), options);
@@ -63,6 +80,10 @@ Painter::Painter(const scene::Scene& scene,
       d_up_world_(rig.cameras.empty()
                       ? Eigen::Vector3d(0, -1, 0)
                       : rig.cameras[0].imager_from_world.rotation.inverse() * Eigen::Vector3d(0, -1, 0)) {
+  Eigen::AlignedBox3f box;
+  if (scene.prototype)
+    for (const Eigen::Vector3f& p : scene.prototype->mesh.positions) box.extend(p);
+  if (!box.isEmpty()) middle_x_m_ = static_cast<double>(box.center().x());
   for (const Imager& projector : rig.projectors)
     painted_.projectors.emplace_back(projector.height, projector.width, CV_8UC3, cv::Scalar::all(0));
 }
@@ -89,7 +110,9 @@ const Painted& Painter::paint(const Watched& watched,
   painted_.shown_at = shown_at;
   if (staging.frozen && !staging.blackout && !is_black_) return painted_;
   is_black_ = staging.blackout;
-  painted_.tracks = tracker::predicted(watched.motions, shown_at, options_.prediction, options_.motion, now);
+  painted_.tracks = scene::carried(
+      scene_, staging,
+      tracker::predicted(watched.motions, shown_at, options_.prediction, options_.motion, now));
   painted_.posed = scene::staged(scene_, staging, painted_.tracks);
   note_changes(painted_.posed, staging, shown_at);
   const Imager viewer = viewer_for(painted_.posed, shown_at);
@@ -97,19 +120,26 @@ const Painted& Painter::paint(const Watched& watched,
   const bool refill = options_.refill && rig_.projectors.size() > 1;
   if (refill) shadows_.look(watched, painted_.posed, shown_, &renderer_);
   drifts_.look(watched, painted_.posed, shown_, &renderer_);
+  const std::vector<LooseMarker> waiting = waiting_markers(scene_, staging, watched);
+  std::vector<Body> bodies = bodies_;
+  for (const LooseMarker& loose : watched.loose)
+    bodies.push_back({scene::loose_body(loose.marker), {{loose.marker, loose_size_m(scene_), Pose()}}});
   for (std::size_t i = 0; i < rig_.projectors.size(); ++i) {
     cv::Mat& picture = painted_.projectors[i];
     if (staging.blackout) {
       picture = cv::Mat::zeros(picture.size(), picture.type());
       continue;
     }
-    picture = lit(i, painted_.posed, viewer, shown_at);
+    picture = lit_for(i, staging, viewer, shown_at);
     if (options_.marker_light != tracker::MarkerLight::as_is) {
-      const cv::Mat mask = tracker::marker_mask(rig_.projectors[i], bodies_, painted_.tracks);
+      const cv::Mat mask = tracker::marker_mask(rig_.projectors[i], bodies, painted_.tracks);
       picture = tracker::with_marker_light(picture, mask, options_.marker_light);
     }
   }
-  if (!staging.blackout) draw_feedback(staging);
+  if (!staging.blackout) {
+    draw_feedback(staging);
+    draw_waiting(waiting);
+  }
   shown_.add(painted_.projectors, shown_at);
   return painted_;
 }
@@ -119,8 +149,8 @@ cv::Mat Painter::screen(const Watched& watched, const scene::Staging& staging) {
   if (staging.screen == scene::Screen::off || behind.empty()) return {};
   if (staging.screen == scene::Screen::camera) return behind;
   const Stamp at = watched.frames[0].captured_at;
-  const std::vector<Track> tracks =
-      tracker::predicted(watched.motions, at, options_.prediction, options_.motion);
+  const std::vector<Track> tracks = scene::carried(
+      scene_, staging, tracker::predicted(watched.motions, at, options_.prediction, options_.motion));
   const scene::PosedScene posed = scene::staged(scene_, staging, tracks);
   if (staging.screen == scene::Screen::full)
     return renderer_.composite(0, behind, posed, projector::Composite::full);
@@ -186,6 +216,24 @@ cv::Mat Painter::lit(std::size_t projector, const scene::PosedScene& posed, cons
   return picture;
 }
 
+// A projector's picture with the staging's aids: another look left of a line, a grid.
+cv::Mat Painter::lit_for(std::size_t projector,
+                         const scene::Staging& staging,
+                         const Imager& viewer,
+                         Stamp at) {
+  cv::Mat picture = lit(projector, painted_.posed, viewer, at);
+  const auto left = scene::left_of_split(scene_, staging);
+  if (!painted_.posed.world_from_prototype || (!left && !staging.grid)) return picture;
+  const cv::Mat points = renderer_.surface_points(projector, painted_.posed);
+  if (left) {
+    const scene::PosedScene other = scene::staged(scene_, *left, painted_.tracks);
+    picture = split_at(points, middle_x_m_ + 1e-3 * staging.split_mm,
+                       renderer_.projector_picture(projector, other, viewer), picture);
+  }
+  if (staging.grid) draw_grid(points, renderer_.blend(projector, painted_.posed), &picture);
+  return picture;
+}
+
 // The projector that reaches a marker best; null when none does.
 const Imager* Painter::best_projector(const Pose& world_from_marker) const {
   const Imager* best = nullptr;
@@ -225,6 +273,16 @@ void Painter::draw_feedback(const scene::Staging& staging) {
                   k_sign * std::min(1.0, 3 * (1 - age)), picture);
       }
     }
+  }
+}
+
+void Painter::draw_waiting(std::span<const LooseMarker> waiting) {
+  for (const LooseMarker& loose : waiting) {
+    const Imager* projector = best_projector(loose.world_from_marker);
+    if (!projector) continue;
+    const double share = &loose == &waiting.back() ? 1 : k_other_waiting;
+    draw_ring(*projector, loose.world_from_marker, loose_size_m(scene_), k_blue, k_sign * share,
+              &painted_.projectors[static_cast<std::size_t>(projector - rig_.projectors.data())]);
   }
 }
 

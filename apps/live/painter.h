@@ -41,6 +41,12 @@ struct Painted {
   Stamp painted_at, shown_at;
 };
 
+/// Loose markers that lie still for a second and carry no slot: they glow. The last one is the one that a
+/// `pair` without a marker means.
+std::vector<LooseMarker> waiting_markers(const scene::Scene& scene,
+                                         const scene::Staging& staging,
+                                         const Watched& watched);
+
 /// The projector side of a session: motions of bodies + staging -> projector pictures and the screen's. Holds
 /// what fades; the same calls give the same pictures. A GL context must be current at every call and at
 /// destruction.
@@ -81,7 +87,9 @@ class Painter {
   Imager viewer_for(const scene::PosedScene& posed, Stamp at);
   void note_changes(const scene::PosedScene& posed, const scene::Staging& staging, Stamp at);
   cv::Mat lit(std::size_t projector, const scene::PosedScene& posed, const Imager& viewer, Stamp at);
+  cv::Mat lit_for(std::size_t projector, const scene::Staging& staging, const Imager& viewer, Stamp at);
   void draw_feedback(const scene::Staging& staging);
+  void draw_waiting(std::span<const LooseMarker> waiting);
   const Imager* best_projector(const Pose& world_from_marker) const;
 
   scene::Scene scene_;
@@ -93,9 +101,10 @@ class Painter {
   ShadowWatch shadows_;
   DriftWatch drifts_;
   Eigen::Vector3d d_up_world_;
+  double middle_x_m_ = 0;  // of the prototype, its own frame
   Painted painted_;
   bool is_black_ = false;  // by blackout, which goes before a freeze
-  Imager viewer_;  // of what was painted last
+  Imager viewer_;          // of what was painted last
   scene::SharedEye shared_eye_;
   Stamp eye_at_;
   std::vector<projector::Treatment> treatments_;

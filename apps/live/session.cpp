@@ -16,6 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr double k_compare_cameras_every_s = 2;
 constexpr double k_renew_every_s = 1;  // a context that was lost
+constexpr const char* k_pairings = "pairings.json";
 
 double milliseconds_since(std::chrono::steady_clock::time_point begun) {
   return 1e3 * seconds_between(begun, std::chrono::steady_clock::now());
@@ -95,6 +96,8 @@ Result<Session> Session::create(const SessionSetup& setup,
   Session out(setup, std::move(painter), telemetry, recorder);
   out.keeps_looks_ = keeps_looks;
   out.load_looks();
+  out.load_pairings();
+  out.ask_units();
   return out;
 }
 
@@ -121,12 +124,35 @@ void Session::load_looks() {
   }
 }
 
+void Session::load_pairings() {
+  const fs::path file = setup_.scene.folder / k_pairings;
+  std::error_code none;
+  if (!fs::exists(file, none)) return;
+  auto paired = scene::with_pairings(file, setup_.scene, staging_);
+  if (paired)
+    staging_ = std::move(*paired);
+  else
+    log_warning("live: {} The scene's own markers carry the parts.", paired.message());
+}
+
+// Of parts that were dropped in, once each.
+void Session::ask_units() {
+  for (const scene::Slot& slot : setup_.scene.slots)
+    for (const scene::Variant& variant : slot.variants) {
+      const std::string question = scene::units_question(slot, variant);
+      if (!question.empty() && telemetry_ && asked_.insert(question).second)
+        telemetry_->note(watched_.captured_at, question);
+    }
+}
+
 void Session::take(Watched watched, std::size_t moments) {
   watched_ = std::move(watched);
   moments_ = moments;
-  staging_ = scene::unpinned(setup_.scene, staging_,
-                             tracker::predicted(watched_.motions, watched_.captured_at,
-                                                setup_.paint.prediction, setup_.paint.motion));
+  staging_ =
+      scene::unpinned(setup_.scene, staging_,
+                      scene::carried(setup_.scene, staging_,
+                                     tracker::predicted(watched_.motions, watched_.captured_at,
+                                                        setup_.paint.prediction, setup_.paint.motion)));
   for (const ControlUse& use : watched_.uses) {
     const scene::Control& control = setup_.scene.controls[use.control];
     const Status done = edit(edit_of(control, use.steps), control.marker.text(), watched_.captured_at);
@@ -153,14 +179,18 @@ void Session::tell_of_swapped_cameras() {
   log_warning("live: {}", what);
 }
 
-Status Session::edit(const scene::Edit& edit, const std::string& source, Stamp at) {
+Status Session::edit(const scene::Edit& wanted, const std::string& source, Stamp at) {
+  scene::Edit edit = wanted;
+  if (edit.action == "pair" && edit.value.empty())
+    if (const auto waiting = waiting_markers(setup_.scene, staging_, watched_); !waiting.empty())
+      edit.value = waiting.back().marker.text();
   LIMN_TRY(scene::Staging changed, scene::edited(setup_.scene, staging_, painted_.posed, edit));
   std::swap(staging_, changed);
   if (recorder_) recorder_->edited(edit, source, moments_);
   if (telemetry_)
     telemetry_->note(at, fmt::format("{}{}{}{}{} ({})", edit.action, edit.slot.empty() ? "" : " ", edit.slot,
                                      edit.value.empty() ? "" : " ", edit.value, source));
-  return keeps_looks_ ? keep_looks(changed) : Status();
+  return keeps_looks_ ? keep(changed, edit) : Status();
 }
 
 Status Session::show(scene::Scene scene, Stamp at) {
@@ -185,6 +215,7 @@ Status Session::show(scene::Scene scene, Stamp at) {
   if (telemetry_) telemetry_->note(at, "the scene's files have changed; it was loaded anew");
   painter_ = std::move(painter);
   setup_.scene = std::move(scene);
+  ask_units();
   return {};
 }
 
@@ -209,6 +240,30 @@ Status Session::show_if_whole(SceneNews news, Stamp at) {
   LIMN_TRY_STATUS(show(std::move(news.scene), at));
   tell(news.left_out, at, telemetry_);
   return {};
+}
+
+Status Session::keep(const scene::Staging& before, const scene::Edit& edit) {
+  LIMN_TRY_STATUS(keep_pairings(before));
+  if (edit.action == "units") LIMN_TRY_STATUS(keep_units(edit));
+  return keep_looks(before);
+}
+
+Status Session::keep_pairings(const scene::Staging& before) {
+  const std::string text = scene::pairings_json(setup_.scene, staging_);
+  if (text == scene::pairings_json(setup_.scene, before)) return {};
+  const fs::path file = setup_.scene.folder / k_pairings;
+  if (!text.empty()) return write_file(file, text);
+  std::error_code ignored;
+  fs::remove(file, ignored);
+  return {};
+}
+
+// The part comes anew when SceneWatch sees the answer.
+Status Session::keep_units(const scene::Edit& edit) {
+  const auto blank = edit.value.rfind(' ');
+  return write_file(setup_.scene.folder / "slots" / edit.slot / "units.json",
+                    scene::units_json(*setup_.scene.find_slot(edit.slot), edit.value.substr(0, blank),
+                                      edit.value.substr(blank + 1)));
 }
 
 // Looks that were saved or deleted, on disk, and the page of all.
@@ -304,7 +359,8 @@ ShownFrame Session::measured() const {
                  .screen_ms = -1,
                  .record_ms = record_ms_};
   for (const auto& detections : watched_.detections) out.markers += static_cast<int>(detections.size());
-  for (const Track& track : painted.tracks) out.lost += track.sight == Sight::lost;
+  for (const Track& track : painted.tracks)
+    out.lost += track.sight == Sight::lost && !scene::is_loose_body(track.body);
   return out;
 }
 

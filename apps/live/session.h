@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -26,7 +27,8 @@ void tell(std::span<const scene::LeftOut> left_out, Stamp at, Telemetry* telemet
 class Session {
  public:
   /// Looks are read from the scene's folder `looks` and, with `keeps_looks`, written to it; damaged ones are
-  /// named and left alone. `telemetry` and `recorder` may be null.
+  /// named and left alone. Likewise pairings.json, and the answers about units. `telemetry` and `recorder`
+  /// may be null.
   static Result<Session> create(const SessionSetup& setup,
                                 Telemetry* telemetry,
                                 Recorder* recorder,
@@ -43,7 +45,8 @@ class Session {
 
   /// What a watcher knows now; its control uses become edits. `moments`: calls of watch() so far.
   void take(Watched watched, std::size_t moments);
-  /// An edit of a person; one that cannot be done is told, and nothing changes. `source` says whose.
+  /// An edit of a person; one that cannot be done is told, and nothing changes. `source` says whose. `pair`
+  /// without a marker means the one that glows (waiting_markers).
   Status edit(const scene::Edit& edit, const std::string& source, Stamp at);
 
   /// Shows another scene from now on, with the same markers and controls: parts that were edited, added or
@@ -74,7 +77,12 @@ class Session {
   void tell_of_swapped_cameras();
   void draw_anew(Stamp now, Stamp shown_at);
   Status show_if_whole(SceneNews news, Stamp at);
+  void load_pairings();
+  void ask_units();
+  Status keep(const scene::Staging& before, const scene::Edit& edit);
   Status keep_looks(const scene::Staging& before);
+  Status keep_pairings(const scene::Staging& before);
+  Status keep_units(const scene::Edit& edit);
 
   SessionSetup setup_;
   Drawing drawing_;
@@ -84,6 +92,7 @@ class Session {
   Telemetry* telemetry_;
   Recorder* recorder_;
   bool keeps_looks_ = true;
+  std::set<std::string> asked_;  // about units
   scene::Staging staging_;
   Watched watched_;
   std::size_t moments_ = 0;

@@ -3,14 +3,21 @@
 #include <algorithm>
 #include <chrono>
 #include <map>
+#include <numbers>
 
 #include "apps/camera_encoding.h"
 #include "core/picture.h"
 #include "tracker/family.h"
+#include "tracker/predict.h"
+#include "tracker/sighting.h"
 
 namespace limn::apps {
 namespace {
 
+// Loose markers: a body from the fifth picture on, forgotten after two seconds.
+constexpr int k_known_after = 5;
+constexpr double k_forgotten_s = 2;
+constexpr double k_still_m = 0.003, k_still_rad = 3 * std::numbers::pi / 180;
 constexpr double k_once_s = 0.4;  // two cameras that see one gesture within it
 constexpr double k_trembles_m = 0.5e-3, k_trembles_rad = 1e-3;
 
@@ -43,12 +50,18 @@ bool is_elsewhere(const Pose& before, const Pose& now) {
          angle_between(before.rotation, now.rotation) > k_trembles_rad;
 }
 
+double loose_size_m(const scene::Scene& scene) { return scene.slots.empty() ? 0 : scene.slots[0].size_m; }
+
 Result<Watcher> Watcher::create(const scene::Scene& scene, const Rig& rig, const WatchOptions& options) {
   LIMN_CHECK(options.full_scan_every > 0);
   Watcher out;
   out.rig_ = rig;
   out.options_ = options;
   out.bodies_ = scene::bodies(scene);
+  out.loose_size_m_ = loose_size_m(scene);
+  for (const Body& body : out.bodies_)
+    for (const BodyMarker& marker : body.markers) out.used_.push_back(marker.marker);
+  for (const scene::Control& control : scene.controls) out.used_.push_back(control.marker);
   LIMN_TRY(const tracker::Families families,
            tracker::Families::load(families_of(scene, out.bodies_), scene.folder));
   std::vector<tracker::GestureReader> gestures;
@@ -80,12 +93,19 @@ const Watched& Watcher::watch(std::span<const Frame> frames) {
   read_gestures(cameras);
   watched_.detect_ms = milliseconds_since(begun);
 
+  note_loose(cameras);
   const auto filtering = std::chrono::steady_clock::now();
   std::vector<tracker::View> views;
   for (const std::size_t i : cameras) views.push_back({&rig_.cameras[i], watched_.detections[i]});
-  if (!views.empty())
+  if (!views.empty()) {
+    std::vector<Body> bodies = bodies_;
+    for (const Loose& loose : loose_)
+      if (loose.moments >= k_known_after)
+        bodies.push_back({scene::loose_body(loose.marker), {{loose.marker, loose_size_m_, Pose()}}});
     watched_.motions =
-        tracker::observed(watched_.motions, bodies_, views, watched_.captured_at, options_.motion);
+        tracker::observed(watched_.motions, bodies, views, watched_.captured_at, options_.motion);
+    follow_loose();
+  }
   watched_.filter_ms = milliseconds_since(filtering);
   return watched_;
 }
@@ -103,6 +123,53 @@ void Watcher::look(std::size_t camera, const Frame& frame) {
       eye.pictures++ % options_.full_scan_every == 0 || eye.followed.size() < detections.size();
   std::swap(detections, eye.followed);
   if (search) eye.detector.detect_more(grey, lens, &detections);
+}
+
+// Markers of the scene's families that nothing in it uses.
+void Watcher::note_loose(std::span<const std::size_t> cameras) {
+  const Stamp at = watched_.captured_at;
+  std::vector<MarkerName> seen;
+  for (const std::size_t camera : cameras)
+    for (const tracker::Detection& detection : watched_.detections[camera])
+      if (std::none_of(used_.begin(), used_.end(),
+                       [&](const MarkerName& used) { return tracker::is_marker(detection.marker, used); }))
+        seen.push_back(detection.marker);
+  std::sort(seen.begin(), seen.end());
+  seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+  std::erase_if(loose_,
+                [&](const Loose& loose) { return seconds_between(loose.seen_at, at) > k_forgotten_s; });
+  for (const MarkerName& marker : seen) {
+    auto known = std::find_if(loose_.begin(), loose_.end(),
+                              [&](const Loose& loose) { return loose.marker == marker; });
+    if (known == loose_.end()) {
+      if (loose_size_m_ <= 0 || static_cast<int>(loose_.size()) >= options_.most_loose) continue;
+      loose_.push_back({marker, 0, at, std::nullopt, at});
+      known = std::prev(loose_.end());
+    }
+    ++known->moments;
+    known->seen_at = at;
+  }
+}
+
+// Which of them lie still.
+void Watcher::follow_loose() {
+  watched_.loose.clear();
+  for (const Track& track : tracker::predicted(watched_.motions, watched_.captured_at,
+                                               tracker::Prediction::filtered, options_.motion)) {
+    const auto loose = std::find_if(loose_.begin(), loose_.end(), [&](const Loose& l) {
+      return scene::loose_body(l.marker) == track.body;
+    });
+    if (loose == loose_.end() || track.sight == Sight::lost) continue;
+    const Pose& now = track.world_from_body;
+    if (!loose->anchor || (now.translation - loose->anchor->translation).norm() > k_still_m ||
+        angle_between(now.rotation, loose->anchor->rotation) > k_still_rad) {
+      loose->anchor = now;
+      loose->still_since = watched_.captured_at;
+    }
+    watched_.loose.push_back({loose->marker, now, loose->still_since});
+  }
+  std::stable_sort(watched_.loose.begin(), watched_.loose.end(),
+                   [](const LooseMarker& a, const LooseMarker& b) { return a.still_since < b.still_since; });
 }
 
 // A control is used when one camera sees the gesture and none of the others sees the marker uncovered.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -20,12 +21,20 @@ struct ControlUse {
   int steps = 1;
 };
 
+/// A marker that carries nothing in the scene, seen for a while. Its body is scene::loose_body(marker).
+struct LooseMarker {
+  MarkerName marker;
+  Pose world_from_marker;
+  Stamp still_since;  ///< it has not been moved by 3 mm or 3 degrees since
+};
+
 /// What is known after a moment's pictures.
 struct Watched {
   std::vector<Frame> frames;                                ///< newest of each camera, in the rig's order
   std::vector<std::vector<tracker::Detection>> detections;  ///< in them
   std::vector<tracker::BodyMotion> motions;
-  std::vector<ControlUse> uses;  ///< made in this moment
+  std::vector<LooseMarker> loose;  ///< seen in the newest pictures; the one that lies longest first
+  std::vector<ControlUse> uses;    ///< made in this moment
   Stamp captured_at;
   double detect_ms = 0, filter_ms = 0;
 };
@@ -38,7 +47,12 @@ struct WatchOptions {
   /// were. Higher is faster and finds new markers later.
   int full_scan_every = 3;
   tracker::MotionModel motion;
+  int most_loose = 8;  ///< markers that carry nothing; more are not looked at
 };
+
+/// How large loose markers are taken to be: as the scene's first slot's, m; 0 without slots: none are looked
+/// at.
+double loose_size_m(const scene::Scene& scene);
 
 /// The camera side of a session: frames -> markers -> motions of bodies, and gestures of control markers.
 /// The same frames give the same answers; no clock but the frames' stamps.
@@ -59,13 +73,25 @@ class Watcher {
     int pictures = 0;
     std::vector<tracker::Detection> followed;
   };
+  struct Loose {
+    MarkerName marker;
+    int moments = 0;  // that showed it
+    Stamp seen_at;
+    std::optional<Pose> anchor;
+    Stamp still_since;
+  };
   Watcher() = default;
   void look(std::size_t camera, const Frame& frame);
+  void note_loose(std::span<const std::size_t> cameras);
+  void follow_loose();
   void read_gestures(std::span<const std::size_t> cameras);
 
   Rig rig_;
   WatchOptions options_;
   std::vector<Body> bodies_;
+  double loose_size_m_ = 0;
+  std::vector<MarkerName> used_;  // by bodies and controls
+  std::vector<Loose> loose_;
   std::vector<Eye> eyes_;       // one a camera
   std::vector<Stamp> used_at_;  // one a control
   Watched watched_;

@@ -76,6 +76,10 @@ TEST(Osc, EveryActionHasAMessage) {
     std::string value;
     if (action.of_slot) arguments.emplace_back("mirror");
     if (action.takes == scene::Takes::text) arguments.emplace_back(value = "some name");
+    if (action.takes == scene::Takes::number) {
+      arguments.emplace_back(12.5F);
+      value = "12.5";
+    }
     if (action.takes == scene::Takes::millimetres) {
       for (const float mm : {1.5F, -2.0F, 0.25F}) arguments.emplace_back(mm);
       value = "1.5 -2 0.25";

@@ -17,6 +17,8 @@ Scene two_slots() {
        {std::pair<std::string, std::vector<std::string>>{"mirror", {"a", "b", "c"}}, {"trim", {"line"}}}) {
     Slot slot;
     slot.name = name;
+    slot.marker = {"aruco_4x4_50", std::to_string(scene.slots.size())};
+    slot.size_m = 0.04;
     for (const std::string& variant : variants) slot.variants.push_back({variant, {}});
     scene.slots.push_back(slot);
   }
@@ -72,6 +74,17 @@ TEST(Staging, WhatCannotBeDoneIsNamedAndChangesNothing) {
            {{"restore_look", "", "none"}, "found 'none'"},
            {{"next_look", "", ""}, "a saved look"},
            {{"blackout", "", "perhaps"}, "on, off or toggle"},
+           {{"pair", "mirror", ""}, "Lay one down for a second"},
+           {{"pair", "mirror", "nine"}, "pair: "},
+           {{"pair", "mirror", "aruco_5x5_50:9"},
+            "the scene's families (aruco_4x4_50), found aruco_5x5_50:9"},
+           {{"pair", "mirror", "aruco_4x4_50:1"}, "found aruco_4x4_50:1, which slot 'trim' uses"},
+           {{"units", "mirror", "a mm"}, "was dropped into slot 'mirror' (none)"},
+           {{"flip", "", ""}, "two looks shown before, found none"},
+           {{"flip", "", "x"}, "flip: expected one of none, found 'x'"},
+           {{"split", "", ""}, "expected a look shown before"},
+           {{"split_at", "", "far"}, "a number of millimetres"},
+           {{"split_at", "", "1e9"}, "a number of millimetres"},
            {{"screen", "", "cinema"}, "rest, full, camera"}}) {
     const auto result = edited(scene, staging, {}, edit);
     ASSERT_FALSE(result) << edit.action;
@@ -133,14 +146,81 @@ TEST(Staging, LooksAreReadAsTheyWereWritten) {
   EXPECT_NE(wrong.message().find("slots.mirror.variant"), std::string::npos) << wrong.message();
 }
 
-TEST(Staging, EveryActionCanBeDone) {
+TEST(Staging, APartIsCarriedByTheMarkerThatItIsPairedWith) {
   const Scene scene = two_slots();
+  const MarkerName nine{"aruco_4x4_50", "9"};
+  const Pose elsewhere(exp_rotation({0, 0, 1}), {-0.2, 0.1, 0});
+  std::vector<Track> tracks = tracks_with(k_prototype_from_marker);
+  tracks.push_back(track_of(loose_body(nine), elsewhere));
+  const auto place = [&](const Staging& staging, const std::string& slot) {
+    for (const PosedPart& part : staged(scene, staging, carried(scene, staging, tracks)).parts)
+      if (part.slot == slot) return part.world_from_part;
+    return Pose(Eigen::Quaterniond::Identity(), {9, 9, 9});
+  };
+  const Pose own = k_world_from_prototype * k_prototype_from_marker;
+  const Staging at_first = first_staging(scene);
+  EXPECT_TRUE(test::pose_near(place(at_first, "mirror"), own, 1e-9_deg, 1e-6_mm));
+  const Staging paired = done(scene, at_first, {}, {"pair", "mirror", nine.text()});
+  EXPECT_TRUE(test::pose_near(place(paired, "mirror"), elsewhere, 1e-9_deg, 1e-6_mm));
+  EXPECT_EQ(place(paired, "trim").translation.x(), 9);
+  // Its own is free for another; then it cannot have it back.
+  Staging both = done(scene, paired, {}, {"pair", "trim", "aruco_4x4_50:0"});
+  EXPECT_TRUE(test::pose_near(place(both, "trim"), own, 1e-9_deg, 1e-6_mm));
+  EXPECT_TRUE(test::pose_near(place(both, "mirror"), elsewhere, 1e-9_deg, 1e-6_mm));
+  EXPECT_FALSE(edited(scene, both, {}, {"unpair", "mirror", ""}));
+  // Two slots that have changed their markers come back from the file, too.
+  both = done(scene, both, {}, {"pair", "mirror", "aruco_4x4_50:1"});
+  const auto file = test::test_folder() / "pairings.json";
+  ASSERT_TRUE(write_file(file, pairings_json(scene, both)));
+  const auto read = with_pairings(file, scene, at_first);
+  ASSERT_TRUE(read) << read.message();
+  EXPECT_EQ(carrier(scene, *read, 0), scene.slots[1].marker);
+  EXPECT_EQ(carrier(scene, *read, 1), scene.slots[0].marker);
+  EXPECT_EQ(pairings_json(scene, done(scene, paired, {}, {"unpair", "mirror", ""})), "");
+  for (const char* wrong : {"aruco_4x4_50:1", "aruco_6x6_50:1", "x"}) {
+    ASSERT_TRUE(write_file(
+        file, fmt::format(R"({{"schema": "limn.pairings/1", "slots": {{"mirror": "{}"}}}})", wrong)));
+    const auto refused = with_pairings(file, scene, at_first);
+    ASSERT_FALSE(refused) << wrong;
+    EXPECT_NE(refused.message().find("slots.mirror"), std::string::npos) << refused.message();
+  }
+}
+
+TEST(Staging, TwoLooksAreFlippedAndSplit) {
+  const Scene scene = two_slots();
+  const PosedScene posed = staged(scene, first_staging(scene), tracks_with(k_prototype_from_marker));
+  Staging staging = done(scene, first_staging(scene), posed, {"save_look", "", "A"});
+  staging = done(scene, staging, {}, {"choose_variant", "mirror", "b"});
+  const PosedScene other = staged(scene, staging, tracks_with(k_prototype_from_marker));
+  staging = done(scene, staging, other, {"save_look", "", "B"});
+  EXPECT_FALSE(left_of_split(scene, staging).has_value());
+  staging = done(scene, staging, {}, {"split", "", "on"});
+  ASSERT_TRUE(left_of_split(scene, staging).has_value());
+  EXPECT_EQ(left_of_split(scene, staging)->slots[0].variant, "a");
+  for (const char* variant : {"a", "b", "a"}) {
+    staging = done(scene, staging, {}, {"flip", "", ""});
+    EXPECT_EQ(staging.slots[0].variant, variant);
+    EXPECT_EQ(staging.look, variant == std::string("a") ? "A" : "B");
+    EXPECT_NE(left_of_split(scene, staging)->slots[0].variant, variant);
+  }
+  staging = done(scene, staging, {}, {"delete_look", "", "B"});
+  EXPECT_FALSE(edited(scene, staging, {}, {"flip", "", ""}));
+  EXPECT_FALSE(staging.split);
+}
+
+TEST(Staging, EveryActionCanBeDone) {
+  Scene scene = two_slots();
+  scene.slots[0].variants.push_back({"new one", {}, Variant::Dropped{"m"}});
   Staging staging = done(scene, first_staging(scene), {}, {"save_look", "", ""});
   EXPECT_EQ(staging.look, "look-01");
+  staging = done(scene, staging, {}, {"save_look", "", ""});
   for (const Action& action : actions()) {
     std::string value;
     if (action.name == "choose_variant") value = "c";
     if (action.name == "nudge") value = "0 0 1";
+    if (action.name == "pair") value = "aruco_4x4_50:9";
+    if (action.name == "units") value = "new one mm";
+    if (action.name == "split_at") value = "-12.5";
     if (action.name == "restore_look" || action.name == "delete_look") value = "look-01";
     const auto result = edited(scene, staging, {}, {action.name, action.of_slot ? "mirror" : "", value});
     EXPECT_TRUE(result) << action.name << ": " << result.message();
