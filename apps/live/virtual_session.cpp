@@ -34,8 +34,10 @@ double placement_mm(const Painted& painted,
   const scene::Scene& scene = session.setup().scene;
   if (scene.prototype) add("prototype", world.world_from_prototype);
   const double at_s = seconds_of(painted.shown_at);
-  for (const scene::Slot& slot : scene.slots)
-    if (sim::world_from_marker(world, slot.marker)) add(slot.name, room.world_from_marker(slot.marker, at_s));
+  for (std::size_t i = 0; i < scene.slots.size(); ++i) {
+    const MarkerName& marker = scene::carrier(scene, session.staging(), i);
+    if (sim::world_from_marker(world, marker)) add(scene.slots[i].name, room.world_from_marker(marker, at_s));
+  }
   const scene::PosedScene right = scene::staged(scene, session.staging(), truth);
   const auto base = [](const scene::PosedScene& posed) {
     return posed.world_from_prototype ? posed.world_from_prototype->inverse() : Pose{};
