@@ -49,6 +49,18 @@ Believed believed(const BodyMotion& known, double seconds, Prediction how, const
 
 }  // namespace
 
+const std::vector<std::string>& prediction_names() {
+  static const std::vector<std::string> names = {"hold", "linear", "filtered"};
+  return names;
+}
+
+std::optional<Prediction> prediction_of(const std::string& name) {
+  const std::vector<std::string>& names = prediction_names();
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) return std::nullopt;
+  return static_cast<Prediction>(found - names.begin());
+}
+
 std::vector<Track> predicted(std::span<const BodyMotion> known,
                              Stamp at,
                              Prediction how,

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "core/track.h"
@@ -15,6 +16,11 @@ enum class Prediction {
   linear,   ///< onwards as from the last picture but one to the last (the 2011 paper's extrapolation)
   filtered  ///< by the filter's position, velocity and acceleration
 };
+
+/// hold, linear, filtered: what people call them, in the order of Prediction.
+const std::vector<std::string>& prediction_names();
+/// nullopt for another word.
+std::optional<Prediction> prediction_of(const std::string& name);
 
 /// Every known body as a track at a moment, not before its measured_at (earlier moments get the pose of
 /// then). The covariance grows with the time since. A body in the newest picture is `measured`; one that is

@@ -36,13 +36,6 @@ constexpr double k_camera_limit_s = 0.5;  // so that the session ends in under a
 std::atomic<bool> g_is_ended = false;
 void end_session(int) { g_is_ended = true; }
 
-Result<tracker::Prediction> prediction_of(const std::string& name) {
-  if (name == "hold") return tracker::Prediction::hold;
-  if (name == "linear") return tracker::Prediction::linear;
-  if (name == "filtered") return tracker::Prediction::filtered;
-  return usage_error("--prediction: expected hold, linear or filtered, found '{}'.", name);
-}
-
 Status check_options(const LiveOptions& options) {
   if (!(options.seconds >= 0) || options.seconds > 1e6)
     return usage_error("--seconds: expected seconds, 0 for no end, found {}.", options.seconds);
@@ -119,7 +112,10 @@ Status check_fits(const Rig& rig, const Rig& devices) {
 
 // What options say of a session, beside where it takes place.
 Status set_up(const LiveOptions& options, SessionSetup* setup) {
-  LIMN_TRY(setup->paint.prediction, prediction_of(options.prediction));
+  const auto prediction = tracker::prediction_of(options.prediction);
+  if (!prediction)
+    return usage_error("--prediction: expected hold, linear or filtered, found '{}'.", options.prediction);
+  setup->paint.prediction = *prediction;
   const auto marker_light = tracker::marker_light_of(options.marker_light);
   if (!marker_light)
     return usage_error("--marker-light: expected as-is, keep-out or spotlight, found '{}'.",

@@ -13,8 +13,6 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t k_most_queued = 40;  // frames; 240 MB of colour 1920x1080
 
-const std::vector<std::string> k_predictions = {"hold", "linear", "filtered"};
-
 std::int64_t nanoseconds(Stamp at) { return at.time_since_epoch().count(); }
 
 Status copy_folder(const fs::path& from, const fs::path& to) {
@@ -42,7 +40,7 @@ nlohmann::ordered_json setup_json(const SessionSetup& setup) {
             {"starts_per_s", motion.starts_per_s},
             {"stops_per_s", motion.stops_per_s},
             {"extrapolation_limit_s", motion.extrapolation_limit_s}}},
-          {"prediction", k_predictions[static_cast<std::size_t>(paint.prediction)]},
+          {"prediction", tracker::prediction_names()[static_cast<std::size_t>(paint.prediction)]},
           {"marker_light", tracker::marker_light_names()[static_cast<std::size_t>(paint.marker_light)]},
           {"fade_s", paint.fade_s},
           {"label_s", paint.label_s},
@@ -189,7 +187,8 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   model.stops_per_s = motion.at("stops_per_s").positive();
   model.extrapolation_limit_s = motion.at("extrapolation_limit_s").positive();
   setup.paint.motion = model;
-  setup.paint.prediction = read_choice<tracker::Prediction>(root.at("prediction"), k_predictions);
+  setup.paint.prediction =
+      read_choice<tracker::Prediction>(root.at("prediction"), tracker::prediction_names());
   setup.paint.marker_light =
       read_choice<tracker::MarkerLight>(root.at("marker_light"), tracker::marker_light_names());
   setup.paint.fade_s = root.at("fade_s").positive();
