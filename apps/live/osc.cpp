@@ -53,6 +53,32 @@ bool is_printable(const std::string& text) {
   });
 }
 
+// For a message to people.
+std::string printable(const std::string& text) {
+  return is_printable(text) ? text.substr(0, k_longest_text) : "?";
+}
+
+// Of the padded text that begins at `at`; nullopt: it has no end.
+std::optional<std::string> text_at(std::span<const std::uint8_t> bytes, std::size_t at) {
+  const auto begin = bytes.begin() + static_cast<std::ptrdiff_t>(std::min(at, bytes.size()));
+  const auto end = std::find(begin, bytes.end(), 0);
+  if (end == bytes.end()) return std::nullopt;
+  return std::string(begin, end);
+}
+
+// A message's type letters; nullopt: it is no message.
+std::optional<std::string> types_of(std::span<const std::uint8_t> bytes) {
+  const auto path = text_at(bytes, 0);
+  if (!path || path->empty() || path->front() != '/') return std::nullopt;
+  const auto types = text_at(bytes, (path->size() / 4 + 1) * 4);
+  if (!types || types->empty() || types->front() != ',') return std::nullopt;
+  return types->substr(1);
+}
+
+// What actions take. liblo (0.31) gets no others: it reads beyond the end of a blob that was cut off.
+const std::string k_known_types = {LO_INT32,  LO_INT64,  LO_FLOAT, LO_DOUBLE,
+                                   LO_STRING, LO_SYMBOL, LO_TRUE,  LO_FALSE};
+
 // One argument, of the types that are understood.
 struct Argument {
   char type;
@@ -188,10 +214,14 @@ Result<scene::Edit> edit_of_osc(std::span<const std::uint8_t> datagram) {
   std::vector<std::uint8_t> bytes(datagram.begin(), datagram.end());
   if (bytes.size() >= 8 && std::equal(bytes.begin(), bytes.begin() + 8, "#bundle"))
     return error("expected a message, found a bundle. Send its messages one by one.");
+  const auto types = types_of(bytes);
+  const auto unknown = types ? types->find_first_not_of(k_known_types) : std::string::npos;
+  if (unknown != std::string::npos)
+    return error("{}: expected text, numbers, true or false, found an argument of type '{}'.",
+                 printable(*text_at(bytes, 0)), printable(types->substr(unknown, 1)));
   int problem = 0;
-  const Message message(bytes.empty() ? nullptr
-                                      : lo_message_deserialise(bytes.data(), bytes.size(), &problem));
-  if (!message || bytes.front() != '/')
+  const Message message(!types ? nullptr : lo_message_deserialise(bytes.data(), bytes.size(), &problem));
+  if (!message)
     return error("expected a message of Open Sound Control 1.0, found {} other bytes.", bytes.size());
   Reader reader{reinterpret_cast<const char*>(bytes.data()), {}};
   const auto& actions = scene::actions();
@@ -200,12 +230,10 @@ Result<scene::Edit> edit_of_osc(std::span<const std::uint8_t> datagram) {
   });
   if (action == actions.end())
     return error("expected an address of docs/osc.md ({}{} and so on), found '{}'.", k_root,
-                 actions.front().name,
-                 is_printable(reader.path) ? reader.path.substr(0, k_longest_text) : "?");
-  const char* types = lo_message_get_types(message.get());
+                 actions.front().name, printable(reader.path));
   lo_arg** values = lo_message_get_argv(message.get());
   for (int i = 0; i < lo_message_get_argc(message.get()); ++i)
-    reader.arguments.push_back({types[i], values[i]});
+    reader.arguments.push_back({(*types)[static_cast<std::size_t>(i)], values[i]});
   scene::Edit edit{action->name, "", ""};
   if (action->of_slot) {
     LIMN_TRY(edit.slot, reader.text("a slot"));

@@ -131,6 +131,8 @@ TEST(Osc, RefusesWithAReason) {
   has(refusal(raw("/limn/next_variant", "i", "\0\0\0\1"s)), "found an argument of type 'i'");
   has(refusal(raw("/limn/next_variant", "ss", "a\0\0\0b\0\0\0"s)), "expected 1 arguments at most, found 2");
   has(refusal(raw("/limn/freeze", "b", "\0\0\0\4abcd"s)), "found an argument of type 'b'");
+  has(refusal(raw("/limn/freeze", "b", "")), "found an argument of type 'b'");  // cut off: not for liblo
+  has(refusal(bytes_of("/limn/freeze\0\0\0\0"s)), "expected a message of Open Sound Control");
   has(refusal(osc_message("/limn/nudge", {"mirror", 1, 2})), "found no more arguments");
   for (const float bad : {std::nanf(""), std::numeric_limits<float>::infinity()}) {
     has(refusal(osc_message("/limn/nudge", {"mirror", 1, 2, bad})), "expected finite numbers");
