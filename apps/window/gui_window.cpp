@@ -15,10 +15,15 @@ Result<GuiWindow> GuiWindow::open(const device::Desktop& desktop,
                                   const std::string& title,
                                   int width,
                                   int height) {
-  LIMN_TRY(device::Window window,
-           device::Window::open(
-               desktop,
-               {.title = title, .width = width, .height = height, .waits = false, .escape_closes = false}));
+  cv::Size most;  // of the monitors
+  for (const device::Monitor& monitor : desktop.monitors())
+    if (monitor.size.area() > most.area()) most = monitor.size;
+  const auto within = [](int wanted, int there) { return there > 0 ? std::min(wanted, there) : wanted; };
+  LIMN_TRY(device::Window window, device::Window::open(desktop, {.title = title,
+                                                                 .width = within(width, most.width),
+                                                                 .height = within(height, most.height),
+                                                                 .waits = false,
+                                                                 .escape_closes = false}));
   GuiWindow out(std::move(window));
   out.window_.in_context([&] { out.gui_ = std::make_unique<Gui>(out.window_.scale()); });
   return out;

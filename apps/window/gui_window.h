@@ -17,6 +17,7 @@ namespace limn::apps {
 /// is current alone and never waits for the monitor.
 class GuiWindow {
  public:
+  /// As large as wanted, and no larger than the largest monitor.
   static Result<GuiWindow> open(const device::Desktop& desktop,
                                 const std::string& title,
                                 int width,

@@ -176,7 +176,7 @@ void draw_curve(const Gui& gui,
     most = std::max(most, *value);
   }
   ImGui::TextUnformatted(name.c_str());
-  const std::string figure = last ? fmt::format("{:.3g} {}", *last, unit) : "no rig yet";
+  const std::string figure = last ? fmt::format("{:.2g} {}", *last, unit) : "no rig yet";
   ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - ImGui::CalcTextSize(figure.c_str()).x);
   ImGui::PushStyleColor(ImGuiCol_Text, !last            ? colour::k_quiet
                                        : *last <= limit ? colour::k_good
@@ -217,7 +217,7 @@ void draw_progress(const Gui& gui, const WizardView& view) {
   }
   const float height = 4.2F * gui.em();
   heading(gui, fmt::format("After {} of {} poses", view.judged.size(), view.poses));
-  draw_curve(gui, "unseen poses, off by", px, "px", calib::k_good_px, height);
+  draw_curve(gui, "unseen poses off by", px, "px", calib::k_good_px, height);
   draw_curve(gui, "light, 95 % within", mm, "mm", calib::k_good_mm, height);
   if (!view.advice.empty()) paragraph(colour::k_text, view.advice);
 }

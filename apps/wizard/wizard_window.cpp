@@ -109,8 +109,10 @@ class Stand {
       return;
     }
     const calib::Report& report = done->report;
-    for (WizardView::Step& step : view_.steps)
+    for (WizardView::Step& step : view_.steps) {
+      if (step.state == State::waits) step.words = "by an earlier run";
       if (step.state != State::fails) step.state = State::done;
+    }
     step(WizardStep::board).words = fmt::format("{} poses", done->poses.size());
     step(WizardStep::solve).words = fmt::format("held-out {:.3f} px", report.assessment.held_out.rms_px);
     step(WizardStep::result).words = calib::to_text(report.assessment.verdict);

@@ -104,6 +104,12 @@ TEST(Calibrate, LeavesCapturesOfOthersAlone) {
   const fs::path folder = test::test_folder(), plan = small_plan(folder);
   ASSERT_TRUE(make_folder(folder / "rig/captures").ok());
   ASSERT_TRUE(write_file(folder / "rig/captures/capture.json", "{}").ok());
+  if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) {
+    testing::internal::CaptureStderr();
+    EXPECT_FALSE(run_calibrate({.plan = plan, .out = folder / "rig"}).ok());
+    const std::string said = testing::internal::GetCapturedStderr();
+    EXPECT_NE(said.find("goes on in the terminal"), std::string::npos) << said;
+  }
   const Status refused = run_calibrate({.plan = plan, .out = folder / "rig", .terminal = true});
   ASSERT_FALSE(refused.ok());
   EXPECT_NE(refused.message().find("Choose another --out"), std::string::npos) << refused.message();
