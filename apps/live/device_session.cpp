@@ -9,6 +9,7 @@
 #include "apps/live/latest.h"
 #include "apps/live/scene_watch.h"
 #include "apps/live/source_clock.h"
+#include "apps/live/stopwatch.h"
 #include "core/log.h"
 
 namespace limn::apps {
@@ -22,8 +23,6 @@ constexpr double k_blend = 0.1;                         // of a new time into th
 
 // The session's clock: all stamps are of it.
 Stamp now() { return std::chrono::time_point_cast<Stamp::duration>(Clock::now()); }
-
-double milliseconds_since(Stamp begun) { return 1e3 * seconds_between(begun, now()); }
 
 // Newest frames of all cameras that were not watched yet.
 using Frames = std::map<std::string, Frame>;

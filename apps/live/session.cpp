@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "apps/live/contact_sheet.h"
+#include "apps/live/stopwatch.h"
 #include "apps/live/swapped_cameras.h"
 #include "core/file.h"
 #include "core/log.h"
@@ -17,10 +18,6 @@ namespace fs = std::filesystem;
 constexpr double k_compare_cameras_every_s = 2;
 constexpr double k_renew_every_s = 1;  // a context that was lost
 constexpr const char* k_pairings = "pairings.json";
-
-double milliseconds_since(std::chrono::steady_clock::time_point begun) {
-  return 1e3 * seconds_between(begun, std::chrono::steady_clock::now());
-}
 
 // A turn backwards undoes what a turn forwards does.
 scene::Edit edit_of(const scene::Control& control, int steps) {

@@ -9,16 +9,13 @@
 #include "apps/live/books.h"
 #include "apps/live/device_health.h"
 #include "apps/live/scene_watch.h"
+#include "apps/live/stopwatch.h"
 #include "core/log.h"
 
 namespace limn::apps {
 namespace {
 
 double seconds_of(Stamp at) { return seconds_between(Stamp{}, at); }
-double milliseconds_since(std::chrono::steady_clock::time_point begun) {
-  return 1e3 * seconds_between(begun, std::chrono::steady_clock::now());
-}
-
 // RMS distance of the parts' origins from where they truly are when the light arrives, on the prototype; -1
 // when none is shown.
 double placement_mm(const Painted& painted,

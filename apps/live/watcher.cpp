@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "apps/camera_encoding.h"
+#include "apps/live/stopwatch.h"
 #include "core/picture.h"
 #include "tracker/family.h"
 #include "tracker/predict.h"
@@ -20,10 +21,6 @@ constexpr double k_forgotten_s = 2;
 constexpr double k_still_m = 0.003, k_still_rad = 3 * std::numbers::pi / 180;
 constexpr double k_once_s = 0.4;  // two cameras that see one gesture within it
 constexpr double k_trembles_m = 0.5e-3, k_trembles_rad = 1e-3;
-
-double milliseconds_since(std::chrono::steady_clock::time_point begun) {
-  return 1e3 * seconds_between(begun, std::chrono::steady_clock::now());
-}
 
 Result<tracker::Gesture> gesture_of(const scene::Control& control) {
   static const std::map<std::string, tracker::Gesture> gestures = {{"", tracker::Gesture::cover},

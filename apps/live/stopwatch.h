@@ -1,0 +1,14 @@
+#pragma once
+
+#include <chrono>
+
+#include "core/frame.h"
+
+namespace limn::apps {
+
+/// How long something took, by the wall.
+inline double milliseconds_since(Stamp begun) {
+  return 1e3 * seconds_between(begun, std::chrono::steady_clock::now());
+}
+
+}  // namespace limn::apps
