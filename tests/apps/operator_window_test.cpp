@@ -55,8 +55,9 @@ OperatorView a_view() {
   view.bodies.push_back({"trim", "aruco_4x4_50:2", std::nullopt});
   view.slots = {{"mirror", {"classic", "sport", "camera pod"}, true, true},
                 {"grille", {"bars", "honeycomb"}, false, false}};
-  view.staging.slots = {{"sport", Eigen::Vector3d::Zero(), std::nullopt},
-                        {"bars", Eigen::Vector3d::Zero(), {}}};
+  view.staging.slots.resize(2);
+  view.staging.slots[0].variant = "sport";
+  view.staging.slots[1].variant = "bars";
   view.staging.looks = {{"look-01", {}}, {"sport and bars", {}}};
   view.staging.look = "look-01";
   for (int i = 0; i < 400; ++i) {
