@@ -140,8 +140,8 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
       play_on_devices(&devices, 2.5, is_ended, &*watcher, &*session, &*books, nullptr, nullptr);
   const double took_s = seconds_between(begun, std::chrono::steady_clock::now());
   ASSERT_TRUE(played.ok()) << played.message();
-  EXPECT_LT(took_s, 2.5 + 1 + 0.6);  // its end, and a picture that was being painted on a slow machine
-  EXPECT_GE(projector.count, 3);
+  EXPECT_LT(took_s, 2.5 + 1 + 1.5);  // its end, and a picture that was being painted on a slow machine
+  EXPECT_GE(projector.count, 1);
   EXPECT_GT(cv::countNonZero(projector.shown.reshape(1)), 1000);
   EXPECT_GT(cv::countNonZero(screen.shown.reshape(1)), 1000);
   EXPECT_EQ(cv::countNonZero(screen.shown.row(10).reshape(1)), 0);  // bars above a wider picture

@@ -41,7 +41,9 @@ inline std::vector<tracker::Detection> detections_of(const Body& body,
   std::normal_distribution<double> noise(0, noise_px);
   std::vector<tracker::Detection> found;
   for (const BodyMarker& marker : body.markers) {
-    tracker::Detection detection{marker.marker, {}, {}, 1};
+    tracker::Detection detection;
+    detection.marker = marker.marker;
+    detection.score = 1;
     const auto corners = tracker::square_corners(marker.size_m);
     for (std::size_t i = 0; i < 4; ++i) {
       const auto px = camera.project(world_from_body * (marker.body_from_marker * corners[i]));
