@@ -41,8 +41,7 @@ std::string sentence(const Drift& drift) {
   for (const std::string& name : drift.devices) names += (names.empty() ? "" : " or ") + name;
   return fmt::format(
       "{} has moved since the calibration: light lies {:.1f} px ({:.1f} mm) beside its place. Put it back, "
-      "or "
-      "hold the board where all see it and run limn recheck (15 s).",
+      "or hold the board where all see it and run limn recheck (15 s).",
       names, drift.px, drift.mm);
 }
 

@@ -159,6 +159,11 @@ void Session::take(Watched watched, std::size_t moments) {
   tell_of_swapped_cameras();
 }
 
+void Session::warn(Stamp at, const std::string& what) {
+  if (telemetry_) telemetry_->note(at, what);
+  log_warning("live: {}", what);
+}
+
 void Session::tell_of_swapped_cameras() {
   if (told_swapped_ || setup_.rig.cameras.size() < 2 ||
       seconds_between(compared_cameras_at_, watched_.captured_at) < k_compare_cameras_every_s)
@@ -172,8 +177,7 @@ void Session::tell_of_swapped_cameras() {
       "{} and {} seem to be exchanged: each sees what the other should. Exchange their cables, or their "
       "addresses in the devices file.",
       swapped->first, swapped->second);
-  if (telemetry_) telemetry_->note(watched_.captured_at, what);
-  log_warning("live: {}", what);
+  warn(watched_.captured_at, what);
 }
 
 Status Session::edit(const scene::Edit& wanted, const std::string& source, Stamp at) {
@@ -222,8 +226,7 @@ void Session::show_news(SceneWatch* files, Stamp at) {
   const Status shown = *news ? show_if_whole(std::move(**news), at) : Status(news->error());
   if (shown) return;
   const std::string what = shown.message() + " The parts stay as they were.";
-  if (telemetry_) telemetry_->note(at, what);
-  log_warning("live: {}", what);
+  warn(at, what);
 }
 
 // A part that is shown and cannot be loaded any more stays; one that never could be is no reason.
@@ -330,8 +333,7 @@ void Session::draw_anew(Stamp now, Stamp shown_at) {
                     "the graphics card lost what it drew; the last picture stays until it can draw "
                     "again: {}",
                     renewed.message());
-  if (telemetry_) telemetry_->note(now, what);
-  log_warning("live: {}", what);
+  warn(now, what);
 }
 
 void Session::tell_of_drift(Stamp at) {
@@ -342,8 +344,7 @@ void Session::tell_of_drift(Stamp at) {
   if (!is_news) return;
   told_drift_ = drift;
   const std::string what = drift ? sentence(*drift) : "all light is where the rig says again";
-  if (telemetry_) telemetry_->note(at, what);
-  log_warning("live: {}", what);
+  warn(at, what);
 }
 
 ShownFrame Session::measured() const {

@@ -73,6 +73,7 @@ class Session {
  private:
   Session(SessionSetup setup, Painter painter, Telemetry* telemetry, Recorder* recorder);
   void load_looks();
+  void warn(Stamp at, const std::string& what);  // people, on the page and in the log
   void tell_of_drift(Stamp at);
   void tell_of_swapped_cameras();
   void draw_anew(Stamp now, Stamp shown_at);
