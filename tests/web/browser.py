@@ -1,0 +1,138 @@
+"""A headless Chromium, driven through Debian's chromedriver (W3C WebDriver) with Python's standard library alone."""
+
+import base64
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+import time
+import urllib.error
+import urllib.request
+
+WAIT_S = 20.0  # for a condition: long, for a machine that does other work; a test that passes does not wait for it
+ELEMENT = "element-6066-11e4-a52e-4f735466cecf"
+
+
+class Failed(Exception):
+    """What was expected and what was found."""
+
+
+def wait_for(what, condition, timeout_s=WAIT_S):
+    """condition() as soon as it is true. Fails, with `what` in words, when it does not become so."""
+    until = time.monotonic() + timeout_s
+    while True:
+        found = condition()
+        if found:
+            return found
+        if time.monotonic() > until:
+            raise Failed(f"expected {what} within {timeout_s:.0f} s, found {found!r}")
+        time.sleep(0.02)
+
+
+class Driver:
+    """chromedriver, and the pages that it has opened."""
+
+    def __init__(self):
+        self.process = subprocess.Popen(["chromedriver", "--port=0"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        for line in self.process.stdout:
+            if "started successfully on port" in line:
+                self.url = "http://127.0.0.1:" + line.rstrip(". \n").split()[-1]
+                return
+        raise Failed("expected chromedriver to start, found that it ended. Is chromium-driver installed?")
+
+    def close(self):
+        self.process.terminate()
+        self.process.wait()
+
+
+class Browser:
+    """One Chromium with a profile of its own."""
+
+    def __init__(self, driver, camera=None, arguments=()):
+        self.driver = driver
+        self.profile = tempfile.mkdtemp(prefix="limn-web-")
+        arguments = ["--headless=new", "--disable-gpu", "--enable-unsafe-swiftshader", "--hide-scrollbars", "--no-first-run",
+                     "--disable-background-networking", "--disable-component-update", f"--user-data-dir={self.profile}",
+                     "--disable-dev-shm-usage", *arguments]
+        if os.geteuid() == 0:
+            arguments.append("--no-sandbox")
+        if camera:
+            arguments += ["--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream",
+                          f"--use-file-for-fake-video-capture={camera}"]
+        wanted = {"browserName": "chrome", "acceptInsecureCerts": True,
+                  "goog:chromeOptions": {"args": arguments}, "goog:loggingPrefs": {"browser": "ALL", "performance": "ALL"}}
+        answer = self._call("POST", "/session", {"capabilities": {"alwaysMatch": wanted}})
+        self.session = "/session/" + answer["sessionId"]
+
+    def close(self):
+        try:
+            self._call("DELETE", self.session)
+        finally:
+            shutil.rmtree(self.profile, ignore_errors=True)
+
+    def _call(self, method, path, body=None):
+        data = None if method != "POST" else json.dumps(body or {}).encode()
+        request = urllib.request.Request(self.driver.url + path, data, {"Content-Type": "application/json"}, method=method)
+        try:
+            with urllib.request.urlopen(request, timeout=60) as answer:
+                return json.load(answer)["value"]
+        except urllib.error.HTTPError as refusal:
+            raise Failed(json.load(refusal)["value"]["message"].splitlines()[0]) from None
+
+    def open(self, url):
+        self._call("POST", self.session + "/url", {"url": url})
+
+    def script(self, code, *arguments):
+        """What the function body `code` returns."""
+        return self._call("POST", self.session + "/execute/sync", {"script": code, "args": list(arguments)})
+
+    def script_async(self, code, *arguments):
+        """What the function body `code`, of an async function, comes to."""
+        wrapped = ("const done = arguments[arguments.length - 1]; const args = [...arguments].slice(0, -1);"
+                   f"(async (...args) => {{ {code} }})(...args).then((value) => done({{value}}), (error) => done({{error: String(error)}}));")
+        answer = self._call("POST", self.session + "/execute/async", {"script": wrapped, "args": list(arguments)})
+        if "error" in answer:
+            raise Failed(answer["error"])
+        return answer.get("value")
+
+    def cdp(self, command, **parameters):
+        return self._call("POST", self.session + "/goog/cdp/execute", {"cmd": command, "params": parameters})
+
+    def find(self, selector):
+        """The elements that a CSS selector finds."""
+        found = self._call("POST", self.session + "/elements", {"using": "css selector", "value": selector})
+        return [element[ELEMENT] for element in found]
+
+    def click(self, selector):
+        """Clicks, as a person does, the one visible element of a selector."""
+        found = wait_for(f"something to click at {selector}", lambda: [e for e in self.find(selector) if self.is_shown(e)])
+        self._call("POST", f"{self.session}/element/{found[0]}/click")
+
+    def is_shown(self, element):
+        try:
+            return self._call("GET", f"{self.session}/element/{element}/displayed")
+        except Failed:
+            return False  # gone meanwhile
+
+    def type(self, selector, text):
+        element = wait_for(f"something to type into at {selector}", lambda: self.find(selector))[0]
+        self._call("POST", f"{self.session}/element/{element}/value", {"text": text})
+
+    def press(self, key, times=1):
+        keys = [action for _ in range(times) for action in ({"type": "keyDown", "value": key}, {"type": "keyUp", "value": key})]
+        self._call("POST", self.session + "/actions", {"actions": [{"type": "key", "id": "keys", "actions": keys}]})
+
+    def text(self, selector):
+        return self.script("return document.querySelector(arguments[0])?.textContent ?? ''", selector)
+
+    def log(self, kind):
+        """What was logged since the last call: kind "browser" (console) or "performance" (DevTools events)."""
+        return self._call("POST", self.session + "/se/log", {"type": kind})
+
+    def resize(self, width, height, is_phone=False):
+        self.cdp("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=2 if is_phone else 1, mobile=is_phone)
+
+    def screenshot(self, path):
+        with open(path, "wb") as file:
+            file.write(base64.b64decode(self._call("GET", self.session + "/screenshot")))

@@ -1,0 +1,50 @@
+// Elements, made and kept in place: a state that arrives changes what differs, so focus and scrolling stay where they are.
+
+/** An element. Properties that begin with "on" are listeners, functions and booleans are properties, the rest attributes. */
+export function h(tag, properties, ...children) {
+  const node = document.createElement(tag);
+  for (const [name, value] of Object.entries(properties ?? {})) {
+    if (name.startsWith("on")) node.addEventListener(name.slice(2), value);
+    else if (typeof value === "boolean") node[name] = value;
+    else if (value !== undefined) node.setAttribute(name, value);
+  }
+  node.append(...children.filter((child) => child !== undefined));
+  return node;
+}
+
+/** A drawing of icons.svg; says nothing to a screen reader. */
+export function icon(name) {
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  const use = document.createElementNS("http://www.w3.org/2000/svg", "use");
+  use.setAttribute("href", `/icons.svg#${name}`);
+  svg.setAttribute("class", "icon");
+  svg.setAttribute("aria-hidden", "true");
+  svg.append(use);
+  return svg;
+}
+
+/** Gives `parent` one child for each item, in order: made by make(item) once for its key, then child.update(item). */
+export function keep(parent, items, key, make) {
+  const old = new Map([...parent.children].map((child) => [child.key, child]));
+  let at = parent.firstElementChild;
+  for (const item of items) {
+    const name = key(item);
+    let child = old.get(name);
+    old.delete(name);
+    if (!child) {
+      child = make(item);
+      child.key = name;
+    }
+    if (child === at) at = at.nextElementSibling;
+    else parent.insertBefore(child, at);
+    child.update?.(item);
+  }
+  for (const child of old.values()) child.remove();
+}
+
+/** Sets a node's text when it differs: a screen reader hears only what is new. */
+export function set_text(node, text) {
+  if (node.textContent !== text) node.textContent = text;
+}
+
+export const by_id = (id) => document.getElementById(id);

@@ -1,0 +1,86 @@
+// Binary glTF 2.0, as far as Limn writes it: triangles with positions, normals and base colours, in nodes with transforms.
+
+const k_magic = 0x46546c67, k_json = 0x4e4f534a, k_bin = 0x004e4942;
+const k_types = { 5120: Int8Array, 5121: Uint8Array, 5122: Int16Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array };
+const k_counts = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4, MAT4: 16 };
+
+/** a times b, both column after column as glTF and WebGL have them. */
+export function product(a, b) {
+  const out = new Float32Array(16);
+  for (let column = 0; column < 4; ++column)
+    for (let row = 0; row < 4; ++row)
+      for (let k = 0; k < 4; ++k) out[4 * column + row] += a[4 * k + row] * b[4 * column + k];
+  return out;
+}
+
+function matrix_of(node) {
+  if (node.matrix) return new Float32Array(node.matrix);
+  const [x, y, z, w] = node.rotation ?? [0, 0, 0, 1], [a, b, c] = node.scale ?? [1, 1, 1], t = node.translation ?? [0, 0, 0];
+  return new Float32Array([
+    a * (1 - 2 * (y * y + z * z)), a * 2 * (x * y + z * w), a * 2 * (x * z - y * w), 0,
+    b * 2 * (x * y - z * w), b * (1 - 2 * (x * x + z * z)), b * 2 * (y * z + x * w), 0,
+    c * 2 * (x * z + y * w), c * 2 * (y * z - x * w), c * (1 - 2 * (x * x + y * y)), 0, ...t, 1]);
+}
+
+function chunks_of(buffer) {
+  const head = new DataView(buffer);
+  if (buffer.byteLength < 20 || head.getUint32(0, true) !== k_magic) throw new Error("expected a binary glTF, found another file");
+  const chunks = {};
+  for (let at = 12; at + 8 <= buffer.byteLength;) {
+    const length = head.getUint32(at, true);
+    chunks[head.getUint32(at + 4, true)] = new Uint8Array(buffer, at + 8, length);
+    at += 8 + length;
+  }
+  return [JSON.parse(new TextDecoder().decode(chunks[k_json])), chunks[k_bin]];
+}
+
+// An accessor's numbers as floats or, of indices, whole numbers; views that interleave or are not aligned are copied together.
+function numbers_of(gltf, bin, index) {
+  const accessor = gltf.accessors[index], view = gltf.bufferViews[accessor.bufferView];
+  const Type = k_types[accessor.componentType], width = k_counts[accessor.type];
+  const at = bin.byteOffset + (view.byteOffset ?? 0) + (accessor.byteOffset ?? 0);
+  const row = width * Type.BYTES_PER_ELEMENT, stride = view.byteStride ?? row;
+  const packed = new Uint8Array(accessor.count * row), bytes = new Uint8Array(bin.buffer);
+  for (let i = 0; i < accessor.count; ++i) packed.set(bytes.subarray(at + i * stride, at + i * stride + row), i * row);
+  const numbers = new Type(packed.buffer);
+  if (!accessor.normalized) return numbers;
+  const most = 2 ** (8 * Type.BYTES_PER_ELEMENT - (Type.name.startsWith("U") ? 0 : 1)) - 1;
+  return Float32Array.from(numbers, (number) => number / most);
+}
+
+// Normals of a mesh that has none: of each triangle, summed at its corners.
+function normals_of(positions, indices) {
+  const normals = new Float32Array(positions.length);
+  for (let i = 0; i + 2 < indices.length; i += 3) {
+    const [a, b, c] = [3 * indices[i], 3 * indices[i + 1], 3 * indices[i + 2]];
+    const u = [0, 1, 2].map((k) => positions[b + k] - positions[a + k]), v = [0, 1, 2].map((k) => positions[c + k] - positions[a + k]);
+    const n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    for (const corner of [a, b, c]) for (let k = 0; k < 3; ++k) normals[corner + k] += n[k];
+  }
+  return normals;
+}
+
+/** Meshes [{name, matrix, positions, normals, colours, indices, base}] of a file's scene; `base` is linear RGBA. Throws in words. */
+export function read_glb(buffer) {
+  const [gltf, bin] = chunks_of(buffer);
+  const meshes = [];
+  const visit = (index, parent, above) => {
+    const node = gltf.nodes[index], matrix = product(parent, matrix_of(node)), name = node.name ?? above;
+    for (const primitive of node.mesh === undefined ? [] : gltf.meshes[node.mesh].primitives) {
+      if ((primitive.mode ?? 4) !== 4) continue;
+      const positions = numbers_of(gltf, bin, primitive.attributes.POSITION);
+      const indices = primitive.indices === undefined ? Uint32Array.from({ length: positions.length / 3 }, (_, i) => i)
+                                                      : Uint32Array.from(numbers_of(gltf, bin, primitive.indices));
+      const { NORMAL: normal, COLOR_0: colour } = primitive.attributes;
+      const material = gltf.materials?.[primitive.material]?.pbrMetallicRoughness;
+      const colours = colour === undefined ? null : { numbers: Float32Array.from(numbers_of(gltf, bin, colour)),
+                                                      width: k_counts[gltf.accessors[colour].type] };
+      meshes.push({ name, matrix, positions, indices, colours, base: material?.baseColorFactor ?? [1, 1, 1, 1],
+                    normals: normal === undefined ? normals_of(positions, indices) : numbers_of(gltf, bin, normal) });
+    }
+    for (const child of node.children ?? []) visit(child, matrix, name);
+  };
+  const identity = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
+  for (const root of gltf.scenes[gltf.scene ?? 0].nodes) visit(root, identity, "");
+  return meshes;
+}

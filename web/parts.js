@@ -1,0 +1,159 @@
+// The slots: what each shows, its variants, where its part stands, which marker carries it.
+import { make_comments } from "/comments.js";
+import { by_id, h, icon, keep, set_text } from "/dom.js";
+import { show_picture } from "/pictures.js";
+
+const k_steps_mm = ["0.1", "1", "5"];
+const k_units = ["mm", "cm", "m", "in", "ft"];
+const k_sight = { "seen": "seen", "carried on": "carried on", "lost": "not seen" };
+
+const part_url = (slot, variant) => `/picture/variant/${encodeURIComponent(slot)}/${encodeURIComponent(variant)}.png`;
+
+/** A word for how a marker is seen, with its own shape beside its colour. */
+export function sight_badge() {
+  const badge = h("span", { class: "badge" });
+  badge.show = (sight) => {
+    badge.dataset.sight = sight;
+    set_text(badge, k_sight[sight] ?? sight);
+  };
+  return badge;
+}
+
+function make_variants(session, slot) {
+  const strip = h("div", { class: "strip", role: "group", "aria-label": `Variants of ${slot.name}` });
+  strip.show = (state_of) => {
+    keep(strip, state_of.variants, (name) => name, (name) => {
+      const canvas = h("canvas", { class: "thumb", "aria-hidden": "true", width: "4", height: "3" });
+      const button = session.button("choose_variant", { slot: slot.name, value: name, class: "card", "data-stays": "" }, canvas, h("span", {}, name));
+      button.update = () => show_picture(canvas, part_url(slot.name, name));
+      return button;
+    });
+    for (const card of strip.children) card.setAttribute("aria-pressed", String(card.key === state_of.variant));
+  };
+  return strip;
+}
+
+function make_nudge(session, slot) {
+  let step = "1";
+  const steps = h("div", { class: "choices", role: "group", "aria-label": "Step" });
+  for (const mm of k_steps_mm)
+    steps.append(h("button", { type: "button", "aria-pressed": String(mm === step), onclick: () => choose(mm) }, `${mm} mm`));
+  function choose(mm) {
+    step = mm;
+    for (const button of steps.children) button.setAttribute("aria-pressed", String(button.textContent === `${mm} mm`));
+  }
+  const move = (axis, sign, picture) => {
+    const value = () => [0, 1, 2].map((i) => (i === axis ? `${sign}${step}` : "0")).join(" ");
+    const name = `${sign === "-" ? "−" : "+"}${"xyz"[axis]}`;
+    return session.button("nudge", { slot: slot.name, value, class: `move ${"xyz"[axis]}${sign === "-" ? "minus" : "plus"}`,
+                                     "aria-label": `Nudge ${slot.name} along ${name}` }, icon(picture), h("span", {}, name));
+  };
+  const readout = h("p", { class: "readout", "aria-label": "Nudged by, millimetres" });
+  const pad = h("div", { class: "pad" }, move(1, "", "up"), move(0, "-", "left"), readout, move(0, "", "right"), move(1, "-", "down"),
+                move(2, "", "up"), move(2, "-", "down"));
+  const release = session.button("release", { slot: slot.name, class: "wide" }, icon("release"), "Follow its marker again");
+  const node = h("div", { class: "stack", "data-needs": "work" }, h("h3", {}, "Nudge"), steps, pad, release);
+  node.show = (state_of) => {
+    const mm = state_of.nudge_mm.map((v) => v.toFixed(1).replace("-", "−"));
+    set_text(readout, `x ${mm[0]}\ny ${mm[1]}\nz ${mm[2]}`);
+    release.disabled = !state_of.is_held && state_of.nudge_mm.every((v) => Math.abs(v) < 1e-6);
+  };
+  return node;
+}
+
+function make_marker(session, slot) {
+  const words = h("p", { class: "soft" });
+  const waiting = h("div", { class: "stack" });
+  const none = h("p", { class: "soft small" }, "To change it, lay another marker down and keep it still for a second.");
+  const own = session.button("unpair", { slot: slot.name, class: "wide" }, "Its own marker again");
+  const node = h("div", { class: "stack" }, h("h3", {}, "Marker"), words,
+                 h("div", { class: "stack", "data-needs": "operate" }, waiting, none, own));
+  node.show = (state_of, markers) => {
+    set_text(words, `Carried by ${state_of.marker}.${state_of.is_held ? " Held where its look had it until the marker moves." : ""}`);
+    keep(waiting, markers, (name) => name, (name) =>
+      session.button("pair", { slot: slot.name, value: name, class: "wide" }, `Carry it by ${name}`));
+    none.hidden = markers.length > 0;
+  };
+  return node;
+}
+
+function make_units(session, slot) {
+  const variant = h("select", { "aria-label": "Variant whose unit is wrong" });
+  const unit = h("select", { "aria-label": "Its unit" }, ...k_units.map((name) => h("option", {}, name)));
+  const set = session.button("units", { slot: slot.name, value: () => `${variant.value} ${unit.value}` }, "Set");
+  const node = h("div", { class: "stack", "data-needs": "operate" }, h("h3", {}, "Unit of a part dropped in"), h("div", { class: "line" }, variant, unit, set));
+  node.show = (state_of) => {
+    const dropped = state_of.dropped ?? [];
+    node.hidden = !dropped.length;
+    keep(variant, dropped, (name) => name, (name) => h("option", {}, name));
+  };
+  return node;
+}
+
+function make_slot(session, slot) {
+  const picture = h("canvas", { class: "thumb", "aria-hidden": "true", width: "4", height: "3" });
+  const variant = h("span", { class: "soft" });
+  const sight = sight_badge();
+  const id = `more-${slot.name}`;
+  const more = h("div", { class: "more stack", id, hidden: true });
+  const head = h("button", { type: "button", class: "open", "aria-expanded": "false", "aria-controls": id }, picture,
+                 h("span", { class: "name" }, h("b", {}, slot.name), variant, sight), icon("more"));
+  const node = h("article", { class: "slot", "aria-label": `Part ${slot.name}` }, h("div", { class: "head" },
+    session.button("previous_variant", { slot: slot.name, class: "step", "aria-label": `Previous variant of ${slot.name}` }, icon("previous")), head,
+    session.button("next_variant", { slot: slot.name, class: "step", "aria-label": `Next variant of ${slot.name}` }, icon("next"))), more);
+  const comments = make_comments(session, () => ({ look: "", slot: slot.name }), `Comment on ${slot.name}`);
+  const pieces = [make_variants(session, slot), make_nudge(session, slot), make_marker(session, slot), make_units(session, slot)];
+  more.append(...pieces, h("h3", {}, "Comments"), comments);
+  let latest;
+  const fill = () => {
+    for (const piece of pieces) piece.show(latest.slot, latest.state.waiting);
+    comments.show(latest.state.comments.filter((c) => c.slot === slot.name));
+  };
+  node.open = (is_open) => {
+    head.setAttribute("aria-expanded", String(is_open));
+    more.hidden = !is_open;
+    if (is_open) fill();
+  };
+  head.addEventListener("click", () => node.open(more.hidden));
+  node.show = (state, state_of) => {
+    latest = { state, slot: state_of };
+    set_text(variant, state_of.variant);
+    sight.show(state_of.sight);
+    show_picture(picture, part_url(slot.name, state_of.variant));
+    if (!more.hidden) fill();
+  };
+  return node;
+}
+
+// A marker that lies still and carries nothing is offered to every part at once.
+function make_offer(session) {
+  const words = h("p", {});
+  const slots = h("div", { class: "strip" });
+  const node = h("div", { class: "offer stack", "data-needs": "operate", hidden: true }, words, slots);
+  node.show = (state) => {
+    const marker = state.waiting[0];
+    node.hidden = !marker;
+    if (!marker) return;
+    set_text(words, `Marker ${marker} lies still and carries nothing. Give it a part:`);
+    keep(slots, state.slots, (slot) => `${slot.name} ${marker}`, (slot) =>
+      session.button("pair", { slot: slot.name, value: marker }, slot.name));
+  };
+  return node;
+}
+
+export function make_parts(session) {
+  const offer = make_offer(session);
+  const role = h("p", { class: "soft small", "data-role-only": "look" }, "You look on. To change things, leave (under Room) and pair again with the PIN for work.");
+  const list = h("div", { class: "slots" });
+  by_id("parts").append(h("h2", {}, "Parts"), role, offer, list);
+  let is_first = true;
+  return {
+    show(state) {
+      offer.show(state);
+      keep(list, state.slots, (slot) => slot.name, (slot) => make_slot(session, slot));
+      for (const slot of state.slots) [...list.children].find((node) => node.key === slot.name).show(state, slot);
+      if (is_first && list.children.length && matchMedia("(min-width: 1100px)").matches) list.firstElementChild.open(true);
+      is_first = false;
+    },
+  };
+}

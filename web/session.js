@@ -1,0 +1,146 @@
+// What both pages share: the link, pairing, the words about the connection, edits and what came of them.
+import { role_of, take_roles } from "/actions.js";
+import { by_id, h, icon, set_text } from "/dom.js";
+import { Link } from "/link.js";
+
+const k_roles = ["look", "work", "operate"];  // each may what the ones before it may
+
+/** `on_state(state)` hears each state, `on_hello(message)` each new connection. */
+export function begin_session({ on_state, on_hello }) {
+  const link = new Link();
+  const session = { link, state: null };
+
+  /** Tells the person something; `is_bad` interrupts a screen reader. */
+  session.say = (text, is_bad = false) => {
+    const note = h("div", { class: is_bad ? "note bad" : "note", role: is_bad ? "alert" : "status" }, h("span", {}, text));
+    note.append(h("button", { class: "quiet", "aria-label": "Close this message", onclick: () => note.remove() }, icon("close")));
+    by_id("notes").replaceChildren(note);
+    setTimeout(() => note.remove(), is_bad ? 9000 : 5000);
+  };
+
+  /** Does an action; a refusal is told to the person. True when it was done. */
+  session.act = async (action, slot, value, button) => {
+    button?.setAttribute("aria-busy", "true");
+    try {
+      await link.edit(action, slot, value);
+      return true;
+    } catch (refusal) {
+      session.say(refusal.message, true);
+      return false;
+    } finally {
+      button?.removeAttribute("aria-busy");
+    }
+  };
+
+  /** A button that does an action; `value` may be a function. A role that may not is not shown it; with data-stays it is, disabled. */
+  session.button = (action, { slot, value, ...properties }, ...children) => {
+    const button = h("button", { type: "button", "data-action": action, "data-needs": role_of(action), ...properties }, ...children);
+    button.addEventListener("click", () =>
+      session.act(action, slot, typeof value === "function" ? value() : value, button));
+    fit_role(button, link.role);
+    return button;
+  };
+
+  link.addEventListener("hello", ({ detail }) => {
+    take_roles(detail.actions);
+    document.body.dataset.role = link.role;
+    for (const node of document.querySelectorAll("[data-action]")) {
+      node.dataset.needs = role_of(node.dataset.action);
+      fit_role(node, link.role);
+    }
+    on_hello?.(detail);
+  });
+  link.addEventListener("state", ({ detail }) => {
+    session.state = detail;
+    on_state(detail);
+    document.body.dataset.number = detail.number;
+  });
+  link.addEventListener("status", ({ detail }) => show_status(link, detail));
+  prepare_pairing(link);
+  return session;
+}
+
+function fit_role(node, role) {
+  if (node.dataset.stays === undefined) return;
+  node.disabled = k_roles.indexOf(role) < k_roles.indexOf(node.dataset.needs);
+  node.title = node.disabled ? `Needs the PIN to ${node.dataset.needs}` : "";
+}
+
+let countdown = 0;
+
+function show_status(link, { status, why, retry_at }) {
+  const is_paired = status !== "unpaired";
+  document.body.dataset.status = status;
+  by_id("pairing").hidden = is_paired;
+  by_id("session").hidden = !is_paired;
+  clearInterval(countdown);
+  const words = () => {
+    const left_s = Math.max(1, Math.ceil((retry_at - Date.now()) / 1000));
+    if (status === "connected") return `${link.name || "Guest"}, ${link.role}`;
+    return status === "connecting" ? "Connecting …" : `No connection. Trying again in ${left_s} s`;
+  };
+  set_text(by_id("link"), words());
+  if (status === "waiting") countdown = setInterval(() => set_text(by_id("link"), words()), 1000);
+  if (!is_paired && why) tell_pairing(why);
+}
+
+function tell_pairing(text) {
+  set_text(by_id("pairing-why"), text);
+}
+
+function wait_before_pairing(why, wait_s, form) {
+  const until = Date.now() + wait_s * 1000;
+  form.querySelector("button").disabled = true;
+  const timer = setInterval(tick, 1000);
+  function tick() {
+    const left_s = Math.ceil((until - Date.now()) / 1000);
+    if (left_s > 0) return tell_pairing(`${why} Try again in ${left_s} s.`);
+    clearInterval(timer);
+    form.querySelector("button").disabled = false;
+    tell_pairing("You can try again.");
+  }
+  tick();
+}
+
+function prepare_pairing(link) {
+  const form = by_id("pairing").querySelector("form");
+  const pin = form.elements.pin, name = form.elements.name;
+  name.value = localStorage.getItem("limn.name") ?? "";
+  let is_asking = false;
+
+  const pair = async () => {
+    if (is_asking || form.querySelector("button").disabled) return;
+    if (!/^\d{6}$/.test(pin.value)) {
+      tell_pairing("The PIN has six digits.");
+      return pin.focus();
+    }
+    is_asking = true;
+    tell_pairing("Pairing …");
+    localStorage.setItem("limn.name", name.value.trim());
+    const { why, is_pin, wait_s } = await link.pair(pin.value, name.value.trim() || "Guest");
+    is_asking = false;
+    tell_pairing(why ?? "");
+    if (!why || is_pin) pin.value = "";
+    if (is_pin) pin.focus();
+    if (wait_s) wait_before_pairing(why, wait_s, form);
+  };
+
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    pair();
+  });
+  pin.addEventListener("input", () => {
+    pin.value = pin.value.replace(/\D/g, "").slice(0, 6);
+    if (pin.value.length === 6 && name.value.trim()) pair();
+  });
+
+  const linked = /^#pin=(\d{6})$/.exec(location.hash);
+  if (linked) {
+    history.replaceState(null, "", location.pathname);
+    pin.value = linked[1];
+    if (name.value) return pair();
+    return name.focus();
+  }
+  if (Link.was_paired) link.connect();
+  else (name.value ? pin : name).focus();
+}

@@ -1,0 +1,196 @@
+// An assembly to turn in the hand: WebGL 2, drawn when something moved.
+import { product } from "/glb.js";
+
+const k_vertex = `#version 300 es
+uniform mat4 u_view_from_model, u_clip_from_view;
+in vec3 a_position, a_normal;
+in vec4 a_colour;
+out vec3 v_normal, v_position;
+out vec4 v_colour;
+void main() {
+  vec4 p_view = u_view_from_model * vec4(a_position, 1);
+  v_position = p_view.xyz;
+  v_normal = mat3(u_view_from_model) * a_normal;
+  v_colour = a_colour;
+  gl_Position = u_clip_from_view * p_view;
+}`;
+const k_fragment = `#version 300 es
+precision highp float;
+uniform vec4 u_base;
+uniform float u_glow;
+in vec3 v_normal, v_position;
+in vec4 v_colour;
+out vec4 o_colour;
+void main() {
+  vec3 n = normalize(v_normal), eye = normalize(-v_position);
+  if (dot(n, eye) < 0.0) n = -n;
+  float key = max(dot(n, normalize(vec3(0.5, 0.8, 0.6))), 0.0), fill = 0.5 + 0.5 * n.y;
+  float rim = pow(1.0 - max(dot(n, eye), 0.0), 3.0);
+  vec3 linear = u_base.rgb * v_colour.rgb * (0.16 + 0.22 * fill + 0.75 * key) + vec3(0.06) * rim + u_glow * vec3(0.35, 0.2, 0.04);
+  o_colour = vec4(pow(linear, vec3(1.0 / 2.2)), 1);
+}`;
+const k_fov = (35 * Math.PI) / 180;
+
+function program_of(gl) {
+  const program = gl.createProgram();
+  for (const [type, text] of [[gl.VERTEX_SHADER, k_vertex], [gl.FRAGMENT_SHADER, k_fragment]]) {
+    const shader = gl.createShader(type);
+    gl.shaderSource(shader, text);
+    gl.compileShader(shader);
+    gl.attachShader(program, shader);
+  }
+  ["a_position", "a_normal", "a_colour"].forEach((name, i) => gl.bindAttribLocation(program, i, name));
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
+  return program;
+}
+
+function upload(gl, mesh) {
+  const array = gl.createVertexArray();
+  gl.bindVertexArray(array);
+  const attribute = (index, numbers, width) => {
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, numbers, gl.STATIC_DRAW);
+    gl.enableVertexAttribArray(index);
+    gl.vertexAttribPointer(index, width, gl.FLOAT, false, 0, 0);
+  };
+  attribute(0, mesh.positions, 3);
+  attribute(1, mesh.normals, 3);
+  if (mesh.colours) attribute(2, mesh.colours.numbers, mesh.colours.width);
+  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.indices, gl.STATIC_DRAW);
+  return { ...mesh, array, count: mesh.indices.length };
+}
+
+function box_of(meshes) {
+  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+  for (const { matrix, positions } of meshes)
+    for (let i = 0; i < positions.length; i += 3)
+      for (let k = 0; k < 3; ++k) {
+        const p = matrix[k] * positions[i] + matrix[4 + k] * positions[i + 1] + matrix[8 + k] * positions[i + 2] + matrix[12 + k];
+        low[k] = Math.min(low[k], p);
+        high[k] = Math.max(high[k], p);
+      }
+  return { centre: low.map((v, k) => (v + high[k]) / 2), radius: Math.hypot(...low.map((v, k) => high[k] - v)) / 2 || 1 };
+}
+
+function perspective(aspect, near, far) {
+  const f = 1 / Math.tan(k_fov / 2);
+  return new Float32Array([f / Math.max(aspect, 1), 0, 0, 0, 0, f * Math.min(aspect, 1), 0, 0,
+                           0, 0, (far + near) / (near - far), -1, 0, 0, (2 * far * near) / (near - far), 0]);
+}
+
+/** A view of meshes in a canvas: dragging, two fingers, the wheel and keys turn it and come nearer. Throws where there is no WebGL 2. */
+export class View3d {
+  #gl;
+  #program;
+  #canvas;
+  #meshes = [];
+  #box = { centre: [0, 0, 0], radius: 1 };
+  #yaw = 0.6;
+  #pitch = 0.35;
+  #near = 1;  // nearer: more than 1
+  #fingers = new Map();
+  #is_due = false;
+  #marked = "";
+
+  constructor(canvas) {
+    this.#canvas = canvas;
+    this.#gl = canvas.getContext("webgl2", { antialias: true });
+    if (!this.#gl) throw new Error("This browser has no WebGL 2: looks are shown as pictures alone.");
+    this.#program = program_of(this.#gl);
+    new ResizeObserver(() => this.#due()).observe(canvas);
+    this.#listen();
+  }
+
+  show(meshes) {
+    for (const { array } of this.#meshes) this.#gl.deleteVertexArray(array);
+    this.#meshes = meshes.map((mesh) => upload(this.#gl, mesh));
+    this.#box = box_of(meshes);
+    this.#due();
+  }
+
+  /** Lights up the meshes of a name; empty: none. */
+  mark(name) {
+    this.#marked = name;
+    this.#due();
+  }
+
+  #listen() {
+    const canvas = this.#canvas;
+    canvas.addEventListener("pointerdown", (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      this.#fingers.set(event.pointerId, event);
+    });
+    canvas.addEventListener("pointermove", (event) => this.#drag(event));
+    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => this.#fingers.delete(event.pointerId));
+    canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.#turn(0, 0, Math.exp(-event.deltaY / 600));
+    }, { passive: false });
+    const keys = { ArrowLeft: [-0.15, 0, 1], ArrowRight: [0.15, 0, 1], ArrowUp: [0, 0.15, 1], ArrowDown: [0, -0.15, 1],
+                   "+": [0, 0, 1.15], "=": [0, 0, 1.15], "-": [0, 0, 1 / 1.15] };
+    canvas.addEventListener("keydown", (event) => {
+      if (!keys[event.key]) return;
+      event.preventDefault();
+      this.#turn(...keys[event.key]);
+    });
+  }
+
+  #drag(event) {
+    const before = this.#fingers.get(event.pointerId);
+    if (!before) return;
+    const other = [...this.#fingers.values()].find((finger) => finger.pointerId !== event.pointerId);
+    const apart = (finger) => Math.hypot(finger.clientX - other.clientX, finger.clientY - other.clientY) || 1;
+    this.#fingers.set(event.pointerId, event);
+    if (other) this.#turn(0, 0, apart(event) / apart(before));
+    else this.#turn((before.clientX - event.clientX) / 150, (event.clientY - before.clientY) / 150, 1);
+  }
+
+  #turn(yaw, pitch, nearer) {
+    this.#yaw += yaw;
+    this.#pitch = Math.min(Math.max(this.#pitch + pitch, -1.55), 1.55);
+    this.#near = Math.min(Math.max(this.#near * nearer, 0.4), 8);
+    this.#due();
+  }
+
+  #due() {
+    if (this.#is_due) return;
+    this.#is_due = true;
+    requestAnimationFrame(() => {
+      this.#is_due = false;
+      this.#draw();
+    });
+  }
+
+  #view_from_world() {
+    const [cy, sy, cp, sp] = [Math.cos(this.#yaw), Math.sin(this.#yaw), Math.cos(this.#pitch), Math.sin(this.#pitch)];
+    const { centre, radius } = this.#box, away = radius / Math.sin(k_fov / 2) / this.#near;
+    const turned = new Float32Array([cy, -sp * sy, cp * sy, 0, 0, cp, sp, 0, -sy, -sp * cy, cp * cy, 0, 0, 0, -away, 1]);
+    const moved = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -centre[0], -centre[1], -centre[2], 1]);
+    return [product(turned, moved), away];
+  }
+
+  #draw() {
+    const gl = this.#gl, canvas = this.#canvas, dense = Math.min(devicePixelRatio, 2);
+    canvas.width = Math.max(1, Math.round(canvas.clientWidth * dense));
+    canvas.height = Math.max(1, Math.round(canvas.clientHeight * dense));
+    gl.viewport(0, 0, canvas.width, canvas.height);
+    gl.clearColor(0.03, 0.03, 0.035, 1);
+    gl.enable(gl.DEPTH_TEST);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.useProgram(this.#program);
+    const at = (name) => gl.getUniformLocation(this.#program, name);
+    const [view_from_world, away] = this.#view_from_world(), { radius } = this.#box;
+    gl.uniformMatrix4fv(at("u_clip_from_view"), false, perspective(canvas.width / canvas.height, Math.max(away - 1.1 * radius, 0.01 * radius), away + 1.1 * radius));
+    for (const mesh of this.#meshes) {
+      gl.uniformMatrix4fv(at("u_view_from_model"), false, product(view_from_world, mesh.matrix));
+      gl.uniform4fv(at("u_base"), mesh.base);
+      gl.uniform1f(at("u_glow"), this.#marked && mesh.name === this.#marked ? 1 : 0);
+      gl.bindVertexArray(mesh.array);
+      if (!mesh.colours) gl.vertexAttrib4f(2, 1, 1, 1, 1);
+      gl.drawElements(gl.TRIANGLES, mesh.count, gl.UNSIGNED_INT, 0);
+    }
+    canvas.dataset.meshes = this.#meshes.length;
+  }
+}

@@ -1,0 +1,261 @@
+// The window: this device's camera looks at the prototype, and Limn returns each of its frames with the parts in it. One frame is
+// in flight; what is shown is always a returned frame, so part and picture cannot slide apart.
+import { by_id, h, icon, set_text } from "/dom.js";
+import { draw_picture } from "/pictures.js";
+
+const k_widths = [320, 480, 640, 800, 960, 1280];  // heights are whole at 4:3, 16:9 and 16:10
+const k_first = 2;                                 // index of the width to begin with
+const k_slow_ms = 160, k_fast_ms = 80;             // from a frame's grab to its answer; above: smaller frames, below: larger
+const k_trials = 8;                                // answers before the width may change again
+const k_quality = [0.6, 0.7, 0.75, 0.75, 0.8, 0.8];
+const k_lost_ms = 4000;  // a frame that is not answered by then is given up
+
+const k_refusals = {
+  NotAllowedError: "The camera was refused. Allow it for this page in the browser's settings, then open the window again.",
+  NotFoundError: "This device has no camera.",
+  NotReadableError: "Another program uses the camera. Close it, then open the window again.",
+  OverconstrainedError: "This device has no camera that fits.",
+};
+
+// The lens belongs to a camera, and to the way the device is held: one name for each, made once and kept.
+function device_name(camera, is_upright) {
+  const key = `limn.device ${camera} ${is_upright ? "upright" : "lying"}`;
+  const kept = localStorage.getItem(key);
+  if (kept) return kept;
+  const bytes = crypto.getRandomValues(new Uint8Array(8));
+  const name = `web-${[...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("")}`;
+  localStorage.setItem(key, name);
+  return name;
+}
+
+/** How wide a frame is sent: by how long the last ones took. */
+export class Pace {
+  #at = k_first;
+  #since = 0;
+  mean_ms = 0;
+  get width() {
+    return k_widths[this.#at];
+  }
+  get quality() {
+    return k_quality[this.#at];
+  }
+  take(ms) {
+    this.mean_ms = this.mean_ms ? 0.8 * this.mean_ms + 0.2 * ms : ms;
+    if (++this.#since < k_trials) return;
+    const step = this.mean_ms > k_slow_ms ? -1 : this.mean_ms < k_fast_ms ? 1 : 0;
+    const at = Math.min(Math.max(this.#at + step, 0), k_widths.length - 1);
+    if (at === this.#at) return;
+    // Time goes with the pixels, about: what is expected of the new width.
+    this.mean_ms *= (k_widths[at] / k_widths[this.#at]) ** 2;
+    this.#at = at;
+    this.#since = 0;
+  }
+}
+
+class CameraWindow {
+  #session;
+  #stage;
+  #panel;
+  #video = h("video", { playsinline: "", muted: true });
+  #grabbed = document.createElement("canvas");
+  #shown = by_id("window-picture");
+  #stream = null;
+  #pace = new Pace();
+  #number = 0;
+  #in_flight = null;  // {number, at, timer}
+  #device = "";
+  #times = [];  // of the last answers, ms
+  #lock = null;
+
+  constructor(session, stage) {
+    this.#session = session;
+    this.#stage = stage;
+    const { link } = session;
+    link.addEventListener("answer", ({ detail }) => this.#answer(detail));
+    link.addEventListener("hello", () => this.#resume());
+    document.addEventListener("visibilitychange", () => this.#send());
+    this.#panel = make_panel(this);
+  }
+
+  get is_open() {
+    return this.#stream !== null;
+  }
+
+  async open() {
+    if (this.is_open) return;
+    if (!isSecureContext || !navigator.mediaDevices)
+      return this.#fail("A browser opens the camera on https alone. Use the https address that Limn shows.");
+    try {
+      this.#stream = await navigator.mediaDevices.getUserMedia({
+        video: { facingMode: { ideal: "environment" }, width: { ideal: 1280 }, height: { ideal: 960 } }, audio: false });
+      this.#video.srcObject = this.#stream;
+      await this.#video.play();
+    } catch (refusal) {
+      this.close();
+      return this.#fail(k_refusals[refusal.name] ?? `The camera did not open: ${refusal.message}`);
+    }
+    this.#stream.getVideoTracks()[0].addEventListener("ended", () => {
+      this.close();
+      this.#fail("The camera stopped.");
+    });
+    this.#lock = await navigator.wakeLock?.request("screen").catch(() => null);
+    this.#panel.show(true);
+    this.#say("Looking for markers …");
+    this.#resume();
+  }
+
+  close() {
+    for (const track of this.#stream?.getTracks() ?? []) track.stop();
+    if (this.#device) this.#session.link.send({ type: "window", device: this.#device, on: false });
+    this.#stream = null;
+    this.#device = "";
+    this.#lock?.release();
+    this.#lock = null;
+    this.#forget();
+    this.#stage.give_to_window(false);
+    by_id("window-numbers").hidden = true;
+    this.#say("");
+    this.#panel.show(false);
+  }
+
+  #say(words) {
+    this.#stage.words = words;
+    this.#stage.say_why();
+  }
+
+  #fail(words) {
+    this.#panel.say(words);
+  }
+
+  #forget() {
+    clearTimeout(this.#in_flight?.timer);
+    this.#in_flight = null;
+  }
+
+  #resume() {
+    if (!this.is_open) return;
+    this.#device = "";
+    this.#forget();
+    this.#send();
+  }
+
+  // Tells Limn whose lens the frames have, when the camera or the way it is held changed.
+  #announce(width, height) {
+    const settings = this.#stream.getVideoTracks()[0].getSettings();
+    const device = device_name(settings.deviceId ?? "camera", height > width);
+    if (device === this.#device) return;
+    this.#device = device;
+    this.#session.link.send({ type: "window", device, on: true });
+  }
+
+  async #send() {
+    const { link } = this.#session;
+    if (!this.is_open || this.#in_flight || document.hidden || link.status !== "connected") return;
+    const number = (this.#number = (this.#number + 1) >>> 0);
+    const frame = (this.#in_flight = { number, at: performance.now(), timer: 0 });
+    const { videoWidth, videoHeight } = this.#video;
+    const long = Math.max(videoWidth, videoHeight), scale = Math.min(1, this.#pace.width / long);
+    this.#grabbed.width = Math.round(videoWidth * scale);
+    this.#grabbed.height = Math.round(videoHeight * scale);
+    this.#grabbed.getContext("2d", { alpha: false }).drawImage(this.#video, 0, 0, this.#grabbed.width, this.#grabbed.height);
+    const jpeg = await new Promise((done) => this.#grabbed.toBlob(done, "image/jpeg", this.#pace.quality));
+    const bytes = jpeg && (await jpeg.arrayBuffer());
+    if (!bytes || frame !== this.#in_flight) return;
+    this.#announce(videoWidth, videoHeight);
+    const message = new Uint8Array(4 + bytes.byteLength);
+    new DataView(message.buffer).setUint32(0, number, true);
+    message.set(new Uint8Array(bytes), 4);
+    link.send(message.buffer);
+    frame.timer = setTimeout(() => {
+      this.#forget();
+      this.#send();
+    }, k_lost_ms);
+  }
+
+  // An answer to another frame than the one in flight is of one that was given up: it is never shown.
+  async #answer({ number, json, jpeg }) {
+    const frame = this.#in_flight;
+    if (!this.is_open || frame?.number !== number) return;
+    clearTimeout(frame.timer);
+    const sees = json.sees !== "nothing" && jpeg.size > 0;
+    if (sees) await this.#show(jpeg, number);
+    if (frame !== this.#in_flight) return;
+    this.#stage.give_to_window(sees);
+    this.#say(sees ? "" : json.why || "No markers in view. Point the camera at the prototype.");
+    const ms = performance.now() - frame.at;
+    this.#pace.take(ms);
+    this.#times = [...this.#times.slice(-19), performance.now()];
+    this.#tell(json);
+    Object.assign(this.#shown.dataset, { number, sees: json.sees, rms: json.rms_px ?? "" });
+    this.#in_flight = null;
+    this.#video.requestVideoFrameCallback ? this.#at_next_frame() : this.#send();
+  }
+
+  #at_next_frame() {
+    let is_sent = false;
+    const send = () => {
+      if (is_sent) return;
+      is_sent = true;
+      this.#send();
+    };
+    this.#video.requestVideoFrameCallback(send);
+    setTimeout(send, 100);  // a camera that stands still gives no frame
+  }
+
+  async #show(jpeg, number) {
+    try {
+      draw_picture(this.#shown, await createImageBitmap(jpeg));
+    } catch {
+      this.#session.say(`The picture of frame ${number} could not be read.`, true);
+    }
+  }
+
+  #tell(json) {
+    const [first, last] = [this.#times[0], this.#times.at(-1)];
+    const rate = this.#times.length > 1 ? (1000 * (this.#times.length - 1)) / (last - first) : 0;
+    const server_ms = Object.values(json.ms ?? {}).reduce((sum, ms) => sum + ms, 0);
+    const lines = [`${this.#grabbed.width} × ${this.#grabbed.height}, ${rate.toFixed(0)}/s, ${this.#pace.mean_ms.toFixed(0)} ms (Limn ${server_ms.toFixed(0)})`];
+    if (json.rms_px !== undefined) lines.push(`${json.markers ?? 0} markers, fit ${json.rms_px.toFixed(2)} px`);
+    const focal = json.lens?.values?.[0];
+    if (focal) lines.push(`lens ${focal.toFixed(0)} ± ${json.lens.focal_stddev_px.toFixed(1)} px of ${json.lens.frames} frames`);
+    const numbers = by_id("window-numbers");
+    set_text(numbers, lines.join("\n"));
+    numbers.hidden = false;
+  }
+}
+
+function make_panel(owner) {
+  const why = h("p", { role: "alert", class: "bad-words" });
+  const words = h("p", { class: "soft" }, "Hold this device before the prototype: its camera's picture comes back with the parts in it.");
+  const open = h("button", { type: "button", class: "main grow", onclick: () => toggle() }, icon("camera"), h("span", {}, "Open the window"));
+  const full = h("button", { type: "button", "aria-label": "Full screen", onclick: () => toggle_full() }, icon("full"));
+  by_id("window").append(h("h2", {}, "Window"), words, why, h("div", { class: "dock line" }, open, full));
+  function toggle() {
+    set_text(why, "");
+    if (owner.is_open) owner.close();
+    else owner.open();
+  }
+  return {
+    say: (text) => set_text(why, text),
+    show(is_open) {
+      document.body.classList.toggle("window-open", is_open);
+      set_text(open.lastElementChild, is_open ? "Close the window" : "Open the window");
+      words.hidden = is_open;
+    },
+  };
+}
+
+function toggle_full() {
+  if (document.fullscreenElement) document.exitFullscreen();
+  else if (document.documentElement.requestFullscreen) by_id("stage").requestFullscreen().catch(() => {});
+}
+
+export function make_window(session, stage) {
+  const owner = new CameraWindow(session, stage);
+  return {
+    show() {},
+    opened(name) {
+      if (name !== "window" && owner.is_open) owner.close();
+    },
+  };
+}
