@@ -2,6 +2,7 @@
 
 #include <turbojpeg.h>
 
+#include <algorithm>
 #include <memory>
 #include <string>
 
@@ -15,31 +16,77 @@ bool is_harmless(const std::string& warning) {
   return warning.find("extraneous bytes before marker") != std::string::npos;
 }
 
+using Handle = std::unique_ptr<void, int (*)(tjhandle)>;
+
+Handle new_decoder() {
+  Handle decoder(tjInitDecompress(), tjDestroy);
+  LIMN_CHECK(decoder != nullptr);
+  return decoder;
+}
+
+Error damaged(std::span<const std::uint8_t> bytes, const Handle& decoder) {
+  return error("expected a whole JPEG picture, found a truncated or damaged one ({} bytes: {}).",
+               bytes.size(), tjGetErrorStr2(decoder.get()));
+}
+
+// The largest n/8 of a size that has no side longer than that.
+cv::Size reduced(cv::Size size, int longest_side) {
+  if (longest_side <= 0) return size;
+  for (int eighths = 8; eighths > 1; --eighths) {
+    const tjscalingfactor factor{eighths, 8};
+    const cv::Size out(TJSCALED(size.width, factor), TJSCALED(size.height, factor));
+    if (std::max(out.width, out.height) <= longest_side) return out;
+  }
+  constexpr tjscalingfactor k_least{1, 8};
+  return {TJSCALED(size.width, k_least), TJSCALED(size.height, k_least)};
+}
+
 }  // namespace
 
+Result<cv::Size> jpeg_size(std::span<const std::uint8_t> bytes) {
+  const Handle decoder = new_decoder();
+  int width = 0, height = 0, subsampling = 0, colours = 0;
+  if (tjDecompressHeader3(decoder.get(), bytes.data(), bytes.size(), &width, &height, &subsampling,
+                          &colours) != 0 ||
+      width < 1 || height < 1)  // a header that ends too early
+    return damaged(bytes, decoder);
+  return cv::Size(width, height);
+}
+
 Result<cv::Mat> decode_jpeg(std::span<const std::uint8_t> bytes, const JpegOptions& options) {
-  const std::unique_ptr<void, int (*)(tjhandle)> decoder(tjInitDecompress(), tjDestroy);
-  LIMN_CHECK(decoder != nullptr);
-  const auto damaged = [&] {
-    return error("expected a whole JPEG picture, found a truncated or damaged one ({} bytes: {}).",
-                 bytes.size(), tjGetErrorStr2(decoder.get()));
-  };
+  const Handle decoder = new_decoder();
   int width = 0, height = 0, subsampling = 0, colours = 0;
   if (tjDecompressHeader3(decoder.get(), bytes.data(), bytes.size(), &width, &height, &subsampling,
                           &colours) != 0)
-    return damaged();
+    return damaged(bytes, decoder);
   if (!options.size.empty() && cv::Size(width, height) != options.size)
     return error("expected a picture of {}x{}, found {}x{}. Set the camera back or start again.",
                  options.size.width, options.size.height, width, height);
   if (static_cast<long>(width) * height > k_max_pixels)
     return error("expected a camera's picture, found one of {}x{} pixels.", width, height);
   const bool grey = options.grey || colours == TJCS_GRAY;
-  cv::Mat picture(height, width, grey ? CV_8UC1 : CV_8UC3);
-  if (tjDecompress2(decoder.get(), bytes.data(), bytes.size(), picture.data, width,
-                    static_cast<int>(picture.step), height, grey ? TJPF_GRAY : TJPF_BGR, 0) != 0 &&
+  cv::Mat picture(reduced({width, height}, options.longest_side), grey ? CV_8UC1 : CV_8UC3);
+  if (tjDecompress2(decoder.get(), bytes.data(), bytes.size(), picture.data, picture.cols,
+                    static_cast<int>(picture.step), picture.rows, grey ? TJPF_GRAY : TJPF_BGR, 0) != 0 &&
       !(tjGetErrorCode(decoder.get()) == TJERR_WARNING && is_harmless(tjGetErrorStr2(decoder.get()))))
-    return damaged();
+    return damaged(bytes, decoder);
   return picture;
+}
+
+std::vector<std::uint8_t> encode_jpeg(const cv::Mat& picture, int quality) {
+  LIMN_CHECK(!picture.empty() && (picture.type() == CV_8UC1 || picture.type() == CV_8UC3));
+  const Handle encoder(tjInitCompress(), tjDestroy);
+  LIMN_CHECK(encoder != nullptr);
+  const bool grey = picture.channels() == 1;
+  const int sampling = grey ? TJSAMP_GRAY : TJSAMP_420;
+  std::vector<std::uint8_t> jpeg(tjBufSize(picture.cols, picture.rows, sampling));
+  unsigned char* at = jpeg.data();
+  unsigned long size = jpeg.size();
+  LIMN_CHECK(tjCompress2(encoder.get(), picture.data, picture.cols, static_cast<int>(picture.step),
+                         picture.rows, grey ? TJPF_GRAY : TJPF_BGR, &at, &size, sampling, quality,
+                         TJFLAG_NOREALLOC) == 0);
+  jpeg.resize(size);
+  return jpeg;
 }
 
 }  // namespace limn::device

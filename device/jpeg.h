@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <span>
+#include <vector>
 
 #include "core/result.h"
 
@@ -11,11 +12,19 @@ namespace limn::device {
 struct JpegOptions {
   bool grey = false;   ///< brightness alone, in half the time
   cv::Size size = {};  ///< expected; another one is an error before anything is decoded. Empty: any
+  /// A larger picture comes out at n/8 of its size (its own, averaged), so that no side is longer. 0: any.
+  int longest_side = 0;
 };
+
+/// Width and height by the header alone, in microseconds. Errors as decode_jpeg's.
+Result<cv::Size> jpeg_size(std::span<const std::uint8_t> bytes);
 
 /// A camera's JPEG as 8-bit BGR, or grey where it holds one channel or `grey` asks for it. Tables that
 /// webcams leave out are the standard's. A truncated or damaged picture is an error, never a half picture;
 /// the message is a sentence without a place.
 Result<cv::Mat> decode_jpeg(std::span<const std::uint8_t> bytes, const JpegOptions& options = {});
+
+/// 8-bit grey or BGR as JPEG, colour at half the resolution (4:2:0). `quality` is 1 … 100.
+std::vector<std::uint8_t> encode_jpeg(const cv::Mat& picture, int quality);
 
 }  // namespace limn::device

@@ -2,6 +2,7 @@
 
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "tests/support/matchers.h"
 
@@ -76,6 +77,40 @@ TEST(Jpeg, AnotherSizeIsNamed) {
   const auto other = decode_jpeg(encoded(ramp()), {.size = {64, 50}});
   ASSERT_FALSE(other);
   EXPECT_NE(other.message().find("64x50, found 64x48"), std::string::npos) << other.message();
+}
+
+TEST(Jpeg, SizeIsKnownBeforeAnythingIsDecoded) {
+  auto bytes = encoded(ramp());
+  const auto size = jpeg_size(bytes);
+  ASSERT_TRUE(size) << size.message();
+  EXPECT_EQ(*size, cv::Size(64, 48));
+  bytes.resize(40);
+  EXPECT_FALSE(jpeg_size(bytes));
+}
+
+TEST(Jpeg, LargePicturesComeOutSmaller) {
+  const auto bytes = encoded(ramp());
+  const auto same = decode_jpeg(bytes, {.longest_side = 64});
+  ASSERT_TRUE(same);
+  EXPECT_EQ(same->size(), cv::Size(64, 48));
+  const auto half = decode_jpeg(bytes, {.longest_side = 32});
+  ASSERT_TRUE(half);
+  cv::Mat expected;
+  cv::resize(ramp(), expected, {32, 24}, 0, 0, cv::INTER_AREA);
+  EXPECT_TRUE(test::image_near(*half, expected, 2, 16, "half"));
+  const auto least = decode_jpeg(bytes, {.longest_side = 2});
+  ASSERT_TRUE(least);
+  EXPECT_EQ(least->size(), cv::Size(8, 6));
+}
+
+TEST(Jpeg, WhatIsEncodedIsDecodedAgain) {
+  const auto colour = decode_jpeg(encode_jpeg(ramp(), 95));
+  ASSERT_TRUE(colour) << colour.message();
+  EXPECT_TRUE(test::image_near(*colour, ramp(), 3, 24, "colour"));
+  const cv::Mat grey(17, 9, CV_8U, cv::Scalar(90));
+  const auto again = decode_jpeg(encode_jpeg(grey, 95));
+  ASSERT_TRUE(again);
+  EXPECT_TRUE(test::image_near(*again, grey, 1, 1, "grey"));
 }
 
 }  // namespace
