@@ -258,7 +258,7 @@ struct Renderer::Impl {
                     int kind,
                     const Whole& whole,
                     const SetUp& set_up_layer);
-  cv::Mat composite_over(std::size_t camera,
+  cv::Mat composite_over(const Imager& imager,
                          const cv::Mat& picture,
                          const scene::PosedScene& posed,
                          int kind,
@@ -517,13 +517,11 @@ cv::Mat Renderer::Impl::laid_over(const cv::Mat& bgr,
   return out;
 }
 
-cv::Mat Renderer::Impl::composite_over(std::size_t camera,
+cv::Mat Renderer::Impl::composite_over(const Imager& imager,
                                        const cv::Mat& picture,
                                        const scene::PosedScene& posed,
                                        int kind,
                                        const Whole& whole) {
-  LIMN_CHECK(camera < rig.cameras.size());
-  const Imager& imager = rig.cameras[camera];
   LIMN_CHECK(picture.cols == imager.width && picture.rows == imager.height && picture.depth() == CV_8U);
   cv::Mat bgr = picture;
   if (picture.channels() == 1) cv::cvtColor(picture, bgr, cv::COLOR_GRAY2BGR);
@@ -761,10 +759,26 @@ cv::Mat Renderer::composite(std::size_t camera,
                             const cv::Mat& picture,
                             const scene::PosedScene& posed,
                             Composite what) {
-  return impl_->composite_over(camera, picture, posed, static_cast<int>(what), whole_of(what));
+  LIMN_CHECK(camera < impl_->rig.cameras.size());
+  return composite(impl_->rig.cameras[camera], picture, posed, what);
 }
 
 cv::Mat Renderer::composite(std::size_t camera,
+                            const cv::Mat& picture,
+                            const scene::PosedScene& posed,
+                            std::span<const Treatment> treatments) {
+  LIMN_CHECK(camera < impl_->rig.cameras.size());
+  return composite(impl_->rig.cameras[camera], picture, posed, treatments);
+}
+
+cv::Mat Renderer::composite(const Imager& camera,
+                            const cv::Mat& picture,
+                            const scene::PosedScene& posed,
+                            Composite what) {
+  return impl_->composite_over(camera, picture, posed, static_cast<int>(what), whole_of(what));
+}
+
+cv::Mat Renderer::composite(const Imager& camera,
                             const cv::Mat& picture,
                             const scene::PosedScene& posed,
                             std::span<const Treatment> treatments) {

@@ -112,6 +112,16 @@ class Renderer {
                     const scene::PosedScene& posed,
                     std::span<const Treatment> treatments);
 
+  /// The same for a picture of a camera that is not of the rig: a guest's, which is elsewhere in each.
+  cv::Mat composite(const Imager& camera,
+                    const cv::Mat& picture,
+                    const scene::PosedScene& posed,
+                    Composite what);
+  cv::Mat composite(const Imager& camera,
+                    const cv::Mat& picture,
+                    const scene::PosedScene& posed,
+                    std::span<const Treatment> treatments);
+
   /// The prototype (in its albedo) and the parts as an eye or a virtual camera sees them, sRGB BGR, over
   /// plain `background`.
   cv::Mat view(const Imager& imager, const scene::PosedScene& posed, const cv::Scalar& background);

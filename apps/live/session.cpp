@@ -216,6 +216,7 @@ Status Session::show(scene::Scene scene, Stamp at) {
   if (telemetry_) telemetry_->note(at, "the scene's files have changed; it was loaded anew");
   painter_ = std::move(painter);
   setup_.scene = std::move(scene);
+  ++scenes_;
   ask_units();
   return {};
 }

@@ -66,6 +66,8 @@ class Session {
   const scene::Staging& staging() const { return staging_; }
   const Watched& watched() const { return watched_; }
   const SessionSetup& setup() const { return setup_; }
+  /// How many scenes were shown so far, the first one included: another number, another setup().scene.
+  int scenes() const { return scenes_; }
   /// What the last paint() was made of and cost: stamps, times, markers, lost bodies; the rest is the
   /// caller's. record_ms is -1 without a recording.
   ShownFrame measured() const;
@@ -100,6 +102,7 @@ class Session {
   std::optional<Drift> told_drift_;
   Stamp compared_cameras_at_;
   bool told_swapped_ = false;
+  int scenes_ = 1;
   double paint_ms_ = 0, record_ms_ = 0;
 };
 

@@ -1,0 +1,366 @@
+#include "apps/tablet/onlooker.h"
+
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <deque>
+#include <future>
+#include <map>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <thread>
+
+#include "apps/live/stopwatch.h"
+#include "apps/tablet/guest_eye.h"
+#include "apps/tablet/guest_picture.h"
+#include "core/config.h"
+#include "core/log.h"
+#include "device/gl_context.h"
+#include "device/jpeg.h"
+#include "projector/renderer.h"
+#include "projector/treatment.h"
+#include "scene/posed.h"
+#include "tracker/family.h"
+#include "tracker/predict.h"
+
+namespace limn::apps {
+namespace {
+
+using Answer = std::function<void(Onlooker::Seen)>;
+
+constexpr int k_quality = 80;           // of JPEG
+constexpr int k_niceness = 19;          // least: sessions and servers go before
+constexpr std::size_t k_most_eyes = 8;  // devices that are known at a time
+
+// What a session said last.
+struct Known {
+  std::shared_ptr<const scene::Scene> scene;
+  int scenes = 0;
+  scene::Staging staging;
+  std::vector<tracker::BodyMotion> motions;
+  PaintOptions paint;
+  Frame room;
+};
+
+struct Guest {
+  std::string device;
+  std::vector<std::uint8_t> jpeg;
+  Answer answer;
+};
+
+// What the bodies of a scene are as people paired markers with its slots.
+std::vector<Body> bodies_of(const scene::Scene& scene, const scene::Staging& staging) {
+  std::vector<Body> out;
+  if (scene.prototype) out.push_back({"prototype", scene.prototype->markers});
+  for (std::size_t i = 0; i < scene.slots.size(); ++i) {
+    const scene::Slot& slot = scene.slots[i];
+    const MarkerName& carrier = scene::carrier(scene, staging, i);
+    const double size_m = carrier == slot.marker ? slot.size_m : loose_size_m(scene);
+    out.push_back({slot.name, {{carrier, size_m, Pose()}}});
+  }
+  return out;
+}
+
+bool is_in_picture(const Imager& view, const scene::Scene& scene, const scene::PosedScene& posed) {
+  const auto p_middle = posed.world_from_prototype ? scene::middle_of(scene, posed) : std::nullopt;
+  const auto px = p_middle ? view.project(*p_middle) : std::nullopt;
+  return px && view.contains(*px);
+}
+
+Onlooker::Seen nothing(const std::string& why) {
+  return {nlohmann::json{{"sees", "nothing"}, {"why", why}, {"markers", 0}}.dump(), {}};
+}
+
+}  // namespace
+
+struct Onlooker::Impl {
+  // Between threads.
+  std::mutex mutex;
+  std::condition_variable changed;
+  bool is_ending = false;
+  std::deque<Guest> guests;  // one a device, in the order of their asking
+  std::vector<Answer> overtaken, rooms;
+  std::shared_ptr<const Known> known;
+
+  // The session's thread's.
+  std::shared_ptr<const scene::Scene> told_scene;
+  int told_scenes = 0;
+
+  // The onlooker's own.
+  Rig rig;
+  std::filesystem::path lens_folder;
+  tracker::Families families;
+  std::optional<device::GlContext> context;
+  std::optional<projector::Renderer> renderer;
+  int drawn_scenes = 0;  // which scene the renderer holds
+  struct Watching {
+    std::string device;
+    GuestEye eye;
+    std::vector<projector::Treatment> treatments;
+    Stamp treated_at;
+  };
+  std::deque<Watching> watching;  // the one that asked last at the end
+  std::vector<projector::Treatment> room_treatments;
+  Stamp room_treated_at;
+
+  std::thread thread;
+
+  Status open(const scene::Scene& scene);
+  void run();
+  bool step();
+  Seen seen_by(const Guest& guest, const Known& known);
+  Seen seen_in_room(const Known& known);
+  Watching& watching_of(const std::string& device);
+  Status follow_scene(const Known& known);
+  cv::Mat drawn(const Imager& camera,
+                const cv::Mat& picture,
+                const scene::PosedScene& posed,
+                const scene::Staging& staging,
+                std::vector<projector::Treatment>* treatments,
+                Stamp* treated_at);
+};
+
+Status Onlooker::Impl::open(const scene::Scene& scene) {
+  setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), k_niceness);
+  LIMN_TRY(context, device::GlContext::create());
+  LIMN_TRY(renderer, projector::Renderer::create(scene, rig));
+  return {};
+}
+
+void Onlooker::Impl::run() {
+  while (step()) {
+  }
+  renderer.reset();
+  context.reset();
+}
+
+// Waits for something to do, and does it. False: it is over.
+bool Onlooker::Impl::step() {
+  std::optional<Guest> guest;
+  std::vector<Answer> late, asking;
+  std::shared_ptr<const Known> now;
+  bool is_over = false;
+  {
+    std::unique_lock lock(mutex);
+    changed.wait(lock, [&] { return is_ending || !guests.empty() || !overtaken.empty() || !rooms.empty(); });
+    is_over = is_ending;
+    late.swap(overtaken);
+    asking.swap(rooms);
+    now = known;
+    if (is_over) {
+      for (Guest& waiting : guests) late.push_back(std::move(waiting.answer));
+      late.insert(late.end(), asking.begin(), asking.end());
+      guests.clear();
+      asking.clear();
+    } else if (!guests.empty()) {
+      guest = std::move(guests.front());
+      guests.pop_front();
+    }
+  }
+  const auto drawn = [&](const auto& draw) -> Seen {
+    if (!now) return nothing("The session has not begun yet.");
+    try {
+      if (const Status ready = follow_scene(*now); !ready) return nothing(ready.message());
+      return draw();
+    } catch (const std::exception& bug) {
+      log_warning("live: the window: this is a bug in Limn, please report it: {}", bug.what());
+      return nothing("This picture could not be drawn into.");
+    }
+  };
+  for (const Answer& answer : late)
+    answer(nothing(is_over ? "The session is over." : "A newer picture came before this one's turn."));
+  if (guest) guest->answer(drawn([&] { return seen_by(*guest, *now); }));
+  if (!asking.empty()) {
+    const Seen room = drawn([&] { return seen_in_room(*now); });
+    for (const Answer& answer : asking) answer(room);
+  }
+  return !is_over;
+}
+
+// A scene that was edited is drawn from now on.
+Status Onlooker::Impl::follow_scene(const Known& known) {
+  if (drawn_scenes == known.scenes && renderer && !context->is_lost()) return {};
+  renderer.reset();
+  if (context->is_lost()) {
+    context.reset();
+    LIMN_TRY(context, device::GlContext::create());
+  }
+  LIMN_TRY(renderer, projector::Renderer::create(*known.scene, rig));
+  drawn_scenes = known.scenes;
+  return {};
+}
+
+Onlooker::Impl::Watching& Onlooker::Impl::watching_of(const std::string& device) {
+  const auto found =
+      std::find_if(watching.begin(), watching.end(), [&](const Watching& w) { return w.device == device; });
+  if (found != watching.end()) {
+    std::rotate(found, found + 1, watching.end());
+    return watching.back();
+  }
+  if (watching.size() >= k_most_eyes) watching.pop_front();
+  watching.push_back({device, GuestEye(families), {}, {}});
+  return watching.back();
+}
+
+// Parts over a picture as the room's screen treats them.
+cv::Mat Onlooker::Impl::drawn(const Imager& camera,
+                              const cv::Mat& picture,
+                              const scene::PosedScene& posed,
+                              const scene::Staging& staging,
+                              std::vector<projector::Treatment>* treatments,
+                              Stamp* treated_at) {
+  if (staging.screen == scene::Screen::full)
+    return renderer->composite(camera, picture, posed, projector::Composite::full);
+  const Stamp at = std::chrono::steady_clock::now();
+  const double seconds = *treated_at == Stamp{} ? 0 : seconds_between(*treated_at, at);
+  *treatments = projector::treated(*treatments, renderer->coverage(posed, camera), seconds);
+  *treated_at = at;
+  return renderer->composite(camera, picture, posed, *treatments);
+}
+
+Onlooker::Seen Onlooker::Impl::seen_by(const Guest& guest, const Known& known) {
+  const Stamp begun = std::chrono::steady_clock::now();
+  const auto picture = decode_guest_picture(guest.jpeg);
+  if (!picture) return nothing(picture.message());
+  const double decode_ms = milliseconds_since(begun);
+
+  const Stamp tracking = std::chrono::steady_clock::now();
+  const std::vector<Track> tracks = scene::carried(
+      *known.scene, known.staging,
+      tracker::predicted(known.motions, known.room.captured_at, known.paint.prediction, known.paint.motion));
+  Watching& device = watching_of(guest.device);
+  const GuestSight sight = device.eye.look(*picture, bodies_of(*known.scene, known.staging), tracks);
+  const double track_ms = milliseconds_since(tracking);
+  if (!sight.view) return nothing(sight.why);
+
+  const Stamp drawing = std::chrono::steady_clock::now();
+  const scene::PosedScene posed = scene::staged(*known.scene, known.staging, tracks);
+  const cv::Mat out =
+      drawn(*sight.view, *picture, posed, known.staging, &device.treatments, &device.treated_at);
+  const double composite_ms = milliseconds_since(drawing);
+
+  const Stamp encoding = std::chrono::steady_clock::now();
+  Seen seen{{}, device::encode_jpeg(out, k_quality)};
+  const double encode_ms = milliseconds_since(encoding);
+  const Lens& lens = sight.view->lens;
+  seen.json =
+      nlohmann::json{
+          {"sees", is_in_picture(*sight.view, *known.scene, posed) ? "prototype" : "markers"},
+          {"why", ""},
+          {"markers", sight.markers},
+          {"view_from_world", to_json(sight.view->imager_from_world)},
+          {"rms_px", sight.rms_px},
+          {"lens",
+           {{"model", lens.model.name()},
+            {"values", lens.values},
+            {"focal_stddev_px", sight.focal_stddev_px},
+            {"frames", sight.lens_frames}}},
+          {"ms",
+           {{"decode", decode_ms}, {"track", track_ms}, {"composite", composite_ms}, {"encode", encode_ms}}}}
+          .dump();
+  return seen;
+}
+
+Onlooker::Seen Onlooker::Impl::seen_in_room(const Known& known) {
+  const auto without = [](const char* why) { return Seen{nlohmann::json{{"why", why}}.dump(), {}}; };
+  if (known.room.image.empty()) return without("The room's camera has shown nothing yet.");
+  cv::Mat picture = known.room.image;
+  if (picture.channels() == 1) cv::cvtColor(picture, picture, cv::COLOR_GRAY2BGR);
+  Imager camera = rig.cameras[0];
+  const double scale = 1.0 * k_drawn_side / std::max(picture.cols, picture.rows);
+  if (scale < 1) {
+    const cv::Size size(cvRound(scale * picture.cols), cvRound(scale * picture.rows));
+    const auto smaller = resized(camera, size.width, size.height);
+    LIMN_CHECK(smaller.has_value());
+    camera = *smaller;
+    cv::resize(picture, picture, size, 0, 0, cv::INTER_AREA);
+  }
+  const std::vector<Track> tracks = scene::carried(
+      *known.scene, known.staging,
+      tracker::predicted(known.motions, known.room.captured_at, known.paint.prediction, known.paint.motion));
+  const scene::PosedScene posed = scene::staged(*known.scene, known.staging, tracks);
+  const cv::Mat out = drawn(camera, picture, posed, known.staging, &room_treatments, &room_treated_at);
+  return {nlohmann::json{{"why", ""}}.dump(), device::encode_jpeg(out, k_quality)};
+}
+
+Onlooker::Onlooker(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Result<std::unique_ptr<Onlooker>> Onlooker::create(const SessionSetup& setup,
+                                                   std::filesystem::path lens_folder) {
+  auto impl = std::make_unique<Impl>();
+  impl->rig = setup.rig;
+  impl->lens_folder = std::move(lens_folder);
+  const std::vector<Body> bodies = scene::bodies(setup.scene);
+  LIMN_TRY(impl->families, tracker::Families::load(tracker::families_of(bodies), setup.scene.folder));
+  impl->told_scene = std::make_shared<scene::Scene>(setup.scene);
+  std::promise<Status> opened;
+  std::future<Status> is_open = opened.get_future();
+  impl->thread = std::thread([impl = impl.get(), &setup, &opened] {
+    Status status = impl->open(setup.scene);
+    const bool is_well = status.ok();
+    opened.set_value(std::move(status));
+    if (is_well) impl->run();
+  });
+  Status status = is_open.get();
+  std::unique_ptr<Onlooker> out(new Onlooker(std::move(impl)));
+  if (!status) return status.error();
+  return out;
+}
+
+Onlooker::~Onlooker() {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->is_ending = true;
+  }
+  impl_->changed.notify_all();
+  impl_->thread.join();
+}
+
+void Onlooker::know(const Session& session) {
+  if (impl_->told_scenes != session.scenes()) {
+    impl_->told_scene = std::make_shared<scene::Scene>(session.setup().scene);
+    impl_->told_scenes = session.scenes();
+  }
+  const Watched& watched = session.watched();
+  auto known = std::make_shared<Known>(Known{.scene = impl_->told_scene,
+                                             .scenes = session.scenes(),
+                                             .staging = session.staging(),
+                                             .motions = watched.motions,
+                                             .paint = session.setup().paint,
+                                             .room = watched.frames.empty() ? Frame{} : watched.frames[0]});
+  if (known->room.captured_at == Stamp{}) known->room.captured_at = watched.captured_at;
+  const std::lock_guard lock(impl_->mutex);
+  impl_->known = std::move(known);
+}
+
+void Onlooker::look(const std::string& device,
+                    std::vector<std::uint8_t> jpeg,
+                    std::function<void(Seen)> answer) {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    const auto before = std::find_if(impl_->guests.begin(), impl_->guests.end(),
+                                     [&](const Guest& guest) { return guest.device == device; });
+    if (before == impl_->guests.end()) {
+      impl_->guests.push_back({device, std::move(jpeg), std::move(answer)});
+    } else {  // keeps its turn
+      impl_->overtaken.push_back(std::exchange(before->answer, std::move(answer)));
+      before->jpeg = std::move(jpeg);
+    }
+  }
+  impl_->changed.notify_all();
+}
+
+void Onlooker::room(std::function<void(Seen)> answer) {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->rooms.push_back(std::move(answer));
+  }
+  impl_->changed.notify_all();
+}
+
+}  // namespace limn::apps
