@@ -135,6 +135,32 @@ Result<Staging> with_look(const Scene& scene,
   return staging;
 }
 
+Result<Staging> without_look(Staging staging, const Edit& edit) {
+  const auto look = std::find_if(staging.looks.begin(), staging.looks.end(),
+                                 [&](const Look& known) { return known.name == edit.value; });
+  if (look == staging.looks.end())
+    return error("delete_look: expected one of {}, found '{}'.", list_of(look_names(staging)), edit.value);
+  staging.deleted_look = std::move(*look);
+  staging.looks.erase(look);
+  if (staging.look == edit.value) staging.look.clear();
+  if (staging.other_look == edit.value) {
+    staging.other_look.clear();
+    staging.split = false;
+  }
+  return staging;
+}
+
+Result<Staging> with_deleted_look(Staging staging) {
+  if (!staging.deleted_look) return error("undelete_look: expected a look that was deleted, found none.");
+  const std::vector<std::string> names = look_names(staging);
+  if (std::find(names.begin(), names.end(), staging.deleted_look->name) != names.end())
+    return error("undelete_look: expected no look of that name, found another '{}'. Delete it first.",
+                 staging.deleted_look->name);
+  staging.looks.push_back(std::move(*staging.deleted_look));
+  staging.deleted_look.reset();
+  return staging;
+}
+
 std::set<std::string> families_of(const Scene& scene) {
   std::set<std::string> families;
   for (const Body& body : bodies(scene))
@@ -282,6 +308,7 @@ const std::vector<Action>& actions() {
       {"split", false, on_off, "on, off or toggle", "left of a line the look shown before"},
       {"split_at", false, number, "mm to the right of the prototype's middle", "where that line is"},
       {"delete_look", false, text, "a look", "forgets a look"},
+      {"undelete_look", false, nothing, "", "brings back the look that was last deleted"},
       {"blackout", false, on_off, "on, off or toggle", "bare model: no light"},
       {"freeze", false, on_off, "on, off or toggle", "what is shown stays"},
       {"grid", false, on_off, "on, off or toggle", "lines on the prototype, every 10 mm"},
@@ -336,16 +363,8 @@ Result<Staging> edited(const Scene& scene,
       return error("split: expected a look shown before the present one, found none. Save or restore two.");
     return out;
   }
-  if (edit.action == "delete_look") {
-    if (std::erase_if(out.looks, [&](const Look& look) { return look.name == edit.value; }) == 0)
-      return error("delete_look: expected one of {}, found '{}'.", list_of(look_names(staging)), edit.value);
-    if (out.look == edit.value) out.look.clear();
-    if (out.other_look == edit.value) {
-      out.other_look.clear();
-      out.split = false;
-    }
-    return out;
-  }
+  if (edit.action == "delete_look") return without_look(std::move(out), edit);
+  if (edit.action == "undelete_look") return with_deleted_look(std::move(out));
   if (edit.action == "screen") return with_screen(std::move(out), edit);
   bool Staging::*const flag = edit.action == "blackout" ? &Staging::blackout
                               : edit.action == "freeze" ? &Staging::frozen

@@ -50,14 +50,15 @@ struct Staging {
   };
   std::vector<Slot> slots;  ///< in the scene's order
   std::vector<Look> looks;
-  std::string look;            ///< the one last saved or restored; empty: none
-  std::string other_look;      ///< the one before it, which flip comes back to
-  bool blackout = false;       ///< bare model: projectors give no light
-  bool frozen = false;         ///< what is shown stays as it is
-  bool marker_states = false;  ///< rings around markers say how they are tracked
-  bool grid = false;           ///< lines on the prototype, every 10 mm
-  bool split = false;          ///< left of a line the other look, right of it what is shown else
-  double split_mm = 0;         ///< where the line is, along the prototype's x, from its middle
+  std::string look;                  ///< the one last saved or restored; empty: none
+  std::string other_look;            ///< the one before it, which flip comes back to
+  std::optional<Look> deleted_look;  ///< the last one deleted, which can come back
+  bool blackout = false;             ///< bare model: projectors give no light
+  bool frozen = false;               ///< what is shown stays as it is
+  bool marker_states = false;        ///< rings around markers say how they are tracked
+  bool grid = false;                 ///< lines on the prototype, every 10 mm
+  bool split = false;                ///< left of a line the other look, right of it what is shown else
+  double split_mm = 0;               ///< where the line is, along the prototype's x, from its middle
   Screen screen = Screen::rest;
 };
 

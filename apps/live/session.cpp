@@ -18,6 +18,7 @@ namespace fs = std::filesystem;
 constexpr double k_compare_cameras_every_s = 2;
 constexpr double k_renew_every_s = 1;  // a context that was lost
 constexpr const char* k_pairings = "pairings.json";
+constexpr const char* k_deleted = "deleted";  // in the folder of looks
 
 // A turn backwards undoes what a turn forwards does.
 scene::Edit edit_of(const scene::Control& control, int steps) {
@@ -32,6 +33,19 @@ scene::Edit edit_of(const scene::Control& control, int steps) {
   else if (edit.action == "previous_look")
     edit.action = "next_look";
   return edit;
+}
+
+// What is not there is not moved.
+Status move_look(const std::string& name, const fs::path& from, const fs::path& to) {
+  LIMN_TRY_STATUS(make_folder(to));
+  std::error_code failed;
+  for (const char* end : {".json", ".png"}) {
+    const fs::path file = from / (name + end);
+    if (fs::exists(file, failed)) fs::rename(file, to / file.filename(), failed);
+    if (failed)
+      return error("{}: could not be moved to {}: {}.", file.string(), to.string(), failed.message());
+  }
+  return {};
 }
 
 std::vector<std::string> variant_names(const scene::Slot& slot) {
@@ -279,13 +293,16 @@ Status Session::keep_looks(const scene::Staging& before) {
   for (const scene::Look& look : before.looks) {
     if (!text_of(staging_, look.name).empty()) continue;
     has_changed = true;
-    std::error_code ignored;
-    for (const char* end : {".json", ".png"}) fs::remove(folder / (look.name + end), ignored);
+    LIMN_TRY_STATUS(move_look(look.name, folder, folder / k_deleted));
   }
   for (const scene::Look& look : staging_.looks) {
     const std::string text = scene::look_json(look);
     if (text == text_of(before, look.name)) continue;
     has_changed = true;
+    if (before.deleted_look && text == scene::look_json(*before.deleted_look) && !staging_.deleted_look) {
+      LIMN_TRY_STATUS(move_look(look.name, folder / k_deleted, folder));
+      continue;
+    }
     LIMN_TRY_STATUS(make_folder(folder));
     LIMN_TRY_STATUS(write_file(folder / (look.name + ".json"), text));
     scene::Staging shown = staging_;

@@ -357,7 +357,9 @@ TEST(Live, KeepsLooks) {
                                {{"at_s", 0.13}, {"edit", {{"action", "next_variant"}, {"slot", "mirror"}}}},
                                edit(0.2, "save_look", "bold"),
                                edit(0.24, "save_look", "third"),
-                               edit(0.27, "delete_look", "third")}));
+                               edit(0.27, "delete_look", "third"),
+                               edit(0.29, "delete_look", "calm"),
+                               edit(0.31, "undelete_look", "")}));
   ASSERT_TRUE(run_live(options).ok());
   const fs::path looks = folder / "door/looks";
   const json calm = read_json(looks / "calm.json"), bold = read_json(looks / "bold.json");

@@ -208,12 +208,27 @@ TEST(Staging, TwoLooksAreFlippedAndSplit) {
   EXPECT_FALSE(staging.split);
 }
 
+TEST(Staging, BringsBackTheLookThatWasDeleted) {
+  const Scene scene = two_slots();
+  Staging staging = done(scene, first_staging(scene), {}, {"save_look", "", "A"});
+  EXPECT_FALSE(edited(scene, staging, {}, {"undelete_look", "", ""}));
+  const std::string text = look_json(staging.looks[0]);
+  staging = done(scene, staging, {}, {"delete_look", "", "A"});
+  const Staging again = done(scene, staging, {}, {"undelete_look", "", ""});
+  ASSERT_EQ(again.looks.size(), 1u);
+  EXPECT_EQ(look_json(again.looks[0]), text);
+  EXPECT_FALSE(edited(scene, again, {}, {"undelete_look", "", ""}));
+  staging = done(scene, staging, {}, {"save_look", "", "A"});  // another of that name
+  EXPECT_FALSE(edited(scene, staging, {}, {"undelete_look", "", ""}));
+}
+
 TEST(Staging, EveryActionCanBeDone) {
   Scene scene = two_slots();
   scene.slots[0].variants.push_back({"new one", {}, Variant::Dropped{"m"}});
   Staging staging = done(scene, first_staging(scene), {}, {"save_look", "", ""});
   EXPECT_EQ(staging.look, "look-01");
   staging = done(scene, staging, {}, {"save_look", "", ""});
+  staging = done(scene, done(scene, staging, {}, {"save_look", "", "gone"}), {}, {"delete_look", "", "gone"});
   for (const Action& action : actions()) {
     std::string value;
     if (action.name == "choose_variant") value = "c";
