@@ -105,6 +105,9 @@ OperatorView OperatorDesk::view_of(const Session& session,
   view.bodies = bodies_of(session);
   view.slots = slots_of(session, keys_.slot());
   view.staging = session.staging();
+  for (const LooseMarker& loose :
+       waiting_markers(session.setup().scene, session.staging(), session.watched()))
+    view.waiting.push_back(loose.marker.text());
   view.recent = {recent_.begin(), recent_.end()};
   const auto& notes = telemetry.notes();
   const double begun_s = seconds_between(Stamp{}, *begun_at_);

@@ -10,6 +10,7 @@ namespace limn::apps {
 namespace {
 
 constexpr float k_small_share = 0.32F, k_most_small = 0.25F;  // of all the pictures' height and width
+constexpr float k_most_split_mm = 2000;                       // by dragging
 constexpr std::size_t k_points = 300;                         // of the plot: pictures
 
 // The names of Screen in words, in its order.
@@ -333,6 +334,12 @@ void OperatorPanel::draw_slots(const Gui& gui, const OperatorView& view) {
     ImGui::SameLine(0, 4);
     if (ImGui::Button("▶", arrow)) ask("next_variant", slot.name);
     if (slot.is_held && ImGui::Button("follow the marker again", {-1, 0})) ask("release", slot.name);
+    if (!view.waiting.empty() &&
+        ImGui::Button(fmt::format("let {} carry it", view.waiting.back()).c_str(), {-1, 0}))
+      ask("pair", slot.name, view.waiting.back());
+    if (const auto& carrier = view.staging.slots[i].marker)
+      if (ImGui::Button(fmt::format("no longer {}", carrier->text()).c_str(), {-1, 0}))
+        ask("unpair", slot.name);
     ImGui::PopID();
   }
   if (view.slots.empty()) ImGui::TextDisabled("the scene has none");
@@ -349,6 +356,7 @@ void OperatorPanel::draw_looks(const Gui& gui, const OperatorView& view) {
     ask("save_look", "", look_.data());
     look_.fill('\0');
   }
+  draw_comparison(gui, view.staging);
   for (const scene::Look& look : view.staging.looks) {
     ImGui::PushID(look.name.c_str());
     const float cross = 1.6F * gui.em();
@@ -366,6 +374,23 @@ void OperatorPanel::draw_looks(const Gui& gui, const OperatorView& view) {
     }
     ImGui::PopID();
   }
+  if (const auto& gone = view.staging.deleted_look)
+    if (ImGui::Button(fmt::format("bring {} back", gone->name).c_str(), {-1, 0})) ask("undelete_look");
+}
+
+// The look shown before the present one, in its place or left of a line.
+void OperatorPanel::draw_comparison(const Gui& gui, const scene::Staging& staging) {
+  if (staging.other_look.empty()) return;
+  const float room = ImGui::GetContentRegionAvail().x, gap = ImGui::GetStyle().ItemSpacing.x;
+  const ImVec2 half{0.5F * (room - gap), 1.9F * gui.em()};
+  if (ImGui::Button(fmt::format("A/B: {}", staging.other_look).c_str(), half)) ask("flip");
+  ImGui::SameLine();
+  if (toggle("Side by side", staging.split, colour::k_blue, half)) ask("split");
+  if (!staging.split) return;
+  float mm = static_cast<float>(staging.split_mm);
+  ImGui::SetNextItemWidth(-1);
+  if (ImGui::DragFloat("##split", &mm, 2, -k_most_split_mm, k_most_split_mm, "line at %.0f mm"))
+    ask("split_at", "", fmt::format("{:.1f}", mm));
 }
 
 // Whether the session is to end: a clicker's stray Escape must not end it.

@@ -28,6 +28,7 @@ class OperatorPanel {
                     bool is_large);
   void draw_slots(const Gui& gui, const OperatorView& view);
   void draw_looks(const Gui& gui, const OperatorView& view);
+  void draw_comparison(const Gui& gui, const scene::Staging& staging);
   void draw_question(const Gui& gui);
   void ask(const std::string& action, const std::string& slot = "", const std::string& value = "") {
     asked_.edits.push_back({action, slot, value});

@@ -51,6 +51,7 @@ struct OperatorView {
   std::vector<Device> devices;
   std::vector<Body> bodies;
   std::vector<Slot> slots;
+  std::vector<std::string> waiting;  ///< loose markers that may carry a part, the next one last
   scene::Staging staging;
   std::vector<ShownFrame> recent;  ///< pictures shown, the newest last
   std::vector<Notice> notices;     ///< the newest last

@@ -153,6 +153,26 @@ TEST(OperatorPanel, EditsAreAClickAway) {
   EXPECT_FALSE(column.contains("release grille")) << "it is where its marker puts it";
 }
 
+// Two looks were shown, one was deleted, a loose marker lies there, another one carries the grille.
+TEST(OperatorPanel, PairsAndComparesByClicks) {
+  OperatorView view = a_view();
+  view.waiting = {"aruco_4x4_50:7"};
+  view.staging.other_look = "sport and bars";
+  view.staging.deleted_look = scene::Look{"evening", {}};
+  view.staging.slots[1].marker = MarkerName{"aruco_4x4_50", "30"};
+  view.staging.split = true;
+  test::GuiCanvas canvas({1600, 1000});
+  OperatorPanel panel;
+  for (int i = 0; i < 2; ++i) canvas.draw([&](Gui& gui) { panel.draw(gui, view); });
+  canvas.keep("operator-compares");
+  for (auto* pictures : {&view.cameras, &view.projectors}) pictures->clear();
+  const std::set<std::string> column = reachable(view, {1600, 1000}, {1290, 60, 280, 660}, 2);
+  for (const char* edit : {"pair mirror aruco_4x4_50:7", "pair grille aruco_4x4_50:7", "unpair grille",
+                           "flip", "split", "undelete_look"})
+    EXPECT_TRUE(column.contains(edit)) << edit;
+  EXPECT_FALSE(column.contains("unpair mirror")) << "its own marker carries it";
+}
+
 TEST(OperatorPanel, APictureGrowsWhenClicked) {
   test::GuiCanvas canvas({1000, 640});
   OperatorPanel panel;
