@@ -6,9 +6,9 @@
 
 #include "apps/known_lengths.h"
 #include "apps/patterns.h"
-#include "calib/judge/board_check.h"
 #include "calib/captures.h"
 #include "calib/judge/assess.h"
+#include "calib/judge/board_check.h"
 #include "calib/judge/capture_faults.h"
 #include "calib/judge/picture_check.h"
 #include "calib/lens_choice.h"
@@ -22,6 +22,7 @@
 #include "core/lens.h"
 #include "core/log.h"
 #include "core/rig.h"
+#include "core/time_now.h"
 
 namespace limn::apps {
 namespace {
@@ -176,7 +177,7 @@ Result<calib::Report> solved(const SolveOptions& options) {
   LIMN_TRY_STATUS(measure_vignetting(captures, report, &response.responses));
   LIMN_TRY_STATUS(check_lengths(captures, lengths, &report));
   report.words = calib::in_words(report.observed, report.solution, report.assessment);
-  report.made_at = calib::time_now();
+  report.made_at = time_now();
   report.history = calib::read_history(options.out);
   LIMN_TRY_STATUS(calib::write_rig_folder(report, solving, options.out));
   if (!response.responses.projectors.empty())

@@ -1,9 +1,11 @@
-#include "sim/glb.h"
+#include "scene/glb.h"
 
 #include <cstring>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
 
-namespace limn::sim {
+namespace limn::scene {
 namespace {
 
 using nlohmann::ordered_json;
@@ -18,18 +20,33 @@ void append(std::string& bytes, T value) {
   bytes.append(raw, sizeof(T));
 }
 
+std::string chunk(const char* kind, std::string data, char filler) {
+  while (data.size() % 4 != 0) data.push_back(filler);
+  std::string bytes;
+  append(bytes, static_cast<std::uint32_t>(data.size()));
+  return bytes.append(kind, 4) + data;
+}
+
 // The binary chunk and the JSON that describes it, growing together.
 struct Document {
   std::string bytes;
-  ordered_json views = ordered_json::array();
-  ordered_json accessors = ordered_json::array();
+  ordered_json views = ordered_json::array(), accessors = ordered_json::array(),
+               images = ordered_json::array();
+  ordered_json meshes = ordered_json::array(), nodes = ordered_json::array();
+  ordered_json materials = ordered_json::array();
+  std::map<const Mesh*, int> numbers = {};  // of meshes that are in already
+  bool has_textures = true, is_unlit = false;
+
+  std::size_t add_view(const std::string& data) {
+    while (bytes.size() % 4 != 0) bytes.push_back('\0');
+    views.push_back({{"buffer", 0}, {"byteOffset", bytes.size()}, {"byteLength", data.size()}});
+    bytes += data;
+    return views.size() - 1;
+  }
 
   int add(const std::string& data, int target, ordered_json accessor) {
-    while (bytes.size() % 4 != 0) bytes.push_back('\0');
-    views.push_back(
-        {{"buffer", 0}, {"byteOffset", bytes.size()}, {"byteLength", data.size()}, {"target", target}});
-    bytes += data;
-    accessor["bufferView"] = views.size() - 1;
+    accessor["bufferView"] = add_view(data);
+    views.back()["target"] = target;
     accessors.push_back(accessor);
     return static_cast<int>(accessors.size()) - 1;
   }
@@ -51,7 +68,7 @@ struct Document {
     return add(data, k_array_buffer, accessor);
   }
 
-  int add_triangles(const scene::Mesh& mesh, std::size_t material) {
+  int add_triangles(const Mesh& mesh, std::size_t material) {
     const bool small = mesh.positions.size() < 65536;
     std::string data;
     std::size_t count = 0;
@@ -66,61 +83,93 @@ struct Document {
         data, k_element_array_buffer,
         {{"componentType", small ? k_unsigned_short : k_unsigned_int}, {"count", count}, {"type", "SCALAR"}});
   }
+
+  std::size_t add_material(const Material& material) {
+    const Eigen::Vector3f& c = material.base_colour;
+    ordered_json surface = {{"baseColorFactor", {c.x(), c.y(), c.z(), 1}},
+                            {"metallicFactor", material.metallic},
+                            {"roughnessFactor", material.roughness}};
+    if (has_textures && !material.texture.empty()) {
+      std::vector<std::uint8_t> png;
+      cv::imencode(".png", material.texture, png);
+      images.push_back({{"bufferView", add_view({png.begin(), png.end()})}, {"mimeType", "image/png"}});
+      surface["baseColorTexture"] = {{"index", images.size() - 1}};
+    }
+    ordered_json json = {{"pbrMetallicRoughness", surface}};
+    if (material.unlit) json["extensions"] = {{"KHR_materials_unlit", ordered_json::object()}};
+    is_unlit |= material.unlit;
+    materials.push_back(json);
+    return materials.size() - 1;
+  }
+
+  int add_mesh(const Mesh& mesh) {
+    if (const auto known = numbers.find(&mesh); known != numbers.end()) return known->second;
+    ordered_json attributes = {{"POSITION", add_vectors(mesh.positions, "VEC3", true)}};
+    if (!mesh.normals.empty()) attributes["NORMAL"] = add_vectors(mesh.normals, "VEC3", false);
+    if (!mesh.uvs.empty()) {
+      std::vector<Eigen::Vector2f> flipped = mesh.uvs;  // glTF counts v from the top row
+      for (Eigen::Vector2f& uv : flipped) uv.y() = 1 - uv.y();
+      attributes["TEXCOORD_0"] = add_vectors(flipped, "VEC2", false);
+    }
+    ordered_json primitives = ordered_json::array();
+    for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
+      const std::size_t material = add_material(mesh.materials[m]);
+      const int indices = add_triangles(mesh, m);
+      if (indices >= 0)
+        primitives.push_back({{"attributes", attributes}, {"indices", indices}, {"material", material}});
+    }
+    meshes.push_back({{"primitives", primitives}});
+    return numbers[&mesh] = static_cast<int>(meshes.size()) - 1;
+  }
+
+  std::string file() {
+    while (bytes.size() % 4 != 0) bytes.push_back('\0');
+    ordered_json roots = ordered_json::array();
+    for (std::size_t i = 0; i < nodes.size(); ++i) roots.push_back(i);
+    ordered_json json = {{"asset", {{"version", "2.0"}, {"generator", "limn"}}},
+                         {"scene", 0},
+                         {"scenes", ordered_json::array({{{"nodes", roots}}})},
+                         {"nodes", nodes},
+                         {"meshes", meshes},
+                         {"materials", materials},
+                         {"accessors", accessors},
+                         {"bufferViews", views},
+                         {"buffers", ordered_json::array({{{"byteLength", bytes.size()}}})}};
+    if (is_unlit) json["extensionsUsed"] = {"KHR_materials_unlit"};
+    if (!images.empty()) {
+      json["images"] = images;
+      json["textures"] = ordered_json::array();
+      for (std::size_t i = 0; i < images.size(); ++i) json["textures"].push_back({{"source", i}});
+    }
+    const std::string body =
+        chunk("JSON", json.dump(), ' ') + chunk(std::string("BIN\0", 4).data(), bytes, '\0');
+    std::string head = "glTF";
+    append(head, std::uint32_t{2});
+    append(head, static_cast<std::uint32_t>(12 + body.size()));
+    return head + body;
+  }
 };
-
-ordered_json material_json(const scene::Material& material) {
-  const Eigen::Vector3f& c = material.base_colour;
-  ordered_json json = {
-      {"pbrMetallicRoughness",
-       {{"baseColorFactor", {c.x(), c.y(), c.z(), 1}}, {"metallicFactor", 0}, {"roughnessFactor", 1}}}};
-  if (material.unlit) json["extensions"] = {{"KHR_materials_unlit", ordered_json::object()}};
-  return json;
-}
-
-std::string chunk(const char* kind, std::string data, char filler) {
-  while (data.size() % 4 != 0) data.push_back(filler);
-  std::string bytes;
-  append(bytes, static_cast<std::uint32_t>(data.size()));
-  return bytes.append(kind, 4) + data;
-}
 
 }  // namespace
 
-std::string glb(const scene::Mesh& mesh) {
+std::string glb(std::span<const PlacedMesh> placed) {
   Document document;
-  ordered_json attributes = {{"POSITION", document.add_vectors(mesh.positions, "VEC3", true)}};
-  if (!mesh.normals.empty()) attributes["NORMAL"] = document.add_vectors(mesh.normals, "VEC3", false);
-  if (!mesh.uvs.empty()) {
-    std::vector<Eigen::Vector2f> flipped = mesh.uvs;  // glTF counts v from the top row
-    for (Eigen::Vector2f& uv : flipped) uv.y() = 1 - uv.y();
-    attributes["TEXCOORD_0"] = document.add_vectors(flipped, "VEC2", false);
+  for (const PlacedMesh& mesh : placed) {
+    const Eigen::Quaterniond& q = mesh.assembly_from_mesh.rotation;
+    const Eigen::Vector3d& t = mesh.assembly_from_mesh.translation;
+    document.nodes.push_back({{"name", mesh.name},
+                              {"mesh", document.add_mesh(*mesh.mesh)},
+                              {"rotation", {q.x(), q.y(), q.z(), q.w()}},
+                              {"translation", {t.x(), t.y(), t.z()}}});
   }
-  ordered_json primitives = ordered_json::array(), materials = ordered_json::array();
-  bool unlit = false;
-  for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
-    materials.push_back(material_json(mesh.materials[m]));
-    unlit = unlit || mesh.materials[m].unlit;
-    const int indices = document.add_triangles(mesh, m);
-    if (indices >= 0)
-      primitives.push_back({{"attributes", attributes}, {"indices", indices}, {"material", m}});
-  }
-  while (document.bytes.size() % 4 != 0) document.bytes.push_back('\0');
-  ordered_json json = {{"asset", {{"version", "2.0"}, {"generator", "limn"}}},
-                       {"scene", 0},
-                       {"scenes", {{{"nodes", {0}}}}},
-                       {"nodes", {{{"mesh", 0}}}},
-                       {"meshes", {{{"primitives", primitives}}}},
-                       {"materials", materials},
-                       {"accessors", document.accessors},
-                       {"bufferViews", document.views},
-                       {"buffers", {{{"byteLength", document.bytes.size()}}}}};
-  if (unlit) json["extensionsUsed"] = {"KHR_materials_unlit"};
-  const std::string body =
-      chunk("JSON", json.dump(), ' ') + chunk(std::string("BIN\0", 4).data(), document.bytes, '\0');
-  std::string file = "glTF";
-  append(file, std::uint32_t{2});
-  append(file, static_cast<std::uint32_t>(12 + body.size()));
-  return file + body;
+  return document.file();
 }
 
-}  // namespace limn::sim
+std::string glb(const Mesh& mesh) {
+  Document document;
+  document.has_textures = false;
+  document.nodes.push_back({{"mesh", document.add_mesh(mesh)}});
+  return document.file();
+}
+
+}  // namespace limn::scene

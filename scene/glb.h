@@ -1,13 +1,26 @@
 #pragma once
 
+#include <span>
 #include <string>
 
+#include "core/pose.h"
 #include "scene/mesh.h"
 
-namespace limn::sim {
+namespace limn::scene {
 
-/// The bytes of a binary glTF 2.0 file: positions, normals, uv when present, one primitive per material with
-/// its base colour (textures are left out). The same mesh gives the same bytes.
-std::string glb(const scene::Mesh& mesh);
+/// A mesh in its place.
+struct PlacedMesh {
+  std::string name;  ///< of its node
+  const Mesh* mesh = nullptr;
+  Pose assembly_from_mesh;
+};
 
-}  // namespace limn::sim
+/// The bytes of a binary glTF 2.0 file, metres: a node for each mesh with its pose, one primitive per
+/// material; positions, normals, uv when present, base colours, metalness, roughness, textures as PNG inside.
+/// The same meshes give the same bytes. Needs at least one mesh.
+std::string glb(std::span<const PlacedMesh> placed);
+
+/// The same of one mesh in its own frame, without its textures.
+std::string glb(const Mesh& mesh);
+
+}  // namespace limn::scene

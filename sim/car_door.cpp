@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "scene/glb.h"
 #include "scene/posed.h"
-#include "sim/glb.h"
 #include "sim/ray_scene.h"
 
 namespace limn::sim {
@@ -507,11 +507,11 @@ std::map<std::string, std::string> car_door_files() {
     json["prototype"]["markers"].push_back({{"name", marker.marker.text()},
                                             {"size_mm", marker.size_m * 1e3},
                                             {"prototype_from_marker", pose_json(marker.body_from_marker)}});
-  files["door.glb"] = glb(scene.prototype->mesh);
+  files["door.glb"] = scene::glb(scene.prototype->mesh);
   for (const scene::Slot& slot : scene.slots) {
     json["slots"].push_back(slot_json(slot));
     for (const scene::Variant& variant : slot.variants)
-      files[slot.name + "-" + variant.name + ".glb"] = glb(variant.mesh);
+      files[slot.name + "-" + variant.name + ".glb"] = scene::glb(variant.mesh);
   }
   json["viewer"]["fixed"] = {{"world_from_viewer", pose_json(world_from_viewer())},
                              {"size", {k_viewer_size[0], k_viewer_size[1]}},

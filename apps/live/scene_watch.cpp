@@ -12,7 +12,7 @@ constexpr auto k_left_alone = std::chrono::milliseconds(150);  // a file that is
 
 SceneWatch::SceneWatch(fs::path folder) : folder_(std::move(folder)), loaded_(listed()), seen_(loaded_) {}
 
-// All files but looks and pairings, which the session writes itself.
+// All files but looks, pairings and comments, which the session writes itself.
 SceneWatch::Files SceneWatch::listed() const {
   Files files;
   std::error_code none;
@@ -20,8 +20,9 @@ SceneWatch::Files SceneWatch::listed() const {
   while (!none && at != end) {
     if (at.depth() == 0 && at->path().filename() == "looks") at.disable_recursion_pending();
     std::error_code gone;
-    const bool is_pairings = at.depth() == 0 && at->path().filename() == "pairings.json";
-    if (!is_pairings && at->is_regular_file(gone)) {
+    const fs::path name = at->path().filename();
+    const bool is_own = at.depth() == 0 && (name == "pairings.json" || name == "comments.json");
+    if (!is_own && at->is_regular_file(gone)) {
       const auto time = at->last_write_time(gone);
       const auto size = at->file_size(gone);
       if (!gone) files[at->path().string()] = {time, size};

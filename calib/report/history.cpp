@@ -1,9 +1,7 @@
 #include "calib/report/history.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <ctime>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -137,15 +135,6 @@ std::vector<Moved> moved(const Rig& earlier, const Observations& observations, c
   for (size_t i = 0; i < solution.rig.projectors.size(); ++i)
     compare(solution.rig.projectors[i], same_device(earlier.projectors, solution.rig.projectors[i]), true, i);
   return all;
-}
-
-std::string time_now() {
-  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
-  std::tm utc{};
-  gmtime_r(&now, &utc);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
-  return text;
 }
 
 }  // namespace limn::calib

@@ -46,7 +46,4 @@ History read_history(const std::filesystem::path& folder);
 /// from and not listed.
 std::vector<Moved> moved(const Rig& earlier, const Observations& observations, const Solution& solution);
 
-/// Now, as PastCalibration::made_at.
-std::string time_now();
-
 }  // namespace limn::calib

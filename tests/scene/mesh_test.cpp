@@ -1,12 +1,14 @@
 #include "scene/mesh.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstring>
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/file.h"
 #include "core/picture.h"
+#include "scene/glb.h"
 #include "scene/nearest.h"
 #include "tests/support/matchers.h"
 
@@ -264,6 +266,45 @@ TEST(Nearest, AgreesWithASearchOverSamplesOfACube) {
     EXPECT_NEAR(found.distance, (expected - p).norm(), 1e-5);
     EXPECT_NEAR(found.d_normal.dot(found.p), 1, 1e-5);  // of the cube's sides
   }
+}
+
+// Two meshes in their places come back as one in which the poses are applied, materials and textures kept.
+TEST(Glb, PutsMeshesInTheirPlaces) {
+  Mesh plain;
+  plain.positions = {{0, 0, 0}, {0.1f, 0, 0}, {0, 0.1f, 0}};
+  plain.normals = {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}};
+  plain.triangles = {{0, 1, 2}};
+  plain.triangle_materials = {0};
+  plain.materials = {{.base_colour = {0.5f, 0.25f, 1}, .unlit = true, .metallic = 0.5f, .roughness = 0.25f}};
+  Mesh textured = plain;
+  textured.uvs = {{0, 0}, {1, 0}, {0, 0.25f}};
+  textured.materials = {{.texture = cv::Mat(4, 4, CV_8UC3, cv::Scalar(10, 200, 30))}};
+  const Pose lifted(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized())), {1, -2, 0.5});
+  const std::vector<PlacedMesh> placed = {
+      {"plain", &plain, {}}, {"lifted", &textured, lifted}, {"again", &plain, lifted}};
+  const std::string bytes = glb(placed);
+  EXPECT_EQ(bytes, glb(placed));
+  EXPECT_LT(bytes.size(), glb(std::vector{placed[0], placed[1]}).size() + 300);  // a mesh is in it once
+
+  const auto loaded = load_mesh(written("placed.glb", bytes), "m");
+  ASSERT_TRUE(loaded) << loaded.message();
+  ASSERT_EQ(loaded->triangles.size(), 3U);
+  const auto has = [&](const Vector3d& p) {
+    return std::any_of(loaded->positions.begin(), loaded->positions.end(),
+                       [&](const Vector3f& q) { return (q.cast<double>() - p).norm() < 1e-6; });
+  };
+  for (const Vector3f& p : plain.positions) {
+    EXPECT_TRUE(has(p.cast<double>()));
+    EXPECT_TRUE(has(lifted * p.cast<double>().eval()));
+  }
+  int textures = 0, unlit = 0;
+  for (const Material& material : loaded->materials) {
+    textures += !material.texture.empty() && material.texture.at<cv::Vec3b>(1, 1) == cv::Vec3b(10, 200, 30);
+    unlit += material.unlit && (material.base_colour - plain.materials[0].base_colour).norm() < 1e-6 &&
+             material.metallic == 0.5f && material.roughness == 0.25f;
+  }
+  EXPECT_GE(textures, 1);
+  EXPECT_GE(unlit, 1);
 }
 
 }  // namespace
