@@ -7,7 +7,6 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
-#include "calib/surface/align.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/log.h"
@@ -113,8 +112,18 @@ Result<Start> start_from_markers(const AlignCommand& command) {
   return Start{track->world_from_body, track->covariance, fmt::format("{} markers", track->marker_count)};
 }
 
+// A scene without frames gives its mesh alone.
+bool starts_from_markers(const AlignCommand& command) {
+  return !command.scene.empty() && !(command.mesh.empty() && command.frames.empty());
+}
+
 Status checked(const AlignCommand& command) {
-  const int starts = !command.start.empty() + !command.points.empty() + !command.scene.empty();
+  if (command.mesh.empty() && command.scene.empty())
+    return usage_error(
+        "expected a CAD file (--mesh and --units) or a --scene with a prototype, found neither.");
+  if (!command.mesh.empty() && command.units.empty())
+    return usage_error("--units: expected m, cm, mm, in or ft of the CAD, found none.");
+  const int starts = !command.start.empty() + !command.points.empty() + starts_from_markers(command);
   if (starts > 1) return usage_error("expected one of --start, --points, --scene, found {}.", starts);
   if (command.scan.empty() && command.scene.empty())
     return usage_error(
@@ -129,7 +138,7 @@ Result<std::optional<Start>> start_of(const AlignCommand& command, double metres
     start = start_from_file(command.start);
   else if (!command.points.empty())
     start = start_from_picks(command.points, metres_per_unit);
-  else if (!command.scene.empty())
+  else if (starts_from_markers(command))
     start = start_from_markers(command);
   else
     return Maybe();
@@ -137,18 +146,12 @@ Result<std::optional<Start>> start_of(const AlignCommand& command, double metres
   return Maybe(*start);
 }
 
-struct Aligned {
-  calib::Alignment alignment;
-  std::string how;
-  std::vector<std::string> warnings;
-};
-
-Result<Aligned> align(const AlignCommand& command,
-                      const scene::Mesh& mesh,
-                      const scene::SurfaceIndex& index,
-                      const scene::Surface& scan,
-                      const std::optional<Start>& start) {
-  Aligned result;
+Result<MeshAligned> align(const AlignCommand& command,
+                          const scene::Mesh& mesh,
+                          const scene::SurfaceIndex& index,
+                          const scene::Surface& scan,
+                          const std::optional<Start>& start) {
+  MeshAligned result;
   if (start) {
     LIMN_TRY(result.alignment, calib::aligned(mesh, index, scan, start->world_from_prototype));
     result.how = start->how;
@@ -183,7 +186,7 @@ std::string text_of(const calib::Difference& d) {
       1e3 * std::abs(d.mean_m), d.mean_m > 0 ? "outside" : "inside", 1e3 * std::abs(d.worst_m));
 }
 
-nlohmann::ordered_json json_of(const Aligned& aligned,
+nlohmann::ordered_json json_of(const MeshAligned& aligned,
                                const std::vector<calib::Difference>& differences,
                                double seconds) {
   const calib::Alignment& a = aligned.alignment;
@@ -249,41 +252,47 @@ Status write_pose(const Pose& world_from_prototype, const fs::path& out) {
 }
 
 // The markers' answer alone.
-Status write_markers_pose(const Start& start, const AlignCommand& command, double seconds) {
-  Aligned aligned;
+Result<MeshAligned> written_markers_pose(const Start& start, const AlignCommand& command, double seconds) {
+  MeshAligned aligned;
   aligned.alignment.world_from_prototype = start.world_from_prototype;
   if (start.covariance) aligned.alignment.covariance = *start.covariance;
   aligned.how = start.how;
-  const auto json = json_of(aligned, {}, seconds);
   LIMN_TRY_STATUS(make_folder(command.out));
-  LIMN_TRY_STATUS(write_file(command.out / "align.json", json.dump(2) + "\n"));
+  LIMN_TRY_STATUS(write_file(command.out / "align.json", json_of(aligned, {}, seconds).dump(2) + "\n"));
   LIMN_TRY_STATUS(write_pose(start.world_from_prototype, command.out));
-  fmt::print("{}", command.json ? json.dump(2) + "\n"
-                                : fmt::format("pose from {} in {}\n", start.how, command.out.string()));
-  return {};
+  return aligned;
+}
+
+// The mesh that is laid onto the scan: the CAD file, or the scene's prototype.
+Result<scene::Mesh> mesh_of(const AlignCommand& command) {
+  if (!command.mesh.empty()) return scene::load_mesh(command.mesh, command.units);
+  LIMN_TRY(scene::Scene scene, scene::load_scene(command.scene));
+  if (!scene.prototype) return error("{}: expected a prototype, found none.", command.scene.string());
+  return std::move(scene.prototype->mesh);
+}
+
+double seconds_since(std::chrono::steady_clock::time_point begun) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
 }
 
 }  // namespace
 
-Status run_align(const AlignCommand& command) {
+Result<MeshAligned> written_alignment(const AlignCommand& command) {
   const auto begun = std::chrono::steady_clock::now();
-  const auto seconds = [&] {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-  };
   LIMN_TRY_STATUS(checked(command));
-  const auto metres = scene::metres_per_unit(command.units);
+  const auto metres = scene::metres_per_unit(command.mesh.empty() ? "m" : command.units);
   if (!metres) return usage_error("--units: {}", metres.message());
   const auto scan_metres = scene::metres_per_unit(command.scan_units);
   if (!scan_metres) return usage_error("--scan-units: {}", scan_metres.message());
-  LIMN_TRY(const scene::Mesh mesh, scene::load_mesh(command.mesh, command.units));
+  LIMN_TRY(const scene::Mesh mesh, mesh_of(command));
   LIMN_TRY(const auto start, start_of(command, *metres));
-  if (command.scan.empty()) return write_markers_pose(*start, command, seconds());
+  if (command.scan.empty()) return written_markers_pose(*start, command, seconds_since(begun));
   const fs::path file = fs::is_directory(command.scan) ? command.scan / "mesh.ply" : command.scan;
   LIMN_TRY(const scene::Surface scan, scene::load_ply(file, *scan_metres));
   if (const Status sizes = calib::comparable_sizes(mesh, scan); !sizes)
-    return error("{}: {}", command.mesh.string(), sizes.message());
+    return error("{}: {}", (command.mesh.empty() ? command.scene : command.mesh).string(), sizes.message());
   const scene::SurfaceIndex index(mesh);
-  LIMN_TRY(Aligned aligned, align(command, mesh, index, scan, start));
+  LIMN_TRY(MeshAligned aligned, align(command, mesh, index, scan, start));
   const auto residuals = calib::residuals(index, scan, aligned.alignment, k_residual_reach_m);
   const auto differences =
       calib::differences(scan, residuals, aligned.alignment, {.least_m = 1e-3 * command.least_mm});
@@ -297,12 +306,22 @@ Status run_align(const AlignCommand& command) {
   const scene::Surface map = coloured(scan, residuals, aligned.alignment.world_from_prototype);
   LIMN_TRY_STATUS(scene::save_ply(map, command.out / "residual.ply"));
   LIMN_TRY_STATUS(write_pictures(map, command.out));
-  const auto json = json_of(aligned, differences, seconds());
-  LIMN_TRY_STATUS(write_file(command.out / "align.json", json.dump(2) + "\n"));
+  LIMN_TRY_STATUS(write_file(command.out / "align.json",
+                             json_of(aligned, differences, seconds_since(begun)).dump(2) + "\n"));
   LIMN_TRY_STATUS(write_pose(aligned.alignment.world_from_prototype, command.out));
+  return aligned;
+}
+
+Status run_align(const AlignCommand& command) {
+  LIMN_TRY(const MeshAligned aligned, written_alignment(command));
   for (const std::string& warning : aligned.warnings) log_warning("align: {}", warning);
   if (command.json) {
-    fmt::print("{}\n", json.dump(2));
+    LIMN_TRY(const std::string json, read_file(command.out / "align.json"));
+    fmt::print("{}", json);
+    return {};
+  }
+  if (command.scan.empty()) {
+    fmt::print("pose from {} in {}\n", aligned.how, command.out.string());
     return {};
   }
   const auto stddev = [&](int i) { return std::sqrt(aligned.alignment.covariance(i, i)); };

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/surface/align.h"
 #include "core/result.h"
 
 namespace limn::apps {
@@ -11,17 +12,27 @@ namespace limn::apps {
 struct AlignCommand {
   std::filesystem::path scan;  ///< PLY, or the folder of limn scan; empty: the markers' answer alone
   std::string scan_units = "m";
-  std::filesystem::path mesh;
-  std::string units;
+  std::filesystem::path mesh;    ///< empty: the scene's prototype
+  std::string units;             ///< of mesh
   std::filesystem::path start;   ///< POSES.json, or {"world_from_prototype": POSE}
   std::filesystem::path points;  ///< limn.picks/1
-  std::filesystem::path scene;   ///< with rig and frames: its prototype's markers give the start
+  std::filesystem::path scene;   ///< its prototype's markers give the start, in frames of a rig
   std::filesystem::path rig;
   std::vector<std::string> frames;  ///< CAMERA=PICTURE
   double least_mm = 1;              ///< smaller differences are not told
   std::filesystem::path out;
   bool json = false;
 };
+
+/// Where a mesh was found to stand.
+struct MeshAligned {
+  calib::Alignment alignment;
+  std::string how;                    ///< what it started from
+  std::vector<std::string> warnings;  ///< symmetric or free shapes, and where the CAD and the scan differ
+};
+
+/// The work of `limn align`, with its files, for a command that has a scan.
+Result<MeshAligned> written_alignment(const AlignCommand& command);
 
 /// `limn align`: where a CAD mesh stands in the scan: poses.json (POSES.json), align.json with its
 /// covariance, residual.ply, residual.png and residual-side.png, and warnings where the CAD and the scan

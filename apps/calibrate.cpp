@@ -18,6 +18,7 @@
 #include "apps/wizard/device_checks.h"
 #include "apps/wizard/device_stage.h"
 #include "apps/wizard/guided_poses.h"
+#include "apps/wizard/prototype_steps.h"
 #include "apps/wizard/virtual_stage.h"
 #include "apps/wizard/wizard_window.h"
 #include "apps/world_markers.h"
@@ -396,6 +397,15 @@ std::string to_json(const Calibrated& done) {
   for (const PoseJudged& judged : done.poses) json["poses"].push_back(to_json(judged));
   for (const auto& [projector, seconds] : done.capture_s) json["capture_s"][projector] = seconds;
   for (const auto& [projector, seconds] : done.latency_s) json["latency_ms"][projector] = 1e3 * seconds;
+  if (const auto& seen = done.prototype) {
+    json["prototype"] = {{"points", seen->points},
+                         {"scan_stddev_mm", seen->scan_stddev_mm},
+                         {"painted_p95_mm", seen->painted_p95_mm},
+                         {"painted_good", seen->painted_good},
+                         {"warnings", seen->warnings}};
+    if (seen->align_rms_mm) json["prototype"]["align_rms_mm"] = *seen->align_rms_mm;
+  }
+  if (!done.no_prototype.empty()) json["no_prototype"] = done.no_prototype;
   return json.dump(2) + "\n";
 }
 
@@ -411,6 +421,9 @@ void say_end(const CalibrateOptions& options, const Calibrated& done, const Say&
   say(fmt::format("captured {} of {} poses in this run, at the cameras' pace: {}", taken, done.poses.size(),
                   fmt::join(times, ", ")));
   say(done.report.words.verdict);
+  if (!done.no_prototype.empty())
+    say(fmt::format("the prototype was not scanned: {} The rig is saved; the same command tries again.",
+                    done.no_prototype));
   say(fmt::format("rig and report in {} ({:.0f} s)", options.out.string(), done.seconds));
 }
 
@@ -501,10 +514,12 @@ Status played(const CalibrateOptions& options,
   return {};
 }
 
-Status calibrate_virtually(const CalibrateOptions& options) {
+Status calibrate_virtually(const CalibrateOptions& asked) {
+  CalibrateOptions options = asked;
   LIMN_TRY(const Plan plan, load_plan(options.plan));
   LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_picture));
   LIMN_TRY(const std::string text, plan_text(options.plan, plan.world));
+  if (options.scene.empty() && world.scene) options.scene = world.scene->folder;
   sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
   const std::vector<Imager> cameras = rig.world().rig.cameras;
   LIMN_TRY(const calib::Captures captures, planned(plan, rig, options.out / "captures"));
@@ -607,7 +622,8 @@ Status calibrate_devices(const CalibrateOptions& options) {
 
 std::string to_text(WizardStep step) {
   static const std::array<const char*, k_wizard_steps> names = {
-      "devices", "outputs", "exposure and focus", "display latency", "board", "solve", "result"};
+      "devices", "outputs", "exposure and focus", "display latency", "board", "solve", "result", "scan",
+      "align",   "paint"};
   return names.at(static_cast<std::size_t>(step));
 }
 
@@ -661,8 +677,18 @@ Result<Calibrated> calibrated(const CalibrateOptions& options,
   }
   LIMN_TRY(const auto latency_s, kept_latencies(captures.folder / k_latency));
   LIMN_TRY_STATUS(add_to_rig(latency_s, options.out));
-  return Calibrated{run.poses(), std::move(*report), run.capture_s(), latency_s,
-                    std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count()};
+  Calibrated done{run.poses(), std::move(*report), run.capture_s(), latency_s, std::nullopt, ""};
+  if (audience.solved) audience.solved(done.report);
+  if (options.scan && surroundings.stand) {
+    auto seen = prototype_seen({options.out, options.scene, captures, done.report.assessment.error_maps},
+                               surroundings, audience);
+    if (seen)
+      done.prototype = std::move(*seen);
+    else
+      done.no_prototype = seen.message();  // the rig stays what it is
+  }
+  done.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  return done;
 }
 
 Status run_calibrate(const CalibrateOptions& options) {

@@ -25,6 +25,8 @@ struct CalibrateOptions {
   std::string board = {};              ///< with devices: `charuco:11x8:25mm`
   std::string code = "gray";           ///< with devices
   std::filesystem::path out;           ///< the rig folder; its captures/ keeps every picture
+  std::filesystem::path scene = {};    ///< of the prototype; with a plan its world's
+  bool scan = false;                   ///< scan the prototype at the end, and paint it
   bool all = false;                    ///< take every pose of the plan, although fewer are enough
   bool terminal = false;               ///< lines instead of a window
   bool json = false;  ///< print one JSON at the end; the lines go to stderr, there is no window
@@ -39,6 +41,11 @@ struct Surroundings {
   calib::Stage stage;
   std::function<Status()> written;  ///< returns when every picture that was stored is on the disk
   std::function<Stamp()> now;       ///< of the cameras' clock
+  /// Returns when the board is gone and the prototype stands still; false: a person skipped it. Empty: there
+  /// is no prototype.
+  std::function<Result<bool>(const Seen& seen)> stand = nullptr;
+  /// All projectors show a picture each, which is visible to the next grab.
+  std::function<Status(const std::vector<cv::Mat>&)> paint = nullptr;
   /// One projector and one camera, the others dark.
   std::function<FlashStage(int projector, int camera)> flashes;
   /// From now on a picture is on the surface so long after it was shown; before, the longest that is
@@ -58,8 +65,8 @@ struct PoseJudged {
 };
 
 /// The wizard's steps, in their order.
-enum class WizardStep { devices, outputs, exposure, latency, board, solve, result };
-constexpr std::size_t k_wizard_steps = 7;
+enum class WizardStep { devices, outputs, exposure, latency, board, solve, result, scan, align, paint };
+constexpr std::size_t k_wizard_steps = 10;
 std::string to_text(WizardStep step);
 enum class WizardState { waits, runs, done, fails };
 
@@ -69,6 +76,8 @@ enum class WizardWish {
   check,   ///< look at outputs, exposure and latency again, then take the pictures of this pose again
   repeat,  ///< take the pictures of this pose again
   finish,  ///< take no more poses: solve
+  scan,    ///< the prototype stands there: scan it
+  skip,    ///< leave out what is waited for
   leave    ///< stop; what was captured stays, the next run goes on from there
 };
 
@@ -77,12 +86,23 @@ struct WizardAudience {
   std::function<void(const std::string& line)> say;
   std::function<void(WizardStep step, WizardState state, const std::string& words)> step = nullptr;
   std::function<void(const std::vector<LightSeen>&)> lit = nullptr;
-  std::function<void(int pose)> aims = nullptr;    ///< a pose's pictures are taken from now on
-  std::function<void(int pose)> judges = nullptr;  ///< it is decoded and judged from now on
+  std::function<void(int pose)> aims = nullptr;                ///< a pose's pictures are taken from now on
+  std::function<void(const calib::Report&)> solved = nullptr;  ///< the rig is saved; the prototype may follow
+  std::function<void(int pose)> judges = nullptr;              ///< it is decoded and judged from now on
   /// Observations are of all poses so far.
   std::function<void(const PoseJudged&, const calib::Observations&, const std::vector<calib::Fault>&)>
       judged = nullptr;
   std::atomic<WizardWish>* wish = nullptr;  ///< none again once it is followed
+};
+
+/// What came of the prototype.
+struct PrototypeSeen {
+  std::size_t points = 0;              ///< of the scan
+  double scan_stddev_mm = 0;           ///< median
+  std::optional<double> align_rms_mm;  ///< of the scan from the CAD; none: not aligned
+  double painted_p95_mm = 0;           ///< predicted error of light on it
+  double painted_good = 0;             ///< share of it with at most calib::k_good_mm
+  std::vector<std::string> warnings;
 };
 
 /// What a run of the wizard gave.
@@ -94,6 +114,8 @@ struct Calibrated {
   /// Measured, from show to light, by name of the projector; those of an earlier run where this one captured
   /// nothing.
   std::vector<std::pair<std::string, double>> latency_s;
+  std::optional<PrototypeSeen> prototype;  ///< none: not asked for, skipped, or `no_prototype` says why
+  std::string no_prototype;
   double seconds = 0;  ///< the run, by the wall
 };
 

@@ -202,15 +202,19 @@ void add_calibrate(CLI::App& app, Run& run) {
   command->footer(
       "In a window where there is a display. OUT/captures keeps every picture: the same command goes on where it was left. Ends\n"
       "when more poses no longer help and the rig is good, or there are no more. With --devices a pose is captured when the board\n"
-      "is held still.\n"
+      "is held still. Then the prototype is scanned, laid onto by the scene's CAD, and painted with how far light may be off.\n"
       "Example: limn calibrate --plan config/plans/bench.json --out rig\n"
       "Example: limn calibrate --devices devices.json --board charuco:11x8:25mm --out rig");
   auto options = std::make_shared<CalibrateOptions>();
+  options->scan = true;
   command->add_option("--plan", options->plan, "plan file (limn.plan/1): on its virtual rig");
   auto* devices = command->add_option("--devices", options->devices, "instead: the cameras and projectors (limn.devices/1)");
   command->add_option("--board", options->board, "with --devices: the board, as limn markers --board prints it")->needs(devices);
   command->add_option("--code", options->code, "with --devices: gray, phase, xor")->needs(devices)->capture_default_str();
+  command->add_option("--scene", options->scene, "whose CAD is laid onto the scan; with --plan its world's")
+      ->check(CLI::ExistingPath);
   command->add_option("--out", options->out, "rig folder to write, with the captures in it")->required();
+  command->add_flag("!--no-scan", options->scan, "end with the rig, without scanning the prototype");
   command->add_flag("--all", options->all, "take every pose of the plan, although fewer are enough");
   command->add_flag("--terminal", options->terminal, "lines in the terminal instead of the window");
   command->add_flag("--json", options->json, "print JSON instead of lines, without a window");
@@ -276,11 +280,11 @@ void add_align(CLI::App& app, Run& run) {
   auto options = std::make_shared<AlignCommand>();
   command->add_option("--scan", options->scan, "PLY, or the folder of limn scan; without it the markers' answer is all");
   command->add_option("--scan-units", options->scan_units, "of the PLY: m, cm, mm, in, ft")->capture_default_str();
-  command->add_option("--mesh", options->mesh, "the CAD: .glb, .gltf, .obj, .stl, .ply")->required();
-  command->add_option("--units", options->units, "of the CAD: m, cm, mm, in, ft")->required();
+  command->add_option("--mesh", options->mesh, "the CAD: .glb, .gltf, .obj, .stl, .ply; without it the scene's prototype");
+  command->add_option("--units", options->units, "of the CAD: m, cm, mm, in, ft");
   command->add_option("--start", options->start, "POSES.json with a world_from_prototype");
   command->add_option("--points", options->points, "PICKS.json: three and more pairs of the same places");
-  command->add_option("--scene", options->scene, "scene whose prototype carries markers; with --rig and --frame");
+  command->add_option("--scene", options->scene, "scene whose prototype carries markers; with --rig and --frame they give the start");
   command->add_option("--rig", options->rig, "rig folder, for --frame");
   command->add_option("--frame", options->frames, "CAMERA=PICTURE, again for another camera");
   command->add_option("--least-mm", options->least_mm, "smaller differences are not told")

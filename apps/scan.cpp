@@ -10,7 +10,6 @@
 #include "apps/picture_writer.h"
 #include "apps/world_markers.h"
 #include "calib/capture.h"
-#include "calib/surface/scan.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/log.h"
@@ -170,8 +169,17 @@ Status checked(const ScanCommand& command) {
 
 }  // namespace
 
-Status run_scan(const ScanCommand& command) {
+Result<calib::Scan> written_scan(const calib::Captures& captures,
+                                 const Rig& rig,
+                                 const calib::ScanOptions& options,
+                                 const std::filesystem::path& out) {
   const auto begun = std::chrono::steady_clock::now();
+  LIMN_TRY(calib::Scan scan, calib::scanned(captures, rig, options));
+  LIMN_TRY_STATUS(write_scan(scan, seconds_since(begun), out));
+  return scan;
+}
+
+Status run_scan(const ScanCommand& command) {
   LIMN_TRY_STATUS(checked(command));
   LIMN_TRY(const Rig rig, load_rig(command.rig));
   std::filesystem::path folder = command.captures;
@@ -184,12 +192,11 @@ Status run_scan(const ScanCommand& command) {
         capture_prototype(plan, {virtual_rig.world().world_from_prototype}, &virtual_rig, folder));
   }
   LIMN_TRY(const calib::Captures captures, calib::load_captures(folder));
-  LIMN_TRY(const calib::Scan scan, calib::scanned(captures, rig, options_of(command)));
-  const double seconds = seconds_since(begun);
-  LIMN_TRY_STATUS(write_scan(scan, seconds, command.out));
+  LIMN_TRY(const calib::Scan scan, written_scan(captures, rig, options_of(command), command.out));
   for (const std::string& warning : scan.warnings) log_warning("scan: {}", warning);
   if (command.json) {
-    fmt::print("{}\n", scan_json(scan, seconds).dump(2));
+    LIMN_TRY(const std::string json, read_file(command.out / "scan.json"));
+    fmt::print("{}", json);
     return {};
   }
   fmt::print("{} points, standard deviation {:.3f} mm (median); mesh of {} triangles; in {}\n",

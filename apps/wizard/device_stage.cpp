@@ -17,7 +17,7 @@ cv::Mat level(const device::Display& display, int value) {
 
 }  // namespace
 
-DeviceStage::DeviceStage(Devices devices, const calib::Board& board, const std::atomic<WizardWish>* wish)
+DeviceStage::DeviceStage(Devices devices, const calib::Board& board, std::atomic<WizardWish>* wish)
     : devices_(std::move(devices)),
       board_(board),
       wish_(wish),
@@ -38,6 +38,8 @@ Surroundings DeviceStage::surroundings(PictureWriter* writer) {
                                       const cv::Mat& picture) { return writer->store(path, picture); }},
           .written = [writer] { return writer->finish(); },
           .now = devices_.now,
+          .stand = [this](const Surroundings::Seen& seen) { return stand(seen); },
+          .paint = [this](const std::vector<cv::Mat>& pictures) { return paint(pictures); },
           .flashes =
               [this](int projector, int camera) {
                 device::Display* display = devices_.projectors.at(static_cast<std::size_t>(projector)).get();
@@ -125,6 +127,34 @@ Status DeviceStage::hold(const Surroundings::Seen& seen) {
     for (StillBoard& board : boards_) board.captured();
     return {};
   }
+}
+
+// Until no camera sees the board and nothing moves in any, or a person says that the prototype stands.
+Result<bool> DeviceStage::stand(const Surroundings::Seen& seen) {
+  LIMN_TRY_STATUS(light_all(255));
+  std::vector<StillRoom> rooms(devices_.cameras.size());
+  for (;;) {
+    bool is_still = true;
+    for (std::size_t i = 0; i < devices_.cameras.size(); ++i) {
+      LIMN_TRY(const Frame frame, next(i));
+      const auto corners = calib::find_board(board_, to_grey(frame.image));
+      if (seen) seen(static_cast<int>(i), frame.image, corners);
+      is_still &= rooms[i].take(frame.image, frame.captured_at) && corners.empty();
+    }
+    const WizardWish wish = wish_ ? wish_->exchange(WizardWish::none) : WizardWish::none;
+    if (wish == WizardWish::leave || wish == WizardWish::skip || wish == WizardWish::finish) return false;
+    if (is_still || wish == WizardWish::scan) return true;
+  }
+}
+
+Status DeviceStage::paint(const std::vector<cv::Mat>& pictures) {
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    const auto shown_at = devices_.projectors[i]->show(pictures[i]);
+    if (!shown_at) return shown_at.error();
+    is_black_[i] = false;
+    lit_at_ = std::max(lit_at_, shifted(*shown_at, latency_s_[i]));
+  }
+  return {};
 }
 
 }  // namespace limn::apps

@@ -7,6 +7,7 @@
 #include "apps/calibrate.h"
 #include "apps/picture_writer.h"
 #include "apps/wizard/still_board.h"
+#include "apps/wizard/still_room.h"
 #include "device/camera_source.h"
 #include "device/display.h"
 
@@ -23,13 +24,15 @@ class DeviceStage {
     std::function<void(double seconds)> wait;  ///< lets that clock go on
   };
   /// `wish`: any ends the waiting for a board; may be null.
-  DeviceStage(Devices devices, const calib::Board& board, const std::atomic<WizardWish>* wish);
+  DeviceStage(Devices devices, const calib::Board& board, std::atomic<WizardWish>* wish);
 
   /// This must stay where it is as long as they are used; pictures go to `writer`.
   Surroundings surroundings(PictureWriter* writer);
 
  private:
   Status hold(const Surroundings::Seen& seen);
+  Result<bool> stand(const Surroundings::Seen& seen);
+  Status paint(const std::vector<cv::Mat>& pictures);
   Status show(std::size_t projector, const cv::Mat& picture);
   Status light_all(int level);
   Result<cv::Mat> grab(std::size_t camera);
@@ -37,7 +40,7 @@ class DeviceStage {
 
   Devices devices_;
   calib::Board board_;
-  const std::atomic<WizardWish>* wish_;
+  std::atomic<WizardWish>* wish_;
   std::vector<double> latency_s_;  // of the projectors
   std::vector<bool> is_black_;
   std::vector<StillBoard> boards_;  // as each camera sees it

@@ -51,6 +51,25 @@ struct VirtualStage {
     return {};
   }
 
+  // The board is gone, the prototype back where the world has it.
+  Result<bool> stand(const Surroundings::Seen& seen) {
+    rig->remove("board");
+    rig->restore_stage();
+    LIMN_TRY_STATUS(show(0, cv::Mat(rig->projector(0).size(), CV_8UC1, cv::Scalar(255))));
+    for (int i = 0; seen && i < static_cast<int>(frames.size()); ++i) seen(i, grab(i), {});
+    return true;
+  }
+
+  Status paint(const std::vector<cv::Mat>& pictures) {
+    for (std::size_t i = 0; i < pictures.size(); ++i) {
+      const auto shown = rig->projector(static_cast<int>(i)).show(pictures[i]);
+      if (!shown) return shown.error();
+      lit_at = std::max(lit_at, shifted(rig->now(), latency_s.at(i) + k_guard_s));
+    }
+    frames.assign(frames.size(), cv::Mat());
+    return {};
+  }
+
   FlashStage flashes(int projector, int camera) {
     rig->darken();
     const auto show = [r = rig, projector](bool white) -> Result<Stamp> {
@@ -83,6 +102,10 @@ Surroundings virtual_surroundings(const Plan& plan, sim::VirtualRig* rig, Pictur
                                       const cv::Mat& picture) { return writer->store(path, picture); }},
           .written = [writer] { return writer->finish(); },
           .now = [rig] { return rig->now(); },
+          .stand = rig->world().scene && rig->world().scene->prototype
+                       ? [stage](const Surroundings::Seen& seen) { return stage->stand(seen); }
+                       : std::function<Result<bool>(const Surroundings::Seen&)>(),
+          .paint = [stage](const std::vector<cv::Mat>& pictures) { return stage->paint(pictures); },
           .flashes = [stage](int projector, int camera) { return stage->flashes(projector, camera); },
           .use_latency =
               [stage](int projector, double seconds) {

@@ -7,6 +7,9 @@
 #include <cctype>
 #include <cmath>
 
+#include "apps/wizard/still_room.h"
+#include "apps/wizard/worth_colour.h"
+
 namespace limn::apps {
 namespace {
 
@@ -25,20 +28,9 @@ ImU32 colour_of(calib::Verdict worth) {
                                            : colour::k_bad;
 }
 
-// Green up to a quarter of a millimetre, amber at one, red from three on.
 ImU32 colour_of_mm(double mm) {
-  const auto mixed = [](ImU32 a, ImU32 b, double share) {
-    ImU32 out = 0;
-    for (int shift = 0; shift < 32; shift += 8) {
-      const double from = (a >> shift) & 255U, to = (b >> shift) & 255U;
-      out |= static_cast<ImU32>(std::lround(from + share * (to - from))) << shift;
-    }
-    return out;
-  };
-  const double fine = calib::k_fine_mm, good = calib::k_good_mm, usable = calib::k_usable_mm;
-  if (mm <= good)
-    return mixed(colour::k_good, colour::k_warn, std::clamp((mm - fine) / (good - fine), 0.0, 1.0));
-  return mixed(colour::k_warn, colour::k_bad, std::clamp((mm - good) / (usable - good), 0.0, 1.0));
+  const auto [red, green, blue] = worth_rgb(mm);
+  return IM_COL32(red, green, blue, 255);
 }
 
 void paragraph(ImU32 colour, const std::string& text) {
@@ -55,7 +47,8 @@ void draw_steps(const Gui& gui, const WizardView& view) {
   heading(gui, "Calibration");
   gap(gui);
   static const std::array<const char*, k_wizard_steps> k_names = {
-      "Devices", "Outputs", "Exposure and focus", "Display latency", "Board", "Solve", "Result"};
+      "Devices", "Outputs", "Exposure and focus", "Display latency", "Board", "Solve",
+      "Result",  "Scan",    "Alignment",          "Painted"};
   for (std::size_t i = 0; i < view.steps.size(); ++i) {
     const WizardView::Step& step = view.steps[i];
     const ImVec2 at = ImGui::GetCursorScreenPos();
@@ -296,6 +289,14 @@ void draw_maps(Gui& gui, const WizardView& view, ImVec2 size) {
   ImGui::SetCursorScreenPos({at.x, at.y + size.y});
 }
 
+void draw_pictures_taken(const Gui& gui, const WizardView& view) {
+  if (view.pictures_of == 0) return;
+  ImGui::PushStyleColor(ImGuiCol_PlotHistogram, colour::k_blue);
+  ImGui::ProgressBar(static_cast<float>(view.pictures) / static_cast<float>(view.pictures_of),
+                     {-1, 0.4F * gui.em()}, "");
+  ImGui::PopStyleColor();
+}
+
 // What to do next, large, above the pictures.
 void draw_task(const Gui& gui, const WizardView& view) {
   if (view.is_over) {
@@ -304,11 +305,23 @@ void draw_task(const Gui& gui, const WizardView& view) {
     heading(gui, has_rig ? fmt::format("The rig is {}", calib::to_text(view.worth)) : "No rig");
     ImGui::PopStyleColor();
     paragraph(colour::k_text, has_rig ? view.verdict : view.failure);
+    const WizardView::Step& painted = view.steps[static_cast<std::size_t>(WizardStep::paint)];
+    if (painted.state == State::done) paragraph(colour::k_text, "The prototype: " + painted.words + ".");
     return;
   }
   if (view.is_leaving) {
     heading(gui, "Leaving");
     paragraph(colour::k_quiet, "What was captured is kept; the same command goes on from there.");
+    return;
+  }
+  if (view.has_rig) {
+    heading(gui, view.awaits_prototype ? "Put the prototype where it will stand"
+                                       : "Leave the prototype where it is: it is measured");
+    if (view.awaits_prototype)
+      paragraph(colour::k_quiet,
+                fmt::format("Take the board away. The scan begins when nothing has moved for {:.0f} s.",
+                            StillRoom::k_rest_s));
+    draw_pictures_taken(gui, view);
     return;
   }
   if (view.place.empty()) {
@@ -325,11 +338,7 @@ void draw_task(const Gui& gui, const WizardView& view) {
                            : view.is_capturing ? "hold the board still"
                                                : "looking at what was captured"));
   paragraph(colour::k_text, "Board: " + view.place);
-  if (!view.is_capturing || view.pictures_of == 0) return;
-  ImGui::PushStyleColor(ImGuiCol_PlotHistogram, colour::k_blue);
-  ImGui::ProgressBar(static_cast<float>(view.pictures) / static_cast<float>(view.pictures_of),
-                     {-1, 0.4F * gui.em()}, "");
-  ImGui::PopStyleColor();
+  if (view.is_capturing) draw_pictures_taken(gui, view);
 }
 
 WizardWish draw_buttons(const Gui& gui, const WizardView& view) {
@@ -347,6 +356,12 @@ WizardWish draw_buttons(const Gui& gui, const WizardView& view) {
     ImGui::EndDisabled();
     if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", what);
   };
+  if (view.has_rig) {
+    button("Scan now", view.awaits_prototype, "the prototype stands there", WizardWish::scan);
+    ImGui::SameLine();
+    button("Skip", view.awaits_prototype, "ends with the rig, which is saved", WizardWish::skip);
+    return wish;
+  }
   button("Check again", view.is_capturing, "outputs, exposure and latency, then this pose",
          WizardWish::check);
   ImGui::SameLine();
@@ -380,7 +395,7 @@ WizardWish draw_wizard(Gui& gui, const WizardView& view) {
   const float low = std::floor(0.24F * rest.y);
   draw_cameras(gui, view, {rest.x, rest.y - low - space});
   ImGui::Dummy({0, 0});
-  if (view.is_over && !view.maps.empty())
+  if (view.has_rig && !view.maps.empty())
     draw_maps(gui, view, {rest.x, low});
   else
     draw_projectors(gui, view, {rest.x, low});

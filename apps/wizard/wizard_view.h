@@ -59,6 +59,8 @@ struct WizardView {
   std::vector<Judged> judged;
   std::string advice;  ///< whether more poses help
   std::vector<calib::Fault> faults;
+  bool has_rig = false;
+  bool awaits_prototype = false;
   std::string verdict;  ///< in words, once there is a rig
   calib::Verdict worth = calib::Verdict::reject;
   std::vector<std::string> to_do;     ///< the report's advice

@@ -55,10 +55,31 @@ class Stand {
                   view_.light = light;
                 },
             .aims = [this](int pose) { aims(pose); },
+            .solved = [this](const calib::Report& report) { solved(report, view_.judged.size()); },
             .judges = [this](int pose) { judges(pose); },
             .judged = [this](const PoseJudged& judged, const calib::Observations& observations,
                              const std::vector<calib::Fault>& faults) { take(judged, observations, faults); },
             .wish = wish_};
+  }
+
+  // There is a rig.
+  void solved(const calib::Report& report, std::size_t poses) {
+    const std::lock_guard lock(mutex_);
+    view_.is_capturing = false;
+    view_.has_rig = true;
+    for (std::size_t i = 0; i <= static_cast<std::size_t>(WizardStep::result); ++i) {
+      if (view_.steps[i].state == State::waits) view_.steps[i].words = "by an earlier run";
+      if (view_.steps[i].state != State::fails) view_.steps[i].state = State::done;
+    }
+    step(WizardStep::board).words = fmt::format("{} poses", poses);
+    step(WizardStep::solve).words = fmt::format("held-out {:.3f} px", report.assessment.held_out.rms_px);
+    step(WizardStep::result).words = calib::to_text(report.assessment.verdict);
+    view_.worth = report.assessment.verdict;
+    view_.verdict = report.words.verdict;
+    view_.faults = report.assessment.faults;
+    view_.to_do = report.words.advice;
+    view_.maps = report.assessment.error_maps;
+    view_.advice.clear();
   }
 
   // The same surroundings, with the pictures passing by here.
@@ -85,16 +106,24 @@ class Stand {
       };
       return flash;
     };
-    around.hold = [this, hold = around.hold](int pose, const Surroundings::Seen&) {
-      return hold(pose,
-                  [this](int camera, const cv::Mat& picture, const std::vector<calib::BoardCorner>& corners) {
-                    const std::lock_guard lock(mutex_);
-                    WizardView::Camera& shown = view_.cameras.at(static_cast<std::size_t>(camera));
-                    shown.picture = picture;
-                    shown.corners.clear();
-                    for (const calib::BoardCorner& corner : corners) shown.corners.push_back(corner.px);
-                  });
+    const Surroundings::Seen seen = [this](int camera, const cv::Mat& picture,
+                                           const std::vector<calib::BoardCorner>& corners) {
+      const std::lock_guard lock(mutex_);
+      WizardView::Camera& shown = view_.cameras.at(static_cast<std::size_t>(camera));
+      shown.picture = picture;
+      shown.corners.clear();
+      for (const calib::BoardCorner& corner : corners) shown.corners.push_back(corner.px);
     };
+    around.hold = [hold = around.hold, seen](int pose, const Surroundings::Seen&) {
+      return hold(pose, seen);
+    };
+    if (around.stand)
+      around.stand = [this, stand = around.stand, seen](const Surroundings::Seen&) {
+        await_prototype(true);
+        auto stands = stand(seen);
+        await_prototype(false);
+        return stands;
+      };
     return around;
   }
 
@@ -108,23 +137,22 @@ class Stand {
       view_.failure = done.message();
       return;
     }
-    const calib::Report& report = done->report;
-    for (WizardView::Step& step : view_.steps) {
-      if (step.state == State::waits) step.words = "by an earlier run";
-      if (step.state != State::fails) step.state = State::done;
-    }
-    step(WizardStep::board).words = fmt::format("{} poses", done->poses.size());
-    step(WizardStep::solve).words = fmt::format("held-out {:.3f} px", report.assessment.held_out.rms_px);
-    step(WizardStep::result).words = calib::to_text(report.assessment.verdict);
-    view_.worth = report.assessment.verdict;
-    view_.verdict = report.words.verdict;
-    view_.faults = report.assessment.faults;
-    view_.to_do = report.words.advice;
-    view_.maps = report.assessment.error_maps;
-    view_.advice.clear();
+    if (!done->no_prototype.empty())
+      for (WizardView::Step& step : view_.steps)
+        if (step.state == State::runs) step = {State::fails, done->no_prototype};
   }
 
  private:
+  void await_prototype(bool awaits) {
+    const std::lock_guard lock(mutex_);
+    view_.awaits_prototype = awaits;
+    view_.pictures = view_.pictures_of = 0;
+    for (WizardView::Camera& camera : view_.cameras) {
+      camera.target.clear();
+      camera.corners.clear();
+    }
+  }
+
   void aims(int pose) {
     const std::lock_guard lock(mutex_);
     const auto at = static_cast<std::size_t>(pose);

@@ -76,6 +76,29 @@ double ErrorMap::worst_mm() const {
   return worst;
 }
 
+double ErrorMap::at(const Eigen::Vector2d& place, double depth_m) const {
+  const double x = std::clamp(place.x() * columns - 0.5, 0.0, columns - 1.0),
+               y = std::clamp(place.y() * rows - 0.5, 0.0, rows - 1.0);
+  std::size_t plane = 0;
+  while (plane + 2 < planes.size() && planes[plane + 1].depth_m < depth_m) ++plane;
+  const std::size_t next = std::min(plane + 1, planes.size() - 1);
+  const double apart_m = planes[next].depth_m - planes[plane].depth_m;
+  const double z = apart_m > 0 ? std::clamp((depth_m - planes[plane].depth_m) / apart_m, 0.0, 1.0) : 0;
+  double sum = 0, weights = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const int column = std::min(static_cast<int>(x) + (corner & 1), columns - 1),
+              row = std::min(static_cast<int>(y) + (corner >> 1 & 1), rows - 1);
+    const double dx = x - std::floor(x), dy = y - std::floor(y);
+    const double weight = (corner & 1 ? dx : 1 - dx) * (corner & 2 ? dy : 1 - dy) * (corner & 4 ? z : 1 - z);
+    const double mm =
+        planes[corner & 4 ? next : plane].p95_mm[static_cast<std::size_t>(row * columns + column)];
+    if (!std::isfinite(mm)) continue;
+    sum += weight * mm;
+    weights += weight;
+  }
+  return weights > 0 ? sum / weights : std::numeric_limits<double>::quiet_NaN();
+}
+
 std::vector<ErrorMap> error_maps(const Observations& observations,
                                  const Solution& solution,
                                  const Uncertainty& uncertainty,

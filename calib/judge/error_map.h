@@ -22,6 +22,9 @@ struct ErrorMap {
   std::vector<Plane> planes;
   /// Largest finite value; 0 when there is none.
   double worst_mm() const;
+  /// Between the middles of cells and planes, at a place of camera 0's picture (0 to 1 across and down) and
+  /// its depth; beyond them as at the nearest. NaN where no neighbour is known.
+  double at(const Eigen::Vector2d& place, double depth_m) const;
 };
 
 struct ErrorMapOptions {

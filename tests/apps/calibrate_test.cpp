@@ -6,8 +6,11 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/board_place.h"
+#include "apps/world_markers.h"
 #include "core/file.h"
+#include "core/picture.h"
 #include "core/rig.h"
+#include "sim/world.h"
 #include "tests/apps/small_plan.h"
 #include "tests/support/matchers.h"
 
@@ -34,6 +37,35 @@ std::size_t pictures_in(const fs::path& folder) {
   for (const auto& entry : fs::recursive_directory_iterator(folder))
     count += entry.path().extension() == ".png" ? 1 : 0;
   return count;
+}
+
+// The prototype was scanned, its CAD laid onto it, and it is lit green.
+void expect_prototype(const json& done, const fs::path& rig, const fs::path& world_file) {
+  ASSERT_TRUE(done.contains("prototype")) << done;
+  EXPECT_GT(done["prototype"]["points"].get<int>(), 10000);
+  EXPECT_LT(done["prototype"]["align_rms_mm"].get<double>(), 1);
+  EXPECT_LT(done["prototype"]["painted_p95_mm"].get<double>(), 1);
+  EXPECT_GT(done["prototype"]["painted_good"].get<double>(), 0.95);
+
+  const sim::World world = sim::load_world(world_file, marker_picture).value();
+  const Pose truth = world.rig.cameras[0].imager_from_world * world.world_from_prototype;
+  const json found = read_json(rig / "scan/poses.json")["world_from_prototype"]["translation_m"];
+  EXPECT_NEAR(found[0].get<double>(), truth.translation.x(), 1e-3);
+  EXPECT_NEAR(found[1].get<double>(), truth.translation.y(), 1e-3);
+  EXPECT_NEAR(found[2].get<double>(), truth.translation.z(), 2e-3);
+
+  const cv::Mat light = read_picture(rig / "scan/projector-projector0.png").value();
+  std::size_t lit = 0, green = 0;
+  for (const auto& bgr : cv::Mat_<cv::Vec3b>(light)) {
+    lit += bgr[1] > 0;
+    green += bgr[1] > 1.2 * bgr[2] && bgr[1] > 1.2 * bgr[0];
+  }
+  EXPECT_GT(lit, light.total() / 10);
+  EXPECT_EQ(green, lit);
+  // The camera sees that light on the prototype, and black beside it.
+  const cv::Mat seen = read_grey_picture(rig / "scan/painted-camera0.png").value();
+  EXPECT_GT(cv::countNonZero(seen > 80), static_cast<int>(seen.total() / 12));
+  EXPECT_LT(cv::countNonZero(seen > 80), static_cast<int>(seen.total() / 3));
 }
 
 // One wizard's life: from nothing, left in the middle of a pose, another plan.
@@ -76,8 +108,11 @@ TEST(Calibrate, GoesFromNothingToAGoodRigAndOnFromWhereItWasLeft) {
   const auto kept = written_at("pose01/camera0/035.png"), torn = written_at("pose02/camera0/000.png");
   fs::remove(captures / "pose02/camera0/035.png");
   fs::remove(out / "rig.json");
-  const json second = calibrated_json(options);
+  CalibrateOptions with_scan = options;
+  with_scan.scan = true;
+  const json second = calibrated_json(with_scan);
   ASSERT_FALSE(second.is_null());
+  expect_prototype(second, out, folder / "world.json");
   EXPECT_EQ(second["verdict"], "good");
   ASSERT_EQ(second["poses"].size(), poses.size());
   for (std::size_t i = 0; i < poses.size(); ++i)

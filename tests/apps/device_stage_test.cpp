@@ -50,6 +50,26 @@ TEST(StillBoard, IsStillWhenItRestsInANewPlace) {
   for (int i = 0; i < 40; ++i) EXPECT_NE(take(190, i % 2 ? 1 : -1), State::still) << "a hand that trembles";
 }
 
+TEST(StillRoom, RestsWhenNothingMovesForAWhile) {
+  StillRoom room;
+  cv::Mat noise(240, 320, CV_8UC1), picture(240, 320, CV_8UC1);
+  cv::RNG random(3);
+  double at_s = 0;
+  const auto rests_after = [&](int hand_x) {
+    random.fill(noise, cv::RNG::NORMAL, 6, 2);
+    picture = cv::Scalar(90);
+    cv::add(picture, noise, picture);
+    if (hand_x >= 0) picture(cv::Rect(hand_x, 60, 40, 40)) = cv::Scalar(180);
+    at_s += 0.1;
+    return room.take(picture, shifted(Stamp{}, at_s));
+  };
+  for (int i = 0; i < 200; ++i) ASSERT_FALSE(rests_after(i)) << "a hand goes through the picture";
+  int waited = 0;
+  while (!rests_after(-1)) ASSERT_LT(++waited, 100);
+  EXPECT_NEAR(0.1 * waited, StillRoom::k_rest_s, 0.3);
+  EXPECT_FALSE(rests_after(100));
+}
+
 // A room with a person who carries the board to where the wizard wants it.
 struct Room {
   Plan plan;

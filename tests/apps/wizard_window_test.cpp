@@ -92,7 +92,7 @@ TEST(WizardPanel, ShowsWhereTheBoardIsAndWhereItIsToGo) {
 // A view at the end, with an error map.
 WizardView an_end() {
   WizardView view = a_view();
-  view.is_over = true;
+  view.is_over = view.has_rig = true;
   view.is_capturing = false;
   for (WizardView::Step& step : view.steps) step.state = State::done;
   view.worth = calib::Verdict::good;
@@ -121,6 +121,26 @@ TEST(WizardPanel, EndsWithAVerdictAndWhereLightIsSure) {
   const auto draw = [&](Gui& gui) { is_closed |= draw_wizard(gui, view) == WizardWish::leave; };
   canvas.click({360, 970}, draw);
   EXPECT_TRUE(is_closed);
+}
+
+TEST(WizardPanel, ScansThePrototypeWhenAsked) {
+  test::GuiCanvas canvas({1600, 1000});
+  WizardView view = an_end();
+  view.is_over = false;
+  view.awaits_prototype = true;
+  for (WizardStep step : {WizardStep::scan, WizardStep::align, WizardStep::paint})
+    view.steps[static_cast<std::size_t>(step)] = {WizardState::waits};
+  view.steps[static_cast<std::size_t>(WizardStep::scan)] = {WizardState::runs, "waiting for the prototype"};
+  for (int i = 0; i < 2; ++i) canvas.draw([&](Gui& gui) { draw_wizard(gui, view); });
+  canvas.keep("wizard-prototype");
+  std::vector<WizardWish> wishes;
+  const auto draw = [&](Gui& gui) {
+    const WizardWish wish = draw_wizard(gui, view);
+    if (wish != WizardWish::none) wishes.push_back(wish);
+  };
+  canvas.click({360, 970}, draw);
+  canvas.click({560, 970}, draw);
+  EXPECT_EQ(wishes, (std::vector<WizardWish>{WizardWish::scan, WizardWish::skip}));
 }
 
 TEST(WizardCells, CountPointsWhereTheyLie) {

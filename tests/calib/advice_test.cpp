@@ -126,5 +126,21 @@ TEST(Advice, WarnsWhereStatedDeviationsAreTooSmall) {
   EXPECT_TRUE(says(judged.words(), "2.0 times as far as the noise explains"));
 }
 
+TEST(ErrorMap, IsReadBetweenItsCells) {
+  ErrorMap map{.projector = 0, .columns = 4, .rows = 2, .planes = {}};
+  for (const double depth_m : {1.0, 2.0}) {
+    map.planes.push_back({depth_m, {}});
+    for (int i = 0; i < 8; ++i) map.planes.back().p95_mm.push_back(depth_m + i % 4 + 10.0 * (i / 4));
+  }
+  EXPECT_DOUBLE_EQ(map.at({0.125, 0.25}, 1), 1);
+  EXPECT_DOUBLE_EQ(map.at({0.375, 0.75}, 2), 13);
+  EXPECT_DOUBLE_EQ(map.at({0.25, 0.5}, 1.5), 7);
+  EXPECT_DOUBLE_EQ(map.at({0, 0}, 0.1), 1) << "beyond it as at its edge";
+  EXPECT_DOUBLE_EQ(map.at({1, 1}, 9), 15);
+  map.planes[0].p95_mm[0] = std::nan("");
+  EXPECT_DOUBLE_EQ(map.at({0.25, 0.25}, 1), 2) << "from what is known";
+  EXPECT_TRUE(std::isnan(map.at({0.125, 0.25}, 1)));
+}
+
 }  // namespace
 }  // namespace limn::calib
