@@ -21,8 +21,8 @@ export const actions = [
   {"name": "blackout", "of_slot": false, "takes": "on_off", "role": "work", "label": "blackout"},
   {"name": "freeze", "of_slot": false, "takes": "on_off", "role": "work", "label": "freeze"},
   {"name": "grid", "of_slot": false, "takes": "on_off", "role": "work", "label": "grid"},
-  {"name": "marker_states", "of_slot": false, "takes": "on_off", "role": "work", "label": "marker states"},
-  {"name": "screen", "of_slot": false, "takes": "maybe_text", "role": "work", "label": "screen"}
+  {"name": "marker_states", "of_slot": false, "takes": "on_off", "role": "operate", "label": "marker states"},
+  {"name": "screen", "of_slot": false, "takes": "maybe_text", "role": "operate", "label": "screen"}
 ];
 
 const known = new Map(actions.map((action) => [action.name, action]));

@@ -1,8 +1,8 @@
-// Binary glTF 2.0, as far as Limn writes it: triangles with positions, normals and base colours, in nodes with transforms.
+// Binary glTF 2.0, as far as Limn writes it: triangles with positions, normals, base colours and textures, in nodes with transforms.
 
 const k_magic = 0x46546c67, k_json = 0x4e4f534a, k_bin = 0x004e4942;
-const k_types = { 5120: Int8Array, 5121: Uint8Array, 5122: Int16Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array };
-const k_counts = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4, MAT4: 16 };
+const k_types = { 5121: Uint8Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array };
+const k_counts = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 
 /** a times b, both column after column as glTF and WebGL have them. */
 export function product(a, b) {
@@ -34,7 +34,7 @@ function chunks_of(buffer) {
   return [JSON.parse(new TextDecoder().decode(chunks[k_json])), chunks[k_bin]];
 }
 
-// An accessor's numbers as floats or, of indices, whole numbers; views that interleave or are not aligned are copied together.
+// An accessor's numbers; rows that interleave with others or are not aligned are copied together.
 function numbers_of(gltf, bin, index) {
   const accessor = gltf.accessors[index], view = gltf.bufferViews[accessor.bufferView];
   const Type = k_types[accessor.componentType], width = k_counts[accessor.type];
@@ -42,10 +42,7 @@ function numbers_of(gltf, bin, index) {
   const row = width * Type.BYTES_PER_ELEMENT, stride = view.byteStride ?? row;
   const packed = new Uint8Array(accessor.count * row), bytes = new Uint8Array(bin.buffer);
   for (let i = 0; i < accessor.count; ++i) packed.set(bytes.subarray(at + i * stride, at + i * stride + row), i * row);
-  const numbers = new Type(packed.buffer);
-  if (!accessor.normalized) return numbers;
-  const most = 2 ** (8 * Type.BYTES_PER_ELEMENT - (Type.name.startsWith("U") ? 0 : 1)) - 1;
-  return Float32Array.from(numbers, (number) => number / most);
+  return new Type(packed.buffer);
 }
 
 // Normals of a mesh that has none: of each triangle, summed at its corners.
@@ -60,10 +57,24 @@ function normals_of(positions, indices) {
   return normals;
 }
 
-/** Meshes [{name, matrix, positions, normals, colours, indices, base}] of a file's scene; `base` is linear RGBA. Throws in words. */
-export function read_glb(buffer) {
+// A material's texture; the same picture is decoded once.
+function texture_of(gltf, bin, material, decoded) {
+  const index = material?.baseColorTexture?.index;
+  if (index === undefined) return null;
+  const { source } = gltf.textures[index], image = gltf.images[source];
+  const view = gltf.bufferViews[image.bufferView], at = view.byteOffset ?? 0;
+  if (!decoded.has(source))
+    decoded.set(source, createImageBitmap(new Blob([bin.subarray(at, at + view.byteLength)], { type: image.mimeType })));
+  return decoded.get(source);
+}
+
+/**
+ * Meshes [{name, matrix, positions, normals, uvs, indices, base, texture, is_unlit}] of a file's scene. `base` is linear RGBA; uvs and
+ * texture, a bitmap, may be null. Throws in words.
+ */
+export async function read_glb(buffer) {
   const [gltf, bin] = chunks_of(buffer);
-  const meshes = [];
+  const meshes = [], decoded = new Map();
   const visit = (index, parent, above) => {
     const node = gltf.nodes[index], matrix = product(parent, matrix_of(node)), name = node.name ?? above;
     for (const primitive of node.mesh === undefined ? [] : gltf.meshes[node.mesh].primitives) {
@@ -71,16 +82,17 @@ export function read_glb(buffer) {
       const positions = numbers_of(gltf, bin, primitive.attributes.POSITION);
       const indices = primitive.indices === undefined ? Uint32Array.from({ length: positions.length / 3 }, (_, i) => i)
                                                       : Uint32Array.from(numbers_of(gltf, bin, primitive.indices));
-      const { NORMAL: normal, COLOR_0: colour } = primitive.attributes;
-      const material = gltf.materials?.[primitive.material]?.pbrMetallicRoughness;
-      const colours = colour === undefined ? null : { numbers: Float32Array.from(numbers_of(gltf, bin, colour)),
-                                                      width: k_counts[gltf.accessors[colour].type] };
-      meshes.push({ name, matrix, positions, indices, colours, base: material?.baseColorFactor ?? [1, 1, 1, 1],
-                    normals: normal === undefined ? normals_of(positions, indices) : numbers_of(gltf, bin, normal) });
+      const { NORMAL: normal, TEXCOORD_0: uv } = primitive.attributes, whole = gltf.materials?.[primitive.material];
+      const material = whole?.pbrMetallicRoughness;
+      meshes.push({ name, matrix, positions, indices, base: material?.baseColorFactor ?? [1, 1, 1, 1],
+                    normals: normal === undefined ? normals_of(positions, indices) : numbers_of(gltf, bin, normal),
+                    uvs: uv === undefined ? null : numbers_of(gltf, bin, uv), texture: texture_of(gltf, bin, material, decoded),
+                    is_unlit: whole?.extensions?.KHR_materials_unlit !== undefined });
     }
     for (const child of node.children ?? []) visit(child, matrix, name);
   };
   const identity = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
   for (const root of gltf.scenes[gltf.scene ?? 0].nodes) visit(root, identity, "");
+  for (const mesh of meshes) mesh.texture = await mesh.texture;
   return meshes;
 }

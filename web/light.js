@@ -1,4 +1,5 @@
 // What the projectors and screens show.
+import { role_of } from "/actions.js";
 import { by_id, h, icon, keep } from "/dom.js";
 import { show_picture } from "/pictures.js";
 import { make_switch } from "/stage.js";
@@ -74,7 +75,8 @@ export function make_light(session) {
   const screens = h("div", { class: "choices wrap", role: "group", "aria-label": "What screens show" });
   const projectors = make_projectors(session);
   by_id("light").append(h("h2", {}, "Light"), h("div", { class: "stack", "data-needs": "work" }, h("div", { class: "pair" }, grid, rings), split,
-    h("h3", {}, "Screens"), screens), h("h3", {}, "Projectors"), projectors);
+    h("div", { class: "stack", "data-action": "screen", "data-needs": role_of("screen") }, h("h3", {}, "Screens"), screens)),
+    h("h3", {}, "Projectors"), projectors);
   return {
     opened: (name) => projectors.opened(name),
     show(state) {

@@ -56,7 +56,7 @@ async function open_solid(look) {
     view.show([]);
     const answer = await fetch(`/look/${encodeURIComponent(look)}.glb`, { cache: "no-store" });
     if (!answer.ok) throw new Error((await answer.json().catch(() => ({}))).error ?? `Limn could not give it (${answer.status}).`);
-    const meshes = read_glb(await answer.arrayBuffer());
+    const meshes = await read_glb(await answer.arrayBuffer());
     view.show(meshes);
     const slots = session.state.slots.map((slot) => slot.name).filter((name) => meshes.some((mesh) => mesh.name === name));
     let marked = "";

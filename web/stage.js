@@ -3,6 +3,8 @@ import { in_words } from "/actions.js";
 import { by_id, icon, set_text } from "/dom.js";
 import { draw_picture } from "/pictures.js";
 
+const k_again_ms = 500;  // until the room is asked for again when it has no picture
+
 /** A switch that does an on_off action and shows whether it is on. */
 export function make_switch(session, action, is_on, ...children) {
   const button = session.button(action, { role: "switch", "aria-checked": "false", class: "switch",
@@ -21,21 +23,27 @@ export function make_stage(session) {
   document.addEventListener("visibilitychange", want);
   want();
 
+  let room_why = "";  // there is no picture of the room
+
   session.link.addEventListener("picture", async ({ detail }) => {
+    const seen = () => session.link.send({ type: "seen", picture: detail.number });
+    room_why = detail.jpeg.size ? "" : detail.json.why || "There is no picture of the room.";
+    stage.say_why();
+    if (room_why) return setTimeout(seen, k_again_ms);
     try {
       draw_picture(room, await createImageBitmap(detail.jpeg));
       room.dataset.picture = detail.number;
     } catch {
       // A picture that is broken is passed over: the next one comes.
     }
-    session.link.send({ type: "seen", picture: detail.number });
+    seen();
   });
 
   const why = (state) => {
     if (session.link.status !== "connected") return "No connection: this picture stands still";
     if (state?.blackout) return "Blackout: the projectors give no light";
     if (state?.frozen) return "Frozen: what is shown stays as it is";
-    return "";
+    return room_why;
   };
   const stage = {
     /** Words over the picture that come before the stage's own; empty: none. */

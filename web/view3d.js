@@ -4,29 +4,32 @@ import { product } from "/glb.js";
 const k_vertex = `#version 300 es
 uniform mat4 u_view_from_model, u_clip_from_view;
 in vec3 a_position, a_normal;
-in vec4 a_colour;
+in vec2 a_uv;
 out vec3 v_normal, v_position;
-out vec4 v_colour;
+out vec2 v_uv;
 void main() {
   vec4 p_view = u_view_from_model * vec4(a_position, 1);
   v_position = p_view.xyz;
   v_normal = mat3(u_view_from_model) * a_normal;
-  v_colour = a_colour;
+  v_uv = a_uv;
   gl_Position = u_clip_from_view * p_view;
 }`;
 const k_fragment = `#version 300 es
 precision highp float;
 uniform vec4 u_base;
-uniform float u_glow;
+uniform sampler2D u_texture;
+uniform float u_glow, u_unlit;
 in vec3 v_normal, v_position;
-in vec4 v_colour;
+in vec2 v_uv;
 out vec4 o_colour;
 void main() {
   vec3 n = normalize(v_normal), eye = normalize(-v_position);
   if (dot(n, eye) < 0.0) n = -n;
   float key = max(dot(n, normalize(vec3(0.5, 0.8, 0.6))), 0.0), fill = 0.5 + 0.5 * n.y;
   float rim = pow(1.0 - max(dot(n, eye), 0.0), 3.0);
-  vec3 linear = u_base.rgb * v_colour.rgb * (0.16 + 0.22 * fill + 0.75 * key) + vec3(0.06) * rim + u_glow * vec3(0.35, 0.2, 0.04);
+  vec3 base = u_base.rgb * texture(u_texture, v_uv).rgb;
+  vec3 lit = base * (0.16 + 0.22 * fill + 0.75 * key) + vec3(0.06) * rim;
+  vec3 linear = mix(lit, base, u_unlit) + u_glow * vec3(0.35, 0.2, 0.04);
   o_colour = vec4(pow(linear, vec3(1.0 / 2.2)), 1);
 }`;
 const k_fov = (35 * Math.PI) / 180;
@@ -39,7 +42,7 @@ function program_of(gl) {
     gl.compileShader(shader);
     gl.attachShader(program, shader);
   }
-  ["a_position", "a_normal", "a_colour"].forEach((name, i) => gl.bindAttribLocation(program, i, name));
+  ["a_position", "a_normal", "a_uv"].forEach((name, i) => gl.bindAttribLocation(program, i, name));
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
   return program;
@@ -56,10 +59,21 @@ function upload(gl, mesh) {
   };
   attribute(0, mesh.positions, 3);
   attribute(1, mesh.normals, 3);
-  if (mesh.colours) attribute(2, mesh.colours.numbers, mesh.colours.width);
+  if (mesh.uvs) attribute(2, mesh.uvs, 2);
   gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
   gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.indices, gl.STATIC_DRAW);
-  return { ...mesh, array, count: mesh.indices.length };
+  return { ...mesh, array, count: mesh.indices.length, texture: texture_of(gl, mesh.texture) };
+}
+
+// A texture of a picture, or of one white pixel.
+function texture_of(gl, picture) {
+  const texture = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  if (picture) gl.texImage2D(gl.TEXTURE_2D, 0, gl.SRGB8_ALPHA8, gl.RGBA, gl.UNSIGNED_BYTE, picture);
+  else gl.texImage2D(gl.TEXTURE_2D, 0, gl.SRGB8_ALPHA8, 1, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array([255, 255, 255, 255]));
+  gl.generateMipmap(gl.TEXTURE_2D);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
+  return texture;
 }
 
 function box_of(meshes) {
@@ -104,7 +118,10 @@ export class View3d {
   }
 
   show(meshes) {
-    for (const { array } of this.#meshes) this.#gl.deleteVertexArray(array);
+    for (const { array, texture } of this.#meshes) {
+      this.#gl.deleteVertexArray(array);
+      this.#gl.deleteTexture(texture);
+    }
     this.#meshes = meshes.map((mesh) => upload(this.#gl, mesh));
     this.#box = box_of(meshes);
     this.#due();
@@ -187,8 +204,9 @@ export class View3d {
       gl.uniformMatrix4fv(at("u_view_from_model"), false, product(view_from_world, mesh.matrix));
       gl.uniform4fv(at("u_base"), mesh.base);
       gl.uniform1f(at("u_glow"), this.#marked && mesh.name === this.#marked ? 1 : 0);
+      gl.uniform1f(at("u_unlit"), mesh.is_unlit ? 1 : 0);
       gl.bindVertexArray(mesh.array);
-      if (!mesh.colours) gl.vertexAttrib4f(2, 1, 1, 1, 1);
+      gl.bindTexture(gl.TEXTURE_2D, mesh.texture);
       gl.drawElements(gl.TRIANGLES, mesh.count, gl.UNSIGNED_INT, 0);
     }
     canvas.dataset.meshes = this.#meshes.length;
