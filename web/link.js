@@ -9,7 +9,7 @@ async function post(path, message) {
 }
 
 /**
- * Events (detail): "status" {status, why, retry_at} with status unpaired, connecting, waiting or connected; "hello", "state";
+ * Events (detail): "status" {status, why} with status unpaired, connecting, waiting or connected; "hello", "state";
  * "picture" and "answer" {number, json, jpeg}, of the room and of the window.
  */
 export class Link extends EventTarget {
@@ -66,7 +66,7 @@ export class Link extends EventTarget {
   connect() {
     clearTimeout(this.#timer);
     this.#drop();
-    this.#say("connecting");
+    if (!this.#tries) this.#say("connecting");
     const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api/live`);
     socket.binaryType = "arraybuffer";
     socket.onmessage = (event) => socket === this.#socket && this.#hear(event.data);
@@ -148,11 +148,11 @@ export class Link extends EventTarget {
   async #closed() {
     const was_connected = this.status === "connected";
     this.#drop();
-    this.#say("connecting");
+    if (!this.#tries) this.#say("connecting");
     const code = was_connected ? 0 : await this.#probe();
     if (code === 401) return this.#end("The session is over. Pair again.");
     const pause = k_pauses_ms[Math.min(this.#tries++, k_pauses_ms.length - 1)];
-    this.#say("waiting", "", Date.now() + pause);
+    this.#say("waiting");
     this.#timer = setTimeout(() => this.connect(), pause);
   }
 
@@ -189,8 +189,8 @@ export class Link extends EventTarget {
     this.#say("unpaired", why);
   }
 
-  #say(status, why = "", retry_at = 0) {
+  #say(status, why = "") {
     this.status = status;
-    this.dispatchEvent(new CustomEvent("status", { detail: { status, why, retry_at } }));
+    this.dispatchEvent(new CustomEvent("status", { detail: { status, why } }));
   }
 }

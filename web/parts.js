@@ -51,6 +51,12 @@ function make_nudge(session, slot) {
   const readout = h("p", { class: "readout", "aria-label": "Nudged by, millimetres" });
   const pad = h("div", { class: "pad" }, move(1, "", "up"), move(0, "-", "left"), readout, move(0, "", "right"), move(1, "-", "down"),
                 move(2, "", "up"), move(2, "-", "down"));
+  const keys = { ArrowUp: ".yplus", ArrowDown: ".yminus", ArrowLeft: ".xminus", ArrowRight: ".xplus", PageUp: ".zplus", PageDown: ".zminus" };
+  pad.addEventListener("keydown", (event) => {
+    if (!keys[event.key]) return;
+    event.preventDefault();
+    pad.querySelector(keys[event.key]).click();
+  });
   const release = session.button("release", { slot: slot.name, class: "wide" }, icon("release"), "Follow its marker again");
   const node = h("div", { class: "stack", "data-needs": "work" }, h("h3", {}, "Nudge"), steps, pad, release);
   node.show = (state_of) => {

@@ -66,21 +66,14 @@ function fit_role(node, role) {
   node.title = node.disabled ? `Needs the PIN to ${node.dataset.needs}` : "";
 }
 
-let countdown = 0;
+const k_words = { connecting: "Connecting …", waiting: "No connection. Trying again …" };
 
-function show_status(link, { status, why, retry_at }) {
+function show_status(link, { status, why }) {
   const is_paired = status !== "unpaired";
   document.body.dataset.status = status;
   by_id("pairing").hidden = is_paired;
   by_id("session").hidden = !is_paired;
-  clearInterval(countdown);
-  const words = () => {
-    const left_s = Math.max(1, Math.ceil((retry_at - Date.now()) / 1000));
-    if (status === "connected") return `${link.name || "Guest"}, ${link.role}`;
-    return status === "connecting" ? "Connecting …" : `No connection. Trying again in ${left_s} s`;
-  };
-  set_text(by_id("link"), words());
-  if (status === "waiting") countdown = setInterval(() => set_text(by_id("link"), words()), 1000);
+  set_text(by_id("link"), k_words[status] ?? `${link.name || "Guest"}, ${link.role}`);
   if (!is_paired && why) tell_pairing(why);
 }
 

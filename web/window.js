@@ -56,7 +56,7 @@ class CameraWindow {
   #session;
   #stage;
   #panel;
-  #video = h("video", { playsinline: "", muted: true });
+  #video = h("video", { playsinline: "", muted: true, "aria-hidden": "true", tabindex: "-1" });
   #grabbed = document.createElement("canvas");
   #shown = by_id("window-picture");
   #stream = null;
@@ -70,6 +70,7 @@ class CameraWindow {
   constructor(session, stage) {
     this.#session = session;
     this.#stage = stage;
+    by_id("view").append(this.#video);  // some browsers give no frames of a video that is nowhere
     const { link } = session;
     link.addEventListener("answer", ({ detail }) => this.#answer(detail));
     link.addEventListener("hello", () => this.#resume());
