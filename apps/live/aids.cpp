@@ -98,4 +98,19 @@ cv::Mat split_at(const cv::Mat& points, double x_m, const cv::Mat& left, const c
   return out;
 }
 
+cv::Mat split_along(const cv::Vec3d& abc, const cv::Mat& left, const cv::Mat& right) {
+  cv::Mat out = right.clone();
+  const double per_px = std::hypot(abc[0], abc[1]);
+  for (int y = 0; y < out.rows; ++y) {
+    for (int x = 0; x < out.cols; ++x) {
+      const double away_px = (abc[0] * x + abc[1] * y + abc[2]) / per_px;
+      auto& bgr = out.at<cv::Vec3b>(y, x);
+      if (away_px < 0) bgr = left.at<cv::Vec3b>(y, x);
+      if (std::abs(away_px) >= 0.5 * static_cast<double>(k_line_px)) continue;
+      for (int i = 0; i < 3; ++i) bgr[i] = std::max(bgr[i], static_cast<std::uint8_t>(k_split));
+    }
+  }
+  return out;
+}
+
 }  // namespace limn::apps

@@ -14,4 +14,8 @@ void draw_grid(const cv::Mat& points, const cv::Mat& share, cv::Mat* picture);
 /// them. Where nothing is lit the brighter one stays.
 cv::Mat split_at(const cv::Mat& points, double x_m, const cv::Mat& left, const cv::Mat& right);
 
+/// Pixels on the side of a straight line where a x + b y + c < 0 from `left`, others from `right`, with a
+/// thin line between them. 8-bit BGR, of one size.
+cv::Mat split_along(const cv::Vec3d& abc, const cv::Mat& left, const cv::Mat& right);
+
 }  // namespace limn::apps

@@ -80,10 +80,8 @@ Painter::Painter(const scene::Scene& scene,
       d_up_world_(rig.cameras.empty()
                       ? Eigen::Vector3d(0, -1, 0)
                       : rig.cameras[0].imager_from_world.rotation.inverse() * Eigen::Vector3d(0, -1, 0)) {
-  Eigen::AlignedBox3f box;
   if (scene.prototype)
-    for (const Eigen::Vector3f& p : scene.prototype->mesh.positions) box.extend(p);
-  if (!box.isEmpty()) middle_x_m_ = static_cast<double>(box.center().x());
+    for (const Eigen::Vector3f& p : scene.prototype->mesh.positions) prototype_box_.extend(p.cast<double>());
   for (const Imager& projector : rig.projectors)
     painted_.projectors.emplace_back(projector.height, projector.width, CV_8UC3, cv::Scalar::all(0));
 }
@@ -145,29 +143,70 @@ const Painted& Painter::paint(const Watched& watched,
 }
 
 cv::Mat Painter::screen(const Watched& watched, const scene::Staging& staging) {
+  using enum scene::Screen;
   const cv::Mat behind = watched.frames.empty() ? cv::Mat() : watched.frames[0].image;
-  if (staging.screen == scene::Screen::off || behind.empty()) return {};
-  if (staging.screen == scene::Screen::camera) return behind;
+  if (staging.screen == off || behind.empty()) return {};
+  if (staging.screen == camera) return behind;
   const Stamp at = watched.frames[0].captured_at;
   const std::vector<Track> tracks = scene::carried(
       scene_, staging, tracker::predicted(watched.motions, at, options_.prediction, options_.motion));
   const scene::PosedScene posed = scene::staged(scene_, staging, tracks);
-  if (staging.screen == scene::Screen::full)
-    return renderer_.composite(0, behind, posed, projector::Composite::full);
-  if (staging.screen == scene::Screen::rest) {
+  if (staging.screen == rest) {
     const double seconds = treated_at_ == Stamp{} ? 0 : std::max(0.0, seconds_between(treated_at_, at));
     treatments_ = projector::treated(treatments_, renderer_.coverage(posed, rig_.cameras[0]), seconds);
     treated_at_ = at;
-    return renderer_.composite(0, behind, posed, treatments_);
   }
+  const cv::Mat picture = screen_of(behind, posed, staging.screen, treatments_);
+  const auto left = scene::left_of_split(scene_, staging);
+  if (!left || staging.screen == stereo) return picture;
+  const Imager& eye = staging.screen == view && viewer_.width > 0 ? viewer_ : rig_.cameras[0];
+  const auto line = split_line(eye, posed, staging.split_mm);
+  if (!line) return picture;
+  const scene::PosedScene other = scene::staged(scene_, *left, tracks);
+  const auto treatments = staging.screen == rest
+                              ? projector::treated({}, renderer_.coverage(other, rig_.cameras[0]), 0)
+                              : std::vector<projector::Treatment>();
+  return split_along(*line, screen_of(behind, other, staging.screen, treatments), picture);
+}
+
+cv::Mat Painter::screen_of(const cv::Mat& behind,
+                           const scene::PosedScene& posed,
+                           scene::Screen what,
+                           std::span<const projector::Treatment> treatments) {
+  if (what == scene::Screen::full) return renderer_.composite(0, behind, posed, projector::Composite::full);
+  if (what == scene::Screen::rest) return renderer_.composite(0, behind, posed, treatments);
   const Imager viewer = viewer_.width > 0 ? viewer_ : rig_.cameras[0];
-  if (staging.screen == scene::Screen::view) return renderer_.view(viewer, posed, k_background);
+  if (what == scene::Screen::view) return renderer_.view(viewer, posed, k_background);
   const double half = 0.5e-3 * options_.stereo_mm;
   const cv::Mat eyes[2] = {renderer_.view(moved_eye(viewer, -half), posed, k_background),
                            renderer_.view(moved_eye(viewer, half), posed, k_background)};
   cv::Mat both;
   cv::hconcat(eyes, 2, both);
   return both;
+}
+
+// Where a picture is split: the line on the prototype, as if that were flat in its middle; a x + b y + c is
+// negative where its x is smaller. None where it is not seen.
+std::optional<cv::Vec3d> Painter::split_line(const Imager& imager,
+                                             const scene::PosedScene& posed,
+                                             double split_mm) const {
+  if (!posed.world_from_prototype || prototype_box_.isEmpty()) return std::nullopt;
+  Eigen::Vector3d p_middle = prototype_box_.center(), d_along = prototype_box_.sizes() / 4;
+  p_middle.x() += 1e-3 * split_mm;
+  (d_along.y() > d_along.z() ? d_along.z() : d_along.y()) = 0;
+  d_along.x() = 0;
+  const Eigen::Vector3d beside = p_middle - Eigen::Vector3d(0.01, 0, 0);
+  std::vector<Eigen::Vector2d> px;
+  for (const Eigen::Vector3d& p :
+       {Eigen::Vector3d(p_middle - d_along), Eigen::Vector3d(p_middle + d_along), beside}) {
+    const auto seen = imager.project(*posed.world_from_prototype * p);
+    if (!seen) return std::nullopt;
+    px.push_back(*seen);
+  }
+  const Eigen::Vector2d along = px[1] - px[0];
+  if (along.norm() < 1) return std::nullopt;
+  cv::Vec3d abc(-along.y(), along.x(), along.y() * px[0].x() - along.x() * px[0].y());
+  return abc[0] * px[2].x() + abc[1] * px[2].y() + abc[2] < 0 ? abc : -abc;
 }
 
 // Which parts have gone since the last picture, and which show another variant.
@@ -227,7 +266,7 @@ cv::Mat Painter::lit_for(std::size_t projector,
   const cv::Mat points = renderer_.surface_points(projector, painted_.posed);
   if (left) {
     const scene::PosedScene other = scene::staged(scene_, *left, painted_.tracks);
-    picture = split_at(points, middle_x_m_ + 1e-3 * staging.split_mm,
+    picture = split_at(points, prototype_box_.center().x() + 1e-3 * staging.split_mm,
                        renderer_.projector_picture(projector, other, viewer), picture);
   }
   if (staging.grid) draw_grid(points, renderer_.blend(projector, painted_.posed), &picture);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <map>
 #include <opencv2/core/mat.hpp>
 #include <optional>
@@ -87,6 +88,13 @@ class Painter {
   Imager viewer_for(const scene::PosedScene& posed, Stamp at);
   void note_changes(const scene::PosedScene& posed, const scene::Staging& staging, Stamp at);
   cv::Mat lit(std::size_t projector, const scene::PosedScene& posed, const Imager& viewer, Stamp at);
+  cv::Mat screen_of(const cv::Mat& behind,
+                    const scene::PosedScene& posed,
+                    scene::Screen what,
+                    std::span<const projector::Treatment> treatments);
+  std::optional<cv::Vec3d> split_line(const Imager& imager,
+                                      const scene::PosedScene& posed,
+                                      double split_mm) const;
   cv::Mat lit_for(std::size_t projector, const scene::Staging& staging, const Imager& viewer, Stamp at);
   void draw_feedback(const scene::Staging& staging);
   void draw_waiting(std::span<const LooseMarker> waiting);
@@ -101,7 +109,7 @@ class Painter {
   ShadowWatch shadows_;
   DriftWatch drifts_;
   Eigen::Vector3d d_up_world_;
-  double middle_x_m_ = 0;  // of the prototype, its own frame
+  Eigen::AlignedBox3d prototype_box_;  // its own frame
   Painted painted_;
   bool is_black_ = false;  // by blackout, which goes before a freeze
   Imager viewer_;          // of what was painted last

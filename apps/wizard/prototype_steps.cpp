@@ -17,7 +17,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double k_gamma = 2.2;  // near enough for colours that are signs
+constexpr std::size_t k_told = 3;  // differences from the CAD; all are in align.json
+constexpr double k_white = 0.9;    // of a colour's white, left out on the prototype
+constexpr double k_gamma = 2.2;    // near enough for colours that are signs
+
+// The colour without its white, which room light and projectors' black give it again.
+cv::Vec3d light_bgr(double mm) {
+  const auto [red, green, blue] = worth_rgb(mm);
+  const cv::Vec3d bgr(blue, green, red);
+  const double most = std::max({bgr[0], bgr[1], bgr[2]}), least = std::min({bgr[0], bgr[1], bgr[2]});
+  return (bgr - cv::Vec3d::all(k_white * least)) * (255 / (most - k_white * least));
+}
 
 class Steps {
  public:
@@ -101,7 +111,11 @@ class Steps {
     world_from_prototype_ = aligned->alignment.world_from_prototype;
     seen_.align_rms_mm = 1e3 * aligned->alignment.rms_m;
     seen_.warnings.insert(seen_.warnings.end(), aligned->warnings.begin(), aligned->warnings.end());
-    for (const std::string& warning : aligned->warnings) audience_.say("advice: " + warning);
+    for (std::size_t i = 0; i < std::min(k_told, aligned->warnings.size()); ++i)
+      audience_.say("advice: " + aligned->warnings[i]);
+    if (aligned->warnings.size() > k_told)
+      audience_.say(fmt::format("advice: {} more in {}", aligned->warnings.size() - k_told,
+                                (out_ / "align.json").string()));
     end(WizardStep::align,
         fmt::format("within {:.2f} mm RMS of the CAD, from {}", *seen_.align_rms_mm, aligned->how));
     return {};
@@ -157,10 +171,7 @@ class Steps {
           if (!std::isfinite(mm)) continue;
           all_mm.push_back(mm);
           const double share = std::pow(static_cast<double>(shares.at<cv::Vec2f>(y, x)[0]), 1 / k_gamma);
-          const auto [red, green, blue] = worth_rgb(mm);
-          picture.at<cv::Vec3b>(y, x) = {cv::saturate_cast<std::uint8_t>(share * blue),
-                                         cv::saturate_cast<std::uint8_t>(share * green),
-                                         cv::saturate_cast<std::uint8_t>(share * red)};
+          picture.at<cv::Vec3b>(y, x) = light_bgr(mm) * share;
         }
       }
       LIMN_TRY_STATUS(write_png(out_ / ("projector-" + rig_.projectors[i].name + ".png"), picture));

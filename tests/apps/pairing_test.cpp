@@ -320,6 +320,57 @@ TEST_F(ASession, TwoLooksStandOnTheTwoSidesOfALine) {
   EXPECT_LT(wrong, 0.02 * (left + right));
 }
 
+TEST_F(ASession, SplitsTheScreenAsTheSurface) {
+  const auto screen = [&](const char* name) {
+    watch(3);
+    painted();
+    const cv::Mat picture = session_->screen();
+    EXPECT_TRUE(write_png(folder_ / fmt::format("screen-{}.png", name), picture).ok());
+    return picture.clone();
+  };
+  watch(3);
+  painted();
+  edit("screen", "", "view");
+  edit("choose_variant", "mirror", "classic");
+  watch(3);
+  painted();
+  edit("save_look", "", "A");
+  const cv::Mat a = screen("a");
+  edit("choose_variant", "mirror", "sport");
+  watch(3);
+  painted();
+  edit("save_look", "", "B");
+  const cv::Mat b = screen("b");
+  // The line goes through the middle of where they differ.
+  edit("split", "", "on");
+  int crossed = 0;
+  for (double mm = -280; mm <= -120; mm += 40) {
+    edit("split_at", "", fmt::format("{}", mm));
+    const cv::Mat split = session_->screen();
+    int of_a = 0, of_b = 0, of_neither = 0;
+    double x_a = 0, x_b = 0;
+    for (int y = 0; y < split.rows; ++y)
+      for (int x = 0; x < split.cols; ++x) {
+        const auto &at = split.at<cv::Vec3b>(y, x), &at_a = a.at<cv::Vec3b>(y, x),
+                   &at_b = b.at<cv::Vec3b>(y, x);
+        if (cv::norm(at_a, at_b, cv::NORM_INF) < 60) continue;
+        const bool is_a = cv::norm(at, at_a, cv::NORM_INF) < 30, is_b = cv::norm(at, at_b, cv::NORM_INF) < 30;
+        of_a += is_a;
+        of_b += is_b;
+        x_a += is_a * x;
+        x_b += is_b * x;
+        of_neither += !is_a && !is_b;
+      }
+    if (of_a > 100 && of_b > 100) {
+      ++crossed;
+      if (crossed == 2) screen("split");
+      EXPECT_LT(x_a / of_a, x_b / of_b) << "left is A";
+      EXPECT_LT(of_neither, 0.1 * (of_a + of_b));
+    }
+  }
+  EXPECT_GE(crossed, 3);
+}
+
 TEST_F(ASession, AsksForTheUnitOfWhatIsDroppedAndTakesTheAnswer) {
   const fs::path slot = folder_ / "door/slots/mirror";
   fs::create_directories(slot);
