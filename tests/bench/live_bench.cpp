@@ -1,6 +1,7 @@
 // What a live session costs beside its rendering: processor time for each 1280x1024 frame (JPEG decoded,
 // markers found, poses, filter, hand-over) beside what libapriltag needs to detect in the same frames, what a
-// recording adds to a frame's time, and whether memory grows. Usage: limn bench live [--frames N (60)]
+// recording adds to a frame's time, how long an edit takes, and whether memory grows. Usage: limn bench live
+// [--frames N (60)]
 #include <fmt/core.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -189,6 +190,37 @@ double session_ms(const std::vector<Shot>& shots, SessionSetup setup, const fs::
   return median(times);
 }
 
+double percentile(std::vector<double> values, double share) {
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+// From a person's edit to the first pictures that show it, by the wall, without the display: what is left of
+// the frame in which it comes, at any moment of it alike, and the whole frame after it.
+void print_edits(const std::vector<Shot>& shots, const SessionSetup& setup) {
+  auto watcher = Watcher::create(setup.scene, setup.rig, setup.watch).value();
+  auto session = Session::create(setup, nullptr, nullptr, false).value();
+  std::vector<double> waits;
+  double before_ms = 0;
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    const double begun = wall_ms();
+    const bool is_edited = i % 3 == 2;
+    if (is_edited) LIMN_CHECK(session.edit({"next_variant", "mirror", ""}, "bench", shots[i].captured_at));
+    const std::vector<Frame> frames = {{setup.rig.cameras[0].name, decoded(shots[i]), shots[i].captured_at}};
+    session.take(watcher.watch(frames), i + 1);
+    session.paint(shifted(shots[i].captured_at, 0.02), shifted(shots[i].captured_at, k_lag_s));
+    const double frame_ms = wall_ms() - begun;
+    constexpr int k_moments = 20;
+    if (is_edited)
+      for (int k = 0; k < k_moments; ++k) waits.push_back((k + 0.5) / k_moments * before_ms + frame_ms);
+    before_ms = frame_ms;
+  }
+  fmt::print("from an edit to its first pictures, display excluded: {:.0f} ms (median), {:.0f} ms (95 %)\n",
+             percentile(waits, 0.5), percentile(waits, 0.95));
+}
+
 void print_recording(const std::vector<Shot>& shots, const SessionSetup& setup) {
   const fs::path folder = fs::temp_directory_path() / fmt::format("limn-bench-live-{}", getpid());
   std::vector<double> without, with;
@@ -237,6 +269,7 @@ int run(int argc, char** argv) {
   SessionSetup setup;
   const std::vector<Shot> frames = shots(count, &setup);
   print_cost(frames, setup);
+  print_edits(frames, setup);
   print_recording(frames, setup);
   print_memory(frames, setup);
   return 0;
