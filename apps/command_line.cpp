@@ -142,9 +142,10 @@ void add_capture(CLI::App& app, Run& run) {
 
 void add_plan(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand("plan", "what a described rig would reach in mm, before anything is bought");
-  command->footer("Example: limn plan config/described/bench.json");
+  command->footer("Example: limn plan config/described/bench.json --out plan   (then open plan/plan.html)");
   auto options = std::make_shared<ForeseeOptions>();
   command->add_option("described", options->described, "the rig (limn.described/1)")->required();
+  command->add_option("--out", options->out, "folder for plan.html, the rig from above and from the side, and plan.json");
   command->add_flag("--json", options->json, "print JSON instead of a table");
   command->callback([options, &run] { run = [options] { return finished(run_foresee(*options)); }; });
 }

@@ -9,11 +9,13 @@
 #include <numbers>
 #include <random>
 
+#include "apps/plan_page.h"
 #include "calib/judge/assess.h"
 #include "calib/judge/propagate.h"
 #include "calib/predict.h"
 #include "calib/solve.h"
 #include "core/config.h"
+#include "core/file.h"
 #include "core/log.h"
 #include "tracker/pose_fit.h"
 
@@ -487,36 +489,6 @@ nlohmann::ordered_json json_of(const Foreseen& foreseen) {
   return json;
 }
 
-void print_table(const Foreseen& foreseen, const Described& described) {
-  fmt::print("{:<14} {:>8} {:>9} {:>14} {:>7} {:>9} {:>7}\n", "", "away, m", "pixel, mm", "on surface, mm",
-             "steep", "coverage", "lux");
-  for (const auto* imagers : {&foreseen.cameras, &foreseen.projectors}) {
-    for (const ForeseenImager& imager : *imagers)
-      fmt::print("{:<14} {:>8.2f} {:>9.2f} {:>14.2f} {:>5.0f} ° {:>7.0f} %{}\n", imager.name,
-                 imager.distance_m, imager.pixel_mm, imager.surface_mm, imager.steep_deg,
-                 100 * imager.coverage, imager.lux > 0 ? fmt::format(" {:>7.0f}", imager.lux) : "");
-  }
-  for (const ForeseenPair& pair : foreseen.pairs)
-    fmt::print("{} and {}: {:.0f} degrees apart, both reach {:.0f} % of the volume\n", pair.camera,
-               pair.projector, pair.angle_deg, 100 * pair.coverage);
-  for (const ForeseenMarker& marker : foreseen.markers)
-    fmt::print(
-        "{}: a {:g} mm marker is {:.0f} px ({:.0f} at the far end), placed within {:.2f} mm across the view "
-        "and "
-        "{:.2f} mm along it (95 %)\n",
-        marker.camera, 1000 * described.marker_m, marker.side_px, marker.farthest_px, marker.across_mm,
-        marker.along_mm);
-  fmt::print("{} and a projector at least reach {:.0f} % of the volume\n", described.rig.cameras.front().name,
-             100 * foreseen.coverage);
-  for (std::size_t i = 0; i < foreseen.error_mm.size(); ++i)
-    fmt::print(
-        "{}: light lands within {:.2f} mm (95 %; calibration {:.2f}, measuring the prototype {:.2f})\n",
-        described.rig.projectors[i].name, foreseen.error_mm[i], foreseen.calibration_mm[i],
-        foreseen.measuring_mm[i]);
-  for (const std::string& sentence : foreseen.advice) fmt::print("advice: {}\n", sentence);
-  if (foreseen.advice.empty()) fmt::print("nothing is too small, too far, too steep or out of reach\n");
-}
-
 }  // namespace
 
 Result<Described> load_described(const std::filesystem::path& path) {
@@ -594,6 +566,39 @@ Result<Foreseen> foresee(const Described& described) {
   return foreseen;
 }
 
+std::string foreseen_table(const Foreseen& foreseen, const Described& described) {
+  std::string out;
+  out += fmt::format("{:<14} {:>8} {:>9} {:>14} {:>7} {:>9} {:>7}\n", "", "away, m", "pixel, mm",
+                     "on surface, mm", "steep", "coverage", "lux");
+  for (const auto* imagers : {&foreseen.cameras, &foreseen.projectors}) {
+    for (const ForeseenImager& imager : *imagers)
+      out += fmt::format("{:<14} {:>8.2f} {:>9.2f} {:>14.2f} {:>5.0f} ° {:>7.0f} %{}\n", imager.name,
+                         imager.distance_m, imager.pixel_mm, imager.surface_mm, imager.steep_deg,
+                         100 * imager.coverage, imager.lux > 0 ? fmt::format(" {:>7.0f}", imager.lux) : "");
+  }
+  for (const ForeseenPair& pair : foreseen.pairs)
+    out += fmt::format("{} and {}: {:.0f} degrees apart, both reach {:.0f} % of the volume\n", pair.camera,
+                       pair.projector, pair.angle_deg, 100 * pair.coverage);
+  for (const ForeseenMarker& marker : foreseen.markers)
+    out += fmt::format(
+        "{}: a {:g} mm marker is {:.0f} px ({:.0f} at the far end), placed within {:.2f} mm across the view "
+        "and "
+        "{:.2f} mm along it (95 %)\n",
+        marker.camera, 1000 * described.marker_m, marker.side_px, marker.farthest_px, marker.across_mm,
+        marker.along_mm);
+  out += fmt::format("{} and a projector at least reach {:.0f} % of the volume\n",
+                     described.rig.cameras.front().name, 100 * foreseen.coverage);
+  for (std::size_t i = 0; i < foreseen.error_mm.size(); ++i)
+    out += fmt::format(
+        "{}: light lands within {:.2f} mm (95 %; calibration {:.2f}, measuring the prototype {:.2f})\n",
+        described.rig.projectors[i].name, foreseen.error_mm[i], foreseen.calibration_mm[i],
+        foreseen.measuring_mm[i]);
+  for (const std::string& sentence : foreseen.advice) out += fmt::format("advice: {}\n", sentence);
+  if (foreseen.advice.empty())
+    out += fmt::format("nothing is too small, too far, too steep or out of reach\n");
+  return out;
+}
+
 Status run_foresee(const ForeseeOptions& options) {
   LIMN_TRY(const Described described, load_described(options.described));
   auto foreseen = foresee(described);
@@ -602,7 +607,12 @@ Status run_foresee(const ForeseeOptions& options) {
   if (options.json) {
     fmt::print("{}\n", json_of(*foreseen).dump(2));
   } else {
-    print_table(*foreseen, described);
+    fmt::print("{}", foreseen_table(*foreseen, described));
+  }
+  if (!options.out.empty()) {
+    LIMN_TRY_STATUS(make_folder(options.out));
+    LIMN_TRY_STATUS(write_file(options.out / "plan.json", json_of(*foreseen).dump(2) + "\n"));
+    LIMN_TRY_STATUS(write_file(options.out / "plan.html", plan_page(described, *foreseen)));
   }
   return {};
 }

@@ -75,9 +75,13 @@ struct Foreseen {
 /// solve, with what the solve says.
 Result<Foreseen> foresee(const Described& described);
 
+/// What `limn plan` prints.
+std::string foreseen_table(const Foreseen& foreseen, const Described& described);
+
 struct ForeseeOptions {
   std::filesystem::path described;
-  bool json = false;  ///< JSON on stdout instead of a table
+  std::filesystem::path out;  ///< folder for plan.html and plan.json; empty: none
+  bool json = false;          ///< JSON on stdout instead of a table
 };
 Status run_foresee(const ForeseeOptions& options);
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "core/file.h"
 #include "tests/support/matchers.h"
@@ -48,6 +49,24 @@ TEST(Foresee, TheExamplesLoadAndTheNumbersRepeat) {
   }
   const auto described = load_described(k_described / "bench.json");
   EXPECT_EQ(foreseen(*described).error_mm, foreseen(*described).error_mm);
+}
+
+// Everything that was described stands on the page, which needs nothing else.
+TEST(Foresee, APageShowsTheRig) {
+  const fs::path out = test::test_folder() / "plan";
+  testing::internal::CaptureStdout();
+  const Status done = run_foresee({.described = k_described / "bench.json", .out = out});
+  const std::string table = testing::internal::GetCapturedStdout();
+  ASSERT_TRUE(done.ok()) << done.message();
+  const std::string page = read_file(out / "plan.html").value();
+  const Described described = load_described(k_described / "bench.json").value();
+  for (const auto* imagers : {&described.rig.cameras, &described.rig.projectors})
+    for (const Imager& imager : *imagers)
+      EXPECT_NE(page.find(">" + imager.name + "</text>"), std::string::npos) << imager.name;
+  EXPECT_NE(page.find(table), std::string::npos) << "the table";
+  EXPECT_EQ(page.find("nan"), std::string::npos);
+  EXPECT_EQ(page.find("http"), std::string::npos);
+  EXPECT_TRUE(nlohmann::json::accept(read_file(out / "plan.json").value()));
 }
 
 TEST(Foresee, NoiseAndNarrowAnglesCostWhatTheyMust) {

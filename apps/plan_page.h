@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+
+#include "apps/foresee.h"
+
+namespace limn::apps {
+
+/// plan.html of `limn plan`: self-contained, the rig from above and from the side to scale, how far light may
+/// be off, the table and what limits.
+std::string plan_page(const Described& described, const Foreseen& foreseen);
+
+}  // namespace limn::apps
