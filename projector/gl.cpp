@@ -1,5 +1,9 @@
 #include "projector/gl.h"
 
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+#include "core/log.h"
 #include "core/result.h"
 
 namespace limn::projector {
@@ -88,6 +92,26 @@ cv::Mat read_back(const GlName& framebuffer, int width, int height, int type, GL
   glReadPixels(0, 0, width, height, format, CV_MAT_DEPTH(type) == CV_8U ? GL_UNSIGNED_BYTE : GL_FLOAT,
                picture.data);
   return picture;
+}
+
+int largest_texture() {
+  constexpr int k_most = 4096;
+  GLint most = 0;
+  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
+  return std::min(most, k_most);
+}
+
+cv::Mat fitting_texture(const cv::Mat& picture, const std::string& name) {
+  const int most = largest_texture();
+  if (picture.cols <= most && picture.rows <= most) return picture;
+  const cv::Size size(std::min(most, picture.cols), std::min(most, picture.rows));
+  log_warning(
+      "{}: expected a texture of at most {} x {} texels, found {} x {}; it is shown reduced to {} x {}. "
+      "Save it smaller.",
+      name, most, most, picture.cols, picture.rows, size.width, size.height);
+  cv::Mat reduced;
+  cv::resize(picture, reduced, size, 0, 0, cv::INTER_AREA);
+  return reduced;
 }
 
 }  // namespace limn::projector

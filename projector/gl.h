@@ -47,4 +47,9 @@ void read_back(const GlName& framebuffer, const cv::Rect& place, cv::Mat* pictur
 /// The colour attachment of a framebuffer, first row first, as a picture of `type` (CV_8UC3 comes as BGR).
 cv::Mat read_back(const GlName& framebuffer, int width, int height, int type, GLenum format);
 
+/// Texels a side that a picture of a scene may have: what the context holds, 4096 at most.
+int largest_texture();
+/// The picture, reduced to largest_texture() where it is larger; that is told, under its name.
+cv::Mat fitting_texture(const cv::Mat& picture, const std::string& name);
+
 }  // namespace limn::projector

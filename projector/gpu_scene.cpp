@@ -11,8 +11,6 @@
 namespace limn::projector {
 namespace {
 
-constexpr int k_largest_look = 4096;  // texels a side
-
 struct GpuMaterial {
   Eigen::Vector4f colour;  // a: 1 when unlit
   Eigen::Vector4f look;    // texture layer (-1 when it has none), metallic, roughness
@@ -119,9 +117,7 @@ TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) 
 // One layer a texture, all brought to the size of the largest, so that one sampler serves and uv stays 0
 // to 1.
 void GpuScene::upload_looks(const std::vector<const scene::Material*>& looks) {
-  GLint most = 0;
-  glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
-  most = std::min(most, k_largest_look);
+  const int most = largest_texture();
   int width = 1, height = 1;
   for (const scene::Material* look : looks) {
     width = std::min(most, std::max(width, look->texture.cols));
@@ -136,17 +132,8 @@ void GpuScene::upload_looks(const std::vector<const scene::Material*>& looks) {
   glTextureParameteri(*looks_, GL_TEXTURE_WRAP_T, GL_REPEAT);
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
   for (std::size_t i = 0; i < looks.size(); ++i) {
-    const cv::Mat& texture = looks[i]->texture;
-    const bool is_too_large = texture.cols > most || texture.rows > most;
-    if (is_too_large)
-      log_warning(
-          "{}: expected a texture of at most {} x {} texels, found {} x {}; it is shown reduced to {} x {}. "
-          "Save it smaller.",
-          looks[i]->texture_file, most, most, texture.cols, texture.rows, std::min(most, texture.cols),
-          std::min(most, texture.rows));
     cv::Mat layer;
-    cv::resize(texture, layer, cv::Size(width, height), 0, 0,
-               is_too_large ? cv::INTER_AREA : cv::INTER_LINEAR);
+    cv::resize(fitting_texture(looks[i]->texture, looks[i]->texture_file), layer, cv::Size(width, height));
     glTextureSubImage3D(*looks_, 0, 0, 0, static_cast<GLint>(i), width, height, 1, GL_BGR, GL_UNSIGNED_BYTE,
                         layer.data);
   }

@@ -222,7 +222,7 @@ struct Renderer::Impl {
     for (std::size_t i = 0; i < rig.projectors.size(); ++i)
       set_arriving(i, cv::Mat(k_arriving_side, k_arriving_side, CV_32F, cv::Scalar(1)));
     const scene::Prototype surface_of = prototype.value_or(scene::Prototype{});
-    const cv::Mat colours = relative_albedo(surface_of);
+    const cv::Mat colours = fitting_texture(relative_albedo(surface_of), "the prototype's albedo");
     mean_albedo = static_cast<float>(mean_albedo_of(surface_of));
     albedo = make_texture(GL_TEXTURE_2D, GL_RGB32F, colours.cols, colours.rows);
     for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})

@@ -97,6 +97,16 @@ TEST_F(BadInput, ATextureBeyondTheLimitIsNamedAndShownReduced) {
   EXPECT_EQ(at(0.05), cv::Vec3b(255, 0, 0));
 }
 
+TEST_F(BadInput, AnAlbedoBeyondTheLimitIsNamedAndReduced) {
+  scene::Scene scene = wall_and_part();
+  scene.prototype->albedo_picture = cv::Mat(8, 5000, CV_8UC3, cv::Scalar(200, 200, 200));
+  testing::internal::CaptureStderr();
+  Renderer drawing = renderer(scene, one_projector());
+  const std::string told = testing::internal::GetCapturedStderr();
+  for (const char* word : {"albedo", "4096 x 4096", "5000 x 8"})
+    EXPECT_NE(told.find(word), std::string::npos) << word << " in: " << told;
+}
+
 TEST_F(BadInput, MoreTrianglesThanTheDriverHoldsAreRefused) {
   GLint64 largest = 0;
   glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &largest);
