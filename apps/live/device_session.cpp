@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <chrono>
-#include <map>
 #include <opencv2/imgproc.hpp>
 #include <thread>
 
+#include "apps/live/camera_threads.h"
 #include "apps/live/latest.h"
 #include "apps/live/scene_watch.h"
-#include "apps/live/source_clock.h"
 #include "apps/live/stopwatch.h"
 #include "core/log.h"
 
@@ -17,15 +16,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr auto k_retry = std::chrono::milliseconds(100);
 constexpr auto k_wait = std::chrono::milliseconds(50);  // for news, before the next picture is painted anyway
 constexpr double k_blend = 0.1;                         // of a new time into the expected one
 
 // The session's clock: all stamps are of it.
 Stamp now() { return std::chrono::time_point_cast<Stamp::duration>(Clock::now()); }
-
-// Newest frames of all cameras that were not watched yet.
-using Frames = std::map<std::string, Frame>;
 
 struct Seen {
   Watched watched;
@@ -49,25 +44,24 @@ class DeviceLoop {
         files_(session->setup().scene.folder) {
     const auto added = [this](const auto& all, const char* kind) {
       std::vector<std::size_t> numbers;
-      for (const auto& device : all) numbers.push_back(device ? health_.add({device->name(), kind}) : 0);
+      for (const auto& device : all) numbers.push_back(device ? health_->add({device->name(), kind}) : 0);
       return numbers;
     };
     const std::vector<std::size_t> cameras = added(devices_->cameras, "camera");
     projectors_ = added(devices_->projectors, "projector");
     screens_ = added(devices_->screens, "screen");
     for (const DeviceState& missing : devices_->missing) {
-      health_.add(missing);
+      health_->add(missing);
       books_->telemetry().note(now(), fmt::format("{} is missing: {}", missing.name, missing.why));
     }
     for (std::size_t i = 0; i < cameras.size(); ++i)
-      if (devices_->cameras[i])
-        threads_.emplace_back([this, i, number = cameras[i]] { grab(devices_->cameras[i].get(), number); });
-    threads_.emplace_back([this] { watch(); });
+      if (devices_->cameras[i]) cameras_.add(std::move(devices_->cameras[i]), cameras[i]);
+    watching_ = std::thread([this] { watch(); });
   }
 
   ~DeviceLoop() {
     is_stopping_ = true;
-    for (std::thread& thread : threads_) thread.join();
+    watching_.join();
   }
 
   // False: the operator ends the session.
@@ -81,7 +75,7 @@ class DeviceLoop {
     paint_s_ += k_blend * (1e-3 * shown.paint_ms - paint_s_);
     show(painted);
     if (osc_) osc_->tell(*session_);
-    shown.missed = static_cast<int>(missed_.exchange(0));
+    shown.missed = static_cast<int>(cameras_.missed());
     const Stamp begun = now();
     const bool wants_screen = !devices_->screens.empty() || (desk_ && desk_->is_due());
     const cv::Mat screen = wants_screen ? session_->screen() : cv::Mat();
@@ -91,51 +85,18 @@ class DeviceLoop {
       books_->shown(shown, painted);
       if (desk_) desk_->shown(shown);
     }
-    for (const std::string& what : health_.news()) {
+    for (const std::string& what : health_->news()) {
       books_->telemetry().note(now(), what);
       log_warning("live: {}", what);
     }
-    return !desk_ || desk_->serve(session_, &books_->telemetry(), health_, screen, now());
+    return !desk_ || desk_->serve(session_, &books_->telemetry(), *health_, screen, now());
   }
 
  private:
-  void grab(device::CameraSource* camera, std::size_t number) try {
-    SourceClock clock;
-    while (!is_stopping_) {
-      Result<Frame> frame = camera->next();
-      if (!frame) {
-        health_.fails(number, frame.message());
-        std::this_thread::sleep_for(k_retry);
-        continue;
-      }
-      if (frame->image.size() != camera->size()) {
-        const cv::Size size = camera->size();
-        health_.fails(number,
-                      fmt::format("expected pictures of {}x{}, found one of {}x{}. Set the mode that the "
-                                  "rig was measured in.",
-                                  size.width, size.height, frame->image.cols, frame->image.rows));
-        continue;
-      }
-      health_.works(number);
-      const SourceClock::Time time = clock.on_session_clock(frame->captured_at, now());
-      if (time.has_stepped)
-        health_.note(camera->name() + "'s clock has stepped; its pictures count from now on");
-      frame->captured_at = time.captured_at;
-      if (clock.is_other()) std::this_thread::sleep_until(frame->captured_at);
-      Frames frames;
-      frames.emplace(frame->camera, std::move(*frame));
-      frames_.put(std::move(frames), [this](const Frames& old, Frames& newest) {
-        for (const auto& [name, frame] : old) missed_ += !newest.emplace(name, frame).second;
-      });
-    }
-  } catch (const std::exception& bug) {
-    health_.note(fmt::format("{}: this is a bug in Limn, please report it: {}", camera->name(), bug.what()));
-  }
-
   void watch() try {
     std::size_t moments = 0;
     while (!is_stopping_) {
-      auto newest = frames_.take(k_wait);
+      auto newest = cameras_.take(k_wait);
       if (!newest) continue;
       std::vector<Frame> frames;
       for (auto& [name, frame] : *newest) frames.push_back(std::move(frame));
@@ -147,7 +108,8 @@ class DeviceLoop {
       });
     }
   } catch (const std::exception& bug) {
-    health_.note(fmt::format("the tracker stopped: this is a bug in Limn, please report it: {}", bug.what()));
+    health_->note(
+        fmt::format("the tracker stopped: this is a bug in Limn, please report it: {}", bug.what()));
   }
 
   void show(const Painted& painted) {
@@ -158,10 +120,10 @@ class DeviceLoop {
       const Stamp begun = now();
       const Result<Stamp> shown_at = display->show(painted.projectors[i]);
       if (!shown_at) {
-        health_.fails(projectors_[i], shown_at.message());
+        health_->fails(projectors_[i], shown_at.message());
         continue;
       }
-      health_.works(projectors_[i]);
+      health_->works(projectors_[i]);
       latest_s = std::max(latest_s, seconds_between(begun, *shown_at));
     }
     if (latest_s > 0) display_s_ += k_blend * (latest_s - display_s_);
@@ -171,7 +133,7 @@ class DeviceLoop {
     for (std::size_t i = 0; i < devices_->screens.size(); ++i) {
       if (!devices_->screens[i]) continue;
       const Result<Stamp> shown_at = devices_->screens[i]->show(fitted(screen, devices_->screens[i]->size()));
-      shown_at ? health_.works(screens_[i]) : health_.fails(screens_[i], shown_at.message());
+      shown_at ? health_->works(screens_[i]) : health_->fails(screens_[i], shown_at.message());
     }
   }
 
@@ -185,14 +147,13 @@ class DeviceLoop {
   OperatorDesk* desk_;
   OscPort* osc_;
   SceneWatch files_;
-  DeviceHealth health_;
+  std::shared_ptr<DeviceHealth> health_ = std::make_shared<DeviceHealth>();
+  CameraThreads cameras_{health_};
   std::vector<std::size_t> projectors_, screens_;  // as health_ calls them
-  Latest<Frames> frames_;
   Latest<Seen> seen_;
   std::atomic<bool> is_stopping_ = false;
-  std::atomic<std::size_t> missed_ = 0;
   double paint_s_ = 0.02, display_s_ = 0.02;  // as expected of the next picture
-  std::vector<std::thread> threads_;
+  std::thread watching_;
 };
 
 cv::Mat DeviceLoop::fitted(const cv::Mat& picture, cv::Size size) {

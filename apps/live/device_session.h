@@ -16,8 +16,8 @@
 
 namespace limn::apps {
 
-/// Opened devices of a session. A camera that is missing at first, or a display, is null: the session goes on
-/// without it.
+/// Opened devices of a session, which takes the cameras with it. A camera that is missing at first, or a
+/// display, is null: the session goes on without it.
 struct SessionDevices {
   std::vector<std::unique_ptr<device::CameraSource>> cameras;  ///< of the rig's names
   std::vector<std::unique_ptr<device::Display>> projectors;    ///< in the rig's order

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "apps/coarser.h"
+#include "apps/live/camera_threads.h"
 #include "apps/live/device_session.h"
 #include "apps/live/latest.h"
 #include "apps/live/replay.h"
@@ -96,6 +97,40 @@ TEST(SourceClock, StampsComeOntoTheSessionsClockAlsoWhenTheirClockSteps) {
   SourceClock video;
   EXPECT_EQ(video.on_session_clock(Stamp{}, begun).captured_at, begun);
   EXPECT_TRUE(video.is_other());
+}
+
+// A camera whose driver searches for it and does not come back.
+class StuckCamera : public device::CameraSource {
+ public:
+  explicit StuckCamera(std::shared_future<void> freed) : freed_(std::move(freed)) {}
+  const std::string& name() const override { return name_; }
+  cv::Size size() const override { return {64, 48}; }
+  Result<Frame> next() override {
+    freed_.wait();
+    return error("camera0: it is gone.");
+  }
+
+ private:
+  std::string name_ = "camera0";
+  std::shared_future<void> freed_;
+};
+
+TEST(CameraThreads, ACameraThatDoesNotComeBackIsLeft) {
+  std::promise<void> freed;
+  auto health = std::make_shared<DeviceHealth>();
+  const std::size_t number = health->add({"camera0", "camera"});
+  auto threads = std::make_unique<CameraThreads>(health);
+  threads->add(std::make_unique<StuckCamera>(freed.get_future().share()), number);
+  EXPECT_FALSE(threads->take(std::chrono::milliseconds(10)).has_value());
+  const auto begun = std::chrono::steady_clock::now();
+  testing::internal::CaptureStderr();
+  threads.reset();
+  EXPECT_NE(testing::internal::GetCapturedStderr().find("camera0 did not come back"), std::string::npos);
+  EXPECT_LT(seconds_between(begun, std::chrono::steady_clock::now()), 1.5);
+  freed.set_value();
+  for (int i = 0; i < 500 && health.use_count() > 1; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_EQ(health.use_count(), 1) << "its thread has ended and taken everything with it";
 }
 
 // Threads as of a real rig, on stored pictures of the studio at their pace; a recording of it replays as the
