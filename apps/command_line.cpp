@@ -406,7 +406,8 @@ void add_live(CLI::App& app, Run& run) {
       "Example: limn live --seconds 5 --out session\n"
       "Example: limn live --devices devices.json --rig rig --scene config/scenes/door --out session --window\n"
       "Example: limn live --rig rig --scene config/scenes/door --seconds 10 --record recording\n"
-      "Example: limn live --osc 9000 --osc-to 127.0.0.1:9001   (docs/osc.md)");
+      "Example: limn live --osc 9000 --osc-to 127.0.0.1:9001   (docs/osc.md)\n"
+      "Example: limn live --window --serve 8080   (docs/remote.md)");
   auto options = std::make_shared<LiveOptions>();
   command->add_option("--rig", options->rig, "rig folder, rig.json or folder of .cameramodel files");
   command->add_option("--scene", options->scene, "scene folder or its scene.json");
@@ -428,6 +429,8 @@ void add_live(CLI::App& app, Run& run) {
   command->add_option("--osc", options->osc, "PORT, or ADDRESS:PORT, where other programs' OSC is heard; a port alone: of this "
                       "machine only");
   command->add_option("--osc-to", options->osc_to, "HOST:PORT that is told by OSC what changes");
+  command->add_option("--serve", options->serve, "PORT, or ADDRESS:PORT, of the remote for phones and tablets; a port alone: of "
+                      "this machine only; on a network encrypted");
   command->add_flag("!--no-refill", options->refill, "leave light that is lost to somebody's shadow lost");
   command->add_option("--extrapolate", options->extrapolate_s, "seconds for which unseen markers are carried on")
       ->capture_default_str();

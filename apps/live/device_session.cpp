@@ -34,13 +34,15 @@ class DeviceLoop {
              Session* session,
              Books* books,
              OperatorDesk* desk,
-             OscPort* osc)
+             OscPort* osc,
+             Server* server)
       : devices_(devices),
         watcher_(watcher),
         session_(session),
         books_(books),
         desk_(desk),
         osc_(osc),
+        server_(server),
         files_(session->setup().scene.folder) {
     const auto added = [this](const auto& all, const char* kind) {
       std::vector<std::size_t> numbers;
@@ -69,12 +71,14 @@ class DeviceLoop {
     if (auto seen = seen_.take(k_wait)) session_->take(std::move(seen->watched), seen->moments);
     session_->show_news(&files_, now());
     if (osc_) osc_->hear(session_, &books_->telemetry(), now());
+    if (server_) server_->hear(session_, now());
     const Stamp painting_at = now();
     const Painted& painted = session_->paint(painting_at, shifted(painting_at, paint_s_ + display_s_));
     ShownFrame shown = session_->measured();
     paint_s_ += k_blend * (1e-3 * shown.paint_ms - paint_s_);
     show(painted);
     if (osc_) osc_->tell(*session_);
+    if (server_) server_->tell(*session_, books_->telemetry(), *health_, now());
     shown.missed = static_cast<int>(cameras_.missed());
     const Stamp begun = now();
     const bool wants_screen = !devices_->screens.empty() || (desk_ && desk_->is_due());
@@ -146,6 +150,7 @@ class DeviceLoop {
   Books* books_;
   OperatorDesk* desk_;
   OscPort* osc_;
+  Server* server_;
   SceneWatch files_;
   std::shared_ptr<DeviceHealth> health_ = std::make_shared<DeviceHealth>();
   CameraThreads cameras_{health_};
@@ -176,7 +181,8 @@ Status play_on_devices(SessionDevices* devices,
                        Session* session,
                        Books* books,
                        OperatorDesk* desk,
-                       OscPort* osc) {
+                       OscPort* osc,
+                       Server* server) {
   const auto any = [](const auto& all) {
     return std::any_of(all.begin(), all.end(), [](const auto& device) { return device != nullptr; });
   };
@@ -185,7 +191,7 @@ Status play_on_devices(SessionDevices* devices,
   if (!any(devices->projectors))
     return error("live: expected a projector that works, found none. Run limn doctor.");
   const Stamp begun = now();
-  DeviceLoop loop(devices, watcher, session, books, desk, osc);
+  DeviceLoop loop(devices, watcher, session, books, desk, osc, server);
   while (!is_ended && !(seconds > 0 && seconds_between(begun, now()) >= seconds)) {
     if (!loop.step()) break;
   }

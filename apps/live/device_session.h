@@ -10,6 +10,7 @@
 #include "apps/live/osc_port.h"
 #include "apps/live/session.h"
 #include "apps/live/watcher.h"
+#include "apps/serve/server.h"
 #include "core/result.h"
 #include "device/camera_source.h"
 #include "device/display.h"
@@ -26,11 +27,11 @@ struct SessionDevices {
 };
 
 /// Plays a session on devices, in real time, until `seconds` are over (0: no end), `is_ended`, or the window
-/// the operator ends it (`desk` and `osc` may be null); at least a camera and a projector must be there. A
-/// thread for each camera takes its newest frame, one thread watches, this one (its GL context current)
-/// paints and shows. Newest wins, nothing queues: what was not taken in time is dropped and counted. Devices
-/// that fail are told of, once, and tried again. Sources with stamps of their own (pictures, videos) are
-/// played at their pace.
+/// the operator ends it (`desk`, `osc` and `server` may be null); at least a camera and a projector must be
+/// there. A thread for each camera takes its newest frame, one thread watches, this one (its GL context
+/// current) paints and shows. Newest wins, nothing queues: what was not taken in time is dropped and counted.
+/// Devices that fail are told of, once, and tried again. Sources with stamps of their own (pictures, videos)
+/// are played at their pace.
 Status play_on_devices(SessionDevices* devices,
                        double seconds,
                        const std::atomic<bool>& is_ended,
@@ -38,6 +39,7 @@ Status play_on_devices(SessionDevices* devices,
                        Session* session,
                        Books* books,
                        OperatorDesk* desk,
-                       OscPort* osc);
+                       OscPort* osc,
+                       Server* server);
 
 }  // namespace limn::apps

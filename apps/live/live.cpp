@@ -17,6 +17,8 @@
 #include "apps/live/session.h"
 #include "apps/live/virtual_session.h"
 #include "apps/live/watcher.h"
+#include "apps/serve/server.h"
+#include "apps/tablet/onlooker.h"
 #include "apps/world_markers.h"
 #include "core/log.h"
 #include "device/desktop.h"
@@ -127,6 +129,17 @@ Status set_up(const LiveOptions& options, SessionSetup* setup) {
   return {};
 }
 
+// The remote; null without one.
+Result<std::unique_ptr<Server>> served(const LiveOptions& options, const SessionSetup& setup) {
+  if (options.serve.empty()) return std::unique_ptr<Server>();
+  ServeOptions serve;
+  serve.at = options.serve;
+  LIMN_TRY(const fs::path own, own_folder());
+  auto onlooker = Onlooker::create(setup, own / "lenses");
+  if (!onlooker) log_warning("live: the remote shows no live pictures: {}", onlooker.message());
+  return Server::open(serve, onlooker ? eyes_of(std::move(*onlooker)) : Eyes{});
+}
+
 Session::Drawing drawing_in(std::optional<device::GlContext>* context) {
   return {[context] { return !*context || (*context)->is_lost(); },
           [context]() -> Status {
@@ -155,6 +168,7 @@ Status play_in_virtual_room(const LiveOptions& options) {
   LIMN_TRY(context, device::GlContext::create());
   log_info("live: {}", context->description());
   LIMN_TRY(OscPort osc, OscPort::open(options.osc, options.osc_to));
+  LIMN_TRY(const std::unique_ptr<Server> server, served(options, setup));
   LIMN_TRY(Books books, Books::open(options.out, options.record, &setup));
   tell(stage.left_out, {}, &books.telemetry());
   LIMN_TRY(Watcher watcher, Watcher::create(setup.scene, setup.rig, setup.watch));
@@ -164,10 +178,12 @@ Status play_in_virtual_room(const LiveOptions& options) {
   if (options.window) {
     LIMN_TRY(const device::Desktop desktop, device::Desktop::open());
     LIMN_TRY(desk, OperatorDesk::open(desktop, setup.scene));
+    if (server) desk->invite(server->invitation());
   }
   LIMN_TRY_STATUS(play_virtually(end_s, g_is_ended, &rig, &room, &watcher, &session, &books,
-                                 desk ? &*desk : nullptr, &osc));
+                                 desk ? &*desk : nullptr, &osc, server.get()));
   desk.reset();
+  if (server) server->stop();
   return books.close(&session, options.json);
 }
 
@@ -218,6 +234,7 @@ Status play_with_devices(const LiveOptions& options) {
   LIMN_TRY(context, device::GlContext::create());
   log_info("live: {}", context->description());
   LIMN_TRY(OscPort osc, OscPort::open(options.osc, options.osc_to));
+  LIMN_TRY(const std::unique_ptr<Server> server, served(options, setup));
   LIMN_TRY(Books books, Books::open(options.out, options.record, &setup));
   tell(left_out, {}, &books.telemetry());
   LIMN_TRY(Watcher watcher, Watcher::create(setup.scene, setup.rig, setup.watch));
@@ -226,10 +243,12 @@ Status play_with_devices(const LiveOptions& options) {
   std::optional<OperatorDesk> desk;
   if (options.window) {
     LIMN_TRY(desk, OperatorDesk::open(*desktop, setup.scene));
+    if (server) desk->invite(server->invitation());
   }
   LIMN_TRY_STATUS(play_on_devices(&open, options.seconds, g_is_ended, &watcher, &session, &books,
-                                  desk ? &*desk : nullptr, &osc));
+                                  desk ? &*desk : nullptr, &osc, server.get()));
   desk.reset();
+  if (server) server->stop();
   return books.close(&session, options.json);
 }
 

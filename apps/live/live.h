@@ -25,6 +25,7 @@ struct LiveOptions {
   double extrapolate_s = 0.3;  ///< for which unseen markers are carried on
   std::string osc;             ///< PORT or ADDRESS:PORT where other programs are heard; empty: not
   std::string osc_to;          ///< HOST:PORT that is told what changes; empty: nobody
+  std::string serve;           ///< PORT or ADDRESS:PORT of the remote (docs/remote.md); empty: none
   bool json = false;
 };
 

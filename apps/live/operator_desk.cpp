@@ -1,8 +1,10 @@
 #include "apps/live/operator_desk.h"
 
 #include <algorithm>
+#include <opencv2/imgproc.hpp>
 
 #include "apps/camera_encoding.h"
+#include "apps/serve/qr_code.h"
 #include "core/log.h"
 
 namespace limn::apps {
@@ -11,7 +13,8 @@ namespace {
 constexpr int k_width = 1600, k_height = 1000;
 constexpr int k_escape = 256;  // GLFW's code
 constexpr std::size_t k_recent = 600, k_notices = 100;
-constexpr double k_pace_s = 1;  // over which devices' pictures are counted
+constexpr double k_module_px = 12;  // of a QR code, so that its edges stay sharp when it is drawn smaller
+constexpr double k_pace_s = 1;      // over which devices' pictures are counted
 
 std::string list_of(const std::vector<BodyMarker>& markers) {
   std::string text;
@@ -62,6 +65,16 @@ Result<OperatorDesk> OperatorDesk::open(const device::Desktop& desktop, const sc
   return OperatorDesk(std::move(window), scene);
 }
 
+void OperatorDesk::invite(const Invitation& invitation) {
+  remote_ = {invitation.url, invitation.fingerprint, {}};
+  for (const Role role : {Role::look, Role::work, Role::operate}) {
+    cv::Mat code = qr_code(invitation.url_for(role));
+    if (!code.empty()) cv::resize(code, code, {}, k_module_px, k_module_px, cv::INTER_NEAREST);
+    remote_->entrances.push_back(
+        {name_of(role), invitation.pins[static_cast<std::size_t>(role)], std::move(code)});
+  }
+}
+
 void OperatorDesk::shown(const ShownFrame& frame) {
   recent_.push_back(frame);
   if (recent_.size() > k_recent) recent_.pop_front();
@@ -108,6 +121,7 @@ OperatorView OperatorDesk::view_of(const Session& session,
   for (const LooseMarker& loose :
        waiting_markers(session.setup().scene, session.staging(), session.watched()))
     view.waiting.push_back(loose.marker.text());
+  view.remote = remote_;
   view.recent = {recent_.begin(), recent_.end()};
   const auto& notes = telemetry.notes();
   const double begun_s = seconds_between(Stamp{}, *begun_at_);

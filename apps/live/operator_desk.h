@@ -10,6 +10,7 @@
 #include "apps/live/operator_panel.h"
 #include "apps/live/session.h"
 #include "apps/live/telemetry.h"
+#include "apps/serve/server.h"
 #include "apps/window/gui_window.h"
 #include "core/result.h"
 #include "device/desktop.h"
@@ -21,6 +22,9 @@ namespace limn::apps {
 class OperatorDesk {
  public:
   static Result<OperatorDesk> open(const device::Desktop& desktop, const scene::Scene& scene);
+
+  /// From now on the window says how guests come in.
+  void invite(const Invitation& invitation);
 
   /// A picture was shown.
   void shown(const ShownFrame& frame);
@@ -42,6 +46,7 @@ class OperatorDesk {
   GuiWindow window_;
   OperatorPanel panel_;
   Keys keys_;
+  std::optional<OperatorView::Remote> remote_;
   std::deque<ShownFrame> recent_;
   cv::Mat screen_;
   double screen_s_ = 0;  // what it cost

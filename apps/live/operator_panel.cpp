@@ -228,6 +228,10 @@ void OperatorPanel::draw_bar(const Gui& gui, const OperatorView& view) {
   if (toggle("Marker rings", staging.marker_states, colour::k_blue, size)) ask("marker_states");
   ImGui::SameLine();
   if (toggle("Grid", staging.grid, colour::k_blue, size)) ask("grid");
+  if (view.remote) {
+    ImGui::SameLine();
+    if (toggle("Remote", shows_remote_, colour::k_blue, size)) shows_remote_ = !shows_remote_;
+  }
   ImGui::SameLine(0, 1.5F * gui.em());
   ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, {10, 0.45F * gui.em()});
   ImGui::AlignTextToFramePadding();
@@ -306,6 +310,37 @@ void OperatorPanel::draw_pictures(Gui& gui, const OperatorView& view, ImVec2 siz
       ImGui::GetWindowDrawList()->AddRect({at.x - 2, at.y + cell_height(gui) - 2},
                                           {at.x + width + 2, at.y + height + 2}, colour::k_blue, 3, 0, 2);
   }
+}
+
+// In place of the pictures: a code for a phone's camera, and the same to type.
+void OperatorPanel::draw_remote(Gui& gui, const OperatorView::Remote& remote, ImVec2 size) {
+  if (remote.entrances.empty()) return;
+  const OperatorView::Remote::Entrance& chosen =
+      remote.entrances[std::min(entrance_, remote.entrances.size() - 1)];
+  const ImVec2 at = ImGui::GetCursorPos(), corner = ImGui::GetCursorScreenPos();
+  const float gap = 1.5F * gui.em(), column = 20 * gui.em();
+  const float side = std::max(1.0F, std::min(size.y, size.x - column - gap));
+  if (!chosen.code.empty()) gui.picture("code of " + chosen.role, chosen.code, corner, {side, side});
+  ImGui::SetCursorPos({at.x + side + gap, at.y});
+  ImGui::BeginChild("remote", {size.x - side - gap, size.y});
+  heading(gui, "Remote");
+  ImGui::PushFont(gui.heading());
+  ImGui::TextUnformatted(remote.url.c_str());
+  ImGui::PopFont();
+  ImGui::TextDisabled("The code pairs for the role that is lit.");
+  ImGui::Dummy({0, 0.4F * gui.em()});
+  for (std::size_t i = 0; i < remote.entrances.size(); ++i)
+    if (toggle(fmt::format("{}   {}", remote.entrances[i].pin, remote.entrances[i].role),
+               &remote.entrances[i] == &chosen, colour::k_blue, {12 * gui.em(), 1.9F * gui.em()}))
+      entrance_ = i;
+  if (!remote.fingerprint.empty()) {
+    ImGui::Dummy({0, 0.4F * gui.em()});
+    ImGui::TextDisabled("SHA-256 of the certificate");
+    constexpr std::size_t k_line = 48;  // sixteen bytes
+    for (std::size_t i = 0; i < remote.fingerprint.size(); i += k_line)
+      ImGui::TextUnformatted(remote.fingerprint.substr(i, k_line - 1).c_str());
+  }
+  ImGui::EndChild();
 }
 
 void OperatorPanel::draw_slots(const Gui& gui, const OperatorView& view) {
@@ -421,7 +456,11 @@ OperatorAsked OperatorPanel::draw(Gui& gui, const OperatorView& view) {
   const float foot = std::clamp(0.24F * room.y, 7 * gui.em(), 13 * gui.em());
   const float left = room.x - column - gap;
   const ImVec2 at = ImGui::GetCursorPos();
-  draw_pictures(gui, view, {left, room.y - foot - gap});
+  const ImVec2 middle{left, room.y - foot - gap};
+  if (shows_remote_ && view.remote)
+    draw_remote(gui, *view.remote, middle);
+  else
+    draw_pictures(gui, view, middle);
   ImGui::SetCursorPos({at.x, at.y + room.y - foot});
   ImGui::BeginChild("telemetry", {std::floor(0.5F * (left - gap)), foot}, false,
                     ImGuiWindowFlags_AlwaysUseWindowPadding | ImGuiWindowFlags_NoScrollbar);

@@ -26,6 +26,7 @@ class OperatorPanel {
                     ImVec2 corner,
                     ImVec2 size,
                     bool is_large);
+  void draw_remote(Gui& gui, const OperatorView::Remote& remote, ImVec2 size);
   void draw_slots(const Gui& gui, const OperatorView& view);
   void draw_looks(const Gui& gui, const OperatorView& view);
   void draw_comparison(const Gui& gui, const scene::Staging& staging);
@@ -38,6 +39,8 @@ class OperatorPanel {
   std::string large_;  // a picture's name; empty: the first
   std::array<char, 65> look_{};
   bool asks_to_end_ = false;
+  bool shows_remote_ = false;
+  std::size_t entrance_ = 1;  // whose code is shown
 };
 
 }  // namespace limn::apps

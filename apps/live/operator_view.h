@@ -45,6 +45,16 @@ struct OperatorView {
     double at_s = 0;
     std::string text;
   };
+  /// How guests come in (docs/remote.md).
+  struct Remote {
+    struct Entrance {
+      std::string role, pin;
+      cv::Mat code;  ///< QR code of the page that pairs by itself
+    };
+    std::string url;
+    std::string fingerprint;  ///< of the certificate; empty without
+    std::vector<Entrance> entrances;
+  };
   double at_s = 0;  ///< of the session's clock, since it began
   std::vector<Picture> cameras, projectors;
   Picture screen;
@@ -55,6 +65,7 @@ struct OperatorView {
   scene::Staging staging;
   std::vector<ShownFrame> recent;  ///< pictures shown, the newest last
   std::vector<Notice> notices;     ///< the newest last
+  std::optional<Remote> remote = {};
 };
 
 /// What a person asked for.

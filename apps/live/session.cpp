@@ -201,6 +201,7 @@ Status Session::edit(const scene::Edit& wanted, const std::string& source, Stamp
       edit.value = waiting.back().marker.text();
   LIMN_TRY(scene::Staging changed, scene::edited(setup_.scene, staging_, painted_.posed, edit));
   std::swap(staging_, changed);
+  last_edit_ = Edited{edit, source, last_edit_ ? last_edit_->count + 1 : 1};
   if (recorder_) recorder_->edited(edit, source, moments_);
   if (telemetry_)
     telemetry_->note(at, fmt::format("{}{}{}{}{} ({})", edit.action, edit.slot.empty() ? "" : " ", edit.slot,

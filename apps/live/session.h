@@ -19,6 +19,13 @@
 
 namespace limn::apps {
 
+/// An edit that was done, and whose it was.
+struct Edited {
+  scene::Edit edit;
+  std::string source;
+  std::size_t count = 0;  ///< of all that were done so far
+};
+
 /// Names parts that could not be loaded. `telemetry` may be null.
 void tell(std::span<const scene::LeftOut> left_out, Stamp at, Telemetry* telemetry);
 
@@ -68,6 +75,8 @@ class Session {
   const SessionSetup& setup() const { return setup_; }
   /// How many scenes were shown so far, the first one included: another number, another setup().scene.
   int scenes() const { return scenes_; }
+  /// The newest edit.
+  const std::optional<Edited>& last_edit() const { return last_edit_; }
   /// What the last paint() was made of and cost: stamps, times, markers, lost bodies; the rest is the
   /// caller's. record_ms is -1 without a recording.
   ShownFrame measured() const;
@@ -103,6 +112,7 @@ class Session {
   Stamp compared_cameras_at_;
   bool told_swapped_ = false;
   int scenes_ = 1;
+  std::optional<Edited> last_edit_;
   double paint_ms_ = 0, record_ms_ = 0;
 };
 

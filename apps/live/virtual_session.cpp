@@ -61,7 +61,8 @@ class VirtualLoop {
               Session* session,
               Books* books,
               OperatorDesk* desk,
-              OscPort* osc)
+              OscPort* osc,
+              Server* server)
       : rig_(rig),
         room_(room),
         watcher_(watcher),
@@ -69,6 +70,7 @@ class VirtualLoop {
         books_(books),
         desk_(desk),
         osc_(osc),
+        server_(server),
         files_(session->setup().scene.folder) {
     for (const Imager& camera : rig->world().rig.cameras)
       cameras_.push_back(health_.add({camera.name, "camera"}));
@@ -91,6 +93,7 @@ class VirtualLoop {
     play_edits(exposed_at);
     session_->show_news(&files_, rig_->now());
     if (osc_) osc_->hear(session_, &books_->telemetry(), rig_->now());
+    if (server_) server_->hear(session_, rig_->now());
     const Painted& painted = session_->paint(rig_->now(), shifted(rig_->now(), k_virtual_display_s));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i) {
       if (!is_plugged(session_->setup().rig.projectors[i].name, projectors_[i], rig_->now())) continue;
@@ -98,6 +101,7 @@ class VirtualLoop {
       LIMN_CHECK(shown_at == painted.shown_at);
     }
     if (osc_) osc_->tell(*session_);
+    if (server_) server_->tell(*session_, books_->telemetry(), health_, rig_->now());
     ShownFrame shown = session_->measured();
     if (shown.record_ms >= 0) shown.record_ms += frames_ms;
     shown.missed = static_cast<int>(rig_->world().rig.cameras.size() - frames.size());
@@ -147,6 +151,7 @@ class VirtualLoop {
   Books* books_;
   OperatorDesk* desk_;
   OscPort* osc_;
+  Server* server_;
   SceneWatch files_;
   DeviceHealth health_;
   std::vector<std::size_t> cameras_, projectors_;  // as health_ calls them
@@ -163,8 +168,9 @@ Status play_virtually(double end_s,
                       Session* session,
                       Books* books,
                       OperatorDesk* desk,
-                      OscPort* osc) {
-  VirtualLoop loop(rig, room, watcher, session, books, desk, osc);
+                      OscPort* osc,
+                      Server* server) {
+  VirtualLoop loop(rig, room, watcher, session, books, desk, osc, server);
   std::optional<Progress> progress;
   if (std::isfinite(end_s)) progress.emplace("live", static_cast<int>(std::ceil(end_s)));
   while (!is_ended && seconds_of(rig->next_exposure()) <= end_s) {

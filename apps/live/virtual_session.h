@@ -8,6 +8,7 @@
 #include "apps/live/script.h"
 #include "apps/live/session.h"
 #include "apps/live/watcher.h"
+#include "apps/serve/server.h"
 #include "core/result.h"
 #include "sim/virtual_rig.h"
 
@@ -17,8 +18,8 @@ namespace limn::apps {
 constexpr double k_virtual_camera_s = 0.020, k_virtual_display_s = 0.040;
 
 /// Plays a session on a virtual rig, on its clock: nothing sleeps, every run is the same. In step: expose,
-/// watch, paint, show. Ends at `end_s` of the clock, with `is_ended`, or when the operator ends it (`desk`
-/// and `osc` may be null).
+/// watch, paint, show. Ends at `end_s` of the clock, with `is_ended`, or when the operator ends it (`desk`,
+/// `osc` and `server` may be null).
 Status play_virtually(double end_s,
                       const std::atomic<bool>& is_ended,
                       sim::VirtualRig* rig,
@@ -27,6 +28,7 @@ Status play_virtually(double end_s,
                       Session* session,
                       Books* books,
                       OperatorDesk* desk,
-                      OscPort* osc);
+                      OscPort* osc,
+                      Server* server);
 
 }  // namespace limn::apps

@@ -55,7 +55,7 @@ std::vector<Quoted> quoted_commands(const fs::path& page) {
 TEST(Documents, EveryCommandAndOptionExists) {
   std::map<std::string, std::string> helps;
   std::size_t options = 0;
-  for (const char* page : {"README.md", "docs/setting-up.md", "docs/osc.md", "config/README.md"}) {
+  for (const char* page : {"README.md", "docs/setting-up.md", "docs/osc.md", "docs/remote.md", "config/README.md"}) {
     for (const Quoted& quoted : quoted_commands(page)) {
       auto help = helps.find(quoted.command);
       if (help == helps.end()) {
@@ -95,7 +95,7 @@ TEST(Documents, QuoteWhatLimnPlanPrints) {
 
 TEST(Documents, NameFilesThatAreThere) {
   static const std::regex path(R"((config/[a-z/-]+\.(?:json|glb)|docs/[a-z-]+\.md))");
-  for (const char* page : {"README.md", "docs/setting-up.md", "docs/osc.md"}) {
+  for (const char* page : {"README.md", "docs/setting-up.md", "docs/osc.md", "docs/remote.md"}) {
     const std::string text = read_file(k_source / page).value();
     for (std::sregex_iterator at(text.begin(), text.end(), path), end; at != end; ++at)
       EXPECT_TRUE(fs::exists(k_source / at->str())) << page << ": " << at->str();

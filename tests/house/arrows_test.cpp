@@ -44,6 +44,8 @@ const std::map<std::string, Rooms>& guests() {
       {"CLI/", {"apps"}},
       {"imgui", {"apps"}},
       {"boost/", {"apps"}},
+      {"openssl/", {"apps"}},
+      {"qrencode", {"apps"}},
       {"turbojpeg", {"device"}},
       {"zip.h", {"apps"}},
       {"lo/", {"apps"}},

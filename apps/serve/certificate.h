@@ -1,0 +1,32 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+
+namespace limn::apps {
+
+/// How long a certificate is good for, and when before its end another one is made. Phones take no more than
+/// 825 days.
+constexpr int k_certificate_days = 800, k_renewed_days_before = 30;
+
+/// What the server shows itself with.
+struct Certificate {
+  std::string pem;          ///< private key (EC P-256), then the certificate that it signed itself
+  std::string fingerprint;  ///< SHA-256 of the certificate, "AB:CD:…"
+};
+
+/// The certificate in `folder`/remote.pem, for these hosts (names and numeric addresses). One is made when
+/// there is none, when it is not for one of the hosts, or when it ends soon; the file then is either old or
+/// complete, and nobody but its owner can read it. Error: somebody else can, or the file holds something
+/// else.
+Result<Certificate> certificate_in(const std::filesystem::path& folder,
+                                   const std::vector<std::string>& hosts);
+
+/// Where Limn keeps what belongs to a person: $XDG_CONFIG_HOME/limn, else ~/.config/limn. Error: neither is
+/// known.
+Result<std::filesystem::path> own_folder();
+
+}  // namespace limn::apps

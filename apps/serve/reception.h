@@ -1,0 +1,174 @@
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <map>
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "apps/serve/backroom.h"
+#include "apps/serve/eyes.h"
+#include "apps/serve/guests.h"
+#include "apps/serve/http.h"
+#include "apps/serve/messages.h"
+#include "apps/serve/part_pictures.h"
+#include "apps/serve/state.h"
+#include "apps/serve/static_files.h"
+#include "apps/serve/visitor.h"
+#include "scene/comments.h"
+
+namespace limn::apps {
+
+/// Edits that wait for the session at once; with one more they are refused.
+constexpr std::size_t k_most_wishes = 256;
+/// How long the session may take over an edit before HTTP answers that it did not come.
+constexpr std::chrono::seconds k_longest_wish{10};
+/// Between two room pictures, and how long a frame of the window may take before the next one is looked at.
+constexpr std::chrono::milliseconds k_between_rooms{66}, k_longest_look{10000};
+
+/// Of a project's comments, how many the state has: the newest.
+constexpr std::size_t k_told_comments = 100;
+
+/// An edit that a guest wants, and what became of it.
+struct Wish {
+  std::uint64_t number = 0;
+  scene::Edit edit;
+  std::string who;
+  std::chrono::steady_clock::time_point since;  ///< too late after k_longest_wish: it was refused by then
+};
+struct Outcome {
+  std::uint64_t number = 0;
+  std::string why;  ///< it was not done; empty: it was
+};
+
+/// News of the session.
+struct SessionNews {
+  SessionState state;
+  std::vector<cv::Mat> projectors;  ///< what they show, 8-bit BGR; nobody writes into them any more
+  std::vector<scene::Look> looks;
+  std::shared_ptr<const scene::Scene> scene;
+  std::vector<Outcome> outcomes;  ///< of wishes; the state has them
+};
+
+/// Where guests arrive: who may come in, what they may have, who is told what (docs/remote.md). Belongs to
+/// the thread of the network and knows nothing of it: requests go in, answers come out.
+class Reception {
+ public:
+  using Clock = std::chrono::steady_clock;
+  struct Setup {
+    bool is_encrypted = false;
+    bool is_loopback = true;  ///< only this machine's own names are answered
+    StaticFiles files;
+    Eyes eyes;
+    Backroom* backroom = nullptr;
+    std::function<void(Wish)> wish;                   ///< to the session
+    std::function<void(bool)> watched;                ///< whether anybody is paired
+    std::function<void(std::function<void()>)> post;  ///< runs it on this object's thread; from any thread
+  };
+  explicit Reception(Setup setup);
+
+  const Guests& guests() const { return guests_; }
+
+  /// Answers once, maybe later, from any thread.
+  void answer(const HttpRequest& request, Answering answering);
+  /// For a request of /api/live: who comes in, or why not.
+  std::variant<std::shared_ptr<Visitor>, HttpAnswer> admit(const HttpRequest& request);
+  /// Once the visitor's `wake` is there.
+  void greet(const std::shared_ptr<Visitor>& visitor);
+  void hear_text(const std::shared_ptr<Visitor>& visitor, std::string_view text);
+  void hear_bytes(const std::shared_ptr<Visitor>& visitor, std::span<const std::uint8_t> bytes);
+  void gone(const std::shared_ptr<Visitor>& visitor);
+
+  void take(SessionNews news);
+  /// Some ten times a second: what time brings.
+  void tick(Clock::time_point now);
+  /// Says goodbye to all.
+  void close(const std::string& why);
+  /// When that thread is no more: lets go of the eyes, which answer for the last time.
+  void blind() { setup_.eyes = {}; }
+
+  std::size_t visitor_count() const { return visitors_.size(); }
+
+ private:
+  struct Asked {
+    Guests::Guest guest;
+    std::string path;
+    std::string body;
+    std::string etag;
+  };
+  struct Route;
+  static const std::vector<Route>& routes();
+  std::optional<HttpAnswer> refuse(const HttpRequest& request) const;
+  std::optional<Guests::Guest> guest_of(const HttpRequest& request) const;
+  HttpAnswer file(const HttpRequest& request, const std::string& path) const;
+  HttpAnswer pair(const HttpRequest& request);
+
+  void get_state(const Asked& asked, Answering answering);
+  void get_actions(const Asked& asked, Answering answering);
+  void get_room(const Asked& asked, Answering answering);
+  void get_projector(const Asked& asked, Answering answering);
+  void get_look_picture(const Asked& asked, Answering answering);
+  void get_look_assembly(const Asked& asked, Answering answering);
+  void get_variant_picture(const Asked& asked, Answering answering);
+  void do_in_backroom(std::function<HttpAnswer()> job, Answering answering);
+  void post_comment(const Asked& asked, Answering answering);
+  void post_edit(const Asked& asked, Answering answering);
+  void post_leave(const Asked& asked, Answering answering);
+
+  using Done = std::function<void(const std::string& why, std::uint64_t number)>;
+  /// `done` is called when the state has it; why it cannot be tried at all.
+  std::optional<HttpAnswer> wish(const Guests::Guest& guest, const scene::Edit& edit, Done done);
+  /// The same for a comment: `done` is called when it is saved.
+  std::optional<HttpAnswer> remark(const Guests::Guest& guest, const Remark& remark, Done done);
+  void load_comments();
+  Done answer_to(const std::shared_ptr<Visitor>& visitor, std::uint64_t id);
+  void refuse(const std::shared_ptr<Visitor>& visitor, std::uint64_t id, const HttpAnswer& refused);
+  void hear(const std::shared_ptr<Visitor>& visitor, const EditMessage& message);
+  void hear(const std::shared_ptr<Visitor>& visitor, const RemarkMessage& message);
+  void hear(const std::shared_ptr<Visitor>& visitor, const PicturesMessage& message);
+  void hear(const std::shared_ptr<Visitor>& visitor, const SeenMessage& message);
+  void hear(const std::shared_ptr<Visitor>& visitor, const WindowMessage& message);
+  void refuse(const std::shared_ptr<Visitor>& visitor,
+              std::optional<std::uint64_t> id,
+              const std::string& why);
+  void look(const std::shared_ptr<Visitor>& visitor, Visitor::Frame frame);
+  void looked(const std::shared_ptr<Visitor>& visitor, std::uint32_t number, const Eyes::Seen& seen);
+  void ask_for_room(Clock::time_point now);
+  void room_came(Eyes::Seen seen);
+  void publish();
+
+  struct Waiting {
+    Done done;
+    Clock::time_point since;
+  };
+  struct Encoded {
+    cv::Mat picture;
+    std::shared_ptr<const std::string> jpeg;
+  };
+
+  Setup setup_;
+  Guests guests_;
+  std::vector<std::shared_ptr<Visitor>> visitors_;
+  std::optional<SessionNews> news_;
+  std::string told_;  // the state, but for its number
+  std::shared_ptr<const std::string> state_;
+  std::uint64_t number_ = 0, edit_number_ = 0;
+  std::size_t edit_count_ = 0;
+  std::map<std::uint64_t, Waiting> wishes_;
+  std::uint64_t last_wish_ = 0;
+  std::optional<Result<std::vector<scene::Comment>>> comments_;  // none before the first news
+  bool room_is_asked_ = false;
+  Clock::time_point room_asked_at_;
+  std::vector<std::uint8_t> room_jpeg_;
+  std::shared_ptr<const std::string> room_message_;
+  std::uint32_t room_number_ = 0;
+  std::shared_ptr<std::map<std::string, Encoded>> encoded_;  // of projectors; the backroom's alone
+  std::shared_ptr<PartPictures> part_pictures_;              // likewise
+};
+
+}  // namespace limn::apps

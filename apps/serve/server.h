@@ -1,0 +1,89 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/live/device_health.h"
+#include "apps/live/session.h"
+#include "apps/live/telemetry.h"
+#include "apps/serve/backroom.h"
+#include "apps/serve/eyes.h"
+#include "apps/serve/network.h"
+#include "apps/serve/reception.h"
+#include "core/result.h"
+
+namespace limn::apps {
+
+struct ServeOptions {
+  std::string at;                 ///< PORT (of this machine alone) or ADDRESS:PORT; port 0: any free one
+  std::filesystem::path page;     ///< the page's files; empty: Limn's own
+  std::filesystem::path keys;     ///< of the certificate; empty: Limn's own folder
+  bool always_encrypted = false;  ///< TLS on the loopback, too
+  NetworkLimits limits = {};
+};
+
+/// What people are to know who want to come in.
+struct Invitation {
+  std::string url;                  ///< "https://192.168.7.2:8443/"
+  std::string fingerprint;          ///< of the certificate, SHA-256; empty without TLS
+  std::array<std::string, 3> pins;  ///< by Role
+
+  /// The page that pairs by itself: what a QR code says.
+  std::string url_for(Role role) const { return url + "#pin=" + pins[static_cast<std::size_t>(role)]; }
+};
+
+/// The remote of a session (docs/remote.md): guests on its network. hear() and tell() belong to the session's
+/// thread and never wait; everything else happens on threads of the server's own.
+class Server {
+ public:
+  /// Tells on stderr where it is and the PINs. Errors name the option. `eyes` may be
+  /// empty.
+  static Result<std::unique_ptr<Server>> open(const ServeOptions& options, Eyes eyes);
+  ~Server();
+
+  /// Does what guests want, at most k_most_at_once edits; the others wait for the next call. What cannot be
+  /// done is answered to who wanted it.
+  void hear(Session* session, Stamp at);
+  /// Lets guests know: at once after an edit, else twenty times a second, and once a second while there are
+  /// none.
+  void tell(const Session& session, const Telemetry& telemetry, const DeviceHealth& health, Stamp at);
+  /// Says goodbye to all, lets go of the eyes and ends the threads.
+  void stop();
+
+  const Invitation& invitation() const { return invitation_; }
+  int port() const { return network_->port(); }
+
+  static constexpr std::size_t k_most_at_once = 64;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Server() = default;
+
+  Invitation invitation_;
+  Backroom backroom_;
+  std::unique_ptr<Reception> reception_;
+  std::unique_ptr<Network> network_;
+  std::atomic<bool> is_watched_ = false;  // somebody is paired
+
+  std::mutex mutex_;
+  std::vector<Wish> wishes_;         // for the session
+  std::optional<SessionNews> news_;  // for the network
+  bool is_news_posted_ = false;
+
+  std::vector<Outcome> outcomes_;  // the session's alone, as the rest
+  std::function<void(const Session&)> know_;
+  std::shared_ptr<const scene::Scene> scene_;
+  int scenes_ = 0;
+  std::optional<Clock::time_point> told_at_;
+  std::optional<Stamp> begun_at_;
+  std::size_t told_edits_ = 0;
+};
+
+}  // namespace limn::apps

@@ -1,0 +1,137 @@
+#include "apps/serve/state.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "core/config.h"
+
+namespace limn::apps {
+namespace {
+
+constexpr double k_same_m = 0.05e-3, k_same_rad = 0.03 * std::numbers::pi / 180;
+constexpr std::size_t k_most_notes = 20;
+
+std::string sight_of(const std::vector<Track>& tracks, const std::string& body) {
+  for (const Track& track : tracks) {
+    if (track.body != body || track.sight == Sight::lost) continue;
+    return track.sight == Sight::measured ? "seen" : "carried on";
+  }
+  return "lost";
+}
+
+SessionState::Slot slot_of(const Session& session, std::size_t index) {
+  const scene::Scene& scene = session.setup().scene;
+  const scene::Slot& slot = scene.slots[index];
+  const scene::Staging::Slot& staged = session.staging().slots[index];
+  SessionState::Slot out;
+  out.name = slot.name;
+  out.variant = staged.variant;
+  for (const scene::Variant& variant : slot.variants) {
+    out.variants.push_back(variant.name);
+    if (variant.dropped) out.dropped.push_back(variant.name);
+  }
+  out.nudge_mm = 1e3 * staged.nudge;
+  out.is_held = staged.pin || !staged.nudge.isZero();
+  out.sight = sight_of(session.painted().tracks, slot.name);
+  out.marker = scene::carrier(scene, session.staging(), index).text();
+  const scene::PosedScene& posed = session.painted().posed;
+  const Pose from_world = posed.world_from_prototype ? posed.world_from_prototype->inverse() : Pose{};
+  for (const scene::PosedPart& part : posed.parts)
+    if (part.slot == slot.name) out.prototype_from_part = from_world * part.world_from_part;
+  return out;
+}
+
+// A millimetre's thousandth, for people and for short messages.
+double rounded(double value) { return std::round(1e3 * value) / 1e3; }
+
+nlohmann::ordered_json to_json(const SessionState::Slot& slot) {
+  nlohmann::ordered_json out = {
+      {"name", slot.name},
+      {"variant", slot.variant},
+      {"variants", slot.variants},
+      {"nudge_mm", {rounded(slot.nudge_mm.x()), rounded(slot.nudge_mm.y()), rounded(slot.nudge_mm.z())}},
+      {"is_held", slot.is_held},
+      {"sight", slot.sight},
+      {"marker", slot.marker},
+      {"dropped", slot.dropped}};
+  if (slot.prototype_from_part) out["prototype_from_part"] = limn::to_json(*slot.prototype_from_part);
+  return out;
+}
+
+}  // namespace
+
+SessionState state_of(const Session& session,
+                      const Telemetry& telemetry,
+                      const DeviceHealth& health,
+                      Stamp begun_at) {
+  const scene::Scene& scene = session.setup().scene;
+  const scene::Staging& staging = session.staging();
+  SessionState out;
+  for (std::size_t i = 0; i < scene.slots.size(); ++i) out.slots.push_back(slot_of(session, i));
+  if (scene.prototype) out.prototype = sight_of(session.painted().tracks, "prototype");
+  for (const scene::Look& look : staging.looks) out.looks.push_back(look.name);
+  out.look = staging.look;
+  out.other_look = staging.other_look;
+  if (staging.deleted_look) out.deleted_look = staging.deleted_look->name;
+  out.blackout = staging.blackout;
+  out.frozen = staging.frozen;
+  out.grid = staging.grid;
+  out.marker_states = staging.marker_states;
+  out.split = staging.split;
+  out.split_mm = staging.split_mm;
+  out.screen = scene::screen_names()[static_cast<std::size_t>(staging.screen)];
+  for (const Imager& projector : session.setup().rig.projectors) out.projectors.push_back(projector.name);
+  out.devices = health.all();
+  for (const LooseMarker& loose : waiting_markers(scene, staging, session.watched()))
+    out.waiting.push_back(loose.marker.text());
+  const auto& notes = telemetry.notes();
+  const double begun_s = seconds_between(Stamp{}, begun_at);
+  for (std::size_t i = notes.size() > k_most_notes ? notes.size() - k_most_notes : 0; i < notes.size(); ++i)
+    out.notes.push_back({notes[i].first - begun_s, notes[i].second});
+  out.last_edit = session.last_edit();
+  return out;
+}
+
+SessionState steadied(SessionState state, const SessionState& told) {
+  for (std::size_t i = 0; i < std::min(state.slots.size(), told.slots.size()); ++i) {
+    auto& pose = state.slots[i].prototype_from_part;
+    const auto& before = told.slots[i].prototype_from_part;
+    if (pose && before && (pose->translation - before->translation).norm() <= k_same_m &&
+        angle_between(pose->rotation, before->rotation) <= k_same_rad)
+      pose = before;
+  }
+  return state;
+}
+
+nlohmann::ordered_json to_json(const SessionState& state) {
+  nlohmann::ordered_json out;
+  out["slots"] = nlohmann::ordered_json::array();
+  for (const SessionState::Slot& slot : state.slots) out["slots"].push_back(to_json(slot));
+  if (!state.prototype.empty()) out["prototype"] = state.prototype;
+  out["looks"] = state.looks;
+  out["look"] = state.look;
+  out["other_look"] = state.other_look;
+  out["deleted_look"] = state.deleted_look;
+  out["blackout"] = state.blackout;
+  out["frozen"] = state.frozen;
+  out["grid"] = state.grid;
+  out["marker_states"] = state.marker_states;
+  out["split"] = state.split;
+  out["split_mm"] = state.split_mm;
+  out["screen"] = state.screen;
+  out["screens"] = scene::screen_names();
+  out["projectors"] = state.projectors;
+  out["devices"] = nlohmann::ordered_json::array();
+  for (const DeviceState& device : state.devices)
+    out["devices"].push_back(
+        {{"name", device.name}, {"kind", device.kind}, {"works", device.works}, {"why", device.why}});
+  out["waiting"] = state.waiting;
+  out["notes"] = nlohmann::ordered_json::array();
+  for (const SessionState::Note& note : state.notes)
+    out["notes"].push_back({{"at_s", rounded(note.at_s)}, {"text", note.text}});
+  return out;
+}
+
+}  // namespace limn::apps

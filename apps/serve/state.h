@@ -1,0 +1,58 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "apps/live/device_health.h"
+#include "apps/live/session.h"
+#include "apps/live/telemetry.h"
+#include "core/pose.h"
+#include "scene/staging.h"
+
+namespace limn::apps {
+
+/// What a guest of the remote is told of a session, but for who is there: "The state" of docs/remote.md.
+struct SessionState {
+  struct Slot {
+    std::string name, variant;
+    std::vector<std::string> variants;
+    Eigen::Vector3d nudge_mm = Eigen::Vector3d::Zero();
+    bool is_held = false;
+    std::string sight;
+    std::string marker;
+    std::vector<std::string> dropped;
+    std::optional<Pose> prototype_from_part;  ///< absent: the part is not shown
+  };
+  struct Note {
+    double at_s = 0;  ///< since the session began
+    std::string text;
+  };
+  std::vector<Slot> slots;
+  std::string prototype;  ///< its sight; empty: the scene has none
+  std::vector<std::string> looks;
+  std::string look, other_look, deleted_look;
+  bool blackout = false, frozen = false, grid = false, marker_states = false, split = false;
+  double split_mm = 0;
+  std::string screen;
+  std::vector<std::string> projectors;
+  std::vector<DeviceState> devices;
+  std::vector<std::string> waiting;
+  std::vector<Note> notes;  ///< the newest last
+  std::optional<Edited> last_edit;
+};
+
+/// `begun_at`: of the session, from which notes are dated.
+SessionState state_of(const Session& session,
+                      const Telemetry& telemetry,
+                      const DeviceHealth& health,
+                      Stamp begun_at);
+
+/// Poses that differ from `told` by what a tracker trembles (0.05 mm, 0.03 degrees) as they were told.
+SessionState steadied(SessionState state, const SessionState& told);
+
+/// Its members of the message, but for number, last_edit, guests and comments.
+nlohmann::ordered_json to_json(const SessionState& state);
+
+}  // namespace limn::apps

@@ -1,0 +1,88 @@
+// What guests of the remote send: messages, bodies, paths, cookies, frames.
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "apps/serve/http.h"
+#include "apps/serve/messages.h"
+#include "tests/fuzz/fuzz_file.h"
+
+namespace limn::apps {
+namespace {
+
+// Told to the guest as JSON: UTF-8, short, and what was expected.
+void check_refusal(const std::string& message) {
+  LIMN_CHECK(message.find("expected") != std::string::npos && message.size() < 500);
+  static_cast<void>(nlohmann::json(message).dump());
+}
+
+void check_word(const std::string& word, std::size_t longest) {
+  LIMN_CHECK(word.size() <= longest);
+  LIMN_CHECK(std::none_of(word.begin(), word.end(), [](char c) { return c >= 0 && c < 0x20 && c != '\n'; }));
+  static_cast<void>(nlohmann::json(word).dump());
+}
+
+void check_edit(const scene::Edit& edit) {
+  const auto& actions = scene::actions();
+  LIMN_CHECK(std::any_of(actions.begin(), actions.end(),
+                         [&](const scene::Action& action) { return action.name == edit.action; }));
+  check_word(edit.slot, k_longest_word);
+  check_word(edit.value, k_longest_word);
+}
+
+void check_remark(const Remark& remark) {
+  check_word(remark.look, k_longest_word);
+  check_word(remark.slot, k_longest_word);
+  check_word(remark.text, scene::k_longest_comment);
+}
+
+void check_message(const Message& message) {
+  if (const auto* edit = std::get_if<EditMessage>(&message)) check_edit(edit->edit);
+  if (const auto* remark = std::get_if<RemarkMessage>(&message)) check_remark(remark->remark);
+  if (const auto* window = std::get_if<WindowMessage>(&message))
+    LIMN_CHECK(window->device.find_first_of("./\\ ") == std::string::npos && window->device.size() >= 8);
+}
+
+void check_bodies(const std::string& text) {
+  if (const auto wish = pair_of_body(text); wish)
+    LIMN_CHECK(wish->pin.size() == 6 && wish->name.size() <= k_longest_guest_name && !wish->name.empty());
+  else
+    check_refusal(wish.message());
+  if (const auto edit = edit_of_body(text); edit)
+    check_edit(*edit);
+  else
+    check_refusal(edit.message());
+  if (const auto remark = remark_of_body(text); remark)
+    check_remark(*remark);
+  else
+    check_refusal(remark.message());
+}
+
+void check_http(const std::string& text) {
+  static_cast<void>(cookie_in(text, "limn"));
+  static_cast<void>(host_in(text));
+  const auto path = path_of(text);
+  LIMN_CHECK(!path || (path->front() == '/' && path->find('?') == std::string::npos));
+  if (const auto name = decoded(text))
+    LIMN_CHECK(name->find('/') == std::string::npos && name->find('\0') == std::string::npos);
+}
+
+}  // namespace
+}  // namespace limn::apps
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
+  using namespace limn::apps;
+  const std::string text(reinterpret_cast<const char*>(bytes), size);
+  if (const auto message = message_of(text); message) {
+    check_message(*message);
+  } else {
+    check_refusal(message.message());
+    static_cast<void>(id_of(text));
+  }
+  check_bodies(text);
+  check_http(text);
+  if (const auto frame = frame_of({bytes, size}); frame)
+    LIMN_CHECK(frame->jpeg.size() + 4 == size && frame->jpeg.data() == bytes + 4);
+  else
+    check_refusal(frame.message());
+  return 0;
+}
