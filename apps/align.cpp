@@ -13,6 +13,7 @@
 #include "core/picture.h"
 #include "core/rig.h"
 #include "scene/drawn.h"
+#include "scene/marker_file.h"
 #include "scene/scene.h"
 #include "tracker/body_pose.h"
 #include "tracker/detector.h"
@@ -78,20 +79,11 @@ Result<Shot> read_shot(const std::string& argument, const Rig& rig) {
   return Shot{&*camera, std::move(picture)};
 }
 
-// All cameras' markers at once.
-Result<Start> start_from_markers(const AlignCommand& command) {
-  if (command.rig.empty() || command.frames.empty())
-    return usage_error("--scene: the markers of its prototype need --rig RIG and --frame CAMERA=PICTURE.");
+// Where a body stands in the frames, by all cameras' markers at once.
+Result<Track> track_in_frames(const AlignCommand& command, const Body& body, const fs::path& family_folder) {
   LIMN_TRY(const Rig rig, load_rig(command.rig));
-  LIMN_TRY(const scene::Scene scene, scene::load_scene(command.scene));
-  const std::vector<Body> bodies = scene::bodies(scene);
-  const auto body =
-      std::find_if(bodies.begin(), bodies.end(), [](const Body& b) { return b.name == "prototype"; });
-  if (body == bodies.end() || body->markers.empty())
-    return error("{}: expected markers on the prototype (prototype.markers), found none.",
-                 command.scene.string());
   LIMN_TRY(tracker::Families families,
-           tracker::Families::load(tracker::families_of({&*body, 1}), scene.folder));
+           tracker::Families::load(tracker::families_of({&body, 1}), family_folder));
   tracker::Detector detector(std::move(families));
   std::vector<Shot> shots;
   std::vector<std::vector<tracker::Detection>> detections;
@@ -102,25 +94,51 @@ Result<Start> start_from_markers(const AlignCommand& command) {
   }
   std::vector<tracker::View> views;
   for (std::size_t i = 0; i < shots.size(); ++i) views.push_back({shots[i].camera, detections[i]});
-  const auto track = tracker::world_from_body(*body, views, Stamp{});
+  const auto track = tracker::world_from_body(body, views, Stamp{});
   if (!track)
     return error(
         "--frame: expected markers of the prototype in the picture, found none of its {}. Look at light and "
         "focus.",
-        body->markers.size());
-  log_info("align: start from {} markers, {:.2f} px", track->marker_count, track->rms_px);
-  return Start{track->world_from_body, track->covariance, fmt::format("{} markers", track->marker_count)};
+        body.markers.size());
+  return *track;
 }
 
-// A scene without frames gives its mesh alone.
+Result<Start> start_from_markers(const AlignCommand& command) {
+  if (command.rig.empty() || command.frames.empty())
+    return usage_error("--scene: the markers of its prototype need --rig RIG and --frame CAMERA=PICTURE.");
+  LIMN_TRY(const scene::Scene scene, scene::load_scene(command.scene));
+  const std::vector<Body> bodies = scene::bodies(scene);
+  const auto body =
+      std::find_if(bodies.begin(), bodies.end(), [](const Body& b) { return b.name == "prototype"; });
+  if (body == bodies.end() || body->markers.empty())
+    return error("{}: expected markers on the prototype (prototype.markers), found none.",
+                 command.scene.string());
+  LIMN_TRY(const Track track, track_in_frames(command, *body, scene.folder));
+  log_info("align: start from {} markers, {:.2f} px", track.marker_count, track.rms_px);
+  return Start{track.world_from_body, track.covariance, fmt::format("{} markers", track.marker_count)};
+}
+
+// The body's markers on the CAD, once that was found to stand there.
+Status write_markers(const AlignCommand& command, const Pose& world_from_prototype) {
+  LIMN_TRY(std::vector<BodyMarker> markers, scene::load_marker_file(command.body));
+  LIMN_TRY(const Track track, track_in_frames(command, {"body", markers}, command.body.parent_path()));
+  const Pose prototype_from_body = world_from_prototype.inverse() * track.world_from_body;
+  for (BodyMarker& marker : markers) marker.body_from_marker = prototype_from_body * marker.body_from_marker;
+  return write_file(command.out / "markers.json", scene::marker_file_json(markers));
+}
+
+// A scene gives its mesh alone without frames, and where the frames are for another body.
 bool starts_from_markers(const AlignCommand& command) {
-  return !command.scene.empty() && !(command.mesh.empty() && command.frames.empty());
+  const bool is_mesh_alone = command.mesh.empty() && (command.frames.empty() || !command.body.empty());
+  return !command.scene.empty() && !is_mesh_alone;
 }
 
 Status checked(const AlignCommand& command) {
   if (command.mesh.empty() && command.scene.empty())
     return usage_error(
         "expected a CAD file (--mesh and --units) or a --scene with a prototype, found neither.");
+  if (!command.body.empty() && (command.rig.empty() || command.frames.empty() || command.scan.empty()))
+    return usage_error("--body: expected --scan, --rig and --frame CAMERA=PICTURE with it.");
   if (!command.mesh.empty() && command.units.empty())
     return usage_error("--units: expected m, cm, mm, in or ft of the CAD, found none.");
   const int starts = !command.start.empty() + !command.points.empty() + starts_from_markers(command);
@@ -309,6 +327,7 @@ Result<MeshAligned> written_alignment(const AlignCommand& command) {
   LIMN_TRY_STATUS(write_file(command.out / "align.json",
                              json_of(aligned, differences, seconds_since(begun)).dump(2) + "\n"));
   LIMN_TRY_STATUS(write_pose(aligned.alignment.world_from_prototype, command.out));
+  if (!command.body.empty()) LIMN_TRY_STATUS(write_markers(command, aligned.alignment.world_from_prototype));
   return aligned;
 }
 

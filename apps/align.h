@@ -17,8 +17,10 @@ struct AlignCommand {
   std::filesystem::path start;   ///< POSES.json, or {"world_from_prototype": POSE}
   std::filesystem::path points;  ///< limn.picks/1
   std::filesystem::path scene;   ///< its prototype's markers give the start, in frames of a rig
+  std::filesystem::path
+      body;  ///< markers that stand anywhere on the thing (limn.body/1): where they are on the CAD
   std::filesystem::path rig;
-  std::vector<std::string> frames;  ///< CAMERA=PICTURE
+  std::vector<std::string> frames;  ///< CAMERA=PICTURE, of the thing as it was scanned
   double least_mm = 1;              ///< smaller differences are not told
   std::filesystem::path out;
   bool json = false;
@@ -31,7 +33,8 @@ struct MeshAligned {
   std::vector<std::string> warnings;  ///< symmetric or free shapes, and where the CAD and the scan differ
 };
 
-/// The work of `limn align`, with its files, for a command that has a scan.
+/// The work of `limn align`, with its files. With a body also markers.json (limn.markers/1), for a scene's
+/// prototype.markers.
 Result<MeshAligned> written_alignment(const AlignCommand& command);
 
 /// `limn align`: where a CAD mesh stands in the scan: poses.json (POSES.json), align.json with its

@@ -277,7 +277,8 @@ void add_align(CLI::App& app, Run& run) {
       "PICKS.json: {\"schema\": \"limn.picks/1\", \"pairs\": [{\"cad\": [x, y, z], \"scan_m\": [x, y, z]}, ...]}, cad in --units\n"
       "Example: limn align --scan scan --mesh door.glb --units m --out aligned\n"
       "Example: limn align --scan scan/mesh.ply --mesh door.stl --units mm --points picks.json --out aligned\n"
-      "Example: limn align --scan scan --mesh door.glb --units m --scene config/scenes/door --rig rig --frame camera0=picture.png --out aligned");
+      "Example: limn align --scan scan --mesh door.glb --units m --scene config/scenes/door --rig rig --frame camera0=picture.png --out aligned\n"
+      "Example: limn align --scan scan --mesh door.glb --units m --body body.json --rig rig --frame camera0=picture.png --out aligned");
   auto options = std::make_shared<AlignCommand>();
   command->add_option("--scan", options->scan, "PLY, or the folder of limn scan; without it the markers' answer is all");
   command->add_option("--scan-units", options->scan_units, "of the PLY: m, cm, mm, in, ft")->capture_default_str();
@@ -286,6 +287,8 @@ void add_align(CLI::App& app, Run& run) {
   command->add_option("--start", options->start, "POSES.json with a world_from_prototype");
   command->add_option("--points", options->points, "PICKS.json: three and more pairs of the same places");
   command->add_option("--scene", options->scene, "scene whose prototype carries markers; with --rig and --frame they give the start");
+  command->add_option("--body", options->body, "body.json of limn markers --learn-body: where its markers are on the CAD, as markers.json")
+      ->check(CLI::ExistingFile);
   command->add_option("--rig", options->rig, "rig folder, for --frame");
   command->add_option("--frame", options->frames, "CAMERA=PICTURE, again for another camera");
   command->add_option("--least-mm", options->least_mm, "smaller differences are not told")

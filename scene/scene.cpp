@@ -11,6 +11,7 @@
 #include "core/config.h"
 #include "core/log.h"
 #include "core/picture.h"
+#include "scene/marker_file.h"
 
 namespace limn::scene {
 namespace {
@@ -37,14 +38,17 @@ MarkerName read_marker_name(const ConfigNode& node) {
   return name ? *name : MarkerName{};
 }
 
-// A marker that carries something; it can carry one thing only.
-MarkerName read_carrier(const ConfigNode& node, Reader* reader) {
-  MarkerName name = read_marker_name(node);
+// A marker can carry one thing only.
+void claim(const MarkerName& name, const ConfigNode& node, Reader* reader) {
   const auto [user, fresh] = reader->marker_users.try_emplace(name.text(), node.where());
-  if (!fresh) {
+  if (!fresh)
     node.problem(fmt::format("expected a marker of its own, found {}, which {} uses already.", name.text(),
                              user->second));
-  }
+}
+
+MarkerName read_carrier(const ConfigNode& node, Reader* reader) {
+  MarkerName name = read_marker_name(node);
+  claim(name, node, reader);
   return name;
 }
 
@@ -67,11 +71,21 @@ void read_albedo(const ConfigNode& node, Prototype* prototype, Reader* reader) {
   }
 }
 
+void read_marker_file(const ConfigNode& node, Prototype* prototype, Reader* reader) {
+  auto markers = load_marker_file(node.path_inside());
+  if (!markers) return node.problem(markers.message());
+  for (const BodyMarker& marker : *markers) claim(marker.marker, node, reader);
+  prototype->markers = std::move(*markers);
+}
+
 Prototype read_prototype(const ConfigNode& node, Reader* reader) {
   node.only({"mesh", "units", "markers", "albedo"});
   Prototype prototype;
   reader->prototype_mesh = read_mesh_file(node);
-  if (const auto markers = node.find("markers")) {
+  const auto markers = node.find("markers");
+  if (markers && markers->is_string()) {
+    read_marker_file(*markers, &prototype, reader);
+  } else if (markers) {
     for (const ConfigNode& item : markers->items()) {
       item.only({"name", "size_mm", "prototype_from_marker"});
       prototype.markers.push_back({read_carrier(item.at("name"), reader), read_size_m(item),

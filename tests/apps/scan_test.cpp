@@ -13,6 +13,7 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/rig.h"
+#include "scene/marker_file.h"
 #include "scene/nearest.h"
 #include "scene/ply.h"
 #include "scene/posed.h"
@@ -125,6 +126,43 @@ TEST(Scan, MeasuresTheVirtualDoorToATenthOfAMillimetreAndTheCadIsLaidOntoIt) {
   }
   for (const char* name : {"residual.ply", "residual.png", "residual-side.png"})
     EXPECT_TRUE(fs::exists(align.out / name)) << name;
+
+  // Its markers as a body that was learned, in the frame of one of them: they are found on the CAD.
+  const std::vector<BodyMarker>& on_door = world.scene->prototype->markers;
+  nlohmann::json body = {{"schema", "limn.body/1"}, {"markers", nlohmann::json::array()}};
+  for (const BodyMarker& marker : on_door)
+    body["markers"].push_back(
+        {{"name", marker.marker.text()},
+         {"size_mm", 1e3 * marker.size_m},
+         {"body_from_marker", to_json(on_door[2].body_from_marker.inverse() * marker.body_from_marker)}});
+  ASSERT_TRUE(write_file(out / "body.json", body.dump()).ok());
+  const calib::Captures captures = calib::load_captures(out / "scan/captures").value();
+  align.body = out / "body.json";
+  align.rig = out / "rig";
+  align.frames = {"camera0=" + captures.poses[0].pictures[0][0][captures.patterns[0].white()].string()};
+  const Status with_body = run_align(align);
+  ASSERT_TRUE(with_body.ok()) << with_body.message();
+  const auto found = scene::load_marker_file(align.out / "markers.json");
+  ASSERT_TRUE(found) << found.message();
+  ASSERT_EQ(found->size(), on_door.size());
+  for (std::size_t i = 0; i < on_door.size(); ++i)
+    EXPECT_TRUE(test::pose_near((*found)[i].body_from_marker, on_door[i].body_from_marker, 0.1_deg, 0.5_mm))
+        << on_door[i].marker.text();
+  // A scene that names that file is the same scene.
+  const fs::path project = out / "project";
+  fs::copy(world.scene->folder, project, fs::copy_options::recursive);
+  fs::copy_file(align.out / "markers.json", project / "markers.json");
+  nlohmann::json file = read_json(project / "scene.json");
+  file["prototype"]["markers"] = "markers.json";
+  ASSERT_TRUE(write_file(project / "scene.json", file.dump(2)).ok());
+  const auto same = scene::load_scene(project);
+  ASSERT_TRUE(same) << same.message();
+  EXPECT_EQ(same->prototype->markers.size(), on_door.size());
+  file["prototype"]["markers"] = "none.json";
+  ASSERT_TRUE(write_file(project / "scene.json", file.dump(2)).ok());
+  EXPECT_NE(scene::load_scene(project).message().find("none.json"), std::string::npos);
+  align.body.clear();
+  align.frames.clear();
 
   align.start.clear();
   align.units = "mm";
