@@ -5,8 +5,11 @@ function made(comment) {
   const head = h("p", { class: "soft small" });
   const pinned = [comment.look && `look ${comment.look}`, comment.slot].filter(Boolean).join(", ");
   const at = new Date(comment.at);
-  head.append(h("b", {}, comment.who || "Somebody"), ` ${isNaN(at) ? "" : at.toLocaleString([], { dateStyle: "short", timeStyle: "short" })}`,
-              pinned ? ` · ${pinned}` : "");
+  head.append(
+    h("b", {}, comment.who || "Somebody"),
+    ` ${isNaN(at) ? "" : at.toLocaleString([], { dateStyle: "short", timeStyle: "short" })}`,
+    pinned ? ` · ${pinned}` : "",
+  );
   return h("li", {}, head, h("p", {}, comment.text));
 }
 
@@ -15,7 +18,12 @@ export function make_comments(session, target, label) {
   const list = h("ul", { class: "comments" });
   const none = h("p", { class: "soft small" }, "No comments yet.");
   const text = h("input", { "aria-label": label, placeholder: label, maxlength: "2000", enterkeyhint: "send" });
-  const form = h("form", { class: "line", "data-needs": "work" }, text, h("button", { "aria-label": "Send the comment" }, icon("say")));
+  const form = h(
+    "form",
+    { class: "line", "data-needs": "work" },
+    text,
+    h("button", { "aria-label": "Send the comment" }, icon("say")),
+  );
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
     const said = text.value.trim();

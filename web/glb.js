@@ -1,6 +1,8 @@
 // Binary glTF 2.0, as far as Limn writes it: triangles with positions, normals, base colours and textures, in nodes with transforms.
 
-const k_magic = 0x46546c67, k_json = 0x4e4f534a, k_bin = 0x004e4942;
+const k_magic = 0x46546c67,
+  k_json = 0x4e4f534a,
+  k_bin = 0x004e4942;
 const k_types = { 5121: Uint8Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array };
 const k_counts = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 
@@ -15,16 +17,31 @@ export function product(a, b) {
 
 function matrix_of(node) {
   if (node.matrix) return new Float32Array(node.matrix);
-  const [x, y, z, w] = node.rotation ?? [0, 0, 0, 1], [a, b, c] = node.scale ?? [1, 1, 1], t = node.translation ?? [0, 0, 0];
+  const [x, y, z, w] = node.rotation ?? [0, 0, 0, 1],
+    [a, b, c] = node.scale ?? [1, 1, 1],
+    t = node.translation ?? [0, 0, 0];
   return new Float32Array([
-    a * (1 - 2 * (y * y + z * z)), a * 2 * (x * y + z * w), a * 2 * (x * z - y * w), 0,
-    b * 2 * (x * y - z * w), b * (1 - 2 * (x * x + z * z)), b * 2 * (y * z + x * w), 0,
-    c * 2 * (x * z + y * w), c * 2 * (y * z - x * w), c * (1 - 2 * (x * x + y * y)), 0, ...t, 1]);
+    a * (1 - 2 * (y * y + z * z)),
+    a * 2 * (x * y + z * w),
+    a * 2 * (x * z - y * w),
+    0,
+    b * 2 * (x * y - z * w),
+    b * (1 - 2 * (x * x + z * z)),
+    b * 2 * (y * z + x * w),
+    0,
+    c * 2 * (x * z + y * w),
+    c * 2 * (y * z - x * w),
+    c * (1 - 2 * (x * x + y * y)),
+    0,
+    ...t,
+    1,
+  ]);
 }
 
 function chunks_of(buffer) {
   const head = new DataView(buffer);
-  if (buffer.byteLength < 20 || head.getUint32(0, true) !== k_magic) throw new Error("expected a binary glTF, found another file");
+  if (buffer.byteLength < 20 || head.getUint32(0, true) !== k_magic)
+    throw new Error("expected a binary glTF, found another file");
   const chunks = {};
   for (let at = 12; at + 8 <= buffer.byteLength;) {
     const length = head.getUint32(at, true);
@@ -36,12 +53,17 @@ function chunks_of(buffer) {
 
 // An accessor's numbers; rows that interleave with others or are not aligned are copied together.
 function numbers_of(gltf, bin, index) {
-  const accessor = gltf.accessors[index], view = gltf.bufferViews[accessor.bufferView];
-  const Type = k_types[accessor.componentType], width = k_counts[accessor.type];
+  const accessor = gltf.accessors[index],
+    view = gltf.bufferViews[accessor.bufferView];
+  const Type = k_types[accessor.componentType],
+    width = k_counts[accessor.type];
   const at = bin.byteOffset + (view.byteOffset ?? 0) + (accessor.byteOffset ?? 0);
-  const row = width * Type.BYTES_PER_ELEMENT, stride = view.byteStride ?? row;
-  const packed = new Uint8Array(accessor.count * row), bytes = new Uint8Array(bin.buffer);
-  for (let i = 0; i < accessor.count; ++i) packed.set(bytes.subarray(at + i * stride, at + i * stride + row), i * row);
+  const row = width * Type.BYTES_PER_ELEMENT,
+    stride = view.byteStride ?? row;
+  const packed = new Uint8Array(accessor.count * row),
+    bytes = new Uint8Array(bin.buffer);
+  for (let i = 0; i < accessor.count; ++i)
+    packed.set(bytes.subarray(at + i * stride, at + i * stride + row), i * row);
   return new Type(packed.buffer);
 }
 
@@ -50,7 +72,8 @@ function normals_of(positions, indices) {
   const normals = new Float32Array(positions.length);
   for (let i = 0; i + 2 < indices.length; i += 3) {
     const [a, b, c] = [3 * indices[i], 3 * indices[i + 1], 3 * indices[i + 2]];
-    const u = [0, 1, 2].map((k) => positions[b + k] - positions[a + k]), v = [0, 1, 2].map((k) => positions[c + k] - positions[a + k]);
+    const u = [0, 1, 2].map((k) => positions[b + k] - positions[a + k]),
+      v = [0, 1, 2].map((k) => positions[c + k] - positions[a + k]);
     const n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
     for (const corner of [a, b, c]) for (let k = 0; k < 3; ++k) normals[corner + k] += n[k];
   }
@@ -61,10 +84,15 @@ function normals_of(positions, indices) {
 function texture_of(gltf, bin, material, decoded) {
   const index = material?.baseColorTexture?.index;
   if (index === undefined) return null;
-  const { source } = gltf.textures[index], image = gltf.images[source];
-  const view = gltf.bufferViews[image.bufferView], at = view.byteOffset ?? 0;
+  const { source } = gltf.textures[index],
+    image = gltf.images[source];
+  const view = gltf.bufferViews[image.bufferView],
+    at = view.byteOffset ?? 0;
   if (!decoded.has(source))
-    decoded.set(source, createImageBitmap(new Blob([bin.subarray(at, at + view.byteLength)], { type: image.mimeType })));
+    decoded.set(
+      source,
+      createImageBitmap(new Blob([bin.subarray(at, at + view.byteLength)], { type: image.mimeType })),
+    );
   return decoded.get(source);
 }
 
@@ -74,20 +102,33 @@ function texture_of(gltf, bin, material, decoded) {
  */
 export async function read_glb(buffer) {
   const [gltf, bin] = chunks_of(buffer);
-  const meshes = [], decoded = new Map();
+  const meshes = [],
+    decoded = new Map();
   const visit = (index, parent, above) => {
-    const node = gltf.nodes[index], matrix = product(parent, matrix_of(node)), name = node.name ?? above;
+    const node = gltf.nodes[index],
+      matrix = product(parent, matrix_of(node)),
+      name = node.name ?? above;
     for (const primitive of node.mesh === undefined ? [] : gltf.meshes[node.mesh].primitives) {
       if ((primitive.mode ?? 4) !== 4) continue;
       const positions = numbers_of(gltf, bin, primitive.attributes.POSITION);
-      const indices = primitive.indices === undefined ? Uint32Array.from({ length: positions.length / 3 }, (_, i) => i)
-                                                      : Uint32Array.from(numbers_of(gltf, bin, primitive.indices));
-      const { NORMAL: normal, TEXCOORD_0: uv } = primitive.attributes, whole = gltf.materials?.[primitive.material];
+      const indices =
+        primitive.indices === undefined
+          ? Uint32Array.from({ length: positions.length / 3 }, (_, i) => i)
+          : Uint32Array.from(numbers_of(gltf, bin, primitive.indices));
+      const { NORMAL: normal, TEXCOORD_0: uv } = primitive.attributes,
+        whole = gltf.materials?.[primitive.material];
       const material = whole?.pbrMetallicRoughness;
-      meshes.push({ name, matrix, positions, indices, base: material?.baseColorFactor ?? [1, 1, 1, 1],
-                    normals: normal === undefined ? normals_of(positions, indices) : numbers_of(gltf, bin, normal),
-                    uvs: uv === undefined ? null : numbers_of(gltf, bin, uv), texture: texture_of(gltf, bin, material, decoded),
-                    is_unlit: whole?.extensions?.KHR_materials_unlit !== undefined });
+      meshes.push({
+        name,
+        matrix,
+        positions,
+        indices,
+        base: material?.baseColorFactor ?? [1, 1, 1, 1],
+        normals: normal === undefined ? normals_of(positions, indices) : numbers_of(gltf, bin, normal),
+        uvs: uv === undefined ? null : numbers_of(gltf, bin, uv),
+        texture: texture_of(gltf, bin, material, decoded),
+        is_unlit: whole?.extensions?.KHR_materials_unlit !== undefined,
+      });
     }
     for (const child of node.children ?? []) visit(child, matrix, name);
   };

@@ -4,17 +4,45 @@ import { by_id, h, icon, keep } from "/dom.js";
 import { show_picture } from "/pictures.js";
 import { make_switch } from "/stage.js";
 
-const k_screens = { rest: "what light cannot show", full: "whole parts", camera: "camera alone", view: "the viewer's eye",
-                    stereo: "two eyes", off: "nothing" };
-const k_every_ms = 1000;  // a projector's picture, while it is looked at
-const k_reach_mm = 300;   // of the slider; the number takes more
+const k_screens = {
+  rest: "what light cannot show",
+  full: "whole parts",
+  camera: "camera alone",
+  view: "the viewer's eye",
+  stereo: "two eyes",
+  off: "nothing",
+};
+const k_every_ms = 1000; // a projector's picture, while it is looked at
+const k_reach_mm = 300; // of the slider; the number takes more
 
 function make_split(session) {
-  const is_on = make_switch(session, "split", (s) => s.split, icon("split"), h("span", {}, "Split", h("small", {}, "left of a line the look before")));
-  const slider = h("input", { type: "range", min: -k_reach_mm, max: k_reach_mm, step: "1", "aria-label": "Where the split is, mm right of the middle", "data-action": "split_at" });
-  const number = h("input", { type: "number", step: "1", min: "-5000", max: "5000", "aria-label": "Where the split is, mm", "data-action": "split_at", inputmode: "decimal" });
+  const is_on = make_switch(
+    session,
+    "split",
+    (s) => s.split,
+    icon("split"),
+    h("span", {}, "Split", h("small", {}, "left of a line the look before")),
+  );
+  const slider = h("input", {
+    type: "range",
+    min: -k_reach_mm,
+    max: k_reach_mm,
+    step: "1",
+    "aria-label": "Where the split is, mm right of the middle",
+    "data-action": "split_at",
+  });
+  const number = h("input", {
+    type: "number",
+    step: "1",
+    min: "-5000",
+    max: "5000",
+    "aria-label": "Where the split is, mm",
+    "data-action": "split_at",
+    inputmode: "decimal",
+  });
   const where = h("div", { class: "line" }, slider, number, h("span", { class: "soft" }, "mm"));
-  let is_sent = false, wanted = null;
+  let is_sent = false,
+    wanted = null;
   // One on its way: a drag sends the newest place once the last one is done.
   const move = async (mm) => {
     wanted = mm;
@@ -44,7 +72,8 @@ function make_split(session) {
 
 function make_projectors(session) {
   const list = h("div", { class: "projectors" });
-  let is_open = false, stamp = 0;
+  let is_open = false,
+    stamp = 0;
   const refresh = () => {
     if (!is_open || document.hidden || session.link.status !== "connected") return;
     ++stamp;
@@ -56,33 +85,75 @@ function make_projectors(session) {
     refresh();
   };
   list.show = (state) => {
-    keep(list, state.projectors, (name) => name, (name) => {
-      const canvas = h("canvas", { role: "img", "aria-label": `What ${name} shows`, width: "8", height: "5", "data-projector": name });
-      const figure = h("figure", {}, canvas, h("figcaption", {}, name));
-      figure.refresh = () => show_picture(canvas, `/picture/projector/${encodeURIComponent(name)}.jpg`, String(stamp));
-      return figure;
-    });
+    keep(
+      list,
+      state.projectors,
+      (name) => name,
+      (name) => {
+        const canvas = h("canvas", {
+          role: "img",
+          "aria-label": `What ${name} shows`,
+          width: "8",
+          height: "5",
+          "data-projector": name,
+        });
+        const figure = h("figure", {}, canvas, h("figcaption", {}, name));
+        figure.refresh = () =>
+          show_picture(canvas, `/picture/projector/${encodeURIComponent(name)}.jpg`, String(stamp));
+        return figure;
+      },
+    );
     refresh();
   };
   return list;
 }
 
 export function make_light(session) {
-  const grid = make_switch(session, "grid", (s) => s.grid, icon("grid"), h("span", {}, "Grid", h("small", {}, "lines every 10 mm")));
-  const rings = make_switch(session, "marker_states", (s) => s.marker_states, icon("rings"),
-                            h("span", {}, "Marker states", h("small", {}, "green seen, amber carried on")));
+  const grid = make_switch(
+    session,
+    "grid",
+    (s) => s.grid,
+    icon("grid"),
+    h("span", {}, "Grid", h("small", {}, "lines every 10 mm")),
+  );
+  const rings = make_switch(
+    session,
+    "marker_states",
+    (s) => s.marker_states,
+    icon("rings"),
+    h("span", {}, "Marker states", h("small", {}, "green seen, amber carried on")),
+  );
   const split = make_split(session);
   const screens = h("div", { class: "choices wrap", role: "group", "aria-label": "What screens show" });
   const projectors = make_projectors(session);
-  by_id("light").append(h("h2", {}, "Light"), h("div", { class: "stack", "data-needs": "work" }, h("div", { class: "pair" }, grid, rings), split,
-    h("div", { class: "stack", "data-action": "screen", "data-needs": role_of("screen") }, h("h3", {}, "Screens"), screens)),
-    h("h3", {}, "Projectors"), projectors);
+  by_id("light").append(
+    h("h2", {}, "Light"),
+    h(
+      "div",
+      { class: "stack", "data-needs": "work" },
+      h("div", { class: "pair" }, grid, rings),
+      split,
+      h(
+        "div",
+        { class: "stack", "data-action": "screen", "data-needs": role_of("screen") },
+        h("h3", {}, "Screens"),
+        screens,
+      ),
+    ),
+    h("h3", {}, "Projectors"),
+    projectors,
+  );
   return {
     opened: (name) => projectors.opened(name),
     show(state) {
       for (const part of [grid, rings, split, projectors]) part.show(state);
-      keep(screens, state.screens, (name) => name, (name) =>
-        session.button("screen", { value: name }, h("span", {}, name, h("small", {}, k_screens[name] ?? ""))));
+      keep(
+        screens,
+        state.screens,
+        (name) => name,
+        (name) =>
+          session.button("screen", { value: name }, h("span", {}, name, h("small", {}, k_screens[name] ?? ""))),
+      );
       for (const button of screens.children) button.setAttribute("aria-pressed", String(button.key === state.screen));
     },
   };

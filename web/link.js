@@ -1,11 +1,15 @@
 // The session with Limn: pairing, one WebSocket, and coming back by itself when it breaks.
 
-const k_pauses_ms = [300, 700, 1500, 3000, 5000, 10000];  // before each further try
-const k_silence_ms = 8000;  // without a picture that was asked for; then the connection is looked into
-const k_answer_ms = 8000;   // an edit that is not answered has failed
+const k_pauses_ms = [300, 700, 1500, 3000, 5000, 10000]; // before each further try
+const k_silence_ms = 8000; // without a picture that was asked for; then the connection is looked into
+const k_answer_ms = 8000; // an edit that is not answered has failed
 
 async function post(path, message) {
-  return fetch(path, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(message) });
+  return fetch(path, {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify(message),
+  });
 }
 
 /**
@@ -17,7 +21,7 @@ export class Link extends EventTarget {
   #tries = 0;
   #timer = 0;
   #last_id = 0;
-  #waiting = new Map();  // id -> {done, failed, timer} of edits on their way
+  #waiting = new Map(); // id -> {done, failed, timer} of edits on their way
   #wants_pictures = false;
   #heard_at = 0;
   status = "unpaired";
@@ -28,6 +32,9 @@ export class Link extends EventTarget {
     super();
     addEventListener("online", () => this.#hurry());
     document.addEventListener("visibilitychange", () => this.#hurry());
+    // A page that the browser keeps for its back button is no guest meanwhile.
+    addEventListener("pagehide", () => this.#drop());
+    addEventListener("pageshow", ({ persisted }) => persisted && this.status !== "unpaired" && this.connect());
     setInterval(() => this.#look_into(), 2000);
   }
 
@@ -44,7 +51,8 @@ export class Link extends EventTarget {
     } catch {
       return { why: "No connection to Limn. Is it running, and are you on its network?" };
     }
-    if (answer.status === 401) return { why: "That is not the PIN. It stands in the operator's window.", is_pin: true };
+    if (answer.status === 401)
+      return { why: "That is not the PIN. It stands in the operator's window.", is_pin: true };
     if (answer.status === 429) {
       const wait_s = Number(answer.headers.get("Retry-After")) || 60;
       return { why: "Too many wrong PINs.", wait_s };
@@ -84,7 +92,8 @@ export class Link extends EventTarget {
   }
 
   send(message) {
-    if (this.status === "connected") this.#socket.send(message instanceof ArrayBuffer ? message : JSON.stringify(message));
+    if (this.status === "connected")
+      this.#socket.send(message instanceof ArrayBuffer ? message : JSON.stringify(message));
   }
 
   /** Asks for room pictures, or no longer. */
@@ -138,7 +147,9 @@ export class Link extends EventTarget {
 
   #hear_picture(data) {
     const head = new DataView(data);
-    const kind = head.getUint32(0, true), number = head.getUint32(4, true), length = head.getUint32(8, true);
+    const kind = head.getUint32(0, true),
+      number = head.getUint32(4, true),
+      length = head.getUint32(8, true);
     const json = length ? JSON.parse(new TextDecoder().decode(new Uint8Array(data, 12, length))) : {};
     const jpeg = new Blob([new Uint8Array(data, 12 + length)], { type: "image/jpeg" });
     this.dispatchEvent(new CustomEvent(kind === 1 ? "picture" : "answer", { detail: { number, json, jpeg } }));

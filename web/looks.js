@@ -19,8 +19,17 @@ export const look_url = (look) => `/picture/look/${encodeURIComponent(look)}.png
 function make_card(session, look) {
   const canvas = h("canvas", { class: "thumb", "aria-hidden": "true", width: "8", height: "5" });
   const name = h("span", {}, look);
-  const restore = session.button("restore_look", { value: look, class: "card", "data-stays": "", "aria-label": `Show look ${look}` }, canvas, name);
-  const remove = session.button("delete_look", { value: look, class: "corner", "aria-label": `Delete look ${look}` }, icon("trash"));
+  const restore = session.button(
+    "restore_look",
+    { value: look, class: "card", "data-stays": "", "aria-label": `Show look ${look}` },
+    canvas,
+    name,
+  );
+  const remove = session.button(
+    "delete_look",
+    { value: look, class: "corner", "aria-label": `Delete look ${look}` },
+    icon("trash"),
+  );
   const node = h("div", { class: "look" }, restore, remove);
   node.show = (state, stamp) => {
     restore.setAttribute("aria-pressed", String(state.look === look));
@@ -31,11 +40,20 @@ function make_card(session, look) {
 
 export function make_looks(session) {
   const saves = new Saves();
-  const none = h("p", { class: "soft" }, "No looks yet. A look keeps which variants are shown and where their parts stand.");
+  const none = h(
+    "p",
+    { class: "soft" },
+    "No looks yet. A look keeps which variants are shown and where their parts stand.",
+  );
   const back = session.button("undelete_look", { class: "wide" }, icon("undo"), h("span", {}, ""));
   const list = h("div", { class: "looks" });
-  const name = h("input", { "aria-label": "Name of the look to save", placeholder: "Name of a new look", maxlength: "64",
-                            pattern: "[A-Za-z0-9_][A-Za-z0-9_. \\-]*", enterkeyhint: "done" });
+  const name = h("input", {
+    "aria-label": "Name of the look to save",
+    placeholder: "Name of a new look",
+    maxlength: "64",
+    pattern: "[A-Za-z0-9_][A-Za-z0-9_. \\-]*",
+    enterkeyhint: "done",
+  });
   const save = h("button", { class: "main", "data-action": "save_look" }, icon("save"), "Save");
   const form = h("form", { class: "line" }, name, save);
   form.addEventListener("submit", async (event) => {
@@ -43,15 +61,29 @@ export function make_looks(session) {
     if (await session.act("save_look", "", name.value.trim(), save)) name.value = "";
   });
   const flip = session.button("flip", { class: "grow" }, icon("flip"), h("span", {}, "Compare"));
-  const previous = session.button("previous_look", { class: "step", "aria-label": "Previous look" }, icon("previous"));
+  const previous = session.button(
+    "previous_look",
+    { class: "step", "aria-label": "Previous look" },
+    icon("previous"),
+  );
   const next = session.button("next_look", { class: "step", "aria-label": "Next look" }, icon("next"));
-  const dock = h("div", { class: "dock stack", "data-needs": "work" }, h("div", { class: "line" }, previous, flip, next), form);
+  const dock = h(
+    "div",
+    { class: "dock stack", "data-needs": "work" },
+    h("div", { class: "line" }, previous, flip, next),
+    form,
+  );
   by_id("looks").append(h("h2", {}, "Looks"), back, none, list, dock);
   return {
     show(state) {
       saves.take(state);
       none.hidden = state.looks.length > 0;
-      keep(list, state.looks, (look) => look, (look) => make_card(session, look));
+      keep(
+        list,
+        state.looks,
+        (look) => look,
+        (look) => make_card(session, look),
+      );
       for (const card of list.children) card.show(state, saves.stamp(card.key));
       back.hidden = !state.deleted_look;
       set_text(back.lastElementChild, `Bring back ${state.deleted_look}`);

@@ -5,7 +5,7 @@ import { show_picture } from "/pictures.js";
 
 const k_steps_mm = ["0.1", "1", "5"];
 const k_units = ["mm", "cm", "m", "in", "ft"];
-const k_sight = { "seen": "seen", "carried on": "carried on", "lost": "not seen" };
+const k_sight = { seen: "seen", "carried on": "carried on", lost: "not seen" };
 
 const part_url = (slot, variant) => `/picture/variant/${encodeURIComponent(slot)}/${encodeURIComponent(variant)}.png`;
 
@@ -22,12 +22,22 @@ export function sight_badge() {
 function make_variants(session, slot) {
   const strip = h("div", { class: "strip", role: "group", "aria-label": `Variants of ${slot.name}` });
   strip.show = (state_of) => {
-    keep(strip, state_of.variants, (name) => name, (name) => {
-      const canvas = h("canvas", { class: "thumb", "aria-hidden": "true", width: "4", height: "3" });
-      const button = session.button("choose_variant", { slot: slot.name, value: name, class: "card", "data-stays": "" }, canvas, h("span", {}, name));
-      button.update = () => show_picture(canvas, part_url(slot.name, name));
-      return button;
-    });
+    keep(
+      strip,
+      state_of.variants,
+      (name) => name,
+      (name) => {
+        const canvas = h("canvas", { class: "thumb", "aria-hidden": "true", width: "4", height: "4" });
+        const button = session.button(
+          "choose_variant",
+          { slot: slot.name, value: name, class: "card", "data-stays": "" },
+          canvas,
+          h("span", {}, name),
+        );
+        button.update = () => show_picture(canvas, part_url(slot.name, name));
+        return button;
+      },
+    );
     for (const card of strip.children) card.setAttribute("aria-pressed", String(card.key === state_of.variant));
   };
   return strip;
@@ -37,27 +47,60 @@ function make_nudge(session, slot) {
   let step = "1";
   const steps = h("div", { class: "choices", role: "group", "aria-label": "Step" });
   for (const mm of k_steps_mm)
-    steps.append(h("button", { type: "button", "aria-pressed": String(mm === step), onclick: () => choose(mm) }, `${mm} mm`));
+    steps.append(
+      h("button", { type: "button", "aria-pressed": String(mm === step), onclick: () => choose(mm) }, `${mm} mm`),
+    );
   function choose(mm) {
     step = mm;
-    for (const button of steps.children) button.setAttribute("aria-pressed", String(button.textContent === `${mm} mm`));
+    for (const button of steps.children)
+      button.setAttribute("aria-pressed", String(button.textContent === `${mm} mm`));
   }
   const move = (axis, sign, picture) => {
     const value = () => [0, 1, 2].map((i) => (i === axis ? `${sign}${step}` : "0")).join(" ");
     const name = `${sign === "-" ? "−" : "+"}${"xyz"[axis]}`;
-    return session.button("nudge", { slot: slot.name, value, class: `move ${"xyz"[axis]}${sign === "-" ? "minus" : "plus"}`,
-                                     "aria-label": `Nudge ${slot.name} along ${name}` }, icon(picture), h("span", {}, name));
+    return session.button(
+      "nudge",
+      {
+        slot: slot.name,
+        value,
+        class: `move ${"xyz"[axis]}${sign === "-" ? "minus" : "plus"}`,
+        "aria-label": `Nudge ${slot.name} along ${name}`,
+      },
+      icon(picture),
+      h("span", {}, name),
+    );
   };
   const readout = h("p", { class: "readout", "aria-label": "Nudged by, millimetres" });
-  const pad = h("div", { class: "pad" }, move(1, "", "up"), move(0, "-", "left"), readout, move(0, "", "right"), move(1, "-", "down"),
-                move(2, "", "up"), move(2, "-", "down"));
-  const keys = { ArrowUp: ".yplus", ArrowDown: ".yminus", ArrowLeft: ".xminus", ArrowRight: ".xplus", PageUp: ".zplus", PageDown: ".zminus" };
+  const pad = h(
+    "div",
+    { class: "pad" },
+    move(1, "", "up"),
+    move(0, "-", "left"),
+    readout,
+    move(0, "", "right"),
+    move(1, "-", "down"),
+    move(2, "", "up"),
+    move(2, "-", "down"),
+  );
+  const keys = {
+    ArrowUp: ".yplus",
+    ArrowDown: ".yminus",
+    ArrowLeft: ".xminus",
+    ArrowRight: ".xplus",
+    PageUp: ".zplus",
+    PageDown: ".zminus",
+  };
   pad.addEventListener("keydown", (event) => {
     if (!keys[event.key]) return;
     event.preventDefault();
     pad.querySelector(keys[event.key]).click();
   });
-  const release = session.button("release", { slot: slot.name, class: "wide" }, icon("release"), "Follow its marker again");
+  const release = session.button(
+    "release",
+    { slot: slot.name, class: "wide" },
+    icon("release"),
+    "Follow its marker again",
+  );
   const node = h("div", { class: "stack", "data-needs": "work" }, h("h3", {}, "Nudge"), steps, pad, release);
   node.show = (state_of) => {
     const mm = state_of.nudge_mm.map((v) => v.toFixed(1).replace("-", "−"));
@@ -70,14 +113,30 @@ function make_nudge(session, slot) {
 function make_marker(session, slot) {
   const words = h("p", { class: "soft" });
   const waiting = h("div", { class: "stack" });
-  const none = h("p", { class: "soft small" }, "To change it, lay another marker down and keep it still for a second.");
+  const none = h(
+    "p",
+    { class: "soft small" },
+    "To change it, lay another marker down and keep it still for a second.",
+  );
   const own = session.button("unpair", { slot: slot.name, class: "wide" }, "Its own marker again");
-  const node = h("div", { class: "stack" }, h("h3", {}, "Marker"), words,
-                 h("div", { class: "stack", "data-needs": "operate" }, waiting, none, own));
+  const node = h(
+    "div",
+    { class: "stack" },
+    h("h3", {}, "Marker"),
+    words,
+    h("div", { class: "stack", "data-needs": "operate" }, waiting, none, own),
+  );
   node.show = (state_of, markers) => {
-    set_text(words, `Carried by ${state_of.marker}.${state_of.is_held ? " Held where its look had it until the marker moves." : ""}`);
-    keep(waiting, markers, (name) => name, (name) =>
-      session.button("pair", { slot: slot.name, value: name, class: "wide" }, `Carry it by ${name}`));
+    set_text(
+      words,
+      `Carried by ${state_of.marker}.${state_of.is_held ? " Held where its look had it until the marker moves." : ""}`,
+    );
+    keep(
+      waiting,
+      markers,
+      (name) => name,
+      (name) => session.button("pair", { slot: slot.name, value: name, class: "wide" }, `Carry it by ${name}`),
+    );
     none.hidden = markers.length > 0;
   };
   return node;
@@ -87,28 +146,65 @@ function make_units(session, slot) {
   const variant = h("select", { "aria-label": "Variant whose unit is wrong" });
   const unit = h("select", { "aria-label": "Its unit" }, ...k_units.map((name) => h("option", {}, name)));
   const set = session.button("units", { slot: slot.name, value: () => `${variant.value} ${unit.value}` }, "Set");
-  const node = h("div", { class: "stack", "data-needs": "operate" }, h("h3", {}, "Unit of a part dropped in"), h("div", { class: "line" }, variant, unit, set));
+  const node = h(
+    "div",
+    { class: "stack", "data-needs": "operate" },
+    h("h3", {}, "Unit of a part dropped in"),
+    h("div", { class: "line" }, variant, unit, set),
+  );
   node.show = (state_of) => {
     const dropped = state_of.dropped ?? [];
     node.hidden = !dropped.length;
-    keep(variant, dropped, (name) => name, (name) => h("option", {}, name));
+    keep(
+      variant,
+      dropped,
+      (name) => name,
+      (name) => h("option", {}, name),
+    );
   };
   return node;
 }
 
 function make_slot(session, slot) {
-  const picture = h("canvas", { class: "thumb", "aria-hidden": "true", width: "4", height: "3" });
+  const picture = h("canvas", { class: "thumb", "aria-hidden": "true", width: "4", height: "4" });
   const variant = h("span", { class: "soft" });
   const sight = sight_badge();
   const id = `more-${slot.name}`;
   const more = h("div", { class: "more stack", id, hidden: true });
-  const head = h("button", { type: "button", class: "open", "aria-expanded": "false", "aria-controls": id }, picture,
-                 h("span", { class: "name" }, h("b", {}, slot.name), variant, sight), icon("more"));
-  const node = h("article", { class: "slot", "aria-label": `Part ${slot.name}` }, h("div", { class: "head" },
-    session.button("previous_variant", { slot: slot.name, class: "step", "aria-label": `Previous variant of ${slot.name}` }, icon("previous")), head,
-    session.button("next_variant", { slot: slot.name, class: "step", "aria-label": `Next variant of ${slot.name}` }, icon("next"))), more);
+  const head = h(
+    "button",
+    { type: "button", class: "open", "aria-expanded": "false", "aria-controls": id },
+    picture,
+    h("span", { class: "name" }, h("b", {}, slot.name), variant, sight),
+    icon("more"),
+  );
+  const node = h(
+    "article",
+    { class: "slot", "aria-label": `Part ${slot.name}` },
+    h(
+      "div",
+      { class: "head" },
+      session.button(
+        "previous_variant",
+        { slot: slot.name, class: "step", "aria-label": `Previous variant of ${slot.name}` },
+        icon("previous"),
+      ),
+      head,
+      session.button(
+        "next_variant",
+        { slot: slot.name, class: "step", "aria-label": `Next variant of ${slot.name}` },
+        icon("next"),
+      ),
+    ),
+    more,
+  );
   const comments = make_comments(session, () => ({ look: "", slot: slot.name }), `Comment on ${slot.name}`);
-  const pieces = [make_variants(session, slot), make_nudge(session, slot), make_marker(session, slot), make_units(session, slot)];
+  const pieces = [
+    make_variants(session, slot),
+    make_nudge(session, slot),
+    make_marker(session, slot),
+    make_units(session, slot),
+  ];
   more.append(...pieces, h("h3", {}, "Comments"), comments);
   let latest;
   const fill = () => {
@@ -141,24 +237,38 @@ function make_offer(session) {
     node.hidden = !marker;
     if (!marker) return;
     set_text(words, `Marker ${marker} lies still and carries nothing. Give it a part:`);
-    keep(slots, state.slots, (slot) => `${slot.name} ${marker}`, (slot) =>
-      session.button("pair", { slot: slot.name, value: marker }, slot.name));
+    keep(
+      slots,
+      state.slots,
+      (slot) => `${slot.name} ${marker}`,
+      (slot) => session.button("pair", { slot: slot.name, value: marker }, slot.name),
+    );
   };
   return node;
 }
 
 export function make_parts(session) {
   const offer = make_offer(session);
-  const role = h("p", { class: "soft small", "data-role-only": "look" }, "You look on. To change things, leave (under Room) and pair again with the PIN for work.");
+  const role = h(
+    "p",
+    { class: "soft small", "data-role-only": "look" },
+    "You look on. To change things, leave (under Room) and pair again with the PIN for work.",
+  );
   const list = h("div", { class: "slots" });
   by_id("parts").append(h("h2", {}, "Parts"), role, offer, list);
   let is_first = true;
   return {
     show(state) {
       offer.show(state);
-      keep(list, state.slots, (slot) => slot.name, (slot) => make_slot(session, slot));
+      keep(
+        list,
+        state.slots,
+        (slot) => slot.name,
+        (slot) => make_slot(session, slot),
+      );
       for (const slot of state.slots) [...list.children].find((node) => node.key === slot.name).show(state, slot);
-      if (is_first && list.children.length && matchMedia("(min-width: 1100px)").matches) list.firstElementChild.open(true);
+      if (is_first && list.children.length && matchMedia("(min-width: 1100px)").matches)
+        list.firstElementChild.open(true);
       is_first = false;
     },
   };

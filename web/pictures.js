@@ -1,6 +1,6 @@
 // Pictures of the project, drawn into canvases: fetched anew when they may differ, none kept by the browser.
 
-const k_again_ms = 3000;  // after a picture that could not be had
+const k_again_ms = 3000; // after a picture that could not be had
 
 /** Draws what `path` gives into a canvas. A `stamp` that has not changed asks for nothing. */
 export async function show_picture(canvas, path, stamp = "") {
@@ -13,7 +13,8 @@ export async function show_picture(canvas, path, stamp = "") {
     const picture = await createImageBitmap(await answer.blob());
     if (canvas.wanted === wanted) draw_picture(canvas, picture);
   } catch {
-    if (canvas.wanted === wanted) setTimeout(() => canvas.wanted === wanted && (canvas.wanted = undefined), k_again_ms);
+    if (canvas.wanted === wanted)
+      setTimeout(() => canvas.wanted === wanted && (canvas.wanted = undefined), k_again_ms);
   }
 }
 

@@ -8,7 +8,13 @@ import { begin_session } from "/session.js";
 import { make_stage } from "/stage.js";
 import { make_window } from "/window.js";
 
-const k_tabs = [["parts", "Parts"], ["looks", "Looks"], ["light", "Light"], ["window", "Window"], ["people", "Room"]];
+const k_tabs = [
+  ["parts", "Parts"],
+  ["looks", "Looks"],
+  ["light", "Light"],
+  ["window", "Window"],
+  ["people", "Room"],
+];
 
 const session = begin_session({
   on_state: (state) => {
@@ -17,7 +23,14 @@ const session = begin_session({
   },
 });
 const stage = make_stage(session);
-const panels = [stage, make_parts(session), make_looks(session), make_light(session), make_window(session, stage), make_room(session)];
+const panels = [
+  stage,
+  make_parts(session),
+  make_looks(session),
+  make_light(session),
+  make_window(session, stage),
+  make_room(session),
+];
 
 function choose_tab(name) {
   document.body.dataset.tab = name;
@@ -29,8 +42,14 @@ function choose_tab(name) {
 }
 
 for (const [name, label] of k_tabs)
-  by_id("tabs").append(h("button", { type: "button", "data-tab": name, onclick: () => choose_tab(name) },
-                         icon(name === "people" ? "room" : name), h("span", {}, label)));
+  by_id("tabs").append(
+    h(
+      "button",
+      { type: "button", "data-tab": name, onclick: () => choose_tab(name) },
+      icon(name === "people" ? "room" : name),
+      h("span", {}, label),
+    ),
+  );
 choose_tab("parts");
 // On a desk the looks are always there and have no tab.
 const desk = matchMedia("(min-width: 1280px) and (min-height: 720px)");

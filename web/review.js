@@ -18,12 +18,22 @@ function make_card(look) {
   const part = h("select", { "aria-label": `What a comment on ${look} is about`, "data-needs": "work" });
   const comments = make_comments(session, () => ({ look, slot: part.value }), `Comment on ${look}`);
   comments.insertBefore(part, comments.lastElementChild);
-  const node = h("article", { class: "sheet-card stack", "aria-label": `Look ${look}` }, canvas,
-                 h("div", { class: "line" }, h("h2", { class: "grow" }, look), open), comments);
+  const node = h(
+    "article",
+    { class: "sheet-card stack", "aria-label": `Look ${look}` },
+    canvas,
+    h("div", { class: "line" }, h("h2", { class: "grow" }, look), open),
+    comments,
+  );
   node.show = (state) => {
     show_picture(canvas, look_url(look), saves.stamp(look));
     const slots = [{ name: "" }, ...state.slots];
-    keep(part, slots, (slot) => slot.name, (slot) => h("option", { value: slot.name }, slot.name || "the whole look"));
+    keep(
+      part,
+      slots,
+      (slot) => slot.name,
+      (slot) => h("option", { value: slot.name }, slot.name || "the whole look"),
+    );
     comments.show(state.comments.filter((comment) => comment.look === look));
   };
   return node;
@@ -42,7 +52,8 @@ function show(state) {
 }
 
 function mark(name) {
-  for (const button of by_id("solid-parts").children) button.setAttribute("aria-pressed", String(button.key === name));
+  for (const button of by_id("solid-parts").children)
+    button.setAttribute("aria-pressed", String(button.key === name));
   view.mark(name);
 }
 
@@ -55,13 +66,25 @@ async function open_solid(look) {
     view ??= new View3d(solid.querySelector("canvas"));
     view.show([]);
     const answer = await fetch(`/look/${encodeURIComponent(look)}.glb`, { cache: "no-store" });
-    if (!answer.ok) throw new Error((await answer.json().catch(() => ({}))).error ?? `Limn could not give it (${answer.status}).`);
+    if (!answer.ok)
+      throw new Error((await answer.json().catch(() => ({}))).error ?? `Limn could not give it (${answer.status}).`);
     const meshes = await read_glb(await answer.arrayBuffer());
     view.show(meshes);
-    const slots = session.state.slots.map((slot) => slot.name).filter((name) => meshes.some((mesh) => mesh.name === name));
+    const parts = session.state.slots
+      .flatMap(({ name, variants }) => variants.map((variant) => [`${name} ${variant}`, name]))
+      .filter(([node]) => meshes.some((mesh) => mesh.name === node));
     let marked = "";
-    keep(by_id("solid-parts"), slots, (name) => name, (name) => h("button", { type: "button", "aria-pressed": "false",
-      onclick: () => mark((marked = marked === name ? "" : name)) }, name));
+    keep(
+      by_id("solid-parts"),
+      parts,
+      ([node]) => node,
+      ([node, name]) =>
+        h(
+          "button",
+          { type: "button", "aria-pressed": "false", onclick: () => mark((marked = marked === node ? "" : node)) },
+          name,
+        ),
+    );
     mark("");
     set_text(by_id("solid-why"), "Drag, two fingers, or the arrow keys.");
   } catch (reason) {

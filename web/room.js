@@ -3,10 +3,11 @@ import { make_comments } from "/comments.js";
 import { by_id, h, keep, set_text } from "/dom.js";
 import { sight_badge } from "/parts.js";
 
-const k_most_notes = 20;  // the newest ones
+const k_most_notes = 20; // the newest ones
 
 function row(name) {
-  const badge = sight_badge(), words = h("span", { class: "soft small" });
+  const badge = sight_badge(),
+    words = h("span", { class: "soft small" });
   const node = h("li", {}, h("b", {}, name), words, badge);
   node.show = (sight, text) => {
     badge.show(sight);
@@ -16,27 +17,65 @@ function row(name) {
 }
 
 export function make_room(session) {
-  const tracking = h("ul", { class: "rows" }), devices = h("ul", { class: "rows" }), people = h("ul", { class: "rows" });
+  const tracking = h("ul", { class: "rows" }),
+    devices = h("ul", { class: "rows" }),
+    people = h("ul", { class: "rows" });
   const no_devices = h("p", { class: "soft small" }, "No devices are watched.");
   const notes = h("ul", { class: "messages small" });
   const no_notes = h("p", { class: "soft small" }, "Nothing to report.");
   const comments = make_comments(session, () => ({ look: session.state.look, slot: "" }), "Comment on all of it");
   const leave = h("button", { type: "button", class: "wide", onclick: () => session.link.leave() }, "Leave");
-  by_id("people").append(h("h2", {}, "Room"), h("h3", {}, "Tracking"), tracking, h("h3", {}, "Devices"), devices, no_devices,
-    h("h3", {}, "People"), people, h("h3", {}, "Comments"), comments, h("h3", {}, "Messages"), notes, no_notes, leave);
+  by_id("people").append(
+    h("h2", {}, "Room"),
+    h("h3", {}, "Tracking"),
+    tracking,
+    h("h3", {}, "Devices"),
+    devices,
+    no_devices,
+    h("h3", {}, "People"),
+    people,
+    h("h3", {}, "Comments"),
+    comments,
+    h("h3", {}, "Messages"),
+    notes,
+    no_notes,
+    leave,
+  );
   return {
     show(state) {
-      const bodies = state.prototype ? [{ name: "prototype", sight: state.prototype, marker: "" }, ...state.slots] : state.slots;
-      keep(tracking, bodies, (body) => body.name, (body) => row(body.name));
+      const bodies = state.prototype
+        ? [{ name: "prototype", sight: state.prototype, marker: "" }, ...state.slots]
+        : state.slots;
+      keep(
+        tracking,
+        bodies,
+        (body) => body.name,
+        (body) => row(body.name),
+      );
       bodies.forEach((body, i) => tracking.children[i].show(body.sight, body.marker));
-      keep(devices, state.devices, (device) => device.name, (device) => row(device.name));
-      state.devices.forEach((device, i) => devices.children[i].show(device.works ? "works" : "broken", device.why || device.kind));
+      keep(
+        devices,
+        state.devices,
+        (device) => device.name,
+        (device) => row(device.name),
+      );
+      state.devices.forEach((device, i) =>
+        devices.children[i].show(device.works ? "works" : "broken", device.why || device.kind),
+      );
       no_devices.hidden = state.devices.length > 0;
-      keep(people, state.guests.map((guest, i) => ({ ...guest, i })), (guest) => `${guest.name} ${guest.role} ${guest.i}`,
-           (guest) => h("li", {}, h("b", {}, guest.name || "Guest"), h("span", { class: "soft small" }, guest.role)));
+      keep(
+        people,
+        state.guests.map((guest, i) => ({ ...guest, i })),
+        (guest) => `${guest.name} ${guest.role} ${guest.i}`,
+        (guest) => h("li", {}, h("b", {}, guest.name || "Guest"), h("span", { class: "soft small" }, guest.role)),
+      );
       comments.show(state.comments);
-      keep(notes, state.notes.slice(-k_most_notes).reverse(), (note) => `${note.at_s} ${note.text}`,
-           (note) => h("li", {}, h("span", { class: "soft" }, `${note.at_s.toFixed(0)} s `), note.text));
+      keep(
+        notes,
+        state.notes.slice(-k_most_notes).reverse(),
+        (note) => `${note.at_s} ${note.text}`,
+        (note) => h("li", {}, h("span", { class: "soft" }, `${note.at_s.toFixed(0)} s `), note.text),
+      );
       no_notes.hidden = state.notes.length > 0;
     },
   };

@@ -9,5 +9,8 @@ self.addEventListener("activate", (event) => event.waitUntil(self.clients.claim(
 self.addEventListener("fetch", (event) => {
   if (event.request.mode !== "navigate") return;
   event.respondWith(
-    fetch(event.request).catch(() => new Response(k_words, { headers: { "Content-Type": "text/html; charset=utf-8" } })));
+    fetch(event.request).catch(
+      () => new Response(k_words, { headers: { "Content-Type": "text/html; charset=utf-8" } }),
+    ),
+  );
 });

@@ -3,7 +3,7 @@ import { role_of, take_roles } from "/actions.js";
 import { by_id, h, icon, set_text } from "/dom.js";
 import { Link } from "/link.js";
 
-const k_roles = ["look", "work", "operate"];  // each may what the ones before it may
+const k_roles = ["look", "work", "operate"]; // each may what the ones before it may
 
 /** `on_state(state)` hears each state, `on_hello(message)` each new connection. */
 export function begin_session({ on_state, on_hello }) {
@@ -12,8 +12,18 @@ export function begin_session({ on_state, on_hello }) {
 
   /** Tells the person something; `is_bad` interrupts a screen reader. */
   session.say = (text, is_bad = false) => {
-    const note = h("div", { class: is_bad ? "note bad" : "note", role: is_bad ? "alert" : "status" }, h("span", {}, text));
-    note.append(h("button", { class: "quiet", "aria-label": "Close this message", onclick: () => note.remove() }, icon("close")));
+    const note = h(
+      "div",
+      { class: is_bad ? "note bad" : "note", role: is_bad ? "alert" : "status" },
+      h("span", {}, text),
+    );
+    note.append(
+      h(
+        "button",
+        { class: "quiet", "aria-label": "Close this message", onclick: () => note.remove() },
+        icon("close"),
+      ),
+    );
     by_id("notes").replaceChildren(note);
     setTimeout(() => note.remove(), is_bad ? 9000 : 5000);
   };
@@ -34,9 +44,14 @@ export function begin_session({ on_state, on_hello }) {
 
   /** A button that does an action; `value` may be a function. A role that may not is not shown it; with data-stays it is, disabled. */
   session.button = (action, { slot, value, ...properties }, ...children) => {
-    const button = h("button", { type: "button", "data-action": action, "data-needs": role_of(action), ...properties }, ...children);
+    const button = h(
+      "button",
+      { type: "button", "data-action": action, "data-needs": role_of(action), ...properties },
+      ...children,
+    );
     button.addEventListener("click", () =>
-      session.act(action, slot, typeof value === "function" ? value() : value, button));
+      session.act(action, slot, typeof value === "function" ? value() : value, button),
+    );
     fit_role(button, link.role);
     return button;
   };
@@ -97,7 +112,8 @@ function wait_before_pairing(why, wait_s, form) {
 
 function prepare_pairing(link) {
   const form = by_id("pairing").querySelector("form");
-  const pin = form.elements.pin, name = form.elements.name;
+  const pin = form.elements.pin,
+    name = form.elements.name;
   name.value = localStorage.getItem("limn.name") ?? "";
   let is_asking = false;
 

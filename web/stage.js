@@ -3,12 +3,15 @@ import { in_words } from "/actions.js";
 import { by_id, icon, set_text } from "/dom.js";
 import { draw_picture } from "/pictures.js";
 
-const k_again_ms = 500;  // until the room is asked for again when it has no picture
+const k_again_ms = 500; // until the room is asked for again when it has no picture
 
 /** A switch that does an on_off action and shows whether it is on. */
 export function make_switch(session, action, is_on, ...children) {
-  const button = session.button(action, { role: "switch", "aria-checked": "false", class: "switch",
-                                          value: () => (is_on(session.state) ? "off" : "on") }, ...children);
+  const button = session.button(
+    action,
+    { role: "switch", "aria-checked": "false", class: "switch", value: () => (is_on(session.state) ? "off" : "on") },
+    ...children,
+  );
   button.show = (state) => button.setAttribute("aria-checked", String(is_on(state)));
   return button;
 }
@@ -23,7 +26,7 @@ export function make_stage(session) {
   document.addEventListener("visibilitychange", want);
   want();
 
-  let room_why = "";  // there is no picture of the room
+  let room_why = ""; // there is no picture of the room
 
   session.link.addEventListener("picture", async ({ detail }) => {
     const seen = () => session.link.send({ type: "seen", picture: detail.number });

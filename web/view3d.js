@@ -36,7 +36,10 @@ const k_fov = (35 * Math.PI) / 180;
 
 function program_of(gl) {
   const program = gl.createProgram();
-  for (const [type, text] of [[gl.VERTEX_SHADER, k_vertex], [gl.FRAGMENT_SHADER, k_fragment]]) {
+  for (const [type, text] of [
+    [gl.VERTEX_SHADER, k_vertex],
+    [gl.FRAGMENT_SHADER, k_fragment],
+  ]) {
     const shader = gl.createShader(type);
     gl.shaderSource(shader, text);
     gl.compileShader(shader);
@@ -70,28 +73,63 @@ function texture_of(gl, picture) {
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, texture);
   if (picture) gl.texImage2D(gl.TEXTURE_2D, 0, gl.SRGB8_ALPHA8, gl.RGBA, gl.UNSIGNED_BYTE, picture);
-  else gl.texImage2D(gl.TEXTURE_2D, 0, gl.SRGB8_ALPHA8, 1, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array([255, 255, 255, 255]));
+  else
+    gl.texImage2D(
+      gl.TEXTURE_2D,
+      0,
+      gl.SRGB8_ALPHA8,
+      1,
+      1,
+      0,
+      gl.RGBA,
+      gl.UNSIGNED_BYTE,
+      new Uint8Array([255, 255, 255, 255]),
+    );
   gl.generateMipmap(gl.TEXTURE_2D);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
   return texture;
 }
 
 function box_of(meshes) {
-  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+  const low = [Infinity, Infinity, Infinity],
+    high = [-Infinity, -Infinity, -Infinity];
   for (const { matrix, positions } of meshes)
     for (let i = 0; i < positions.length; i += 3)
       for (let k = 0; k < 3; ++k) {
-        const p = matrix[k] * positions[i] + matrix[4 + k] * positions[i + 1] + matrix[8 + k] * positions[i + 2] + matrix[12 + k];
+        const p =
+          matrix[k] * positions[i] +
+          matrix[4 + k] * positions[i + 1] +
+          matrix[8 + k] * positions[i + 2] +
+          matrix[12 + k];
         low[k] = Math.min(low[k], p);
         high[k] = Math.max(high[k], p);
       }
-  return { centre: low.map((v, k) => (v + high[k]) / 2), radius: Math.hypot(...low.map((v, k) => high[k] - v)) / 2 || 1 };
+  return {
+    centre: low.map((v, k) => (v + high[k]) / 2),
+    radius: Math.hypot(...low.map((v, k) => high[k] - v)) / 2 || 1,
+  };
 }
 
 function perspective(aspect, near, far) {
   const f = 1 / Math.tan(k_fov / 2);
-  return new Float32Array([f / Math.max(aspect, 1), 0, 0, 0, 0, f * Math.min(aspect, 1), 0, 0,
-                           0, 0, (far + near) / (near - far), -1, 0, 0, (2 * far * near) / (near - far), 0]);
+  return new Float32Array([
+    f / Math.max(aspect, 1),
+    0,
+    0,
+    0,
+    0,
+    f * Math.min(aspect, 1),
+    0,
+    0,
+    0,
+    0,
+    (far + near) / (near - far),
+    -1,
+    0,
+    0,
+    (2 * far * near) / (near - far),
+    0,
+  ]);
 }
 
 /** A view of meshes in a canvas: dragging, two fingers, the wheel and keys turn it and come nearer. Throws where there is no WebGL 2. */
@@ -103,7 +141,7 @@ export class View3d {
   #box = { centre: [0, 0, 0], radius: 1 };
   #yaw = 0.6;
   #pitch = 0.35;
-  #near = 1;  // nearer: more than 1
+  #near = 1; // nearer: more than 1
   #fingers = new Map();
   #is_due = false;
   #marked = "";
@@ -140,13 +178,25 @@ export class View3d {
       this.#fingers.set(event.pointerId, event);
     });
     canvas.addEventListener("pointermove", (event) => this.#drag(event));
-    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => this.#fingers.delete(event.pointerId));
-    canvas.addEventListener("wheel", (event) => {
-      event.preventDefault();
-      this.#turn(0, 0, Math.exp(-event.deltaY / 600));
-    }, { passive: false });
-    const keys = { ArrowLeft: [-0.15, 0, 1], ArrowRight: [0.15, 0, 1], ArrowUp: [0, 0.15, 1], ArrowDown: [0, -0.15, 1],
-                   "+": [0, 0, 1.15], "=": [0, 0, 1.15], "-": [0, 0, 1 / 1.15] };
+    for (const end of ["pointerup", "pointercancel"])
+      canvas.addEventListener(end, (event) => this.#fingers.delete(event.pointerId));
+    canvas.addEventListener(
+      "wheel",
+      (event) => {
+        event.preventDefault();
+        this.#turn(0, 0, Math.exp(-event.deltaY / 600));
+      },
+      { passive: false },
+    );
+    const keys = {
+      ArrowLeft: [-0.15, 0, 1],
+      ArrowRight: [0.15, 0, 1],
+      ArrowUp: [0, 0.15, 1],
+      ArrowDown: [0, -0.15, 1],
+      "+": [0, 0, 1.15],
+      "=": [0, 0, 1.15],
+      "-": [0, 0, 1 / 1.15],
+    };
     canvas.addEventListener("keydown", (event) => {
       if (!keys[event.key]) return;
       event.preventDefault();
@@ -182,14 +232,34 @@ export class View3d {
 
   #view_from_world() {
     const [cy, sy, cp, sp] = [Math.cos(this.#yaw), Math.sin(this.#yaw), Math.cos(this.#pitch), Math.sin(this.#pitch)];
-    const { centre, radius } = this.#box, away = radius / Math.sin(k_fov / 2) / this.#near;
-    const turned = new Float32Array([cy, -sp * sy, cp * sy, 0, 0, cp, sp, 0, -sy, -sp * cy, cp * cy, 0, 0, 0, -away, 1]);
+    const { centre, radius } = this.#box,
+      away = radius / Math.sin(k_fov / 2) / this.#near;
+    const turned = new Float32Array([
+      cy,
+      -sp * sy,
+      cp * sy,
+      0,
+      0,
+      cp,
+      sp,
+      0,
+      -sy,
+      -sp * cy,
+      cp * cy,
+      0,
+      0,
+      0,
+      -away,
+      1,
+    ]);
     const moved = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -centre[0], -centre[1], -centre[2], 1]);
     return [product(turned, moved), away];
   }
 
   #draw() {
-    const gl = this.#gl, canvas = this.#canvas, dense = Math.min(devicePixelRatio, 2);
+    const gl = this.#gl,
+      canvas = this.#canvas,
+      dense = Math.min(devicePixelRatio, 2);
     canvas.width = Math.max(1, Math.round(canvas.clientWidth * dense));
     canvas.height = Math.max(1, Math.round(canvas.clientHeight * dense));
     gl.viewport(0, 0, canvas.width, canvas.height);
@@ -198,8 +268,13 @@ export class View3d {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.useProgram(this.#program);
     const at = (name) => gl.getUniformLocation(this.#program, name);
-    const [view_from_world, away] = this.#view_from_world(), { radius } = this.#box;
-    gl.uniformMatrix4fv(at("u_clip_from_view"), false, perspective(canvas.width / canvas.height, Math.max(away - 1.1 * radius, 0.01 * radius), away + 1.1 * radius));
+    const [view_from_world, away] = this.#view_from_world(),
+      { radius } = this.#box;
+    gl.uniformMatrix4fv(
+      at("u_clip_from_view"),
+      false,
+      perspective(canvas.width / canvas.height, Math.max(away - 1.1 * radius, 0.01 * radius), away + 1.1 * radius),
+    );
     for (const mesh of this.#meshes) {
       gl.uniformMatrix4fv(at("u_view_from_model"), false, product(view_from_world, mesh.matrix));
       gl.uniform4fv(at("u_base"), mesh.base);

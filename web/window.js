@@ -3,15 +3,17 @@
 import { by_id, h, icon, set_text } from "/dom.js";
 import { draw_picture } from "/pictures.js";
 
-const k_widths = [320, 480, 640, 800, 960, 1280];  // heights are whole at 4:3, 16:9 and 16:10
-const k_first = 2;                                 // index of the width to begin with
-const k_slow_ms = 160, k_fast_ms = 80;             // from a frame's grab to its answer; above: smaller frames, below: larger
-const k_trials = 8;                                // answers before the width may change again
+const k_widths = [320, 480, 640, 800, 960, 1280]; // heights are whole at 4:3, 16:9 and 16:10
+const k_first = 2; // index of the width to begin with
+const k_slow_ms = 160,
+  k_fast_ms = 80; // from a frame's grab to its answer; above: smaller frames, below: larger
+const k_trials = 8; // answers before the width may change again
 const k_quality = [0.6, 0.7, 0.75, 0.75, 0.8, 0.8];
-const k_lost_ms = 4000;  // a frame that is not answered by then is given up
+const k_lost_ms = 4000; // a frame that is not answered by then is given up
 
 const k_refusals = {
-  NotAllowedError: "The camera was refused. Allow it for this page in the browser's settings, then open the window again.",
+  NotAllowedError:
+    "The camera was refused. Allow it for this page in the browser's settings, then open the window again.",
   NotFoundError: "This device has no camera.",
   NotReadableError: "Another program uses the camera. Close it, then open the window again.",
   OverconstrainedError: "This device has no camera that fits.",
@@ -28,10 +30,11 @@ function device_name(camera, is_upright) {
   return name;
 }
 
-/** How wide a frame is sent: by how long the last ones took. */
+/** How wide a frame is sent: by how long the last ones took, and how much of that was Limn's. */
 export class Pace {
   #at = k_first;
   #since = 0;
+  #limn_ms = 0;
   mean_ms = 0;
   get width() {
     return k_widths[this.#at];
@@ -39,14 +42,19 @@ export class Pace {
   get quality() {
     return k_quality[this.#at];
   }
-  take(ms) {
+  take(ms, limn_ms) {
     this.mean_ms = this.mean_ms ? 0.8 * this.mean_ms + 0.2 * ms : ms;
+    this.#limn_ms = this.#limn_ms ? 0.8 * this.#limn_ms + 0.2 * limn_ms : limn_ms;
     if (++this.#since < k_trials) return;
-    const step = this.mean_ms > k_slow_ms ? -1 : this.mean_ms < k_fast_ms ? 1 : 0;
+    // A busy Limn is not helped by frames in which markers are too small; a slow link is.
+    const may_shrink = this.#at > k_first || this.#limn_ms < this.mean_ms / 2;
+    const step = this.mean_ms > k_slow_ms && may_shrink ? -1 : this.mean_ms < k_fast_ms ? 1 : 0;
     const at = Math.min(Math.max(this.#at + step, 0), k_widths.length - 1);
     if (at === this.#at) return;
     // Time goes with the pixels, about: what is expected of the new width.
-    this.mean_ms *= (k_widths[at] / k_widths[this.#at]) ** 2;
+    const scale = (k_widths[at] / k_widths[this.#at]) ** 2;
+    this.mean_ms *= scale;
+    this.#limn_ms *= scale;
     this.#at = at;
     this.#since = 0;
   }
@@ -62,15 +70,15 @@ class CameraWindow {
   #stream = null;
   #pace = new Pace();
   #number = 0;
-  #in_flight = null;  // {number, at, timer}
+  #in_flight = null; // {number, at, timer}
   #device = "";
-  #times = [];  // of the last answers, ms
+  #times = []; // of the last answers, ms
   #lock = null;
 
   constructor(session, stage) {
     this.#session = session;
     this.#stage = stage;
-    by_id("view").append(this.#video);  // some browsers give no frames of a video that is nowhere
+    by_id("view").append(this.#video); // some browsers give no frames of a video that is nowhere
     const { link } = session;
     link.addEventListener("answer", ({ detail }) => this.#answer(detail));
     link.addEventListener("hello", () => this.#resume());
@@ -88,7 +96,9 @@ class CameraWindow {
       return this.#fail("A browser opens the camera on https alone. Use the https address that Limn shows.");
     try {
       this.#stream = await navigator.mediaDevices.getUserMedia({
-        video: { facingMode: { ideal: "environment" }, width: { ideal: 1280 }, height: { ideal: 960 } }, audio: false });
+        video: { facingMode: { ideal: "environment" }, width: { ideal: 1280 }, height: { ideal: 960 } },
+        audio: false,
+      });
       this.#video.srcObject = this.#stream;
       await this.#video.play();
     } catch (refusal) {
@@ -155,10 +165,13 @@ class CameraWindow {
     const number = (this.#number = (this.#number + 1) >>> 0);
     const frame = (this.#in_flight = { number, at: performance.now(), timer: 0 });
     const { videoWidth, videoHeight } = this.#video;
-    const long = Math.max(videoWidth, videoHeight), scale = Math.min(1, this.#pace.width / long);
+    const long = Math.max(videoWidth, videoHeight),
+      scale = Math.min(1, this.#pace.width / long);
     this.#grabbed.width = Math.round(videoWidth * scale);
     this.#grabbed.height = Math.round(videoHeight * scale);
-    this.#grabbed.getContext("2d", { alpha: false }).drawImage(this.#video, 0, 0, this.#grabbed.width, this.#grabbed.height);
+    this.#grabbed
+      .getContext("2d", { alpha: false })
+      .drawImage(this.#video, 0, 0, this.#grabbed.width, this.#grabbed.height);
     const jpeg = await new Promise((done) => this.#grabbed.toBlob(done, "image/jpeg", this.#pace.quality));
     const bytes = jpeg && (await jpeg.arrayBuffer());
     if (!bytes || frame !== this.#in_flight) return;
@@ -183,10 +196,10 @@ class CameraWindow {
     if (frame !== this.#in_flight) return;
     this.#stage.give_to_window(sees);
     this.#say(sees ? "" : json.why || "No markers in view. Point the camera at the prototype.");
-    const ms = performance.now() - frame.at;
-    this.#pace.take(ms);
+    const limn_ms = Object.values(json.ms ?? {}).reduce((sum, ms) => sum + ms, 0);
+    this.#pace.take(performance.now() - frame.at, limn_ms);
     this.#times = [...this.#times.slice(-19), performance.now()];
-    this.#tell(json);
+    this.#tell(json, limn_ms);
     Object.assign(this.#shown.dataset, { number, sees: json.sees, rms: json.rms_px ?? "" });
     this.#in_flight = null;
     this.#video.requestVideoFrameCallback ? this.#at_next_frame() : this.#send();
@@ -200,7 +213,7 @@ class CameraWindow {
       this.#send();
     };
     this.#video.requestVideoFrameCallback(send);
-    setTimeout(send, 100);  // a camera that stands still gives no frame
+    setTimeout(send, 100); // a camera that stands still gives no frame
   }
 
   async #show(jpeg, number) {
@@ -211,14 +224,18 @@ class CameraWindow {
     }
   }
 
-  #tell(json) {
+  #tell(json, limn_ms) {
     const [first, last] = [this.#times[0], this.#times.at(-1)];
     const rate = this.#times.length > 1 ? (1000 * (this.#times.length - 1)) / (last - first) : 0;
-    const server_ms = Object.values(json.ms ?? {}).reduce((sum, ms) => sum + ms, 0);
-    const lines = [`${this.#grabbed.width} × ${this.#grabbed.height}, ${rate.toFixed(0)}/s, ${this.#pace.mean_ms.toFixed(0)} ms (Limn ${server_ms.toFixed(0)})`];
+    const lines = [
+      `${this.#grabbed.width} × ${this.#grabbed.height}, ${rate.toFixed(0)}/s, ${this.#pace.mean_ms.toFixed(0)} ms (Limn ${limn_ms.toFixed(0)})`,
+    ];
     if (json.rms_px !== undefined) lines.push(`${json.markers ?? 0} markers, fit ${json.rms_px.toFixed(2)} px`);
     const focal = json.lens?.values?.[0];
-    if (focal) lines.push(`lens ${focal.toFixed(0)} ± ${json.lens.focal_stddev_px.toFixed(1)} px of ${json.lens.frames} frames`);
+    if (focal)
+      lines.push(
+        `lens ${focal.toFixed(0)} ± ${json.lens.focal_stddev_px.toFixed(1)} px of ${json.lens.frames} frames`,
+      );
     const numbers = by_id("window-numbers");
     set_text(numbers, lines.join("\n"));
     numbers.hidden = false;
@@ -227,9 +244,22 @@ class CameraWindow {
 
 function make_panel(owner) {
   const why = h("p", { role: "alert", class: "bad-words" });
-  const words = h("p", { class: "soft" }, "Hold this device before the prototype: its camera's picture comes back with the parts in it.");
-  const open = h("button", { type: "button", class: "main grow", onclick: () => toggle() }, icon("camera"), h("span", {}, "Open the window"));
-  const full = h("button", { type: "button", "aria-label": "Full screen", onclick: () => toggle_full() }, icon("full"));
+  const words = h(
+    "p",
+    { class: "soft" },
+    "Hold this device before the prototype: its camera's picture comes back with the parts in it.",
+  );
+  const open = h(
+    "button",
+    { type: "button", class: "main grow", onclick: () => toggle() },
+    icon("camera"),
+    h("span", {}, "Open the window"),
+  );
+  const full = h(
+    "button",
+    { type: "button", "aria-label": "Full screen", onclick: () => toggle_full() },
+    icon("full"),
+  );
   by_id("window").append(h("h2", {}, "Window"), words, why, h("div", { class: "dock line" }, open, full));
   function toggle() {
     set_text(why, "");
@@ -248,7 +278,10 @@ function make_panel(owner) {
 
 function toggle_full() {
   if (document.fullscreenElement) document.exitFullscreen();
-  else if (document.documentElement.requestFullscreen) by_id("stage").requestFullscreen().catch(() => {});
+  else if (document.documentElement.requestFullscreen)
+    by_id("stage")
+      .requestFullscreen()
+      .catch(() => {});
 }
 
 export function make_window(session, stage) {
