@@ -11,6 +11,7 @@ import urllib.error
 import urllib.request
 
 WAIT_S = 20.0  # for a condition: long, for a machine that does other work; a test that passes does not wait for it
+ENTER, ESCAPE, TAB = "\ue007", "\ue00c", "\ue004"  # as WebDriver has them
 ELEMENT = "element-6066-11e4-a52e-4f735466cecf"
 
 
@@ -80,6 +81,11 @@ class Browser:
         except urllib.error.HTTPError as refusal:
             raise Failed(json.load(refusal)["value"]["message"].splitlines()[0]) from None
 
+    def settle(self):
+        """Waits until what was changed is on the screen."""
+        self.script_async("await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));"
+                          "await Promise.all(document.getAnimations().map((animation) => animation.finished));")
+
     def open(self, url):
         self._call("POST", self.session + "/url", {"url": url})
 
@@ -89,8 +95,9 @@ class Browser:
 
     def script_async(self, code, *arguments):
         """What the function body `code`, of an async function, comes to."""
-        wrapped = ("const done = arguments[arguments.length - 1]; const args = [...arguments].slice(0, -1);"
-                   f"(async (...args) => {{ {code} }})(...args).then((value) => done({{value}}), (error) => done({{error: String(error)}}));")
+        wrapped = f"""
+            const done = arguments[arguments.length - 1], given = [...arguments].slice(0, -1);
+            (async (...args) => {{ {code} }})(...given).then((value) => done({{ value }}), (error) => done({{ error: String(error) }}));"""
         answer = self._call("POST", self.session + "/execute/async", {"script": wrapped, "args": list(arguments)})
         if "error" in answer:
             raise Failed(answer["error"])
@@ -120,8 +127,9 @@ class Browser:
         self._call("POST", f"{self.session}/element/{element}/value", {"text": text})
 
     def press(self, key, times=1):
-        keys = [action for _ in range(times) for action in ({"type": "keyDown", "value": key}, {"type": "keyUp", "value": key})]
-        self._call("POST", self.session + "/actions", {"actions": [{"type": "key", "id": "keys", "actions": keys}]})
+        down_and_up = [{"type": "keyDown", "value": key}, {"type": "keyUp", "value": key}]
+        keys = {"type": "key", "id": "keys", "actions": down_and_up * times}
+        self._call("POST", self.session + "/actions", {"actions": [keys]})
 
     def text(self, selector):
         return self.script("return document.querySelector(arguments[0])?.textContent ?? ''", selector)
@@ -131,7 +139,8 @@ class Browser:
         return self._call("POST", self.session + "/se/log", {"type": kind})
 
     def resize(self, width, height, is_phone=False):
-        self.cdp("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=2 if is_phone else 1, mobile=is_phone)
+        self.cdp("Emulation.setDeviceMetricsOverride", width=width, height=height, mobile=is_phone,
+                 deviceScaleFactor=2 if is_phone else 1)
 
     def screenshot(self, path):
         with open(path, "wb") as file:

@@ -1,0 +1,206 @@
+// Runs in each page before its own code. Remembers what the WebSocket carried, and answers the test's questions about the page
+// as functions of window.limn_test.
+(() => {
+  const k_kept = 12; // frames and answers of the window
+  const k_drawn = 12; // levels by which a part differs from what is behind it
+  const k_wide = 640; // px: of the frames that distances are told for
+  const frames = [],
+    answers = [],
+    states = [],
+    sockets = [];
+  const Native = WebSocket;
+  window.WebSocket = class extends Native {
+    constructor(...given) {
+      super(...given);
+      sockets.push(this);
+      this.addEventListener("message", ({ data }) => {
+        if (data instanceof ArrayBuffer) {
+          if (new DataView(data).getUint32(0, true) === 2)
+            answers.splice(0, answers.length, ...answers.slice(1 - k_kept), data);
+          return;
+        }
+        const { type, number, last_edit } = JSON.parse(data);
+        if (type === "state") states.push({ at: performance.timeOrigin + performance.now(), number, last_edit });
+      });
+    }
+    send(data) {
+      if (data instanceof ArrayBuffer) frames.splice(0, frames.length, ...frames.slice(1 - k_kept), data);
+      super.send(data);
+    }
+  };
+
+  const all = (selector) => [...document.querySelectorAll(selector)].filter((node) => node.checkVisibility());
+  const controls = () => all("button, a[href], select, input").filter((node) => !node.disabled);
+  const in_words = (node) => node.outerHTML.slice(0, 120);
+
+  // WCAG: how much light a colour gives, from 0.05 to 1.05.
+  const linear = (v) => (v <= 10 ? v / 3294.6 : ((v / 255 + 0.055) / 1.055) ** 2.4);
+  const light = ([r, g, b]) => 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b) + 0.05;
+  const numbers = (text) => text.match(/[\d.]+/g).map(Number);
+  const ground = (node) => {
+    for (; node; node = node.parentElement) {
+      const colour = numbers(getComputedStyle(node).backgroundColor);
+      if (colour.length < 4 || colour[3] > 0.5) return colour;
+    }
+    return [255, 255, 255];
+  };
+  const has_text = (node) =>
+    [...node.childNodes].some((child) => child.nodeType === Node.TEXT_NODE && child.textContent.trim());
+
+  const colours = (picture, width, height) => {
+    const context = new OffscreenCanvas(width, height).getContext("2d", { willReadFrequently: true });
+    context.drawImage(picture, 0, 0, width, height);
+    return context.getImageData(0, 0, width, height).data;
+  };
+  const grey = (picture, width, height) => {
+    const data = colours(picture, width, height);
+    return Array.from({ length: width * height }, (_, i) => (data[4 * i] + data[4 * i + 1] + data[4 * i + 2]) / 3);
+  };
+  const bitmap = (bytes, type) => createImageBitmap(new Blob([bytes], { type }));
+  const bytes_of = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const apart = (a, b) => a.reduce((sum, value, i) => sum + Math.abs(value - b[i]), 0) / a.length;
+  const small = (picture) => grey(picture, 64, 48);
+  const median = (values) => values.sort((x, y) => x - y)[values.length >> 1] ?? NaN;
+  let film = [];
+
+  // Share of the pixels in either mask that are in both, the second one moved by (dx, dy).
+  const overlap = (one, two, width, height, dx, dy) => {
+    const margin = 8;
+    let both = 0,
+      either = 0;
+    for (let y = margin; y < height - margin; ++y)
+      for (let x = margin; x < width - margin; ++x) {
+        const a = one[y * width + x],
+          b = two[(y + dy) * width + x + dx];
+        both += a && b;
+        either += a || b;
+      }
+    return either ? both / either : 0;
+  };
+
+  // How far, in pixels of the masks, one must be moved to lie on the other best: to a part of a pixel, by a parabola.
+  const offset = (one, two, width, height) => {
+    const shared = (dx, dy) => overlap(one, two, width, height, dx, dy);
+    let [x, y, best] = [0, 0, 0];
+    for (let dy = -4; dy <= 4; ++dy)
+      for (let dx = -4; dx <= 4; ++dx) {
+        const found = shared(dx, dy);
+        if (found > best) [x, y, best] = [dx, dy, found];
+      }
+    const peak = (low, high) => (low - high) / 2 / (low - 2 * best + high);
+    return Math.hypot(x + peak(shared(x - 1, y), shared(x + 1, y)), y + peak(shared(x, y - 1), shared(x, y + 1)));
+  };
+
+  window.limn_test = {
+    frames,
+    answers,
+    states,
+    sockets,
+
+    unnamed: () =>
+      controls()
+        .filter((n) => !(n.getAttribute("aria-label") || n.textContent.trim() || n.labels?.length))
+        .map(in_words),
+
+    // Controls that the Tab key has not come to since watch_focus().
+    watch_focus() {
+      const seen = new Set();
+      addEventListener("focusin", (event) => seen.add(event.target));
+      document.activeElement?.blur();
+      const wanted = controls();
+      this.missed = () =>
+        wanted.filter((node) => node.isConnected && node.checkVisibility() && !seen.has(node)).map(in_words);
+      return wanted.length;
+    },
+
+    small_targets: (least) =>
+      all("button, a[href], select, input:not([type=range])")
+        .map((node) => [in_words(node), node.getBoundingClientRect()])
+        .filter(([, box]) => Math.min(box.width, box.height) < least - 0.5)
+        .map(([words, box]) => `${words} ${box.width}x${box.height}`),
+
+    sticking_out: () =>
+      all("#session *")
+        .filter((node) => !node.closest(".strip, .looks, svg, video"))
+        .filter((node) => {
+          const { left, right } = node.getBoundingClientRect();
+          return left < -1 || right > innerWidth + 1;
+        })
+        .map(in_words),
+
+    faint_text: (least) =>
+      all("body *")
+        .filter(has_text)
+        .map((node) => [in_words(node), light(numbers(getComputedStyle(node).color)), light(ground(node))])
+        .filter(([, one, two]) => Math.max(one, two) / Math.min(one, two) < least)
+        .map(([words]) => words),
+
+    // A canvas, small and grey.
+    pixels: (selector) => small(document.querySelector(selector)),
+
+    // `views`: each view's picture (JPEG) and where the part is in it (PNG), in base64.
+    async keep_film(views) {
+      film = await Promise.all(
+        views.map(async ({ picture, part }) => {
+          const mask = await bitmap(bytes_of(part), "image/png"),
+            { width, height } = mask;
+          return {
+            small: small(await bitmap(bytes_of(picture), "image/jpeg")),
+            part: grey(mask, width, height).map((v) => Number(v > 127)),
+            width,
+            height,
+          };
+        }),
+      );
+    },
+
+    // Each answer's picture beside the frame of its number, and the part in it beside where it is in truth in the view that the
+    // frame shows. Counts, and medians over the answers.
+    async window_measured() {
+      const sent = new Map();
+      for (const data of frames)
+        sent.set(new DataView(data).getUint32(0, true), await bitmap(data.slice(4), "image/jpeg"));
+      const out = { answers: 0, belong: 0 },
+        offs = [],
+        overlaps = [],
+        views = new Set();
+      for (const data of answers) {
+        const head = new DataView(data),
+          number = head.getUint32(4, true),
+          length = head.getUint32(8, true);
+        const json = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 12, length))),
+          frame = sent.get(number);
+        if (!frame || json.sees === "nothing") continue;
+        const answer = await bitmap(new Uint8Array(data, 12 + length), "image/jpeg"),
+          seen = small(answer);
+        ++out.answers;
+        out.belong += [...sent.values()].every(
+          (other) => apart(seen, small(frame)) <= apart(seen, small(other)) + 0.5,
+        );
+        const view = film.reduce((best, one) =>
+          apart(one.small, small(frame)) < apart(best.small, small(frame)) ? one : best,
+        );
+        const { width, height } = view,
+          a = colours(answer, width, height),
+          b = colours(frame, width, height);
+        const drawn = view.part.map((_, i) =>
+          Number([0, 1, 2].some((k) => Math.abs(a[4 * i + k] - b[4 * i + k]) > k_drawn)),
+        );
+        offs.push((offset(drawn, view.part, width, height) * k_wide) / width);
+        overlaps.push(overlap(drawn, view.part, width, height, 0, 0));
+        views.add(view);
+        const { rms_px, lens, ms } = json,
+          limn_ms = Object.values(ms).reduce((sum, one) => sum + one, 0);
+        Object.assign(out, {
+          rms_px,
+          limn_ms,
+          focal_px: lens.values[0],
+          focal_stddev_px: lens.focal_stddev_px,
+          lens_frames: lens.frames,
+          width: frame.width,
+        });
+      }
+      return Object.assign(out, { off_px: median(offs), overlap: median(overlaps), views: views.size });
+    },
+  };
+})();
