@@ -60,19 +60,20 @@ std::vector<OperatorView::Slot> slots_of(const Session& session, const std::stri
 
 }  // namespace
 
-Result<OperatorDesk> OperatorDesk::open(const device::Desktop& desktop, const scene::Scene& scene) {
-  LIMN_TRY(GuiWindow window, GuiWindow::open(desktop, "Limn", k_width, k_height));
-  return OperatorDesk(std::move(window), scene);
-}
-
-void OperatorDesk::invite(const Invitation& invitation) {
-  remote_ = {invitation.url, invitation.fingerprint, {}};
+OperatorView::Remote shown(const Invitation& invitation) {
+  OperatorView::Remote out{invitation.url, invitation.fingerprint, {}};
   for (const Role role : {Role::look, Role::work, Role::operate}) {
     cv::Mat code = qr_code(invitation.url_for(role));
     if (!code.empty()) cv::resize(code, code, {}, k_module_px, k_module_px, cv::INTER_NEAREST);
-    remote_->entrances.push_back(
+    out.entrances.push_back(
         {name_of(role), invitation.pins[static_cast<std::size_t>(role)], std::move(code)});
   }
+  return out;
+}
+
+Result<OperatorDesk> OperatorDesk::open(const device::Desktop& desktop, const scene::Scene& scene) {
+  LIMN_TRY(GuiWindow window, GuiWindow::open(desktop, "Limn", k_width, k_height));
+  return OperatorDesk(std::move(window), scene);
 }
 
 void OperatorDesk::shown(const ShownFrame& frame) {

@@ -17,6 +17,9 @@
 
 namespace limn::apps {
 
+/// What the window shows of an invitation, with the codes that phones read.
+OperatorView::Remote shown(const Invitation& invitation);
+
 /// Where the operator of a session sits: its window and keys. Belongs to the session's thread; the session's
 /// GL context stays current.
 class OperatorDesk {
@@ -24,7 +27,7 @@ class OperatorDesk {
   static Result<OperatorDesk> open(const device::Desktop& desktop, const scene::Scene& scene);
 
   /// From now on the window says how guests come in.
-  void invite(const Invitation& invitation);
+  void invite(const Invitation& invitation) { remote_ = apps::shown(invitation); }
 
   /// A picture was shown.
   void shown(const ShownFrame& frame);

@@ -322,7 +322,7 @@ void OperatorPanel::draw_remote(Gui& gui, const OperatorView::Remote& remote, Im
   const float side = std::max(1.0F, std::min(size.y, size.x - column - gap));
   if (!chosen.code.empty()) gui.picture("code of " + chosen.role, chosen.code, corner, {side, side});
   ImGui::SetCursorPos({at.x + side + gap, at.y});
-  ImGui::BeginChild("remote", {size.x - side - gap, size.y});
+  ImGui::BeginChild("remote", {size.x - side - gap, size.y}, false, ImGuiWindowFlags_AlwaysUseWindowPadding);
   heading(gui, "Remote");
   ImGui::PushFont(gui.heading());
   ImGui::TextUnformatted(remote.url.c_str());

@@ -7,7 +7,9 @@
 #include <thread>
 
 #include "apps/live/live.h"
+#include "apps/live/operator_desk.h"
 #include "apps/live/operator_panel.h"
+#include "apps/serve/qr_code.h"
 #include "apps/world_markers.h"
 #include "core/file.h"
 #include "sim/virtual_rig.h"
@@ -184,6 +186,43 @@ TEST(OperatorPanel, APictureGrowsWhenClicked) {
   canvas.draw(draw);
   canvas.keep("operator-large");
   EXPECT_GT(box_of(canvas.picture(), k_violet).width, 2 * before.width);
+}
+
+// Whether the code of a text is the bright square in the window.
+bool shows_code(const cv::Mat& picture, const std::string& text) {
+  const cv::Rect box = box_of(picture(cv::Rect(0, 50, 720, 720)), cv::Scalar::all(255)) + cv::Point(0, 50);
+  const cv::Mat code = qr_code(text);
+  if (box.width < 8 * code.cols) return false;
+  for (int row = 0; row < code.rows; ++row)
+    for (int column = 0; column < code.cols; ++column) {
+      const cv::Vec3b seen = around(picture, box.x + cvRound((column + 0.5) * box.width / code.cols),
+                                    box.y + cvRound((row + 0.5) * box.height / code.rows));
+      if ((seen[1] > 127) != (code.at<std::uint8_t>(row, column) > 127)) return false;
+    }
+  return true;
+}
+
+TEST(OperatorPanel, InvitesGuestsByACodeOrByPin) {
+  OperatorView view = a_view();
+  test::GuiCanvas canvas({1600, 1000});
+  OperatorPanel panel;
+  const auto draw = [&](Gui& gui) { panel.draw(gui, view); };
+  for (int i = 0; i < 2; ++i) canvas.draw(draw);
+  const std::string page = "https://192.168.7.2:8443/#pin=";
+  EXPECT_FALSE(shows_code(canvas.picture(), page + "234567"));
+  const Invitation invitation{"https://192.168.7.2:8443/",
+                              "0F:1E:2D:3C:4B:5A:69:78:87:96:A5:B4:C3:D2:E1:F0:"
+                              "0F:1E:2D:3C:4B:5A:69:78:87:96:A5:B4:C3:D2:E1:F0",
+                              {"123456", "234567", "345678"}};
+  view.remote = shown(invitation);
+  canvas.click({435, 25}, draw);  // Remote
+  canvas.draw(draw);
+  canvas.keep("operator-remote");
+  EXPECT_TRUE(shows_code(canvas.picture(), page + "234567"));
+  canvas.click({800, 257}, draw);  // operate
+  canvas.draw(draw);
+  canvas.keep("operator-remote-operate");
+  EXPECT_TRUE(shows_code(canvas.picture(), page + "345678"));
 }
 
 TEST(OperatorPanel, AsksBeforeItEnds) {
