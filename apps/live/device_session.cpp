@@ -71,14 +71,13 @@ class DeviceLoop {
     if (auto seen = seen_.take(k_wait)) session_->take(std::move(seen->watched), seen->moments);
     session_->show_news(&files_, now());
     if (osc_) osc_->hear(session_, &books_->telemetry(), now());
-    if (server_) server_->hear(session_, now());
+    if (server_) serve();
     const Stamp painting_at = now();
     const Painted& painted = session_->paint(painting_at, shifted(painting_at, paint_s_ + display_s_));
     ShownFrame shown = session_->measured();
     paint_s_ += k_blend * (1e-3 * shown.paint_ms - paint_s_);
     show(painted);
     if (osc_) osc_->tell(*session_);
-    if (server_) server_->tell(*session_, books_->telemetry(), *health_, now());
     shown.missed = static_cast<int>(cameras_.missed());
     const Stamp begun = now();
     const bool wants_screen = !devices_->screens.empty() || (desk_ && desk_->is_due());
@@ -97,6 +96,11 @@ class DeviceLoop {
   }
 
  private:
+  void serve() {
+    server_->hear(session_, now());
+    server_->tell(*session_, books_->telemetry(), *health_, now());
+  }
+
   void watch() try {
     std::size_t moments = 0;
     while (!is_stopping_) {

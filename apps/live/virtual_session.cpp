@@ -93,7 +93,7 @@ class VirtualLoop {
     play_edits(exposed_at);
     session_->show_news(&files_, rig_->now());
     if (osc_) osc_->hear(session_, &books_->telemetry(), rig_->now());
-    if (server_) server_->hear(session_, rig_->now());
+    if (server_) serve();
     const Painted& painted = session_->paint(rig_->now(), shifted(rig_->now(), k_virtual_display_s));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i) {
       if (!is_plugged(session_->setup().rig.projectors[i].name, projectors_[i], rig_->now())) continue;
@@ -101,7 +101,6 @@ class VirtualLoop {
       LIMN_CHECK(shown_at == painted.shown_at);
     }
     if (osc_) osc_->tell(*session_);
-    if (server_) server_->tell(*session_, books_->telemetry(), health_, rig_->now());
     ShownFrame shown = session_->measured();
     if (shown.record_ms >= 0) shown.record_ms += frames_ms;
     shown.missed = static_cast<int>(rig_->world().rig.cameras.size() - frames.size());
@@ -117,6 +116,11 @@ class VirtualLoop {
   }
 
  private:
+  void serve() {
+    server_->hear(session_, rig_->now());
+    server_->tell(*session_, books_->telemetry(), health_, rig_->now());
+  }
+
   std::vector<Frame> exposed(Stamp at) {
     std::vector<int> plugged;
     const std::vector<Imager>& cameras = rig_->world().rig.cameras;

@@ -15,6 +15,14 @@
 
 namespace limn::test {
 
+namespace {
+
+std::string bearer(const std::string& token) {
+  return token.empty() ? "" : fmt::format("Authorization: Bearer {}\r\n", token);
+}
+
+}  // namespace
+
 struct RemoteClient::Tls {
   SSL_CTX* context = nullptr;
   SSL* session = nullptr;
@@ -117,7 +125,8 @@ RemoteClient::Answer RemoteClient::ask(const std::string& method,
                                        const std::string& target,
                                        const std::string& headers,
                                        const std::string& body) {
-  const std::string host = headers.find("Host:") == std::string::npos ? "Host: " + host_ + "\r\n" : "";
+  const std::string host =
+      headers.find("Host:") == std::string::npos ? fmt::format("Host: {}\r\n", host_) : "";
   const std::string length = method == "POST" && headers.find("Content-Length:") == std::string::npos
                                  ? fmt::format("Content-Length: {}\r\n", body.size())
                                  : "";
@@ -126,18 +135,18 @@ RemoteClient::Answer RemoteClient::ask(const std::string& method,
 }
 
 RemoteClient::Answer RemoteClient::get(const std::string& target, const std::string& token) {
-  return ask("GET", target, token.empty() ? "" : "Authorization: Bearer " + token + "\r\n");
+  return ask("GET", target, bearer(token));
 }
 
 RemoteClient::Answer RemoteClient::post(const std::string& target,
                                         const std::string& body,
                                         const std::string& token) {
-  const std::string who = token.empty() ? "" : "Authorization: Bearer " + token + "\r\n";
+  const std::string who = bearer(token);
   return ask("POST", target, who + "Content-Type: application/json\r\n", body);
 }
 
 RemoteClient::Answer RemoteClient::upgrade(const std::string& token, const std::string& headers) {
-  const std::string who = token.empty() ? "" : "Authorization: Bearer " + token + "\r\n";
+  const std::string who = bearer(token);
   return ask("GET", "/api/live",
              who + headers +
                  "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"

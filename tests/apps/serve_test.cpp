@@ -1,14 +1,19 @@
 // The remote over a real network: the loopback. Guests are tests/apps/remote_client.
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
+#include <csignal>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "apps/coarser.h"
+#include "apps/live/live.h"
+#include "apps/live/replay.h"
 #include "apps/serve/own_addresses.h"
 #include "apps/serve/server.h"
 #include "apps/world_markers.h"
@@ -739,6 +744,90 @@ TEST_F(AServedSession, CostsTheSessionLittle) {
   const double served_us = cost_us();
   fmt::print("a turn costs the session {:.1f} us alone, {:.1f} us with four guests\n", alone_us, served_us);
   EXPECT_LT(served_us, 1000);
+}
+
+// stderr into a file, from which the PINs are read while the session runs.
+class StderrFile {
+ public:
+  explicit StderrFile(const fs::path& file) : before_(::dup(2)), file_(file) {
+    const int handle = ::open(file.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0600);
+    ::dup2(handle, 2);
+    ::close(handle);
+  }
+  ~StderrFile() {
+    ::dup2(before_, 2);
+    ::close(before_);
+  }
+  StderrFile(const StderrFile&) = delete;
+  StderrFile& operator=(const StderrFile&) = delete;
+
+  // What follows these words, once they are there.
+  std::string after(const std::string& words, std::size_t length) const {
+    for (int i = 0; i < 600; ++i) {
+      const std::string text = read_file(file_).value();
+      if (const auto at = text.find(words);
+          at != std::string::npos && text.find('\n', at) != std::string::npos)
+        return text.substr(at + words.size(), length);
+      std::this_thread::sleep_for(100ms);
+    }
+    return "";
+  }
+
+ private:
+  int before_;
+  fs::path file_;
+};
+
+// Guests' edits come at any moment, are in the recording, and come again at the same one.
+TEST(LiveServe, GuestsReachARunningSessionThatIsReplayed) {
+  const fs::path folder = test::test_folder(), config = fs::path(LIMN_SOURCE_DIR) / "config";
+  fs::copy(config / "scenes/door", folder / "door");
+  std::string world = read_file(config / "worlds/studio.json").value();
+  world.replace(world.find("../scenes/door"), 14, "door");
+  ASSERT_TRUE(write_file(folder / "world.json", world));
+  ::setenv("XDG_CONFIG_HOME", folder.c_str(), 1);
+  LiveOptions options;
+  options.resolution = 0.25;
+  options.world = folder / "world.json";
+  options.seconds = 1e5;  // ended below
+  options.serve = "0";
+  options.record = folder / "recording";
+  bool is_room_there = false;
+  int status = 0;
+  json state;
+  Status lived;
+  {
+    const StderrFile said(folder / "stderr.txt");
+    std::thread guest([&] {
+      const std::string url = said.after("the remote is at http://127.0.0.1:", 6);
+      const std::string pin = said.after("operate ", 6);
+      const int port = std::atoi(url.c_str());
+      const auto answer = RemoteClient(port).post("/api/pair", json({{"pin", pin}, {"name", "Ann"}}).dump());
+      if (answer.status == 200) {
+        const std::string token = json::parse(answer.body)["token"];
+        const auto edit = [&](const json& what) {
+          status = RemoteClient(port).post("/api/edit", what.dump(), token).status;
+        };
+        edit({{"action", "choose_variant"}, {"slot", "mirror"}, {"value", "sport"}});
+        edit({{"action", "save_look"}, {"value", "by Ann"}});
+        is_room_there = RemoteClient(port).get("/picture/room.jpg", token).status == 200;
+        state = json::parse(RemoteClient(port).get("/api/state", token).body);
+      }
+      std::raise(SIGTERM);
+    });
+    lived = run_live(options);
+    guest.join();
+  }
+  ASSERT_TRUE(lived.ok()) << lived.message();
+  EXPECT_EQ(status, 200);
+  EXPECT_TRUE(is_room_there);
+  EXPECT_EQ(state["slots"][0]["variant"], "sport");
+  EXPECT_EQ(state["last_edit"]["who"], "Ann");
+  EXPECT_EQ(state["looks"], json({"by Ann"}));
+  ReplayOptions replay;
+  replay.session = folder / "recording";
+  const Status replayed = run_replay(replay);
+  EXPECT_TRUE(replayed.ok()) << (replayed ? "" : replayed.message());
 }
 
 }  // namespace
