@@ -93,7 +93,7 @@ function show_status(link, { status, why }) {
 }
 
 function tell_pairing(text) {
-  set_text(by_id("pairing-why"), text);
+  set_text(by_id("pairing-why"), text.charAt(0).toUpperCase() + text.slice(1));
 }
 
 function wait_before_pairing(why, wait_s, form) {
