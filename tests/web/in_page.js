@@ -157,10 +157,12 @@
     // Each answer's picture beside the frame of its number, and the part in it beside where it is in truth in the view that the
     // frame shows. Counts, and medians over the answers.
     async window_measured() {
+      const window_picture = document.querySelector("#window-picture");
+      const shown = { number: Number(window_picture.dataset.number), small: small(window_picture) };
       const sent = new Map();
       for (const data of frames)
         sent.set(new DataView(data).getUint32(0, true), await bitmap(data.slice(4), "image/jpeg"));
-      const out = { answers: 0, belong: 0 },
+      const out = { answers: 0, belong: 0, is_shown: false },
         offs = [],
         overlaps = [],
         views = new Set();
@@ -174,6 +176,7 @@
         const answer = await bitmap(new Uint8Array(data, 12 + length), "image/jpeg"),
           seen = small(answer);
         ++out.answers;
+        if (number === shown.number) out.is_shown = apart(seen, shown.small) < 1;
         out.belong += [...sent.values()].every(
           (other) => apart(seen, small(frame)) <= apart(seen, small(other)) + 0.5,
         );

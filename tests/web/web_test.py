@@ -240,7 +240,8 @@ class Checks:
             bo.type("[name=name]", "Bo" + ENTER)
             wait_for("a state", lambda: bo.script("return document.body.dataset.number"))
             offered = bo.script("return [...document.querySelectorAll('[data-needs]')]"
-                                ".filter((n) => n.checkVisibility() && !n.disabled).map((n) => n.outerHTML)")
+                                ".filter((n) => !n.disabled && (n.checkVisibility() || 'stays' in n.dataset))"
+                                ".map((n) => n.outerHTML)")
             expect(not offered, "nothing offered to somebody who looks on", offered)
             bo.settle()
             bo.screenshot(os.path.join(self.out, "looking-on-phone.png"))
@@ -331,6 +332,7 @@ class Checks:
         self.browser.click("#window button.main")
         found = wait_for("the mirror where it is in truth", self._mirror_in_place, 40)
         expect(found["belong"] == found["answers"], "every picture to belong to its frame", found)
+        expect(found["is_shown"], "the picture of its number in the window", found)
         self.screenshots("window")
         self.size("tablet")
         self.browser.click("#window button.main")
