@@ -172,7 +172,7 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
   const std::atomic<bool> is_ended = false;
   const auto begun = std::chrono::steady_clock::now();
   const Status played =
-      play_on_devices(&devices, 2.5, is_ended, &*watcher, &*session, &*books, nullptr, nullptr);
+      play_on_devices(&devices, 2.5, is_ended, &*watcher, &*session, &*books, nullptr, nullptr, nullptr);
   const double took_s = seconds_between(begun, std::chrono::steady_clock::now());
   ASSERT_TRUE(played.ok()) << played.message();
   EXPECT_LT(took_s, 2.5 + 1 + 1.5);  // its end, and a picture that was being painted on a slow machine
@@ -195,7 +195,8 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
 TEST(LiveDevices, SaysWhatIsMissing) {
   SessionDevices devices;
   const std::atomic<bool> is_ended = false;
-  const Status played = play_on_devices(&devices, 1, is_ended, nullptr, nullptr, nullptr, nullptr, nullptr);
+  const Status played =
+      play_on_devices(&devices, 1, is_ended, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr);
   ASSERT_FALSE(played.ok());
   EXPECT_NE(played.message().find("a camera that works"), std::string::npos);
 }
