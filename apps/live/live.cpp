@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "apps/camera_encoding.h"
 #include "apps/coarser.h"
 #include "apps/devices.h"
 #include "apps/live/books.h"
@@ -155,6 +156,7 @@ Status play_in_virtual_room(const LiveOptions& options) {
   SessionSetup& setup = stage.setup;
   LIMN_TRY_STATUS(check_fits(setup.rig, stage.world.rig));
   LIMN_TRY_STATUS(set_up(options, &setup));
+  setup.paint.is_linear_camera = !stage.world.camera_effects.front().srgb;
   log_info("live: no devices are named; the session runs on a virtual rig, on its own clock");
   const double end_s = options.seconds > 0  ? options.seconds
                        : script.seconds > 0 ? script.seconds
@@ -224,6 +226,8 @@ Status play_with_devices(const LiveOptions& options) {
   LIMN_TRY(setup.scene, scene::load_scene(options.scene, &left_out));
   LIMN_TRY(const Devices devices, matched(named, setup.rig));
   LIMN_TRY_STATUS(set_up(options, &setup));
+  setup.paint.is_linear_camera =
+      !setup.rig.cameras.empty() && is_measured_linear(setup.rig, setup.rig.cameras.front());
   std::optional<device::Desktop> desktop;
   if (options.window ||
       std::any_of(devices.displays.begin(), devices.displays.end(), device::needs_desktop)) {

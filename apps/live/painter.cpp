@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "apps/camera_encoding.h"
 #include "apps/live/aids.h"
 #include "apps/live/feedback.h"
 
@@ -144,8 +145,9 @@ const Painted& Painter::paint(const Watched& watched,
 
 cv::Mat Painter::screen(const Watched& watched, const scene::Staging& staging) {
   using enum scene::Screen;
-  const cv::Mat behind = watched.frames.empty() ? cv::Mat() : watched.frames[0].image;
-  if (staging.screen == off || behind.empty()) return {};
+  if (staging.screen == off || watched.frames.empty() || watched.frames[0].image.empty()) return {};
+  const cv::Mat& seen = watched.frames[0].image;
+  const cv::Mat behind = options_.is_linear_camera ? srgb_picture(seen) : seen;
   if (staging.screen == camera) return behind;
   const Stamp at = watched.frames[0].captured_at;
   const std::vector<Track> tracks = scene::carried(

@@ -32,6 +32,8 @@ struct PaintOptions {
   double lost_s = 1.5;    ///< for which a ring marks where a part was lost
   double stereo_mm = 63;  ///< between the eyes of Screen::stereo
   bool refill = true;     ///< light lost to a shadow is given by other projectors
+  /// Camera 0's pictures are proportional to light; a screen's are made of them as sRGB.
+  bool is_linear_camera = false;
 };
 
 /// What is shown at a moment.

@@ -15,6 +15,7 @@
 #include <optional>
 #include <thread>
 
+#include "apps/camera_encoding.h"
 #include "apps/live/stopwatch.h"
 #include "apps/tablet/guest_eye.h"
 #include "apps/tablet/guest_picture.h"
@@ -269,7 +270,7 @@ Onlooker::Seen Onlooker::Impl::seen_by(const Guest& guest, const Known& known) {
 Onlooker::Seen Onlooker::Impl::seen_in_room(const Known& known) {
   const auto without = [](const char* why) { return Seen{nlohmann::json{{"why", why}}.dump(), {}}; };
   if (known.room.image.empty()) return without("The room's camera has shown nothing yet.");
-  cv::Mat picture = known.room.image;
+  cv::Mat picture = known.paint.is_linear_camera ? srgb_picture(known.room.image) : known.room.image;
   if (picture.channels() == 1) cv::cvtColor(picture, picture, cv::COLOR_GRAY2BGR);
   Imager camera = rig.cameras[0];
   const double scale = 1.0 * k_drawn_side / std::max(picture.cols, picture.rows);

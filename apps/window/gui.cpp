@@ -10,7 +10,7 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
-#include "core/response.h"
+#include "apps/camera_encoding.h"
 #include "core/result.h"
 
 namespace limn::apps {
@@ -36,17 +36,6 @@ ImFont* font(const char* file, float pixels) {
 }
 
 ImVec4 of(ImU32 colour) { return ImGui::ColorConvertU32ToFloat4(colour); }
-
-// Display values of 8-bit linear ones.
-const cv::Mat& srgb_table() {
-  static const cv::Mat table = [] {
-    cv::Mat values(1, 256, CV_8UC1);
-    for (int i = 0; i < 256; ++i)
-      values.at<std::uint8_t>(0, i) = cv::saturate_cast<std::uint8_t>(255 * srgb_of_linear(i / 255.0));
-    return values;
-  }();
-  return table;
-}
 
 void set_theme(float scale) {
   ImGui::StyleColorsDark();
@@ -163,7 +152,7 @@ PlacedPicture Gui::picture(
     cv::resize(picture, shown,
                {std::max(1, static_cast<int>(placed.size.x)), std::max(1, static_cast<int>(placed.size.y))},
                0, 0, cv::INTER_AREA);
-  if (is_linear) cv::LUT(shown, srgb_table(), shown);
+  if (is_linear) shown = srgb_picture(shown);
   if (!shown.isContinuous()) shown = shown.clone();
   Texture& texture = textures_[name];
   if (texture.size != shown.size()) {
