@@ -1,7 +1,7 @@
 // What the projectors and screens show.
 import { role_of } from "/actions.js";
 import { by_id, h, icon, keep } from "/dom.js";
-import { show_picture } from "/pictures.js";
+import { draw_picture, fetch_picture } from "/pictures.js";
 import { make_switch } from "/stage.js";
 
 const k_screens = {
@@ -12,7 +12,7 @@ const k_screens = {
   stereo: "two eyes",
   off: "nothing",
 };
-const k_every_ms = 1000; // a projector's picture, while it is looked at
+const k_every_ms = 700; // a projector's picture, while it is looked at
 const k_reach_mm = 300; // of the slider; the number takes more
 
 function make_split(session) {
@@ -70,13 +70,32 @@ function make_split(session) {
   return node;
 }
 
+function make_projector(name) {
+  const canvas = h("canvas", {
+    role: "img",
+    "aria-label": `What ${name} shows`,
+    width: "8",
+    height: "5",
+    "data-projector": name,
+  });
+  const figure = h("figure", {}, canvas, h("figcaption", {}, name));
+  let is_asked = false; // one at a time, however slow the link
+  figure.refresh = async () => {
+    if (is_asked) return;
+    is_asked = true;
+    const picture = await fetch_picture(`/picture/projector/${encodeURIComponent(name)}.jpg`);
+    if (picture) draw_picture(canvas, picture);
+    is_asked = false;
+  };
+  return figure;
+}
+
 function make_projectors(session) {
   const list = h("div", { class: "projectors" });
   let is_open = false,
-    stamp = 0;
+    edit_number;
   const refresh = () => {
     if (!is_open || document.hidden || session.link.status !== "connected") return;
-    ++stamp;
     for (const figure of list.children) figure.refresh();
   };
   setInterval(refresh, k_every_ms);
@@ -85,24 +104,9 @@ function make_projectors(session) {
     refresh();
   };
   list.show = (state) => {
-    keep(
-      list,
-      state.projectors,
-      (name) => name,
-      (name) => {
-        const canvas = h("canvas", {
-          role: "img",
-          "aria-label": `What ${name} shows`,
-          width: "8",
-          height: "5",
-          "data-projector": name,
-        });
-        const figure = h("figure", {}, canvas, h("figcaption", {}, name));
-        figure.refresh = () =>
-          show_picture(canvas, `/picture/projector/${encodeURIComponent(name)}.jpg`, String(stamp));
-        return figure;
-      },
-    );
+    keep(list, state.projectors, (name) => name, make_projector);
+    if (state.last_edit?.number === edit_number) return;
+    edit_number = state.last_edit?.number;
     refresh();
   };
   return list;

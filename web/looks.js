@@ -51,14 +51,20 @@ export function make_looks(session) {
     "aria-label": "Name of the look to save",
     placeholder: "Name of a new look",
     maxlength: "64",
+    title: "Letters, digits, blanks, -, _ and .",
     pattern: "[A-Za-z0-9_][A-Za-z0-9_. \\-]*",
     enterkeyhint: "done",
   });
-  const save = h("button", { class: "main", "data-action": "save_look" }, icon("save"), "Save");
+  const save = h("button", { class: "main", "data-action": "save_look" }, icon("save"), h("span", {}, "Save"));
+  // A look of that name would be written over: it is said before.
+  const say_what = () =>
+    set_text(save.lastElementChild, session.state?.looks.includes(name.value.trim()) ? "Replace" : "Save");
+  name.addEventListener("input", say_what);
   const form = h("form", { class: "line" }, name, save);
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
     if (await session.act("save_look", "", name.value.trim(), save)) name.value = "";
+    say_what();
   });
   const flip = session.button("flip", { class: "grow" }, icon("flip"), h("span", {}, "Compare"));
   const previous = session.button(

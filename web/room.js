@@ -16,6 +16,18 @@ function row(name) {
   return node;
 }
 
+// The link for those who only look; by the device's own way to share, or into the clipboard.
+async function share(session) {
+  const url = `${location.origin}/review`;
+  try {
+    if (navigator.share) return await navigator.share({ title: "Limn: looks", url });
+    await navigator.clipboard.writeText(url);
+    session.say("The link to the looks is in the clipboard. It asks for a PIN.");
+  } catch (reason) {
+    if (reason.name !== "AbortError") session.say(`The looks are at ${url}`);
+  }
+}
+
 export function make_room(session) {
   const tracking = h("ul", { class: "rows" }),
     devices = h("ul", { class: "rows" }),
@@ -25,6 +37,7 @@ export function make_room(session) {
   const no_notes = h("p", { class: "soft small" }, "Nothing to report.");
   const comments = make_comments(session, () => ({ look: session.state.look, slot: "" }), "Comment on all of it");
   const leave = h("button", { type: "button", class: "wide", onclick: () => session.link.leave() }, "Leave");
+  const link = h("button", { type: "button", class: "wide", onclick: () => share(session) }, "Share the looks");
   by_id("people").append(
     h("h2", {}, "Room"),
     h("h3", {}, "Tracking"),
@@ -39,6 +52,7 @@ export function make_room(session) {
     h("h3", {}, "Messages"),
     notes,
     no_notes,
+    link,
     leave,
   );
   return {
