@@ -179,7 +179,8 @@ Result<fs::path> own_folder() {
   if (config && fs::path(config).is_absolute()) return fs::path(config) / "limn";
   const char* home = std::getenv("HOME");
   if (home && *home) return fs::path(home) / ".config" / "limn";
-  return error("expected a folder for Limn's certificate, found neither XDG_CONFIG_HOME nor HOME. Set one.");
+  return error(
+      "expected a folder for what Limn keeps of guests, found neither XDG_CONFIG_HOME nor HOME. Set one.");
 }
 
 Result<Certificate> certificate_in(const fs::path& folder, const std::vector<std::string>& hosts) {

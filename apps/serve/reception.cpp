@@ -422,6 +422,11 @@ void Reception::hear(const std::shared_ptr<Visitor>& visitor, const SeenMessage&
 
 void Reception::hear(const std::shared_ptr<Visitor>& visitor, const WindowMessage& message) {
   if (message.on && !setup_.eyes.look) return refuse(visitor, std::nullopt, "this session has no window.");
+  const auto windows = std::count_if(visitors_.begin(), visitors_.end(), [&](const auto& other) {
+    return other != visitor && !other->device.empty();
+  });
+  if (message.on && windows >= k_most_windows)
+    return refuse(visitor, std::nullopt, fmt::format("{} windows are open; no more at once.", windows));
   visitor->device = message.on ? message.device : "";
   visitor->frame_waiting.reset();
 }
@@ -482,11 +487,10 @@ void Reception::ask_for_room(Clock::time_point now) {
 
 void Reception::room_came(Eyes::Seen seen) {
   room_is_asked_ = false;
-  if (seen.jpeg.empty()) return;
-  if (!room_message_ || seen.jpeg != room_jpeg_) {
+  if (!room_message_ || seen.jpeg != room_.jpeg || seen.json != room_.json) {
     room_message_ = std::make_shared<const std::string>(
         picture_message(PictureKind::room, ++room_number_, seen.json, seen.jpeg));
-    room_jpeg_ = std::move(seen.jpeg);
+    room_ = std::move(seen);
   }
   for (const auto& visitor : visitors_) {
     if (!visitor->wants_room || visitor->room_in_flight || visitor->room_sent == room_number_) continue;

@@ -31,6 +31,8 @@ constexpr std::chrono::seconds k_longest_wish{10};
 /// Between two room pictures, and how long a frame of the window may take before the next one is looked at.
 constexpr std::chrono::milliseconds k_between_rooms{66}, k_longest_look{10000};
 
+/// Tablets whose windows are open at once.
+constexpr std::ptrdiff_t k_most_windows = 8;
 /// Of a project's comments, how many the state has: the newest.
 constexpr std::size_t k_told_comments = 100;
 
@@ -164,7 +166,7 @@ class Reception {
   std::optional<Result<std::vector<scene::Comment>>> comments_;  // none before the first news
   bool room_is_asked_ = false;
   Clock::time_point room_asked_at_;
-  std::vector<std::uint8_t> room_jpeg_;
+  Eyes::Seen room_;
   std::shared_ptr<const std::string> room_message_;
   std::uint32_t room_number_ = 0;
   std::shared_ptr<std::map<std::string, Encoded>> encoded_;  // of projectors; the backroom's alone

@@ -10,7 +10,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::milliseconds k_between_news{50}, k_between_unwatched{1000};
+constexpr std::chrono::milliseconds k_between_news{50}, k_between_unwatched{1000}, k_longest_hearing{5};
 
 bool is_late(const Wish& wish, std::chrono::steady_clock::time_point now) {
   return now - wish.since >= k_longest_wish;
@@ -105,18 +105,22 @@ void Server::stop() {
   backroom_.close();
 }
 
+std::optional<Wish> Server::next_wish() {
+  const std::lock_guard lock(mutex_);
+  if (wishes_.empty()) return std::nullopt;
+  Wish wish = std::move(wishes_.front());
+  wishes_.pop_front();
+  return wish;
+}
+
 void Server::hear(Session* session, Stamp at) {
-  std::vector<Wish> wishes;
-  {
-    const std::lock_guard lock(mutex_);
-    const auto end = wishes_.begin() + static_cast<std::ptrdiff_t>(std::min(wishes_.size(), k_most_at_once));
-    wishes.assign(std::make_move_iterator(wishes_.begin()), std::make_move_iterator(end));
-    wishes_.erase(wishes_.begin(), end);
-  }
-  for (const Wish& wish : wishes) {
-    if (is_late(wish, Clock::now())) continue;
-    const Status done = session->edit(wish.edit, wish.who, at);
-    outcomes_.push_back({wish.number, done ? "" : done.message()});
+  const auto begun = Clock::now();
+  for (std::size_t i = 0; i < k_most_at_once && Clock::now() - begun < k_longest_hearing; ++i) {
+    const auto wish = next_wish();
+    if (!wish) break;
+    if (is_late(*wish, Clock::now())) continue;
+    const Status done = session->edit(wish->edit, wish->who, at);
+    outcomes_.push_back({wish->number, done ? "" : done.message()});
   }
 }
 

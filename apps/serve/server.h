@@ -3,6 +3,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <deque>
 #include <filesystem>
 #include <memory>
 #include <mutex>
@@ -48,8 +49,8 @@ class Server {
   static Result<std::unique_ptr<Server>> open(const ServeOptions& options, Eyes eyes);
   ~Server();
 
-  /// Does what guests want, at most k_most_at_once edits; the others wait for the next call. What cannot be
-  /// done is answered to who wanted it.
+  /// Does what guests want, at most k_most_at_once edits and for at most 5 ms; the others wait for the next
+  /// call. What cannot be done is answered to who wanted it.
   void hear(Session* session, Stamp at);
   /// Lets guests know: at once after an edit, else twenty times a second, and once a second while there are
   /// none.
@@ -65,6 +66,7 @@ class Server {
  private:
   using Clock = std::chrono::steady_clock;
   Server() = default;
+  std::optional<Wish> next_wish();
 
   Invitation invitation_;
   Backroom backroom_;
@@ -73,7 +75,7 @@ class Server {
   std::atomic<bool> is_watched_ = false;  // somebody is paired
 
   std::mutex mutex_;
-  std::vector<Wish> wishes_;         // for the session
+  std::deque<Wish> wishes_;          // for the session
   std::optional<SessionNews> news_;  // for the network
   bool is_news_posted_ = false;
 

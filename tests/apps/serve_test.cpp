@@ -369,6 +369,33 @@ TEST_F(AServer, AnswersEveryFrameOfAWindowWithItsNumber) {
   }
 }
 
+TEST_F(AServer, OpensNoMoreWindowsThanItCanLookThrough) {
+  open({}, eyes_that_echo());
+  std::vector<std::unique_ptr<RemoteClient>> tablets;
+  for (std::ptrdiff_t i = 0; i <= k_most_windows; ++i) {
+    tablets.push_back(guest(Role::look));
+    tablets.back()->send_text(
+        fmt::format(R"({{"type": "window", "device": "tablet-{:04}", "on": true}})", i));
+  }
+  EXPECT_TRUE(tablets.back()->message_of("refused"));
+  tablets.front()->send_binary(number_bytes(1) + k_jpeg);
+  const auto answer = tablets.front()->message();
+  ASSERT_TRUE(answer);
+  EXPECT_FALSE(answer->is_text);
+}
+
+TEST_F(AServer, SaysWhyThereIsNoRoomPicture) {
+  Eyes eyes;
+  eyes.room = [](Eyes::Answer answer) { answer({R"({"why":"no camera"})", {}}); };
+  open({}, eyes);
+  const auto one = guest(Role::look);
+  one->send_text(R"({"type": "pictures", "room": true})");
+  const auto picture = one->message();
+  ASSERT_TRUE(picture && !picture->is_text);
+  EXPECT_EQ(picture->bytes.substr(12), R"({"why":"no camera"})");
+  EXPECT_EQ(client()->get("/picture/room.jpg", token_of(Role::look)).status, 404);
+}
+
 TEST_F(AServer, LooksAtTheNewestOfFramesThatComeTogether) {
   open({}, eyes_that_echo(200ms));
   const auto tablet = guest(Role::look);
@@ -455,6 +482,7 @@ TEST_F(AServer, IsEncryptedFromTheFirstByteAwayFromTheLoopback) {
 TEST_F(AServer, SpeaksTlsAllTheWay) {
   ServeOptions options;
   options.always_encrypted = true;
+  options.limits.read = 500ms;
   open(options, eyes_that_echo());
   const auto first = client();
   EXPECT_EQ(first->fingerprint(), server_->invitation().fingerprint);
@@ -462,6 +490,9 @@ TEST_F(AServer, SpeaksTlsAllTheWay) {
   ASSERT_EQ(paired.status, 200);
   EXPECT_NE(paired.headers.at("set-cookie").find("; Secure"), std::string::npos);
   EXPECT_EQ(client()->ask("GET", "/", "X-Long: " + std::string(9000, 'x') + "\r\n").status, 431);
+  const auto slow = client();
+  slow->send("GET / HTTP/1.1\r\nHost: local");
+  EXPECT_EQ(slow->answer().status, 408);
   const auto tablet = guest(Role::look);
   tablet->send_text(R"({"type": "window", "device": "tablet-0001", "on": true})");
   const std::string jpeg = "\xff\xd8" + std::string(500'000, 'x');
@@ -616,6 +647,22 @@ TEST_F(AServedSession, ProgramsEditOverHttp) {
     EXPECT_NE(wrong.body.find("expected on, off or toggle"), std::string::npos);
   });
   EXPECT_TRUE(session_->staging().blackout);
+}
+
+// The session gives guests no more of its time than it can between two pictures.
+TEST_F(AServedSession, AFloodOfEditsIsTakenInPortions) {
+  const auto ann = guest(Role::work);
+  for (int i = 0; i < 100; ++i)
+    ann->send_text(fmt::format(
+        R"({{"type": "edit", "id": {}, "action": "nudge", "slot": "mirror", "value": "1 0 0"}})", i));
+  std::this_thread::sleep_for(200ms);
+  turn();
+  const double first_mm = 1e3 * session_->staging().slots[0].nudge.x();
+  EXPECT_GT(first_mm, 0);
+  EXPECT_LE(first_mm, Server::k_most_at_once + 1e-6);
+  for (int i = 0; i < 100; ++i) turn();
+  EXPECT_NEAR(1e3 * session_->staging().slots[0].nudge.x(), 100, 1e-6);
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(ann->message_of("done")) << i;
 }
 
 // The state that the documentation shows has the members that are told.
