@@ -138,6 +138,12 @@
     // A canvas, small and grey.
     pixels: (selector) => small(document.querySelector(selector)),
 
+    // What a projector shows, likewise.
+    async projector(name) {
+      const answer = await fetch(`/picture/projector/${name}.jpg`);
+      return small(await createImageBitmap(await answer.blob()));
+    },
+
     // `views`: each view's picture (JPEG) and where the part is in it (PNG), in base64.
     async keep_film(views) {
       film = await Promise.all(
