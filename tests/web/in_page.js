@@ -3,7 +3,6 @@
 (() => {
   const k_kept = 12; // frames and answers of the window
   const k_drawn = 12; // levels by which a part differs from what is behind it
-  const k_wide = 640; // px: of the frames that distances are told for
   const frames = [],
     answers = [],
     states = [],
@@ -195,7 +194,7 @@
         const drawn = view.part.map((_, i) =>
           Number([0, 1, 2].some((k) => Math.abs(a[4 * i + k] - b[4 * i + k]) > k_drawn)),
         );
-        offs.push((offset(drawn, view.part, width, height) * k_wide) / width);
+        offs.push((offset(drawn, view.part, width, height) * frame.width) / width);
         overlaps.push(overlap(drawn, view.part, width, height, 0, 0));
         views.add(view);
         const { rms_px, lens, ms } = json,

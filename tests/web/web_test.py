@@ -25,7 +25,7 @@ PHONE, DESK = "phone", "desk"
 SIZES = {PHONE: (390, 844, True), "tablet": (820, 1180, True), "tablet-lying": (1180, 820, True), DESK: (1440, 900, False)}
 MOST_BYTES, MOST_READY_MS, MOST_HEARD_MS = 300_000, 1000, 200
 LEAST_TARGET_PX, LEAST_CONTRAST = 48, 4.5
-MOST_OFF_PX, LEAST_OVERLAP = 3.0, 0.6  # of the mirror in the window's pictures, 640 wide
+MOST_OFF_PX, LEAST_OVERLAP = 3.0, 0.6  # of the mirror in the window's pictures
 MIRROR = ".slot:first-child"
 BLACKOUT = "#stage-buttons [data-action=blackout]"
 
