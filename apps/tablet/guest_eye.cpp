@@ -3,25 +3,31 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
-#include "tracker/sighting.h"
+#include "tracker/marker_pose.h"
 
 namespace limn::apps {
 namespace {
 
-constexpr double k_fov_deg = 65;        // of most tablets and phones, horizontally
-constexpr double k_guess_share = 0.25;  // of the focal length, one standard deviation: 50 to 90 degrees
-constexpr int k_full_scan_every = 3;    // as of a room's camera (WatchOptions)
-constexpr double k_gate_px = 3,
-                 k_gate_of_median = 4;  // corners further off belong to a marker that was moved
-constexpr double k_sure =
-    9;  // by so much (chi square) must a lone marker's pose be likelier than its mirror's
+constexpr int k_full_scan_every = 3;                   // as of a room's camera (WatchOptions)
+constexpr int k_lens_side = 1280;                      // px, the longer side that lenses are kept at
+constexpr std::size_t k_most_aspects = 4;              // of one device
+constexpr double k_gate_px = 2, k_gate_of_median = 4;  // markers further off than both were moved
+constexpr double k_sure = 9;  // by so much (chi square) is a lone marker's place likelier than its mirror's
+constexpr double k_most_unsure_px = 8;  // of the place, as it shows at the markers' distance
+constexpr double k_noticed_px = 0.15;   // of a change of the lens, anywhere in the picture
+constexpr double k_known_share = 0.03;  // of the focal length: a lens good enough to straighten sides with
+constexpr double k_learnt = 0.8;        // of a deviation: less of it is worth keeping
 
-// All markers whose place is known, as one body in the world.
-Body room_of(std::span<const Body> bodies, std::span<const Track> tracks) {
+using tracker::PoseFit;
+using tracker::Sighting;
+
+// The markers of bodies whose place is known, as one body in the world.
+Body room_of(std::span<const Body> bodies, std::span<const Track> tracks, std::size_t least_markers) {
   Body room{"room", {}};
   for (const Body& body : bodies)
     for (const Track& track : tracks) {
-      if (track.body != body.name || track.sight == Sight::lost) continue;
+      if (track.body != body.name || track.sight == Sight::lost || body.markers.size() < least_markers)
+        continue;
       for (const BodyMarker& marker : body.markers)
         room.markers.push_back(
             {marker.marker, marker.size_m, track.world_from_body * marker.body_from_marker});
@@ -29,79 +35,235 @@ Body room_of(std::span<const Body> bodies, std::span<const Track> tracks) {
   return room;
 }
 
-// How far off each marker's corners are, RMS px.
-std::vector<double> misfits(const tracker::Sighting& seen, const Pose& pose) {
-  std::vector<double> out;
-  for (const tracker::SeenMarker& marker : seen) {
-    const tracker::Sighting alone = {marker};
-    double squares = 0;
-    const auto chosen = tracker::corners_at(alone, pose);
-    for (const tracker::PointSight& sight : chosen.sights) {
-      Eigen::Vector2d r;
-      squares += tracker::residual(sight, pose, &r) ? r.squaredNorm() : 1e12;
-    }
-    out.push_back(std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, chosen.sights.size()))));
+// How far off a marker's corners are, RMS px.
+double misfit(const tracker::SeenMarker& marker, const Pose& pose) {
+  const auto chosen = tracker::corners_at({marker}, pose);
+  double squares = 0;
+  for (const tracker::PointSight& sight : chosen.sights) {
+    Eigen::Vector2d r;
+    if (!tracker::residual(sight, pose, &r)) return 1e6;
+    squares += r.squaredNorm();
   }
-  return out;
+  return chosen.sights.empty() ? 1e6 : std::sqrt(squares / static_cast<double>(chosen.sights.size()));
 }
 
-// Without the markers that stand elsewhere than was said.
-tracker::Sighting without_moved(const tracker::Sighting& seen, const Pose& pose) {
-  const std::vector<double> off = misfits(seen, pose);
-  std::vector<double> sorted = off;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  const double gate = std::max(k_gate_px, k_gate_of_median * *middle);
-  tracker::Sighting kept;
-  for (std::size_t i = 0; i < seen.size(); ++i)
-    if (off[i] <= gate) kept.push_back(seen[i]);
+double gate_of(const Sighting& seen, const Pose& pose) {
+  std::vector<double> off;
+  for (const tracker::SeenMarker& marker : seen) off.push_back(misfit(marker, pose));
+  const auto middle = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2);
+  std::nth_element(off.begin(), middle, off.end());
+  return std::max(k_gate_px, k_gate_of_median * *middle);
+}
+
+Sighting without_moved(const Sighting& seen, const Pose& pose) {
+  const double gate = gate_of(seen, pose);
+  Sighting kept;
+  for (const tracker::SeenMarker& marker : seen)
+    if (misfit(marker, pose) <= gate) kept.push_back(marker);
   return kept;
+}
+
+// One standard deviation of where a fit puts the middle of what it sees, px.
+double unsure_px(const Imager& camera, const PoseFit& fit, const Sighting& seen) {
+  Eigen::Vector3d p_middle = Eigen::Vector3d::Zero();
+  for (const tracker::SeenMarker& marker : seen) p_middle += marker.marker->body_from_marker.translation;
+  p_middle /= static_cast<double>(seen.size());
+  const tracker::PointSight sight{&camera.lens, Pose(), p_middle, Eigen::Vector2d::Zero()};
+  Eigen::Vector2d r;
+  Eigen::Matrix<double, 2, 6> d_r;
+  if (!tracker::residual(sight, fit.world_from_body, &r, &d_r)) return 1e6;
+  return std::sqrt((d_r * fit.covariance * d_r.transpose()).trace());
+}
+
+// How far apart two lenses of one size show things at most, px of a picture `width` wide.
+double difference_px(const calib::LensBelief& a, const calib::LensBelief& b, int width) {
+  constexpr int k_nodes = 7;
+  const Lens lens_a = a.lens(), lens_b = b.lens();
+  double most = 0;
+  for (int i = 0; i < k_nodes * k_nodes; ++i) {
+    const Eigen::Vector2d px(static_cast<double>(i % k_nodes) * (a.width - 1) / (k_nodes - 1),
+                             static_cast<double>(i / k_nodes) * (a.height - 1) / (k_nodes - 1));
+    const auto d = lens_a.unproject(px);
+    const auto there = d ? lens_b.project(*d) : std::nullopt;
+    most = std::max(most, there ? (*there - px).norm() : 1e6);
+  }
+  return most * width / a.width;
+}
+
+// The single markers that stand elsewhere than was said, by the guest's own picture.
+std::vector<Track> moved_markers(const Imager& view,
+                                 double gate_px,
+                                 std::span<const tracker::Detection> detections,
+                                 std::span<const Body> bodies,
+                                 std::span<const Track> tracks) {
+  std::vector<Track> moved;
+  Imager camera = view;
+  camera.imager_from_world = Pose();
+  const tracker::View here{&camera, detections};
+  for (const Track& track : tracks) {
+    const auto body =
+        std::find_if(bodies.begin(), bodies.end(), [&](const Body& b) { return b.name == track.body; });
+    if (body == bodies.end() || body->markers.size() != 1 || track.sight == Sight::lost) continue;
+    const Sighting seen = tracker::sighting(*body, std::span(&here, 1));
+    const Pose said = view.imager_from_world * track.world_from_body;
+    if (seen.empty() || misfit(seen[0], said) <= gate_px) continue;
+    // The branch that leans as the marker did.
+    std::optional<PoseFit> best;
+    for (const PoseFit& fit : tracker::minima(seen))
+      if (!best || angle_between(fit.world_from_body.rotation, said.rotation) <
+                       angle_between(best->world_from_body.rotation, said.rotation))
+        best = fit;
+    if (!best) continue;
+    const Pose world_from_camera = view.imager_from_world.inverse();
+    Track there = track;
+    there.world_from_body = world_from_camera * best->world_from_body;
+    Matrix6d turn = Matrix6d::Zero();
+    turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = world_from_camera.rotation_matrix();
+    there.covariance = turn * best->covariance * turn.transpose();
+    there.sight = Sight::measured;
+    moved.push_back(there);
+  }
+  return moved;
 }
 
 }  // namespace
 
-GuestEye::GuestEye(tracker::Families families)
-    : detector_(std::move(families), {.encoding = tracker::Encoding::srgb}) {}
+GuestEye::GuestEye(tracker::Families families, std::span<const calib::LensBelief> lenses)
+    : detector_(std::move(families), {.encoding = tracker::Encoding::srgb}) {
+  for (const calib::LensBelief& lens : lenses)
+    aspects_.push_back({calib::RoamingLens(lens), lens, lens.focal_stddev_px()});
+}
+
+GuestEye::Aspect& GuestEye::aspect_of(int width, int height) {
+  const auto found = std::find_if(aspects_.begin(), aspects_.end(), [&](const Aspect& aspect) {
+    return aspect.used.resized(width, height).has_value();
+  });
+  if (found != aspects_.end()) {
+    std::rotate(found, found + 1, aspects_.end());
+    return aspects_.back();
+  }
+  if (aspects_.size() >= k_most_aspects) aspects_.erase(aspects_.begin());
+  const double scale = static_cast<double>(k_lens_side) / std::max(width, height);
+  const calib::LensBelief lens =
+      calib::expected_lens(std::max(1, static_cast<int>(std::lround(scale * width))),
+                           std::max(1, static_cast<int>(std::lround(scale * height))));
+  aspects_.push_back({calib::RoamingLens(lens), lens, lens.focal_stddev_px()});
+  return aspects_.back();
+}
+
+void GuestEye::detect(const cv::Mat& grey, const Lens* lens) {
+  if (grey.size() != size_) detections_.clear();
+  size_ = grey.size();
+  detector_.follow(grey, lens, detections_, &followed_);
+  const bool search =
+      pictures_++ % k_full_scan_every == 0 || followed_.empty() || followed_.size() < detections_.size();
+  std::swap(detections_, followed_);
+  if (search) detector_.detect_more(grey, lens, &detections_);
+}
+
+// What the picture shows of each body with several markers, for learning: bodies alone, so that it does not
+// matter where the session takes them to be.
+void GuestEye::note_views(const Imager& camera, std::span<const Body> bodies) {
+  Imager here = camera;
+  here.imager_from_world = Pose();
+  const tracker::View view{&here, detections_};
+  const calib::LensBelief& kept = aspects_.back().used;
+  const Eigen::Vector2d scale(static_cast<double>(kept.width) / camera.width,
+                              static_cast<double>(kept.height) / camera.height);
+  for (const Body& body : bodies) {
+    if (body.markers.size() < 2) continue;
+    const Sighting seen = tracker::sighting(body, std::span(&view, 1));
+    if (seen.size() < 2) continue;
+    const std::vector<PoseFit> fits = tracker::minima(seen);
+    if (fits.empty()) continue;
+    calib::BodyView noted{fits[0].world_from_body, {}};
+    for (const tracker::PointSight& sight : tracker::corners_at(seen, fits[0].world_from_body).sights)
+      noted.points.push_back(
+          {sight.p_body, (scale.array() * (sight.px.array() + 0.5) - 0.5).matrix(),
+           scale.asDiagonal() * Eigen::Matrix2d(sight.information.inverse()) * scale.asDiagonal()});
+    views_.push_back(std::move(noted));
+  }
+}
 
 GuestSight GuestEye::look(const cv::Mat& bgr, std::span<const Body> bodies, std::span<const Track> tracks) {
   cv::Mat grey;
   cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
-  Imager camera = viewer_imager(Pose(), grey.cols, grey.rows, k_fov_deg);
-  detector_.follow(grey, nullptr, detections_, &followed_);
-  const bool search = pictures_++ % k_full_scan_every == 0 || followed_.size() < detections_.size();
-  std::swap(detections_, followed_);
-  if (search) detector_.detect_more(grey, nullptr, &detections_);
+  views_.clear();
+  const Aspect& aspect = aspect_of(grey.cols, grey.rows);
+  const auto lens = aspect.used.resized(grey.cols, grey.rows);
+  LIMN_CHECK(lens.has_value());
+  Imager camera{"guest", grey.cols, grey.rows, lens->lens(), Pose()};
+  const double focal_stddev_px =
+      aspect.lens.belief().focal_stddev_px() * grey.cols / static_cast<double>(aspect.used.width);
+  detect(grey, focal_stddev_px < k_known_share * lens->values[0] ? &camera.lens : nullptr);
 
   GuestSight out;
-  out.focal_stddev_px = k_guess_share * camera.lens.fx();
+  out.focal_stddev_px = focal_stddev_px;
+  out.lens_frames = aspect.lens.belief().views;
   const auto nothing = [&](const char* why) {
-    last_.reset();
     out.why = why;
     return out;
   };
   if (detections_.empty()) return nothing("No markers in view: point the camera at the prototype.");
-  const Body room = room_of(bodies, tracks);
+  note_views(camera, bodies);
   const tracker::View view{&camera, detections_};
-  const tracker::Sighting seen = tracker::sighting(room, std::span(&view, 1));
+  // Bodies of several markers stand more firmly than those of one.
+  Body room = room_of(bodies, tracks, 2);
+  Sighting seen = tracker::sighting(room, std::span(&view, 1));
+  if (seen.size() < 2) {
+    room = room_of(bodies, tracks, 1);
+    seen = tracker::sighting(room, std::span(&view, 1));
+  }
   if (seen.empty())
-    return nothing("The markers in view are not known in the room: its own cameras must see them, too.");
-  const auto fitted = [](const tracker::Sighting& markers, const Pose& start) {
-    return tracker::fit_pose(tracker::corners_at(markers, start).sights, start, tracker::k_huber);
-  };
-  std::vector<tracker::PoseFit> fits = tracker::minima(seen);
-  if (fits.empty()) return nothing("The markers in view are too small or too steep: go nearer.");
-  tracker::PoseFit fit = fits.front();
-  const tracker::Sighting kept = without_moved(seen, fit.world_from_body);
-  if (!kept.empty() && kept.size() < seen.size())
-    if (const auto again = fitted(kept, fit.world_from_body)) fit = *again;
+    return nothing("The markers in view have no known place: the room's camera must see them, too.");
+  const std::vector<PoseFit> fits = tracker::minima(seen);
+  constexpr const char* k_go_nearer = "The markers in view are too small or too steep: go nearer.";
+  if (fits.empty()) return nothing(k_go_nearer);
+  PoseFit fit = fits.front();
+  const Sighting kept = without_moved(seen, fit.world_from_body);
+  if (kept.size() < seen.size() && !kept.empty())
+    if (const auto again = tracker::fit_pose(tracker::corners_at(kept, fit.world_from_body).sights,
+                                             fit.world_from_body, tracker::k_huber))
+      fit = *again;
   if (kept.size() < 2 && fits.size() > 1 && fits[1].chi_square - fits[0].chi_square < k_sure)
-    return nothing("One marker alone, from straight ahead: bring a second one into view.");
-  last_ = fit.world_from_body;
+    return nothing("One marker alone does not tell the place for sure: bring a second one into view.");
+  if (!(unsure_px(camera, fit, kept.empty() ? seen : kept) < k_most_unsure_px)) return nothing(k_go_nearer);
   out.markers = static_cast<int>(kept.size());
   out.rms_px = fit.rms_px;
   camera.imager_from_world = fit.world_from_body;
-  out.view = camera;
+  out.moved = moved_markers(camera, gate_of(seen, fit.world_from_body), detections_, bodies, tracks);
+  out.view = std::move(camera);
   return out;
+}
+
+void GuestEye::learn() {
+  if (aspects_.empty()) return;
+  Aspect& aspect = aspects_.back();
+  bool is_news = false;
+  for (const calib::BodyView& view : views_) is_news |= aspect.lens.add(view);
+  views_.clear();
+  if (is_news) aspect.lens.improve();
+  if (difference_px(aspect.lens.belief(), aspect.used, size_.width) > k_noticed_px)
+    aspect.used = aspect.lens.belief();
+}
+
+std::vector<calib::LensBelief> GuestEye::lenses() const {
+  std::vector<calib::LensBelief> out;
+  for (const Aspect& aspect : aspects_)
+    if (aspect.lens.belief().views > 0) out.push_back(aspect.lens.belief());
+  return out;
+}
+
+bool GuestEye::has_learnt() const {
+  return std::any_of(aspects_.begin(), aspects_.end(), [](const Aspect& aspect) {
+    const double now = aspect.lens.belief().focal_stddev_px();
+    return aspect.lens.belief().views > 0 &&
+           (now < k_learnt * aspect.kept_stddev_px || now > aspect.kept_stddev_px / k_learnt);
+  });
+}
+
+void GuestEye::note_kept() {
+  for (Aspect& aspect : aspects_) aspect.kept_stddev_px = aspect.lens.belief().focal_stddev_px();
 }
 
 }  // namespace limn::apps

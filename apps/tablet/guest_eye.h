@@ -6,11 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "calib/roaming_lens.h"
 #include "core/imager.h"
 #include "core/marker.h"
-#include "core/result.h"
 #include "core/track.h"
 #include "tracker/detector.h"
+#include "tracker/sighting.h"
 
 namespace limn::apps {
 
@@ -21,26 +22,51 @@ struct GuestSight {
   std::string why;
   int markers = 0;    ///< that the place rests on
   double rms_px = 0;  ///< of their corners, each
+  /// Bodies of a single marker that the guest sees elsewhere than `tracks` says, for they are being moved:
+  /// where they are by the guest's own picture.
+  std::vector<Track> moved;
   /// Of the lens: one standard deviation of its focal length, and the pictures that it was found in.
   double focal_stddev_px = 0;
   int lens_frames = 0;
 };
 
-/// Finds a guest's camera by the markers in its pictures, without knowing its lens at first. One a device.
-/// Pure: the same pictures give the same answers.
+/// Finds a guest's camera by the markers in its pictures, and its lens while it looks round. One a device.
+/// Pure: the same pictures give the same answers. What is drawn by `view` fits the picture that it was found
+/// in, and no other: nothing is smoothed.
 class GuestEye {
  public:
-  explicit GuestEye(tracker::Families families);
+  /// `lenses` are what is known of the device's from before, one for each aspect ratio of its pictures.
+  explicit GuestEye(tracker::Families families, std::span<const calib::LensBelief> lenses = {});
 
-  /// `bgr` is a whole picture, sRGB. `bodies` are what markers stand on, `tracks` where those are; a body
-  /// without a track, or with a lost one, is not to be gone by.
+  /// `bgr` is a whole picture, sRGB, of any size. `bodies` are what markers stand on, `tracks` where those
+  /// are; a body without a track, or with a lost one, is not to be gone by.
   GuestSight look(const cv::Mat& bgr, std::span<const Body> bodies, std::span<const Track> tracks);
 
+  /// Learns of the lens what the last picture tells: a millisecond or two that need not be waited for.
+  void learn();
+
+  /// What is known of the lenses. `has_learnt`: noticeably more than when they were last asked for.
+  std::vector<calib::LensBelief> lenses() const;
+  bool has_learnt() const;
+  void note_kept();
+
  private:
+  // Pictures of one aspect ratio, in pixels of its lens's own size.
+  struct Aspect {
+    calib::RoamingLens lens;
+    calib::LensBelief used;  // for drawing: it stays until the found one differs noticeably
+    double kept_stddev_px = 0;
+  };
+  Aspect& aspect_of(int width, int height);
+  void detect(const cv::Mat& grey, const Lens* lens);
+  void note_views(const Imager& camera, std::span<const Body> bodies);
+
   tracker::Detector detector_;
   std::vector<tracker::Detection> detections_, followed_;
+  cv::Size size_;  // of the pictures that detections_ are of
   int pictures_ = 0;
-  std::optional<Pose> last_;  // camera_from_world, of the picture before
+  std::vector<Aspect> aspects_;         // the newest last
+  std::vector<calib::BodyView> views_;  // of the last picture, to learn from
 };
 
 }  // namespace limn::apps

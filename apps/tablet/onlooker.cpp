@@ -19,6 +19,7 @@
 #include "apps/live/stopwatch.h"
 #include "apps/tablet/guest_eye.h"
 #include "apps/tablet/guest_picture.h"
+#include "apps/tablet/lens_book.h"
 #include "core/config.h"
 #include "core/log.h"
 #include "device/gl_context.h"
@@ -34,9 +35,12 @@ namespace {
 
 using Answer = std::function<void(Onlooker::Seen)>;
 
-constexpr int k_quality = 80;           // of JPEG
-constexpr int k_niceness = 19;          // least: sessions and servers go before
-constexpr std::size_t k_most_eyes = 8;  // devices that are known at a time
+constexpr int k_quality = 80;               // of JPEG
+constexpr int k_niceness = 19;              // least: sessions and servers go before
+constexpr std::size_t k_most_eyes = 8;      // devices that are known at a time
+constexpr double k_treat_every_s = 0.5;     // how parts are drawn is decided anew, on pictures of a
+constexpr int k_coarser = 4;                // fourth of the size
+constexpr std::size_t k_most_waiting = 16;  // pictures that are not looked at yet
 
 // What a session said last.
 struct Known {
@@ -65,6 +69,13 @@ std::vector<Body> bodies_of(const scene::Scene& scene, const scene::Staging& sta
     out.push_back({slot.name, {{carrier, size_m, Pose()}}});
   }
   return out;
+}
+
+// What carries what, as of the room's newest picture.
+std::vector<Track> tracks_of(const Known& known) {
+  return scene::carried(
+      *known.scene, known.staging,
+      tracker::predicted(known.motions, known.room.captured_at, known.paint.prediction, known.paint.motion));
 }
 
 bool is_in_picture(const Imager& view, const scene::Scene& scene, const scene::PosedScene& posed) {
@@ -114,6 +125,8 @@ struct Onlooker::Impl {
   Status open(const scene::Scene& scene);
   void run();
   bool step();
+  void learn();
+  void keep(Watching* device);
   Seen seen_by(const Guest& guest, const Known& known);
   Seen seen_in_room(const Known& known);
   Watching& watching_of(const std::string& device);
@@ -136,6 +149,7 @@ Status Onlooker::Impl::open(const scene::Scene& scene) {
 void Onlooker::Impl::run() {
   while (step()) {
   }
+  for (Watching& device : watching) keep(&device);
   renderer.reset();
   context.reset();
 }
@@ -175,12 +189,30 @@ bool Onlooker::Impl::step() {
   };
   for (const Answer& answer : late)
     answer(nothing(is_over ? "The session is over." : "A newer picture came before this one's turn."));
-  if (guest) guest->answer(drawn([&] { return seen_by(*guest, *now); }));
+  if (guest) {
+    guest->answer(drawn([&] { return seen_by(*guest, *now); }));
+    learn();
+  }
   if (!asking.empty()) {
     const Seen room = drawn([&] { return seen_in_room(*now); });
     for (const Answer& answer : asking) answer(room);
   }
   return !is_over;
+}
+
+// What the last picture tells of its lens, while its guest is not waiting.
+void Onlooker::Impl::learn() {
+  if (watching.empty()) return;
+  watching.back().eye.learn();
+  if (watching.back().eye.has_learnt()) keep(&watching.back());
+}
+
+void Onlooker::Impl::keep(Watching* device) {
+  const std::vector<calib::LensBelief> lenses = device->eye.lenses();
+  if (lenses.empty()) return;
+  device->eye.note_kept();
+  if (const Status kept = save_lenses(lens_folder, device->device, lenses); !kept)
+    log_warning("live: {} What was found of a guest's lens is not kept.", kept.message());
 }
 
 // A scene that was edited is drawn from now on.
@@ -203,8 +235,11 @@ Onlooker::Impl::Watching& Onlooker::Impl::watching_of(const std::string& device)
     std::rotate(found, found + 1, watching.end());
     return watching.back();
   }
-  if (watching.size() >= k_most_eyes) watching.pop_front();
-  watching.push_back({device, GuestEye(families), {}, {}});
+  if (watching.size() >= k_most_eyes) {
+    keep(&watching.front());
+    watching.pop_front();
+  }
+  watching.push_back({device, GuestEye(families, load_lenses(lens_folder, device)), {}, {}});
   return watching.back();
 }
 
@@ -218,28 +253,36 @@ cv::Mat Onlooker::Impl::drawn(const Imager& camera,
   if (staging.screen == scene::Screen::full)
     return renderer->composite(camera, picture, posed, projector::Composite::full);
   const Stamp at = std::chrono::steady_clock::now();
-  const double seconds = *treated_at == Stamp{} ? 0 : seconds_between(*treated_at, at);
-  *treatments = projector::treated(*treatments, renderer->coverage(posed, camera), seconds);
-  *treated_at = at;
+  const double seconds = *treated_at == Stamp{} ? k_treat_every_s : seconds_between(*treated_at, at);
+  if (seconds >= k_treat_every_s) {
+    const auto coarse =
+        resized(camera, std::max(1, camera.width / k_coarser), std::max(1, camera.height / k_coarser));
+    *treatments =
+        projector::treated(*treatments, renderer->coverage(posed, coarse ? *coarse : camera), seconds);
+    *treated_at = at;
+  }
   return renderer->composite(camera, picture, posed, *treatments);
 }
 
 Onlooker::Seen Onlooker::Impl::seen_by(const Guest& guest, const Known& known) {
+  if (!is_device_name(guest.device))
+    return nothing("Expected a device's name of 8 to 64 letters, digits and -.");
   const Stamp begun = std::chrono::steady_clock::now();
   const auto picture = decode_guest_picture(guest.jpeg);
   if (!picture) return nothing(picture.message());
   const double decode_ms = milliseconds_since(begun);
 
   const Stamp tracking = std::chrono::steady_clock::now();
-  const std::vector<Track> tracks = scene::carried(
-      *known.scene, known.staging,
-      tracker::predicted(known.motions, known.room.captured_at, known.paint.prediction, known.paint.motion));
+  std::vector<Track> tracks = tracks_of(known);
   Watching& device = watching_of(guest.device);
   const GuestSight sight = device.eye.look(*picture, bodies_of(*known.scene, known.staging), tracks);
   const double track_ms = milliseconds_since(tracking);
   if (!sight.view) return nothing(sight.why);
 
   const Stamp drawing = std::chrono::steady_clock::now();
+  for (const Track& moved : sight.moved)
+    for (Track& track : tracks)
+      if (track.body == moved.body) track = moved;
   const scene::PosedScene posed = scene::staged(*known.scene, known.staging, tracks);
   const cv::Mat out =
       drawn(*sight.view, *picture, posed, known.staging, &device.treatments, &device.treated_at);
@@ -281,10 +324,7 @@ Onlooker::Seen Onlooker::Impl::seen_in_room(const Known& known) {
     camera = *smaller;
     cv::resize(picture, picture, size, 0, 0, cv::INTER_AREA);
   }
-  const std::vector<Track> tracks = scene::carried(
-      *known.scene, known.staging,
-      tracker::predicted(known.motions, known.room.captured_at, known.paint.prediction, known.paint.motion));
-  const scene::PosedScene posed = scene::staged(*known.scene, known.staging, tracks);
+  const scene::PosedScene posed = scene::staged(*known.scene, known.staging, tracks_of(known));
   const cv::Mat out = drawn(camera, picture, posed, known.staging, &room_treatments, &room_treated_at);
   return {nlohmann::json{{"why", ""}}.dump(), device::encode_jpeg(out, k_quality)};
 }
@@ -347,6 +387,10 @@ void Onlooker::look(const std::string& device,
     const auto before = std::find_if(impl_->guests.begin(), impl_->guests.end(),
                                      [&](const Guest& guest) { return guest.device == device; });
     if (before == impl_->guests.end()) {
+      if (impl_->guests.size() >= k_most_waiting) {
+        impl_->overtaken.push_back(std::move(impl_->guests.front().answer));
+        impl_->guests.pop_front();
+      }
       impl_->guests.push_back({device, std::move(jpeg), std::move(answer)});
     } else {  // keeps its turn
       impl_->overtaken.push_back(std::exchange(before->answer, std::move(answer)));
