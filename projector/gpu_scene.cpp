@@ -11,6 +11,8 @@
 namespace limn::projector {
 namespace {
 
+constexpr int k_cluster = 128;  // triangles
+
 struct GpuMaterial {
   Eigen::Vector4f colour;  // a: 1 when unlit
   Eigen::Vector4f look;    // texture layer (-1 when it has none), metallic, roughness
@@ -96,20 +98,23 @@ TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) 
   TriangleRun run;
   run.first = static_cast<int>(staging->owners.size());
   run.count = static_cast<int>(mesh.triangles.size());
-  Eigen::AlignedBox3f bounds;
+  Eigen::AlignedBox3d bounds;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (t % k_cluster == 0) run.clusters.push_back({run.first + static_cast<int>(t), 0, {}});
+    ++run.clusters.back().count;
     for (const std::uint32_t i : mesh.triangles[t]) {
       const Eigen::Vector2f uv = mesh.uvs.empty() ? Eigen::Vector2f(0, 0) : mesh.uvs[i];
       staging->corners.push_back((Eigen::Vector4f() << mesh.positions[i], uv.x()).finished());
       staging->normals.push_back((Eigen::Vector4f() << mesh.normals[i], uv.y()).finished());
-      bounds.extend(mesh.positions[i]);
+      run.clusters.back().box.extend(mesh.positions[i].cast<double>());
     }
     staging->owners.push_back(
         {static_cast<std::uint32_t>(owner), first_material + mesh.triangle_materials[t]});
   }
+  for (const TriangleRun::Cluster& cluster : run.clusters) bounds.extend(cluster.box);
   if (run.count > 0) {
-    run.p_lower = bounds.min().cast<double>();
-    run.p_upper = bounds.max().cast<double>();
+    run.p_lower = bounds.min();
+    run.p_upper = bounds.max();
   }
   return run;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <map>
 #include <optional>
@@ -15,10 +16,17 @@ namespace limn::projector {
 
 /// A run of triangles on the GPU and its bounds in its own frame (m).
 struct TriangleRun {
+  /// Neighbours in the mesh's order, to be left out together where they are out of sight.
+  struct Cluster {
+    int first = 0;
+    int count = 0;
+    Eigen::AlignedBox3d box;
+  };
   int first = 0;
   int count = 0;
   Eigen::Vector3d p_lower = Eigen::Vector3d::Zero();
   Eigen::Vector3d p_upper = Eigen::Vector3d::Zero();
+  std::vector<Cluster> clusters = {};  ///< all of the run, in its order
 };
 
 /// A piece in its place: owner 0 is the prototype, owner i + 1 slot i.

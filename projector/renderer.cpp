@@ -25,7 +25,7 @@ constexpr int k_arriving_side = 256;   // texels of a projector's map of arrivin
 constexpr GLuint k_list_binding = 6;   // of buffers, after the scene's and the sights'
 constexpr int k_each = 2, k_view = 3;  // overlays of parts treated each in its way, and of a virtual camera
 // Steps of light that ask for more samples: beside light, and between blacks.
-constexpr float k_edge = 0.02F, k_dark_edge = 0.001F;
+constexpr Smoothing k_light_edges, k_dark_edges{.least_step = 0.001};
 // The light where no room is known: soft, and a lamp, in the viewer's frame above and behind the left
 // shoulder.
 constexpr double k_soft_below = 0.15, k_soft_above = 0.35, k_lamp = 0.65;
@@ -154,6 +154,7 @@ struct Renderer::Impl {
   Sights sights;
   std::optional<ContactShadow> contact_shadow;
   bool has_contact_shadow = false;
+  Smoothing smoothing;
   Program points, blend, light, irradiance, lit, coverage, composite, edges;
   // A layer of the parts' light: where there may be some, at pixel centres, by more samples at edges.
   struct LayerPrograms {
@@ -189,7 +190,7 @@ struct Renderer::Impl {
   std::vector<PlacedRun> runs;
   std::vector<cv::Rect> light_places;  // of the projector drawn last
   Pose scene_from_world;
-  enum class EyeKind { none, imager, eye };
+  enum class EyeKind { none, imager, parts_of_imager, eye };
   EyeKind eye_kind = EyeKind::none;
   Imager eye;
   std::vector<std::pair<Imager, GpuLens>> lenses;  // of cameras and viewers, the newest last
@@ -238,7 +239,7 @@ struct Renderer::Impl {
   const Canvas& canvas(int width, int height, GLenum format);
   void prepare(const scene::PosedScene& posed);
   void look_from_eye(const Imager& viewer);
-  void look_from_imager(const Imager& imager);
+  void look_from_imager(const Imager& imager, bool parts_alone = false);
   void set_up(const Program& program, const GpuLens& lens, const Imager* viewer);
   void set_up_light(const Program& program, const scene::PosedScene& posed);
   void draw(const Program& program, const Canvas& into) const;
@@ -248,7 +249,7 @@ struct Renderer::Impl {
   void draw_layer(LayerPrograms& layer,
                   const Canvas& into,
                   const std::vector<cv::Rect>& places,
-                  float least_step,
+                  const Smoothing& smoothing,
                   const SetUp& set_up);
   template <class SetUp>
   cv::Mat laid_over(const cv::Mat& bgr,
@@ -356,14 +357,15 @@ void Renderer::Impl::look_from_eye(const Imager& viewer) {
   eye = viewer;
 }
 
-void Renderer::Impl::look_from_imager(const Imager& imager) {
-  if (eye_kind == EyeKind::imager && is_same_lens(eye, imager) &&
+void Renderer::Impl::look_from_imager(const Imager& imager, bool parts_alone) {
+  const EyeKind wanted = parts_alone ? EyeKind::parts_of_imager : EyeKind::imager;
+  if (eye_kind == wanted && is_same_lens(eye, imager) &&
       is_same(eye.imager_from_world, imager.imager_from_world)) {
     return;
   }
   const PassTimes::Scope scope(&times, "ids from a camera");
-  sights.see_from_imager(scene, runs, scene_from_world, imager, lens_of(imager).baked);
-  eye_kind = EyeKind::imager;
+  sights.see_from_imager(scene, runs, scene_from_world, imager, lens_of(imager).baked, parts_alone);
+  eye_kind = wanted;
   eye = imager;
 }
 
@@ -435,7 +437,7 @@ template <class SetUp>
 void Renderer::Impl::draw_layer(LayerPrograms& layer,
                                 const Canvas& into,
                                 const std::vector<cv::Rect>& places,
-                                float least_step,
+                                const Smoothing& smoothing,
                                 const SetUp& set_up) {
   const auto over_places = [&](const Program& program) {
     start_list(into.width * into.height * static_cast<int>(std::max<std::size_t>(1, places.size())));
@@ -469,10 +471,11 @@ void Renderer::Impl::draw_layer(LayerPrograms& layer,
   {
     const PassTimes::Scope scope(&times, "where edges are");
     edges.bind("s_centre", k_centre_unit, into.texture);
-    edges.set("u_least_step", least_step);
+    edges.set("u_least_step", static_cast<float>(smoothing.least_step));
     over_places(edges);
   }
   const PassTimes::Scope scope(&times, "light at edges");
+  layer.edges.set("u_samples", smoothing.samples);
   over_list(layer.edges);
 }
 
@@ -490,11 +493,11 @@ cv::Mat Renderer::Impl::laid_over(const cv::Mat& bgr,
   if (!overlay.posed || overlay.whole != whole || !is_same(*overlay.posed, posed) ||
       !is_same(overlay.imager.imager_from_world, imager.imager_from_world)) {
     prepare(posed);
-    look_from_imager(imager);
+    look_from_imager(imager, kind != k_view && !has_contact_shadow);
     overlay.places = sights.seen_places(imager, lens_of(imager).baked, runs, scene_from_world, kind == k_view,
                                         has_contact_shadow ? ContactShadow::k_reach : 0);
     if (has_contact_shadow) contact_shadow->place(posed);
-    draw_layer(layer, overlay.parts, overlay.places, k_edge, [&](const Program& program) {
+    draw_layer(layer, overlay.parts, overlay.places, smoothing, [&](const Program& program) {
       set_up(program, lens_of(imager), &imager);
       program.set("s_distances", k_distances_unit);
       if (has_contact_shadow) contact_shadow->bind(program, k_distances_unit);
@@ -639,6 +642,11 @@ void Renderer::set_arriving(std::size_t index, const cv::Mat& map) {
   for (Impl::Shown& shown : impl_->shown) shown.is_current = false;
 }
 
+void Renderer::set_smoothing(const Smoothing& smoothing) {
+  LIMN_CHECK(smoothing.samples == 4 || smoothing.samples == 8);
+  impl_->smoothing = smoothing;
+}
+
 void Renderer::set_contact_shadow(const scene::Scene* scene) {
   const bool wanted = scene != nullptr;
   if (wanted && !impl_->contact_shadow) impl_->contact_shadow.emplace(*scene);
@@ -677,7 +685,8 @@ unsigned Renderer::draw_projector(std::size_t index, const scene::PosedScene& po
     impl_->sights.light_places(index, impl_->runs, impl_->scene_from_world,
                                (impl_->scene_from_world * viewer.imager_from_world.inverse()).translation,
                                &places);
-  impl_->draw_layer(impl_->light_layer, centre, places, options.even_black ? k_dark_edge : k_edge, set_up);
+  impl_->draw_layer(impl_->light_layer, centre, places, options.even_black ? k_dark_edges : k_light_edges,
+                    set_up);
   {
     const PassTimes::Scope scope(&impl_->times, "response");
     set_up(impl_->light);
@@ -795,7 +804,7 @@ cv::Mat Renderer::view(const Imager& imager, const scene::PosedScene& posed, con
 
 std::vector<PartCoverage> Renderer::coverage(const scene::PosedScene& posed, const Imager& viewer) {
   impl_->prepare(posed);
-  impl_->look_from_imager(viewer);
+  impl_->look_from_imager(viewer, true);
   const Canvas& canvas = impl_->canvas(viewer.width, viewer.height, GL_RG8);
   impl_->set_up(impl_->coverage, impl_->lens_of(viewer), &viewer);
   impl_->draw(impl_->coverage, canvas);

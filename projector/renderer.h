@@ -24,6 +24,12 @@ enum class Composite {
 
 struct Treatment;
 
+/// How smooth the edges of parts are drawn.
+struct Smoothing {
+  int samples = 8;  ///< of a pixel on an edge: 8, or 4 in half the time, for small and compressed pictures
+  double least_step = 0.02;  ///< of full light between neighbours; a smaller one is no edge
+};
+
 /// How one part is shown to a viewer.
 struct PartCoverage {
   std::string slot;
@@ -59,6 +65,9 @@ class Renderer {
   /// empty: all of it, as at first. Where it is blocked the others that reach the point give its light, and
   /// it keeps at most 7 % of the light, to show when the shadow goes. Where no other reaches it shines on.
   void set_arriving(std::size_t index, const cv::Mat& map);
+
+  /// Of composites and views from the next one on.
+  void set_smoothing(const Smoothing& smoothing);
 
   /// View parts of `scene`, the one given to create, darken the prototype around them in composites and views
   /// (ContactShadow); null: they do not, as at first. Light cannot darken: projector pictures stay the same.

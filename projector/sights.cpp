@@ -72,6 +72,20 @@ TangentRect spanned_behind(const Pose& twin_from_scene,
   return spanned(twin_from_scene, out);
 }
 
+// The tangents that a twin's picture covers.
+TangentRect covered(const Twin& twin) {
+  return {
+      (Eigen::Vector2d::Constant(-0.5) - twin.centre) / twin.focal,
+      (Eigen::Vector2d(twin.width, twin.height).array() - 0.5 - twin.centre.array()).matrix() / twin.focal};
+}
+
+std::array<Eigen::Vector3d, 8> corners_of(const Eigen::AlignedBox3d& box) {
+  std::array<Eigen::Vector3d, 8> corners;
+  for (int k = 0; k < 8; ++k)
+    corners[static_cast<std::size_t>(k)] = box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(k));
+  return corners;
+}
+
 }  // namespace
 
 struct Sights::GpuSight {
@@ -161,13 +175,29 @@ void Sights::draw(const GpuScene& scene,
   glDisable(GL_BLEND);
   glBindVertexArray(scene.vertex_array());
   program_.use();
+  const TangentRect rect = covered(twin);
+  const auto draw_triangles = [&](int first, int count) {
+    if (count == 0) return;
+    program_.set_id("u_first_id", static_cast<unsigned>(first) + 1);
+    glDrawArrays(GL_TRIANGLES, 3 * first, 3 * count);
+  };
   for (const PlacedRun& placed : runs) {
     if (!wanted(placed)) continue;
-    const Eigen::Matrix4d clip_from_owner =
-        clip_from_twin(twin) * (twin.twin_from_scene * placed.scene_from_owner).matrix();
+    const Pose twin_from_owner = twin.twin_from_scene * placed.scene_from_owner;
+    const Eigen::Matrix4d clip_from_owner = clip_from_twin(twin) * twin_from_owner.matrix();
     program_.set("u_clip_from_owner", Eigen::Matrix4f(clip_from_owner.cast<float>()));
-    program_.set_id("u_first_id", static_cast<unsigned>(placed.run->first) + 1);
-    glDrawArrays(GL_TRIANGLES, 3 * placed.run->first, 3 * placed.run->count);
+    // Those in sight that stand together, at once.
+    int first = placed.run->first, count = 0;
+    for (const TriangleRun::Cluster& cluster : placed.run->clusters) {
+      if (intersected(rect, spanned(twin_from_owner, corners_of(cluster.box))).is_empty()) continue;
+      if (cluster.first != first + count) {
+        draw_triangles(first, count);
+        first = cluster.first;
+        count = 0;
+      }
+      count += cluster.count;
+    }
+    draw_triangles(first, count);
   }
   glDisable(GL_DEPTH_TEST);
 }
@@ -206,9 +236,10 @@ void Sights::see_from_imager(const GpuScene& scene,
                              const std::vector<PlacedRun>& runs,
                              const Pose& scene_from_world,
                              const Imager& imager,
-                             const BakedLens& lens) {
+                             const BakedLens& lens,
+                             bool parts_alone) {
   const Pose pose = sight_pose(imager, scene_from_world);
-  const TangentRect rect = intersected(lens.rect, spanned_by(pose, runs, is_any));
+  const TangentRect rect = intersected(lens.rect, spanned_by(pose, runs, parts_alone ? is_part : is_any));
   const Twin twin = twin_over(pose, rect, k_oversampling * imager.lens.fx(), k_eye_side, k_eye_side);
   draw(scene, runs, is_prototype, twin, eye_ids_, 0);
   draw(scene, runs, is_part, twin, eye_ids_, 1);

@@ -30,12 +30,13 @@ class Sights {
                            const std::vector<PlacedRun>& runs,
                            const Pose& scene_from_world,
                            bool prototype_too);
-  /// Draws the ids from an imager's own eye, over its picture.
+  /// Draws the ids from an imager's own eye, over its picture; `parts_alone`: only where parts may be.
   void see_from_imager(const GpuScene& scene,
                        const std::vector<PlacedRun>& runs,
                        const Pose& scene_from_world,
                        const Imager& imager,
-                       const BakedLens& lens);
+                       const BakedLens& lens,
+                       bool parts_alone);
   /// Draws the ids from an eye, over its view parts, as finely as the projectors show them; `d_up_scene` is
   /// any direction but the line of sight.
   void see_from_eye(const GpuScene& scene,

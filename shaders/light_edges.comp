@@ -10,6 +10,6 @@ void main() {
   if (gl_GlobalInvocationID.x >= s_list_count) return;
   ivec2 at = listed_pixel(gl_GlobalInvocationID.x);
   vec4 sum = vec4(0);
-  for (int k = 0; k < k_samples; ++k) sum += light_at(vec2(at) + sample_offset(k));
-  imageStore(u_picture, at, sum / float(k_samples));
+  for (int k = 0; k < u_samples; ++k) sum += light_at(vec2(at) + sample_offset(k));
+  imageStore(u_picture, at, sum / float(u_samples));
 }

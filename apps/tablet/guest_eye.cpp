@@ -8,7 +8,6 @@
 namespace limn::apps {
 namespace {
 
-constexpr int k_full_scan_every = 3;                   // as of a room's camera (WatchOptions)
 constexpr int k_lens_side = 1280;                      // px, the longer side that lenses are kept at
 constexpr std::size_t k_most_aspects = 4;              // of one device
 constexpr double k_gate_px = 2, k_gate_of_median = 4;  // markers further off than both were moved
@@ -151,51 +150,46 @@ GuestEye::Aspect& GuestEye::aspect_of(int width, int height) {
   return aspects_.back();
 }
 
-void GuestEye::detect(const cv::Mat& grey, const Lens* lens) {
-  if (grey.size() != size_) detections_.clear();
-  size_ = grey.size();
-  detector_.follow(grey, lens, detections_, &followed_);
-  const bool search =
-      pictures_++ % k_full_scan_every == 0 || followed_.empty() || followed_.size() < detections_.size();
-  std::swap(detections_, followed_);
-  if (search) detector_.detect_more(grey, lens, &detections_);
-}
-
-// What the picture shows of each body with several markers, for learning: bodies alone, so that it does not
-// matter where the session takes them to be.
-void GuestEye::note_views(const Imager& camera, std::span<const Body> bodies) {
+// What the picture shows of each body with several markers, for learning of the lens: of bodies alone, so
+// that it matters little where the session takes them to be.
+void GuestEye::note_views(const Imager& camera,
+                          std::span<const tracker::Detection> detections,
+                          std::span<const Body> bodies,
+                          std::span<const Track> tracks) {
   Imager here = camera;
   here.imager_from_world = Pose();
-  const tracker::View view{&here, detections_};
+  const tracker::View view{&here, detections};
   const calib::LensBelief& kept = aspects_.back().used;
   const Eigen::Vector2d scale(static_cast<double>(kept.width) / camera.width,
                               static_cast<double>(kept.height) / camera.height);
-  for (const Body& body : bodies) {
-    if (body.markers.size() < 2) continue;
-    const Sighting seen = tracker::sighting(body, std::span(&view, 1));
-    if (seen.size() < 2) continue;
-    const std::vector<PoseFit> fits = tracker::minima(seen);
-    if (fits.empty()) continue;
-    calib::BodyView noted{fits[0].world_from_body, {}};
-    for (const tracker::PointSight& sight : tracker::corners_at(seen, fits[0].world_from_body).sights)
-      noted.points.push_back(
-          {sight.p_body, (scale.array() * (sight.px.array() + 0.5) - 0.5).matrix(),
-           scale.asDiagonal() * Eigen::Matrix2d(sight.information.inverse()) * scale.asDiagonal()});
-    views_.push_back(std::move(noted));
-  }
+  for (const Body& body : bodies)
+    for (const Track& track : tracks) {
+      if (body.markers.size() < 2 || track.body != body.name) continue;
+      const Sighting seen = tracker::sighting(body, std::span(&view, 1));
+      if (seen.size() < 2) continue;
+      calib::BodyView noted{camera.imager_from_world * track.world_from_body, {}};
+      for (const tracker::PointSight& sight : tracker::corners_at(seen, noted.camera_from_body).sights)
+        noted.points.push_back(
+            {sight.p_body, (scale.array() * (sight.px.array() + 0.5) - 0.5).matrix(),
+             scale.asDiagonal() * Eigen::Matrix2d(sight.information.inverse()) * scale.asDiagonal()});
+      views_.push_back(std::move(noted));
+    }
 }
 
 GuestSight GuestEye::look(const cv::Mat& bgr, std::span<const Body> bodies, std::span<const Track> tracks) {
   cv::Mat grey;
   cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
   views_.clear();
+  width_ = grey.cols;
   const Aspect& aspect = aspect_of(grey.cols, grey.rows);
   const auto lens = aspect.used.resized(grey.cols, grey.rows);
   LIMN_CHECK(lens.has_value());
   Imager camera{"guest", grey.cols, grey.rows, lens->lens(), Pose()};
   const double focal_stddev_px =
       aspect.lens.belief().focal_stddev_px() * grey.cols / static_cast<double>(aspect.used.width);
-  detect(grey, focal_stddev_px < k_known_share * lens->values[0] ? &camera.lens : nullptr);
+  const bool is_known = focal_stddev_px < k_known_share * lens->values[0];
+  const std::vector<tracker::Detection> detections =
+      detector_.detect(grey, is_known ? &camera.lens : nullptr);
 
   GuestSight out;
   out.focal_stddev_px = focal_stddev_px;
@@ -204,9 +198,8 @@ GuestSight GuestEye::look(const cv::Mat& bgr, std::span<const Body> bodies, std:
     out.why = why;
     return out;
   };
-  if (detections_.empty()) return nothing("No markers in view: point the camera at the prototype.");
-  note_views(camera, bodies);
-  const tracker::View view{&camera, detections_};
+  if (detections.empty()) return nothing("No markers in view: point the camera at the prototype.");
+  const tracker::View view{&camera, detections};
   // Bodies of several markers stand more firmly than those of one.
   Body room = room_of(bodies, tracks, 2);
   Sighting seen = tracker::sighting(room, std::span(&view, 1));
@@ -231,7 +224,8 @@ GuestSight GuestEye::look(const cv::Mat& bgr, std::span<const Body> bodies, std:
   out.markers = static_cast<int>(kept.size());
   out.rms_px = fit.rms_px;
   camera.imager_from_world = fit.world_from_body;
-  out.moved = moved_markers(camera, gate_of(seen, fit.world_from_body), detections_, bodies, tracks);
+  out.moved = moved_markers(camera, gate_of(seen, fit.world_from_body), detections, bodies, tracks);
+  note_views(camera, detections, bodies, tracks);
   out.view = std::move(camera);
   return out;
 }
@@ -243,7 +237,7 @@ void GuestEye::learn() {
   for (const calib::BodyView& view : views_) is_news |= aspect.lens.add(view);
   views_.clear();
   if (is_news) aspect.lens.improve();
-  if (difference_px(aspect.lens.belief(), aspect.used, size_.width) > k_noticed_px)
+  if (is_news && difference_px(aspect.lens.belief(), aspect.used, width_) > k_noticed_px)
     aspect.used = aspect.lens.belief();
 }
 

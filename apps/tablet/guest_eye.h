@@ -58,14 +58,14 @@ class GuestEye {
     double kept_stddev_px = 0;
   };
   Aspect& aspect_of(int width, int height);
-  void detect(const cv::Mat& grey, const Lens* lens);
-  void note_views(const Imager& camera, std::span<const Body> bodies);
+  void note_views(const Imager& camera,
+                  std::span<const tracker::Detection> detections,
+                  std::span<const Body> bodies,
+                  std::span<const Track> tracks);
 
   tracker::Detector detector_;
-  std::vector<tracker::Detection> detections_, followed_;
-  cv::Size size_;  // of the pictures that detections_ are of
-  int pictures_ = 0;
   std::vector<Aspect> aspects_;         // the newest last
+  int width_ = 0;                       // of the last picture
   std::vector<calib::BodyView> views_;  // of the last picture, to learn from
 };
 

@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <set>
 #include <thread>
 
 #include "apps/camera_encoding.h"
@@ -35,12 +36,14 @@ namespace {
 
 using Answer = std::function<void(Onlooker::Seen)>;
 
-constexpr int k_quality = 80;               // of JPEG
+constexpr int k_quality = 80;  // of JPEG
+constexpr projector::Smoothing k_smoothing{.samples = 4, .least_step = 0.05};
 constexpr int k_niceness = 19;              // least: sessions and servers go before
 constexpr std::size_t k_most_eyes = 8;      // devices that are known at a time
-constexpr double k_treat_every_s = 0.5;     // how parts are drawn is decided anew, on pictures of a
-constexpr int k_coarser = 4;                // fourth of the size
 constexpr std::size_t k_most_waiting = 16;  // pictures that are not looked at yet
+// How parts are drawn is decided so often, on pictures of a fourth of the size.
+constexpr double k_decide_every_s = 0.5;
+constexpr int k_coarser = 4;
 
 // What a session said last.
 struct Known {
@@ -110,15 +113,20 @@ struct Onlooker::Impl {
   std::optional<device::GlContext> context;
   std::optional<projector::Renderer> renderer;
   int drawn_scenes = 0;  // which scene the renderer holds
+  // How parts are drawn into the pictures of one camera.
+  struct Shown {
+    bool is_viewer = false;  // light shows `view` parts to this camera's eye
+    std::vector<projector::Treatment> treatments = {};
+    std::set<std::string> by_light_alone = {};  // slots of which nothing is left to draw
+    Stamp decided_at = {};
+  };
   struct Watching {
     std::string device;
     GuestEye eye;
-    std::vector<projector::Treatment> treatments;
-    Stamp treated_at;
+    Shown shown;
   };
   std::deque<Watching> watching;  // the one that asked last at the end
-  std::vector<projector::Treatment> room_treatments;
-  Stamp room_treated_at;
+  Shown room{.is_viewer = true};  // as the room's screen
 
   std::thread thread;
 
@@ -134,15 +142,15 @@ struct Onlooker::Impl {
   cv::Mat drawn(const Imager& camera,
                 const cv::Mat& picture,
                 const scene::PosedScene& posed,
-                const scene::Staging& staging,
-                std::vector<projector::Treatment>* treatments,
-                Stamp* treated_at);
+                const Known& known,
+                Shown* shown);
 };
 
 Status Onlooker::Impl::open(const scene::Scene& scene) {
   setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), k_niceness);
   LIMN_TRY(context, device::GlContext::create());
   LIMN_TRY(renderer, projector::Renderer::create(scene, rig));
+  renderer->set_smoothing(k_smoothing);
   return {};
 }
 
@@ -224,6 +232,7 @@ Status Onlooker::Impl::follow_scene(const Known& known) {
     LIMN_TRY(context, device::GlContext::create());
   }
   LIMN_TRY(renderer, projector::Renderer::create(*known.scene, rig));
+  renderer->set_smoothing(k_smoothing);
   drawn_scenes = known.scenes;
   return {};
 }
@@ -239,29 +248,43 @@ Onlooker::Impl::Watching& Onlooker::Impl::watching_of(const std::string& device)
     keep(&watching.front());
     watching.pop_front();
   }
-  watching.push_back({device, GuestEye(families, load_lenses(lens_folder, device)), {}, {}});
+  watching.push_back({device, GuestEye(families, load_lenses(lens_folder, device)), {}});
   return watching.back();
 }
 
-// Parts over a picture as the room's screen treats them.
+// Parts over a picture as the room's screen treats them. `view` parts that light shows to another eye than
+// this camera's are drawn whole.
 cv::Mat Onlooker::Impl::drawn(const Imager& camera,
                               const cv::Mat& picture,
                               const scene::PosedScene& posed,
-                              const scene::Staging& staging,
-                              std::vector<projector::Treatment>* treatments,
-                              Stamp* treated_at) {
-  if (staging.screen == scene::Screen::full)
+                              const Known& known,
+                              Shown* shown) {
+  if (known.staging.screen == scene::Screen::full)
     return renderer->composite(camera, picture, posed, projector::Composite::full);
   const Stamp at = std::chrono::steady_clock::now();
-  const double seconds = *treated_at == Stamp{} ? k_treat_every_s : seconds_between(*treated_at, at);
-  if (seconds >= k_treat_every_s) {
+  const double seconds =
+      shown->decided_at == Stamp{} ? k_decide_every_s : seconds_between(shown->decided_at, at);
+  if (seconds >= k_decide_every_s) {
     const auto coarse =
         resized(camera, std::max(1, camera.width / k_coarser), std::max(1, camera.height / k_coarser));
-    *treatments =
-        projector::treated(*treatments, renderer->coverage(posed, coarse ? *coarse : camera), seconds);
-    *treated_at = at;
+    const std::vector<projector::PartCoverage> coverage =
+        renderer->coverage(posed, coarse ? *coarse : camera);
+    shown->treatments = projector::treated(shown->treatments, coverage, seconds);
+    shown->by_light_alone.clear();
+    for (projector::Treatment& treatment : shown->treatments) {
+      if (known.scene->find_slot(treatment.slot)->mode == scene::Mode::view && !shown->is_viewer)
+        treatment.what = projector::Composite::full;
+      if (treatment.what == projector::Composite::full) continue;
+      for (const projector::PartCoverage& part : coverage)
+        if (part.slot == treatment.slot && part.viewer_pixels > 0 && part.off_surface_share == 0)
+          shown->by_light_alone.insert(part.slot);
+    }
+    shown->decided_at = at;
   }
-  return renderer->composite(camera, picture, posed, *treatments);
+  scene::PosedScene rest = posed;
+  std::erase_if(rest.parts,
+                [&](const scene::PosedPart& part) { return shown->by_light_alone.contains(part.slot); });
+  return renderer->composite(camera, picture, rest, shown->treatments);
 }
 
 Onlooker::Seen Onlooker::Impl::seen_by(const Guest& guest, const Known& known) {
@@ -284,8 +307,7 @@ Onlooker::Seen Onlooker::Impl::seen_by(const Guest& guest, const Known& known) {
     for (Track& track : tracks)
       if (track.body == moved.body) track = moved;
   const scene::PosedScene posed = scene::staged(*known.scene, known.staging, tracks);
-  const cv::Mat out =
-      drawn(*sight.view, *picture, posed, known.staging, &device.treatments, &device.treated_at);
+  const cv::Mat out = drawn(*sight.view, *picture, posed, known, &device.shown);
   const double composite_ms = milliseconds_since(drawing);
 
   const Stamp encoding = std::chrono::steady_clock::now();
@@ -325,7 +347,7 @@ Onlooker::Seen Onlooker::Impl::seen_in_room(const Known& known) {
     cv::resize(picture, picture, size, 0, 0, cv::INTER_AREA);
   }
   const scene::PosedScene posed = scene::staged(*known.scene, known.staging, tracks_of(known));
-  const cv::Mat out = drawn(camera, picture, posed, known.staging, &room_treatments, &room_treated_at);
+  const cv::Mat out = drawn(camera, picture, posed, known, &room);
   return {nlohmann::json{{"why", ""}}.dump(), device::encode_jpeg(out, k_quality)};
 }
 
