@@ -8,7 +8,7 @@
 namespace limn::apps {
 
 struct BenchOptions {
-  std::string name;                    ///< tracker, calib
+  std::string name;                    ///< tracker, calib, projector, live, remote, tablet
   std::vector<std::string> arguments;  ///< passed on
 };
 

@@ -37,24 +37,28 @@ bool has_word(const char* list, const char* word) {
   return false;
 }
 
-// Displays to try: hardware devices, software devices, then Mesa without a surface.
-std::vector<EGLDisplay> candidate_displays() {
+// Displays to try: hardware devices, software devices, then Mesa without a surface; `apart`: that before the
+// software devices. Mesa's software has its threads by display.
+std::vector<EGLDisplay> candidate_displays(bool apart) {
   std::vector<EGLDisplay> displays;
+  std::ptrdiff_t hardware = 0;
   const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
   if (has_word(client, "EGL_EXT_device_enumeration") || has_word(client, "EGL_EXT_device_base")) {
     EGLint count = 0;
     eglQueryDevicesEXT(0, nullptr, &count);
     std::vector<EGLDeviceEXT> devices(static_cast<std::size_t>(std::max(count, 0)));
     if (count > 0) eglQueryDevicesEXT(count, devices.data(), &count);
-    std::stable_partition(devices.begin(), devices.end(), [](EGLDeviceEXT device) {
+    const auto software = std::stable_partition(devices.begin(), devices.end(), [](EGLDeviceEXT device) {
       return !has_word(eglQueryDeviceStringEXT(device, EGL_EXTENSIONS), "EGL_MESA_device_software");
     });
+    hardware = software - devices.begin();
     for (const EGLDeviceEXT device : devices) {
       displays.push_back(eglGetPlatformDisplayEXT(EGL_PLATFORM_DEVICE_EXT, device, nullptr));
     }
   }
   if (has_word(client, "EGL_MESA_platform_surfaceless")) {
-    displays.push_back(eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr));
+    displays.insert(apart ? displays.begin() + hardware : displays.end(),
+                    eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr));
   }
   std::erase(displays, EGL_NO_DISPLAY);
   return displays;
@@ -89,14 +93,14 @@ GlContext::GlContext(GlContext&&) noexcept = default;
 GlContext& GlContext::operator=(GlContext&&) noexcept = default;
 GlContext::~GlContext() = default;
 
-Result<GlContext> GlContext::create() {
+Result<GlContext> GlContext::create(bool apart) {
   constexpr const char* k_advice =
       "Install a driver (Debian: libegl1 and libgl1-mesa-dri for software rendering).";
   // epoxy ends the process when the library itself is missing, so ask for it first.
   if (!dlopen("libEGL.so.1", RTLD_LAZY | RTLD_GLOBAL)) {
     return error("OpenGL: expected the library libEGL.so.1, found none. {}", k_advice);
   }
-  const std::vector<EGLDisplay> displays = candidate_displays();
+  const std::vector<EGLDisplay> displays = candidate_displays(apart);
   for (const EGLDisplay display : displays) {
     auto impl = std::make_unique<Impl>();
     impl->display = display;

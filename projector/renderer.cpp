@@ -431,7 +431,7 @@ void Renderer::Impl::start_list(int pixels) {
   glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, *list);
 }
 
-// Draws a layer (linear light, alpha: coverage) into a canvas of GL_RGBA32F; outside of `places` it is empty.
+// Draws a layer (linear light, alpha: coverage) into a canvas of GL_RGBA32F, within `places` alone.
 // `set_up` gives every program what it needs.
 template <class SetUp>
 void Renderer::Impl::draw_layer(LayerPrograms& layer,
@@ -458,7 +458,12 @@ void Renderer::Impl::draw_layer(LayerPrograms& layer,
     glDispatchComputeIndirect(k_groups);
     glMemoryBarrier(GL_ALL_BARRIER_BITS);
   };
-  glClearTexImage(*into.texture, 0, GL_RGBA, GL_FLOAT, nullptr);
+  const cv::Rect whole(0, 0, into.width, into.height);
+  for (const cv::Rect& place : places) {  // with the neighbours that edges are judged by
+    const cv::Rect around = whole & cv::Rect(place.x - 1, place.y - 1, place.width + 2, place.height + 2);
+    glClearTexSubImage(*into.texture, 0, around.x, around.y, 0, around.width, around.height, 1, GL_RGBA,
+                       GL_FLOAT, nullptr);
+  }
   {
     const PassTimes::Scope scope(&times, "where there may be light");
     set_up(layer.where);

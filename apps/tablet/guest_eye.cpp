@@ -62,6 +62,16 @@ Sighting without_moved(const Sighting& seen, const Pose& pose) {
   return kept;
 }
 
+// The pose that fits all markers and is not far from the one before, where there are enough of them to leave
+// no doubt: found sooner than from nothing.
+std::optional<PoseFit> fitted_near(const Sighting& seen, const std::optional<Pose>& last) {
+  constexpr std::size_t k_enough = 4;
+  constexpr double k_fits_px = 1;
+  if (!last || seen.size() < k_enough) return std::nullopt;
+  const auto fit = tracker::fit_pose(tracker::corners_at(seen, *last).sights, *last, tracker::k_huber);
+  return fit && fit->rms_px < k_fits_px ? fit : std::nullopt;
+}
+
 // One standard deviation of where a fit puts the middle of what it sees, px.
 double unsure_px(const Imager& camera, const PoseFit& fit, const Sighting& seen) {
   Eigen::Vector3d p_middle = Eigen::Vector3d::Zero();
@@ -128,7 +138,7 @@ std::vector<Track> moved_markers(const Imager& view,
 }  // namespace
 
 GuestEye::GuestEye(tracker::Families families, std::span<const calib::LensBelief> lenses)
-    : detector_(std::move(families), {.encoding = tracker::Encoding::srgb}) {
+    : detector_(std::move(families), {.encoding = tracker::Encoding::srgb, .broken_markers = false}) {
   for (const calib::LensBelief& lens : lenses)
     aspects_.push_back({calib::RoamingLens(lens), lens, lens.focal_stddev_px()});
 }
@@ -209,7 +219,10 @@ GuestSight GuestEye::look(const cv::Mat& bgr, std::span<const Body> bodies, std:
   }
   if (seen.empty())
     return nothing("The markers in view have no known place: the room's camera must see them, too.");
-  const std::vector<PoseFit> fits = tracker::minima(seen);
+  std::vector<PoseFit> fits;
+  if (const auto near = fitted_near(seen, last_)) fits = {*near};
+  last_.reset();
+  if (fits.empty()) fits = tracker::minima(seen);
   constexpr const char* k_go_nearer = "The markers in view are too small or too steep: go nearer.";
   if (fits.empty()) return nothing(k_go_nearer);
   PoseFit fit = fits.front();
@@ -223,9 +236,11 @@ GuestSight GuestEye::look(const cv::Mat& bgr, std::span<const Body> bodies, std:
   if (!(unsure_px(camera, fit, kept.empty() ? seen : kept) < k_most_unsure_px)) return nothing(k_go_nearer);
   out.markers = static_cast<int>(kept.size());
   out.rms_px = fit.rms_px;
-  camera.imager_from_world = fit.world_from_body;
-  out.moved = moved_markers(camera, gate_of(seen, fit.world_from_body), detections, bodies, tracks);
+  const double gate_px = gate_of(seen, fit.world_from_body);
+  camera.imager_from_world = fit.world_from_body;  // what was seen so far had it at the origin
+  out.moved = moved_markers(camera, gate_px, detections, bodies, tracks);
   note_views(camera, detections, bodies, tracks);
+  last_ = camera.imager_from_world;
   out.view = std::move(camera);
   return out;
 }

@@ -66,6 +66,7 @@ class GuestEye {
   tracker::Detector detector_;
   std::vector<Aspect> aspects_;         // the newest last
   int width_ = 0;                       // of the last picture
+  std::optional<Pose> last_;            // camera_from_world, if the last picture gave one
   std::vector<calib::BodyView> views_;  // of the last picture, to learn from
 };
 

@@ -37,7 +37,7 @@ namespace {
 using Answer = std::function<void(Onlooker::Seen)>;
 
 constexpr int k_quality = 80;  // of JPEG
-constexpr projector::Smoothing k_smoothing{.samples = 4, .least_step = 0.05};
+constexpr projector::Smoothing k_smoothing{.samples = 4, .least_step = 0.25};
 constexpr int k_niceness = 19;              // least: sessions and servers go before
 constexpr std::size_t k_most_eyes = 8;      // devices that are known at a time
 constexpr std::size_t k_most_waiting = 16;  // pictures that are not looked at yet
@@ -148,7 +148,7 @@ struct Onlooker::Impl {
 
 Status Onlooker::Impl::open(const scene::Scene& scene) {
   setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), k_niceness);
-  LIMN_TRY(context, device::GlContext::create());
+  LIMN_TRY(context, device::GlContext::create(true));
   LIMN_TRY(renderer, projector::Renderer::create(scene, rig));
   renderer->set_smoothing(k_smoothing);
   return {};
@@ -229,7 +229,7 @@ Status Onlooker::Impl::follow_scene(const Known& known) {
   renderer.reset();
   if (context->is_lost()) {
     context.reset();
-    LIMN_TRY(context, device::GlContext::create());
+    LIMN_TRY(context, device::GlContext::create(true));
   }
   LIMN_TRY(renderer, projector::Renderer::create(*known.scene, rig));
   renderer->set_smoothing(k_smoothing);
