@@ -2,9 +2,10 @@
 
 say() { printf '%s\n' "limn: $*" >&2; }
 
+# install_packages LIST...
 install_packages() {
   local wanted missing=() runner=()
-  mapfile -t wanted < <(sed 's/#.*//; /^[[:space:]]*$/d' "$root/packages.txt")
+  mapfile -t wanted < <(cat "$@" | sed 's/#.*//; /^[[:space:]]*$/d')
   if ! command -v dpkg-query >/dev/null; then
     say "expected a Debian 12 system with apt; install the equivalents of packages.txt by hand."
     return 0
@@ -49,13 +50,15 @@ show_progress() {
 # build TARGET: nothing to do when no source is newer than the last build of TARGET.
 build() {
   local target="$1" folder="$root/build/release" stamp="$root/build/release/.built-$1"
+  local packages=("$root/packages.txt")
   local sources=(CMakeLists.txt CMakePresets.json packages.txt tools core scene device calib tracker projector shaders
     sim apps)
   case "$target" in all | *_bench) sources+=(tests) ;; esac
+  case "$target" in all) packages+=("$root/tests/packages.txt") ;; esac
   if [ -e "$stamp" ] && [ -z "$(cd "$root" && find "${sources[@]}" -newer "$stamp" -print -quit)" ]; then
     return 0
   fi
-  install_packages || return 1
+  install_packages "${packages[@]}" || return 1
   mkdir -p "$folder"
   local begun="$folder/.begun" log="$folder/build.log"
   touch "$begun"
