@@ -477,7 +477,7 @@ void Reception::ask_for_room(Clock::time_point now) {
   const bool is_wanted = std::any_of(visitors_.begin(), visitors_.end(), [](const auto& visitor) {
     return visitor->wants_room && !visitor->room_in_flight;
   });
-  if (!is_wanted || room_is_asked_ || now - room_asked_at_ < k_between_rooms) return;
+  if (!is_wanted || room_is_asked_ || now < room_next_at_) return;
   room_is_asked_ = true;
   room_asked_at_ = now;
   setup_.eyes.room([this, post = setup_.post](Eyes::Seen seen) {
@@ -487,6 +487,8 @@ void Reception::ask_for_room(Clock::time_point now) {
 
 void Reception::room_came(Eyes::Seen seen) {
   room_is_asked_ = false;
+  const auto took = Clock::now() - room_asked_at_;
+  room_next_at_ = room_asked_at_ + std::max<Clock::duration>(k_between_rooms, k_room_rest * took);
   if (!room_message_ || seen.jpeg != room_.jpeg || seen.json != room_.json) {
     room_message_ = std::make_shared<const std::string>(
         picture_message(PictureKind::room, ++room_number_, seen.json, seen.jpeg));

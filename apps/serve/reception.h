@@ -31,6 +31,9 @@ constexpr std::chrono::seconds k_longest_wish{10};
 /// Between two room pictures, and how long a frame of the window may take before the next one is looked at.
 constexpr std::chrono::milliseconds k_between_rooms{66}, k_longest_look{10000};
 
+/// A room picture that took so long to draw is followed by another after so many times as long: projectors go
+/// first, also where one processor draws for all.
+constexpr int k_room_rest = 8;
 /// Tablets whose windows are open at once.
 constexpr std::ptrdiff_t k_most_windows = 8;
 /// Of a project's comments, how many the state has: the newest.
@@ -165,7 +168,7 @@ class Reception {
   std::uint64_t last_wish_ = 0;
   std::optional<Result<std::vector<scene::Comment>>> comments_;  // none before the first news
   bool room_is_asked_ = false;
-  Clock::time_point room_asked_at_;
+  Clock::time_point room_asked_at_, room_next_at_;
   Eyes::Seen room_;
   std::shared_ptr<const std::string> room_message_;
   std::uint32_t room_number_ = 0;
