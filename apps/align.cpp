@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
+#include "apps/live/stopwatch.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/log.h"
@@ -289,10 +290,6 @@ Result<scene::Mesh> mesh_of(const AlignCommand& command) {
   return std::move(scene.prototype->mesh);
 }
 
-double seconds_since(std::chrono::steady_clock::time_point begun) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-}
-
 }  // namespace
 
 Result<MeshAligned> written_alignment(const AlignCommand& command) {
@@ -304,7 +301,7 @@ Result<MeshAligned> written_alignment(const AlignCommand& command) {
   if (!scan_metres) return usage_error("--scan-units: {}", scan_metres.message());
   LIMN_TRY(const scene::Mesh mesh, mesh_of(command));
   LIMN_TRY(const auto start, start_of(command, *metres));
-  if (command.scan.empty()) return written_markers_pose(*start, command, seconds_since(begun));
+  if (command.scan.empty()) return written_markers_pose(*start, command, 1e-3 * milliseconds_since(begun));
   const fs::path file = fs::is_directory(command.scan) ? command.scan / "mesh.ply" : command.scan;
   LIMN_TRY(const scene::Surface scan, scene::load_ply(file, *scan_metres));
   if (const Status sizes = calib::comparable_sizes(mesh, scan); !sizes)
@@ -325,7 +322,7 @@ Result<MeshAligned> written_alignment(const AlignCommand& command) {
   LIMN_TRY_STATUS(scene::save_ply(map, command.out / "residual.ply"));
   LIMN_TRY_STATUS(write_pictures(map, command.out));
   LIMN_TRY_STATUS(write_file(command.out / "align.json",
-                             json_of(aligned, differences, seconds_since(begun)).dump(2) + "\n"));
+                             json_of(aligned, differences, 1e-3 * milliseconds_since(begun)).dump(2) + "\n"));
   LIMN_TRY_STATUS(write_pose(aligned.alignment.world_from_prototype, command.out));
   if (!command.body.empty()) LIMN_TRY_STATUS(write_markers(command, aligned.alignment.world_from_prototype));
   return aligned;

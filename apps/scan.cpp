@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "apps/capture.h"
+#include "apps/live/stopwatch.h"
 #include "apps/picture_writer.h"
 #include "apps/world_markers.h"
 #include "calib/capture.h"
@@ -21,10 +22,6 @@ namespace {
 
 constexpr int k_picture_width = 1200, k_picture_height = 800;
 constexpr double k_deviation_limit_mm = 0.5;  // end of the colours of the deviation map
-
-double seconds_since(std::chrono::steady_clock::time_point begun) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-}
 
 double percentile(std::vector<float> values, double share) {
   if (values.empty()) return 0;
@@ -175,7 +172,7 @@ Result<calib::Scan> written_scan(const calib::Captures& captures,
                                  const std::filesystem::path& out) {
   const auto begun = std::chrono::steady_clock::now();
   LIMN_TRY(calib::Scan scan, calib::scanned(captures, rig, options));
-  LIMN_TRY_STATUS(write_scan(scan, seconds_since(begun), out));
+  LIMN_TRY_STATUS(write_scan(scan, 1e-3 * milliseconds_since(begun), out));
   return scan;
 }
 

@@ -66,7 +66,12 @@ class Steps {
     std::error_code ignored;
     fs::remove_all(captures.folder, ignored);  // of a prototype that may have stood elsewhere
     LIMN_TRY_STATUS(calib::begin_captures(captures));
-    const Status captured = calib::capture_pose(captures, 0, around_.stage);
+    calib::Stage stage = around_.stage;
+    stage.show = [&](int projector, const cv::Mat& picture) -> Status {
+      if (audience_.wish && *audience_.wish == WizardWish::leave) return error("left while it was captured.");
+      return around_.stage.show(projector, picture);
+    };
+    const Status captured = calib::capture_pose(captures, 0, stage);
     LIMN_TRY_STATUS(around_.written());
     LIMN_TRY_STATUS(captured);
     step(WizardStep::scan, WizardState::runs, "measuring");

@@ -127,7 +127,7 @@ TEST(ForeseeTruth, ACoarseBenchComesOutAsForeseen) {
 // At full size, minutes each: LIMN_RIGS=bench or studio.
 TEST(ForeseeTruth, ARigOfTheExamplesComesOutAsForeseen) {
   const char* name = std::getenv("LIMN_RIGS");
-  if (!name) GTEST_SKIP() << "LIMN_RIGS is not set";
+  if (!name) GTEST_SKIP() << "takes minutes a rig: LIMN_RIGS is not set";
   const std::string file = std::string(name) + ".json";
   const auto described = load_described(k_config / "described" / file);
   ASSERT_TRUE(described) << described.message();
