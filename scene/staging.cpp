@@ -315,6 +315,8 @@ const std::vector<Action>& actions() {
       {"marker_states", false, on_off, "on, off or toggle",
        "rings around markers: green seen, amber carried on"},
       {"screen", false, maybe_text, "rest, full, camera, view, stereo, off or next", "what screens show"},
+      {"viewer", false, maybe_text, "a guest's name; empty: the scene's own viewer",
+       "whose eye view parts are drawn for: a guest's tablet while its window sees markers"},
   };
   return all;
 }
@@ -366,6 +368,10 @@ Result<Staging> edited(const Scene& scene,
   if (edit.action == "delete_look") return without_look(std::move(out), edit);
   if (edit.action == "undelete_look") return with_deleted_look(std::move(out));
   if (edit.action == "screen") return with_screen(std::move(out), edit);
+  if (edit.action == "viewer") {
+    out.viewer = edit.value;
+    return out;
+  }
   bool Staging::*const flag = edit.action == "blackout" ? &Staging::blackout
                               : edit.action == "freeze" ? &Staging::frozen
                               : edit.action == "grid"   ? &Staging::grid

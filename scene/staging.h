@@ -60,6 +60,7 @@ struct Staging {
   bool split = false;                ///< left of a line the other look, right of it what is shown else
   double split_mm = 0;               ///< where the line is, along the prototype's x, from its middle
   Screen screen = Screen::rest;
+  std::string viewer;  ///< a guest, for whose tablet `view` parts are drawn; empty: the scene's own viewers
 };
 
 /// Each slot's first variant, no looks.

@@ -22,7 +22,8 @@ export const actions = [
   {"name": "freeze", "of_slot": false, "takes": "on_off", "role": "work", "label": "freeze"},
   {"name": "grid", "of_slot": false, "takes": "on_off", "role": "work", "label": "grid"},
   {"name": "marker_states", "of_slot": false, "takes": "on_off", "role": "operate", "label": "marker states"},
-  {"name": "screen", "of_slot": false, "takes": "maybe_text", "role": "operate", "label": "screen"}
+  {"name": "screen", "of_slot": false, "takes": "maybe_text", "role": "operate", "label": "screen"},
+  {"name": "viewer", "of_slot": false, "takes": "maybe_text", "role": "work", "label": "drawn for the eye of"}
 ];
 
 const known = new Map(actions.map((action) => [action.name, action]));
@@ -47,7 +48,8 @@ export function in_words(edit, state) {
     return `${who}: ${edit.action === "save_look" ? "saved look" : "look"} ${state.look}`;
   const is_on = { blackout: state.blackout, freeze: state.frozen, grid: state.grid, marker_states: state.marker_states,
                   split: state.split }[edit.action];
-  const value = is_on === undefined ? edit.value : is_on ? "on" : "off";
+  const named = edit.action === "viewer" ? edit.value || "the scene's own viewer" : edit.value;
+  const value = is_on === undefined ? named : is_on ? "on" : "off";
   const unit = edit.action === "nudge" || edit.action === "split_at" ? " mm" : "";
   return `${who}: ${[edit.slot, known.get(edit.action)?.label ?? edit.action, value && value + unit].filter(Boolean).join(" ")}`;
 }

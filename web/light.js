@@ -1,6 +1,6 @@
 // What the projectors and screens show.
 import { role_of } from "/actions.js";
-import { by_id, h, icon, keep } from "/dom.js";
+import { by_id, h, icon, keep, set_text } from "/dom.js";
 import { draw_picture, fetch_picture } from "/pictures.js";
 import { make_switch } from "/stage.js";
 
@@ -70,6 +70,34 @@ function make_split(session) {
   return node;
 }
 
+const k_own = "\n"; // the key of the scene's own viewer: no guest's name
+
+// Whose eye view parts are drawn for: guests whose windows are open, and the one that is waited for.
+function make_viewers(session) {
+  const list = h("div", { class: "choices wrap", role: "group", "aria-label": "Whose eye view parts are drawn for" });
+  const node = h(
+    "div",
+    { class: "stack", "data-action": "viewer", "data-needs": role_of("viewer") },
+    h("h3", {}, "View parts are drawn for"),
+    list,
+  );
+  const make = (name) =>
+    name === k_own
+      ? session.button("viewer", { value: "" }, h("span", {}, "the scene's own viewer", h("small")))
+      : session.button("viewer", { value: name }, h("span", {}, `${name}'s eye`, h("small")));
+  node.show = (state) => {
+    const names = [k_own, ...new Set([...state.windows, state.viewer].filter(Boolean))];
+    keep(list, names, (name) => name, make);
+    for (const button of list.children) {
+      const is_chosen = button.key === (state.viewer || k_own);
+      button.setAttribute("aria-pressed", String(is_chosen));
+      const waits = is_chosen && state.viewer && state.follows !== state.viewer;
+      set_text(button.querySelector("small"), button.key === k_own ? "" : waits ? "sees no markers now" : "a tablet");
+    }
+  };
+  return node;
+}
+
 function make_projector(name) {
   const canvas = h("canvas", {
     role: "img",
@@ -129,6 +157,7 @@ export function make_light(session) {
   );
   const split = make_split(session);
   const screens = h("div", { class: "choices wrap", role: "group", "aria-label": "What screens show" });
+  const viewers = make_viewers(session);
   const projectors = make_projectors(session);
   by_id("light").append(
     h("h2", {}, "Light"),
@@ -137,6 +166,7 @@ export function make_light(session) {
       { class: "stack", "data-needs": "work" },
       h("div", { class: "pair" }, grid, rings),
       split,
+      viewers,
       h(
         "div",
         { class: "stack", "data-action": "screen", "data-needs": role_of("screen") },
@@ -150,7 +180,7 @@ export function make_light(session) {
   return {
     opened: (name) => projectors.opened(name),
     show(state) {
-      for (const part of [grid, rings, split, projectors]) part.show(state);
+      for (const part of [grid, rings, split, viewers, projectors]) part.show(state);
       keep(
         screens,
         state.screens,

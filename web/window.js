@@ -83,7 +83,11 @@ class CameraWindow {
     link.addEventListener("answer", ({ detail }) => this.#answer(detail));
     link.addEventListener("hello", () => this.#resume());
     document.addEventListener("visibilitychange", () => this.#send());
-    this.#panel = make_panel(this);
+    this.#panel = make_panel(this, session);
+  }
+
+  show(state) {
+    this.#panel.follows(state);
   }
 
   get is_open() {
@@ -242,7 +246,30 @@ class CameraWindow {
   }
 }
 
-function make_panel(owner) {
+// Whether view parts are drawn for this device's eye.
+function make_follow(session) {
+  const is_on = (state) => state.viewer === session.link.name;
+  const words = h("small", {});
+  const button = session.button(
+    "viewer",
+    {
+      role: "switch",
+      "aria-checked": "false",
+      class: "switch grow",
+      value: () => (is_on(session.state) ? "" : session.link.name),
+    },
+    icon("window"),
+    h("span", {}, "Light for this eye", words),
+  );
+  button.show = (state) => {
+    button.setAttribute("aria-checked", String(is_on(state)));
+    const waits = is_on(state) && state.follows !== state.viewer;
+    set_text(words, waits ? "waits for markers" : "view parts are drawn for this device");
+  };
+  return button;
+}
+
+function make_panel(owner, session) {
   const why = h("p", { role: "alert", class: "bad-words" });
   const words = h(
     "p",
@@ -260,7 +287,8 @@ function make_panel(owner) {
     { type: "button", "aria-label": "Full screen", onclick: () => toggle_full() },
     icon("full"),
   );
-  by_id("window").append(h("h2", {}, "Window"), words, why, h("div", { class: "dock line" }, open, full));
+  const follow = make_follow(session);
+  by_id("window").append(h("h2", {}, "Window"), words, why, h("div", { class: "dock stack" }, follow, h("div", { class: "line" }, open, full)));
   function toggle() {
     set_text(why, "");
     if (owner.is_open) owner.close();
@@ -268,6 +296,7 @@ function make_panel(owner) {
   }
   return {
     say: (text) => set_text(why, text),
+    follows: (state) => follow.show(state),
     show(is_open) {
       document.body.classList.toggle("window-open", is_open);
       set_text(open.lastElementChild, is_open ? "Close the window" : "Open the window");
@@ -287,7 +316,7 @@ function toggle_full() {
 export function make_window(session, stage) {
   const owner = new CameraWindow(session, stage);
   return {
-    show() {},
+    show: (state) => owner.show(state),
     opened(name) {
       if (name !== "window" && owner.is_open) owner.close();
     },

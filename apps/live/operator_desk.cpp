@@ -123,6 +123,8 @@ OperatorView OperatorDesk::view_of(const Session& session,
        waiting_markers(session.setup().scene, session.staging(), session.watched()))
     view.waiting.push_back(loose.marker.text());
   view.remote = remote_;
+  view.windows = {session.windows().begin(), session.windows().end()};
+  view.follows = session.painted().follows;
   view.recent = {recent_.begin(), recent_.end()};
   const auto& notes = telemetry.notes();
   const double begun_s = seconds_between(Stamp{}, *begun_at_);

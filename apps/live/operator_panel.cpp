@@ -313,7 +313,8 @@ void OperatorPanel::draw_pictures(Gui& gui, const OperatorView& view, ImVec2 siz
 }
 
 // In place of the pictures: a code for a phone's camera, and the same to type.
-void OperatorPanel::draw_remote(Gui& gui, const OperatorView::Remote& remote, ImVec2 size) {
+void OperatorPanel::draw_remote(Gui& gui, const OperatorView& view, ImVec2 size) {
+  const OperatorView::Remote& remote = *view.remote;
   if (remote.entrances.empty()) return;
   const OperatorView::Remote::Entrance& chosen =
       remote.entrances[std::min(entrance_, remote.entrances.size() - 1)];
@@ -340,7 +341,28 @@ void OperatorPanel::draw_remote(Gui& gui, const OperatorView::Remote& remote, Im
     for (std::size_t i = 0; i < remote.fingerprint.size(); i += k_line)
       ImGui::TextUnformatted(remote.fingerprint.substr(i, k_line - 1).c_str());
   }
+  draw_viewers(gui, view);
   ImGui::EndChild();
+}
+
+// Whose eye view parts are drawn for: of the scene's own viewer and of guests with a tablet.
+void OperatorPanel::draw_viewers(const Gui& gui, const OperatorView& view) {
+  const std::string& chosen = view.staging.viewer;
+  std::vector<std::string> all = view.windows;
+  if (!chosen.empty() && std::find(all.begin(), all.end(), chosen) == all.end()) all.push_back(chosen);
+  ImGui::Dummy({0, 0.8F * gui.em()});
+  heading(gui, "View parts are drawn for");
+  if (all.empty()) ImGui::TextDisabled("the scene's own viewer: no guest's window is open");
+  if (all.empty()) return;
+  const ImVec2 size{18 * gui.em(), 1.9F * gui.em()};
+  if (toggle("the scene's own viewer", chosen.empty(), colour::k_blue, size)) ask("viewer");
+  for (const std::string& guest : all) {
+    ImGui::PushID(guest.c_str());
+    if (toggle(guest + "'s tablet", guest == chosen, colour::k_blue, size)) ask("viewer", "", guest);
+    ImGui::PopID();
+    if (guest != chosen || guest == view.follows) continue;
+    ImGui::TextDisabled("sees no markers: the scene's own viewer meanwhile");
+  }
 }
 
 void OperatorPanel::draw_slots(const Gui& gui, const OperatorView& view) {
@@ -458,7 +480,7 @@ OperatorAsked OperatorPanel::draw(Gui& gui, const OperatorView& view) {
   const ImVec2 at = ImGui::GetCursorPos();
   const ImVec2 middle{left, room.y - foot - gap};
   if (shows_remote_ && view.remote)
-    draw_remote(gui, *view.remote, middle);
+    draw_remote(gui, view, middle);
   else
     draw_pictures(gui, view, middle);
   ImGui::SetCursorPos({at.x, at.y + room.y - foot});

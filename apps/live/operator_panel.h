@@ -26,7 +26,8 @@ class OperatorPanel {
                     ImVec2 corner,
                     ImVec2 size,
                     bool is_large);
-  void draw_remote(Gui& gui, const OperatorView::Remote& remote, ImVec2 size);
+  void draw_remote(Gui& gui, const OperatorView& view, ImVec2 size);
+  void draw_viewers(const Gui& gui, const OperatorView& view);
   void draw_slots(const Gui& gui, const OperatorView& view);
   void draw_looks(const Gui& gui, const OperatorView& view);
   void draw_comparison(const Gui& gui, const scene::Staging& staging);

@@ -61,7 +61,9 @@ struct OperatorView {
   std::vector<Device> devices;
   std::vector<Body> bodies;
   std::vector<Slot> slots;
-  std::vector<std::string> waiting;  ///< loose markers that may carry a part, the next one last
+  std::vector<std::string> waiting;       ///< loose markers that may carry a part, the next one last
+  std::vector<std::string> windows = {};  ///< guests whose tablets can be the eye
+  std::string follows = {};               ///< the one whose tablet it is; empty: the scene's own viewer
   scene::Staging staging;
   std::vector<ShownFrame> recent;  ///< pictures shown, the newest last
   std::vector<Notice> notices;     ///< the newest last

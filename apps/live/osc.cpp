@@ -204,6 +204,8 @@ const std::vector<OscAddress>& osc_told() {
       {"/limn/state/freeze", "0 or 1", "what is shown stays"},
       {"/limn/state/marker_states", "0 or 1", "rings around markers"},
       {"/limn/state/screen", "rest, full, camera, view, stereo or off (text)", "what screens show"},
+      {"/limn/state/viewer", "name (text; empty: the scene's own viewer)",
+       "the guest whose tablet view parts are drawn for"},
   };
   return all;
 }

@@ -120,6 +120,7 @@ void OscPort::tell(const Session& session) {
   put_all("freeze", {static_cast<int>(staging.frozen)});
   put_all("marker_states", {static_cast<int>(staging.marker_states)});
   put_all("screen", {scene::screen_names()[static_cast<std::size_t>(staging.screen)]});
+  put_all("viewer", {staging.viewer});
 }
 
 void OscPort::put(const std::string& key, const std::string& path, std::vector<OscValue> arguments) {

@@ -16,7 +16,9 @@ constexpr double k_sign = 0.7;   // display value of signs: bright ones could hi
 constexpr double k_gamma = 2.2;  // near enough to mix what fades
 const cv::Scalar k_background(40, 36, 34);  // of views: a dark room
 const cv::Scalar k_green(90, 220, 90), k_amber(40, 170, 255), k_red(60, 60, 255), k_blue(255, 190, 110);
-constexpr double k_waits_s = 1;          // a marker that lies still for so long may be paired
+constexpr double k_waits_s = 1;    // a marker that lies still for so long may be paired
+constexpr double k_glide_s = 0.1;  // in which a guest's eye is followed to a third of its way
+constexpr const char* k_still_eye = "the scene's own";
 constexpr double k_other_waiting = 0.4;  // light of those that are not next, as a share
 
 // base + share of what `with` adds to it, in linear light.
@@ -87,24 +89,62 @@ Painter::Painter(const scene::Scene& scene,
     painted_.projectors.emplace_back(projector.height, projector.width, CV_8UC3, cv::Scalar::all(0));
 }
 
-// The only viewer if it is fixed, else one at the eye that all viewers share, which moves calmly.
-Imager Painter::viewer_for(const scene::PosedScene& posed, Stamp at) {
-  if (scene_.viewers.size() == 1 && scene_.viewers[0].fixed) return *scene_.viewers[0].fixed;
+// Where the scene's own eye stands still: its only viewer if that is fixed, the first camera's without
+// viewers. Null: viewers move, or share an eye.
+const Imager* Painter::still_viewer() const {
+  if (scene_.viewers.size() == 1 && scene_.viewers[0].fixed) return &*scene_.viewers[0].fixed;
+  if (!scene_.viewers.empty()) return nullptr;
+  return rig_.cameras.empty() ? &rig_.projectors[0] : &rig_.cameras[0];
+}
+
+// A guest's eye is known some ten times a second: between, and where it trembles, it is followed smoothly.
+scene::Eye Painter::glided(const scene::Eye& guest, double seconds) {
+  if (!glide_ || glide_->viewer != guest.viewer)
+    glide_ = guest;
+  else
+    glide_->p_world += (1 - std::exp(-seconds / k_glide_s)) * (guest.p_world - glide_->p_world);
+  return *glide_;
+}
+
+// The scene's own viewer if it stands still, else one at the eye that all viewers share, which moves calmly;
+// a guest's, alone, while there is one.
+Imager Painter::viewer_for(const scene::PosedScene& posed, const std::optional<scene::Eye>& guest, Stamp at) {
+  const Imager* still = still_viewer();
+  is_away_ |= guest.has_value();
+  if (still && !is_away_) return *still;
   const auto p_middle = scene::middle_of(scene_, posed);
-  if (!scene_.viewers.empty() && p_middle) {
-    const double seconds = eye_at_ == Stamp{} ? 0 : std::max(0.0, seconds_between(eye_at_, at));
-    shared_eye_ = scene::followed(shared_eye_, posed.eyes, *p_middle, seconds);
-    eye_at_ = std::max(eye_at_, at);
-    if (const auto p_eye = shared_eye_.p_world())
-      if (const auto viewer = scene::viewer_at(*p_eye, scene_, posed, d_up_world_)) return *viewer;
+  if (!p_middle) return still ? *still : rig_.cameras.empty() ? rig_.projectors[0] : rig_.cameras[0];
+  std::vector<scene::Eye> eyes = posed.eyes;
+  if (still) eyes = {{k_still_eye, still->imager_from_world.inverse().translation}};
+  const double seconds = eye_at_ == Stamp{} ? 0 : std::max(0.0, seconds_between(eye_at_, at));
+  eye_at_ = std::max(eye_at_, at);
+  if (still && shared_eye_.shares.empty()) shared_eye_ = scene::followed({}, eyes, *p_middle, 0);
+  if (guest)
+    eyes = {glided(*guest, seconds)};
+  else
+    glide_.reset();
+  shared_eye_ = scene::followed(shared_eye_, eyes, *p_middle, seconds);
+  const bool is_back =
+      !guest && std::none_of(shared_eye_.shares.begin(), shared_eye_.shares.end(), [](const auto& share) {
+        return share.viewer.empty();  // of one who is gone
+      });
+  if (is_back) is_away_ = false;
+  if (is_back && still) {
+    shared_eye_ = {};
+    eye_at_ = {};
+    return *still;
   }
-  return rig_.cameras.empty() ? rig_.projectors[0] : rig_.cameras[0];
+  const auto p_eye = shared_eye_.p_world();
+  if (is_away_) painted_.p_guest_eye_world = p_eye;
+  const auto viewer = p_eye ? scene::viewer_at(*p_eye, scene_, posed, d_up_world_) : std::nullopt;
+  return viewer ? *viewer : still ? *still : rig_.cameras.empty() ? rig_.projectors[0] : rig_.cameras[0];
 }
 
 const Painted& Painter::paint(const Watched& watched,
                               const scene::Staging& staging,
                               Stamp now,
-                              Stamp shown_at) {
+                              Stamp shown_at,
+                              const std::optional<GuestPlace>& place) {
   painted_.painted_at = now;
   painted_.shown_at = shown_at;
   if (staging.frozen && !staging.blackout && !is_black_) return painted_;
@@ -114,7 +154,13 @@ const Painted& Painter::paint(const Watched& watched,
       tracker::predicted(watched.motions, shown_at, options_.prediction, options_.motion, now));
   painted_.posed = scene::staged(scene_, staging, painted_.tracks);
   note_changes(painted_.posed, staging, shown_at);
-  const Imager viewer = viewer_for(painted_.posed, shown_at);
+  std::optional<scene::Eye> guest;
+  if (place && !staging.viewer.empty() && place->guest == staging.viewer &&
+      seconds_between(place->at, now) < k_guest_place_lasts_s)
+    guest = scene::Eye{"guest " + place->guest, place->p_eye_world};
+  painted_.follows = guest ? place->guest : "";
+  painted_.p_guest_eye_world.reset();
+  const Imager viewer = viewer_for(painted_.posed, guest, shown_at);
   viewer_ = viewer;
   const bool refill = options_.refill && rig_.projectors.size() > 1;
   if (refill) shadows_.look(watched, painted_.posed, shown_, &renderer_);

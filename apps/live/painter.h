@@ -36,12 +36,24 @@ struct PaintOptions {
   bool is_linear_camera = false;
 };
 
+/// Where a guest's tablet looks from, by its own picture.
+struct GuestPlace {
+  std::string guest;
+  Eigen::Vector3d p_eye_world = Eigen::Vector3d::Zero();
+  Stamp at;  ///< when it became known
+};
+/// A place as old as this is no guest's any more.
+constexpr double k_guest_place_lasts_s = 1;
+
 /// What is shown at a moment.
 struct Painted {
   std::vector<cv::Mat> projectors;  ///< in the rig's order, CV_8UC3
   std::vector<Track> tracks;        ///< predicted to shown_at
   scene::PosedScene posed;          ///< what the tracks and the staging make of the scene
   Stamp painted_at, shown_at;
+  std::string follows;  ///< the guest whose tablet `view` parts are drawn for; empty: the scene's own viewer
+  /// The eye that they are drawn for while it is a guest's or on its way back.
+  std::optional<Eigen::Vector3d> p_guest_eye_world = {};
 };
 
 /// Loose markers that lie still for a second and carry no slot: they glow. The last one is the one that a
@@ -58,8 +70,13 @@ class Painter {
   static Result<Painter> create(const scene::Scene& scene, const Rig& rig, const PaintOptions& options = {});
 
   /// Projector pictures for the moment at which their light arrives; what is lost is judged by `now`. Stamps
-  /// must not go back.
-  const Painted& paint(const Watched& watched, const scene::Staging& staging, Stamp now, Stamp shown_at);
+  /// must not go back. `place` counts while it is the guest's that the staging names, and new: the eye passes
+  /// to it, and back, as between viewers (scene/viewers.h), and glides with it.
+  const Painted& paint(const Watched& watched,
+                       const scene::Staging& staging,
+                       Stamp now,
+                       Stamp shown_at,
+                       const std::optional<GuestPlace>& place = {});
 
   /// A large screen's picture for the newest frame of camera 0, at that frame's own stamp; empty before the
   /// first frame and for Screen::off.
@@ -87,7 +104,9 @@ class Painter {
           const Rig& rig,
           projector::Renderer renderer,
           const PaintOptions& options);
-  Imager viewer_for(const scene::PosedScene& posed, Stamp at);
+  const Imager* still_viewer() const;
+  Imager viewer_for(const scene::PosedScene& posed, const std::optional<scene::Eye>& guest, Stamp at);
+  scene::Eye glided(const scene::Eye& guest, double seconds);
   void note_changes(const scene::PosedScene& posed, const scene::Staging& staging, Stamp at);
   cv::Mat lit(std::size_t projector, const scene::PosedScene& posed, const Imager& viewer, Stamp at);
   cv::Mat screen_of(const cv::Mat& behind,
@@ -117,6 +136,8 @@ class Painter {
   Imager viewer_;          // of what was painted last
   scene::SharedEye shared_eye_;
   Stamp eye_at_;
+  std::optional<scene::Eye> glide_;  // a guest's eye, as it is followed
+  bool is_away_ = false;             // the eye is a guest's, or on its way back
   std::vector<projector::Treatment> treatments_;
   Stamp treated_at_;
   scene::PosedScene last_;                       // as last shown

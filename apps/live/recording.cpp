@@ -111,6 +111,14 @@ void Recorder::edited(const scene::Edit& edit, const std::string& source, std::s
          {"moments", moments}});
 }
 
+void Recorder::saw(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at) {
+  const std::lock_guard lock(mutex_);
+  if (ended_) return;
+  nlohmann::ordered_json eye = {{"guest", guest}, {"at_ns", nanoseconds(at)}};
+  if (p_eye_world) eye["p_world"] = {p_eye_world->x(), p_eye_world->y(), p_eye_world->z()};
+  write({{"eye", eye}});
+}
+
 void Recorder::painted(const Painted& painted, std::size_t moments) {
   const std::lock_guard lock(mutex_);
   if (ended_) return;
@@ -166,6 +174,7 @@ nlohmann::ordered_json pose_log(const Painted& painted) {
   for (const scene::PosedPart& part : painted.posed.parts)
     json["parts"].push_back(
         {{"slot", part.slot}, {"variant", part.variant}, {"world_from_part", to_json(part.world_from_part)}});
+  if (const auto& p = painted.p_guest_eye_world) json["guest_eye"] = {p->x(), p->y(), p->z()};
   return json;
 }
 

@@ -28,7 +28,8 @@ struct SessionSetup {
 };
 
 /// Writes a session's folder (limn.session/1): rig and scene as they were, frames as PNG, and events.jsonl,
-/// what happened in its order: frames watched, edits, pictures painted with their poses. Frames are written
+/// what happened in its order: frames watched, edits, where a tablet looked from that was followed, pictures
+/// painted with their poses. Frames are written
 /// on a thread of their own; when the disk is full or too slow for them the recording ends there, complete up
 /// to that moment, and says so, and the session goes on. Safe from several threads.
 class Recorder {
@@ -43,7 +44,9 @@ class Recorder {
   void shown(const scene::Scene& scene);
   /// `moments` counts the calls of watched() that the session knew of.
   void edited(const scene::Edit& edit, const std::string& source, std::size_t moments);
-  /// Likewise.
+  /// Where a guest's tablet looks from that is followed; nullopt: nowhere any more.
+  void saw(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at);
+  /// `moments` as of edited().
   void painted(const Painted& painted, std::size_t moments);
 
   /// Why it ended before the session, if it did.

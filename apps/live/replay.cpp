@@ -40,9 +40,9 @@ Result<Events> load_events(const fs::path& path) {
     Json event = Json::parse(line, nullptr, false);
     if (event.is_discarded() || !event.is_object() ||
         !(event.contains("watch") || event.contains("edit") || event.contains("paint") ||
-          event.contains("scene"))) {
+          event.contains("scene") || event.contains("eye"))) {
       events.damage =
-          fmt::format("{}:{}: expected an event (watch, edit, scene, paint), found something else",
+          fmt::format("{}:{}: expected an event (watch, edit, eye, scene, paint), found something else",
                       path.string(), events.all.size() + 1);
       break;
     }
@@ -100,6 +100,10 @@ class Replay {
       LIMN_TRY_STATUS(watch_until(event.value("moments", moments_)));
       return edit(event.at("edit"), event.at("source"));
     }
+    if (event.contains("eye")) {
+      see(event.at("eye"));
+      return {};
+    }
     return paint(event);
   } catch (const nlohmann::json::exception& problem) {
     return error("{}: expected whole events, found a damaged one ({}).",
@@ -147,6 +151,15 @@ class Replay {
   Status edit(const Json& json, const std::string& source) {
     const scene::Edit edit{json.at("action"), json.at("slot"), json.at("value")};
     return session_.edit(edit, source, session_.watched().captured_at);
+  }
+
+  void see(const Json& eye) {
+    std::optional<Eigen::Vector3d> p_world;
+    if (eye.contains("p_world")) {
+      const Json& p = eye.at("p_world");
+      p_world = {p.at(0).get<double>(), p.at(1).get<double>(), p.at(2).get<double>()};
+    }
+    session_.see(eye.at("guest"), p_world, stamp_of(eye.at("at_ns")));
   }
 
   Status paint(const Json& event) {

@@ -209,6 +209,18 @@ Status Session::edit(const scene::Edit& wanted, const std::string& source, Stamp
   return keeps_looks_ ? keep(changed, edit) : Status();
 }
 
+void Session::see(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at) {
+  if (p_eye_world && !p_eye_world->allFinite()) return;
+  if (p_eye_world)
+    windows_.insert(guest);
+  else
+    windows_.erase(guest);
+  if (guest != staging_.viewer || (!p_eye_world && !place_)) return;
+  place_.reset();
+  if (p_eye_world) place_ = GuestPlace{guest, *p_eye_world, at};
+  if (recorder_) recorder_->saw(guest, p_eye_world, at);
+}
+
 Status Session::show(scene::Scene scene, Stamp at) {
   if (!is_carried_alike(setup_.scene, scene))
     return error(
@@ -316,7 +328,7 @@ Status Session::keep_looks(const scene::Staging& before) {
 
 const Painted& Session::paint(Stamp now, Stamp shown_at) {
   const auto begun = std::chrono::steady_clock::now();
-  if (painter_) painter_->paint(watched_, staging_, now, shown_at);
+  if (painter_) painter_->paint(watched_, staging_, now, shown_at, place_);
   if (painter_ && !(drawing_.is_lost && drawing_.is_lost()))
     painted_ = painter_->painted();
   else
@@ -340,7 +352,7 @@ void Session::draw_anew(Stamp now, Stamp shown_at) {
     auto painter = Painter::create(setup_.scene, setup_.rig, setup_.paint);
     if (painter) {
       painter_ = std::move(*painter);
-      painted_ = painter_->paint(watched_, staging_, now, shown_at);
+      painted_ = painter_->paint(watched_, staging_, now, shown_at, place_);
     } else {
       renewed = painter.error();
     }

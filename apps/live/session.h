@@ -56,6 +56,10 @@ class Session {
   /// without a marker means the one that glows (waiting_markers).
   Status edit(const scene::Edit& edit, const std::string& source, Stamp at);
 
+  /// Where a guest's tablet looks from; nullopt: its window is closed. Painter::paint goes by it while
+  /// Staging::viewer names the guest.
+  void see(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at);
+
   /// Shows another scene from now on, with the same markers and controls: parts that were edited, added or
   /// taken away; a new variant is shown at once. Error, and nothing changes: markers or controls differ, or
   /// it cannot be drawn.
@@ -77,6 +81,8 @@ class Session {
   int scenes() const { return scenes_; }
   /// The newest edit.
   const std::optional<Edited>& last_edit() const { return last_edit_; }
+  /// Guests whose windows have seen markers and are open.
+  const std::set<std::string>& windows() const { return windows_; }
   /// What the last paint() was made of and cost: stamps, times, markers, lost bodies; the rest is the
   /// caller's. record_ms is -1 without a recording.
   ShownFrame measured() const;
@@ -113,6 +119,8 @@ class Session {
   bool told_swapped_ = false;
   int scenes_ = 1;
   std::optional<Edited> last_edit_;
+  std::set<std::string> windows_;
+  std::optional<GuestPlace> place_;  // of the guest that is followed
   double paint_ms_ = 0, record_ms_ = 0;
 };
 

@@ -17,7 +17,7 @@ struct Eyes {
   using Seen = Onlooker::Seen;
   using Answer = std::function<void(Seen)>;
   std::function<void(const Session&)> know;  ///< at every picture of the session, on its thread
-  std::function<void(const std::string& device, std::vector<std::uint8_t> jpeg, Answer)> look;
+  std::function<void(const Onlooker::Window&, std::vector<std::uint8_t> jpeg, Answer)> look;
   std::function<void(Answer)> room;
 };
 
@@ -25,8 +25,8 @@ struct Eyes {
 inline Eyes eyes_of(std::unique_ptr<Onlooker> onlooker) {
   const std::shared_ptr<Onlooker> shared = std::move(onlooker);
   return {[shared](const Session& session) { shared->know(session); },
-          [shared](const std::string& device, std::vector<std::uint8_t> jpeg, Eyes::Answer answer) {
-            shared->look(device, std::move(jpeg), std::move(answer));
+          [shared](const Onlooker::Window& window, std::vector<std::uint8_t> jpeg, Eyes::Answer answer) {
+            shared->look(window, std::move(jpeg), std::move(answer));
           },
           [shared](Eyes::Answer answer) { shared->room(std::move(answer)); }};
 }

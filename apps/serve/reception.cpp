@@ -363,7 +363,14 @@ void Reception::greet(const std::shared_ptr<Visitor>& visitor) {
 }
 
 void Reception::gone(const std::shared_ptr<Visitor>& visitor) {
+  close_window(visitor);
   if (std::erase(visitors_, visitor) > 0) publish();
+}
+
+void Reception::close_window(const std::shared_ptr<Visitor>& visitor) {
+  if (!visitor->device.empty()) setup_.place(visitor->guest.name, std::nullopt);
+  visitor->device.clear();
+  visitor->frame_waiting.reset();
 }
 
 void Reception::hear_text(const std::shared_ptr<Visitor>& visitor, std::string_view text) {
@@ -427,7 +434,8 @@ void Reception::hear(const std::shared_ptr<Visitor>& visitor, const WindowMessag
   });
   if (message.on && windows >= k_most_windows)
     return refuse(visitor, std::nullopt, fmt::format("{} windows are open; no more at once.", windows));
-  visitor->device = message.on ? message.device : "";
+  if (!message.on) return close_window(visitor);
+  visitor->device = message.device;
   visitor->frame_waiting.reset();
 }
 
@@ -452,7 +460,7 @@ void Reception::look(const std::shared_ptr<Visitor>& visitor, Visitor::Frame fra
   visitor->frame_in_flight = frame.number;
   visitor->frame_since = Clock::now();
   setup_.eyes.look(
-      visitor->device, std::move(frame.jpeg),
+      {visitor->device, visitor->guest.name}, std::move(frame.jpeg),
       [this, post = setup_.post, weak = std::weak_ptr(visitor), number = frame.number](Eyes::Seen seen) {
         post([this, weak, number, seen = std::move(seen)] {
           if (const auto visitor = weak.lock()) looked(visitor, number, seen);
@@ -466,6 +474,7 @@ void Reception::looked(const std::shared_ptr<Visitor>& visitor,
   if (visitor->frame_in_flight != number) return;
   visitor->frame_in_flight.reset();
   if (!visitor->device.empty()) {
+    if (seen.p_eye_world) setup_.place(visitor->guest.name, seen.p_eye_world);
     visitor->outbox.show(PictureKind::window, std::make_shared<const std::string>(picture_message(
                                                   PictureKind::window, number, seen.json, seen.jpeg)));
     visitor->wake();

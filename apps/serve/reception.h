@@ -71,7 +71,9 @@ class Reception {
     StaticFiles files;
     Eyes eyes;
     Backroom* backroom = nullptr;
-    std::function<void(Wish)> wish;                   ///< to the session
+    std::function<void(Wish)> wish;  ///< to the session
+    /// To the session: where a guest's tablet looks from, by each picture; nullopt: its window is closed.
+    std::function<void(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world)> place;
     std::function<void(bool)> watched;                ///< whether anybody is paired
     std::function<void(std::function<void()>)> post;  ///< runs it on this object's thread; from any thread
   };
@@ -142,6 +144,7 @@ class Reception {
               std::optional<std::uint64_t> id,
               const std::string& why);
   void look(const std::shared_ptr<Visitor>& visitor, Visitor::Frame frame);
+  void close_window(const std::shared_ptr<Visitor>& visitor);
   void looked(const std::shared_ptr<Visitor>& visitor, std::uint32_t number, const Eyes::Seen& seen);
   void ask_for_room(Clock::time_point now);
   void room_came(Eyes::Seen seen);

@@ -80,6 +80,11 @@ Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, Eyes e
             std::erase_if(server->wishes_, [&](const Wish& old) { return is_late(old, wish.since); });
             server->wishes_.push_back(std::move(wish));
           },
+      .place =
+          [server](const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world) {
+            const std::lock_guard lock(server->mutex_);
+            server->places_[guest] = p_eye_world;
+          },
       .watched = [server](bool is_watched) { server->is_watched_ = is_watched; },
       .post = [network = out->network_.get()](std::function<void()> job) { network->post(std::move(job)); }});
   const bool is_encrypted = certificate->has_value();
@@ -115,6 +120,12 @@ std::optional<Wish> Server::next_wish() {
 
 void Server::hear(Session* session, Stamp at) {
   const auto begun = Clock::now();
+  std::map<std::string, std::optional<Eigen::Vector3d>> places;
+  {
+    const std::lock_guard lock(mutex_);
+    places.swap(places_);
+  }
+  for (const auto& [guest, p_eye_world] : places) session->see(guest, p_eye_world, at);
   for (std::size_t i = 0; i < k_most_at_once && Clock::now() - begun < k_longest_hearing; ++i) {
     const auto wish = next_wish();
     if (!wish) break;

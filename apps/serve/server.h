@@ -5,6 +5,7 @@
 #include <chrono>
 #include <deque>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -49,8 +50,9 @@ class Server {
   static Result<std::unique_ptr<Server>> open(const ServeOptions& options, Eyes eyes);
   ~Server();
 
-  /// Does what guests want, at most k_most_at_once edits and for at most 5 ms; the others wait for the next
-  /// call. What cannot be done is answered to who wanted it.
+  /// Tells the session where guests' tablets look from. Does what guests want, at most k_most_at_once edits
+  /// and for at most 5 ms; the others wait for the next call. What cannot be done is answered to who wanted
+  /// it.
   void hear(Session* session, Stamp at);
   /// Lets guests know: at once after an edit, else twenty times a second, and once a second while there are
   /// none.
@@ -75,8 +77,9 @@ class Server {
   std::atomic<bool> is_watched_ = false;  // somebody is paired
 
   std::mutex mutex_;
-  std::deque<Wish> wishes_;          // for the session
-  std::optional<SessionNews> news_;  // for the network
+  std::deque<Wish> wishes_;                                       // for the session
+  std::map<std::string, std::optional<Eigen::Vector3d>> places_;  // likewise: the newest of each guest
+  std::optional<SessionNews> news_;                               // for the network
   bool is_news_posted_ = false;
 
   std::vector<Outcome> outcomes_;  // the session's alone, as the rest

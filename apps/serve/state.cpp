@@ -82,6 +82,9 @@ SessionState state_of(const Session& session,
   out.split = staging.split;
   out.split_mm = staging.split_mm;
   out.screen = scene::screen_names()[static_cast<std::size_t>(staging.screen)];
+  out.viewer = staging.viewer;
+  out.follows = session.painted().follows;
+  out.windows = {session.windows().begin(), session.windows().end()};
   for (const Imager& projector : session.setup().rig.projectors) out.projectors.push_back(projector.name);
   out.devices = health.all();
   for (const LooseMarker& loose : waiting_markers(scene, staging, session.watched()))
@@ -122,6 +125,9 @@ nlohmann::ordered_json to_json(const SessionState& state) {
   out["split_mm"] = state.split_mm;
   out["screen"] = state.screen;
   out["screens"] = scene::screen_names();
+  out["viewer"] = state.viewer;
+  out["follows"] = state.follows;
+  out["windows"] = state.windows;
   out["projectors"] = state.projectors;
   out["devices"] = nlohmann::ordered_json::array();
   for (const DeviceState& device : state.devices)

@@ -36,6 +36,8 @@ struct SessionState {
   bool blackout = false, frozen = false, grid = false, marker_states = false, split = false;
   double split_mm = 0;
   std::string screen;
+  std::string viewer, follows;       ///< whose tablet is to be the eye, and whose it is
+  std::vector<std::string> windows;  ///< of guests whose tablets can be
   std::vector<std::string> projectors;
   std::vector<DeviceState> devices;
   std::vector<std::string> waiting;

@@ -53,10 +53,11 @@ struct Known {
   std::vector<tracker::BodyMotion> motions;
   PaintOptions paint;
   Frame room;
+  std::string follows;  // the guest whom light shows `view` parts to
 };
 
 struct Guest {
-  std::string device;
+  Onlooker::Window window;
   std::vector<std::uint8_t> jpeg;
   Answer answer;
 };
@@ -288,7 +289,7 @@ cv::Mat Onlooker::Impl::drawn(const Imager& camera,
 }
 
 Onlooker::Seen Onlooker::Impl::seen_by(const Guest& guest, const Known& known) {
-  if (!is_device_name(guest.device))
+  if (!is_device_name(guest.window.device))
     return nothing("Expected a device's name of 8 to 64 letters, digits and -.");
   const Stamp begun = std::chrono::steady_clock::now();
   const auto picture = decode_guest_picture(guest.jpeg);
@@ -297,7 +298,7 @@ Onlooker::Seen Onlooker::Impl::seen_by(const Guest& guest, const Known& known) {
 
   const Stamp tracking = std::chrono::steady_clock::now();
   std::vector<Track> tracks = tracks_of(known);
-  Watching& device = watching_of(guest.device);
+  Watching& device = watching_of(guest.window.device);
   const GuestSight sight = device.eye.look(*picture, bodies_of(*known.scene, known.staging), tracks);
   const double track_ms = milliseconds_since(tracking);
   if (!sight.view) return nothing(sight.why);
@@ -307,11 +308,13 @@ Onlooker::Seen Onlooker::Impl::seen_by(const Guest& guest, const Known& known) {
     for (Track& track : tracks)
       if (track.body == moved.body) track = moved;
   const scene::PosedScene posed = scene::staged(*known.scene, known.staging, tracks);
+  const bool is_viewer = !guest.window.guest.empty() && guest.window.guest == known.follows;
+  if (is_viewer != device.shown.is_viewer) device.shown = {.is_viewer = is_viewer};
   const cv::Mat out = drawn(*sight.view, *picture, posed, known, &device.shown);
   const double composite_ms = milliseconds_since(drawing);
 
   const Stamp encoding = std::chrono::steady_clock::now();
-  Seen seen{{}, device::encode_jpeg(out, k_quality)};
+  Seen seen{{}, device::encode_jpeg(out, k_quality), sight.view->imager_from_world.inverse().translation};
   const double encode_ms = milliseconds_since(encoding);
   const Lens& lens = sight.view->lens;
   seen.json =
@@ -395,26 +398,27 @@ void Onlooker::know(const Session& session) {
                                              .staging = session.staging(),
                                              .motions = watched.motions,
                                              .paint = session.setup().paint,
-                                             .room = watched.frames.empty() ? Frame{} : watched.frames[0]});
+                                             .room = watched.frames.empty() ? Frame{} : watched.frames[0],
+                                             .follows = session.painted().follows});
   if (known->room.captured_at == Stamp{}) known->room.captured_at = watched.captured_at;
   const std::lock_guard lock(impl_->mutex);
   impl_->known = std::move(known);
 }
 
-void Onlooker::look(const std::string& device,
-                    std::vector<std::uint8_t> jpeg,
-                    std::function<void(Seen)> answer) {
+void Onlooker::look(const Window& window, std::vector<std::uint8_t> jpeg, std::function<void(Seen)> answer) {
   {
     const std::lock_guard lock(impl_->mutex);
-    const auto before = std::find_if(impl_->guests.begin(), impl_->guests.end(),
-                                     [&](const Guest& guest) { return guest.device == device; });
+    const auto before = std::find_if(impl_->guests.begin(), impl_->guests.end(), [&](const Guest& guest) {
+      return guest.window.device == window.device;
+    });
     if (before == impl_->guests.end()) {
       if (impl_->guests.size() >= k_most_waiting) {
         impl_->overtaken.push_back(std::move(impl_->guests.front().answer));
         impl_->guests.pop_front();
       }
-      impl_->guests.push_back({device, std::move(jpeg), std::move(answer)});
+      impl_->guests.push_back({window, std::move(jpeg), std::move(answer)});
     } else {  // keeps its turn
+      before->window = window;
       impl_->overtaken.push_back(std::exchange(before->answer, std::move(answer)));
       before->jpeg = std::move(jpeg);
     }

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,13 +35,20 @@ class Onlooker {
   struct Seen {
     std::string json;
     std::vector<std::uint8_t> jpeg;
+    std::optional<Eigen::Vector3d> p_eye_world = {};  ///< where the tablet looks from, if that is known
+  };
+
+  /// Whose picture it is.
+  struct Window {
+    std::string device;      ///< whose lens it has
+    std::string guest = {};  ///< as Staging::viewer calls the one that light shows `view` parts to
   };
 
   /// Draws the parts into a guest's picture. From any thread; returns at once. The newest picture of a device
   /// wins: one that it overtakes is answered with nothing. Every call is answered exactly once, on the
   /// onlooker's thread, which waits for `answer` to return. Pictures that are no JPEG, too large or damaged
   /// are answered with nothing and why.
-  void look(const std::string& device, std::vector<std::uint8_t> jpeg, std::function<void(Seen)> answer);
+  void look(const Window& window, std::vector<std::uint8_t> jpeg, std::function<void(Seen)> answer);
 
   /// Camera 0's newest picture with the parts, as the room's screen shows it, at most 1280 pixels a side; its
   /// JSON is {"why": ""}, or says why there is no picture. Otherwise as look().

@@ -23,6 +23,7 @@
 #include "scene/comments.h"
 #include "sim/virtual_rig.h"
 #include "tests/apps/remote_client.h"
+#include "tests/apps/virtual_tablet.h"
 #include "tests/support/matchers.h"
 
 namespace limn::apps {
@@ -69,10 +70,10 @@ Eyes eyes_that_echo(std::chrono::milliseconds after = 0ms, std::size_t jpeg_byte
     });
   };
   Eyes eyes;
-  eyes.look = [later, jpeg_bytes](const std::string& device, std::vector<std::uint8_t> jpeg,
+  eyes.look = [later, jpeg_bytes](const Onlooker::Window& window, std::vector<std::uint8_t> jpeg,
                                   Eyes::Answer answer) {
     if (jpeg_bytes > 0) jpeg.resize(jpeg_bytes);
-    later([device, jpeg = std::move(jpeg), answer = std::move(answer)] {
+    later([device = window.device, jpeg = std::move(jpeg), answer = std::move(answer)] {
       answer({json({{"sees", "nothing"}, {"why", device}}).dump(), jpeg});
     });
   };
@@ -683,10 +684,10 @@ TEST_F(AServedSession, TellsTheStateOfTheDocumentation) {
   };
   check(state);
   check(state["slots"][0]);
-  for (const char* key :
-       {"number",   "slots",      "prototype", "looks",         "look",   "other_look", "deleted_look",
-        "blackout", "frozen",     "grid",      "marker_states", "split",  "split_mm",   "screen",
-        "screens",  "projectors", "devices",   "waiting",       "guests", "comments",   "notes"})
+  for (const char* key : {"number",       "slots",    "prototype", "looks",   "look",          "other_look",
+                          "deleted_look", "blackout", "frozen",    "grid",    "marker_states", "split",
+                          "split_mm",     "screen",   "viewer",    "follows", "windows",       "screens",
+                          "projectors",   "devices",  "waiting",   "guests",  "comments",      "notes"})
     EXPECT_TRUE(state.contains(key)) << key;
 }
 
@@ -839,7 +840,17 @@ TEST(LiveServe, GuestsReachARunningSessionThatIsReplayed) {
   options.seconds = 1e5;  // ended below
   options.serve = "0";
   options.record = folder / "recording";
-  bool is_room_there = false;
+  // What a tablet sees of the room.
+  sim::World seen = sim::load_world(folder / "world.json", marker_picture).value();
+  std::vector<cv::Mat> dark;
+  for (const Imager& p : seen.rig.projectors) dark.push_back(cv::Mat::zeros(p.height, p.width, CV_8UC3));
+  const Eigen::Vector3d p_middle = seen.world_from_prototype.translation;
+  const std::vector<std::uint8_t> picture =
+      test::VirtualTablet(seen, dark, 640, 400, 2)
+          .shoot_from(looking_at(p_middle + Eigen::Vector3d(-0.4, -0.6, 0.1), p_middle, {0, 0, 1}))
+          .jpeg;
+  const std::string jpeg(picture.begin(), picture.end());
+  bool is_room_there = false, is_followed = false, is_left = false;
   int status = 0;
   json state;
   Status lived;
@@ -857,6 +868,23 @@ TEST(LiveServe, GuestsReachARunningSessionThatIsReplayed) {
         };
         edit({{"action", "choose_variant"}, {"slot", "mirror"}, {"value", "sport"}});
         edit({{"action", "save_look"}, {"value", "by Ann"}});
+        // Her tablet becomes the eye, and leaves.
+        edit({{"action", "viewer"}, {"value", "Ann"}});
+        RemoteClient window(port);
+        window.upgrade(token);
+        const auto follows = [&](const std::string& guest) {
+          for (int i = 0; i < 200; ++i) {
+            if (guest == "Ann") window.send_binary(number_bytes(static_cast<std::uint32_t>(i)) + jpeg);
+            const auto told = window.message_of("state");
+            if (told && json::parse(*told)["follows"] == guest) return true;
+          }
+          return false;
+        };
+        window.send_text(R"({"type": "window", "device": "tablet-of-ann", "on": true})");
+        is_followed = follows("Ann");
+        std::this_thread::sleep_for(300ms);
+        window.send_text(R"({"type": "window", "device": "tablet-of-ann", "on": false})");
+        is_left = follows("");
         is_room_there = RemoteClient(port).get("/picture/room.jpg", token).status == 200;
         state = json::parse(RemoteClient(port).get("/api/state", token).body);
       }
@@ -868,6 +896,9 @@ TEST(LiveServe, GuestsReachARunningSessionThatIsReplayed) {
   ASSERT_TRUE(lived.ok()) << lived.message();
   EXPECT_EQ(status, 200);
   EXPECT_TRUE(is_room_there);
+  EXPECT_TRUE(is_followed);
+  EXPECT_TRUE(is_left);
+  EXPECT_NE(read_file(folder / "recording/events.jsonl").value().find("\"guest_eye\":["), std::string::npos);
   EXPECT_EQ(state["slots"][0]["variant"], "sport");
   EXPECT_EQ(state["last_edit"]["who"], "Ann");
   EXPECT_EQ(state["looks"], json({"by Ann"}));

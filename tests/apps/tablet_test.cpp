@@ -45,13 +45,15 @@ Pose pose_of(const json& node) {
 // A session in the studio that has seen and lit the door, and somebody who looks on.
 class Room {
  public:
-  explicit Room(const fs::path& lens_folder) : context_(device::GlContext::create().value()) {
+  explicit Room(const fs::path& lens_folder, double resolution = 0.5, double frame_period_s = 1 / 30.0)
+      : context_(device::GlContext::create().value()) {
     sim::World world =
         sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture).value();
-    EXPECT_TRUE(make_coarser(0.5, &world.rig).ok());
+    EXPECT_TRUE(make_coarser(resolution, &world.rig).ok());
     setup_.rig = world.rig;
     setup_.scene = *world.scene;
-    rig_.emplace(std::move(world), sim::VirtualRigOptions{.grab_waits_for_light = false});
+    rig_.emplace(std::move(world),
+                 sim::VirtualRigOptions{.frame_period_s = frame_period_s, .grab_waits_for_light = false});
     watcher_ = Watcher::create(setup_.scene, setup_.rig).value();
     session_ = Session::create(setup_, nullptr, nullptr, false).value();
     onlooker_ = Onlooker::create(setup_, lens_folder).value();
@@ -72,13 +74,14 @@ class Room {
     json said;
     cv::Mat picture;
     std::vector<std::uint8_t> jpeg;
+    std::optional<Eigen::Vector3d> p_eye_world;
   };
   Window look(const std::string& device, std::vector<std::uint8_t> jpeg) {
     std::promise<Onlooker::Seen> answered;
-    onlooker_->look(device, std::move(jpeg),
+    onlooker_->look({device}, std::move(jpeg),
                     [&](Onlooker::Seen seen) { answered.set_value(std::move(seen)); });
     Onlooker::Seen seen = answered.get_future().get();
-    Window window{json::parse(seen.json), {}, seen.jpeg};
+    Window window{json::parse(seen.json), {}, seen.jpeg, seen.p_eye_world};
     if (!seen.jpeg.empty()) window.picture = device::decode_jpeg(seen.jpeg).value();
     return window;
   }
@@ -190,6 +193,128 @@ TEST(Tablet, PartAndPictureLieOnEachOtherAfterTenSecondsOfLookingRound) {
   EXPECT_GT(judged, 0);
 }
 
+// Where light of the mirror falls in a tablet's picture, and where it should for that tablet's eye.
+struct LitMirror {
+  double off_mm = 0;   // between the middles, at the prototype's distance
+  double overlap = 0;  // what is in both, of what is in either
+};
+
+// With all between its ends: the glass is hardly lighter than what is behind it.
+cv::Mat filled(const cv::Mat& mask) {
+  std::vector<cv::Point> points, hull;
+  cv::findNonZero(mask, points);
+  cv::Mat out = cv::Mat::zeros(mask.size(), CV_8U);
+  if (points.empty()) return out;
+  cv::convexHull(points, hull);
+  cv::fillConvexPoly(out, hull, 255);
+  return out;
+}
+
+LitMirror lit_mirror(const sim::World& world,
+                     std::vector<cv::Mat> shown,
+                     const Pose& camera_from_world,
+                     const fs::path& kept) {
+  constexpr int k_lit = 6;  // levels
+  const scene::PosedScene parts = sim::true_poses(world);
+  std::vector<cv::Mat> dark;
+  for (const cv::Mat& picture : shown) dark.push_back(cv::Mat::zeros(picture.size(), picture.type()));
+  test::VirtualTablet with(world, std::move(shown), k_width, k_height, 21),
+      without(world, std::move(dark), k_width, k_height, 21);
+  const test::TabletShot lit = with.shoot_from(camera_from_world);
+  const sim::Truth judge(world, parts);
+  const cv::Mat wanted = filled(judge.part_mask(lit.camera, "mirror") == 255);
+  cv::Mat lights, either;
+  cv::absdiff(lit.picture, without.shoot_from(camera_from_world).picture, lights);
+  cv::blur(lights, lights, {3, 3});  // the noise
+  cv::cvtColor(lights, lights, cv::COLOR_BGR2GRAY);
+  lights = lights > k_lit;
+  lights.setTo(0, judge.part_mask(lit.camera, "trim"));
+  cv::morphologyEx(lights, lights, cv::MORPH_OPEN, cv::Mat::ones(5, 5, CV_8U));
+  lights = filled(lights);
+  EXPECT_TRUE(write_png(kept.string() + ".png", lit.picture));
+  EXPECT_TRUE(write_png(kept.string() + "-light.png", lights));
+  cv::bitwise_or(lights, wanted, either);
+  const cv::Moments a = cv::moments(lights, true), b = cv::moments(wanted, true);
+  if (a.m00 < 1 || b.m00 < 1) return {1e3, 0};
+  const double off_px = std::hypot(a.m10 / a.m00 - b.m10 / b.m00, a.m01 / a.m00 - b.m01 / b.m00);
+  const double away_m = (camera_from_world * world.world_from_prototype.translation).z();
+  return {1e3 * off_px * away_m / lit.camera.lens.fx(),
+          1.0 * cv::countNonZero(lights & wanted) / cv::countNonZero(either)};
+}
+
+// Light shows view parts to a tablet's eye while that is wanted and known, and comes and goes calmly.
+TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
+  const fs::path folder = test::test_folder();
+  constexpr double k_period_s = 0.1;
+  Room room(folder / "lenses", 0.25, k_period_s);
+  Session& session = room.session();
+  const sim::World& world = room.rig().world();
+  test::VirtualTablet tablet = room.tablet(6);
+  for (int i = 0; i < 4; ++i) room.look(k_tablet, tablet.shoot(1.2 * i).jpeg);  // the lens
+  const Eigen::Vector3d p_middle = world.world_from_prototype.translation;
+  const Pose aside = looking_at(p_middle + Eigen::Vector3d(-0.5, -0.55, 0.1), p_middle, {0, 0, 1});
+  const Room::Window seen = room.look(k_tablet, tablet.shoot_from(aside).jpeg);
+  ASSERT_TRUE(seen.p_eye_world.has_value()) << seen.said.dump();
+  const Eigen::Vector3d p_tablet = aside.inverse().translation,
+                        p_own =
+                            session.setup().scene.viewers[0].fixed->imager_from_world.inverse().translation;
+  EXPECT_LT((*seen.p_eye_world - p_tablet).norm(), 0.01);
+
+  // Nobody has asked for it.
+  for (int i = 0; i < 3; ++i) {
+    session.see("Ann", seen.p_eye_world, room.rig().now());
+    room.step();
+  }
+  EXPECT_FALSE(session.painted().p_guest_eye_world.has_value());
+  EXPECT_EQ(session.windows(), std::set<std::string>{"Ann"});
+  const LitMirror before =
+      lit_mirror(world, session.painted().projectors, aside, folder / "lit-for-its-own-viewer");
+
+  // Followed: what else is seen of other guests does not matter.
+  ASSERT_TRUE(session.edit({"viewer", "", "Ann"}, "Ben", room.rig().now()).ok());
+  Eigen::Vector3d p_before = p_own;
+  double farthest_m = 0;
+  const auto steps = [&](int count, bool is_seen) {
+    for (int i = 0; i < count; ++i) {
+      if (is_seen) session.see("Ann", seen.p_eye_world, room.rig().now());
+      session.see("Ben", p_middle + Eigen::Vector3d(1, -1, 0), room.rig().now());
+      room.step();
+      const Eigen::Vector3d p_now = session.painted().p_guest_eye_world.value_or(p_own);
+      farthest_m = std::max(farthest_m, (p_now - p_before).norm());
+      p_before = p_now;
+    }
+  };
+  steps(11, true);
+  EXPECT_EQ(session.painted().follows, "Ann");
+  EXPECT_LT((p_before - *seen.p_eye_world).norm(), 1e-6);
+  const LitMirror followed =
+      lit_mirror(world, session.painted().projectors, aside, folder / "lit-for-the-tablet");
+  std::printf("light of the mirror: %.1f mm off, overlap %.2f; followed %.1f mm, %.2f; eye %.1f mm off; %s\n",
+              before.off_mm, before.overlap, followed.off_mm, followed.overlap,
+              1e3 * (*seen.p_eye_world - p_tablet).norm(), folder.c_str());
+  EXPECT_GT(before.off_mm, 15);
+  EXPECT_LT(before.overlap, 0.6);
+  EXPECT_LT(followed.off_mm, 2);
+  EXPECT_GT(followed.overlap, 0.85);
+
+  // The tablet is silent: after a second the eye goes back, never at once.
+  steps(8, false);
+  EXPECT_EQ(session.painted().follows, "Ann");
+  steps(2, false);
+  EXPECT_EQ(session.painted().follows, "");
+  EXPECT_TRUE(session.painted().p_guest_eye_world.has_value());
+  steps(9, false);
+  EXPECT_FALSE(session.painted().p_guest_eye_world.has_value());
+  EXPECT_LT(farthest_m, 1.05 * (p_own - p_tablet).norm() / 0.8 * k_period_s) << "of 0.8 s for the whole way";
+  // It comes again and its window is closed.
+  steps(3, true);
+  EXPECT_EQ(session.painted().follows, "Ann");
+  session.see("Ann", std::nullopt, room.rig().now());
+  steps(1, false);
+  EXPECT_EQ(session.painted().follows, "");
+  EXPECT_EQ(session.windows(), std::set<std::string>{"Ben"});
+}
+
 // What is no picture, or too much of one, is refused, and everybody gets an answer.
 TEST(Tablet, WhatCannotBeLookedAtIsAnsweredWithWhy) {
   Room room(test::test_folder() / "lenses");
@@ -251,7 +376,7 @@ TEST(Tablet, TheNewestPictureOfADeviceWinsAndAllAreAnswered) {
   } answers;
   for (int i = 0; i < 2 * k_pictures; ++i) {
     const bool is_one = i % 2 == 0;
-    room.onlooker().look(is_one ? "tablet-one" : "tablet-other", is_one ? one.jpeg : other.jpeg,
+    room.onlooker().look({is_one ? "tablet-one" : "tablet-other"}, is_one ? one.jpeg : other.jpeg,
                          [&answers, i](Onlooker::Seen seen) {
                            const std::lock_guard lock(answers.mutex);
                            answers.said[static_cast<std::size_t>(i)].push_back(json::parse(seen.json));
@@ -278,8 +403,8 @@ TEST(Tablet, TheNewestPictureOfADeviceWinsAndAllAreAnswered) {
   EXPECT_LT(drawn, 2 * k_pictures);
   // What still waits at the end is told so.
   std::promise<Onlooker::Seen> late;
-  room.onlooker().look(k_tablet, one.jpeg, [](const Onlooker::Seen&) {});
-  room.onlooker().look("tablet-late", one.jpeg,
+  room.onlooker().look({k_tablet}, one.jpeg, [](const Onlooker::Seen&) {});
+  room.onlooker().look({"tablet-late"}, one.jpeg,
                        [&](Onlooker::Seen seen) { late.set_value(std::move(seen)); });
   room.end_onlooker();
   EXPECT_EQ(late.get_future().wait_for(std::chrono::seconds(0)), std::future_status::ready);

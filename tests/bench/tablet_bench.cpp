@@ -85,7 +85,7 @@ struct Room {
 
 apps::Onlooker::Seen look(apps::Onlooker* onlooker, const std::vector<std::uint8_t>& jpeg) {
   std::promise<apps::Onlooker::Seen> answered;
-  onlooker->look(k_device, jpeg, [&](apps::Onlooker::Seen seen) { answered.set_value(std::move(seen)); });
+  onlooker->look({k_device}, jpeg, [&](apps::Onlooker::Seen seen) { answered.set_value(std::move(seen)); });
   return answered.get_future().get();
 }
 
