@@ -45,6 +45,12 @@ std::optional<std::array<unsigned char, k_token_bytes>> token_of(const std::stri
   return bytes;
 }
 
+std::string in_small_letters(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
 // What counts as one place: an IPv4 address, an IPv6 network.
 std::string place_of(const std::string& address) {
   in6_addr six{};
@@ -62,6 +68,17 @@ Guests::Guests() {
     while (std::find(pins_.begin(), pins_.end(), drawn) != pins_.end()) drawn = drawn_pin();
     pin = std::move(drawn);
   }
+}
+
+std::string Guests::told_apart(const std::string& name) const {
+  const auto is_taken = [&](const std::string& wanted) {
+    return std::any_of(sessions_.begin(), sessions_.end(), [&](const Session& session) {
+      return in_small_letters(session.guest.name) == in_small_letters(wanted);
+    });
+  };
+  std::string out = name;
+  for (int i = 2; is_taken(out); ++i) out = fmt::format("{} ({})", name, i);
+  return out;
 }
 
 std::optional<Guests::Wait> Guests::wait_of(const Tries& tries, Time now) const {
@@ -87,10 +104,12 @@ Guests::Tries* Guests::tries_of(const std::string& address, Time now) {
   return &tries_[place];
 }
 
-std::variant<Guests::Paired, Guests::WrongPin, Guests::Wait> Guests::pair(const std::string& pin,
-                                                                          const std::string& name,
-                                                                          const std::string& address,
-                                                                          Time now) {
+std::variant<Guests::Paired, Guests::WrongPin, Guests::Wait> Guests::pair(
+    const std::string& pin,
+    const std::string& name,
+    const std::string& address,
+    Time now,
+    const std::optional<Guest>& replaced) {
   if (now - of_all_.last > k_forgets_after) of_all_ = {};
   Tries* tries = tries_of(address, now);
   tries->last = now;
@@ -105,10 +124,11 @@ std::variant<Guests::Paired, Guests::WrongPin, Guests::Wait> Guests::pair(const 
     return WrongPin{};
   }
   std::erase_if(sessions_, [&](const Session& session) { return now >= session.guest.until; });
+  if (replaced) leave(replaced->number);
   if (sessions_.size() >= k_most_sessions) sessions_.erase(sessions_.begin());
   Session session;
   draw(session.token.data(), session.token.size());
-  session.guest = {++last_number_, name, *role, now + k_session_life};
+  session.guest = {++last_number_, told_apart(name), *role, now + k_session_life};
   sessions_.push_back(session);
   return Paired{hex_of(session.token), session.guest};
 }

@@ -54,11 +54,13 @@ class Guests {
   const std::string& pin(Role role) const { return pins_[static_cast<std::size_t>(role)]; }
 
   /// A session for whoever knows a PIN. `address`: a numeric IP address; those of an IPv6 network (/64) count
-  /// as one. While it is to wait nothing is compared, so a right PIN says no more than a wrong one.
+  /// as one. While it is to wait nothing is compared, so a right PIN says no more than a wrong one. Somebody
+  /// of the same name is told apart: "Ann (2)". `replaced`: who asks has that session already, which ends.
   std::variant<Paired, WrongPin, Wait> pair(const std::string& pin,
                                             const std::string& name,
                                             const std::string& address,
-                                            Time now);
+                                            Time now,
+                                            const std::optional<Guest>& replaced = {});
 
   /// Whose token it is; nullopt: nobody's, or the session is over.
   std::optional<Guest> find(const std::string& token, Time now) const;
@@ -77,6 +79,7 @@ class Guests {
     std::optional<Time> waits_until;
     Time last;
   };
+  std::string told_apart(const std::string& name) const;
   std::optional<Wait> wait_of(const Tries& tries, Time now) const;
   void note_wrong(Tries* tries, int most, Time now);
   Tries* tries_of(const std::string& address, Time now);

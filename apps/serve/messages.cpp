@@ -156,6 +156,19 @@ Message read_message(const std::string& type, Reader* reader) {
   return {};
 }
 
+std::string list_of(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+  return list;
+}
+
+bool is_reserved(std::string name) {
+  for (char& c : name)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  const auto& all = reserved_names();
+  return name.find(':') != std::string::npos || std::find(all.begin(), all.end(), name) != all.end();
+}
+
 void put_number(std::uint32_t number, std::string* out) {
   for (int shift = 0; shift < 32; shift += 8) out->push_back(static_cast<char>(number >> shift & 0xffu));
 }
@@ -180,13 +193,25 @@ std::optional<std::uint64_t> id_of(std::string_view text) {
   return id->get<std::uint64_t>();
 }
 
+const std::vector<std::string>& reserved_names() {
+  static const std::vector<std::string> all = {"operator", "key", "script", "osc", "limn"};
+  return all;
+}
+
 Result<PairWish> pair_of_body(std::string_view text) {
   LIMN_TRY(Reader reader, Reader::of(text));
   PairWish wish{reader.text("pin", k_longest_word, false), reader.text("name", k_longest_guest_name, true)};
   if (wish.pin.size() != k_pin_digits ||
       !std::all_of(wish.pin.begin(), wish.pin.end(), [](char c) { return c >= '0' && c <= '9'; }))
     reader.problem("pin", fmt::format("{} digits", k_pin_digits), "other text");
-  if (wish.name.find_first_not_of(' ') == std::string::npos) wish.name = "guest";
+  const auto first = wish.name.find_first_not_of(' ');
+  wish.name = first == std::string::npos
+                  ? "guest"
+                  : wish.name.substr(first, wish.name.find_last_not_of(' ') + 1 - first);
+  if (is_reserved(wish.name))
+    reader.problem(
+        "name", fmt::format("a name without ':' that is none of Limn's own ({})", list_of(reserved_names())),
+        in_quotes(wish.name));
   LIMN_TRY_STATUS(reader.status());
   return wish;
 }

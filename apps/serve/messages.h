@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "core/result.h"
 #include "scene/comments.h"
@@ -55,8 +56,11 @@ std::optional<std::uint64_t> id_of(std::string_view text);
 /// Bodies of HTTP requests; errors as above.
 struct PairWish {
   std::string pin;   ///< six digits
-  std::string name;  ///< "guest" when it was left out or empty
+  std::string name;  ///< without blanks around it; "guest" when it was left out or empty
 };
+/// Names that the log gives to Limn's own doings: no guest's, however they are written; nor is one with ':',
+/// as markers have it.
+const std::vector<std::string>& reserved_names();
 Result<PairWish> pair_of_body(std::string_view text);
 Result<scene::Edit> edit_of_body(std::string_view text);
 Result<Remark> remark_of_body(std::string_view text);

@@ -117,7 +117,7 @@ std::optional<Guests::Guest> Reception::guest_of(const HttpRequest& request) con
   constexpr std::string_view k_bearer = "Bearer ";
   const std::string token = request.authorization.starts_with(k_bearer)
                                 ? request.authorization.substr(k_bearer.size())
-                                : cookie_in(request.cookie, "limn");
+                                : cookie_in(request.cookie, setup_.cookie);
   return guests_.find(token, Clock::now());
 }
 
@@ -163,7 +163,7 @@ HttpAnswer Reception::file(const HttpRequest& request, const std::string& path) 
 HttpAnswer Reception::pair(const HttpRequest& request) {
   const auto wish = pair_of_body(request.body);
   if (!wish) return refusal(k_bad, wish.message());
-  auto found = guests_.pair(wish->pin, wish->name, request.address, Clock::now());
+  auto found = guests_.pair(wish->pin, wish->name, request.address, Clock::now(), guest_of(request));
   if (const auto* wait = std::get_if<Guests::Wait>(&found)) {
     HttpAnswer out = refusal(k_too_many, fmt::format("too many wrong PINs. Wait {} s.", wait->left.count()));
     out.headers.emplace_back("Retry-After", std::to_string(wait->left.count()));
@@ -178,8 +178,8 @@ HttpAnswer Reception::pair(const HttpRequest& request) {
                                        {"token", paired->token},
                                        {"expires_s", life_s}}));
   out.headers.emplace_back(
-      "Set-Cookie", fmt::format("limn={}; Path=/; HttpOnly; SameSite=Strict; Max-Age={}{}", paired->token,
-                                life_s, setup_.is_encrypted ? "; Secure" : ""));
+      "Set-Cookie", fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict; Max-Age={}{}", setup_.cookie,
+                                paired->token, life_s, setup_.is_encrypted ? "; Secure" : ""));
   return out;
 }
 
@@ -290,7 +290,7 @@ void Reception::post_leave(const Asked& asked, Answering answering) {
   if (const Status empty = empty_body(asked.body); !empty) return answering(refusal(k_bad, empty.message()));
   guests_.leave(asked.guest.number);
   HttpAnswer out = json_answer("{}");
-  out.headers.emplace_back("Set-Cookie", "limn=; Path=/; HttpOnly; SameSite=Strict; Max-Age=0");
+  out.headers.emplace_back("Set-Cookie", setup_.cookie + "=; Path=/; HttpOnly; SameSite=Strict; Max-Age=0");
   answering(std::move(out));
   tick(Clock::now());
 }

@@ -71,6 +71,7 @@ Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, Eyes e
   out->reception_ = std::make_unique<Reception>(Reception::Setup{
       .is_encrypted = certificate->has_value(),
       .is_loopback = is_loopback(place->host),
+      .cookie = fmt::format("limn-{}", out->network_->port()),
       .files = std::move(*files),
       .eyes = std::move(eyes),
       .backroom = &out->backroom_,

@@ -162,11 +162,44 @@ TEST(RemoteMessages, APairingNeedsSixDigits) {
   EXPECT_FALSE(pair_of_body(json({{"pin", "012345"}, {"name", std::string(65, 'A')}}).dump()));
 }
 
+// The log says whose an edit was: a guest is not to pass for Limn itself.
+TEST(RemoteMessages, AGuestHasNoNameOfLimnsOwn) {
+  const auto named = [](const std::string& name) {
+    return pair_of_body(json({{"pin", "012345"}, {"name", name}}).dump());
+  };
+  for (const char* own : {"operator", " Operator ", "KEY", "script", "osc", "Limn", "aruco_4x4_50:0"}) {
+    const auto wish = named(own);
+    ASSERT_FALSE(wish) << own;
+    EXPECT_NE(wish.message().find("name: expected a name"), std::string::npos) << wish.message();
+  }
+  EXPECT_EQ(named("  Ann B. ")->name, "Ann B.");
+  EXPECT_EQ(named("my operator")->name, "my operator");
+}
+
 std::string wrong_pin(const Guests& guests) {
   for (int i = 0;; ++i) {
     std::string pin = fmt::format("{:06}", i);
     if (std::find(guests.pins().begin(), guests.pins().end(), pin) == guests.pins().end()) return pin;
   }
+}
+
+TEST(Guests, OfOneNameAreToldApart) {
+  Guests guests;
+  const Guests::Time now{};
+  const auto paired = [&](const std::string& name, const std::optional<Guests::Guest>& replaced = {}) {
+    return std::get<Guests::Paired>(guests.pair(guests.pin(Role::look), name, "10.0.0.1", now, replaced));
+  };
+  const Guests::Paired first = paired("Ann"), second = paired("ann");
+  EXPECT_EQ(first.guest.name, "Ann");
+  EXPECT_EQ(second.guest.name, "ann (2)");
+  EXPECT_EQ(paired("Ann").guest.name, "Ann (3)");
+  EXPECT_EQ(paired("Ben").guest.name, "Ben");
+  // Who pairs again is the same, and one session ends.
+  EXPECT_EQ(paired("Ann", first.guest).guest.name, "Ann");
+  EXPECT_FALSE(guests.find(first.token, now));
+  EXPECT_TRUE(std::holds_alternative<Guests::WrongPin>(
+      guests.pair(wrong_pin(guests), "Ann", "10.0.0.1", now, second.guest)));
+  EXPECT_TRUE(guests.find(second.token, now));
 }
 
 TEST(Guests, APinGivesItsRoleAndATokenThatEnds) {

@@ -188,11 +188,25 @@ TEST_F(AServer, PairsByPinAndForgetsWhoLeaves) {
   EXPECT_EQ(said["name"], "Ann");
   EXPECT_EQ(said["expires_s"], 12 * 60 * 60);
   const std::string cookie = answer.headers.at("set-cookie"), token = said["token"];
-  EXPECT_EQ(cookie.rfind("limn=" + token + ";", 0), 0u);
+  const std::string name = fmt::format("limn-{}", server_->port());  // two on a machine do not share it
+  EXPECT_EQ(cookie.rfind(name + "=" + token + ";", 0), 0u) << cookie;
   for (const char* word : {"HttpOnly", "SameSite=Strict", "Path=/"})
     EXPECT_NE(cookie.find(word), std::string::npos) << cookie;
   EXPECT_EQ(client()->get("/api/actions", token).status, 200);
-  EXPECT_EQ(client()->ask("GET", "/api/actions", "Cookie: limn=" + token + "\r\n").status, 200);
+  EXPECT_EQ(client()->ask("GET", "/api/actions", "Cookie: " + name + "=" + token + "\r\n").status, 200);
+  EXPECT_EQ(client()->ask("GET", "/api/actions", "Cookie: limn-1=" + token + "\r\n").status, 401);
+  const auto posing =
+      client()->post("/api/pair", json({{"pin", pin(Role::work)}, {"name", "operator"}}).dump());
+  EXPECT_EQ(posing.status, 400);
+  EXPECT_NE(posing.body.find("none of Limn's own"), std::string::npos) << posing.body;
+  // Somebody else of that name, and the same browser again.
+  const json another = {{"pin", pin(Role::look)}, {"name", "Ann"}};
+  EXPECT_EQ(json::parse(client()->post("/api/pair", another.dump()).body)["name"], "Ann (2)");
+  const auto again = client()->ask(
+      "POST", "/api/pair",
+      "Content-Type: application/json\r\nCookie: " + name + "=" + token_of(Role::look, "Ben") + "\r\n",
+      json({{"pin", pin(Role::look)}, {"name", "Ben"}}).dump());
+  EXPECT_EQ(json::parse(again.body)["name"], "Ben");
   const auto socket = client();
   ASSERT_EQ(socket->upgrade(token).status, 101);
   ASSERT_TRUE(socket->message_of("hello"));
