@@ -14,7 +14,8 @@ namespace limn::scene {
 namespace {
 
 constexpr double k_moved_m = 0.010, k_moved_rad = 5 * std::numbers::pi / 180;
-constexpr double k_most_nudge_mm = 1000, k_most_split_mm = 5000;
+constexpr double k_most_nudge_mm = 1000, k_most_split_mm = 5000, k_most_place_mm = 5000;
+constexpr double k_least_quaternion = 0.5, k_most_quaternion = 2;  // its length, which is made 1
 
 std::string list_of(const std::vector<std::string>& names) {
   std::string list;
@@ -75,6 +76,21 @@ Result<double> millimetre(const Edit& edit) {
     return error("{}: expected a number of millimetres, at most {}, found '{}'.", edit.action,
                  k_most_split_mm, edit.value);
   return mm;
+}
+
+Result<Pose> place_of(const Edit& edit) {
+  std::istringstream text(edit.value);
+  Eigen::Vector3d mm;
+  Eigen::Quaterniond turn;
+  std::string rest;
+  if (!(text >> mm.x() >> mm.y() >> mm.z() >> turn.w() >> turn.x() >> turn.y() >> turn.z()) || text >> rest ||
+      !(mm.cwiseAbs().maxCoeff() <= k_most_place_mm))
+    return error(
+        "place: expected x, y, z in millimetres, at most {}, and a quaternion w, x, y, z, found '{}'.",
+        k_most_place_mm, edit.value);
+  if (!(turn.norm() >= k_least_quaternion && turn.norm() <= k_most_quaternion))
+    return error("place: expected a quaternion of length 1, found length {:.3g}.", turn.norm());
+  return Pose(turn.normalized(), 1e-3 * mm);
 }
 
 bool is_file_name(const std::string& name) {
@@ -260,6 +276,10 @@ Result<Staging> edited_slot(const Scene& scene, std::size_t index, Staging stagi
     if (staged.pin)
       staged.pin->prototype_from_part =
           staged.pin->prototype_from_part * Pose(Eigen::Quaterniond::Identity(), 1e-3 * mm);
+  } else if (edit.action == "place") {
+    LIMN_TRY(const Pose prototype_from_part, place_of(edit));
+    staged.nudge.setZero();
+    staged.pin = Pin{prototype_from_part, std::nullopt};
   } else if (edit.action == "pair") {
     return paired(scene, index, std::move(staging), edit);
   } else if (edit.action == "unpair") {
@@ -294,6 +314,8 @@ const std::vector<Action>& actions() {
       {"previous_variant", true, nothing, "", "the slot's previous variant"},
       {"choose_variant", true, text, "a variant", "a variant by name"},
       {"nudge", true, millimetres, "three numbers, mm", "moves the part along its own axes"},
+      {"place", true, Takes::pose, "x, y, z in mm; quaternion w, x, y, z",
+       "puts the part there on the prototype, until its marker is moved"},
       {"release", true, nothing, "", "the part follows its marker again, without nudges"},
       {"pair", true, maybe_text, "a marker; empty: the one that glows",
        "the part is carried by that marker from now on"},

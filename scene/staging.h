@@ -80,6 +80,7 @@ enum class Takes {
   maybe_text,   ///< or nothing
   number,       ///< "12.5"
   millimetres,  ///< three numbers, "1 0 -2.5"
+  pose,         ///< seven: x y z in mm and a quaternion w x y z, "120 0 -35.5 1 0 0 0"
   on_off        ///< "on", "off", "toggle"; nothing: toggle
 };
 

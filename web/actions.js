@@ -5,6 +5,7 @@ export const actions = [
   {"name": "previous_variant", "of_slot": true, "takes": "nothing", "role": "work", "label": "previous variant"},
   {"name": "choose_variant", "of_slot": true, "takes": "text", "role": "work", "label": "variant"},
   {"name": "nudge", "of_slot": true, "takes": "millimetres", "role": "work", "label": "nudged"},
+  {"name": "place", "of_slot": true, "takes": "pose", "role": "work", "label": "placed"},
   {"name": "release", "of_slot": true, "takes": "nothing", "role": "work", "label": "follows its marker again"},
   {"name": "pair", "of_slot": true, "takes": "maybe_text", "role": "operate", "label": "carried by"},
   {"name": "unpair", "of_slot": true, "takes": "nothing", "role": "operate", "label": "has its own marker again"},
@@ -49,7 +50,7 @@ export function in_words(edit, state) {
   const is_on = { blackout: state.blackout, freeze: state.frozen, grid: state.grid, marker_states: state.marker_states,
                   split: state.split }[edit.action];
   const named = edit.action === "viewer" ? edit.value || "the scene's own viewer" : edit.value;
-  const value = is_on === undefined ? named : is_on ? "on" : "off";
+  const value = edit.action === "place" ? "" : is_on === undefined ? named : is_on ? "on" : "off";
   const unit = edit.action === "nudge" || edit.action === "split_at" ? " mm" : "";
   return `${who}: ${[edit.slot, known.get(edit.action)?.label ?? edit.action, value && value + unit].filter(Boolean).join(" ")}`;
 }

@@ -110,6 +110,39 @@ function make_nudge(session, slot) {
   return node;
 }
 
+// Where the part is on the prototype, in numbers; it keeps its turn.
+function make_place(session, slot) {
+  const numbers = ["x", "y", "z"].map((axis) =>
+    h("input", {
+      type: "number",
+      step: "0.1",
+      min: "-5000",
+      max: "5000",
+      inputmode: "decimal",
+      "aria-label": `${slot.name}: ${axis} on the prototype, mm`,
+    }),
+  );
+  let turn = [1, 0, 0, 0];
+  const set = session.button(
+    "place",
+    { slot: slot.name, value: () => [...numbers.map((number) => number.value || "0"), ...turn].join(" ") },
+    "Set",
+  );
+  const node = h(
+    "div",
+    { class: "stack", "data-needs": "work" },
+    h("h3", {}, "Place on the prototype: x, y, z in mm"),
+    h("div", { class: "line" }, ...numbers, set),
+  );
+  node.show = (state_of) => {
+    const pose = state_of.prototype_from_part;
+    if (!pose || node.contains(document.activeElement)) return;
+    turn = pose.rotation_wxyz;
+    numbers.forEach((number, i) => (number.value = (1000 * pose.translation_m[i]).toFixed(1)));
+  };
+  return node;
+}
+
 function make_marker(session, slot) {
   const words = h("p", { class: "soft" });
   const waiting = h("div", { class: "stack" });
@@ -202,6 +235,7 @@ function make_slot(session, slot) {
   const pieces = [
     make_variants(session, slot),
     make_nudge(session, slot),
+    make_place(session, slot),
     make_marker(session, slot),
     make_units(session, slot),
   ];

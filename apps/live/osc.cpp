@@ -37,6 +37,9 @@ std::string arguments_of(const scene::Action& action) {
     case scene::Takes::millimetres:
       words.push_back("three numbers, mm");
       break;
+    case scene::Takes::pose:
+      words.push_back(action.value);
+      break;
     case scene::Takes::on_off:
       words.push_back("on, off or toggle (text; or true, false, a number: 0 is off; left out: toggle)");
       break;
@@ -129,9 +132,9 @@ struct Reader {
     return *found;
   }
 
-  Result<double> number() {
+  Result<double> number(const char* what = "a number of millimetres") {
     const auto found = is_at_end() ? std::nullopt : arguments[next].number();
-    if (!found) return error("{}: expected a number of millimetres, found {}.", path, found_here());
+    if (!found) return error("{}: expected {}, found {}.", path, what, found_here());
     if (!std::isfinite(*found)) return error("{}: expected finite numbers, found {}.", path, *found);
     ++next;
     return *found;
@@ -174,6 +177,14 @@ Result<std::string> value_of(scene::Takes takes, const std::string& what, Reader
       LIMN_TRY(const double y, reader->number());
       LIMN_TRY(const double z, reader->number());
       return fmt::format("{} {} {}", x, y, z);
+    }
+    case scene::Takes::pose: {
+      std::string all;
+      for (int i = 0; i < 7; ++i) {
+        LIMN_TRY(const double number, reader->number(i < 3 ? "a number of millimetres" : "a number"));
+        all += fmt::format("{}{}", i > 0 ? " " : "", number);
+      }
+      return all;
     }
     case scene::Takes::on_off:
       return switch_of(reader);

@@ -19,6 +19,8 @@ const char* name_of(scene::Takes takes) {
       return "number";
     case scene::Takes::millimetres:
       return "millimetres";
+    case scene::Takes::pose:
+      return "pose";
     case scene::Takes::on_off:
       return "on_off";
   }
@@ -36,7 +38,8 @@ Role role_for(const std::string& action) {
   static const std::set<std::string> work = {
       "next_variant", "previous_variant", "choose_variant", "nudge",  "release", "save_look",
       "restore_look", "next_look",        "previous_look",  "flip",   "split",   "split_at",
-      "delete_look",  "undelete_look",    "blackout",       "freeze", "grid",    "viewer"};
+      "delete_look",  "undelete_look",    "blackout",       "freeze", "grid",    "viewer",
+      "place"};
   return work.contains(action) ? Role::work : Role::operate;
 }
 

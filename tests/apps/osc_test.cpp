@@ -84,6 +84,11 @@ TEST(Osc, EveryActionHasAMessage) {
       for (const float mm : {1.5F, -2.0F, 0.25F}) arguments.emplace_back(mm);
       value = "1.5 -2 0.25";
     }
+    if (action.takes == scene::Takes::pose) {
+      for (const float number : {120.5F, -2.0F, 0.25F, 0.5F, -0.5F, 0.5F, 0.5F})
+        arguments.emplace_back(number);
+      value = "120.5 -2 0.25 0.5 -0.5 0.5 0.5";
+    }
     const auto edit = edit_of_osc(osc_message("/limn/" + action.name, arguments));
     ASSERT_TRUE(edit) << edit.message();
     EXPECT_EQ(edit->action, action.name);
@@ -134,9 +139,11 @@ TEST(Osc, RefusesWithAReason) {
   has(refusal(raw("/limn/freeze", "b", "")), "found an argument of type 'b'");  // cut off: not for liblo
   has(refusal(bytes_of("/limn/freeze\0\0\0\0"s)), "expected a message of Open Sound Control");
   has(refusal(osc_message("/limn/nudge", {"mirror", 1, 2})), "found no more arguments");
+  has(refusal(osc_message("/limn/place", {"mirror", 1, 2, 3, 1, 0, 0})), "expected a number, found no more");
   for (const float bad : {std::nanf(""), std::numeric_limits<float>::infinity()}) {
     has(refusal(osc_message("/limn/nudge", {"mirror", 1, 2, bad})), "expected finite numbers");
     has(refusal(osc_message("/limn/blackout", {bad})), "/limn/blackout: expected on, off");
+    has(refusal(osc_message("/limn/place", {"mirror", 1, 2, 3, 1, bad, 0, 0})), "expected finite numbers");
   }
   has(refusal(osc_message("/limn/choose_variant", {"mirror", std::string(300, 'x')})), "found 300 bytes");
   has(refusal(osc_message("/limn/save_look", {"a\nb"})), "printable");
@@ -232,6 +239,17 @@ TEST_F(AnOscSession, HearsAnotherPrograms) {
   EXPECT_EQ(session_->staging().slots[0].variant, variants[1].name);
   EXPECT_TRUE(session_->staging().blackout);
   EXPECT_TRUE(test::near(session_->staging().slots[0].nudge, Eigen::Vector3d(0.001, 0.002, -0.0035), 1e-9));
+
+  // A pose: as it is told, and where the part then is.
+  ASSERT_GT(lo_send(to, "/limn/place", "sfffffff", "mirror", 20.0, -30.0, 12.5, 1.2, 0.0, 1.2, 0.0), 0);
+  hear();
+  const auto& pin = session_->staging().slots[0].pin;
+  ASSERT_TRUE(pin.has_value());
+  EXPECT_TRUE(test::pose_near(
+      pin->prototype_from_part,
+      Pose(Eigen::Quaterniond(std::sqrt(0.5), 0, std::sqrt(0.5), 0), Eigen::Vector3d(0.02, -0.03, 0.0125)),
+      1e-6, 1e-6));
+  EXPECT_TRUE(session_->staging().slots[0].nudge.isZero());
 
   // What the scene does not have changes nothing and is told.
   ASSERT_GT(lo_send(to, "/limn/choose_variant", "ss", "mirror", "no such"), 0);

@@ -70,6 +70,12 @@ TEST(Staging, WhatCannotBeDoneIsNamedAndChangesNothing) {
            {{"nudge", "mirror", "1 2"}, "three numbers"},
            {{"nudge", "mirror", "1 2 nan"}, "three numbers"},
            {{"nudge", "mirror", "1 2 3 4"}, "three numbers"},
+           {{"place", "mirror", "1 2 3"}, "and a quaternion w, x, y, z, found '1 2 3'"},
+           {{"place", "mirror", "1 2 3 1 0 0 0 0"}, "x, y, z in millimetres"},
+           {{"place", "mirror", "1 nan 3 1 0 0 0"}, "x, y, z in millimetres"},
+           {{"place", "mirror", "5001 0 0 1 0 0 0"}, "at most 5000"},
+           {{"place", "mirror", "1 2 3 0 0 0 0"}, "a quaternion of length 1, found length 0."},
+           {{"place", "mirror", "1 2 3 0 0 9 0"}, "found length 9"},
            {{"save_look", "", "../x"}, "letters, digits"},
            {{"restore_look", "", "none"}, "found 'none'"},
            {{"next_look", "", ""}, "a saved look"},
@@ -90,6 +96,24 @@ TEST(Staging, WhatCannotBeDoneIsNamedAndChangesNothing) {
     ASSERT_FALSE(result) << edit.action;
     EXPECT_NE(result.message().find(part), std::string::npos) << result.message();
   }
+}
+
+TEST(Staging, APlacedPartStaysOnThePrototypeUntilItsMarkerIsMoved) {
+  const Scene scene = two_slots();
+  Staging staging = done(scene, first_staging(scene), {}, {"nudge", "mirror", "1 2 3"});
+  staging = done(scene, staging, {}, {"place", "mirror", "120.5 -40 8 1.8 0 0 0"});
+  const Pose placed(Eigen::Quaterniond::Identity(), {0.1205, -0.04, 0.008});
+  const auto found = [&](const Pose& prototype_from_marker) {
+    const std::vector<Track> tracks = tracks_with(prototype_from_marker);
+    staging = unpinned(scene, staging, tracks);
+    return k_world_from_prototype.inverse() * staged(scene, staging, tracks).parts.at(0).world_from_part;
+  };
+  EXPECT_TRUE(test::pose_near(found(k_prototype_from_marker), placed, 1e-9, 1e-9));
+  staging = done(scene, staging, {}, {"nudge", "mirror", "0 0 2"});
+  EXPECT_NEAR(found(k_prototype_from_marker).translation.z(), 0.010, 1e-9);
+  Pose moved = k_prototype_from_marker;
+  moved.translation.x() += 0.02;
+  EXPECT_GT((found(moved).translation - placed.translation).norm(), 0.05);
 }
 
 TEST(Staging, ALookComesBackUntilItsMarkerIsMoved) {
@@ -233,6 +257,7 @@ TEST(Staging, EveryActionCanBeDone) {
     std::string value;
     if (action.name == "choose_variant") value = "c";
     if (action.name == "nudge") value = "0 0 1";
+    if (action.name == "place") value = "0 0 1 1 0 0 0";
     if (action.name == "pair") value = "aruco_4x4_50:9";
     if (action.name == "units") value = "new one mm";
     if (action.name == "split_at") value = "-12.5";
