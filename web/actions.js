@@ -24,7 +24,7 @@ export const actions = [
   {"name": "grid", "of_slot": false, "takes": "on_off", "role": "work", "label": "grid"},
   {"name": "marker_states", "of_slot": false, "takes": "on_off", "role": "operate", "label": "marker states"},
   {"name": "screen", "of_slot": false, "takes": "maybe_text", "role": "operate", "label": "screen"},
-  {"name": "viewer", "of_slot": false, "takes": "maybe_text", "role": "work", "label": "drawn for the eye of"}
+  {"name": "viewer", "of_slot": false, "takes": "maybe_text", "role": "work", "label": "view parts for"}
 ];
 
 const known = new Map(actions.map((action) => [action.name, action]));

@@ -162,7 +162,7 @@ function make_marker(session, slot) {
   node.show = (state_of, markers) => {
     set_text(
       words,
-      `Carried by ${state_of.marker}.${state_of.is_held ? " Held where its look had it until the marker moves." : ""}`,
+      `Carried by ${state_of.marker}.${state_of.is_held ? " Held where it was put until its marker moves." : ""}`,
     );
     keep(
       waiting,

@@ -11,6 +11,12 @@ const k_trials = 8; // answers before the width may change again
 const k_quality = [0.6, 0.7, 0.75, 0.75, 0.8, 0.8];
 const k_lost_ms = 4000; // a frame that is not answered by then is given up
 
+const k_parts = [
+  ["screen", "As the screen"],
+  ["rest", "What light lacks"],
+  ["full", "Whole parts"],
+];
+
 const k_refusals = {
   NotAllowedError:
     "The camera was refused. Allow it for this page in the browser's settings, then open the window again.",
@@ -74,6 +80,8 @@ class CameraWindow {
   #device = "";
   #times = []; // of the last answers, ms
   #lock = null;
+  #announced = ""; // what was said of the window last
+  parts = localStorage.getItem("limn.window.parts") ?? "screen";
 
   constructor(session, stage) {
     this.#session = session;
@@ -123,7 +131,7 @@ class CameraWindow {
     for (const track of this.#stream?.getTracks() ?? []) track.stop();
     if (this.#device) this.#session.link.send({ type: "window", device: this.#device, on: false });
     this.#stream = null;
-    this.#device = "";
+    this.#device = this.#announced = "";
     this.#lock?.release();
     this.#lock = null;
     this.#forget();
@@ -149,18 +157,26 @@ class CameraWindow {
 
   #resume() {
     if (!this.is_open) return;
-    this.#device = "";
+    this.#device = this.#announced = "";
     this.#forget();
     this.#send();
   }
 
-  // Tells Limn whose lens the frames have, when the camera or the way it is held changed.
+  /** What this window draws of the parts: screen, rest or full. */
+  choose_parts(parts) {
+    this.parts = parts;
+    localStorage.setItem("limn.window.parts", parts);
+  }
+
+  // Tells Limn whose lens the frames have and what is to be drawn, when the camera, the way it is held or that changed.
   #announce(width, height) {
     const settings = this.#stream.getVideoTracks()[0].getSettings();
     const device = device_name(settings.deviceId ?? "camera", height > width);
-    if (device === this.#device) return;
+    const announced = `${device} ${this.parts}`;
+    if (announced === this.#announced) return;
     this.#device = device;
-    this.#session.link.send({ type: "window", device, on: true });
+    this.#announced = announced;
+    this.#session.link.send({ type: "window", device, on: true, parts: this.parts });
   }
 
   async #send() {
@@ -269,6 +285,29 @@ function make_follow(session) {
   return button;
 }
 
+// What the window draws of the parts: this guest's own choice.
+function make_parts_choice(owner) {
+  const buttons = k_parts.map(([value, label]) =>
+    h(
+      "button",
+      {
+        type: "button",
+        "data-parts": value,
+        onclick: () => {
+          owner.choose_parts(value);
+          show();
+        },
+      },
+      label,
+    ),
+  );
+  const show = () => {
+    for (const button of buttons) button.setAttribute("aria-pressed", String(button.dataset.parts === owner.parts));
+  };
+  show();
+  return h("div", { class: "choices", role: "group", "aria-label": "What this window draws" }, ...buttons);
+}
+
 function make_panel(owner, session) {
   const why = h("p", { role: "alert", class: "bad-words" });
   const words = h(
@@ -288,7 +327,12 @@ function make_panel(owner, session) {
     icon("full"),
   );
   const follow = make_follow(session);
-  by_id("window").append(h("h2", {}, "Window"), words, why, h("div", { class: "dock stack" }, follow, h("div", { class: "line" }, open, full)));
+  by_id("window").append(
+    h("h2", {}, "Window"),
+    words,
+    why,
+    h("div", { class: "dock stack" }, make_parts_choice(owner), follow, h("div", { class: "line" }, open, full)),
+  );
   function toggle() {
     set_text(why, "");
     if (owner.is_open) owner.close();

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
 namespace limn::apps {
 namespace {
@@ -111,6 +112,29 @@ cv::Mat split_along(const cv::Vec3d& abc, const cv::Mat& left, const cv::Mat& ri
     }
   }
   return out;
+}
+
+std::optional<cv::Vec3d> split_line(const Imager& imager,
+                                    const scene::PosedScene& posed,
+                                    const Eigen::AlignedBox3d& prototype_box,
+                                    double split_mm) {
+  if (!posed.world_from_prototype || prototype_box.isEmpty()) return std::nullopt;
+  Eigen::Vector3d p_middle = prototype_box.center(), d_along = prototype_box.sizes() / 4;
+  p_middle.x() += 1e-3 * split_mm;
+  (d_along.y() > d_along.z() ? d_along.z() : d_along.y()) = 0;
+  d_along.x() = 0;
+  const Eigen::Vector3d beside = p_middle - Eigen::Vector3d(0.01, 0, 0);
+  std::vector<Eigen::Vector2d> px;
+  for (const Eigen::Vector3d& p :
+       {Eigen::Vector3d(p_middle - d_along), Eigen::Vector3d(p_middle + d_along), beside}) {
+    const auto seen = imager.project(*posed.world_from_prototype * p);
+    if (!seen) return std::nullopt;
+    px.push_back(*seen);
+  }
+  const Eigen::Vector2d along = px[1] - px[0];
+  if (along.norm() < 1) return std::nullopt;
+  cv::Vec3d abc(-along.y(), along.x(), along.y() * px[0].x() - along.x() * px[0].y());
+  return abc[0] * px[2].x() + abc[1] * px[2].y() + abc[2] < 0 ? abc : -abc;
 }
 
 }  // namespace limn::apps

@@ -1,6 +1,11 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <opencv2/core/mat.hpp>
+#include <optional>
+
+#include "core/imager.h"
+#include "scene/posed.h"
 
 namespace limn::apps {
 
@@ -17,5 +22,13 @@ cv::Mat split_at(const cv::Mat& points, double x_m, const cv::Mat& left, const c
 /// Pixels on the side of a straight line where a x + b y + c < 0 from `left`, others from `right`, with a
 /// thin line between them. 8-bit BGR, of one size.
 cv::Mat split_along(const cv::Vec3d& abc, const cv::Mat& left, const cv::Mat& right);
+
+/// Where an imager's picture is split: the line on the prototype `split_mm` beside the middle of its box (its
+/// own frame), as if that were flat there; a x + b y + c is negative where the prototype's x is smaller.
+/// nullopt where it is not seen.
+std::optional<cv::Vec3d> split_line(const Imager& imager,
+                                    const scene::PosedScene& posed,
+                                    const Eigen::AlignedBox3d& prototype_box,
+                                    double split_mm);
 
 }  // namespace limn::apps

@@ -208,7 +208,7 @@ cv::Mat Painter::screen(const Watched& watched, const scene::Staging& staging) {
   const auto left = scene::left_of_split(scene_, staging);
   if (!left || staging.screen == stereo) return picture;
   const Imager& eye = staging.screen == view && viewer_.width > 0 ? viewer_ : rig_.cameras[0];
-  const auto line = split_line(eye, posed, staging.split_mm);
+  const auto line = split_line(eye, posed, prototype_box_, staging.split_mm);
   if (!line) return picture;
   const scene::PosedScene other = scene::staged(scene_, *left, tracks);
   const auto treatments = staging.screen == rest
@@ -231,30 +231,6 @@ cv::Mat Painter::screen_of(const cv::Mat& behind,
   cv::Mat both;
   cv::hconcat(eyes, 2, both);
   return both;
-}
-
-// Where a picture is split: the line on the prototype, as if that were flat in its middle; a x + b y + c is
-// negative where its x is smaller. None where it is not seen.
-std::optional<cv::Vec3d> Painter::split_line(const Imager& imager,
-                                             const scene::PosedScene& posed,
-                                             double split_mm) const {
-  if (!posed.world_from_prototype || prototype_box_.isEmpty()) return std::nullopt;
-  Eigen::Vector3d p_middle = prototype_box_.center(), d_along = prototype_box_.sizes() / 4;
-  p_middle.x() += 1e-3 * split_mm;
-  (d_along.y() > d_along.z() ? d_along.z() : d_along.y()) = 0;
-  d_along.x() = 0;
-  const Eigen::Vector3d beside = p_middle - Eigen::Vector3d(0.01, 0, 0);
-  std::vector<Eigen::Vector2d> px;
-  for (const Eigen::Vector3d& p :
-       {Eigen::Vector3d(p_middle - d_along), Eigen::Vector3d(p_middle + d_along), beside}) {
-    const auto seen = imager.project(*posed.world_from_prototype * p);
-    if (!seen) return std::nullopt;
-    px.push_back(*seen);
-  }
-  const Eigen::Vector2d along = px[1] - px[0];
-  if (along.norm() < 1) return std::nullopt;
-  cv::Vec3d abc(-along.y(), along.x(), along.y() * px[0].x() - along.x() * px[0].y());
-  return abc[0] * px[2].x() + abc[1] * px[2].y() + abc[2] < 0 ? abc : -abc;
 }
 
 // Which parts have gone since the last picture, and which show another variant.

@@ -113,9 +113,6 @@ class Painter {
                     const scene::PosedScene& posed,
                     scene::Screen what,
                     std::span<const projector::Treatment> treatments);
-  std::optional<cv::Vec3d> split_line(const Imager& imager,
-                                      const scene::PosedScene& posed,
-                                      double split_mm) const;
   cv::Mat lit_for(std::size_t projector, const scene::Staging& staging, const Imager& viewer, Stamp at);
   void draw_feedback(const scene::Staging& staging);
   void draw_waiting(std::span<const LooseMarker> waiting);

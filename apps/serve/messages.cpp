@@ -146,6 +146,13 @@ Message read_message(const std::string& type, Reader* reader) {
   if (type == "seen") return SeenMessage{static_cast<std::uint32_t>(reader->number("picture", 0xffffffffu))};
   if (type == "window") {
     WindowMessage window{reader->text("device", k_longest_word, false), reader->boolean("on")};
+    const std::string parts = reader->text("parts", k_longest_word, true);
+    if (parts == "rest")
+      window.parts = WindowParts::rest;
+    else if (parts == "full")
+      window.parts = WindowParts::full;
+    else if (!parts.empty() && parts != "screen")
+      reader->problem("parts", "screen, rest or full", in_quotes(parts));
     if (!is_device_name(window.device))
       reader->problem("device",
                       fmt::format("{} to {} letters, digits and '-'", k_shortest_device, k_longest_device),

@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "apps/tablet/window_parts.h"
 #include "core/result.h"
 #include "scene/comments.h"
 #include "scene/staging.h"
@@ -43,6 +44,7 @@ struct SeenMessage {
 struct WindowMessage {
   std::string device;
   bool on = false;
+  WindowParts parts = WindowParts::as_screen;  ///< also when it is left out
 };
 using Message = std::variant<EditMessage, RemarkMessage, PicturesMessage, SeenMessage, WindowMessage>;
 

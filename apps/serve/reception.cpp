@@ -436,6 +436,7 @@ void Reception::hear(const std::shared_ptr<Visitor>& visitor, const WindowMessag
     return refuse(visitor, std::nullopt, fmt::format("{} windows are open; no more at once.", windows));
   if (!message.on) return close_window(visitor);
   visitor->device = message.device;
+  visitor->parts = message.parts;
   visitor->frame_waiting.reset();
 }
 
@@ -460,7 +461,7 @@ void Reception::look(const std::shared_ptr<Visitor>& visitor, Visitor::Frame fra
   visitor->frame_in_flight = frame.number;
   visitor->frame_since = Clock::now();
   setup_.eyes.look(
-      {visitor->device, visitor->guest.name}, std::move(frame.jpeg),
+      {visitor->device, visitor->guest.name, visitor->parts}, std::move(frame.jpeg),
       [this, post = setup_.post, weak = std::weak_ptr(visitor), number = frame.number](Eyes::Seen seen) {
         post([this, weak, number, seen = std::move(seen)] {
           if (const auto visitor = weak.lock()) looked(visitor, number, seen);

@@ -70,7 +70,8 @@ struct Visitor {
   std::optional<std::uint32_t> room_in_flight;  ///< a picture that was sent and not seen yet
   std::optional<std::uint32_t> room_sent;       ///< the last one
 
-  std::string device;  ///< of the window; empty: it is not on
+  std::string device;                          ///< of the window; empty: it is not on
+  WindowParts parts = WindowParts::as_screen;  ///< that it shows
   struct Frame {
     std::uint32_t number = 0;
     std::vector<std::uint8_t> jpeg;

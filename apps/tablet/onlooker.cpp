@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "apps/camera_encoding.h"
+#include "apps/live/aids.h"
 #include "apps/live/stopwatch.h"
 #include "apps/tablet/guest_eye.h"
 #include "apps/tablet/guest_picture.h"
@@ -121,13 +122,19 @@ struct Onlooker::Impl {
     std::set<std::string> by_light_alone = {};  // slots of which nothing is left to draw
     Stamp decided_at = {};
   };
+  // Left of the session's split another look is shown.
+  struct Sides {
+    Shown right, left;
+  };
   struct Watching {
     std::string device;
     GuestEye eye;
-    Shown shown;
+    Sides shown;
+    WindowParts parts = WindowParts::as_screen;  // of the last picture
   };
-  std::deque<Watching> watching;  // the one that asked last at the end
-  Shown room{.is_viewer = true};  // as the room's screen
+  std::deque<Watching> watching;                         // the one that asked last at the end
+  Sides room{{.is_viewer = true}, {.is_viewer = true}};  // as the room's screen
+  Eigen::AlignedBox3d prototype_box;                     // its own frame
 
   std::thread thread;
 
@@ -140,11 +147,20 @@ struct Onlooker::Impl {
   Seen seen_in_room(const Known& known);
   Watching& watching_of(const std::string& device);
   Status follow_scene(const Known& known);
+  void measure(const scene::Scene& scene);
+  cv::Mat with_parts(const Imager& camera,
+                     const cv::Mat& picture,
+                     const scene::PosedScene& posed,
+                     const Known& known,
+                     WindowParts parts,
+                     Shown* shown);
   cv::Mat drawn(const Imager& camera,
                 const cv::Mat& picture,
                 const scene::PosedScene& posed,
+                std::span<const Track> tracks,
                 const Known& known,
-                Shown* shown);
+                WindowParts parts,
+                Sides* shown);
 };
 
 Status Onlooker::Impl::open(const scene::Scene& scene) {
@@ -152,7 +168,14 @@ Status Onlooker::Impl::open(const scene::Scene& scene) {
   LIMN_TRY(context, device::GlContext::create(true));
   LIMN_TRY(renderer, projector::Renderer::create(scene, rig));
   renderer->set_smoothing(k_smoothing);
+  measure(scene);
   return {};
+}
+
+void Onlooker::Impl::measure(const scene::Scene& scene) {
+  prototype_box.setEmpty();
+  if (scene.prototype)
+    for (const Eigen::Vector3f& p : scene.prototype->mesh.positions) prototype_box.extend(p.cast<double>());
 }
 
 void Onlooker::Impl::run() {
@@ -234,6 +257,7 @@ Status Onlooker::Impl::follow_scene(const Known& known) {
   }
   LIMN_TRY(renderer, projector::Renderer::create(*known.scene, rig));
   renderer->set_smoothing(k_smoothing);
+  measure(*known.scene);
   drawn_scenes = known.scenes;
   return {};
 }
@@ -253,14 +277,33 @@ Onlooker::Impl::Watching& Onlooker::Impl::watching_of(const std::string& device)
   return watching.back();
 }
 
-// Parts over a picture as the room's screen treats them. `view` parts that light shows to another eye than
-// this camera's are drawn whole.
+// Parts over a picture with another look left of the split, if there is one.
 cv::Mat Onlooker::Impl::drawn(const Imager& camera,
                               const cv::Mat& picture,
                               const scene::PosedScene& posed,
+                              std::span<const Track> tracks,
                               const Known& known,
-                              Shown* shown) {
-  if (known.staging.screen == scene::Screen::full)
+                              WindowParts parts,
+                              Sides* shown) {
+  const cv::Mat right = with_parts(camera, picture, posed, known, parts, &shown->right);
+  const auto left = scene::left_of_split(*known.scene, known.staging);
+  const auto line =
+      left ? split_line(camera, posed, prototype_box, known.staging.split_mm) : std::optional<cv::Vec3d>();
+  if (!line) return right;
+  const scene::PosedScene other = scene::staged(*known.scene, *left, tracks);
+  return split_along(*line, with_parts(camera, picture, other, known, parts, &shown->left), right);
+}
+
+// Parts over a picture. As the room's screen treats them `view` parts that light shows to another eye than
+// this camera's are drawn whole.
+cv::Mat Onlooker::Impl::with_parts(const Imager& camera,
+                                   const cv::Mat& picture,
+                                   const scene::PosedScene& posed,
+                                   const Known& known,
+                                   WindowParts parts,
+                                   Shown* shown) {
+  const bool as_screen = parts == WindowParts::as_screen;
+  if (parts == WindowParts::full || (as_screen && known.staging.screen == scene::Screen::full))
     return renderer->composite(camera, picture, posed, projector::Composite::full);
   const Stamp at = std::chrono::steady_clock::now();
   const double seconds =
@@ -273,7 +316,7 @@ cv::Mat Onlooker::Impl::drawn(const Imager& camera,
     shown->treatments = projector::treated(shown->treatments, coverage, seconds);
     shown->by_light_alone.clear();
     for (projector::Treatment& treatment : shown->treatments) {
-      if (known.scene->find_slot(treatment.slot)->mode == scene::Mode::view && !shown->is_viewer)
+      if (as_screen && !shown->is_viewer && known.scene->find_slot(treatment.slot)->mode == scene::Mode::view)
         treatment.what = projector::Composite::full;
       if (treatment.what == projector::Composite::full) continue;
       for (const projector::PartCoverage& part : coverage)
@@ -309,8 +352,10 @@ Onlooker::Seen Onlooker::Impl::seen_by(const Guest& guest, const Known& known) {
       if (track.body == moved.body) track = moved;
   const scene::PosedScene posed = scene::staged(*known.scene, known.staging, tracks);
   const bool is_viewer = !guest.window.guest.empty() && guest.window.guest == known.follows;
-  if (is_viewer != device.shown.is_viewer) device.shown = {.is_viewer = is_viewer};
-  const cv::Mat out = drawn(*sight.view, *picture, posed, known, &device.shown);
+  const bool is_as_before = is_viewer == device.shown.right.is_viewer && guest.window.parts == device.parts;
+  if (!is_as_before) device.shown = {{.is_viewer = is_viewer}, {.is_viewer = is_viewer}};
+  device.parts = guest.window.parts;
+  const cv::Mat out = drawn(*sight.view, *picture, posed, tracks, known, device.parts, &device.shown);
   const double composite_ms = milliseconds_since(drawing);
 
   const Stamp encoding = std::chrono::steady_clock::now();
@@ -349,8 +394,9 @@ Onlooker::Seen Onlooker::Impl::seen_in_room(const Known& known) {
     camera = *smaller;
     cv::resize(picture, picture, size, 0, 0, cv::INTER_AREA);
   }
-  const scene::PosedScene posed = scene::staged(*known.scene, known.staging, tracks_of(known));
-  const cv::Mat out = drawn(camera, picture, posed, known, &room);
+  const std::vector<Track> tracks = tracks_of(known);
+  const scene::PosedScene posed = scene::staged(*known.scene, known.staging, tracks);
+  const cv::Mat out = drawn(camera, picture, posed, tracks, known, WindowParts::as_screen, &room);
   return {nlohmann::json{{"why", ""}}.dump(), device::encode_jpeg(out, k_quality)};
 }
 

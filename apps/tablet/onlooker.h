@@ -10,6 +10,7 @@
 
 #include "apps/live/recording.h"
 #include "apps/live/session.h"
+#include "apps/tablet/window_parts.h"
 #include "core/result.h"
 
 namespace limn::apps {
@@ -38,10 +39,11 @@ class Onlooker {
     std::optional<Eigen::Vector3d> p_eye_world = {};  ///< where the tablet looks from, if that is known
   };
 
-  /// Whose picture it is.
+  /// Whose picture it is, and what is drawn into it; the session's split is kept.
   struct Window {
     std::string device;      ///< whose lens it has
     std::string guest = {};  ///< as Staging::viewer calls the one that light shows `view` parts to
+    WindowParts parts = WindowParts::as_screen;
   };
 
   /// Draws the parts into a guest's picture. From any thread; returns at once. The newest picture of a device

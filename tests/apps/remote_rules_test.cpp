@@ -68,7 +68,7 @@ TEST(RemoteMessages, AreThoseOfTheDocumentation) {
   for (std::sregex_iterator at(rows.begin(), rows.end(), row), none; at != none; ++at) {
     std::string text = (*at)[1];
     if (const auto dots = text.find("\"device\": \"…\""); dots != std::string::npos)
-      text = "{\"type\": \"window\", \"device\": \"tablet-0001\", \"on\": true}";
+      text.replace(dots, std::string("\"device\": \"…\"").size(), "\"device\": \"tablet-0001\"");
     const auto message = message_of(text);
     EXPECT_TRUE(message) << text << ": " << (message ? "" : message.message());
     types.insert(json::parse(text)["type"].get<std::string>());
@@ -116,6 +116,8 @@ TEST(RemoteMessages, RefuseWithAReason) {
       "value: expected at most 200 bytes, found 201");
   has(R"({"type": "pictures", "room": 1})", "room: expected true or false");
   has(R"({"type": "seen", "picture": 4294967296})", "picture: expected a whole number");
+  has(R"({"type": "window", "device": "tablet-0001", "on": true, "parts": "half"})",
+      "parts: expected screen, rest or full, found 'half'");
   has(R"({"type": "window", "device": "short", "on": true})", "device: expected 8 to 64");
   has(R"({"type": "window", "device": "../../etc/passwd", "on": true})", "device: expected 8 to 64");
   has(R"({"type": "comment", "id": 1, "text": " \n"})", "text: expected a remark");

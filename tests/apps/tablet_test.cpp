@@ -76,9 +76,11 @@ class Room {
     std::vector<std::uint8_t> jpeg;
     std::optional<Eigen::Vector3d> p_eye_world;
   };
-  Window look(const std::string& device, std::vector<std::uint8_t> jpeg) {
+  Window look(const std::string& device,
+              std::vector<std::uint8_t> jpeg,
+              WindowParts parts = WindowParts::as_screen) {
     std::promise<Onlooker::Seen> answered;
-    onlooker_->look({device}, std::move(jpeg),
+    onlooker_->look({device, "", parts}, std::move(jpeg),
                     [&](Onlooker::Seen seen) { answered.set_value(std::move(seen)); });
     Onlooker::Seen seen = answered.get_future().get();
     Window window{json::parse(seen.json), {}, seen.jpeg, seen.p_eye_world};
@@ -313,6 +315,56 @@ TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
   steps(1, false);
   EXPECT_EQ(session.painted().follows, "");
   EXPECT_EQ(session.windows(), std::set<std::string>{"Ben"});
+}
+
+// What a window draws is its guest's choice; left of the session's split it shows the other look, as screens
+// do.
+TEST(Tablet, AWindowShowsWhatItsGuestChoseAndTheSessionsSplit) {
+  const fs::path folder = test::test_folder();
+  Room room(folder / "lenses");
+  Session& session = room.session();
+  const auto edit = [&](const char* action, const char* slot, const char* value) {
+    const Status done = session.edit({action, slot, value}, "Ben", room.rig().now());
+    EXPECT_TRUE(done.ok()) << done.message();
+    room.onlooker().know(session);
+  };
+  test::VirtualTablet tablet = room.tablet(7);
+  for (int i = 0; i < 4; ++i) room.look(k_tablet, tablet.shoot(1.2 * i).jpeg);  // the lens
+  const Eigen::Vector3d p_middle = room.rig().world().world_from_prototype.translation;
+  const test::TabletShot shot = tablet.shoot_from(
+      looking_at(p_middle + Eigen::Vector3d(-0.1, -0.7, 0.1), p_middle, Eigen::Vector3d::UnitZ()));
+  const cv::Mat sent = device::decode_jpeg(shot.jpeg).value();
+  const auto shown = [&](const char* name, WindowParts parts) {
+    cv::Mat picture = room.look(k_tablet, shot.jpeg, parts).picture;
+    EXPECT_TRUE(write_png(folder / (std::string(name) + ".png"), picture));
+    return picture;
+  };
+  const cv::Rect mirror = cv::boundingRect(
+      sim::Truth(room.rig().world(), sim::true_poses(room.rig().world())).part_mask(shot.camera, "mirror"));
+  const auto pixels = [&](const cv::Mat& picture) {
+    return cv::countNonZero(drawn_mask(sent(mirror), picture(mirror)));
+  };
+
+  // The mirror's light is for another eye: as the screen, whole.
+  const cv::Mat classic = shown("full", WindowParts::full);
+  EXPECT_NEAR(pixels(shown("as-screen", WindowParts::as_screen)), pixels(classic), 0.05 * pixels(classic));
+  const int rest = pixels(shown("rest", WindowParts::rest));
+  EXPECT_LT(rest, 0.7 * pixels(classic));
+  EXPECT_GT(rest, 100);
+
+  edit("save_look", "", "classic");
+  edit("choose_variant", "mirror", "sport");
+  edit("save_look", "", "sport");
+  const cv::Mat sport = shown("sport", WindowParts::full);
+  EXPECT_GT(cv::countNonZero(drawn_mask(classic, sport)), 300);
+  edit("split", "", "on");
+  const cv::Mat left = shown("left-of-the-split", WindowParts::full);  // as the mirror is
+  edit("split_at", "", "-440");
+  const cv::Mat right = shown("right-of-the-split", WindowParts::full);
+  // But for the line and what JPEG makes of it.
+  const auto apart = [](const cv::Mat& a, const cv::Mat& b) { return cv::countNonZero(drawn_mask(a, b)); };
+  EXPECT_LT(10 * apart(left, classic), apart(left, sport));
+  EXPECT_LT(10 * apart(right, sport), apart(right, classic));
 }
 
 // What is no picture, or too much of one, is refused, and everybody gets an answer.

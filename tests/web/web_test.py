@@ -234,6 +234,24 @@ class Checks:
         expect(not missing, "something on the page for every action", missing)
 
     @check
+    def a_part_is_placed_by_numbers(self):
+        before = self.mirror()["prototype_from_part"]
+        wanted = [round(1000 * v + 4, 1) for v in before["translation_m"]]
+        self.browser.script("""
+            const [selector, wanted] = arguments, inputs = document.querySelectorAll(`${selector} input[aria-label*="prototype"]`);
+            inputs[0].focus();
+            inputs[0].scrollIntoView({ block: "center" });
+            inputs.forEach((input, i) => (input.value = wanted[i]));
+            document.querySelector(`${selector} [data-action=place]`).click();""", MIRROR, wanted)
+        is_there = lambda pose: all(abs(1000 * a - b) < 0.1 for a, b in zip(pose["translation_m"], wanted))
+        placed = wait_for("the mirror there", lambda: is_there(now := self.mirror()["prototype_from_part"]) and now)
+        turned = max(abs(a - b) for a, b in zip(placed["rotation_wxyz"], before["rotation_wxyz"]))
+        expect(turned < 1e-3, "its turn to stay", placed)
+        self.screenshots("placed", [PHONE])
+        self.browser.click(f"{MIRROR} [data-action=release]")
+        wait_for("its marker to carry it again", lambda: not self.mirror()["is_held"])
+
+    @check
     def others_hear_of_an_edit_in_time_and_whose_it_was(self):
         bo = Browser(self.browser.driver)
         try:
@@ -337,8 +355,27 @@ class Checks:
         expect(found["belong"] == found["answers"], "every picture to belong to its frame", found)
         expect(found["is_shown"], "the picture of its number in the window", found)
         self.screenshots("window")
+
+    @check
+    def light_follows_the_tablet_that_asks_for_it(self):
         self.size("tablet")
-        self.browser.click("#window button.main")
+        self.browser.click("#window [data-parts=full]")
+        wait_for("the choice to show", lambda: self.is_marked("#window [data-parts=full]", "aria-pressed"))
+        self.browser.click("#window [data-action=viewer]")
+        wait_for("light for Ann's eye", lambda: self.state()["follows"] == "Ann")
+        wait_for("the switch to show it", lambda: self.is_marked("#window [data-action=viewer]", "aria-checked"))
+        self.screenshots("following", [PHONE, "tablet"])
+        self.size("tablet")
+        self.tab("light")  # which closes the window
+        wait_for("the scene's own viewer meanwhile", lambda: self.state()["follows"] == "" and "sees no markers" in
+                 self.browser.text("#light .choices [data-action=viewer][aria-pressed=true]"))
+        self.screenshots("light-for", [PHONE, DESK])
+        self.browser.click("#light .choices [data-action=viewer]")
+        wait_for("the scene's own viewer", lambda: self.state()["viewer"] == "")
+
+    def is_marked(self, selector, attribute):
+        return self.browser.script(
+            "return document.querySelector(arguments[0]).getAttribute(arguments[1]) === 'true'", selector, attribute)
 
     def _mirror_in_place(self):
         found = self.measured["window"] = self.ask("window_measured")
