@@ -36,8 +36,10 @@ constexpr double k_seam_blur_px = 1;  // 8-bit levels average out; an eye at the
 constexpr double k_min_incidence_cosine =
     0.34;                          // 70 degrees: beyond, a projector's pixel is drawn out threefold
 constexpr float k_whole = 0.999F;  // of a viewer's pixel
-constexpr int k_light_end =
-    7;  // viewer pixels: where light ends within 3, it fades over the last projector pixel
+constexpr int k_finer = 2;  // rays a side of a viewer's pixel for even light: a ray sees a projector's pixel,
+                            // narrower than the viewer's, and would skip others
+constexpr int k_light_end = 9;  // viewer pixels: where light ends within 4, it fades over the last projector
+                                // pixel, at 70 degrees some 3 viewer pixels wide, and the eye's blur
 constexpr int k_least_outline_px = 50;    // of a part's area; below, an outline says nothing
 constexpr double k_difference_gain = 32;  // 4/255 becomes 128
 
@@ -142,12 +144,54 @@ std::string words_of(const LevelErrors& errors, const cv::Mat& shown) {
       cv::countNonZero(shown), errors.mean, 100 * errors.over, 100 * errors.inner_over);
 }
 
+// The mean of each factor x factor pixels.
+cv::Mat binned(const cv::Mat& fine, int factor) {
+  cv::Mat out;
+  cv::resize(fine, out, {fine.cols / factor, fine.rows / factor}, 0, 0, cv::INTER_AREA);
+  return out;
+}
+
+// The viewer's eye as a camera of a world, traced by `finer` rays a side of a pixel.
+struct TracedEye {
+  int finer;
+  sim::World world;
+  sim::Samples samples;
+
+  TracedEye(const sim::World& stage, const Imager& viewer, int rays) : finer(rays), world(stage) {
+    world.rig.cameras = {resized(viewer, rays * viewer.width, rays * viewer.height).value()};
+    world.camera_effects = {sim::CameraEffects{.colour = true}};
+    samples = sim::trace(world, 0);
+  }
+
+  // With these pictures shone by the projectors as `projectors` has them: linear light.
+  cv::Mat seen(const sim::World& projectors, const std::vector<cv::Mat>& shown) const {
+    return binned(sim::ideal_light(projectors, samples, shown), finer);
+  }
+  cv::Mat seen(const std::vector<cv::Mat>& shown) const { return seen(world, shown); }
+  // With the picture of one projector alone.
+  cv::Mat seen(std::size_t projector, const cv::Mat& shown) const {
+    std::vector<cv::Mat> all(world.rig.projectors.size());
+    all[projector] = shown;
+    return seen(all);
+  }
+  // Share of each of the viewer's pixels that each projector reaches.
+  std::vector<cv::Mat> reaches() const {
+    std::vector<cv::Mat> reaches;
+    for (std::size_t i = 0; i < world.rig.projectors.size(); ++i) {
+      const Imager& projector = world.rig.projectors[i];
+      const cv::Mat white(projector.height, projector.width, CV_32FC3, cv::Scalar::all(1));
+      cv::Mat reach;
+      cv::extractChannel(seen(i, white), reach, 1);
+      reaches.push_back(reach);
+    }
+    return reaches;
+  }
+};
+
 // One check while it is being judged. What several measures need is made once.
 class Judge {
  public:
-  explicit Judge(const Check& check) : check_(check), world_(staged(check)), seen_world_(world_) {
-    seen_world_.rig.cameras = {check.viewer};
-    seen_world_.camera_effects = {sim::CameraEffects{.colour = true}};
+  explicit Judge(const Check& check) : check_(check), world_(staged(check)) {
     for (const CheckLimit& limit : check.limits) asked_.insert(limit.measure.name);
   }
 
@@ -205,34 +249,17 @@ class Judge {
     return aims_;
   }
 
-  const sim::Samples& samples() {
-    if (!samples_) samples_ = sim::trace(seen_world_, 0);
-    return *samples_;
+  const TracedEye& eye() {
+    if (!eye_) eye_.emplace(world_, check_.viewer, 1);
+    return *eye_;
   }
-
-  // What the viewer's eye sees with these pictures shone: linear light.
-  cv::Mat seen_by_eye(const std::vector<cv::Mat>& shown) {
-    return sim::ideal_light(seen_world_, samples(), shown);
-  }
-
-  // With the picture of one projector alone.
-  cv::Mat seen_by_eye(std::size_t projector, const cv::Mat& shown) {
-    std::vector<cv::Mat> all(world_.rig.projectors.size());
-    all[projector] = shown;
-    return seen_by_eye(all);
-  }
-
-  // Share of each of the viewer's pixels that each projector reaches.
-  const std::vector<cv::Mat>& reaches() {
-    if (!reaches_.empty()) return reaches_;
-    for (std::size_t i = 0; i < world_.rig.projectors.size(); ++i) {
-      const Imager& projector = world_.rig.projectors[i];
-      const cv::Mat white(projector.height, projector.width, CV_32FC3, cv::Scalar::all(1));
-      cv::Mat reach;
-      cv::extractChannel(seen_by_eye(i, white), reach, 1);
-      reaches_.push_back(reach);
+  // For light that is to be even.
+  const TracedEye& fine_eye() {
+    if (!fine_eye_) {
+      fine_eye_.emplace(world_, check_.viewer, k_finer);
+      fine_reaches_ = fine_eye_->reaches();
     }
-    return reaches_;
+    return *fine_eye_;
   }
 
   // The scene's prototype with one part instead of the scene's own, and where that is.
@@ -290,7 +317,7 @@ class Judge {
                 const std::vector<cv::Mat>& pictures,
                 const Registration& found,
                 const std::vector<Eigen::Vector3d>& places) {
-    const cv::Mat actual = for_eye(seen_by_eye(pictures));
+    const cv::Mat actual = for_eye(eye().seen(pictures));
     cv::Mat expected = bgr(cv::Mat(actual.size(), CV_8U, cv::Scalar(0))), difference = actual / 4;
     const double worst_mm = values_.at(file + "_mm");
     for (std::size_t i = 0; i < places.size(); ++i) {
@@ -312,12 +339,13 @@ class Judge {
   // Between what any projector that reaches a pixel best would show alone.
   std::pair<cv::Mat, cv::Mat> bounds_of_light() {
     cv::Mat low(check_.viewer.height, check_.viewer.width, CV_32FC3, cv::Scalar::all(0)), high = low.clone();
-    cv::Mat best = reaches()[0].clone();
-    for (const cv::Mat& reach : reaches()) best = cv::max(best, reach);
+    const std::vector<cv::Mat> reaches = eye().reaches();
+    cv::Mat best = reaches[0].clone();
+    for (const cv::Mat& reach : reaches) best = cv::max(best, reach);
     cv::Mat begun(low.size(), CV_8U, cv::Scalar(0));
-    for (std::size_t i = 0; i < reaches().size(); ++i) {
-      const cv::Mat alone = seen_by_eye(i, aims()[i].light);
-      const cv::Mat candidate = (reaches()[i] > 0) & (reaches()[i] >= best - k_same_reach);
+    for (std::size_t i = 0; i < reaches.size(); ++i) {
+      const cv::Mat alone = eye().seen(i, aims()[i].light);
+      const cv::Mat candidate = (reaches[i] > 0) & (reaches[i] >= best - k_same_reach);
       cv::Mat(cv::min(low, alone)).copyTo(low, candidate & begun);
       cv::Mat(cv::max(high, alone)).copyTo(high, candidate & begun);
       alone.copyTo(low, candidate & ~begun);
@@ -328,7 +356,7 @@ class Judge {
   }
 
   Status judge_shone() {
-    const cv::Mat actual = seen_by_eye(projector_pictures());
+    const cv::Mat actual = eye().seen(projector_pictures());
     const auto [low, high] = bounds_of_light();
     const cv::Mat lit = any_channel_over(actual, k_dark) | any_channel_over(high, k_dark);
     if (cv::countNonZero(lit) == 0)
@@ -463,7 +491,7 @@ class Judge {
 
   Status judge_seams() {
     LIMN_TRY(const auto pictures, drawn_instead(coat(), scene::Mode::surface));
-    const cv::Mat actual = seen_by_eye(pictures);
+    const cv::Mat actual = fine_eye().seen(pictures);
     const cv::Mat whole = evenly_lit();
     const Steps steps = steps_of(actual, k_coat, whole);
     if (cv::countNonZero(steps.along) == 0)
@@ -484,7 +512,7 @@ class Judge {
   // Where nothing is to be shown all projectors are on: their blacks add up. Distance and incidence count,
   // for they decide how much black arrives.
   Status judge_black() {
-    sim::World glowing = seen_world_;
+    sim::World glowing = fine_eye().world;
     Rig rig = check_.told.rig;
     for (std::size_t i = 0; i < glowing.projector_effects.size(); ++i) {
       sim::ProjectorEffects& effects = glowing.projector_effects[i];
@@ -499,13 +527,13 @@ class Judge {
     LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(check_.told.scene, rig));
     LIMN_TRY_STATUS(renderer.set_light({.even_black = true}));
     const auto pictures = drawn_by(renderer, {check_.told.posed.world_from_prototype, {}});
-    const cv::Mat actual = sim::ideal_light(glowing, samples(), pictures);
+    const cv::Mat actual = fine_eye().seen(glowing, pictures);
     const Steps steps = steps_of(actual / one_black, 1, whole);
     if (cv::countNonZero(steps.along) == 0)
       return nothing_to_judge("black_step_share", "a seam of projectors in the viewer's picture");
     values_["black_step_share"] = steps.worst_along;
     const double brightness = 0.1 / brightest;  // for the eye
-    cv::Mat even = one_black * static_cast<double>(reaches().size());
+    cv::Mat even = one_black * static_cast<double>(fine_reaches_.size());
     even.setTo(0, ~whole);
     pictures_.push_back(
         {"black", "The light of black, brightened",
@@ -520,22 +548,25 @@ class Judge {
   // The light of one projector's black in the viewer's pixels, the mean of all as if each reached all that
   // faces it (CV_32FC3).
   cv::Mat mean_black(const sim::World& glowing) {
-    cv::Mat light(check_.viewer.height, check_.viewer.width, CV_32FC3, cv::Scalar::all(0));
+    const sim::Samples& samples = fine_eye().samples;
+    cv::Mat light(samples.height, samples.width, CV_32FC3, cv::Scalar::all(0));
     const std::size_t projectors = glowing.rig.projectors.size();
     for (std::size_t i = 0; i < projectors; ++i) {
-      const Eigen::Vector3f p_light =
-          glowing.rig.projectors[i].imager_from_world.inverse().translation.cast<float>();
       const auto black =
           static_cast<float>(glowing.projector_effects[i].black_level / static_cast<double>(projectors));
       for (std::size_t k = 0; k < light.total(); ++k) {
-        if (samples().object[k] < 0) continue;
-        const Eigen::Vector3f towards = p_light - samples().p_world[k];
-        const float cosine = samples().n_world[k].dot(towards.normalized());
+        if (samples.object[k] < 0) continue;
+        const Eigen::Vector3f towards = p_projector(i) - samples.p_world[k];
+        const float cosine = samples.n_world[k].dot(towards.normalized());
         light.at<cv::Vec3f>(static_cast<int>(k)) +=
             cv::Vec3f::all(black * std::max(0.0F, cosine) / towards.squaredNorm());
       }
     }
-    return light;
+    return binned(light, k_finer);
+  }
+
+  Eigen::Vector3f p_projector(std::size_t i) const {
+    return world_.rig.projectors[i].imager_from_world.inverse().translation.cast<float>();
   }
 
   // As limn solve would measure it.
@@ -552,16 +583,15 @@ class Judge {
   // Pixels that the projectors can light evenly: one of them reaches the whole pixel at no grazing angle,
   // away from where all light ends.
   cv::Mat evenly_lit() {
+    const sim::Samples& samples = fine_eye().samples;
     cv::Mat lit(check_.viewer.height, check_.viewer.width, CV_8U, cv::Scalar(0));
-    for (std::size_t i = 0; i < reaches().size(); ++i) {
-      const Eigen::Vector3f p_light =
-          world_.rig.projectors[i].imager_from_world.inverse().translation.cast<float>();
-      for (std::size_t k = 0; k < lit.total(); ++k) {
-        const Eigen::Vector3f towards = (p_light - samples().p_world[k]).normalized();
-        if (reaches()[i].at<float>(static_cast<int>(k)) > k_whole &&
-            samples().n_world[k].dot(towards) > k_min_incidence_cosine)
-          lit.data[k] = 255;
-      }
+    for (std::size_t i = 0; i < fine_reaches_.size(); ++i) {
+      const Eigen::Vector3f p_light = p_projector(i);
+      cv::Mat steep(samples.height, samples.width, CV_32F, cv::Scalar(0));
+      for (std::size_t k = 0; k < steep.total(); ++k)
+        if (samples.n_world[k].dot((p_light - samples.p_world[k]).normalized()) > k_min_incidence_cosine)
+          steep.at<float>(static_cast<int>(k)) = 1;
+      lit |= (fine_reaches_[i] > k_whole) & (binned(steep, k_finer) > k_whole);
     }
     cv::erode(lit, lit, cv::getStructuringElement(cv::MORPH_RECT, {k_light_end, k_light_end}));
     return lit;
@@ -595,7 +625,7 @@ class Judge {
       return difference;
     };
     Steps steps{range(ratio), cv::Mat(light.size(), CV_8U, cv::Scalar(0))};
-    for (const cv::Mat& reach : reaches()) {
+    for (const cv::Mat& reach : fine_reaches_) {
       cv::Mat reached;
       cv::Mat(reach > 0.5).convertTo(reached, CV_32F);
       steps.along |= range(reached) > 0;
@@ -658,14 +688,13 @@ class Judge {
   }
 
   const Check& check_;
-  sim::World world_;       // the stage
-  sim::World seen_world_;  // with the viewer's eye for a camera
+  sim::World world_;  // the stage
   std::set<std::string> asked_;
   std::optional<projector::Renderer> renderer_;
   std::vector<cv::Mat> projector_pictures_;
   std::vector<sim::PartPicture> aims_;
-  std::optional<sim::Samples> samples_;
-  std::vector<cv::Mat> reaches_;
+  std::optional<TracedEye> eye_, fine_eye_;
+  std::vector<cv::Mat> fine_reaches_;
   std::map<std::string, double> values_;
   std::vector<CheckPicture> pictures_;
 };

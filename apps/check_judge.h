@@ -62,7 +62,8 @@ struct CheckResult {
 /// - `seam_step_…`: an even coat of light over the whole prototype instead of the parts, from the viewer's
 /// eye;
 ///   how far its luminance varies within 9 x 9 pixels, as a share of it: 95 % along the lines where another
-///   set of projectors begins, and the largest anywhere that the projectors can light evenly.
+///   set of projectors begins, and the largest anywhere that the projectors can light evenly. Traced by 2 x 2
+///   rays a pixel.
 /// - `black_step_share`: light of black where nothing is shown, evened out by the renderer
 ///   (LightOptions::even_black), of projectors with the world's black level, falloff and incidence and
 ///   responses that say so; the worst variation along those lines, as a share of the mean black of one

@@ -17,15 +17,15 @@ namespace limn::projector {
 namespace {
 
 constexpr int k_response_columns = 1025;
-// Texture units; the sights take three from k_sights_unit on.
+// Texture units; the sights take four from k_sights_unit on.
 constexpr int k_tangents_unit = 0, k_looks_unit = 1, k_response_unit = 2, k_centre_unit = 3,
-              k_picture_unit = 4, k_sights_unit = 5, k_mixing_unit = 8, k_albedo_unit = 9,
-              k_arriving_unit = 10, k_distances_unit = 11;
+              k_picture_unit = 4, k_sights_unit = 5, k_mixing_unit = 9, k_albedo_unit = 10,
+              k_arriving_unit = 11, k_distances_unit = 12;
 constexpr int k_arriving_side = 256;   // texels of a projector's map of arriving light
 constexpr GLuint k_list_binding = 6;   // of buffers, after the scene's and the sights'
 constexpr int k_each = 2, k_view = 3;  // overlays of parts treated each in its way, and of a virtual camera
 // Steps of light that ask for more samples: beside light, and between blacks.
-constexpr Smoothing k_light_edges, k_dark_edges{.least_step = 0.001};
+constexpr Smoothing k_light_edges, k_dark_edges{.samples = 16, .least_step = 0.0001};
 // The light where no room is known: soft, and a lamp, in the viewer's frame above and behind the left
 // shoulder.
 constexpr double k_soft_below = 0.15, k_soft_above = 0.35, k_lamp = 0.65;

@@ -142,10 +142,14 @@ Result<Sights> Sights::create(const Rig& rig) {
   sights.projector_ids_ =
       make_texture(GL_TEXTURE_2D_ARRAY, GL_R32UI, sights.ids_width_, sights.ids_height_, 2 * count);
   sights.eye_ids_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_R32UI, k_eye_side, k_eye_side, 2);
-  sights.depth_ =
-      make_depth_buffer(std::max(k_eye_side, sights.ids_width_), std::max(k_eye_side, sights.ids_height_));
+  sights.depth_ = make_texture(GL_TEXTURE_2D, GL_DEPTH_COMPONENT32F, std::max(k_eye_side, sights.ids_width_),
+                               std::max(k_eye_side, sights.ids_height_));
+  if (projectors.size() > 1) {
+    LIMN_TRY(sights.soft_edges_,
+             SoftEdges::create(static_cast<int>(projectors.size()), sights.ids_width_, sights.ids_height_));
+  }
   sights.framebuffer_ = make_framebuffer();
-  glNamedFramebufferRenderbuffer(*sights.framebuffer_, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER, *sights.depth_);
+  glNamedFramebufferTexture(*sights.framebuffer_, GL_DEPTH_ATTACHMENT, *sights.depth_, 0);
   const std::vector<std::byte> empty((projectors.size() + 2) * sizeof(GpuSight));
   sights.sights_ = make_buffer(empty.data(), empty.size());
   return sights;
@@ -221,7 +225,10 @@ void Sights::see_from_projectors(const GpuScene& scene,
     const Twin twin = twin_over(pose, intersected(whole, spanned_by(pose, runs, is_prototype)),
                                 k_oversampling * projectors_[i].lens.fx(), ids_width_, ids_height_);
     const int layer = 2 * static_cast<int>(i);
-    if (prototype_too) draw(scene, runs, is_prototype, twin, projector_ids_, layer);
+    if (prototype_too) {
+      draw(scene, runs, is_prototype, twin, projector_ids_, layer);
+      if (soft_edges_) soft_edges_->find(static_cast<int>(i), depth_, twin);
+    }
     draw(scene, runs, is_surface_part, twin, projector_ids_, layer + 1);
     GpuSight sight(twin, layer);
     sight.of_imager(projectors_[i]);
@@ -333,6 +340,9 @@ void Sights::bind(const Program& program, int first_unit) const {
   program.bind("s_projector_ids", first_unit, projector_ids_);
   program.bind("s_eye_ids", first_unit + 1, eye_ids_);
   program.bind("s_pixel_maps", first_unit + 2, pixel_maps_);
+  program.set("s_kept",
+              first_unit + 3);  // samplers of other kinds may not share a unit, though it is not read
+  if (soft_edges_) soft_edges_->bind(program, first_unit + 3);
   program.set("u_projector_count", static_cast<int>(projectors_.size()));
   program.set("u_eye", eye());
 }

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <opencv2/core/types.hpp>
+#include <optional>
 #include <vector>
 
 #include "core/rig.h"
 #include "projector/bake.h"
 #include "projector/gpu_scene.h"
 #include "projector/shader.h"
+#include "projector/soft_edges.h"
 #include "projector/twin.h"
 
 namespace limn::projector {
@@ -94,6 +96,7 @@ class Sights {
   std::vector<Response> responses_;
   std::vector<GpuLens> lenses_;
   Program program_;
+  std::optional<SoftEdges> soft_edges_;  // with several projectors
   GlName framebuffer_, depth_, projector_ids_, eye_ids_, pixel_maps_, sights_;
   int ids_width_ = 1, ids_height_ = 1;  // room of the projectors' ids
 };

@@ -6,7 +6,6 @@
 namespace limn::projector {
 namespace {
 
-constexpr double k_near = 0.01;           // m; nothing is lit or worn nearer to a lens
 constexpr double k_widest_tangent = 3.7;  // 75 degrees; a flat picture of more is mostly its border
 
 }  // namespace

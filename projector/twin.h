@@ -7,6 +7,9 @@
 
 namespace limn::projector {
 
+/// Metres; the nearest that a twin sees: nothing is lit or worn nearer to a lens.
+constexpr double k_near = 0.01;
+
 /// A rectangle of tangents (x/z, y/z) that a view covers.
 struct TangentRect {
   Eigen::Vector2d lower = {-1, -1};

@@ -56,10 +56,10 @@ Surface surface_at(int i, vec3 p, Hit prototype) {
   return Surface(mat3(albedo.r, 0, 0, 0, albedo.g, 0, 0, 0, albedo.b), vec3(0));
 }
 
-// Light over black of projector i at the prototype's point p; outside 0 ... 1 where it cannot give what is wanted.
+// Light over black of projector i at a place of the prototype; outside 0 ... 1 where it cannot give what is wanted.
 // `colour` has a: 0 where nothing is to be shown.
-vec3 balanced(int i, vec4 colour, vec3 p, Hit prototype, vec3 d_normal) {
-  Share share = share_of(i, p, d_normal);
+vec3 balanced(int i, vec4 colour, Place place, Hit prototype) {
+  Share share = share_of(i, place);
   if (u_compensation == k_as_it_is && !u_even_black) return colour.rgb * share.share;
   if (share.share == 0.0) return vec3(0);
   vec3 light = vec3(0);
@@ -67,7 +67,7 @@ vec3 balanced(int i, vec4 colour, vec3 p, Hit prototype, vec3 d_normal) {
     if (u_compensation == k_as_it_is) {
       light = colour.rgb * share.share;
     } else {
-      Surface surface = surface_at(i, p, prototype);
+      Surface surface = surface_at(i, place.p, prototype);
       vec3 wanted = u_level * u_mean_mixing * colour.rgb - surface.offset;
       light = share.share / share.irradiance * (inverse(surface.mixing) * wanted);
     }

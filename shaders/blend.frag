@@ -13,8 +13,6 @@ void main() {
   Hit hit = first_hit(s_projector_ids, projector, 0, d);
   o_blend = vec2(0);
   if (hit.id == 0u) return;
-  vec3 n = flat_normal(hit.id);
-  if (dot(n, d) > 0.0) n = -n;
-  Share share = share_of(u_projector, projector.p_eye.xyz + hit.t * d, n);
+  Share share = share_of(u_projector, place_at(hit, d));
   o_blend = vec2(share.share, black_lift(share, share.missing_black));
 }

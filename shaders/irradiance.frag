@@ -13,8 +13,6 @@ void main() {
   Hit hit = first_hit(s_eye_ids, eye, 0, d);
   o_irradiance = 0.0;
   if (hit.id == 0u) return;
-  vec3 n = flat_normal(hit.id);
-  if (dot(n, d) > 0.0) n = -n;
-  Reach reach = reach(u_projector, eye.p_eye.xyz + hit.t * d, n);
+  Reach reach = reach(u_projector, place_at(hit, d));
   if (reach.quality > 0.0) o_irradiance = reach.irradiance;
 }

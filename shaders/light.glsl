@@ -25,12 +25,10 @@ vec4 view_colour(vec3 p, vec3 d_normal, float footprint) {
   return vec4(look_along(d, hit, footprint), 1);
 }
 
-vec4 surface_colour(vec3 p, Hit prototype, vec3 d_normal, float footprint) {
-  if (!may_hold_surface_part(p, u_placement_count)) return vec4(0);
-  vec3 n = smooth_normal(prototype);
-  if (dot(n, d_normal) < 0.0) n = -n;
-  Hit hit = surface_part_at(s_projector_ids, s_sights[u_projector], p, n);
-  return hit.id == 0u ? vec4(0) : vec4(look_on_surface(hit, n, footprint), 1);
+vec4 surface_colour(Place place, float footprint) {
+  if (!may_hold_surface_part(place.p, u_placement_count)) return vec4(0);
+  Hit hit = surface_part_at(s_projector_ids, s_sights[u_projector], place.p, place.d_smooth);
+  return hit.id == 0u ? vec4(0) : vec4(look_on_surface(hit, place.d_smooth, footprint), 1);
 }
 
 // rgb: light; a: coverage by what is to be lit.
@@ -39,14 +37,12 @@ vec4 light_at(vec2 px) {
   vec3 d = ray_of(projector, px);
   Hit prototype = first_hit(s_projector_ids, projector, 0, d);
   if (prototype.id == 0u) return vec4(0);
-  vec3 p = projector.p_eye.xyz + prototype.t * d;
-  vec3 n = flat_normal(prototype.id);
-  if (dot(n, d) > 0.0) n = -n;
+  Place place = place_at(prototype, d);
   float footprint = prototype.t / projector.quality.x;
-  vec4 colour = u_has_view_parts ? view_colour(p, n, footprint) : vec4(0);
-  if (colour.a == 0.0 && u_has_surface_parts) colour = surface_colour(p, prototype, n, footprint);
+  vec4 colour = u_has_view_parts ? view_colour(place.p, place.d_flat, footprint) : vec4(0);
+  if (colour.a == 0.0 && u_has_surface_parts) colour = surface_colour(place, footprint);
   if (colour.a == 0.0 && !u_even_black) return colour;
-  return vec4(balanced(u_projector, colour, p, prototype, n), 1);
+  return vec4(balanced(u_projector, colour, place, prototype), 1);
 }
 
 // False only where light_at is 0 for certain: no part is seen there from the viewer's eye, and none lies there.

@@ -16,13 +16,11 @@ void main() {
   Hit hit = first_hit(s_eye_ids, eye, 0, d);
   o_lit = vec4(0);
   if (hit.id == 0u) return;
-  vec3 p = eye.p_eye.xyz + hit.t * d;
-  o_lit = vec4(p, 1);
+  Place place = place_at(hit, d);
+  o_lit = vec4(place.p, 1);
   if (u_projector < 0) return;
-  vec3 n = flat_normal(hit.id);
-  if (dot(n, d) > 0.0) n = -n;
   Sight projector = s_sights[u_projector];
-  Reach reach = reach(u_projector, p, n);
-  vec3 q = (projector.sight_from_scene * vec4(p, 1)).xyz;
+  Reach reach = reach(u_projector, place);
+  vec3 q = (projector.sight_from_scene * vec4(place.p, 1)).xyz;
   o_lit.xyz = reach.quality > 0.0 ? vec3(pixel_of(projector, q.xy / q.z), reach.irradiance) : vec3(0);
 }

@@ -16,7 +16,7 @@ vec4 shadow_at(vec3 d) {
 vec4 part_at(vec2 px) {
   Seen seen = in_sight_at(px);
   if (seen.how == k_nothing) return u_contact_shadow ? shadow_at(seen.d) : vec4(0);
-  if (seen.how == k_if_reached && !is_whole(owner_of(seen.part.id)) && is_reached(seen.p_behind, seen.n_behind))
+  if (seen.how == k_if_reached && !is_whole(owner_of(seen.part.id)) && is_reached(seen.behind))
     return vec4(0);
   float footprint = seen.part.t / s_sights[u_eye].quality.x;
   if (s_placements[owner_of(seen.part.id)].upper.w > 0.5) {  // as the projectors show it

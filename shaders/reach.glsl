@@ -1,10 +1,15 @@
 // Which projectors reach a point of the prototype, and how the light is shared among them.
+#include "blocks.glsl"
 
 uniform usampler2DArray s_projector_ids;
 uniform sampler2DArray s_pixel_maps;  // for each projector: pixels over a grid of tangents
 uniform sampler2DArray s_arriving;    // for each projector, over its picture: how much of its light arrives
+uniform sampler2DArray s_kept;        // for each projector, over its ids: share of its light kept beside edges and shadows
 uniform int u_projector_count;
 
+// Weight beside shadows, of what is elsewhere: the step where light ends stays below it. Less would hand light over
+// within a few pixels where two projectors have shadows.
+const float k_least_kept = 0.01;
 const float k_least_share = 1e-4;  // at the very border, so that a projector alone there still gives its light
 
 // Pixel of a tangent in a projector's own picture.
@@ -28,46 +33,71 @@ float vignetting(Sight projector, vec2 px) {
   return 1.0 + dot(projector.vignetting.xy, q) + q2 * (projector.vignetting.z + q2 * projector.vignetting.w);
 }
 
-// How projector j lights p, whose triangle has the normal d_normal turned to the side that counts.
+// A point of the prototype with two unit normals, of its triangle and of the smooth surface that the mesh stands for, both
+// turned to the side that counts.
+struct Place {
+  vec3 p, d_flat, d_smooth;
+};
+
+// Where a ray along d meets the prototype: on its triangle, also where the ray just missed that. The scene's frame is the
+// prototype's.
+Place place_at(Hit hit, vec3 d) {
+  uint first = 3u * (hit.id - 1u);
+  vec3 p = mat3(s_corners[first].xyz, s_corners[first + 1u].xyz, s_corners[first + 2u].xyz) * hit.weights;
+  Place place = Place(p, flat_normal(hit.id), smooth_normal(hit));
+  if (dot(place.d_flat, d) > 0.0) place.d_flat = -place.d_flat;
+  if (dot(place.d_smooth, place.d_flat) < 0.0) place.d_smooth = -place.d_smooth;
+  return place;
+}
+
+// How projector j lights a place.
 struct Reach {
   float quality;     // pixels a square metre, times the cosine once more against grazing light, fading towards the
-                     // picture's border; 0 where its light does not fall on p: turned away, outside, in a shadow
+                     // picture's border, the prototype's edges and its shadows; 0 where its light does not fall: turned away,
+                     // outside, in a shadow
   float irradiance;  // of white, where 1 m away and head on is 1 (1/m^2); also where p is outside or in a shadow
   float arriving;    // of its light on the way to p, 0 ... 1: the rest is in somebody's shadow
 };
 
-Reach reach(int j, vec3 p, vec3 d_normal) {
+Reach reach(int j, Place place) {
   Sight projector = s_sights[j];
-  vec3 to_eye = projector.p_eye.xyz - p;
+  vec3 to_eye = projector.p_eye.xyz - place.p;
   float distance_2 = dot(to_eye, to_eye);
-  float cosine = dot(d_normal, to_eye) * inversesqrt(distance_2);
-  vec3 q = (projector.sight_from_scene * vec4(p, 1)).xyz;
-  if (cosine <= 0.0 || q.z <= 0.0) return Reach(0.0, 0.0, 1.0);
+  vec3 q = (projector.sight_from_scene * vec4(place.p, 1)).xyz;
+  if (dot(place.d_flat, to_eye) <= 0.0 || q.z <= 0.0) return Reach(0.0, 0.0, 1.0);
+  const float k_least_cosine = 0.01;  // where the smooth surface looks away and its triangle does not
+  float cosine = max(k_least_cosine, dot(place.d_smooth, to_eye) * inversesqrt(distance_2));
   vec2 px = pixel_of(projector, q.xy / q.z);
   vec2 last = projector.size.zw - 0.5;
   float gain = vignetting(projector, clamp(px, vec2(-0.5), last));
   Reach reach = Reach(0.0, cosine / distance_2 * max(gain, 0.05), 1.0);
   vec2 inside = min(px + 0.5, last - px);
   float border = min(inside.x, inside.y);
-  if (border < 0.0 || is_hidden(s_projector_ids, projector, p)) return reach;
-  float soft = max(k_least_share, smoothstep(0.0, projector.quality.y, border));
+  if (border < 0.0 || is_hidden(s_projector_ids, projector, place.p)) return reach;
+  float soft = smoothstep(0.0, projector.quality.y, border);
+  if (u_projector_count > 1) {
+    vec2 texel = projector.focal_centre.xy * q.xy / q.z + projector.focal_centre.zw + 0.5;
+    float kept = texture(s_kept, vec3(texel / float(k_block) / vec2(textureSize(s_kept, 0).xy), projector.quality.z)).r;
+    soft *= mix(k_least_kept, 1.0, kept);
+  }
+  soft = max(k_least_share, soft);
   reach.arriving = texture(s_arriving, vec3((px + 0.5) / projector.size.zw, projector.quality.z)).r;
   reach.quality = soft * cosine * cosine * projector.quality.x * projector.quality.x / distance_2;
   return reach;
 }
 
-bool is_reached(vec3 p, vec3 d_normal) {
+bool is_reached(Place place) {
   for (int j = 0; j < u_projector_count; ++j) {
-    if (reach(j, p, d_normal).quality > 0.0) return true;
+    if (reach(j, place).quality > 0.0) return true;
   }
   return false;
 }
 
-// What projector i is to give at p.
+// What projector i is to give at a place.
 struct Share {
-  float share;          // of the light there; what arrives of all that reach p sums to one
+  float share;          // of the light there; what arrives of all that reach the place sums to one
   float irradiance;     // as Reach
-  float missing_black;  // irradiance that black gives where every projector reaches, and that is missing at p
+  float missing_black;  // irradiance that black gives where every projector reaches, and that is missing there
   float blocked_black;  // of it, what would arrive but for somebody's shadow
 };
 
@@ -78,11 +108,11 @@ const float k_blocked = 1e-3;   // weight of a blocked projector against others
 const float k_watch = 0.07;     // of the light, all that keep watch together
 const float k_well_in = 0.25;   // share of the light above which a projector keeps its watch whole
 
-Share share_of(int i, vec3 p, vec3 d_normal) {
+Share share_of(int i, Place place) {
   float own = 0.0, sum = 0.0, own_quality = 0.0, quality = 0.0, own_blocked = 0.0, blocked = 0.0;
   Share share = Share(0.0, 0.0, 0.0, 0.0);
   for (int j = 0; j < u_projector_count; ++j) {
-    Reach reach = reach(j, p, d_normal);
+    Reach reach = reach(j, place);
     bool is_reached = reach.quality > 0.0;
     float weight = reach.quality * pow(k_blocked, 1.0 - reach.arriving);
     sum += weight;

@@ -14,7 +14,7 @@ struct Seen {
   int how;
   Hit part;
   vec3 d;
-  vec3 p_behind, n_behind;  // the prototype's point behind the part, where `how` is k_if_reached
+  Place behind;  // of the prototype, behind the part, where `how` is k_if_reached
 };
 
 // The part at px that the prototype does not hide. A surface part counts as visible within 2 mm behind the surface.
@@ -22,7 +22,7 @@ struct Seen {
 Seen in_sight_at(vec2 px) {
   Sight eye = s_sights[u_eye];
   vec3 d = ray_of(eye, px);
-  Seen seen = Seen(k_nothing, first_hit(s_eye_ids, eye, 1, d), d, vec3(0), vec3(0));
+  Seen seen = Seen(k_nothing, first_hit(s_eye_ids, eye, 1, d), d, Place(vec3(0), vec3(0), vec3(0)));
   if (seen.part.id == 0u) return seen;
   bool on_surface = s_placements[owner_of(seen.part.id)].upper.w > 0.5;
   Hit prototype = first_hit(s_eye_ids, eye, 0, d);
@@ -30,19 +30,17 @@ Seen in_sight_at(vec2 px) {
     seen.how = k_screen;
     return seen;
   }
-  vec3 n = flat_normal(prototype.id);
-  if (dot(n, d) > 0.0) n = -n;
-  float height = (prototype.t - seen.part.t) * -dot(n, d);  // of the part over the surface
+  Place behind = place_at(prototype, d);
+  float height = (prototype.t - seen.part.t) * -dot(behind.d_flat, d);  // of the part over the surface
   if (height < (on_surface ? -k_on_surface : -k_same_place)) return seen;
   bool shown = !on_surface || height <= k_on_surface;
   seen.how = shown ? k_if_reached : k_screen;
-  seen.p_behind = eye.p_eye.xyz + prototype.t * d;
-  seen.n_behind = n;
+  seen.behind = behind;
   return seen;
 }
 
 Seen seen_at(vec2 px) {
   Seen seen = in_sight_at(px);
-  if (seen.how == k_if_reached) seen.how = is_reached(seen.p_behind, seen.n_behind) ? k_projected : k_screen;
+  if (seen.how == k_if_reached) seen.how = is_reached(seen.behind) ? k_projected : k_screen;
   return seen;
 }
