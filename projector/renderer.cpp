@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <opencv2/imgproc.hpp>
@@ -44,8 +45,8 @@ struct Canvas {
   }
 };
 
-// A bit an owner: the parts that a composite draws whole.
-using Whole = std::array<GLuint, 8>;
+// A byte an owner, in 255ths: how much of what light can show of its part a composite draws.
+using Whole = std::array<GLuint, 64>;
 
 Whole whole_of(Composite what) {
   Whole whole{};
@@ -55,11 +56,10 @@ Whole whole_of(Composite what) {
 
 Whole whole_of(std::span<const Treatment> treatments, std::span<const std::string> slots) {
   Whole whole{};
-  for (std::size_t owner = 1; owner <= slots.size() && owner < 32 * whole.size(); ++owner)
-    if (std::any_of(treatments.begin(), treatments.end(), [&](const Treatment& t) {
-          return t.slot == slots[owner - 1] && t.what == Composite::full;
-        }))
-      whole[owner / 32] |= 1U << owner % 32;
+  for (std::size_t owner = 1; owner <= slots.size() && owner < 4 * whole.size(); ++owner)
+    for (const Treatment& treatment : treatments)
+      if (treatment.slot == slots[owner - 1])
+        whole[owner / 4] |= static_cast<GLuint>(std::lround(255 * treatment.whole())) << owner % 4 * 8;
   return whole;
 }
 

@@ -10,9 +10,12 @@ std::vector<Treatment> treated(std::span<const Treatment> before,
                                std::span<const PartCoverage> coverage,
                                double seconds,
                                const TreatmentOptions& options) {
-  LIMN_CHECK(options.full_below <= options.rest_above && options.hold_s >= 0);
+  LIMN_CHECK(options.full_below <= options.rest_above && options.hold_s >= 0 && options.fade_s > 0);
   std::vector<Treatment> after(before.begin(), before.end());
-  for (Treatment& treatment : after) treatment.for_s += seconds;
+  for (Treatment& treatment : after) {
+    treatment.for_s += seconds;
+    treatment.passing = std::max(0.0, treatment.passing - seconds / options.fade_s);
+  }
   for (const PartCoverage& part : coverage) {
     if (part.viewer_pixels == 0) continue;
     const double share = part.on_surface_share;
@@ -28,6 +31,7 @@ std::vector<Treatment> treated(std::span<const Treatment> before,
     if (!wants_other || known->for_s < options.hold_s) continue;
     known->what = known->what == Composite::rest ? Composite::full : Composite::rest;
     known->for_s = 0;
+    known->passing = 1 - known->passing;
   }
   return after;
 }

@@ -317,8 +317,8 @@ cv::Mat Onlooker::Impl::with_parts(const Imager& camera,
     shown->by_light_alone.clear();
     for (projector::Treatment& treatment : shown->treatments) {
       if (as_screen && !shown->is_viewer && known.scene->find_slot(treatment.slot)->mode == scene::Mode::view)
-        treatment.what = projector::Composite::full;
-      if (treatment.what == projector::Composite::full) continue;
+        treatment = {treatment.slot, projector::Composite::full};
+      if (treatment.whole() > 0) continue;
       for (const projector::PartCoverage& part : coverage)
         if (part.slot == treatment.slot && part.viewer_pixels > 0 && part.off_surface_share == 0)
           shown->by_light_alone.insert(part.slot);

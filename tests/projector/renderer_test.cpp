@@ -397,6 +397,31 @@ TEST_F(RendererTest, EachPartOfACompositeIsTreatedInItsOwnWay) {
   }
 }
 
+TEST_F(RendererTest, BetweenRestAndFullACompositeIsTheirMixInLinearLight) {
+  const Scene scene =
+      scene_of(sheet(0.5, 0.4),
+               {slot("mirror", scene::Mode::view, coloured(sheet(0.1, 0.1, -0.01), {0.2F, 0.9F, 0.6F}))});
+  const PosedScene posed = posed_at_origin(scene);
+  Renderer drawing = renderer(scene, two_projectors());
+  const cv::Mat picture(480, 640, CV_8UC3, cv::Scalar(200, 90, 30));
+  const auto drawn = [&](double passing) {
+    return drawing.composite(0, picture, posed,
+                             std::vector<Treatment>{{"mirror", Composite::full, 0, passing}});
+  };
+  const cv::Mat full = drawn(0), rest = drawn(1);
+  EXPECT_EQ(cv::norm(rest, drawing.composite(0, picture, posed, Composite::rest), cv::NORM_INF), 0);
+  ASSERT_GT(cv::norm(full, rest, cv::NORM_INF), 100);
+  for (const double passing : {0.25, 0.6}) {
+    cv::Mat expected(picture.size(), CV_8UC3);
+    for (int i = 0; i < static_cast<int>(picture.total()) * 3; ++i) {
+      const double light = (1 - passing) * linear_of_srgb(full.data[i] / 255.0) +
+                           passing * linear_of_srgb(rest.data[i] / 255.0);
+      expected.data[i] = cv::saturate_cast<std::uint8_t>(255 * srgb_of_linear(light));
+    }
+    EXPECT_LE(cv::norm(drawn(passing), expected, cv::NORM_INF), 3) << passing;
+  }
+}
+
 TEST_F(RendererTest, WhereNoPartIsTheCompositeIsTheCamerasPicture) {
   const Scene scene = scene_of(sheet(0.3, 0.3), {});
   auto rng = test::test_rng();

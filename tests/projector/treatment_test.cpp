@@ -59,7 +59,7 @@ TEST(Treatment, NeverChangesTwiceWithinTheHold) {
   std::uniform_real_distribution<double> share(0, 1), seconds(0.005, 0.1);
   const TreatmentOptions options;
   std::vector<Treatment> treatments;
-  double now = 0, changed_at = -1e9, shortest = 1e9;
+  double now = 0, changed_at = -1e9, shortest = 1e9, fastest = 0;
   int changes = 0;
   for (int frame = 0; frame < 20000; ++frame) {
     const double step = seconds(rng);
@@ -72,11 +72,38 @@ TEST(Treatment, NeverChangesTwiceWithinTheHold) {
       changed_at = now;
       ++changes;
     }
+    if (!treatments.empty())
+      fastest = std::max(fastest, std::abs(after[0].whole() - treatments[0].whole()) / step);
     treatments = after;
   }
   EXPECT_GT(changes, 300);
   EXPECT_GE(shortest, options.hold_s - 1e-9);
+  EXPECT_LE(fastest, 1 / options.fade_s + 1e-9);
   std::cout << changes << " changes in " << now << " s, at least " << shortest << " s apart\n";
+}
+
+TEST(Treatment, OnePassesIntoTheOtherWithinTheFadeWhateverTheStepsOfTime) {
+  for (const double step : {0.01, 0.037, 0.1}) {
+    const TreatmentOptions options{0.3, 0.5, 0, 0.4};
+    PartCoverage part = covered("mirror", 0.9);
+    auto treatments = treated({}, std::span(&part, 1), 0, options);
+    EXPECT_EQ(treatments[0].whole(), 0) << "there is nothing to pass from at first";
+    part = covered("mirror", 0.1);
+    treatments = treated(treatments, std::span(&part, 1), step, options);
+    EXPECT_EQ(treatments[0].what, Composite::full);
+    EXPECT_EQ(treatments[0].whole(), 0) << "at the change what showed still shows";
+    for (double seconds = step; seconds < 0.2; seconds += step) {
+      treatments = treated(treatments, std::span(&part, 1), step, options);
+      EXPECT_NEAR(treatments[0].whole(), seconds / options.fade_s, 1e-9);
+    }
+    part = covered("mirror", 0.9);  // and back before it has passed
+    const double before = treatments[0].whole();
+    treatments = treated(treatments, std::span(&part, 1), step, options);
+    EXPECT_EQ(treatments[0].what, Composite::rest);
+    EXPECT_NEAR(treatments[0].whole(), before + step / options.fade_s, 1e-9);
+    treatments = treated(treatments, {}, 1, options);  // also while it is out of sight
+    EXPECT_EQ(treatments[0].whole(), 0);
+  }
 }
 
 }  // namespace
