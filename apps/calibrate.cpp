@@ -8,7 +8,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <thread>
 
 #include "apps/board_place.h"
 #include "apps/capture.h"
@@ -32,8 +31,6 @@
 #include "core/file.h"
 #include "core/log.h"
 #include "device/desktop.h"
-#include "device/open_camera.h"
-#include "device/open_display.h"
 
 namespace limn::apps {
 namespace {
@@ -553,29 +550,6 @@ class ErrandDisplay : public device::Display {
   MainErrands* errands_;
 };
 
-// Cameras and projectors of a devices file; every one must work.
-Result<DeviceStage::Devices> opened(const Devices& named, const Result<device::Desktop>& desktop) {
-  DeviceStage::Devices open{
-      .cameras = {},
-      .projectors = {},
-      .now = [] { return std::chrono::time_point_cast<Stamp::duration>(std::chrono::steady_clock::now()); },
-      .wait = [](double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }};
-  for (const device::CameraWanted& wanted : named.cameras) {
-    LIMN_TRY(auto camera, device::open_camera(wanted));
-    open.cameras.push_back(std::move(camera));
-  }
-  for (device::DisplayWanted wanted : named.displays) {
-    if (!wanted.name.starts_with("projector")) continue;
-    wanted.latency_s = 0;  // is measured
-    LIMN_TRY(auto display, device::open_display(wanted, desktop ? &*desktop : nullptr));
-    open.projectors.push_back(std::move(display));
-  }
-  if (open.cameras.empty() || open.projectors.empty())
-    return error("{}: expected a camera and a display whose name begins with projector, found none.",
-                 named.file.string());
-  return open;
-}
-
 // What decides what devices capture.
 std::string devices_text(const CalibrateOptions& options, const calib::Captures& captures) {
   ordered_json all = {{"schema", "limn.captured_plan/1"},
@@ -591,15 +565,10 @@ Status calibrate_devices(const CalibrateOptions& options) {
   if (!board) return usage_error("--board: {}", board.message());
   LIMN_TRY(const Devices named, load_devices(options.devices));
   const Result<device::Desktop> desktop = device::Desktop::open();
-  LIMN_TRY(DeviceStage::Devices devices, opened(named, desktop));
-  const auto captured = [](const auto& all) {
-    std::vector<calib::CapturedDevice> list;
-    for (const auto& device : all)
-      list.push_back({device->name(), device->size().width, device->size().height});
-    return list;
-  };
-  const calib::Captures captures = calib::plan_captures(options.out / "captures", captured(devices.cameras),
-                                                        captured(devices.projectors), *board, options.code);
+  LIMN_TRY(DeviceStage::Devices devices, opened_devices(named, desktop));
+  const calib::Captures captures =
+      calib::plan_captures(options.out / "captures", captured_devices(devices.cameras),
+                           captured_devices(devices.projectors), *board, options.code);
   const calib::CapturedDevice& first = captures.cameras.front();
   const Imager assumed = assumed_camera(first.name, first.width, first.height);
   const std::vector<Pose> poses = guided_poses(assumed, *board);

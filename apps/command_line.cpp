@@ -253,15 +253,18 @@ void add_scan(CLI::App& app, Run& run) {
 void add_recheck(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand("recheck", "has a camera or projector of a calibrated rig been nudged? which, how far");
   command->footer(
-      "Captures of the board in one pose are enough. The device that has moved gets its pose re-solved, its lens is kept;\n"
-      "the rig folder is written in any case, with recheck.json. With one camera and one projector only a board that has\n"
-      "not been touched since an earlier recheck tells which of them it was.\n"
+      "Captures of the board in one pose are enough, or of the prototype alone where three devices share it. The device that\n"
+      "has moved gets its pose re-solved, its lens is kept; the rig folder is written in any case, with recheck.json. With one\n"
+      "camera and one projector only a board that has not been touched since an earlier recheck tells which of them it was.\n"
+      "Example: limn recheck --devices devices.json --rig rig --out rig-repaired\n"
       "Example: limn recheck captures --rig rig --out rig-repaired\n"
       "Example: limn recheck captures --rig rig --still rig-repaired/recheck.json --out rig-again\n"
-      "Example: limn recheck --plan config/plans/studio.json --rig rig --out rig-repaired");
+      "Example: limn recheck --plan config/plans/studio.json --prototype --rig rig --out rig-repaired");
   auto options = std::make_shared<RecheckCommand>();
-  command->add_option("captures", options->captures, "captures folder with the board in view");
+  command->add_option("captures", options->captures, "captures folder with the board or the prototype in view");
+  command->add_option("--devices", options->devices, "instead: the rig's cameras and projectors (limn.devices/1) capture what is there (15 s), into OUT/captures");
   command->add_option("--plan", options->plan, "instead: capture its first poses (15 s) on the virtual rig, into OUT/captures");
+  command->add_flag("--prototype", options->prototype, "with --plan: of the world's prototype instead of the board");
   command->add_option("--rig", options->rig, "rig folder, rig.json or folder of .cameramodel files")->required();
   command->add_option("--still", options->still, "an earlier recheck.json: the board stands where it stood then");
   command->add_option("--out", options->out, "rig folder to write")->required();

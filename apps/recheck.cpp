@@ -5,13 +5,17 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/capture.h"
+#include "apps/devices.h"
+#include "apps/picture_writer.h"
 #include "apps/plan.h"
+#include "apps/wizard/device_stage.h"
 #include "apps/world_markers.h"
 #include "calib/captures.h"
 #include "calib/observations.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/rig.h"
+#include "device/desktop.h"
 
 namespace limn::apps {
 namespace {
@@ -23,6 +27,8 @@ using Json = nlohmann::ordered_json;
 constexpr double k_least_rig_px = 0.05;
 constexpr double k_pictures_a_second = 10;  // shown, settled, photographed by an ordinary camera
 constexpr double k_most_seconds = 15;
+constexpr double k_guard_s = 0.001;                       // beyond a measured latency
+constexpr const char* k_any_board = "charuco:11x8:25mm";  // of a rig that does not tell its own
 
 double rounded(double v) { return std::round(v * 1e4) / 1e4; }
 
@@ -37,32 +43,65 @@ size_t affordable_poses(const Plan& plan, const Rig& rig) {
   return static_cast<size_t>(std::max(1.0, k_most_seconds * k_pictures_a_second / std::max(1, pictures)));
 }
 
-Result<fs::path> captured(const RecheckCommand& command) {
-  if (command.plan.empty() == command.captures.empty())
-    return usage_error("expected a captures folder or --plan, found {}.",
-                       command.plan.empty() ? "neither" : "both");
-  if (command.plan.empty()) return command.captures;
+Json provenance_of(const Rig& rig) {
+  const Json provenance = Json::parse(rig.provenance_json, nullptr, false);
+  return provenance.is_object() ? provenance : Json::object();
+}
+
+Status captured_virtually(const RecheckCommand& command, const fs::path& folder) {
   LIMN_TRY(Plan plan, load_plan(command.plan));
   plan.code_options.inverses = false;  // the rig is all but known: sparse pictures, more devices in the time
   LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_picture));
+  if (command.prototype && !world.scene)
+    return error("{}: scene: expected a prototype for --prototype, found none.", plan.world.string());
   plan.world_from_board.resize(std::min(plan.world_from_board.size(), affordable_poses(plan, world.rig)));
   sim::VirtualRig rig(std::move(world));
+  if (!command.prototype) return capture_virtually(plan, &rig, folder);
+  return capture_prototype(plan, {rig.world().world_from_prototype}, &rig, folder);
+}
+
+Status captured_by_devices(const RecheckCommand& command, const fs::path& folder) {
+  LIMN_TRY(const Rig rig, load_rig(command.rig));
+  LIMN_TRY(const Devices all, load_devices(command.devices));
+  LIMN_TRY(const Devices named, matched(all, rig));
+  const Result<device::Desktop> desktop = device::Desktop::open();
+  LIMN_TRY(DeviceStage::Devices devices, opened_devices(named, desktop));
+  // The rig's own board, should it be in view.
+  const std::string text = provenance_of(rig).value("board", std::string(k_any_board));
+  LIMN_TRY(const calib::Board board, calib::Board::parse(text));
+  const calib::Captures captures =
+      calib::plan_captures(folder, captured_devices(devices.cameras), captured_devices(devices.projectors),
+                           board, "gray", {.inverses = false});
+  DeviceStage stage(std::move(devices), board, nullptr);
+  PictureWriter writer;
+  return captured_once(captures, rig, stage.surroundings(&writer));
+}
+
+// The captures folder that the command names or makes.
+Result<fs::path> captured(const RecheckCommand& command) {
+  const int ways = !command.plan.empty() + !command.captures.empty() + !command.devices.empty();
+  if (ways != 1)
+    return usage_error("expected one of a captures folder, --plan and --devices, found {}.",
+                       ways == 0 ? "none" : "several");
+  if (command.prototype && command.plan.empty())
+    return usage_error("--prototype: expected --plan; captures and --devices need no such word.");
+  if (!command.captures.empty()) return command.captures;
   const fs::path folder = command.out / "captures";
-  LIMN_TRY_STATUS(capture_virtually(plan, &rig, folder));
+  LIMN_TRY_STATUS(command.plan.empty() ? captured_by_devices(command, folder)
+                                       : captured_virtually(command, folder));
   return folder;
 }
 
 // How well the rig foretells, and how its board is bent, as its solve noted them.
 calib::RecheckOptions options_for(const Rig& rig, const calib::Board& board) {
   calib::RecheckOptions options;
-  const auto provenance = nlohmann::json::parse(rig.provenance_json, nullptr, false);
-  if (!provenance.is_object()) return options;
+  const Json provenance = provenance_of(rig);
   if (const auto held_out = provenance.find("held_out_px");
       held_out != provenance.end() && held_out->is_number())
     options.rig_px = std::max(k_least_rig_px, held_out->get<double>() / std::sqrt(2.0));
   const auto bend = provenance.find("board_bend_mm");
-  if (bend != provenance.end() && provenance.value("board", nlohmann::json()) == board.text() &&
-      bend->is_array() && bend->size() == 2 && bend->at(0).is_number() && bend->at(1).is_number())
+  if (bend != provenance.end() && provenance.value("board", Json()) == board.text() && bend->is_array() &&
+      bend->size() == 2 && bend->at(0).is_number() && bend->at(1).is_number())
     options.bend_m = 1e-3 * Eigen::Vector2d(bend->at(0).get<double>(), bend->at(1).get<double>());
   return options;
 }
@@ -120,8 +159,7 @@ Json json_of(const Rechecked& checked, const std::vector<std::string>& poses) {
 Rig repaired(const calib::Recheck& result) {
   Rig rig = result.rig;
   if (result.candidates.empty()) return rig;
-  Json provenance = Json::parse(rig.provenance_json, nullptr, false);
-  if (!provenance.is_object()) provenance = Json::object();
+  Json provenance = provenance_of(rig);
   const calib::Move& move = result.candidates.front();
   provenance["re_solved"] = {{"made_by", "limn recheck"},
                              {"device", move.device},
@@ -210,6 +248,18 @@ Status told(const calib::Recheck& result) {
 }
 
 }  // namespace
+
+Status captured_once(const calib::Captures& captures, const Rig& rig, const Surroundings& around) {
+  LIMN_TRY_STATUS(calib::begin_captures(captures));
+  const Json latencies_ms = provenance_of(rig).value("display_latency_ms", Json::object());
+  for (std::size_t i = 0; i < captures.projectors.size(); ++i)
+    if (const auto ms = latencies_ms.find(captures.projectors[i].name);
+        ms != latencies_ms.end() && ms->is_number())
+      around.use_latency(static_cast<int>(i), 1e-3 * ms->get<double>() + k_guard_s);
+  const Status taken = calib::capture_pose(captures, 0, around.stage);
+  const Status written = around.written();
+  return taken ? written : taken;
+}
 
 Result<Rechecked> rechecked(const RecheckCommand& command) {
   LIMN_TRY(Checked checked, check(command));

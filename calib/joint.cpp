@@ -21,8 +21,6 @@ constexpr double k_unseen = 1e4;  // standard deviations that an observation wit
 constexpr int k_most_steps = 200;
 constexpr double k_settled = 1e-10;  // of the cost: a step that promises less is the last
 constexpr double k_first_damping = 1e-6, k_least_damping = 1e-12, k_most_damping = 1e10;
-constexpr double k_least_parallax =
-    0.01;  // rad between a free point's rays; below, its depth is anybody's guess
 
 ImagerView view(const Imager& imager) {
   return {imager.lens.model, imager.lens.values, imager.imager_from_world};
@@ -46,19 +44,6 @@ bool is_finite(const Unknowns& unknowns) {
     if (board && !board->is_finite()) return false;
   }
   return unknowns.bend_m.allFinite();
-}
-
-// Distance along `ray` (units of its d) of the point nearest to another imager's ray; 0 when they are all but
-// parallel or meet behind.
-double depth_by(const Imager& camera, const LensRay& ray, const Imager& seeing, const Vector2d& px) {
-  LensRay other;
-  if (!find_ray(seeing.lens.model, seeing.lens.values, px, false, &other)) return 0;
-  const Pose camera_from_seeing = camera.imager_from_world * seeing.imager_from_world.inverse();
-  const Vector3d a = ray.d, b = camera_from_seeing.rotation * other.d, o = camera_from_seeing.translation;
-  const double aa = a.dot(a), bb = b.dot(b), ab = a.dot(b), determinant = aa * bb - ab * ab;
-  if (!(determinant > k_least_parallax * k_least_parallax * aa * bb)) return 0;
-  const double depth = (a.dot(o) * bb - b.dot(o) * ab) / determinant;
-  return std::isfinite(depth) && depth > 0 ? depth : 0;
 }
 
 }  // namespace
@@ -381,7 +366,7 @@ void Joint::place_points(Unknowns* unknowns) const {
     const Imager& seeing = sighting.by_projector ? unknowns->projectors[which] : unknowns->cameras[which];
     LensRay ray;
     if (!find_ray(camera.lens.model, camera.lens.values, point.px_camera, false, &ray)) continue;
-    const double depth = depth_by(camera, ray, seeing, sighting.px);
+    const double depth = depth_by(view(camera), ray, view(seeing), sighting.px);
     if (!(depth > 0)) continue;
     sums[index] += 1 / depth;
     ++counts[index];

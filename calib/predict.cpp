@@ -6,6 +6,8 @@
 namespace limn::calib {
 namespace {
 
+constexpr double k_least_parallax = 0.01;  // rad between two rays; below, the depth is anybody's guess
+
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
@@ -232,6 +234,17 @@ bool predict_sighting(const ImagerView& camera,
   derivatives->camera_values.noalias() = by_camera.leftCols<2>() * ray.xy_by_values / inverse_depth;
   derivatives->inverse_depth = -by_camera * ray.d / (inverse_depth * inverse_depth);
   return true;
+}
+
+double depth_by(const ImagerView& camera, const LensRay& ray, const ImagerView& seeing, const Vector2d& px) {
+  LensRay other;
+  if (!find_ray(seeing.model, seeing.values, px, false, &other)) return 0;
+  const Pose camera_from_seeing = camera.imager_from_world * seeing.imager_from_world.inverse();
+  const Vector3d a = ray.d, b = camera_from_seeing.rotation * other.d, o = camera_from_seeing.translation;
+  const double aa = a.dot(a), bb = b.dot(b), ab = a.dot(b), determinant = aa * bb - ab * ab;
+  if (!(determinant > k_least_parallax * k_least_parallax * aa * bb)) return 0;
+  const double depth = (a.dot(o) * bb - b.dot(o) * ab) / determinant;
+  return std::isfinite(depth) && depth > 0 ? depth : 0;
 }
 
 }  // namespace limn::calib

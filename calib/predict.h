@@ -105,4 +105,11 @@ bool predict_sighting(const ImagerView& camera,
                       Eigen::Vector2d* px,
                       SightingDerivatives* derivatives = nullptr);
 
+/// Distance along `ray` (units of its d) of a camera to the point nearest to the ray of another imager's
+/// pixel; 0 when the rays are all but parallel or meet behind.
+double depth_by(const ImagerView& camera,
+                const LensRay& ray,
+                const ImagerView& seeing,
+                const Eigen::Vector2d& px);
+
 }  // namespace limn::calib

@@ -41,7 +41,9 @@ std::string sentence(const Drift& drift) {
   for (const std::string& name : drift.devices) names += (names.empty() ? "" : " or ") + name;
   return fmt::format(
       "{} has moved since the calibration: light lies {:.1f} px ({:.1f} mm) beside its place. Put it back, "
-      "or hold the board where all see it and run limn recheck (15 s).",
+      "or let limn recheck --devices look at the prototype as it stands (with one camera and one projector "
+      "at "
+      "the board): 15 s, and it writes a rig for the next session.",
       names, drift.px, drift.mm);
 }
 

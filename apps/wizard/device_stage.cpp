@@ -1,9 +1,13 @@
 #include "apps/wizard/device_stage.h"
 
 #include <algorithm>
+#include <chrono>
 #include <opencv2/core.hpp>
+#include <thread>
 
 #include "core/picture.h"
+#include "device/open_camera.h"
+#include "device/open_display.h"
 
 namespace limn::apps {
 namespace {
@@ -155,6 +159,28 @@ Status DeviceStage::paint(const std::vector<cv::Mat>& pictures) {
     lit_at_ = std::max(lit_at_, shifted(*shown_at, latency_s_[i]));
   }
   return {};
+}
+
+Result<DeviceStage::Devices> opened_devices(const Devices& named, const Result<device::Desktop>& desktop) {
+  DeviceStage::Devices open{
+      .cameras = {},
+      .projectors = {},
+      .now = [] { return std::chrono::time_point_cast<Stamp::duration>(std::chrono::steady_clock::now()); },
+      .wait = [](double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }};
+  for (const device::CameraWanted& wanted : named.cameras) {
+    LIMN_TRY(auto camera, device::open_camera(wanted));
+    open.cameras.push_back(std::move(camera));
+  }
+  for (device::DisplayWanted wanted : named.displays) {
+    if (!wanted.name.starts_with("projector")) continue;
+    wanted.latency_s = 0;  // the stage adds it
+    LIMN_TRY(auto display, device::open_display(wanted, desktop ? &*desktop : nullptr));
+    open.projectors.push_back(std::move(display));
+  }
+  if (open.cameras.empty() || open.projectors.empty())
+    return error("{}: expected a camera and a display whose name begins with projector, found none.",
+                 named.file.string());
+  return open;
 }
 
 }  // namespace limn::apps

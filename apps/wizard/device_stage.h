@@ -5,10 +5,12 @@
 #include <vector>
 
 #include "apps/calibrate.h"
+#include "apps/devices.h"
 #include "apps/picture_writer.h"
 #include "apps/wizard/still_board.h"
 #include "apps/wizard/still_room.h"
 #include "device/camera_source.h"
+#include "device/desktop.h"
 #include "device/display.h"
 
 namespace limn::apps {
@@ -48,5 +50,17 @@ class DeviceStage {
   std::vector<double> period_s_;    // of each camera's frames
   Stamp lit_at_;                    // what was shown last is on the surface
 };
+
+/// Cameras and projectors of a devices file; every one must work, and there must be some of both.
+Result<DeviceStage::Devices> opened_devices(const Devices& named, const Result<device::Desktop>& desktop);
+
+/// As captures name them.
+template <typename AllDevices>
+std::vector<calib::CapturedDevice> captured_devices(const AllDevices& all) {
+  std::vector<calib::CapturedDevice> list;
+  for (const auto& device : all)
+    list.push_back({device->name(), device->size().width, device->size().height});
+  return list;
+}
 
 }  // namespace limn::apps

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <span>
 
 #include "calib/predict.h"
 #include "calib/seed.h"
@@ -23,6 +24,10 @@ constexpr double k_degrees = 180 / std::numbers::pi;
 constexpr double k_moved = 30;
 constexpr double k_apart = 15;
 constexpr double k_sound_rig_px = 4;  // RMS misfit that a sound rig may show beyond min_deg
+// Without a board a device is undetermined when its place along the light is: two devices alone tell no
+// scale.
+constexpr double k_loose_deg = 5, k_loose_m = 0.2;  // that a moved device may well have moved
+constexpr double k_undetermined_m = 0.02;           // standard deviation
 
 ImagerView view_of(const Imager& imager) {
   return {imager.lens.model, imager.lens.values, imager.imager_from_world};
@@ -33,11 +38,25 @@ struct Places {
   std::vector<Imager> devices;
   size_t cameras = 0;
   std::vector<std::optional<Pose>> world_from_board;
+  std::vector<double> inverse_depths;  // of the free points; 0: none follows
   Vector2d bend = Vector2d::Zero();
 
   const Imager& camera(int i) const { return devices[static_cast<size_t>(i)]; }
   const Imager& projector(int i) const { return devices[cameras + static_cast<size_t>(i)]; }
+  size_t device_of(const Sighting& sighting) const {
+    return static_cast<size_t>(sighting.imager) + (sighting.by_projector ? cameras : 0);
+  }
 };
+
+// Calls visit(point's number, its sightings) with every free point that is sighted.
+template <typename Visit>
+void each_point(const Observations& observations, const Visit& visit) {
+  const std::vector<Sighting>& all = observations.sightings;
+  for (size_t begin = 0, end = 0; begin < all.size(); begin = end) {
+    while (end < all.size() && all[end].point == all[begin].point) ++end;
+    visit(static_cast<size_t>(all[begin].point), std::span(all).subspan(begin, end - begin));
+  }
+}
 
 constexpr size_t k_nobody = static_cast<size_t>(-1);
 
@@ -71,11 +90,12 @@ class Fit {
     unknowns_ = at + 2;
     for (const CornerSeen& seen : observations.corners) ++counts_[{seen.camera, -1, seen.pose}];
     for (const Match& match : observations.matches) ++counts_[{match.camera, match.projector, match.pose}];
+    for (const Sighting& sighting : observations.sightings) ++counts_[sight_of(sighting)];
   }
 
   Fitted run(Places places) const {
     Fitted fitted{std::move(places)};
-    Normal normal = linearised(fitted.places);
+    Normal normal = linearised(&fitted.places);
     double damping = 1e-4;
     for (int i = 0; i < k_most_steps && damping < 1e8; ++i) {
       Eigen::MatrixXd damped = normal.matrix;
@@ -83,7 +103,7 @@ class Fit {
       const Eigen::VectorXd step = -damped.ldlt().solve(normal.right);
       if (!step.allFinite()) break;
       Places moved = stepped(fitted.places, step);
-      Normal next = linearised(moved);
+      Normal next = linearised(&moved);
       if (next.cost <= normal.cost && next.count == normal.count) {
         const bool done = normal.cost - next.cost < 1e-9 * normal.cost;
         fitted.places = std::move(moved);
@@ -123,8 +143,13 @@ class Fit {
     ++normal->count;
   }
 
-  // One sight of a board: camera, projector (-1: the camera's corners), pose.
+  // One sight of a board: camera, projector (-1: the camera's corners), pose. Of a scene: camera, device that
+  // sees its points (-2 and below: cameras), pose.
   using Sight = std::array<int, 3>;
+  Sight sight_of(const Sighting& sighting) const {
+    const FreePoint& point = observations_.points[static_cast<size_t>(sighting.point)];
+    return {point.camera, sighting.by_projector ? sighting.imager : -2 - sighting.imager, point.pose};
+  }
   // How much of one observation of a sight is independent of the others.
   double share_of(const Sight& sight) const {
     return std::min(1.0, static_cast<double>(options_.independent) / counts_.at(sight));
@@ -137,8 +162,81 @@ class Fit {
   }
   int device_at(size_t device) const { return device == free_.device ? 0 : -1; }
 
-  Normal linearised(const Places& places) const {
+  // What other devices see of a free point at an inverse depth: rows with their weights.
+  struct PointRow {
+    Row row;
+    Vector2d by_inverse_depth;
+    double weight = 0, cost = 0;
+  };
+  std::vector<PointRow> rows_of(size_t index,
+                                std::span<const Sighting> sightings,
+                                const Places& places,
+                                double inverse_depth) const {
+    std::vector<PointRow> rows;
+    const FreePoint& point = observations_.points[index];
+    const auto camera = static_cast<size_t>(point.camera);
+    LensRay ray;
+    const Imager& from = places.devices[camera];
+    if (!find_ray(from.lens.model, from.lens.values, point.px_camera, true, &ray)) return rows;
+    for (const Sighting& sighting : sightings) {
+      const size_t device = places.device_of(sighting);
+      Vector2d px;
+      SightingDerivatives by;
+      if (!predict_sighting(view_of(from), view_of(places.devices[device]), ray, inverse_depth, &px, &by))
+        continue;
+      PointRow seen{empty_row(), by.inverse_depth};
+      seen.row.residual = px - sighting.px;
+      put(by.camera_pose, device_at(camera), &seen.row);
+      put(by.pose, device_at(device), &seen.row);
+      const double stddev = std::hypot(sighting.stddev_px, options_.rig_px);
+      const double size = seen.row.residual.norm() / stddev, share = share_of(sight_of(sighting));
+      seen.weight = share * (size > k_huber ? k_huber / size : 1) / (stddev * stddev);
+      seen.cost = share * (size > k_huber ? k_huber * (2 * size - k_huber) : size * size);
+      rows.push_back(std::move(seen));
+    }
+    return rows;
+  }
+
+  // Free points lie where their sightings put them best, whatever the devices' places (variable projection,
+  // Golub and Pereyra 1973).
+  void add_points(Places* places, Normal* normal) const {
+    constexpr int k_rounds = 3;
+    each_point(observations_, [&](size_t index, std::span<const Sighting> sightings) {
+      double& inverse_depth = places->inverse_depths[index];
+      if (inverse_depth == 0) return;
+      std::vector<PointRow> rows;
+      double information = 0;
+      for (int round = 0; round < k_rounds; ++round) {
+        rows = rows_of(index, sightings, *places, inverse_depth);
+        double right = 0;
+        information = 0;
+        for (const PointRow& seen : rows) {
+          information += seen.weight * seen.by_inverse_depth.squaredNorm();
+          right += seen.weight * seen.by_inverse_depth.dot(seen.row.residual);
+        }
+        if (!(information > 0) || round + 1 == k_rounds) break;
+        inverse_depth = std::max(1e-6, inverse_depth - right / information);
+      }
+      if (!(information > 0)) return;
+      Eigen::RowVectorXd with_depth = Eigen::RowVectorXd::Zero(unknowns_);
+      double right = 0;
+      for (const PointRow& seen : rows) {
+        normal->matrix.noalias() += seen.weight * seen.row.by.transpose() * seen.row.by;
+        normal->right.noalias() += seen.weight * seen.row.by.transpose() * seen.row.residual;
+        with_depth += seen.weight * seen.by_inverse_depth.transpose() * seen.row.by;
+        right += seen.weight * seen.by_inverse_depth.dot(seen.row.residual);
+        normal->cost += seen.cost;
+        ++normal->count;
+      }
+      normal->matrix.noalias() -= with_depth.transpose() * with_depth / information;
+      normal->right -= with_depth.transpose() * right / information;
+    });
+  }
+
+  Normal linearised(Places* given) const {
     Normal normal{Eigen::MatrixXd::Zero(unknowns_, unknowns_), Eigen::VectorXd::Zero(unknowns_)};
+    add_points(given, &normal);
+    const Places& places = *given;
     Derivatives by;
     for (const CornerSeen& seen : observations_.corners) {
       const auto& board = places.world_from_board[static_cast<size_t>(seen.pose)];
@@ -172,6 +270,11 @@ class Fit {
     }
     const double weight = 1 / (options_.bend_stddev_m * options_.bend_stddev_m);
     const Vector2d off = places.bend - options_.bend_m;
+    if (free_.device != k_nobody) {
+      const double loose_rad = k_loose_deg / k_degrees;
+      normal.matrix.diagonal().head<3>().array() += 1 / (loose_rad * loose_rad);
+      normal.matrix.diagonal().segment<3>(3).array() += 1 / (k_loose_m * k_loose_m);
+    }
     normal.matrix.bottomRightCorner<2, 2>().diagonal().array() += weight;
     normal.right.tail<2>() += weight * off;
     normal.cost += weight * off.squaredNorm();
@@ -204,6 +307,8 @@ class Fit {
                                     scaled.solve(Eigen::MatrixXd::Identity(unknowns_, unknowns_)) *
                                     scale.asDiagonal();
     fitted->covariance = inverse.topLeftCorner<6, 6>();
+    const double stddev_m = std::sqrt(fitted->covariance.bottomRightCorner<3, 3>().diagonal().maxCoeff());
+    fitted->determined = stddev_m < k_undetermined_m;
   }
 
   const Observations& observations_;
@@ -242,6 +347,35 @@ Result<Places> places_of(const Rig& rig, const Observations& observations) {
   return places;
 }
 
+// Whether a free point lies in the view of three devices: two of them tell its distance, whichever moved.
+bool has_scale(const Observations& observations, const Places& places) {
+  constexpr int k_least_shared = 20;
+  int shared = 0;
+  each_point(observations, [&](size_t index, std::span<const Sighting> sightings) {
+    shared += places.inverse_depths[index] > 0 && sightings.size() >= 2;
+  });
+  return shared >= k_least_shared;
+}
+
+// The mean of what the sightings say.
+void place_points(const Observations& observations, Places* places) {
+  places->inverse_depths.assign(observations.points.size(), 0.0);
+  each_point(observations, [&](size_t index, std::span<const Sighting> sightings) {
+    const FreePoint& point = observations.points[index];
+    const Imager& camera = places->camera(point.camera);
+    LensRay ray;
+    if (!find_ray(camera.lens.model, camera.lens.values, point.px_camera, false, &ray)) return;
+    double sum = 0;
+    int count = 0;
+    for (const Sighting& sighting : sightings) {
+      const Imager& seeing = places->devices[places->device_of(sighting)];
+      const double depth = depth_by(view_of(camera), ray, view_of(seeing), sighting.px);
+      if (depth > 0) sum += 1 / depth, ++count;
+    }
+    if (count > 0) places->inverse_depths[index] = sum / count;
+  });
+}
+
 // Boards from what cameras see of their corners, where nothing else is known.
 Status place_boards(const Observations& observations, const RecheckOptions& options, Places* places) {
   Rig seen_by;
@@ -260,9 +394,12 @@ Status place_boards(const Observations& observations, const RecheckOptions& opti
     }
     any = any || places->world_from_board[pose];
   }
+  any = any || has_scale(observations, *places);
   if (!any)
-    return error("captures: expected the board ({}) in a camera's picture, found none. Put it into view.",
-                 observations.board.text());
+    return error(
+        "captures: expected the board ({}) in a camera's picture, or a scene that three of the rig's devices "
+        "share, found neither. Put the board into view.",
+        observations.board.text());
   return {};
 }
 
@@ -356,18 +493,17 @@ class Detective {
                     k_sound_rig_px * options_.rig_px);
   }
 
-  template <typename Visit>  // visit(pixel predicted, pixel measured, point) of all observations of a device
+  // visit(pixel predicted, pixel measured, point) of all observations of a device. A camera's free points lie
+  // on its own rays: they are told by what the others see of them.
+  template <typename Visit>
   void each(const Places& places, size_t device, Visit visit) const {
     const BoardShape shape{observations_.board.width_m(), observations_.board.height_m()};
-    if (device < places.cameras) {
-      for (const CornerSeen& seen : observations_.corners) {
-        const auto& board = places.world_from_board[static_cast<size_t>(seen.pose)];
-        if (static_cast<size_t>(seen.camera) != device || !board) continue;
-        Eigen::Vector3d p = observations_.board.p_corner(seen.corner);
-        p.z() = shape.z(places.bend, p.x(), p.y());
-        visit(places.devices[device].project(*board * p), seen.px, *board * p);
-      }
-      return;
+    for (const CornerSeen& seen : observations_.corners) {
+      const auto& board = places.world_from_board[static_cast<size_t>(seen.pose)];
+      if (static_cast<size_t>(seen.camera) != device || !board) continue;
+      Eigen::Vector3d p = observations_.board.p_corner(seen.corner);
+      p.z() = shape.z(places.bend, p.x(), p.y());
+      visit(places.devices[device].project(*board * p), seen.px, *board * p);
     }
     for (const Match& match : observations_.matches) {
       const auto& board = places.world_from_board[static_cast<size_t>(match.pose)];
@@ -377,6 +513,23 @@ class Detective {
         continue;
       visit(places.devices[device].project(p), match.px_projector, p);
     }
+    each_point(observations_, [&](size_t index, std::span<const Sighting> sightings) {
+      const auto p = world_of(places, index);
+      if (!p) return;
+      const auto camera = static_cast<size_t>(observations_.points[index].camera);
+      for (const Sighting& sighting : sightings)
+        if (camera == device || places.device_of(sighting) == device)
+          visit(places.devices[places.device_of(sighting)].project(*p), sighting.px, *p);
+    });
+  }
+
+  std::optional<Eigen::Vector3d> world_of(const Places& places, size_t index) const {
+    const FreePoint& point = observations_.points[index];
+    const auto ray = places.camera(point.camera).ray(point.px_camera);
+    if (!ray || places.inverse_depths[index] == 0) return std::nullopt;
+    // Depth is along z of the camera; a ray's d is of unit length there.
+    const double z = (places.camera(point.camera).imager_from_world.rotation * ray->d).z();
+    return Eigen::Vector3d(ray->p_origin + ray->d / (z * places.inverse_depths[index]));
   }
 
   int observations_of(size_t device) const {
@@ -401,8 +554,8 @@ class Detective {
     double squares = 0, depths = 0;
     int count = 0;
     each(fitted.places, device,
-         [&](const std::optional<Vector2d>& px, const Vector2d&, const Eigen::Vector3d& p_world) {
-           const auto old_px = before.project(p_world);
+         [&](const std::optional<Vector2d>&, const Vector2d&, const Eigen::Vector3d& p_world) {
+           const auto px = now.project(p_world), old_px = before.project(p_world);
            if (!px || !old_px) return;
            squares += (*px - *old_px).squaredNorm();
            depths += (now.imager_from_world * p_world).norm();
@@ -493,6 +646,7 @@ std::string to_text(RecheckVerdict verdict) {
 Result<Recheck> recheck(const Rig& rig, const Observations& observations, const RecheckOptions& options) {
   LIMN_TRY(Places places, places_of(rig, observations));
   places.bend = options.bend_m;
+  place_points(observations, &places);
   LIMN_TRY_STATUS(place_boards(observations, options, &places));
   return Detective(observations, options, std::move(places)).run(rig);
 }

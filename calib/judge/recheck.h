@@ -38,7 +38,7 @@ struct Move {
   double degrees = 0, degrees_stddev = 0;  ///< its turn
   double mm = 0, mm_stddev = 0;            ///< of its centre
   double px = 0;                           ///< what that does to its pixels of things on the board, RMS
-  double mm_on_board = 0;                  ///< the same on the board
+  double mm_on_board = 0;                  ///< the same on the board, or on the scene
   Pose imager_from_world;                  ///< where it stands now
 };
 
@@ -52,7 +52,7 @@ std::string to_text(RecheckVerdict verdict);
 
 struct CheckedDevice {
   std::string name;
-  int observations = 0;  ///< corners and matches that tell of it; 0: it was not checked
+  int observations = 0;  ///< corners, matches and sightings that tell of it; 0: it was not checked
   double before_px = 0;  ///< RMS misfit of the rig as it was
   double after_px = 0;   ///< and with the first candidate moved
 };
@@ -68,9 +68,11 @@ struct Recheck {
 };
 
 /// Has a camera or a projector of a calibrated rig moved? For "nobody" and for every single device the poses
-/// of the boards (and of that device) are fitted to what is seen, lenses kept. A device has moved when its
-/// fit is clearly better than nobody's and puts its pixels clearly elsewhere; others that fit as well are
-/// candidates too. Errors: devices that the rig does not have or has in another size, no board in view.
+/// of the boards (and of that device) are fitted to what is seen, lenses kept. Without a board a scene will
+/// do, by its free points, where three devices share it: two of them that have not moved tell its distance.
+/// A device has moved when its fit is clearly better than nobody's and puts its pixels clearly elsewhere;
+/// others that fit as well are candidates too. Errors: devices that the rig does not have or has in another
+/// size, neither a board nor such a scene in view.
 Result<Recheck> recheck(const Rig& rig, const Observations& observations, const RecheckOptions& options = {});
 
 }  // namespace limn::calib

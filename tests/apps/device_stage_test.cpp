@@ -7,6 +7,7 @@
 #include "apps/board_place.h"
 #include "apps/capture.h"
 #include "apps/plan.h"
+#include "apps/recheck.h"
 #include "apps/wizard/guided_poses.h"
 #include "apps/world_markers.h"
 #include "core/file.h"
@@ -161,6 +162,18 @@ TEST(DeviceStage, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
   EXPECT_EQ(done->report.assessment.verdict, calib::Verdict::good) << lines;
   ASSERT_EQ(done->latency_s.size(), 1U) << lines;
   EXPECT_NEAR(done->latency_s[0].second, 0.12, 0.0025);
+
+  // A recheck by the same devices, of what stands there.
+  const Rig rig = load_rig(options.out).value();
+  const calib::Captures again = calib::plan_captures(folder / "again", captures.cameras, captures.projectors,
+                                                     captures.board, "gray", {.inverses = false});
+  const Stamp before = room.rig.now();
+  const Status taken = captured_once(again, rig, stage.surroundings(&writer));
+  ASSERT_TRUE(taken) << taken.message();
+  EXPECT_LT(seconds_between(before, room.rig.now()), 15);
+  const auto checked = rechecked({.rig = options.out, .captures = again.folder, .out = folder / "checked"});
+  ASSERT_TRUE(checked) << checked.message();
+  EXPECT_EQ(checked->result.verdict, calib::RecheckVerdict::sound);
 }
 
 TEST(GuidedPoses, AreSeenWholeAndTiltedToAllSides) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -116,6 +117,42 @@ TEST(RecheckCommand, FindsAndRepairsANudgeOnTheVirtualRig) {
   EXPECT_NE(rechecked(again).message().find("limn.recheck/1"), std::string::npos);
 }
 
+// The studio with its prototype; projector1's target raised by `up_m`.
+fs::path studio_plan(const fs::path& folder, double up_m) {
+  const fs::path config = fs::path(LIMN_SOURCE_DIR) / "config";
+  Json world = json_at(config / "worlds/studio.json");
+  world["scene"] = (config / "scenes/door").string();
+  world["projectors"][1]["target_m"][2] = world["projectors"][1]["target_m"][2].get<double>() + up_m;
+  Json plan = json_at(config / "plans/studio.json");
+  plan["world"] = "world.json";
+  fs::create_directories(folder);
+  EXPECT_TRUE(write_file(folder / "world.json", world.dump()).ok());
+  EXPECT_TRUE(write_file(folder / "plan.json", plan.dump()).ok());
+  return folder / "plan.json";
+}
+
+TEST(RecheckCommand, ThePrototypeAloneTellsWhatMoved) {
+  const fs::path folder = test_folder();
+  studio_plan(folder / "sound", 0);
+  const fs::path nudged_plan = studio_plan(folder / "nudged", 0.006);
+  const Rig rig = sim::load_world(folder / "sound/world.json", marker_picture).value().rig;
+  const Rig truth = sim::load_world(folder / "nudged/world.json", marker_picture).value().rig;
+  ASSERT_TRUE(save_rig(rig, folder / "rig").ok());
+  const auto after = rechecked(
+      {.rig = folder / "rig", .plan = nudged_plan, .prototype = true, .out = folder / "nudged/out"});
+  ASSERT_TRUE(after) << after.message();
+  ASSERT_EQ(after->result.verdict, RecheckVerdict::nudged);
+  EXPECT_EQ(after->result.candidates[0].device, "projector1");
+  EXPECT_EQ(after->pictures, 2 * (11 + 10 + 2));
+  const auto repaired = load_rig(folder / "nudged/out");
+  ASSERT_TRUE(repaired) << repaired.message();
+  const double apart_before_mm = light_apart_mm(rig.projectors[1], truth.projectors[1]),
+               apart_mm = light_apart_mm(repaired->projectors[1], truth.projectors[1]);
+  std::printf("light off by %.2f mm, after the repair by %.3f mm\n", apart_before_mm, apart_mm);
+  EXPECT_GT(apart_before_mm, 3);
+  EXPECT_LT(apart_mm, 0.3);
+}
+
 TEST(RecheckCommand, WantsCapturesOrAPlan) {
   const fs::path folder = test_folder();
   const Rig rig = sim::load_world(bench_world(folder / "world.json", 0), marker_picture).value().rig;
@@ -123,6 +160,12 @@ TEST(RecheckCommand, WantsCapturesOrAPlan) {
   const auto neither = rechecked({.rig = folder / "rig", .out = folder / "out"});
   ASSERT_FALSE(neither);
   EXPECT_TRUE(neither.error().wrong_usage);
+  const auto no_plan = rechecked(
+      {.rig = folder / "rig", .captures = folder / "none", .prototype = true, .out = folder / "out"});
+  EXPECT_TRUE(!no_plan && no_plan.error().wrong_usage);
+  const auto devices =
+      rechecked({.rig = folder / "rig", .devices = folder / "devices.json", .out = folder / "out"});
+  EXPECT_NE(devices.message().find("devices.json"), std::string::npos);
   const auto missing = rechecked({.rig = folder / "rig", .captures = folder / "none", .out = folder / "out"});
   EXPECT_NE(missing.message().find("capture.json"), std::string::npos);
   EXPECT_FALSE(fs::exists(folder / "out")) << "nothing is written when nothing was measured";

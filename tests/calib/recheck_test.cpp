@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <cstdio>
 #include <random>
 
 #include "calib/predict.h"
@@ -86,6 +87,35 @@ Observations seen_by(const Rig& rig, const std::vector<Pose>& world_from_board, 
             seen.matches.push_back({c, k, pose, *px, lit + noise(k_match_noise_px), k_match_noise_px, 100});
         }
       }
+    }
+  }
+  return seen;
+}
+
+// What a rig sees, with noise, of a panel with a bump that stands where boards were: no board, free points.
+Observations scene_seen_by(const Rig& rig, Rng* rng) {
+  Observations seen = seen_by(rig, {}, rng);
+  seen.poses = {"scene"};
+  std::normal_distribution<double> scatter(0, k_match_noise_px);
+  const Pose panel(exp_rotation({0.3, 0.2, 0}), {-0.25, -0.15, 1.05});
+  for (int i = 0; i < 300; ++i) {
+    const double x = (i % 20 + 0.5) / 20, y = (i / 20 + 0.5) / 15;
+    const Vector3d p = panel * Vector3d(0.5 * x, 0.35 * y, -0.08 * std::sin(3 * x) * std::sin(3 * y));
+    for (int c = 0; c < static_cast<int>(rig.cameras.size()); ++c) {
+      const auto px = rig.cameras[static_cast<size_t>(c)].project(p);
+      if (!px || !rig.cameras[static_cast<size_t>(c)].contains(*px)) continue;
+      const int point = static_cast<int>(seen.points.size());
+      seen.points.push_back({0, c, *px});
+      const auto look = [&](const Imager& imager, bool by_projector, int number) {
+        const auto at = imager.project(p);
+        if (at && imager.contains(*at))
+          seen.sightings.push_back(
+              {point, by_projector, number, *at + Vector2d(scatter(*rng), scatter(*rng)), k_match_noise_px});
+      };
+      for (int k = 0; k < static_cast<int>(rig.projectors.size()); ++k)
+        look(rig.projectors[static_cast<size_t>(k)], true, k);
+      for (int k = 0; k < static_cast<int>(rig.cameras.size()); ++k)
+        if (k != c) look(rig.cameras[static_cast<size_t>(k)], false, k);
     }
   }
   return seen;
@@ -188,6 +218,37 @@ TEST(Recheck, NamesTheDeviceThatWasTurnedByAFifthOfADegreeAndPutsItBack) {
   EXPECT_LT(error_deg, 0.05);
   RecordProperty("worst_mm_after_repair", std::to_string(worst_mm));
   RecordProperty("worst_error_of_turn_deg", std::to_string(error_deg));
+}
+
+TEST(Recheck, ASceneWithoutABoardTellsWhichDeviceMovedAndPutsItBack) {
+  Rng rng = test_rng();
+  double worst_mm = 0;
+  for (const auto& [cameras, projectors] : {std::pair<size_t, size_t>{1, 2}, {2, 1}, {2, 2}}) {
+    const Rig rig = calibrated(true_rig(cameras, projectors), &rng);
+    const auto still = recheck(rig, scene_seen_by(true_rig(cameras, projectors), &rng), {.rig_px = 0.08});
+    ASSERT_TRUE(still) << still.message();
+    EXPECT_EQ(still->verdict, RecheckVerdict::sound);
+    for (size_t device = 0; device < cameras + projectors; ++device)
+      for (const double degrees : {0.2, 2.0}) {
+        Rig truth = true_rig(cameras, projectors);
+        nudge(&device_of(&truth, device), degrees, 5 * degrees, &rng);
+        const auto checked = recheck(rig, scene_seen_by(truth, &rng), {.rig_px = 0.08});
+        ASSERT_TRUE(checked) << checked.message();
+        ASSERT_EQ(checked->verdict, RecheckVerdict::nudged) << cameras << " cameras, device " << device;
+        EXPECT_EQ(checked->candidates[0].device, device_of(&truth, device).name);
+        EXPECT_NEAR(checked->candidates[0].degrees, degrees, 4 * checked->candidates[0].degrees_stddev);
+        worst_mm = std::max(worst_mm, registration_mm(checked->rig, truth));
+      }
+  }
+  std::printf("after repair by a scene: %.2f mm at worst\n", worst_mm);
+  EXPECT_LT(worst_mm, 1);
+}
+
+TEST(Recheck, ASceneThatTwoDevicesShareTellsNoScale) {
+  Rng rng = test_rng();
+  const auto checked = recheck(true_rig(1, 1), scene_seen_by(true_rig(1, 1), &rng));
+  ASSERT_FALSE(checked);
+  EXPECT_NE(checked.message().find("three of the rig's devices share"), std::string::npos);
 }
 
 TEST(Recheck, TellsWhichOfTwoCamerasWasPushed) {
