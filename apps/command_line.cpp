@@ -437,6 +437,8 @@ void add_live(CLI::App& app, Run& run) {
   command->add_option("--osc-to", options->osc_to, "HOST:PORT that is told by OSC what changes");
   command->add_option("--serve", options->serve, "PORT, or ADDRESS:PORT, of the remote for phones and tablets; a port alone: of "
                       "this machine only; on a network encrypted");
+  command->add_option("--serve-show", options->serve_show, "a projector that shows the remote's QR code and PIN (role work) for "
+                      "the first 60 s");
   command->add_flag("!--no-refill", options->refill, "leave light that is lost to somebody's shadow lost");
   command->add_option("--extrapolate", options->extrapolate_s, "seconds for which unseen markers are carried on")
       ->capture_default_str();

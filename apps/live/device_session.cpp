@@ -126,7 +126,7 @@ class DeviceLoop {
       device::Display* display = devices_->projectors[i].get();
       if (!display) continue;
       const Stamp begun = now();
-      const Result<Stamp> shown_at = display->show(painted.projectors[i]);
+      const Result<Stamp> shown_at = display->show(server_ ? server_->lit(session_, i) : painted.projectors[i]);
       if (!shown_at) {
         health_->fails(projectors_[i], shown_at.message());
         continue;

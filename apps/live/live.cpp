@@ -49,6 +49,8 @@ Status check_options(const LiveOptions& options) {
     return usage_error("--devices: expected --rig and --scene with it, found neither.");
   if (!options.devices.empty() && (!options.world.empty() || !options.script.empty()))
     return usage_error("--devices: expected no --world and --script with it, which are of the virtual rig.");
+  if (!options.serve_show.empty() && options.serve.empty())
+    return usage_error("--serve-show: expected --serve with it, found none.");
   if (options.rig.empty() != options.scene.empty())
     return usage_error(
         "expected --rig and --scene together, found one of them. Without both the session is in a "
@@ -133,12 +135,24 @@ Status set_up(const LiveOptions& options, SessionSetup* setup) {
 // The remote; null without one.
 Result<std::unique_ptr<Server>> served(const LiveOptions& options, const SessionSetup& setup) {
   if (options.serve.empty()) return std::unique_ptr<Server>();
+  const auto is_named = [&](const Imager& projector) { return projector.name == options.serve_show; };
+  if (!options.serve_show.empty() &&
+      std::none_of(setup.rig.projectors.begin(), setup.rig.projectors.end(), is_named)) {
+    std::string names;
+    for (const Imager& projector : setup.rig.projectors)
+      names += (names.empty() ? "" : ", ") + projector.name;
+    return usage_error("--serve-show: expected a projector of the rig ({}), found '{}'.", names,
+                       options.serve_show);
+  }
   ServeOptions serve;
   serve.at = options.serve;
   LIMN_TRY(const fs::path own, own_folder());
   auto onlooker = Onlooker::create(setup, own / "lenses");
   if (!onlooker) log_warning("live: the remote shows no live pictures: {}", onlooker.message());
-  return Server::open(serve, onlooker ? eyes_of(std::move(*onlooker)) : Eyes{});
+  LIMN_TRY(std::unique_ptr<Server> server,
+           Server::open(serve, onlooker ? eyes_of(std::move(*onlooker)) : Eyes{}));
+  if (!options.serve_show.empty()) server->show_code(options.serve_show, Role::work);
+  return server;
 }
 
 Session::Drawing drawing_in(std::optional<device::GlContext>* context) {
@@ -180,7 +194,7 @@ Status play_in_virtual_room(const LiveOptions& options) {
   if (options.window) {
     LIMN_TRY(const device::Desktop desktop, device::Desktop::open());
     LIMN_TRY(desk, OperatorDesk::open(desktop, setup.scene));
-    if (server) desk->invite(server->invitation());
+    if (server) desk->invite(server.get());
   }
   LIMN_TRY_STATUS(play_virtually(end_s, g_is_ended, &rig, &room, &watcher, &session, &books,
                                  desk ? &*desk : nullptr, &osc, server.get()));
@@ -247,7 +261,7 @@ Status play_with_devices(const LiveOptions& options) {
   std::optional<OperatorDesk> desk;
   if (options.window) {
     LIMN_TRY(desk, OperatorDesk::open(*desktop, setup.scene));
-    if (server) desk->invite(server->invitation());
+    if (server) desk->invite(server.get());
   }
   LIMN_TRY_STATUS(play_on_devices(&open, options.seconds, g_is_ended, &watcher, &session, &books,
                                   desk ? &*desk : nullptr, &osc, server.get()));

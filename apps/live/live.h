@@ -26,6 +26,7 @@ struct LiveOptions {
   std::string osc;             ///< PORT or ADDRESS:PORT where other programs are heard; empty: not
   std::string osc_to;          ///< HOST:PORT that is told what changes; empty: nobody
   std::string serve;           ///< PORT or ADDRESS:PORT of the remote (docs/remote.md); empty: none
+  std::string serve_show;      ///< projector that shows the remote's code at first; empty: none
   bool json = false;
 };
 

@@ -76,6 +76,11 @@ Result<OperatorDesk> OperatorDesk::open(const device::Desktop& desktop, const sc
   return OperatorDesk(std::move(window), scene);
 }
 
+void OperatorDesk::invite(Server* server) {
+  server_ = server;
+  remote_ = apps::shown(server->invitation());
+}
+
 void OperatorDesk::shown(const ShownFrame& frame) {
   recent_.push_back(frame);
   if (recent_.size() > k_recent) recent_.pop_front();
@@ -101,6 +106,9 @@ bool OperatorDesk::serve(
   OperatorAsked asked;
   window_.draw([&](Gui& gui) { asked = panel_.draw(gui, view); });
   for (const scene::Edit& wanted : asked.edits) edit(wanted, "operator");
+  if (asked.code && server_)
+    for (const Role role : {Role::look, Role::work, Role::operate})
+      if (name_of(role) == asked.code->role) server_->show_code(asked.code->projector, role);
   return !asked.ends && window_.is_wanted();
 }
 
@@ -123,6 +131,7 @@ OperatorView OperatorDesk::view_of(const Session& session,
        waiting_markers(session.setup().scene, session.staging(), session.watched()))
     view.waiting.push_back(loose.marker.text());
   view.remote = remote_;
+  if (view.remote) view.remote->projector = server_->code_projector();
   view.windows = {session.windows().begin(), session.windows().end()};
   view.follows = session.painted().follows;
   view.recent = {recent_.begin(), recent_.end()};

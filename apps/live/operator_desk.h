@@ -26,8 +26,8 @@ class OperatorDesk {
  public:
   static Result<OperatorDesk> open(const device::Desktop& desktop, const scene::Scene& scene);
 
-  /// From now on the window says how guests come in.
-  void invite(const Invitation& invitation) { remote_ = apps::shown(invitation); }
+  /// From now on the window says how guests come in. The server outlives this.
+  void invite(Server* server);
 
   /// A picture was shown.
   void shown(const ShownFrame& frame);
@@ -49,6 +49,7 @@ class OperatorDesk {
   GuiWindow window_;
   OperatorPanel panel_;
   Keys keys_;
+  Server* server_ = nullptr;
   std::optional<OperatorView::Remote> remote_;
   std::deque<ShownFrame> recent_;
   cv::Mat screen_;

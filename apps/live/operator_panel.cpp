@@ -334,6 +334,14 @@ void OperatorPanel::draw_remote(Gui& gui, const OperatorView& view, ImVec2 size)
     if (toggle(fmt::format("{}   {}", remote.entrances[i].pin, remote.entrances[i].role),
                &remote.entrances[i] == &chosen, colour::k_blue, {12 * gui.em(), 1.9F * gui.em()}))
       entrance_ = i;
+  if (!view.projectors.empty()) {
+    ImGui::Dummy({0, 0.4F * gui.em()});
+    ImGui::TextDisabled("For 60 s in the light of");
+    for (const OperatorView::Picture& projector : view.projectors)
+      if (toggle(projector.name, projector.name == remote.projector, colour::k_warn,
+                 {12 * gui.em(), 1.9F * gui.em()}))
+        asked_.code = {projector.name, chosen.role};
+  }
   if (!remote.fingerprint.empty()) {
     ImGui::Dummy({0, 0.4F * gui.em()});
     ImGui::TextDisabled("SHA-256 of the certificate");

@@ -54,6 +54,7 @@ struct OperatorView {
     std::string url;
     std::string fingerprint;  ///< of the certificate; empty without
     std::vector<Entrance> entrances;
+    std::string projector = {};  ///< that shows a code; empty: none
   };
   double at_s = 0;  ///< of the session's clock, since it began
   std::vector<Picture> cameras, projectors;
@@ -72,8 +73,12 @@ struct OperatorView {
 
 /// What a person asked for.
 struct OperatorAsked {
+  struct Code {
+    std::string projector, role;
+  };
   std::vector<scene::Edit> edits;
-  bool ends = false;  ///< the session
+  std::optional<Code> code = {};  ///< that a projector is to show
+  bool ends = false;              ///< the session
 };
 
 }  // namespace limn::apps

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 
 #include "apps/camera_encoding.h"
@@ -187,6 +188,13 @@ const Painted& Painter::paint(const Watched& watched,
   }
   shown_.add(painted_.projectors, shown_at);
   return painted_;
+}
+
+cv::Mat Painter::free_surface(std::size_t projector) {
+  cv::Mat points = renderer_.surface_points(projector, painted_.posed);
+  points.setTo(cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()),
+               tracker::marker_mask(rig_.projectors[projector], bodies_, painted_.tracks));
+  return points;
 }
 
 cv::Mat Painter::screen(const Watched& watched, const scene::Staging& staging) {

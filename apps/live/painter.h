@@ -82,6 +82,10 @@ class Painter {
   /// first frame and for Screen::off.
   cv::Mat screen(const Watched& watched, const scene::Staging& staging);
 
+  /// The prototype's point (its own frame, m) that each pixel of a projector lights, CV_32FC3, as painted
+  /// last; NaN where none, and on markers.
+  cv::Mat free_surface(std::size_t projector);
+
   /// What was painted last.
   const Painted& painted() const { return painted_; }
   /// A device that was nudged.

@@ -393,6 +393,10 @@ ShownFrame Session::measured() const {
   return out;
 }
 
+cv::Mat Session::free_surface(std::size_t projector) {
+  return painter_ && painted_.posed.world_from_prototype ? painter_->free_surface(projector) : cv::Mat();
+}
+
 cv::Mat Session::screen() { return painter_ ? painter_->screen(watched_, staging_) : cv::Mat(); }
 
 }  // namespace limn::apps

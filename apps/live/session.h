@@ -71,6 +71,8 @@ class Session {
   /// The projectors' pictures for a moment to come.
   const Painted& paint(Stamp now, Stamp shown_at);
   cv::Mat screen();
+  /// As of Painter; empty while there is nothing to draw with, or no prototype is seen.
+  cv::Mat free_surface(std::size_t projector);
 
   /// What was painted last.
   const Painted& painted() const { return painted_; }

@@ -97,7 +97,7 @@ class VirtualLoop {
     const Painted& painted = session_->paint(rig_->now(), shifted(rig_->now(), k_virtual_display_s));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i) {
       if (!is_plugged(session_->setup().rig.projectors[i].name, projectors_[i], rig_->now())) continue;
-      LIMN_TRY(const Stamp shown_at, rig_->projector(static_cast<int>(i)).show(painted.projectors[i]));
+      LIMN_TRY(const Stamp shown_at, rig_->projector(static_cast<int>(i)).show(lit(painted, i)));
       LIMN_CHECK(shown_at == painted.shown_at);
     }
     if (osc_) osc_->tell(*session_);
@@ -119,6 +119,10 @@ class VirtualLoop {
   void serve() {
     server_->hear(session_, rig_->now());
     server_->tell(*session_, books_->telemetry(), health_, rig_->now());
+  }
+
+  cv::Mat lit(const Painted& painted, std::size_t projector) {
+    return server_ ? server_->lit(session_, projector) : painted.projectors[projector];
   }
 
   std::vector<Frame> exposed(Stamp at) {

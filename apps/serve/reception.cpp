@@ -63,6 +63,7 @@ std::string assembly_of(const scene::Scene& scene, const scene::Look& look) {
   return placed.empty() ? "" : scene::glb(placed);
 }
 
+const std::string k_hidden = "A code for other guests is in the light. The room comes back in a minute.";
 const std::string k_late = "the session did not answer in time.";
 
 std::string may_not(const Guests::Guest& guest, const std::string& what, Role role) {
@@ -189,7 +190,17 @@ void Reception::get_state(const Asked&, Answering answering) {
 
 void Reception::get_actions(const Asked&, Answering answering) { answering(json_answer(actions_json())); }
 
-void Reception::get_room(const Asked&, Answering answering) {
+void Reception::hide_room(Role role, Clock::time_point until) {
+  const bool is_hidden = Clock::now() < hidden_.second;
+  hidden_ = {is_hidden ? std::max(role, hidden_.first) : role, std::max(until, hidden_.second)};
+}
+
+bool Reception::may_see_room(const Guests::Guest& guest) const {
+  return guest.role >= hidden_.first || Clock::now() >= hidden_.second;
+}
+
+void Reception::get_room(const Asked& asked, Answering answering) {
+  if (!may_see_room(asked.guest)) return answering(refusal(k_unavailable, k_hidden));
   if (!setup_.eyes.room) return answering(refusal(k_unavailable, "this session has no live composite."));
   setup_.eyes.room([answering = std::move(answering)](const Eyes::Seen& seen) {
     answering(seen.jpeg.empty() ? refusal(k_absent, "no camera's picture has come yet.")
@@ -507,7 +518,11 @@ void Reception::room_came(Eyes::Seen seen) {
   for (const auto& visitor : visitors_) {
     if (!visitor->wants_room || visitor->room_in_flight || visitor->room_sent == room_number_) continue;
     visitor->room_in_flight = visitor->room_sent = room_number_;
-    visitor->outbox.show(PictureKind::room, room_message_);
+    const bool may_see = may_see_room(visitor->guest);
+    visitor->outbox.show(PictureKind::room,
+                         may_see ? room_message_
+                                 : std::make_shared<const std::string>(picture_message(
+                                       PictureKind::room, room_number_, dumped({{"why", k_hidden}}), {})));
     visitor->wake();
   }
 }

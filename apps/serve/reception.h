@@ -92,6 +92,9 @@ class Reception {
   void hear_bytes(const std::shared_ptr<Visitor>& visitor, std::span<const std::uint8_t> bytes);
   void gone(const std::shared_ptr<Visitor>& visitor);
 
+  /// Guests of lesser roles see no picture of the room until then.
+  void hide_room(Role role, Clock::time_point until);
+
   void take(SessionNews news);
   /// Some ten times a second: what time brings.
   void tick(Clock::time_point now);
@@ -149,6 +152,7 @@ class Reception {
   void looked(const std::shared_ptr<Visitor>& visitor, std::uint32_t number, const Eyes::Seen& seen);
   void ask_for_room(Clock::time_point now);
   void room_came(Eyes::Seen seen);
+  bool may_see_room(const Guests::Guest& guest) const;
   void publish();
 
   struct Waiting {
@@ -176,6 +180,7 @@ class Reception {
   Eyes::Seen room_;
   std::shared_ptr<const std::string> room_message_;
   std::uint32_t room_number_ = 0;
+  std::pair<Role, Clock::time_point> hidden_{Role::look, Clock::time_point::min()};
   std::shared_ptr<std::map<std::string, Encoded>> encoded_;  // of projectors; the backroom's alone
   std::shared_ptr<PartPictures> part_pictures_;              // likewise
 };

@@ -1,6 +1,8 @@
 #include "apps/serve/server.h"
 
 #include <algorithm>
+#include <limits>
+#include <opencv2/imgproc.hpp>
 
 #include "apps/serve/own_addresses.h"
 #include "core/log.h"
@@ -11,6 +13,16 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::chrono::milliseconds k_between_news{50}, k_between_unwatched{1000}, k_longest_hearing{5};
+
+constexpr std::chrono::seconds k_cameras_late{2};  // after which no picture shows a code any more
+constexpr double k_code_share = 0.5;               // of a projector's shorter side, without a prototype
+constexpr std::chrono::milliseconds k_between_searches{300}, k_longest_search{2000};
+constexpr int k_pin_px = 360;            // a PIN's sign, as it is kept
+constexpr double k_least_pin_px = 50;    // in the projector's picture
+constexpr int k_dark = 8;                // display value
+constexpr int k_module_px = 12;          // of the code, as it is kept
+constexpr double k_least_module_px = 2;  // of the projector's picture, that a phone still reads
+constexpr double k_code_light = 0.75;    // display value: white paper would outshine all else
 
 bool is_late(const Wish& wish, std::chrono::steady_clock::time_point now) {
   return now - wish.since >= k_longest_wish;
@@ -50,6 +62,30 @@ Result<std::optional<Certificate>> certificate_for(const ServeOptions& options, 
   return std::optional(std::move(made));
 }
 
+// Where the prototype is free of markers and, if there is room, of parts.
+std::optional<SignPlace> free_place(Session* session,
+                                    std::size_t projector,
+                                    cv::Size shape,
+                                    double least_px) {
+  cv::Mat points = session->free_surface(projector);
+  if (points.empty() || shape.empty()) return std::nullopt;
+  const Rig& rig = session->setup().rig;
+  const Imager& imager = rig.projectors[projector];
+  const Pose& world_from_prototype = *session->painted().posed.world_from_prototype;
+  const Eigen::Vector3d d_up_world =
+      (rig.cameras.empty() ? imager : rig.cameras[0]).imager_from_world.rotation.inverse() *
+      Eigen::Vector3d(0, -1, 0);
+  const auto place = [&](const cv::Mat& free) {
+    return sign_place(imager, world_from_prototype, free,
+                      world_from_prototype.rotation.inverse() * d_up_world, shape, least_px);
+  };
+  cv::Mat parts, free = points.clone();
+  cv::cvtColor(session->painted().projectors[projector], parts, cv::COLOR_BGR2GRAY);
+  free.setTo(cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()), parts > k_dark);
+  const auto beside = place(free);
+  return beside ? beside : place(points);
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, Eyes eyes) {
@@ -67,6 +103,7 @@ Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, Eyes e
   std::unique_ptr<Server> out(new Server());
   out->network_ = std::move(*network);
   out->know_ = eyes.know;
+  out->code_lasts_ = options.code_lasts;
   Server* server = out.get();
   out->reception_ = std::make_unique<Reception>(Reception::Setup{
       .is_encrypted = certificate->has_value(),
@@ -134,6 +171,64 @@ void Server::hear(Session* session, Stamp at) {
     const Status done = session->edit(wish->edit, wish->who, at);
     outcomes_.push_back({wish->number, done ? "" : done.message()});
   }
+}
+
+void Server::show_code(const std::string& projector, Role role) {
+  code_ = {};
+  code_.projector = projector;
+  code_.role = role;
+  log_info("live: {} shows the code of the remote for {}", projector, name_of(role));
+}
+
+// The code begins with a place for it; after a while without one, too: the prototype may not be seen.
+bool Server::has_code_begun(Session* session, std::size_t projector) {
+  if (code_.until) return true;
+  const auto now = Clock::now();
+  const std::string& pin = invitation_.pins[static_cast<std::size_t>(code_.role)];
+  if (!code_.asked) {
+    code_.asked = now;
+    code_.sign =
+        k_code_light * code_sign(invitation_.url_for(code_.role), pin, name_of(code_.role), k_module_px);
+  }
+  if (code_.searched && now - *code_.searched < k_between_searches) return false;
+  code_.searched = now;
+  code_.place =
+      free_place(session, projector, code_.sign.size(), k_least_module_px * code_.sign.cols / k_module_px);
+  if (!code_.place && now - *code_.asked < k_longest_search) return false;
+  if (!code_.place) {
+    const cv::Mat smaller = k_code_light * pin_sign(pin, name_of(code_.role), k_pin_px);
+    code_.place = free_place(session, projector, smaller.size(), k_least_pin_px);
+    if (code_.place) code_.sign = smaller;
+  }
+  code_.until = now + code_lasts_;
+  network_->post([this, role = code_.role, until = *code_.until + k_cameras_late] {
+    reception_->hide_room(role, until);
+  });
+  return true;
+}
+
+cv::Mat Server::lit(Session* session, std::size_t projector) {
+  const Painted& painted = session->painted();
+  const cv::Mat& picture = painted.projectors[projector];
+  const Imager& imager = session->setup().rig.projectors[projector];
+  if (imager.name != code_.projector || session->staging().blackout) return picture;
+  if (!has_code_begun(session, projector)) return picture;
+  if (Clock::now() >= *code_.until) code_ = {};
+  if (code_.sign.empty()) return picture;
+  cv::Mat out = picture.clone();
+  if (code_.place) {
+    if (painted.posed.world_from_prototype)
+      draw_sign(code_.sign, *code_.place, imager, *painted.posed.world_from_prototype, &out);
+    return out;
+  }
+  const int module_px =
+      static_cast<int>(k_code_share * std::min(out.cols, out.rows) * k_module_px / code_.sign.cols);
+  if (module_px < 1) return picture;
+  cv::Mat plain;
+  cv::resize(code_.sign, plain, {}, 1.0 * module_px / k_module_px, 1.0 * module_px / k_module_px,
+             cv::INTER_AREA);
+  plain.copyTo(out(cv::Rect({(out.cols - plain.cols) / 2, (out.rows - plain.rows) / 2}, plain.size())));
+  return out;
 }
 
 void Server::tell(const Session& session, const Telemetry& telemetry, const DeviceHealth& health, Stamp at) {

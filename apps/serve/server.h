@@ -16,6 +16,7 @@
 #include "apps/live/session.h"
 #include "apps/live/telemetry.h"
 #include "apps/serve/backroom.h"
+#include "apps/serve/code_sign.h"
 #include "apps/serve/eyes.h"
 #include "apps/serve/network.h"
 #include "apps/serve/reception.h"
@@ -29,6 +30,7 @@ struct ServeOptions {
   std::filesystem::path keys;     ///< of the certificate; empty: Limn's own folder
   bool always_encrypted = false;  ///< TLS on the loopback, too
   NetworkLimits limits = {};
+  std::chrono::milliseconds code_lasts{60000};  ///< in a projector's light
 };
 
 /// What people are to know who want to come in.
@@ -57,6 +59,16 @@ class Server {
   /// Lets guests know: at once after an edit, else twenty times a second, and once a second while there are
   /// none.
   void tell(const Session& session, const Telemetry& telemetry, const DeviceHealth& health, Stamp at);
+  /// From its next picture on a projector shows the code that pairs for a role, for ServeOptions::code_lasts;
+  /// no other one does then. Guests of lesser roles see no pictures of the room meanwhile, since its cameras
+  /// see the code.
+  void show_code(const std::string& projector, Role role);
+  /// Who shows it; empty: nobody.
+  const std::string& code_projector() const { return code_.projector; }
+  /// What a projector of the session's rig is to give: what was painted, and the code on the largest flat and
+  /// free piece of the prototype (in the picture's middle, where there is none). Not under a blackout. What
+  /// guests and recordings get is what was painted.
+  cv::Mat lit(Session* session, std::size_t projector);
   /// Says goodbye to all, lets go of the eyes and ends the threads.
   void stop();
 
@@ -69,6 +81,16 @@ class Server {
   using Clock = std::chrono::steady_clock;
   Server() = default;
   std::optional<Wish> next_wish();
+  bool has_code_begun(Session* session, std::size_t projector);
+
+  // In a projector's light.
+  struct Code {
+    std::string projector;
+    Role role = Role::look;
+    std::optional<Clock::time_point> asked, searched, until;  // none before the first picture
+    cv::Mat sign;
+    std::optional<SignPlace> place;  // on the prototype
+  };
 
   Invitation invitation_;
   Backroom backroom_;
@@ -86,6 +108,8 @@ class Server {
   std::function<void(const Session&)> know_;
   std::shared_ptr<const scene::Scene> scene_;
   int scenes_ = 0;
+  Code code_;
+  std::chrono::milliseconds code_lasts_{};
   std::optional<Clock::time_point> told_at_;
   std::optional<Stamp> begun_at_;
   std::size_t told_edits_ = 0;

@@ -223,6 +223,25 @@ TEST(OperatorPanel, InvitesGuestsByACodeOrByPin) {
   canvas.draw(draw);
   canvas.keep("operator-remote-operate");
   EXPECT_TRUE(shows_code(canvas.picture(), page + "345678"));
+
+  // Below: a projector that shows the code, and whose eye view parts are drawn for.
+  view.windows = {"Ann", "Ben"};
+  view.staging.viewer = "Ann";
+  view.follows = "Ann";
+  view.remote->projector = view.projectors[0].name;
+  for (int i = 0; i < 2; ++i) canvas.draw(draw);
+  canvas.keep("operator-remote-viewers");
+  std::set<std::string> asked;
+  for (int y = 280; y < 900; y += 18)
+    canvas.click({800, static_cast<float>(y)}, [&](Gui& gui) {
+      const OperatorAsked now = panel.draw(gui, view);
+      for (const scene::Edit& edit : now.edits) asked.insert(edit.action + " " + edit.value);
+      if (now.code) asked.insert("code " + now.code->role + " " + now.code->projector);
+    });
+  EXPECT_TRUE(asked.contains("viewer ")) << "the scene's own";
+  EXPECT_TRUE(asked.contains("viewer Ann"));
+  EXPECT_TRUE(asked.contains("viewer Ben"));
+  EXPECT_TRUE(asked.contains("code operate " + view.projectors[0].name));
 }
 
 TEST(OperatorPanel, AsksBeforeItEnds) {

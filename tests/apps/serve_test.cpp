@@ -9,11 +9,13 @@
 #include <csignal>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgproc.hpp>
 #include <thread>
 
 #include "apps/coarser.h"
 #include "apps/live/live.h"
 #include "apps/live/replay.h"
+#include "apps/serve/code_sign.h"
 #include "apps/serve/own_addresses.h"
 #include "apps/serve/server.h"
 #include "apps/world_markers.h"
@@ -789,6 +791,65 @@ TEST_F(AServedSession, GivesPicturesAndAssemblies) {
 }
 
 // What the loop pays for guests, of its time between two pictures.
+// A code in a projector's light is for those who stand there.
+TEST_F(AServedSession, ProjectsACodeForAWhile) {
+  ServeOptions options;
+  options.code_lasts = 1500ms;
+  open(options, eyes_that_echo());
+  session_->paint(at_, at_);
+  const cv::Mat painted = session_->painted().projectors[0].clone();
+  const auto is_painted = [&](const cv::Mat& lit) { return cv::norm(lit, painted, cv::NORM_INF) == 0; };
+  EXPECT_TRUE(is_painted(server_->lit(&*session_, 0)));
+  server_->show_code("projector0", Role::work);
+  EXPECT_EQ(server_->code_projector(), "projector0");
+  ASSERT_TRUE(session_->edit({"blackout", "", "on"}, "test", at_));
+  EXPECT_TRUE(is_painted(server_->lit(&*session_, 0))) << "under a blackout";
+  ASSERT_TRUE(session_->edit({"blackout", "", "off"}, "test", at_));
+  // No prototype is seen: after a while it is in the picture's middle.
+  cv::Mat lit = server_->lit(&*session_, 0);
+  EXPECT_TRUE(is_painted(lit));
+  for (const auto asked = Clock::now(); is_painted(lit) && seconds_since(asked) < 5;) {
+    std::this_thread::sleep_for(50ms);
+    lit = server_->lit(&*session_, 0);
+  }
+  const auto begun = Clock::now();
+  cv::Mat sign;
+  cv::resize(0.75 * code_sign(server_->invitation().url_for(Role::work), pin(Role::work), "work", 12), sign,
+             {}, 1.0 / 6, 1.0 / 6, cv::INTER_AREA);
+  const cv::Rect middle({(lit.cols - sign.cols) / 2, (lit.rows - sign.rows) / 2}, sign.size());
+  EXPECT_LE(cv::norm(lit(middle), sign, cv::NORM_INF), 1);
+  EXPECT_TRUE(is_painted(session_->painted().projectors[0])) << "what is recorded and told";
+  EXPECT_EQ(cv::norm(server_->lit(&*session_, 1), session_->painted().projectors[1], cv::NORM_INF), 0);
+  play_while([&] {
+    const std::string looks = token_of(Role::look, "Ben"), works = token_of(Role::work, "Ann");
+    std::this_thread::sleep_for(100ms);
+    const auto hidden = client()->get("/picture/room.jpg", looks);
+    EXPECT_EQ(hidden.status, 503);
+    EXPECT_NE(hidden.body.find("A code for other guests"), std::string::npos) << hidden.body;
+    EXPECT_EQ(client()->get("/picture/room.jpg", works).status, 200);
+    const auto projector = client()->get("/picture/projector/projector0.jpg", looks);
+    ASSERT_EQ(projector.status, 200);
+    const cv::Mat told = device::decode_jpeg({reinterpret_cast<const std::uint8_t*>(projector.body.data()),
+                                              projector.body.size()})
+                             .value();
+    EXPECT_LT(cv::norm(told, painted, cv::NORM_L1) / static_cast<double>(told.total()), 3) << "of 255 levels";
+    for (const auto& [token, bytes] : {std::pair{looks, 0}, {works, 3}}) {
+      const auto socket = client();
+      ASSERT_EQ(socket->upgrade(token).status, 101);
+      socket->send_text(R"({"type": "pictures", "room": true})");
+      auto message = socket->message();
+      while (message && message->is_text) message = socket->message();
+      ASSERT_TRUE(message.has_value());
+      const std::size_t length = number_at(message->bytes, 8);
+      EXPECT_EQ(message->bytes.size(), 12 + length + static_cast<std::size_t>(bytes));
+    }
+  });
+  EXPECT_LT(seconds_since(begun), 1.4) << "too slow a machine for this test";
+  std::this_thread::sleep_for(1500ms);
+  EXPECT_TRUE(is_painted(server_->lit(&*session_, 0)));
+  EXPECT_EQ(server_->code_projector(), "");
+}
+
 TEST_F(AServedSession, CostsTheSessionLittle) {
   const auto cost_us = [&] {
     double spent_s = 0;

@@ -321,7 +321,7 @@ TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
 // do.
 TEST(Tablet, AWindowShowsWhatItsGuestChoseAndTheSessionsSplit) {
   const fs::path folder = test::test_folder();
-  Room room(folder / "lenses");
+  Room room(folder / "lenses", 0.25);
   Session& session = room.session();
   const auto edit = [&](const char* action, const char* slot, const char* value) {
     const Status done = session.edit({action, slot, value}, "Ben", room.rig().now());
