@@ -279,8 +279,9 @@ function make_follow(session) {
   );
   button.show = (state) => {
     button.setAttribute("aria-checked", String(is_on(state)));
-    const waits = is_on(state) && state.follows !== state.viewer;
-    set_text(words, waits ? "waits for markers" : "view parts are drawn for this device");
+    const waits = state.follows !== state.viewer;
+    const on = waits ? "waits until this device sees markers" : "view parts are drawn for this device";
+    set_text(words, is_on(state) ? on : "have view parts drawn for this device");
   };
   return button;
 }
