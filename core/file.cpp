@@ -1,5 +1,6 @@
 #include "core/file.h"
 
+#include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -59,6 +60,16 @@ Status write_file(const fs::path& path, std::string_view content) {
     return write_error(path, code);
   }
   return {};
+}
+
+Status append_file(const fs::path& path, std::string_view content) {
+  const int fd = ::open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  if (fd < 0) return write_error(path, errno);
+  const off_t before = ::lseek(fd, 0, SEEK_END);
+  int code = write_all(fd, content);
+  if (code != 0 && before >= 0 && ::ftruncate(fd, before) != 0) code = errno;
+  if (::close(fd) != 0 && code == 0) code = errno;
+  return code == 0 ? Status() : Status(write_error(path, code));
 }
 
 Status make_folder(const fs::path& path) {

@@ -15,6 +15,9 @@ Result<std::string> read_file(const std::filesystem::path& path);
 /// A read-only folder or a full disk is an error that names it.
 Status write_file(const std::filesystem::path& path, std::string_view content);
 
+/// Writes at the file's end, all of it or nothing: what was there stays.
+Status append_file(const std::filesystem::path& path, std::string_view content);
+
 /// Makes the folder and its parents where absent and checks that it can be written.
 Status make_folder(const std::filesystem::path& path);
 

@@ -30,11 +30,8 @@ Result<Books> Books::open(const std::filesystem::path& out,
   Books books(std::move(telemetry));
   books.out_ = out;
   if (!out.empty()) {
-    books.poses_.open(out / "poses.csv");
-    if (!books.poses_)
-      return error("{}: expected a file that can be written, found none. Look at rights and space.",
-                   (out / "poses.csv").string());
-    books.poses_ << "shown_at_s,slot,variant,x_mm,y_mm,z_mm,qw,qx,qy,qz\n";
+    LIMN_TRY(books.poses_,
+             GrowingFile::create(out / "poses.csv", "shown_at_s,slot,variant,x_mm,y_mm,z_mm,qw,qx,qy,qz\n"));
   }
   if (!record.empty()) {
     LIMN_TRY(books.recorder_, Recorder::create(record, *setup));
@@ -48,6 +45,7 @@ Result<Books> Books::open(const std::filesystem::path& out,
 void Books::shown(const ShownFrame& frame, const Painted& painted) {
   telemetry_.add(frame);
   if (poses_.is_open()) add_poses(painted);
+  if (const auto news = poses_.news()) telemetry_.note(painted.shown_at, *news);
   if (!recorder_ || told_of_recording_) return;
   const auto ended = recorder_->ended();
   if (!ended) return;
@@ -65,13 +63,15 @@ void Books::add_poses(const Painted& painted) {
     const Pose pose = from_world * part.world_from_part;
     const Eigen::Vector3d mm = 1e3 * pose.translation;
     const Eigen::Quaterniond& q = pose.rotation;
-    poses_ << fmt::format("{:.6f},{},{},{:.4f},{:.4f},{:.4f},{:.8f},{:.8f},{:.8f},{:.8f}\n",
-                          seconds_of(painted.shown_at), part.slot, part.variant, mm.x(), mm.y(), mm.z(),
-                          q.w(), q.x(), q.y(), q.z());
+    poses_.add(fmt::format("{:.6f},{},{},{:.4f},{:.4f},{:.4f},{:.8f},{:.8f},{:.8f},{:.8f}\n",
+                           seconds_of(painted.shown_at), part.slot, part.variant, mm.x(), mm.y(), mm.z(),
+                           q.w(), q.x(), q.y(), q.z()),
+               painted.shown_at);
   }
 }
 
 Status Books::close(Session* session, bool as_json) {
+  poses_.flush();
   const Status recorded = recorder_ ? recorder_->finish() : Status();
   nlohmann::ordered_json json = {{"schema", "limn.live/1"}};
   json.update(telemetry_.summary());

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <filesystem>
-#include <fstream>
 #include <memory>
 
+#include "apps/live/growing_file.h"
 #include "apps/live/recording.h"
 #include "apps/live/session.h"
 #include "apps/live/telemetry.h"
@@ -35,7 +35,7 @@ class Books {
 
   std::filesystem::path out_;
   Telemetry telemetry_;
-  std::ofstream poses_;
+  GrowingFile poses_;
   std::unique_ptr<Recorder> recorder_;
   bool told_of_recording_ = false;
 };

@@ -85,12 +85,10 @@ Result<Telemetry> Telemetry::create(const std::filesystem::path& folder) {
   Telemetry out;
   if (folder.empty()) return out;
   LIMN_TRY_STATUS(make_folder(folder));
-  out.csv_.open(folder / "telemetry.csv");
-  if (!out.csv_)
-    return error("{}: expected a file that can be written, found none. Look at rights and space.",
-                 (folder / "telemetry.csv").string());
-  out.csv_ << "captured_at_s,shown_at_s,latency_ms,detect_ms,filter_ms,paint_ms,screen_ms,record_ms,markers,"
-              "lost,missed,placement_mm\n";
+  LIMN_TRY(out.csv_,
+           GrowingFile::create(folder / "telemetry.csv",
+                               "captured_at_s,shown_at_s,latency_ms,detect_ms,filter_ms,paint_ms,screen_ms,"
+                               "record_ms,markers,lost,missed,placement_mm\n"));
   return out;
 }
 
@@ -104,11 +102,13 @@ void Telemetry::add(const ShownFrame& frame) {
                            frame.record_ms, latency_ms,      frame.placement_mm};
   for (std::size_t i = 0; i < measures_.size(); ++i) measures_[i].all.add(values[i]);
   add_to_slice(frame, latency_ms);
-  if (csv_.is_open())
-    csv_ << fmt::format("{:.6f},{:.6f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{},{},{},{:.4f}\n",
-                        seconds_between(Stamp{}, frame.captured_at), seconds_between(Stamp{}, frame.shown_at),
-                        latency_ms, frame.detect_ms, frame.filter_ms, frame.paint_ms, frame.screen_ms,
-                        frame.record_ms, frame.markers, frame.lost, frame.missed, frame.placement_mm);
+  if (!csv_.is_open()) return;
+  csv_.add(fmt::format("{:.6f},{:.6f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{},{},{},{:.4f}\n",
+                       seconds_between(Stamp{}, frame.captured_at), seconds_between(Stamp{}, frame.shown_at),
+                       latency_ms, frame.detect_ms, frame.filter_ms, frame.paint_ms, frame.screen_ms,
+                       frame.record_ms, frame.markers, frame.lost, frame.missed, frame.placement_mm),
+           frame.shown_at);
+  if (const auto news = csv_.news()) note(frame.shown_at, *news);
 }
 
 // When there are too many slices, two become one.

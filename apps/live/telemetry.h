@@ -2,11 +2,11 @@
 
 #include <array>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
+#include "apps/live/growing_file.h"
 #include "core/frame.h"
 #include "core/result.h"
 
@@ -70,7 +70,7 @@ class Telemetry {
   std::vector<Slice> slices_;
   double slice_s_ = 0.5;
   std::vector<std::pair<double, std::string>> notes_;
-  std::ofstream csv_;
+  GrowingFile csv_;
   Stamp begun_at_, last_at_;
   std::size_t frames_ = 0, missed_ = 0, with_lost_ = 0;
 };

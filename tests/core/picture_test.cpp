@@ -1,14 +1,13 @@
 #include "core/picture.h"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
-#include <csignal>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/file.h"
 #include "tests/support/matchers.h"
+#include "tests/support/small_disk.h"
 
 namespace limn {
 namespace {
@@ -92,18 +91,13 @@ TEST(File, AMissingFolderIsToldAndWritingReplacesWhole) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1) << "no temporary file is left";
 }
 
-// A limit on file sizes makes write() fail half way, as a full disk does.
 TEST(File, AWriteThatFailsHalfWayKeepsTheOldFile) {
   const auto folder = test::test_folder();
   ASSERT_TRUE(write_file(folder / "a.txt", "old"));
-  rlimit before{};
-  getrlimit(RLIMIT_FSIZE, &before);
-  rlimit small = before;
-  small.rlim_cur = 1000;
-  std::signal(SIGXFSZ, SIG_IGN);
-  setrlimit(RLIMIT_FSIZE, &small);
-  const Status status = write_file(folder / "a.txt", std::string(5000, 'x'));
-  setrlimit(RLIMIT_FSIZE, &before);
+  const Status status = [&] {
+    const test::SmallDisk full(1000);
+    return write_file(folder / "a.txt", std::string(5000, 'x'));
+  }();
   ASSERT_FALSE(status);
   EXPECT_NE(status.message().find("a.txt"), std::string::npos) << status.message();
   EXPECT_EQ(read_file(folder / "a.txt").value(), "old");
