@@ -22,8 +22,9 @@ constexpr int k_response_columns = 1025;
 constexpr int k_tangents_unit = 0, k_looks_unit = 1, k_response_unit = 2, k_centre_unit = 3,
               k_picture_unit = 4, k_sights_unit = 5, k_mixing_unit = 9, k_albedo_unit = 10,
               k_arriving_unit = 11, k_distances_unit = 12;
-constexpr int k_arriving_side = 256;   // texels of a projector's map of arriving light
-constexpr GLuint k_list_binding = 6;   // of buffers, after the scene's and the sights'
+constexpr int k_arriving_side = 256;  // texels of a projector's map of arriving light
+constexpr GLuint k_list_binding = 6;  // of buffers, after the scene's and the sights'
+constexpr GLuint k_hits_binding = 7;
 constexpr int k_each = 2, k_view = 3;  // overlays of parts treated each in its way, and of a virtual camera
 // Steps of light that ask for more samples: beside light, and between blacks.
 constexpr Smoothing k_light_edges, k_dark_edges{.samples = 16, .least_step = 0.0001};
@@ -161,7 +162,7 @@ struct Renderer::Impl {
     Program where, centre, edges;
   };
   LayerPrograms light_layer, parts_layer, view_layer;
-  GlName list;  // of pixels, shaders/listed.glsl
+  GlName list, listed_hits;  // of pixels, shaders/listed.glsl and listed_hits.glsl
   int list_room = 0;
   std::vector<GlName> responses;
   // Of the projectors' last pictures.
@@ -423,11 +424,13 @@ void Renderer::Impl::set_up_light(const Program& program, const scene::PosedScen
 void Renderer::Impl::start_list(int pixels) {
   if (list_room < pixels) {
     list = make_buffer(nullptr, sizeof(std::uint32_t) * (static_cast<std::size_t>(pixels) + 4));
+    listed_hits = make_buffer(nullptr, sizeof(std::uint32_t) * 4 * static_cast<std::size_t>(pixels));
     list_room = pixels;
   }
   const std::uint32_t head[] = {0, 0, 1, 1};
   glNamedBufferSubData(*list, 0, sizeof(head), head);
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_list_binding, *list);
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_hits_binding, *listed_hits);
   glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, *list);
 }
 

@@ -56,10 +56,9 @@ Surface surface_at(int i, vec3 p, Hit prototype) {
   return Surface(mat3(albedo.r, 0, 0, 0, albedo.g, 0, 0, 0, albedo.b), vec3(0));
 }
 
-// Light over black of projector i at a place of the prototype; outside 0 ... 1 where it cannot give what is wanted.
-// `colour` has a: 0 where nothing is to be shown.
-vec3 balanced(int i, vec4 colour, Place place, Hit prototype) {
-  Share share = share_of(i, place);
+// Light over black of projector i at a place of the prototype, its share there; outside 0 ... 1 where it cannot give what
+// is wanted. `colour` has a: 0 where nothing is to be shown.
+vec3 balanced(int i, vec4 colour, Share share, Place place, Hit prototype) {
   if (u_compensation == k_as_it_is && !u_even_black) return colour.rgb * share.share;
   if (share.share == 0.0) return vec3(0);
   vec3 light = vec3(0);

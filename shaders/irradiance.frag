@@ -13,6 +13,6 @@ void main() {
   Hit hit = first_hit(s_eye_ids, eye, 0, d);
   o_irradiance = 0.0;
   if (hit.id == 0u) return;
-  Reach reach = reach(u_projector, place_at(hit, d));
+  Reach reach = reach(u_projector, place_at(hit, d), false);
   if (reach.quality > 0.0) o_irradiance = reach.irradiance;
 }

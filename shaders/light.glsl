@@ -31,25 +31,60 @@ vec4 surface_colour(Place place, float footprint) {
   return hit.id == 0u ? vec4(0) : vec4(look_on_surface(hit, place.d_smooth, footprint), 1);
 }
 
-// rgb: light; a: coverage by what is to be lit.
-vec4 light_at(vec2 px) {
+// The share at a pixel's centre, good for samples of the pixel that meet the same smooth surface: there it changes by less
+// than what falls on either side evens out.
+struct CentreShare {
+  float t;      // m along the centre's ray; 0: none
+  vec3 d_flat;  // of the place there
+  Share share;
+};
+const CentreShare k_no_centre = CentreShare(0.0, vec3(0), Share(0.0, 0.0, 0.0, 0.0));
+
+// None where the ray meets nothing, and where black is to be even, which begins and ends within a pixel.
+CentreShare centre_share(vec2 px) {
   Sight projector = s_sights[u_projector];
   vec3 d = ray_of(projector, px);
+  if (u_even_black) return k_no_centre;
   Hit prototype = first_hit(s_projector_ids, projector, 0, d);
-  if (prototype.id == 0u) return vec4(0);
+  if (prototype.id == 0u) return k_no_centre;
+  Place place = place_at(prototype, d);
+  return CentreShare(prototype.t, place.d_flat, share_of(u_projector, place));
+}
+
+bool is_beside(CentreShare centre, Hit hit, Place place, float footprint) {
+  const float k_steepest = 4.0;    // m of depth a m across, 76 degrees
+  const float k_same_side = 0.99;  // cosine between triangles, 8 degrees
+  return abs(hit.t - centre.t) < k_steepest * footprint && dot(place.d_flat, centre.d_flat) > k_same_side;
+}
+
+// What the ray d of a pixel's sample meets is to be given: rgb: light; a: coverage by what is to be lit.
+vec4 light_on(Hit prototype, vec3 d, CentreShare centre) {
+  Sight projector = s_sights[u_projector];
   Place place = place_at(prototype, d);
   float footprint = prototype.t / projector.quality.x;
   vec4 colour = u_has_view_parts ? view_colour(place.p, place.d_flat, footprint) : vec4(0);
   if (colour.a == 0.0 && u_has_surface_parts) colour = surface_colour(place, footprint);
   if (colour.a == 0.0 && !u_even_black) return colour;
-  return vec4(balanced(u_projector, colour, place, prototype), 1);
+  Share share;
+  if (is_beside(centre, prototype, place, footprint))
+    share = centre.share;
+  else
+    share = share_of(u_projector, place);
+  return vec4(balanced(u_projector, colour, share, place, prototype), 1);
 }
 
-// False only where light_at is 0 for certain: no part is seen there from the viewer's eye, and none lies there.
-bool may_give_light(vec2 px) {
+vec4 light_at(vec2 px, CentreShare centre) {
   Sight projector = s_sights[u_projector];
   vec3 d = ray_of(projector, px);
   Hit prototype = first_hit(s_projector_ids, projector, 0, d);
+  return prototype.id == 0u ? vec4(0) : light_on(prototype, d, centre);
+}
+
+// False only where light_at is 0 for certain: no part is seen there from the viewer's eye, and none lies there.
+bool may_give_light(vec2 px, out Hit prototype) {
+  Sight projector = s_sights[u_projector];
+  vec3 d = ray_of(projector, px);
+  prototype = first_hit(s_projector_ids, projector, 0, d);
   if (prototype.id == 0u) return false;
   vec3 p = projector.p_eye.xyz + prototype.t * d;
   vec4 share;

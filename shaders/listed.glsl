@@ -8,10 +8,11 @@ layout(std430, binding = 6) buffer List {
   uint s_list[];  // row << 16 | column
 };
 
-void list_pixel(ivec2 at) {
+uint list_pixel(ivec2 at) {
   uint i = atomicAdd(s_list_count, 1u);
   s_list[i] = uint(at.y) << 16 | uint(at.x);
   atomicMax(s_list_groups[0], i / k_group + 1u);
+  return i;
 }
 
 ivec2 listed_pixel(uint i) { return ivec2(s_list[i] & 0xffffu, s_list[i] >> 16); }

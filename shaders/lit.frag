@@ -20,7 +20,7 @@ void main() {
   o_lit = vec4(place.p, 1);
   if (u_projector < 0) return;
   Sight projector = s_sights[u_projector];
-  Reach reach = reach(u_projector, place);
+  Reach reach = reach(u_projector, place, false);
   vec3 q = (projector.sight_from_scene * vec4(place.p, 1)).xyz;
   o_lit.xyz = reach.quality > 0.0 ? vec3(pixel_of(projector, q.xy / q.z), reach.irradiance) : vec3(0);
 }

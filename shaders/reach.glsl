@@ -59,7 +59,8 @@ struct Reach {
   float arriving;    // of its light on the way to p, 0 ... 1: the rest is in somebody's shadow
 };
 
-Reach reach(int j, Place place) {
+// `is_seen`: it is known that the prototype does not hide the place from it.
+Reach reach(int j, Place place, bool is_seen) {
   Sight projector = s_sights[j];
   vec3 to_eye = projector.p_eye.xyz - place.p;
   float distance_2 = dot(to_eye, to_eye);
@@ -73,7 +74,7 @@ Reach reach(int j, Place place) {
   Reach reach = Reach(0.0, cosine / distance_2 * max(gain, 0.05), 1.0);
   vec2 inside = min(px + 0.5, last - px);
   float border = min(inside.x, inside.y);
-  if (border < 0.0 || is_hidden(s_projector_ids, projector, place.p)) return reach;
+  if (border < 0.0 || (!is_seen && is_hidden(s_projector_ids, projector, place.p))) return reach;
   float soft = smoothstep(0.0, projector.quality.y, border);
   if (u_projector_count > 1) {
     vec2 texel = projector.focal_centre.xy * q.xy / q.z + projector.focal_centre.zw + 0.5;
@@ -88,12 +89,12 @@ Reach reach(int j, Place place) {
 
 bool is_reached(Place place) {
   for (int j = 0; j < u_projector_count; ++j) {
-    if (reach(j, place).quality > 0.0) return true;
+    if (reach(j, place, false).quality > 0.0) return true;
   }
   return false;
 }
 
-// What projector i is to give at a place.
+// What projector i is to give at a place that it sees.
 struct Share {
   float share;          // of the light there; what arrives of all that reach the place sums to one
   float irradiance;     // as Reach
@@ -112,7 +113,7 @@ Share share_of(int i, Place place) {
   float own = 0.0, sum = 0.0, own_quality = 0.0, quality = 0.0, own_blocked = 0.0, blocked = 0.0;
   Share share = Share(0.0, 0.0, 0.0, 0.0);
   for (int j = 0; j < u_projector_count; ++j) {
-    Reach reach = reach(j, place);
+    Reach reach = reach(j, place, j == i);
     bool is_reached = reach.quality > 0.0;
     float weight = reach.quality * pow(k_blocked, 1.0 - reach.arriving);
     sum += weight;
