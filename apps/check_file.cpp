@@ -215,6 +215,8 @@ const std::vector<CheckMeasure>& check_measures() {
       {"mask_iou", "on/off-surface masks, overlap with the ray tracer's (IoU)", "", true},
       {"spill_share", "light on what no part asks for, of all light", ""},
       {"composite_px", "outlines over a camera picture, RMS of the worst part", "px"},
+      {"edge_gap_share", "part's light missing where light meets screen, 95 %", ""},
+      {"edge_double_share", "part's light shown twice where light meets screen, 95 %", ""},
       {"depth_order_share", "pixels with parts and prototype in the right order", "", true},
       {"seam_step_p95", "luminance step along projectors' seams, 95 %", ""},
       {"seam_step_max", "luminance step anywhere, largest", ""},

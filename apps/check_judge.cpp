@@ -35,6 +35,7 @@ constexpr int k_seam_window = 9;       // viewer pixels within which a step is l
 constexpr double k_seam_blur_px = 1;  // 8-bit levels average out; an eye at the viewer's pixels sees no finer
 constexpr double k_min_incidence_cosine =
     0.34;                          // 70 degrees: beyond, a projector's pixel is drawn out threefold
+constexpr int k_edge_window = 5;   // viewer pixels: light and screen within 2 of each other meet
 constexpr float k_whole = 0.999F;  // of a viewer's pixel
 constexpr int k_finer = 2;  // rays a side of a viewer's pixel for even light: a ray sees a projector's pixel,
                             // narrower than the viewer's, and would skip others
@@ -119,9 +120,11 @@ struct LevelErrors {
   double inner_over = 0;
 };
 
+cv::Mat square(int side) { return cv::getStructuringElement(cv::MORPH_RECT, {side, side}); }
+
 // Pixels of a picture (levels, CV_32FC3) around which it is nearly even.
 cv::Mat even(const cv::Mat& picture) {
-  const cv::Mat around = cv::getStructuringElement(cv::MORPH_RECT, {3, 3});
+  const cv::Mat around = square(3);
   cv::Mat highest, lowest;
   cv::dilate(picture, highest, around);
   cv::erode(picture, lowest, around);
@@ -188,6 +191,32 @@ struct TracedEye {
   }
 };
 
+// By how much the luminance of `less` is below that of `more`, as a share of it; both as an eye sees them.
+cv::Mat off_luminance(const cv::Mat& more, const cv::Mat& less) {
+  const auto luminance = [](const cv::Mat& picture) {
+    cv::Mat table(1, 256, CV_32F), light;
+    for (int v = 0; v < 256; ++v) table.at<float>(v) = static_cast<float>(linear_of_srgb(v / 255.0));
+    cv::LUT(picture, table, light);
+    cv::transform(light, light, cv::Matx13f(0.0722F, 0.7152F, 0.2126F));
+    cv::GaussianBlur(light, light, {0, 0}, k_seam_blur_px);
+    return light;
+  };
+  const cv::Mat whole = luminance(more);
+  return cv::max((whole - luminance(less)) / cv::max(whole, k_dark), 0);
+}
+
+// That 95 % of the values do not exceed.
+double p95_of(const cv::Mat& values, const cv::Mat& where) {
+  std::vector<float> chosen;
+  for (int row = 0; row < values.rows; ++row)
+    for (int column = 0; column < values.cols; ++column)
+      if (where.at<std::uint8_t>(row, column)) chosen.push_back(values.at<float>(row, column));
+  if (chosen.empty()) return 0;
+  const auto at = static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(chosen.size() - 1));
+  std::nth_element(chosen.begin(), chosen.begin() + at, chosen.end());
+  return chosen[static_cast<std::size_t>(at)];
+}
+
 // One check while it is being judged. What several measures need is made once.
 class Judge {
  public:
@@ -207,6 +236,7 @@ class Judge {
       LIMN_TRY_STATUS(judge_drawn());
     if (asked("mask_iou")) LIMN_TRY_STATUS(judge_mask());
     if (asked("composite_px")) LIMN_TRY_STATUS(judge_composite());
+    if (asked("edge_gap_share") || asked("edge_double_share")) LIMN_TRY_STATUS(judge_edge());
     if (asked("depth_order_share")) LIMN_TRY_STATUS(judge_depth_order());
     if (asked("seam_step_p95") || asked("seam_step_max")) LIMN_TRY_STATUS(judge_seams());
     if (asked("black_step_share")) LIMN_TRY_STATUS(judge_black());
@@ -469,6 +499,53 @@ class Judge {
     return {};
   }
 
+  // Where at camera 0 light and screen meet within a part, away from the part's outline.
+  cv::Mat light_meets_screen(const Imager& camera, const cv::Mat& cover) const {
+    const sim::Truth masks(world_, check_.posed);
+    const cv::Mat front = aim().order(camera).front, near = square(k_edge_window), inner_of = square(5);
+    cv::Mat meets(camera.height, camera.width, CV_8U, cv::Scalar(0));
+    for (std::size_t i = 0; i < check_.posed.parts.size(); ++i) {
+      const cv::Mat mask = masks.part_mask(camera, check_.posed.parts[i].slot);
+      cv::Mat lit, left, inner;
+      cv::dilate(mask == 255, lit, near);
+      cv::dilate(mask == 128, left, near);
+      cv::erode((front == static_cast<int>(i)) & (cover > k_whole), inner, inner_of);
+      meets |= lit & left & inner;
+    }
+    return meets;
+  }
+
+  // The camera looks at the light that is right for its own eye, and the screen adds the rest: together they
+  // should be the parts.
+  Status judge_edge() {
+    LIMN_TRY(const Imager* camera, this->camera("edge_…"));
+    const Imager& true_camera = world_.rig.cameras.front();
+    const sim::PartPicture parts = aim().seen(true_camera);
+    const cv::Mat meets = light_meets_screen(true_camera, parts.cover);
+    if (cv::countNonZero(meets) == 0)
+      return nothing_to_judge("edge_…", "a part in camera 0's picture that is half on, half off the surface");
+    std::vector<cv::Mat> pictures;
+    for (std::size_t i = 0; i < check_.told.rig.projectors.size(); ++i)
+      pictures.push_back(renderer_->projector_picture(i, check_.told.posed, *camera));
+    const cv::Mat by_light = for_eye(TracedEye(world_, true_camera, k_finer).seen(pictures));
+    const cv::Mat together = renderer_->composite(0, by_light, check_.told.posed, projector::Composite::rest);
+    const cv::Mat expected = for_eye(parts.light), gap = off_luminance(expected, together),
+                  twice = off_luminance(together, expected);
+    values_["edge_gap_share"] = p95_of(gap, meets);
+    values_["edge_double_share"] = p95_of(twice, meets);
+    cv::Mat levels, shown = together / 4;
+    cv::Mat(cv::max(gap, twice)).convertTo(levels, CV_8U, 255 / 0.5);
+    bgr(levels).copyTo(shown, meets);
+    pictures_.push_back(
+        {"edge", "Where light meets screen at " + camera->name,
+         fmt::format(
+             "{} pixels; 95 %: {:.1f} % of the light missing, {:.1f} % shown twice. Difference: there, "
+             "up to white at 50 %.",
+             cv::countNonZero(meets), 100 * values_["edge_gap_share"], 100 * values_["edge_double_share"]),
+         together, expected, shown});
+    return {};
+  }
+
   Status judge_depth_order() {
     LIMN_TRY(const Imager* camera, this->camera("depth_order_share"));
     const cv::Mat found = front_of(renderer_->coverage(check_.told.posed, *camera), *camera);
@@ -593,7 +670,7 @@ class Judge {
           steep.at<float>(static_cast<int>(k)) = 1;
       lit |= (fine_reaches_[i] > k_whole) & (binned(steep, k_finer) > k_whole);
     }
-    cv::erode(lit, lit, cv::getStructuringElement(cv::MORPH_RECT, {k_light_end, k_light_end}));
+    cv::erode(lit, lit, square(k_light_end));
     return lit;
   }
 
@@ -613,7 +690,7 @@ class Judge {
     cv::GaussianBlur(ratio, ratio, {0, 0}, k_seam_blur_px);
     cv::GaussianBlur(weight, weight, {0, 0}, k_seam_blur_px);
     ratio /= cv::max(weight, 1e-6);
-    const cv::Mat window = cv::getStructuringElement(cv::MORPH_RECT, {k_seam_window, k_seam_window});
+    const cv::Mat window = square(k_seam_window);
     const auto range = [&](const cv::Mat& values) {
       cv::Mat highest = values.clone(), lowest = values.clone();
       highest.setTo(-1e9, ~whole);
@@ -632,13 +709,7 @@ class Judge {
     }
     cv::minMaxLoc(steps.step, nullptr, &steps.worst);
     cv::minMaxLoc(steps.step, nullptr, &steps.worst_along, nullptr, nullptr, steps.along);
-    std::vector<float> on_seams;
-    for (int row = 0; row < light.rows; ++row)
-      for (int column = 0; column < light.cols; ++column)
-        if (steps.along.at<std::uint8_t>(row, column)) on_seams.push_back(steps.step.at<float>(row, column));
-    std::sort(on_seams.begin(), on_seams.end());
-    if (!on_seams.empty())
-      steps.p95_along = on_seams[static_cast<std::size_t>(0.95 * static_cast<double>(on_seams.size() - 1))];
+    steps.p95_along = p95_of(steps.step, steps.along);
     return steps;
   }
 

@@ -56,6 +56,8 @@ struct CheckResult {
 /// - `spill_share`: linear light in projector pixels no point of which a part asks for, of all linear light.
 /// - `mask_iou`: coverage masks in the viewer's picture against sim::Truth's.
 /// - `composite_px`: outline of each part at camera 0, at twice the resolution; the worst part's RMS.
+/// - `edge_…`: camera 0's picture of the projectors' light, drawn for its eye, with the `rest` composite over
+///   it, against the parts as sim::Aim sees them, where sim::Truth's masks meet.
 /// - `depth_order_share`: which part is seen at camera 0, over the pixels whose rays meet a part and
 /// something
 ///   else.

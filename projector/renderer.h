@@ -18,7 +18,7 @@ namespace limn::projector {
 
 /// What a composite draws of the parts over the camera's picture.
 enum class Composite {
-  rest,  ///< only what light cannot show: the picture shows the rest already
+  rest,  ///< only what light cannot show, and a pixel or two beside it: the picture shows the rest already
   full   ///< the whole parts
 };
 

@@ -15,10 +15,17 @@ vec4 shadow_at(vec3 d) {
   return vec4(0, 0, 0, contact_shadow(eye.p_eye.xyz + prototype.t * d, facing_normal(prototype, d)));
 }
 
-vec4 part_at(vec2 px) {
+// Whether the screen shows a part at px that light might have shown.
+bool is_left_to_screen(vec2 px) {
+  Seen seen = in_sight_at(px);
+  return seen.how == k_screen || (seen.how == k_if_reached && !is_reached(seen.behind));
+}
+
+// `whole`: what light can show is drawn, too.
+vec4 part_at(vec2 px, bool whole) {
   Seen seen = in_sight_at(px);
   if (seen.how == k_nothing) return u_contact_shadow ? shadow_at(seen.d) : vec4(0);
-  float share = seen.how == k_if_reached ? whole_share(owner_of(seen.part.id)) : 1.0;
+  float share = seen.how == k_if_reached && !whole ? whole_share(owner_of(seen.part.id)) : 1.0;
   if (share < 1.0 && !is_reached(seen.behind)) share = 1.0;
   if (share == 0.0) return vec4(0);
   float footprint = seen.part.t / s_sights[u_eye].quality.x;

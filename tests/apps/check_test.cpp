@@ -175,6 +175,21 @@ TEST_F(CheckJudge, APartElsewhereMissesWhatItsPlaceIsJudgedBy) {
   expect_missed(good, wrong);
 }
 
+TEST_F(CheckJudge, LightThatEndsEarlyLeavesAGapBesideTheScreenAndLightTooBrightShowsTwice) {
+  const Check good = check("studio", fmt::format(R"("viewer": {}, "resolution": 0.5,
+      "poses": {{"shown": ["mirror"], "slots": {{"mirror": {{"variant": "city"}}}}}},
+      "limits": {{"edge_gap_share": 0.12, "edge_double_share": 0.05}})",
+                                                 k_viewer));
+  Check aside = good, bright = good;
+  for (Imager& projector : aside.told.rig.projectors) projector.lens.values[3] += 6;
+  for (scene::Variant& variant : bright.told.scene.slots[0].variants)
+    for (scene::Material& material : variant.mesh.materials) material.base_colour *= 1.2F;
+  for (const auto& [name, reading] : readings(good))
+    EXPECT_TRUE(reading.good()) << name << " " << reading.value;
+  EXPECT_FALSE(readings(aside).at("edge_gap_share").good());
+  EXPECT_FALSE(readings(bright).at("edge_double_share").good());
+}
+
 TEST_F(CheckJudge, AWrongResponseShowsAtTheSeams) {
   const Check good = check("halves", fmt::format(R"("viewer": {}, "resolution": 0.5,
       "limits": {{"seam_step_p95": 0.01, "seam_step_max": 0.02}})",
