@@ -314,7 +314,9 @@ void add_render(CLI::App& app, Run& run) {
   command->add_option("--scene", options->scene, "scene folder or its scene.json")->required();
   command->add_option("--frame", options->frames, "CAMERA=PICTURE, again for another camera; its markers place the scene");
   command->add_option("--poses", options->poses, "POSES.json that places the scene; frames are then only drawn over");
-  command->add_option("--viewer", options->viewer, "viewer file; without it the scene's viewer, else camera 0");
+  command->add_option("--viewer", options->viewers,
+                      "viewer file; again for another viewer: they share one eye, the nearest leads. Without it the scene's "
+                      "viewers, else camera 0");
   command->add_option("--composite", options->composite, "full parts, or rest: only what light cannot show")
       ->check(CLI::IsMember({"full", "rest"}))
       ->capture_default_str();

@@ -19,6 +19,7 @@
 #include "projector/renderer.h"
 #include "scene/posed.h"
 #include "scene/scene.h"
+#include "scene/viewers.h"
 #include "tracker/detector.h"
 #include "tracker/family.h"
 #include "tracker/marker_light.h"
@@ -159,14 +160,41 @@ std::vector<Track> tracks_of(const scene::Scene& scene, const scene::PosedScene&
   return tracks;
 }
 
+// The only one, or one at the eye that several share.
+Result<Imager> told_viewer(std::span<const std::filesystem::path> files,
+                           const scene::Scene& scene,
+                           const scene::PosedScene& posed,
+                           const Eigen::Vector3d& d_up_world) {
+  std::vector<scene::Eye> eyes;
+  for (const std::filesystem::path& file : files) {
+    LIMN_TRY(const Imager viewer, scene::load_viewer(file));
+    if (files.size() == 1) return viewer;
+    eyes.push_back({fmt::format("viewer{}", eyes.size()), viewer.imager_from_world.inverse().translation, 1});
+  }
+  const auto p_middle = scene::middle_of(scene, posed);
+  if (!p_middle) {
+    return error(
+        "--viewer: expected one viewer, for neither the prototype nor a part was found that {} could "
+        "look at together.",
+        files.size());
+  }
+  const scene::SharedEye shared = scene::followed({}, eyes, *p_middle, 0);
+  for (const scene::SharedEye::Share& share : shared.shares)
+    fmt::print("{}: {:.0f} % of the eye{}\n", share.viewer, 100 * share.share,
+               share.viewer == shared.leader ? ", leads" : "");
+  const auto viewer = scene::viewer_at(*shared.p_world(), scene, posed, d_up_world);
+  if (!viewer) return error("--viewer: expected viewers apart from what they look at, found them there.");
+  return *viewer;
+}
+
 Result<Imager> choose_viewer(const RenderOptions& options,
                              const scene::Scene& scene,
                              const scene::PosedScene& posed,
                              const Rig& rig) {
-  if (!options.viewer.empty()) return scene::load_viewer(options.viewer);
   const Eigen::Vector3d d_up_world =
       rig.cameras.empty() ? Eigen::Vector3d(0, -1, 0)
                           : rig.cameras[0].imager_from_world.rotation.inverse() * Eigen::Vector3d(0, -1, 0);
+  if (!options.viewers.empty()) return told_viewer(options.viewers, scene, posed, d_up_world);
   if (const auto viewer = scene::viewer_of(scene, posed, d_up_world)) return *viewer;
   if (rig.cameras.empty()) {
     return usage_error(

@@ -15,9 +15,11 @@ struct RenderOptions {
   std::filesystem::path scene;
   std::vector<std::string> frames;  ///< CAMERA=PICTURE
   std::filesystem::path poses;      ///< POSES.json; places everything, frames are then only drawn over
-  std::filesystem::path viewer;     ///< empty: the scene's, else camera 0
-  std::string composite = "full";   ///< or "rest": only what light cannot show
-  bool undistorted = false;         ///< composites without the cameras' distortion
+  /// Viewer files; none: the scene's, else camera 0. Several share an eye (scene/viewers.h), that of one who
+  /// has just come in.
+  std::vector<std::filesystem::path> viewers;
+  std::string composite = "full";  ///< or "rest": only what light cannot show
+  bool undistorted = false;        ///< composites without the cameras' distortion
   std::string marker_light =
       "as-is";  ///< projectors leave markers dark ("keep-out") or light them ("spotlight")
   LightArguments light;

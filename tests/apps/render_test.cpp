@@ -11,6 +11,7 @@
 #include "core/file.h"
 #include "core/picture.h"
 #include "core/rig.h"
+#include "scene/posed.h"
 #include "scene/scene.h"
 #include "sim/car_door.h"
 #include "tests/support/matchers.h"
@@ -172,9 +173,44 @@ TEST_F(RenderDoor, PosesPlaceEverythingAndEveryPictureIsWritten) {
       {"size", {320, 200}},
       {"fov_deg", 45}};
   ASSERT_TRUE(write_file(folder / "viewer.json", viewer.dump()));
-  options.viewer = folder / "viewer.json";
+  options.viewers = {folder / "viewer.json"};
   ASSERT_TRUE(run_render(options));
   EXPECT_EQ(read_picture(folder / "out/mask-mirror.png").value().size(), cv::Size(320, 200));
+}
+
+TEST_F(RenderDoor, SeveralViewersShareTheEyeOfThoseOnTheNearestOnesSide) {
+  const auto viewer_at = [&](const std::string& name, const Pose& world_from_viewer, double fov_deg) {
+    const json viewer = {
+        {"world_from_viewer", to_json(world_from_viewer)}, {"size", {1280, 800}}, {"fov_deg", fov_deg}};
+    EXPECT_TRUE(write_file(folder / name, viewer.dump()));
+    return folder / name;
+  };
+  const auto light = [&](const std::vector<fs::path>& viewers) {
+    options.viewers = viewers;
+    const Status status = run_render(options);
+    EXPECT_TRUE(status) << status.message();
+    return read_picture(folder / "out/projector-projector0.png").value();
+  };
+  const Vector3d p_near(0.2, 0, 1), p_beside(-0.1, 0, 1.4), p_aside(-3, 0, 0.2);
+  std::vector<fs::path> files;
+  for (const Vector3d& p_eye : {p_near, p_beside, p_aside})
+    files.push_back(viewer_at(fmt::format("viewer{}.json", files.size()),
+                              looking_at(p_eye, {0, 0, 0}, {0, 1, 0}).inverse(), 45));
+  const cv::Mat shared = light(files), near_alone = light({files[0]});
+  EXPECT_EQ(cv::norm(shared, light({files[0], files[1]}), cv::NORM_INF), 0)
+      << "who stands at another side does not count";
+  EXPECT_GT(cv::norm(shared, near_alone, cv::NORM_INF), 20);
+
+  const scene::Scene scene = scene::load_scene(options.scene).value();
+  const scene::PosedScene posed = scene::load_poses(options.poses, scene).value();
+  const Vector3d p_middle = *scene::middle_of(scene, posed);
+  const double near = 1 / (p_near - p_middle).norm(), beside = 1 / (p_beside - p_middle).norm();
+  const Vector3d d_up =
+      load_rig(options.rig).value().cameras[0].imager_from_world.rotation.inverse() * Vector3d(0, -1, 0);
+  const auto eye =
+      scene::viewer_at((near * p_near + beside * p_beside) / (near + beside), scene, posed, d_up);
+  const cv::Mat expected = light({viewer_at("eye.json", eye->imager_from_world.inverse(), 40)});
+  EXPECT_LT(cv::countNonZero(cv::Mat(shared != expected).reshape(1)), 30) << "but for rounding";
 }
 
 TEST_F(RenderDoor, SparesOrLightsTheMarkers) {
