@@ -110,11 +110,16 @@ Status all_there(const Devices& devices,
 Result<Devices> load_devices(const std::filesystem::path& path) {
   LIMN_TRY(const Config config, Config::load(path, "limn.devices/1"));
   const ConfigNode root = config.root();
-  root.only({"schema", "cameras", "displays"});
+  root.only({"schema", "cameras", "displays", "keys"});
   Devices devices{.file = path, .cameras = {}, .displays = {}};
   const auto cameras = root.at("cameras").items(), displays = root.at("displays").items();
   for (const ConfigNode& node : cameras) devices.cameras.push_back(read_camera(node, config.folder()));
   for (const ConfigNode& node : displays) devices.displays.push_back(read_display(node));
+  if (const auto keys = root.find("keys"))
+    for (const ConfigNode& node : keys->items()) {
+      node.only({"name", "path"});
+      devices.keys.push_back({node.at("name").text(), config.folder() / node.at("path").text()});
+    }
   const auto name = [](const auto& item) { return item.name; };
   refuse_twins(devices.cameras, cameras, name, "name");
   refuse_twins(devices.displays, displays, name, "name");

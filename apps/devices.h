@@ -5,16 +5,18 @@
 
 #include "core/result.h"
 #include "core/rig.h"
+#include "device/key_source.h"
 #include "device/open_camera.h"
 #include "device/open_display.h"
 
 namespace limn::apps {
 
-/// The cameras and displays of a place (limn.devices/1).
+/// The cameras, displays and keys of a place (limn.devices/1).
 struct Devices {
   std::filesystem::path file;
   std::vector<device::CameraWanted> cameras;
   std::vector<device::DisplayWanted> displays;
+  std::vector<device::KeysWanted> keys = {};
 };
 
 /// Reads a devices file; paths of pictures and videos are relative to its folder. Errors name the place:

@@ -9,7 +9,7 @@ namespace limn::apps {
 /// How a device of a session is.
 struct DeviceState {
   std::string name;
-  std::string kind;  ///< camera, projector, screen
+  std::string kind;  ///< camera, projector, screen, keys
   bool works = true;
   std::string why = {};      ///< it does not work
   std::size_t pictures = 0;  ///< taken or shown so far

@@ -43,6 +43,7 @@ class DeviceLoop {
         desk_(desk),
         osc_(osc),
         server_(server),
+        keys_(session->setup().scene),
         files_(session->setup().scene.folder) {
     const auto added = [this](const auto& all, const char* kind) {
       std::vector<std::size_t> numbers;
@@ -52,6 +53,9 @@ class DeviceLoop {
     const std::vector<std::size_t> cameras = added(devices_->cameras, "camera");
     projectors_ = added(devices_->projectors, "projector");
     screens_ = added(devices_->screens, "screen");
+    for (const device::KeySource& source : devices_->keys)
+      key_sources_.push_back(health_->add({source.name(), "keys"}));
+    are_keys_gone_.assign(key_sources_.size(), false);
     for (const DeviceState& missing : devices_->missing) {
       health_->add(missing);
       books_->telemetry().note(now(), fmt::format("{} is missing: {}", missing.name, missing.why));
@@ -70,6 +74,7 @@ class DeviceLoop {
   bool step() {
     if (auto seen = seen_.take(k_wait)) session_->take(std::move(seen->watched), seen->moments);
     session_->show_news(&files_, now());
+    hear_keys();
     if (osc_) osc_->hear(session_, &books_->telemetry(), now());
     if (server_) serve();
     const Stamp painting_at = now();
@@ -96,6 +101,24 @@ class DeviceLoop {
   }
 
  private:
+  void hear_keys() {
+    Keys& keys = desk_ ? desk_->keys() : keys_;
+    for (std::size_t i = 0; i < devices_->keys.size(); ++i) {
+      const auto pressed = devices_->keys[i].pressed();
+      if (static_cast<bool>(pressed) == are_keys_gone_[i])  // it went, or it came back
+        pressed ? health_->works(key_sources_[i]) : health_->fails(key_sources_[i], pressed.message());
+      are_keys_gone_[i] = !pressed;
+      if (!pressed) continue;
+      for (const int key : *pressed) {
+        const auto edit = keys.edit_of(key);
+        const Status done = edit ? session_->edit(*edit, devices_->keys[i].name(), now()) : Status();
+        if (done) continue;
+        books_->telemetry().note(now(), done.message());
+        log_warning("live: {}", done.message());
+      }
+    }
+  }
+
   void serve() {
     server_->hear(session_, now());
     server_->tell(*session_, books_->telemetry(), *health_, now());
@@ -126,7 +149,8 @@ class DeviceLoop {
       device::Display* display = devices_->projectors[i].get();
       if (!display) continue;
       const Stamp begun = now();
-      const Result<Stamp> shown_at = display->show(server_ ? server_->lit(session_, i) : painted.projectors[i]);
+      const Result<Stamp> shown_at =
+          display->show(server_ ? server_->lit(session_, i) : painted.projectors[i]);
       if (!shown_at) {
         health_->fails(projectors_[i], shown_at.message());
         continue;
@@ -155,10 +179,12 @@ class DeviceLoop {
   OperatorDesk* desk_;
   OscPort* osc_;
   Server* server_;
+  Keys keys_;  // where there is no desk
   SceneWatch files_;
   std::shared_ptr<DeviceHealth> health_ = std::make_shared<DeviceHealth>();
   CameraThreads cameras_{health_};
-  std::vector<std::size_t> projectors_, screens_;  // as health_ calls them
+  std::vector<std::size_t> projectors_, screens_, key_sources_;  // as health_ calls them
+  std::vector<bool> are_keys_gone_;
   Latest<Seen> seen_;
   std::atomic<bool> is_stopping_ = false;
   double paint_s_ = 0.02, display_s_ = 0.02;  // as expected of the next picture

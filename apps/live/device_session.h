@@ -14,6 +14,7 @@
 #include "core/result.h"
 #include "device/camera_source.h"
 #include "device/display.h"
+#include "device/key_source.h"
 
 namespace limn::apps {
 
@@ -23,7 +24,8 @@ struct SessionDevices {
   std::vector<std::unique_ptr<device::CameraSource>> cameras;  ///< of the rig's names
   std::vector<std::unique_ptr<device::Display>> projectors;    ///< in the rig's order
   std::vector<std::unique_ptr<device::Display>> screens;       ///< show what Staging::screen says
-  std::vector<DeviceState> missing = {};                       ///< what could not be opened, and why
+  std::vector<device::KeySource> keys = {};
+  std::vector<DeviceState> missing = {};  ///< what could not be opened, and why
 };
 
 /// Plays a session on devices, in real time, until `seconds` are over (0: no end), `is_ended`, or the window

@@ -229,6 +229,10 @@ SessionDevices opened(const Devices& devices, const Rig& rig, const device::Desk
     else
       out.screens.push_back(std::move(opened));
   }
+  for (const device::KeysWanted& wanted : devices.keys) {
+    auto keys = device::KeySource::open(wanted);
+    keys ? out.keys.push_back(std::move(*keys)) : miss(wanted.name, "keys", keys.message());
+  }
   return out;
 }
 

@@ -29,6 +29,9 @@ class OperatorDesk {
   /// From now on the window says how guests come in. The server outlives this.
   void invite(Server* server);
 
+  /// What keys do; one slot is chosen for all of them.
+  Keys& keys() { return keys_; }
+
   /// A picture was shown.
   void shown(const ShownFrame& frame);
   /// Whether the window is to be drawn anew at the next serve(), with a screen's picture.

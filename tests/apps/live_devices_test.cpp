@@ -17,6 +17,7 @@
 #include "device/gl_context.h"
 #include "device/picture_camera.h"
 #include "sim/virtual_rig.h"
+#include "tests/support/clicker.h"
 #include "tests/support/matchers.h"
 
 namespace limn::apps {
@@ -169,6 +170,10 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
   const Canvas& screen = *wide;
   devices.screens.push_back(std::move(wide));
 
+  const test::Clicker clicker(folder / "clicker");
+  devices.keys.push_back(device::KeySource::open({"clicker", folder / "clicker"}).value());
+  clicker.send(EV_KEY, KEY_PAGEDOWN, 1);
+
   const std::atomic<bool> is_ended = false;
   const auto begun = std::chrono::steady_clock::now();
   const Status played =
@@ -185,6 +190,7 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
   EXPECT_NE(page.find("camera0 is gone; the session goes on without it: camera0: the cable is out"),
             std::string::npos);
   EXPECT_NE(page.find("camera0 is back"), std::string::npos);
+  EXPECT_NE(page.find("next_variant mirror (clicker)"), std::string::npos);
 
   ReplayOptions replay;
   replay.session = folder / "recording";

@@ -1,0 +1,96 @@
+#include "device/key_source.h"
+
+#include <fcntl.h>
+#include <linux/input.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <optional>
+#include <utility>
+
+namespace limn::device {
+namespace {
+
+constexpr std::chrono::seconds k_retry{1};
+
+// GLFW's codes: letters are their capitals, other keys from 256 on.
+std::optional<int> code_of(int key) {
+  static constexpr std::pair<int, int> k_codes[] = {
+      {KEY_RIGHT, 262},    {KEY_LEFT, 263}, {KEY_DOWN, 264},  {KEY_UP, 265},  {KEY_PAGEUP, 266},
+      {KEY_PAGEDOWN, 267}, {KEY_TAB, 258},  {KEY_ENTER, 257}, {KEY_ESC, 256}, {KEY_SPACE, ' '},
+      {KEY_DOT, '.'},      {KEY_A, 'A'},    {KEY_B, 'B'},     {KEY_C, 'C'},   {KEY_D, 'D'},
+      {KEY_E, 'E'},        {KEY_F, 'F'},    {KEY_G, 'G'},     {KEY_H, 'H'},   {KEY_I, 'I'},
+      {KEY_J, 'J'},        {KEY_K, 'K'},    {KEY_L, 'L'},     {KEY_M, 'M'},   {KEY_N, 'N'},
+      {KEY_O, 'O'},        {KEY_P, 'P'},    {KEY_Q, 'Q'},     {KEY_R, 'R'},   {KEY_S, 'S'},
+      {KEY_T, 'T'},        {KEY_U, 'U'},    {KEY_V, 'V'},     {KEY_W, 'W'},   {KEY_X, 'X'},
+      {KEY_Y, 'Y'},        {KEY_Z, 'Z'}};
+  for (const auto& [linux_code, glfw_code] : k_codes)
+    if (linux_code == key) return glfw_code;
+  return std::nullopt;
+}
+
+Result<int> opened(const KeysWanted& wanted) {
+  const int file = ::open(wanted.path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (file < 0) {
+    const char* advice = errno == EACCES ? "Add yourself to the group `input`."
+                                         : "ls /dev/input/by-id lists what is plugged in.";
+    return error("{}: {}: expected an input device, found: {}. {}", wanted.name, wanted.path.string(),
+                 std::strerror(errno), advice);
+  }
+  ::ioctl(file, EVIOCGRAB, 1);  // else its keys go to the window in front, too; not every file can do it
+  return file;
+}
+
+}  // namespace
+
+Result<KeySource> KeySource::open(const KeysWanted& wanted) {
+  LIMN_TRY(const int file, opened(wanted));
+  return KeySource(wanted, file);
+}
+
+KeySource::KeySource(KeySource&& other) noexcept
+    : wanted_(std::move(other.wanted_)),
+      file_(std::exchange(other.file_, -1)),
+      why_gone_(std::move(other.why_gone_)),
+      tried_at_(other.tried_at_) {}
+
+KeySource::~KeySource() { close(); }
+
+void KeySource::close() {
+  if (file_ >= 0) ::close(std::exchange(file_, -1));
+}
+
+Result<std::vector<int>> KeySource::pressed() {
+  const auto now = std::chrono::steady_clock::now();
+  if (file_ < 0) {
+    if (now - tried_at_ < k_retry) return error("{}", why_gone_);
+    tried_at_ = now;
+    const Result<int> again = opened(wanted_);
+    if (!again) {
+      why_gone_ = again.message();
+      return again.error();
+    }
+    file_ = *again;
+  }
+  std::vector<int> keys;
+  input_event event;
+  for (;;) {
+    const ssize_t got = ::read(file_, &event, sizeof event);
+    if (got < 0 && errno == EINTR) continue;
+    if (got == 0 || (got < 0 && errno == EAGAIN)) return keys;
+    if (got != sizeof event) {
+      why_gone_ = fmt::format("{}: {}: it is gone ({}). Plug it in again.", wanted_.name,
+                              wanted_.path.string(), got < 0 ? std::strerror(errno) : "half an event");
+      close();
+      tried_at_ = now;
+      return error("{}", why_gone_);
+    }
+    constexpr int k_down = 1;  // 0: let go, 2: held down
+    if (event.type != EV_KEY || event.value != k_down) continue;
+    if (const auto code = code_of(event.code)) keys.push_back(*code);
+  }
+}
+
+}  // namespace limn::device
