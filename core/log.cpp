@@ -21,14 +21,19 @@ constexpr double k_silent_s = 1;  // shorter work shows no progress (interfaces.
 constexpr double k_terminal_every_s = 0.1;
 constexpr double k_file_every_s = 5;
 
+// A line that cannot be written, on a full disk or into a closed pipe, is lost: nobody can be told.
+void write_line(const std::string& text) {
+  const std::lock_guard lock(g_stderr);
+  std::fwrite(text.data(), 1, text.size(), stderr);
+}
+
 }  // namespace
 
 void set_log_level(LogLevel level) { g_level = level; }
 
 void log_line(LogLevel level, const std::string& line) {
   if (level > g_level.load()) return;
-  const std::lock_guard lock(g_stderr);
-  fmt::print(stderr, "{}\n", line);
+  write_line(line + "\n");
 }
 
 Progress::Progress(std::string what, int total)
@@ -41,17 +46,15 @@ void Progress::step(int done) {
   const double every = terminal ? k_terminal_every_s : k_file_every_s;
   if (g_level.load() < LogLevel::info || now - started_s_ < k_silent_s || now - printed_s_ < every) return;
   printed_s_ = now;
-  const std::lock_guard lock(g_stderr);
-  fmt::print(stderr, "{}{} {}/{} ({:.0f} s){}", terminal ? "\r\033[K" : "", what_, done_, total_,
-             now - started_s_, terminal ? "" : "\n");
+  write_line(fmt::format("{}{} {}/{} ({:.0f} s){}", terminal ? "\r\033[K" : "", what_, done_, total_,
+                         now - started_s_, terminal ? "" : "\n"));
 }
 
 Progress::~Progress() {
   const double seconds = now_s() - started_s_;
   if (g_level.load() < LogLevel::info || seconds < k_silent_s) return;
-  const std::lock_guard lock(g_stderr);
-  fmt::print(stderr, "{}{} {}/{} ({:.1f} s)\n", isatty(STDERR_FILENO) ? "\r\033[K" : "", what_, done_, total_,
-             seconds);
+  write_line(fmt::format("{}{} {}/{} ({:.1f} s)\n", isatty(STDERR_FILENO) ? "\r\033[K" : "", what_, done_,
+                         total_, seconds));
 }
 
 }  // namespace limn

@@ -75,11 +75,17 @@ Status Books::close(Session* session, bool as_json) {
   const Status recorded = recorder_ ? recorder_->finish() : Status();
   nlohmann::ordered_json json = {{"schema", "limn.live/1"}};
   json.update(telemetry_.summary());
+  const Status written = write_end(session, json);
   if (as_json)
     fmt::print("{}\n", json.dump(2));
   else
     print_summary(json);
-  if (out_.empty()) return recorded;
+  return written ? recorded : written;
+}
+
+// What a session leaves in its folder.
+Status Books::write_end(Session* session, const nlohmann::ordered_json& json) const {
+  if (out_.empty()) return {};
   const std::vector<cv::Mat>& pictures = session->painted().projectors;
   for (std::size_t i = 0; i < pictures.size(); ++i)
     LIMN_TRY_STATUS(
@@ -87,8 +93,7 @@ Status Books::close(Session* session, bool as_json) {
   if (const cv::Mat screen = session->screen(); !screen.empty())
     LIMN_TRY_STATUS(write_png(out_ / "screen.png", screen));
   LIMN_TRY_STATUS(write_file(out_ / "session.json", json.dump(2) + "\n"));
-  LIMN_TRY_STATUS(telemetry_.write_page(out_ / "session.html", "A session of Limn"));
-  return recorded;
+  return telemetry_.write_page(out_ / "session.html", "A session of Limn");
 }
 
 }  // namespace limn::apps

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 
 #include "apps/live/growing_file.h"
 #include "apps/live/recording.h"
@@ -32,6 +33,7 @@ class Books {
  private:
   explicit Books(Telemetry telemetry) : telemetry_(std::move(telemetry)) {}
   void add_poses(const Painted& painted);
+  Status write_end(Session* session, const nlohmann::ordered_json& json) const;
 
   std::filesystem::path out_;
   Telemetry telemetry_;
