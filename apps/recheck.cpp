@@ -48,6 +48,14 @@ Json provenance_of(const Rig& rig) {
   return provenance.is_object() ? provenance : Json::object();
 }
 
+// The board that it was calibrated with, should that be in view.
+Result<calib::Board> board_of(const Rig& rig) {
+  const Json provenance = provenance_of(rig);
+  const auto text = provenance.find("board");
+  const bool is_told = text != provenance.end() && text->is_string();
+  return calib::Board::parse(is_told ? text->get<std::string>() : k_any_board);
+}
+
 Status captured_virtually(const RecheckCommand& command, const fs::path& folder) {
   LIMN_TRY(Plan plan, load_plan(command.plan));
   plan.code_options.inverses = false;  // the rig is all but known: sparse pictures, more devices in the time
@@ -66,9 +74,7 @@ Status captured_by_devices(const RecheckCommand& command, const fs::path& folder
   LIMN_TRY(const Devices named, matched(all, rig));
   const Result<device::Desktop> desktop = device::Desktop::open();
   LIMN_TRY(DeviceStage::Devices devices, opened_devices(named, desktop));
-  // The rig's own board, should it be in view.
-  const std::string text = provenance_of(rig).value("board", std::string(k_any_board));
-  LIMN_TRY(const calib::Board board, calib::Board::parse(text));
+  LIMN_TRY(const calib::Board board, board_of(rig));
   const calib::Captures captures =
       calib::plan_captures(folder, captured_devices(devices.cameras), captured_devices(devices.projectors),
                            board, "gray", {.inverses = false});
