@@ -152,14 +152,14 @@ Pose GpuScene::scene_from_world(const scene::PosedScene& posed) {
 void GpuScene::placed(const scene::PosedScene& posed, std::vector<PlacedRun>* runs) const {
   const Pose from_world = scene_from_world(posed);
   runs->clear();
-  if (prototype_ && posed.world_from_prototype) runs->push_back({0, &*prototype_, Pose(), false});
+  if (prototype_ && posed.world_from_prototype) runs->push_back({0, &*prototype_, Pose()});
   for (const scene::PosedPart& part : posed.parts) {
     for (std::size_t i = 0; i < slots_.size(); ++i) {
       if (slots_[i].name != part.slot) continue;
       const auto variant = slots_[i].variants.find(part.variant);
       LIMN_CHECK(variant != slots_[i].variants.end());
       runs->push_back({static_cast<int>(i) + 1, &variant->second, from_world * part.world_from_part,
-                       slots_[i].on_surface});
+                       slots_[i].on_surface, part.material});
     }
   }
 }
@@ -171,6 +171,9 @@ void GpuScene::place(const std::vector<PlacedRun>& runs) {
     owner.owner_from_scene = placed.scene_from_owner.inverse().matrix().cast<float>();
     owner.lower << placed.run->p_lower.cast<float>(), 1.f;
     owner.upper << placed.run->p_upper.cast<float>(), placed.on_surface ? 1.f : 0.f;
+    if (placed.material.base_colour) owner.colour = placed.material.base_colour->cast<float>().homogeneous();
+    owner.look.x() = static_cast<float>(placed.material.metallic.value_or(-1));
+    owner.look.y() = static_cast<float>(placed.material.roughness.value_or(-1));
   }
   glNamedBufferSubData(*placements_, 0, static_cast<GLsizeiptr>(owners_shown_.size() * sizeof(GpuOwner)),
                        owners_shown_.data());

@@ -35,6 +35,7 @@ struct PlacedRun {
   const TriangleRun* run = nullptr;
   Pose scene_from_owner;
   bool on_surface = false;  ///< its slot's mode is surface
+  scene::MaterialChange material = {};
 };
 
 /// All meshes of a scene on the GPU, as shaders/scene.glsl reads them.
@@ -69,6 +70,8 @@ class GpuScene {
     Eigen::Matrix4f owner_from_scene = Eigen::Matrix4f::Identity();
     Eigen::Vector4f lower = Eigen::Vector4f::Zero();  // w: 1 when it is shown
     Eigen::Vector4f upper = Eigen::Vector4f::Zero();  // w: 1 when its mode is surface
+    Eigen::Vector4f colour = Eigen::Vector4f::Zero();
+    Eigen::Vector4f look = Eigen::Vector4f::Constant(-1);
   };
   TriangleRun add(const scene::Mesh& mesh, int owner, Staging* staging);
   void upload_looks(const std::vector<const scene::Material*>& looks);

@@ -74,11 +74,12 @@ bool is_same_prototype(const scene::PosedScene& a, const scene::PosedScene& b) {
 }
 
 bool is_same(const scene::PosedScene& a, const scene::PosedScene& b) {
-  return is_same_prototype(a, b) && std::equal(a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(),
-                                               [](const auto& p, const auto& q) {
-                                                 return p.slot == q.slot && p.variant == q.variant &&
-                                                        is_same(p.world_from_part, q.world_from_part);
-                                               });
+  return is_same_prototype(a, b) && a.light == b.light &&
+         std::equal(a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(),
+                    [](const auto& p, const auto& q) {
+                      return p.slot == q.slot && p.variant == q.variant && p.material == q.material &&
+                             is_same(p.world_from_part, q.world_from_part);
+                    });
 }
 
 bool is_same(const LightOptions& a, const LightOptions& b) {
@@ -370,7 +371,8 @@ void Renderer::Impl::look_from_imager(const Imager& imager, bool parts_alone) {
   eye = imager;
 }
 
-// `viewer` gives the lamp its place (shaders/look.glsl); null for programs without looks.
+// For what is `drawn`. `viewer` gives the lamp its place (shaders/look.glsl); null for programs without
+// looks.
 void Renderer::Impl::set_up(const Program& program, const GpuLens& lens, const Imager* viewer) {
   scene.bind();
   sights.bind(program, k_sights_unit);
@@ -392,9 +394,10 @@ void Renderer::Impl::set_up(const Program& program, const GpuLens& lens, const I
   const Eigen::Quaterniond world_from_viewer = viewer->imager_from_world.rotation.inverse();
   viewer_light.d_up_world = world_from_viewer * -Eigen::Vector3d::UnitY();
   viewer_light.lamps[0].d_world = world_from_viewer * k_d_lamp_viewer;
-  const scene::RoomLight& light = room ? *room : viewer_light;
+  const std::optional<scene::RoomLight>& known = drawn->light ? drawn->light : room;
+  const scene::RoomLight& light = known ? *known : viewer_light;
   const auto vector = [](const Eigen::Vector3d& v) { return Eigen::Vector4f(v.cast<float>().homogeneous()); };
-  program.set("u_is_room_known", room.has_value());
+  program.set("u_is_room_known", known.has_value());
   program.set("u_d_up", vector(scene_from_world.rotation * light.d_up_world));
   program.set("u_soft_below", vector(light.below_rgb));
   program.set("u_soft_above", vector(light.above_rgb));

@@ -43,8 +43,8 @@ struct PartCoverage {
 /// Draws a scene for a rig: projector pictures, composites over camera pictures, coverage. Every pixel is a
 /// ray of the true (distorted) lens, met exactly with the triangles that a rasterised picture from the same
 /// eye lists around it. Belongs to the GL context (4.5 core) that is current when it is created; that context
-/// must be current at every call and at destruction. Poses may change from call to call; what did not change
-/// is not drawn again.
+/// must be current at every call and at destruction. Poses, materials and light may change from call to call;
+/// what did not change is not drawn again.
 class Renderer {
  public:
   /// Copies scene and rig to the GPU. Error: no current GL context of version 4.5, a driver that refuses

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/track.h"
+#include "scene/material_change.h"
 #include "scene/scene.h"
 #include "scene/viewers.h"
 
@@ -16,6 +17,7 @@ struct PosedPart {
   std::string slot;
   std::string variant;
   Pose world_from_part;
+  MaterialChange material = {};
 };
 
 /// A scene at a moment: where everything is and which variant each slot shows. A slot that is not seen, or
@@ -23,7 +25,8 @@ struct PosedPart {
 struct PosedScene {
   std::optional<Pose> world_from_prototype;
   std::vector<PosedPart> parts;
-  std::vector<Eye> eyes = {};  ///< of the viewers whose markers are seen and of fixed ones
+  std::vector<Eye> eyes = {};           ///< of the viewers whose markers are seen and of fixed ones
+  std::optional<RoomLight> light = {};  ///< absent: the scene's own
 };
 
 /// The scene as the tracks (bodies of `bodies(scene)`) place it; `variants[i]` is the chosen variant of slot

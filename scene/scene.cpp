@@ -212,36 +212,6 @@ std::vector<Viewer> read_viewers(const ConfigNode& node, const Scene& scene) {
   return viewers;
 }
 
-Eigen::Vector3d read_direction(const ConfigNode& node) {
-  const Eigen::Vector3d d = node.vector3();
-  if (d.norm() > 1e-9) return d.normalized();
-  node.problem("expected a direction, found a vector of no length.");
-  return Eigen::Vector3d::UnitZ();
-}
-
-Eigen::Vector3d read_light_rgb(const ConfigNode& node) {
-  const Eigen::Vector3d rgb = node.vector3();
-  if (rgb.minCoeff() < 0) node.problem("expected linear light of 0 or more in red, green and blue.");
-  return rgb;
-}
-
-RoomLight read_light(const ConfigNode& node) {
-  node.only({"up_world", "soft_below", "soft_above", "lamps"});
-  RoomLight light;
-  light.d_up_world = read_direction(node.at("up_world"));
-  light.below_rgb = read_light_rgb(node.at("soft_below"));
-  light.above_rgb = read_light_rgb(node.at("soft_above"));
-  const auto lamps = node.find("lamps");
-  for (const ConfigNode& item : lamps ? lamps->items() : std::vector<ConfigNode>()) {
-    item.only({"towards_world", "strength"});
-    light.lamps.push_back({read_direction(item.at("towards_world")), read_light_rgb(item.at("strength"))});
-  }
-  if (light.lamps.size() > RoomLight::k_most_lamps)
-    lamps->problem(
-        fmt::format("expected at most {} lamps, found {}.", RoomLight::k_most_lamps, light.lamps.size()));
-  return light;
-}
-
 // A thing that nobody can stand on a table was most likely drawn in another unit.
 Status check_size(const Mesh& mesh, const std::string& units) {
   constexpr double k_smallest_m = 1e-3, k_largest_m = 20;
@@ -419,7 +389,7 @@ Result<Scene> load_scene(const fs::path& path, std::vector<LeftOut>* left_out) {
     for (const ConfigNode& item : controls->items()) scene.controls.push_back(read_control(item, scene));
   }
   if (const auto node = root.find("viewer")) scene.viewers = read_viewers(*node, scene);
-  if (const auto node = root.find("light")) scene.light = read_light(*node);
+  if (const auto node = root.find("light")) scene.light = read_room_light(*node);
   LIMN_TRY_STATUS(config.status());
   LIMN_TRY_STATUS(load_files(reader, file, &scene, left_out));
   return scene;

@@ -11,6 +11,7 @@
 #include "core/marker.h"
 #include "core/result.h"
 #include "scene/mesh.h"
+#include "scene/room_light.h"
 
 namespace limn::scene {
 
@@ -65,20 +66,6 @@ struct Viewer {
   std::optional<MarkerName> marker;
   double marker_size_m = 0;
   Eigen::Vector3d p_eye_marker = Eigen::Vector3d::Zero();  ///< the eye in the marker's frame
-};
-
-/// The room's light that parts are shaded by, linear: a hemisphere of soft light and lamps far away.
-struct RoomLight {
-  struct Lamp {
-    Eigen::Vector3d d_world = Eigen::Vector3d::UnitZ();           ///< unit, towards the lamp
-    Eigen::Vector3d strength_rgb = Eigen::Vector3d::Constant(1);  ///< light of a white surface that faces it
-  };
-  static constexpr std::size_t k_most_lamps = 4;
-  Eigen::Vector3d d_up_world = Eigen::Vector3d::UnitZ();
-  Eigen::Vector3d below_rgb =
-      Eigen::Vector3d::Zero();  ///< light of a white surface that faces down, without lamps
-  Eigen::Vector3d above_rgb = Eigen::Vector3d::Zero();  ///< up
-  std::vector<Lamp> lamps;
 };
 
 /// What is shown: a project folder's scene.json (limn.scene/1), read with everything that it names.

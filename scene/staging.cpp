@@ -118,14 +118,19 @@ void remember_look(const std::string& name, Staging* staging) {
   staging->look = name;
 }
 
-Result<Staging> with_saved_look(Staging staging, const PosedScene& posed, const Edit& edit) {
+Result<Staging> with_saved_look(const Scene& scene,
+                                Staging staging,
+                                const PosedScene& posed,
+                                const Edit& edit) {
   Look look;
   look.name = edit.value.empty() ? unused_look_name(staging) : edit.value;
   if (!is_file_name(look.name))
     return error("save_look: expected a name of letters, digits, blanks, '-', '_' and '.', found '{}'.",
                  look.name);
   for (const PosedPart& part : posed.parts)
-    look.parts.push_back({part.slot, part.variant, prototype_from_world(posed) * part.world_from_part});
+    look.parts.push_back(
+        {part.slot, part.variant, prototype_from_world(posed) * part.world_from_part, part.material});
+  look.light = posed.light ? posed.light : scene.light;
   remember_look(look.name, &staging);
   std::erase_if(staging.looks, [&](const Look& known) { return known.name == look.name; });
   staging.looks.push_back(std::move(look));
@@ -145,8 +150,10 @@ Result<Staging> with_look(const Scene& scene,
       if (scene.slots[i].name != part.slot) continue;
       staging.slots[i].variant = part.variant;
       staging.slots[i].pin = Pin{part.prototype_from_part, std::nullopt};
+      staging.slots[i].material = part.material;
     }
   }
+  staging.light = look->light;
   remember_look(name, &staging);
   return staging;
 }
@@ -286,6 +293,8 @@ Result<Staging> edited_slot(const Scene& scene, std::size_t index, Staging stagi
     return paired(scene, index, std::move(staging), {edit.action, edit.slot, slot.marker.text()});
   } else if (edit.action == "units") {
     LIMN_TRY_STATUS(check_units(slot, edit));
+  } else if (edit.action == "material") {
+    LIMN_TRY(staged.material, material_change_of(edit.value));
   } else {  // release
     staged.nudge.setZero();
     staged.pin.reset();
@@ -321,8 +330,10 @@ const std::vector<Action>& actions() {
        "the part is carried by that marker from now on"},
       {"unpair", true, nothing, "", "the scene's own marker carries the part again"},
       {"units", true, text, "a variant and m, cm, mm, in or ft", "the unit of a part that was dropped in"},
+      {"material", true, maybe_text, "a colour, metalness, roughness, - for the file's: #c02818 0 0.4",
+       "the part's material, of every variant; empty: as its file says"},
       {"save_look", false, maybe_text, "a name; empty: look-01 and so on",
-       "keeps variants and places, as JSON and PNG"},
+       "keeps variants, places, materials and light, as JSON and PNG"},
       {"restore_look", false, text, "a look", "shows a look until its markers are moved"},
       {"next_look", false, nothing, "", "the look after the one last shown"},
       {"previous_look", false, nothing, "", "the look before it"},
@@ -331,6 +342,9 @@ const std::vector<Action>& actions() {
       {"split_at", false, number, "mm to the right of the prototype's middle", "where that line is"},
       {"delete_look", false, text, "a look", "forgets a look"},
       {"undelete_look", false, nothing, "", "brings back the look that was last deleted"},
+      {"light", false, maybe_text,
+       "a lamp's degrees right and up, its strength, soft light above and below: 30 45 0.6 0.3 0.1",
+       "the light that parts are shaded by, as seen from camera 0; empty: the scene's own"},
       {"blackout", false, on_off, "on, off or toggle", "bare model: no light"},
       {"freeze", false, on_off, "on, off or toggle", "what is shown stays"},
       {"grid", false, on_off, "on, off or toggle", "lines on the prototype, every 10 mm"},
@@ -363,7 +377,7 @@ Result<Staging> edited(const Scene& scene,
                  edit.slot);
   }
   Staging out = staging;
-  if (edit.action == "save_look") return with_saved_look(std::move(out), posed, edit);
+  if (edit.action == "save_look") return with_saved_look(scene, std::move(out), posed, edit);
   if (edit.action == "restore_look") return with_look(scene, std::move(out), edit.action, edit.value);
   if (edit.action == "next_look" || edit.action == "previous_look") {
     if (staging.looks.empty()) return error("{}: expected a saved look, found none. Save one.", edit.action);
@@ -385,6 +399,13 @@ Result<Staging> edited(const Scene& scene,
     LIMN_TRY(out.split, switched(staging.split, edit));
     if (out.split && staging.other_look.empty())
       return error("split: expected a look shown before the present one, found none. Save or restore two.");
+    return out;
+  }
+  if (edit.action == "light") {
+    out.light.reset();
+    if (edit.value.empty()) return out;
+    LIMN_TRY(out.light, room_light_of(edit.value, scene.light ? scene.light->d_up_world : staging.d_up_world,
+                                      staging.d_front_world));
     return out;
   }
   if (edit.action == "delete_look") return without_look(std::move(out), edit);
@@ -501,22 +522,29 @@ PosedScene staged(const Scene& scene, const Staging& staging, std::span<const Tr
       part->world_from_part = part->world_from_part * Pose(Eigen::Quaterniond::Identity(), slot.nudge);
     }
   }
+  for (PosedPart& part : out.parts)
+    part.material =
+        staging.slots[static_cast<std::size_t>(scene.find_slot(part.slot) - scene.slots.data())].material;
+  out.light = staging.light;
   return out;
 }
 
 std::string look_json(const Look& look) {
   nlohmann::ordered_json json = {{"schema", "limn.look/1"}, {"name", look.name}};
   json["slots"] = nlohmann::ordered_json::object();
-  for (const Look::Part& part : look.parts)
-    json["slots"][part.slot] = {{"variant", part.variant},
-                                {"prototype_from_part", to_json(part.prototype_from_part)}};
+  for (const Look::Part& part : look.parts) {
+    nlohmann::ordered_json& slot = json["slots"][part.slot];
+    slot = {{"variant", part.variant}, {"prototype_from_part", to_json(part.prototype_from_part)}};
+    if (!part.material.is_none()) slot["material"] = to_json(part.material);
+  }
+  if (look.light) json["light"] = to_json(*look.light);
   return json.dump(2) + "\n";
 }
 
 Result<Look> load_look(const std::filesystem::path& path, const Scene& scene) {
   LIMN_TRY(const Config config, Config::load(path, "limn.look/1"));
   const ConfigNode root = config.root();
-  root.only({"schema", "name", "slots"});
+  root.only({"schema", "name", "slots", "light"});
   Look look;
   look.name = root.at("name").text();
   if (!is_file_name(look.name))
@@ -524,7 +552,7 @@ Result<Look> load_look(const std::filesystem::path& path, const Scene& scene) {
   const ConfigNode slots = root.at("slots");
   for (const std::string& name : slots.keys()) {
     const ConfigNode node = slots.at(name);
-    node.only({"variant", "prototype_from_part"});
+    node.only({"variant", "prototype_from_part", "material"});
     const Slot* slot = scene.find_slot(name);
     if (!slot) {
       node.problem("expected a slot of the scene, found another name.");
@@ -532,7 +560,10 @@ Result<Look> load_look(const std::filesystem::path& path, const Scene& scene) {
     }
     look.parts.push_back(
         {name, node.at("variant").choice(variant_names(*slot)), node.at("prototype_from_part").pose()});
+    if (const auto material = node.find("material"))
+      look.parts.back().material = read_material_change(*material);
   }
+  if (const auto light = root.find("light")) look.light = read_room_light(*light);
   LIMN_TRY_STATUS(config.status());
   return look;
 }

@@ -23,15 +23,18 @@ enum class Screen {
 };
 const std::vector<std::string>& screen_names();  ///< in the order of Screen
 
-/// An arrangement to come back to: which variants, and where they stood on the prototype.
+/// An arrangement to come back to: which variants, where they stood on the prototype, of which materials and
+/// in which light.
 struct Look {
   struct Part {
     std::string slot;
     std::string variant;
     Pose prototype_from_part;  ///< world_from_part in a scene without a prototype
+    MaterialChange material = {};
   };
   std::string name;
   std::vector<Part> parts;
+  std::optional<RoomLight> light = {};  ///< absent: the scene's own
 };
 
 /// A part held where a look had it, until its marker is moved.
@@ -47,6 +50,7 @@ struct Staging {
     Eigen::Vector3d nudge = Eigen::Vector3d::Zero();  ///< along the part's own axes, m
     std::optional<Pin> pin;
     std::optional<MarkerName> marker;  ///< carries the part instead of the scene's own
+    MaterialChange material = {};      ///< of whichever variant is shown
   };
   std::vector<Slot> slots;  ///< in the scene's order
   std::vector<Look> looks;
@@ -60,6 +64,9 @@ struct Staging {
   bool split = false;                ///< left of a line the other look, right of it what is shown else
   double split_mm = 0;               ///< where the line is, along the prototype's x, from its middle
   Screen screen = Screen::rest;
+  std::optional<RoomLight> light;                             ///< instead of the scene's own
+  Eigen::Vector3d d_up_world = Eigen::Vector3d::UnitZ();      ///< for `light` in a scene that has none
+  Eigen::Vector3d d_front_world = -Eigen::Vector3d::UnitY();  ///< towards those who look, for `light`
   std::string viewer;  ///< a guest, for whose tablet `view` parts are drawn; empty: the scene's own viewers
 };
 
@@ -109,7 +116,7 @@ std::vector<Track> carried(const Scene& scene, const Staging& staging, std::span
 Staging unpinned(const Scene& scene, const Staging& staging, std::span<const Track> tracks);
 
 /// The scene as tracks (carried()) and people place it: posed() with the chosen variants, nudged, pinned
-/// parts where their look had them.
+/// parts where their look had them, in the materials and the light that people chose.
 PosedScene staged(const Scene& scene, const Staging& staging, std::span<const Track> tracks);
 
 /// What is left of a line shows the other look: the same staging as it. Nothing without one.
@@ -120,7 +127,8 @@ std::optional<Staging> left_of_split(const Scene& scene, const Staging& staging)
 std::string pairings_json(const Scene& scene, const Staging& staging);
 Result<Staging> with_pairings(const std::filesystem::path& path, const Scene& scene, Staging staging);
 
-/// limn.look/1 as text, and back. Error: unknown slots or variants, numbers that are no pose.
+/// limn.look/1 as text, and back. A look without materials or light has the files' own. Error: unknown slots
+/// or variants, numbers that are no pose, material or light.
 std::string look_json(const Look& look);
 Result<Look> load_look(const std::filesystem::path& path, const Scene& scene);
 

@@ -65,16 +65,25 @@ float texture_lod(Hit hit, float footprint) {
 
 // Own colour at a hit; `footprint` is the side (m) of the pixel's patch on the surface.
 vec3 base_colour(Hit hit, float footprint) {
-  Material material = s_materials[s_owners[hit.id - 1u].y];
-  vec3 colour = material.colour.rgb;
+  uvec2 owner = s_owners[hit.id - 1u];
+  Material material = s_materials[owner.y];
+  vec4 wanted = s_placements[owner.x].colour;
+  vec3 colour = wanted.a > 0.5 ? wanted.rgb : material.colour.rgb;
   if (material.look.x < 0.0) return colour;
   vec2 uv = uv_of(hit);
   return colour * textureLod(s_looks, vec3(uv.x, 1.0 - uv.y, material.look.x), texture_lod(hit, footprint)).rgb;
 }
 
-bool is_unlit(Hit hit) { return s_materials[s_owners[hit.id - 1u].y].colour.a > 0.5; }
+bool is_unlit(Hit hit) {
+  uvec2 owner = s_owners[hit.id - 1u];
+  return s_materials[owner.y].colour.a > 0.5 && all(lessThan(s_placements[owner.x].look.xy, vec2(0)));
+}
 
-vec2 metallic_roughness(Hit hit) { return s_materials[s_owners[hit.id - 1u].y].look.yz; }
+vec2 metallic_roughness(Hit hit) {
+  uvec2 owner = s_owners[hit.id - 1u];
+  vec2 wanted = s_placements[owner.x].look.xy;
+  return mix(wanted, s_materials[owner.y].look.yz, lessThan(wanted, vec2(0)));
+}
 
 // Colour seen along d.
 vec3 look_along(vec3 d, Hit hit, float footprint) {

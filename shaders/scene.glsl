@@ -15,6 +15,8 @@ struct Owner {
   mat4 owner_from_scene;
   vec4 lower;  // of its bounds, owner frame; w: 1 when it is shown
   vec4 upper;  // w: 1 when its mode is surface
+  vec4 colour; // linear light, instead of its materials' where w is 1
+  vec4 look;   // metallic, roughness, instead of its materials' where not negative
 };
 layout(std430, binding = 4) readonly buffer Placements { Owner s_placements[]; };
 

@@ -118,7 +118,12 @@ Session::Session(SessionSetup setup, Painter painter, Telemetry* telemetry, Reco
       painted_(painter_->painted()),
       telemetry_(telemetry),
       recorder_(recorder),
-      staging_(scene::first_staging(setup_.scene)) {}
+      staging_(scene::first_staging(setup_.scene)) {
+  if (setup_.rig.cameras.empty()) return;
+  const Eigen::Quaterniond world_from_camera = setup_.rig.cameras[0].imager_from_world.rotation.inverse();
+  staging_.d_up_world = world_from_camera * -Eigen::Vector3d::UnitY();
+  staging_.d_front_world = world_from_camera * -Eigen::Vector3d::UnitZ();
+}
 
 void Session::load_looks() {
   std::error_code none;

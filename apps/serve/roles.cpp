@@ -39,7 +39,7 @@ Role role_for(const std::string& action) {
       "next_variant", "previous_variant", "choose_variant", "nudge",  "release", "save_look",
       "restore_look", "next_look",        "previous_look",  "flip",   "split",   "split_at",
       "delete_look",  "undelete_look",    "blackout",       "freeze", "grid",    "viewer",
-      "place"};
+      "place",        "material",         "light"};
   return work.contains(action) ? Role::work : Role::operate;
 }
 

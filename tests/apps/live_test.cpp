@@ -147,6 +147,9 @@ TEST(Live, ASessionIsReplayedToTheLastDigit) {
                   {"move", k_mirror},
                   {"home_from_marker", {{"rotation_wxyz", {1, 0, 0, 0}}, {"translation_m", {0.012, 0, 0}}}}},
                  {{"at_s", 0.4}, {"edit", {{"action", "next_variant"}, {"slot", "mirror"}}}},
+                 {{"at_s", 0.45},
+                  {"edit", {{"action", "material"}, {"slot", "mirror"}, {"value", "#20c040 0.5 0.3"}}}},
+                 {{"at_s", 0.5}, {"edit", {{"action", "light"}, {"value", "60 30 0.8 0.2 0.1"}}}},
                  {{"at_s", 0.5}, {"edit", {{"action", "marker_states"}}}},
                  {{"at_s", 0.6}, {"edit", {{"action", "next_variant"}, {"slot", "no"}}}}}));
   options.record = folder / "recording";
@@ -355,6 +358,9 @@ TEST(Live, KeepsLooks) {
       written(folder / "script.json",
               script_of(0.35, {edit(0.1, "save_look", "calm"),
                                {{"at_s", 0.13}, {"edit", {{"action", "next_variant"}, {"slot", "mirror"}}}},
+                               {{"at_s", 0.13},
+                                {"edit", {{"action", "material"}, {"slot", "mirror"}, {"value", "#20c040"}}}},
+                               edit(0.16, "light", "-60 20 0.9 0.2 0.05"),
                                edit(0.2, "save_look", "bold"),
                                edit(0.24, "save_look", "third"),
                                edit(0.27, "delete_look", "third"),
@@ -372,6 +378,16 @@ TEST(Live, KeepsLooks) {
   EXPECT_NE(page.find("<b>calm</b>"), std::string::npos);
   EXPECT_EQ(page.find("<b>third</b>"), std::string::npos);
 
+  EXPECT_FALSE(calm.at("slots").at("mirror").contains("material"));
+  EXPECT_EQ(bold.at("slots").at("mirror").at("material").at("base_colour").size(), 3u);
+  EXPECT_EQ(bold.at("light").at("lamps").at(0).at("strength"), json({0.9, 0.9, 0.9}));
+  const auto green = [](const cv::Mat& bgr) {  // pixels
+    int count = 0;
+    for (const cv::Vec3b& c : cv::Mat_<cv::Vec3b>(bgr)) count += c[1] > 1.5 * std::max(c[0], c[2]) + 20;
+    return count;
+  };
+  EXPECT_GT(green(bold_picture), green(calm_picture) + 500);
+
   // The next session knows them.
   options.script =
       written(folder / "next.json", script_of(0.2, json::array({edit(0.1, "restore_look", "bold")})));
@@ -386,6 +402,7 @@ TEST(Live, KeepsLooks) {
           1e3 * translation[2].get<double>())),
       std::string::npos)
       << poses[poses.size() - 2];
+  EXPECT_GT(green(read_picture(options.out / "projector-projector0.png").value()), 100);
 }
 
 // A part is dropped into its slot's folder, then spoilt, while the session runs.

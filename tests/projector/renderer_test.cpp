@@ -712,6 +712,44 @@ TEST_F(RendererTest, MetalAndGlossAreAsInGltf) {
   }
 }
 
+// What people chose instead is drawn as if the files had said it, and what they chose not as the files say.
+TEST_F(RendererTest, DrawsOtherMaterialsAndLightFromPictureToPicture) {
+  const scene::RoomLight evening{
+      k_up, {0.05, 0.08, 0.1}, {0.3, 0.28, 0.25}, {{Vector3d(0.2, -0.5, -1).normalized(), {0.5, 0.45, 0.4}}}};
+  Mesh own = coloured(sheet(0.5, 0.4), {0.2f, 0.4f, 0.6f}, true), other = own;
+  other.materials[0] = {
+      .base_colour = {0.7f, 0.45f, 0.2f}, .metallic = 0.5f, .roughness = 0.3f, .texture = {}};
+  // A trim behind it shows that other slots keep their own.
+  Mesh trim = coloured(sheet(0.1, 0.7, 0.01), {0.1f, 0.5f, 0.1f}, false);
+  const std::vector<scene::Slot> slots = {slot("panel", scene::Mode::view, own),
+                                          slot("trim", scene::Mode::view, trim)};
+  const Scene scene = scene_of(sheet(0.1, 0.1, 2), slots);
+  Scene wanted_scene = scene_of(sheet(0.1, 0.1, 2), slots);
+  wanted_scene.slots[0] = slot("panel", scene::Mode::view, other);
+  wanted_scene.light = evening;
+  const Rig rig = two_projectors();
+  const cv::Mat black = cv::Mat::zeros(480, 640, CV_8UC1);
+  PosedScene posed = posed_at_origin(scene);
+  Renderer drawing = renderer(scene, rig);
+  const auto seen = [&] { return drawing.composite(0, black, posed, Composite::full); };
+  const cv::Mat before = seen();
+  posed.parts[0].material = {Vector3d(0.7, 0.45, 0.2), 0.5, 0.3};
+  posed.light = evening;
+  const cv::Mat wanted =
+      renderer(wanted_scene, rig).composite(0, black, posed_at_origin(wanted_scene), Composite::full);
+  EXPECT_TRUE(test::image_near(seen(), wanted, 0.01, 1, "chosen"));
+  EXPECT_GT(cv::norm(before, wanted, cv::NORM_INF), 60);
+  posed.parts[0].material = {};
+  const cv::Mat own_in_other_light = seen();
+  EXPECT_EQ(own_in_other_light.at<cv::Vec3b>(240, 240), before.at<cv::Vec3b>(240, 240));  // unlit
+  EXPECT_NE(own_in_other_light.at<cv::Vec3b>(60, 320), before.at<cv::Vec3b>(60, 320));    // the trim
+  posed.light.reset();
+  EXPECT_EQ(cv::norm(before, seen(), cv::NORM_INF), 0);
+  // A colour alone leaves an unlit part unlit.
+  posed.parts[0].material.base_colour = Vector3d(1, 0, 0);
+  EXPECT_EQ(seen().at<cv::Vec3b>(240, 240), cv::Vec3b(0, 0, 255));
+}
+
 TEST_F(RendererTest, TextureStandsTheRightWayUp) {
   // Left half red, top half bright, as seen by a viewer whose picture's down is +y.
   Mesh part = coloured(sheet(0.2, 0.2, -0.001), {1, 1, 1});

@@ -91,6 +91,16 @@ TEST(Staging, WhatCannotBeDoneIsNamedAndChangesNothing) {
            {{"split", "", ""}, "expected a look shown before"},
            {{"split_at", "", "far"}, "a number of millimetres"},
            {{"split_at", "", "1e9"}, "a number of millimetres"},
+           {{"material", "mirror", "red"}, "expected a colour (#c02818)"},
+           {{"material", "mirror", "#c0281"}, "found '#c0281'"},
+           {{"material", "mirror", "- 1.5"}, "from 0 to 1"},
+           {{"material", "mirror", "- - nan"}, "from 0 to 1"},
+           {{"material", "mirror", "- - - -"}, "each or '-'"},
+           {{"light", "", "30 45 0.6 0.3"}, "expected five numbers"},
+           {{"light", "", "30 45 0.6 0.3 -0.1"}, "(0 to 10)"},
+           {{"light", "", "30 45 0.6 0.3 nan"}, "(0 to 10)"},
+           {{"light", "", "30 450 0.6 0.3 0.1"}, "expected five numbers"},
+           {{"light", "", "30 45 0.6 0.3 0.1 9"}, "expected five numbers"},
            {{"screen", "", "cinema"}, "rest, full, camera"}}) {
     const auto result = edited(scene, staging, {}, edit);
     ASSERT_FALSE(result) << edit.action;
@@ -232,6 +242,91 @@ TEST(Staging, TwoLooksAreFlippedAndSplit) {
   EXPECT_FALSE(staging.split);
 }
 
+TEST(Staging, ALookHoldsMaterialsAndLight) {
+  const Scene scene = two_slots();
+  const std::vector<Track> tracks = tracks_with(k_prototype_from_marker);
+  const auto shown = [&](const Staging& staging) { return staged(scene, staging, tracks); };
+  Staging staging = done(scene, first_staging(scene), {}, {"material", "mirror", "#ff0080 1 0.25"});
+  staging = done(scene, staging, {}, {"light", "", "30 45 0.6 0.3 0.1"});
+  const PosedScene posed = shown(staging);
+  ASSERT_EQ(posed.parts.size(), 1u);
+  const MaterialChange red = posed.parts[0].material;
+  ASSERT_TRUE(red.base_colour && posed.light);
+  EXPECT_NEAR((*red.base_colour - Eigen::Vector3d(1, 0, 0.21586)).norm(), 0, 1e-5);  // IEC 61966-2-1
+  EXPECT_EQ(red.metallic, 1);
+  EXPECT_EQ(red.roughness, 0.25);
+  staging = done(scene, staging, posed, {"save_look", "", "red"});
+  staging = done(scene, staging, posed, {"material", "mirror", "- - 0.5"});
+  const MaterialChange dull = shown(staging).parts[0].material;
+  EXPECT_FALSE(dull.base_colour || dull.metallic);
+  EXPECT_EQ(dull.roughness, 0.5);
+  staging = done(scene, staging, posed, {"material", "mirror", ""});
+  staging = done(scene, staging, posed, {"light", "", ""});
+  EXPECT_TRUE(shown(staging).parts[0].material.is_none());
+  EXPECT_FALSE(shown(staging).light);
+  staging = done(scene, staging, shown(staging), {"save_look", "", "plain"});
+  const Staging again = done(scene, staging, posed, {"restore_look", "", "red"});
+  EXPECT_EQ(shown(again).parts[0].material, red);
+  EXPECT_EQ(shown(again).light, posed.light);
+  const Staging plain = done(scene, again, posed, {"flip", "", ""});
+  EXPECT_TRUE(shown(plain).parts[0].material.is_none());
+  EXPECT_FALSE(shown(plain).light);
+  // The parts of a look that is split off have theirs.
+  const auto left = left_of_split(scene, done(scene, plain, posed, {"split", "", "on"}));
+  ASSERT_TRUE(left);
+  EXPECT_EQ(shown(*left).parts[0].material, red);
+
+  const auto file = std::filesystem::path(testing::TempDir()) / "materials.json";
+  ASSERT_TRUE(write_file(file, look_json(staging.looks[0])));
+  const auto loaded = load_look(file, scene);
+  ASSERT_TRUE(loaded) << loaded.message();
+  EXPECT_EQ(loaded->parts[0].material, red);
+  EXPECT_EQ(loaded->light, posed.light);
+  const std::string old_one = look_json(staging.looks[1]);
+  EXPECT_EQ(old_one.find("material"), std::string::npos);
+  EXPECT_EQ(old_one.find("light"), std::string::npos);
+  for (const auto& [was, is, part] : std::vector<std::tuple<std::string, std::string, std::string>>{
+           {"\"metallic\": 1.0", "\"metallic\": 1.5", "slots.mirror.material.metallic: expected 0 to 1"},
+           {"\"metallic\"", "\"metal\"", "slots.mirror.material"},
+           {"\"soft_below\"", "\"soft_under\"", "light"}}) {
+    std::string text = look_json(staging.looks[0]);
+    ASSERT_NE(text.find(was), std::string::npos) << text;
+    text.replace(text.find(was), was.size(), is);
+    ASSERT_TRUE(write_file(file, text));
+    const auto damaged = load_look(file, scene);
+    ASSERT_FALSE(damaged);
+    EXPECT_NE(damaged.message().find(part), std::string::npos) << damaged.message();
+  }
+}
+
+// The lamp is told as seen by somebody in front; the scene's own light says which way is up, if there is one.
+TEST(Staging, LightComesFromWhereItIsSaid) {
+  Scene scene = two_slots();
+  Staging staging = first_staging(scene);
+  staging.d_up_world = {0, -1, 0};  // camera 0 is the world
+  staging.d_front_world = {0, 0, -1};
+  const auto lit = [&](const std::string& value) {
+    return *done(scene, staging, {}, {"light", "", value}).light;
+  };
+  const RoomLight right = lit("90 0 0.6 0.3 0.1");
+  ASSERT_EQ(right.lamps.size(), 1u);
+  EXPECT_NEAR((right.lamps[0].d_world - Eigen::Vector3d::UnitX()).norm(), 0, 1e-9);
+  EXPECT_EQ(right.lamps[0].strength_rgb, Eigen::Vector3d::Constant(0.6));
+  EXPECT_EQ(right.above_rgb, Eigen::Vector3d::Constant(0.3));
+  EXPECT_EQ(right.below_rgb, Eigen::Vector3d::Constant(0.1));
+  EXPECT_EQ(right.d_up_world, staging.d_up_world);
+  const double half = std::sqrt(0.5);
+  EXPECT_NEAR((lit("0 45 1 0 0").lamps[0].d_world - Eigen::Vector3d(0, -half, -half)).norm(), 0, 1e-9);
+  // Looking down by 30 degrees does not lower what is level.
+  const double c = std::cos(30_deg), s = std::sin(30_deg);
+  scene.light = RoomLight{};
+  scene.light->d_up_world = {0, -c, s};
+  EXPECT_NEAR((lit("0 0 1 0 0").lamps[0].d_world - Eigen::Vector3d(0, -s, -c)).norm(), 0, 1e-9);
+  // A look keeps the scene's own light, too.
+  staging = done(scene, staging, {}, {"save_look", "", "own"});
+  EXPECT_EQ(staging.looks[0].light, scene.light);
+}
+
 TEST(Staging, BringsBackTheLookThatWasDeleted) {
   const Scene scene = two_slots();
   Staging staging = done(scene, first_staging(scene), {}, {"save_look", "", "A"});
@@ -261,6 +356,8 @@ TEST(Staging, EveryActionCanBeDone) {
     if (action.name == "pair") value = "aruco_4x4_50:9";
     if (action.name == "units") value = "new one mm";
     if (action.name == "split_at") value = "-12.5";
+    if (action.name == "material") value = "#c02818 0 0.4";
+    if (action.name == "light") value = "30 45 0.6 0.3 0.1";
     if (action.name == "restore_look" || action.name == "delete_look") value = "look-01";
     const auto result = edited(scene, staging, {}, {action.name, action.of_slot ? "mirror" : "", value});
     EXPECT_TRUE(result) << action.name << ": " << result.message();
