@@ -379,8 +379,14 @@ void Reception::gone(const std::shared_ptr<Visitor>& visitor) {
 }
 
 void Reception::close_window(const std::shared_ptr<Visitor>& visitor) {
-  if (!visitor->device.empty()) setup_.place(visitor->guest.name, std::nullopt);
-  visitor->device.clear();
+  const std::string& name = visitor->guest.name;
+  const bool was_open = !std::exchange(visitor->device, "").empty();
+  const auto eye = guest_eyes_.find(name);
+  if (eye != guest_eyes_.end() && eye->second.visitor.lock() == visitor) guest_eyes_.erase(eye);
+  const bool is_last = std::none_of(visitors_.begin(), visitors_.end(), [&](const auto& other) {
+    return other->guest.name == name && !other->device.empty();
+  });
+  if (was_open && is_last) setup_.place(name, std::nullopt);
   visitor->frame_waiting.reset();
 }
 
@@ -446,6 +452,7 @@ void Reception::hear(const std::shared_ptr<Visitor>& visitor, const WindowMessag
   if (message.on && windows >= k_most_windows)
     return refuse(visitor, std::nullopt, fmt::format("{} windows are open; no more at once.", windows));
   if (!message.on) return close_window(visitor);
+  if (visitor->device.empty()) guest_eyes_[visitor->guest.name] = {visitor, Clock::now()};
   visitor->device = message.device;
   visitor->parts = message.parts;
   visitor->frame_waiting.reset();
@@ -468,11 +475,19 @@ void Reception::hear_bytes(const std::shared_ptr<Visitor>& visitor, std::span<co
     look(visitor, std::move(frame));
 }
 
+// Whether a guest's window, among others of the same guest, is its tablet.
+bool Reception::is_eye(const std::shared_ptr<Visitor>& visitor, Clock::time_point now) const {
+  const auto eye = guest_eyes_.find(visitor->guest.name);
+  return eye == guest_eyes_.end() || eye->second.visitor.lock() == visitor ||
+         now - eye->second.at > std::chrono::duration<double>(k_guest_place_lasts_s);
+}
+
 void Reception::look(const std::shared_ptr<Visitor>& visitor, Visitor::Frame frame) {
   visitor->frame_in_flight = frame.number;
   visitor->frame_since = Clock::now();
   setup_.eyes.look(
-      {visitor->device, visitor->guest.name, visitor->parts}, std::move(frame.jpeg),
+      {visitor->device, is_eye(visitor, visitor->frame_since) ? visitor->guest.name : "", visitor->parts},
+      std::move(frame.jpeg),
       [this, post = setup_.post, weak = std::weak_ptr(visitor), number = frame.number](Eyes::Seen seen) {
         post([this, weak, number, seen = std::move(seen)] {
           if (const auto visitor = weak.lock()) looked(visitor, number, seen);
@@ -486,7 +501,11 @@ void Reception::looked(const std::shared_ptr<Visitor>& visitor,
   if (visitor->frame_in_flight != number) return;
   visitor->frame_in_flight.reset();
   if (!visitor->device.empty()) {
-    if (seen.p_eye_world) setup_.place(visitor->guest.name, seen.p_eye_world);
+    const auto now = Clock::now();
+    if (seen.p_eye_world && is_eye(visitor, now)) {
+      guest_eyes_[visitor->guest.name] = {visitor, now};
+      setup_.place(visitor->guest.name, seen.p_eye_world);
+    }
     visitor->outbox.show(PictureKind::window, std::make_shared<const std::string>(picture_message(
                                                   PictureKind::window, number, seen.json, seen.jpeg)));
     visitor->wake();

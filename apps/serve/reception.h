@@ -149,6 +149,7 @@ class Reception {
               const std::string& why);
   void look(const std::shared_ptr<Visitor>& visitor, Visitor::Frame frame);
   void close_window(const std::shared_ptr<Visitor>& visitor);
+  bool is_eye(const std::shared_ptr<Visitor>& visitor, Clock::time_point now) const;
   void looked(const std::shared_ptr<Visitor>& visitor, std::uint32_t number, const Eyes::Seen& seen);
   void ask_for_room(Clock::time_point now);
   void room_came(Eyes::Seen seen);
@@ -180,6 +181,13 @@ class Reception {
   Eyes::Seen room_;
   std::shared_ptr<const std::string> room_message_;
   std::uint32_t room_number_ = 0;
+  // Which of a guest's windows is its tablet: the one that was opened last, until it has given no place for
+  // as long as one lasts; then the next that gives one.
+  struct GuestEye {
+    std::weak_ptr<Visitor> visitor;
+    Clock::time_point at;  // when it was opened, or gave a place
+  };
+  std::map<std::string, GuestEye> guest_eyes_;  // by the guest's name
   std::pair<Role, Clock::time_point> hidden_{Role::look, Clock::time_point::min()};
   std::shared_ptr<std::map<std::string, Encoded>> encoded_;  // of projectors; the backroom's alone
   std::shared_ptr<PartPictures> part_pictures_;              // likewise

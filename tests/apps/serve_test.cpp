@@ -276,6 +276,49 @@ TEST_F(AServer, OpensNoMoreWindowsThanItCanLookThrough) {
   EXPECT_FALSE(answer->is_text);
 }
 
+// Two windows of one guest, as of two tabs of a browser: light follows the one that was opened last, and the
+// other one only when that has been still for a second.
+TEST_F(AServer, OneWindowOfAGuestIsItsTablet) {
+  Eyes eyes;
+  std::mutex mutex;
+  std::map<std::string, std::string> named;  // by device
+  eyes.look = [&](const Onlooker::Window& window, std::vector<std::uint8_t>, Eyes::Answer answer) {
+    {
+      const std::lock_guard lock(mutex);
+      named[window.device] = window.guest;
+    }
+    answer({R"({"sees": "markers"})", {0xff, 0xd8}, Eigen::Vector3d(window.device == "tablet-0001", 0, 0)});
+  };
+  open({}, eyes);
+  const std::string token = token_of(Role::work);
+  const auto window = [&](const std::string& device) {
+    auto out = client();
+    EXPECT_EQ(out->upgrade(token).status, 101);
+    EXPECT_TRUE(out->message_of("hello"));
+    out->send_text(json({{"type", "window"}, {"device", device}, {"on", true}}).dump());
+    return out;
+  };
+  std::uint32_t number = 0;
+  const auto is_tablet = [&](RemoteClient* of, const std::string& device) {
+    of->send_binary(number_bytes(++number) + k_jpeg);
+    EXPECT_TRUE(of->message());
+    const std::lock_guard lock(mutex);
+    return named.at(device) == "Ann";
+  };
+  const auto first = window("tablet-0001");
+  EXPECT_TRUE(is_tablet(first.get(), "tablet-0001"));
+  const auto second = window("tablet-0002");
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_TRUE(is_tablet(second.get(), "tablet-0002"));
+    EXPECT_FALSE(is_tablet(first.get(), "tablet-0001"));
+  }
+  std::this_thread::sleep_for(1100ms);  // the second one is hidden
+  EXPECT_TRUE(is_tablet(first.get(), "tablet-0001"));
+  EXPECT_FALSE(is_tablet(second.get(), "tablet-0002")) << "it is back, and takes it from nobody";
+  first->send_text(R"({"type": "window", "device": "tablet-0001", "on": false})");
+  while (!is_tablet(second.get(), "tablet-0002")) ASSERT_LT(number, 50u);
+}
+
 TEST_F(AServer, SaysWhyThereIsNoRoomPicture) {
   Eyes eyes;
   eyes.room = [](Eyes::Answer answer) { answer({R"({"why":"no camera"})", {}}); };
