@@ -177,7 +177,7 @@ Rig repaired(const calib::Recheck& result) {
 }
 
 Status write_rig(const calib::Recheck& result, const RecheckCommand& command) {
-  LIMN_TRY_STATUS(save_rig(repaired(result), command.out));
+  LIMN_TRY_STATUS(save_rig(result.rig, command.out));
   const fs::path folder = fs::is_directory(command.rig) ? command.rig : command.rig.parent_path();
   const fs::path response = folder / "response.json";
   std::error_code ignored;
@@ -227,22 +227,29 @@ struct Checked {
   std::string json;
 };
 
-Result<Checked> check(const RecheckCommand& command) {
-  LIMN_TRY(const Rig rig, load_rig(command.rig));
-  LIMN_TRY(const fs::path folder, captured(command));
+// What captures say of a rig; into recheck.json in `out`, and the rig of the result is the repaired one.
+Result<Checked> check(const Rig& rig, const fs::path& folder, const fs::path& still, const fs::path& out) {
   LIMN_TRY(const calib::Captures captures, calib::load_captures(folder));
   LIMN_TRY(const calib::Observed observed, calib::observe(captures));
   const std::vector<std::string>& poses = observed.observations.poses;
   calib::RecheckOptions options = options_for(rig, captures.board);
-  if (!command.still.empty()) {
-    LIMN_TRY(options.still_boards, still_boards(command.still, poses));
+  if (!still.empty()) {
+    LIMN_TRY(options.still_boards, still_boards(still, poses));
   }
   Checked checked;
   LIMN_TRY(checked.rechecked.result, calib::recheck(rig, observed.observations, options));
   checked.rechecked.pictures = shown_pictures(captures);
   checked.json = json_of(checked.rechecked, poses).dump(2) + "\n";
-  LIMN_TRY_STATUS(make_folder(command.out));
-  LIMN_TRY_STATUS(write_file(command.out / "recheck.json", checked.json));
+  checked.rechecked.result.rig = repaired(checked.rechecked.result);
+  LIMN_TRY_STATUS(make_folder(out));
+  LIMN_TRY_STATUS(write_file(out / "recheck.json", checked.json));
+  return checked;
+}
+
+Result<Checked> check(const RecheckCommand& command) {
+  LIMN_TRY(const Rig rig, load_rig(command.rig));
+  LIMN_TRY(const fs::path folder, captured(command));
+  LIMN_TRY(Checked checked, check(rig, folder, command.still, command.out));
   if (checked.rechecked.result.verdict != calib::RecheckVerdict::unexplained)
     LIMN_TRY_STATUS(write_rig(checked.rechecked.result, command));
   return checked;
@@ -265,6 +272,25 @@ Status captured_once(const calib::Captures& captures, const Rig& rig, const Surr
   const Status taken = calib::capture_pose(captures, 0, around.stage);
   const Status written = around.written();
   return taken ? written : taken;
+}
+
+Result<Rechecked> rechecked_in_place(const Rig& rig, const Surroundings& around, const fs::path& folder) {
+  LIMN_TRY(const calib::Board board, board_of(rig));
+  const auto devices = [](const std::vector<Imager>& imagers) {
+    std::vector<calib::CapturedDevice> list;
+    for (const Imager& imager : imagers) list.push_back({imager.name, imager.width, imager.height});
+    return list;
+  };
+  const fs::path captures = folder / "captures";
+  LIMN_TRY_STATUS(captured_once(calib::plan_captures(captures, devices(rig.cameras), devices(rig.projectors),
+                                                     board, "gray", {.inverses = false}),
+                                rig, around));
+  LIMN_TRY(Checked checked, check(rig, captures, {}, folder));
+  LIMN_TRY_STATUS(told(checked.rechecked.result));
+  LIMN_TRY_STATUS(save_rig(checked.rechecked.result.rig, folder));
+  if (!rig.responses.empty() || !rig.camera_responses.empty())
+    LIMN_TRY_STATUS(save_responses({rig.responses, rig.camera_responses}, {}, folder));
+  return std::move(checked.rechecked);
 }
 
 Result<Rechecked> rechecked(const RecheckCommand& command) {

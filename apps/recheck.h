@@ -38,6 +38,14 @@ Result<Rechecked> rechecked(const RecheckCommand& command);
 /// latencies as the rig has them.
 Status captured_once(const calib::Captures& captures, const Rig& rig, const Surroundings& around);
 
+/// The prototype as it stands, captured once by devices that are open already (those of `around`, with the
+/// names and in the order of the rig's; of it stage, written and use_latency are needed), against the rig.
+/// The result's rig is the mended one; it, recheck.json and captures/ are in `folder`. Error, and no rig is
+/// written: no single move explains what is seen.
+Result<Rechecked> rechecked_in_place(const Rig& rig,
+                                     const Surroundings& around,
+                                     const std::filesystem::path& folder);
+
 /// `limn recheck`: as rechecked(), and prints a table.
 Status run_recheck(const RecheckCommand& command);
 

@@ -342,6 +342,8 @@ const std::vector<Action>& actions() {
       {"split_at", false, number, "mm to the right of the prototype's middle", "where that line is"},
       {"delete_look", false, text, "a look", "forgets a look"},
       {"undelete_look", false, nothing, "", "brings back the look that was last deleted"},
+      {"repair", false, nothing, "",
+       "patterns on the prototype for some 15 s: the session goes on with a rig that knows what was nudged"},
       {"light", false, maybe_text,
        "a lamp's degrees right and up, its strength, soft light above and below: 30 45 0.6 0.3 0.1",
        "the light that parts are shaded by, as seen from camera 0; empty: the scene's own"},
@@ -410,6 +412,10 @@ Result<Staging> edited(const Scene& scene,
   }
   if (edit.action == "delete_look") return without_look(std::move(out), edit);
   if (edit.action == "undelete_look") return with_deleted_look(std::move(out));
+  if (edit.action == "repair") {  // by the session's devices
+    if (!staging.blackout) return out;
+    return error("repair: expected light, found blackout. End the blackout first.");
+  }
   if (edit.action == "screen") return with_screen(std::move(out), edit);
   if (edit.action == "viewer") {
     out.viewer = edit.value;

@@ -20,6 +20,7 @@ export const actions = [
   {"name": "split_at", "of_slot": false, "takes": "number", "role": "work", "label": "split moved"},
   {"name": "delete_look", "of_slot": false, "takes": "text", "role": "work", "label": "deleted look"},
   {"name": "undelete_look", "of_slot": false, "takes": "nothing", "role": "work", "label": "brought the look back"},
+  {"name": "repair", "of_slot": false, "takes": "nothing", "role": "operate", "label": "repair"},
   {"name": "light", "of_slot": false, "takes": "maybe_text", "role": "work", "label": "light"},
   {"name": "blackout", "of_slot": false, "takes": "on_off", "role": "work", "label": "blackout"},
   {"name": "freeze", "of_slot": false, "takes": "on_off", "role": "work", "label": "freeze"},

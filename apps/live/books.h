@@ -24,6 +24,8 @@ class Books {
   Telemetry& telemetry() { return telemetry_; }
   Recorder* recorder() { return recorder_.get(); }  ///< null without one
 
+  const std::filesystem::path& out() const { return out_; }  ///< empty: none
+
   /// One picture shown. Says once that the recording ended.
   void shown(const ShownFrame& frame, const Painted& painted);
 

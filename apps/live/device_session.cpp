@@ -7,6 +7,7 @@
 
 #include "apps/live/camera_threads.h"
 #include "apps/live/latest.h"
+#include "apps/live/repair.h"
 #include "apps/live/scene_watch.h"
 #include "apps/live/stopwatch.h"
 #include "core/log.h"
@@ -17,6 +18,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr auto k_wait = std::chrono::milliseconds(50);  // for news, before the next picture is painted anyway
+constexpr double k_patience_s = 5;                      // for a picture of a repair
+constexpr double k_longest_exposure_s = 0.1;            // while a camera's period is not known
 constexpr double k_blend = 0.1;                         // of a new time into the expected one
 
 // The session's clock: all stamps are of it.
@@ -30,6 +33,7 @@ struct Seen {
 class DeviceLoop {
  public:
   DeviceLoop(SessionDevices* devices,
+             const std::atomic<bool>& is_ended,
              Watcher* watcher,
              Session* session,
              Books* books,
@@ -37,6 +41,7 @@ class DeviceLoop {
              OscPort* osc,
              Server* server)
       : devices_(devices),
+        is_ended_(is_ended),
         watcher_(watcher),
         session_(session),
         books_(books),
@@ -62,13 +67,10 @@ class DeviceLoop {
     }
     for (std::size_t i = 0; i < cameras.size(); ++i)
       if (devices_->cameras[i]) cameras_.add(std::move(devices_->cameras[i]), cameras[i]);
-    watching_ = std::thread([this] { watch(); });
+    start_watching();
   }
 
-  ~DeviceLoop() {
-    is_stopping_ = true;
-    watching_.join();
-  }
+  ~DeviceLoop() { stop_watching(); }
 
   // False: the operator ends the session.
   bool step() {
@@ -77,6 +79,7 @@ class DeviceLoop {
     hear_keys();
     if (osc_) osc_->hear(session_, &books_->telemetry(), now());
     if (server_) serve();
+    if (session_->takes_repair()) mend();
     const Stamp painting_at = now();
     const Painted& painted = session_->paint(painting_at, shifted(painting_at, paint_s_ + display_s_));
     ShownFrame shown = session_->measured();
@@ -124,8 +127,89 @@ class DeviceLoop {
     server_->tell(*session_, books_->telemetry(), *health_, now());
   }
 
+  void start_watching() {
+    is_stopping_ = false;
+    watching_ = std::thread([this] { watch(); });
+  }
+
+  void stop_watching() {
+    is_stopping_ = true;
+    watching_.join();
+  }
+
+  // Nobody watches meanwhile; the cameras' pictures are of patterns.
+  void mend() {
+    stop_watching();
+    if (auto seen = seen_.take({})) session_->take(std::move(seen->watched), seen->moments);
+    PictureWriter writer;
+    const auto folder = repair_folder(books_->out());
+    if (folder)
+      repair(surroundings(&writer), *folder, now(), watcher_, session_);
+    else
+      session_->warn(now(), folder.message());
+    start_watching();
+  }
+
+  // The session's devices as a repair wants them.
+  Surroundings surroundings(PictureWriter* writer) {
+    grabbed_.clear();
+    latency_s_.assign(devices_->projectors.size(), FlashOptions().limit_s);
+    Surroundings around;
+    around.stage.show = [this](int projector, const cv::Mat& picture) {
+      return show_pattern(static_cast<std::size_t>(projector), picture);
+    };
+    around.stage.grab = [this](int camera) {
+      return grab(session_->setup().rig.cameras.at(static_cast<std::size_t>(camera)).name);
+    };
+    around.stage.store = [writer](const std::filesystem::path& path, const cv::Mat& picture) {
+      return writer->store(path, picture);
+    };
+    around.written = [writer] { return writer->finish(); };
+    around.use_latency = [this](int projector, double seconds) {
+      latency_s_.at(static_cast<std::size_t>(projector)) = seconds;
+    };
+    return around;
+  }
+
+  // One projector shows a picture, the others nothing.
+  Status show_pattern(std::size_t projector, const cv::Mat& picture) {
+    for (std::size_t i = 0; i < devices_->projectors.size(); ++i) {
+      device::Display* display = devices_->projectors[i].get();
+      if (!display)
+        return error("{}: expected a projector that works, found none.",
+                     session_->setup().rig.projectors[i].name);
+      const Stamp begun = now();
+      LIMN_TRY(const Stamp shown_at,
+               display->show(i == projector ? picture : cv::Mat(display->size(), CV_8UC1, cv::Scalar(0))));
+      lit_at_ = std::max({lit_at_, shown_at, shifted(begun, latency_s_[i])});
+    }
+    return {};
+  }
+
+  // A picture whose whole exposure lies after what was shown last: a stamp is of an exposure's middle.
+  Result<cv::Mat> grab(const std::string& camera) {
+    const Stamp begun = now();
+    for (;;) {
+      auto newest = cameras_.take(k_wait);
+      if (newest)
+        for (auto& [name, frame] : *newest) {
+          const auto [known, is_first] = grabbed_.try_emplace(name);
+          if (!is_first)
+            known->second.period_s = std::min(
+                known->second.period_s, seconds_between(known->second.frame.captured_at, frame.captured_at));
+          known->second.frame = std::move(frame);
+        }
+      const auto found = grabbed_.find(camera);
+      if (found != grabbed_.end() &&
+          found->second.frame.captured_at >= shifted(lit_at_, found->second.period_s / 2))
+        return found->second.frame.image;
+      if (is_ended_) return error("the session was ended.");
+      if (seconds_between(begun, now()) > k_patience_s)
+        return error("{}: expected a picture within {} s, found none.", camera, k_patience_s);
+    }
+  }
+
   void watch() try {
-    std::size_t moments = 0;
     while (!is_stopping_) {
       auto newest = cameras_.take(k_wait);
       if (!newest) continue;
@@ -134,7 +218,7 @@ class DeviceLoop {
       std::sort(frames.begin(), frames.end(),
                 [](const Frame& a, const Frame& b) { return a.captured_at < b.captured_at; });
       if (books_->recorder()) books_->recorder()->watched(frames);
-      seen_.put({watcher_->watch(frames), ++moments}, [](const Seen& old, Seen& next) {
+      seen_.put({watcher_->watch(frames), ++moments_}, [](const Seen& old, Seen& next) {
         next.watched.uses.insert(next.watched.uses.begin(), old.watched.uses.begin(), old.watched.uses.end());
       });
     }
@@ -172,7 +256,14 @@ class DeviceLoop {
   // The picture as large as the screen takes it, with black bars.
   static cv::Mat fitted(const cv::Mat& picture, cv::Size size);
 
+  // A camera's newest picture during a repair.
+  struct Grabbed {
+    Frame frame;
+    double period_s = k_longest_exposure_s;
+  };
+
   SessionDevices* devices_;
+  const std::atomic<bool>& is_ended_;
   Watcher* watcher_;
   Session* session_;
   Books* books_;
@@ -185,6 +276,10 @@ class DeviceLoop {
   CameraThreads cameras_{health_};
   std::vector<std::size_t> projectors_, screens_, key_sources_;  // as health_ calls them
   std::vector<bool> are_keys_gone_;
+  std::map<std::string, Grabbed> grabbed_;
+  std::vector<double> latency_s_;  // of the projectors, during a repair
+  Stamp lit_at_;                   // what a repair showed last is on the surface
+  std::size_t moments_ = 0;        // of the watching thread
   Latest<Seen> seen_;
   std::atomic<bool> is_stopping_ = false;
   double paint_s_ = 0.02, display_s_ = 0.02;  // as expected of the next picture
@@ -221,7 +316,7 @@ Status play_on_devices(SessionDevices* devices,
   if (!any(devices->projectors))
     return error("live: expected a projector that works, found none. Run limn doctor.");
   const Stamp begun = now();
-  DeviceLoop loop(devices, watcher, session, books, desk, osc, server);
+  DeviceLoop loop(devices, is_ended, watcher, session, books, desk, osc, server);
   while (!is_ended && !(seconds > 0 && seconds_between(begun, now()) >= seconds)) {
     if (!loop.step()) break;
   }

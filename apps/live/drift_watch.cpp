@@ -41,9 +41,9 @@ std::string sentence(const Drift& drift) {
   for (const std::string& name : drift.devices) names += (names.empty() ? "" : " or ") + name;
   return fmt::format(
       "{} has moved since the calibration: light lies {:.1f} px ({:.1f} mm) beside its place. Put it back, "
-      "or let limn recheck --devices look at the prototype as it stands (with one camera and one projector "
-      "at "
-      "the board): 15 s, and it writes a rig for the next session.",
+      "or ask for repair: 15 s of patterns on the prototype as it stands, and the session goes on with a "
+      "mended "
+      "rig (with one camera and one projector end it, and let limn recheck look at the board).",
       names, drift.px, drift.mm);
 }
 

@@ -25,6 +25,12 @@ Status copy_folder(const fs::path& from, const fs::path& to) {
                problem.message());
 }
 
+Status save_whole_rig(const Rig& rig, const fs::path& folder) {
+  LIMN_TRY_STATUS(save_rig(rig, folder));
+  if (rig.responses.empty() && rig.camera_responses.empty()) return {};
+  return save_responses({rig.responses, rig.camera_responses}, {}, folder);
+}
+
 nlohmann::ordered_json setup_json(const SessionSetup& setup) {
   const tracker::MotionModel& motion = setup.watch.motion;
   const PaintOptions& paint = setup.paint;
@@ -66,9 +72,7 @@ Result<std::unique_ptr<Recorder>> Recorder::create(const fs::path& folder, const
         "{}: expected a folder without a session, found one. Name another folder; nothing was changed.",
         folder.string());
   LIMN_TRY_STATUS(make_folder(folder));
-  LIMN_TRY_STATUS(save_rig(setup.rig, folder / "rig"));
-  if (!setup.rig.responses.empty() || !setup.rig.camera_responses.empty())
-    LIMN_TRY_STATUS(save_responses({setup.rig.responses, setup.rig.camera_responses}, {}, folder / "rig"));
+  LIMN_TRY_STATUS(save_whole_rig(setup.rig, folder / "rig"));
   LIMN_TRY_STATUS(copy_folder(setup.scene.folder, folder / "scene"));
   for (const Imager& camera : setup.rig.cameras)
     LIMN_TRY_STATUS(make_folder(folder / "frames" / camera.name));
@@ -101,6 +105,20 @@ void Recorder::shown(const scene::Scene& scene) {
   const std::string copy = fmt::format("scene-{}", ++scenes_);
   if (!copy_folder(scene.folder, folder_ / copy)) return end("the scene's files could not be copied");
   write({{"scene", copy}});
+}
+
+Rig Recorder::mended(Rig rig, std::size_t moments) {
+  const std::lock_guard lock(mutex_);
+  if (ended_) return rig;
+  const std::string copy = fmt::format("rig-{}", ++rigs_);
+  const Status saved = save_whole_rig(rig, folder_ / copy);
+  Result<Rig> read = saved ? load_rig(folder_ / copy) : Result<Rig>(saved.error());
+  if (!read) {
+    end("the mended rig could not be written");
+    return rig;
+  }
+  write({{"rig", copy}, {"moments", moments}});
+  return std::move(*read);
 }
 
 void Recorder::edited(const scene::Edit& edit, const std::string& source, std::size_t moments) {

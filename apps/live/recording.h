@@ -42,6 +42,8 @@ class Recorder {
   void watched(std::span<const Frame> frames);
   /// The scene's files have changed: they are copied as they are now.
   void shown(const scene::Scene& scene);
+  /// Another rig from now on; returns it as replay will read it, to the last bit. `moments` as of edited().
+  Rig mended(Rig rig, std::size_t moments);
   /// `moments` counts the calls of watched() that the session knew of.
   void edited(const scene::Edit& edit, const std::string& source, std::size_t moments);
   /// Where a guest's tablet looks from that is followed; nullopt: nowhere any more.
@@ -63,7 +65,7 @@ class Recorder {
   PictureWriter pictures_;
   mutable std::mutex mutex_;
   std::ofstream events_;
-  std::size_t frames_ = 0, scenes_ = 1;
+  std::size_t frames_ = 0, scenes_ = 1, rigs_ = 1;
   std::optional<std::string> ended_;
 };
 

@@ -40,9 +40,9 @@ Result<Events> load_events(const fs::path& path) {
     Json event = Json::parse(line, nullptr, false);
     if (event.is_discarded() || !event.is_object() ||
         !(event.contains("watch") || event.contains("edit") || event.contains("paint") ||
-          event.contains("scene") || event.contains("eye"))) {
+          event.contains("scene") || event.contains("rig") || event.contains("eye"))) {
       events.damage =
-          fmt::format("{}:{}: expected an event (watch, edit, eye, scene, paint), found something else",
+          fmt::format("{}:{}: expected an event (watch, edit, eye, scene, rig, paint), found something else",
                       path.string(), events.all.size() + 1);
       break;
     }
@@ -96,6 +96,10 @@ class Replay {
       return {};
     }
     if (event.contains("scene")) return show(event.at("scene"));
+    if (event.contains("rig")) {
+      LIMN_TRY_STATUS(watch_until(event.at("moments")));
+      return mend(event.at("rig"));
+    }
     if (event.contains("edit")) {
       LIMN_TRY_STATUS(watch_until(event.value("moments", moments_)));
       return edit(event.at("edit"), event.at("source"));
@@ -139,12 +143,26 @@ class Replay {
     return {};
   }
 
+  Result<fs::path> inside(const std::string& folder) const {
+    if (!folder.empty() && folder.find_first_of("/\\.") == std::string::npos)
+      return options_.session / folder;
+    return error("{}: expected a folder inside the recording, found '{}'.", options_.session.string(),
+                 folder);
+  }
+
+  Status mend(const std::string& folder) {
+    LIMN_TRY(const fs::path path, inside(folder));
+    LIMN_TRY(Rig rig, load_rig(path));
+    LIMN_TRY_STATUS(session_.mend(std::move(rig), session_.watched().captured_at));
+    const SessionSetup& setup = session_.setup();
+    LIMN_TRY(watcher_, Watcher::create(setup.scene, setup.rig, setup.watch));
+    return {};
+  }
+
   Status show(const std::string& folder) {
-    if (folder.empty() || folder.find_first_of("/\\.") != std::string::npos)
-      return error("{}: expected a scene's folder inside the recording, found '{}'.",
-                   options_.session.string(), folder);
+    LIMN_TRY(const fs::path path, inside(folder));
     std::vector<scene::LeftOut> left_out;  // as the session left it out
-    LIMN_TRY(scene::Scene scene, scene::load_scene(options_.session / folder, &left_out));
+    LIMN_TRY(scene::Scene scene, scene::load_scene(path, &left_out));
     return session_.show(std::move(scene), session_.watched().captured_at);
   }
 

@@ -208,6 +208,7 @@ Status Session::edit(const scene::Edit& wanted, const std::string& source, Stamp
   std::swap(staging_, changed);
   last_edit_ = Edited{edit, source, last_edit_ ? last_edit_->count + 1 : 1};
   if (recorder_) recorder_->edited(edit, source, moments_);
+  repair_asked_ |= edit.action == "repair";
   if (telemetry_)
     telemetry_->note(at, fmt::format("{}{}{}{}{} ({})", edit.action, edit.slot.empty() ? "" : " ", edit.slot,
                                      edit.value.empty() ? "" : " ", edit.value, source));
@@ -250,6 +251,17 @@ Status Session::show(scene::Scene scene, Stamp at) {
   setup_.scene = std::move(scene);
   ++scenes_;
   ask_units();
+  return {};
+}
+
+Status Session::mend(Rig rig, Stamp at) {
+  if (recorder_) rig = recorder_->mended(std::move(rig), moments_);
+  LIMN_TRY(Painter painter, Painter::create(setup_.scene, rig, setup_.paint));
+  painter_ = std::move(painter);
+  setup_.rig = std::move(rig);
+  told_drift_.reset();
+  told_swapped_ = false;
+  compared_cameras_at_ = at;
   return {};
 }
 

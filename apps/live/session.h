@@ -7,6 +7,7 @@
 #include <set>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "apps/live/painter.h"
@@ -65,6 +66,15 @@ class Session {
   /// it cannot be drawn.
   Status show(scene::Scene scene, Stamp at);
 
+  /// Goes on with another rig of the same devices. Error, and nothing changes: it cannot be drawn for.
+  Status mend(Rig rig, Stamp at);
+  /// Whether somebody asked for a repair (apps/live/repair.h) since the last call.
+  bool takes_repair() { return std::exchange(repair_asked_, false); }
+  /// What has moved, as far as people were told.
+  const std::optional<Drift>& drift() const { return told_drift_; }
+  /// Tells people, on the page and in the log.
+  void warn(Stamp at, const std::string& what);
+
   /// The same, when `files` have changed; what cannot be loaded is told of and the parts stay as they were.
   void show_news(SceneWatch* files, Stamp at);
 
@@ -92,7 +102,6 @@ class Session {
  private:
   Session(SessionSetup setup, Painter painter, Telemetry* telemetry, Recorder* recorder);
   void load_looks();
-  void warn(Stamp at, const std::string& what);  // people, on the page and in the log
   void tell_of_drift(Stamp at);
   void tell_of_swapped_cameras();
   void draw_anew(Stamp now, Stamp shown_at);
@@ -119,6 +128,7 @@ class Session {
   std::optional<Drift> told_drift_;
   Stamp compared_cameras_at_;
   bool told_swapped_ = false;
+  bool repair_asked_ = false;
   int scenes_ = 1;
   std::optional<Edited> last_edit_;
   std::set<std::string> windows_;

@@ -8,8 +8,10 @@
 
 #include "apps/live/books.h"
 #include "apps/live/device_health.h"
+#include "apps/live/repair.h"
 #include "apps/live/scene_watch.h"
 #include "apps/live/stopwatch.h"
+#include "apps/wizard/virtual_stage.h"
 #include "core/log.h"
 
 namespace limn::apps {
@@ -94,6 +96,7 @@ class VirtualLoop {
     session_->show_news(&files_, rig_->now());
     if (osc_) osc_->hear(session_, &books_->telemetry(), rig_->now());
     if (server_) serve();
+    if (session_->takes_repair()) LIMN_TRY_STATUS(mend());
     const Painted& painted = session_->paint(rig_->now(), shifted(rig_->now(), k_virtual_display_s));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i) {
       if (!is_plugged(session_->setup().rig.projectors[i].name, projectors_[i], rig_->now())) continue;
@@ -116,6 +119,18 @@ class VirtualLoop {
   }
 
  private:
+  // The clock goes on meanwhile, the room stays as it is.
+  Status mend() {
+    LIMN_TRY(const std::filesystem::path folder, repair_folder(books_->out()));
+    const Plan no_board{};
+    PictureWriter writer;
+    const Surroundings around = virtual_surroundings(no_board, rig_, &writer);
+    for (std::size_t i = 0; i < projectors_.size(); ++i)
+      around.use_latency(static_cast<int>(i), k_virtual_display_s);
+    repair(around, folder, rig_->now(), watcher_, session_);
+    return {};
+  }
+
   void serve() {
     server_->hear(session_, rig_->now());
     server_->tell(*session_, books_->telemetry(), health_, rig_->now());

@@ -2,6 +2,8 @@
 
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
+#include <mutex>
 #include <opencv2/core.hpp>
 #include <thread>
 
@@ -24,6 +26,7 @@ namespace limn::apps {
 namespace {
 
 namespace fs = std::filesystem;
+using namespace test::literals;
 
 // Remembers what it was shown; its light leaves 20 ms later.
 class Canvas : public device::Display {
@@ -192,6 +195,97 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
   EXPECT_NE(page.find("camera0 is back"), std::string::npos);
   EXPECT_NE(page.find("next_variant mirror (clicker)"), std::string::npos);
 
+  ReplayOptions replay;
+  replay.session = folder / "recording";
+  const Status replayed = run_replay(replay);
+  EXPECT_TRUE(replayed.ok()) << replayed.message();
+}
+
+// A room of which threads have their turns; its cameras' stamps are of the session's clock.
+struct SharedRoom {
+  sim::VirtualRig rig;
+  std::mutex mutex;
+};
+
+class RoomCamera : public device::CameraSource {
+ public:
+  RoomCamera(SharedRoom* room, int index) : room_(room), index_(index) {}
+  const std::string& name() const override { return room_->rig.camera(index_).name(); }
+  cv::Size size() const override { return room_->rig.camera(index_).size(); }
+  Result<Frame> next() override {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    const std::lock_guard lock(room_->mutex);
+    const Stamp exposed_at = std::chrono::steady_clock::now();
+    LIMN_TRY(Frame frame, room_->rig.camera(index_).next());
+    frame.captured_at = exposed_at;
+    return frame;
+  }
+
+ private:
+  SharedRoom* room_;
+  int index_;
+};
+
+class RoomProjector : public device::Display {
+ public:
+  RoomProjector(SharedRoom* room, int index) : room_(room), index_(index) {}
+  const std::string& name() const override { return room_->rig.projector(index_).name(); }
+  cv::Size size() const override { return room_->rig.projector(index_).size(); }
+  Result<Stamp> show(const cv::Mat& picture) override {
+    const std::lock_guard lock(room_->mutex);
+    const Result<Stamp> shown_at = room_->rig.projector(index_).show(picture);
+    return shown_at ? Result<Stamp>(std::chrono::steady_clock::now()) : shown_at;
+  }
+
+ private:
+  SharedRoom* room_;
+  int index_;
+};
+
+// A camera that was nudged is found by the session's own devices, whose threads go on with the mended rig.
+TEST(LiveDevices, IsRepairedWhileItRuns) {
+  const fs::path folder = test::test_folder();
+  sim::World world =
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture).value();
+  ASSERT_TRUE(make_coarser(0.5, &world.rig).ok());
+  SessionSetup setup;
+  setup.rig = world.rig;
+  setup.rig.provenance_json = R"({"display_latency_ms": {"projector0": 0, "projector1": 0}})";
+  setup.scene = *world.scene;
+  Pose& moved = world.rig.cameras[0].imager_from_world;
+  moved = Pose(exp_rotation(Eigen::Vector3d(0, 0.25, 0) * M_PI / 180), Eigen::Vector3d::Zero()) * moved;
+  const Pose truth = moved, world_from_prototype = world.world_from_prototype;
+  SharedRoom room{sim::VirtualRig(std::move(world), {.display_delay_s = 0, .grab_waits_for_light = false}),
+                  {}};
+  const auto context = device::GlContext::create();
+  ASSERT_TRUE(context) << context.message();
+  auto books = Books::open(folder / "out", folder / "recording", &setup);
+  ASSERT_TRUE(books) << books.message();
+  auto watcher = Watcher::create(setup.scene, setup.rig, setup.watch);
+  auto session = Session::create(setup, &books->telemetry(), books->recorder());
+  ASSERT_TRUE(watcher && session);
+  SessionDevices devices;
+  devices.cameras.push_back(std::make_unique<RoomCamera>(&room, 0));
+  for (int i = 0; i < 2; ++i) devices.projectors.push_back(std::make_unique<RoomProjector>(&room, i));
+  ASSERT_TRUE(session->edit({"repair", "", ""}, "test", {}));
+  std::atomic<bool> is_ended = false;
+  std::thread ends([&] {
+    for (int i = 0; i < 600 && !fs::exists(folder / "recording/rig-2"); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    is_ended = true;
+  });
+  const Status played =
+      play_on_devices(&devices, 60, is_ended, &*watcher, &*session, &*books, nullptr, nullptr, nullptr);
+  ends.join();
+  ASSERT_TRUE(played.ok()) << played.message();
+  ASSERT_TRUE(books->close(&*session, false).ok());
+  EXPECT_TRUE(
+      test::pose_near(session->setup().rig.cameras[0].imager_from_world, truth, 0.02 * M_PI / 180, 0.0015));
+  ASSERT_TRUE(session->painted().posed.world_from_prototype);
+  EXPECT_TRUE(
+      test::pose_near(*session->painted().posed.world_from_prototype, world_from_prototype, 0.2_deg, 1.5_mm));
+  EXPECT_GT(cv::countNonZero(session->painted().projectors[1].reshape(1)), 1000);
   ReplayOptions replay;
   replay.session = folder / "recording";
   const Status replayed = run_replay(replay);

@@ -35,8 +35,10 @@ namespace limn::apps {
 namespace {
 
 namespace fs = std::filesystem;
+using namespace test::literals;
 using nlohmann::json;
 
+constexpr double k_mended_s = 5.4;  // what a repair takes of the virtual clock, and half a second
 constexpr const char* k_mirror = "aruco_4x4_50:0";  // the marker of the door's slot
 
 sim::World studio(double resolution) {
@@ -195,6 +197,55 @@ TEST(Live, ASessionIsReplayedToTheLastDigit) {
   const Status damaged = with(cut);
   ASSERT_FALSE(damaged.ok());
   EXPECT_NE(damaged.message().find("events.jsonl:5"), std::string::npos) << damaged.message();
+}
+
+// A projector is nudged; asked for it, the session looks at the prototype and goes on with a rig that knows.
+TEST(Live, GoesOnWithAMendedRig) {
+  const fs::path folder = test::test_folder();
+  LiveOptions options;
+  options.resolution = 0.5;
+  options.frame_period_s = 0.1;
+  const auto edit = [](double at_s, const std::string& action, const std::string& value) {
+    return json{{"at_s", at_s}, {"edit", {{"action", action}, {"value", value}}}};
+  };
+  options.script = written(
+      folder / "script.json",
+      script_of(k_mended_s, {{{"at_s", 0.05}, {"nudge", "projector1"}, {"degrees", {0, 0.25, 0}}},
+                             edit(0.3, "blackout", "on"),
+                             edit(0.3, "repair", ""),
+                             edit(0.35, "blackout", "off"),
+                             {{"at_s", 0.35}, {"edit", {{"action", "next_variant"}, {"slot", "mirror"}}}},
+                             edit(0.45, "repair", "")}));
+  options.record = folder / "recording";
+  options.out = folder / "out";
+  const Status lived = run_live(options);
+  ASSERT_TRUE(lived.ok()) << lived.message();
+  const Imager before = studio(0.5).rig.projectors[1];
+  const Pose nudge(exp_rotation(Eigen::Vector3d(0, 0.25, 0) * M_PI / 180), Eigen::Vector3d::Zero());
+  const Pose truth = nudge.inverse() * before.imager_from_world;
+  const auto mended = load_rig(folder / "out/repaired-1");
+  ASSERT_TRUE(mended) << mended.message();
+  EXPECT_TRUE(test::pose_near(mended->projectors[1].imager_from_world, truth, 0.02_deg, 1.5_mm));
+  EXPECT_EQ(mended->projectors[0].imager_from_world.matrix(),
+            load_rig(folder / "recording/rig")->projectors[0].imager_from_world.matrix());
+  const std::string page = read_file(folder / "out/session.html").value();
+  EXPECT_NE(page.find("projector1 was turned by 0.2"), std::string::npos);
+  EXPECT_FALSE(fs::exists(folder / "out/repaired-2")) << "in a blackout no light is given";
+  // What people had chosen is still shown.
+  const auto poses = lines_of(folder / "out/poses.csv");
+  EXPECT_NE(poses[poses.size() - 2].find(",mirror,sport,"), std::string::npos) << poses[poses.size() - 2];
+
+  ReplayOptions replay;
+  replay.session = folder / "recording";
+  const Status replayed = run_replay(replay);
+  EXPECT_TRUE(replayed.ok()) << replayed.message();
+  // It is the mended rig that was gone on with.
+  fs::copy(folder / "recording/rig", folder / "recording/rig-2",
+           fs::copy_options::recursive | fs::copy_options::overwrite_existing);
+  const Status other = run_replay(replay);
+  ASSERT_FALSE(other.ok());
+  EXPECT_NE(other.message().find("expected the recorded projector pictures"), std::string::npos)
+      << other.message();
 }
 
 // Another program's edits come at any moment, are in the recording, and come again at the same one.

@@ -53,7 +53,7 @@ TEST(RemoteActions, DesignersDoAllButWhatBelongsToTheOperator) {
   std::set<std::string> operate;
   for (const scene::Action& action : scene::actions())
     if (role_for(action.name) == Role::operate) operate.insert(action.name);
-  EXPECT_EQ(operate, (std::set<std::string>{"pair", "unpair", "units", "marker_states", "screen"}));
+  EXPECT_EQ(operate, (std::set<std::string>{"pair", "unpair", "units", "marker_states", "screen", "repair"}));
   EXPECT_EQ(role_for("an action of tomorrow"), Role::operate);
 }
 

@@ -348,6 +348,7 @@ TEST(Staging, EveryActionCanBeDone) {
   EXPECT_EQ(staging.look, "look-01");
   staging = done(scene, staging, {}, {"save_look", "", ""});
   staging = done(scene, done(scene, staging, {}, {"save_look", "", "gone"}), {}, {"delete_look", "", "gone"});
+  EXPECT_FALSE(edited(scene, done(scene, staging, {}, {"blackout", "", "on"}), {}, {"repair", "", ""}));
   for (const Action& action : actions()) {
     std::string value;
     if (action.name == "choose_variant") value = "c";
