@@ -134,6 +134,9 @@ OperatorView OperatorDesk::view_of(const Session& session,
   if (view.remote) view.remote->projector = server_->code_projector();
   view.windows = {session.windows().begin(), session.windows().end()};
   view.follows = session.painted().follows;
+  if (const auto& drift = session.drift())
+    for (const std::string& device : drift->devices)
+      view.moved += (view.moved.empty() ? "" : " or ") + device;
   view.recent = {recent_.begin(), recent_.end()};
   const auto& notes = telemetry.notes();
   const double begun_s = seconds_between(Stamp{}, *begun_at_);

@@ -228,6 +228,12 @@ void OperatorPanel::draw_bar(const Gui& gui, const OperatorView& view) {
   if (toggle("Marker rings", staging.marker_states, colour::k_blue, size)) ask("marker_states");
   ImGui::SameLine();
   if (toggle("Grid", staging.grid, colour::k_blue, size)) ask("grid");
+  if (!view.moved.empty()) {
+    ImGui::SameLine();
+    if (toggle("Repair " + view.moved, true, colour::k_bad, size)) ask("repair");
+    if (ImGui::IsItemHovered())
+      ImGui::SetTooltip("%s", "It has moved. Patterns on the prototype for some 15 s.");
+  }
   if (view.remote) {
     ImGui::SameLine();
     if (toggle("Remote", shows_remote_, colour::k_blue, size)) shows_remote_ = !shows_remote_;

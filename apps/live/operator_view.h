@@ -69,6 +69,7 @@ struct OperatorView {
   std::vector<ShownFrame> recent;  ///< pictures shown, the newest last
   std::vector<Notice> notices;     ///< the newest last
   std::optional<Remote> remote = {};
+  std::string moved = {};  ///< devices that do not stand where the rig says; empty: none is known of
 };
 
 /// What a person asked for.

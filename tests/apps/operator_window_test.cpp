@@ -147,6 +147,10 @@ TEST(OperatorPanel, EditsAreAClickAway) {
   EXPECT_TRUE(bar.contains("blackout"));
   EXPECT_TRUE(bar.contains("freeze"));
   EXPECT_TRUE(bar.contains("marker_states"));
+  EXPECT_FALSE(bar.contains("repair"));
+  view.moved = "projector1";
+  EXPECT_TRUE(reachable(view, {1000, 640}, {420, 25, 60, 10}, 3).contains("repair"));
+  view.moved.clear();
   std::set<std::string> column = reachable(view, {1000, 640}, {730, 60, 220, 400}, 1);
   column.merge(reachable(view, {1000, 640}, {950, 60, 10, 400}, 1));
   for (const char* edit : {"next_variant mirror", "previous_variant mirror", "next_variant grille",
