@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "calib/observations.h"
+#include "calib/seed.h"
 #include "core/result.h"
 
 namespace limn::apps {
@@ -81,6 +83,41 @@ std::vector<std::string> places_in_words(const Imager& camera,
                                 turn(camera_from_board)));
   }
   return words;
+}
+
+std::vector<std::vector<std::vector<Eigen::Vector2d>>> outlines(const calib::Board& board,
+                                                                const std::vector<Pose>& world_from_board,
+                                                                const std::vector<Imager>& cameras) {
+  const double width = board.width_m(), height = board.height_m();
+  const Eigen::Vector3d corners[] = {{0, 0, 0}, {width, 0, 0}, {width, height, 0}, {0, height, 0}};
+  std::vector<std::vector<std::vector<Eigen::Vector2d>>> all;
+  for (const Pose& place : world_from_board) {
+    auto& outlines = all.emplace_back();
+    for (const Imager& camera : cameras) {
+      auto& outline = outlines.emplace_back();
+      for (const Eigen::Vector3d& p_board : corners)
+        if (const auto px = camera.project(place * p_board)) outline.push_back(*px);
+      if (outline.size() < std::size(corners)) outline.clear();
+    }
+  }
+  return all;
+}
+
+std::vector<Pose> placed_alike(const std::vector<Pose>& world_from_board,
+                               const calib::Board& board,
+                               const Imager& assumed,
+                               const Rig& rig) {
+  std::vector<Pose> places;
+  for (const Pose& place : world_from_board) {
+    calib::Observations seen;
+    seen.board = board;
+    for (int i = 0; i < board.corner_count(); ++i)
+      if (const auto px = assumed.project(place * board.p_corner(i)))
+        seen.corners.push_back({.camera = 0, .corner = i, .px = *px});
+    const Result<Pose> found = calib::board_pose_seed(seen, rig);
+    places.push_back(found ? *found : place);
+  }
+  return places;
 }
 
 }  // namespace limn::apps

@@ -6,6 +6,7 @@
 #include "calib/board/board.h"
 #include "core/imager.h"
 #include "core/pose.h"
+#include "core/rig.h"
 
 namespace limn::apps {
 
@@ -16,5 +17,19 @@ namespace limn::apps {
 std::vector<std::string> places_in_words(const Imager& camera,
                                          const calib::Board& board,
                                          const std::vector<Pose>& world_from_board);
+
+/// The board's four corners in the picture of each camera, pixels, for each of its places: [place][camera];
+/// empty where one of them is behind the camera.
+std::vector<std::vector<std::vector<Eigen::Vector2d>>> outlines(const calib::Board& board,
+                                                                const std::vector<Pose>& world_from_board,
+                                                                const std::vector<Imager>& cameras);
+
+/// The places of a board that lies in the picture of the rig's first camera where `assumed`, which stood in
+/// for it, sees it at `world_from_board`; in the rig's world, as far as the rig is right. A place that cannot
+/// be found is left as it is.
+std::vector<Pose> placed_alike(const std::vector<Pose>& world_from_board,
+                               const calib::Board& board,
+                               const Imager& assumed,
+                               const Rig& rig);
 
 }  // namespace limn::apps

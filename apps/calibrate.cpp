@@ -183,10 +183,12 @@ Status capture(const calib::Captures& captures,
 }
 
 // The solve after each pose: one lens model for all, for models are chosen when all poses are there.
-Result<calib::Assessment> judged(const calib::Observed& observed) {
+Status judge(const calib::Observed& observed, PoseJudged* judged) {
   const calib::SolveOptions options;
-  LIMN_TRY(const calib::Solution solution, calib::solve(observed.observations, options));
-  return calib::assess(observed, options, solution);
+  LIMN_TRY(calib::Solution solution, calib::solve(observed.observations, options));
+  LIMN_TRY(judged->assessment, calib::assess(observed, options, solution));
+  judged->rig = std::move(solution.rig);
+  return {};
 }
 
 std::string line_of(const PoseJudged& judged) {
@@ -275,6 +277,12 @@ class Run {
     return true;
   }
 
+  bool is_left() const { return audience_.wish && *audience_.wish == WizardWish::leave; }
+  static Status left_in(const calib::CapturedPose& files) {
+    return error("calibrate: left in {}. What was captured is kept; the same command goes on from there.",
+                 files.name);
+  }
+
   void step(WizardStep which, WizardState state, const std::string& words) {
     if (audience_.step) audience_.step(which, state, words);
   }
@@ -301,13 +309,11 @@ class Run {
       remove_pictures(files);
       if (const Status held = around_.hold(number, nullptr); !held) {
         if (followed(WizardWish::check) || followed(WizardWish::repeat)) continue;
-        return held;
+        return is_left() ? left_in(files) : held;
       }
       if (!are_checked_) LIMN_TRY_STATUS(check());
       const Status done = capture(captures_, number, around_, audience_.wish, &clock_);
-      if (audience_.wish && *audience_.wish == WizardWish::leave)
-        return error("calibrate: left in {}. What was captured is kept; the same command goes on from there.",
-                     files.name);
+      if (is_left()) return left_in(files);
       is_again = followed(WizardWish::check) || followed(WizardWish::repeat);
       if (!is_again) LIMN_TRY_STATUS(done);
     }
@@ -325,9 +331,7 @@ class Run {
   }
 
   void judge(PoseJudged* judged) {
-    auto assessment = apps::judged(*observed_);
-    if (assessment) judged->assessment = std::move(*assessment);
-    if (!judged->assessment) judged->unsolved = assessment.message();
+    if (const Status done = apps::judge(*observed_, judged); !done) judged->unsolved = done.message();
     poses_.push_back(*judged);
     judged->more_helps = poses_.back().more_helps = apps::more_helps(poses_);
   }
@@ -447,27 +451,6 @@ Status add_to_rig(const std::vector<std::pair<std::string, double>>& latency_s, 
   return save_rig(rig, folder);
 }
 
-// The board's outline in each camera's picture, for each pose.
-std::vector<std::vector<std::vector<Eigen::Vector2d>>> outlines(const calib::Board& board,
-                                                                const std::vector<Pose>& world_from_boards,
-                                                                const std::vector<Imager>& cameras) {
-  const double width = board.width_m(), height = board.height_m();
-  const Eigen::Vector3d corners[] = {{0, 0, 0}, {width, 0, 0}, {width, height, 0}, {0, height, 0}};
-  std::vector<std::vector<std::vector<Eigen::Vector2d>>> all;
-  for (const Pose& world_from_board : world_from_boards) {
-    auto& pose = all.emplace_back();
-    for (const Imager& camera : cameras) {
-      auto& outline = pose.emplace_back();
-      for (const Eigen::Vector3d& p_board : corners) {
-        const auto px = camera.project(world_from_board * p_board);
-        if (px) outline.push_back(*px);
-      }
-      if (outline.size() < std::size(corners)) outline.clear();
-    }
-  }
-  return all;
-}
-
 std::string devices_in_words(const calib::Captures& captures, const char* where) {
   const auto counted = [](std::size_t count, const char* what) {
     return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
@@ -561,11 +544,21 @@ std::string devices_text(const CalibrateOptions& options, const calib::Captures&
 }
 
 Status calibrate_devices(const CalibrateOptions& options) {
-  const auto board = calib::Board::parse(options.board);
-  if (!board) return usage_error("--board: {}", board.message());
+  if (const auto board = calib::Board::parse(options.board); !board)
+    return usage_error("--board: {}", board.message());
   LIMN_TRY(const Devices named, load_devices(options.devices));
   const Result<device::Desktop> desktop = device::Desktop::open();
   LIMN_TRY(DeviceStage::Devices devices, opened_devices(named, desktop));
+  return calibrate_on(options, std::move(devices), desktop);
+}
+
+}  // namespace
+
+Status calibrate_on(const CalibrateOptions& options,
+                    DeviceStage::Devices devices,
+                    const Result<device::Desktop>& desktop) {
+  const auto board = calib::Board::parse(options.board);
+  if (!board) return usage_error("--board: {}", board.message());
   const calib::Captures captures =
       calib::plan_captures(options.out / "captures", captured_devices(devices.cameras),
                            captured_devices(devices.projectors), *board, options.code);
@@ -573,7 +566,10 @@ Status calibrate_devices(const CalibrateOptions& options) {
   const Imager assumed = assumed_camera(first.name, first.width, first.height);
   const std::vector<Pose> poses = guided_poses(assumed, *board);
   auto targets = outlines(*board, poses, {assumed});
-  for (auto& pose : targets) pose.resize(captures.cameras.size());  // nothing is known of the others
+  for (auto& pose : targets) pose.resize(captures.cameras.size());  // nothing is known yet of the others
+  const auto targets_by = [&](const Rig& rig) {
+    return outlines(*board, placed_alike(poses, *board, assumed, rig), rig.cameras);
+  };
   std::atomic<WizardWish> wish = WizardWish::none;
   MainErrands errands;
   std::optional<GuiWindow> window = window_for(options, desktop);
@@ -583,11 +579,10 @@ Status calibrate_devices(const CalibrateOptions& options) {
   DeviceStage stage(std::move(devices), *board, &wish);
   PictureWriter writer;
   return played(options, devices_text(options, captures),
-                {captures, places_in_words(assumed, *board, poses), targets, devices_in_words(captures, "")},
+                {captures, places_in_words(assumed, *board, poses), targets, devices_in_words(captures, ""),
+                 targets_by},
                 stage.surroundings(&writer), std::move(window), &wish, &errands);
 }
-
-}  // namespace
 
 std::string to_text(WizardStep step) {
   static const std::array<const char*, k_wizard_steps> names = {

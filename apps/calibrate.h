@@ -16,6 +16,7 @@
 #include "calib/report/report.h"
 #include "core/frame.h"
 #include "core/result.h"
+#include "core/rig.h"
 
 namespace limn::apps {
 
@@ -61,7 +62,8 @@ struct PoseJudged {
   /// None: no solution comes of these poses yet, and `unsolved` says why.
   std::optional<calib::Assessment> assessment;
   std::string unsolved;
-  std::string more_helps;  ///< why more poses help; empty: they are enough
+  std::optional<Rig> rig = {};  ///< of these poses, before models are chosen; world: camera 0
+  std::string more_helps;       ///< why more poses help; empty: they are enough
 };
 
 /// The wizard's steps, in their order.

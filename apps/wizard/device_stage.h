@@ -54,6 +54,12 @@ class DeviceStage {
 /// Cameras and projectors of a devices file; every one must work, and there must be some of both.
 Result<DeviceStage::Devices> opened_devices(const Devices& named, const Result<device::Desktop>& desktop);
 
+/// `limn calibrate` on devices that are open (of `options` devices is not read); in a window of `desktop`, as
+/// run_calibrate() does it. The displays are used by the calling thread alone.
+Status calibrate_on(const CalibrateOptions& options,
+                    DeviceStage::Devices devices,
+                    const Result<device::Desktop>& desktop);
+
 /// As captures name them.
 template <typename AllDevices>
 std::vector<calib::CapturedDevice> captured_devices(const AllDevices& all) {

@@ -18,7 +18,8 @@ constexpr auto k_pause = std::chrono::milliseconds(2);  // errands wait no longe
 // What worker and window share.
 class Stand {
  public:
-  Stand(const WizardPlan& plan, std::atomic<WizardWish>* wish) : plan_(plan), wish_(wish) {
+  Stand(const WizardPlan& plan, std::atomic<WizardWish>* wish)
+      : plan_(plan), targets_(plan.targets), wish_(wish) {
     step(WizardStep::devices) = {State::done, plan.devices};
     for (const calib::CapturedDevice& camera : plan.captures.cameras)
       view_.cameras.push_back({.name = camera.name, .width = camera.width, .height = camera.height});
@@ -161,7 +162,7 @@ class Stand {
     view_.is_capturing = true;
     view_.pictures = 0;
     for (std::size_t i = 0; i < view_.cameras.size(); ++i) {
-      view_.cameras[i].target = plan_.targets[at][i];
+      view_.cameras[i].target = targets_[at][i];
       view_.cameras[i].corners.clear();
     }
   }
@@ -183,6 +184,7 @@ class Stand {
       row.predicted_mm = predicted_mm(*judged.assessment);
     }
     view_.judged.push_back(row);
+    if (judged.rig && plan_.targets_by) targets_ = plan_.targets_by(*judged.rig);
     view_.advice = !judged.assessment          ? "No rig yet: " + judged.unsolved
                    : judged.more_helps.empty() ? "These poses are enough."
                                                : "More poses help: " + judged.more_helps + ".";
@@ -203,6 +205,7 @@ class Stand {
   WizardView::Step& step(WizardStep which) { return view_.steps.at(static_cast<std::size_t>(which)); }
 
   const WizardPlan& plan_;
+  std::vector<std::vector<std::vector<Eigen::Vector2d>>> targets_;  // as far as they are known
   mutable std::mutex mutex_;
   WizardView view_;
   std::atomic<WizardWish>* wish_;

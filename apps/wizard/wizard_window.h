@@ -20,6 +20,8 @@ struct WizardPlan {
   /// The same as the board's outline in each camera's picture, pixels; empty where it would not be seen.
   std::vector<std::vector<std::vector<Eigen::Vector2d>>> targets;  ///< [pose][camera]
   std::string devices;                                             ///< what was found, in words
+  /// The targets once a rig is known; empty: they are known beforehand.
+  std::function<std::vector<std::vector<std::vector<Eigen::Vector2d>>>(const Rig&)> targets_by = nullptr;
 };
 
 /// The wizard's work, as calibrated() with these surroundings and this audience.

@@ -9,9 +9,8 @@
 #include "apps/plan.h"
 #include "apps/recheck.h"
 #include "apps/wizard/guided_poses.h"
-#include "apps/world_markers.h"
 #include "core/file.h"
-#include "sim/virtual_rig.h"
+#include "tests/apps/board_room.h"
 #include "tests/apps/small_plan.h"
 #include "tests/support/matchers.h"
 
@@ -71,97 +70,33 @@ TEST(StillRoom, RestsWhenNothingMovesForAWhile) {
   EXPECT_FALSE(rests_after(100));
 }
 
-// A room with a person who carries the board to where the wizard wants it.
-struct Room {
-  Plan plan;
-  sim::VirtualRig rig;
-  Pose from, to;
-  int steps_left = 0;  // of the person
-
-  explicit Room(const Plan& wanted)
-      : plan(wanted),
-        rig(sim::load_world(wanted.world, marker_picture).value(),
-            {.display_delay_s = 0.12, .frame_period_s = 0.1, .grab_waits_for_light = false}) {
-    rig.clear_stage();
-    from = to = plan.world_from_board[0];
-    from.translation.z() += 0.5;
-  }
-  void go(const Pose& place) {
-    from = to;
-    to = place;
-    steps_left = k_steps;
-  }
-  void step() {
-    if (steps_left == 0) return;
-    const double share = 1 - 1.0 * --steps_left / k_steps;
-    Pose now = to;
-    now.translation = from.translation + share * (to.translation - from.translation);
-    now.rotation = from.rotation.slerp(share, to.rotation);
-    rig.place(board_object(plan.board, now));
-  }
-  static constexpr int k_steps = 4;
-};
-
-class RoomCamera : public device::CameraSource {
- public:
-  explicit RoomCamera(Room* room) : room_(room) {}
-  const std::string& name() const override { return room_->rig.camera(0).name(); }
-  cv::Size size() const override { return room_->rig.camera(0).size(); }
-  Result<Frame> next() override {
-    room_->step();
-    return room_->rig.camera(0).next();
-  }
-
- private:
-  Room* room_;
-};
-
-// Tells when it has swapped, not when its light leaves.
-class RoomProjector : public device::Display {
- public:
-  RoomProjector(Room* room, int* moved) : room_(room), moved_(moved) {}
-  const std::string& name() const override { return room_->rig.projector(0).name(); }
-  cv::Size size() const override { return room_->rig.projector(0).size(); }
-  Result<Stamp> show(const cv::Mat& picture) override {
-    const Stamp at = room_->rig.now();
-    double least = 0, most = 0;
-    cv::minMaxLoc(picture.reshape(1), &least, &most);
-    *moved_ += least < most && room_->steps_left > 0;  // a pattern
-    LIMN_TRY([[maybe_unused]] const Stamp lit_at, room_->rig.projector(0).show(picture));
-    return at;
-  }
-
- private:
-  Room* room_;
-  int* moved_;
-};
-
 TEST(DeviceStage, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
   const std::filesystem::path folder = test::test_folder();
-  Room room(load_plan(test::small_plan(folder)).value());
-  int moved = 0;
-  DeviceStage::Devices devices{.cameras = {},
-                               .projectors = {},
-                               .now = [&] { return room.rig.now(); },
-                               .wait = [&](double seconds) { room.rig.advance(seconds); }};
-  devices.cameras.push_back(std::make_unique<RoomCamera>(&room));
-  devices.projectors.push_back(std::make_unique<RoomProjector>(&room, &moved));
-  DeviceStage stage(std::move(devices), room.plan.board, nullptr);
+  test::BoardRoom room(load_plan(test::small_plan(folder)).value());
+  DeviceStage stage(room.devices(), room.plan.board, nullptr);
   PictureWriter writer;
   const CalibrateOptions options{.out = folder / "rig"};
   const calib::Captures captures = planned(room.plan, room.rig, options.out / "captures").value();
   const auto places =
       places_in_words(room.rig.world().rig.cameras[0], room.plan.board, room.plan.world_from_board);
   std::string lines;
+  std::optional<Rig> last;  // as of the poses so far
   const auto done = calibrated(
       options, "{\"schema\": \"limn.captured_plan/1\"}", captures, places, stage.surroundings(&writer),
       {.say = [&](const std::string& line) { lines += line + "\n"; },
-       .aims = [&](int pose) { room.go(room.plan.world_from_board[static_cast<std::size_t>(pose)]); }});
+       .aims = [&](int pose) { room.go(room.plan.world_from_board[static_cast<std::size_t>(pose)]); },
+       .judged =
+           [&](const PoseJudged& judged, const auto&, const auto&) {
+             EXPECT_EQ(judged.rig.has_value(), judged.assessment.has_value());
+             last = judged.rig;
+           }});
   ASSERT_TRUE(done) << done.message();
-  EXPECT_EQ(moved, 0) << "patterns shown while the board moved";
+  EXPECT_EQ(room.moved, 0) << "patterns shown while the board moved";
   EXPECT_EQ(done->report.assessment.verdict, calib::Verdict::good) << lines;
   ASSERT_EQ(done->latency_s.size(), 1U) << lines;
   EXPECT_NEAR(done->latency_s[0].second, 0.12, 0.0025);
+  ASSERT_TRUE(last);
+  EXPECT_NEAR(last->cameras[0].lens.fx(), room.rig.world().rig.cameras[0].lens.fx(), 10);
 
   // A recheck by the same devices, of what stands there.
   const Rig rig = load_rig(options.out).value();
@@ -174,6 +109,40 @@ TEST(DeviceStage, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
   const auto checked = rechecked({.rig = options.out, .captures = again.folder, .out = folder / "checked"});
   ASSERT_TRUE(checked) << checked.message();
   EXPECT_EQ(checked->result.verdict, calib::RecheckVerdict::sound);
+}
+
+// A place was planned for a guessed lens: laid onto its outline the board is elsewhere, which the rig tells,
+// and from there it is foretold where the other cameras see it.
+TEST(GuidedPoses, AreShownToAllCamerasOnceThereIsARig) {
+  const calib::Board board = calib::Board::parse("charuco:11x8:25mm").value();
+  const Imager assumed = assumed_camera("camera0", 1280, 1024);
+  const std::vector<Pose> planned = guided_poses(assumed, board);
+  Rig rig;
+  const double f = 1.3 * assumed.lens.fx();
+  const Lens lens =
+      Lens::create("LENSMODEL_OPENCV8", {f, f, 650, 500, -0.1, 0.05, 0.001, 0, 0, 0, 0, 0}).value();
+  rig.cameras.push_back({"camera0", 1280, 1024, lens, Pose()});
+  rig.cameras.push_back(rig.cameras[0]);
+  rig.cameras[1].name = "camera1";
+  rig.cameras[1].imager_from_world = Pose(exp_rotation({0, 0.4, 0}), {-0.4, 0.02, 0.1});
+  const std::vector<Pose> places = placed_alike(planned, board, assumed, rig);
+  const auto wanted = outlines(board, planned, {assumed}), shown = outlines(board, places, rig.cameras);
+  ASSERT_EQ(shown.size(), planned.size());
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    ASSERT_EQ(shown[i].size(), 2U);
+    ASSERT_EQ(shown[i][0].size(), 4U) << i;
+    for (std::size_t k = 0; k < 4; ++k)
+      EXPECT_LT((shown[i][0][k] - wanted[i][0][k]).norm(), 25) << i << " " << k;
+    EXPECT_GT(places[i].translation.norm(), 1.15 * planned[i].translation.norm()) << "farther away, as large";
+    // Where the other camera sees the board that lies there.
+    ASSERT_EQ(shown[i][1].size(), 4U) << i;
+    const auto px = rig.cameras[1].project(places[i] * Eigen::Vector3d(board.width_m(), board.height_m(), 0));
+    EXPECT_LT((shown[i][1][2] - *px).norm(), 1e-6);
+    EXPECT_GT((shown[i][1][2] - shown[i][0][2]).norm(), 20);
+  }
+  // Behind a camera it is not shown.
+  rig.cameras[1].imager_from_world = Pose(exp_rotation({0, 3.1, 0}), {0, 0, 0});
+  for (const auto& cameras : outlines(board, places, rig.cameras)) EXPECT_TRUE(cameras[1].empty());
 }
 
 TEST(GuidedPoses, AreSeenWholeAndTiltedToAllSides) {

@@ -7,7 +7,10 @@
 #include <thread>
 
 #include "apps/wizard/wizard_panel.h"
+#include "core/config.h"
 #include "core/rig.h"
+#include "device/desktop.h"
+#include "tests/apps/board_room.h"
 #include "tests/apps/gui_canvas.h"
 #include "tests/apps/small_plan.h"
 #include "tests/support/matchers.h"
@@ -194,6 +197,40 @@ TEST(WizardWindow, IsLeftAndGoesOnUntilTheRigIsGood) {
   });
   EXPECT_TRUE(done.ok()) << (done ? "" : done.message());
   EXPECT_TRUE(load_rig(out).ok());
+}
+
+// The same on devices, as a room has them: the devices are looked at, and somebody carries the board from
+// place to place until there is a rig to look at; then it is left by a click.
+TEST(WizardWindow, TakesPosesOfDevicesAndIsLeft) {
+  if (!has_display()) GTEST_SKIP() << "no display: WizardWindow.TakesPosesOfDevicesAndIsLeft";
+  const fs::path folder = test::test_folder(), out = folder / "rig";
+  test::BoardRoom room(load_plan(test::small_plan(folder)).value(), 0.02);
+  const CalibrateOptions options{.board = room.plan.board.text(), .out = out};
+  const auto captured = [&](std::size_t pose) {
+    return fs::exists(out / fmt::format("captures/pose{:02}/camera0/035.png", pose));
+  };
+  std::size_t held = 0;
+  room.go(room.plan.world_from_board[0]);
+  room.person = [&] {
+    if (captured(held)) room.go(room.plan.world_from_board[++held]);
+  };
+  std::thread person([&] {
+    test::XPerson x;
+    for (int i = 0; i < 300 && !x.finds("Limn calibration"); ++i)
+      std::this_thread::sleep_for(milliseconds(100));
+    for (int i = 0; i < 1200 && !captured(2); ++i) std::this_thread::sleep_for(milliseconds(50));
+    leave(&x);
+    x.close();
+  });
+  const Status left = calibrate_on(options, room.devices(), device::Desktop::open());
+  person.join();
+  ASSERT_FALSE(left.ok());
+  EXPECT_NE(left.message().find("left in pose"), std::string::npos) << left.message();
+  EXPECT_EQ(room.moved, 0) << "patterns shown while the board moved";
+  EXPECT_TRUE(captured(2));
+  EXPECT_FALSE(fs::exists(out / "rig.json"));
+  const auto latency = test::read_json(out / "captures/latency.json");
+  EXPECT_NEAR(latency["projectors"][0]["latency_ms"].get<double>(), 20, 2.5);
 }
 
 }  // namespace
