@@ -189,6 +189,8 @@ struct Renderer::Impl {
 
   // What was drawn last, so that the same is not drawn again.
   std::optional<scene::PosedScene> drawn;
+  // What is drawn of it from the projectors.
+  bool is_prototype_seen = false, are_soft_edges_seen = false, are_surface_parts_seen = false;
   std::vector<PlacedRun> runs;
   std::vector<cv::Rect> light_places;  // of the projector drawn last
   Pose scene_from_world;
@@ -239,7 +241,10 @@ struct Renderer::Impl {
   bool set_arriving(std::size_t index, const cv::Mat& map);
   const GpuLens& lens_of(const Imager& imager);
   const Canvas& canvas(int width, int height, GLenum format);
-  void prepare(const scene::PosedScene& posed);
+  // Of what projectors see: their own pictures need all, others whether the prototype hides a place from
+  // them.
+  enum class FromProjectors { nothing, prototype, all };
+  void prepare(const scene::PosedScene& posed, FromProjectors needed);
   void look_from_eye(const Imager& viewer);
   void look_from_imager(const Imager& imager, bool parts_alone = false);
   void set_up(const Program& program, const GpuLens& lens, const Imager* viewer);
@@ -335,18 +340,31 @@ const Canvas& Renderer::Impl::canvas(int width, int height, GLenum format) {
   return canvas;
 }
 
-void Renderer::Impl::prepare(const scene::PosedScene& posed) {
-  if (drawn && is_same(*drawn, posed)) return;
-  scene.placed(posed, &runs);
-  scene_from_world = GpuScene::scene_from_world(posed);
-  scene.place(runs);
-  {
-    const PassTimes::Scope scope(&times, "ids from projectors");
-    const bool is_prototype_there = drawn && is_same_prototype(*drawn, posed);
-    sights.see_from_projectors(scene, runs, scene_from_world, !is_prototype_there);
+void Renderer::Impl::prepare(const scene::PosedScene& posed, FromProjectors needed) {
+  if (!drawn || !is_same(*drawn, posed)) {
+    const bool stays = drawn && is_same_prototype(*drawn, posed);
+    scene.placed(posed, &runs);
+    scene_from_world = GpuScene::scene_from_world(posed);
+    scene.place(runs);
+    is_prototype_seen &= stays;
+    are_soft_edges_seen &= stays;
+    are_surface_parts_seen = false;
+    eye_kind = EyeKind::none;
+    drawn = posed;
   }
-  eye_kind = EyeKind::none;
-  drawn = posed;
+  const bool all = needed == FromProjectors::all;
+  if (needed == FromProjectors::nothing || (is_prototype_seen && !all) ||
+      (are_soft_edges_seen && are_surface_parts_seen))
+    return;
+  const PassTimes::Scope scope(&times, "ids from projectors");
+  if (!is_prototype_seen || (all && !are_soft_edges_seen)) {
+    sights.see_prototype_from_projectors(scene, runs, scene_from_world, all);
+    is_prototype_seen = true;
+    are_soft_edges_seen = all;
+  }
+  if (!all) return;
+  sights.see_surface_parts_from_projectors(scene, runs, scene_from_world);
+  are_surface_parts_seen = true;
 }
 
 void Renderer::Impl::look_from_eye(const Imager& viewer) {
@@ -503,7 +521,7 @@ cv::Mat Renderer::Impl::laid_over(const cv::Mat& bgr,
   Overlay& overlay = overlay_of(imager, kind);
   if (!overlay.posed || overlay.whole != whole || !is_same(*overlay.posed, posed) ||
       !is_same(overlay.imager.imager_from_world, imager.imager_from_world)) {
-    prepare(posed);
+    prepare(posed, kind == k_view ? FromProjectors::nothing : FromProjectors::prototype);
     look_from_imager(imager, kind != k_view && !has_contact_shadow);
     overlay.places = sights.seen_places(imager, lens_of(imager).baked, runs, scene_from_world, kind == k_view,
                                         has_contact_shadow ? ContactShadow::k_reach : 0);
@@ -565,7 +583,7 @@ Result<SurfaceMixing> Renderer::Impl::measured(const MeasuredSurface& measured) 
   const Imager& camera = measured.camera;
   scene::PosedScene bare;
   bare.world_from_prototype = measured.world_from_prototype;
-  prepare(bare);
+  prepare(bare, FromProjectors::prototype);
   look_from_imager(camera);
   const Canvas& canvas = this->canvas(camera.width, camera.height, GL_R32F);
   std::vector<cv::Mat> irradiances;
@@ -679,7 +697,7 @@ unsigned Renderer::draw_projector(std::size_t index, const scene::PosedScene& po
   if (shown.is_current && is_same(shown.posed, posed) &&
       is_same(shown.imager_from_world, viewer.imager_from_world))
     return *shown.display.texture;
-  impl_->prepare(posed);
+  impl_->prepare(posed, Impl::FromProjectors::all);
   impl_->look_from_eye(viewer);
   const Canvas& centre = impl_->canvas(projector.width, projector.height, GL_RGBA32F);
   if (!shown.display.texture) shown.display = Canvas(projector.width, projector.height, GL_RGBA8);
@@ -728,7 +746,7 @@ cv::Mat Renderer::projector_picture(std::size_t index, const scene::PosedScene& 
 cv::Mat Renderer::surface_points(std::size_t index, const scene::PosedScene& posed) {
   LIMN_CHECK(index < impl_->rig.projectors.size());
   const Imager& projector = impl_->rig.projectors[index];
-  impl_->prepare(posed);
+  impl_->prepare(posed, Impl::FromProjectors::prototype);
   const Canvas& canvas = impl_->canvas(projector.width, projector.height, GL_RGBA32F);
   impl_->set_up(impl_->points, impl_->sights.projector_lens(index), nullptr);
   impl_->points.set("u_projector", static_cast<int>(index));
@@ -747,7 +765,7 @@ cv::Mat Renderer::surface_points(std::size_t index, const scene::PosedScene& pos
 cv::Mat Renderer::blend(std::size_t index, const scene::PosedScene& posed) {
   LIMN_CHECK(index < impl_->rig.projectors.size());
   const Imager& projector = impl_->rig.projectors[index];
-  impl_->prepare(posed);
+  impl_->prepare(posed, Impl::FromProjectors::all);
   const Canvas& canvas = impl_->canvas(projector.width, projector.height, GL_RG32F);
   impl_->set_up(impl_->blend, impl_->sights.projector_lens(index), nullptr);
   impl_->blend.set("u_projector", static_cast<int>(index));
@@ -758,7 +776,7 @@ cv::Mat Renderer::blend(std::size_t index, const scene::PosedScene& posed) {
 LitPatches Renderer::lit_patches(std::size_t camera, const scene::PosedScene& posed, int side_px) {
   LIMN_CHECK(camera < impl_->rig.cameras.size() && side_px > 0);
   const Imager& imager = impl_->rig.cameras[camera];
-  impl_->prepare(posed);
+  impl_->prepare(posed, Impl::FromProjectors::prototype);
   impl_->look_from_imager(imager);
   const Canvas& canvas =
       impl_->canvas(std::max(1, imager.width / side_px), std::max(1, imager.height / side_px), GL_RGBA32F);
@@ -814,11 +832,13 @@ cv::Mat Renderer::view(const Imager& imager, const scene::PosedScene& posed, con
 }
 
 std::vector<PartCoverage> Renderer::coverage(const scene::PosedScene& posed, const Imager& viewer) {
-  impl_->prepare(posed);
-  impl_->look_from_imager(viewer);
+  impl_->prepare(posed, Impl::FromProjectors::prototype);
+  impl_->look_from_imager(viewer, true);
   const Canvas& canvas = impl_->canvas(viewer.width, viewer.height, GL_RG8);
   impl_->set_up(impl_->coverage, impl_->lens_of(viewer), &viewer);
-  impl_->draw(impl_->coverage, canvas);
+  impl_->draw(impl_->coverage, canvas,
+              impl_->sights.seen_places(viewer, impl_->lens_of(viewer).baked, impl_->runs,
+                                        impl_->scene_from_world, false, 0));
   const cv::Mat seen = read_back(canvas.framebuffer, viewer.width, viewer.height, CV_8UC2, GL_RG);
   std::vector<PartCoverage> out;
   for (const scene::PosedPart& part : posed.parts) {

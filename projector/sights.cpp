@@ -215,28 +215,39 @@ void Sights::upload_pixel_map(int layer, const Imager& imager, const TangentRect
   glTextureSubImage3D(*pixel_maps_, 0, 0, 0, layer, map.cols, map.rows, 1, GL_RG, GL_FLOAT, map.data);
 }
 
-void Sights::see_from_projectors(const GpuScene& scene,
-                                 const std::vector<PlacedRun>& runs,
-                                 const Pose& scene_from_world,
-                                 bool prototype_too) {
+// Over the prototype: nothing else is lit.
+Twin Sights::projector_twin(std::size_t projector,
+                            const std::vector<PlacedRun>& runs,
+                            const Pose& scene_from_world) const {
+  const Pose pose = sight_pose(projectors_[projector], scene_from_world);
+  return twin_over(pose, intersected(lenses_[projector].baked.rect, spanned_by(pose, runs, is_prototype)),
+                   k_oversampling * projectors_[projector].lens.fx(), ids_width_, ids_height_);
+}
+
+void Sights::see_prototype_from_projectors(const GpuScene& scene,
+                                           const std::vector<PlacedRun>& runs,
+                                           const Pose& scene_from_world,
+                                           bool with_soft_edges) {
   for (std::size_t i = 0; i < projectors_.size(); ++i) {
-    const Pose pose = sight_pose(projectors_[i], scene_from_world);
-    const TangentRect& whole = lenses_[i].baked.rect;
-    const Twin twin = twin_over(pose, intersected(whole, spanned_by(pose, runs, is_prototype)),
-                                k_oversampling * projectors_[i].lens.fx(), ids_width_, ids_height_);
+    const Twin twin = projector_twin(i, runs, scene_from_world);
     const int layer = 2 * static_cast<int>(i);
-    if (prototype_too) {
-      draw(scene, runs, is_prototype, twin, projector_ids_, layer);
-      if (soft_edges_) soft_edges_->find(static_cast<int>(i), depth_, twin);
-    }
-    draw(scene, runs, is_surface_part, twin, projector_ids_, layer + 1);
+    draw(scene, runs, is_prototype, twin, projector_ids_, layer);
+    if (with_soft_edges && soft_edges_) soft_edges_->find(static_cast<int>(i), depth_, twin);
     GpuSight sight(twin, layer);
     sight.of_imager(projectors_[i]);
-    sight.with_map(whole, static_cast<int>(i));
+    sight.with_map(lenses_[i].baked.rect, static_cast<int>(i));
     for (const Response& response : responses_)
       if (response.projector == projectors_[i].name) sight.with_response(response);
     send(static_cast<int>(i), sight);
   }
+}
+
+void Sights::see_surface_parts_from_projectors(const GpuScene& scene,
+                                               const std::vector<PlacedRun>& runs,
+                                               const Pose& scene_from_world) {
+  for (std::size_t i = 0; i < projectors_.size(); ++i)
+    draw(scene, runs, is_surface_part, projector_twin(i, runs, scene_from_world), projector_ids_,
+         2 * static_cast<int>(i) + 1);
 }
 
 void Sights::see_from_imager(const GpuScene& scene,

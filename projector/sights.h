@@ -27,11 +27,16 @@ class Sights {
  public:
   static Result<Sights> create(const Rig& rig);
 
-  /// Draws the projectors' ids of a posed scene; `prototype_too`: not just the surface parts again.
-  void see_from_projectors(const GpuScene& scene,
-                           const std::vector<PlacedRun>& runs,
-                           const Pose& scene_from_world,
-                           bool prototype_too);
+  /// Draws the projectors' ids of the prototype; `with_soft_edges`: also where their light fades beside
+  /// edges, which only their own pictures need.
+  void see_prototype_from_projectors(const GpuScene& scene,
+                                     const std::vector<PlacedRun>& runs,
+                                     const Pose& scene_from_world,
+                                     bool with_soft_edges);
+  /// Draws their ids of the surface parts, once the prototype's are there for the same pose.
+  void see_surface_parts_from_projectors(const GpuScene& scene,
+                                         const std::vector<PlacedRun>& runs,
+                                         const Pose& scene_from_world);
   /// Draws the ids from an imager's own eye, over its picture; `parts_alone`: only where parts may be.
   void see_from_imager(const GpuScene& scene,
                        const std::vector<PlacedRun>& runs,
@@ -89,6 +94,9 @@ class Sights {
             const Twin& twin,
             const GlName& ids,
             int layer);
+  Twin projector_twin(std::size_t projector,
+                      const std::vector<PlacedRun>& runs,
+                      const Pose& scene_from_world) const;
   void send(int index, const GpuSight& sight);
   void upload_pixel_map(int layer, const Imager& imager, const TangentRect& rect);
 

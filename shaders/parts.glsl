@@ -22,8 +22,7 @@ bool is_left_to_screen(vec2 px) {
 }
 
 // `whole`: what light can show is drawn, too.
-vec4 part_at(vec2 px, bool whole) {
-  Seen seen = in_sight_at(px);
+vec4 part_seen(Seen seen, bool whole) {
   if (seen.how == k_nothing) return u_contact_shadow ? shadow_at(seen.d) : vec4(0);
   float share = seen.how == k_if_reached && !whole ? whole_share(owner_of(seen.part.id)) : 1.0;
   if (share < 1.0 && !is_reached(seen.behind)) share = 1.0;

@@ -8,5 +8,5 @@ layout(rgba32f, binding = 0) uniform writeonly image2D u_picture;
 void main() {
   if (gl_GlobalInvocationID.x >= s_list_count) return;
   ivec2 at = listed_pixel(gl_GlobalInvocationID.x);
-  imageStore(u_picture, at, part_at(vec2(at), false));
+  imageStore(u_picture, at, part_seen(in_sight_at(vec2(at)), false));
 }

@@ -135,6 +135,7 @@ struct Onlooker::Impl {
   std::deque<Watching> watching;                         // the one that asked last at the end
   Sides room{{.is_viewer = true}, {.is_viewer = true}};  // as the room's screen
   Eigen::AlignedBox3d prototype_box;                     // its own frame
+  std::optional<Pose> held;  // world_from_prototype that is drawn by, see steadied()
 
   std::thread thread;
 
@@ -145,6 +146,7 @@ struct Onlooker::Impl {
   void keep(Watching* device);
   Seen seen_by(const Guest& guest, const Known& known);
   Seen seen_in_room(const Known& known);
+  Pose steadied(std::vector<Track>* tracks);
   Watching& watching_of(const std::string& device);
   Status follow_scene(const Known& known);
   void measure(const scene::Scene& scene);
@@ -277,6 +279,22 @@ Onlooker::Impl::Watching& Onlooker::Impl::watching_of(const std::string& device)
   return watching.back();
 }
 
+// Turns all bodies together so that the prototype stands exactly where it did while it but trembles, and what
+// projectors see of it need not be drawn anew for each picture. What is drawn over a picture goes by where
+// bodies are to each other and to its camera, so nothing moves in it. Returns turned_from_world.
+Pose Onlooker::Impl::steadied(std::vector<Track>* tracks) {
+  const auto prototype = std::find_if(tracks->begin(), tracks->end(), [](const Track& track) {
+    return track.body == "prototype" && track.sight != Sight::lost;
+  });
+  if (prototype == tracks->end()) return Pose();
+  const Pose world_from_prototype = prototype->world_from_body;
+  if (!held || is_elsewhere(*held, world_from_prototype)) held = world_from_prototype;
+  const Pose turned_from_world = *held * world_from_prototype.inverse();
+  for (Track& track : *tracks) track.world_from_body = turned_from_world * track.world_from_body;
+  prototype->world_from_body = *held;  // to the last bit
+  return turned_from_world;
+}
+
 // Parts over a picture with another look left of the split, if there is one.
 cv::Mat Onlooker::Impl::drawn(const Imager& camera,
                               const cv::Mat& picture,
@@ -341,6 +359,7 @@ Onlooker::Seen Onlooker::Impl::seen_by(const Guest& guest, const Known& known) {
 
   const Stamp tracking = std::chrono::steady_clock::now();
   std::vector<Track> tracks = tracks_of(known);
+  const Pose turned_from_world = steadied(&tracks);
   Watching& device = watching_of(guest.window.device);
   const GuestSight sight = device.eye.look(*picture, bodies_of(*known.scene, known.staging), tracks);
   const double track_ms = milliseconds_since(tracking);
@@ -359,7 +378,8 @@ Onlooker::Seen Onlooker::Impl::seen_by(const Guest& guest, const Known& known) {
   const double composite_ms = milliseconds_since(drawing);
 
   const Stamp encoding = std::chrono::steady_clock::now();
-  Seen seen{{}, device::encode_jpeg(out, k_quality), sight.view->imager_from_world.inverse().translation};
+  const Pose view_from_world = sight.view->imager_from_world * turned_from_world;
+  Seen seen{{}, device::encode_jpeg(out, k_quality), view_from_world.inverse().translation};
   const double encode_ms = milliseconds_since(encoding);
   const Lens& lens = sight.view->lens;
   seen.json =
@@ -367,7 +387,7 @@ Onlooker::Seen Onlooker::Impl::seen_by(const Guest& guest, const Known& known) {
           {"sees", is_in_picture(*sight.view, *known.scene, posed) ? "prototype" : "markers"},
           {"why", ""},
           {"markers", sight.markers},
-          {"view_from_world", to_json(sight.view->imager_from_world)},
+          {"view_from_world", to_json(view_from_world)},
           {"rms_px", sight.rms_px},
           {"lens",
            {{"model", lens.model.name()},
@@ -394,7 +414,8 @@ Onlooker::Seen Onlooker::Impl::seen_in_room(const Known& known) {
     camera = *smaller;
     cv::resize(picture, picture, size, 0, 0, cv::INTER_AREA);
   }
-  const std::vector<Track> tracks = tracks_of(known);
+  std::vector<Track> tracks = tracks_of(known);
+  camera.imager_from_world = camera.imager_from_world * steadied(&tracks).inverse();
   const scene::PosedScene posed = scene::staged(*known.scene, known.staging, tracks);
   const cv::Mat out = drawn(camera, picture, posed, tracks, known, WindowParts::as_screen, &room);
   return {nlohmann::json{{"why", ""}}.dump(), device::encode_jpeg(out, k_quality)};

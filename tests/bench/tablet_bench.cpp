@@ -74,9 +74,14 @@ struct Room {
     for (int i = 0; i < 6; ++i) step();
   }
 
-  void step() {
+  const apps::Watched& see() {
     const int camera = 0;
-    session.take(watcher.watch(rig.expose(std::span(&camera, 1))), ++moments);
+    ++moments;
+    return watcher.watch(rig.expose(std::span(&camera, 1)));
+  }
+
+  void step() {
+    session.take(see(), moments);
     const apps::Painted& painted = session.paint(rig.now(), shifted(rig.now(), 0.04));
     for (std::size_t k = 0; k < painted.projectors.size(); ++k)
       (void)rig.projector(static_cast<int>(k)).show(painted.projectors[k]).value();
@@ -136,8 +141,14 @@ void print_window(const std::vector<TabletShot>& shots, Room* room, apps::Onlook
   Off off;
   json last;
   constexpr const char* k_parts[] = {"decode", "track", "composite", "encode"};
+  // As in a session, each picture meets other tracks.
+  std::vector<apps::Watched> moments;
+  for (std::size_t i = 0; i < shots.size(); ++i) moments.push_back(room->see());
   for (int round = 0; round < 3; ++round) {
-    for (const TabletShot& shot : shots) {
+    for (std::size_t i = 0; i < shots.size(); ++i) {
+      const TabletShot& shot = shots[i];
+      room->session.take(moments[i], room->moments);
+      onlooker->know(room->session);
       const double begun_processor = processor_ms(), begun = now_ms();
       const cv::Mat picture = device::decode_jpeg(shot.jpeg).value();
       const double decoded = now_ms();
