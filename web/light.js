@@ -2,6 +2,7 @@
 import { role_of } from "/actions.js";
 import { by_id, h, icon, keep, set_text } from "/dom.js";
 import { draw_picture, fetch_picture } from "/pictures.js";
+import { make_shading } from "/shading.js";
 import { make_switch } from "/stage.js";
 
 const k_screens = {
@@ -173,6 +174,7 @@ export function make_light(session) {
         h("h3", {}, "Screens"),
         screens,
       ),
+      make_shading(session),
     ),
     h("h3", {}, "Projectors"),
     projectors,

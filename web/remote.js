@@ -17,6 +17,8 @@ const k_tabs = [
 ];
 
 const session = begin_session({
+  purpose: "The PIN stands in the operator's window, or in its QR code.",
+  name_hint: "so that others see whose edit it was",
   on_state: (state) => {
     for (const panel of panels) panel.show(state);
     if (!performance.getEntriesByName("ready").length) performance.mark("ready");

@@ -8,7 +8,11 @@ import { begin_session } from "/session.js";
 import { View3d } from "/view3d.js";
 
 const saves = new Saves();
-const session = begin_session({ on_state: show });
+const session = begin_session({
+  purpose: "To see the looks: the PIN stands in the operator's window, or in its QR code.",
+  name_hint: "so that others see whose comment it is",
+  on_state: show,
+});
 const solid = by_id("solid");
 let view = null;
 

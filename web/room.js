@@ -45,6 +45,7 @@ export function make_room(session) {
     h("h3", {}, "Devices"),
     devices,
     no_devices,
+    session.button("repair", { class: "wide" }, "Repair what has moved"),
     h("h3", {}, "People"),
     people,
     h("h3", {}, "Comments"),

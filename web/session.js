@@ -2,11 +2,15 @@
 import { role_of, take_roles } from "/actions.js";
 import { by_id, h, icon, set_text } from "/dom.js";
 import { Link } from "/link.js";
+import { prepare_pairing, tell_pairing } from "/pairing.js";
 
 const k_roles = ["look", "work", "operate"]; // each may what the ones before it may
 
-/** `on_state(state)` hears each state, `on_hello(message)` each new connection. */
-export function begin_session({ on_state, on_hello }) {
+/**
+ * `on_state(state)` hears each state, `on_hello(message)` each new connection; `purpose` and `name_hint` are words of the
+ * pairing form.
+ */
+export function begin_session({ on_state, on_hello, purpose, name_hint }) {
   const link = new Link();
   const session = { link, state: null };
 
@@ -71,7 +75,7 @@ export function begin_session({ on_state, on_hello }) {
     document.body.dataset.number = detail.number;
   });
   link.addEventListener("status", ({ detail }) => show_status(link, detail));
-  prepare_pairing(link);
+  prepare_pairing(link, purpose, name_hint);
   return session;
 }
 
@@ -90,66 +94,4 @@ function show_status(link, { status, why }) {
   by_id("session").hidden = !is_paired;
   set_text(by_id("link"), k_words[status] ?? `${link.name || "Guest"}, ${link.role}`);
   if (!is_paired && why) tell_pairing(why);
-}
-
-function tell_pairing(text) {
-  set_text(by_id("pairing-why"), text.charAt(0).toUpperCase() + text.slice(1));
-}
-
-function wait_before_pairing(why, wait_s, form) {
-  const until = Date.now() + wait_s * 1000;
-  form.querySelector("button").disabled = true;
-  const timer = setInterval(tick, 1000);
-  function tick() {
-    const left_s = Math.ceil((until - Date.now()) / 1000);
-    if (left_s > 0) return tell_pairing(`${why} Try again in ${left_s} s.`);
-    clearInterval(timer);
-    form.querySelector("button").disabled = false;
-    tell_pairing("You can try again.");
-  }
-  tick();
-}
-
-function prepare_pairing(link) {
-  const form = by_id("pairing").querySelector("form");
-  const pin = form.elements.pin,
-    name = form.elements.name;
-  name.value = localStorage.getItem("limn.name") ?? "";
-  let is_asking = false;
-
-  const pair = async () => {
-    if (is_asking || form.querySelector("button").disabled) return;
-    if (!/^\d{6}$/.test(pin.value)) {
-      tell_pairing("The PIN has six digits.");
-      return pin.focus();
-    }
-    is_asking = true;
-    tell_pairing("Pairing …");
-    localStorage.setItem("limn.name", name.value.trim());
-    const { why, is_pin, wait_s } = await link.pair(pin.value, name.value.trim() || "Guest");
-    is_asking = false;
-    tell_pairing(why ?? "");
-    if (!why || is_pin) pin.value = "";
-    if (is_pin) pin.focus();
-    if (wait_s) wait_before_pairing(why, wait_s, form);
-  };
-
-  form.addEventListener("submit", (event) => {
-    event.preventDefault();
-    pair();
-  });
-  pin.addEventListener("input", () => {
-    pin.value = pin.value.replace(/\D/g, "").slice(0, 6);
-    if (pin.value.length === 6 && name.value.trim()) pair();
-  });
-
-  const linked = /^#pin=(\d{6})$/.exec(location.hash);
-  if (linked) {
-    history.replaceState(null, "", location.pathname);
-    pin.value = linked[1];
-    if (name.value) return pair();
-    return name.focus();
-  }
-  if (Link.was_paired) link.connect();
-  else (name.value ? pin : name).focus();
 }

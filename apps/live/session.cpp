@@ -259,6 +259,7 @@ Status Session::mend(Rig rig, Stamp at) {
   LIMN_TRY(Painter painter, Painter::create(setup_.scene, rig, setup_.paint));
   painter_ = std::move(painter);
   setup_.rig = std::move(rig);
+  ++scenes_;
   told_drift_.reset();
   told_swapped_ = false;
   compared_cameras_at_ = at;

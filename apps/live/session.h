@@ -89,7 +89,8 @@ class Session {
   const scene::Staging& staging() const { return staging_; }
   const Watched& watched() const { return watched_; }
   const SessionSetup& setup() const { return setup_; }
-  /// How many scenes were shown so far, the first one included: another number, another setup().scene.
+  /// How many scenes were shown so far, the first one included, and rigs: another number, another
+  /// setup().scene or setup().rig.
   int scenes() const { return scenes_; }
   /// The newest edit.
   const std::optional<Edited>& last_edit() const { return last_edit_; }

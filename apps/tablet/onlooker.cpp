@@ -49,6 +49,7 @@ constexpr int k_coarser = 4;
 // What a session said last.
 struct Known {
   std::shared_ptr<const scene::Scene> scene;
+  std::shared_ptr<const Rig> rig;
   int scenes = 0;
   scene::Staging staging;
   std::vector<tracker::BodyMotion> motions;
@@ -106,6 +107,7 @@ struct Onlooker::Impl {
 
   // The session's thread's.
   std::shared_ptr<const scene::Scene> told_scene;
+  std::shared_ptr<const Rig> told_rig;
   int told_scenes = 0;
 
   // The onlooker's own.
@@ -249,7 +251,7 @@ void Onlooker::Impl::keep(Watching* device) {
     log_warning("live: {} What was found of a guest's lens is not kept.", kept.message());
 }
 
-// A scene that was edited is drawn from now on.
+// A scene that was edited, or a rig that was mended, is drawn from now on.
 Status Onlooker::Impl::follow_scene(const Known& known) {
   if (drawn_scenes == known.scenes && renderer && !context->is_lost()) return {};
   renderer.reset();
@@ -257,6 +259,7 @@ Status Onlooker::Impl::follow_scene(const Known& known) {
     context.reset();
     LIMN_TRY(context, device::GlContext::create(true));
   }
+  rig = *known.rig;
   LIMN_TRY(renderer, projector::Renderer::create(*known.scene, rig));
   renderer->set_smoothing(k_smoothing);
   measure(*known.scene);
@@ -431,6 +434,7 @@ Result<std::unique_ptr<Onlooker>> Onlooker::create(const SessionSetup& setup,
   const std::vector<Body> bodies = scene::bodies(setup.scene);
   LIMN_TRY(impl->families, tracker::Families::load(tracker::families_of(bodies), setup.scene.folder));
   impl->told_scene = std::make_shared<scene::Scene>(setup.scene);
+  impl->told_rig = std::make_shared<Rig>(setup.rig);
   std::promise<Status> opened;
   std::future<Status> is_open = opened.get_future();
   impl->thread = std::thread([impl = impl.get(), &setup, &opened] {
@@ -457,10 +461,12 @@ Onlooker::~Onlooker() {
 void Onlooker::know(const Session& session) {
   if (impl_->told_scenes != session.scenes()) {
     impl_->told_scene = std::make_shared<scene::Scene>(session.setup().scene);
+    impl_->told_rig = std::make_shared<Rig>(session.setup().rig);
     impl_->told_scenes = session.scenes();
   }
   const Watched& watched = session.watched();
   auto known = std::make_shared<Known>(Known{.scene = impl_->told_scene,
+                                             .rig = impl_->told_rig,
                                              .scenes = session.scenes(),
                                              .staging = session.staging(),
                                              .motions = watched.motions,

@@ -1,0 +1,51 @@
+// What parts are made of and in which light they stand: sliders that act when they are let go.
+import { h } from "/dom.js";
+
+function slider(label, properties) {
+  const input = h("input", { type: "range", ...properties, "aria-label": label });
+  return { input, row: h("div", { class: "line named" }, h("span", { class: "soft" }, properties.title ?? label), input) };
+}
+
+const share = (label, title, value) => slider(label, { title, min: "0", max: "1", step: "0.05", value });
+
+/** A part's colour, metalness and roughness, instead of what its file says. */
+export function make_material(session, slot) {
+  const colour = h("input", { type: "color", value: "#808080", "aria-label": `Colour of ${slot.name}` });
+  const metal = share(`Metalness of ${slot.name}`, "Metal", "0"),
+    rough = share(`Roughness of ${slot.name}`, "Rough", "0.5");
+  const words = () => `${colour.value} ${metal.input.value} ${rough.input.value}`;
+  for (const input of [colour, metal.input, rough.input])
+    input.addEventListener("change", () => session.act("material", slot.name, words()));
+  const node = h(
+    "div",
+    { class: "stack", "data-needs": "work" },
+    h("h3", {}, "Material"),
+    h("div", { class: "line named" }, h("span", { class: "soft" }, "Colour"), colour),
+    metal.row,
+    rough.row,
+    session.button("material", { slot: slot.name, class: "wide" }, "As its file says"),
+  );
+  node.show = () => {};
+  return node;
+}
+
+/** The light that parts are shaded by, instead of the scene's own. */
+export function make_shading(session) {
+  const strength = { min: "0", max: "2", step: "0.05" };
+  const lights = [
+    slider("Lamp, degrees to the right", { title: "Right", min: "-180", max: "180", step: "5", value: "30" }),
+    slider("Lamp, degrees up", { title: "Up", min: "-90", max: "90", step: "5", value: "45" }),
+    slider("Lamp's strength", { title: "Lamp", ...strength, value: "0.6" }),
+    slider("Soft light from above", { title: "Above", ...strength, value: "0.3" }),
+    slider("Soft light from below", { title: "Below", ...strength, value: "0.1" }),
+  ];
+  const words = () => lights.map(({ input }) => input.value).join(" ");
+  for (const { input } of lights) input.addEventListener("change", () => session.act("light", "", words()));
+  return h(
+    "div",
+    { class: "stack", "data-needs": "work" },
+    h("h3", {}, "Light on the parts"),
+    ...lights.map(({ row }) => row),
+    session.button("light", { class: "wide" }, "The scene's own light"),
+  );
+}
