@@ -6,12 +6,15 @@
 #include <cmath>
 #include <map>
 
+#include "core/response.h"
+
 namespace limn::apps {
 namespace {
 
 constexpr float k_small_share = 0.32F, k_most_small = 0.25F;  // of all the pictures' height and width
 constexpr float k_most_split_mm = 2000;                       // by dragging
-constexpr std::size_t k_points = 300;                         // of the plot: pictures
+constexpr double k_plain = 0.8;        // colour of a material before somebody chooses one, linear
+constexpr std::size_t k_points = 300;  // of the plot: pictures
 
 // The names of Screen in words, in its order.
 const char* const k_screens[] = {"camera and what light cannot show",
@@ -52,6 +55,15 @@ void right_text(ImU32 colour, const std::string& text) {
   ImGui::PushStyleColor(ImGuiCol_Text, colour);
   ImGui::TextUnformatted(text.c_str());
   ImGui::PopStyleColor();
+}
+
+// A small button behind what stands in the line; lit when something was chosen with it.
+bool small_button(const Gui& gui, const char* name, bool is_lit) {
+  ImGui::SameLine(0, 0.8F * gui.em());
+  ImGui::PushStyleColor(ImGuiCol_Text, is_lit ? colour::k_blue : colour::k_quiet);
+  const bool is_clicked = ImGui::SmallButton(name);
+  ImGui::PopStyleColor();
+  return is_clicked;
 }
 
 double latency_ms(const ShownFrame& frame) {
@@ -386,8 +398,10 @@ void OperatorPanel::draw_slots(const Gui& gui, const OperatorView& view) {
     const OperatorView::Slot& slot = view.slots[i];
     ImGui::PushID(slot.name.c_str());
     const std::string& shown = view.staging.slots[i].variant;
-    text_within(ImGui::GetContentRegionAvail().x, slot.is_chosen ? colour::k_blue : colour::k_quiet,
+    text_within(ImGui::GetContentRegionAvail().x - 6 * gui.em(),
+                slot.is_chosen ? colour::k_blue : colour::k_quiet,
                 slot.is_chosen && view.slots.size() > 1 ? slot.name + "  (keys)" : slot.name);
+    draw_material(gui, slot.name, view.staging.slots[i].material);
     if (ImGui::Button("◀", arrow)) ask("previous_variant", slot.name);
     ImGui::SameLine(0, 4);
     const float room = ImGui::GetContentRegionAvail().x - arrow.x - 4;
@@ -416,8 +430,56 @@ void OperatorPanel::draw_slots(const Gui& gui, const OperatorView& view) {
   if (view.slots.empty()) ImGui::TextDisabled("the scene has none");
 }
 
+// Colour, metalness and roughness of a part, in a box that opens.
+void OperatorPanel::draw_material(const Gui& gui, const std::string& slot, const scene::MaterialChange& now) {
+  if (small_button(gui, "material", !now.is_none())) ImGui::OpenPopup("material");
+  if (!ImGui::BeginPopup("material")) return;
+  const Eigen::Vector3d linear = now.base_colour.value_or(Eigen::Vector3d::Constant(k_plain));
+  std::array<float, 3> rgb{};
+  for (std::size_t i = 0; i < 3; ++i)
+    rgb[i] = static_cast<float>(srgb_of_linear(linear[static_cast<Eigen::Index>(i)]));
+  auto metallic = static_cast<float>(now.metallic.value_or(0)),
+       roughness = static_cast<float>(now.roughness.value_or(1));
+  const bool is_coloured = ImGui::ColorEdit3("colour", rgb.data());
+  const bool is_metal = ImGui::SliderFloat("metal", &metallic, 0, 1, "%.2f");
+  const bool is_rough = ImGui::SliderFloat("rough", &roughness, 0, 1, "%.2f");
+  const auto level = [&](std::size_t i) {
+    return static_cast<int>(std::lround(255 * std::clamp(rgb[i], 0.F, 1.F)));
+  };
+  const auto share = [](bool is_wanted, float value) {
+    return is_wanted ? fmt::format("{:.2f}", std::clamp(value, 0.F, 1.F)) : std::string("-");
+  };
+  if (is_coloured || is_metal || is_rough)
+    ask("material", slot,
+        fmt::format("{} {} {}",
+                    is_coloured || now.base_colour
+                        ? fmt::format("#{:02x}{:02x}{:02x}", level(0), level(1), level(2))
+                        : "-",
+                    share(is_metal || now.metallic, metallic), share(is_rough || now.roughness, roughness)));
+  if (ImGui::Button("as its file says", {-1, 0})) ask("material", slot);
+  ImGui::EndPopup();
+}
+
+// The light that parts are shaded by, in a box that opens.
+void OperatorPanel::draw_light(const Gui& gui, const scene::Staging& staging) {
+  if (small_button(gui, "light", staging.light.has_value())) ImGui::OpenPopup("light");
+  if (!ImGui::BeginPopup("light")) return;
+  bool is_changed = ImGui::SliderFloat("right", &light_[0], -180, 180, "%.0f deg");
+  is_changed |= ImGui::SliderFloat("up", &light_[1], -90, 90, "%.0f deg");
+  is_changed |= ImGui::SliderFloat("lamp", &light_[2], 0, 2, "%.2f");
+  is_changed |= ImGui::SliderFloat("above", &light_[3], 0, 2, "%.2f");
+  is_changed |= ImGui::SliderFloat("below", &light_[4], 0, 2, "%.2f");
+  if (is_changed)
+    ask("light", "",
+        fmt::format("{:.0f} {:.0f} {:.2f} {:.2f} {:.2f}", light_[0], light_[1], light_[2], light_[3],
+                    light_[4]));
+  if (ImGui::Button("the scene's own", {-1, 0})) ask("light");
+  ImGui::EndPopup();
+}
+
 void OperatorPanel::draw_looks(const Gui& gui, const OperatorView& view) {
   heading(gui, "Looks");
+  draw_light(gui, view.staging);
   const float save = 4 * gui.em();
   ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x - save - ImGui::GetStyle().ItemSpacing.x);
   const bool is_entered = ImGui::InputTextWithHint("##name", "a new look", look_.data(), look_.size(),

@@ -29,7 +29,9 @@ class OperatorPanel {
   void draw_remote(Gui& gui, const OperatorView& view, ImVec2 size);
   void draw_viewers(const Gui& gui, const OperatorView& view);
   void draw_slots(const Gui& gui, const OperatorView& view);
+  void draw_material(const Gui& gui, const std::string& slot, const scene::MaterialChange& now);
   void draw_looks(const Gui& gui, const OperatorView& view);
+  void draw_light(const Gui& gui, const scene::Staging& staging);
   void draw_comparison(const Gui& gui, const scene::Staging& staging);
   void draw_question(const Gui& gui);
   void ask(const std::string& action, const std::string& slot = "", const std::string& value = "") {
@@ -39,6 +41,7 @@ class OperatorPanel {
   OperatorAsked asked_;
   std::string large_;  // a picture's name; empty: the first
   std::array<char, 65> look_{};
+  std::array<float, 5> light_ = {30, 45, 0.65F, 0.35F, 0.15F};  // as last asked for, in the action's order
   bool asks_to_end_ = false;
   bool shows_remote_ = false;
   std::size_t entrance_ = 1;  // whose code is shown

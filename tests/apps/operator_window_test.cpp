@@ -80,6 +80,8 @@ OperatorView a_view() {
   return view;
 }
 
+const cv::Point2f k_material(885, 102), k_light(820, 286);  // their buttons
+
 cv::Vec3b around(const cv::Mat& picture, int x, int y) { return picture.at<cv::Vec3b>(y, x); }
 
 // The box of pixels of a colour; empty where there are none.
@@ -246,6 +248,46 @@ TEST(OperatorPanel, InvitesGuestsByACodeOrByPin) {
   EXPECT_TRUE(asked.contains("viewer Ann"));
   EXPECT_TRUE(asked.contains("viewer Ben"));
   EXPECT_TRUE(asked.contains("code operate " + view.projectors[0].name));
+}
+
+// A box opens where its button is clicked; clicks in it set what a slider then shows.
+TEST(OperatorPanel, MaterialsAndLightAreSetInABox) {
+  OperatorView view = a_view();
+  test::GuiCanvas canvas({1000, 640});
+  const auto asked_in = [&](cv::Point2f button, const std::string& picture) {
+    OperatorPanel panel;
+    std::set<std::string> asked;
+    const auto draw = [&](Gui& gui) {
+      for (const scene::Edit& edit : panel.draw(gui, view).edits)
+        asked.insert(fmt::format("{}|{}|{}", edit.action, edit.slot, edit.value));
+    };
+    canvas.click(button, draw);
+    for (int i = 0; i < 2; ++i) canvas.draw(draw);
+    canvas.keep(picture);
+    for (float y = button.y + 14; y < button.y + 224; y += 12) canvas.click({750, y}, draw);
+    canvas.click({5, 635}, draw);  // away: it closes
+    return asked;
+  };
+  const auto has = [](const std::set<std::string>& asked, const std::string& begin) {
+    return std::any_of(asked.begin(), asked.end(),
+                       [&](const std::string& a) { return a.starts_with(begin); });
+  };
+  const std::set<std::string> material = asked_in(k_material, "operator-material");
+  EXPECT_TRUE(has(material, "material|mirror|- 0.")) << "metal";
+  EXPECT_TRUE(has(material, "material|mirror|- - 0.")) << "rough";
+  EXPECT_TRUE(material.contains("material|mirror|")) << "as its file says";
+  view.staging.slots[0].material = {Eigen::Vector3d(1, 0, 0), std::nullopt, 0.5};
+  EXPECT_TRUE(has(asked_in(k_material, "operator-material-red"), "material|mirror|#ff0000 0."))
+      << "the rest stays";
+  const std::set<std::string> light = asked_in(k_light, "operator-light");
+  EXPECT_TRUE(light.contains("light||")) << "the scene's own";
+  int lights = 0;
+  for (const std::string& edit : light) {
+    if (edit == "light||" || !edit.starts_with("light||")) continue;
+    EXPECT_TRUE(scene::room_light_of(edit.substr(7), {0, 0, 1}, {0, -1, 0})) << edit;
+    ++lights;
+  }
+  EXPECT_GE(lights, 4) << "sliders";
 }
 
 TEST(OperatorPanel, AsksBeforeItEnds) {
