@@ -368,6 +368,26 @@ TEST(Tablet, AWindowShowsWhatItsGuestChoseAndTheSessionsSplit) {
 }
 
 // What is no picture, or too much of one, is refused, and everybody gets an answer.
+// After a repair the room's picture is drawn by the camera's new place.
+TEST(Tablet, AMendedRigIsDrawnWith) {
+  const fs::path folder = test::test_folder();
+  Room room(folder / "lenses", 0.25);
+  const auto picture = [&](Onlooker* onlooker) {
+    onlooker->know(room.session());
+    std::promise<Onlooker::Seen> answered;
+    onlooker->room([&](Onlooker::Seen seen) { answered.set_value(std::move(seen)); });
+    return device::decode_jpeg(answered.get_future().get().jpeg).value();
+  };
+  const cv::Mat before = picture(&room.onlooker());
+  Rig mended = room.session().setup().rig;
+  mended.cameras[0].imager_from_world.translation.x() += 0.05;
+  ASSERT_TRUE(room.session().mend(mended, room.rig().now()));
+  const cv::Mat after = picture(&room.onlooker());
+  EXPECT_GT(cv::countNonZero(drawn_mask(before, after)), 50);
+  const auto fresh = Onlooker::create(room.session().setup(), folder / "lenses").value();
+  EXPECT_EQ(cv::countNonZero(drawn_mask(picture(fresh.get()), after)), 0);
+}
+
 TEST(Tablet, WhatCannotBeLookedAtIsAnsweredWithWhy) {
   Room room(test::test_folder() / "lenses");
   test::VirtualTablet tablet = room.tablet(3);
