@@ -27,7 +27,8 @@ constexpr GLuint k_list_binding = 6;  // of buffers, after the scene's and the s
 constexpr GLuint k_hits_binding = 7;
 constexpr int k_each = 2, k_view = 3;  // overlays of parts treated each in its way, and of a virtual camera
 // Steps of light that ask for more samples: beside light, and between blacks.
-constexpr Smoothing k_light_edges, k_dark_edges{.samples = 16, .least_step = 0.0001};
+constexpr Smoothing k_light_edges, k_quick_edges{.samples = 4},
+    k_dark_edges{.samples = 16, .least_step = 0.0001};
 // The light where no room is known: soft, and a lamp, in the viewer's frame above and behind the left
 // shoulder.
 constexpr double k_soft_below = 0.15, k_soft_above = 0.35, k_lamp = 0.65;
@@ -173,8 +174,10 @@ struct Renderer::Impl {
     Pose imager_from_world;    // of the viewer
     cv::Mat picture, clipped;  // once read back
     bool is_current = false;
+    bool is_quick = false;
   };
   std::vector<Shown> shown;
+  bool quick_motion = false;
   PassTimes times;
   LightOptions light_options;
   std::optional<SurfaceMixing> surface;     // its layers are on the GPU
@@ -676,6 +679,8 @@ void Renderer::set_smoothing(const Smoothing& smoothing) {
   impl_->smoothing = smoothing;
 }
 
+void Renderer::set_quick_motion(bool wanted) { impl_->quick_motion = wanted; }
+
 void Renderer::set_contact_shadow(const scene::Scene* scene) {
   const bool wanted = scene != nullptr;
   if (wanted && !impl_->contact_shadow) impl_->contact_shadow.emplace(*scene);
@@ -694,9 +699,9 @@ unsigned Renderer::draw_projector(std::size_t index, const scene::PosedScene& po
   LIMN_CHECK(index < impl_->rig.projectors.size());
   const Imager& projector = impl_->rig.projectors[index];
   Impl::Shown& shown = impl_->shown[index];
-  if (shown.is_current && is_same(shown.posed, posed) &&
-      is_same(shown.imager_from_world, viewer.imager_from_world))
-    return *shown.display.texture;
+  const bool is_still = shown.is_current && is_same(shown.posed, posed) &&
+                        is_same(shown.imager_from_world, viewer.imager_from_world);
+  if (is_still && !shown.is_quick) return *shown.display.texture;
   impl_->prepare(posed, Impl::FromProjectors::all);
   impl_->look_from_eye(viewer);
   const Canvas& centre = impl_->canvas(projector.width, projector.height, GL_RGBA32F);
@@ -714,7 +719,12 @@ unsigned Renderer::draw_projector(std::size_t index, const scene::PosedScene& po
     impl_->sights.light_places(index, impl_->runs, impl_->scene_from_world,
                                (impl_->scene_from_world * viewer.imager_from_world.inverse()).translation,
                                &places);
-  impl_->draw_layer(impl_->light_layer, centre, places, options.even_black ? k_dark_edges : k_light_edges,
+  // Even black begins and ends within a pixel: it would be seen to jump.
+  shown.is_quick = impl_->quick_motion && !is_still && !options.even_black;
+  impl_->draw_layer(impl_->light_layer, centre, places,
+                    options.even_black ? k_dark_edges
+                    : shown.is_quick   ? k_quick_edges
+                                       : k_light_edges,
                     set_up);
   {
     const PassTimes::Scope scope(&impl_->times, "response");

@@ -69,6 +69,11 @@ class Renderer {
   /// Of composites and views from the next one on.
   void set_smoothing(const Smoothing& smoothing);
 
+  /// Wanted: a projector's picture that differs from its last one, because something moves, has the edges of
+  /// parts drawn by half the samples; the first call in which all is as it was draws it whole. Off at first:
+  /// each picture is whole.
+  void set_quick_motion(bool wanted);
+
   /// View parts of `scene`, the one given to create, darken the prototype around them in composites and views
   /// (ContactShadow); null: they do not, as at first. Light cannot darken: projector pictures stay the same.
   /// Takes some 0.2 s for each variant the first time.

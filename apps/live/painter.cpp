@@ -84,6 +84,7 @@ Painter::Painter(const scene::Scene& scene,
       d_up_world_(rig.cameras.empty()
                       ? Eigen::Vector3d(0, -1, 0)
                       : rig.cameras[0].imager_from_world.rotation.inverse() * Eigen::Vector3d(0, -1, 0)) {
+  renderer_.set_quick_motion(true);
   if (scene.prototype)
     for (const Eigen::Vector3f& p : scene.prototype->mesh.positions) prototype_box_.extend(p.cast<double>());
   for (const Imager& projector : rig.projectors)

@@ -187,6 +187,7 @@ int run(int frames) {
   fmt::print("  cv::remap                               {:6.2f}\n\n",
              median_ms(frames, [&] { yardsticks.remap(); }));
 
+  renderer->set_quick_motion(true);  // as in a session
   int step = 0;
   const auto moved = [&] {  // the part, a little, as in a hand
     scene::PosedScene out = posed;

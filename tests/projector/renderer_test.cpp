@@ -654,6 +654,28 @@ TEST_F(RendererTest, NothingIsDrawnAgainUntilSomethingChanges) {
   EXPECT_GT(cv::norm(plain, drawn.projector_picture(0, posed, viewer), cv::NORM_INF), 5);
 }
 
+TEST_F(RendererTest, WhatMovesIsDrawnQuicklyAndWholeOnceItStandsStill) {
+  const Scene scene =
+      scene_of(sheet(0.8, 0.6),
+               {slot("panel", scene::Mode::view, coloured(sheet(0.3, 0.2, -0.05), {0.5f, 0.4f, 0.3f}))});
+  const PosedScene posed = posed_at_origin(scene);
+  PosedScene moved = posed;
+  moved.parts[0].world_from_part = Pose(exp_rotation({0, 0, 0.1}), {0.011, 0.007, 0});
+  const Imager viewer = viewer_from({0.1, -0.2, -1.4});
+  const cv::Mat whole = renderer(scene, two_projectors()).projector_picture(0, moved, viewer);
+
+  Renderer drawn = renderer(scene, two_projectors());
+  drawn.set_quick_motion(true);
+  (void)drawn.projector_picture(0, posed, viewer);
+  const cv::Mat quick = drawn.projector_picture(0, moved, viewer);
+  EXPECT_GT(cv::norm(quick, whole, cv::NORM_INF), 0) << "edges by half the samples";
+  cv::Mat apart;
+  cv::extractChannel(cv::abs(quick - whole), apart, 1);
+  EXPECT_LT(cv::countNonZero(apart), 0.03 * static_cast<double>(quick.total())) << "and edges alone";
+  EXPECT_EQ(cv::norm(drawn.projector_picture(0, moved, viewer), whole, cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(drawn.projector_picture(0, moved, viewer), whole, cv::NORM_INF), 0);
+}
+
 // The look of shaders/look.glsl spelled once more: soft light from up, one lamp.
 Vector3d lit(const Vector3d& base,
              double metallic,
