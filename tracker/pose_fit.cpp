@@ -8,7 +8,10 @@ namespace limn::tracker {
 namespace {
 
 constexpr int k_max_steps = 60;
-constexpr double k_small_step = 1e-10;     // radians and metres
+constexpr double k_small_gain = 1e-10;  // of the cost: a hundred thousandth of a standard deviation
+// Far from corners that miss by much the robust cost is all but flat, and falls little for many steps.
+constexpr int k_patient_steps = 10;
+constexpr double k_slow_gain = 1e-3;       // of the cost
 constexpr double k_min_condition = 1e-13;  // smallest over largest eigenvalue of the scaled normal matrix
 
 struct Normal {
@@ -131,17 +134,19 @@ std::optional<PoseFit> fit_pose(std::span<const PointSight> sights,
     damped.diagonal() *= 1 + damping;
     const Vector6d delta = damped.ldlt().solve(-normal->gradient);
     if (!delta.allFinite()) return std::nullopt;
+    const double gain = -normal->gradient.dot(delta);
+    const bool is_last = gain < k_small_gain || (step >= k_patient_steps && gain < k_slow_gain * best);
     const Pose next = boxplus(pose, delta);
     const double next_cost = cost(sights, next, huber) + prior_cost(prior, next);
     if (next_cost <= best) {
       pose = next;
       best = next_cost;
       damping = std::max(1e-12, damping * 0.1);
-      if (delta.norm() < k_small_step) break;
     } else {
       damping = std::max(damping, 1e-9) * 10;
       if (damping > 1e8) break;
     }
+    if (is_last) break;
   }
   const auto normal = normal_equations(sights, pose, huber, prior);
   if (!normal) return std::nullopt;
