@@ -38,10 +38,11 @@ class Canvas : public device::Display {
     if (picture.size() != size_) return error("{}: expected its size, found another.", name_);
     shown = picture.clone();
     ++count;
+    most_lit = std::max(most_lit, cv::countNonZero(picture.reshape(1)));
     return shifted(std::chrono::steady_clock::now(), 0.020);
   }
   cv::Mat shown;
-  int count = 0;
+  int count = 0, most_lit = 0;
 
  private:
   std::string name_;
@@ -185,8 +186,8 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
   ASSERT_TRUE(played.ok()) << played.message();
   EXPECT_LT(took_s, 2.5 + 1 + 1.5);  // its end, and a picture that was being painted on a slow machine
   EXPECT_GE(projector.count, 1);
-  EXPECT_GT(cv::countNonZero(projector.shown.reshape(1)), 1000);
-  EXPECT_GT(cv::countNonZero(screen.shown.reshape(1)), 1000);
+  EXPECT_GT(projector.most_lit, 1000);  // on a slow machine the last may be of the time without a camera
+  EXPECT_GT(screen.most_lit, 1000);
   EXPECT_EQ(cv::countNonZero(screen.shown.row(10).reshape(1)), 0);  // bars above a wider picture
   ASSERT_TRUE(books->close(&*session, false).ok());
   const std::string page = read_file(folder / "out/session.html").value();
