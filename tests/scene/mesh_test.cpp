@@ -275,7 +275,11 @@ TEST(Glb, PutsMeshesInTheirPlaces) {
   plain.normals = {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}};
   plain.triangles = {{0, 1, 2}};
   plain.triangle_materials = {0};
-  plain.materials = {{.base_colour = {0.5f, 0.25f, 1}, .unlit = true, .metallic = 0.5f, .roughness = 0.25f}};
+  plain.materials.resize(1);
+  plain.materials[0].base_colour = {0.5f, 0.25f, 1};
+  plain.materials[0].unlit = true;
+  plain.materials[0].metallic = 0.5f;
+  plain.materials[0].roughness = 0.25f;
   Mesh textured = plain;
   textured.uvs = {{0, 0}, {1, 0}, {0, 0.25f}};
   textured.materials = {{.texture = cv::Mat(4, 4, CV_8UC3, cv::Scalar(10, 200, 30))}};

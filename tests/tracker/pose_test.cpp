@@ -209,8 +209,12 @@ World world() {
 Detection detection_of(const World& w, std::size_t marker, double noise, std::mt19937_64& rng) {
   const BodyMarker& m = w.body.markers[marker];
   const Pose camera_from_marker = w.camera.imager_from_world * w.world_from_body * m.body_from_marker;
-  return {m.marker, noisy(seen(w.camera.lens, camera_from_marker, m.size_m), noise, rng),
-          even(std::max(noise, 0.01)), 1};
+  Detection detection;
+  detection.marker = m.marker;
+  detection.corners_px = noisy(seen(w.camera.lens, camera_from_marker, m.size_m), noise, rng);
+  detection.corner_covariance = even(std::max(noise, 0.01));
+  detection.score = 1;
+  return detection;
 }
 
 std::vector<Track> observed_by(const World& w, std::span<const Detection> detections) {
