@@ -209,14 +209,29 @@ std::optional<std::string> user_of(const Scene& scene,
 }
 
 Result<Staging> with_screen(Staging staging, const Edit& edit) {
+  const auto output = std::find_if(staging.screens.begin(), staging.screens.end(),
+                                   [&](const Output& known) { return known.name == edit.slot; });
+  if (!edit.slot.empty() && output == staging.screens.end()) {
+    std::vector<std::string> outputs;
+    for (const Output& known : staging.screens) outputs.push_back(known.name);
+    return error("screen: expected a screen of the devices file ({}), or none for all, found '{}'.",
+                 list_of(outputs), edit.slot);
+  }
+  const Screen before = edit.slot.empty() ? staging.screen : output->shows;
   const std::vector<std::string>& names = screen_names();
   const std::string name = edit.value.empty() || edit.value == "next"
-                               ? stepped(names, names[static_cast<std::size_t>(staging.screen)], 1)
+                               ? stepped(names, names[static_cast<std::size_t>(before)], 1)
                                : edit.value;
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end())
     return error("screen: expected one of {}, found '{}'.", list_of(names), edit.value);
-  staging.screen = static_cast<Screen>(found - names.begin());
+  const auto chosen = static_cast<Screen>(found - names.begin());
+  if (!edit.slot.empty()) {
+    output->shows = chosen;
+    return staging;
+  }
+  staging.screen = chosen;
+  for (Output& each : staging.screens) each.shows = chosen;
   return staging;
 }
 
@@ -352,7 +367,8 @@ const std::vector<Action>& actions() {
       {"grid", false, on_off, "on, off or toggle", "lines on the prototype, every 10 mm"},
       {"marker_states", false, on_off, "on, off or toggle",
        "rings around markers: green seen, amber carried on"},
-      {"screen", false, maybe_text, "rest, full, camera, view, stereo, off or next", "what screens show"},
+      {"screen", false, maybe_text, "rest, full, camera, view, stereo, off or next",
+       "what screens show, or the one that is named", "a screen; left out: all"},
       {"viewer", false, maybe_text, "a guest's name; empty: the scene's own viewer",
        "whose eye view parts are drawn for: a guest's tablet while its window sees markers"},
   };
@@ -427,6 +443,12 @@ Result<Staging> edited(const Scene& scene,
                                                         : &Staging::marker_states;
   LIMN_TRY(out.*flag, switched(staging.*flag, edit));
   return out;
+}
+
+Screen shown_on(const Staging& staging, const std::string& screen) {
+  for (const Output& output : staging.screens)
+    if (output.name == screen) return output.shows;
+  return staging.screen;
 }
 
 const MarkerName& carrier(const Scene& scene, const Staging& staging, std::size_t slot) {

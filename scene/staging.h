@@ -43,6 +43,12 @@ struct Pin {
   std::optional<Pose> prototype_from_marker;  ///< where the marker stood then; absent until it is seen
 };
 
+/// A screen of the session's devices, and what it shows.
+struct Output {
+  std::string name;
+  Screen shows = Screen::rest;
+};
+
 /// What the people around the prototype have chosen, on top of what the project's files say.
 struct Staging {
   struct Slot {
@@ -63,8 +69,9 @@ struct Staging {
   bool grid = false;                 ///< lines on the prototype, every 10 mm
   bool split = false;                ///< left of a line the other look, right of it what is shown else
   double split_mm = 0;               ///< where the line is, along the prototype's x, from its middle
-  Screen screen = Screen::rest;
-  std::optional<RoomLight> light;                             ///< instead of the scene's own
+  Screen screen = Screen::rest;      ///< what was last chosen for all screens
+  std::vector<Output> screens = {};  ///< the session's, in the order of its devices file
+  std::optional<RoomLight> light;    ///< instead of the scene's own
   Eigen::Vector3d d_up_world = Eigen::Vector3d::UnitZ();      ///< for `light` in a scene that has none
   Eigen::Vector3d d_front_world = -Eigen::Vector3d::UnitY();  ///< towards those who look, for `light`
   std::string viewer;  ///< a guest, for whose tablet `view` parts are drawn; empty: the scene's own viewers
@@ -76,7 +83,7 @@ Staging first_staging(const Scene& scene);
 /// One action of a person: by control marker, key, script or another program.
 struct Edit {
   std::string action;  ///< by its name in actions()
-  std::string slot;    ///< of actions on a slot
+  std::string slot;    ///< of actions on a slot; of `screen`: the one that is meant, empty: all
   std::string value;   ///< as the action wants it; may be empty
 };
 
@@ -98,12 +105,17 @@ struct Action {
   Takes takes = Takes::nothing;
   std::string value;  ///< what Edit::value says, in words; empty: nothing
   std::string what;
+  std::string of =
+      {};  ///< what Edit::slot may name of an action that is on no slot, in words; empty: nothing
 };
 const std::vector<Action>& actions();
 
 /// The staging after an edit. `posed` is what was shown last: looks are saved from it. Error, and nothing has
 /// changed: an unknown action, slot, variant or look, or a value that is not what the action wants.
 Result<Staging> edited(const Scene& scene, const Staging& staging, const PosedScene& posed, const Edit& edit);
+
+/// What a screen shows; one that the staging does not know: what was chosen for all.
+Screen shown_on(const Staging& staging, const std::string& screen);
 
 /// The marker that carries a slot's part.
 const MarkerName& carrier(const Scene& scene, const Staging& staging, std::size_t slot);

@@ -141,6 +141,22 @@ function make_projectors(session) {
   return list;
 }
 
+// What one of several screens shows; the buttons above choose for all.
+function make_output(session, name, screens) {
+  const choice = h(
+    "select",
+    { "aria-label": `What ${name} shows`, "data-action": "screen", "data-output": name },
+    ...screens.map((what) => h("option", { value: what }, what)),
+  );
+  choice.addEventListener("change", async () => {
+    if (await session.act("screen", name, choice.value)) return;
+    choice.value = session.state.outputs.find((output) => output.name === name)?.shows ?? choice.value;
+  });
+  const node = h("div", { class: "line named" }, h("span", { class: "soft" }, name), choice);
+  node.choice = choice;
+  return node;
+}
+
 export function make_light(session) {
   const grid = make_switch(
     session,
@@ -158,6 +174,7 @@ export function make_light(session) {
   );
   const split = make_split(session);
   const screens = h("div", { class: "choices wrap", role: "group", "aria-label": "What screens show" });
+  const outputs = h("div", { class: "stack" });
   const viewers = make_viewers(session);
   const projectors = make_projectors(session);
   by_id("light").append(
@@ -173,6 +190,7 @@ export function make_light(session) {
         { class: "stack", "data-action": "screen", "data-needs": role_of("screen") },
         h("h3", {}, "Screens"),
         screens,
+        outputs,
       ),
       make_shading(session),
     ),
@@ -190,7 +208,17 @@ export function make_light(session) {
         (name) =>
           session.button("screen", { value: name }, h("span", {}, name, h("small", {}, k_screens[name] ?? ""))),
       );
-      for (const button of screens.children) button.setAttribute("aria-pressed", String(button.key === state.screen));
+      const shown = state.outputs.length ? state.outputs.map((output) => output.shows) : [state.screen];
+      for (const button of screens.children)
+        button.setAttribute("aria-pressed", String(shown.every((what) => what === button.key)));
+      const several = state.outputs.length > 1 ? state.outputs : [];
+      keep(
+        outputs,
+        several,
+        (output) => output.name,
+        (output) => make_output(session, output.name, state.screens),
+      );
+      several.forEach((output, i) => (outputs.children[i].choice.value = output.shows));
     },
   };
 }

@@ -88,10 +88,9 @@ class DeviceLoop {
     if (osc_) osc_->tell(*session_);
     shown.missed = static_cast<int>(cameras_.missed());
     const Stamp begun = now();
-    const bool wants_screen = !devices_->screens.empty() || (desk_ && desk_->is_due());
-    const cv::Mat screen = wants_screen ? session_->screen() : cv::Mat();
-    shown.screen_ms = wants_screen ? milliseconds_since(begun) : -1;
-    if (!screen.empty()) show_screen(screen);
+    const std::map<scene::Screen, cv::Mat> pictures = screen_pictures();
+    shown.screen_ms = pictures.empty() ? -1 : milliseconds_since(begun);
+    show_screens(pictures);
     if (session_->watched().captured_at != Stamp{}) {  // something was seen
       books_->shown(shown, painted);
       if (desk_) desk_->shown(shown);
@@ -100,7 +99,9 @@ class DeviceLoop {
       books_->telemetry().note(now(), what);
       log_warning("live: {}", what);
     }
-    return !desk_ || desk_->serve(session_, &books_->telemetry(), *health_, screen, now());
+    const auto screen = pictures.find(session_->staging().screen);
+    return !desk_ || desk_->serve(session_, &books_->telemetry(), *health_,
+                                  screen == pictures.end() ? cv::Mat() : screen->second, now());
   }
 
  private:
@@ -245,10 +246,28 @@ class DeviceLoop {
     if (latest_s > 0) display_s_ += k_blend * (latest_s - display_s_);
   }
 
-  void show_screen(const cv::Mat& screen) {
+  // Of what screens and the desk show: each choice is painted once.
+  std::map<scene::Screen, cv::Mat> screen_pictures() {
+    const scene::Staging& staging = session_->staging();
+    std::map<scene::Screen, cv::Mat> out;
+    for (const auto& screen : devices_->screens)
+      if (screen) out.try_emplace(scene::shown_on(staging, screen->name()));
+    if (desk_ && desk_->is_due()) out.try_emplace(staging.screen);
+    for (auto& [what, picture] : out) picture = session_->screen(what);
+    return out;
+  }
+
+  // `off` is black.
+  void show_screens(const std::map<scene::Screen, cv::Mat>& pictures) {
     for (std::size_t i = 0; i < devices_->screens.size(); ++i) {
-      if (!devices_->screens[i]) continue;
-      const Result<Stamp> shown_at = devices_->screens[i]->show(fitted(screen, devices_->screens[i]->size()));
+      device::Display* screen = devices_->screens[i].get();
+      if (!screen) continue;
+      const scene::Screen what = scene::shown_on(session_->staging(), screen->name());
+      const cv::Mat& picture = pictures.at(what);
+      if (picture.empty() && what != scene::Screen::off) continue;
+      const Result<Stamp> shown_at =
+          screen->show(picture.empty() ? cv::Mat(screen->size(), CV_8UC3, cv::Scalar::all(0))
+                                       : fitted(picture, screen->size()));
       shown_at ? health_->works(screens_[i]) : health_->fails(screens_[i], shown_at.message());
     }
   }

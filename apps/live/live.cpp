@@ -203,6 +203,11 @@ Status play_in_virtual_room(const LiveOptions& options) {
   return books.close(&session, options.json);
 }
 
+bool is_projector(const Rig& rig, const std::string& display) {
+  return std::any_of(rig.projectors.begin(), rig.projectors.end(),
+                     [&](const Imager& projector) { return projector.name == display; });
+}
+
 // Opens what can be opened; what cannot is told of and left out.
 SessionDevices opened(const Devices& devices, const Rig& rig, const device::Desktop* desktop) {
   SessionDevices out;
@@ -243,6 +248,8 @@ Status play_with_devices(const LiveOptions& options) {
   std::vector<scene::LeftOut> left_out;
   LIMN_TRY(setup.scene, scene::load_scene(options.scene, &left_out));
   LIMN_TRY(const Devices devices, matched(named, setup.rig));
+  for (const device::DisplayWanted& display : devices.displays)
+    if (!is_projector(setup.rig, display.name)) setup.screens.push_back(display.name);
   LIMN_TRY_STATUS(set_up(options, &setup));
   setup.paint.is_linear_camera =
       !setup.rig.cameras.empty() && is_measured_linear(setup.rig, setup.rig.cameras.front());

@@ -44,6 +44,7 @@ std::string arguments_of(const scene::Action& action) {
       words.push_back("on, off or toggle (text; or true, false, a number: 0 is off; left out: toggle)");
       break;
   }
+  if (!action.of.empty()) words.push_back(action.of + " (text)");
   std::string all;
   for (const std::string& word : words) all += (all.empty() ? "" : "; ") + word;
   return all.empty() ? "none" : all;
@@ -214,7 +215,10 @@ const std::vector<OscAddress>& osc_told() {
       {"/limn/state/blackout", "0 or 1", "no light"},
       {"/limn/state/freeze", "0 or 1", "what is shown stays"},
       {"/limn/state/marker_states", "0 or 1", "rings around markers"},
-      {"/limn/state/screen", "rest, full, camera, view, stereo or off (text)", "what screens show"},
+      {"/limn/state/screen", "rest, full, camera, view, stereo or off (text)",
+       "what was last chosen for all screens"},
+      {"/limn/state/output", "a screen (text); rest, full, camera, view, stereo or off (text)",
+       "what that screen shows"},
       {"/limn/state/viewer", "name (text; empty: the scene's own viewer)",
        "the guest whose tablet view parts are drawn for"},
   };
@@ -252,6 +256,9 @@ Result<scene::Edit> edit_of_osc(std::span<const std::uint8_t> datagram) {
     LIMN_TRY(edit.slot, reader.text("a slot"));
   }
   LIMN_TRY(edit.value, value_of(action->takes, action->value, &reader));
+  if (!action->of.empty() && !reader.is_at_end()) {
+    LIMN_TRY(edit.slot, reader.text(action->of));
+  }
   if (!reader.is_at_end())
     return error("{}: expected {} arguments at most, found {}.", reader.path, reader.next,
                  reader.arguments.size());

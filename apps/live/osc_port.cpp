@@ -120,6 +120,9 @@ void OscPort::tell(const Session& session) {
   put_all("freeze", {static_cast<int>(staging.frozen)});
   put_all("marker_states", {static_cast<int>(staging.marker_states)});
   put_all("screen", {scene::screen_names()[static_cast<std::size_t>(staging.screen)]});
+  for (const scene::Output& output : staging.screens)
+    put("output " + output.name, "/limn/state/output",
+        {output.name, scene::screen_names()[static_cast<std::size_t>(output.shows)]});
   put_all("viewer", {staging.viewer});
 }
 

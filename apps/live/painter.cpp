@@ -198,32 +198,31 @@ cv::Mat Painter::free_surface(std::size_t projector) {
   return points;
 }
 
-cv::Mat Painter::screen(const Watched& watched, const scene::Staging& staging) {
+cv::Mat Painter::screen(const Watched& watched, const scene::Staging& staging, scene::Screen what) {
   using enum scene::Screen;
-  if (staging.screen == off || watched.frames.empty() || watched.frames[0].image.empty()) return {};
+  if (what == off || watched.frames.empty() || watched.frames[0].image.empty()) return {};
   const cv::Mat& seen = watched.frames[0].image;
   const cv::Mat behind = options_.is_linear_camera ? srgb_picture(seen) : seen;
-  if (staging.screen == camera) return behind;
+  if (what == camera) return behind;
   const Stamp at = watched.frames[0].captured_at;
   const std::vector<Track> tracks = scene::carried(
       scene_, staging, tracker::predicted(watched.motions, at, options_.prediction, options_.motion));
   const scene::PosedScene posed = scene::staged(scene_, staging, tracks);
-  if (staging.screen == rest) {
+  if (what == rest) {
     const double seconds = treated_at_ == Stamp{} ? 0 : std::max(0.0, seconds_between(treated_at_, at));
     treatments_ = projector::treated(treatments_, renderer_.coverage(posed, rig_.cameras[0]), seconds);
     treated_at_ = at;
   }
-  const cv::Mat picture = screen_of(behind, posed, staging.screen, treatments_);
+  const cv::Mat picture = screen_of(behind, posed, what, treatments_);
   const auto left = scene::left_of_split(scene_, staging);
-  if (!left || staging.screen == stereo) return picture;
-  const Imager& eye = staging.screen == view && viewer_.width > 0 ? viewer_ : rig_.cameras[0];
+  if (!left || what == stereo) return picture;
+  const Imager& eye = what == view && viewer_.width > 0 ? viewer_ : rig_.cameras[0];
   const auto line = split_line(eye, posed, prototype_box_, staging.split_mm);
   if (!line) return picture;
   const scene::PosedScene other = scene::staged(scene_, *left, tracks);
-  const auto treatments = staging.screen == rest
-                              ? projector::treated({}, renderer_.coverage(other, rig_.cameras[0]), 0)
-                              : std::vector<projector::Treatment>();
-  return split_along(*line, screen_of(behind, other, staging.screen, treatments), picture);
+  const auto treatments = what == rest ? projector::treated({}, renderer_.coverage(other, rig_.cameras[0]), 0)
+                                       : std::vector<projector::Treatment>();
+  return split_along(*line, screen_of(behind, other, what, treatments), picture);
 }
 
 cv::Mat Painter::screen_of(const cv::Mat& behind,

@@ -80,7 +80,7 @@ class Painter {
 
   /// A large screen's picture for the newest frame of camera 0, at that frame's own stamp; empty before the
   /// first frame and for Screen::off.
-  cv::Mat screen(const Watched& watched, const scene::Staging& staging);
+  cv::Mat screen(const Watched& watched, const scene::Staging& staging, scene::Screen what);
 
   /// The prototype's point (its own frame, m) that each pixel of a projector lights, CV_32FC3, as painted
   /// last; NaN where none, and on markers.

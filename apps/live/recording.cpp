@@ -52,7 +52,8 @@ nlohmann::ordered_json setup_json(const SessionSetup& setup) {
           {"label_s", paint.label_s},
           {"lost_s", paint.lost_s},
           {"stereo_mm", paint.stereo_mm},
-          {"refill", paint.refill}};
+          {"refill", paint.refill},
+          {"screens", setup.screens}};
 }
 
 template <class T>
@@ -200,7 +201,7 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   LIMN_TRY(const Config config, Config::load(folder / "session.json", "limn.session/1"));
   const ConfigNode root = config.root();
   root.only({"schema", "rig", "scene", "full_scan_every", "motion", "prediction", "marker_light", "fade_s",
-             "label_s", "lost_s", "stereo_mm", "refill"});
+             "label_s", "lost_s", "stereo_mm", "refill", "screens"});
   SessionSetup setup;
   setup.watch.full_scan_every = root.at("full_scan_every").integer();
   if (setup.watch.full_scan_every < 1) root.at("full_scan_every").problem("expected 1 or more, found less.");
@@ -223,6 +224,8 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   setup.paint.lost_s = root.at("lost_s").positive();
   setup.paint.stereo_mm = root.at("stereo_mm").number();
   setup.paint.refill = root.at("refill").boolean();
+  if (const auto screens = root.find("screens"))
+    for (const ConfigNode& name : screens->items()) setup.screens.push_back(name.text());
   const fs::path rig = root.at("rig").path_inside(), scene = root.at("scene").path_inside();
   LIMN_TRY_STATUS(config.status());
   LIMN_TRY(setup.rig, load_rig(rig));

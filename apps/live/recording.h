@@ -25,6 +25,7 @@ struct SessionSetup {
   scene::Scene scene;
   WatchOptions watch;
   PaintOptions paint;
+  std::vector<std::string> screens = {};  ///< names of displays that are no projectors
 };
 
 /// Writes a session's folder (limn.session/1): rig and scene as they were, frames as PNG, and events.jsonl,

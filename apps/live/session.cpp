@@ -119,6 +119,7 @@ Session::Session(SessionSetup setup, Painter painter, Telemetry* telemetry, Reco
       telemetry_(telemetry),
       recorder_(recorder),
       staging_(scene::first_staging(setup_.scene)) {
+  for (const std::string& name : setup_.screens) staging_.screens.push_back({name});
   if (setup_.rig.cameras.empty()) return;
   const Eigen::Quaterniond world_from_camera = setup_.rig.cameras[0].imager_from_world.rotation.inverse();
   staging_.d_up_world = world_from_camera * -Eigen::Vector3d::UnitY();
@@ -336,9 +337,7 @@ Status Session::keep_looks(const scene::Staging& before) {
     }
     LIMN_TRY_STATUS(make_folder(folder));
     LIMN_TRY_STATUS(write_file(folder / (look.name + ".json"), text));
-    scene::Staging shown = staging_;
-    shown.screen = scene::Screen::view;
-    const cv::Mat picture = painter_ ? painter_->screen(watched_, shown) : cv::Mat();
+    const cv::Mat picture = screen(scene::Screen::view);
     if (!picture.empty()) LIMN_TRY_STATUS(write_png(folder / (look.name + ".png"), picture));
   }
   return has_changed ? write_contact_sheet(staging_.looks, folder, folder / "looks.html") : Status();
@@ -415,6 +414,8 @@ cv::Mat Session::free_surface(std::size_t projector) {
   return painter_ && painted_.posed.world_from_prototype ? painter_->free_surface(projector) : cv::Mat();
 }
 
-cv::Mat Session::screen() { return painter_ ? painter_->screen(watched_, staging_) : cv::Mat(); }
+cv::Mat Session::screen(scene::Screen what) {
+  return painter_ ? painter_->screen(watched_, staging_, what) : cv::Mat();
+}
 
 }  // namespace limn::apps

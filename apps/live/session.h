@@ -80,7 +80,9 @@ class Session {
 
   /// The projectors' pictures for a moment to come.
   const Painted& paint(Stamp now, Stamp shown_at);
-  cv::Mat screen();
+  /// A screen's picture (Painter::screen), of what was chosen for all or of `what`.
+  cv::Mat screen() { return screen(staging_.screen); }
+  cv::Mat screen(scene::Screen what);
   /// As of Painter; empty while there is nothing to draw with, or no prototype is seen.
   cv::Mat free_surface(std::size_t projector);
 

@@ -82,6 +82,7 @@ SessionState state_of(const Session& session,
   out.split = staging.split;
   out.split_mm = staging.split_mm;
   out.screen = scene::screen_names()[static_cast<std::size_t>(staging.screen)];
+  out.outputs = staging.screens;
   out.viewer = staging.viewer;
   out.follows = session.painted().follows;
   out.windows = {session.windows().begin(), session.windows().end()};
@@ -125,6 +126,10 @@ nlohmann::ordered_json to_json(const SessionState& state) {
   out["split_mm"] = state.split_mm;
   out["screen"] = state.screen;
   out["screens"] = scene::screen_names();
+  out["outputs"] = nlohmann::ordered_json::array();
+  for (const scene::Output& output : state.outputs)
+    out["outputs"].push_back(
+        {{"name", output.name}, {"shows", scene::screen_names()[static_cast<std::size_t>(output.shows)]}});
   out["viewer"] = state.viewer;
   out["follows"] = state.follows;
   out["windows"] = state.windows;

@@ -35,7 +35,8 @@ struct SessionState {
   std::string look, other_look, deleted_look;
   bool blackout = false, frozen = false, grid = false, marker_states = false, split = false;
   double split_mm = 0;
-  std::string screen;
+  std::string screen;  ///< for all
+  std::vector<scene::Output> outputs;
   std::string viewer, follows;       ///< whose tablet is to be the eye, and whose it is
   std::vector<std::string> windows;  ///< of guests whose tablets can be
   std::vector<std::string> projectors;

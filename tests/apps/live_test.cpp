@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "apps/coarser.h"
+#include "apps/live/device_session.h"
 #include "apps/live/osc.h"
 #include "apps/live/replay.h"
 #include "apps/live/room.h"
@@ -27,6 +28,7 @@
 #include "core/file.h"
 #include "core/picture.h"
 #include "device/gl_context.h"
+#include "device/picture_camera.h"
 #include "sim/virtual_rig.h"
 #include "tests/support/matchers.h"
 #include "tracker/predict.h"
@@ -348,6 +350,69 @@ TEST(Live, DrawsAnewWhenTheGraphicsCardLostIt) {
   ASSERT_EQ(notes.size(), 2u) << notes.dump();
   EXPECT_NE(notes[0].at("what").get<std::string>().find("there is no card"), std::string::npos);
   EXPECT_NE(notes[1].at("what").get<std::string>().find("drawn anew"), std::string::npos);
+}
+
+// Remembers what it was shown.
+class Canvas : public device::Display {
+ public:
+  Canvas(std::string name, cv::Size size) : name_(std::move(name)), size_(size) {}
+  const std::string& name() const override { return name_; }
+  cv::Size size() const override { return size_; }
+  Result<Stamp> show(const cv::Mat& picture) override {
+    shown = picture.clone();
+    return shifted(std::chrono::steady_clock::now(), 0.02);
+  }
+  cv::Mat shown;
+
+ private:
+  std::string name_;
+  cv::Size size_;
+};
+
+// Three screens of one devices file; a recording knows them.
+TEST(Live, EachScreenShowsWhatWasChosenForIt) {
+  const fs::path folder = test::test_folder();
+  const sim::World world = studio(0.34);
+  SessionSetup setup{world.rig, *world.scene, {}, {}, {"wall", "desk", "roof"}};
+  sim::VirtualRig room(world, {.grab_waits_for_light = false});
+  const cv::Mat seen = room.camera(0).next()->image;
+  ASSERT_TRUE(write_png(folder / "seen.png", seen));
+  const auto context = device::GlContext::create();
+  ASSERT_TRUE(context) << context.message();
+  auto books = Books::open({}, folder / "recording", &setup);
+  ASSERT_TRUE(books) << books.message();
+  EXPECT_EQ(setup.screens.size(), 3u);
+  auto watcher = Watcher::create(setup.scene, setup.rig);
+  auto session = Session::create(setup, &books->telemetry(), books->recorder(), false);
+  ASSERT_TRUE(watcher && session);
+  for (const auto& [screen, what] : {std::pair{"", "full"}, {"wall", "camera"}, {"roof", "off"}})
+    ASSERT_TRUE(session->edit({"screen", screen, what}, "test", {}));
+  SessionDevices devices;
+  devices.cameras.push_back(std::make_unique<device::PictureCamera>(
+      device::PictureCamera::open(folder / "seen.png", {.repeat = true}).value()));
+  const Imager& projector = setup.rig.projectors[0];
+  devices.projectors.resize(setup.rig.projectors.size());
+  devices.projectors[0] =
+      std::make_unique<Canvas>(projector.name, cv::Size(projector.width, projector.height));
+  std::vector<const Canvas*> screens;
+  for (const std::string& name : setup.screens) {
+    auto canvas = std::make_unique<Canvas>(name, seen.size());
+    screens.push_back(canvas.get());
+    devices.screens.push_back(std::move(canvas));
+  }
+  const std::atomic<bool> is_ended = false;
+  const Status played =
+      play_on_devices(&devices, 1.5, is_ended, &*watcher, &*session, &*books, nullptr, nullptr, nullptr);
+  ASSERT_TRUE(played) << played.message();
+  for (const Canvas* screen : screens) ASSERT_FALSE(screen->shown.empty()) << screen->name();
+  EXPECT_EQ(cv::norm(screens[0]->shown, seen, cv::NORM_INF), 0);
+  EXPECT_GT(cv::norm(screens[1]->shown, seen, cv::NORM_INF), 50) << "with parts";
+  EXPECT_EQ(cv::countNonZero(screens[2]->shown.reshape(1)), 0);
+  ASSERT_TRUE(books->close(&*session, false));
+  ReplayOptions replay;
+  replay.session = folder / "recording";
+  const Status replayed = run_replay(replay);
+  EXPECT_TRUE(replayed.ok()) << replayed.message();
 }
 
 // A camera goes and comes back: parts are carried on, fade, and are there again.

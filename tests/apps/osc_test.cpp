@@ -96,6 +96,7 @@ TEST(Osc, EveryActionHasAMessage) {
     EXPECT_EQ(edit->value, value);
     arguments.emplace_back("one more");
     arguments.emplace_back("and another");
+    if (!action.of.empty()) arguments.emplace_back("and a third");
     EXPECT_NE(refusal(osc_message("/limn/" + action.name, arguments)).find("/limn/" + action.name),
               std::string::npos);
   }
@@ -201,6 +202,7 @@ class AnOscSession : public testing::Test {
     SessionSetup setup;
     setup.rig = world->rig;
     setup.scene = *world->scene;
+    setup.screens = {"wall", "desk"};
     auto telemetry = Telemetry::create({});
     ASSERT_TRUE(telemetry);
     telemetry_.emplace(std::move(*telemetry));
@@ -250,6 +252,14 @@ TEST_F(AnOscSession, HearsAnotherPrograms) {
       Pose(Eigen::Quaterniond(std::sqrt(0.5), 0, std::sqrt(0.5), 0), Eigen::Vector3d(0.02, -0.03, 0.0125)),
       1e-6, 1e-6));
   EXPECT_TRUE(session_->staging().slots[0].nudge.isZero());
+
+  // One screen, and all.
+  ASSERT_GT(lo_send(to, "/limn/screen", "s", "camera"), 0);
+  ASSERT_GT(lo_send(to, "/limn/screen", "ss", "full", "wall"), 0);
+  hear();
+  EXPECT_EQ(session_->staging().screen, scene::Screen::camera);
+  EXPECT_EQ(scene::shown_on(session_->staging(), "wall"), scene::Screen::full);
+  EXPECT_EQ(scene::shown_on(session_->staging(), "desk"), scene::Screen::camera);
 
   // What the scene does not have changes nothing and is told.
   ASSERT_GT(lo_send(to, "/limn/choose_variant", "ss", "mirror", "no such"), 0);

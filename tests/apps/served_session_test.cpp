@@ -37,6 +37,7 @@ class AServedSession : public AServer {
     setup.rig = world->rig;
     setup.scene = *world->scene;
     setup.scene.folder = folder_ / "project";
+    setup.screens = {"wall", "desk"};
     fs::create_directories(setup.scene.folder);
     auto telemetry = Telemetry::create({});
     ASSERT_TRUE(telemetry);
@@ -135,6 +136,23 @@ TEST_F(AServedSession, ProgramsEditOverHttp) {
   EXPECT_TRUE(session_->staging().blackout);
 }
 
+TEST_F(AServedSession, TellsWhatEachScreenShows) {
+  play_while([&] {
+    const std::string token = token_of(Role::operate, "Ann");
+    ASSERT_EQ(client()->post("/api/edit", R"({"action": "screen", "value": "camera"})", token).status, 200);
+    ASSERT_EQ(
+        client()->post("/api/edit", R"({"action": "screen", "slot": "wall", "value": "full"})", token).status,
+        200);
+    const json state = json::parse(client()->get("/api/state", token).body);
+    EXPECT_EQ(state["screen"], "camera");
+    EXPECT_EQ(state["outputs"],
+              json::parse(R"([{"name": "wall", "shows": "full"}, {"name": "desk", "shows": "camera"}])"));
+    const auto wrong = client()->post("/api/edit", R"({"action": "screen", "slot": "roof"})", token);
+    EXPECT_EQ(wrong.status, 400);
+    EXPECT_NE(wrong.body.find("a screen of the devices file (wall, desk)"), std::string::npos) << wrong.body;
+  });
+}
+
 // The session gives guests no more of its time than it can between two pictures.
 TEST_F(AServedSession, AFloodOfEditsIsTakenInPortions) {
   const auto ann = guest(Role::work);
@@ -169,10 +187,11 @@ TEST_F(AServedSession, TellsTheStateOfTheDocumentation) {
   };
   check(state);
   check(state["slots"][0]);
-  for (const char* key : {"number",       "slots",    "prototype", "looks",   "look",          "other_look",
-                          "deleted_look", "blackout", "frozen",    "grid",    "marker_states", "split",
-                          "split_mm",     "screen",   "viewer",    "follows", "windows",       "screens",
-                          "projectors",   "devices",  "waiting",   "guests",  "comments",      "notes"})
+  for (const char* key :
+       {"number",   "slots",  "prototype", "looks",         "look",    "other_look", "deleted_look",
+        "blackout", "frozen", "grid",      "marker_states", "split",   "outputs",    "split_mm",
+        "screen",   "viewer", "follows",   "windows",       "screens", "projectors", "devices",
+        "waiting",  "guests", "comments",  "notes"})
     EXPECT_TRUE(state.contains(key)) << key;
 }
 

@@ -101,11 +101,28 @@ TEST(Staging, WhatCannotBeDoneIsNamedAndChangesNothing) {
            {{"light", "", "30 45 0.6 0.3 nan"}, "(0 to 10)"},
            {{"light", "", "30 450 0.6 0.3 0.1"}, "expected five numbers"},
            {{"light", "", "30 45 0.6 0.3 0.1 9"}, "expected five numbers"},
-           {{"screen", "", "cinema"}, "rest, full, camera"}}) {
+           {{"screen", "", "cinema"}, "rest, full, camera"},
+           {{"screen", "wall", "full"}, "a screen of the devices file (none)"}}) {
     const auto result = edited(scene, staging, {}, edit);
     ASSERT_FALSE(result) << edit.action;
     EXPECT_NE(result.message().find(part), std::string::npos) << result.message();
   }
+}
+
+TEST(Staging, EachScreenHasItsChoice) {
+  const Scene scene = two_slots();
+  Staging staging = first_staging(scene);
+  staging.screens = {{"wall"}, {"desk"}};
+  staging = done(scene, staging, {}, {"screen", "wall", "full"});
+  staging = done(scene, staging, {}, {"screen", "desk", "next"});
+  staging = done(scene, staging, {}, {"screen", "desk", "next"});
+  EXPECT_EQ(shown_on(staging, "wall"), Screen::full);
+  EXPECT_EQ(shown_on(staging, "desk"), Screen::camera);
+  EXPECT_EQ(shown_on(staging, "another"), Screen::rest);
+  EXPECT_EQ(staging.screen, Screen::rest);
+  staging = done(scene, staging, {}, {"screen", "", "view"});
+  for (const char* name : {"wall", "desk", "another"}) EXPECT_EQ(shown_on(staging, name), Screen::view);
+  EXPECT_FALSE(edited(scene, staging, {}, {"screen", "mirror", "full"}));
 }
 
 TEST(Staging, APlacedPartStaysOnThePrototypeUntilItsMarkerIsMoved) {

@@ -234,6 +234,23 @@ class Checks:
         expect(not missing, "something on the page for every action", missing)
 
     @check
+    def each_of_several_screens_has_its_choice(self):
+        self.tab("light")
+        shown = self.browser.script_async("""
+            const state = await (await fetch("/api/state")).json();
+            state.outputs = [{ name: "wall", shows: "full" }, { name: "desk", shows: "rest" }];  // the virtual rig has none
+            const data = JSON.stringify({ ...state, type: "state" });
+            limn_test.sockets.at(-1).dispatchEvent(new MessageEvent("message", { data }));
+            const choices = [...document.querySelectorAll("#light [data-output]")];
+            const shown = choices.map((one) => `${one.dataset.output} ${one.value}`);
+            choices[0].value = "view";
+            choices[0].dispatchEvent(new Event("change"));
+            return shown;""")
+        expect(shown == ["wall full", "desk rest"], "a choice for each screen", shown)
+        wait_for("what the session says of the first", lambda: "found 'wall'" in self.browser.text("#notes"))
+        self.tab("parts")
+
+    @check
     def a_part_is_placed_by_numbers(self):
         before = self.mirror()["prototype_from_part"]
         wanted = [round(1000 * v + 4, 1) for v in before["translation_m"]]
