@@ -175,6 +175,7 @@ export function make_light(session) {
   const split = make_split(session);
   const screens = h("div", { class: "choices wrap", role: "group", "aria-label": "What screens show" });
   const outputs = h("div", { class: "stack" });
+  const shading = make_shading(session);
   const viewers = make_viewers(session);
   const projectors = make_projectors(session);
   by_id("light").append(
@@ -192,7 +193,7 @@ export function make_light(session) {
         screens,
         outputs,
       ),
-      make_shading(session),
+      shading,
     ),
     h("h3", {}, "Projectors"),
     projectors,
@@ -200,7 +201,7 @@ export function make_light(session) {
   return {
     opened: (name) => projectors.opened(name),
     show(state) {
-      for (const part of [grid, rings, split, viewers, projectors]) part.show(state);
+      for (const part of [grid, rings, split, viewers, shading, projectors]) part.show(state);
       keep(
         screens,
         state.screens,

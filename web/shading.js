@@ -8,14 +8,35 @@ function slider(label, properties) {
 
 const share = (label, title, value) => slider(label, { title, min: "0", max: "1", step: "0.05", value });
 
+/**
+ * What is let go of is sent. Returned is how the inputs follow what the session has: its words, in the inputs' order, where
+ * `-` or nothing at all means how they stood at first.
+ */
+function let_go(inputs, send) {
+  const first = inputs.map((input) => input.value);
+  let is_held = false;
+  for (const input of inputs) {
+    input.addEventListener("input", () => (is_held = true));
+    input.addEventListener("change", async () => {
+      is_held = true;
+      await send();
+      is_held = false;
+    });
+  }
+  return (text) => {
+    if (is_held) return;
+    const words = text.split(" ");
+    inputs.forEach((input, i) => (input.value = !words[i] || words[i] === "-" ? first[i] : words[i]));
+  };
+}
+
 /** A part's colour, metalness and roughness, instead of what its file says. */
 export function make_material(session, slot) {
   const colour = h("input", { type: "color", value: "#808080", "aria-label": `Colour of ${slot.name}` });
   const metal = share(`Metalness of ${slot.name}`, "Metal", "0"),
     rough = share(`Roughness of ${slot.name}`, "Rough", "0.5");
   const words = () => `${colour.value} ${metal.input.value} ${rough.input.value}`;
-  for (const input of [colour, metal.input, rough.input])
-    input.addEventListener("change", () => session.act("material", slot.name, words()));
+  const follow = let_go([colour, metal.input, rough.input], () => session.act("material", slot.name, words()));
   const node = h(
     "div",
     { class: "stack", "data-needs": "work" },
@@ -25,7 +46,7 @@ export function make_material(session, slot) {
     rough.row,
     session.button("material", { slot: slot.name, class: "wide" }, "As its file says"),
   );
-  node.show = () => {};
+  node.show = (state_of) => follow(state_of.material);
   return node;
 }
 
@@ -40,12 +61,17 @@ export function make_shading(session) {
     slider("Soft light from below", { title: "Below", ...strength, value: "0.1" }),
   ];
   const words = () => lights.map(({ input }) => input.value).join(" ");
-  for (const { input } of lights) input.addEventListener("change", () => session.act("light", "", words()));
-  return h(
+  const follow = let_go(
+    lights.map(({ input }) => input),
+    () => session.act("light", "", words()),
+  );
+  const node = h(
     "div",
     { class: "stack", "data-needs": "work" },
     h("h3", {}, "Light on the parts"),
     ...lights.map(({ row }) => row),
     session.button("light", { class: "wide" }, "The scene's own light"),
   );
+  node.show = (state) => state.light !== "other" && follow(state.light);
+  return node;
 }

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "core/response.h"
+#include "scene/in_words.h"
 
 namespace limn::apps {
 namespace {
@@ -463,6 +464,11 @@ void OperatorPanel::draw_material(const Gui& gui, const std::string& slot, const
 // The light that parts are shaded by, in a box that opens.
 void OperatorPanel::draw_light(const Gui& gui, const scene::Staging& staging) {
   if (small_button(gui, "light", staging.light.has_value())) ImGui::OpenPopup("light");
+  const auto numbers =
+      staging.light ? scene::numbers_of(*staging.light, staging.d_front_world) : std::nullopt;
+  if (numbers && !ImGui::IsAnyItemActive())
+    std::transform(numbers->begin(), numbers->end(), light_.begin(),
+                   [](double number) { return static_cast<float>(number); });
   if (!ImGui::BeginPopup("light")) return;
   bool is_changed = ImGui::SliderFloat("right", &light_[0], -180, 180, "%.0f deg");
   is_changed |= ImGui::SliderFloat("up", &light_[1], -90, 90, "%.0f deg");

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "core/config.h"
+#include "scene/in_words.h"
 
 namespace limn::apps {
 namespace {
@@ -36,11 +37,20 @@ SessionState::Slot slot_of(const Session& session, std::size_t index) {
   out.is_held = staged.pin || !staged.nudge.isZero();
   out.sight = sight_of(session.painted().tracks, slot.name);
   out.marker = scene::carrier(scene, session.staging(), index).text();
+  out.material = scene::words_of(staged.material);
   const scene::PosedScene& posed = session.painted().posed;
   const Pose from_world = posed.world_from_prototype ? posed.world_from_prototype->inverse() : Pose{};
   for (const scene::PosedPart& part : posed.parts)
     if (part.slot == slot.name) out.prototype_from_part = from_world * part.world_from_part;
   return out;
+}
+
+std::string light_of(const scene::Scene& scene, const scene::Staging& staging) {
+  if (!staging.light || staging.light == scene.light) return {};
+  const auto numbers = scene::numbers_of(*staging.light, staging.d_front_world);
+  if (!numbers) return "other";
+  return fmt::format("{:g} {:g} {:g} {:g} {:g}", (*numbers)[0], (*numbers)[1], (*numbers)[2], (*numbers)[3],
+                     (*numbers)[4]);
 }
 
 // A millimetre's thousandth, for people and for short messages.
@@ -55,6 +65,7 @@ nlohmann::ordered_json to_json(const SessionState::Slot& slot) {
       {"is_held", slot.is_held},
       {"sight", slot.sight},
       {"marker", slot.marker},
+      {"material", slot.material},
       {"dropped", slot.dropped}};
   if (slot.prototype_from_part) out["prototype_from_part"] = limn::to_json(*slot.prototype_from_part);
   return out;
@@ -83,6 +94,7 @@ SessionState state_of(const Session& session,
   out.split_mm = staging.split_mm;
   out.screen = scene::screen_names()[static_cast<std::size_t>(staging.screen)];
   out.outputs = staging.screens;
+  out.light = light_of(scene, staging);
   out.viewer = staging.viewer;
   out.follows = session.painted().follows;
   out.windows = {session.windows().begin(), session.windows().end()};
@@ -124,6 +136,7 @@ nlohmann::ordered_json to_json(const SessionState& state) {
   out["marker_states"] = state.marker_states;
   out["split"] = state.split;
   out["split_mm"] = state.split_mm;
+  out["light"] = state.light;
   out["screen"] = state.screen;
   out["screens"] = scene::screen_names();
   out["outputs"] = nlohmann::ordered_json::array();

@@ -22,6 +22,7 @@ struct SessionState {
     bool is_held = false;
     std::string sight;
     std::string marker;
+    std::string material;  ///< as the action takes it; empty: as its file says
     std::vector<std::string> dropped;
     std::optional<Pose> prototype_from_part;  ///< absent: the part is not shown
   };
@@ -35,6 +36,7 @@ struct SessionState {
   std::string look, other_look, deleted_look;
   bool blackout = false, frozen = false, grid = false, marker_states = false, split = false;
   double split_mm = 0;
+  std::string light;   ///< as the action takes it; empty: the scene's own; `other`: one that it cannot say
   std::string screen;  ///< for all
   std::vector<scene::Output> outputs;
   std::string viewer, follows;       ///< whose tablet is to be the eye, and whose it is

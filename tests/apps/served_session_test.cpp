@@ -136,6 +136,33 @@ TEST_F(AServedSession, ProgramsEditOverHttp) {
   EXPECT_TRUE(session_->staging().blackout);
 }
 
+// In the words of the actions, so that everybody's sliders stand there; also those of a look.
+TEST_F(AServedSession, TellsMaterialsAndLight) {
+  using Told = std::pair<std::string, std::string>;  // the mirror's material, the light
+  std::string token;
+  const auto done = [&](const char* action, const char* slot, const std::string& value) {
+    const auto answer = client()->post(
+        "/api/edit", json({{"action", action}, {"slot", slot}, {"value", value}}).dump(), token);
+    EXPECT_EQ(answer.status, 200) << answer.body;
+    const json state = json::parse(client()->get("/api/state", token).body);
+    return Told(state["slots"][0]["material"], state["light"]);
+  };
+  play_while([&] {
+    token = token_of(Role::work, "Ann");
+    EXPECT_EQ(done("grid", "", "on"), Told("", ""));
+    EXPECT_EQ(done("material", "mirror", "#c02818 - 0.45"), Told("#c02818 - 0.45", ""));
+    EXPECT_EQ(done("material", "mirror", ""), Told("", ""));
+    for (const char* light : {"-135 -20.5 0.65 0.35 0.15", "30 45 0.6 0.3 0.1", "170 5 2 0 0"})
+      EXPECT_EQ(done("light", "", light), Told("", light));
+  });
+  session_->paint(at_, at_);  // which looks are saved of
+  ASSERT_TRUE(session_->edit({"save_look", "", "dark"}, "test", at_));
+  play_while([&] {
+    EXPECT_EQ(done("light", "", ""), Told("", ""));
+    EXPECT_EQ(done("restore_look", "", "dark"), Told("", "170 5 2 0 0"));
+  });
+}
+
 TEST_F(AServedSession, TellsWhatEachScreenShows) {
   play_while([&] {
     const std::string token = token_of(Role::operate, "Ann");
@@ -188,10 +215,10 @@ TEST_F(AServedSession, TellsTheStateOfTheDocumentation) {
   check(state);
   check(state["slots"][0]);
   for (const char* key :
-       {"number",   "slots",  "prototype", "looks",         "look",    "other_look", "deleted_look",
-        "blackout", "frozen", "grid",      "marker_states", "split",   "outputs",    "split_mm",
-        "screen",   "viewer", "follows",   "windows",       "screens", "projectors", "devices",
-        "waiting",  "guests", "comments",  "notes"})
+       {"number",   "slots",   "prototype", "looks",         "look",    "other_look", "deleted_look",
+        "blackout", "frozen",  "grid",      "marker_states", "split",   "outputs",    "light",
+        "split_mm", "screen",  "viewer",    "follows",       "windows", "screens",    "projectors",
+        "devices",  "waiting", "guests",    "comments",      "notes"})
     EXPECT_TRUE(state.contains(key)) << key;
 }
 

@@ -234,6 +234,22 @@ class Checks:
         expect(not missing, "something on the page for every action", missing)
 
     @check
+    def sliders_follow_others(self):
+        values = lambda scope: self.browser.script(
+            "return [...document.querySelectorAll(arguments[0])].map((input) => input.value)",
+            f"{scope} input[type=color], {scope} .named input[type=range]")
+        self.tab("parts")
+        first = values(MIRROR)
+        self.edit("material", "mirror", "#c02818 0.25 -")
+        wait_for("its colour and metal", lambda: values(MIRROR) == ["#c02818", "0.25", first[2]])
+        self.edit("material", "mirror", "")
+        wait_for("what it was", lambda: values(MIRROR) == first)
+        self.edit("light", "", "-60 20 1.5 0.2 0.05")
+        wait_for("the light's", lambda: values("#light") == ["-60", "20", "1.5", "0.2", "0.05"])
+        self.edit("light", "", "")
+        wait_for("the light's own", lambda: values("#light") == ["30", "45", "0.6", "0.3", "0.1"])
+
+    @check
     def each_of_several_screens_has_its_choice(self):
         self.tab("light")
         shown = self.browser.script_async("""
