@@ -60,7 +60,9 @@ std::optional<double> number_of(const std::string& text) {
   return number;
 }
 
-std::string shortened(const std::string& text) { return text.size() <= 40 ? text : text.substr(0, 40) + "…"; }
+std::string shortened(const std::string& text) {
+  return text.size() <= 40 ? text : fmt::format("{}…", text.substr(0, 40));
+}
 
 Result<double> read_number(const std::string& text, const std::string& where) {
   const auto number = number_of(text);

@@ -198,7 +198,8 @@ class Checks:
         self.measured["projector_changed_by"] = round(difference(before, after))
         self.tab("light")
         canvas = "#light canvas[data-projector=projector0]"
-        wait_for("it on the page", lambda: difference(after, self.ask("pixels", canvas)) < 60)
+        wait_for("it on the page",
+                 lambda: difference(shown(), page := self.ask("pixels", canvas)) < 60 < difference(before, page))
 
     @check
     def a_look_is_saved_and_restored(self):
