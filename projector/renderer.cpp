@@ -843,7 +843,7 @@ cv::Mat Renderer::view(const Imager& imager, const scene::PosedScene& posed, con
 
 std::vector<PartCoverage> Renderer::coverage(const scene::PosedScene& posed, const Imager& viewer) {
   impl_->prepare(posed, Impl::FromProjectors::prototype);
-  impl_->look_from_imager(viewer, true);
+  impl_->look_from_imager(viewer);
   const Canvas& canvas = impl_->canvas(viewer.width, viewer.height, GL_RG8);
   impl_->set_up(impl_->coverage, impl_->lens_of(viewer), &viewer);
   impl_->draw(impl_->coverage, canvas,
