@@ -70,8 +70,8 @@ class Renderer {
   void set_smoothing(const Smoothing& smoothing);
 
   /// Wanted: a projector's picture that differs from its last one, because something moves, has the edges of
-  /// parts drawn by half the samples; the first call in which all is as it was draws it whole. Off at first:
-  /// each picture is whole.
+  /// parts drawn by half the samples; the first call in which all is as it was draws it whole. Off at first,
+  /// and while black is to be even: each picture is whole.
   void set_quick_motion(bool wanted);
 
   /// View parts of `scene`, the one given to create, darken the prototype around them in composites and views

@@ -435,28 +435,18 @@ void OperatorPanel::draw_slots(const Gui& gui, const OperatorView& view) {
 void OperatorPanel::draw_material(const Gui& gui, const std::string& slot, const scene::MaterialChange& now) {
   if (small_button(gui, "material", !now.is_none())) ImGui::OpenPopup("material");
   if (!ImGui::BeginPopup("material")) return;
+  scene::MaterialChange wanted = now;
   const Eigen::Vector3d linear = now.base_colour.value_or(Eigen::Vector3d::Constant(k_plain));
-  std::array<float, 3> rgb{};
-  for (std::size_t i = 0; i < 3; ++i)
-    rgb[i] = static_cast<float>(srgb_of_linear(linear[static_cast<Eigen::Index>(i)]));
+  Eigen::Vector3f rgb = linear.unaryExpr([](double light) { return srgb_of_linear(light); }).cast<float>();
   auto metallic = static_cast<float>(now.metallic.value_or(0)),
        roughness = static_cast<float>(now.roughness.value_or(1));
-  const bool is_coloured = ImGui::ColorEdit3("colour", rgb.data());
-  const bool is_metal = ImGui::SliderFloat("metal", &metallic, 0, 1, "%.2f");
-  const bool is_rough = ImGui::SliderFloat("rough", &roughness, 0, 1, "%.2f");
-  const auto level = [&](std::size_t i) {
-    return static_cast<int>(std::lround(255 * std::clamp(rgb[i], 0.F, 1.F)));
-  };
-  const auto share = [](bool is_wanted, float value) {
-    return is_wanted ? fmt::format("{:.2f}", std::clamp(value, 0.F, 1.F)) : std::string("-");
-  };
-  if (is_coloured || is_metal || is_rough)
-    ask("material", slot,
-        fmt::format("{} {} {}",
-                    is_coloured || now.base_colour
-                        ? fmt::format("#{:02x}{:02x}{:02x}", level(0), level(1), level(2))
-                        : "-",
-                    share(is_metal || now.metallic, metallic), share(is_rough || now.roughness, roughness)));
+  if (ImGui::ColorEdit3("colour", rgb.data()))
+    wanted.base_colour =
+        rgb.cast<double>().unaryExpr([](double s) { return linear_of_srgb(std::clamp(s, 0.0, 1.0)); });
+  if (ImGui::SliderFloat("metal", &metallic, 0, 1, "%.2f")) wanted.metallic = std::clamp(metallic, 0.F, 1.F);
+  if (ImGui::SliderFloat("rough", &roughness, 0, 1, "%.2f"))
+    wanted.roughness = std::clamp(roughness, 0.F, 1.F);
+  if (wanted != now) ask("material", slot, scene::words_of(wanted));
   if (ImGui::Button("as its file says", {-1, 0})) ask("material", slot);
   ImGui::EndPopup();
 }

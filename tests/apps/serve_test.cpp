@@ -401,7 +401,8 @@ TEST_F(AServer, CutsWhoDoesNotRead) {
 TEST_F(AServer, IsEncryptedFromTheFirstByteAwayFromTheLoopback) {
   const std::vector<std::string> own = own_addresses();
   if (own.empty() || own.front().find(':') != std::string::npos)
-    GTEST_SKIP() << "no network: AServer.IsEncryptedFromTheFirstByteAwayFromTheLoopback";
+    GTEST_SKIP()
+        << "no address but the loopback's (IPv4): AServer.IsEncryptedFromTheFirstByteAwayFromTheLoopback";
   ServeOptions options;
   options.at = own.front() + ":0";
   open(options);
