@@ -137,6 +137,7 @@ void at_once(int count, int threads, const Work& work) {
 Detector::Detector(Families families, DetectorOptions options)
     : families_(std::move(families)), options_(options) {
   options_.threads = std::max(1, options_.threads);
+  options_.broken_markers &= std::any_of(families_.codes().begin(), families_.codes().end(), can_be_covered);
   workers_.assign(static_cast<std::size_t>(options_.threads), {EdgeRefiner(options_.encoding), {}});
 }
 
@@ -151,14 +152,18 @@ void Detector::detect(const cv::Mat& grey, const Lens* lens, std::vector<Detecti
   detect_more(grey, lens, detections);
 }
 
-void Detector::detect_more(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections) {
+void Detector::detect_more(const cv::Mat& grey,
+                           const Lens* lens,
+                           std::vector<Detection>* detections,
+                           Reading reading) {
   LIMN_CHECK(grey.empty() || grey.type() == CV_8UC1);
   if (grey.empty()) return;
-  find_candidates(grey);
+  const bool broken = options_.broken_markers && reading == Reading::covered;
+  find_candidates(grey, broken);
   if (!detections->empty())
     std::erase_if(quads_, [&](const Quad& quad) { return is_known(quad, *detections); });
   read_all(grey, lens, Reading::open, detections);
-  if (!options_.broken_markers) return;
+  if (!broken) return;
   join_segments(grey, *detections);
   read_all(grey, lens, Reading::covered, detections);
 }
@@ -201,22 +206,20 @@ std::optional<Detection> Detector::found_again(const cv::Mat& grey, const Lens* 
     }
     return std::nullopt;
   };
-  find_candidates(part);
+  find_candidates(part, options_.broken_markers);
   if (auto regular = read_quads(Reading::open)) return regular;
   if (!options_.broken_markers) return std::nullopt;
   join_segments(part, {});
   return read_quads(Reading::covered);
 }
 
-// Quads and straight edges.
-void Detector::find_candidates(const cv::Mat& grey) {
+void Detector::find_candidates(const cv::Mat& grey, bool with_segments) {
   const auto find_quads = [&] {
     threshold_.apply(grey, {options_.min_contrast}, corner_codes_);
     finder_.find(corner_codes_, {options_.min_side_px}, quads_);
   };
   const auto find_segments = [&] { segment_finder_.find(grey, options_.min_contrast, segments_); };
-  at_once(options_.broken_markers ? 2 : 1, options_.threads,
-          [&](int i) { i == 0 ? find_quads() : find_segments(); });
+  at_once(with_segments ? 2 : 1, options_.threads, [&](int i) { i == 0 ? find_quads() : find_segments(); });
 }
 
 // The quads that straight edges suggest where none of these markers are, into quads_.

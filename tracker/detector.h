@@ -27,7 +27,7 @@ struct DetectorOptions {
   /// How the camera writes light. Wrong, markers shrink, the more the softer their edges.
   Encoding encoding = Encoding::linear;
   /// Also joins straight edges to quadrilaterals, for markers that fingers, bites or slatted shadows break
-  /// up. Costs about half as much again as the rest.
+  /// up. Costs about half as much again as the rest; left out where no family can_be_covered().
   bool broken_markers = true;
   /// How many threads a picture is shared out to, of OpenCV's pool (cv::setNumThreads limits them). The
   /// result is the same with any number.
@@ -50,7 +50,11 @@ class Detector {
   void detect(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections);
 
   /// Adds the markers that stand beside the `detections` there are: those of follow() need not be read twice.
-  void detect_more(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections);
+  /// Broken ones too where that is an option, unless only Reading::open is asked for.
+  void detect_more(const cv::Mat& grey,
+                   const Lens* lens,
+                   std::vector<Detection>* detections,
+                   Reading reading = Reading::covered);
 
   /// Finds markers again that were at `last`, looking only about there: a marker that moved by more than half
   /// of its side is lost, and new ones want detect_more(). Each square once, in the order of `last`, which
@@ -85,7 +89,7 @@ class Detector {
   std::vector<std::optional<Detection>> read_;  // what each of quads_ shows
 
   std::optional<Detection> found_again(const cv::Mat& grey, const Lens* lens, const Detection& last);
-  void find_candidates(const cv::Mat& grey);
+  void find_candidates(const cv::Mat& grey, bool with_segments);
   void join_segments(const cv::Mat& grey, const std::vector<Detection>& found);
   void read_all(const cv::Mat& grey, const Lens* lens, Reading reading, std::vector<Detection>* detections);
   std::optional<Detection> read(const cv::Mat& grey,

@@ -474,8 +474,7 @@ void read_code(const Families& families,
   const int count = family.cells * family.cells;
   const bool few = count <= k_few_bits;
   const bool covered = reading == Reading::covered;
-  // So few bits that clutter shows them by chance: not a second time.
-  if (covered && family.max_errors.size() == 1) return;
+  if (covered && !can_be_covered(family)) return;
   const double border_share = covered ? k_border_errors_covered
                               : few   ? k_border_errors_few_bits
                                       : k_border_errors;
@@ -642,6 +641,8 @@ int pixel_at(const cv::Mat& grey, const Eigen::Vector2d& px) {
 }
 
 }  // namespace
+
+bool can_be_covered(const CodeFamily& family) { return !is_barcode(family) && family.max_errors.size() > 1; }
 
 bool may_be_marker(const cv::Mat& grey, const Quad& quad, double min_contrast) {
   constexpr double k_inset = 0.07;  // within the border of every family (a ninth and more)

@@ -40,6 +40,10 @@ enum class Reading {
   covered  ///< some may be hidden, shadows may cross: codes only, hidden bits count as such
 };
 
+/// Whether codes of the family are read where cells are hidden. Of those with few bits clutter shows some by
+/// chance.
+bool can_be_covered(const CodeFamily& family);
+
 /// What an identity's score is worth.
 enum class Certainty {
   any,     ///< nothing: some marker could be there, at a part of the cost

@@ -43,6 +43,22 @@ int next_start(const std::uint8_t* row, int x, int count) {
 constexpr std::array<int, 4> k_dx = {0, 1, 0, -1};  // up, right, down, left
 constexpr std::array<int, 4> k_dy = {-1, 0, 1, 0};
 
+struct Box {
+  float low_x, high_x, low_y, high_y;
+};
+
+LIMN_SIMD Box box_of(const float* __restrict x, const float* __restrict y, std::size_t count) {
+  float low_x = x[0], high_x = x[0], low_y = y[0], high_y = y[0];
+#pragma omp simd reduction(min : low_x, low_y) reduction(max : high_x, high_y)
+  for (std::size_t i = 0; i < count; ++i) {
+    low_x = x[i] < low_x ? x[i] : low_x;
+    high_x = x[i] > high_x ? x[i] : high_x;
+    low_y = y[i] < low_y ? y[i] : low_y;
+    high_y = y[i] > high_y ? y[i] : high_y;
+  }
+  return {low_x, high_x, low_y, high_y};
+}
+
 // Square of the largest distance of a point from (from_x, from_y).
 LIMN_SIMD float largest_square(
     const float* __restrict x, const float* __restrict y, std::size_t count, float from_x, float from_y) {
@@ -68,42 +84,83 @@ std::size_t farthest(std::span<const float> x, std::span<const float> y, float f
   return 0;
 }
 
-struct Chord {
-  float x, y, dx, dy;
-  float distance(float px, float py) const { return std::abs(dx * (py - y) - dy * (px - x)); }
+// Points are looked at by so many: buffers reach as far behind the last.
+constexpr std::size_t k_together = 16;
+
+struct Limits {
+  float tolerance;  // half pixels
+  std::size_t max_count, min_run;
 };
 
-// Largest distance of a point from the chord, times its length.
-LIMN_SIMD float largest_distance(const float* __restrict x,
-                                 const float* __restrict y,
-                                 std::size_t count,
-                                 const Chord chord) {
-  float largest = 0;
-#pragma omp simd reduction(max : largest)
-  for (std::size_t i = 0; i < count; ++i) {
-    const float distance = std::abs(chord.dx * (y[i] - chord.y) - chord.dy * (x[i] - chord.x));
-    largest = distance > largest ? distance : largest;
+// Adds the corners strictly between two points (Douglas and Peucker): of a piece the first of the points
+// farthest from the chord between its ends, and so on on both sides.
+LIMN_SIMD void split(const float* __restrict x,
+                     const float* __restrict y,
+                     std::size_t from,
+                     std::size_t to,
+                     const Limits limits,
+                     std::vector<std::size_t>* corners,
+                     std::vector<std::size_t>* pending) {
+  pending->assign(1, to);
+  for (;;) {
+    const std::size_t end = pending->back(), count = end - from;
+    std::size_t at = from;
+    const float x0 = x[from], y0 = y[from], dx = x[end] - x0, dy = y[end] - y0;
+    const float length = std::sqrt(dx * dx + dy * dy);
+    if (count >= limits.min_run && corners->size() <= limits.max_count && length > 0) {
+      std::array<float, k_together> most{};
+      std::array<int, k_together> where{};
+      for (std::size_t block = 0; block < count; block += k_together)
+        for (std::size_t k = 0; k < k_together; ++k) {
+          const auto i = static_cast<int>(block + k);
+          const float distance = std::abs(dx * (y[from + block + k] - y0) - dy * (x[from + block + k] - x0));
+          const bool more = distance > most[k] && i < static_cast<int>(count);
+          most[k] = more ? distance : most[k];
+          where[k] = more ? i : where[k];
+        }
+      float worst = 0;
+      for (const float distance : most) worst = std::max(worst, distance);
+      if (k_nearly * worst > limits.tolerance * length) {
+        int first = static_cast<int>(count);
+        for (std::size_t k = 0; k < k_together; ++k)
+          first = most[k] == worst ? std::min(first, where[k]) : first;
+        at = from + static_cast<std::size_t>(first);
+      }
+    }
+    if (at > from) {
+      pending->push_back(at);
+      continue;
+    }
+    from = end;
+    pending->pop_back();
+    if (pending->empty()) return;
+    corners->push_back(from);
   }
-  return largest;
 }
 
 }  // namespace
 
+// Diagonal neighbours are connected: left first.
 Outlines::Steps::Steps(std::ptrdiff_t stride) {
   using C = CornerCodes;
   constexpr std::array<int, 4> ahead_left = {C::k_upper_left, C::k_upper_right, C::k_lower_right,
                                              C::k_lower_left};
   constexpr std::array<int, 4> ahead_right = {C::k_upper_right, C::k_lower_right, C::k_lower_left,
                                               C::k_upper_left};
-  for (std::size_t i = 0; i < offset.size(); ++i) {
+  for (std::size_t i = 0; i < on.size(); ++i) {
     const std::size_t from = i / 32;
     const auto code = static_cast<int>(i % 32);
     const std::size_t turn = code & ahead_left[from] ? 3 : code & ahead_right[from] ? 0 : 1;
     const std::size_t d = (from + turn) % 4;
-    offset[i] = k_dx[d] + k_dy[d] * stride;
-    next[i] = static_cast<int>(32 * d);
-    dx[i] = k_dx[d];
-    dy[i] = k_dy[d];
+    const auto step_to = [&](std::size_t direction, int sign, std::size_t next) {
+      return Step{static_cast<std::int32_t>(sign * (k_dx[direction] + k_dy[direction] * stride)),
+                  static_cast<std::int16_t>(32 * next), static_cast<std::int8_t>(sign * k_dx[direction]),
+                  static_cast<std::int8_t>(sign * k_dy[direction])};
+    };
+    on[i] = step_to(d, 1, d);
+    // What lies behind, on both sides: black on the right alone is a boundary.
+    if (!(code & ahead_right[(from + 1) % 4]) || code & ahead_left[(from + 3) % 4]) continue;
+    back[32 * d + i % 32] = step_to(from, -1, from);
   }
 }
 
@@ -117,58 +174,78 @@ Outlines::Start Outlines::next(const CornerCodes& corners, Start after) {
   return {0, corners.height};
 }
 
-// Follows the boundary that runs up to corner (x, y) and on to its right, black on its right, into the trail.
+struct Outlines::End {
+  std::uint8_t* corner;
+  std::size_t direction;  // times 32
+  int x, y;               // of the corner, in half pixels
+  long long area = 0;     // half pixels times pixels
+
+  void go_on(const std::array<Step, 128>& steps, float* into_x, float* into_y) {
+    const std::uint8_t code = *corner;
+    // Only where boundaries start.
+    *corner =
+        static_cast<std::uint8_t>(code | (code == CornerCodes::k_lower_right ? CornerCodes::k_visited : 0));
+    const Step& step = steps[direction + code];
+    direction = static_cast<std::size_t>(step.next);
+    corner += step.offset;
+    __builtin_prefetch(corner + 8 * step.offset);  // every row of codes is another cache line
+    *into_x = static_cast<float>(x + step.dx);
+    *into_y = static_cast<float>(y + step.dy);
+    area += x * step.dy;
+    x += 2 * step.dx;
+    y += 2 * step.dy;
+  }
+};
+
+// Follows the boundary that runs up to corner (x, y) and on to its right, black on its right, into the trail:
+// from both of its ends in turn, so that neither has to wait for what it reads.
 Outlines::Extent Outlines::trace(CornerCodes& corners, Start from) {
   constexpr std::size_t k_block = 1024;
+  constexpr std::size_t k_up = 0, k_right = 32;
   std::uint8_t* const start = corners.at(from.x, from.y);
-  std::uint8_t* corner = start;
-  std::size_t next = 0;
-  int px = 2 * from.x - 1;  // of the corner, in half pixels
-  int py = 2 * from.y - 1;
-  int low_x = px, high_x = px, low_y = py, high_y = py;
-  long long area = 0;  // in half pixels times pixels
-  count_ = 0;
-  do {
-    if (count_ + k_block > trail_x_.size()) {
-      trail_x_.resize(2 * trail_x_.size() + k_block);
+  End end{start, k_up, 2 * from.x - 1, 2 * from.y - 1};
+  End begin{start, k_right, 2 * from.x - 1, 2 * from.y - 1};
+  // Whether the way on from the end is the way that the beginning has come.
+  const auto have_met = [&] {
+    return end.corner == begin.corner &&
+           static_cast<std::size_t>(steps_.on[end.direction + *end.corner].next) == begin.direction;
+  };
+  std::size_t on = 0, back = 0;
+  for (bool closed = false; !closed;) {
+    if (on + k_block > back_x_.size()) {
+      back_x_.resize(2 * back_x_.size() + k_block);
+      back_y_.resize(back_x_.size());
+      trail_x_.resize(std::max(trail_x_.size(), 2 * back_x_.size()));
       trail_y_.resize(trail_x_.size());
     }
-    float* into_x = trail_x_.data() + count_;
-    float* into_y = trail_y_.data() + count_;
-    std::size_t i = 0;
-    do {
-      const std::uint8_t code = *corner;
-      // Only where boundaries start.
-      *corner =
-          static_cast<std::uint8_t>(code | (code == CornerCodes::k_lower_right ? CornerCodes::k_visited : 0));
-      const std::size_t step = next + code;
-      next = static_cast<std::size_t>(steps_.next[step]);
-      corner += steps_.offset[step];
-      __builtin_prefetch(corner + 8 * steps_.offset[step]);  // every row of codes is another cache line
-      const int dx = steps_.dx[step];
-      const int dy = steps_.dy[step];
-      into_x[i] = static_cast<float>(px + dx);
-      into_y[i] = static_cast<float>(py + dy);
-      area += px * dy;
-      px += 2 * dx;
-      py += 2 * dy;
-      low_x = std::min(low_x, px);
-      high_x = std::max(high_x, px);
-      low_y = std::min(low_y, py);
-      high_y = std::max(high_y, py);
-    } while (++i < k_block && corner != start);
-    count_ += i;
-  } while (corner != start);
-  return {count_, 0.5 * (high_x - low_x), 0.5 * (high_y - low_y), 0.5 * static_cast<double>(area)};
+    float* const on_x = trail_x_.data();
+    float* const on_y = trail_y_.data();
+    float* const back_x = back_x_.data();
+    float* const back_y = back_y_.data();
+    for (const std::size_t until = on + k_block; on < until;) {
+      end.go_on(steps_.on, on_x + on, on_y + on);
+      ++on;
+      if ((closed = have_met())) break;
+      begin.go_on(steps_.back, back_x + back, back_y + back);
+      ++back;
+      if ((closed = have_met())) break;
+    }
+  }
+  if (*end.corner == CornerCodes::k_lower_right) *end.corner |= CornerCodes::k_visited;
+  const auto backs = static_cast<std::ptrdiff_t>(back), ons = static_cast<std::ptrdiff_t>(on);
+  std::reverse_copy(back_x_.begin(), back_x_.begin() + backs, trail_x_.begin() + ons);
+  std::reverse_copy(back_y_.begin(), back_y_.begin() + backs, trail_y_.begin() + ons);
+  count_ = on + back;
+  const Box box = box_of(trail_x_.data(), trail_y_.data(), count_);
+  return {count_, 0.5 * static_cast<double>(box.high_x - box.low_x),
+          0.5 * static_cast<double>(box.high_y - box.low_y),
+          0.5 * static_cast<double>(end.area - begin.area)};
 }
 
 void Outlines::find_corners(double tolerance_px, std::size_t max_count, std::size_t min_run) {
-  tolerance_ = static_cast<float>(2 * tolerance_px);
-  max_count_ = max_count;
-  min_run_ = std::max<std::size_t>(2, min_run);
   // The trail twice over, so that it can begin anywhere.
   for (auto* trail : {&trail_x_, &trail_y_}) {
-    if (trail->size() < 2 * count_ + 1) trail->resize(2 * count_ + 1);
+    if (trail->size() < 2 * count_ + k_together) trail->resize(2 * count_ + k_together);
     std::copy_n(trail->begin(), count_, trail->begin() + static_cast<std::ptrdiff_t>(count_));
   }
   x_ = std::span(trail_x_).first(count_);
@@ -179,24 +256,10 @@ void Outlines::find_corners(double tolerance_px, std::size_t max_count, std::siz
   const std::size_t second = farthest(x_, y_, x_[0], y_[0]);
   corners_.clear();
   corners_.push_back(0);
-  split(0, second);
+  const Limits limits{static_cast<float>(2 * tolerance_px), max_count, std::max<std::size_t>(2, min_run)};
+  split(x_.data(), y_.data(), 0, second, limits, &corners_, &pending_);
   corners_.push_back(second);
-  split(second, count_);
-}
-
-// Adds the corners strictly between two indices of the boundary; the last point is the first again.
-void Outlines::split(std::size_t from, std::size_t to) {
-  if (to < from + min_run_ || corners_.size() > max_count_) return;
-  const Chord chord{x_[from], y_[from], x_[to] - x_[from], y_[to] - y_[from]};
-  const float length = std::sqrt(chord.dx * chord.dx + chord.dy * chord.dy);
-  if (length == 0) return;
-  const float worst = k_nearly * largest_distance(&x_[from], &y_[from], to - from, chord);
-  if (worst <= tolerance_ * length) return;
-  std::size_t at = from + 1;
-  while (at + 1 < to && chord.distance(x_[at], y_[at]) < worst) ++at;
-  split(from, at);
-  corners_.push_back(at);
-  split(at, to);
+  split(x_.data(), y_.data(), second, count_, limits, &corners_, &pending_);
 }
 
 // Pixels, from the boundary's first point.

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -54,14 +55,18 @@ class Outlines {
   Line line(std::size_t from, std::size_t to) const;
 
  private:
-  // How a boundary with black on its right goes on, by 32 * direction + corner code. Diagonal neighbours are
-  // connected: left first.
+  // How a boundary goes on from one corner to the next, by 32 * direction + corner code.
+  struct Step {
+    std::int32_t offset = 0;  // to the next corner's code
+    std::int16_t next = 0;    // 32 * direction
+    std::int8_t dx = 0, dy = 0;
+  };
   struct Steps {
-    std::array<std::ptrdiff_t, 128> offset{};  // to the next corner's code
-    std::array<int, 128> next{};               // 32 * direction
-    std::array<int, 128> dx{}, dy{};
+    std::array<Step, 128> on, back;  // with black on its right, and the other way
     explicit Steps(std::ptrdiff_t stride);
   };
+  // One end of what has been traced of a boundary.
+  struct End;
   struct Start {
     int x = 0, y = 0;
   };
@@ -70,17 +75,15 @@ class Outlines {
   };
   Steps steps_{0};
   std::vector<float> trail_x_, trail_y_;  // in half pixels
+  std::vector<float> back_x_, back_y_;    // what was traced backwards
   std::size_t count_ = 0;
   std::span<const float> x_, y_;  // the same from a corner on, and that one again at the end
   std::vector<Moments> sums_;
-  std::vector<std::size_t> corners_;
-  float tolerance_ = 0;  // half pixels
-  std::size_t max_count_ = 0, min_run_ = 2;
+  std::vector<std::size_t> corners_, pending_;
 
   static Start first(const CornerCodes& corners);
   static Start next(const CornerCodes& corners, Start after);
   Extent trace(CornerCodes& corners, Start start);
-  void split(std::size_t from, std::size_t to);
 };
 
 }  // namespace limn::tracker

@@ -43,12 +43,77 @@ constexpr double k_bound = 0.15;        // of the contrast: residuals beyond tel
 constexpr double k_noise = 0.02;        // of the contrast, RMS: residuals that ask for no motion
 constexpr double k_systematic_px = 0.004;
 
-// Unknowns are taken by fours and samples by sixteens, rounded up with zeros.
+// Unknowns are taken by fours, rounded up with zeros.
 constexpr int k_fours = 4;
-constexpr std::size_t k_sixteens = 16;
 
 LIMN_SIMD void scale_by(const float* __restrict factors, std::size_t count, float* __restrict values) {
   for (std::size_t i = 0; i < count; ++i) values[i] *= factors[i];
+}
+
+// Residuals of what the model expects, in its place, and their sizes.
+LIMN_SIMD void compare(const float* __restrict light,
+                       std::size_t count,
+                       float* __restrict expected,
+                       float* __restrict sizes) {
+  for (std::size_t i = 0; i < count; ++i) {
+    expected[i] = light[i] - expected[i];
+    sizes[i] = std::abs(expected[i]);
+  }
+}
+
+struct Unlike {
+  float squares, weights;
+};
+
+// Square residuals where something lies behind the paper.
+LIMN_SIMD Unlike sum_behind(const float* __restrict residuals,
+                            const float* __restrict behind,
+                            std::size_t count) {
+  float squares = 0, weights = 1e-9F;
+#pragma omp simd reduction(+ : squares, weights)
+  for (std::size_t i = 0; i < count; ++i) {
+    squares += behind[i] * residuals[i] * residuals[i];
+    weights += behind[i];
+  }
+  return {squares, weights};
+}
+
+struct Weights {  // sums
+  float weights, trusted, misfit;
+  float scores, slopes;  // squares of the biweight's, and its slopes: a robust mean's variance (Huber 1981)
+};
+
+// Tukey's biweight of residuals, less where something unlike lies behind the paper; no more misfit than about
+// `bound`, a square, each.
+LIMN_SIMD Weights weigh(const float* __restrict residuals,
+                        const float* __restrict behind,
+                        std::size_t count,
+                        float unlike,
+                        float scale,
+                        float bound,
+                        float* __restrict roots,
+                        float* __restrict pulls) {
+  float weights = 0, trusted = 0, misfit = 0, scores = 0, slopes = 0;
+  const float per_scale = 1 / (16 * scale * scale);
+  const float per_bound = 1 / bound;
+#pragma omp simd reduction(+ : weights, trusted, misfit, scores, slopes)
+  for (std::size_t i = 0; i < count; ++i) {
+    const float trust = 1 / (1 + unlike * behind[i] * behind[i]);
+    const float square = residuals[i] * residuals[i];
+    const float z2 = square * trust * per_scale;
+    const float left = z2 < 1 ? 1 - z2 : 0.0F;
+    const float robust = left * left;
+    trusted += trust;
+    misfit += trust * square / (1 + square * per_bound);
+    const float w = trust * robust;
+    weights += w;
+    scores += w * robust * square;
+    slopes += trust * left * (1 - 5 * z2);
+    const float root = std::sqrt(w);
+    roots[i] = root;
+    pulls[i] = root * residuals[i];
+  }
+  return {weights, trusted, misfit, scores, slopes};
 }
 
 // The products of `number` columns, a multiple of four, of `count` values each with one another and with
@@ -124,7 +189,7 @@ class PatternFit {
              const SeenCells& cells,
              const RefinedQuad& start,
              PatternFitBuffers* buffers)
-      : grey_(grey), light_(light), pattern_(cells), start_(start), buffers_(*buffers) {}
+      : grey_(grey), levels_(light), cells_(cells), start_(start), buffers_(*buffers) {}
 
   std::optional<RefinedQuad> fit() {
     const State begun = this->begun();
@@ -152,23 +217,27 @@ class PatternFit {
 
  private:
   const cv::Mat& grey_;
-  const std::array<double, 256>& light_;
-  const Pattern pattern_;
+  const std::array<double, 256>& levels_;
+  const SeenCells& cells_;
   const RefinedQuad& start_;
+  const Eigen::Vector2d origin_ = 0.25 * (start_.corners_px[0] + start_.corners_px[1] + start_.corners_px[2] +
+                                          start_.corners_px[3]);  // of the samples' pixels
   bool has_ground_ = false;
   Eigen::Vector4d margin_;  // at the start
   double contrast_ = 0;     // at the start
   double least_scale_ = 0;  // of residuals: far from the solution most look wrong
   PatternFitBuffers& buffers_;
-  std::vector<Sample>& samples_ = buffers_.samples;
+  PatternFitBuffers::Samples& samples_ = buffers_.samples;
+  const LightFunctions& light_ = light_functions(light_versions() - 1);
+  std::size_t count_ = 0;  // of the samples, of which the last is repeated up to padded_count()
 
   double light_at(const Eigen::Vector2d& px) const {
     const int x = std::clamp(static_cast<int>(std::lround(px.x())), 0, grey_.cols - 1);
     const int y = std::clamp(static_cast<int>(std::lround(px.y())), 0, grey_.rows - 1);
-    return light_[grey_.ptr(y)[x]];
+    return levels_[grey_.ptr(y)[x]];
   }
   double light_of(double level) const {
-    return light_[static_cast<std::size_t>(std::clamp(level, 0.0, 255.0))];
+    return levels_[static_cast<std::size_t>(std::clamp(level, 0.0, 255.0))];
   }
 
   double px_a_cell(const std::array<Eigen::Vector2d, 4>& corners, std::size_t s) const {
@@ -176,7 +245,7 @@ class PatternFit {
     const Eigen::Vector2d far = 0.5 * (corners[(s + 2) % 4] + corners[(s + 3) % 4]);
     const Eigen::Vector2d along = (corners[(s + 1) % 4] - corners[s]) / side;
     const Eigen::Vector2d across = far - corners[s];
-    return std::abs(along.x() * across.y() - along.y() * across.x()) / pattern_.count();
+    return std::abs(along.x() * across.y() - along.y() * across.x()) / cells_.count;
   }
 
   // Blur and levels from the refiner's edges; margins from where the light falls again outside.
@@ -225,7 +294,7 @@ class PatternFit {
   // pattern come first.
   void take_samples(std::size_t most, const State* known = nullptr) {
     least_scale_ = known ? k_least_scale : k_rough_scale * contrast_;
-    samples_.clear();
+    for (auto* values : samples_values()) values->clear();
     const std::array<Eigen::Vector2d, 4>& corners = start_.corners_px;
     const Eigen::Matrix3d square_from_px = SquareToQuad(corners).matrix().inverse();
     Eigen::Vector2d low = corners[0];
@@ -238,7 +307,7 @@ class PatternFit {
     const double side_px = std::sqrt(0.5 * std::abs(a.x() * b.y() - a.y() * b.x()));
     const double out = outside_px / side_px;
     Eigen::Array4d reach = Eigen::Array4d::Constant(out);
-    if (has_ground_) reach = reach.min(margin_.array() / pattern_.count());
+    if (has_ground_) reach = reach.min(margin_.array() / cells_.count);
     const int x0 = std::max(0, static_cast<int>(std::ceil(low.x() - outside_px)));
     const int y0 = std::max(0, static_cast<int>(std::ceil(low.y() - outside_px)));
     const int x1 = std::min(grey_.cols - 1, static_cast<int>(std::floor(high.x() + outside_px)));
@@ -248,9 +317,6 @@ class PatternFit {
     const double wanted = static_cast<double>(choose ? k_choice * most : most);
     const int stride = std::max(1, static_cast<int>(std::lround(pixels / wanted)));
     const int lean = std::max(1, static_cast<int>(std::lround(0.618 * stride)));  // from row to row
-    std::optional<Model> model;
-    if (choose) model.emplace(pattern_, *known, has_ground_);
-    int flat = 0;
     for (int y = y0; y <= y1; ++y)
       for (int x = x0 + (lean * (y - y0)) % stride; x <= x1; x += stride) {
         const Eigen::Vector3d p = square_from_px * Eigen::Vector3d(x, y, 1);
@@ -261,15 +327,49 @@ class PatternFit {
         if ((beside_x && beside_y) ||
             !(q.y() > -reach[0] && q.x() < 1 + reach[1] && q.y() < 1 + reach[2] && q.x() > -reach[3]))
           continue;
-        if (choose && !model->shows_edge(Eigen::Vector2d(x, y)) && ++flat % k_flat_stride != 0) continue;
-        samples_.push_back({Eigen::Vector2d(x, y), 2 * q - Eigen::Vector2d::Ones(), light_[grey_.ptr(y)[x]]});
+        samples_.x.push_back(static_cast<float>(x - origin_.x()));
+        samples_.y.push_back(static_cast<float>(y - origin_.y()));
+        samples_.level_x.push_back(static_cast<float>(2 * q.x() - 1));
+        samples_.level_y.push_back(static_cast<float>(2 * q.y() - 1));
+        samples_.light.push_back(static_cast<float>(levels_[grey_.ptr(y)[x]]));
       }
-    // Blurred or small, they all do.
-    if (samples_.size() <= k_most_samples) return;
-    const double every = static_cast<double>(samples_.size()) / static_cast<double>(k_most_samples);
-    for (std::size_t i = 0; i < k_most_samples; ++i)
-      samples_[i] = samples_[static_cast<std::size_t>(every * static_cast<double>(i))];
-    samples_.resize(k_most_samples);
+    if (choose) keep_edges(*known);
+    count_ = samples_.x.size();
+    // Blurred or small, they all show edges.
+    if (count_ > k_most_samples) {
+      const double every = static_cast<double>(count_) / static_cast<double>(k_most_samples);
+      for (auto* values : samples_values())
+        for (std::size_t i = 0; i < k_most_samples; ++i)
+          (*values)[i] = (*values)[static_cast<std::size_t>(every * static_cast<double>(i))];
+      count_ = k_most_samples;
+    }
+    for (auto* values : samples_values()) {
+      const float last = count_ == 0 ? 0 : (*values)[count_ - 1];
+      values->resize(count_);
+      values->resize(padded_count(), last);
+    }
+  }
+
+  std::array<std::vector<float>*, 5> samples_values() {
+    return {&samples_.x, &samples_.y, &samples_.level_x, &samples_.level_y, &samples_.light};
+  }
+
+  // The samples that show an edge of the pattern, and some that do not.
+  void keep_edges(const State& known) {
+    count_ = samples_.x.size();
+    for (auto* values : samples_values()) values->resize(padded_count(), 0);
+    std::vector<std::int32_t>& shows = buffers_.shows_edge;
+    shows.resize(padded_count());
+    light_.see_edges(guess_of(cells_, known, has_ground_, origin_), samples_.x.data(), samples_.y.data(),
+                     padded_count(), shows.data());
+    std::size_t kept = 0;
+    int flat = 0;
+    for (std::size_t i = 0; i < count_; ++i) {
+      if (!shows[i] && ++flat % k_flat_stride != 0) continue;
+      for (auto* values : samples_values()) (*values)[kept] = (*values)[i];
+      ++kept;
+    }
+    for (auto* values : samples_values()) values->resize(kept);
   }
 
   Fitted settled(const State& start, Free free, double settled_px) {
@@ -321,9 +421,7 @@ class PatternFit {
     while (!fits->empty() && (fits->size() > most || std::isinf(fits->back().misfit))) fits->pop_back();
   }
 
-  static std::size_t stride_of(std::size_t count) {
-    return (count + k_sixteens - 1) / k_sixteens * k_sixteens;
-  }
+  std::size_t padded_count() const { return (count_ + k_together - 1) / k_together * k_together; }
 
   // Bend comes last.
   static Active active(Free free, const State& state, bool has_ground) {
@@ -354,65 +452,41 @@ class PatternFit {
 
   // One Gauss-Newton step on the samples.
   bool step(Free free, Fitted* fitted) {
-    State& state = fitted->state;
-    const Model model(pattern_, state, has_ground_);
-    const std::size_t count = samples_.size();
-    if (count < 2 * k_unknowns) return false;
-    auto& [samples, residuals, sizes, behind, roots, pulls, derivatives] = buffers_;
-    const Active active = this->active(free, state, has_ground_);
-    const std::size_t stride = stride_of(count);
-    derivatives.assign(static_cast<std::size_t>(active.padded()) * stride, 0);
-    pulls.assign(stride, 0);
-    roots.assign(stride, 0);
-    residuals.resize(count);
-    behind.resize(count);
-    sizes.resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      Vector derivative;
-      residuals[i] = samples[i].light - model.at(samples[i], &derivative, &behind[i]);
-      for (std::size_t a = 0; a < static_cast<std::size_t>(active.count); ++a)
-        derivatives[a * stride + i] = static_cast<float>(derivative[active.unknowns[a]]);
-      sizes[i] = std::abs(residuals[i]);
-    }
-    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(count / 2);
-    std::nth_element(sizes.begin(), middle, sizes.end());
+    if (count_ < 2 * k_unknowns) return false;
+    auto& [samples, shows_edge, residuals, sizes, behind, roots, pulls, derivatives, unused] = buffers_;
+    const Active active = this->active(free, fitted->state, has_ground_);
+    const std::size_t stride = padded_count();
+    residuals.resize(stride);
+    sizes.resize(stride);
+    behind.resize(stride);
+    unused.resize(stride);
+    const auto number = static_cast<std::size_t>(active.count);
+    derivatives.resize(static_cast<std::size_t>(active.padded()) * stride);
+    std::fill(derivatives.begin() + static_cast<std::ptrdiff_t>(number * stride), derivatives.end(), 0.0F);
+    Results results{residuals.data(), behind.data(), {}};
+    std::fill_n(results.derivatives, k_unknowns, unused.data());
+    for (std::size_t a = 0; a < number; ++a)
+      results.derivatives[active.unknowns[a]] = &derivatives[a * stride];
+    const Places places{samples.x.data(), samples.y.data(), samples.level_x.data(), samples.level_y.data()};
+    light_.see(guess_of(cells_, fitted->state, has_ground_, origin_), places, stride, results);
+    compare(samples.light.data(), count_, residuals.data(), sizes.data());
+    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(count_ / 2);
+    std::nth_element(sizes.begin(), middle, sizes.begin() + static_cast<std::ptrdiff_t>(count_));
     const double scale = std::max(least_scale_, 1.4826 * *middle);
     // What is behind the paper is one level a side only by chance.
-    double unlike = 0;
-    double unlike_weights = 1e-9;
-    for (std::size_t i = 0; i < count; ++i) {
-      unlike += behind[i] * residuals[i] * residuals[i];
-      unlike_weights += behind[i];
-    }
-    unlike /= unlike_weights * scale * scale;
-    double weights = 0;
-    double agree = 0;
-    double scores = 0;  // squares of the biweight's, and its slopes: a robust mean's variance (Huber 1981)
-    double slopes = 0;
-    double trusted = 0;
-    double misfit = 0;
+    const Unlike unlike = sum_behind(residuals.data(), behind.data(), count_);
     const double bound = k_bound * k_bound * contrast_ * contrast_;
-    for (std::size_t i = 0; i < count; ++i) {
-      const double trust = 1 / (1 + unlike * behind[i] * behind[i]);
-      const double z = residuals[i] / (4 * scale) * std::sqrt(trust);
-      const double robust = z * z < 1 ? (1 - z * z) * (1 - z * z) : 0;  // Tukey's biweight
-      trusted += trust;
-      const double square = residuals[i] * residuals[i];
-      misfit += trust * square / (1 + square / bound);
-      const double w = trust * robust;
-      agree += w;
-      roots[i] = static_cast<float>(std::sqrt(w));
-      pulls[i] = static_cast<float>(std::sqrt(w) * residuals[i]);
-      scores += trust * robust * robust * residuals[i] * residuals[i];
-      if (z * z < 1) slopes += trust * (1 - z * z) * (1 - 5 * z * z);
-      weights += w;
-    }
-    fitted->explained = agree / trusted;
-    fitted->misfit = misfit / trusted;
-    const double lost = weights / std::max(1.0, weights - active.count);
-    fitted->variance = lost * weights * scores / (slopes * slopes);
-    for (std::size_t a = 0; a < static_cast<std::size_t>(active.count); ++a)
-      scale_by(roots.data(), stride, &derivatives[a * stride]);
+    pulls.assign(stride, 0);
+    roots.assign(stride, 0);
+    const Weights sums =
+        weigh(residuals.data(), behind.data(), count_,
+              static_cast<float>(unlike.squares / unlike.weights / (scale * scale)),
+              static_cast<float>(scale), static_cast<float>(bound), roots.data(), pulls.data());
+    fitted->explained = sums.weights / sums.trusted;
+    fitted->misfit = sums.misfit / sums.trusted;
+    const double lost = sums.weights / std::max(1.0, static_cast<double>(sums.weights) - active.count);
+    fitted->variance = lost * sums.weights * sums.scores / (sums.slopes * sums.slopes);
+    for (std::size_t a = 0; a < number; ++a) scale_by(roots.data(), stride, &derivatives[a * stride]);
     return solved(free, active, scale * scale, fitted);
   }
 
@@ -422,8 +496,8 @@ class PatternFit {
     const int padded = active.padded();
     std::array<double, static_cast<std::size_t>(k_padded * k_padded)> lower;
     std::array<double, static_cast<std::size_t>(k_padded)> products;
-    add_products(buffers_.derivatives.data(), padded, stride_of(samples_.size()), buffers_.pulls.data(),
-                 lower.data(), products.data());
+    add_products(buffers_.derivatives.data(), padded, padded_count(), buffers_.pulls.data(), lower.data(),
+                 products.data());
     SomeMatrix information(active.count, active.count);
     SomeVector right(active.count);
     for (int i = 0; i < active.count; ++i) {
@@ -464,7 +538,7 @@ class PatternFit {
   // ones.
   double correlation(const Eigen::Ref<const Eigen::MatrixXd>& covariance) const {
     constexpr int k_blocks = 8;  // a side
-    const auto stride = static_cast<Eigen::Index>(stride_of(samples_.size()));
+    const auto stride = static_cast<Eigen::Index>(padded_count());
     const Eigen::Map<const Eigen::VectorXf> pulls(buffers_.pulls.data(), stride);
     const Eigen::Map<const Eigen::MatrixXf> derivatives(buffers_.derivatives.data(), stride,
                                                         covariance.rows());
@@ -472,12 +546,12 @@ class PatternFit {
         pulls.asDiagonal() * (derivatives * covariance.cast<float>());
     Eigen::Matrix<float, k_blocks * k_blocks, 8> sums;
     sums.setZero();
-    for (std::size_t i = 0; i < samples_.size(); ++i) {
-      const auto block = [&](double place) {
-        return std::clamp(static_cast<int>(std::floor((0.5 * place + 0.5) * k_blocks)), 0, k_blocks - 1);
+    for (std::size_t i = 0; i < count_; ++i) {
+      const auto block = [&](float place) {
+        return std::clamp(static_cast<int>(std::floor((0.5F * place + 0.5F) * k_blocks)), 0, k_blocks - 1);
       };
-      const Eigen::Vector2d& place = samples_[i].place;
-      sums.row(k_blocks * block(place.y()) + block(place.x())) += moves.row(static_cast<Eigen::Index>(i));
+      sums.row(k_blocks * block(samples_.level_y[i]) + block(samples_.level_x[i])) +=
+          moves.row(static_cast<Eigen::Index>(i));
     }
     const Eigen::Matrix<double, 8, 8> independent = (moves.transpose() * moves).cast<double>();
     const Eigen::Matrix<double, 8, 8> together = (sums.transpose() * sums).cast<double>();

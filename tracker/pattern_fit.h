@@ -25,14 +25,17 @@ struct SeenCells {
 
 /// The memory of fit_pattern, kept between calls.
 struct PatternFitBuffers {
-  struct Sample {
-    Eigen::Vector2d px, place;  ///< place: -1 to 1 over the marker at first, of the levels' planes
-    double light;
+  struct Samples {
+    std::vector<float> x, y;              ///< pixels from the marker's middle
+    std::vector<float> level_x, level_y;  ///< -1 to 1 over the marker at first, of the levels' planes
+    std::vector<float> light;
   };
-  std::vector<Sample> samples;
-  std::vector<double> residuals, sizes, behind;
+  Samples samples;
+  std::vector<std::int32_t> shows_edge;
+  std::vector<float> residuals, sizes, behind;
   std::vector<float> roots, pulls;  ///< of the weights; residuals times these
   std::vector<float> derivatives;   ///< one unknown's after the other's, then times the weight's root
+  std::vector<float> unused;        ///< derivatives by what takes no part
 };
 
 /// Refines a quad whose code is known where edges lie too near to each other for EdgeRefiner: blur wider than

@@ -132,7 +132,10 @@ void Threshold::compare(const cv::Mat& grey, const ThresholdOptions& options, Co
   corners.width = grey.cols;
   corners.height = grey.rows;
   corners.stride = (grey.cols + 1 + 7) / 8 * 8 + 8;  // words of 8 may be read from every corner
-  corners.codes.assign(static_cast<std::size_t>(corners.stride) * static_cast<std::size_t>(grey.rows + 1), 0);
+  corners.codes.resize(static_cast<std::size_t>(corners.stride) * static_cast<std::size_t>(grey.rows + 1));
+  const int beside = grey.cols + 1;
+  for (int y = 0; y <= grey.rows; ++y)
+    std::fill(corners.at(beside, y), corners.at(0, y) + corners.stride, std::uint8_t{0});
   const auto width = static_cast<std::size_t>(grey.cols);
   const auto tiles = static_cast<std::size_t>(tiles_x_);
   above_.assign(width + 2, 0);
