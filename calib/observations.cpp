@@ -24,6 +24,7 @@ namespace {
 
 using Eigen::Vector2d;
 
+constexpr const char* k_ended = "captures: it was ended while they were looked at.";
 constexpr int k_cells = 2;          // to a square's side, as interfaces.md's held-out score averages
 constexpr double k_inset_px = 2;    // from a square's edge: pixels across it see the light of one side only
 constexpr double k_inset = 0.06;    // of a square, likewise
@@ -323,7 +324,10 @@ void append(const Observed& seen, Observed* all) {
 }
 
 // A pose in which no camera sees the board shows the scene alone.
-Status observe_scenes(const Captures& captures, const DecodeOptions& options, Observed* observed) {
+Status observe_scenes(const Captures& captures,
+                      const DecodeOptions& options,
+                      const std::function<bool()>& goes_on,
+                      Observed* observed) {
   for (size_t pose = 0; pose < captures.poses.size(); ++pose) {
     const bool has_board =
         std::any_of(observed->observations.corners.begin(), observed->observations.corners.end(),
@@ -334,6 +338,7 @@ Status observe_scenes(const Captures& captures, const DecodeOptions& options, Ob
     for (size_t camera = 0; camera < captures.cameras.size(); ++camera) {
       const CapturedDevice& device = captures.cameras[camera];
       for (size_t p = 0; p < captures.projectors.size(); ++p) {
+        if (goes_on && !goes_on()) return error("{}", k_ended);
         LIMN_TRY(Decoded seen, decode(captures.patterns[p], captures.poses[pose].pictures[p][camera],
                                       device.width, device.height, options));
         decoded[camera].push_back(std::move(seen));
@@ -347,7 +352,9 @@ Status observe_scenes(const Captures& captures, const DecodeOptions& options, Ob
 
 }  // namespace
 
-Result<Observed> observe(const Captures& captures, const DecodeOptions& options) {
+Result<Observed> observe(const Captures& captures,
+                         const DecodeOptions& options,
+                         const std::function<bool()>& goes_on) {
   Observed observed;
   observed.observations.board = captures.board;
   observed.observations.cameras = captures.cameras;
@@ -363,6 +370,10 @@ Result<Observed> observe(const Captures& captures, const DecodeOptions& options)
   int done = 0;
   const auto work = [&] {
     for (int i = next++; i < count; i = next++) {
+      if (goes_on && !goes_on()) {
+        parts[static_cast<size_t>(i)] = error("{}", k_ended);
+        continue;
+      }
       parts[static_cast<size_t>(i)] = observe_pose(captures, i / cameras, i % cameras, options);
       const std::lock_guard lock(telling);
       progress.step(++done);
@@ -376,7 +387,7 @@ Result<Observed> observe(const Captures& captures, const DecodeOptions& options)
     LIMN_TRY_STATUS(part->ok() ? Status() : Status(part->error()));
     append(**part, &observed);
   }
-  LIMN_TRY_STATUS(observe_scenes(captures, options, &observed));
+  LIMN_TRY_STATUS(observe_scenes(captures, options, goes_on, &observed));
   return observed;
 }
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -96,7 +97,10 @@ struct Observed {
 /// The corners and matches of all captures. Poses in which no camera sees the board are scene captures: they
 /// give free points (calib/free_points.h). A camera that does not see the board that another sees gives
 /// nothing. An unreadable picture is an error that names it.
-Result<Observed> observe(const Captures& captures, const DecodeOptions& options = {});
+/// `goes_on` is asked between series of pictures, from any thread; false ends it with an error.
+Result<Observed> observe(const Captures& captures,
+                         const DecodeOptions& options = {},
+                         const std::function<bool()>& goes_on = {});
 
 /// Both together: the poses of `more`, captures of the same board and devices, come after those of `first`.
 /// The same as observe() on all their poses at once, but for the order of observations.

@@ -15,8 +15,11 @@ using Json = nlohmann::ordered_json;
 
 constexpr int k_max_side = 16384;  // pixels; the largest picture side that GL 4.5 must hold
 
-Imager read_imager(const ConfigNode& node) {
-  node.only({"name", "size", "lens", "imager_from_world"});
+Imager read_imager(const ConfigNode& node, bool is_projector) {
+  if (is_projector)
+    node.only({"name", "size", "lens", "imager_from_world", "focus"});
+  else
+    node.only({"name", "size", "lens", "imager_from_world"});
   Imager imager;
   imager.name = node.at("name").text();
   const ConfigNode size = node.at("size");
@@ -43,7 +46,7 @@ std::vector<Imager> read_imagers(const ConfigNode& root,
                                  std::set<std::string>* names) {
   std::vector<Imager> imagers;
   for (const ConfigNode& node : root.at(key).items()) {
-    imagers.push_back(read_imager(node));
+    imagers.push_back(read_imager(node, key == "projectors"));
     const std::string& name = imagers.back().name;
     if (name.empty() || name.find('/') != std::string::npos) {
       node.problem(fmt::format("name: expected a name without '/', found \"{}\".", name));
@@ -52,6 +55,18 @@ std::vector<Imager> read_imagers(const ConfigNode& root,
       node.problem(fmt::format("name: \"{}\" stands twice in this rig.", name));
   }
   return imagers;
+}
+
+std::vector<Focus> read_focuses(const ConfigNode& root) {
+  std::vector<Focus> focuses;
+  for (const ConfigNode& node : root.at("projectors").items()) {
+    const auto focus = node.find("focus");
+    if (!focus) continue;
+    focus->only({"distance_m", "aperture_m"});
+    focuses.push_back(
+        {node.at("name").text(), focus->at("distance_m").positive(), focus->at("aperture_m").positive()});
+  }
+  return focuses;
 }
 
 // What was measured beside the rig, if anything.
@@ -71,6 +86,7 @@ Result<Rig> load_rig_json(const fs::path& path) {
   std::set<std::string> names;
   rig.cameras = read_imagers(root, "cameras", &names);
   rig.projectors = read_imagers(root, "projectors", &names);
+  rig.focuses = read_focuses(root);
   if (const auto node = root.find("covariance")) rig.covariance_json = node->json().dump();
   if (const auto node = root.find("provenance")) rig.provenance_json = node->json().dump();
   LIMN_TRY_STATUS(config.status());
@@ -130,7 +146,13 @@ Status save_rig(const Rig& rig, const fs::path& folder) {
   LIMN_TRY_STATUS(make_folder(folder));
   Json json = {{"schema", "limn.rig/1"}, {"cameras", Json::array()}, {"projectors", Json::array()}};
   for (const Imager& camera : rig.cameras) json["cameras"].push_back(json_of(camera));
-  for (const Imager& projector : rig.projectors) json["projectors"].push_back(json_of(projector));
+  for (const Imager& projector : rig.projectors) {
+    json["projectors"].push_back(json_of(projector));
+    for (const Focus& focus : rig.focuses)
+      if (focus.projector == projector.name && focus.aperture_m > 0)
+        json["projectors"].back()["focus"] = {{"distance_m", focus.distance_m},
+                                              {"aperture_m", focus.aperture_m}};
+  }
   if (!rig.covariance_json.empty()) json["covariance"] = Json::parse(rig.covariance_json);
   if (!rig.provenance_json.empty()) json["provenance"] = Json::parse(rig.provenance_json);
   for (const auto* imagers : {&rig.cameras, &rig.projectors}) {

@@ -12,6 +12,14 @@
 
 namespace limn {
 
+/// How a projector's light blurs before and behind its plane of sharp focus: at depth z a point of it is a
+/// disc of diameter aperture_m |1 - z / distance_m|.
+struct Focus {
+  std::string projector;
+  double distance_m = 1;  ///< depth of the sharp plane, along the lens's axis
+  double aperture_m = 0;  ///< diameter of the exit pupil; 0: sharp everywhere
+};
+
 /// Calibrated cameras and projectors in one world.
 struct Rig {
   std::vector<Imager> cameras;
@@ -21,6 +29,7 @@ struct Rig {
   std::string covariance_json;
   std::string provenance_json;
   std::vector<CameraResponse> camera_responses = {};  ///< none where none was measured
+  std::vector<Focus> focuses = {};                    ///< of projectors; none where nobody told it
 
   const Imager* find(const std::string& name) const;
 };

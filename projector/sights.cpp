@@ -90,7 +90,7 @@ std::array<Eigen::Vector3d, 8> corners_of(const Eigen::AlignedBox3d& box) {
 
 struct Sights::GpuSight {
   Eigen::Matrix4f sight_from_scene;
-  Eigen::Vector4f focal_centre, p_eye, size, map, quality, vignetting;
+  Eigen::Vector4f focal_centre, p_eye, size, map, quality, vignetting, focus;
 
   GpuSight(const Twin& twin, int first_layer) {
     sight_from_scene = twin.twin_from_scene.matrix().cast<float>();
@@ -101,6 +101,7 @@ struct Sights::GpuSight {
     map.setZero();
     quality << focal, 0, 0, 0;
     vignetting.setZero();
+    focus.setZero();
   }
   void of_imager(const Imager& imager) {
     size.tail<2>() << static_cast<float>(imager.width), static_cast<float>(imager.height);
@@ -111,6 +112,10 @@ struct Sights::GpuSight {
     const Eigen::Vector2d nodes(k_map_columns - 1, k_map_rows - 1);
     map << whole.lower.cast<float>(), nodes.cwiseQuotient(whole.upper - whole.lower).cast<float>();
     quality.z() = static_cast<float>(layer);
+  }
+  void with_focus(const Focus& known, const Imager& imager) {
+    const double disc = known.aperture_m * imager.lens.fx();  // px, a metre before a lens focused at infinity
+    focus.head<2>() << static_cast<float>(disc / known.distance_m), static_cast<float>(disc);
   }
   void with_response(const Response& response) {
     if (response.black_level) quality.w() = static_cast<float>(response.black_level->value);
@@ -126,6 +131,7 @@ Result<Sights> Sights::create(const Rig& rig) {
   LIMN_TRY(sights.program_, Program::link("ids.vert", "ids.frag"));
   sights.projectors_ = projectors;
   sights.responses_ = rig.responses;
+  sights.focuses_ = rig.focuses;
   const int count = static_cast<int>(projectors.size()) + 1;  // with the witness
   sights.pixel_maps_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_RG32F, k_map_columns, k_map_rows, count);
   for (std::size_t i = 0; i < projectors.size(); ++i) {
@@ -238,8 +244,13 @@ void Sights::see_prototype_from_projectors(const GpuScene& scene,
     sight.with_map(lenses_[i].baked.rect, static_cast<int>(i));
     for (const Response& response : responses_)
       if (response.projector == projectors_[i].name) sight.with_response(response);
+    for (const Focus& focus : focuses_)
+      if (focus.projector == projectors_[i].name) sight.with_focus(focus, projectors_[i]);
     send(static_cast<int>(i), sight);
   }
+  if (!with_soft_edges || !soft_edges_) return;
+  scene.bind();
+  soft_edges_->soften([this](const Program& program) { bind(program, 0); });
 }
 
 void Sights::see_surface_parts_from_projectors(const GpuScene& scene,

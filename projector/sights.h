@@ -102,6 +102,7 @@ class Sights {
 
   std::vector<Imager> projectors_;
   std::vector<Response> responses_;
+  std::vector<Focus> focuses_;
   std::vector<GpuLens> lenses_;
   Program program_;
   std::optional<SoftEdges> soft_edges_;  // with several projectors

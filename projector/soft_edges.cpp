@@ -1,5 +1,7 @@
 #include "projector/soft_edges.h"
 
+#include <cstddef>
+
 namespace limn::projector {
 namespace {
 
@@ -7,14 +9,26 @@ constexpr int k_block = 8;  // as in shaders/blocks.glsl
 
 int blocks_of(int texels) { return (texels + k_block - 1) / k_block; }
 
+void run(const Program& program, cv::Size blocks) {
+  constexpr int k_group = 8;
+  program.set("u_blocks", blocks.width, blocks.height);
+  program.use();
+  glDispatchCompute(static_cast<GLuint>(blocks.width + k_group - 1) / k_group,
+                    static_cast<GLuint>(blocks.height + k_group - 1) / k_group, 1);
+  glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT);
+}
+
 }  // namespace
 
 Result<SoftEdges> SoftEdges::create(int projectors, int width, int height) {
   SoftEdges edges;
-  LIMN_TRY(edges.jumps_, Program::link_compute("jumps.comp"));
+  LIMN_TRY(edges.find_, Program::link_compute("jumps.comp"));
+  LIMN_TRY(edges.handed_, Program::link_compute("jump_handed.comp"));
   LIMN_TRY(edges.rows_, Program::link_compute("jump_rows.comp"));
   LIMN_TRY(edges.fade_, Program::link_compute("jump_fade.comp"));
   const int columns = blocks_of(width), rows = blocks_of(height);
+  edges.blocks_.resize(static_cast<std::size_t>(projectors));
+  edges.jumps_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_RGBA32F, columns, rows, projectors);
   edges.marks_ = make_texture(GL_TEXTURE_2D, GL_R8, columns, rows);
   edges.along_rows_ = make_texture(GL_TEXTURE_2D, GL_R8, columns, rows);
   edges.kept_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_R16F, columns, rows, projectors);
@@ -24,27 +38,33 @@ Result<SoftEdges> SoftEdges::create(int projectors, int width, int height) {
 }
 
 void SoftEdges::find(int projector, const GlName& depth, const Twin& twin) {
-  const int columns = blocks_of(twin.width), rows = blocks_of(twin.height);
-  const auto over_blocks = [&](const Program& program) {
-    constexpr int k_group = 8;
-    program.set("u_blocks", columns, rows);
-    program.use();
-    glDispatchCompute(static_cast<GLuint>(columns + k_group - 1) / k_group,
-                      static_cast<GLuint>(rows + k_group - 1) / k_group, 1);
-    glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT);
-  };
-  jumps_.bind("s_depth", 0, depth);
-  jumps_.set("u_last", twin.width - 1, twin.height - 1);
-  jumps_.set("u_near", static_cast<float>(k_near));
-  jumps_.set("u_focal", static_cast<float>(twin.focal));
-  glBindImageTexture(0, *marks_, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R8);
-  over_blocks(jumps_);
-  glBindImageTexture(0, *marks_, 0, GL_FALSE, 0, GL_READ_ONLY, GL_R8);
-  glBindImageTexture(1, *along_rows_, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R8);
-  over_blocks(rows_);
-  glBindImageTexture(0, *along_rows_, 0, GL_FALSE, 0, GL_READ_ONLY, GL_R8);
-  glBindImageTexture(1, *kept_, 0, GL_FALSE, projector, GL_WRITE_ONLY, GL_R16F);
-  over_blocks(fade_);
+  cv::Size& blocks = blocks_[static_cast<std::size_t>(projector)];
+  blocks = {blocks_of(twin.width), blocks_of(twin.height)};
+  find_.bind("s_depth", 0, depth);
+  find_.set("u_last", twin.width - 1, twin.height - 1);
+  find_.set("u_near", static_cast<float>(k_near));
+  find_.set("u_focal", static_cast<float>(twin.focal));
+  glBindImageTexture(0, *jumps_, 0, GL_FALSE, projector, GL_WRITE_ONLY, GL_RGBA32F);
+  run(find_, blocks);
+}
+
+void SoftEdges::soften(const std::function<void(const Program&)>& bind_sights) {
+  constexpr int k_jumps_unit = 8, k_no_unit = 9;
+  bind_sights(handed_);
+  handed_.bind("s_jumps", k_jumps_unit, jumps_);
+  handed_.set("s_arriving", k_no_unit);  // read, but not gone by
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    const int projector = static_cast<int>(i);
+    handed_.set("u_projector", projector);
+    glBindImageTexture(0, *marks_, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R8);
+    run(handed_, blocks_[i]);
+    glBindImageTexture(0, *marks_, 0, GL_FALSE, 0, GL_READ_ONLY, GL_R8);
+    glBindImageTexture(1, *along_rows_, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R8);
+    run(rows_, blocks_[i]);
+    glBindImageTexture(0, *along_rows_, 0, GL_FALSE, 0, GL_READ_ONLY, GL_R8);
+    glBindImageTexture(1, *kept_, 0, GL_FALSE, projector, GL_WRITE_ONLY, GL_R16F);
+    run(fade_, blocks_[i]);
+  }
 }
 
 void SoftEdges::bind(const Program& program, int unit) const { program.bind("s_kept", unit, kept_); }

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <functional>
+#include <opencv2/core/types.hpp>
+#include <vector>
+
 #include "core/result.h"
 #include "projector/gl.h"
 #include "projector/shader.h"
@@ -7,9 +11,9 @@
 
 namespace limn::projector {
 
-/// How much of its light each projector keeps beside the edges of the prototype and of its shadows on itself,
-/// so that others take over there before light ends: found in its picture of ids' depth, in blocks of 8 x 8
-/// texels.
+/// How much of its light each projector keeps beside the edges of the prototype and of its shadows on itself
+/// where others go on, so that they take over there before light ends: found in its picture of ids' depth, in
+/// blocks of 8 x 8 texels.
 class SoftEdges {
  public:
   /// For `projectors` pictures of up to width x height texels.
@@ -17,12 +21,15 @@ class SoftEdges {
 
   /// Looks through the depth picture that a projector's ids were drawn with.
   void find(int projector, const GlName& depth, const Twin& twin);
+  /// Once that is done for all. `bind_sights`: Sights::bind, with fewer than 8 units from 0 on.
+  void soften(const std::function<void(const Program&)>& bind_sights);
   /// Binds a layer a projector: 0 at an edge ... 1 away from edges, a texel a block.
   void bind(const Program& program, int unit) const;
 
  private:
-  Program jumps_, rows_, fade_;
-  GlName marks_, along_rows_, kept_;
+  Program find_, handed_, rows_, fade_;
+  GlName jumps_, marks_, along_rows_, kept_;
+  std::vector<cv::Size> blocks_;  // of each projector's picture
 };
 
 }  // namespace limn::projector

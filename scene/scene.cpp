@@ -180,15 +180,29 @@ Imager read_viewer_imager(const ConfigNode& node) {
   return viewer_imager(world_from_viewer, read_side(size, sides[0]), read_side(size, sides[1]), fov_deg);
 }
 
+// A guest's name, or true: every guest's.
+std::string read_tablet(const ConfigNode& node) {
+  if (!node.is_string()) {
+    if (!node.boolean()) node.problem("expected true or a guest's name, found false.");
+    return "";
+  }
+  if (node.text().empty()) node.problem("expected true or a guest's name, found an empty one.");
+  return node.text();
+}
+
 Viewer read_viewer(const ConfigNode& node, const Scene& scene) {
-  node.only({"fixed", "marker", "size_mm", "eye_mm", "weight"});
+  node.only({"fixed", "marker", "tablet", "size_mm", "eye_mm", "weight"});
   Viewer viewer;
   if (const auto weight = node.find("weight")) viewer.weight = weight->positive();
   if (const auto fixed = node.find("fixed")) viewer.fixed = read_viewer_imager(*fixed);
   if (const auto marker = node.find("marker")) viewer.marker = read_marker_name(*marker);
-  if (viewer.fixed.has_value() == viewer.marker.has_value()) {
+  if (const auto tablet = node.find("tablet")) viewer.tablet = read_tablet(*tablet);
+  const int kinds = viewer.fixed.has_value() + viewer.marker.has_value() + viewer.tablet.has_value();
+  if (kinds != 1) {
     node.problem(
-        fmt::format("expected either \"fixed\" or \"marker\", found {}.", viewer.fixed ? "both" : "neither"));
+        fmt::format("expected one of \"fixed\", \"marker\" and \"tablet\", found {}.", kinds == 0   ? "none"
+                                                                                       : kinds == 2 ? "two"
+                                                                                                    : "all"));
   }
   if (const auto size = node.find("size_mm"))
     viewer.marker_size_m = 1e-3 * size->positive();
@@ -203,11 +217,15 @@ std::vector<Viewer> read_viewers(const ConfigNode& node, const Scene& scene) {
   if (!node.is_array()) return {read_viewer(node, scene)};
   std::vector<Viewer> viewers;
   std::set<MarkerName> markers;
+  std::set<std::string> tablets;
   for (const ConfigNode& item : node.items()) {
     viewers.push_back(read_viewer(item, scene));
     const auto& marker = viewers.back().marker;
     if (marker && !markers.insert(*marker).second)
       item.at("marker").problem(fmt::format("expected a marker of its own, found {} twice.", marker->text()));
+    const auto& tablet = viewers.back().tablet;
+    if (tablet && !tablets.insert(*tablet).second)
+      item.at("tablet").problem("expected another guest's, found the same twice.");
   }
   return viewers;
 }
@@ -367,6 +385,15 @@ Status load_files(const Reader& reader, const fs::path& path, Scene* scene, std:
 }
 
 }  // namespace
+
+const Viewer* Scene::find_tablet(const std::string& guest) const {
+  const Viewer* of_all = nullptr;
+  for (const Viewer& viewer : viewers) {
+    if (viewer.tablet == guest) return &viewer;
+    if (viewer.tablet == "") of_all = &viewer;
+  }
+  return of_all;
+}
 
 const Slot* Scene::find_slot(const std::string& name) const {
   const auto found =

@@ -58,14 +58,16 @@ struct Control {
   std::string gesture;
 };
 
-/// Whose eye `view` parts are drawn for: a fixed imager's, or one that stands by a marker (on glasses, on a
-/// cap).
+/// Whose eye `view` parts are drawn for: a fixed imager's, one that stands by a marker (on glasses, on a
+/// cap), or a guest's tablet.
 struct Viewer {
   double weight = 1;  ///< among several
   std::optional<Imager> fixed;
   std::optional<MarkerName> marker;
   double marker_size_m = 0;
   Eigen::Vector3d p_eye_marker = Eigen::Vector3d::Zero();  ///< the eye in the marker's frame
+  /// The guest's name; empty: each guest's is a viewer.
+  std::optional<std::string> tablet = {};
 };
 
 /// What is shown: a project folder's scene.json (limn.scene/1), read with everything that it names.
@@ -78,6 +80,8 @@ struct Scene {
   std::optional<RoomLight> light;  ///< absent: soft light and a lamp that stand with the viewer
 
   const Slot* find_slot(const std::string& name) const;
+  /// The viewer that a guest's tablet is: the one of that name, else the one for all; null: it is none.
+  const Viewer* find_tablet(const std::string& guest) const;
 };
 
 /// A variant whose mesh cannot be loaded, and why.

@@ -1,8 +1,9 @@
 #version 450 core
-// Marks the blocks of a depth picture in which the prototype ends or begins to hide itself: where depth jumps.
+// Finds the blocks of a depth picture in which the prototype ends or begins to hide itself: where depth jumps.
 #include "blocks.glsl"
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(r8, binding = 0) uniform writeonly image2D u_marks;
+layout(rgba32f, binding = 0) uniform writeonly image2D u_jumps;  // texels on the jump's near side (xy) and its far side
+                                                                 // (zw); x: -1 without a jump, z: nothing is there
 uniform sampler2D s_depth;  // nearness: k_near / z, 0 where there is nothing
 uniform ivec2 u_last;       // texel of the picture
 uniform float u_near, u_focal;
@@ -31,23 +32,32 @@ bool may_jump(ivec2 first) {
   return false;
 }
 
-bool jumps(ivec2 first) {
-  if (!may_jump(first)) return false;
+// Between the texels on both sides of one.
+vec4 sides(ivec2 at, ivec2 step) {
+  ivec2 first = clamp(at - step, ivec2(0), u_last), second = clamp(at + step, ivec2(0), u_last);
+  float before = nearness(first), after = nearness(second);
+  vec4 sides = before > after ? vec4(first, second) : vec4(second, first);
+  if (min(before, after) == 0.0) sides.z = -1.0;
+  return sides;
+}
+
+vec4 jump(ivec2 first) {
+  if (!may_jump(first)) return vec4(-1);
   for (int y = 0; y < k_block; ++y) {
     for (int x = 0; x < k_block; ++x) {
       ivec2 at = first + ivec2(x, y);
       float here = nearness(at);
-      if (is_jump(nearness(at - ivec2(1, 0)), here, nearness(at + ivec2(1, 0))) ||
-          is_jump(nearness(at - ivec2(0, 1)), here, nearness(at + ivec2(0, 1)))) {
-        return true;
+      for (int k = 0; k < 2; ++k) {
+        ivec2 step = ivec2(1 - k, k);
+        if (is_jump(nearness(at - step), here, nearness(at + step))) return sides(at, step);
       }
     }
   }
-  return false;
+  return vec4(-1);
 }
 
 void main() {
   ivec2 block = ivec2(gl_GlobalInvocationID.xy);
   if (any(greaterThan(k_block * block, u_last))) return;
-  imageStore(u_marks, block, vec4(jumps(k_block * block) ? 1.0 : 0.0));
+  imageStore(u_jumps, block, jump(k_block * block));
 }

@@ -50,11 +50,18 @@ Place place_at(Hit hit, vec3 d) {
   return place;
 }
 
+// How much wider a pixel's light lies at a depth than its square, area by area: a square of side 1 has a variance of
+// 1 / 12, a disc of diameter d one of d^2 / 16.
+float spread(Sight projector, float depth) {
+  float disc = (projector.focus.x * depth - projector.focus.y) / depth;  // divided last: drivers divide inexactly
+  return 1.0 + 0.75 * disc * disc;
+}
+
 // How projector j lights a place.
 struct Reach {
-  float quality;     // pixels a square metre, times the cosine once more against grazing light, fading towards the
-                     // picture's border, the prototype's edges and its shadows; 0 where its light does not fall: turned away,
-                     // outside, in a shadow
+  float quality;     // pixels a square metre, fewer where they are out of focus, times the cosine once more against
+                     // grazing light, fading towards the picture's border, the prototype's edges and its shadows; 0 where
+                     // its light does not fall: turned away, outside, in a shadow
   float irradiance;  // of white, where 1 m away and head on is 1 (1/m^2); also where p is outside or in a shadow
   float arriving;    // of its light on the way to p, 0 ... 1: the rest is in somebody's shadow
 };
@@ -83,7 +90,7 @@ Reach reach(int j, Place place, bool is_seen) {
   }
   soft = max(k_least_share, soft);
   reach.arriving = texture(s_arriving, vec3((px + 0.5) / projector.size.zw, projector.quality.z)).r;
-  reach.quality = soft * cosine * cosine * projector.quality.x * projector.quality.x / distance_2;
+  reach.quality = soft * cosine * cosine * projector.quality.x * projector.quality.x / distance_2 / spread(projector, q.z);
   return reach;
 }
 

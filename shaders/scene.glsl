@@ -31,6 +31,7 @@ struct Sight {
   vec4 quality;       // focal length of the imager (px), width of the soft border (px), layer of its pixel map, light of
                       // black as a share of white
   vec4 vignetting;    // tilt (xy), r2, r4 of core/response.h
+  vec4 focus;         // a point's disc at depth z is |x - y / z| pixels wide
 };
 layout(std430, binding = 5) readonly buffer Sights { Sight s_sights[]; };
 

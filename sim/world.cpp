@@ -455,6 +455,9 @@ scene::PosedScene true_poses(const World& world, std::span<const std::string> va
   if (world.scene->prototype) add("prototype", world.world_from_prototype);
   for (const scene::Slot& slot : world.scene->slots)
     if (const auto pose = world_from_marker(world, slot.marker)) add(slot.name, *pose);
+  for (std::size_t i = 0; i < world.scene->viewers.size(); ++i)
+    if (const auto& marker = world.scene->viewers[i].marker)
+      if (const auto pose = world_from_marker(world, *marker)) add(scene::viewer_body(i), *pose);
   return scene::posed(*world.scene, tracks, variants);
 }
 

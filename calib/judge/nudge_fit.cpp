@@ -42,7 +42,8 @@ class Fit {
     NudgeFit fitted{std::move(places)};
     Normal normal = linearised(&fitted.places);
     double damping = 1e-4;
-    for (int i = 0; i < k_most_steps && damping < 1e8; ++i) {
+    const auto goes_on = [this] { return !options_.goes_on || options_.goes_on(); };
+    for (int i = 0; i < k_most_steps && damping < 1e8 && goes_on(); ++i) {
       Eigen::MatrixXd damped = normal.matrix;
       damped.diagonal() *= 1 + damping;
       const Eigen::VectorXd step = -damped.ldlt().solve(normal.right);

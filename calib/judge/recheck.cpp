@@ -351,7 +351,9 @@ Result<Recheck> recheck(const Rig& rig, const Observations& observations, const 
   places.bend = options.bend_m;
   place_points(observations, &places);
   LIMN_TRY_STATUS(place_boards(observations, options, &places));
-  return Detective(observations, options, std::move(places)).run(rig);
+  Recheck result = Detective(observations, options, std::move(places)).run(rig);
+  if (options.goes_on && !options.goes_on()) return error("recheck: it was ended.");
+  return result;
 }
 
 }  // namespace limn::calib

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,6 +30,8 @@ struct RecheckOptions {
   /// For each pose: where its board stood when the rig was sound, if nobody has touched it since. One of them
   /// tells a moved camera from a moved projector where there is only one of each.
   std::vector<std::optional<Pose>> still_boards = {};
+  /// Asked at every step of the fits; false ends it with an error.
+  std::function<bool()> goes_on = nullptr;
 };
 
 /// How far a device has moved. Standard deviations hold the rig's own error.

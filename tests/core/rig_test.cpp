@@ -53,6 +53,36 @@ TEST(Rig, SavedRigLoadsTheSame) {
   EXPECT_EQ(rig->provenance_json, two_devices().provenance_json);
 }
 
+TEST(Rig, AProjectorsFocusMayBeTold) {
+  const auto folder = test::test_folder();
+  Rig told = two_devices();
+  told.focuses = {{"projector0", 1.25, 0.02}};
+  ASSERT_TRUE(save_rig(told, folder));
+  const auto rig = load_rig(folder);
+  ASSERT_TRUE(rig) << rig.message();
+  ASSERT_EQ(rig->focuses.size(), 1u);
+  EXPECT_EQ(rig->focuses[0].projector, "projector0");
+  EXPECT_EQ(rig->focuses[0].distance_m, 1.25);
+  EXPECT_EQ(rig->focuses[0].aperture_m, 0.02);
+  for (const auto& [right, wrong, says] :
+       {std::tuple{"\"aperture_m\": 0.02", "\"aperture_m\": -1", "projectors[0].focus.aperture_m"},
+        {"\"distance_m\"", "\"distance_mm\"", "projectors[0].focus"}}) {
+    std::string text = read_file(folder / "rig.json").value();
+    text.replace(text.find(right), std::string(right).size(), wrong);
+    const auto spoiled = folder / "spoiled.json";
+    ASSERT_TRUE(write_file(spoiled, text));
+    EXPECT_NE(load_message(spoiled).find(says), std::string::npos) << load_message(spoiled);
+  }
+  std::string text = read_file(folder / "rig.json").value();
+  text.replace(text.find("\"cameras\""), 9, "\"lenses\"");
+  text.replace(text.find("\"projectors\""), 12, "\"cameras\"");
+  text.replace(text.find("\"lenses\""), 8, "\"projectors\"");
+  ASSERT_TRUE(write_file(folder / "spoiled.json", text));
+  EXPECT_NE(load_message(folder / "spoiled.json").find("cameras[0]: unknown key \"focus\""),
+            std::string::npos)
+      << load_message(folder / "spoiled.json");
+}
+
 TEST(Rig, AFolderOfCameramodelsAloneIsARig) {
   const auto folder = test::test_folder();
   ASSERT_TRUE(save_rig(two_devices(), folder));

@@ -544,6 +544,46 @@ TEST_F(RendererTest, BlendSharesTheLightAndMakesUpForMissingBlack) {
   EXPECT_LT(worst_lift, 1e-4);
 }
 
+// Two projectors that differ in nothing but where they are sharp: light is shared by how finely it can be
+// drawn.
+TEST_F(RendererTest, AProjectorOutOfFocusGivesLessOfTheLight) {
+  const Scene scene = scene_of(sheet(1.1, 0.7), {});
+  const PosedScene posed = posed_at_origin(scene);
+  constexpr double k_focal = 800, k_aperture = 0.03;
+  Rig rig;
+  for (const char* name : {"projector0", "projector1"})
+    rig.projectors.push_back({name, 640, 400, Lens::pinhole(k_focal, k_focal, 320, 200),
+                              looking_at({0, -0.4, -1}, {0, 0, 0}, k_up)});
+  const cv::Mat even = renderer(scene, rig).blend(0, posed);
+  rig.focuses = {{"projector0", 1.0, k_aperture}, {"projector1", 1.15, k_aperture}};
+  Renderer drawing = renderer(scene, rig);
+  const cv::Mat blend = drawing.blend(0, posed), points = drawing.surface_points(0, posed);
+  double least = 1, most = 0;
+  int off = 0, lit = 0;
+  for (int row = 0; row < blend.rows; ++row) {
+    for (int column = 0; column < blend.cols; ++column) {
+      const auto& q = points.at<cv::Vec3f>(row, column);
+      if (std::isnan(q[0])) continue;
+      const double depth = (rig.projectors[0].imager_from_world * Vector3d(q[0], q[1], q[2])).z();
+      double fineness[2];
+      for (std::size_t i = 0; i < 2; ++i) {
+        const double disc = k_focal * k_aperture * std::abs(1 / rig.focuses[i].distance_m - 1 / depth);
+        fineness[i] = 1 / (1.0 / 12 + disc * disc / 16);  // pixels are squares, blurred by discs
+      }
+      const double share = static_cast<double>(blend.at<cv::Vec2f>(row, column)[0]);
+      ++lit;
+      off += std::abs(share - fineness[0] / (fineness[0] + fineness[1])) > 1e-5;
+      least = std::min(least, share);
+      most = std::max(most, share);
+      EXPECT_NEAR(even.at<cv::Vec2f>(row, column)[0], 0.5, 1e-6);
+    }
+  }
+  EXPECT_GT(lit, 200000);
+  EXPECT_LT(off, 20);  // rays between two triangles
+  EXPECT_LT(least, 0.35);
+  EXPECT_GT(most, 0.65);
+}
+
 TEST_F(RendererTest, ProjectorInTheOthersShadowGivesAllTheLight) {
   // A post before the plate keeps the right projector's light from a strip of it.
   Mesh mesh = sheet(0.5, 0.4);

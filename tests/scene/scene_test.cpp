@@ -159,6 +159,26 @@ TEST(Scene, SeveralViewersShareOneEye) {
   EXPECT_NE(load_scene(folder_with(watched)).message().find("viewer[1].marker"), std::string::npos);
 }
 
+TEST(Scene, GuestsTabletsMayBeViewers) {
+  json watched = whole_scene();
+  const json fixed = watched["viewer"]["fixed"];
+  watched["viewer"] = {{{"fixed", fixed}}, {{"tablet", "Ann"}, {"weight", 3}}};
+  const auto named = load_scene(folder_with(watched));
+  ASSERT_TRUE(named) << named.message();
+  EXPECT_EQ(bodies(*named).size(), 3u);  // no marker is theirs
+  ASSERT_TRUE(named->find_tablet("Ann"));
+  EXPECT_EQ(named->find_tablet("Ann")->weight, 3);
+  EXPECT_FALSE(named->find_tablet("Ben"));
+  watched["viewer"].push_back({{"tablet", true}});
+  const auto all = load_scene(folder_with(watched));
+  ASSERT_TRUE(all) << all.message();
+  ASSERT_TRUE(all->find_tablet("Ann") && all->find_tablet("Ben"));
+  EXPECT_EQ(all->find_tablet("Ann")->weight, 3);
+  EXPECT_EQ(all->find_tablet("Ben")->weight, 1);
+  watched["viewer"].push_back({{"tablet", true}});
+  EXPECT_NE(load_scene(folder_with(watched)).message().find("viewer[3].tablet"), std::string::npos);
+}
+
 TEST(Scene, ThingsOfAnAbsurdSizeAreAskedAbout) {
   const auto loaded = [](const char* units, const char* mesh) {
     json scene = whole_scene();
@@ -207,6 +227,10 @@ TEST(Scene, MistakesAreErrorsWithTheirPath) {
        "marker_from_part"},
       {R"([{"op":"replace","path":"/controls/0/slot","value":"grille"}])", "controls[0].slot"},
       {R"([{"op":"add","path":"/viewer/marker","value":"aruco_4x4_50:8"}])", "viewer"},
+      {R"([{"op":"add","path":"/viewer/tablet","value":true}])", "viewer"},
+      {R"([{"op":"replace","path":"/viewer","value":{"tablet":false}}])", "viewer.tablet"},
+      {R"([{"op":"replace","path":"/viewer","value":{"tablet":""}}])", "viewer.tablet"},
+      {R"([{"op":"replace","path":"/viewer","value":{"weight":2}}])", "viewer"},
       {R"([{"op":"replace","path":"/viewer/fixed/fov_deg","value":200}])", "viewer.fixed.fov_deg"},
       {R"([{"op":"add","path":"/light","value":{"up_world":[0,0,0],"soft_below":[0,0,0],"soft_above":[1,1,1]}}])",
        "light.up_world"},
@@ -237,7 +261,8 @@ TEST(Scene, MissingAndTruncatedFilesAreErrors) {
 
 // A session begins with the parts that there are.
 TEST(Scene, PartsThatCannotBeLoadedAreLeftOutWhenThatIsAskedFor) {
-  const fs::path door = fs::path(LIMN_SOURCE_DIR) / "config/scenes/door", folder = test::test_folder() / "door";
+  const fs::path door = fs::path(LIMN_SOURCE_DIR) / "config/scenes/door",
+                 folder = test::test_folder() / "door";
   fs::copy(door, folder);
   fs::create_directories(folder / "slots/mirror");
   ASSERT_TRUE(write_file(folder / "slots/mirror/half.glb", "glTF"));
