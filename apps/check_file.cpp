@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "apps/coarser.h"
@@ -22,8 +23,7 @@ int side_px(const ConfigNode& node, double value) {
 }
 
 // As a viewer file, or with eye_m and target_m instead of the pose.
-Imager read_viewer(const ConfigNode& node) {
-  node.only({"world_from_viewer", "eye_m", "target_m", "size", "fov_deg"});
+Imager read_imager(const ConfigNode& node) {
   std::vector<double> size = node.at("size").numbers(2);
   size.resize(2, 1);
   const int width = side_px(node.at("size"), size[0]), height = side_px(node.at("size"), size[1]);
@@ -45,6 +45,31 @@ Imager read_viewer(const ConfigNode& node) {
   }
   return viewer_imager(looking_at(p_eye, p_target, Eigen::Vector3d::UnitZ()).inverse(), width, height,
                        fov_deg);
+}
+
+struct Viewer {
+  Imager imager;
+  double weight = 1;
+};
+
+Viewer read_viewer(const ConfigNode& node, bool is_one_of_several) {
+  if (!is_one_of_several) {
+    node.only({"world_from_viewer", "eye_m", "target_m", "size", "fov_deg"});
+    return {read_imager(node)};
+  }
+  node.only({"world_from_viewer", "eye_m", "target_m", "size", "fov_deg", "weight"});
+  Viewer viewer{read_imager(node)};
+  if (const auto weight = node.find("weight")) viewer.weight = weight->positive();
+  return viewer;
+}
+
+// One, or a list of several.
+std::vector<Viewer> read_viewers(const ConfigNode& node) {
+  if (!node.is_array()) return {read_viewer(node, false)};
+  std::vector<Viewer> viewers;
+  for (const ConfigNode& item : node.items()) viewers.push_back(read_viewer(item, true));
+  if (viewers.empty()) node.problem("expected at least one viewer, found none.");
+  return viewers;
 }
 
 std::vector<CheckLimit> read_limits(const ConfigNode& node) {
@@ -132,7 +157,7 @@ scene::PosedScene read_poses(const ConfigNode& node, sim::World* world) {
       if (known_slot(scene, name.text(), name)) shown.insert(name.text());
   }
   const scene::PosedScene standing = sim::true_poses(*world, variants);
-  scene::PosedScene posed{world->world_from_prototype, {}};
+  scene::PosedScene posed{world->world_from_prototype, {}, standing.eyes};
   for (std::size_t i = 0; i < scene.slots.size(); ++i) {
     const scene::Slot& slot = scene.slots[i];
     if (!shown.contains(slot.name)) continue;
@@ -160,12 +185,49 @@ Result<scene::PosedScene> poses_of(const std::optional<ConfigNode>& node,
   LIMN_TRY(scene::PosedScene posed, scene::load_poses(folder / node->text(), *world->scene));
   if (posed.world_from_prototype) sim::move_prototype(*world, *posed.world_from_prototype);
   posed.world_from_prototype = world->world_from_prototype;
+  posed.eyes = sim::true_poses(*world).eyes;
   return posed;
 }
 
 void coarsen(const ConfigNode& node, Rig* rig) {
   const Status done = make_coarser(node.positive(), rig);
   if (!done) node.problem(done.message());
+}
+
+// Those of the file, else of the scene. Of several the eye that they share, in a picture like the first
+// one's.
+Status choose_viewer(const std::vector<Viewer>& told, Check* check) {
+  const scene::Scene& scene = check->told.scene;
+  std::vector<scene::Eye> eyes = check->posed.eyes;
+  std::optional<Imager> like;
+  if (!told.empty()) {
+    eyes.clear();
+    like = told[0].imager;
+    for (const Viewer& viewer : told)
+      eyes.push_back({fmt::format("viewer{}", eyes.size()),
+                      viewer.imager.imager_from_world.inverse().translation, viewer.weight});
+  } else if (!scene.viewers.empty()) {
+    like = scene.viewers[0].fixed;
+  }
+  const bool is_alone = told.empty() ? scene.viewers.size() == 1 : told.size() == 1;
+  if (is_alone && like) {
+    check->viewer = *like;
+    return {};
+  }
+  const Eigen::Vector3d d_up_world = Eigen::Vector3d::UnitZ();
+  if (eyes.empty()) return error("viewer: expected one, for the scene has none in the world, found nothing.");
+  const scene::SharedEye shared = scene::followed({}, eyes, *scene::middle_of(scene, check->posed), 0);
+  const auto viewer = scene::viewer_at(*shared.p_world(), scene, check->posed, d_up_world);
+  if (!viewer)
+    return error("viewer: expected viewers apart from the prototype, found their eye in its middle.");
+  check->viewer = *viewer;
+  if (like) {
+    const double half = 0.5 * like->width / like->lens.fx();
+    check->viewer = viewer_imager(viewer->imager_from_world.inverse(), like->width, like->height,
+                                  360 / std::numbers::pi * std::atan(half));
+  }
+  if (eyes.size() > 1) check->shares = shared.shares;
+  return {};
 }
 
 // Moves the light of a projector by so many of its pixels: what a push against it does.
@@ -206,6 +268,7 @@ const std::vector<CheckMeasure>& check_measures() {
   static const std::vector<CheckMeasure> measures = {
       {"texture_mm", "surface light from where it was aimed, RMS", "mm"},
       {"parallax_mm", "points 50 mm off the surface, seen from the eye, worst", "mm"},
+      {"shared_mm", "the same, seen by the viewers who share the eye, RMS", "mm"},
       {"shone_mean_255", "light on the prototype against the ray tracer, mean of lit pixels", "/255"},
       {"shone_over4_share", "light on the prototype, pixels more than 4/255 off", ""},
       {"shone_inner_over4_share", "light on the prototype off edges, pixels more than 4/255 off", ""},
@@ -239,8 +302,8 @@ Result<Check> load_check(const fs::path& path) {
   check.about = root.at("about").text();
   const fs::path world_file = (config.folder() / root.at("world").text()).lexically_normal();
   check.limits = read_limits(root.at("limits"));
-  std::optional<Imager> viewer;
-  if (const auto node = root.find("viewer")) viewer = read_viewer(*node);
+  std::vector<Viewer> viewers;
+  if (const auto node = root.find("viewer")) viewers = read_viewers(*node);
   const auto scene = root.find("scene");
   const std::string scene_folder = scene ? scene->text() : "";
   LIMN_TRY_STATUS(config.status());
@@ -255,11 +318,6 @@ Result<Check> load_check(const fs::path& path) {
         "{}: world: expected a world or a scene with a prototype to shine on, found none. Add scene.",
         path.string());
   }
-  if (const auto& viewers = check.truth.scene->viewers; !viewer && viewers.size() == 1)
-    viewer = viewers[0].fixed;
-  if (!viewer)
-    return error("{}: viewer: expected one, for the scene has none, found nothing.", path.string());
-  check.viewer = *viewer;
   LIMN_TRY(check.posed, poses_of(root.find("poses"), config.folder(), &check.truth));
   if (const auto node = root.find("resolution")) coarsen(*node, &check.truth.rig);
   if (const auto node = root.find("hand")) check.hand = read_hand(*node, check.truth.rig);
@@ -268,6 +326,8 @@ Result<Check> load_check(const fs::path& path) {
     if (sim::Object* prototype = check.truth.find("prototype")) prototype->albedo = rgb.reverse();
   }
   check.told = {check.truth.rig, *check.truth.scene, check.posed};
+  if (const Status chosen = choose_viewer(viewers, &check); !chosen)
+    return error("{}: {}", path.string(), chosen.message());
   if (const auto node = root.find("nudge")) nudge(*node, &check.truth.rig);
   LIMN_TRY_STATUS(config.status());
   return check;

@@ -40,8 +40,9 @@ struct Check {
   std::string name;  ///< the file's stem
   std::string about;
   std::vector<CheckLimit> limits;
-  Imager viewer;
-  Hand hand;  ///< that shades in `refill_…`
+  Imager viewer;                                ///< whose eye view parts are drawn for
+  std::vector<scene::SharedEye::Share> shares;  ///< of the viewers, where several share that eye
+  Hand hand;                                    ///< that shades in `refill_…`
 
   sim::World truth;         ///< with the injected nudges
   scene::PosedScene posed;  ///< where the parts truly are

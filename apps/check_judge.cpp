@@ -229,6 +229,7 @@ class Judge {
     LIMN_TRY(renderer_, projector::Renderer::create(check_.told.scene, check_.told.rig));
     if (asked("texture_mm")) LIMN_TRY_STATUS(judge_texture());
     if (asked("parallax_mm")) LIMN_TRY_STATUS(judge_parallax());
+    if (asked("shared_mm")) LIMN_TRY_STATUS(judge_shared());
     if (asked("shone_mean_255") || asked("shone_over4_share") || asked("shone_inner_over4_share"))
       LIMN_TRY_STATUS(judge_shone());
     if (asked("spill_share")) LIMN_TRY_STATUS(judge_spill());
@@ -342,16 +343,58 @@ class Judge {
     return {};
   }
 
+  // The picture is the first viewer's.
+  Status judge_shared() {
+    if (check_.shares.empty()) return nothing_to_judge("shared_mm", "several viewers");
+    AimedDots dots = floating_dots(world_, check_.viewer, k_off_surface_m, k_dot_count, k_dot_seed);
+    if (dots.p_aimed.empty())
+      return nothing_to_judge("shared_mm", "a place before which the shared eye sees a disc");
+    LIMN_TRY(const auto pictures, drawn_instead(dots.mesh, scene::Mode::view));
+    std::optional<Registration> first;
+    std::string shares;
+    double squares = 0;
+    int viewers = 0;
+    for (const scene::SharedEye::Share& share : check_.shares) {
+      dots.p_eye = world_.world_from_prototype.inverse() * share.p_world;
+      const Registration found = judged_registration(world_, dots, pictures);
+      shares += fmt::format(" {}: {:.0f} % of the eye, RMS {:.1f} mm.", share.viewer, 100 * share.share,
+                            found.rms_mm);
+      if (!first) first = found;
+      if (share.share <= 0) continue;
+      squares += found.rms_mm * found.rms_mm;
+      ++viewers;
+    }
+    values_["shared_mm"] = std::sqrt(squares / viewers);
+    Imager viewer = check_.viewer;
+    viewer.imager_from_world =
+        looking_at(check_.shares[0].p_world, *scene::middle_of(check_.told.scene, check_.posed),
+                   Eigen::Vector3d::UnitZ());
+    const TracedEye seeing(world_, viewer, 1);
+    add_dots("shared", "Points 50 mm off the surface, as " + check_.shares[0].viewer + " sees them",
+             seeing.seen(pictures), viewer, *first, dots.p_centres, shares);
+    return {};
+  }
+
   void add_dots(const std::string& file,
                 const std::string& title,
                 const std::vector<cv::Mat>& pictures,
                 const Registration& found,
                 const std::vector<Eigen::Vector3d>& places) {
-    const cv::Mat actual = for_eye(eye().seen(pictures));
+    add_dots(file, title, eye().seen(pictures), check_.viewer, found, places, "");
+  }
+
+  void add_dots(const std::string& file,
+                const std::string& title,
+                const cv::Mat& light,
+                const Imager& viewer,
+                const Registration& found,
+                const std::vector<Eigen::Vector3d>& places,
+                const std::string& remark) {
+    const cv::Mat actual = for_eye(light);
     cv::Mat expected = bgr(cv::Mat(actual.size(), CV_8U, cv::Scalar(0))), difference = actual / 4;
     const double worst_mm = values_.at(file + "_mm");
     for (std::size_t i = 0; i < places.size(); ++i) {
-      const auto px = check_.viewer.project(world_.world_from_prototype * places[i]);
+      const auto px = viewer.project(world_.world_from_prototype * places[i]);
       if (!px) continue;
       const cv::Point at(cvRound(px->x()), cvRound(px->y()));
       cv::circle(expected, at, 2, cv::Scalar::all(255), cv::FILLED, cv::LINE_AA);
@@ -361,8 +404,8 @@ class Judge {
     }
     pictures_.push_back(
         {file, title,
-         fmt::format("{} discs; RMS {:.3f} mm, 95 % {:.3f} mm, unlit {}. Difference: red is {:.3f} mm.",
-                     found.points, found.rms_mm, found.p95_mm, found.unlit, worst_mm),
+         fmt::format("{} discs; RMS {:.3f} mm, 95 % {:.3f} mm, unlit {}.{} Difference: red is {:.3f} mm.",
+                     found.points, found.rms_mm, found.p95_mm, found.unlit, remark, worst_mm),
          actual, expected, difference});
   }
 

@@ -45,6 +45,7 @@ struct CheckResult {
 /// - `texture_mm`, `parallax_mm`: discs on and 50 mm off the surface instead of the scene's parts. Each pixel
 ///   of the projectors' pictures is followed by a ray to where it lands; the centroid of a disc's light
 ///   against the point that it was aimed at, or against the disc as the viewer's eye sees it.
+/// - `shared_mm`: the latter drawn for the eye that several share, as each of them sees it who has a share.
 /// - `shone_…`: the projectors' pictures, shone and photographed from the viewer's eye in linear light,
 /// against
 ///   the ray-traced light of the parts (sim::Aim) averaged over the same projector pixels, for light cannot

@@ -28,6 +28,8 @@ constexpr double k_least_rig_px = 0.05;
 constexpr double k_pictures_a_second = 10;  // shown, settled, photographed by an ordinary camera
 constexpr double k_most_seconds = 15;
 constexpr double k_guard_s = 0.001;                       // beyond a measured latency
+constexpr const char* k_code_in_place = "gray";
+const calib::CodeOptions k_sparse{.inverses = false};
 constexpr const char* k_any_board = "charuco:11x8:25mm";  // of a rig that does not tell its own
 
 double rounded(double v) { return std::round(v * 1e4) / 1e4; }
@@ -228,11 +230,16 @@ struct Checked {
 };
 
 // What captures say of a rig; into recheck.json in `out`, and the rig of the result is the repaired one.
-Result<Checked> check(const Rig& rig, const fs::path& folder, const fs::path& still, const fs::path& out) {
+Result<Checked> check(const Rig& rig,
+                      const fs::path& folder,
+                      const fs::path& still,
+                      const fs::path& out,
+                      const std::function<bool()>& goes_on = {}) {
   LIMN_TRY(const calib::Captures captures, calib::load_captures(folder));
-  LIMN_TRY(const calib::Observed observed, calib::observe(captures));
+  LIMN_TRY(const calib::Observed observed, calib::observe(captures, {}, goes_on));
   const std::vector<std::string>& poses = observed.observations.poses;
   calib::RecheckOptions options = options_for(rig, captures.board);
+  options.goes_on = goes_on;
   if (!still.empty()) {
     LIMN_TRY(options.still_boards, still_boards(still, poses));
   }
@@ -274,7 +281,19 @@ Status captured_once(const calib::Captures& captures, const Rig& rig, const Surr
   return taken ? written : taken;
 }
 
-Result<Rechecked> rechecked_in_place(const Rig& rig, const Surroundings& around, const fs::path& folder) {
+int recheck_pictures(const Rig& rig) {
+  int pictures = 0;
+  for (const Imager& projector : rig.projectors)
+    if (const auto patterns =
+            calib::Patterns::create(k_code_in_place, projector.width, projector.height, k_sparse))
+      pictures += patterns->count();
+  return pictures;
+}
+
+Result<Rechecked> rechecked_in_place(const Rig& rig,
+                                     const Surroundings& around,
+                                     const fs::path& folder,
+                                     const std::function<bool()>& goes_on) {
   LIMN_TRY(const calib::Board board, board_of(rig));
   const auto devices = [](const std::vector<Imager>& imagers) {
     std::vector<calib::CapturedDevice> list;
@@ -283,9 +302,9 @@ Result<Rechecked> rechecked_in_place(const Rig& rig, const Surroundings& around,
   };
   const fs::path captures = folder / "captures";
   LIMN_TRY_STATUS(captured_once(calib::plan_captures(captures, devices(rig.cameras), devices(rig.projectors),
-                                                     board, "gray", {.inverses = false}),
+                                                     board, k_code_in_place, k_sparse),
                                 rig, around));
-  LIMN_TRY(Checked checked, check(rig, captures, {}, folder));
+  LIMN_TRY(Checked checked, check(rig, captures, {}, folder, goes_on));
   LIMN_TRY_STATUS(told(checked.rechecked.result));
   LIMN_TRY_STATUS(save_rig(checked.rechecked.result.rig, folder));
   if (!rig.responses.empty() || !rig.camera_responses.empty())

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 
 #include "apps/calibrate.h"
 #include "calib/captures.h"
@@ -41,10 +42,14 @@ Status captured_once(const calib::Captures& captures, const Rig& rig, const Surr
 /// The prototype as it stands, captured once by devices that are open already (those of `around`, with the
 /// names and in the order of the rig's; of it stage, written and use_latency are needed), against the rig.
 /// The result's rig is the mended one; it, recheck.json and captures/ are in `folder`. Error, and no rig is
-/// written: no single move explains what is seen.
+/// written: no single move explains what is seen, or `goes_on`, which is asked now and then, says false.
 Result<Rechecked> rechecked_in_place(const Rig& rig,
                                      const Surroundings& around,
-                                     const std::filesystem::path& folder);
+                                     const std::filesystem::path& folder,
+                                     const std::function<bool()>& goes_on = {});
+
+/// How many pictures that shows.
+int recheck_pictures(const Rig& rig);
 
 /// `limn recheck`: as rechecked(), and prints a table.
 Status run_recheck(const RecheckCommand& command);

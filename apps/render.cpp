@@ -201,7 +201,7 @@ Result<Imager> choose_viewer(const RenderOptions& options,
         "--viewer: expected a viewer file, since neither the scene has a viewer nor the rig a camera.");
   }
   if (!scene.viewers.empty())
-    log_warning("render: no viewer's marker was not found; {} looks instead", rig.cameras[0].name);
+    log_warning("render: none of the scene's viewers is seen; {} looks instead", rig.cameras[0].name);
   return rig.cameras[0];
 }
 

@@ -36,6 +36,8 @@ export function make_room(session) {
   const notes = h("ul", { class: "messages small" });
   const no_notes = h("p", { class: "soft small" }, "Nothing to report.");
   const comments = make_comments(session, () => ({ look: session.state.look, slot: "" }), "Comment on all of it");
+  const repair_words = h("span", {}, "Repair what has moved");
+  const repair = session.button("repair", { class: "wide" }, repair_words);
   const leave = h("button", { type: "button", class: "wide", onclick: () => session.link.leave() }, "Leave");
   const link = h("button", { type: "button", class: "wide", onclick: () => share(session) }, "Share the looks");
   by_id("people").append(
@@ -45,7 +47,7 @@ export function make_room(session) {
     h("h3", {}, "Devices"),
     devices,
     no_devices,
-    session.button("repair", { class: "wide" }, "Repair what has moved"),
+    repair,
     h("h3", {}, "People"),
     people,
     h("h3", {}, "Comments"),
@@ -84,6 +86,8 @@ export function make_room(session) {
         (guest) => `${guest.name} ${guest.role} ${guest.i}`,
         (guest) => h("li", {}, h("b", {}, guest.name || "Guest"), h("span", { class: "soft small" }, guest.role)),
       );
+      repair.disabled = state.repair !== "";
+      set_text(repair_words, state.repair ? `Repair: ${state.repair}` : "Repair what has moved");
       comments.show(state.comments);
       keep(
         notes,

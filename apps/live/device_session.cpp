@@ -18,9 +18,10 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr auto k_wait = std::chrono::milliseconds(50);  // for news, before the next picture is painted anyway
-constexpr double k_patience_s = 5;                      // for a picture of a repair
-constexpr double k_longest_exposure_s = 0.1;            // while a camera's period is not known
-constexpr double k_blend = 0.1;                         // of a new time into the expected one
+constexpr auto k_errand_wait = std::chrono::milliseconds(10);  // for what a repair wants
+constexpr double k_patience_s = 5;                             // for a picture of a repair
+constexpr double k_longest_exposure_s = 0.1;                   // while a camera's period is not known
+constexpr double k_blend = 0.1;                                // of a new time into the expected one
 
 // The session's clock: all stamps are of it.
 Stamp now() { return std::chrono::time_point_cast<Stamp::duration>(Clock::now()); }
@@ -70,22 +71,29 @@ class DeviceLoop {
     start_watching();
   }
 
-  ~DeviceLoop() { stop_watching(); }
+  ~DeviceLoop() {
+    repair_.reset();
+    stop_watching();
+  }
 
   // False: the operator ends the session.
   bool step() {
+    if (repair_) go_on_repairing();
+    if (repair_ && repair_->is_capturing()) {  // the light is its own
+      hear_people();
+      return serve_desk({});
+    }
     if (auto seen = seen_.take(k_wait)) session_->take(std::move(seen->watched), seen->moments);
     session_->show_news(&files_, now());
-    hear_keys();
-    if (osc_) osc_->hear(session_, &books_->telemetry(), now());
-    if (server_) serve();
-    if (session_->takes_repair()) mend();
+    hear_people();
+    if (session_->takes_repair()) begin_repair();
     const Stamp painting_at = now();
     const Painted& painted = session_->paint(painting_at, shifted(painting_at, paint_s_ + display_s_));
     ShownFrame shown = session_->measured();
     paint_s_ += k_blend * (1e-3 * shown.paint_ms - paint_s_);
     show(painted);
     if (osc_) osc_->tell(*session_);
+    if (server_) serve();  // what came while it painted need not wait for screens and news
     shown.missed = static_cast<int>(cameras_.missed());
     const Stamp begun = now();
     const std::map<scene::Screen, cv::Mat> pictures = screen_pictures();
@@ -95,16 +103,26 @@ class DeviceLoop {
       books_->shown(shown, painted);
       if (desk_) desk_->shown(shown);
     }
+    const auto screen = pictures.find(session_->staging().screen);
+    return serve_desk(screen == pictures.end() ? cv::Mat() : screen->second);
+  }
+
+ private:
+  void hear_people() {
+    hear_keys();
+    if (osc_) osc_->hear(session_, &books_->telemetry(), now());
+    if (server_) serve();
+  }
+
+  // False: the operator ends the session.
+  bool serve_desk(const cv::Mat& screen) {
     for (const std::string& what : health_->news()) {
       books_->telemetry().note(now(), what);
       log_warning("live: {}", what);
     }
-    const auto screen = pictures.find(session_->staging().screen);
-    return !desk_ || desk_->serve(session_, &books_->telemetry(), *health_,
-                                  screen == pictures.end() ? cv::Mat() : screen->second, now());
+    return !desk_ || desk_->serve(session_, &books_->telemetry(), *health_, screen, now());
   }
 
- private:
   void hear_keys() {
     Keys& keys = desk_ ? desk_->keys() : keys_;
     for (std::size_t i = 0; i < devices_->keys.size(); ++i) {
@@ -135,19 +153,36 @@ class DeviceLoop {
 
   void stop_watching() {
     is_stopping_ = true;
-    watching_.join();
+    if (watching_.joinable()) watching_.join();
   }
 
-  // Nobody watches meanwhile; the cameras' pictures are of patterns.
-  void mend() {
+  // The session knows all that was watched.
+  void pause_watching() {
     stop_watching();
     if (auto seen = seen_.take({})) session_->take(std::move(seen->watched), seen->moments);
-    PictureWriter writer;
+  }
+
+  // Nobody watches while it captures: the cameras' pictures are of patterns.
+  void begin_repair() {
+    if (repair_) return;
     const auto folder = repair_folder(books_->out());
-    if (folder)
-      repair(surroundings(&writer), *folder, now(), watcher_, session_);
-    else
-      session_->warn(now(), folder.message());
+    if (!folder) return session_->warn(now(), folder.message());
+    pause_watching();
+    repair_ = std::make_unique<Repair>(session_->setup().rig, *folder,
+                                       [this](PictureWriter* writer) { return surroundings(writer); });
+  }
+
+  void go_on_repairing() {
+    if (repair_->is_capturing()) repair_->serve(k_errand_wait);
+    session_->note_repair(repair_->words());
+    const auto checked = repair_->take();
+    if (!checked) {
+      if (!repair_->is_capturing() && !watching_.joinable()) start_watching();
+      return;
+    }
+    pause_watching();
+    go_on_mended(*checked, repair_->folder(), now(), watcher_, session_);
+    repair_.reset();
     start_watching();
   }
 
@@ -303,6 +338,7 @@ class DeviceLoop {
   std::atomic<bool> is_stopping_ = false;
   double paint_s_ = 0.02, display_s_ = 0.02;  // as expected of the next picture
   std::thread watching_;
+  std::unique_ptr<Repair> repair_;
 };
 
 cv::Mat DeviceLoop::fitted(const cv::Mat& picture, cv::Size size) {

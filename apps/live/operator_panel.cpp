@@ -241,7 +241,11 @@ void OperatorPanel::draw_bar(const Gui& gui, const OperatorView& view) {
   if (toggle("Marker rings", staging.marker_states, colour::k_blue, size)) ask("marker_states");
   ImGui::SameLine();
   if (toggle("Grid", staging.grid, colour::k_blue, size)) ask("grid");
-  if (!view.moved.empty()) {
+  if (!view.repairing.empty()) {
+    ImGui::SameLine();
+    ImGui::AlignTextToFramePadding();
+    ImGui::TextUnformatted(("Repair: " + view.repairing).c_str());
+  } else if (!view.moved.empty()) {
     ImGui::SameLine();
     if (toggle("Repair " + view.moved, true, colour::k_bad, size)) ask("repair");
     if (ImGui::IsItemHovered())

@@ -49,6 +49,9 @@ Imager moved_eye(Imager imager, double right_m) {
   return imager;
 }
 
+// What a guest is called among the viewers.
+std::string guest_eye(const std::string& guest) { return "guest " + guest; }
+
 }  // namespace
 
 std::vector<LooseMarker> waiting_markers(const scene::Scene& scene,
@@ -95,58 +98,82 @@ Painter::Painter(const scene::Scene& scene,
 // viewers. Null: viewers move, or share an eye.
 const Imager* Painter::still_viewer() const {
   if (scene_.viewers.size() == 1 && scene_.viewers[0].fixed) return &*scene_.viewers[0].fixed;
-  if (!scene_.viewers.empty()) return nullptr;
-  return rig_.cameras.empty() ? &rig_.projectors[0] : &rig_.cameras[0];
+  return scene_.viewers.empty() ? &stand_in() : nullptr;
+}
+
+// Looks until somebody is seen.
+const Imager& Painter::stand_in() const {
+  return rig_.cameras.empty() ? rig_.projectors[0] : rig_.cameras[0];
+}
+
+// Of guests whose tablets have seen markers lately: of the one who is followed, else of the scene's viewers.
+std::vector<scene::Eye> Painter::guests_eyes(const scene::Staging& staging,
+                                             std::span<const GuestPlace> places,
+                                             Stamp now) const {
+  std::vector<scene::Eye> eyes;
+  const auto add = [&](const GuestPlace& place, double weight) {
+    if (seconds_between(place.at, now) < k_guest_place_lasts_s)
+      eyes.push_back({guest_eye(place.guest), place.p_eye_world, weight});
+  };
+  for (const GuestPlace& place : places)
+    if (place.guest == staging.viewer) add(place, 1);
+  if (!eyes.empty()) return eyes;
+  for (const GuestPlace& place : places)
+    if (const scene::Viewer* viewer = scene_.find_tablet(place.guest)) add(place, viewer->weight);
+  return eyes;
 }
 
 // A guest's eye is known some ten times a second: between, and where it trembles, it is followed smoothly.
-scene::Eye Painter::glided(const scene::Eye& guest, double seconds) {
-  if (!glide_ || glide_->viewer != guest.viewer)
-    glide_ = guest;
-  else
-    glide_->p_world += (1 - std::exp(-seconds / k_glide_s)) * (guest.p_world - glide_->p_world);
-  return *glide_;
+void Painter::glide(std::vector<scene::Eye>* guests, double seconds) {
+  const double step = 1 - std::exp(-seconds / k_glide_s);
+  for (scene::Eye& eye : *guests)
+    for (const scene::Eye& before : gliding_)
+      if (before.viewer == eye.viewer) eye.p_world = before.p_world + step * (eye.p_world - before.p_world);
+  gliding_ = *guests;
 }
 
 // The scene's own viewer if it stands still, else one at the eye that all viewers share, which moves calmly;
-// a guest's, alone, while there is one.
-Imager Painter::viewer_for(const scene::PosedScene& posed, const std::optional<scene::Eye>& guest, Stamp at) {
+// a guest's, alone, while one is followed.
+Imager Painter::viewer_for(const scene::PosedScene& posed, std::vector<scene::Eye> guests, Stamp at) {
   const Imager* still = still_viewer();
-  is_away_ |= guest.has_value();
+  is_away_ |= !guests.empty();
   if (still && !is_away_) return *still;
-  const auto p_middle = scene::middle_of(scene_, posed);
-  if (!p_middle) return still ? *still : rig_.cameras.empty() ? rig_.projectors[0] : rig_.cameras[0];
-  std::vector<scene::Eye> eyes = posed.eyes;
-  if (still) eyes = {{k_still_eye, still->imager_from_world.inverse().translation}};
   const double seconds = eye_at_ == Stamp{} ? 0 : std::max(0.0, seconds_between(eye_at_, at));
   eye_at_ = std::max(eye_at_, at);
-  if (still && shared_eye_.shares.empty()) shared_eye_ = scene::followed({}, eyes, *p_middle, 0);
-  if (guest)
-    eyes = {glided(*guest, seconds)};
-  else
-    glide_.reset();
+  glide(&guests, seconds);
+  const auto p_middle = scene::middle_of(scene_, posed);
+  if (!p_middle) return painted_.viewer.width > 0 ? painted_.viewer : still ? *still : stand_in();
+  const scene::Eye waiting{k_still_eye,
+                           (still ? *still : stand_in()).imager_from_world.inverse().translation};
+  std::vector<scene::Eye> eyes = posed.eyes;
+  if (still) eyes = {waiting};
+  if (!painted_.follows.empty()) eyes.clear();
+  eyes.insert(eyes.end(), guests.begin(), guests.end());
+  if (shared_eye_.shares.empty() && (still || eyes.empty()))
+    shared_eye_ = scene::followed({}, std::span(&waiting, 1), *p_middle, 0);
   shared_eye_ = scene::followed(shared_eye_, eyes, *p_middle, seconds);
-  const bool is_back =
-      !guest && std::none_of(shared_eye_.shares.begin(), shared_eye_.shares.end(), [](const auto& share) {
-        return share.viewer.empty();  // of one who is gone
-      });
+  const bool is_back = guests.empty() && std::none_of(shared_eye_.shares.begin(), shared_eye_.shares.end(),
+                                                      [](const auto& share) {
+                                                        return share.viewer.empty();  // of one who is gone
+                                                      });
   if (is_back) is_away_ = false;
   if (is_back && still) {
     shared_eye_ = {};
     eye_at_ = {};
     return *still;
   }
-  const auto p_eye = shared_eye_.p_world();
+  const Eigen::Vector3d p_eye = *shared_eye_.p_world();
   if (is_away_) painted_.p_guest_eye_world = p_eye;
-  const auto viewer = p_eye ? scene::viewer_at(*p_eye, scene_, posed, d_up_world_) : std::nullopt;
-  return viewer ? *viewer : still ? *still : rig_.cameras.empty() ? rig_.projectors[0] : rig_.cameras[0];
+  if (shared_eye_.leader == k_still_eye && !still) return stand_in();
+  const auto viewer = scene::viewer_at(p_eye, scene_, posed, d_up_world_);
+  return viewer ? *viewer : still ? *still : stand_in();
 }
 
 const Painted& Painter::paint(const Watched& watched,
                               const scene::Staging& staging,
                               Stamp now,
                               Stamp shown_at,
-                              const std::optional<GuestPlace>& place) {
+                              std::span<const GuestPlace> places) {
   painted_.painted_at = now;
   painted_.shown_at = shown_at;
   if (staging.frozen && !staging.blackout && !is_black_) return painted_;
@@ -156,14 +183,12 @@ const Painted& Painter::paint(const Watched& watched,
       tracker::predicted(watched.motions, shown_at, options_.prediction, options_.motion, now));
   painted_.posed = scene::staged(scene_, staging, painted_.tracks);
   note_changes(painted_.posed, staging, shown_at);
-  std::optional<scene::Eye> guest;
-  if (place && !staging.viewer.empty() && place->guest == staging.viewer &&
-      seconds_between(place->at, now) < k_guest_place_lasts_s)
-    guest = scene::Eye{"guest " + place->guest, place->p_eye_world};
-  painted_.follows = guest ? place->guest : "";
+  std::vector<scene::Eye> guests = guests_eyes(staging, places, now);
+  const bool is_followed = guests.size() == 1 && guests[0].viewer == guest_eye(staging.viewer);
+  painted_.follows = is_followed ? staging.viewer : "";
   painted_.p_guest_eye_world.reset();
-  const Imager viewer = viewer_for(painted_.posed, guest, shown_at);
-  viewer_ = viewer;
+  painted_.viewer = viewer_for(painted_.posed, std::move(guests), shown_at);
+  const Imager& viewer = painted_.viewer;
   const bool refill = options_.refill && rig_.projectors.size() > 1;
   if (refill) shadows_.look(watched, painted_.posed, shown_, &renderer_);
   drifts_.look(watched, painted_.posed, shown_, &renderer_);
@@ -216,7 +241,7 @@ cv::Mat Painter::screen(const Watched& watched, const scene::Staging& staging, s
   const cv::Mat picture = screen_of(behind, posed, what, treatments_);
   const auto left = scene::left_of_split(scene_, staging);
   if (!left || what == stereo) return picture;
-  const Imager& eye = what == view && viewer_.width > 0 ? viewer_ : rig_.cameras[0];
+  const Imager& eye = what == view && painted_.viewer.width > 0 ? painted_.viewer : rig_.cameras[0];
   const auto line = split_line(eye, posed, prototype_box_, staging.split_mm);
   if (!line) return picture;
   const scene::PosedScene other = scene::staged(scene_, *left, tracks);
@@ -231,7 +256,7 @@ cv::Mat Painter::screen_of(const cv::Mat& behind,
                            std::span<const projector::Treatment> treatments) {
   if (what == scene::Screen::full) return renderer_.composite(0, behind, posed, projector::Composite::full);
   if (what == scene::Screen::rest) return renderer_.composite(0, behind, posed, treatments);
-  const Imager viewer = viewer_.width > 0 ? viewer_ : rig_.cameras[0];
+  const Imager viewer = painted_.viewer.width > 0 ? painted_.viewer : rig_.cameras[0];
   if (what == scene::Screen::view) return renderer_.view(viewer, posed, k_background);
   const double half = 0.5e-3 * options_.stereo_mm;
   const cv::Mat eyes[2] = {renderer_.view(moved_eye(viewer, -half), posed, k_background),

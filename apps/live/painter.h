@@ -36,7 +36,7 @@ struct PaintOptions {
   bool is_linear_camera = false;
 };
 
-/// Where a guest's tablet looks from, by its own picture.
+/// Where a guest's tablet looks from, by its own picture; the guest has a name.
 struct GuestPlace {
   std::string guest;
   Eigen::Vector3d p_eye_world = Eigen::Vector3d::Zero();
@@ -52,7 +52,8 @@ struct Painted {
   scene::PosedScene posed;          ///< what the tracks and the staging make of the scene
   Stamp painted_at, shown_at;
   std::string follows;  ///< the guest whose tablet `view` parts are drawn for; empty: the scene's own viewer
-  /// The eye that they are drawn for while it is a guest's or on its way back.
+  Imager viewer = {};   ///< whose eye they are drawn for
+  /// That eye's place while a guest has part in it, or it is on its way back.
   std::optional<Eigen::Vector3d> p_guest_eye_world = {};
 };
 
@@ -70,13 +71,14 @@ class Painter {
   static Result<Painter> create(const scene::Scene& scene, const Rig& rig, const PaintOptions& options = {});
 
   /// Projector pictures for the moment at which their light arrives; what is lost is judged by `now`. Stamps
-  /// must not go back. `place` counts while it is the guest's that the staging names, and new: the eye passes
-  /// to it, and back, as between viewers (scene/viewers.h), and glides with it.
+  /// must not go back. A guest's place counts while it is new, for the guest that the staging names, whose
+  /// eye is then the only one, else for those who are among the scene's viewers: the eye passes to it, and
+  /// back, as between viewers (scene/viewers.h), and glides with it.
   const Painted& paint(const Watched& watched,
                        const scene::Staging& staging,
                        Stamp now,
                        Stamp shown_at,
-                       const std::optional<GuestPlace>& place = {});
+                       std::span<const GuestPlace> places = {});
 
   /// A large screen's picture for the newest frame of camera 0, at that frame's own stamp; empty before the
   /// first frame and for Screen::off.
@@ -109,8 +111,12 @@ class Painter {
           projector::Renderer renderer,
           const PaintOptions& options);
   const Imager* still_viewer() const;
-  Imager viewer_for(const scene::PosedScene& posed, const std::optional<scene::Eye>& guest, Stamp at);
-  scene::Eye glided(const scene::Eye& guest, double seconds);
+  const Imager& stand_in() const;
+  std::vector<scene::Eye> guests_eyes(const scene::Staging& staging,
+                                      std::span<const GuestPlace> places,
+                                      Stamp now) const;
+  Imager viewer_for(const scene::PosedScene& posed, std::vector<scene::Eye> guests, Stamp at);
+  void glide(std::vector<scene::Eye>* guests, double seconds);
   void note_changes(const scene::PosedScene& posed, const scene::Staging& staging, Stamp at);
   cv::Mat lit(std::size_t projector, const scene::PosedScene& posed, const Imager& viewer, Stamp at);
   cv::Mat screen_of(const cv::Mat& behind,
@@ -134,11 +140,10 @@ class Painter {
   Eigen::AlignedBox3d prototype_box_;  // its own frame
   Painted painted_;
   bool is_black_ = false;  // by blackout, which goes before a freeze
-  Imager viewer_;          // of what was painted last
   scene::SharedEye shared_eye_;
   Stamp eye_at_;
-  std::optional<scene::Eye> glide_;  // a guest's eye, as it is followed
-  bool is_away_ = false;             // the eye is a guest's, or on its way back
+  std::vector<scene::Eye> gliding_;  // guests' eyes, as they are followed
+  bool is_away_ = false;             // a guest has part in the eye, or it is on its way back
   std::vector<projector::Treatment> treatments_;
   Stamp treated_at_;
   scene::PosedScene last_;                       // as last shown

@@ -1,12 +1,16 @@
 #include "apps/live/repair.h"
 
-#include "apps/recheck.h"
+#include "apps/serve/backroom.h"
 #include "apps/serve/certificate.h"
 
 namespace limn::apps {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr int k_niceness = 10;  // while it computes: light goes first
+constexpr auto k_look_again = std::chrono::milliseconds(5);
+constexpr const char* k_ended = "the session was ended.";
 
 // The rig with what has moved, in words.
 std::string words_of(const calib::Recheck& result, const fs::path& folder) {
@@ -22,14 +26,14 @@ std::string words_of(const calib::Recheck& result, const fs::path& folder) {
 }
 
 Status mend(
-    const Surroundings& around, const fs::path& folder, Stamp at, Watcher* watcher, Session* session) {
-  LIMN_TRY(const Rechecked checked, rechecked_in_place(session->setup().rig, around, folder));
-  if (checked.result.verdict != calib::RecheckVerdict::sound) {
-    LIMN_TRY_STATUS(session->mend(checked.result.rig, at));
+    const Result<Rechecked>& checked, const fs::path& folder, Stamp at, Watcher* watcher, Session* session) {
+  if (!checked) return checked.error();
+  if (checked->result.verdict != calib::RecheckVerdict::sound) {
+    LIMN_TRY_STATUS(session->mend(checked->result.rig, at));
     const SessionSetup& setup = session->setup();
     LIMN_TRY(*watcher, Watcher::create(setup.scene, setup.rig, setup.watch));
   }
-  session->warn(at, words_of(checked.result, folder));
+  session->warn(at, words_of(checked->result, folder));
   return {};
 }
 
@@ -47,9 +51,71 @@ Result<fs::path> repair_folder(const fs::path& out) {
   }
 }
 
-void repair(
-    const Surroundings& around, const fs::path& folder, Stamp at, Watcher* watcher, Session* session) {
-  const Status mended = mend(around, folder, at, watcher, session);
+Repair::Repair(const Rig& rig, fs::path folder, const std::function<Surroundings(PictureWriter*)>& around)
+    : folder_(std::move(folder)), pictures_(recheck_pictures(rig)) {
+  result_ = std::async(std::launch::async,
+                       [this, rig, around = through_errands(around(&writer_))]() -> Result<Rechecked> {
+                         try {
+                           return rechecked_in_place(rig, around, folder_, [this] { return !is_over_; });
+                         } catch (const std::exception& bug) {
+                           return error("this is a bug in Limn, please report it: {}", bug.what());
+                         }
+                       });
+}
+
+Repair::~Repair() {
+  is_over_ = true;
+  while (result_.valid() && result_.wait_for(k_look_again) != std::future_status::ready) errands_.serve();
+}
+
+// The same, done in serve(); errors from the moment at which it is over.
+Surroundings Repair::through_errands(Surroundings around) {
+  Surroundings out;
+  out.stage.show = [this, show = around.stage.show](int projector, const cv::Mat& picture) {
+    Status status = error("{}", k_ended);
+    errands_.run([&] {
+      if (is_over_) return;
+      status = show(projector, picture);
+      ++shown_;
+    });
+    return status;
+  };
+  out.stage.grab = [this, grab = around.stage.grab](int camera) {
+    Result<cv::Mat> picture = error("{}", k_ended);
+    errands_.run([&] {
+      if (!is_over_) picture = grab(camera);
+    });
+    return picture;
+  };
+  out.stage.store = around.stage.store;
+  out.use_latency = [this, use = around.use_latency](int projector, double seconds) {
+    errands_.run([&] { use(projector, seconds); });
+  };
+  out.written = [this, written = around.written] {
+    Status status = written();
+    step_back(k_niceness);
+    is_capturing_ = false;
+    return status;
+  };
+  return out;
+}
+
+std::string Repair::words() const {
+  return is_capturing_ ? fmt::format("{} of {} patterns", shown_.load(), pictures_) : "computing";
+}
+
+std::optional<Result<Rechecked>> Repair::take() {
+  if (!result_.valid() || result_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+    return std::nullopt;
+  is_capturing_ = false;
+  return result_.get();
+}
+
+void go_on_mended(
+    const Result<Rechecked>& checked, const fs::path& folder, Stamp at, Watcher* watcher, Session* session) {
+  session->note_repair("");
+  static_cast<void>(session->takes_repair());  // who asked meanwhile has it
+  const Status mended = mend(checked, folder, at, watcher, session);
   if (!mended) session->warn(at, "repair: " + mended.message() + " The session goes on with its rig.");
 }
 

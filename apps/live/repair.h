@@ -1,12 +1,19 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <filesystem>
+#include <functional>
+#include <future>
+#include <optional>
+#include <string>
 
 #include "apps/calibrate.h"
 #include "apps/live/session.h"
-#include "apps/live/telemetry.h"
 #include "apps/live/watcher.h"
+#include "apps/picture_writer.h"
+#include "apps/recheck.h"
+#include "apps/wizard/main_errands.h"
 
 namespace limn::apps {
 
@@ -14,13 +21,50 @@ namespace limn::apps {
 Result<std::filesystem::path> repair_folder(const std::filesystem::path& out);
 
 /// The rig of a running session is checked by the prototype as it stands (apps/recheck.h), with the session's
-/// own devices: `around` needs stage, written and use_latency. Where one device has moved, watcher and
-/// session go on with the mended rig, which is in `folder` for the next session; what could not be done is
-/// told, and the session goes on as it was. Nobody may use the watcher meanwhile.
-void repair(const Surroundings& around,
-            const std::filesystem::path& folder,
-            Stamp at,
-            Watcher* watcher,
-            Session* session);
+/// own devices, on a thread of its own: what it shows and photographs is done by serve(), so that the
+/// session's thread answers people in between. When all is photographed the session may paint again while the
+/// rest is computed, with low priority.
+class Repair {
+ public:
+  /// `around` needs stage, written and use_latency, which store pictures in the writer that it is given.
+  Repair(const Rig& rig,
+         std::filesystem::path folder,
+         const std::function<Surroundings(PictureWriter*)>& around);
+  /// Ends it where it is; a second at most.
+  ~Repair();
+  Repair(const Repair&) = delete;
+  Repair& operator=(const Repair&) = delete;
+
+  /// Does what is wanted of the devices, now or within `wait`.
+  void serve(std::chrono::nanoseconds wait) { errands_.serve(wait); }
+  /// Whether the devices are its own.
+  bool is_capturing() const { return is_capturing_; }
+  /// How far it is: "12 of 44 patterns", "computing".
+  std::string words() const;
+  /// What came of it, once, when it is over.
+  std::optional<Result<Rechecked>> take();
+
+  const std::filesystem::path& folder() const { return folder_; }
+
+ private:
+  Surroundings through_errands(Surroundings around);
+
+  std::filesystem::path folder_;
+  int pictures_ = 0;
+  std::atomic<int> shown_ = 0;
+  std::atomic<bool> is_capturing_ = true, is_over_ = false;
+  MainErrands errands_;
+  PictureWriter writer_;
+  std::future<Result<Rechecked>> result_;
+};
+
+/// Where one device has moved, watcher and session go on with the mended rig, which is in `folder` for the
+/// next session; what could not be done is told, and the session goes on as it was. Nobody may use the
+/// watcher meanwhile.
+void go_on_mended(const Result<Rechecked>& checked,
+                  const std::filesystem::path& folder,
+                  Stamp at,
+                  Watcher* watcher,
+                  Session* session);
 
 }  // namespace limn::apps

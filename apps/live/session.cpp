@@ -222,9 +222,13 @@ void Session::see(const std::string& guest, const std::optional<Eigen::Vector3d>
     windows_.insert(guest);
   else
     windows_.erase(guest);
-  if (guest != staging_.viewer || (!p_eye_world && !place_)) return;
-  place_.reset();
-  if (p_eye_world) place_ = GuestPlace{guest, *p_eye_world, at};
+  const bool counts = guest == staging_.viewer || setup_.scene.find_tablet(guest);
+  const auto known = std::find_if(places_.begin(), places_.end(),
+                                  [&](const GuestPlace& place) { return place.guest == guest; });
+  const bool is_known = known != places_.end();
+  if (!counts || (!p_eye_world && !is_known)) return;
+  if (is_known) places_.erase(known);
+  if (p_eye_world) places_.push_back({guest, *p_eye_world, at});
   if (recorder_) recorder_->saw(guest, p_eye_world, at);
 }
 
@@ -345,7 +349,7 @@ Status Session::keep_looks(const scene::Staging& before) {
 
 const Painted& Session::paint(Stamp now, Stamp shown_at) {
   const auto begun = std::chrono::steady_clock::now();
-  if (painter_) painter_->paint(watched_, staging_, now, shown_at, place_);
+  if (painter_) painter_->paint(watched_, staging_, now, shown_at, places_);
   if (painter_ && !(drawing_.is_lost && drawing_.is_lost()))
     painted_ = painter_->painted();
   else
@@ -369,7 +373,7 @@ void Session::draw_anew(Stamp now, Stamp shown_at) {
     auto painter = Painter::create(setup_.scene, setup_.rig, setup_.paint);
     if (painter) {
       painter_ = std::move(*painter);
-      painted_ = painter_->paint(watched_, staging_, now, shown_at, place_);
+      painted_ = painter_->paint(watched_, staging_, now, shown_at, places_);
     } else {
       renewed = painter.error();
     }

@@ -58,7 +58,7 @@ class Session {
   Status edit(const scene::Edit& edit, const std::string& source, Stamp at);
 
   /// Where a guest's tablet looks from; nullopt: its window is closed. Painter::paint goes by it while
-  /// Staging::viewer names the guest.
+  /// Staging::viewer names the guest, or the guest is among the scene's viewers.
   void see(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at);
 
   /// Shows another scene from now on, with the same markers and controls: parts that were edited, added or
@@ -70,6 +70,9 @@ class Session {
   Status mend(Rig rig, Stamp at);
   /// Whether somebody asked for a repair (apps/live/repair.h) since the last call.
   bool takes_repair() { return std::exchange(repair_asked_, false); }
+  /// How far a repair is, in words; empty: there is none.
+  const std::string& repairing() const { return repairing_; }
+  void note_repair(std::string how_far) { repairing_ = std::move(how_far); }
   /// What has moved, as far as people were told.
   const std::optional<Drift>& drift() const { return told_drift_; }
   /// Tells people, on the page and in the log.
@@ -132,10 +135,11 @@ class Session {
   Stamp compared_cameras_at_;
   bool told_swapped_ = false;
   bool repair_asked_ = false;
+  std::string repairing_;
   int scenes_ = 1;
   std::optional<Edited> last_edit_;
   std::set<std::string> windows_;
-  std::optional<GuestPlace> place_;  // of the guest that is followed
+  std::vector<GuestPlace> places_;  // of guests that light goes by, one each
   double paint_ms_ = 0, record_ms_ = 0;
 };
 

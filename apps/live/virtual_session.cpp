@@ -17,6 +17,8 @@
 namespace limn::apps {
 namespace {
 
+constexpr auto k_errand_wait = std::chrono::milliseconds(10);  // for what a repair wants
+
 double seconds_of(Stamp at) { return seconds_between(Stamp{}, at); }
 // RMS distance of the parts' origins from where they truly are when the light arrives, on the prototype; -1
 // when none is shown.
@@ -57,7 +59,8 @@ double placement_mm(const Painted& painted,
 
 class VirtualLoop {
  public:
-  VirtualLoop(sim::VirtualRig* rig,
+  VirtualLoop(const std::atomic<bool>& is_ended,
+              sim::VirtualRig* rig,
               ScriptedRoom* room,
               Watcher* watcher,
               Session* session,
@@ -65,7 +68,8 @@ class VirtualLoop {
               OperatorDesk* desk,
               OscPort* osc,
               Server* server)
-      : rig_(rig),
+      : is_ended_(is_ended),
+        rig_(rig),
         room_(room),
         watcher_(watcher),
         session_(session),
@@ -96,7 +100,10 @@ class VirtualLoop {
     session_->show_news(&files_, rig_->now());
     if (osc_) osc_->hear(session_, &books_->telemetry(), rig_->now());
     if (server_) serve();
-    if (session_->takes_repair()) LIMN_TRY_STATUS(mend());
+    if (session_->takes_repair()) {
+      LIMN_TRY(const bool goes_on, mend());
+      if (!goes_on) return false;
+    }
     const Painted& painted = session_->paint(rig_->now(), shifted(rig_->now(), k_virtual_display_s));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i) {
       if (!is_plugged(session_->setup().rig.projectors[i].name, projectors_[i], rig_->now())) continue;
@@ -104,6 +111,7 @@ class VirtualLoop {
       LIMN_CHECK(shown_at == painted.shown_at);
     }
     if (osc_) osc_->tell(*session_);
+    if (server_) serve();  // what came while it painted need not wait for the next exposure
     ShownFrame shown = session_->measured();
     if (shown.record_ms >= 0) shown.record_ms += frames_ms;
     shown.missed = static_cast<int>(rig_->world().rig.cameras.size() - frames.size());
@@ -119,16 +127,29 @@ class VirtualLoop {
   }
 
  private:
-  // The clock goes on meanwhile, the room stays as it is.
-  Status mend() {
+  // The clock goes on while patterns are shown and stands while the rest is computed; the room stays as it
+  // is. People are answered. False: somebody ends the session.
+  Result<bool> mend() {
     LIMN_TRY(const std::filesystem::path folder, repair_folder(books_->out()));
     const Plan no_board{};
-    PictureWriter writer;
-    const Surroundings around = virtual_surroundings(no_board, rig_, &writer);
-    for (std::size_t i = 0; i < projectors_.size(); ++i)
-      around.use_latency(static_cast<int>(i), k_virtual_display_s);
-    repair(around, folder, rig_->now(), watcher_, session_);
-    return {};
+    Repair repair(session_->setup().rig, folder, [&](PictureWriter* writer) {
+      Surroundings around = virtual_surroundings(no_board, rig_, writer);
+      for (std::size_t i = 0; i < projectors_.size(); ++i)
+        around.use_latency(static_cast<int>(i), k_virtual_display_s);
+      return around;
+    });
+    for (;;) {
+      repair.serve(k_errand_wait);
+      session_->note_repair(repair.words());
+      if (osc_) osc_->hear(session_, &books_->telemetry(), rig_->now());
+      if (server_) serve();
+      const bool is_left = desk_ && !desk_->serve(session_, &books_->telemetry(), health_, {}, rig_->now());
+      if (is_left || is_ended_) return false;
+      if (const auto checked = repair.take()) {
+        go_on_mended(*checked, folder, rig_->now(), watcher_, session_);
+        return true;
+      }
+    }
   }
 
   void serve() {
@@ -167,6 +188,7 @@ class VirtualLoop {
     }
   }
 
+  const std::atomic<bool>& is_ended_;
   sim::VirtualRig* rig_;
   ScriptedRoom* room_;
   Watcher* watcher_;
@@ -193,7 +215,7 @@ Status play_virtually(double end_s,
                       OperatorDesk* desk,
                       OscPort* osc,
                       Server* server) {
-  VirtualLoop loop(rig, room, watcher, session, books, desk, osc, server);
+  VirtualLoop loop(is_ended, rig, room, watcher, session, books, desk, osc, server);
   std::optional<Progress> progress;
   if (std::isfinite(end_s)) progress.emplace("live", static_cast<int>(std::ceil(end_s)));
   while (!is_ended && seconds_of(rig->next_exposure()) <= end_s) {

@@ -20,6 +20,8 @@ constexpr int k_known_after = 5;
 constexpr double k_forgotten_s = 2;
 constexpr double k_still_m = 0.003, k_still_rad = 3 * std::numbers::pi / 180;
 constexpr double k_once_s = 0.4;  // two cameras that see one gesture within it
+// Every how many searches also look for markers that are partly covered, while all of the scene's are seen.
+constexpr int k_covered_every = 4;
 constexpr double k_trembles_m = 0.5e-3, k_trembles_rad = 1e-3;
 
 Result<tracker::Gesture> gesture_of(const scene::Control& control) {
@@ -68,7 +70,7 @@ Result<Watcher> Watcher::create(const scene::Scene& scene, const Rig& rig, const
   }
   for (const Imager& camera : rig.cameras)
     out.eyes_.push_back(
-        {tracker::Detector(families, {.encoding = encoding_of(rig, camera)}), gestures, 0, {}});
+        {tracker::Detector(families, {.encoding = encoding_of(rig, camera)}), gestures, 0, 0, {}});
   out.used_at_.resize(scene.controls.size());
   out.watched_.frames.resize(rig.cameras.size());
   out.watched_.detections.resize(rig.cameras.size());
@@ -119,7 +121,21 @@ void Watcher::look(std::size_t camera, const Frame& frame) {
   const bool search =
       eye.pictures++ % options_.full_scan_every == 0 || eye.followed.size() < detections.size();
   std::swap(detections, eye.followed);
-  if (search) eye.detector.detect_more(grey, lens, &detections);
+  if (!search) return;
+  const bool covered = eye.searches++ % k_covered_every == 0 || !all_are_seen();
+  eye.detector.detect_more(grey, lens, &detections,
+                           covered ? tracker::Reading::covered : tracker::Reading::open);
+}
+
+// Whether some camera sees each of the markers that bodies and controls use.
+bool Watcher::all_are_seen() const {
+  return std::all_of(used_.begin(), used_.end(), [&](const MarkerName& used) {
+    return std::any_of(watched_.detections.begin(), watched_.detections.end(), [&](const auto& of_camera) {
+      return std::any_of(of_camera.begin(), of_camera.end(), [&](const tracker::Detection& detection) {
+        return tracker::is_marker(detection.marker, used);
+      });
+    });
+  });
 }
 
 // Markers of the scene's families that nothing in it uses.

@@ -70,7 +70,7 @@ class Watcher {
   struct Eye {
     tracker::Detector detector;
     std::vector<tracker::GestureReader> gestures;  // one a control
-    int pictures = 0;
+    int pictures = 0, searches = 0;
     std::vector<tracker::Detection> followed;
   };
   struct Loose {
@@ -82,6 +82,7 @@ class Watcher {
   };
   Watcher() = default;
   void look(std::size_t camera, const Frame& frame);
+  bool all_are_seen() const;
   void note_loose(std::span<const std::size_t> cameras);
   void follow_loose();
   void read_gestures(std::span<const std::size_t> cameras);

@@ -97,6 +97,7 @@ SessionState state_of(const Session& session,
   out.light = light_of(scene, staging);
   out.viewer = staging.viewer;
   out.follows = session.painted().follows;
+  out.repair = session.repairing();
   out.windows = {session.windows().begin(), session.windows().end()};
   for (const Imager& projector : session.setup().rig.projectors) out.projectors.push_back(projector.name);
   out.devices = health.all();
@@ -145,6 +146,7 @@ nlohmann::ordered_json to_json(const SessionState& state) {
         {{"name", output.name}, {"shows", scene::screen_names()[static_cast<std::size_t>(output.shows)]}});
   out["viewer"] = state.viewer;
   out["follows"] = state.follows;
+  out["repair"] = state.repair;
   out["windows"] = state.windows;
   out["projectors"] = state.projectors;
   out["devices"] = nlohmann::ordered_json::array();

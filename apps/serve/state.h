@@ -41,6 +41,7 @@ struct SessionState {
   std::vector<scene::Output> outputs;
   std::string viewer, follows;       ///< whose tablet is to be the eye, and whose it is
   std::vector<std::string> windows;  ///< of guests whose tablets can be
+  std::string repair;                ///< how far it is; empty: there is none
   std::vector<std::string> projectors;
   std::vector<DeviceState> devices;
   std::vector<std::string> waiting;

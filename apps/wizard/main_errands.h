@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <functional>
 #include <mutex>
@@ -14,13 +15,14 @@ class MainErrands {
   void run(const std::function<void()>& errand) {
     std::unique_lock lock(mutex_);
     errand_ = &errand;
+    wanted_.notify_one();
     done_.wait(lock, [this] { return errand_ == nullptr; });
   }
 
-  /// Of the main thread: does what is wanted, if anything is.
-  void serve() {
-    const std::lock_guard lock(mutex_);
-    if (!errand_) return;
+  /// Of the main thread: does what is wanted, if anything is or comes in so long.
+  void serve(std::chrono::nanoseconds wait = {}) {
+    std::unique_lock lock(mutex_);
+    if (!wanted_.wait_for(lock, wait, [this] { return errand_ != nullptr; })) return;
     (*errand_)();
     errand_ = nullptr;
     done_.notify_one();
@@ -28,7 +30,7 @@ class MainErrands {
 
  private:
   std::mutex mutex_;
-  std::condition_variable done_;
+  std::condition_variable wanted_, done_;
   const std::function<void()>* errand_ = nullptr;
 };
 

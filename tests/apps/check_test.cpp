@@ -109,6 +109,43 @@ TEST(Check, AFileSaysWhatStandsWhereAndWhatTheRendererIsNotTold) {
   EXPECT_TRUE(test::near(plain->posed.world_from_prototype->translation, Eigen::Vector3d(0, 0, 0.42), 1e-9));
 }
 
+TEST(Check, SeveralViewersShareAnEye) {
+  const char* two =
+      R"([{"eye_m": [-0.3, -1, 0.6], "target_m": [0, 0, 0.4], "size": [320, 240], "fov_deg": 50},
+      {"eye_m": [0.3, -2, 0.6], "target_m": [0, 0, 0.4], "size": [640, 480], "fov_deg": 34, "weight": 3}])";
+  const auto told = load_check(written(test::test_folder(), "studio",
+                                       fmt::format(R"("viewer": {}, "limits": {{"shared_mm": 1}})", two)));
+  ASSERT_TRUE(told) << told.message();
+  // Weight over distance from the middle of the door.
+  const Eigen::Vector3d p_middle = *scene::middle_of(*told->truth.scene, told->posed);
+  const Eigen::Vector3d p_near(-0.3, -1, 0.6), p_far(0.3, -2, 0.6);
+  const double near = 1 / (p_near - p_middle).norm(), far = 3 / (p_far - p_middle).norm();
+  const Eigen::Vector3d p_shared = (near * p_near + far * p_far) / (near + far);
+  const auto p_eye = [](const Check& check) { return check.viewer.imager_from_world.inverse().translation; };
+  EXPECT_TRUE(test::near(p_eye(*told), p_shared, 1e-9));
+  EXPECT_EQ(told->viewer.width, 320);
+  EXPECT_NEAR(told->viewer.lens.fx(), 160 / std::tan(25 * M_PI / 180), 1e-6);
+  ASSERT_EQ(told->shares.size(), 2u);
+  EXPECT_NEAR(told->shares[1].share, far / (near + far), 1e-9);
+
+  // The scene's own, one with a cap that stands in the world.
+  const fs::path folder = test::test_folder();
+  fs::copy(k_config / "scenes/door", folder / "door");
+  auto scene = nlohmann::json::parse(read_file(folder / "door/scene.json").value(), nullptr, true, true);
+  const auto fixed = scene.at("viewer");
+  scene["viewer"] = {fixed, {{"marker", scene.at("slots")[0].at("marker")}, {"eye_mm", {0, 0, -900}}}};
+  scene["slots"][0]["marker"] = "aruco_4x4_50:40";
+  ASSERT_TRUE(write_file(folder / "door/scene.json", scene.dump()));
+  const auto own = load_check(written(folder, "studio", R"("scene": "door", "limits": {"shared_mm": 1},
+      "poses": {"shown": ["trim"]})"));
+  ASSERT_TRUE(own) << own.message();
+  ASSERT_EQ(own->shares.size(), 2u);
+  const Eigen::Vector3d p_cap =
+      *sim::world_from_marker(own->truth, *own->truth.scene->viewers[1].marker) * Eigen::Vector3d(0, 0, -0.9);
+  EXPECT_TRUE(test::near(own->shares[1].p_world, p_cap, 1e-9));
+  EXPECT_EQ(own->viewer.width, own->truth.scene->viewers[0].fixed->width);
+}
+
 class CheckJudge : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -188,6 +225,16 @@ TEST_F(CheckJudge, LightThatEndsEarlyLeavesAGapBesideTheScreenAndLightTooBrightS
     EXPECT_TRUE(reading.good()) << name << " " << reading.value;
   EXPECT_FALSE(readings(aside).at("edge_gap_share").good());
   EXPECT_FALSE(readings(bright).at("edge_double_share").good());
+}
+
+// Drawn for one of them alone the other sees it twice as far off.
+TEST_F(CheckJudge, AnEyeThatIsNotBetweenItsViewersMissesWhatTheyAreJudgedBy) {
+  const Check good = check("studio", R"("resolution": 0.5, "limits": {"shared_mm": 15.5}, "viewer": [
+      {"eye_m": [-0.35, -1.3, 0.7], "target_m": [0, 0, 0.4], "size": [320, 240], "fov_deg": 44},
+      {"eye_m": [0.35, -1.3, 0.7], "target_m": [0, 0, 0.4], "size": [320, 240], "fov_deg": 44}])");
+  Check wrong = good;
+  wrong.viewer.imager_from_world = looking_at(good.shares[0].p_world, {0, 0, 0.42}, Eigen::Vector3d::UnitZ());
+  expect_missed(good, wrong);
 }
 
 TEST_F(CheckJudge, AWrongResponseShowsAtTheSeams) {

@@ -4,21 +4,26 @@
 #include <cstdio>
 #include <filesystem>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
+#include <set>
 #include <thread>
 
 #include "apps/coarser.h"
 #include "apps/live/camera_threads.h"
 #include "apps/live/device_session.h"
 #include "apps/live/latest.h"
+#include "apps/live/repair.h"
 #include "apps/live/replay.h"
 #include "apps/live/source_clock.h"
+#include "apps/serve/server.h"
 #include "apps/world_markers.h"
 #include "core/file.h"
 #include "core/picture.h"
 #include "device/gl_context.h"
 #include "device/picture_camera.h"
 #include "sim/virtual_rig.h"
+#include "tests/apps/remote_client.h"
 #include "tests/support/clicker.h"
 #include "tests/support/matchers.h"
 
@@ -268,19 +273,44 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
   SessionDevices devices;
   devices.cameras.push_back(std::make_unique<RoomCamera>(&room, 0));
   for (int i = 0; i < 2; ++i) devices.projectors.push_back(std::make_unique<RoomProjector>(&room, i));
+  // Meanwhile guests are answered, and told how far it is.
+  ASSERT_TRUE(make_folder(folder / "page").ok());
+  ASSERT_TRUE(write_file(folder / "page/index.html", "<title>Limn</title>").ok());
+  const auto server = Server::open({.at = "0", .page = folder / "page", .keys = {}}, {}).value();
   ASSERT_TRUE(session->edit({"repair", "", ""}, "test", {}));
   std::atomic<bool> is_ended = false;
-  std::thread ends([&] {
-    for (int i = 0; i < 600 && !fs::exists(folder / "recording/rig-2"); ++i)
+  double longest_s = 0, repair_s = 0;
+  std::set<std::string> told;
+  std::thread guest([&] {
+    const auto ask = [&](const std::string& path, const nlohmann::json& body, const std::string& token) {
+      return nlohmann::json::parse(test::RemoteClient(server->port()).post(path, body.dump(), token).body);
+    };
+    const std::string token = ask("/api/pair", {{"pin", server->invitation().pins[2]}}, "")["token"];
+    const auto begun = std::chrono::steady_clock::now();
+    for (int i = 0; i < 600 && !fs::exists(folder / "recording/rig-2"); ++i) {
+      const auto asked = std::chrono::steady_clock::now();
+      (void)ask("/api/edit", {{"action", "grid"}, {"value", i % 2 ? "on" : "off"}}, token);
+      longest_s = std::max(longest_s, seconds_between(asked, std::chrono::steady_clock::now()));
+      const std::string state = test::RemoteClient(server->port()).get("/api/state", token).body;
+      told.insert(nlohmann::json::parse(state)["repair"]);
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
+    repair_s = seconds_between(begun, std::chrono::steady_clock::now());
     std::this_thread::sleep_for(std::chrono::milliseconds(1500));
     is_ended = true;
   });
   const Status played =
-      play_on_devices(&devices, 60, is_ended, &*watcher, &*session, &*books, nullptr, nullptr, nullptr);
-  ends.join();
+      play_on_devices(&devices, 60, is_ended, &*watcher, &*session, &*books, nullptr, nullptr, server.get());
+  guest.join();
   ASSERT_TRUE(played.ok()) << played.message();
   ASSERT_TRUE(books->close(&*session, false).ok());
+  std::printf("during a repair of %.1f s an edit took %.2f s at most\n", repair_s, longest_s);
+  EXPECT_LT(longest_s, 0.4 * repair_s) << "a picture that is painted, and a painter for the mended rig";
+  EXPECT_TRUE(told.contains("computing"));
+  EXPECT_GT(std::count_if(told.begin(), told.end(),
+                          [](const std::string& words) { return words.ends_with(" patterns"); }),
+            3);
+  EXPECT_EQ(session->repairing(), "");
   EXPECT_TRUE(
       test::pose_near(session->setup().rig.cameras[0].imager_from_world, truth, 0.02 * M_PI / 180, 0.0015));
   ASSERT_TRUE(session->painted().posed.world_from_prototype);
@@ -291,6 +321,39 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
   replay.session = folder / "recording";
   const Status replayed = run_replay(replay);
   EXPECT_TRUE(replayed.ok()) << replayed.message();
+
+  // Whatever it is at, it ends in time: with the pictures that were taken.
+  for (const bool is_computing : {false, true}) {
+    std::vector<fs::path> shown;
+    auto repair = std::make_unique<Repair>(
+        setup.rig, folder / fmt::format("ended-{}", is_computing), [&](PictureWriter* writer) {
+          Surroundings around;
+          around.stage.show = [&](int projector, const cv::Mat&) -> Status {
+            const fs::path pictures =
+                folder / fmt::format("out/repaired-1/captures/pose00/projector{}/camera0", projector);
+            const auto before = std::count_if(shown.begin(), shown.end(), [&](const fs::path& path) {
+              return path.parent_path() == pictures;
+            });
+            shown.push_back(pictures / fmt::format("{:03}.png", before));
+            return {};
+          };
+          around.stage.grab = [&](int) { return read_picture(shown.back()); };
+          around.stage.store = [writer](const fs::path& path, const cv::Mat& picture) {
+            return writer->store(path, picture);
+          };
+          around.written = [writer] { return writer->finish(); };
+          around.use_latency = [](int, double) {};
+          return around;
+        });
+    while (is_computing ? repair->is_capturing() : shown.size() < 10)
+      repair->serve(std::chrono::milliseconds(10));
+    EXPECT_FALSE(repair->take());
+    const auto begun = std::chrono::steady_clock::now();
+    repair.reset();
+    const double took_s = seconds_between(begun, std::chrono::steady_clock::now());
+    std::printf("a repair that was %s ended in %.2f s\n", is_computing ? "computing" : "capturing", took_s);
+    EXPECT_LT(took_s, 0.5);
+  }
 }
 
 TEST(LiveDevices, SaysWhatIsMissing) {

@@ -10,6 +10,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <thread>
 
 #include "apps/coarser.h"
@@ -626,6 +627,121 @@ TEST(Live, KnowsCamerasThatWereExchanged) {
   const json notes = telemetry.summary().at("notes");
   ASSERT_EQ(notes.size(), 1u) << notes.dump();
   EXPECT_EQ(notes[0].at("what").get<std::string>().find("camera0 and camera1 seem to be exchanged"), 0u);
+}
+
+// Somebody's fixed place, a cap with a marker and guests' tablets share the eye; whoever comes, goes or is
+// lost from sight moves it slowly.
+TEST(Live, ViewersOfAllKindsShareAnEyeThatNeverJumps) {
+  constexpr double k_period_s = 0.1, k_fade_s = 0.8;
+  constexpr const char* k_cap = "aruco_4x4_50:9";
+  const auto context = device::GlContext::create();
+  ASSERT_TRUE(context) << context.message();
+  sim::World world = studio(0.25);
+  scene::Viewer cap, tablets;
+  cap.marker = MarkerName::parse(k_cap).value();
+  cap.marker_size_m = 0.12;
+  cap.p_eye_marker = {0, 0.1, 0};
+  tablets.tablet = "";
+  tablets.weight = 2;
+  world.scene->viewers.push_back(cap);
+  world.scene->viewers.push_back(tablets);
+  const Eigen::Vector3d p_cap(0.2, -0.75, 0.62);
+  const Eigen::Vector3d p_camera = world.rig.cameras[0].imager_from_world.inverse().translation;
+  const Pose world_from_cap = looking_at(p_cap, 2 * p_cap - p_camera, Eigen::Vector3d::UnitZ()).inverse();
+  ASSERT_TRUE(
+      sim::add_marker(world, {*cap.marker, cap.marker_size_m, world_from_cap}, false, marker_picture));
+  const fs::path folder = test::test_folder();
+  const auto script = load_script(
+      written(folder / "script.json", script_of(6, {{{"at_s", 2.4}, {"until_s", 4.8}, {"cover", k_cap}}})));
+  ASSERT_TRUE(script) << script.message();
+  const SessionSetup setup{world.rig, *world.scene, {}, {}};
+  const Eigen::Vector3d p_fixed = world.scene->viewers[0].fixed->imager_from_world.inverse().translation,
+                        p_worn = world_from_cap * cap.p_eye_marker, p_ann(-0.3, -1.1, 0.7),
+                        p_ben(0.5, -1.2, 0.5), p_middle = world.world_from_prototype.translation;
+  sim::VirtualRig rig(std::move(world), {.frame_period_s = k_period_s, .grab_waits_for_light = false});
+  auto room = ScriptedRoom::create(*script, &rig);
+  ASSERT_TRUE(room) << room.message();
+  auto watcher = Watcher::create(setup.scene, setup.rig);
+  auto session = Session::create(setup, nullptr, nullptr, false);
+  ASSERT_TRUE(watcher && session);
+  std::size_t moments = 0;
+  std::optional<Eigen::Vector3d> p_before;
+  double farthest_m = 0;
+  // The eye then, with these tablets seeing markers.
+  const auto eye_at = [&](double end_s, const std::map<std::string, Eigen::Vector3d>& guests) {
+    while (seconds_between(Stamp{}, rig.next_exposure()) < end_s) {
+      room->set(seconds_between(Stamp{}, rig.next_exposure()));
+      const int camera = 0;
+      session->take(watcher->watch(rig.expose(std::span(&camera, 1))), ++moments);
+      for (const auto& [guest, p_eye] : guests) session->see(guest, p_eye, rig.now());
+      const Painted& painted = session->paint(rig.now(), shifted(rig.now(), 0.04));
+      const Eigen::Vector3d p_eye = painted.viewer.imager_from_world.inverse().translation;
+      if (p_before) farthest_m = std::max(farthest_m, (p_eye - *p_before).norm());
+      p_before = p_eye;
+      EXPECT_EQ(painted.follows, "");
+      EXPECT_EQ(painted.p_guest_eye_world.has_value(), !guests.empty()) << end_s;
+    }
+    return *p_before;
+  };
+  // All stand on one side of the door: each counts by weight over distance.
+  using Weighted = std::vector<std::pair<Eigen::Vector3d, double>>;
+  const auto off_mm = [&](const Eigen::Vector3d& p_eye, const Weighted& eyes) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    double weights = 0;
+    for (const auto& [p, weight] : eyes) {
+      sum += weight / (p - p_middle).norm() * p;
+      weights += weight / (p - p_middle).norm();
+    }
+    return 1e3 * (p_eye - sum / weights).norm();
+  };
+  const std::pair own{p_fixed, 1.0}, worn{p_worn, 1.0}, ann{p_ann, 2.0}, ben{p_ben, 2.0};
+  const double two_mm = off_mm(eye_at(1.4, {}), {own, worn}),
+               four_mm = off_mm(eye_at(2.4, {{"Ann", p_ann}, {"Ben", p_ben}}), {own, worn, ann, ben}),
+               lost_mm = off_mm(eye_at(4.6, {{"Ben", p_ben}}), {own, ben}),
+               back_mm = off_mm(eye_at(6, {{"Ben", p_ben}}), {own, worn, ben});
+  double apart_m = 0;
+  for (const Eigen::Vector3d& p : {p_fixed, p_worn, p_ann, p_ben})
+    for (const Eigen::Vector3d& q : {p_fixed, p_worn, p_ann, p_ben})
+      apart_m = std::max(apart_m, (p - q).norm());
+  std::printf("off: %.1f, %.1f, %.1f, %.1f mm; at most %.1f mm a picture, of %.1f\n", two_mm, four_mm,
+              lost_mm, back_mm, 1e3 * farthest_m, 1e3 * apart_m);
+  for (const double mm : {two_mm, four_mm, lost_mm, back_mm}) EXPECT_LT(mm, 10);
+  EXPECT_LT(farthest_m, 1.05 * apart_m * k_period_s / k_fade_s);
+  EXPECT_GT(farthest_m, 0.01);
+}
+
+TEST(Live, LooksForCoveredMarkersWhileOneIsMissing) {
+  sim::World world = studio(1);
+  const MarkerName control = MarkerName::parse("apriltag_36h11:9").value();
+  world.scene->controls = {{control, "next_variant", "mirror", "cover"}};
+  const Pose lying(Eigen::Quaterniond(0.707106781, -0.707106781, 0, 0), {-0.35, -0.15, 0.45});
+  ASSERT_TRUE(sim::add_marker(world, {control, 0.05, lying}, false, marker_picture));
+  sim::VirtualRig rig(world, {.grab_waits_for_light = false});
+  const int camera = 0;
+  Frame whole = rig.expose(std::span(&camera, 1))[0];
+  auto watcher = Watcher::create(*world.scene, world.rig);
+  ASSERT_TRUE(watcher) << watcher.message();
+  const auto found_in = [&](const Frame& frame) -> std::optional<tracker::Detection> {
+    whole.captured_at = shifted(whole.captured_at, 1 / 30.0);
+    for (const tracker::Detection& found :
+         watcher->watch(std::vector<Frame>{{frame.camera, frame.image, whole.captured_at}}).detections[0])
+      if (found.marker == control) return found;
+    return std::nullopt;
+  };
+  const auto marker = found_in(whole);
+  ASSERT_TRUE(marker);
+  std::vector<cv::Point> outline;
+  for (const Eigen::Vector2d& corner : marker->corners_px)
+    outline.emplace_back(static_cast<int>(corner.x()), static_cast<int>(corner.y()));
+  const int side = static_cast<int>(cv::norm(outline[1] - outline[0]));
+  Frame gone{whole.camera, whole.image.clone(), {}}, covered{whole.camera, whole.image.clone(), {}};
+  cv::fillConvexPoly(gone.image, outline, cv::Scalar::all(40));
+  cv::circle(covered.image, 0.5 * (outline[0] + outline[1]), side / 7, cv::Scalar::all(40), cv::FILLED);
+  EXPECT_FALSE(found_in(gone));
+  std::optional<tracker::Detection> found;
+  int pictures = 0;
+  for (; pictures < 3 && !found; ++pictures) found = found_in(covered);
+  ASSERT_TRUE(found) << "in " << pictures << " pictures";
 }
 
 TEST(Live, MakesARoomForARigAndAScene) {

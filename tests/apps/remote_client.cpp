@@ -219,6 +219,8 @@ std::string RemoteClient::fingerprint() const {
 void RemoteClient::read_little() {
   const int bytes = 2048;
   ::setsockopt(handle_, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes);
+  const timeval patience{1, 0};
+  ::setsockopt(handle_, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
 }
 
 }  // namespace limn::test

@@ -52,7 +52,7 @@ class RemoteClient {
 
   /// The certificate's SHA-256, "AB:CD:…".
   std::string fingerprint() const;
-  /// Bytes that wait to be read at most: a slow reader's.
+  /// Becomes a slow reader: little waits to be read, and what it cannot send within a second it does not.
   void read_little();
 
  private:

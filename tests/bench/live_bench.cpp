@@ -166,14 +166,18 @@ void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup) {
       mean(theirs), ours / mean(theirs), (ours - mean(decode)) / mean(theirs));
 }
 
-// Milliseconds of the wall for each frame of a session: decode, watch, paint.
-double session_ms(const std::vector<Shot>& shots, SessionSetup setup, const fs::path& record) {
+// A frame of a session, decoded, watched and painted.
+struct FrameCost {
+  double wall_ms = 0, processor_ms = 0;  // of all threads, that of the recording included
+};
+FrameCost session_cost(const std::vector<Shot>& shots, SessionSetup setup, const fs::path& record) {
   std::unique_ptr<apps::Recorder> recorder;
   if (!record.empty()) recorder = apps::Recorder::create(record, setup).value();
   auto watcher = Watcher::create(setup.scene, setup.rig, setup.watch).value();
   auto session = Session::create(setup, nullptr, recorder.get(), false).value();
   std::vector<double> times;
   std::size_t moments = 0;
+  const double begun_processor = processor_ms();
   for (const Shot& shot : shots) {
     const double begun = wall_ms();
     const std::vector<Frame> frames = {{setup.rig.cameras[0].name, decoded(shot), shot.captured_at}};
@@ -187,7 +191,7 @@ double session_ms(const std::vector<Shot>& shots, SessionSetup setup, const fs::
     fmt::print("{}", ended ? "the recording ended: " + *ended + "\n" : "");
     (void)recorder->finish();
   }
-  return median(times);
+  return {median(times), (processor_ms() - begun_processor) / static_cast<double>(shots.size())};
 }
 
 double percentile(std::vector<double> values, double share) {
@@ -223,14 +227,20 @@ void print_edits(const std::vector<Shot>& shots, const SessionSetup& setup) {
 
 void print_recording(const std::vector<Shot>& shots, const SessionSetup& setup) {
   const fs::path folder = fs::temp_directory_path() / fmt::format("limn-bench-live-{}", getpid());
-  std::vector<double> without, with;
+  std::vector<double> without, with, processor_without, processor_with;
   for (int i = 0; i < 3; ++i) {
-    without.push_back(session_ms(shots, setup, {}));
-    with.push_back(session_ms(shots, setup, folder));
+    const FrameCost alone = session_cost(shots, setup, {}), recorded = session_cost(shots, setup, folder);
+    without.push_back(alone.wall_ms);
+    with.push_back(recorded.wall_ms);
+    processor_without.push_back(alone.processor_ms);
+    processor_with.push_back(recorded.processor_ms);
     fs::remove_all(folder);
   }
   fmt::print("a frame of the session, decoded, watched, painted: {:.1f} ms; recorded {:.1f} ms: {:+.1f} %\n",
              median(without), median(with), 100 * (median(with) / median(without) - 1));
+  fmt::print("its processor time, of all threads: {:.1f} ms; recorded {:.1f} ms: {:+.1f} %\n",
+             median(processor_without), median(processor_with),
+             100 * (median(processor_with) / median(processor_without) - 1));
 }
 
 void print_memory(const std::vector<Shot>& shots, const SessionSetup& setup) {

@@ -8,6 +8,7 @@ FOLDER. Each check is a function; they follow one another in one session, as peo
 
 import argparse
 import base64
+import contextlib
 import json
 import os
 import re
@@ -16,6 +17,7 @@ import subprocess
 import sys
 import time
 import urllib.parse
+import zlib
 
 from browser import ENTER, ESCAPE, TAB, Browser, Driver, Failed, wait_for
 
@@ -24,10 +26,13 @@ CONFIG = os.path.join(HERE, "..", "..", "config")
 PHONE, DESK = "phone", "desk"
 SIZES = {PHONE: (390, 844, True), "tablet": (820, 1180, True), "tablet-lying": (1180, 820, True), DESK: (1440, 900, False)}
 MOST_BYTES, MOST_READY_MS, MOST_HEARD_MS = 300_000, 1000, 200
+MOST_BESIDE_MM = 120  # of the mirror from the marker that carries it, each way
 LEAST_TARGET_PX, LEAST_CONTRAST = 48, 4.5
 MOST_OFF_PX, LEAST_OVERLAP = 3.0, 0.6  # of the mirror in the window's pictures
 MIRROR = ".slot:first-child"
 BLACKOUT = "#stage-buttons [data-action=blackout]"
+LAID, LAID_AT_M = "aruco_4x4_50:9", [0.12, -0.03, 0.052]  # on the door; it carries nothing
+A4_IN = 8.27, 11.69
 
 
 def in_page():
@@ -40,6 +45,13 @@ def expect(is_so, what, found=""):
         raise Failed(f"expected {what}, found {found}")
 
 
+def with_laid_marker(world):
+    """The text of a world, and in it a marker on the prototype that the scene does not use."""
+    place = {"rotation_wxyz": [-0.036792076, 0.999285831, -0.000316876, 0.008606471], "translation_m": LAID_AT_M}
+    laid = json.dumps([{"name": LAID, "size_mm": 40, "prototype_from_marker": place}])
+    return world.replace("{", '{"loose_markers": ' + laid + ",", 1)
+
+
 class Live:
     """limn live --serve on the virtual rig, on a copy of its project: looks and comments are kept in it."""
 
@@ -47,9 +59,13 @@ class Live:
         project = os.path.join(folder, "project")
         shutil.rmtree(project, ignore_errors=True)
         shutil.copytree(CONFIG, project, ignore=shutil.ignore_patterns("looks"))
+        world = os.path.join(project, "worlds", "studio.json")
+        with open(world, "r+") as file:
+            text = with_laid_marker(file.read())
+            file.seek(0)
+            file.write(text)
         self.log_path = os.path.join(folder, "live.log")
         with open(self.log_path, "w") as log:
-            world = os.path.join(project, "worlds", "studio.json")
             self.process = subprocess.Popen(
                 [limn, "live", "--serve", "0", "--world", world, "--resolution", "0.25"], stdout=log, stderr=log)
         self.url = wait_for("the remote's address", lambda: self._told(r"the remote is at (\S+)/"), 60)[0]
@@ -158,6 +174,16 @@ class Checks:
         self.screenshots("pairing", [PHONE, DESK])
 
     @check
+    def it_installs_as_a_web_app(self):
+        browser = self.browser
+        wait_for("a service worker", lambda: browser.script_async(
+            "return (await navigator.serviceWorker.getRegistration())?.active?.state === 'activated';"))
+        manifest = browser.cdp("Page.getAppManifest")
+        expect(manifest["url"].endswith("/manifest.webmanifest") and not manifest["errors"], "a manifest without errors", manifest)
+        problems = [problem["errorId"] for problem in browser.cdp("Page.getInstallabilityErrors")["installabilityErrors"]]
+        expect(not problems, "a page that installs", problems)
+
+    @check
     def a_wrong_pin_is_refused(self):
         wrong = next(pin for pin in ("000000", "000001", "000002", "000003") if pin not in self.live.pins.values())
         self.browser.type("[name=name]", "Ann")
@@ -242,9 +268,16 @@ class Checks:
         self.tab("parts")
         first = values(MIRROR)
         self.edit("material", "mirror", "#c02818 0.25 -")
-        wait_for("its colour and metal", lambda: values(MIRROR) == ["#c02818", "0.25", first[2]])
+        red = ["#c02818", "0.25", first[2]]
+        wait_for("its colour and metal", lambda: values(MIRROR) == red)
+        self.edit("save_look", "", "red")
         self.edit("material", "mirror", "")
         wait_for("what it was", lambda: values(MIRROR) == first)
+        self.edit("restore_look", "", "red")
+        wait_for("the look's", lambda: values(MIRROR) == red)
+        self.edit("restore_look", "", "evening")
+        wait_for("the other look's", lambda: values(MIRROR) == first)
+        self.edit("delete_look", "", "red")
         self.edit("light", "", "-60 20 1.5 0.2 0.05")
         wait_for("the light's", lambda: values("#light") == ["-60", "20", "1.5", "0.2", "0.05"])
         self.edit("light", "", "")
@@ -266,6 +299,16 @@ class Checks:
         expect(shown == ["wall full", "desk rest"], "a choice for each screen", shown)
         wait_for("what the session says of the first", lambda: "found 'wall'" in self.browser.text("#notes"))
         self.tab("parts")
+
+    @check
+    def how_far_a_repair_is_stands_on_its_button(self):
+        shown = self.browser.script_async("""
+            const state = await (await fetch("/api/state")).json();
+            const data = JSON.stringify({ ...state, type: "state", repair: "12 of 44 patterns" });
+            limn_test.sockets.at(-1).dispatchEvent(new MessageEvent("message", { data }));
+            const button = document.querySelector("[data-action=repair]");
+            return [button.textContent.trim(), button.disabled];""")
+        expect(shown == ["Repair: 12 of 44 patterns", True], "how far it is, and nothing to press", shown)
 
     @check
     def a_part_is_placed_by_numbers(self):
@@ -322,6 +365,28 @@ class Checks:
             "return document.querySelector(arguments[0]).getAttribute('aria-checked')", BLACKOUT)
         wait_for("the switch to show it", lambda: is_on() == str(value == "on").lower())
         return round(heard["at"] - clicked)
+
+    @check
+    def a_marker_that_was_laid_down_carries_the_part_that_is_chosen(self):
+        offer, own = "#parts .offer", self.mirror()["marker"]
+        difference = lambda one, two: max(abs(a - b) for a, b in zip(one, two))
+        shown = lambda: self.ask("projector", "projector0")
+        self.tab("parts")
+        wait_for("the marker to be offered", lambda: LAID in self.browser.text(offer))
+        self.screenshots("offer", [PHONE])
+        before = shown()
+        self.browser.click(f"{offer} [data-action=pair]")  # the first part, the mirror
+        wait_for("it to carry the mirror", lambda: self.mirror()["marker"] == LAID)
+        far_mm = lambda pose: pose and 1000 * max(abs(a - b) for a, b in zip(pose["translation_m"], LAID_AT_M))
+        wait_for("the mirror there", lambda: (far_mm(self.mirror().get("prototype_from_part")) or 1000) < MOST_BESIDE_MM)
+        after = wait_for("a projector to show it there", lambda: difference(before, now := shown()) > 60 and now)
+        self.measured["paired_changed_by"] = round(difference(before, after))
+        wait_for("no more markers on offer", lambda: self.browser.script(
+            "return !document.querySelector(arguments[0]).checkVisibility()", offer))
+        wait_for("its marker on the page", lambda: f"Carried by {LAID}" in self.browser.text(MIRROR))
+        self.browser.click(f"{MIRROR} [data-action=unpair]")
+        wait_for("its own marker again", lambda: self.mirror()["marker"] == own)
+        wait_for("the light as before", lambda: difference(before, shown()) < 60)
 
     @check
     def the_keyboard_reaches_everything(self):
@@ -434,6 +499,31 @@ class Checks:
         self.screenshots("solid", [PHONE, DESK])
         self.browser.press(ESCAPE)
 
+    @check
+    def looks_are_printed_as_a_contact_sheet(self):
+        sheet = self.browser.script_async("""
+            const state = await (await fetch("/api/state")).json();
+            state.looks = ["evening", "noon", "dusk", "night", "dawn", "rain", "snow"];
+            const data = JSON.stringify({ ...state, type: "state" });
+            limn_test.is_deaf = true;  // to what the session says of its one look
+            limn_test.sockets.at(-1).dispatchEvent(new MessageEvent("message", { data }));
+            const [one, ...others] = document.querySelectorAll(".sheet-card canvas");
+            for (const other of others) {
+              Object.assign(other, { width: one.width, height: one.height });
+              other.getContext("2d").drawImage(one, 0, 0);
+            }
+            return others.length;""")
+        expect(sheet == 6, "seven looks", 1 + sheet)
+        paper = self.browser.cdp("Page.printToPDF", paperWidth=A4_IN[0], paperHeight=A4_IN[1])
+        pdf = base64.b64decode(paper["data"])
+        with open(os.path.join(self.out, "looks.pdf"), "wb") as file:
+            file.write(pdf)
+        self.browser.script("limn_test.is_deaf = false")
+        self.browser.log("browser")  # that six of them have no picture at Limn's
+        # A picture that two pages share stands on both.
+        pictures = [stream.count(b" Do\n") for stream in streams_of(pdf) if b" cm\n" in stream]
+        expect(pictures == [6, 1], "six whole looks on a page, and the last on another", pictures)
+
     def _brightness(self):
         """The 3D view's mean, of 1, as it is drawn anew."""
         return self.browser.script_async("""
@@ -473,6 +563,21 @@ class Checks:
         wait_for("a page to pair with, and why", lambda: self.browser.text("#pairing-why") and self.browser.script(
             "return document.body.dataset.status") == "unpaired")
         self.screenshots("over", [PHONE])
+
+    @check
+    def without_limn_the_app_still_opens_and_says_so(self):
+        self.open("/")
+        expect("Limn is not there" in self.browser.text("h1"), "Limn's own words", self.browser.text("body")[:200])
+        self.screenshots("without", [PHONE])
+
+
+def streams_of(pdf):
+    """What the streams of a PDF say, as far as they are deflated."""
+    found = []
+    for stream in re.finditer(rb"stream\r?\n(.*?)endstream", pdf, re.DOTALL):
+        with contextlib.suppress(zlib.error):
+            found.append(zlib.decompressobj().decompress(stream[1]))
+    return found
 
 
 def read_film(folder):
