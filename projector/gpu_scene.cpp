@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <compare>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
@@ -30,13 +32,61 @@ std::size_t triangles_of(const scene::Scene& scene) {
   return count;
 }
 
+// As in shaders/scene.glsl.
+struct GpuTriangle {
+  std::uint32_t owner = 0, material = 0;
+  std::array<std::uint32_t, 3> beside = {0, 0, 0};  // ids
+};
+
+// Appends a mesh's triangles that know their neighbours: one of them where many share a side. Corners in one
+// place are one corner.
+void append_linked(const scene::Mesh& mesh, std::vector<GpuTriangle>* triangles) {
+  std::vector<std::uint32_t> by_place(mesh.positions.size()), place(mesh.positions.size());
+  std::iota(by_place.begin(), by_place.end(), 0U);
+  const auto coordinates = [&](std::uint32_t i) {
+    const Eigen::Vector3f& p = mesh.positions[i];
+    return std::array<float, 3>{p.x(), p.y(), p.z()};
+  };
+  std::sort(by_place.begin(), by_place.end(),
+            [&](std::uint32_t i, std::uint32_t k) { return coordinates(i) < coordinates(k); });
+  for (std::size_t i = 0; i < by_place.size(); ++i) {
+    const bool is_same = i > 0 && coordinates(by_place[i]) == coordinates(by_place[i - 1]);
+    place[by_place[i]] = is_same ? place[by_place[i - 1]] : by_place[i];
+  }
+  struct Side {
+    std::uint32_t lower, upper;  // places
+    std::uint32_t corner;        // opposite to it, three a triangle
+    auto operator<=>(const Side&) const = default;
+  };
+  std::vector<Side> sides;
+  sides.reserve(3 * mesh.triangles.size());
+  for (const auto& triangle : mesh.triangles) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t a = place[triangle[(k + 1) % 3]], b = place[triangle[(k + 2) % 3]];
+      sides.push_back({std::min(a, b), std::max(a, b), static_cast<std::uint32_t>(sides.size())});
+    }
+  }
+  std::sort(sides.begin(), sides.end());
+  const std::size_t first = triangles->size();
+  triangles->resize(first + mesh.triangles.size());
+  const auto link = [&](const Side& from, const Side& to) {
+    (*triangles)[first + from.corner / 3].beside[from.corner % 3] =
+        static_cast<std::uint32_t>(first) + to.corner / 3 + 1;
+  };
+  for (std::size_t i = 1; i < sides.size(); ++i) {
+    if (sides[i - 1].lower != sides[i].lower || sides[i - 1].upper != sides[i].upper) continue;
+    link(sides[i - 1], sides[i]);
+    link(sides[i], sides[i - 1]);
+  }
+}
+
 int level_count(int side) { return 1 + static_cast<int>(std::floor(std::log2(side))); }
 
 }  // namespace
 
 struct GpuScene::Staging {
   std::vector<Eigen::Vector4f> corners, normals;
-  std::vector<std::array<std::uint32_t, 2>> owners;
+  std::vector<GpuTriangle> triangles;
   std::vector<GpuMaterial> materials;
   std::vector<const scene::Material*> looks;  // those with a texture
 };
@@ -56,9 +106,13 @@ Status GpuScene::check_fits(const scene::Scene& scene) {
 GpuScene::GpuScene(const scene::Scene& scene) {
   Staging staging;
   const std::size_t count = triangles_of(scene);
+  // Neighbours first: what finds them is gone before corners and normals need their room.
+  staging.triangles.reserve(count);
+  if (scene.prototype) append_linked(scene.prototype->mesh, &staging.triangles);
+  for (const scene::Slot& slot : scene.slots)
+    for (const scene::Variant& variant : slot.variants) append_linked(variant.mesh, &staging.triangles);
   staging.corners.reserve(3 * count);
   staging.normals.reserve(3 * count);
-  staging.owners.reserve(count);
   if (scene.prototype) prototype_ = add(scene.prototype->mesh, 0, &staging);
   for (const scene::Slot& slot : scene.slots) {
     SlotRuns runs{slot.name, slot.mode == scene::Mode::surface, {}};
@@ -70,7 +124,7 @@ GpuScene::GpuScene(const scene::Scene& scene) {
   }
   corners_ = buffer_of(std::exchange(staging.corners, {}));  // freed one by one
   normals_ = buffer_of(std::exchange(staging.normals, {}));
-  owners_ = buffer_of(std::exchange(staging.owners, {}));
+  triangles_ = buffer_of(std::exchange(staging.triangles, {}));
   materials_ = buffer_of(staging.materials);
   owners_shown_.resize(static_cast<std::size_t>(owner_count()));
   placements_ = buffer_of(owners_shown_);
@@ -96,7 +150,7 @@ TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) 
     staging->materials.push_back(gpu);
   }
   TriangleRun run;
-  run.first = static_cast<int>(staging->owners.size());
+  run.first = static_cast<int>(staging->corners.size() / 3);
   run.count = static_cast<int>(mesh.triangles.size());
   Eigen::AlignedBox3d bounds;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -108,8 +162,9 @@ TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) 
       staging->normals.push_back((Eigen::Vector4f() << mesh.normals[i], uv.y()).finished());
       run.clusters.back().box.extend(mesh.positions[i].cast<double>());
     }
-    staging->owners.push_back(
-        {static_cast<std::uint32_t>(owner), first_material + mesh.triangle_materials[t]});
+    GpuTriangle& triangle = staging->triangles[static_cast<std::size_t>(run.first) + t];
+    triangle.owner = static_cast<std::uint32_t>(owner);
+    triangle.material = first_material + mesh.triangle_materials[t];
   }
   for (const TriangleRun::Cluster& cluster : run.clusters) bounds.extend(cluster.box);
   if (run.count > 0) {
@@ -180,7 +235,7 @@ void GpuScene::place(const std::vector<PlacedRun>& runs) {
 }
 
 void GpuScene::bind() const {
-  const GlName* buffers[] = {&corners_, &normals_, &owners_, &materials_, &placements_};
+  const GlName* buffers[] = {&corners_, &normals_, &triangles_, &materials_, &placements_};
   for (GLuint i = 0; i < std::size(buffers); ++i) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, **buffers[i]);
 }
 

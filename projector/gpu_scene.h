@@ -79,7 +79,7 @@ class GpuScene {
   std::optional<TriangleRun> prototype_;
   std::vector<SlotRuns> slots_;
   std::vector<GpuOwner> owners_shown_;
-  GlName corners_, normals_, owners_, materials_, placements_, looks_, vertex_array_;
+  GlName corners_, normals_, triangles_, materials_, placements_, looks_, vertex_array_;
 };
 
 /// The corners of a run's bounds, with a margin, in the scene's frame.

@@ -65,9 +65,9 @@ float texture_lod(Hit hit, float footprint) {
 
 // Own colour at a hit; `footprint` is the side (m) of the pixel's patch on the surface.
 vec3 base_colour(Hit hit, float footprint) {
-  uvec2 owner = s_owners[hit.id - 1u];
-  Material material = s_materials[owner.y];
-  vec4 wanted = s_placements[owner.x].colour;
+  Triangle triangle = s_triangles[hit.id - 1u];
+  Material material = s_materials[triangle.material];
+  vec4 wanted = s_placements[triangle.owner].colour;
   vec3 colour = wanted.a > 0.5 ? wanted.rgb : material.colour.rgb;
   if (material.look.x < 0.0) return colour;
   vec2 uv = uv_of(hit);
@@ -75,14 +75,14 @@ vec3 base_colour(Hit hit, float footprint) {
 }
 
 bool is_unlit(Hit hit) {
-  uvec2 owner = s_owners[hit.id - 1u];
-  return s_materials[owner.y].colour.a > 0.5 && all(lessThan(s_placements[owner.x].look.xy, vec2(0)));
+  Triangle triangle = s_triangles[hit.id - 1u];
+  return s_materials[triangle.material].colour.a > 0.5 && all(lessThan(s_placements[triangle.owner].look.xy, vec2(0)));
 }
 
 vec2 metallic_roughness(Hit hit) {
-  uvec2 owner = s_owners[hit.id - 1u];
-  vec2 wanted = s_placements[owner.x].look.xy;
-  return mix(wanted, s_materials[owner.y].look.yz, lessThan(wanted, vec2(0)));
+  Triangle triangle = s_triangles[hit.id - 1u];
+  vec2 wanted = s_placements[triangle.owner].look.xy;
+  return mix(wanted, s_materials[triangle.material].look.yz, lessThan(wanted, vec2(0)));
 }
 
 // Colour seen along d.

@@ -3,7 +3,13 @@
 
 layout(std430, binding = 0) readonly buffer Corners { vec4 s_corners[]; };  // 3 a triangle: p in its owner's frame, u
 layout(std430, binding = 1) readonly buffer Normals { vec4 s_normals[]; };  // 3 a triangle: unit normal, v
-layout(std430, binding = 2) readonly buffer Owners { uvec2 s_owners[]; };   // owner (0 prototype, slot + 1), material
+
+struct Triangle {
+  uint owner;      // 0 prototype, slot + 1
+  uint material;
+  uint beside[3];  // id of the triangle across the side that lies opposite each corner; 0 where the mesh ends
+};
+layout(std430, binding = 2) readonly buffer Triangles { Triangle s_triangles[]; };
 
 struct Material {
   vec4 colour;  // linear light; a: 1 when unlit
@@ -46,7 +52,7 @@ const Hit k_no_hit = Hit(0u, 1e30, vec3(0), 0.0);
 const float k_rounding = 2e-6;     // m; of single precision a few metres away, closes cracks between neighbours
 const float k_same_place = 1e-4;   // m; nearer than this two hits are one surface
 
-uint owner_of(uint id) { return s_owners[id - 1u].x; }
+uint owner_of(uint id) { return s_triangles[id - 1u].owner; }
 
 vec3 to_owner(uint owner, vec3 p) { return (s_placements[owner].owner_from_scene * vec4(p, 1)).xyz; }
 vec3 turned_to_owner(uint owner, vec3 d) { return mat3(s_placements[owner].owner_from_scene) * d; }
@@ -156,14 +162,42 @@ Hit first_hit(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
   return hit;
 }
 
+// Whether a ray meets the prototype nearer than t in or beside a triangle that a texel saw: where a smooth surface turns
+// away its last triangles are seen so much aslant that texels miss them.
+bool is_met_beside(uint id, vec3 p_origin, vec3 d, float t) {
+  const int k_most_steps = 6;
+  uint from = 0u;
+  for (int i = 0; i < k_most_steps && id != 0u; ++i) {
+    Hit hit;
+    if (!plane_hit(id, p_origin, d, hit)) return false;
+    if (is_inside(hit)) return hit.t < t;
+    int side = hit.weights.x < hit.weights.y ? (hit.weights.x < hit.weights.z ? 0 : 2) : hit.weights.y < hit.weights.z ? 1 : 2;
+    uint next = s_triangles[id - 1u].beside[side];
+    if (next == from) return false;  // folded back: the ray passes beside both
+    from = id;
+    id = next;
+  }
+  return false;
+}
+
 // Whether the prototype hides p (a point on it) from the sight's eye.
 bool is_hidden(usampler2DArray s_ids, Sight sight, vec3 p) {
   vec3 d = p - sight.p_eye.xyz;
   float t = length(d);
-  Hit hit = first_hit(s_ids, sight, 0, d / t);
+  d /= t;
+  Hit hit = first_hit(s_ids, sight, 0, d);
   bool exact = hit.id != 0u && all(greaterThan(hit.weights, vec3(0)));
-  float slack = k_same_place + (exact ? 1e-5 * t : 2.0 * t / sight.focal_centre.x);
-  return hit.id != 0u && hit.t < t - slack;
+  float texel = t / sight.focal_centre.x;
+  float slack = k_same_place + (exact ? 1e-5 * t : 2.0 * texel);
+  if (hit.id != 0u && hit.t < t - slack) return true;
+  vec4 share;
+  uvec4 left = each_once(ids_around(s_ids, sight, 0, d, share));
+  if (left.y == 0u) return false;
+  for (; left.x != 0u; left = uvec4(left.yzw, 0u)) {
+    if (left.x == hit.id || dot(s_corners[3u * (left.x - 1u)].xyz - p, d) > -2.0 * texel) continue;
+    if (is_met_beside(left.x, sight.p_eye.xyz, d, t - slack)) return true;
+  }
+  return false;
 }
 
 // Unit normal of the triangle itself, scene frame.

@@ -627,6 +627,61 @@ TEST_F(RendererTest, ProjectorInTheOthersShadowGivesAllTheLight) {
   EXPECT_GT(dim, 10000);
 }
 
+// The last triangles of a ball before its outline are seen so much aslant that no texel of ids sees them.
+TEST_F(RendererTest, ABallsShadowReachesAsFarAsItsOutline) {
+  const Vector3d p_ball(0, 0, -0.12);
+  constexpr double k_radius = 0.05;
+  constexpr double k_pi = 3.14159265358979;
+  const Mesh ball = grid(90, 45, [&](double u, double v) {
+    const double a = 2 * k_pi * u, b = k_pi * v;
+    return Vector3d(p_ball +
+                    k_radius * Vector3d(std::sin(b) * std::cos(a), -std::cos(b), std::sin(b) * std::sin(a)));
+  });
+  Mesh mesh = sheet(0.5, 0.4);
+  const auto offset = static_cast<std::uint32_t>(mesh.positions.size());
+  mesh.positions.insert(mesh.positions.end(), ball.positions.begin(), ball.positions.end());
+  mesh.normals.insert(mesh.normals.end(), ball.normals.begin(), ball.normals.end());
+  for (auto triangle : ball.triangles) {
+    for (auto& i : triangle) i += offset;
+    mesh.triangles.push_back(triangle);
+    mesh.triangle_materials.push_back(0);
+  }
+  const Scene scene = scene_of(mesh, {});
+  Rig rig = two_projectors();
+  for (const Imager& projector : rig.projectors) {
+    Response response;
+    response.projector = projector.name;
+    response.black_level = Measured{0.004, 0};
+    for (int value = 0; value < 256; ++value)
+      response.green.push_back(0.004 + 0.996 * std::pow(value / 255.0, 2.2));
+    response.red = response.blue = response.green;
+    rig.responses.push_back(response);
+  }
+  Renderer drawing = renderer(scene, rig);
+  const cv::Mat blend = drawing.blend(0, posed_at_origin(scene));
+  const cv::Mat points = drawing.surface_points(0, posed_at_origin(scene));
+  const sim::PlacedMesh placed{&mesh, Pose()};
+  const sim::RayScene truth(std::span(&placed, 1));
+  const Vector3d p_right = rig.projectors[1].imager_from_world.inverse().translation;
+  int shadowed = 0, lit_in_shadow = 0, dark_in_light = 0;
+  for (int row = 0; row < points.rows; ++row) {
+    for (int column = 0; column < points.cols; ++column) {
+      const auto& p = points.at<cv::Vec3f>(row, column);
+      if (std::isnan(p[0]) || p[2] < -0.001F) continue;
+      const auto px = rig.projectors[1].project(Vector3d(p[0], p[1], p[2]));
+      if (!px || !rig.projectors[1].contains(*px)) continue;
+      const bool in_shadow = !truth.lit(p_right, Vector3d(p[0], p[1], p[2]));
+      const bool made_up = blend.at<cv::Vec2f>(row, column)[1] > 0;  // for the right one's black
+      shadowed += in_shadow;
+      lit_in_shadow += in_shadow && !made_up;
+      dark_in_light += !in_shadow && made_up;
+    }
+  }
+  EXPECT_GT(shadowed, 2000);
+  EXPECT_LT(lit_in_shadow, 10);
+  EXPECT_LT(dark_in_light, 10);
+}
+
 TEST_F(RendererTest, UnlitColourIsExactAndTheResponseIsApplied) {
   const Eigen::Vector3f colour(0.2f, 0.5f, 0.9f);
   const Scene scene =
