@@ -11,6 +11,7 @@
 #include <fstream>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -51,21 +52,33 @@ struct Tally {
   double squares = 0;  // px^2, of corners
   double outward = 0;  // px, away from the marker's centre
   Eigen::Vector2d offset = Eigen::Vector2d::Zero();
-  double pulls = 0;  // mean of both coordinates' squares, of corners that nothing covers
-  int open_corners = 0;
+  std::vector<double> pulls;  // mean of both coordinates' squares, of each corner that nothing covers
   std::vector<double> turn_deg, shift_mm;  // pose errors
 
   int corners() const { return std::max(1, 4 * found); }
   void add(const Tally& t) {
     markers += t.markers, found += t.found, wrong += t.wrong, flips += t.flips, poses += t.poses;
-    squares += t.squares, outward += t.outward, offset += t.offset, pulls += t.pulls;
-    open_corners += t.open_corners;
+    squares += t.squares, outward += t.outward, offset += t.offset;
+    pulls.insert(pulls.end(), t.pulls.begin(), t.pulls.end());
     turn_deg.insert(turn_deg.end(), t.turn_deg.begin(), t.turn_deg.end());
     shift_mm.insert(shift_mm.end(), t.shift_mm.begin(), t.shift_mm.end());
   }
   double recall() const { return static_cast<double>(found) / std::max(1, markers); }
   double rms() const { return std::sqrt(squares / corners()); }
-  double pull() const { return std::sqrt(pulls / std::max(1, open_corners)); }
+  double pull() const {
+    return std::sqrt(std::accumulate(pulls.begin(), pulls.end(), 0.0) /
+                     std::max(1.0, static_cast<double>(pulls.size())));
+  }
+  // The pull that a Gaussian would have with as many corners beyond this quantile: mean squares of two
+  // coordinates are distributed exponentially.
+  double pull_at(double share) const {
+    if (pulls.empty()) return 0;
+    std::vector<double> squares_of = pulls;
+    const auto at =
+        squares_of.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(pulls.size()));
+    std::nth_element(squares_of.begin(), at, squares_of.end());
+    return std::sqrt(*at / -std::log(1 - share));
+  }
 };
 
 double median(std::vector<double> values) {
@@ -127,9 +140,7 @@ void judge_marker(const Found& found, const TrueMarker& truth, const TrackerFram
     tally->squares += e.squaredNorm();
     tally->outward += e.dot((c[i] - centre).normalized());
     tally->offset += e;
-    if (truth.corner_covered[i]) continue;
-    ++tally->open_corners;
-    tally->pulls += 0.5 * e.dot(found.covariance[i].inverse() * e);
+    if (!truth.corner_covered[i]) tally->pulls.push_back(0.5 * e.dot(found.covariance[i].inverse() * e));
   }
   judge_pose(found, truth, frame, tally);
 }
@@ -171,13 +182,14 @@ void print_rows(const std::vector<Peer>& peers, const std::vector<std::pair<std:
 }
 
 void print_ours(const std::vector<std::pair<std::string, Row>>& rows) {
-  fmt::print("\n  {:<40}{:>9}{:>9}{:>7}{:>10}{:>10}{:>8}\n", "limn alone", "offset", "outward", "pull",
-             "turn deg", "shift mm", "flips");
+  fmt::print("\n  {:<40}{:>9}{:>9}{:>7}{:>7}{:>7}{:>10}{:>10}{:>8}\n", "limn alone", "offset", "outward",
+             "pull", "50 %", "95 %", "turn deg", "shift mm", "flips");
   for (const auto& [name, row] : rows) {
     const Tally& t = row[0];
-    fmt::print("  {:<40}{:>9.3f}{:>9.3f}{:>7.2f}{:>10.3f}{:>10.3f}{:>7.1f}%\n", name,
-               t.offset.norm() / t.corners(), t.outward / t.corners(), t.pull(), median(t.turn_deg),
-               median(t.shift_mm), 100.0 * t.flips / std::max(1, t.poses));
+    fmt::print("  {:<40}{:>9.3f}{:>9.3f}{:>7.2f}{:>7.2f}{:>7.2f}{:>10.3f}{:>10.3f}{:>7.1f}%\n", name,
+               t.offset.norm() / t.corners(), t.outward / t.corners(), t.pull(), t.pull_at(0.5),
+               t.pull_at(0.95), median(t.turn_deg), median(t.shift_mm),
+               100.0 * t.flips / std::max(1, t.poses));
   }
 }
 
