@@ -34,7 +34,7 @@ struct PictureOptions {
 };
 
 /// The light of markers with exact truth, in grey levels, before blur and noise (CV_32FC1): every pixel is
-/// the mean over its area (coverage by low-discrepancy samples, as many as an edge needs), through the true
+/// the mean over its area (coverage by a lattice of samples where an edge runs through), through the true
 /// lens; pixel centres at integers. `background` (8-bit grey) is what is seen beside the papers; later
 /// markers cover earlier ones.
 cv::Mat light_of(const Lens& lens,
