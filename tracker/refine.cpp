@@ -19,7 +19,7 @@ constexpr double k_flat_share = 0.05;
 // table.
 constexpr double k_valley_share = 0.35;
 constexpr double k_settled_px = 2e-3;
-constexpr double k_near_start_px = 0.1;   // corners that were so near at first need no second round
+constexpr double k_near_start_px = 0.1;  // corners that were so near at first need no second round
 constexpr int k_max_reach = 10;
 constexpr int k_rough_rows = 12;         // of a side, where the effort is rough
 constexpr double k_huber = 1.5;          // in robust standard deviations
@@ -115,6 +115,50 @@ EdgeRefiner::EdgeRefiner(Encoding encoding) {
   }
 }
 
+namespace {
+
+using Profile = std::array<double, 2 * k_max_reach>;  // of gradients across an edge
+
+struct Window {
+  std::size_t low, high;
+  Profile parts{};  // of each place in [low, high)
+};
+
+// A window that reaches as far to both sides of the edge's centre as [low, high) does to either. One that
+// cuts off more of the blur on one side moves all crossings of the line alike, which their residuals do not
+// show.
+Window centred(const Profile& mean, std::size_t size, std::size_t low, std::size_t high) {
+  Profile parts{};
+  const auto from = static_cast<double>(low);
+  const auto to = static_cast<double>(high);
+  double centre = 0.5 * (from + to);
+  double half = centre - from;
+  constexpr int k_rounds = 3;
+  for (int round = 0; round <= k_rounds; ++round) {
+    double sum = 0;
+    double moment = 0;
+    for (std::size_t k = 0; k < size; ++k) {
+      const auto at = static_cast<double>(k);
+      parts[k] = std::clamp(std::min(at + 1, centre + half) - std::max(at, centre - half), 0.0, 1.0);
+      sum += parts[k] * mean[k];
+      moment += parts[k] * mean[k] * (at + 0.5);
+    }
+    if (round == k_rounds) break;
+    centre = moment / sum;
+    half = std::min({std::max(centre - from, to - centre), centre, static_cast<double>(size) - centre});
+  }
+  return {static_cast<std::size_t>(centre - half),
+          std::min(size, static_cast<std::size_t>(std::ceil(centre + half))), parts};
+}
+
+Window whole(std::size_t low, std::size_t high) {
+  Window window{low, high};
+  for (std::size_t k = low; k < high; ++k) window.parts[k] = 1;
+  return window;
+}
+
+}  // namespace
+
 // Crossings of one side. First the gradient profile averaged along the side says how wide the edge is (blur,
 // thin margins), then every row's centroid is taken over that window alone.
 bool EdgeRefiner::fit_side(const cv::Mat& grey,
@@ -153,7 +197,7 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
 
   rows_.clear();
   gradients_.clear();
-  std::array<double, 2 * k_max_reach> mean{};
+  Profile mean{};
   const int stride = effort == Effort::rough ? 1 + (last - first) / k_rough_rows : 1;
   for (int u = first; u <= last; u += stride) {
     const double straight =
@@ -202,6 +246,9 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   line->blur_px = 0.4 * contrast / mean[peak] / std::hypot(1.0, slope);
   contrast /= static_cast<double>(rows_.size());
   if (!(contrast > 0)) return false;
+  const bool ends_flat = low > 0 && high < profile && std::abs(mean[low - 1]) <= flat_below &&
+                         std::abs(mean[high]) <= flat_below;
+  const Window window = ends_flat ? centred(mean, profile, low, high) : whole(low, high);
 
   // Rows beside a corner see the other edge as far as the blur reaches.
   const double blur_trim = std::min(0.2 * (u_high - u_low), 0.5 * static_cast<double>(high - low) + 0.5);
@@ -214,9 +261,10 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
     const double* gradient = &gradients_[i * profile];
     double sum = 0;
     double moment = 0;
-    for (std::size_t k = low; k < high; ++k) {
-      sum += gradient[k];
-      moment += gradient[k] * (static_cast<double>(k) + 0.5 - reach);
+    for (std::size_t k = window.low; k < window.high; ++k) {
+      const double part = window.parts[k] * gradient[k];
+      sum += part;
+      moment += part * (static_cast<double>(k) + 0.5 - reach);
     }
     if (sum < k_min_share * contrast) continue;  // covered, or no edge here
     const double v = row.centre + inward * moment / sum;
