@@ -24,7 +24,7 @@ constexpr int k_tangents_unit = 0, k_looks_unit = 1, k_response_unit = 2, k_cent
               k_arriving_unit = 11, k_distances_unit = 12;
 constexpr int k_arriving_side = 256;  // texels of a projector's map of arriving light
 constexpr GLuint k_list_binding = 6;  // of buffers, after the scene's and the sights'
-constexpr GLuint k_hits_binding = 7;
+constexpr GLuint k_known_hits_image = 1, k_known_shares_image = 2;  // shaders/known.glsl
 constexpr int k_each = 2, k_view = 3;  // overlays of parts treated each in its way, and of a virtual camera
 // Steps of light that ask for more samples: beside light, and between blacks.
 constexpr Smoothing k_light_edges, k_quick_edges{.samples = 4},
@@ -164,12 +164,13 @@ struct Renderer::Impl {
     Program where, centre, edges;
   };
   LayerPrograms light_layer, parts_layer, view_layer;
-  GlName list, listed_hits;  // of pixels, shaders/listed.glsl and listed_hits.glsl
+  GlName list;  // of pixels, shaders/listed.glsl
   int list_room = 0;
   std::vector<GlName> responses;
   // Of the projectors' last pictures.
   struct Shown {
     Canvas display;
+    GlName known_hits, known_shares;  // shaders/known.glsl
     scene::PosedScene posed;
     Pose imager_from_world;    // of the viewer
     cv::Mat picture, clipped;  // once read back
@@ -192,6 +193,7 @@ struct Renderer::Impl {
 
   // What was drawn last, so that the same is not drawn again.
   std::optional<scene::PosedScene> drawn;
+  GLuint known_stamp = 1;  // another one once the prototype has moved or light arrives in another way
   // What is drawn of it from the projectors.
   bool is_prototype_seen = false, are_soft_edges_seen = false, are_surface_parts_seen = false;
   std::vector<PlacedRun> runs;
@@ -319,6 +321,7 @@ bool Renderer::Impl::set_arriving(std::size_t index, const cv::Mat& map) {
   cv::Mat& known = arriving_maps[index];
   if (!known.empty() && cv::norm(known, map, cv::NORM_INF) == 0) return false;
   known = map;
+  ++known_stamp;
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
   glTextureSubImage3D(*arriving, 0, 0, 0, static_cast<GLint>(index), map.cols, map.rows, 1, GL_RED, GL_FLOAT,
                       map.data);
@@ -349,6 +352,7 @@ void Renderer::Impl::prepare(const scene::PosedScene& posed, FromProjectors need
     scene.placed(posed, &runs);
     scene_from_world = GpuScene::scene_from_world(posed);
     scene.place(runs);
+    if (!stays) ++known_stamp;
     is_prototype_seen &= stays;
     are_soft_edges_seen &= stays;
     are_surface_parts_seen = false;
@@ -448,13 +452,11 @@ void Renderer::Impl::set_up_light(const Program& program, const scene::PosedScen
 void Renderer::Impl::start_list(int pixels) {
   if (list_room < pixels) {
     list = make_buffer(nullptr, sizeof(std::uint32_t) * (static_cast<std::size_t>(pixels) + 4));
-    listed_hits = make_buffer(nullptr, sizeof(std::uint32_t) * 4 * static_cast<std::size_t>(pixels));
     list_room = pixels;
   }
   const std::uint32_t head[] = {0, 0, 1, 1};
   glNamedBufferSubData(*list, 0, sizeof(head), head);
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_list_binding, *list);
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_hits_binding, *listed_hits);
   glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, *list);
 }
 
@@ -705,11 +707,19 @@ unsigned Renderer::draw_projector(std::size_t index, const scene::PosedScene& po
   impl_->prepare(posed, Impl::FromProjectors::all);
   impl_->look_from_eye(viewer);
   const Canvas& centre = impl_->canvas(projector.width, projector.height, GL_RGBA32F);
-  if (!shown.display.texture) shown.display = Canvas(projector.width, projector.height, GL_RGBA8);
+  if (!shown.display.texture) {
+    shown.display = Canvas(projector.width, projector.height, GL_RGBA8);
+    shown.known_hits = make_texture(GL_TEXTURE_2D, GL_RGBA32UI, projector.width, projector.height);
+    shown.known_shares = make_texture(GL_TEXTURE_2D, GL_RGBA32F, projector.width, projector.height);
+    glClearTexImage(*shown.known_hits, 0, GL_RGBA_INTEGER, GL_UNSIGNED_INT, nullptr);
+  }
   const LightOptions& options = impl_->light_options;
   const auto set_up = [&](const Program& program) {
     impl_->set_up(program, impl_->sights.projector_lens(index), &viewer);
     program.set("u_projector", static_cast<int>(index));
+    program.set_id("u_known_stamp", impl_->known_stamp);
+    glBindImageTexture(k_known_hits_image, *shown.known_hits, 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32UI);
+    glBindImageTexture(k_known_shares_image, *shown.known_shares, 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
     impl_->set_up_light(program, posed);
   };
   std::vector<cv::Rect>& places = impl_->light_places;

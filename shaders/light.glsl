@@ -11,6 +11,7 @@ uniform int u_projector;
 uniform int u_eye;  // sight of the viewer
 uniform int u_placement_count;
 uniform bool u_has_view_parts, u_has_surface_parts;
+#include "known.glsl"
 
 // Colour of the view part that the viewer sees before p; a: 0 when none, or when p is hidden from the viewer.
 vec4 view_colour(vec3 p, vec3 d_normal, float footprint) {
@@ -41,14 +42,12 @@ struct CentreShare {
 const CentreShare k_no_centre = CentreShare(0.0, vec3(0), Share(0.0, 0.0, 0.0, 0.0));
 
 // None where the ray meets nothing, and where black is to be even, which begins and ends within a pixel.
-CentreShare centre_share(vec2 px) {
-  Sight projector = s_sights[u_projector];
-  vec3 d = ray_of(projector, px);
+CentreShare centre_share(ivec2 at) {
   if (u_even_black) return k_no_centre;
-  Hit prototype = first_hit(s_projector_ids, projector, 0, d);
+  Hit prototype = centre_hit(at);
   if (prototype.id == 0u) return k_no_centre;
-  Place place = place_at(prototype, d);
-  return CentreShare(prototype.t, place.d_flat, share_of(u_projector, place));
+  Place place = place_at(prototype, ray_of(s_sights[u_projector], vec2(at)));
+  return CentreShare(distance(place.p, s_sights[u_projector].p_eye.xyz), place.d_flat, known_share(at, place));
 }
 
 bool is_beside(CentreShare centre, Hit hit, Place place, float footprint) {
@@ -57,36 +56,47 @@ bool is_beside(CentreShare centre, Hit hit, Place place, float footprint) {
   return abs(hit.t - centre.t) < k_steepest * footprint && dot(place.d_flat, centre.d_flat) > k_same_side;
 }
 
-// What the ray d of a pixel's sample meets is to be given: rgb: light; a: coverage by what is to be lit.
-vec4 light_on(Hit prototype, vec3 d, CentreShare centre) {
-  Sight projector = s_sights[u_projector];
-  Place place = place_at(prototype, d);
-  float footprint = prototype.t / projector.quality.x;
+// Colour that is to be seen at a place, t along the projector's ray; a: 0 where there is none.
+vec4 wanted_colour(Place place, float t) {
+  float footprint = t / s_sights[u_projector].quality.x;
   vec4 colour = u_has_view_parts ? view_colour(place.p, place.d_flat, footprint) : vec4(0);
   if (colour.a == 0.0 && u_has_surface_parts) colour = surface_colour(place, footprint);
+  return colour;
+}
+
+// Light of a pixel's centre. rgb: light; a: coverage by what is to be lit.
+vec4 centre_light(ivec2 at) {
+  Hit prototype = centre_hit(at);
+  Sight projector = s_sights[u_projector];
+  Place place = place_at(prototype, ray_of(projector, vec2(at)));
+  vec4 colour = wanted_colour(place, distance(place.p, projector.p_eye.xyz));
+  if (colour.a == 0.0 && !u_even_black) return colour;
+  return vec4(balanced(u_projector, colour, known_share(at, place), place, prototype), 1);
+}
+
+// The same of any sample of a pixel.
+vec4 light_at(vec2 px, CentreShare centre) {
+  Sight projector = s_sights[u_projector];
+  vec3 d = ray_of(projector, px);
+  Hit prototype = first_hit(s_projector_ids, projector, 0, d);
+  if (prototype.id == 0u) return vec4(0);
+  Place place = place_at(prototype, d);
+  vec4 colour = wanted_colour(place, prototype.t);
   if (colour.a == 0.0 && !u_even_black) return colour;
   Share share;
-  if (is_beside(centre, prototype, place, footprint))
+  if (is_beside(centre, prototype, place, prototype.t / projector.quality.x))
     share = centre.share;
   else
     share = share_of(u_projector, place);
   return vec4(balanced(u_projector, colour, share, place, prototype), 1);
 }
 
-vec4 light_at(vec2 px, CentreShare centre) {
-  Sight projector = s_sights[u_projector];
-  vec3 d = ray_of(projector, px);
-  Hit prototype = first_hit(s_projector_ids, projector, 0, d);
-  return prototype.id == 0u ? vec4(0) : light_on(prototype, d, centre);
-}
-
-// False only where light_at is 0 for certain: no part is seen there from the viewer's eye, and none lies there.
-bool may_give_light(vec2 px, out Hit prototype) {
-  Sight projector = s_sights[u_projector];
-  vec3 d = ray_of(projector, px);
-  prototype = first_hit(s_projector_ids, projector, 0, d);
+// False only where centre_light is 0 for certain: no part is seen there from the viewer's eye, and none lies there.
+bool may_give_light(ivec2 at) {
+  Hit prototype = centre_hit(at);
   if (prototype.id == 0u) return false;
-  vec3 p = projector.p_eye.xyz + prototype.t * d;
+  uint first = 3u * (prototype.id - 1u);
+  vec3 p = mat3(s_corners[first].xyz, s_corners[first + 1u].xyz, s_corners[first + 2u].xyz) * prototype.weights;
   vec4 share;
   Sight eye = s_sights[u_eye];
   return u_even_black ||

@@ -9,7 +9,7 @@ layout(rgba32f, binding = 0) uniform writeonly image2D u_picture;
 void main() {
   if (gl_GlobalInvocationID.x >= s_list_count) return;
   ivec2 at = listed_pixel(gl_GlobalInvocationID.x);
-  CentreShare centre = centre_share(vec2(at));
+  CentreShare centre = centre_share(at);
   vec4 sum = vec4(0);
   for (int k = 0; k < u_samples; ++k) sum += light_at(vec2(at) + sample_offset(k), centre);
   imageStore(u_picture, at, sum / float(u_samples));

@@ -1,12 +1,11 @@
 #version 450 core
 // Lists the pixels of a projector that may give light.
 #include "light.glsl"
-#include "listed_hits.glsl"
+#include "listed.glsl"
 layout(local_size_x = 16, local_size_y = 4) in;
 uniform ivec2 u_first, u_end;  // of the rectangle to look through
 
 void main() {
   ivec2 at = u_first + ivec2(gl_GlobalInvocationID.xy);
-  Hit hit;
-  if (all(lessThan(at, u_end)) && may_give_light(vec2(at), hit)) list_hit(at, hit);
+  if (all(lessThan(at, u_end)) && may_give_light(at)) list_pixel(at);
 }

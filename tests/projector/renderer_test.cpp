@@ -749,6 +749,36 @@ TEST_F(RendererTest, NothingIsDrawnAgainUntilSomethingChanges) {
   EXPECT_GT(cv::norm(plain, drawn.projector_picture(0, posed, viewer), cv::NORM_INF), 5);
 }
 
+// Whatever is kept from picture to picture.
+TEST_F(RendererTest, APictureAfterOthersIsTheSameAsTheFirstOfItsKind) {
+  const Scene scene =
+      scene_of(sheet(0.5, 0.4),
+               {slot("mirror", scene::Mode::view, coloured(sheet(0.16, 0.1, -0.05), {0.25f, 0.5f, 0.75f})),
+                slot("trim", scene::Mode::surface, coloured(sheet(0.4, 0.03), {0.9f, 0.8f, 0.1f}))});
+  const PosedScene still = posed_at_origin(scene);
+  PosedScene part_moved = still, all_moved = still;
+  part_moved.parts[0].world_from_part.translation.x() = 0.03;
+  all_moved.parts[1].world_from_part.translation.y() = 0.05;
+  all_moved.world_from_prototype->rotation = exp_rotation({0.2, 0.1, 0});
+  for (auto& part : all_moved.parts)
+    part.world_from_part = *all_moved.world_from_prototype * part.world_from_part;
+  cv::Mat shadow(8, 8, CV_32F, cv::Scalar(1));
+  shadow(cv::Rect(2, 2, 4, 4)).setTo(0);
+  const Imager viewer = viewer_from({0.1, -0.1, -1.3});
+  Renderer drawing = renderer(scene, two_projectors()), anew = renderer(scene, two_projectors()),
+           anew_in_shadow = renderer(scene, two_projectors());
+  anew_in_shadow.set_arriving(1, shadow);
+  (void)drawing.projector_picture(0, still, viewer);
+  (void)drawing.projector_picture(0, part_moved, viewer);
+  EXPECT_EQ(cv::norm(drawing.projector_picture(0, all_moved, viewer),
+                     anew.projector_picture(0, all_moved, viewer), cv::NORM_INF),
+            0);
+  drawing.set_arriving(1, shadow);
+  const cv::Mat refilled = drawing.projector_picture(0, all_moved, viewer);
+  EXPECT_EQ(cv::norm(refilled, anew_in_shadow.projector_picture(0, all_moved, viewer), cv::NORM_INF), 0);
+  EXPECT_GT(cv::norm(refilled, anew.projector_picture(0, all_moved, viewer), cv::NORM_INF), 20);
+}
+
 TEST_F(RendererTest, WhatMovesIsDrawnQuicklyAndWholeOnceItStandsStill) {
   const Scene scene =
       scene_of(sheet(0.8, 0.6),

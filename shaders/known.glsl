@@ -1,0 +1,28 @@
+// What a projector's pixel centres see of the prototype and its share there, kept from picture to picture while the
+// prototype stays and light arrives as it did.
+
+layout(rgba32ui, binding = 1) uniform uimage2D u_known_hits;  // id, bits of two weights, u_known_stamp of its time
+layout(rgba32f, binding = 2) uniform image2D u_known_shares;  // a Share; x: negative where unknown yet
+uniform uint u_known_stamp;
+
+Hit centre_hit(ivec2 at) {
+  uvec4 known = imageLoad(u_known_hits, at);
+  if (known.w == u_known_stamp) {
+    vec2 weights = uintBitsToFloat(known.yz);
+    return Hit(known.x, 0.0, vec3(1.0 - weights.x - weights.y, weights), 0.0);
+  }
+  Sight projector = s_sights[u_projector];
+  Hit hit = first_hit(s_projector_ids, projector, 0, ray_of(projector, vec2(at)));
+  imageStore(u_known_hits, at, uvec4(hit.id, floatBitsToUint(hit.weights.yz), u_known_stamp));
+  imageStore(u_known_shares, at, vec4(-1));
+  return hit;
+}
+
+// Where centre_hit has been asked, and found something.
+Share known_share(ivec2 at, Place place) {
+  vec4 known = imageLoad(u_known_shares, at);
+  if (known.x >= 0.0) return Share(known.x, known.y, known.z, known.w);
+  Share share = share_of(u_projector, place);
+  imageStore(u_known_shares, at, vec4(share.share, share.irradiance, share.missing_black, share.blocked_black));
+  return share;
+}
