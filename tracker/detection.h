@@ -24,8 +24,8 @@ struct Detection {
   /// Top-left, top-right, bottom-right, bottom-left of the black square in the marker's own upright frame;
   /// pixels of the raw picture, pixel centres at integers.
   std::array<Eigen::Vector2d, 4> corners_px;
-  /// Covariance of each corner (px^2), from the residuals of its two edge lines plus what edge lines keep as
-  /// systematic error (refine.h).
+  /// Covariance of each corner (px^2), from the residuals of its two edge lines, their correlation along the
+  /// side and what stands next to the edge; or from those of the whole pattern's fit.
   std::array<Eigen::Matrix2d, 4> corner_covariance;
   /// False where a corner itself is covered and only follows from what is seen of its two sides.
   std::array<bool, 4> corner_visible = {true, true, true, true};

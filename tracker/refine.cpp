@@ -10,11 +10,13 @@
 namespace limn::tracker {
 namespace {
 
-// What edge lines keep however little noise there is: pixels that are not square, print, paper. From still
-// markers in real pictures (.05 px between poses against .026 px jitter).
-constexpr double k_systematic_px = 0.014;
+// What edge lines keep however little noise there is: .002 to .004 px in pictures without any. What pixels,
+// print and paper do changes along a side and shows in its residuals.
+constexpr double k_systematic_px = 0.002;
 // The averaged gradient's tails below this share of its peak count as flat.
 constexpr double k_flat_share = 0.05;
+// Above this share, and twice the next place, what lies just outside still is the edge's tail.
+constexpr double k_tail_share = 0.03;
 // Below this share a rise means another edge of the same direction behind the first: grey paper, then a white
 // table.
 constexpr double k_valley_share = 0.35;
@@ -75,29 +77,38 @@ Bow bow_of(const Lens& lens, const Eigen::Vector2d& from, const Eigen::Vector2d&
   return bow;
 }
 
-// How much of a bend is believed, 0 to 1: the non-negative garrote (Breiman 1995), 1 - (k s / b)^2 of a bow b
-// with standard deviation s. It grows steadily with the evidence, so that a corner does not jump between
-// frames whose evidence lies on either side of a limit; a bow that shows clearly keeps its whole size.
-double weight_of_bow(const EdgeRefiner::EdgeLine& bent, double half) {
+struct Belief {
+  double share;        // of a bend that is taken
+  double probability;  // that there is one
+};
+
+// The share is the non-negative garrote (Breiman 1995), 1 - (k s / b)^2 of a bow b with standard deviation s.
+// It grows steadily with the evidence, so that a corner does not jump between frames whose evidence lies on
+// either side of a limit; a bow that shows clearly keeps its whole size. The probability is even at that
+// limit.
+Belief belief_in_bow(const EdgeRefiner::EdgeLine& bent, double half) {
   const double bow_share = std::abs(bent.curvature) * half;
-  const double squared = bent.curvature * bent.curvature;
-  const double noise = k_bow_deviations * k_bow_deviations * bent.covariance(2, 2);
-  if (!(squared > noise)) return 0;
-  const double plausible = (k_no_bow_share - bow_share) / (k_no_bow_share - k_max_bow_share);
-  return (1 - noise / squared) * std::clamp(plausible, 0.0, 1.0);
+  const double plausible =
+      std::clamp((k_no_bow_share - bow_share) / (k_no_bow_share - k_max_bow_share), 0.0, 1.0);
+  constexpr double k_limit = k_bow_deviations * k_bow_deviations;
+  const double evidence = bent.curvature * bent.curvature / bent.covariance(2, 2);
+  return {plausible * std::max(0.0, 1 - k_limit / evidence),
+          plausible / (1 + std::exp(0.5 * (k_limit - evidence)))};
 }
 
-// The mean of both lines; its covariance holds how far they lie apart (Buckland 1997).
+// The mean of both lines; its covariance holds how far off it is if either is true.
 EdgeRefiner::EdgeLine averaged(const EdgeRefiner::EdgeLine& straight,
                                const EdgeRefiner::EdgeLine& bent,
-                               double bent_weight) {
+                               const Belief& belief) {
+  const auto& [share, probability] = belief;
   EdgeRefiner::EdgeLine line = straight;
   const Eigen::Vector3d apart(bent.offset - straight.offset, bent.slope - straight.slope, bent.curvature);
-  line.offset += bent_weight * apart[0];
-  line.slope += bent_weight * apart[1];
-  line.curvature = bent_weight * apart[2];
-  line.covariance = (1 - bent_weight) * straight.covariance + bent_weight * bent.covariance +
-                    bent_weight * (1 - bent_weight) * apart * apart.transpose();
+  line.offset += share * apart[0];
+  line.slope += share * apart[1];
+  line.curvature = share * apart[2];
+  const double off = probability * (1 - share) * (1 - share) + (1 - probability) * share * share;
+  line.covariance =
+      (1 - share) * straight.covariance + share * bent.covariance + off * apart * apart.transpose();
   return line;
 }
 
@@ -240,15 +251,25 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   line->separate = low >= 2 && high + 2 <= profile && std::abs(mean[low - 1]) <= flat_below &&
                    std::abs(mean[high]) <= flat_below && std::abs(mean[low - 2]) <= 4 * flat_below &&
                    std::abs(mean[high + 1]) <= 4 * flat_below;
+  double beyond = 0;  // the window
+  if (low > 1) beyond = std::abs(mean[low - 2]);
+  if (high + 1 < profile) beyond = std::max(beyond, std::abs(mean[high + 1]));
   double contrast = 0;  // in light
   for (std::size_t k = low; k < high; ++k) contrast += mean[k];
   // A Gaussian's peak is its area over sigma sqrt(2 pi); v is not the edge's normal when the side leans.
   line->blur_px = 0.4 * contrast / mean[peak] / std::hypot(1.0, slope);
+  // Up to as much light at the window's end moves all crossings up to so far, evenly distributed.
+  const double unknown_px = 0.5 * static_cast<double>(high - low) * beyond / contrast;
   contrast /= static_cast<double>(rows_.size());
   if (!(contrast > 0)) return false;
-  const bool ends_flat = low > 0 && high < profile && std::abs(mean[low - 1]) <= flat_below &&
-                         std::abs(mean[high]) <= flat_below;
-  const Window window = ends_flat ? centred(mean, profile, low, high) : whole(low, high);
+  const auto is_flat = [&](std::size_t k) { return std::abs(mean[k]) <= flat_below; };
+  const auto is_tail = [&](std::size_t k, std::size_t beyond) {
+    return mean[k] > k_tail_share * mean[peak] && mean[k] > 2 * std::abs(mean[beyond]);
+  };
+  Window window = whole(low, high);
+  if (low > 1 && high + 1 < profile && is_flat(low - 1) && is_flat(high))
+    window = centred(mean, profile, is_tail(low - 1, low - 2) ? low - 1 : low,
+                     is_tail(high, high + 1) ? high + 1 : high);
 
   // Rows beside a corner see the other edge as far as the blur reaches.
   const double blur_trim = std::min(0.2 * (u_high - u_low), 0.5 * static_cast<double>(high - low) + 0.5);
@@ -280,6 +301,8 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   if (line->outside_level - line->inside_level < min_contrast) return false;
   double variance = 0;
   if (!fit_line(effort, sides, line, &variance)) return false;
+  line->covariance(0, 0) += unknown_px * unknown_px / 3;
+  line->correlation = effort == Effort::full ? correlation_along(*line, variance) : 1;
   see_ends(from[u_axis], to[u_axis], std::max(trim, blur_trim), variance, line);
   return true;
 }
@@ -300,7 +323,7 @@ bool EdgeRefiner::fit_line(Effort effort, Sides sides, EdgeLine* line, double* v
   EdgeLine bent = *line;
   if (!(fit_terms(3, false, &bent) >= 0)) return true;
   const double half = 0.5 * std::abs(crossings_.u.back() - crossings_.u.front());
-  *line = averaged(*line, bent, weight_of_bow(bent, half));
+  *line = averaged(*line, bent, belief_in_bow(bent, half));
   return true;
 }
 
@@ -444,6 +467,33 @@ double EdgeRefiner::fit_terms(int terms, bool from_line, EdgeLine* line) {
   return variance;
 }
 
+// How many times larger the line's variance is where neighbouring crossings err alike: print, paper, shadows
+// and JPEG do that. From sums of residuals over blocks (the "sandwich", Liang and Zeger 1986).
+double EdgeRefiner::correlation_along(const EdgeLine& line, double variance) const {
+  constexpr std::size_t k_blocks = 12;
+  constexpr std::size_t k_least_rows = 4;
+  const std::size_t count = crossings_.u.size();
+  const std::size_t rows = std::max(k_least_rows, (count + k_blocks - 1) / k_blocks);
+  const double blocks = static_cast<double>(count) / static_cast<double>(rows);
+  const double terms = line.curvature == 0 ? 2 : 3;
+  if (blocks < terms + 1) return 1;
+  const double bound = k_reject * std::sqrt(variance);
+  double together = 0;
+  double alone = 0;
+  for (std::size_t first = 0; first < count; first += rows) {
+    double sum = 0;
+    for (std::size_t i = first; i < std::min(count, first + rows); ++i) {
+      const double r = crossings_.share[i] * (crossings_.v[i] - line.at(crossings_.u[i]));
+      if (std::abs(r) > bound) continue;
+      sum += r;
+      alone += r * r;
+    }
+    together += sum * sum;
+  }
+  const auto number = static_cast<double>(count);
+  return together / (blocks - terms) * blocks / (alone / (number - terms) * number);
+}
+
 // Whether most rows next to the side's ends lie on the line. Rows nearer than `trim` to an end are not looked
 // at.
 void EdgeRefiner::see_ends(double from, double to, double trim, double variance, EdgeLine* line) const {
@@ -532,6 +582,9 @@ std::optional<RefinedQuad> EdgeRefiner::refine(const cv::Mat& grey,
       refined.inside_level[side] = lines[side].inside_level;
       refined.blur_px[side] = lines[side].blur_px;
     }
+    double correlation = 0;
+    for (const EdgeLine& line : lines) correlation += 0.25 * line.correlation;
+    for (EdgeLine& line : lines) line.covariance *= std::max(1.0, correlation);
     std::array<Eigen::Vector2d, 4> corners = refined.corners_px;
     double moved = 0;
     for (std::size_t i = 0; i < 4; ++i) {

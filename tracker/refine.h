@@ -96,6 +96,7 @@ class EdgeRefiner {
     double u_middle = 0;
     double offset = 0, slope = 0, curvature = 0;
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of (offset, slope, curvature)
+    double correlation = 1;  ///< variance over that of crossings with an error each of its own
     double outside_level = 0, inside_level = 0;
     double blur_px = 0;
     bool separate = true;                           ///< no other edge within the edge's blur
@@ -127,6 +128,7 @@ class EdgeRefiner {
                 EdgeLine* line);
   bool fit_line(Effort effort, Sides sides, EdgeLine* line, double* variance);
   void see_ends(double from, double to, double trim, double variance, EdgeLine* line) const;
+  double correlation_along(const EdgeLine& line, double variance) const;
   double fit_terms(int terms, bool from_line, EdgeLine* line);
   void find_consensus(EdgeLine* line);
 };

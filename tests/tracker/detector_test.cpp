@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
 #include <vector>
@@ -40,6 +41,8 @@ struct Sweep {
   Encoding encoding = Encoding::linear;
   double bow = 0;        ///< of the upper and lower sides, as share of a side
   double motion_px = 0;  ///< even, in any direction
+  double stains = 0;     ///< of the light, standard deviation: spots some pixels wide on paper and ink
+  int jpeg_quality = 0;  ///< 0: none
 };
 
 cv::Mat in_motion(const cv::Mat& light, const Eigen::Vector2d& motion) {
@@ -55,8 +58,33 @@ cv::Mat in_motion(const cv::Mat& light, const Eigen::Vector2d& motion) {
   return sum;
 }
 
+// Light that differs from place to place, as that of a projector's picture does.
+cv::Mat stained(const cv::Mat& light, double deviation, std::mt19937_64& rng) {
+  constexpr double k_spot_px = 2;
+  cv::Mat spots(light.size(), CV_32F);
+  std::normal_distribution<float> level;
+  for (int y = 0; y < spots.rows; ++y)
+    for (int x = 0; x < spots.cols; ++x) spots.at<float>(y, x) = level(rng);
+  cv::GaussianBlur(spots, spots, {0, 0}, k_spot_px);
+  cv::Mat seen;
+  cv::multiply(light, 1 + deviation * 2 * std::sqrt(std::numbers::pi) * k_spot_px * spots, seen);
+  return seen;
+}
+
+cv::Mat after_jpeg(const cv::Mat& grey, int quality) {
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".jpg", grey, bytes, {cv::IMWRITE_JPEG_QUALITY, quality});
+  return cv::imdecode(bytes, cv::IMREAD_GRAYSCALE);
+}
+
 cv::Mat picture_of(const Sweep& sweep, const PlacedMarker& marker, std::mt19937_64& rng) {
   const cv::Mat ground = test::plain(640, 480, 100);
+  if (sweep.stains > 0) {
+    cv::Mat light = test::light_of(sweep.lens, ground, std::vector{marker}, sweep.picture, rng);
+    light = stained(light, sweep.stains, rng);
+    cv::GaussianBlur(light, light, {0, 0}, sweep.picture.blur_px);
+    return test::noisy_grey(light, sweep.picture.noise_levels, rng);
+  }
   if (sweep.motion_px == 0)
     return test::picture_of(sweep.lens, ground, std::vector{marker}, sweep.picture, rng);
   const double angle = uniform(rng, 0, 6.28);
@@ -100,6 +128,7 @@ SweepResult swept(const Sweep& sweep, int count) {
     marker.bow = sweep.bow;
     cv::Mat grey = picture_of(sweep, marker, rng);
     if (sweep.srgb_picture) grey = srgb_encoded(grey);
+    if (sweep.jpeg_quality > 0) grey = after_jpeg(grey, sweep.jpeg_quality);
     const auto truth = test::true_corners(sweep.lens, marker);
     ++result.markers;
     for (const Detection& found : detector.detect(grey, sweep.give_lens ? &sweep.lens : nullptr)) {
@@ -203,14 +232,45 @@ TEST(Detector, StraightensTheSidesOfADistortedPictureThroughItsLens) {
   EXPECT_GT(without.rms_px, 1.4 * with.rms_px);  // bent lines follow most of the bow
 }
 
+// Pulls of N(0, 1) within a fifth.
+void expect_true_covariance(const SweepResult& r) {
+  EXPECT_GE(r.found, r.markers - 2);
+  EXPECT_GT(r.mahalanobis, 0.8 * 0.8);
+  EXPECT_LT(r.mahalanobis, 1.2 * 1.2);
+}
+
 TEST(Detector, SaysHowSureItsCornersAre) {
+  for (const double noise : {2.0, 8.0}) {
+    SCOPED_TRACE(noise);
+    Sweep sweep{60, 120, 50_deg, {}};
+    sweep.picture.blur_px = 0.7;
+    sweep.picture.noise_levels = noise;
+    expect_true_covariance(swept(sweep, 60));
+  }
+}
+
+TEST(Detector, SaysHowSureItsCornersAreWithoutAnyBlur) {
+  Sweep sweep{48, 120, 60_deg, {}};
+  sweep.picture.noise_levels = 2;
+  const SweepResult r = swept(sweep, 60);
+  expect_true_covariance(r);
+  EXPECT_LT(r.rms_px, 0.02);
+}
+
+TEST(Detector, SaysHowSureItsCornersAreInUnevenLight) {
   Sweep sweep{60, 120, 50_deg, {}};
   sweep.picture.blur_px = 0.7;
-  sweep.picture.noise_levels = 8;  // noise far above the systematic floor, so that the pull is the noise's
-  const SweepResult r = swept(sweep, 60);
-  EXPECT_GE(r.found, 58);
-  EXPECT_GT(r.mahalanobis, 0.6);
-  EXPECT_LT(r.mahalanobis, 1.6);
+  sweep.picture.noise_levels = 2;
+  sweep.stains = 0.05;
+  expect_true_covariance(swept(sweep, 60));
+}
+
+TEST(Detector, SaysHowSureItsCornersAreInAJpegPicture) {
+  Sweep sweep{60, 120, 50_deg, {}};
+  sweep.picture.blur_px = 0.4;
+  sweep.picture.noise_levels = 2;
+  sweep.jpeg_quality = 75;
+  expect_true_covariance(swept(sweep, 60));
 }
 
 TEST(Detector, FindsMovingCornersAndSaysHowSureTheyAre) {
@@ -254,6 +314,7 @@ TEST(Detector, SaysHowSureTheCornersOfBlurredMarkersAre) {
 
 TEST(Detector, FindsTheCornersOfBentPaper) {
   for (const double bow : {0.003, 0.006, 0.012}) {  // 0.2 to 1 px
+    SCOPED_TRACE(bow);
     Sweep sweep{60, 80, 30_deg, {}};
     sweep.picture.blur_px = 0.5;
     sweep.picture.noise_levels = 2;
@@ -261,7 +322,7 @@ TEST(Detector, FindsTheCornersOfBentPaper) {
     const SweepResult r = swept(sweep, 25);
     EXPECT_EQ(r.found, r.markers);
     EXPECT_LT(r.rms_px, 0.07) << bow;  // 0.15 and more when straight lines are fitted
-    EXPECT_LT(r.mahalanobis, 2) << bow;
+    expect_true_covariance(r);
   }
 }
 
@@ -280,7 +341,7 @@ TEST(Detector, MovesACornerSteadilyAsItsPaperBends) {
         test::picture_of(pinhole_vga(), test::plain(640, 480, 100), std::vector{marker}, options, rng));
     ASSERT_EQ(found.size(), 1u);
     for (std::size_t k = 0; k < 4 && step > 0; ++k)
-      EXPECT_LT((found[0].corners_px[k] - before[k]).norm(), 5 * k_step_px) << step << " corner " << k;
+      EXPECT_LT((found[0].corners_px[k] - before[k]).norm(), 6 * k_step_px) << step << " corner " << k;
     before = found[0].corners_px;
   }
 }
