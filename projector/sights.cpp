@@ -86,6 +86,18 @@ std::array<Eigen::Vector3d, 8> corners_of(const Eigen::AlignedBox3d& box) {
   return corners;
 }
 
+cv::Rect whole_of(const Twin& twin) { return {0, 0, twin.width, twin.height}; }
+
+// The texels of a twin's picture around tangents.
+cv::Rect texels_of(const Twin& twin, const TangentRect& rect) {
+  if (rect.is_empty()) return {};
+  const auto texel = [&](const Eigen::Vector2d& tangent) {
+    const Eigen::Vector2d at = twin.focal * tangent + twin.centre;
+    return cv::Point(static_cast<int>(std::floor(at.x())), static_cast<int>(std::floor(at.y())));
+  };
+  return cv::Rect(texel(rect.lower) - cv::Point(1, 1), texel(rect.upper) + cv::Point(3, 3)) & whole_of(twin);
+}
+
 }  // namespace
 
 struct Sights::GpuSight {
@@ -147,6 +159,8 @@ Result<Sights> Sights::create(const Rig& rig) {
   }
   sights.projector_ids_ =
       make_texture(GL_TEXTURE_2D_ARRAY, GL_R32UI, sights.ids_width_, sights.ids_height_, 2 * count);
+  glClearTexImage(*sights.projector_ids_, 0, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
+  sights.surface_places_.resize(projectors.size());
   sights.eye_ids_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_R32UI, k_eye_side, k_eye_side, 2);
   sights.depth_ = make_texture(GL_TEXTURE_2D, GL_DEPTH_COMPONENT32F, std::max(k_eye_side, sights.ids_width_),
                                std::max(k_eye_side, sights.ids_height_));
@@ -165,13 +179,14 @@ void Sights::draw(const GpuScene& scene,
                   const std::vector<PlacedRun>& runs,
                   bool (*wanted)(const PlacedRun&),
                   const Twin& twin,
+                  const cv::Rect& within,
                   const GlName& ids,
                   int layer) {
   glNamedFramebufferTextureLayer(*framebuffer_, GL_COLOR_ATTACHMENT0, *ids, 0, layer);
   glBindFramebuffer(GL_FRAMEBUFFER, *framebuffer_);
   glViewport(0, 0, twin.width, twin.height);
   glEnable(GL_SCISSOR_TEST);  // clears what is read, no more
-  glScissor(0, 0, twin.width, twin.height);
+  glScissor(within.x, within.y, within.width, within.height);
   const GLuint nothing[4] = {};
   const float farthest = 0;
   glClearNamedFramebufferuiv(*framebuffer_, GL_COLOR, 0, nothing);
@@ -237,7 +252,7 @@ void Sights::see_prototype_from_projectors(const GpuScene& scene,
   for (std::size_t i = 0; i < projectors_.size(); ++i) {
     const Twin twin = projector_twin(i, runs, scene_from_world);
     const int layer = 2 * static_cast<int>(i);
-    draw(scene, runs, is_prototype, twin, projector_ids_, layer);
+    draw(scene, runs, is_prototype, twin, whole_of(twin), projector_ids_, layer);
     if (with_soft_edges && soft_edges_) soft_edges_->find(static_cast<int>(i), depth_, twin);
     GpuSight sight(twin, layer);
     sight.of_imager(projectors_[i]);
@@ -256,9 +271,16 @@ void Sights::see_prototype_from_projectors(const GpuScene& scene,
 void Sights::see_surface_parts_from_projectors(const GpuScene& scene,
                                                const std::vector<PlacedRun>& runs,
                                                const Pose& scene_from_world) {
-  for (std::size_t i = 0; i < projectors_.size(); ++i)
-    draw(scene, runs, is_surface_part, projector_twin(i, runs, scene_from_world), projector_ids_,
-         2 * static_cast<int>(i) + 1);
+  for (std::size_t i = 0; i < projectors_.size(); ++i) {
+    const Twin twin = projector_twin(i, runs, scene_from_world);
+    const int layer = 2 * static_cast<int>(i) + 1;
+    cv::Rect& place = surface_places_[i];
+    if (!place.empty())
+      glClearTexSubImage(*projector_ids_, 0, place.x, place.y, layer, place.width, place.height, 1,
+                         GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
+    place = texels_of(twin, spanned_by(twin.twin_from_scene, runs, is_surface_part));
+    if (!place.empty()) draw(scene, runs, is_surface_part, twin, place, projector_ids_, layer);
+  }
 }
 
 void Sights::see_from_imager(const GpuScene& scene,
@@ -270,8 +292,8 @@ void Sights::see_from_imager(const GpuScene& scene,
   const Pose pose = sight_pose(imager, scene_from_world);
   const TangentRect rect = intersected(lens.rect, spanned_by(pose, runs, parts_alone ? is_part : is_any));
   const Twin twin = twin_over(pose, rect, k_oversampling * imager.lens.fx(), k_eye_side, k_eye_side);
-  draw(scene, runs, is_prototype, twin, eye_ids_, 0);
-  draw(scene, runs, is_part, twin, eye_ids_, 1);
+  draw(scene, runs, is_prototype, twin, whole_of(twin), eye_ids_, 0);
+  draw(scene, runs, is_part, twin, whole_of(twin), eye_ids_, 1);
   GpuSight sight(twin, 0);
   sight.of_imager(imager);
   send(eye(), sight);
@@ -286,7 +308,7 @@ void Sights::see_from_witness(const GpuScene& scene,
   const Twin twin = twin_over(pose, intersected(lens.rect, spanned_by(pose, runs, is_prototype)),
                               k_oversampling * camera.lens.fx(), ids_width_, ids_height_);
   const int layer = 2 * eye();
-  draw(scene, runs, is_prototype, twin, projector_ids_, layer);
+  draw(scene, runs, is_prototype, twin, whole_of(twin), projector_ids_, layer);
   upload_pixel_map(eye(), camera, lens.rect);
   GpuSight sight(twin, layer);
   sight.of_imager(camera);
@@ -312,8 +334,8 @@ void Sights::see_from_eye(const GpuScene& scene,
     focal = std::max(focal, k_oversampling * projector.lens.fx() * farthest / distance);
   }
   const Twin twin = twin_over(pose, spanned_by(pose, runs, is_view_part), focal, k_eye_side, k_eye_side);
-  draw(scene, runs, is_prototype, twin, eye_ids_, 0);
-  draw(scene, runs, is_part, twin, eye_ids_, 1);
+  draw(scene, runs, is_prototype, twin, whole_of(twin), eye_ids_, 0);
+  draw(scene, runs, is_part, twin, whole_of(twin), eye_ids_, 1);
   send(eye(), GpuSight(twin, 0));
 }
 

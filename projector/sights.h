@@ -92,6 +92,7 @@ class Sights {
             const std::vector<PlacedRun>& runs,
             bool (*wanted)(const PlacedRun&),
             const Twin& twin,
+            const cv::Rect& within,
             const GlName& ids,
             int layer);
   Twin projector_twin(std::size_t projector,
@@ -107,7 +108,8 @@ class Sights {
   Program program_;
   std::optional<SoftEdges> soft_edges_;  // with several projectors
   GlName framebuffer_, depth_, projector_ids_, eye_ids_, pixel_maps_, sights_;
-  int ids_width_ = 1, ids_height_ = 1;  // room of the projectors' ids
+  int ids_width_ = 1, ids_height_ = 1;    // room of the projectors' ids
+  std::vector<cv::Rect> surface_places_;  // texels of each projector's ids that surface parts are within
 };
 
 }  // namespace limn::projector
