@@ -49,10 +49,9 @@ void SoftEdges::find(int projector, const GlName& depth, const Twin& twin) {
 }
 
 void SoftEdges::soften(const std::function<void(const Program&)>& bind_sights) {
-  constexpr int k_jumps_unit = 8, k_no_unit = 9;
+  constexpr int k_jumps_unit = 8;
   bind_sights(handed_);
   handed_.bind("s_jumps", k_jumps_unit, jumps_);
-  handed_.set("s_arriving", k_no_unit);  // read, but not gone by
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     const int projector = static_cast<int>(i);
     handed_.set("u_projector", projector);

@@ -30,7 +30,7 @@ bool goes_on(vec2 texel) {
   if (hit.id == 0u) return false;
   Place place = place_at(hit, d);
   for (int j = 0; j < u_projector_count; ++j)
-    if (j != u_projector && reach(j, place, false).quality > 0.0 && !is_beside_jump(j, place.p)) return true;
+    if (j != u_projector && !is_beside_jump(j, place.p) && reaches(j, place)) return true;
   return false;
 }
 

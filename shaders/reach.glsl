@@ -94,10 +94,19 @@ Reach reach(int j, Place place, bool is_seen) {
   return reach;
 }
 
+// Whether projector j's light falls on a place: reach(j, place, false).quality > 0, for less.
+bool reaches(int j, Place place) {
+  Sight projector = s_sights[j];
+  vec3 q = (projector.sight_from_scene * vec4(place.p, 1)).xyz;
+  if (dot(place.d_flat, projector.p_eye.xyz - place.p) <= 0.0 || q.z <= 0.0) return false;
+  vec2 px = pixel_of(projector, q.xy / q.z);
+  vec2 inside = min(px + 0.5, projector.size.zw - 0.5 - px);
+  return min(inside.x, inside.y) >= 0.0 && !is_hidden(s_projector_ids, projector, place.p);
+}
+
 bool is_reached(Place place) {
-  for (int j = 0; j < u_projector_count; ++j) {
-    if (reach(j, place, false).quality > 0.0) return true;
-  }
+  for (int j = 0; j < u_projector_count; ++j)
+    if (reaches(j, place)) return true;
   return false;
 }
 
