@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "calib/solve.h"
+#include "core/linear_algebra.h"
 
 namespace limn::calib {
 namespace {
@@ -482,7 +483,7 @@ Result<Pose> Joint::board_pose(const Unknowns& at, int pose, const Noise& noise,
   for (int step = 0; step < k_most_steps && damping < k_most_damping; ++step) {
     Matrix6 damped = matrix;
     damped.diagonal() *= 1 + damping;
-    const Vector6d delta = -damped.ldlt().solve(gradient);
+    const Vector6d delta = -solved(damped, gradient);
     if (!delta.allFinite()) break;
     const bool last = -delta.dot(gradient) / 2 < k_settled * cost + k_to_rounding;
     const Pose tried = boxplus(start, delta);

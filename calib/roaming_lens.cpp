@@ -7,6 +7,8 @@
 #include <limits>
 #include <numbers>
 
+#include "core/linear_algebra.h"
+
 namespace limn::calib {
 namespace {
 
@@ -212,7 +214,7 @@ std::optional<Pose> RoamingLens::placed(const Vector5d& values, const View& view
     for (int step = 0; step < k_most_steps && now.is_whole && damping < k_most_damping; ++step) {
       Matrix6d damped = now.pp;
       damped.diagonal() *= 1 + damping;
-      const Vector6d delta = damped.ldlt().solve(now.p);
+      const Vector6d delta = limn::solved(damped, now.p);
       if (!delta.allFinite()) return std::nullopt;
       const Pose next = boxplus(pose, delta);
       const Blocks there = blocks(values, view, next, *noise);

@@ -252,7 +252,7 @@ std::optional<LinearCamera> linear_camera(const std::vector<Vector3d>& p_world,
   if (px.size() < 6) return std::nullopt;
   const Eigen::Matrix4d t_world = normaliser<3>(p_world);
   const Matrix3d t_px = normaliser<2>(px);
-  Eigen::Matrix<double, 12, 12> normal = Eigen::Matrix<double, 12, 12>::Zero();
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(12, 12);
   for (size_t i = 0; i < px.size(); ++i) {
     const Eigen::Vector4d x = t_world * p_world[i].homogeneous();
     const Vector3d u = t_px * px[i].homogeneous();
@@ -261,7 +261,7 @@ std::optional<LinearCamera> linear_camera(const std::vector<Vector3d>& p_world,
         Eigen::RowVector4d::Zero(), x.transpose(), -u.y() * x.transpose();
     normal += rows.transpose() * rows;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 12, 12>> eigen(normal);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normal);
   // On a plane two more directions are free.
   if (!(eigen.eigenvalues()[1] > 1e-9 * eigen.eigenvalues()[11])) return std::nullopt;
   const Eigen::Matrix<double, 12, 1> v = eigen.eigenvectors().col(0);

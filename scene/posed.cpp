@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/config.h"
+#include "core/linear_algebra.h"
 #include "scene/nearest.h"
 
 namespace limn::scene {
@@ -45,7 +46,7 @@ Pose laid_on(const Mesh& mesh, const Track& prototype, const Track& marker) {
       likeliest_on(mesh, prototype_from_marker.translation, place_covariance(prototype, marker));
   const Eigen::Vector3d d_marker_z = prototype_from_marker.rotation * Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d d_inward = d_marker_z.dot(point.d_normal) > 0 ? point.d_normal : -point.d_normal;
-  const auto turn = Eigen::Quaterniond::FromTwoVectors(d_marker_z, d_inward);
+  const Eigen::Quaterniond turn = turn_between(d_marker_z, d_inward);
   return prototype.world_from_body * Pose(turn * prototype_from_marker.rotation, point.p);
 }
 

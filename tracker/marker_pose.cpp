@@ -5,7 +5,9 @@
 #include <cmath>
 #include <optional>
 
+#include "core/linear_algebra.h"
 #include "tracker/pose_fit.h"
+#include "tracker/square_to_quad.h"
 
 namespace limn::tracker {
 namespace {
@@ -84,25 +86,11 @@ std::array<Eigen::Vector3d, 4> square_corners(double size_m) {
 }
 
 Eigen::Matrix3d homography_from_square(const std::array<Eigen::Vector2d, 4>& points) {
-  // Four points determine it: eight equations of h (h33 = 1) for the corners (-1,-1), (1,-1), (1,1), (-1,1).
-  static const std::array<Eigen::Vector2d, 4> k_square = {Eigen::Vector2d(-1, -1), Eigen::Vector2d(1, -1),
-                                                          Eigen::Vector2d(1, 1), Eigen::Vector2d(-1, 1)};
-  Eigen::Matrix<double, 8, 8> a;
-  Eigen::Matrix<double, 8, 1> b;
-  for (int i = 0; i < 4; ++i) {
-    const Eigen::Vector2d& s = k_square[static_cast<std::size_t>(i)];
-    const Eigen::Vector2d& p = points[static_cast<std::size_t>(i)];
-    a.row(2 * i) << s.x(), s.y(), 1, 0, 0, 0, -s.x() * p.x(), -s.y() * p.x();
-    a.row(2 * i + 1) << 0, 0, 0, s.x(), s.y(), 1, -s.x() * p.y(), -s.y() * p.y();
-    b[2 * i] = p.x();
-    b[2 * i + 1] = p.y();
-  }
-  const Eigen::FullPivLU<Eigen::Matrix<double, 8, 8>> lu(a);
-  if (!lu.isInvertible()) return Eigen::Matrix3d::Zero();
-  const Eigen::Matrix<double, 8, 1> h = lu.solve(b);
-  Eigen::Matrix3d homography;
-  homography << h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], 1;
-  return homography;
+  const Eigen::Matrix3d unit_from_square =
+      (Eigen::Matrix3d() << 0.5, 0, 0.5, 0, 0.5, 0.5, 0, 0, 1).finished();  // the corners are at -1 and 1
+  const Eigen::Matrix3d homography = SquareToQuad(points).matrix() * unit_from_square;
+  if (!homography.allFinite() || homography(2, 2) == 0) return Eigen::Matrix3d::Zero();
+  return homography / homography(2, 2);
 }
 
 std::vector<Eigen::Matrix3d> planar_rotations(const Eigen::Matrix3d& h) {
@@ -113,7 +101,7 @@ std::vector<Eigen::Matrix3d> planar_rotations(const Eigen::Matrix3d& h) {
   // Turn the ray through the origin's picture onto the optical axis.
   const Eigen::Vector3d d = Eigen::Vector3d(v.x(), v.y(), 1).normalized();
   const Eigen::Matrix3d ray_turn =
-      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), d).toRotationMatrix();
+      turn_between(Eigen::Vector3d::UnitZ(), d).toRotationMatrix();
   Eigen::Matrix<double, 2, 3> projection;
   projection << 1, 0, -v.x(), 0, 1, -v.y();
   const Eigen::Matrix2d b = (projection * ray_turn).leftCols<2>();

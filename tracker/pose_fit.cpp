@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/linear_algebra.h"
+
 namespace limn::tracker {
 namespace {
 
@@ -61,10 +63,10 @@ std::optional<Matrix6d> inverse(const Matrix6d& matrix) {
   if (!matrix.allFinite() || !(diagonal.minCoeff() > 0)) return std::nullopt;
   const Vector6d scale = diagonal.cwiseSqrt().cwiseInverse();
   const Matrix6d scaled = scale.asDiagonal() * matrix * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(scaled);
-  if (!(eigen.eigenvalues()[0] > k_min_condition * eigen.eigenvalues()[5])) return std::nullopt;
-  const Matrix6d middle = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
-                          eigen.eigenvectors().transpose();
+  const EigenPairs6 eigen = eigen_pairs(scaled);
+  if (!(eigen.values[0] > k_min_condition * eigen.values[5])) return std::nullopt;
+  const Matrix6d middle = eigen.vectors * eigen.values.cwiseInverse().asDiagonal() *
+                          eigen.vectors.transpose();
   return Matrix6d(scale.asDiagonal() * middle * scale.asDiagonal());
 }
 
@@ -132,7 +134,7 @@ std::optional<PoseFit> fit_pose(std::span<const PointSight> sights,
     if (!normal) return std::nullopt;
     Matrix6d damped = normal->matrix;
     damped.diagonal() *= 1 + damping;
-    const Vector6d delta = damped.ldlt().solve(-normal->gradient);
+    const Vector6d delta = solved(damped, -normal->gradient);
     if (!delta.allFinite()) return std::nullopt;
     const double gain = -normal->gradient.dot(delta);
     const bool is_last = gain < k_small_gain || (step >= k_patient_steps && gain < k_slow_gain * best);

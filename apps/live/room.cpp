@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "apps/world_markers.h"
+#include "core/linear_algebra.h"
 #include "scene/nearest.h"
 
 namespace limn::apps {
@@ -28,11 +29,7 @@ Eigen::Quaterniond prototype_from_face(const scene::Prototype& prototype) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (const BodyMarker& marker : prototype.markers) sum += marker.body_from_marker.rotation_matrix();
   if (prototype.markers.empty()) return Eigen::Quaterniond::Identity();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
-  if (rotation.determinant() < 0)
-    rotation = svd.matrixU() * Eigen::Vector3d(1, 1, -1).asDiagonal() * svd.matrixV().transpose();
-  return Eigen::Quaterniond(rotation);
+  return Eigen::Quaterniond(nearest_rotation(sum));
 }
 
 // The point nearest to all lines of sight; so far before camera 0 that the prototype fills its picture where
@@ -76,7 +73,7 @@ std::vector<BodyMarker> slot_markers(const scene::Scene& scene,
           scene::nearest_on(prototype.mesh, box.center() + prototype_from_face * in_face);
       const Eigen::Vector3d d_face = prototype_from_face * Eigen::Vector3d::UnitZ();
       const Eigen::Vector3d d_in = on.d_normal.dot(d_face) > 0 ? on.d_normal : -on.d_normal;
-      const Pose at(Eigen::Quaterniond::FromTwoVectors(d_face, d_in) * prototype_from_face,
+      const Pose at(turn_between(d_face, d_in) * prototype_from_face,
                     on.p - k_paper_m * d_in);
       const bool is_free = std::none_of(all.begin(), all.end(), [&](const BodyMarker& other) {
         return (other.body_from_marker.translation - at.translation).norm() <

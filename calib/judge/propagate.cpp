@@ -254,10 +254,10 @@ double p95_of(std::span<const std::vector<Eigen::Matrix2d>> groups) {
   double largest = 0, total = 0;
   for (const auto& group : groups) {
     for (const Eigen::Matrix2d& covariance : group) {
-      const Vector2d variances =
-          Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance, Eigen::EigenvaluesOnly)
-              .eigenvalues()
-              .cwiseMax(0.0);
+      const Vector2d variances = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>()
+                                     .computeDirect(covariance, Eigen::EigenvaluesOnly)
+                                     .eigenvalues()
+                                     .cwiseMax(0.0);
       const double weight = 1.0 / (k_angles * static_cast<double>(group.size()));
       for (int i = 0; i < k_angles; ++i) {
         const double c = std::cos((i + 0.5) / k_angles * std::numbers::pi / 2);

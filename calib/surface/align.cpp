@@ -10,6 +10,7 @@
 #include <opencv2/core.hpp>
 #include <tuple>
 
+#include "core/linear_algebra.h"
 #include "core/log.h"
 
 namespace limn::calib {
@@ -164,12 +165,12 @@ Matrix6d information_of(const std::vector<Row>& rows) {
 Vector6d step_of(const std::vector<Row>& rows) {
   Vector6d gradient = Vector6d::Zero();
   for (const Row& row : rows) gradient += row.weight * row.residual * row.jacobian;
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(information_of(rows));
+  const EigenPairs6 eigen = eigen_pairs(information_of(rows));
   Vector6d step = Vector6d::Zero();
   for (int i = 0; i < 6; ++i) {
-    if (eigen.eigenvalues()[i] < k_held * eigen.eigenvalues()[5]) continue;
-    const Vector6d d = eigen.eigenvectors().col(i);
-    step -= d.dot(gradient) / eigen.eigenvalues()[i] * d;
+    if (eigen.values[i] < k_held * eigen.values[5]) continue;
+    const Vector6d d = eigen.vectors.col(i);
+    step -= d.dot(gradient) / eigen.values[i] * d;
   }
   return step;
 }
@@ -235,7 +236,7 @@ std::optional<Fitted> fitted(const scene::SurfaceIndex& index,
 Matrix6d covariance_of(const Fitted& fit, double cluster) {
   Matrix6d slopes = Matrix6d::Zero();
   for (const Row& row : fit.rows) slopes += row.slope * row.jacobian * row.jacobian.transpose();
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(slopes);
+  const EigenPairs6 eigen = eigen_pairs(slopes);
   std::map<Cell, Vector6d> sums;
   for (const Row& row : fit.rows) {
     const auto [at, fresh] = sums.try_emplace(cell_of(row.p, cluster), Vector6d::Zero());
@@ -247,11 +248,11 @@ Matrix6d covariance_of(const Fitted& fit, double cluster) {
   middle *= clusters / std::max(1.0, clusters - 6);
   Matrix6d inverse = Matrix6d::Zero(), free = Matrix6d::Zero();
   for (int i = 0; i < 6; ++i) {
-    const Vector6d d = eigen.eigenvectors().col(i);
-    if (eigen.eigenvalues()[i] < k_held * eigen.eigenvalues()[5])
+    const Vector6d d = eigen.vectors.col(i);
+    if (eigen.values[i] < k_held * eigen.values[5])
       free += k_free_m * k_free_m * d * d.transpose();
     else
-      inverse += d * d.transpose() / eigen.eigenvalues()[i];
+      inverse += d * d.transpose() / eigen.values[i];
   }
   return inverse * middle * inverse + free;
 }
@@ -279,11 +280,11 @@ std::vector<std::string> free_directions(const Fitted& fit, const Matrix6d& cova
   const Matrix6d information = information_of(fit.rows);
   double weights = 0;
   for (const Row& row : fit.rows) weights += row.weight;
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(information);
+  const EigenPairs6 eigen = eigen_pairs(information);
   std::vector<Vector6d> loose;
   for (int i = 0; i < 6; ++i) {
-    const Vector6d d = eigen.eigenvectors().col(i);
-    const double sensitivity = std::sqrt(std::max(0.0, eigen.eigenvalues()[i]) / weights);
+    const Vector6d d = eigen.vectors.col(i);
+    const double sensitivity = std::sqrt(std::max(0.0, eigen.values[i]) / weights);
     if (sensitivity < k_sensitive || std::sqrt(d.dot(covariance * d)) > k_loose_m) loose.push_back(d);
   }
   Eigen::MatrixXd space(6, static_cast<Eigen::Index>(loose.size()));
@@ -525,15 +526,13 @@ Result<Pose> pose_from_picks(const std::vector<Pick>& picks, double max_apart_m)
   }
   const Vector3d mean_a = a.rowwise().mean(), mean_b = b.rowwise().mean();
   const Eigen::Matrix3Xd da = a.colwise() - mean_a, db = b.colwise() - mean_b;
-  for (const Eigen::Matrix3Xd& d : {da, db}) {
-    const Eigen::Vector3d spread = Eigen::JacobiSVD<Eigen::Matrix3Xd>(d).singularValues();
-    if (!(spread[1] > 0.02 * spread[0]))
+  for (const Eigen::Matrix3d& scatter :
+       {Eigen::Matrix3d(da * da.transpose()), Eigen::Matrix3d(db * db.transpose())}) {
+    const Eigen::Vector3d squares = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues();
+    if (!(std::sqrt(std::max(0.0, squares[1])) > 0.02 * std::sqrt(squares[2])))
       return error("the picked points lie on one line: the turn about it is open. Pick a point beside it.");
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(db * da.transpose(), Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d flip = Eigen::Matrix3d::Identity();
-  flip(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  const Eigen::Matrix3d rotation = svd.matrixU() * flip * svd.matrixV().transpose();
+  const Eigen::Matrix3d rotation = nearest_rotation(db * da.transpose());
   const Pose pose(rotation, mean_b - rotation * mean_a);
   Eigen::Index worst = 0;
   const double apart = (b - ((rotation * a).colwise() + pose.translation)).colwise().norm().maxCoeff(&worst);
