@@ -14,6 +14,10 @@ namespace {
 constexpr double k_least_weight = 1e-6;
 // The reported branch changes when the other is this likely: odds that waver about even ones would flicker.
 constexpr double k_change_at = 0.9;
+// Odds between the branches change by at most e to this in one picture. Corner errors of a picture go
+// together (a patch of light, a covered side, a small marker's pattern) and are then rarer by the model than
+// in truth: one picture must not outweigh all before it.
+constexpr double k_most_evidence = 2;
 // Branches nearer than this are one: beyond, the planar ambiguity has two minima of their own.
 constexpr double k_same_branch = 0.02;
 // chi² by which a picture may miss the motion: the prior's six degrees of freedom exceed it never by noise
@@ -193,6 +197,12 @@ std::optional<std::vector<Branch>> advanced(const BodyMotion& known,
     if (!update || (!updates.empty() && are_one(*update, updates.front()))) continue;
     updates.push_back(std::move(*update));
     forecasts.push_back(at);
+  }
+  if (updates.size() == 2) {
+    const double before = std::log(forecasts[1].weight / forecasts[0].weight);
+    const double evidence = updates[1].log_weight - updates[0].log_weight - before;
+    updates[1].log_weight =
+        updates[0].log_weight + before + std::clamp(evidence, -k_most_evidence, k_most_evidence);
   }
   const bool suits = std::any_of(updates.begin(), updates.end(), [&](const Update& update) {
     return update.moving.chi_square < fits.front().chi_square + k_max_excess;

@@ -17,7 +17,6 @@ constexpr double k_sign = 0.7;   // display value of signs: bright ones could hi
 constexpr double k_gamma = 2.2;  // near enough to mix what fades
 const cv::Scalar k_background(40, 36, 34);  // of views: a dark room
 const cv::Scalar k_green(90, 220, 90), k_amber(40, 170, 255), k_red(60, 60, 255), k_blue(255, 190, 110);
-constexpr double k_waits_s = 1;    // a marker that lies still for so long may be paired
 constexpr double k_glide_s = 0.1;  // in which a guest's eye is followed to a third of its way
 constexpr const char* k_still_eye = "the scene's own";
 constexpr double k_other_waiting = 0.4;  // light of those that are not next, as a share
@@ -62,7 +61,7 @@ std::vector<LooseMarker> waiting_markers(const scene::Scene& scene,
     bool carries = false;
     for (std::size_t i = 0; i < scene.slots.size(); ++i)
       carries |= scene::carrier(scene, staging, i) == loose.marker;
-    if (!carries && seconds_between(loose.still_since, watched.captured_at) >= k_waits_s)
+    if (!carries && seconds_between(loose.still_since, watched.captured_at) >= k_lies_after_s)
       waiting.push_back(loose);
   }
   return waiting;

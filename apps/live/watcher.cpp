@@ -19,6 +19,7 @@ namespace {
 constexpr int k_known_after = 5;
 constexpr double k_forgotten_s = 2;
 constexpr double k_still_m = 0.003, k_still_rad = 3 * std::numbers::pi / 180;
+constexpr double k_lying_m = 0.01, k_lying_rad = 45 * std::numbers::pi / 180;
 constexpr double k_once_s = 0.4;  // two cameras that see one gesture within it
 // Every how many searches also look for markers that are partly covered, while all of the scene's are seen.
 constexpr int k_covered_every = 4;
@@ -174,8 +175,10 @@ void Watcher::follow_loose() {
     });
     if (loose == loose_.end() || track.sight == Sight::lost) continue;
     const Pose& now = track.world_from_body;
-    if (!loose->anchor || (now.translation - loose->anchor->translation).norm() > k_still_m ||
-        angle_between(now.rotation, loose->anchor->rotation) > k_still_rad) {
+    const bool lies = seconds_between(loose->still_since, watched_.captured_at) >= k_lies_after_s;
+    if (!loose->anchor ||
+        (now.translation - loose->anchor->translation).norm() > (lies ? k_lying_m : k_still_m) ||
+        angle_between(now.rotation, loose->anchor->rotation) > (lies ? k_lying_rad : k_still_rad)) {
       loose->anchor = now;
       loose->still_since = watched_.captured_at;
     }

@@ -21,11 +21,16 @@ struct ControlUse {
   int steps = 1;
 };
 
+/// A marker that lies still for so long may be paired.
+inline constexpr double k_lies_after_s = 1;
+
 /// A marker that carries nothing in the scene, seen for a while. Its body is scene::loose_body(marker).
 struct LooseMarker {
   MarkerName marker;
   Pose world_from_marker;
-  Stamp still_since;  ///< it has not been moved by 3 mm or 3 degrees since
+  /// It has not been moved by 3 mm or 3 degrees since; once it lies, by 10 mm or 45 degrees: what is offered
+  /// must not come and go with a small marker's noise in depth and tilt.
+  Stamp still_since;
 };
 
 /// What is known after a moment's pictures.

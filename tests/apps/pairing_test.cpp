@@ -18,6 +18,7 @@
 #include "sim/ray_scene.h"
 #include "sim/virtual_rig.h"
 #include "tests/support/matchers.h"
+#include "tests/tracker/marker_pictures.h"
 
 namespace limn::apps {
 namespace {
@@ -57,6 +58,35 @@ Eigen::Vector3d last_place(const fs::path& csv, const std::string& slot) {
     EXPECT_EQ(std::sscanf(line.c_str() + numbers, ",%lf,%lf,%lf", &mm.x(), &mm.y(), &mm.z()), 3) << line;
   }
   return mm;
+}
+
+// A small marker's depth and tilt waver by more than the 3 mm by which one that is laid down settles.
+TEST(Pairing, AMarkerThatLiesIsOfferedUntilItIsTakenAway) {
+  auto rng = test::test_rng();
+  const auto scene = scene::load_scene(fs::path(LIMN_SOURCE_DIR) / "config/scenes/door");
+  ASSERT_TRUE(scene) << scene.message();
+  Rig rig;
+  rig.cameras = {{"camera0", 640, 480, Lens::pinhole(600, 600, 319.5, 239.5), Pose{}}};
+  Watcher watcher = Watcher::create(*scene, rig).value();
+  const cv::Mat ground(480, 640, CV_8UC1, cv::Scalar(90));
+  const Pose laid(exp_rotation({0.3, 0.1, 0}), {0, 0, 0.6});
+  double now = 0;
+  const auto see = [&](const Eigen::Vector3d& beside) {
+    test::PlacedMarker marker{k_nine, laid};
+    marker.camera_from_marker.translation += beside;
+    marker.size_m = loose_size_m(*scene);
+    now += 1 / 30.0;
+    const cv::Mat picture = test::picture_of(rig.cameras[0].lens, ground, std::span(&marker, 1), {}, rng);
+    const Frame frame{"camera0", picture, shifted(Stamp{}, now)};
+    const Watched& watched = watcher.watch(std::span(&frame, 1));
+    return watched.loose.empty() ? now : seconds_between(Stamp{}, watched.loose[0].still_since);
+  };
+  double since = 0;
+  while (now < 2) since = see({0, 0, 0});
+  ASSERT_GE(now - since, k_lies_after_s);
+  for (int i = 0; i < 30; ++i) EXPECT_EQ(see({0, 0, i % 20 < 10 ? 0.006 : 0}), since) << now;
+  for (int i = 0; i < 10; ++i) see({0.03, 0, 0});
+  EXPECT_GT(see({0.03, 0, 0}), since);
 }
 
 TEST(Pairing, AMarkerThatLiesStillIsPairedAndStaysSo) {

@@ -291,6 +291,28 @@ TEST(BodyMotion, PassesOverAFalseMarkerButBelievesTwo) {
   EXPECT_TRUE(test::pose_near(predicted(known, at(now))[0].world_from_body, elsewhere, 1.5_deg, 3_mm));
 }
 
+// Corners that a patch of light drags all at once towards the other branch.
+TEST(BodyMotion, OnePictureDoesNotOutweighASecond) {
+  auto rng = test::test_rng();
+  const Imager camera = {"camera0", 1280, 960, Lens::pinhole(1200, 1200, 639.5, 479.5), Pose{}};
+  const Body body = body_of(1);
+  const Pose truth(exp_rotation({15_deg, 0, 0}), {0, 0, 2}),
+      mirrored(exp_rotation({-15_deg, 0, 0}), {0, 0, 2});
+  std::vector<BodyMotion> known;
+  double now = 0;
+  const auto see = [&](const Pose& pose) {
+    known = step(known, body, camera, detections_of(body, camera, pose, 0.02, rng), now += k_frame_s);
+    return is_flipped(predicted(known, at(now))[0].world_from_body, truth);
+  };
+  while (now < 1) see(truth);
+  EXPECT_FALSE(see(truth));
+  EXPECT_FALSE(see(mirrored));
+  EXPECT_FALSE(see(truth));
+  bool is_believed = false;
+  for (int i = 0; i < 20; ++i) is_believed = see(mirrored);
+  EXPECT_TRUE(is_believed);
+}
+
 TEST(BodyMotion, IgnoresStalePicturesAndUnknownBodies) {
   auto rng = test::test_rng();
   const Imager camera = camera_1080p();
