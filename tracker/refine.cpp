@@ -91,6 +91,7 @@ Belief belief_in_bow(const EdgeRefiner::EdgeLine& bent, double half) {
   const double plausible =
       std::clamp((k_no_bow_share - bow_share) / (k_no_bow_share - k_max_bow_share), 0.0, 1.0);
   constexpr double k_limit = k_bow_deviations * k_bow_deviations;
+  if (bent.curvature == 0) return {0, 0};  // exactly, as its covariance then is
   const double evidence = bent.curvature * bent.curvature / bent.covariance(2, 2);
   return {plausible * std::max(0.0, 1 - k_limit / evidence),
           plausible / (1 + std::exp(0.5 * (k_limit - evidence)))};

@@ -257,6 +257,23 @@ TEST(Detector, SaysHowSureItsCornersAreWithoutAnyBlur) {
   EXPECT_LT(r.rms_px, 0.02);
 }
 
+// Of sides that end where pixels do, no crossing errs: what is computed from residuals is 0 of 0.
+TEST(Detector, SaysHowSureItsCornersAreInAPerfectPicture) {
+  auto rng = test::test_rng();
+  const cv::Mat white(480, 640, CV_8UC1, cv::Scalar(210));
+  for (const double side : {24, 60, 200}) {
+    const PlacedMarker marker =
+        test::placed(pinhole_vga(), {"aruco_4x4_50", "7"}, {319.5, 239.5}, side, 0, 0, 0);
+    const auto found = Detector(families({"aruco_4x4_50"}))
+                           .detect(test::picture_of(pinhole_vga(), white, std::span(&marker, 1), {}, rng));
+    ASSERT_EQ(found.size(), 1u) << side;
+    for (const Eigen::Matrix2d& covariance : found[0].corner_covariance) {
+      EXPECT_TRUE(covariance.allFinite()) << side;
+      EXPECT_GT(covariance.determinant(), 0) << side;
+    }
+  }
+}
+
 TEST(Detector, SaysHowSureItsCornersAreInUnevenLight) {
   Sweep sweep{60, 120, 50_deg, {}};
   sweep.picture.blur_px = 0.7;
