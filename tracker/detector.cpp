@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <atomic>
-#include <opencv2/core/utility.hpp>
 #include <utility>
+
+#include "tracker/at_once.h"
 
 namespace limn::tracker {
 namespace {
@@ -118,20 +119,6 @@ bool is_inside(const Segment& segment, const Detection& detection) {
   return true;
 }
 
-// Calls work(i), i = 0 ... count - 1, at once where there are threads.
-template <typename Work>
-void at_once(int count, int threads, const Work& work) {
-  if (threads == 1 || count == 1)
-    for (int i = 0; i < count; ++i) work(i);
-  else
-    cv::parallel_for_(
-        cv::Range(0, count),
-        [&](const cv::Range& range) {
-          for (int i = range.start; i < range.end; ++i) work(i);
-        },
-        count);
-}
-
 }  // namespace
 
 Detector::Detector(Families families, DetectorOptions options)
@@ -214,10 +201,8 @@ std::optional<Detection> Detector::found_again(const cv::Mat& grey, const Lens* 
 }
 
 void Detector::find_candidates(const cv::Mat& grey, bool with_segments) {
-  const auto find_quads = [&] {
-    threshold_.apply(grey, {options_.min_contrast}, corner_codes_);
-    finder_.find(corner_codes_, {options_.min_side_px}, quads_);
-  };
+  threshold_.apply(grey, {options_.min_contrast}, corner_codes_, options_.threads);
+  const auto find_quads = [&] { finder_.find(corner_codes_, {options_.min_side_px}, quads_); };
   const auto find_segments = [&] { segment_finder_.find(grey, options_.min_contrast, segments_); };
   at_once(with_segments ? 2 : 1, options_.threads, [&](int i) { i == 0 ? find_quads() : find_segments(); });
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "tracker/at_once.h"
 #include "tracker/simd.h"
 
 namespace limn::tracker {
@@ -61,54 +62,68 @@ LIMN_SIMD void middle_levels(const std::uint8_t* low,
 
 }  // namespace
 
-void Threshold::apply(const cv::Mat& grey, const ThresholdOptions& options, CornerCodes& corners) {
-  measure_tiles(grey);
-  widen_tiles();
-  for (int reach = 1; reach < options.reach; ++reach) {
-    join_rows();
-    widen_tiles();
-  }
-  compare(grey, options, corners);
-}
-
-// A tile at the right or lower end also takes the pixels that are too few for one of their own.
-void Threshold::measure_tiles(const cv::Mat& grey) {
+void Threshold::apply(const cv::Mat& grey,
+                      const ThresholdOptions& options,
+                      CornerCodes& corners,
+                      int threads) {
   tiles_x_ = std::max(1, grey.cols / k_tile);
   tiles_y_ = std::max(1, grey.rows / k_tile);
   const auto count = static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_);
-  darkest_.resize(count);
-  brightest_.resize(count);
+  for (auto* tiles : {&darkest_, &brightest_, &wide_darkest_, &wide_brightest_}) tiles->resize(count);
+  corners.width = grey.cols;
+  corners.height = grey.rows;
+  corners.stride = (grey.cols + 1 + 7) / 8 * 8 + 8;  // words of 8 may be read from every corner
+  corners.codes.resize(static_cast<std::size_t>(corners.stride) * static_cast<std::size_t>(grey.rows + 1));
+  rows_.resize(static_cast<std::size_t>(threads));
+  at_once(threads, threads, [&](int i) {
+    Rows& rows = rows_[static_cast<std::size_t>(i)];
+    rows.first = tiles_y_ * i / threads;
+    rows.last = tiles_y_ * (i + 1) / threads;
+    measure_tiles(grey, rows);
+    widen_tiles(rows.first, rows.last);
+  });
+  for (int reach = 1; reach < options.reach; ++reach) {
+    join_rows();
+    widen_tiles(0, tiles_y_);
+  }
+  at_once(threads, threads,
+          [&](int i) { compare(grey, options, rows_[static_cast<std::size_t>(i)], corners); });
+}
+
+// A tile at the right or lower end also takes the pixels that are too few for one of their own.
+void Threshold::measure_tiles(const cv::Mat& grey, Rows& rows) {
   const auto width = static_cast<std::size_t>(grey.cols);
-  for (int tile_y = 0; tile_y < tiles_y_; ++tile_y) {
+  for (int tile_y = rows.first; tile_y < rows.last; ++tile_y) {
     const int first = tile_y * k_tile;
     const int last = tile_y + 1 == tiles_y_ ? grey.rows : first + k_tile;
-    row_low_.assign(grey.ptr(first), grey.ptr(first) + width);
-    row_high_ = row_low_;
+    rows.low.assign(grey.ptr(first), grey.ptr(first) + width);
+    rows.high = rows.low;
     for (int y = first + 1; y < last; ++y) {
-      lowest(grey.ptr(y), row_low_.data(), grey.cols);
-      highest(grey.ptr(y), row_high_.data(), grey.cols);
+      lowest(grey.ptr(y), rows.low.data(), grey.cols);
+      highest(grey.ptr(y), rows.high.data(), grey.cols);
     }
     std::uint8_t* dark = &darkest_[index(0, tile_y, tiles_x_)];
     std::uint8_t* bright = &brightest_[index(0, tile_y, tiles_x_)];
     const int full = grey.cols >= k_tile ? tiles_x_ : 0;
-    join_fours(row_low_.data(), row_high_.data(), full, dark, bright);
+    join_fours(rows.low.data(), rows.high.data(), full, dark, bright);
     if (full == 0) {
-      dark[0] = row_low_[0];
-      bright[0] = row_high_[0];
+      dark[0] = rows.low[0];
+      bright[0] = rows.high[0];
     }
     for (std::size_t x = static_cast<std::size_t>(full * k_tile); x < width; ++x) {
-      dark[tiles_x_ - 1] = std::min(dark[tiles_x_ - 1], row_low_[x]);
-      bright[tiles_x_ - 1] = std::max(bright[tiles_x_ - 1], row_high_[x]);
+      dark[tiles_x_ - 1] = std::min(dark[tiles_x_ - 1], rows.low[x]);
+      bright[tiles_x_ - 1] = std::max(bright[tiles_x_ - 1], rows.high[x]);
     }
   }
 }
 
-// Each tile's extremes over itself and its left and right neighbours; compare() joins three such rows.
-void Threshold::widen_tiles() {
-  wide_darkest_ = darkest_;
-  wide_brightest_ = brightest_;
-  for (int y = 0; y < tiles_y_; ++y) {
+// Each tile's extremes over itself and its left and right neighbours; set_limits() joins three such rows.
+void Threshold::widen_tiles(int first, int last) {
+  for (int y = first; y < last; ++y) {
     const std::size_t row = index(0, y, tiles_x_);
+    const auto tiles = static_cast<std::size_t>(tiles_x_);
+    std::copy_n(&darkest_[row], tiles, &wide_darkest_[row]);
+    std::copy_n(&brightest_[row], tiles, &wide_brightest_[row]);
     lowest(&darkest_[row], wide_darkest_.data() + row + 1, tiles_x_ - 1);
     lowest(darkest_.data() + row + 1, &wide_darkest_[row], tiles_x_ - 1);
     highest(&brightest_[row], wide_brightest_.data() + row + 1, tiles_x_ - 1);
@@ -128,41 +143,53 @@ void Threshold::join_rows() {
     }
 }
 
-void Threshold::compare(const cv::Mat& grey, const ThresholdOptions& options, CornerCodes& corners) {
-  corners.width = grey.cols;
-  corners.height = grey.rows;
-  corners.stride = (grey.cols + 1 + 7) / 8 * 8 + 8;  // words of 8 may be read from every corner
-  corners.codes.resize(static_cast<std::size_t>(corners.stride) * static_cast<std::size_t>(grey.rows + 1));
-  const int beside = grey.cols + 1;
-  for (int y = 0; y <= grey.rows; ++y)
-    std::fill(corners.at(beside, y), corners.at(0, y) + corners.stride, std::uint8_t{0});
+// The limits of the pixels in a row of tiles.
+void Threshold::set_limits(int tile_y, const ThresholdOptions& options, Rows& rows) const {
+  const auto tiles = static_cast<std::size_t>(tiles_x_);
+  const std::size_t row = index(0, tile_y, tiles_x_);
+  rows.low.assign(&wide_darkest_[row], &wide_darkest_[row] + tiles);
+  rows.high.assign(&wide_brightest_[row], &wide_brightest_[row] + tiles);
+  for (const int neighbour : {tile_y - 1, tile_y + 1}) {
+    if (neighbour < 0 || neighbour >= tiles_y_) continue;
+    lowest(&wide_darkest_[index(0, neighbour, tiles_x_)], rows.low.data(), tiles_x_);
+    highest(&wide_brightest_[index(0, neighbour, tiles_x_)], rows.high.data(), tiles_x_);
+  }
+  middle_levels(rows.low.data(), rows.high.data(), tiles_x_, options, rows.middle.data());
+  for (std::size_t t = 0; t < tiles; ++t) std::memset(&rows.limit[t * k_tile], rows.middle[t], k_tile);
+  for (std::size_t x = tiles * k_tile; x < rows.limit.size(); ++x)
+    rows.limit[x] = rows.limit[tiles * k_tile - 1];
+}
+
+void Threshold::compare(const cv::Mat& grey,
+                        const ThresholdOptions& options,
+                        Rows& rows,
+                        CornerCodes& corners) const {
   const auto width = static_cast<std::size_t>(grey.cols);
   const auto tiles = static_cast<std::size_t>(tiles_x_);
-  above_.assign(width + 2, 0);
-  here_.assign(width + 2, 0);
-  limit_.resize(std::max(width, tiles * k_tile));
-  middle_.resize(tiles);
-  for (int tile_y = 0; tile_y < tiles_y_; ++tile_y) {
-    const std::size_t row = index(0, tile_y, tiles_x_);
-    row_low_.assign(&wide_darkest_[row], &wide_darkest_[row] + tiles);
-    row_high_.assign(&wide_brightest_[row], &wide_brightest_[row] + tiles);
-    for (const int neighbour : {tile_y - 1, tile_y + 1}) {
-      if (neighbour < 0 || neighbour >= tiles_y_) continue;
-      lowest(&wide_darkest_[index(0, neighbour, tiles_x_)], row_low_.data(), tiles_x_);
-      highest(&wide_brightest_[index(0, neighbour, tiles_x_)], row_high_.data(), tiles_x_);
-    }
-    middle_levels(row_low_.data(), row_high_.data(), tiles_x_, options, middle_.data());
-    for (std::size_t t = 0; t < tiles; ++t) std::memset(&limit_[t * k_tile], middle_[t], k_tile);
-    for (std::size_t x = tiles * k_tile; x < limit_.size(); ++x) limit_[x] = limit_[tiles * k_tile - 1];
+  rows.above.assign(width + 2, 0);
+  rows.here.assign(width + 2, 0);
+  rows.limit.resize(std::max(width, tiles * k_tile));
+  rows.middle.resize(tiles);
+  const auto write = [&](int y) {
+    corner_row(rows.above.data(), rows.here.data(), grey.cols + 1, corners.at(0, y));
+    std::fill(corners.at(grey.cols + 1, y), corners.at(0, y) + corners.stride, std::uint8_t{0});
+  };
+  if (rows.first > 0 && rows.first < rows.last) {
+    set_limits(rows.first - 1, options, rows);
+    darker(grey.ptr(rows.first * k_tile - 1), rows.limit.data(), grey.cols, rows.above.data() + 1);
+  }
+  for (int tile_y = rows.first; tile_y < rows.last; ++tile_y) {
+    set_limits(tile_y, options, rows);
     const int last = tile_y + 1 == tiles_y_ ? grey.rows : (tile_y + 1) * k_tile;
     for (int y = tile_y * k_tile; y < last; ++y) {
-      darker(grey.ptr(y), limit_.data(), grey.cols, here_.data() + 1);
-      corner_row(above_.data(), here_.data(), grey.cols + 1, corners.at(0, y));
-      std::swap(above_, here_);
+      darker(grey.ptr(y), rows.limit.data(), grey.cols, rows.here.data() + 1);
+      write(y);
+      std::swap(rows.above, rows.here);
     }
   }
-  std::fill(here_.begin(), here_.end(), std::uint8_t{0});
-  corner_row(above_.data(), here_.data(), grey.cols + 1, corners.at(0, grey.rows));
+  if (rows.first == rows.last || rows.last != tiles_y_) return;
+  std::fill(rows.here.begin(), rows.here.end(), std::uint8_t{0});
+  write(grey.rows);
 }
 
 }  // namespace limn::tracker

@@ -37,21 +37,27 @@ struct ThresholdOptions {
 /// between calls.
 class Threshold {
  public:
-  /// `grey` is 8-bit, one channel, not empty.
-  void apply(const cv::Mat& grey, const ThresholdOptions& options, CornerCodes& corners);
+  /// `grey` is 8-bit, one channel, not empty. The result is the same with any number of threads.
+  void apply(const cv::Mat& grey, const ThresholdOptions& options, CornerCodes& corners, int threads = 1);
 
  private:
+  // What a thread writes on the way through its rows of tiles.
+  struct Rows {
+    int first = 0, last = 0;
+    std::vector<std::uint8_t> low, high, middle, limit;
+    std::vector<std::uint8_t> above, here;  // black pixels of two rows, from column -1
+  };
   int tiles_x_ = 0;
   int tiles_y_ = 0;
   std::vector<std::uint8_t> darkest_, brightest_;            // per tile
   std::vector<std::uint8_t> wide_darkest_, wide_brightest_;  // per tile, of a row of three
-  std::vector<std::uint8_t> row_low_, row_high_, middle_, limit_;
-  std::vector<std::uint8_t> above_, here_;  // black pixels of two rows, from column -1
+  std::vector<Rows> rows_;                                   // one a thread
 
-  void measure_tiles(const cv::Mat& grey);
-  void widen_tiles();
+  void measure_tiles(const cv::Mat& grey, Rows& rows);
+  void widen_tiles(int first, int last);
   void join_rows();
-  void compare(const cv::Mat& grey, const ThresholdOptions& options, CornerCodes& corners);
+  void set_limits(int tile_y, const ThresholdOptions& options, Rows& rows) const;
+  void compare(const cv::Mat& grey, const ThresholdOptions& options, Rows& rows, CornerCodes& corners) const;
 };
 
 }  // namespace limn::tracker

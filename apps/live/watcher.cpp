@@ -18,7 +18,7 @@ namespace {
 // Loose markers: a body from the fifth picture on, forgotten after two seconds.
 constexpr int k_known_after = 5;
 constexpr double k_forgotten_s = 2;
-constexpr double k_still_m = 0.003, k_still_rad = 3 * std::numbers::pi / 180;
+constexpr double k_still_m = 0.005, k_still_rad = 5 * std::numbers::pi / 180;
 constexpr double k_lying_m = 0.01, k_lying_rad = 45 * std::numbers::pi / 180;
 constexpr double k_once_s = 0.4;  // two cameras that see one gesture within it
 // Every how many searches also look for markers that are partly covered, while all of the scene's are seen.

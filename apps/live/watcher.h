@@ -28,7 +28,7 @@ inline constexpr double k_lies_after_s = 1;
 struct LooseMarker {
   MarkerName marker;
   Pose world_from_marker;
-  /// It has not been moved by 3 mm or 3 degrees since; once it lies, by 10 mm or 45 degrees: what is offered
+  /// It has not been moved by 5 mm or 5 degrees since; once it lies, by 10 mm or 45 degrees: what is offered
   /// must not come and go with a small marker's noise in depth and tilt.
   Stamp still_since;
 };

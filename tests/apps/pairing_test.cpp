@@ -60,7 +60,7 @@ Eigen::Vector3d last_place(const fs::path& csv, const std::string& slot) {
   return mm;
 }
 
-// A small marker's depth and tilt waver by more than the 3 mm by which one that is laid down settles.
+// A small marker's depth and tilt waver by more than the 5 mm by which one that is laid down settles.
 TEST(Pairing, AMarkerThatLiesIsOfferedUntilItIsTakenAway) {
   auto rng = test::test_rng();
   const auto scene = scene::load_scene(fs::path(LIMN_SOURCE_DIR) / "config/scenes/door");
@@ -84,7 +84,7 @@ TEST(Pairing, AMarkerThatLiesIsOfferedUntilItIsTakenAway) {
   double since = 0;
   while (now < 2) since = see({0, 0, 0});
   ASSERT_GE(now - since, k_lies_after_s);
-  for (int i = 0; i < 30; ++i) EXPECT_EQ(see({0, 0, i % 20 < 10 ? 0.006 : 0}), since) << now;
+  for (int i = 0; i < 30; ++i) EXPECT_EQ(see({0, 0, i % 20 < 10 ? 0.007 : 0}), since) << now;
   for (int i = 0; i < 10; ++i) see({0.03, 0, 0});
   EXPECT_GT(see({0.03, 0, 0}), since);
 }
