@@ -12,9 +12,9 @@
 namespace limn::apps {
 namespace {
 
-constexpr int k_embedded_width = 640;
+constexpr int k_shown_width = 640;
 
-constexpr const char* k_style = R"(
+constexpr const char* k_check_style = R"(
 :root { color-scheme: light dark; --ground: #fbfaf8; --text: #1d1f23; --faint: #6b6862; --line: #dddad3;
         --good: #17683c; --bad: #b3261e; }
 @media (prefers-color-scheme: dark) { :root { --ground: #14161a; --text: #e8e6e1; --faint: #a9a69f;
@@ -33,14 +33,6 @@ a { color: inherit; }
 figure { margin: 0; } img { width: 100%; display: block; border-radius: 4px; background: #000; }
 figcaption { color: var(--faint); font-size: .9rem; }
 )";
-
-cv::Mat scaled_for_page(const cv::Mat& picture) {
-  if (picture.cols <= k_embedded_width) return picture;
-  cv::Mat scaled;
-  cv::resize(picture, scaled, {k_embedded_width, picture.rows * k_embedded_width / picture.cols}, 0, 0,
-             cv::INTER_AREA);
-  return scaled;
-}
 
 struct Row {
   const CheckResult* result;
@@ -94,7 +86,7 @@ std::string pictures_html(const CheckResult& result) {
     for (const auto& [what, pixels] : three) {
       html += fmt::format(
           "<figure><img loading=\"lazy\" alt=\"{0}\" src=\"{1}\"><figcaption>{0}</figcaption></figure>\n",
-          what, data_uri(scaled_for_page(*pixels)));
+          what, data_uri(at_most_wide(*pixels, k_shown_width)));
     }
     html += fmt::format("</div><p class=\"lead\">{}</p>\n", escaped(picture.caption));
   }
@@ -114,7 +106,7 @@ Status write_check_page(std::span<const CheckResult> results,
       "<p class=\"lead\">What the renderer drew ({}), judged by a ray tracer that shares no code with it. "
       "The most "
       "strained limit comes first.</p>\n",
-      k_style,
+      k_check_style,
       failed == 0 ? fmt::format("all {} passed", results.size())
                   : fmt::format("{} of {} failed", failed, results.size()),
       escaped(renderer));

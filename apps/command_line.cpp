@@ -123,7 +123,7 @@ void add_bench(CLI::App& app, Run& run) {
       "tracker: generated frames with exact truth; libapriltag and OpenCV aruco on the same frames.\n"
       "Example: limn bench tracker --frames 4 --detail");
   auto options = std::make_shared<BenchOptions>();
-  command->add_option("name", options->name, "tracker, projector, calib, live, remote or tablet; what follows it goes to the bench")->required();
+  command->add_option("name", options->name, "tracker, id, calib, solve, projector, live, remote or tablet; what follows it goes to the bench")->required();
   command->prefix_command();
   command->callback([command, options, &run] {
     options->arguments = command->remaining();

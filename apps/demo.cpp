@@ -10,8 +10,8 @@
 #include <thread>
 
 #include "apps/capture.h"
-#include "apps/judge.h"
 #include "apps/demo_page.h"
+#include "apps/judge.h"
 #include "apps/solve.h"
 #include "apps/world_markers.h"
 #include "core/file.h"
@@ -32,8 +32,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int k_dot_count = 2500;
-constexpr std::uint64_t k_dot_seed = 20261121;
+constexpr int k_judged_points = 2500;
+constexpr std::uint64_t k_judged_seed = 20261121;
 constexpr int k_viewer_width = 1280, k_viewer_height = 960;
 constexpr double k_viewer_fov_deg = 40;
 
@@ -176,7 +176,7 @@ struct JudgedDots {
 
 // The calibrated rig's light against the truth, with the door where the tracker says it is.
 Result<JudgedDots> judged(const Session& session, const sim::World& world, const Moment& moment) {
-  const AimedDots dots = aimed_dots(world, k_dot_count, k_dot_seed);
+  const AimedDots dots = aimed_dots(world, k_judged_points, k_judged_seed);
   LIMN_TRY(projector::Renderer renderer, dots_renderer(session, dots));
   const Pose& world_from_prototype = *moment.posed.world_from_prototype;
   const scene::PosedScene posed{world_from_prototype, {{"dots", "dots", world_from_prototype}}};

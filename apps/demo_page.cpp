@@ -14,7 +14,7 @@ namespace {
 
 constexpr int k_embedded_width = 1280;
 
-constexpr const char* k_style = R"(
+constexpr const char* k_demo_style = R"(
 :root { color-scheme: dark; }
 body { margin: 0 auto; max-width: 1320px; padding: 2rem 1.5rem 4rem; background: #14161a; color: #e8e6e1;
        font: 16px/1.5 system-ui, sans-serif; }
@@ -26,14 +26,6 @@ td.value { font-variant-numeric: tabular-nums; text-align: right; } .good { colo
 figure { margin: 0; } img { width: 100%; display: block; border-radius: 4px; background: #000; }
 figcaption { margin-top: .5rem; color: #a9a69f; } figcaption b { color: #e8e6e1; }
 )";
-
-cv::Mat scaled_for_page(const cv::Mat& picture) {
-  if (picture.cols <= k_embedded_width) return picture;
-  cv::Mat scaled;
-  const int height = picture.rows * k_embedded_width / picture.cols;
-  cv::resize(picture, scaled, cv::Size(k_embedded_width, height), 0, 0, cv::INTER_AREA);
-  return scaled;
-}
 
 std::string rows_html(const std::vector<DemoRow>& rows) {
   std::string html = "<table><tr><th>measured</th><th>value</th><th>asked for</th></tr>\n";
@@ -52,12 +44,12 @@ Status write_demo_page(const DemoPage& page, const std::filesystem::path& path) 
       "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" "
       "content=\"width=device-width\"><title>Limn demo</title>\n<style>{}</style>\n<h1>Limn</h1>\n<p "
       "class=\"lead\">{}</p>\n",
-      k_style, escaped(page.headline));
+      k_demo_style, escaped(page.headline));
   html += rows_html(page.rows) + "<div class=\"pictures\">\n";
   for (const DemoPicture& picture : page.pictures) {
     html +=
         fmt::format("<figure><img alt=\"{}\" src=\"{}\"><figcaption><b>{}.</b> {}</figcaption></figure>\n",
-                    escaped(picture.title), data_uri(scaled_for_page(picture.picture)),
+                    escaped(picture.title), data_uri(at_most_wide(picture.picture, k_embedded_width)),
                     escaped(picture.title), escaped(picture.caption));
   }
   return write_file(path, html + "</div></html>\n");

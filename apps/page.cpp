@@ -1,5 +1,7 @@
 #include "apps/page.h"
 
+#include <opencv2/imgproc.hpp>
+
 namespace limn::apps {
 
 std::string escaped(const std::string& text) {
@@ -15,6 +17,13 @@ std::string escaped(const std::string& text) {
       html += c;
   }
   return html;
+}
+
+cv::Mat at_most_wide(const cv::Mat& picture, int width) {
+  if (picture.cols <= width) return picture;
+  cv::Mat scaled;
+  cv::resize(picture, scaled, {width, picture.rows * width / picture.cols}, 0, 0, cv::INTER_AREA);
+  return scaled;
 }
 
 }  // namespace limn::apps

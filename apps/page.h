@@ -1,10 +1,14 @@
 #pragma once
 
+#include <opencv2/core/mat.hpp>
 #include <string>
 
 namespace limn::apps {
 
 /// Text as HTML shows it.
 std::string escaped(const std::string& text);
+
+/// The picture, made smaller where it is wider than `width` pixels.
+cv::Mat at_most_wide(const cv::Mat& picture, int width);
 
 }  // namespace limn::apps

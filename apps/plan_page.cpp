@@ -17,7 +17,7 @@ using Eigen::Vector3d;
 constexpr double k_margin_m = 0.35, k_tick_m = 0.5;
 constexpr double k_view_px = 620;  // of the longer side of a drawing
 
-constexpr const char* k_style = R"(
+constexpr const char* k_plan_style = R"(
 :root { color-scheme: light dark; --ground: #fbfaf8; --text: #1d1f23; --faint: #6b6862; --line: #dddad3;
         --camera: #1f66b1; --projector: #b36b00; --good: #17683c; --doubt: #8a5a00; --bad: #b3261e; }
 @media (prefers-color-scheme: dark) { :root { --ground: #14161a; --text: #e8e6e1; --faint: #a9a69f; --line: #2b2f36;
@@ -146,7 +146,7 @@ std::string plan_page(const Described& described, const Foreseen& foreseen) {
       "<p class=\"lead\">Foreseen by playing its calibration with the noise of real pictures. Room light, "
       "defocus and "
       "a board that bends are not in it.</p>\n",
-      k_style);
+      k_plan_style);
   for (std::size_t i = 0; i < foreseen.error_mm.size(); ++i) {
     const double mm = foreseen.error_mm[i];
     const char* worth = mm <= calib::k_good_mm ? "good" : mm <= calib::k_usable_mm ? "doubt" : "bad";

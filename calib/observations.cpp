@@ -29,11 +29,11 @@ constexpr int k_cells = 2;          // to a square's side, as interfaces.md's he
 constexpr double k_inset_px = 2;    // from a square's edge: pixels across it see the light of one side only
 constexpr double k_inset = 0.06;    // of a square, likewise
 constexpr int k_least_pixels = 12;  // in a cell: three times a plane's unknowns and some
-constexpr double k_least_share =
+constexpr double k_least_of_cell =
     0.5;  // of a cell's bright pixels with a label; fewer are a chance selection, and biased
 constexpr double k_outlier_px = 3;  // from the cell's plane
 constexpr double k_bright = 0.75;   // of the cell's bright pixels; halfway between ink and paper is 0.5
-constexpr double k_stddev_floor_px = 0.02;
+constexpr double k_least_stddev_px = 0.02;
 
 // Pixel of every grid point (column, row of squares' corners, rim included) that corners nearby tell.
 class Grid {
@@ -119,7 +119,7 @@ struct Cell {
       if (least_levels[static_cast<size_t>(labelled_at[i])] >= limit) pixels[kept++] = pixels[i];
     }
     pixels.resize(kept);
-    return static_cast<double>(kept) >= k_least_share * static_cast<double>(all);
+    return static_cast<double>(kept) >= k_least_of_cell * static_cast<double>(all);
   }
 };
 
@@ -153,7 +153,7 @@ std::optional<Match> fitted(std::vector<Labelled> pixels) {
     match.px_camera = mean;
     match.px_projector = mean_label;
     match.pixels = static_cast<int>(before);
-    match.stddev_px = std::hypot(std::sqrt(squared / static_cast<double>(before)), k_stddev_floor_px);
+    match.stddev_px = std::hypot(std::sqrt(squared / static_cast<double>(before)), k_least_stddev_px);
     return match;
   }
   return std::nullopt;

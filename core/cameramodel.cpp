@@ -26,8 +26,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr unsigned k_max_side = 16384;  // pixels; the largest picture side that GL 4.5 must hold
-
 struct FreeModel {
   void operator()(mrcal_cameramodel_t* model) const { std::free(model); }
 };

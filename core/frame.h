@@ -9,6 +9,8 @@ namespace limn {
 /// A moment on the session's monotonic clock; which moment, the variable's name says (`captured_at`).
 using Stamp = std::chrono::time_point<std::chrono::steady_clock, std::chrono::nanoseconds>;
 
+/// This moment.
+inline Stamp now() { return std::chrono::time_point_cast<Stamp::duration>(Stamp::clock::now()); }
 /// Seconds from `from` to `to`.
 inline double seconds_between(Stamp from, Stamp to) {
   return std::chrono::duration<double>(to - from).count();

@@ -9,6 +9,9 @@
 
 namespace limn {
 
+/// Pixels: no picture's side is longer; the largest that GL 4.5 must hold.
+inline constexpr int k_max_side = 16384;
+
 /// A half-line: origin (m) and unit direction.
 struct Ray {
   Eigen::Vector3d p_origin = Eigen::Vector3d::Zero();

@@ -16,8 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int k_max_side = 16384;  // pixels; the largest picture side that GL 4.5 must hold
-
 // ---- OpenCV ----
 
 using Names = std::initializer_list<const char*>;

@@ -14,7 +14,7 @@ namespace limn {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
 constexpr double k_map_unit = 1.0 / 4096;  // of a map's level: half the noise of what 8-bit pictures can tell
 constexpr std::uint16_t k_no_value = 65535;
@@ -112,20 +112,22 @@ Result<cv::Mat> load_map(const fs::path& path, double unit, int width, int heigh
 // Seven digits: more would be noise, and other compilers' last digits.
 double rounded(double value) { return std::round(value * 1e7) / 1e7; }
 
-Json rounded(const std::vector<double>& values) {
-  Json list = Json::array();
+OrderedJson rounded(const std::vector<double>& values) {
+  OrderedJson list = OrderedJson::array();
   for (const double value : values) list.push_back(rounded(value));
   return list;
 }
 
-Json json_of(const std::optional<double>& value) { return value ? Json(rounded(*value)) : Json(); }
+OrderedJson json_of(const std::optional<double>& value) {
+  return value ? OrderedJson(rounded(*value)) : OrderedJson();
+}
 
-Json json_of(const std::optional<Measured>& measured) {
+OrderedJson json_of(const std::optional<Measured>& measured) {
   if (!measured) return {};
   return {{"value", rounded(measured->value)}, {"stddev", rounded(measured->stddev)}};
 }
 
-Json json_of(const std::optional<Vignetting>& vignetting) {
+OrderedJson json_of(const std::optional<Vignetting>& vignetting) {
   if (!vignetting) return {};
   return {{"tilt", {rounded(vignetting->tilt.x()), rounded(vignetting->tilt.y())}},
           {"r2", rounded(vignetting->r2)},
@@ -133,7 +135,7 @@ Json json_of(const std::optional<Vignetting>& vignetting) {
           {"corner_stddev", rounded(vignetting->corner_stddev)}};
 }
 
-Json json_of(const Response& response) {
+OrderedJson json_of(const Response& response) {
   return {{"name", response.projector},
           {"red", rounded(response.red)},
           {"green", rounded(response.green)},
@@ -146,7 +148,7 @@ Json json_of(const Response& response) {
           {"captures", response.captures}};
 }
 
-Json json_of(const CameraResponse& response) {
+OrderedJson json_of(const CameraResponse& response) {
   return {{"name", response.camera},
           {"encoding", response.encoding},
           {"gamma", rounded(response.gamma)},
@@ -168,11 +170,11 @@ std::string map_file(const ColourMixing& mixing, const char* map) {
   return fmt::format("response/{}-{}-{}.png", mixing.projector, mixing.camera, map);
 }
 
-Json json_of(const ColourMixing& mixing) {
-  Json json = {{"projector", mixing.projector},
-               {"camera", mixing.camera},
-               {"size", {mixing.offset.cols, mixing.offset.rows}},
-               {"unit", k_map_unit}};
+OrderedJson json_of(const ColourMixing& mixing) {
+  OrderedJson json = {{"projector", mixing.projector},
+                      {"camera", mixing.camera},
+                      {"size", {mixing.offset.cols, mixing.offset.rows}},
+                      {"unit", k_map_unit}};
   for (const auto& [name, map] : maps_of(mixing)) json[name] = map_file(mixing, name);
   json["held_out_levels"] = rounded(mixing.held_out_levels);
   return json;
@@ -214,10 +216,10 @@ Result<Responses> load_responses(const fs::path& response_json) {
 Status save_responses(const Responses& responses,
                       const std::vector<ColourMixing>& mixings,
                       const fs::path& folder) {
-  Json json = {{"schema", "limn.response/1"},
-               {"projectors", Json::array()},
-               {"cameras", Json::array()},
-               {"mixing", Json::array()}};
+  OrderedJson json = {{"schema", "limn.response/1"},
+                      {"projectors", OrderedJson::array()},
+                      {"cameras", OrderedJson::array()},
+                      {"mixing", OrderedJson::array()}};
   for (const Response& response : responses.projectors) json["projectors"].push_back(json_of(response));
   for (const CameraResponse& response : responses.cameras) json["cameras"].push_back(json_of(response));
   LIMN_TRY_STATUS(make_folder(mixings.empty() ? folder : folder / "response"));

@@ -11,9 +11,7 @@ namespace limn {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
-
-constexpr int k_max_side = 16384;  // pixels; the largest picture side that GL 4.5 must hold
+using OrderedJson = nlohmann::ordered_json;
 
 Imager read_imager(const ConfigNode& node, bool is_projector) {
   if (is_projector)
@@ -114,7 +112,7 @@ Result<Rig> load_cameramodels(const fs::path& folder) {
   return rig;
 }
 
-Json json_of(const Imager& imager) {
+OrderedJson json_of(const Imager& imager) {
   return {{"name", imager.name},
           {"size", {imager.width, imager.height}},
           {"lens", {{"model", imager.lens.model.name()}, {"values", imager.lens.values}}},
@@ -144,7 +142,8 @@ Result<Rig> load_rig(const fs::path& path) {
 
 Status save_rig(const Rig& rig, const fs::path& folder) {
   LIMN_TRY_STATUS(make_folder(folder));
-  Json json = {{"schema", "limn.rig/1"}, {"cameras", Json::array()}, {"projectors", Json::array()}};
+  OrderedJson json = {
+      {"schema", "limn.rig/1"}, {"cameras", OrderedJson::array()}, {"projectors", OrderedJson::array()}};
   for (const Imager& camera : rig.cameras) json["cameras"].push_back(json_of(camera));
   for (const Imager& projector : rig.projectors) {
     json["projectors"].push_back(json_of(projector));
@@ -153,8 +152,8 @@ Status save_rig(const Rig& rig, const fs::path& folder) {
         json["projectors"].back()["focus"] = {{"distance_m", focus.distance_m},
                                               {"aperture_m", focus.aperture_m}};
   }
-  if (!rig.covariance_json.empty()) json["covariance"] = Json::parse(rig.covariance_json);
-  if (!rig.provenance_json.empty()) json["provenance"] = Json::parse(rig.provenance_json);
+  if (!rig.covariance_json.empty()) json["covariance"] = OrderedJson::parse(rig.covariance_json);
+  if (!rig.provenance_json.empty()) json["provenance"] = OrderedJson::parse(rig.provenance_json);
   for (const auto* imagers : {&rig.cameras, &rig.projectors}) {
     for (const Imager& imager : *imagers) {
       LIMN_TRY_STATUS(save_cameramodel(imager, folder / (imager.name + ".cameramodel")));

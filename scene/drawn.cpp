@@ -20,7 +20,7 @@ constexpr double k_margin = 1.12;  // of the surface's radius around it
 constexpr double k_behind = 0.35;  // brightness of a back side
 const cv::Scalar k_background_bgr(46, 42, 40);
 
-struct Corner {
+struct Projected {
   Vector2d px = Vector2d::Zero();
   double inverse_depth = 0;
   Vector3d colour_bgr = Vector3d::Zero();  // lit
@@ -40,11 +40,11 @@ Vector3d lit_colour(const Surface& surface,
   return colour * (0.25 + 0.75 * light) * (behind ? k_behind : 1);
 }
 
-std::vector<Corner> corners_of(const Surface& surface, const Imager& viewer) {
+std::vector<Projected> corners_of(const Surface& surface, const Imager& viewer) {
   const Pose world_from_viewer = viewer.imager_from_world.inverse();
   const Vector3d d_light =
       (world_from_viewer.rotation * Vector3d(-0.45, -0.6, -1)).normalized();  // over the left shoulder
-  std::vector<Corner> corners(surface.positions.size());
+  std::vector<Projected> corners(surface.positions.size());
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const Vector3d p = surface.positions[i].cast<double>();
     const double depth = (viewer.imager_from_world * p).z();
@@ -71,7 +71,7 @@ struct Canvas {
 
 double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-void fill(const Corner& a, const Corner& b, const Corner& c, Canvas* canvas) {
+void fill(const Projected& a, const Projected& b, const Projected& c, Canvas* canvas) {
   if (!a.seen || !b.seen || !c.seen) return;
   const double area = cross(b.px - a.px, c.px - a.px);
   if (std::abs(area) < 1e-12) return;
@@ -94,11 +94,11 @@ void fill(const Corner& a, const Corner& b, const Corner& c, Canvas* canvas) {
 }  // namespace
 
 cv::Mat drawn(const Surface& surface, const Imager& viewer) {
-  const std::vector<Corner> corners = corners_of(surface, viewer);
+  const std::vector<Projected> corners = corners_of(surface, viewer);
   Canvas canvas(viewer);
   for (const auto& [i, j, k] : surface.triangles) fill(corners[i], corners[j], corners[k], &canvas);
   if (!surface.triangles.empty()) return canvas.picture;
-  for (const Corner& corner : corners) {
+  for (const Projected& corner : corners) {
     if (!corner.seen || !viewer.contains(corner.px)) continue;
     const cv::Rect square = cv::Rect(static_cast<int>(corner.px.x()), static_cast<int>(corner.px.y()), 2, 2) &
                             cv::Rect({}, canvas.picture.size());

@@ -17,7 +17,7 @@ constexpr double k_moved_m = 0.010, k_moved_rad = 5 * std::numbers::pi / 180;
 constexpr double k_most_nudge_mm = 1000, k_most_split_mm = 5000, k_most_place_mm = 5000;
 constexpr double k_least_quaternion = 0.5, k_most_quaternion = 2;  // its length, which is made 1
 
-std::string list_of(const std::vector<std::string>& names) {
+std::string listed(const std::vector<std::string>& names) {
   std::string list;
   for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
   return list.empty() ? "none" : list;
@@ -144,7 +144,7 @@ Result<Staging> with_look(const Scene& scene,
   const auto look = std::find_if(staging.looks.begin(), staging.looks.end(),
                                  [&](const Look& known) { return known.name == name; });
   if (look == staging.looks.end())
-    return error("{}: expected one of {}, found '{}'.", action, list_of(look_names(staging)), name);
+    return error("{}: expected one of {}, found '{}'.", action, listed(look_names(staging)), name);
   for (const Look::Part& part : look->parts) {
     for (std::size_t i = 0; i < scene.slots.size(); ++i) {
       if (scene.slots[i].name != part.slot) continue;
@@ -162,7 +162,7 @@ Result<Staging> without_look(Staging staging, const Edit& edit) {
   const auto look = std::find_if(staging.looks.begin(), staging.looks.end(),
                                  [&](const Look& known) { return known.name == edit.value; });
   if (look == staging.looks.end())
-    return error("delete_look: expected one of {}, found '{}'.", list_of(look_names(staging)), edit.value);
+    return error("delete_look: expected one of {}, found '{}'.", listed(look_names(staging)), edit.value);
   staging.deleted_look = std::move(*look);
   staging.looks.erase(look);
   if (staging.look == edit.value) staging.look.clear();
@@ -215,7 +215,7 @@ Result<Staging> with_screen(Staging staging, const Edit& edit) {
     std::vector<std::string> outputs;
     for (const Output& known : staging.screens) outputs.push_back(known.name);
     return error("screen: expected a screen of the devices file ({}), or none for all, found '{}'.",
-                 list_of(outputs), edit.slot);
+                 listed(outputs), edit.slot);
   }
   const Screen before = edit.slot.empty() ? staging.screen : output->shows;
   const std::vector<std::string>& names = screen_names();
@@ -224,7 +224,7 @@ Result<Staging> with_screen(Staging staging, const Edit& edit) {
                                : edit.value;
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end())
-    return error("screen: expected one of {}, found '{}'.", list_of(names), edit.value);
+    return error("screen: expected one of {}, found '{}'.", listed(names), edit.value);
   const auto chosen = static_cast<Screen>(found - names.begin());
   if (!edit.slot.empty()) {
     output->shows = chosen;
@@ -239,7 +239,7 @@ Status check_carrier(const Scene& scene, const Staging& staging, const MarkerNam
   const std::set<std::string> families = families_of(scene);
   if (!families.count(marker.family))
     return error("expected a marker of the scene's families ({}), found {}.",
-                 list_of({families.begin(), families.end()}), marker.text());
+                 listed({families.begin(), families.end()}), marker.text());
   if (const auto user = user_of(scene, staging, marker, slot))
     return error("expected a marker that carries nothing, found {}, which {} uses.", marker.text(), *user);
   return {};
@@ -273,7 +273,7 @@ Status check_units(const Slot& slot, const Edit& edit) {
     if (variant.dropped) dropped.push_back(variant.name);
   if (std::find(dropped.begin(), dropped.end(), name) == dropped.end())
     return error("units: expected a part that was dropped into slot '{}' ({}) and its unit, found '{}'.",
-                 slot.name, list_of(dropped), edit.value);
+                 slot.name, listed(dropped), edit.value);
   if (!metres_per_unit(units))
     return error("units: expected m, cm, mm, in or ft after the part's name, found '{}'.", units);
   return {};
@@ -290,7 +290,7 @@ Result<Staging> edited_slot(const Scene& scene, std::size_t index, Staging stagi
   } else if (edit.action == "choose_variant") {
     if (std::find(names.begin(), names.end(), edit.value) == names.end())
       return error("choose_variant: expected a variant of slot '{}' ({}), found '{}'.", slot.name,
-                   list_of(names), edit.value);
+                   listed(names), edit.value);
     staged.variant = edit.value;
   } else if (edit.action == "nudge") {
     LIMN_TRY(const Eigen::Vector3d mm, millimetres(edit));
@@ -384,15 +384,14 @@ Result<Staging> edited(const Scene& scene,
   if (action == actions().end()) {
     std::vector<std::string> names;
     for (const Action& known : actions()) names.push_back(known.name);
-    return error("edit: expected an action ({}), found '{}'.", list_of(names), edit.action);
+    return error("edit: expected an action ({}), found '{}'.", listed(names), edit.action);
   }
   if (action->of_slot) {
     for (std::size_t i = 0; i < scene.slots.size(); ++i)
       if (scene.slots[i].name == edit.slot) return edited_slot(scene, i, staging, edit);
     std::vector<std::string> names;
     for (const Slot& slot : scene.slots) names.push_back(slot.name);
-    return error("{}: expected a slot of the scene ({}), found '{}'.", edit.action, list_of(names),
-                 edit.slot);
+    return error("{}: expected a slot of the scene ({}), found '{}'.", edit.action, listed(names), edit.slot);
   }
   Staging out = staging;
   if (edit.action == "save_look") return with_saved_look(scene, std::move(out), posed, edit);

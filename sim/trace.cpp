@@ -13,7 +13,7 @@
 namespace limn::sim {
 namespace {
 
-constexpr int k_sub_samples = 32;       // of a pixel on an edge: an edge's place is then known to 1/64 px
+constexpr int k_edge_samples = 32;      // of a pixel on an edge: an edge's place is then known to 1/64 px
 constexpr float k_same_albedo = 0.02F;  // samples of one pixel that differ by less are one surface
 constexpr float k_same_normal = 0.99F;  // cosine, about 8°
 constexpr float k_same_depth = 1e-3F;   // m, departure from a plane within one pixel
@@ -251,14 +251,14 @@ class Tracer {
     for (unsigned v = 1U << 31, i = k; i != 0; i >>= 1U, v ^= v >> 1U)
       if ((i & 1U) != 0) sobol ^= v;
     y = static_cast<double>(sobol) / 4294967296.0;
-    constexpr double k_centred = 0.5 / k_sub_samples - 0.5;
+    constexpr double k_centred = 0.5 / k_edge_samples - 0.5;
     return {x + k_centred, y + k_centred};
   }
 
   std::vector<Group> refine(std::int32_t pixel) const {
     const Eigen::Vector2d px(pixel % imager_.width, pixel / imager_.width);
-    std::array<Eigen::Vector3f, k_sub_samples> d;
-    for (unsigned k = 0; k < k_sub_samples; ++k) {
+    std::array<Eigen::Vector3f, k_edge_samples> d;
+    for (unsigned k = 0; k < k_edge_samples; ++k) {
       const Eigen::Vector2d at = px + sub_sample(k);
       d[k] = directions_.at(at.x(), at.y());
     }
@@ -343,7 +343,7 @@ class Tracer {
     mean.n = group.n.normalized();
     mean.albedo = group.albedo / group.count;
     put(i, pixel, mean, group.room_light / group.count);
-    samples_.weight[i] = group.count / k_sub_samples;
+    samples_.weight[i] = group.count / k_edge_samples;
     samples_.grey[i] *= samples_.weight[i];
     for (std::size_t k = 0; k < group.lit.size(); ++k)
       samples_.projectors[k][i].gain = group.lit[k] / group.count;

@@ -11,7 +11,8 @@
 namespace limn::sim {
 namespace {
 
-constexpr double k_on_surface = 2e-3;  // m, interfaces.md: a surface part this near to the prototype is on it
+constexpr double k_surface_reach =
+    2e-3;  // m, interfaces.md: a surface part this near to the prototype is on it
 
 std::vector<PlacedMesh> physical_meshes(const World& world) {
   std::vector<PlacedMesh> meshes;
@@ -137,7 +138,7 @@ cv::Mat Truth::part_mask(const Imager& viewer, const std::string& slot) const {
     if (n.dot(direction) > 0) n = -n;
     const double slant =
         std::max(0.05, std::abs(n.dot(direction)));  // a ray runs 1 / slant longer than the gap
-    const double allowed = part->slot->mode == scene::Mode::surface ? k_on_surface / slant : 0;
+    const double allowed = part->slot->mode == scene::Mode::surface ? k_surface_reach / slant : 0;
     if (part_hits[i].distance > behind[i].distance + allowed) continue;
     out[i] = projected(p_eye + behind[i].distance * direction, n) ? 255 : 128;
   }

@@ -11,9 +11,6 @@ namespace {
 
 constexpr auto k_retry = std::chrono::milliseconds(100);
 
-// The session's clock.
-Stamp now() { return std::chrono::time_point_cast<Stamp::duration>(std::chrono::steady_clock::now()); }
-
 }  // namespace
 
 struct CameraThreads::Shared {

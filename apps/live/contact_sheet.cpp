@@ -12,7 +12,7 @@ namespace {
 
 constexpr int k_width = 960;  // of a picture, pixels
 
-constexpr const char* k_style = R"(
+constexpr const char* k_sheet_style = R"(
 body { margin: 0 auto; max-width: 1320px; padding: 2rem 1.5rem 4rem; background: #14161a; color: #e8e6e1;
        font: 16px/1.5 system-ui, sans-serif; }
 h1 { font-weight: 600; } .looks { display: grid; grid-template-columns: repeat(auto-fill, minmax(26rem, 1fr)); gap: 1.6rem; }
@@ -38,7 +38,7 @@ Status write_contact_sheet(std::span<const scene::Look> looks,
       "<!doctype html><html lang=\"en\"><meta "
       "charset=\"utf-8\"><title>Looks</title><style>{}</style><h1>Looks</h1>"
       "<div class=\"looks\">\n",
-      k_style);
+      k_sheet_style);
   for (const scene::Look& look : looks) {
     std::string parts;
     for (const scene::Look::Part& part : look.parts)

@@ -23,9 +23,6 @@ constexpr double k_patience_s = 5;                             // for a picture 
 constexpr double k_longest_exposure_s = 0.1;                   // while a camera's period is not known
 constexpr double k_blend = 0.1;                                // of a new time into the expected one
 
-// The session's clock: all stamps are of it.
-Stamp now() { return std::chrono::time_point_cast<Stamp::duration>(Clock::now()); }
-
 struct Seen {
   Watched watched;
   std::size_t moments = 0;

@@ -17,7 +17,7 @@ constexpr std::size_t k_longest_text = 200;  // bytes
 struct FreeMessage {
   void operator()(lo_message message) const { lo_message_free(message); }
 };
-using Message = std::unique_ptr<std::remove_pointer_t<lo_message>, FreeMessage>;
+using OscMessage = std::unique_ptr<std::remove_pointer_t<lo_message>, FreeMessage>;
 
 std::string arguments_of(const scene::Action& action) {
   std::vector<std::string> words;
@@ -237,7 +237,7 @@ Result<scene::Edit> edit_of_osc(std::span<const std::uint8_t> datagram) {
     return error("{}: expected text, numbers, true or false, found an argument of type '{}'.",
                  printable(*text_at(bytes, 0)), printable(types->substr(unknown, 1)));
   int problem = 0;
-  const Message message(!types ? nullptr : lo_message_deserialise(bytes.data(), bytes.size(), &problem));
+  const OscMessage message(!types ? nullptr : lo_message_deserialise(bytes.data(), bytes.size(), &problem));
   if (!message)
     return error("expected a message of Open Sound Control 1.0, found {} other bytes.", bytes.size());
   Reader reader{reinterpret_cast<const char*>(bytes.data()), {}};
@@ -266,7 +266,7 @@ Result<scene::Edit> edit_of_osc(std::span<const std::uint8_t> datagram) {
 }
 
 std::vector<std::uint8_t> osc_message(const std::string& path, const std::vector<OscValue>& arguments) {
-  const Message message(lo_message_new());
+  const OscMessage message(lo_message_new());
   LIMN_CHECK(message != nullptr);
   for (const OscValue& argument : arguments) {
     if (const int* whole = std::get_if<int>(&argument))

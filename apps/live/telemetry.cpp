@@ -15,7 +15,7 @@ namespace {
 constexpr double k_least = 1e-4, k_growth = 1.02;
 constexpr std::size_t k_most_notes = 500, k_most_slices = 240;
 
-constexpr const char* k_style = R"(
+constexpr const char* k_telemetry_style = R"(
 :root { color-scheme: dark; }
 body { margin: 0 auto; max-width: 1000px; padding: 2rem 1.5rem 4rem; background: #14161a; color: #e8e6e1;
        font: 16px/1.5 system-ui, sans-serif; }
@@ -161,7 +161,7 @@ Status Telemetry::write_page(const std::filesystem::path& path, const std::strin
       "<h1>{0}</h1><p class=\"lead\">{2:.1f} s, {3} pictures shown, {4} camera frames missed, {5} pictures "
       "with a "
       "lost body.</p>\n<table><tr><th>what</th><th>median</th><th>95 %</th><th>99 %</th></tr>\n",
-      escaped(title), k_style, json["seconds"].get<double>(), frames_, missed_, with_lost_);
+      escaped(title), k_telemetry_style, json["seconds"].get<double>(), frames_, missed_, with_lost_);
   for (const Measure& measure : measures_) {
     if (measure.all.count() == 0) continue;
     html += fmt::format(

@@ -8,6 +8,8 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "calib/median.h"
+
 namespace limn::calib {
 namespace {
 
@@ -29,13 +31,6 @@ constexpr double k_off_noise = 4.5;    // and times a sum's noise
 constexpr double k_same = 0.08;        // mean difference of two pictures of one pattern, of the contrast
 constexpr double k_odd_group = 0.05;   // of samples that are off; motion at edges stays below
 constexpr double k_wrong_group = 0.5;  // likewise: no motion does that
-
-double median(std::vector<float> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // The lit samples of a series: what their pictures add up to, and how far apart they get.
 struct Samples {
@@ -303,8 +298,8 @@ void measure_waves(const Samples& lit, const Patterns& patterns, SeriesHealth* h
 
 void measure_light(const Samples& lit, const Patterns& patterns, SeriesHealth* health) {
   const float *white = lit.of(patterns.white()), *black = lit.of(patterns.black());
-  health->white_level = median({white, white + lit.size()});
-  health->black_level = median({black, black + lit.size()});
+  health->white_level = median(std::vector<float>(white, white + lit.size()));
+  health->black_level = median(std::vector<float>(black, black + lit.size()));
   const auto full = std::count_if(white, white + lit.size(), [](float v) { return v >= k_saturated; });
   health->saturated = static_cast<double>(full) / static_cast<double>(lit.size());
 }

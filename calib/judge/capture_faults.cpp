@@ -10,6 +10,7 @@
 #include <optional>
 #include <tuple>
 
+#include "calib/median.h"
 #include "core/log.h"
 
 namespace limn::calib {
@@ -44,13 +45,6 @@ constexpr double k_saturated_share = 0.2;
 // Of the waves' mean light from one half: a gamma that is 12 % off. Beyond it the phase of 3 steps errs by
 // 0.1 pixel in waves of 16; 6 steps stand more.
 constexpr double k_wave_level = 0.025;
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // All that one camera saw of one projector.
 struct Seen {

@@ -19,14 +19,14 @@ double nearest_length(const Ray& ray, const Ray& other) {
   return (between.dot(ray.d) - between.dot(other.d) * cosine) / std::max(1 - cosine * cosine, 1e-12);
 }
 
-struct Seen {
+struct Image {
   Vector2d px;
   Vector2d per_metre;  // of the ray's length
 };
 
-std::optional<Seen> seen_by(const Imager& projector, const Ray& ray, double length) {
+std::optional<Image> seen_by(const Imager& projector, const Ray& ray, double length) {
   const Vector3d p = projector.imager_from_world * (ray.p_origin + length * ray.d);
-  Seen seen;
+  Image seen;
   Eigen::Matrix<double, 2, 3, Eigen::RowMajor> px_by_p;
   if (!projector.lens.model.project(projector.lens.values, p, &seen.px, px_by_p.data())) return std::nullopt;
   seen.per_metre = px_by_p * (projector.imager_from_world.rotation * ray.d);

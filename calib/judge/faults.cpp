@@ -12,6 +12,7 @@
 #include "calib/judge/assess.h"
 #include "calib/judge/board_faults.h"
 #include "calib/judge/capture_faults.h"
+#include "calib/median.h"
 #include "core/log.h"
 
 namespace limn::calib {
@@ -35,13 +36,6 @@ constexpr double k_same_axes = 0.1;        // rad
 constexpr double k_same_direction = 0.01;  // rad, and of the focal lengths: between two calibrations
 constexpr double k_scale = 0.005;
 constexpr double k_zoom = 0.03;  // of the field of view; refocusing breathes by 0.02
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 void note_board(const Observations& observations, const Solution& solution, std::vector<Fault>* faults) {
   for (int pose = 0; pose < static_cast<int>(observations.poses.size()); ++pose) {

@@ -44,14 +44,14 @@ std::string joined(const std::vector<std::string>& parts) {
 }
 
 // Observed pixels of an imager.
-struct Seen {
+struct SeenPixels {
   std::string name;
   int width = 0, height = 0;
   std::vector<Vector2d> px;
 };
 
-std::vector<Seen> seen_pixels(const Observations& observations) {
-  std::vector<Seen> all;
+std::vector<SeenPixels> seen_pixels(const Observations& observations) {
+  std::vector<SeenPixels> all;
   for (const auto* devices : {&observations.cameras, &observations.projectors}) {
     for (const CapturedDevice& device : *devices)
       all.push_back({device.name, device.width, device.height, {}});
@@ -64,7 +64,7 @@ std::vector<Seen> seen_pixels(const Observations& observations) {
 }
 
 // Share of the cells along an edge with something seen: left, right, upper, lower.
-std::array<double, 4> edge_coverage(const Seen& seen) {
+std::array<double, 4> edge_coverage(const SeenPixels& seen) {
   std::array<std::array<bool, k_edge_cells>, 4> cells{};
   for (const Vector2d& px : seen.px) {
     const double x = (px.x() + 0.5) / seen.width, y = (px.y() + 0.5) / seen.height;
@@ -85,7 +85,7 @@ std::array<double, 4> edge_coverage(const Seen& seen) {
 
 void advise_edges(const Observations& observations, std::vector<std::string>* advice) {
   constexpr std::array k_sides = {"left", "right", "upper", "lower"};
-  for (const Seen& seen : seen_pixels(observations)) {
+  for (const SeenPixels& seen : seen_pixels(observations)) {
     std::vector<std::string> bare;
     const auto shares = edge_coverage(seen);
     for (size_t side = 0; side < 4; ++side) {

@@ -16,7 +16,7 @@ constexpr size_t k_most_arrows = 4000;  // in one picture; more are every n-th
 constexpr double k_long = 0.04;         // of the width: what nine of ten arrows stay below
 constexpr double k_longest = 0.1;       // of the width: longer arrows are cut
 
-constexpr auto k_frame = "#cfd4da", k_bare = "#eceff2", k_ink = "#1d2329", k_soft = "#5d6670";
+constexpr auto k_frame = "#cfd4da", k_empty = "#eceff2", k_ink = "#1d2329", k_soft = "#5d6670";
 
 // Blue, teal, green, amber, red: dark enough on white, in order of lightness and hue.
 std::string colour_at(double share) {
@@ -25,7 +25,7 @@ std::string colour_at(double share) {
   };
   constexpr std::array<Colour, 5> k_stops = {
       {{38, 99, 178}, {27, 158, 160}, {116, 173, 62}, {236, 157, 20}, {205, 48, 56}}};
-  if (!std::isfinite(share)) return k_bare;
+  if (!std::isfinite(share)) return k_empty;
   const double at = std::clamp(share, 0.0, 1.0) * (k_stops.size() - 1);
   const auto i = std::min(static_cast<size_t>(at), k_stops.size() - 2);
   const double t = at - static_cast<double>(i);
@@ -55,7 +55,7 @@ std::string bare_cells(int width, int height, const std::vector<FieldPoint>& poi
     const int y = std::clamp(static_cast<int>((p.px.y() + 0.5) / height * k_grid), 0, k_grid - 1);
     seen[static_cast<size_t>(y * k_grid + x)] = true;
   }
-  std::string svg = fmt::format("<g fill='{}'>", k_bare);
+  std::string svg = fmt::format("<g fill='{}'>", k_empty);
   for (int i = 0; i < k_grid * k_grid; ++i) {
     if (seen[static_cast<size_t>(i)]) continue;
     svg += fmt::format("<rect x='{:.1f}' y='{:.1f}' width='{:.1f}' height='{:.1f}'/>",

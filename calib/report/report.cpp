@@ -1,8 +1,8 @@
 #include "calib/report/report.h"
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "calib/report/rounded.h"
 #include "core/file.h"
 #include "core/rig.h"
 
@@ -10,8 +10,6 @@ namespace limn::calib {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-double rounded(double v) { return std::isfinite(v) ? std::round(v * 1e4) / 1e4 : v; }
 
 std::string provenance(const Report& report, const SolveOptions& options) {
   const Observations& observations = report.observed.observations;

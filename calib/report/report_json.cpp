@@ -3,14 +3,12 @@
 #include <nlohmann/json.hpp>
 
 #include "calib/report/report.h"
+#include "calib/report/rounded.h"
 
 namespace limn::calib {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-// To a thousandth: more digits are noise, and they make files hard to read.
-double rounded(double v) { return std::isfinite(v) ? std::round(v * 1e4) / 1e4 : v; }
 
 Json devices_json(const std::vector<DeviceQuality>& devices) {
   Json list = Json::array();

@@ -13,9 +13,9 @@
 namespace limn::calib {
 namespace {
 
-constexpr size_t k_most_samples = 20000;  // of a camera and projector; a curve's noise is then below 0.1 %
-constexpr double k_worst_drift = 0.01;    // of white from first to last picture
-constexpr double k_worst_white = 0.03;    // of white from red + green + blue
+constexpr size_t k_most_of_curve = 20000;  // of a camera and projector; a curve's noise is then below 0.1 %
+constexpr double k_worst_drift = 0.01;     // of white from first to last picture
+constexpr double k_worst_white = 0.03;     // of white from red + green + blue
 constexpr double k_worst_residual = 0.02;
 
 struct Pair {
@@ -30,7 +30,7 @@ Result<std::vector<Pair>> sampled_pairs(const Captures& captures, std::vector<st
   std::vector<std::pair<int, Error>> failed;
   for (const ResponsePair& pair : pairs) {
     LIMN_TRY(const ResponseShots shots, read_response_shots(captures, pair));
-    auto samples = sampled(shots, k_most_samples);
+    auto samples = sampled(shots, k_most_of_curve);
     if (samples) all.push_back({pair, std::move(*samples)});
     if (!samples) failed.emplace_back(pair.projector, samples.error());
   }

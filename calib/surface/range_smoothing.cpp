@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
-constexpr double k_nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double k_nowhere = std::numeric_limits<double>::quiet_NaN();
 constexpr double k_degree = std::numbers::pi / 180;
 constexpr double k_outlier_sigmas = 5;  // of a pixel from its neighbours' fit
 constexpr int k_noise_half = 12;  // window for measuring noise: wide, so that the fit takes little of it
@@ -169,7 +169,7 @@ cv::Mat residuals_around(const Ranges& ranges, const cv::Mat& links, cv::Point a
   if (static_cast<int>(around.size()) < window->area() / 2) return {};
   const auto fit = fitted(around);
   if (!fit) return {};
-  cv::Mat picture(2 * k_noise_half + 1, 2 * k_noise_half + 1, CV_64F, cv::Scalar(k_nan));
+  cv::Mat picture(2 * k_noise_half + 1, 2 * k_noise_half + 1, CV_64F, cv::Scalar(k_nowhere));
   for (const Neighbour& n : around)
     picture.at<double>(n.dy + k_noise_half, n.dx + k_noise_half) = residual(n, *fit) / n.sigma;
   return picture;
@@ -199,7 +199,7 @@ Noise measured_noise(const Ranges& ranges, const cv::Mat& links, int smooth_half
   Window window(k_noise_half);
   Noise noise;
   noise.scale = cv::Mat((links.rows + k_noise_step - 1) / k_noise_step,
-                        (links.cols + k_noise_step - 1) / k_noise_step, CV_32F, cv::Scalar(k_nan));
+                        (links.cols + k_noise_step - 1) / k_noise_step, CV_32F, cv::Scalar(k_nowhere));
   Pairs pairs;
   std::vector<float> scales;
   int number = 0;
@@ -256,7 +256,7 @@ std::optional<Vector3d> normal_of(const RangeView& view, cv::Point at, const Six
 }
 
 struct Smoothed {
-  double range = k_nan, stddev = k_nan;
+  double range = k_nowhere, stddev = k_nowhere;
   Vector3d d_normal = Vector3d::Zero();
 };
 

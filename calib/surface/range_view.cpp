@@ -19,8 +19,8 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
-constexpr float k_nan = std::numeric_limits<float>::quiet_NaN();
-constexpr double k_degree = std::numbers::pi / 180;
+constexpr float k_no_range = std::numeric_limits<float>::quiet_NaN();
+constexpr double k_rad_per_deg = std::numbers::pi / 180;
 constexpr double k_code_sigmas = 4;      // of the epipolar residual that the code's noise may take
 constexpr double k_conflict_sigmas = 5;  // two projectors' answers differ by more: one is wrong
 constexpr double k_conflict_m = 0.5e-3;  // and by more than what a good rig leaves
@@ -59,7 +59,7 @@ enum class Verdict : std::uint8_t { nothing, kept, epipolar, angle, unsure };
 struct Reading {
   Verdict verdict = Verdict::nothing;
   double range = 0, variance = 0;
-  float epipolar_px = k_nan;
+  float epipolar_px = k_no_range;
 };
 
 Reading read_pixel(const Imager& camera,
@@ -81,7 +81,7 @@ Reading read_pixel(const Imager& camera,
   const double sigma_px = found->epipolar_px / std::max(found->epipolar_sigmas, 1e-9);
   if (found->epipolar_px > options.max_epipolar_px + k_code_sigmas * sigma_px)
     reading.verdict = Verdict::epipolar;
-  else if (found->angle < options.min_angle_deg * k_degree)
+  else if (found->angle < options.min_angle_deg * k_rad_per_deg)
     reading.verdict = Verdict::angle;
   else if (reading.variance > options.max_stddev_m * options.max_stddev_m)
     reading.verdict = Verdict::unsure;
@@ -154,7 +154,7 @@ Ranges combined(const RangeView& view,
       variance = 1 / (weight + other);
     }
   }
-  all.range.setTo(k_nan, conflict);
+  all.range.setTo(k_no_range, conflict);
   counts->conflicts = cv::countNonZero(conflict);
   const int met = static_cast<int>(epipolar.size()) - counts->epipolar - counts->angle - counts->unsure;
   counts->epipolar_rms_px = met > 0 ? std::sqrt(counts->epipolar_rms_px / met) : 0;
@@ -177,7 +177,7 @@ bool joined(const RangeView& view, const Ranges& ranges, cv::Point a, cv::Point 
 }
 
 cv::Mat links_of(const RangeView& view, const Ranges& ranges, double max_incidence_deg) {
-  const double steepest = std::tan(max_incidence_deg * k_degree);
+  const double steepest = std::tan(max_incidence_deg * k_rad_per_deg);
   cv::Mat links(ranges.range.size(), CV_8U, cv::Scalar(0));
   cv::parallel_for_(cv::Range(0, links.rows), [&](const cv::Range& rows) {
     for (int y = rows.start; y < rows.end; ++y) {
@@ -205,7 +205,7 @@ int drop_edges(const cv::Mat& links, Ranges* ranges) {
       if (y + 1 < links.rows) look({x, y}, {x, y + 1});
     }
   }
-  ranges->range.setTo(k_nan, edge);
+  ranges->range.setTo(k_no_range, edge);
   return cv::countNonZero(edge);
 }
 
@@ -219,7 +219,7 @@ int drop_rims(Ranges* ranges) {
   cv::erode(gap, gap, square);  // small gaps vanish
   cv::dilate(gap, gap, cv::Mat::ones(5, 5, CV_8U));
   const cv::Mat rim = gap & valid;
-  ranges->range.setTo(k_nan, rim);
+  ranges->range.setTo(k_no_range, rim);
   return cv::countNonZero(rim);
 }
 
@@ -257,7 +257,7 @@ void drop_islands(const cv::Mat& links, Ranges* ranges) {
   for (int i = 0; i < static_cast<int>(label.total()); ++i) {
     const int number = label.ptr<int>()[i];
     if (number > 0 && pixels[static_cast<size_t>(number - 1)] < k_least_piece)
-      ranges->range.ptr<double>()[i] = k_nan;
+      ranges->range.ptr<double>()[i] = k_no_range;
   }
 }
 
@@ -275,7 +275,7 @@ RangeView range_view(const Imager& camera, std::span<const DecodedBy> seen, cons
   view.camera = camera;
   view.d_camera = direction_map(camera.lens, camera.width, camera.height);
   const cv::Size size(camera.width, camera.height);
-  view.range = cv::Mat(size, CV_32F, cv::Scalar(k_nan));
+  view.range = cv::Mat(size, CV_32F, cv::Scalar(k_no_range));
   view.stddev = view.range.clone();
   view.d_normal = cv::Mat(size, CV_32FC3, cv::Scalar::all(0));
   Ranges ranges = combined(view, seen, options, &view.counts);
@@ -298,7 +298,7 @@ void restrict_to(const cv::Mat& keep, RangeView* view) {
       if ((link & k_down) && !kept(x, y + 1)) link &= static_cast<std::uint8_t>(~k_down);
     }
   }
-  view->range.setTo(k_nan, keep == 0);
+  view->range.setTo(k_no_range, keep == 0);
   view->counts.kept = cv::countNonZero(valid_in(view->range));
 }
 

@@ -8,7 +8,7 @@
 namespace limn::calib {
 namespace {
 
-constexpr int k_steps = 8;           // from a midpoint two suffice
+constexpr int k_most_steps = 8;      // from a midpoint two suffice
 constexpr double k_settled = 1e-9;   // m; a thousandth of what a pixel's noise moves
 constexpr double k_parallel = 1e-6;  // sin² of 0.06 degrees
 
@@ -56,7 +56,7 @@ std::optional<Triangulated> triangulate(const Imager& a,
   found.p_world = p_start;
   Eigen::Vector2d residual_a, residual_b;
   Jacobian j_a, j_b;
-  for (int step = 0; step < k_steps; ++step) {
+  for (int step = 0; step < k_most_steps; ++step) {
     if (!look(a, px_a, found.p_world, &residual_a, &j_a)) return std::nullopt;
     if (!look(b, px_b, found.p_world, &residual_b, &j_b)) return std::nullopt;
     const Eigen::Matrix3d information = j_a.transpose() * j_a + j_b.transpose() * j_b;

@@ -1,5 +1,5 @@
 // The whole `limn solve` over the real captures beside cv::imread alone over the same pictures on one thread.
-// Usage: calib_speed FOLDER_OF_GRAYCODE OUT [REPEATS]
+// Usage: solve_bench FOLDER_OF_GRAYCODE OUT [REPEATS]
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -35,7 +35,7 @@ std::vector<fs::path> pictures_in(const fs::path& folder) {
 
 int main(int argc, char** argv) {
   if (argc < 3) {
-    fmt::print(stderr, "usage: calib_speed FOLDER_OF_GRAYCODE OUT [REPEATS]\n");
+    fmt::print(stderr, "usage: solve_bench FOLDER_OF_GRAYCODE OUT [REPEATS]\n");
     return 2;
   }
   limn::apps::SolveOptions options{.captures = argv[1], .out = argv[2]};
