@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
-#include "calib/median.h"
+#include "core/median.h"
 
 namespace limn::calib {
 namespace {

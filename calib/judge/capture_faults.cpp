@@ -10,8 +10,8 @@
 #include <optional>
 #include <tuple>
 
-#include "calib/median.h"
 #include "core/log.h"
+#include "core/median.h"
 
 namespace limn::calib {
 namespace {

@@ -12,8 +12,8 @@
 #include "calib/judge/assess.h"
 #include "calib/judge/board_faults.h"
 #include "calib/judge/capture_faults.h"
-#include "calib/median.h"
 #include "core/log.h"
+#include "core/median.h"
 
 namespace limn::calib {
 namespace {

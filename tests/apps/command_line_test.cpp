@@ -356,7 +356,7 @@ TEST_F(CommandLine, ConfigsWithAnyValueSpoiledNeverCrash) {
 }
 
 TEST_F(CommandLine, BenchNamesTheBenchesThereAre) {
-  expect({"bench", "tracking"}, 2, {"tracking", "tracker, calib, projector, live"});
+  expect({"bench", "tracking"}, 2, {"tracking", "tracker, id, calib, solve, projector, live, remote, tablet"});
 }
 
 TEST_F(CommandLine, BenchSaysWhichProgramIsMissing) {  // none stands beside the test's own

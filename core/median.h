@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace limn::calib {
+namespace limn {
 
 /// The middle of the values (the upper one of an even number), in their unit; 0 for none.
 template <class Value>
@@ -14,4 +14,4 @@ Value median(std::vector<Value> values) {
   return *middle;
 }
 
-}  // namespace limn::calib
+}  // namespace limn
