@@ -25,14 +25,18 @@ constexpr double k_side_trim = 0.1;             // of a side at each end: corner
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-// Whether the boundary is an outer one and could be a quadrilateral's.
-bool may_be_quad(const Outlines::Extent& outline, double min_side_px) {
-  const auto length = static_cast<double>(outline.count);
-  const double width = outline.width;
-  const double height = outline.height;
-  return length >= 3 * min_side_px && std::max(width, height) >= min_side_px &&
-         std::min(width, height) >= 0.5 * min_side_px && length <= k_max_roughness * 2 * (width + height) &&
-         outline.area >= k_min_box_share * width * height && outline.area >= 0.5 * min_side_px * min_side_px;
+// Whether a boundary is an outer one and large enough to be a quadrilateral's.
+bool is_large(const Outlines::Extent& outline, double min_side_px) {
+  return static_cast<double>(outline.count) >= 3 * min_side_px &&
+         outline.area >= 0.5 * min_side_px * min_side_px;
+}
+
+// Whether it is as long as a quadrilateral's, and holds as much.
+bool is_full(const Outlines::Extent& outline, const Outlines::Box& box, double min_side_px) {
+  return std::max(box.width, box.height) >= min_side_px &&
+         std::min(box.width, box.height) >= 0.5 * min_side_px &&
+         static_cast<double>(outline.count) <= k_max_roughness * 2 * (box.width + box.height) &&
+         outline.area >= k_min_box_share * box.width * box.height;
 }
 
 }  // namespace
@@ -40,12 +44,13 @@ bool may_be_quad(const Outlines::Extent& outline, double min_side_px) {
 void QuadFinder::find(CornerCodes& corners, const CandidateOptions& options, std::vector<Quad>& quads) {
   quads.clear();
   outlines_.for_each(corners, [&](const Outlines::Extent& outline) {
-    if (!may_be_quad(outline, options.min_side_px)) return;
+    if (!is_large(outline, options.min_side_px)) return;
+    if (!is_full(outline, outlines_.box(), options.min_side_px)) return;
     outlines_.find_corners(k_corner_px + k_corner_share * static_cast<double>(outline.count), k_max_corners);
-    if (outlines_.corners().size() < 4 || outlines_.corners().size() > k_max_corners) return;
-    outlines_.sum_moments();
-    for (auto& row : sides_)
-      for (Side& side : row) side.known = false;
+    const std::size_t count = outlines_.corners().size();
+    if (count < 4 || count > k_max_corners) return;
+    for (std::size_t from = 0; from < count; ++from)
+      for (std::size_t to = 0; to < count; ++to) sides_[from][to].known = false;
     Quad quad;
     if (choose_quad(options.min_side_px, &quad)) quads.push_back(quad);
   });
@@ -61,8 +66,10 @@ const QuadFinder::Side& QuadFinder::side(std::size_t from_corner, std::size_t to
   const std::size_t to = outlines_.corners()[to_corner] + (to_corner > from_corner ? 0 : outlines_.size());
   const auto trim = static_cast<std::size_t>(k_side_trim * static_cast<double>(to - from) + 1);
   if (to - from < 2 * trim + 3) return side;
-  side.line = outlines_.line(from + trim, to - trim);
-  side.straight = side.line.rms() <= k_max_side_rms_px + k_max_side_rms_share * side.line.count;
+  const auto count = static_cast<double>(to - from - 2 * trim);
+  const auto line = outlines_.line(from + trim, to - trim, k_max_side_rms_px + k_max_side_rms_share * count);
+  side.straight = line.has_value();
+  if (line) side.line = *line;
   return side;
 }
 

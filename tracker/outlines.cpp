@@ -10,7 +10,8 @@
 namespace limn::tracker {
 namespace {
 
-constexpr float k_nearly = 0.99999F;  // products may be rounded otherwise where they are fused
+constexpr float k_nearly = 0.99999F;   // products may be rounded otherwise where they are fused
+constexpr std::size_t k_block = 1024;  // points that are traced before the trail is looked after
 
 // The first of the blocks from x on in which a boundary may start, or the end of the last whole one.
 LIMN_SIMD int skip_empty(const std::uint8_t* row, int x, int count) {
@@ -43,49 +44,69 @@ int next_start(const std::uint8_t* row, int x, int count) {
 constexpr std::array<int, 4> k_dx = {0, 1, 0, -1};  // up, right, down, left
 constexpr std::array<int, 4> k_dy = {-1, 0, 1, 0};
 
-struct Box {
-  float low_x, high_x, low_y, high_y;
+using Packed = std::uint32_t;
+
+inline int x_of(Packed point) { return static_cast<int>(point & 0xFFFF); }
+inline int y_of(Packed point) { return static_cast<int>(point >> 16); }
+
+struct Bounds {
+  int low_x, high_x, low_y, high_y;
 };
 
-LIMN_SIMD Box box_of(const float* __restrict x, const float* __restrict y, std::size_t count) {
-  float low_x = x[0], high_x = x[0], low_y = y[0], high_y = y[0];
+LIMN_SIMD Bounds bounds_of(const Packed* points, std::size_t count) {
+  int low_x = x_of(points[0]), high_x = low_x, low_y = y_of(points[0]), high_y = low_y;
 #pragma omp simd reduction(min : low_x, low_y) reduction(max : high_x, high_y)
   for (std::size_t i = 0; i < count; ++i) {
-    low_x = x[i] < low_x ? x[i] : low_x;
-    high_x = x[i] > high_x ? x[i] : high_x;
-    low_y = y[i] < low_y ? y[i] : low_y;
-    high_y = y[i] > high_y ? y[i] : high_y;
+    const int x = x_of(points[i]), y = y_of(points[i]);
+    low_x = x < low_x ? x : low_x;
+    high_x = x > high_x ? x : high_x;
+    low_y = y < low_y ? y : low_y;
+    high_y = y > high_y ? y : high_y;
   }
   return {low_x, high_x, low_y, high_y};
 }
 
-// Square of the largest distance of a point from (from_x, from_y).
-LIMN_SIMD float largest_square(
-    const float* __restrict x, const float* __restrict y, std::size_t count, float from_x, float from_y) {
-  float largest = 0;
-#pragma omp simd reduction(max : largest)
-  for (std::size_t i = 0; i < count; ++i) {
-    const float dx = x[i] - from_x;
-    const float dy = y[i] - from_y;
-    const float square = dx * dx + dy * dy;
-    largest = square > largest ? square : largest;
-  }
-  return largest;
-}
-
-// The first of the points farthest from (from_x, from_y).
-std::size_t farthest(std::span<const float> x, std::span<const float> y, float from_x, float from_y) {
-  const float largest = k_nearly * largest_square(x.data(), y.data(), x.size(), from_x, from_y);
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    const float dx = x[i] - from_x;
-    const float dy = y[i] - from_y;
-    if (dx * dx + dy * dy >= largest) return i;
-  }
-  return 0;
-}
-
 // Points are looked at by so many: buffers reach as far behind the last.
 constexpr std::size_t k_together = 16;
+
+struct Farthest {
+  float distance;
+  std::size_t index;
+};
+
+// The first of the points with the largest distance_of(x, y).
+template <typename DistanceOf>
+__attribute__((always_inline)) inline Farthest farthest(const Packed* points,
+                                                        std::size_t count,
+                                                        const DistanceOf& distance_of) {
+  std::array<float, k_together> most{};
+  std::array<int, k_together> where{};
+  for (std::size_t block = 0; block < count; block += k_together)
+    for (std::size_t k = 0; k < k_together; ++k) {
+      const auto i = static_cast<int>(block + k);
+      const Packed point = points[block + k];
+      const float distance = distance_of(static_cast<float>(x_of(point)), static_cast<float>(y_of(point)));
+      const bool more = distance > most[k] && i < static_cast<int>(count);
+      most[k] = more ? distance : most[k];
+      where[k] = more ? i : where[k];
+    }
+  float worst = 0;
+#pragma omp simd reduction(max : worst)
+  for (std::size_t k = 0; k < k_together; ++k) worst = most[k] > worst ? most[k] : worst;
+  int first = static_cast<int>(count);
+#pragma omp simd reduction(min : first)
+  for (std::size_t k = 0; k < k_together; ++k) {
+    const int candidate = most[k] == worst ? where[k] : static_cast<int>(count);
+    first = candidate < first ? candidate : first;
+  }
+  return {worst, static_cast<std::size_t>(first)};
+}
+
+LIMN_SIMD std::size_t farthest_from(const Packed* points, std::size_t count, Packed from) {
+  const auto x0 = static_cast<float>(x_of(from)), y0 = static_cast<float>(y_of(from));
+  const auto square = [=](float x, float y) { return (x - x0) * (x - x0) + (y - y0) * (y - y0); };
+  return farthest(points, count, square).index;
+}
 
 struct Limits {
   float tolerance;  // half pixels
@@ -94,8 +115,7 @@ struct Limits {
 
 // Adds the corners strictly between two points (Douglas and Peucker): of a piece the first of the points
 // farthest from the chord between its ends, and so on on both sides.
-LIMN_SIMD void split(const float* __restrict x,
-                     const float* __restrict y,
+LIMN_SIMD void split(const Packed* points,
                      std::size_t from,
                      std::size_t to,
                      const Limits limits,
@@ -104,38 +124,52 @@ LIMN_SIMD void split(const float* __restrict x,
   pending->assign(1, to);
   for (;;) {
     const std::size_t end = pending->back(), count = end - from;
-    std::size_t at = from;
-    const float x0 = x[from], y0 = y[from], dx = x[end] - x0, dy = y[end] - y0;
-    const float length = std::sqrt(dx * dx + dy * dy);
-    if (count >= limits.min_run && corners->size() <= limits.max_count && length > 0) {
-      std::array<float, k_together> most{};
-      std::array<int, k_together> where{};
-      for (std::size_t block = 0; block < count; block += k_together)
-        for (std::size_t k = 0; k < k_together; ++k) {
-          const auto i = static_cast<int>(block + k);
-          const float distance = std::abs(dx * (y[from + block + k] - y0) - dy * (x[from + block + k] - x0));
-          const bool more = distance > most[k] && i < static_cast<int>(count);
-          most[k] = more ? distance : most[k];
-          where[k] = more ? i : where[k];
-        }
-      float worst = 0;
-      for (const float distance : most) worst = std::max(worst, distance);
-      if (k_nearly * worst > limits.tolerance * length) {
-        int first = static_cast<int>(count);
-        for (std::size_t k = 0; k < k_together; ++k)
-          first = most[k] == worst ? std::min(first, where[k]) : first;
-        at = from + static_cast<std::size_t>(first);
+    if (count >= limits.min_run && corners->size() <= limits.max_count) {
+      const auto x0 = static_cast<float>(x_of(points[from])), y0 = static_cast<float>(y_of(points[from]));
+      const float dx = static_cast<float>(x_of(points[end])) - x0;
+      const float dy = static_cast<float>(y_of(points[end])) - y0;
+      const auto from_chord = [=](float x, float y) { return std::abs(dx * (y - y0) - dy * (x - x0)); };
+      const Farthest worst = farthest(points + from, count, from_chord);
+      const float limit = limits.tolerance * limits.tolerance * (dx * dx + dy * dy);
+      if (limit > 0 && k_nearly * worst.distance * worst.distance > limit) {
+        pending->push_back(from + worst.index);
+        continue;
       }
-    }
-    if (at > from) {
-      pending->push_back(at);
-      continue;
     }
     from = end;
     pending->pop_back();
     if (pending->empty()) return;
     corners->push_back(from);
   }
+}
+
+struct Moments {  // sums, in half pixels
+  double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+};
+
+// From `origin` on: whole numbers, so their order makes no difference.
+LIMN_SIMD Moments moments_of(const Packed* points, std::size_t count, Packed origin) {
+  constexpr std::size_t k_lanes = 8;
+  static_assert(k_lanes <= k_together);
+  using Lanes = std::array<double, k_lanes>;
+  const int x0 = x_of(origin), y0 = y_of(origin);
+  Lanes xs{}, ys{}, xxs{}, xys{}, yys{};
+  for (std::size_t block = 0; block < count; block += k_lanes)
+#pragma omp simd
+    for (std::size_t k = 0; k < k_lanes; ++k) {
+      const double counts = static_cast<int>(block + k) < static_cast<int>(count) ? 1 : 0;
+      const double x = counts * (x_of(points[block + k]) - x0);
+      const double y = counts * (y_of(points[block + k]) - y0);
+      xs[k] += x;
+      ys[k] += y;
+      xxs[k] += x * x;
+      xys[k] += x * y;
+      yys[k] += y * y;
+    }
+  const auto sum = [](const Lanes& l) {
+    return ((l[0] + l[4]) + (l[1] + l[5])) + ((l[2] + l[6]) + (l[3] + l[7]));
+  };
+  return {sum(xs), sum(ys), sum(xxs), sum(xys), sum(yys)};
 }
 
 }  // namespace
@@ -147,20 +181,22 @@ Outlines::Steps::Steps(std::ptrdiff_t stride) {
                                              C::k_lower_left};
   constexpr std::array<int, 4> ahead_right = {C::k_upper_right, C::k_lower_right, C::k_lower_left,
                                               C::k_upper_left};
-  for (std::size_t i = 0; i < on.size(); ++i) {
+  for (std::size_t i = 0; i < on.steps.size(); ++i) {
     const std::size_t from = i / 32;
     const auto code = static_cast<int>(i % 32);
     const std::size_t turn = code & ahead_left[from] ? 3 : code & ahead_right[from] ? 0 : 1;
     const std::size_t d = (from + turn) % 4;
-    const auto step_to = [&](std::size_t direction, int sign, std::size_t next) {
-      return Step{static_cast<std::int32_t>(sign * (k_dx[direction] + k_dy[direction] * stride)),
-                  static_cast<std::int16_t>(32 * next), static_cast<std::int8_t>(sign * k_dx[direction]),
-                  static_cast<std::int8_t>(sign * k_dy[direction])};
+    const auto step_to = [&](Way* way, std::size_t at, std::size_t direction, int sign, std::size_t next) {
+      const int dx = sign * k_dx[direction], dy = sign * k_dy[direction];
+      way->steps[at] = {static_cast<std::int32_t>(dx + dy * stride), static_cast<std::int16_t>(32 * next),
+                        static_cast<std::int8_t>(dy),
+                        static_cast<std::uint8_t>(code == C::k_lower_right ? code | C::k_visited : code)};
+      way->moves[at] = static_cast<Packed>(dx) + (static_cast<Packed>(dy) << 16);
     };
-    on[i] = step_to(d, 1, d);
+    step_to(&on, i, d, 1, d);
     // What lies behind, on both sides: black on the right alone is a boundary.
     if (!(code & ahead_right[(from + 1) % 4]) || code & ahead_left[(from + 3) % 4]) continue;
-    back[32 * d + i % 32] = step_to(from, -1, from);
+    step_to(&back, 32 * d + i % 32, from, -1, from);
   }
 }
 
@@ -177,129 +213,118 @@ Outlines::Start Outlines::next(const CornerCodes& corners, Start after) {
 struct Outlines::End {
   std::uint8_t* corner;
   std::size_t direction;  // times 32
-  int x, y;               // of the corner, in half pixels
+  Packed at;              // the corner
   long long area = 0;     // half pixels times pixels
 
-  void go_on(const std::array<Step, 128>& steps, float* into_x, float* into_y) {
-    const std::uint8_t code = *corner;
-    // Only where boundaries start.
-    *corner =
-        static_cast<std::uint8_t>(code | (code == CornerCodes::k_lower_right ? CornerCodes::k_visited : 0));
-    const Step& step = steps[direction + code];
+  // The middle of the crack to the next corner.
+  Packed go_on(const Way& way) {
+    const std::size_t from = direction + *corner;
+    const Step& step = way.steps[from];
+    *corner = step.code;
     direction = static_cast<std::size_t>(step.next);
     corner += step.offset;
     __builtin_prefetch(corner + 8 * step.offset);  // every row of codes is another cache line
-    *into_x = static_cast<float>(x + step.dx);
-    *into_y = static_cast<float>(y + step.dy);
-    area += x * step.dy;
-    x += 2 * step.dx;
-    y += 2 * step.dy;
+    area += x_of(at) * step.dy;
+    const Packed middle = at + way.moves[from];
+    at = middle + way.moves[from];
+    return middle;
   }
 };
+
+// Where the trail's middle is, with room for so many points and another block on both sides of it.
+std::size_t Outlines::with_room(std::size_t back, std::size_t on) {
+  const std::size_t half = std::max(back, on) + k_block;
+  if (trail_.size() >= 2 * half) return trail_.size() / 2;
+  std::vector<Packed> wider(4 * half);
+  const std::size_t middle = trail_.size() / 2 - back;
+  std::copy_n(trail_.begin() + static_cast<std::ptrdiff_t>(middle), back + on,
+              wider.begin() + static_cast<std::ptrdiff_t>(2 * half - back));
+  trail_.swap(wider);
+  return 2 * half;
+}
 
 // Follows the boundary that runs up to corner (x, y) and on to its right, black on its right, into the trail:
 // from both of its ends in turn, so that neither has to wait for what it reads.
 Outlines::Extent Outlines::trace(CornerCodes& corners, Start from) {
-  constexpr std::size_t k_block = 1024;
   constexpr std::size_t k_up = 0, k_right = 32;
   std::uint8_t* const start = corners.at(from.x, from.y);
-  End end{start, k_up, 2 * from.x - 1, 2 * from.y - 1};
-  End begin{start, k_right, 2 * from.x - 1, 2 * from.y - 1};
+  const Packed at = static_cast<Packed>(2 * from.x) + (static_cast<Packed>(2 * from.y) << 16);
+  End end{start, k_up, at};
+  End begin{start, k_right, at};
   // Whether the way on from the end is the way that the beginning has come.
   const auto have_met = [&] {
     return end.corner == begin.corner &&
-           static_cast<std::size_t>(steps_.on[end.direction + *end.corner].next) == begin.direction;
+           static_cast<std::size_t>(steps_.on.steps[end.direction + *end.corner].next) == begin.direction;
   };
-  std::size_t on = 0, back = 0;
+  std::size_t on = 0, back = 0, middle = 0;
   for (bool closed = false; !closed;) {
-    if (on + k_block > back_x_.size()) {
-      back_x_.resize(2 * back_x_.size() + k_block);
-      back_y_.resize(back_x_.size());
-      trail_x_.resize(std::max(trail_x_.size(), 2 * back_x_.size()));
-      trail_y_.resize(trail_x_.size());
-    }
-    float* const on_x = trail_x_.data();
-    float* const on_y = trail_y_.data();
-    float* const back_x = back_x_.data();
-    float* const back_y = back_y_.data();
+    middle = with_room(back, on);
+    Packed* const trail = trail_.data() + middle;
     for (const std::size_t until = on + k_block; on < until;) {
-      end.go_on(steps_.on, on_x + on, on_y + on);
-      ++on;
+      trail[on++] = end.go_on(steps_.on);
       if ((closed = have_met())) break;
-      begin.go_on(steps_.back, back_x + back, back_y + back);
-      ++back;
+      trail[-static_cast<std::ptrdiff_t>(++back)] = begin.go_on(steps_.back);
       if ((closed = have_met())) break;
     }
   }
   if (*end.corner == CornerCodes::k_lower_right) *end.corner |= CornerCodes::k_visited;
-  const auto backs = static_cast<std::ptrdiff_t>(back), ons = static_cast<std::ptrdiff_t>(on);
-  std::reverse_copy(back_x_.begin(), back_x_.begin() + backs, trail_x_.begin() + ons);
-  std::reverse_copy(back_y_.begin(), back_y_.begin() + backs, trail_y_.begin() + ons);
+  begin_ = middle - back;
   count_ = on + back;
-  const Box box = box_of(trail_x_.data(), trail_y_.data(), count_);
-  return {count_, 0.5 * static_cast<double>(box.high_x - box.low_x),
-          0.5 * static_cast<double>(box.high_y - box.low_y),
-          0.5 * static_cast<double>(end.area - begin.area)};
+  return {count_, 0.5 * static_cast<double>(end.area - begin.area)};
+}
+
+Outlines::Box Outlines::box() const {
+  const Bounds bounds = bounds_of(trail_.data() + begin_, count_);
+  return {0.5 * (bounds.high_x - bounds.low_x), 0.5 * (bounds.high_y - bounds.low_y)};
 }
 
 void Outlines::find_corners(double tolerance_px, std::size_t max_count, std::size_t min_run) {
-  // The trail twice over, so that it can begin anywhere.
-  for (auto* trail : {&trail_x_, &trail_y_}) {
-    if (trail->size() < 2 * count_ + k_together) trail->resize(2 * count_ + k_together);
-    std::copy_n(trail->begin(), count_, trail->begin() + static_cast<std::ptrdiff_t>(count_));
-  }
-  x_ = std::span(trail_x_).first(count_);
-  y_ = std::span(trail_y_).first(count_);
-  const std::size_t first = farthest(x_, y_, x_[0], y_[0]);
-  x_ = std::span(trail_x_).subspan(first, count_ + 1);
-  y_ = std::span(trail_y_).subspan(first, count_ + 1);
-  const std::size_t second = farthest(x_, y_, x_[0], y_[0]);
+  // The points before the first corner once more behind the last, and what may be looked at beside them.
+  const std::size_t most = begin_ + 2 * count_ + k_together;
+  if (trail_.size() < most) trail_.resize(most);
+  const auto begin = trail_.begin() + static_cast<std::ptrdiff_t>(begin_);
+  const std::size_t first = farthest_from(&*begin, count_, *begin);
+  std::copy_n(begin, first + 1, begin + static_cast<std::ptrdiff_t>(count_));
+  points_ = std::span(trail_).subspan(begin_ + first, count_ + 1);
+  const std::size_t second = farthest_from(points_.data(), count_, points_[0]);
   corners_.clear();
   corners_.push_back(0);
   const Limits limits{static_cast<float>(2 * tolerance_px), max_count, std::max<std::size_t>(2, min_run)};
-  split(x_.data(), y_.data(), 0, second, limits, &corners_, &pending_);
+  split(points_.data(), 0, second, limits, &corners_, &pending_);
   corners_.push_back(second);
-  split(x_.data(), y_.data(), second, count_, limits, &corners_, &pending_);
+  split(points_.data(), second, count_, limits, &corners_, &pending_);
 }
 
-// Pixels, from the boundary's first point.
-void Outlines::sum_moments() {
-  sums_.resize(x_.size());
-  sums_[0] = Moments{};
-  for (std::size_t i = 0; i + 1 < x_.size(); ++i) {
-    const double x = 0.5 * (x_[i] - x_[0]);
-    const double y = 0.5 * (y_[i] - y_[0]);
-    const Moments& m = sums_[i];
-    sums_[i + 1] = {m.x + x, m.y + y, m.xx + x * x, m.xy + x * y, m.yy + y * y};
+std::optional<Outlines::Line> Outlines::line(std::size_t from, std::size_t to, double max_rms_px) const {
+  if (from >= count_) return line(from - count_, to - count_, max_rms_px);
+  const std::size_t end = std::min(to, count_);
+  Moments sum = moments_of(&points_[from], end - from, points_[0]);
+  if (to > end) {
+    const Moments more = moments_of(&points_[0], to - end, points_[0]);
+    sum = {sum.x + more.x, sum.y + more.y, sum.xx + more.xx, sum.xy + more.xy, sum.yy + more.yy};
   }
-}
-
-Outlines::Line Outlines::line(std::size_t from, std::size_t to) const {
-  const auto sum_to = [&](std::size_t i) {
-    if (i < size()) return sums_[i];
-    const Moments& m = sums_[i - size()];
-    const Moments& all = sums_[size()];
-    return Moments{m.x + all.x, m.y + all.y, m.xx + all.xx, m.xy + all.xy, m.yy + all.yy};
-  };
-  const Moments a = sum_to(from);
-  const Moments b = sum_to(to);
   const auto n = static_cast<double>(to - from);
-  const double x = (b.x - a.x) / n;
-  const double y = (b.y - a.y) / n;
-  const double xx = (b.xx - a.xx) / n - x * x;
-  const double xy = (b.xy - a.xy) / n - x * y;
-  const double yy = (b.yy - a.yy) / n - y * y;
-  // The eigenvector of the larger eigenvalue, the way that does not cancel.
+  const double x = 0.5 / n * sum.x;
+  const double y = 0.5 / n * sum.y;
+  const double xx = 0.25 / n * sum.xx - x * x;
+  const double xy = 0.25 / n * sum.xy - x * y;
+  const double yy = 0.25 / n * sum.yy - y * y;
   const double apart = 0.5 * (xx - yy);
-  const double root = std::sqrt(apart * apart + xy * xy);
+  const double square = apart * apart + xy * xy;
+  // The smaller eigenvalue is middle - sqrt(square).
+  const double middle = 0.5 * (xx + yy);
+  const double beyond = middle - max_rms_px * max_rms_px;
+  if (beyond > 0 && beyond * beyond > square) return std::nullopt;
+  const double root = std::sqrt(square);
   Line line;
   line.p = point(0) + Eigen::Vector2d(x, y);
+  // The eigenvector of the larger one, the way that does not cancel.
   line.d = apart > 0 ? Eigen::Vector2d(apart + root, xy) : Eigen::Vector2d(xy, root - apart);
   line.d /= std::max(1e-12, line.d.norm());
-  line.squares = n * std::max(0.0, 0.5 * (xx + yy) - root);
+  line.squares = n * std::max(0.0, middle - root);
   line.count = n;
-  const auto point_around = [&](std::size_t i) { return point(i > size() ? i - size() : i); };
-  if (line.d.dot(point_around(to) - point_around(from)) < 0) line.d = -line.d;
+  const auto point_around = [&](std::size_t i) { return point(i > count_ ? i - count_ : i); };
+  if (line.d.dot(point_around(to) - point(from)) < 0) line.d = -line.d;
   return line;
 }
 

@@ -2,11 +2,12 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <cmath>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "core/result.h"
 #include "tracker/threshold.h"
 
 namespace limn::tracker {
@@ -16,28 +17,36 @@ namespace limn::tracker {
 /// Holds its buffers between calls.
 class Outlines {
  public:
+  /// Largest width and height of a picture: points are kept in 16 bits of half pixels.
+  static constexpr int k_max_side = 32767;
+
   /// Of a boundary as it is traced.
   struct Extent {
     std::size_t count = 0;  ///< cracks
+    double area = 0;        ///< square pixels; negative around a hole
+  };
+  struct Box {
     double width = 0, height = 0;
-    double area = 0;  ///< square pixels; negative around a hole
   };
   /// Total least squares line of some points.
   struct Line {
     Eigen::Vector2d p, d;  ///< centroid, unit direction along the boundary
     double squares = 0;    ///< sum of squared distances, px^2
     double count = 0;
-    double rms() const { return std::sqrt(squares / count); }
   };
 
   /// Calls visit(extent) with every boundary; what follows is about that one. Sets the visited bits of
   /// `corners`.
   template <typename Visit>
   void for_each(CornerCodes& corners, const Visit& visit) {
+    LIMN_CHECK(corners.width <= k_max_side && corners.height <= k_max_side);
     steps_ = Steps(corners.stride);
     for (Start start = first(corners); start.y < corners.height; start = next(corners, start))
       visit(trace(corners, start));
   }
+
+  /// Around all points.
+  Box box() const;
 
   /// Finds the boundary's corners (Douglas and Peucker from two far points), no more than `max_count` and
   /// some; pieces of fewer than `min_run` points are not split further.
@@ -45,24 +54,29 @@ class Outlines {
 
   /// Indices of points, ascending, the first 0. Points are counted from there, and on into a second round.
   std::span<const std::size_t> corners() const { return corners_; }
-  std::size_t size() const { return x_.size() - 1; }
-  Eigen::Vector2d point(std::size_t i) const { return {0.5 * x_[i], 0.5 * y_[i]}; }
+  std::size_t size() const { return count_; }
+  Eigen::Vector2d point(std::size_t i) const { return at(points_[i]); }
 
-  /// Needed once before line().
-  void sum_moments();
-
-  /// Of the points from ... to - 1.
-  Line line(std::size_t from, std::size_t to) const;
+  /// Of the points from ... to - 1; nullopt when their RMS distance from it is larger.
+  std::optional<Line> line(std::size_t from, std::size_t to, double max_rms_px) const;
 
  private:
-  // How a boundary goes on from one corner to the next, by 32 * direction + corner code.
+  // In half pixels from the picture's upper left corner: x in the lower 16 bits, y in the upper.
+  using Packed = std::uint32_t;
+  // How a boundary goes on from one corner to the next.
   struct Step {
     std::int32_t offset = 0;  // to the next corner's code
     std::int16_t next = 0;    // 32 * direction
-    std::int8_t dx = 0, dy = 0;
+    std::int8_t dy = 0;       // of the way
+    std::uint8_t code = 0;    // that the corner has then: visited where boundaries start
+  };
+  // By 32 * direction + corner code.
+  struct Way {
+    std::array<Step, 128> steps;
+    std::array<Packed, 128> moves;  // halves of the steps
   };
   struct Steps {
-    std::array<Step, 128> on, back;  // with black on its right, and the other way
+    Way on, back;  // with black on its right, and the other way
     explicit Steps(std::ptrdiff_t stride);
   };
   // One end of what has been traced of a boundary.
@@ -70,20 +84,20 @@ class Outlines {
   struct Start {
     int x = 0, y = 0;
   };
-  struct Moments {  // sums over the boundary's points up to an index
-    double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
-  };
   Steps steps_{0};
-  std::vector<float> trail_x_, trail_y_;  // in half pixels
-  std::vector<float> back_x_, back_y_;    // what was traced backwards
-  std::size_t count_ = 0;
-  std::span<const float> x_, y_;  // the same from a corner on, and that one again at the end
-  std::vector<Moments> sums_;
+  std::vector<Packed> trail_;       // of both ends, to both sides from the middle on
+  std::size_t begin_ = 0;           // of the boundary within the trail
+  std::size_t count_ = 0;           // points
+  std::span<const Packed> points_;  // from the first corner on, and that one again at the end
   std::vector<std::size_t> corners_, pending_;
 
   static Start first(const CornerCodes& corners);
   static Start next(const CornerCodes& corners, Start after);
+  static Eigen::Vector2d at(Packed point) {
+    return {0.5 * (point & 0xFFFF) - 0.5, 0.5 * (point >> 16) - 0.5};
+  }
   Extent trace(CornerCodes& corners, Start start);
+  std::size_t with_room(std::size_t back, std::size_t on);
 };
 
 }  // namespace limn::tracker

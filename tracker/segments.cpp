@@ -55,9 +55,10 @@ void SegmentFinder::add_outlines(const cv::Mat& picture,
                                  std::vector<Segment>& segments) {
   threshold_.apply(picture, options, corner_codes_);
   outlines_.for_each(corner_codes_, [&](const Outlines::Extent& outline) {
-    if (std::max(outline.width, outline.height) < min_side ||
-        std::abs(outline.area) < k_min_width * static_cast<double>(outline.count))
-      return;
+    const auto length = static_cast<double>(outline.count);
+    if (length < 2 * min_side || std::abs(outline.area) < k_min_width * length) return;
+    const Outlines::Box box = outlines_.box();
+    if (std::max(box.width, box.height) < min_side) return;
     outlines_.find_corners(k_corner_px, outline.count, static_cast<std::size_t>(min_side));
     add_sides(scale, min_side, segments);
   });
@@ -65,7 +66,6 @@ void SegmentFinder::add_outlines(const cv::Mat& picture,
 
 // The straight ones of the outline's sides between corners.
 void SegmentFinder::add_sides(int scale, double min_side, std::vector<Segment>& segments) {
-  bool summed = false;
   const auto corners = outlines_.corners();
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const std::size_t from = corners[i];
@@ -75,15 +75,13 @@ void SegmentFinder::add_sides(int scale, double min_side, std::vector<Segment>& 
     const Eigen::Vector2d start = outlines_.point(from);
     const Eigen::Vector2d end = outlines_.point(to);
     if ((end - start).norm() < min_side) continue;
-    if (!summed) outlines_.sum_moments();
-    summed = true;
-    const Outlines::Line line = outlines_.line(from + trim, to - trim);
-    if (line.rms() > k_max_rms_px) continue;
+    const auto line = outlines_.line(from + trim, to - trim, k_max_rms_px);
+    if (!line) continue;
     const auto on_line = [&](const Eigen::Vector2d& p) {
-      const Eigen::Vector2d nearest = line.p + line.d.dot(p - line.p) * line.d;
+      const Eigen::Vector2d nearest = line->p + line->d.dot(p - line->p) * line->d;
       return Eigen::Vector2d(scale * nearest + Eigen::Vector2d::Constant(0.5 * (scale - 1)));
     };
-    Segment segment{on_line(start), on_line(end), line.d, 0};
+    Segment segment{on_line(start), on_line(end), line->d, 0};
     segment.length = (segment.to - segment.from).norm();
     segments.push_back(segment);
   }
