@@ -1,7 +1,9 @@
 #include "tracker/segment_quads.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <tuple>
 
 #include "tracker/simd.h"
@@ -72,10 +74,11 @@ LIMN_SIMD void match_corners(const Probe p,
                              const float* __restrict dy,
                              const float* __restrict length,
                              int count,
-                             std::int32_t* __restrict matches) {
+                             std::uint8_t* __restrict matches) {
   constexpr float k_slack_px = 0.01F;  // of single precision
   const float own_overlap = k_slack_px + static_cast<float>(k_overlap_px + k_overlap_share * p.length);
-  for (int block = 0; block < count; block += k_block)
+  for (int block = 0; block < count; block += k_block) {
+    std::array<std::int32_t, k_block> found;
     for (int i = block; i < block + k_block; ++i) {
       const float ax = x[i] - p.x;
       const float ay = y[i] - p.y;
@@ -88,10 +91,13 @@ LIMN_SIMD void match_corners(const Probe p,
           static_cast<float>(k_gap_px) + k_slack_px + static_cast<float>(k_max_gap_share) * longer;
       const float overlap =
           static_cast<float>(k_overlap_px) + k_slack_px + static_cast<float>(k_overlap_share) * length[i];
-      matches[i] = (ax * ax + ay * ay <= p.radius * p.radius) &
-                   (sine >= 0.999F * static_cast<float>(k_min_sine)) & (own >= -own_overlap * sine) &
-                   (own <= gap * sine) & (other >= -gap * sine) & (other <= overlap * sine);
+      found[static_cast<std::size_t>(i - block)] = (ax * ax + ay * ay <= p.radius * p.radius) &
+                                                   (sine >= 0.999F * static_cast<float>(k_min_sine)) &
+                                                   (own >= -own_overlap * sine) & (own <= gap * sine) &
+                                                   (other >= -gap * sine) & (other <= overlap * sine);
     }
+    std::copy(found.begin(), found.end(), matches + block);
+  }
 }
 
 // Marks the entries that may go on along the probe's line.
@@ -101,17 +107,21 @@ LIMN_SIMD void match_collinear(const Probe p,
                                const float* __restrict dx,
                                const float* __restrict dy,
                                int count,
-                               std::int32_t* __restrict matches) {
+                               std::uint8_t* __restrict matches) {
   constexpr float k_sine = 1.01F * static_cast<float>(k_max_collinear_sine);
-  for (int block = 0; block < count; block += k_block)
+  for (int block = 0; block < count; block += k_block) {
+    std::array<std::int32_t, k_block> found;
     for (int i = block; i < block + k_block; ++i) {
       const float ax = x[i] - p.x;
       const float ay = y[i] - p.y;
       const float sine = p.dx * dy[i] - p.dy * dx[i];
       const float gap = p.dx * ax + p.dy * ay;
-      matches[i] = (ax * ax + ay * ay <= p.radius * p.radius) & (gap > 0) & (std::abs(sine) <= k_sine) &
-                   (p.dx * dx[i] + p.dy * dy[i] > 0);
+      found[static_cast<std::size_t>(i - block)] = (ax * ax + ay * ay <= p.radius * p.radius) & (gap > 0) &
+                                                   (std::abs(sine) <= k_sine) &
+                                                   (p.dx * dx[i] + p.dy * dy[i] > 0);
     }
+    std::copy(found.begin(), found.end(), matches + block);
+  }
 }
 
 bool same(const Quad& a, const Quad& b) {
@@ -188,8 +198,13 @@ void SegmentQuadFinder::visit(
     const std::uint32_t end = cells.begin[static_cast<std::size_t>(first + columns) + 1];
     matches_.resize(std::max<std::size_t>(matches_.size(), end - begin + k_block));
     match(begin, static_cast<int>(end - begin), matches_.data());
-    for (std::uint32_t i = begin; i < end; ++i)
-      if (matches_[i - begin]) visit(cells.segment[i]);
+    for (std::uint32_t i = begin; i < end; i += 8) {
+      std::uint64_t word = 0;
+      std::memcpy(&word, &matches_[i - begin], 8);
+      for (; word != 0; word &= word - 1)
+        if (const auto at = i + static_cast<std::uint32_t>(std::countr_zero(word) / 8); at < end)
+          visit(cells.segment[at]);
+    }
   }
 }
 
@@ -203,7 +218,7 @@ void SegmentQuadFinder::join_collinear() {
     std::uint32_t nearest = 0;
     double least = reach;
     const Probe probe = probe_of(a, a.to, reach);
-    const auto match = [&](std::uint32_t first, int entries, std::int32_t* matches) {
+    const auto match = [&](std::uint32_t first, int entries, std::uint8_t* matches) {
       match_collinear(probe, &begins_.x[first], &begins_.y[first], &begins_.dx[first], &begins_.dy[first],
                       entries, matches);
     };
@@ -240,7 +255,7 @@ void SegmentQuadFinder::find_corners() {
     const Segment& here = segments_[i];
     const double reach = reach_of(here);
     const auto match = [](const Cells& cells, const Probe& probe, float sign) {
-      return [&cells, probe, sign](std::uint32_t first, int count, std::int32_t* matches) {
+      return [&cells, probe, sign](std::uint32_t first, int count, std::uint8_t* matches) {
         match_corners(probe, sign, &cells.x[first], &cells.y[first], &cells.dx[first], &cells.dy[first],
                       &cells.length[first], count, matches);
       };

@@ -40,7 +40,7 @@ class SegmentQuadFinder {
   std::vector<Corner> found_;
   std::vector<Corner> corners_;  // of all segments, each one's best first
   std::vector<std::uint32_t> corner_begin_;
-  std::vector<std::int32_t> matches_;  // scratch: of a run of entries
+  std::vector<std::uint8_t> matches_;  // scratch: of a run of entries, 1 or 0
   int columns_ = 0, rows_ = 0;
 
   int cell_of(const Eigen::Vector2d& px) const;
