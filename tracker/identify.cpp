@@ -11,7 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "tracker/square_to_quad.h"
+#include "tracker/quad_levels.h"
+#include "tracker/simd.h"
 
 namespace limn::tracker {
 namespace {
@@ -41,32 +42,38 @@ constexpr double k_min_barcode_margin = 0.4;
 constexpr double k_min_mean_barcode_margin = 0.75;
 constexpr double k_barcode_border_errors = 0.02;
 
-// Bilinear; the picture's edge goes on outside.
-double sample(const cv::Mat& grey, const Eigen::Vector2d& px) {
-  const double x = std::clamp(px.x(), 0.0, static_cast<double>(grey.cols - 1));
-  const double y = std::clamp(px.y(), 0.0, static_cast<double>(grey.rows - 1));
-  const int x0 = std::min(static_cast<int>(x), std::max(0, grey.cols - 2));
-  const int y0 = std::min(static_cast<int>(y), std::max(0, grey.rows - 2));
-  const int x1 = std::min(x0 + 1, grey.cols - 1);
-  const int y1 = std::min(y0 + 1, grey.rows - 1);
-  const double fx = x - x0;
-  const double fy = y - y0;
-  const std::uint8_t* upper = grey.ptr(y0);
-  const std::uint8_t* lower = grey.ptr(y1);
-  return (1 - fy) * ((1 - fx) * upper[x0] + fx * upper[x1]) + fy * ((1 - fx) * lower[x0] + fx * lower[x1]);
-}
-
 // Plane a + b x + c y over the unit square through the values at the middles of its four sides.
 struct Plane {
-  double a, b, c;
+  float a, b, c;
   explicit Plane(const std::array<double, 4>& side)
-      : a(0.25 * (side[0] + side[1] + side[2] + side[3]) - 0.5 * (side[1] - side[3]) -
-          0.5 * (side[2] - side[0])),
-        b(side[1] - side[3]),
-        c(side[2] - side[0]) {}
-  double at(double x, double y) const { return a + b * x + c * y; }
+      : a(static_cast<float>(0.25 * (side[0] + side[1] + side[2] + side[3]) - 0.5 * (side[1] - side[3]) -
+                             0.5 * (side[2] - side[0]))),
+        b(static_cast<float>(side[1] - side[3])),
+        c(static_cast<float>(side[2] - side[0])) {}
 };
 
+// Places of the unit square.
+struct Places {
+  std::size_t count = 0;
+  std::array<float, QuadLevels::k_most> x, y;
+
+  void add(double at_x, double at_y) {
+    x[count] = static_cast<float>(at_x);
+    y[count++] = static_cast<float>(at_y);
+  }
+  // In the middle half of the cell about (x, y) of a grid with `cells` a side.
+  void add_cell(double at_x, double at_y, double cells, bool several) {
+    add(at_x, at_y);
+    if (!several) return;
+    const double d = 0.2 / cells;
+    add(at_x - d, at_y - d);
+    add(at_x + d, at_y - d);
+    add(at_x - d, at_y + d);
+    add(at_x + d, at_y + d);
+  }
+};
+
+using Fractions = std::array<float, QuadLevels::k_most>;
 using Grid = std::array<double, k_max_grid * k_max_grid>;
 
 // Where the limit between black and white lies: the middle, or lower when a shadow crosses, whose white paper
@@ -75,29 +82,47 @@ using Grid = std::array<double, k_max_grid * k_max_grid>;
 constexpr double k_middle = 0.5;
 constexpr std::array<double, 3> k_limits = {k_middle, 0.35, 0.22};
 
-// Fraction of the way from black to white, at one to five places of every cell, border included.
+// Fraction of the way from black to white, at one or five places of every cell, border included.
 struct CellSamples {
-  static constexpr std::size_t k_places = 5;
   int cells = 0;  // a side
   bool several = false;
-  std::array<double, k_max_grid * k_max_grid * k_places> fraction;
+  Fractions fraction;
+
+  std::size_t places() const { return several ? 5 : 1; }
 };
+static_assert(5 * k_max_grid * k_max_grid <= QuadLevels::k_most);
 
 // -1 at black, 0 at the limit, 1 as far above it as black lies below.
-double relative(double fraction, double limit) {
-  return std::clamp((fraction - limit) / limit, -k_brightest, k_brightest);
+inline float relative(float fraction, float limit) {
+  constexpr auto k_most = static_cast<float>(k_brightest);
+  const float value = (fraction - limit) / limit;
+  const float bounded = value < k_most ? value : k_most;
+  return bounded > -k_most ? bounded : -k_most;
+}
+
+// Levels in their place as fractions of the way from dark to light.
+LIMN_SIMD void to_fractions(const Plane& dark,
+                            const Plane& light,
+                            const float* __restrict x,
+                            const float* __restrict y,
+                            std::size_t count,
+                            float* __restrict levels) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const float low = dark.a + dark.b * x[i] + dark.c * y[i];
+    const float apart = light.a + light.b * x[i] + light.c * y[i] - low;
+    const float range = apart > 2 ? apart : 2;
+    levels[i] = (levels[i] - low) / range;
+  }
 }
 
 // What one quad shows, between the levels inside and outside its edges.
 struct Reader {
-  const cv::Mat& grey;
-  SquareToQuad px_from_square;
+  QuadLevels levels;
   Plane light, dark;
   double side_px;
 
   Reader(const cv::Mat& picture, const RefinedQuad& quad)
-      : grey(picture),
-        px_from_square(quad.corners_px),
+      : levels(picture, quad.corners_px),
         light(quad.outside_level),
         dark(quad.inside_level),
         side_px(std::sqrt(area(quad.corners_px))) {}
@@ -108,51 +133,47 @@ struct Reader {
     return 0.5 * std::abs(a.x() * b.y() - a.y() * b.x());
   }
 
-  double fraction(double x, double y) const {
-    const double low = dark.at(x, y);
-    const double range = std::max(2.0, light.at(x, y) - low);
-    return (sample(grey, px_from_square.at(x, y)) - low) / range;
+  void fractions(const Places& places, Fractions* into) const {
+    const std::span x = std::span(places.x).first(places.count), y = std::span(places.y).first(places.count);
+    levels.between(x, y, into->data());
+    to_fractions(dark, light, x.data(), y.data(), places.count, into->data());
   }
 
-  // Places in the middle half of cell (row, column) of a grid with `cells` a side.
-  void read_cell(int row, int column, double cells, bool several, double* into) const {
-    read_around((column + 0.5) / cells, (row + 0.5) / cells, cells, several, into);
-  }
-
-  // The same of the cell about (x, y).
-  void read_around(double x, double y, double cells, bool several, double* into) const {
-    into[0] = fraction(x, y);
-    if (!several) return;
-    const double d = 0.2 / cells;
-    into[1] = fraction(x - d, y - d);
-    into[2] = fraction(x + d, y - d);
-    into[3] = fraction(x - d, y + d);
-    into[4] = fraction(x + d, y + d);
+  // How many of them are light.
+  int light_places(const Places& places) const {
+    Fractions found;
+    fractions(places, &found);
+    return static_cast<int>(std::count_if(found.begin(),
+                                          found.begin() + static_cast<std::ptrdiff_t>(places.count),
+                                          [](float fraction) { return fraction > k_middle; }));
   }
 
   void read(int cells, CellSamples* samples) const {
-    samples->cells = cells;
-    samples->several = side_px / cells >= k_sharpen_below_px;
-    double* into = samples->fraction.data();
-    for (int row = 0; row < cells; ++row)
-      for (int column = 0; column < cells; ++column, into += CellSamples::k_places)
-        read_cell(row, column, cells, samples->several, into);
+    read_cells(
+        cells, cells, [&](int i) { return (i + 0.5) / cells; }, samples);
   }
 
   // A family whose border is wider than a cell: the border as one ring of cells, read in its middle.
   void read_barcode(const CodeFamily& family, CellSamples* samples) const {
     const double side_cells = family.cells + 2 * family.border_cells;
-    samples->cells = family.cells + 2;
-    samples->several = side_px / side_cells >= k_sharpen_below_px;
     const auto middle = [&](int i) {
       if (i == 0) return 0.5 * family.border_cells / side_cells;
       if (i > family.cells) return 1 - 0.5 * family.border_cells / side_cells;
       return (family.border_cells + i - 0.5) / side_cells;
     };
-    double* into = samples->fraction.data();
-    for (int row = 0; row < samples->cells; ++row)
-      for (int column = 0; column < samples->cells; ++column, into += CellSamples::k_places)
-        read_around(middle(column), middle(row), side_cells, samples->several, into);
+    read_cells(family.cells + 2, side_cells, middle, samples);
+  }
+
+ private:
+  template <typename Middle>
+  void read_cells(int cells, double side_cells, const Middle& middle, CellSamples* samples) const {
+    samples->cells = cells;
+    samples->several = side_px / side_cells >= k_sharpen_below_px;
+    Places places;
+    for (int row = 0; row < cells; ++row)
+      for (int column = 0; column < cells; ++column)
+        places.add_cell(middle(column), middle(row), side_cells, samples->several);
+    fractions(places, &samples->fraction);
   }
 };
 
@@ -167,18 +188,18 @@ struct Pattern {
 
   bool operator==(const Pattern&) const = default;
 
-  // -1 black … 1 white at a place of the unit square.
-  double at(double x, double y) const {
-    const double side = cells + 2 * border;
+  // Which row (or column) of cells lies at a share of the side; -1 for the border.
+  int cell_at(double share) const {
+    const double place = share * (cells + 2 * border) - border;
+    return place < 0 || place >= cells ? -1 : static_cast<int>(place);
+  }
+  // -1 black … 1 white of a cell.
+  float value(int row, int column) const {
+    if (row < 0 || column < 0) return -1;
     const int columns = static_cast<int>(cells);
-    const double u = x * side - border;
-    const double v = y * side - border;
-    if (u < 0 || v < 0 || u >= cells || v >= cells) return -1;
-    int column = static_cast<int>(u);
-    int row = static_cast<int>(v);
     if (!drawn) return (code >> (columns * columns - 1 - (row * columns + column))) & 1 ? 1 : -1;
     for (std::size_t k = 0; k < rotation; ++k) row = columns - 1 - std::exchange(column, row);
-    return drawn->grey[static_cast<std::size_t>(row * columns + column)] / 127.5 - 1;
+    return static_cast<float>(drawn->grey[static_cast<std::size_t>(row * columns + column)] / 127.5 - 1);
   }
 };
 
@@ -213,47 +234,71 @@ class SeenSquare {
   double correlation(const Pattern& pattern) const;
 
  private:
-  static constexpr int k_places = 20;  // a side
+  static constexpr std::size_t k_places = 20;  // a side
   using Values = std::array<float, k_places * k_places>;
   Values values_;
 
-  // Of zero mean and unit length.
-  template <class ValueAt>
-  static Values normalised(ValueAt value_at);
+  static double share(std::size_t place) { return (static_cast<double>(place) + 0.5) / k_places; }
+  // Smoothed, of zero mean and unit length.
+  static void normalise(Values* values);
 };
 
-double mean_relative(const double* fractions, bool several, double limit) {
-  if (!several) return relative(fractions[0], limit);
+double mean_relative(const float* fractions, std::size_t places, double limit) {
   double sum = 0;
-  for (std::size_t i = 0; i < CellSamples::k_places; ++i) sum += relative(fractions[i], limit);
-  return sum / CellSamples::k_places;
+  for (std::size_t i = 0; i < places; ++i) sum += relative(fractions[i], static_cast<float>(limit));
+  return sum / static_cast<double>(places);
 }
 
-template <class ValueAt>
-SeenSquare::Values SeenSquare::normalised(ValueAt value_at) {
-  Values values, scratch;
-  for (int row = 0; row < k_places; ++row)
-    for (int column = 0; column < k_places; ++column)
-      values[static_cast<std::size_t>(row * k_places + column)] =
-          static_cast<float>(value_at((column + 0.5) / k_places, (row + 0.5) / k_places));
-  smooth(values, scratch, k_places);
-  const float mean = std::accumulate(values.begin(), values.end(), 0.0f) / (k_places * k_places);
+void SeenSquare::normalise(Values* values) {
+  Values scratch;
+  smooth(*values, scratch, k_places);
+  const float mean = std::accumulate(values->begin(), values->end(), 0.0f) / (k_places * k_places);
   float squares = 1e-9f;
-  for (float& value : values) {
+  for (float& value : *values) {
     value -= mean;
     squares += value * value;
   }
   const float scale = 1 / std::sqrt(squares);
-  for (float& value : values) value *= scale;
-  return values;
+  for (float& value : *values) value *= scale;
 }
 
-SeenSquare::SeenSquare(const Reader& reader, double limit)
-    : values_(normalised([&](double x, double y) { return relative(reader.fraction(x, y), limit); })) {}
+SeenSquare::SeenSquare(const Reader& reader, double limit) {
+  Places places;
+  for (std::size_t row = 0; row < k_places; ++row)
+    for (std::size_t column = 0; column < k_places; ++column) places.add(share(column), share(row));
+  Fractions fractions;
+  reader.fractions(places, &fractions);
+  for (std::size_t i = 0; i < values_.size(); ++i)
+    values_[i] = relative(fractions[i], static_cast<float>(limit));
+  normalise(&values_);
+}
 
+// A place between two cells shows half of each, whichever way round the square is read.
 double SeenSquare::correlation(const Pattern& pattern) const {
-  const Values shown = normalised([&](double x, double y) { return pattern.at(x, y); });
-  return std::inner_product(shown.begin(), shown.end(), values_.begin(), 0.0);
+  constexpr double k_beside = 1e-6;
+  std::array<int, k_places> before, after;  // the cells on both sides
+  for (std::size_t i = 0; i < k_places; ++i) {
+    before[i] = pattern.cell_at(share(i) - k_beside);
+    after[i] = pattern.cell_at(share(i) + k_beside);
+  }
+  Values shown;
+  for (std::size_t row = 0; row < k_places; ++row) {
+    float* const into = &shown[row * k_places];
+    if (row > 0 && before[row] == after[row - 1] && before[row] == before[row - 1] &&
+        after[row] == before[row]) {
+      std::copy_n(into - k_places, k_places, into);
+      continue;
+    }
+    for (std::size_t column = 0; column < k_places; ++column) {
+      const auto of_row = [&](int cell) {
+        return 0.5F * (pattern.value(cell, before[column]) + pattern.value(cell, after[column]));
+      };
+      const float upper = of_row(before[row]);
+      into[column] = after[row] == before[row] ? upper : 0.5F * (upper + of_row(after[row]));
+    }
+  }
+  normalise(&shown);
+  return std::inner_product(shown.begin(), shown.end(), values_.begin(), 0.0f);
 }
 
 // Logarithm of the likelihood ratio of a pattern to none: `k_independent` values in Gaussian noise whose
@@ -324,7 +369,7 @@ Grid grid_of(const CellSamples& samples, double limit) {
   Grid grid;
   const auto count = static_cast<std::size_t>(samples.cells * samples.cells);
   for (std::size_t i = 0; i < count; ++i)
-    grid[i] = mean_relative(&samples.fraction[i * CellSamples::k_places], samples.several, limit);
+    grid[i] = mean_relative(&samples.fraction[i * samples.places()], samples.places(), limit);
   if (!samples.several) sharpen(samples.cells, &grid);
   return grid;
 }
@@ -492,16 +537,16 @@ void read_code(const Families& families,
 // Whether the whole border is dark, near its outer edge and near the cells, where other families have some.
 bool is_border_dark(const Reader& reader) {
   constexpr int k_places = 24;  // a side
-  int light = 0;
+  Places places;
   for (const double inset : {0.08, 0.19})
     for (int i = 0; i < k_places; ++i) {
       const double along = inset + (1 - 2 * inset) * i / k_places;
-      light += reader.fraction(along, inset) > k_middle;
-      light += reader.fraction(1 - inset, along) > k_middle;
-      light += reader.fraction(1 - along, 1 - inset) > k_middle;
-      light += reader.fraction(inset, 1 - along) > k_middle;
+      places.add(along, inset);
+      places.add(1 - inset, along);
+      places.add(1 - along, 1 - inset);
+      places.add(inset, 1 - along);
     }
-  return light <= k_barcode_border_errors * 8 * k_places;
+  return reader.light_places(places) <= k_barcode_border_errors * 8 * k_places;
 }
 
 Bits barcode_bits(const Reader& reader, const CodeFamily& family) {
@@ -533,15 +578,15 @@ void add_rival_barcodes(const Reader& reader, const Families& families, Readings
 
 // Border of a template: a quarter of the side; dark at 12 places of its middle ring.
 bool has_template_border(const Reader& reader) {
-  int light = 0;
+  Places places;
   for (int i = 0; i < 3; ++i) {
     const double along = 0.2 + 0.3 * i;
-    light += reader.fraction(along, 0.125) > k_middle;
-    light += reader.fraction(along, 0.875) > k_middle;
-    light += reader.fraction(0.125, along) > k_middle;
-    light += reader.fraction(0.875, along) > k_middle;
+    places.add(along, 0.125);
+    places.add(along, 0.875);
+    places.add(0.125, along);
+    places.add(0.875, along);
   }
-  return light <= 1;
+  return reader.light_places(places) <= 1;
 }
 
 double correlation(const std::vector<float>& a, const std::vector<float>& b) {
@@ -555,12 +600,16 @@ std::vector<float> read_inner_half(const Reader& reader, int size) {
   std::vector<float> values;
   const double cells = 2.0 * size;
   const bool several = reader.side_px / cells > 2;
-  for (int row = 0; row < size; ++row)
-    for (int column = 0; column < size; ++column) {
-      std::array<double, CellSamples::k_places> fractions;
-      reader.read_cell(row + size / 2, column + size / 2, cells, several, fractions.data());
-      values.push_back(static_cast<float>(mean_relative(fractions.data(), several, k_middle)));
-    }
+  for (int row = 0; row < size; ++row) {
+    Places places;
+    for (int column = 0; column < size; ++column)
+      places.add_cell((column + size / 2 + 0.5) / cells, (row + size / 2 + 0.5) / cells, cells, several);
+    Fractions fractions;
+    reader.fractions(places, &fractions);
+    const std::size_t each = several ? 5 : 1;
+    for (std::size_t i = 0; i < places.count; i += each)
+      values.push_back(static_cast<float>(mean_relative(&fractions[i], each, k_middle)));
+  }
   values = smoothed(values, size);
   double mean = 0;
   for (const float v : values) mean += v / static_cast<double>(values.size());
@@ -633,11 +682,33 @@ std::optional<Identity> read(const Reader& reader,
   return chosen(reader, readings);
 }
 
-// The picture's nearest pixel; its edge goes on outside.
-int pixel_at(const cv::Mat& grey, const Eigen::Vector2d& px) {
-  const int x = static_cast<int>(std::clamp(px.x() + 0.5, 0.0, static_cast<double>(grey.cols - 1)));
-  const int y = static_cast<int>(std::clamp(px.y() + 0.5, 0.0, static_cast<double>(grey.rows - 1)));
-  return grey.ptr(y)[x];
+// The level of which `rank` others are smaller. Levels are few: all are compared with all.
+LIMN_SIMD int level_of_rank(const std::uint8_t* levels, int count, int rank) {
+  constexpr int k_lanes = 64;
+  std::array<std::uint8_t, k_lanes> padded{}, smaller{};
+  std::copy_n(levels, count, padded.begin());
+  for (int i = 0; i < count; ++i) {
+    const std::uint8_t level = levels[i];
+    for (std::size_t k = 0; k < k_lanes; ++k)
+      smaller[k] = static_cast<std::uint8_t>(smaller[k] + (level < padded[k] ? 1 : 0));
+  }
+  int highest = 0;
+#pragma omp simd reduction(max : highest)
+  for (std::size_t k = 0; k < k_lanes; ++k) {
+    const int level = smaller[k] <= rank ? padded[k] : 0;
+    highest = level > highest ? level : highest;
+  }
+  return highest;
+}
+
+// The nearest pixels' levels at some places of a quad.
+template <std::size_t count>
+std::array<std::uint8_t, count> nearest_levels(const cv::Mat& grey,
+                                               const Quad& quad,
+                                               const std::array<std::array<float, count>, 2>& places) {
+  std::array<std::uint8_t, count> levels;
+  QuadLevels(grey, quad.corners_px).nearest(places[0], places[1], levels.data());
+  return levels;
 }
 
 }  // namespace
@@ -645,58 +716,57 @@ int pixel_at(const cv::Mat& grey, const Eigen::Vector2d& px) {
 bool can_be_covered(const CodeFamily& family) { return !is_barcode(family) && family.max_errors.size() > 1; }
 
 bool may_be_marker(const cv::Mat& grey, const Quad& quad, double min_contrast) {
-  constexpr double k_inset = 0.07;  // within the border of every family (a ninth and more)
-  constexpr int k_border = 20;
-  constexpr int k_inside = 5;  // rows and columns
-  const SquareToQuad px_from_square(quad.corners_px);
-  std::array<int, k_border> border;
-  for (int i = 0; i < k_border / 4; ++i) {
-    const double along = 0.1 + 0.2 * i;
-    const auto at = static_cast<std::size_t>(4 * i);
-    border[at] = pixel_at(grey, px_from_square.at(along, k_inset));
-    border[at + 1] = pixel_at(grey, px_from_square.at(along, 1 - k_inset));
-    border[at + 2] = pixel_at(grey, px_from_square.at(k_inset, along));
-    border[at + 3] = pixel_at(grey, px_from_square.at(1 - k_inset, along));
-  }
-  std::sort(border.begin(), border.end());
-  int lightest = 0;
-  for (int row = 0; row < k_inside; ++row)
-    for (int column = 0; column < k_inside; ++column)
-      lightest = std::max(lightest, pixel_at(grey, px_from_square.at(0.2 + 0.15 * column, 0.2 + 0.15 * row)));
-  const int middle = border[k_border / 2];
+  constexpr float k_inset = 0.07F;  // within the border of every family (a ninth and more)
+  constexpr std::size_t k_border = 20, k_inside = 25;
+  static constexpr auto k_at = [] {
+    std::array<std::array<float, k_border + k_inside>, 2> at{};
+    std::size_t count = 0;
+    const auto add = [&](float x, float y) { at[0][count] = x, at[1][count++] = y; };
+    for (std::size_t i = 0; i < k_border / 4; ++i) {
+      const float along = 0.1F + 0.2F * static_cast<float>(i);
+      add(along, k_inset), add(along, 1 - k_inset), add(k_inset, along), add(1 - k_inset, along);
+    }
+    for (int row = 0; row < 5; ++row)
+      for (int column = 0; column < 5; ++column)
+        add(0.2F + 0.15F * static_cast<float>(column), 0.2F + 0.15F * static_cast<float>(row));
+    return at;
+  }();
+  const auto levels = nearest_levels(grey, quad, k_at);
+  const auto inside = levels.begin() + k_border;
+  const int lightest = *std::max_element(inside, levels.end());
+  const int middle = level_of_rank(levels.data(), k_border, k_border / 2);
+  if (lightest - middle < min_contrast) return false;
   // Three quarters of the border darker than half way to what is lightest inside.
-  return lightest - middle >= min_contrast && border[k_border * 3 / 4] < middle + 0.6 * (lightest - middle);
+  return level_of_rank(levels.data(), k_border, k_border * 3 / 4) < middle + 0.6 * (lightest - middle);
 }
 
 bool may_be_covered_code(const cv::Mat& grey, const Quad& quad) {
-  constexpr int k_along = 10;
-  constexpr int k_border = 4 * k_along;
+  constexpr std::size_t k_along = 10, k_border = 4 * k_along;
   constexpr int k_max_light = k_border * 7 / 40;  // of codes with fingers, bites, slatted shadow: up to 5
-  constexpr int k_cells = 6;
+  constexpr std::size_t k_cells = 6;
   // Between neighbours among the cells, 60 pairs. No code of the families that are read when covered has
   // fewer than 17, and a quarter may be hidden; two or three edges through a quad make 12.
   constexpr int k_min_changes = 13;
-  const SquareToQuad px_from_square(quad.corners_px);
-  std::array<int, k_border> border;
-  for (int i = 0; i < k_along; ++i) {
-    constexpr double k_inset = 1.0 / 16;
-    const double along = k_inset + (1 - 2 * k_inset) * i / (k_along - 1);
-    const auto at = static_cast<std::size_t>(4 * i);
-    border[at] = pixel_at(grey, px_from_square.at(along, k_inset));
-    border[at + 1] = pixel_at(grey, px_from_square.at(along, 1 - k_inset));
-    border[at + 2] = pixel_at(grey, px_from_square.at(k_inset, along));
-    border[at + 3] = pixel_at(grey, px_from_square.at(1 - k_inset, along));
-  }
-  std::array<int, k_cells * k_cells> inside;
-  for (int row = 0; row < k_cells; ++row)
-    for (int column = 0; column < k_cells; ++column)
-      inside[static_cast<std::size_t>(row * k_cells + column)] =
-          pixel_at(grey, px_from_square.at((column + 1.5) / (k_cells + 2), (row + 1.5) / (k_cells + 2)));
-  auto sorted = inside;
-  std::nth_element(border.begin(), border.begin() + k_border / 2, border.end());
-  std::nth_element(sorted.begin(), sorted.begin() + 31, sorted.end());
-  const double dark = border[k_border / 2];
-  const double light = sorted[31];  // some of the brightest may be glare
+  static constexpr auto k_at = [] {
+    std::array<std::array<float, k_border + k_cells * k_cells>, 2> at{};
+    std::size_t count = 0;
+    const auto add = [&](float x, float y) { at[0][count] = x, at[1][count++] = y; };
+    for (std::size_t i = 0; i < k_along; ++i) {
+      constexpr float k_inset = 1.0F / 16;
+      const float along = k_inset + (1 - 2 * k_inset) * static_cast<float>(i) / (k_along - 1);
+      add(along, k_inset), add(along, 1 - k_inset), add(k_inset, along), add(1 - k_inset, along);
+    }
+    const auto middle = [](std::size_t i) { return (static_cast<float>(i) + 1.5F) / (k_cells + 2); };
+    for (std::size_t row = 0; row < k_cells; ++row)
+      for (std::size_t column = 0; column < k_cells; ++column) add(middle(column), middle(row));
+    return at;
+  }();
+  const auto levels = nearest_levels(grey, quad, k_at);
+  const auto border = std::span(levels).first(k_border);
+  const auto inside = std::span(levels).subspan(k_border);
+  const double dark = level_of_rank(border.data(), k_border, k_border / 2);
+  // Some of the brightest may be glare.
+  const double light = level_of_rank(inside.data(), static_cast<int>(inside.size()), 31);
   const double middle = dark + k_middle * (light - dark);
   if (std::count_if(border.begin(), border.end(), [&](int level) { return level > middle; }) > k_max_light)
     return false;

@@ -185,6 +185,24 @@ TEST(Barcode, MixWithOtherFamiliesInOnePicture) {
   EXPECT_EQ(found, shown);
 }
 
+// The cells of 8 of 3x3 and of 544 of 4x4 differ by a twelfth of the side, whichever way it is turned.
+TEST(Barcode, IsToldFromALargerOneWhicheverWayItIsTurned) {
+  auto rng = test::test_rng();
+  const Lens lens = pinhole_vga();
+  const std::vector<std::string> names = {"artoolkit_3x3", "artoolkit_4x4"};
+  const std::vector<MarkerName> markers = {{"artoolkit_3x3", "8"}, {"artoolkit_4x4", "544"}};
+  for (const MarkerName& name : markers)
+    for (int turn = 0; turn < 4; ++turn) {
+      const std::vector<PlacedMarker> placed = {
+          test::placed(lens, name, {320, 240}, 70, turn * 90_deg, 0, 0)};
+      const cv::Mat grey = test::picture_of(lens, test::plain(640, 480, 100), placed,
+                                            {.blur_px = 0.6, .noise_levels = 2}, rng);
+      const auto found = Detector(families(names)).detect(grey);
+      ASSERT_EQ(found.size(), 1U) << name.text() << " turned " << turn << " times";
+      EXPECT_EQ(found[0].marker, name);
+    }
+}
+
 // None in 219 photographs: 210 of Gray code stripes on a wall and a chessboard, 9 of other families' markers.
 TEST(Barcode, PhotographsWithoutThemShowNone) {
   const auto folder = test::real_data("");
