@@ -1,5 +1,6 @@
 #include "core/picture.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <opencv2/imgcodecs.hpp>
@@ -58,6 +59,9 @@ Result<cv::Mat> read(const fs::path& path, int flags) {
     const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
     cv::Mat picture = cv::imdecode(encoded, flags | cv::IMREAD_IGNORE_ORIENTATION);
     if (picture.empty()) return truncated;
+    if (std::max(picture.cols, picture.rows) > k_max_picture_side)
+      return error("{}: expected at most {} pixels a side, found {}x{}. Make it smaller.", path.string(),
+                   k_max_picture_side, picture.cols, picture.rows);
     return picture;
   } catch (const cv::Exception&) {
     return truncated;

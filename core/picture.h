@@ -8,8 +8,11 @@
 
 namespace limn {
 
+/// Largest width and height of a picture that is read.
+inline constexpr int k_max_picture_side = 32767;
+
 /// Reads a PNG or JPEG as 8-bit grey or BGR, as stored (alpha is dropped, 16 bits become 8). A truncated or
-/// damaged file is an error, never a half picture.
+/// damaged file is an error, never a half picture; so is one larger than k_max_picture_side.
 Result<cv::Mat> read_picture(const std::filesystem::path& path);
 /// As read_picture, converted to one 8-bit grey channel.
 Result<cv::Mat> read_grey_picture(const std::filesystem::path& path);

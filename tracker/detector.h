@@ -41,8 +41,9 @@ class Detector {
  public:
   explicit Detector(Families families, DetectorOptions options = {});
 
-  /// `grey` is 8-bit, one channel, the camera's raw picture; an empty one has no markers. With `lens` sides
-  /// are straight in undistorted directions, without one in the picture. Corners are raw pixels either way.
+  /// `grey` is the camera's raw picture: 8-bit, one channel, at most k_max_picture_side a side; an empty one
+  /// has no markers. With `lens` sides are straight in undistorted directions, without one in the picture.
+  /// Corners are raw pixels either way.
   std::vector<Detection> detect(const cv::Mat& grey, const Lens* lens = nullptr);
 
   /// The same into `detections`. Allocates nothing once its buffers are large enough, but where a pattern is

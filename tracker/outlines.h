@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "core/picture.h"
 #include "core/result.h"
 #include "tracker/threshold.h"
 
@@ -17,9 +18,6 @@ namespace limn::tracker {
 /// Holds its buffers between calls.
 class Outlines {
  public:
-  /// Largest width and height of a picture: points are kept in 16 bits of half pixels.
-  static constexpr int k_max_side = 32767;
-
   /// Of a boundary as it is traced.
   struct Extent {
     std::size_t count = 0;  ///< cracks
@@ -39,7 +37,8 @@ class Outlines {
   /// `corners`.
   template <typename Visit>
   void for_each(CornerCodes& corners, const Visit& visit) {
-    LIMN_CHECK(corners.width <= k_max_side && corners.height <= k_max_side);
+    static_assert(2 * k_max_picture_side <= 0xFFFF);
+    LIMN_CHECK(corners.width <= k_max_picture_side && corners.height <= k_max_picture_side);
     steps_ = Steps(corners.stride);
     for (Start start = first(corners); start.y < corners.height; start = next(corners, start))
       visit(trace(corners, start));

@@ -124,27 +124,30 @@ LIMN_SIMD void add_products(const float* __restrict columns,
                             const float* __restrict right,
                             double* __restrict information,
                             double* __restrict products) {
-  for (int i = 0; i < number; ++i) {
-    const float* a = columns + static_cast<std::size_t>(i) * count;
-    float sum = 0;
-#pragma omp simd reduction(+ : sum)
-    for (std::size_t k = 0; k < count; ++k) sum += a[k] * right[k];
-    products[i] = sum;
+  constexpr int k_rows = 2;
+  static_assert(k_fours % k_rows == 0);
+  for (int i = 0; i < number; i += k_rows) {
+    const float* a0 = columns + static_cast<std::size_t>(i) * count;
+    const float* a1 = a0 + count;
+    float right0 = 0, right1 = 0;
+#pragma omp simd reduction(+ : right0, right1)
+    for (std::size_t k = 0; k < count; ++k) right0 += a0[k] * right[k], right1 += a1[k] * right[k];
+    products[i] = right0, products[i + 1] = right1;
     for (int j = 0; j <= i; j += k_fours) {
       const float* b0 = columns + static_cast<std::size_t>(j) * count;
       const float* b1 = b0 + count;
       const float* b2 = b1 + count;
       const float* b3 = b2 + count;
-      float s0 = 0, s1 = 0, s2 = 0, s3 = 0;
-#pragma omp simd reduction(+ : s0, s1, s2, s3)
+      float s0 = 0, s1 = 0, s2 = 0, s3 = 0, t0 = 0, t1 = 0, t2 = 0, t3 = 0;
+#pragma omp simd reduction(+ : s0, s1, s2, s3, t0, t1, t2, t3)
       for (std::size_t k = 0; k < count; ++k) {
-        s0 += a[k] * b0[k];
-        s1 += a[k] * b1[k];
-        s2 += a[k] * b2[k];
-        s3 += a[k] * b3[k];
+        s0 += a0[k] * b0[k], s1 += a0[k] * b1[k], s2 += a0[k] * b2[k], s3 += a0[k] * b3[k];
+        t0 += a1[k] * b0[k], t1 += a1[k] * b1[k], t2 += a1[k] * b2[k], t3 += a1[k] * b3[k];
       }
       double* row = information + i * number + j;
       row[0] = s0, row[1] = s1, row[2] = s2, row[3] = s3;
+      row += number;
+      row[0] = t0, row[1] = t1, row[2] = t2, row[3] = t3;
     }
   }
 }

@@ -72,6 +72,17 @@ TEST(Picture, DamagedMissingAndForeignFilesAreErrors) {
   EXPECT_NE(foreign.message().find("expected a PNG or JPEG"), std::string::npos);
 }
 
+TEST(Picture, LargerOnesThanAnyCameraTakesAreErrors) {
+  const auto path = test::test_folder() / "a.png";
+  ASSERT_TRUE(write_png(path, cv::Mat(2, k_max_picture_side, CV_8UC1, cv::Scalar(9))));
+  EXPECT_TRUE(read_grey_picture(path));
+  ASSERT_TRUE(write_png(path, cv::Mat(k_max_picture_side + 1, 2, CV_8UC1, cv::Scalar(9))));
+  const auto picture = read_grey_picture(path);
+  ASSERT_FALSE(picture);
+  EXPECT_EQ(picture.message(),
+            path.string() + ": expected at most 32767 pixels a side, found 2x32768. Make it smaller.");
+}
+
 TEST(Picture, DataUriHoldsTheJpeg) {
   const std::string uri = data_uri(noise(5, 7, CV_8UC3));
   const std::string head = "data:image/jpeg;base64,";
