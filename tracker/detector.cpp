@@ -105,19 +105,34 @@ bool is_known(const Quad& quad, const std::vector<Detection>& detections) {
   });
 }
 
-// Whether both of a segment's ends lie on the marker or next to it.
-bool is_inside(const Segment& segment, const Detection& detection) {
-  constexpr double k_around_px = 3;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Eigen::Vector2d corner = detection.corners_px[i];
-    const Eigen::Vector2d side = (detection.corners_px[(i + 1) % 4] - corner).normalized();
-    for (const Eigen::Vector2d& end : {segment.from, segment.to}) {
-      const Eigen::Vector2d to = end - corner;
-      if (side.x() * to.y() - side.y() * to.x() < -k_around_px) return false;
+// A marker's square and what is next to it.
+class SquareAround {
+ public:
+  explicit SquareAround(const Detection& detection)
+      : corner_(detection.corners_px[0]), square_(4 * std::pow(longest_side(detection), 2)) {
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Eigen::Vector2d& from = detection.corners_px[i];
+      const Eigen::Vector2d side = (detection.corners_px[(i + 1) % 4] - from).normalized();
+      inward_[i] = {-side.y(), side.x()};
+      offset_[i] = inward_[i].dot(from) - k_around_px;
     }
   }
-  return true;
-}
+
+  /// Whether both of a segment's ends lie in it.
+  bool holds(const Segment& segment) const {
+    if ((segment.from - corner_).squaredNorm() >= square_) return false;
+    for (std::size_t i = 0; i < 4; ++i)
+      if (std::min(inward_[i].dot(segment.from), inward_[i].dot(segment.to)) < offset_[i]) return false;
+    return true;
+  }
+
+ private:
+  static constexpr double k_around_px = 3;
+  Eigen::Vector2d corner_;
+  double square_;  // of the distance beyond which nothing lies in it
+  std::array<Eigen::Vector2d, 4> inward_;
+  std::array<double, 4> offset_;
+};
 
 }  // namespace
 
@@ -213,11 +228,9 @@ void Detector::join_segments(const cv::Mat& grey, const std::vector<Detection>& 
   at_once(2, options_.threads, [&](int kind) {
     std::vector<Segment>& segments = kind == 0 ? segments_.of_black : segments_.of_blurred;
     Joined& joined = joined_[static_cast<std::size_t>(kind)];
-    for (const Detection& d : found) {
-      const double square = 4 * std::pow(longest_side(d), 2);
-      std::erase_if(segments, [&](const Segment& s) {
-        return (s.from - d.corners_px[0]).squaredNorm() < square && is_inside(s, d);
-      });
+    for (const Detection& detection : found) {
+      const SquareAround square(detection);
+      std::erase_if(segments, [&](const Segment& segment) { return square.holds(segment); });
     }
     joined.finder.find(segments, grey.cols, grey.rows, joined.quads);
     if (joined.quads.size() > k_max_candidates) joined.quads.resize(k_max_candidates);

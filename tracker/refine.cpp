@@ -208,7 +208,8 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   const int last = std::min(u_limit - 1, static_cast<int>(std::floor(u_high - trim)));
 
   rows_.clear();
-  gradients_.clear();
+  gradients_.resize(profile * static_cast<std::size_t>(std::max(0, last - first + 1)));
+  double* gradient = gradients_.data();
   Profile mean{};
   const int stride = effort == Effort::rough ? 1 + (last - first) / k_rough_rows : 1;
   for (int u = first; u <= last; u += stride) {
@@ -216,14 +217,18 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
         before && before->flat == line->flat ? before->at(u) : from[v_axis] + (u - from[u_axis]) * slope;
     const double v = straight + bow.at(u);
     if (!(v > reach && v < v_limit - 1 - reach)) continue;
-    const int centre = static_cast<int>(std::lround(v));
+    const int centre = static_cast<int>(v + 0.5);
     const std::uint8_t* pixel = line->flat ? grey.ptr(centre) + u : grey.ptr(u) + centre;
-    for (int k = 0; k < 2 * reach; ++k) {
-      const std::ptrdiff_t at = (k - reach) * v_stride;
-      const double difference = light_[pixel[at]] - light_[pixel[at + v_stride]];
-      gradients_.push_back(difference);
-      mean[static_cast<std::size_t>(k)] += difference;
+    pixel -= reach * v_stride;
+    double level = light_[*pixel];
+    for (std::size_t k = 0; k < profile; ++k) {
+      pixel += v_stride;
+      const double next = light_[*pixel];
+      gradient[k] = level - next;
+      mean[k] += level - next;
+      level = next;
     }
+    gradient += profile;
     rows_.push_back({u, centre});
   }
   if (static_cast<int>(rows_.size()) < k_min_crossings) return false;
