@@ -15,8 +15,10 @@ namespace {
 constexpr double k_systematic_px = 0.002;
 // The averaged gradient's tails below this share of its peak count as flat.
 constexpr double k_flat_share = 0.05;
-// Above this share, and twice the next place, what lies just outside still is the edge's tail.
-constexpr double k_tail_share = 0.03;
+// From this share to twice it, and from half as much again as the next place to twice and a half, what lies
+// just outside counts more and more as the edge's tail.
+constexpr double k_tail_share = 0.02;
+constexpr double k_tail_lead = 1.5;
 // Below this share a rise means another edge of the same direction behind the first: grey paper, then a white
 // table.
 constexpr double k_valley_share = 0.35;
@@ -136,13 +138,11 @@ struct Window {
   Profile parts{};  // of each place in [low, high)
 };
 
-// A window that reaches as far to both sides of the edge's centre as [low, high) does to either. One that
+// A window that reaches as far to both sides of the edge's centre as [from, to) does to either. One that
 // cuts off more of the blur on one side moves all crossings of the line alike, which their residuals do not
 // show.
-Window centred(const Profile& mean, std::size_t size, std::size_t low, std::size_t high) {
+Window centred(const Profile& mean, std::size_t size, double from, double to) {
   Profile parts{};
-  const auto from = static_cast<double>(low);
-  const auto to = static_cast<double>(high);
   double centre = 0.5 * (from + to);
   double half = centre - from;
   constexpr int k_rounds = 3;
@@ -269,13 +269,16 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   contrast /= static_cast<double>(rows_.size());
   if (!(contrast > 0)) return false;
   const auto is_flat = [&](std::size_t k) { return std::abs(mean[k]) <= flat_below; };
-  const auto is_tail = [&](std::size_t k, std::size_t beyond) {
-    return mean[k] > k_tail_share * mean[peak] && mean[k] > 2 * std::abs(mean[beyond]);
+  // How much of place k is the edge's tail.
+  const auto tail = [&](std::size_t k, std::size_t beyond) {
+    const double large = mean[k] / (k_tail_share * mean[peak]) - 1;
+    const double leads = mean[k] - k_tail_lead * std::abs(mean[beyond]);
+    return std::clamp(large, 0.0, 1.0) * (leads > 0 ? std::min(1.0, leads / std::abs(mean[beyond])) : 0.0);
   };
   Window window = whole(low, high);
   if (low > 1 && high + 1 < profile && is_flat(low - 1) && is_flat(high))
-    window = centred(mean, profile, is_tail(low - 1, low - 2) ? low - 1 : low,
-                     is_tail(high, high + 1) ? high + 1 : high);
+    window = centred(mean, profile, static_cast<double>(low) - tail(low - 1, low - 2),
+                     static_cast<double>(high) + tail(high, high + 1));
 
   // Rows beside a corner see the other edge as far as the blur reaches.
   const double blur_trim = std::min(0.2 * (u_high - u_low), 0.5 * static_cast<double>(high - low) + 0.5);
