@@ -11,6 +11,7 @@
 
 #include "apps/judge.h"
 #include "apps/refill.h"
+#include "apps/traced_eye.h"
 #include "core/log.h"
 #include "projector/renderer.h"
 #include "scene/drawn.h"
@@ -146,50 +147,6 @@ std::string words_of(const LevelErrors& errors, const cv::Mat& shown) {
       "Difference: 32 times.",
       cv::countNonZero(shown), errors.mean, 100 * errors.over, 100 * errors.inner_over);
 }
-
-// The mean of each factor x factor pixels.
-cv::Mat binned(const cv::Mat& fine, int factor) {
-  cv::Mat out;
-  cv::resize(fine, out, {fine.cols / factor, fine.rows / factor}, 0, 0, cv::INTER_AREA);
-  return out;
-}
-
-// The viewer's eye as a camera of a world, traced by `finer` rays a side of a pixel.
-struct TracedEye {
-  int finer;
-  sim::World world;
-  sim::Samples samples;
-
-  TracedEye(const sim::World& stage, const Imager& viewer, int rays) : finer(rays), world(stage) {
-    world.rig.cameras = {resized(viewer, rays * viewer.width, rays * viewer.height).value()};
-    world.camera_effects = {sim::CameraEffects{.colour = true}};
-    samples = sim::trace(world, 0);
-  }
-
-  // With these pictures shone by the projectors as `projectors` has them: linear light.
-  cv::Mat seen(const sim::World& projectors, const std::vector<cv::Mat>& shown) const {
-    return binned(sim::ideal_light(projectors, samples, shown), finer);
-  }
-  cv::Mat seen(const std::vector<cv::Mat>& shown) const { return seen(world, shown); }
-  // With the picture of one projector alone.
-  cv::Mat seen(std::size_t projector, const cv::Mat& shown) const {
-    std::vector<cv::Mat> all(world.rig.projectors.size());
-    all[projector] = shown;
-    return seen(all);
-  }
-  // Share of each of the viewer's pixels that each projector reaches.
-  std::vector<cv::Mat> reaches() const {
-    std::vector<cv::Mat> reaches;
-    for (std::size_t i = 0; i < world.rig.projectors.size(); ++i) {
-      const Imager& projector = world.rig.projectors[i];
-      const cv::Mat white(projector.height, projector.width, CV_32FC3, cv::Scalar::all(1));
-      cv::Mat reach;
-      cv::extractChannel(seen(i, white), reach, 1);
-      reaches.push_back(reach);
-    }
-    return reaches;
-  }
-};
 
 // By how much the luminance of `less` is below that of `more`, as a share of it; both as an eye sees them.
 cv::Mat off_luminance(const cv::Mat& more, const cv::Mat& less) {
