@@ -19,6 +19,8 @@ const cv::Scalar k_background(40, 36, 34);  // of views: a dark room
 const cv::Scalar k_green(90, 220, 90), k_amber(40, 170, 255), k_red(60, 60, 255), k_blue(255, 190, 110);
 constexpr double k_glide_s = 0.1;  // in which a guest's eye is followed to a third of its way
 constexpr const char* k_still_eye = "the scene's own";
+// Of the corners of the prototype's box: less is not shown. An eighth of a pixel where 1280 light a metre.
+constexpr double k_stays_m = 0.1e-3;
 constexpr double k_other_waiting = 0.4;  // light of those that are not next, as a share
 
 // base + share of what `with` adds to it, in linear light.
@@ -46,6 +48,23 @@ cv::Mat mixed(const cv::Mat& base, const cv::Mat& with, double share) {
 Imager moved_eye(Imager imager, double right_m) {
   imager.imager_from_world.translation.x() -= right_m;
   return imager;
+}
+
+// A prototype that stands still trembles by what its markers are measured to; it stays where it was shown, so
+// that what is known of its surface need not be found again.
+void keep_still(const std::optional<Pose>& shown,
+                const Eigen::AlignedBox3d& box,
+                std::vector<Track>* tracks) {
+  if (!shown || box.isEmpty()) return;
+  for (Track& track : *tracks) {
+    if (track.body != "prototype") continue;
+    double most_m = 0;
+    for (int i = 0; i < 8; ++i) {
+      const Eigen::Vector3d p = box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i));
+      most_m = std::max(most_m, (track.world_from_body * p - *shown * p).norm());
+    }
+    if (most_m < k_stays_m) track.world_from_body = *shown;
+  }
 }
 
 // What a guest is called among the viewers.
@@ -180,6 +199,7 @@ const Painted& Painter::paint(const Watched& watched,
   painted_.tracks = scene::carried(
       scene_, staging,
       tracker::predicted(watched.motions, shown_at, options_.prediction, options_.motion, now));
+  keep_still(last_.world_from_prototype, prototype_box_, &painted_.tracks);
   painted_.posed = scene::staged(scene_, staging, painted_.tracks);
   note_changes(painted_.posed, staging, shown_at);
   std::vector<scene::Eye> guests = guests_eyes(staging, places, now);
@@ -229,8 +249,9 @@ cv::Mat Painter::screen(const Watched& watched, const scene::Staging& staging, s
   const cv::Mat behind = options_.is_linear_camera ? srgb_picture(seen) : seen;
   if (what == camera) return behind;
   const Stamp at = watched.frames[0].captured_at;
-  const std::vector<Track> tracks = scene::carried(
+  std::vector<Track> tracks = scene::carried(
       scene_, staging, tracker::predicted(watched.motions, at, options_.prediction, options_.motion));
+  keep_still(last_.world_from_prototype, prototype_box_, &tracks);
   const scene::PosedScene posed = scene::staged(scene_, staging, tracks);
   if (what == rest) {
     const double seconds = treated_at_ == Stamp{} ? 0 : std::max(0.0, seconds_between(treated_at_, at));
