@@ -463,15 +463,15 @@ double EdgeRefiner::fit_terms(int terms, bool from_line, EdgeLine* line) {
     if (terms == 2) inverse(2, 2) = 0;
     const Spread spread =
         new_residuals(d, v, share, count, solution, scale > 0 ? 3 * scale : k_all, foreign, residual);
-    deviations_.assign(residual, residual + count);
-    const auto middle = deviations_.begin() + static_cast<std::ptrdiff_t>(count / 2);
-    std::nth_element(deviations_.begin(), middle, deviations_.end());
-    scale = std::max(1.4826 * *middle, 1e-3);
     variance = spread.squares / std::max(1.0, spread.count - terms);  // of a row of full contrast
     line->covariance = inverse * variance;
     // Settled, with nothing to reject in the rounds to come.
     if (round > 0 && moved < k_settled_px && spread.largest < k_reject * std::max(scale, k_min_scale_px))
       break;
+    deviations_.assign(residual, residual + count);
+    const auto middle = deviations_.begin() + static_cast<std::ptrdiff_t>(count / 2);
+    std::nth_element(deviations_.begin(), middle, deviations_.end());
+    scale = std::max(1.4826 * *middle, 1e-3);
   }
   return variance;
 }

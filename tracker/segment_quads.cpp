@@ -11,7 +11,7 @@
 namespace limn::tracker {
 namespace {
 
-constexpr double k_cell_px = 32;
+constexpr double k_cell_px = 64;
 constexpr double k_min_length_px = 12;   // of a segment: shorter ones' directions are too vague
 constexpr double k_min_sine = 0.25;      // of a quad's corner: steeper markers show as regions
 constexpr double k_max_opposite = -0.3;  // cosine between opposite sides
