@@ -10,33 +10,33 @@
 namespace limn::tracker {
 namespace {
 
-using Frame = QuadLevels::Frame;
+using View = QuadLevels::View;
 
 // Comparisons are such that NaN becomes a pixel, too.
-inline void find_place(const Frame& frame, float u, float v, float* x, float* y) {
-  const auto& h = frame.homography;
+inline void find_place(const View& view, float u, float v, float* x, float* y) {
+  const auto& h = view.homography;
   const float scale = 1 / (h[6] * u + h[7] * v + 1);
   const float to_x = (h[0] * u + h[1] * v + h[2]) * scale;
   const float to_y = (h[3] * u + h[4] * v + h[5]) * scale;
   const float right_x = to_x > 0 ? to_x : 0;
   const float right_y = to_y > 0 ? to_y : 0;
-  *x = right_x < frame.high_x ? right_x : frame.high_x;
-  *y = right_y < frame.high_y ? right_y : frame.high_y;
+  *x = right_x < view.high_x ? right_x : view.high_x;
+  *y = right_y < view.high_y ? right_y : view.high_y;
 }
 
-LIMN_SIMD void find_nearest(const Frame& frame,
+LIMN_SIMD void find_nearest(const View& view,
                             const float* __restrict u,
                             const float* __restrict v,
                             std::size_t count,
                             std::int32_t* __restrict offsets) {
   for (std::size_t i = 0; i < count; ++i) {
     float x = 0, y = 0;
-    find_place(frame, u[i], v[i], &x, &y);
-    offsets[i] = static_cast<std::int32_t>(y + 0.5F) * frame.stride + static_cast<std::int32_t>(x + 0.5F);
+    find_place(view, u[i], v[i], &x, &y);
+    offsets[i] = static_cast<std::int32_t>(y + 0.5F) * view.stride + static_cast<std::int32_t>(x + 0.5F);
   }
 }
 
-LIMN_SIMD void find_between(const Frame& frame,
+LIMN_SIMD void find_between(const View& view,
                             const float* __restrict u,
                             const float* __restrict v,
                             std::size_t count,
@@ -45,13 +45,13 @@ LIMN_SIMD void find_between(const Frame& frame,
                             float* __restrict down) {
   for (std::size_t i = 0; i < count; ++i) {
     float x = 0, y = 0;
-    find_place(frame, u[i], v[i], &x, &y);
+    find_place(view, u[i], v[i], &x, &y);
     const auto whole_x = static_cast<std::int32_t>(x), whole_y = static_cast<std::int32_t>(y);
-    const std::int32_t column = whole_x < frame.last_x ? whole_x : frame.last_x;
-    const std::int32_t row = whole_y < frame.last_y ? whole_y : frame.last_y;
+    const std::int32_t column = whole_x < view.last_x ? whole_x : view.last_x;
+    const std::int32_t row = whole_y < view.last_y ? whole_y : view.last_y;
     across[i] = x - static_cast<float>(column);
     down[i] = y - static_cast<float>(row);
-    offsets[i] = row * frame.stride + column;
+    offsets[i] = row * view.stride + column;
   }
 }
 
@@ -87,21 +87,21 @@ QuadLevels::QuadLevels(const cv::Mat& grey, const std::array<Eigen::Vector2d, 4>
   for (Eigen::Vector2d& corner : corners) corner -= Eigen::Vector2d(x0, y0);
   const Eigen::Matrix3d m = SquareToQuad(corners).matrix();
   for (int i = 0; i < 8; ++i)
-    frame_.homography[static_cast<std::size_t>(i)] = static_cast<float>(m(i / 3, i % 3));
-  frame_.high_x = static_cast<float>(grey.cols - 1 - x0);
-  frame_.high_y = static_cast<float>(grey.rows - 1 - y0);
-  frame_.last_x = last_x - x0;
-  frame_.last_y = last_y - y0;
-  frame_.stride = static_cast<std::int32_t>(grey.step[0]);
+    view_.homography[static_cast<std::size_t>(i)] = static_cast<float>(m(i / 3, i % 3));
+  view_.high_x = static_cast<float>(grey.cols - 1 - x0);
+  view_.high_y = static_cast<float>(grey.rows - 1 - y0);
+  view_.last_x = last_x - x0;
+  view_.last_y = last_y - y0;
+  view_.stride = static_cast<std::int32_t>(grey.step[0]);
   origin_ = grey.ptr(y0) + x0;
   right_ = grey.cols > 1 ? 1 : 0;
-  below_ = grey.rows > 1 ? frame_.stride : 0;
+  below_ = grey.rows > 1 ? view_.stride : 0;
 }
 
 void QuadLevels::nearest(std::span<const float> x, std::span<const float> y, std::uint8_t* levels) const {
   LIMN_CHECK(x.size() == y.size() && x.size() <= k_most);
   std::array<std::int32_t, k_most> offsets;
-  find_nearest(frame_, x.data(), y.data(), x.size(), offsets.data());
+  find_nearest(view_, x.data(), y.data(), x.size(), offsets.data());
   for (std::size_t i = 0; i < x.size(); ++i) levels[i] = origin_[offsets[i]];
 }
 
@@ -110,7 +110,7 @@ void QuadLevels::between(std::span<const float> x, std::span<const float> y, flo
   std::array<std::int32_t, k_most> offsets;
   std::array<float, k_most> across, down;
   Neighbours neighbours;
-  find_between(frame_, x.data(), y.data(), x.size(), offsets.data(), across.data(), down.data());
+  find_between(view_, x.data(), y.data(), x.size(), offsets.data(), across.data(), down.data());
   for (std::size_t i = 0; i < x.size(); ++i) {
     const std::uint8_t* pixel = origin_ + offsets[i];
     neighbours.here[i] = pixel[0];

@@ -26,7 +26,7 @@ class QuadLevels {
   void between(std::span<const float> x, std::span<const float> y, float* levels) const;
 
   /// What is needed of picture and quadrilateral, about a pixel near its upper left.
-  struct Frame {
+  struct View {
     std::array<float, 8> homography;  ///< row by row, the last entry 1
     float high_x, high_y;             ///< the picture's last pixel
     std::int32_t last_x, last_y;      ///< the last one that has a neighbour on its right, below
@@ -34,7 +34,7 @@ class QuadLevels {
   };
 
  private:
-  Frame frame_;
+  View view_;
   const std::uint8_t* origin_;
   int right_, below_;  // from a pixel to its neighbours; 0 where there is none
 };

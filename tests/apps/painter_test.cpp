@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <span>
 
 #include "apps/coarser.h"
 #include "apps/live/watcher.h"
@@ -17,7 +19,8 @@ namespace {
 using namespace test::literals;
 namespace fs = std::filesystem;
 
-// Its markers are measured a little otherwise in every picture; a move is shown, however small.
+// Its markers are measured a little otherwise in every picture; a move of less than half a millimetre is
+// shown.
 TEST(Painter, APrototypeThatStandsStillIsShownWhereItWas) {
   sim::World world =
       sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture).value();
