@@ -41,7 +41,6 @@ using Say = std::function<void(const std::string&)>;
 
 constexpr double k_settled = 0.05;  // of the predicted error, over two poses
 constexpr const char *k_taken_by = "plan.json", *k_latency = "latency.json";  // beside capture.json
-constexpr double k_guard_s = 0.001;                                           // beyond a measured latency
 
 // Every leaf of two plans that differs, the first alone: "plan.board: captured with …, this plan says …".
 std::string difference(const nlohmann::json& then, const nlohmann::json& now) {

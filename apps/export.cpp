@@ -28,8 +28,6 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr double k_display_gamma = 2.2;  // where no response was measured, as projector-NAME.png
-
 // What one projector lights and how it is to be blended.
 struct Maps {
   cv::Mat points;  // Renderer::surface_points

@@ -35,8 +35,8 @@ Result<std::vector<Pair>> sampled_pairs(const Captures& captures, std::vector<st
     if (!samples) failed.emplace_back(pair.projector, samples.error());
   }
   for (const auto& [projector, problem] : failed) {
-    const bool seen =
-        std::any_of(all.begin(), all.end(), [&](const Pair& p) { return p.pair.projector == projector; });
+    const bool seen = std::any_of(all.begin(), all.end(),
+                                  [wanted = projector](const Pair& p) { return p.pair.projector == wanted; });
     if (!seen) return problem;
     warnings->push_back(problem.message + " Another camera sees this projector: left out.");
   }
