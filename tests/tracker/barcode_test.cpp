@@ -185,7 +185,7 @@ TEST(Barcode, MixWithOtherFamiliesInOnePicture) {
   EXPECT_EQ(found, shown);
 }
 
-// The cells of 8 of 3x3 and of 544 of 4x4 differ by a twelfth of the side, whichever way it is turned.
+// Cells of 8 of 3x3 and of 544 of 4x4 end 1/24 of the side apart, whichever way they are turned.
 TEST(Barcode, IsToldFromALargerOneWhicheverWayItIsTurned) {
   auto rng = test::test_rng();
   const Lens lens = pinhole_vga();
