@@ -49,8 +49,10 @@ void QuadFinder::find(CornerCodes& corners, const CandidateOptions& options, std
     outlines_.find_corners(k_corner_px + k_corner_share * static_cast<double>(outline.count), k_max_corners);
     const std::size_t count = outlines_.corners().size();
     if (count < 4 || count > k_max_corners) return;
-    for (std::size_t from = 0; from < count; ++from)
+    for (std::size_t from = 0; from < count; ++from) {
+      corners_[from] = outlines_.point(outlines_.corners()[from]);
       for (std::size_t to = 0; to < count; ++to) sides_[from][to].known = false;
+    }
     Quad quad;
     if (choose_quad(options.min_side_px, &quad)) quads.push_back(quad);
   });
@@ -73,7 +75,12 @@ const QuadFinder::Side& QuadFinder::side(std::size_t from_corner, std::size_t to
   return side;
 }
 
-// The four corners among those found whose sides are straightest.
+// Whether the outline turns as a convex one at the second of three of its corners.
+bool QuadFinder::turns_right(std::size_t a, std::size_t b, std::size_t c) const {
+  return cross(corners_[b] - corners_[a], corners_[c] - corners_[b]) > 0;
+}
+
+// The four corners among those found, convex, whose sides are straightest.
 bool QuadFinder::choose_quad(double min_side_px, Quad* quad) {
   const std::size_t n = outlines_.corners().size();
   double best = std::numeric_limits<double>::infinity();
@@ -82,8 +89,9 @@ bool QuadFinder::choose_quad(double min_side_px, Quad* quad) {
     for (std::size_t b = a + 1; b + 2 < n; ++b) {
       if (!side(a, b).straight) continue;
       for (std::size_t c = b + 1; c + 1 < n; ++c) {
-        if (!side(b, c).straight) continue;
+        if (!turns_right(a, b, c) || !side(b, c).straight) continue;
         for (std::size_t d = c + 1; d < n; ++d) {
+          if (!turns_right(b, c, d) || !turns_right(c, d, a) || !turns_right(d, a, b)) continue;
           if (!side(c, d).straight || !side(d, a).straight) continue;
           const double squares = side(a, b).line.squares + side(b, c).line.squares + side(c, d).line.squares +
                                  side(d, a).line.squares;
@@ -97,9 +105,6 @@ bool QuadFinder::choose_quad(double min_side_px, Quad* quad) {
 }
 
 bool QuadFinder::fit_quad(const std::array<std::size_t, 4>& corners, double min_side_px, Quad* quad) {
-  const auto at = [&](std::size_t i) { return outlines_.point(outlines_.corners()[corners[i % 4]]); };
-  for (std::size_t i = 0; i < 4; ++i)  // the found corners as they are: convex, nearly
-    if (cross(at(i + 1) - at(i), at(i + 2) - at(i + 1)) <= 0) return false;
   for (std::size_t i = 0; i < 4; ++i) {
     const Outlines::Line& before = side(corners[(i + 3) % 4], corners[i]).line;
     const Outlines::Line& after = side(corners[i], corners[(i + 1) % 4]).line;
@@ -107,7 +112,7 @@ bool QuadFinder::fit_quad(const std::array<std::size_t, 4>& corners, double min_
     if (std::abs(sine) < 0.06) return false;  // 3.4 degrees: the sharpest corner of a marker 84 degrees steep
     const double along = cross(after.p - before.p, after.d) / sine;
     quad->corners_px[i] = before.p + along * before.d;
-    if ((quad->corners_px[i] - at(i)).norm() > 2.5 + 0.1 * before.count) return false;
+    if ((quad->corners_px[i] - corners_[corners[i]]).norm() > 2.5 + 0.1 * before.count) return false;
   }
   double longest = 0;
   for (std::size_t i = 0; i < 4; ++i) {  // convex, clockwise as seen, no side too short

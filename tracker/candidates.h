@@ -35,9 +35,11 @@ class QuadFinder {
   };
   static constexpr std::size_t k_max_corners = 10;
   Outlines outlines_;
+  std::array<Eigen::Vector2d, k_max_corners> corners_;                // of the outline
   std::array<std::array<Side, k_max_corners>, k_max_corners> sides_;  // from corner to corner
 
   const Side& side(std::size_t from, std::size_t to);
+  bool turns_right(std::size_t a, std::size_t b, std::size_t c) const;
   bool choose_quad(double min_side_px, Quad* quad);
   bool fit_quad(const std::array<std::size_t, 4>& corners, double min_side_px, Quad* quad);
 };

@@ -85,14 +85,6 @@ bool still_holds(const PatternShift& shift, const Identity& identity, const Refi
   return true;
 }
 
-// Whether a marker found before takes the place.
-bool is_taken(const Quad& quad, const std::vector<Detection>& detections) {
-  const auto& q = quad.corners_px;
-  const Eigen::Vector2d middle = 0.25 * (q[0] + q[1] + q[2] + q[3]);
-  return std::any_of(detections.begin(), detections.end(),
-                     [&](const Detection& d) { return (centre(d) - middle).norm() < 0.5 * longest_side(d); });
-}
-
 // Whether it is the square of a marker found before: another one may lie inside or around it.
 bool is_known(const Quad& quad, const std::vector<Detection>& detections) {
   const auto& q = quad.corners_px;
@@ -104,35 +96,6 @@ bool is_known(const Quad& quad, const std::vector<Detection>& detections) {
            side < 1.2 * longest;
   });
 }
-
-// A marker's square and what is next to it.
-class SquareAround {
- public:
-  explicit SquareAround(const Detection& detection)
-      : corner_(detection.corners_px[0]), square_(4 * std::pow(longest_side(detection), 2)) {
-    for (std::size_t i = 0; i < 4; ++i) {
-      const Eigen::Vector2d& from = detection.corners_px[i];
-      const Eigen::Vector2d side = (detection.corners_px[(i + 1) % 4] - from).normalized();
-      inward_[i] = {-side.y(), side.x()};
-      offset_[i] = inward_[i].dot(from) - k_around_px;
-    }
-  }
-
-  /// Whether both of a segment's ends lie in it.
-  bool holds(const Segment& segment) const {
-    if ((segment.from - corner_).squaredNorm() >= square_) return false;
-    for (std::size_t i = 0; i < 4; ++i)
-      if (std::min(inward_[i].dot(segment.from), inward_[i].dot(segment.to)) < offset_[i]) return false;
-    return true;
-  }
-
- private:
-  static constexpr double k_around_px = 3;
-  Eigen::Vector2d corner_;
-  double square_;  // of the distance beyond which nothing lies in it
-  std::array<Eigen::Vector2d, 4> inward_;
-  std::array<double, 4> offset_;
-};
 
 }  // namespace
 
@@ -225,22 +188,26 @@ void Detector::find_candidates(const cv::Mat& grey, bool with_segments) {
 // The quads that straight edges suggest where none of these markers are, into quads_.
 void Detector::join_segments(const cv::Mat& grey, const std::vector<Detection>& found) {
   constexpr std::size_t k_max_candidates = 400;  // of each kind of edges
+  squares_.clear();
+  for (const Detection& detection : found) squares_.emplace_back(detection);
   at_once(2, options_.threads, [&](int kind) {
     std::vector<Segment>& segments = kind == 0 ? segments_.of_black : segments_.of_blurred;
     Joined& joined = joined_[static_cast<std::size_t>(kind)];
-    for (const Detection& detection : found) {
-      const SquareAround square(detection);
-      std::erase_if(segments, [&](const Segment& segment) { return square.holds(segment); });
-    }
+    std::erase_if(segments, [&](const Segment& segment) {
+      return std::any_of(squares_.begin(), squares_.end(),
+                         [&](const FoundSquare& square) { return square.holds(segment); });
+    });
     joined.finder.find(segments, grey.cols, grey.rows, joined.quads);
     if (joined.quads.size() > k_max_candidates) joined.quads.resize(k_max_candidates);
   });
   quads_.clear();
   for (const Joined& joined : joined_)
     for (const SegmentQuad& candidate : joined.quads) {
+      if (std::any_of(squares_.begin(), squares_.end(),
+                      [&](const FoundSquare& square) { return square.takes(candidate.quad); }))
+        continue;
       quads_.push_back(candidate.quad);
       quads_.back().within_px = 5;
-      if (is_taken(quads_.back(), found)) quads_.pop_back();
     }
 }
 

@@ -10,6 +10,7 @@
 #include "tracker/candidates.h"
 #include "tracker/detection.h"
 #include "tracker/family.h"
+#include "tracker/found_square.h"
 #include "tracker/identify.h"
 #include "tracker/refine.h"
 #include "tracker/segment_quads.h"
@@ -86,6 +87,7 @@ class Detector {
     SegmentQuadFinder finder;
     std::vector<SegmentQuad> quads;
   };
+  std::vector<FoundSquare> squares_;            // of markers found before segments are joined
   std::array<Joined, 2> joined_;                // of black, of blurred edges
   std::vector<std::optional<Detection>> read_;  // what each of quads_ shows
 

@@ -13,34 +13,6 @@ namespace {
 constexpr float k_nearly = 0.99999F;   // products may be rounded otherwise where they are fused
 constexpr std::size_t k_block = 1024;  // points that are traced before the trail is looked after
 
-// The first of the blocks from x on in which a boundary may start, or the end of the last whole one.
-LIMN_SIMD int skip_empty(const std::uint8_t* row, int x, int count) {
-  constexpr int k_block = 64;
-  for (; x + k_block <= count; x += k_block) {
-    std::uint8_t starts = 0;
-    for (int i = 0; i < k_block; ++i)
-      starts = static_cast<std::uint8_t>(starts | (row[x + i] == CornerCodes::k_lower_right));
-    if (starts) break;
-  }
-  return x;
-}
-
-// First corner in [x, count) with black at its lower right alone, not visited; count when there is none. The
-// upper left pixel of a region's top row has one, so every outer boundary runs through such corners. Words of
-// 8 corners.
-int next_start(const std::uint8_t* row, int x, int count) {
-  x = skip_empty(row, x, count);
-  constexpr std::uint64_t k_ones = 0x0101010101010101;
-  while (x < count) {
-    std::uint64_t word = 0;
-    std::memcpy(&word, row + x, 8);
-    const std::uint64_t starts = (word >> 3) & ~word & ~(word >> 1) & ~(word >> 2) & ~(word >> 4) & k_ones;
-    if (starts != 0) return std::min(count, x + __builtin_ctzll(starts) / 8);
-    x += 8;
-  }
-  return count;
-}
-
 constexpr std::array<int, 4> k_dx = {0, 1, 0, -1};  // up, right, down, left
 constexpr std::array<int, 4> k_dy = {-1, 0, 1, 0};
 
@@ -200,14 +172,14 @@ Outlines::Steps::Steps(std::ptrdiff_t stride) {
   }
 }
 
-Outlines::Start Outlines::first(const CornerCodes& corners) { return next(corners, {-1, 0}); }
-
-Outlines::Start Outlines::next(const CornerCodes& corners, Start after) {
-  for (int y = after.y, from = after.x + 1; y < corners.height; ++y, from = 0) {
-    const int x = next_start(corners.at(0, y), from, corners.width);
-    if (x < corners.width) return {x, y};
-  }
-  return {0, corners.height};
+// The first code from there on of a corner with black at its lower right alone, not visited; the number of
+// codes when there is none. The upper left pixel of a region's top row has one, so every outer boundary runs
+// through such corners.
+std::size_t Outlines::next_start(const CornerCodes& corners, std::size_t from) {
+  const std::uint8_t* const codes = corners.codes.data();
+  const void* found = std::memchr(codes + from, CornerCodes::k_lower_right, corners.codes.size() - from);
+  return found ? static_cast<std::size_t>(static_cast<const std::uint8_t*>(found) - codes)
+               : corners.codes.size();
 }
 
 struct Outlines::End {
@@ -243,12 +215,13 @@ std::size_t Outlines::with_room(std::size_t back, std::size_t on) {
   return 2 * half;
 }
 
-// Follows the boundary that runs up to corner (x, y) and on to its right, black on its right, into the trail:
+// Follows the boundary that runs up to this corner and on to its right, black on its right, into the trail:
 // from both of its ends in turn, so that neither has to wait for what it reads.
-Outlines::Extent Outlines::trace(CornerCodes& corners, Start from) {
+Outlines::Extent Outlines::trace(CornerCodes& corners, std::size_t from) {
   constexpr std::size_t k_up = 0, k_right = 32;
-  std::uint8_t* const start = corners.at(from.x, from.y);
-  const Packed at = static_cast<Packed>(2 * from.x) + (static_cast<Packed>(2 * from.y) << 16);
+  std::uint8_t* const start = corners.codes.data() + from;
+  const auto stride = static_cast<std::size_t>(corners.stride);
+  const auto at = static_cast<Packed>(2 * (from % stride) + (2 * (from / stride) << 16));
   End end{start, k_up, at};
   End begin{start, k_right, at};
   // Whether the way on from the end is the way that the beginning has come.

@@ -40,7 +40,8 @@ class Outlines {
     static_assert(2 * k_max_picture_side <= 0xFFFF);
     LIMN_CHECK(corners.width <= k_max_picture_side && corners.height <= k_max_picture_side);
     steps_ = Steps(corners.stride);
-    for (Start start = first(corners); start.y < corners.height; start = next(corners, start))
+    for (std::size_t start = next_start(corners, 0); start < corners.codes.size();
+         start = next_start(corners, start + 1))
       visit(trace(corners, start));
   }
 
@@ -80,9 +81,6 @@ class Outlines {
   };
   // One end of what has been traced of a boundary.
   struct End;
-  struct Start {
-    int x = 0, y = 0;
-  };
   Steps steps_{0};
   std::vector<Packed> trail_;       // of both ends, to both sides from the middle on
   std::size_t begin_ = 0;           // of the boundary within the trail
@@ -90,12 +88,11 @@ class Outlines {
   std::span<const Packed> points_;  // from the first corner on, and that one again at the end
   std::vector<std::size_t> corners_, pending_;
 
-  static Start first(const CornerCodes& corners);
-  static Start next(const CornerCodes& corners, Start after);
+  static std::size_t next_start(const CornerCodes& corners, std::size_t from);
   static Eigen::Vector2d at(Packed point) {
     return {0.5 * (point & 0xFFFF) - 0.5, 0.5 * (point >> 16) - 0.5};
   }
-  Extent trace(CornerCodes& corners, Start start);
+  Extent trace(CornerCodes& corners, std::size_t start);
   std::size_t with_room(std::size_t back, std::size_t on);
 };
 

@@ -20,6 +20,7 @@ constexpr double k_gap_px = 6;
 constexpr double k_overlap_px = 3;  // by which a segment may run past the corner
 constexpr double k_overlap_share = 0.2;
 constexpr double k_max_reach_px = 75;     // between the segments of a corner
+constexpr double k_reach_share = 1.2;     // of the longer one's length
 constexpr std::size_t k_max_corners = 8;  // that are kept of a segment
 constexpr double k_min_visible = 0.5;     // of the outline
 constexpr double k_min_side_visible = 0.15;
@@ -34,7 +35,9 @@ double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() 
 double max_gap(const Segment& a, const Segment& b) {
   return k_gap_px + k_max_gap_share * std::max(a.length, b.length);
 }
-double reach_of(const Segment& s) { return std::min(k_max_reach_px, 1.2 * s.length + 2 * k_gap_px); }
+double reach(const Segment& a, const Segment& b) {
+  return std::min(k_max_reach_px, k_reach_share * std::max(a.length, b.length) + 2 * k_gap_px);
+}
 double max_overlap(const Segment& s) { return k_overlap_px + k_overlap_share * s.length; }
 
 // Where the outline turns from one segment to the next; false when it cannot.
@@ -50,24 +53,21 @@ bool corner_of(const Segment& a, const Segment& b, Eigen::Vector2d* px, double* 
   return true;
 }
 
-// One segment among many: its end that is looked from, its direction and length, and how far it looks.
+// One segment among many: its end that is looked from, its direction and length.
 struct Probe {
-  float x, y, dx, dy, length, radius;
+  float x, y, dx, dy, length;
 };
 
-Probe probe_of(const Segment& s, const Eigen::Vector2d& px, double radius) {
-  return {static_cast<float>(px.x()),          static_cast<float>(px.y()),
-          static_cast<float>(s.direction.x()), static_cast<float>(s.direction.y()),
-          static_cast<float>(s.length),        static_cast<float>(radius)};
+Probe probe_of(const Segment& s) {
+  return {static_cast<float>(s.to.x()), static_cast<float>(s.to.y()), static_cast<float>(s.direction.x()),
+          static_cast<float>(s.direction.y()), static_cast<float>(s.length)};
 }
 
 // Entries are looked at by blocks: runs of them are short, and end with some that do not belong.
 constexpr int k_block = 16;
 
-// Marks the entries that corner_of may join to the probe, which comes before them (sign 1) or after them
-// (-1), and some more behind the last.
+// Marks the entries that corner_of may join to the probe, and some more behind the last.
 LIMN_SIMD void match_corners(const Probe p,
-                             float sign,
                              const float* __restrict x,
                              const float* __restrict y,
                              const float* __restrict dx,
@@ -76,22 +76,26 @@ LIMN_SIMD void match_corners(const Probe p,
                              int count,
                              std::uint8_t* __restrict matches) {
   constexpr float k_slack_px = 0.01F;  // of single precision
-  const float own_overlap = k_slack_px + static_cast<float>(k_overlap_px + k_overlap_share * p.length);
+  constexpr auto k_reach = static_cast<float>(k_max_reach_px), k_least_gap = static_cast<float>(k_gap_px);
+  constexpr auto k_gap_share = static_cast<float>(k_max_gap_share);
+  constexpr auto k_least_overlap = static_cast<float>(k_overlap_px) + k_slack_px;
+  constexpr auto k_more_overlap = static_cast<float>(k_overlap_share);
+  const float own_overlap = k_least_overlap + k_more_overlap * p.length;
   for (int block = 0; block < count; block += k_block) {
     std::array<std::int32_t, k_block> found;
     for (int i = block; i < block + k_block; ++i) {
       const float ax = x[i] - p.x;
       const float ay = y[i] - p.y;
-      const float sine = sign * (p.dx * dy[i] - p.dy * dx[i]);
+      const float sine = p.dx * dy[i] - p.dy * dx[i];
       // Along the probe to the corner, and along the entry from the corner, times sine.
       const float own = ax * dy[i] - ay * dx[i];
       const float other = ax * p.dy - ay * p.dx;
       const float longer = p.length > length[i] ? p.length : length[i];
-      const float gap =
-          static_cast<float>(k_gap_px) + k_slack_px + static_cast<float>(k_max_gap_share) * longer;
-      const float overlap =
-          static_cast<float>(k_overlap_px) + k_slack_px + static_cast<float>(k_overlap_share) * length[i];
-      found[static_cast<std::size_t>(i - block)] = (ax * ax + ay * ay <= p.radius * p.radius) &
+      const float far = static_cast<float>(k_reach_share) * longer + 2 * k_least_gap;
+      const float reach = k_slack_px + (far < k_reach ? far : k_reach);
+      const float gap = k_least_gap + k_slack_px + k_gap_share * longer;
+      const float overlap = k_least_overlap + k_more_overlap * length[i];
+      found[static_cast<std::size_t>(i - block)] = (ax * ax + ay * ay <= reach * reach) &
                                                    (sine >= 0.999F * static_cast<float>(k_min_sine)) &
                                                    (own >= -own_overlap * sine) & (own <= gap * sine) &
                                                    (other >= -gap * sine) & (other <= overlap * sine);
@@ -102,6 +106,7 @@ LIMN_SIMD void match_corners(const Probe p,
 
 // Marks the entries that may go on along the probe's line.
 LIMN_SIMD void match_collinear(const Probe p,
+                               float radius,
                                const float* __restrict x,
                                const float* __restrict y,
                                const float* __restrict dx,
@@ -116,7 +121,7 @@ LIMN_SIMD void match_collinear(const Probe p,
       const float ay = y[i] - p.y;
       const float sine = p.dx * dy[i] - p.dy * dx[i];
       const float gap = p.dx * ax + p.dy * ay;
-      found[static_cast<std::size_t>(i - block)] = (ax * ax + ay * ay <= p.radius * p.radius) & (gap > 0) &
+      found[static_cast<std::size_t>(i - block)] = (ax * ax + ay * ay <= radius * radius) & (gap > 0) &
                                                    (std::abs(sine) <= k_sine) &
                                                    (p.dx * dx[i] + p.dy * dy[i] > 0);
     }
@@ -146,10 +151,9 @@ void SegmentQuadFinder::find(std::span<const Segment> segments,
   segments_.clear();
   for (const Segment& s : segments)
     if (s.length >= k_min_length_px) segments_.push_back(s);
-  sort_into_cells(&Segment::from, &begins_);
+  sort_into_cells();
   join_collinear();
-  sort_into_cells(&Segment::from, &begins_);
-  sort_into_cells(&Segment::to, &ends_);
+  sort_into_cells();
   find_corners();
   for (std::uint32_t i = 0; i < segments_.size() && quads.size() < k_max_quads; ++i) add_quads(i, quads);
   const auto key = [](const SegmentQuad& q) {
@@ -166,36 +170,38 @@ int SegmentQuadFinder::cell_of(const Eigen::Vector2d& px) const {
   return row * columns_ + column;
 }
 
-void SegmentQuadFinder::sort_into_cells(Eigen::Vector2d Segment::*point, Cells* cells) const {
-  cells->begin.assign(static_cast<std::size_t>(columns_ * rows_) + 2, 0);
-  for (const Segment& s : segments_) ++cells->begin[static_cast<std::size_t>(cell_of(s.*point)) + 2];
-  for (std::size_t i = 2; i < cells->begin.size(); ++i) cells->begin[i] += cells->begin[i - 1];
-  cells->segment.resize(segments_.size());
-  for (auto* values : {&cells->x, &cells->y, &cells->dx, &cells->dy, &cells->length})
+void SegmentQuadFinder::sort_into_cells() {
+  cells_.begin.assign(static_cast<std::size_t>(columns_ * rows_) + 2, 0);
+  for (const Segment& s : segments_) ++cells_.begin[static_cast<std::size_t>(cell_of(s.from)) + 2];
+  for (std::size_t i = 2; i < cells_.begin.size(); ++i) cells_.begin[i] += cells_.begin[i - 1];
+  cells_.segment.resize(segments_.size());
+  for (auto* values : {&cells_.x, &cells_.y, &cells_.dx, &cells_.dy, &cells_.length})
     values->assign(segments_.size() + k_block, 0);
   for (std::uint32_t i = 0; i < segments_.size(); ++i) {
     const Segment& s = segments_[i];
-    const std::size_t at = cells->begin[static_cast<std::size_t>(cell_of(s.*point)) + 1]++;
-    cells->segment[at] = i;
-    cells->x[at] = static_cast<float>((s.*point).x());
-    cells->y[at] = static_cast<float>((s.*point).y());
-    cells->dx[at] = static_cast<float>(s.direction.x());
-    cells->dy[at] = static_cast<float>(s.direction.y());
-    cells->length[at] = static_cast<float>(s.length);
+    const std::size_t at = cells_.begin[static_cast<std::size_t>(cell_of(s.from)) + 1]++;
+    cells_.segment[at] = i;
+    cells_.x[at] = static_cast<float>(s.from.x());
+    cells_.y[at] = static_cast<float>(s.from.y());
+    cells_.dx[at] = static_cast<float>(s.direction.x());
+    cells_.dy[at] = static_cast<float>(s.direction.y());
+    cells_.length[at] = static_cast<float>(s.length);
   }
 }
 
-// The segments whose points of these cells lie about `px` and that match(first, count, matches) marks.
+// The segments that begin about `px` and that match(first, count, matches) marks.
 template <typename Match, typename Visit>
-void SegmentQuadFinder::visit(
-    const Cells& cells, const Eigen::Vector2d& px, double radius, const Match& match, const Visit& visit) {
+void SegmentQuadFinder::visit(const Eigen::Vector2d& px,
+                              double radius,
+                              const Match& match,
+                              const Visit& visit) {
   const Eigen::Vector2d reach(radius, radius);
   const int low = cell_of(px - reach);
   const int high = cell_of(px + reach);
   const int columns = high % columns_ - low % columns_;
   for (int first = low; first + columns <= high; first += columns_) {
-    const std::uint32_t begin = cells.begin[static_cast<std::size_t>(first)];
-    const std::uint32_t end = cells.begin[static_cast<std::size_t>(first + columns) + 1];
+    const std::uint32_t begin = cells_.begin[static_cast<std::size_t>(first)];
+    const std::uint32_t end = cells_.begin[static_cast<std::size_t>(first + columns) + 1];
     matches_.resize(std::max<std::size_t>(matches_.size(), end - begin + k_block));
     match(begin, static_cast<int>(end - begin), matches_.data());
     for (std::uint32_t i = begin; i < end; i += 8) {
@@ -203,7 +209,7 @@ void SegmentQuadFinder::visit(
       std::memcpy(&word, &matches_[i - begin], 8);
       for (; word != 0; word &= word - 1)
         if (const auto at = i + static_cast<std::uint32_t>(std::countr_zero(word) / 8); at < end)
-          visit(cells.segment[at]);
+          visit(cells_.segment[at]);
     }
   }
 }
@@ -217,12 +223,12 @@ void SegmentQuadFinder::join_collinear() {
     const double reach = std::min(k_max_reach_px, a.length + k_gap_px);
     std::uint32_t nearest = 0;
     double least = reach;
-    const Probe probe = probe_of(a, a.to, reach);
+    const Probe probe = probe_of(a);
     const auto match = [&](std::uint32_t first, int entries, std::uint8_t* matches) {
-      match_collinear(probe, &begins_.x[first], &begins_.y[first], &begins_.dx[first], &begins_.dy[first],
-                      entries, matches);
+      match_collinear(probe, static_cast<float>(reach), &cells_.x[first], &cells_.y[first],
+                      &cells_.dx[first], &cells_.dy[first], entries, matches);
     };
-    visit(begins_, a.to, reach, match, [&](std::uint32_t j) {
+    visit(a.to, reach, match, [&](std::uint32_t j) {
       const Segment& b = segments_[j];
       const Eigen::Vector2d apart = b.from - a.to;
       const double gap = a.direction.dot(apart);
@@ -244,42 +250,33 @@ void SegmentQuadFinder::join_collinear() {
   }
 }
 
-// Corners within reach of either segment.
+// Corners within reach of either segment, each segment's best first.
 void SegmentQuadFinder::find_corners() {
-  found_.clear();
-  const auto add = [&](std::uint32_t i, std::uint32_t j) {
-    Corner corner{i, j, 0, {}};
-    if (corner_of(segments_[i], segments_[j], &corner.px, &corner.cost)) found_.push_back(corner);
-  };
-  for (std::uint32_t i = 0; i < segments_.size(); ++i) {
-    const Segment& here = segments_[i];
-    const double reach = reach_of(here);
-    const auto match = [](const Cells& cells, const Probe& probe, float sign) {
-      return [&cells, probe, sign](std::uint32_t first, int count, std::uint8_t* matches) {
-        match_corners(probe, sign, &cells.x[first], &cells.y[first], &cells.dx[first], &cells.dy[first],
-                      &cells.length[first], count, matches);
-      };
-    };
-    visit(begins_, here.to, reach, match(begins_, probe_of(here, here.to, reach), 1),
-          [&](std::uint32_t j) { add(i, j); });
-    visit(ends_, here.from, reach, match(ends_, probe_of(here, here.from, reach), -1), [&](std::uint32_t j) {
-      const Segment& before = segments_[j];
-      const double short_reach = reach_of(before);
-      if ((before.to - here.from).squaredNorm() > short_reach * short_reach) add(j, i);
-    });
-  }
-  std::sort(found_.begin(), found_.end(), [](const Corner& x, const Corner& y) {
-    return std::tie(x.segment, x.cost, x.next) < std::tie(y.segment, y.cost, y.next);
-  });
   corners_.clear();
   corner_begin_.assign(segments_.size() + 1, 0);
-  std::size_t next = 0;
   for (std::uint32_t i = 0; i < segments_.size(); ++i) {
-    corner_begin_[i] = static_cast<std::uint32_t>(corners_.size());
-    for (std::size_t kept = 0; next < found_.size() && found_[next].segment == i; ++next, ++kept)
-      if (kept < k_max_corners) corners_.push_back(found_[next]);
+    const Segment& here = segments_[i];
+    const Probe probe = probe_of(here);
+    const auto match = [&](std::uint32_t first, int count, std::uint8_t* matches) {
+      match_corners(probe, &cells_.x[first], &cells_.y[first], &cells_.dx[first], &cells_.dy[first],
+                    &cells_.length[first], count, matches);
+    };
+    found_.clear();
+    visit(here.to, k_max_reach_px, match, [&](std::uint32_t j) {
+      Corner corner{j, 0, {}};
+      const Segment& next = segments_[j];
+      const double near = reach(here, next);
+      if ((next.from - here.to).squaredNorm() <= near * near &&
+          corner_of(here, next, &corner.px, &corner.cost))
+        found_.push_back(corner);
+    });
+    std::sort(found_.begin(), found_.end(), [](const Corner& x, const Corner& y) {
+      return std::tie(x.cost, x.next) < std::tie(y.cost, y.next);
+    });
+    if (found_.size() > k_max_corners) found_.resize(k_max_corners);
+    corners_.insert(corners_.end(), found_.begin(), found_.end());
+    corner_begin_[i + 1] = static_cast<std::uint32_t>(corners_.size());
   }
-  corner_begin_[segments_.size()] = static_cast<std::uint32_t>(corners_.size());
 }
 
 std::span<const SegmentQuadFinder::Corner> SegmentQuadFinder::corners_of(std::uint32_t segment) const {

@@ -26,28 +26,27 @@ class SegmentQuadFinder {
 
  private:
   struct Corner {
-    std::uint32_t segment, next;  // the outline turns from the one to the other
-    double cost;                  // gaps over lengths
+    std::uint32_t next;  // to which the outline turns
+    double cost;         // gaps over lengths
     Eigen::Vector2d px;
   };
-  struct Cells {                       // of k_cell_px: the segments by where one of their points lies
+  struct Cells {                       // of k_cell_px: the segments by where they begin
     std::vector<std::uint32_t> begin;  // first entry of every cell, and the end
     std::vector<std::uint32_t> segment;
-    std::vector<float> x, y, dx, dy, length;  // the point, the segment's direction and length
+    std::vector<float> x, y, dx, dy, length;  // where it begins, its direction and length
   };
   std::vector<Segment> segments_;  // those found, and those joined of two on one line
-  Cells begins_, ends_;
-  std::vector<Corner> found_;
+  Cells cells_;
+  std::vector<Corner> found_;  // scratch: of one segment
   std::vector<Corner> corners_;  // of all segments, each one's best first
   std::vector<std::uint32_t> corner_begin_;
   std::vector<std::uint8_t> matches_;  // scratch: of a run of entries, 1 or 0
   int columns_ = 0, rows_ = 0;
 
   int cell_of(const Eigen::Vector2d& px) const;
-  void sort_into_cells(Eigen::Vector2d Segment::*point, Cells* cells) const;
+  void sort_into_cells();
   template <typename Match, typename Visit>
-  void visit(
-      const Cells& cells, const Eigen::Vector2d& px, double radius, const Match& match, const Visit& visit);
+  void visit(const Eigen::Vector2d& px, double radius, const Match& match, const Visit& visit);
   void join_collinear();
   void find_corners();
   std::span<const Corner> corners_of(std::uint32_t segment) const;

@@ -72,7 +72,7 @@ void Threshold::apply(const cv::Mat& grey,
   for (auto* tiles : {&darkest_, &brightest_, &wide_darkest_, &wide_brightest_}) tiles->resize(count);
   corners.width = grey.cols;
   corners.height = grey.rows;
-  corners.stride = (grey.cols + 1 + 7) / 8 * 8 + 8;  // words of 8 may be read from every corner
+  corners.stride = grey.cols + 1;
   corners.codes.resize(static_cast<std::size_t>(corners.stride) * static_cast<std::size_t>(grey.rows + 1));
   rows_.resize(static_cast<std::size_t>(threads));
   at_once(threads, threads, [&](int i) {
@@ -172,7 +172,6 @@ void Threshold::compare(const cv::Mat& grey,
   rows.middle.resize(tiles);
   const auto write = [&](int y) {
     corner_row(rows.above.data(), rows.here.data(), grey.cols + 1, corners.at(0, y));
-    std::fill(corners.at(grey.cols + 1, y), corners.at(0, y) + corners.stride, std::uint8_t{0});
   };
   if (rows.first > 0 && rows.first < rows.last) {
     set_limits(rows.first - 1, options, rows);
