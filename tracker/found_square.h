@@ -1,0 +1,31 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+#include "tracker/candidates.h"
+#include "tracker/detection.h"
+#include "tracker/segments.h"
+
+namespace limn::tracker {
+
+/// The place of a marker that was found in the picture: nothing else is looked for there.
+class FoundSquare {
+ public:
+  explicit FoundSquare(const Detection& detection);
+
+  /// Whether both of a segment's ends lie in the marker's square or next to it.
+  bool holds(const Segment& segment) const;
+
+  /// Whether the quadrilateral lies about where the marker lies.
+  bool takes(const Quad& quad) const;
+
+ private:
+  Eigen::Vector2d corner_, middle_;
+  double half_square_;    // of half the longest side
+  double around_square_;  // of the distance from corner_ beyond which nothing lies in the marker
+  std::array<Eigen::Vector2d, 4> inward_;
+  std::array<double, 4> offset_;
+};
+
+}  // namespace limn::tracker
