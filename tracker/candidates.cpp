@@ -41,8 +41,9 @@ bool is_full(const Outlines::Extent& outline, const Outlines::Box& box, double m
 
 }  // namespace
 
-void QuadFinder::find(CornerCodes& corners, const CandidateOptions& options, std::vector<Quad>& quads) {
-  quads.clear();
+void QuadFinder::find(CornerCodes& corners,
+                      const CandidateOptions& options,
+                      const std::function<void(const Quad&)>& tell) {
   outlines_.for_each(corners, [&](const Outlines::Extent& outline) {
     if (!is_large(outline, options.min_side_px)) return;
     if (!is_full(outline, outlines_.box(), options.min_side_px)) return;
@@ -54,7 +55,7 @@ void QuadFinder::find(CornerCodes& corners, const CandidateOptions& options, std
       for (std::size_t to = 0; to < count; ++to) sides_[from][to].known = false;
     }
     Quad quad;
-    if (choose_quad(options.min_side_px, &quad)) quads.push_back(quad);
+    if (choose_quad(options.min_side_px, &quad)) tell(quad);
   });
 }
 

@@ -2,7 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <vector>
+#include <functional>
 
 #include "tracker/outlines.h"
 #include "tracker/threshold.h"
@@ -25,8 +25,10 @@ struct CandidateOptions {
 /// Keeps the outlines of black regions that four straight lines describe. Holds its buffers between calls.
 class QuadFinder {
  public:
-  /// Sets the visited bits of `corners`.
-  void find(CornerCodes& corners, const CandidateOptions& options, std::vector<Quad>& quads);
+  /// Sets the visited bits of `corners`. Each quadrilateral is told when it is found.
+  void find(CornerCodes& corners,
+            const CandidateOptions& options,
+            const std::function<void(const Quad&)>& tell);
 
  private:
   struct Side {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <mutex>
 #include <utility>
 
 #include "tracker/at_once.h"
@@ -124,13 +125,14 @@ void Detector::detect_more(const cv::Mat& grey,
   LIMN_CHECK(grey.empty() || grey.type() == CV_8UC1);
   if (grey.empty()) return;
   const bool broken = options_.broken_markers && reading == Reading::covered;
-  find_candidates(grey, broken);
-  if (!detections->empty())
-    std::erase_if(quads_, [&](const Quad& quad) { return is_known(quad, *detections); });
-  read_all(grey, lens, Reading::open, detections);
+  const bool is_first = detections->empty();
+  find_candidates(grey, broken, is_first ? &lens : nullptr);
+  if (!is_first) std::erase_if(quads_, [&](const Quad& quad) { return is_known(quad, *detections); });
+  read_rest(grey, lens, Reading::open, detections);
   if (!broken) return;
   join_segments(grey, *detections);
-  read_all(grey, lens, Reading::covered, detections);
+  read_.clear();
+  read_rest(grey, lens, Reading::covered, detections);
 }
 
 void Detector::follow(const cv::Mat& grey,
@@ -171,17 +173,38 @@ std::optional<Detection> Detector::found_again(const cv::Mat& grey, const Lens* 
     }
     return std::nullopt;
   };
-  find_candidates(part, options_.broken_markers);
+  find_candidates(part, options_.broken_markers, nullptr);
   if (auto regular = read_quads(Reading::open)) return regular;
   if (!options_.broken_markers) return std::nullopt;
   join_segments(part, {});
   return read_quads(Reading::covered);
 }
 
-void Detector::find_candidates(const cv::Mat& grey, bool with_segments) {
+// Quads and segments at once. Whoever has the segments reads quads ahead, where there is a lens to read them
+// with, into read_, until the last is found.
+void Detector::find_candidates(const cv::Mat& grey, bool with_segments, const Lens* const* ahead) {
   threshold_.apply(grey, {options_.min_contrast}, corner_codes_, options_.threads);
-  const auto find_quads = [&] { finder_.find(corner_codes_, {options_.min_side_px}, quads_); };
-  const auto find_segments = [&] { segment_finder_.find(grey, options_.min_contrast, segments_); };
+  quads_.clear();
+  read_.clear();
+  std::mutex mutex;  // of quads_
+  std::atomic<bool> found_all = false;
+  const auto find_quads = [&] {
+    finder_.find(corner_codes_, {options_.min_side_px}, [&](const Quad& quad) {
+      const std::lock_guard lock(mutex);
+      quads_.push_back(quad);
+    });
+    found_all = true;
+  };
+  const auto next_quad = [&]() -> std::optional<Quad> {
+    const std::lock_guard lock(mutex);
+    if (found_all || read_.size() == quads_.size()) return std::nullopt;
+    return quads_[read_.size()];
+  };
+  const auto find_segments = [&] {
+    segment_finder_.find(grey, options_.min_contrast, segments_);
+    while (const auto quad = ahead ? next_quad() : std::nullopt)
+      read_.push_back(read(grey, *quad, *ahead, Reading::open, workers_.back()));
+  };
   at_once(with_segments ? 2 : 1, options_.threads, [&](int i) { i == 0 ? find_quads() : find_segments(); });
 }
 
@@ -211,14 +234,13 @@ void Detector::join_segments(const cv::Mat& grey, const std::vector<Detection>& 
     }
 }
 
-// What quads_ show.
-void Detector::read_all(const cv::Mat& grey,
-                        const Lens* lens,
-                        Reading reading,
-                        std::vector<Detection>* detections) {
-  read_.clear();
+// What quads_ show that are not in read_.
+void Detector::read_rest(const cv::Mat& grey,
+                         const Lens* lens,
+                         Reading reading,
+                         std::vector<Detection>* detections) {
+  std::atomic<std::size_t> next = read_.size();
   read_.resize(quads_.size());
-  std::atomic<std::size_t> next = 0;
   at_once(options_.threads, options_.threads, [&](int thread) {
     for (std::size_t i = next++; i < quads_.size(); i = next++)
       read_[i] = read(grey, quads_[i], lens, reading, workers_[static_cast<std::size_t>(thread)]);

@@ -89,12 +89,12 @@ class Detector {
   };
   std::vector<FoundSquare> squares_;            // of markers found before segments are joined
   std::array<Joined, 2> joined_;                // of black, of blurred edges
-  std::vector<std::optional<Detection>> read_;  // what each of quads_ shows
+  std::vector<std::optional<Detection>> read_;  // what quads_ show, so far
 
   std::optional<Detection> found_again(const cv::Mat& grey, const Lens* lens, const Detection& last);
-  void find_candidates(const cv::Mat& grey, bool with_segments);
+  void find_candidates(const cv::Mat& grey, bool with_segments, const Lens* const* ahead);
   void join_segments(const cv::Mat& grey, const std::vector<Detection>& found);
-  void read_all(const cv::Mat& grey, const Lens* lens, Reading reading, std::vector<Detection>* detections);
+  void read_rest(const cv::Mat& grey, const Lens* lens, Reading reading, std::vector<Detection>* detections);
   std::optional<Detection> read(const cv::Mat& grey,
                                 const Quad& quad,
                                 const Lens* lens,

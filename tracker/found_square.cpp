@@ -23,8 +23,7 @@ FoundSquare::FoundSquare(const Detection& detection) : corner_(detection.corners
   around_square_ = 4 * longest_square;
 }
 
-bool FoundSquare::holds(const Segment& segment) const {
-  if ((segment.from - corner_).squaredNorm() >= around_square_) return false;
+bool FoundSquare::holds_both_ends(const Segment& segment) const {
   for (std::size_t i = 0; i < 4; ++i)
     if (std::min(inward_[i].dot(segment.from), inward_[i].dot(segment.to)) < offset_[i]) return false;
   return true;

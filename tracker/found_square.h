@@ -15,12 +15,16 @@ class FoundSquare {
   explicit FoundSquare(const Detection& detection);
 
   /// Whether both of a segment's ends lie in the marker's square or next to it.
-  bool holds(const Segment& segment) const;
+  bool holds(const Segment& segment) const {
+    return (segment.from - corner_).squaredNorm() < around_square_ && holds_both_ends(segment);
+  }
 
   /// Whether the quadrilateral lies about where the marker lies.
   bool takes(const Quad& quad) const;
 
  private:
+  bool holds_both_ends(const Segment& segment) const;
+
   Eigen::Vector2d corner_, middle_;
   double half_square_;    // of half the longest side
   double around_square_;  // of the distance from corner_ beyond which nothing lies in the marker

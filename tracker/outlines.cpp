@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 
@@ -46,11 +47,12 @@ struct Farthest {
   std::size_t index;
 };
 
-// The first of the points with the largest distance_of(x, y).
+// One of the points with the largest distance_of(x, y), which is not negative, but for the last four bits.
 template <typename DistanceOf>
 __attribute__((always_inline)) inline Farthest farthest(const Packed* points,
                                                         std::size_t count,
                                                         const DistanceOf& distance_of) {
+  static_assert(k_together == 16);
   std::array<float, k_together> most{};
   std::array<int, k_together> where{};
   for (std::size_t block = 0; block < count; block += k_together)
@@ -62,16 +64,14 @@ __attribute__((always_inline)) inline Farthest farthest(const Packed* points,
       most[k] = more ? distance : most[k];
       where[k] = more ? i : where[k];
     }
-  float worst = 0;
-#pragma omp simd reduction(max : worst)
-  for (std::size_t k = 0; k < k_together; ++k) worst = most[k] > worst ? most[k] : worst;
-  int first = static_cast<int>(count);
-#pragma omp simd reduction(min : first)
+  std::int32_t best = 0;  // its bits, which are ordered as it is, and in the last four who has it
+#pragma omp simd reduction(max : best)
   for (std::size_t k = 0; k < k_together; ++k) {
-    const int candidate = most[k] == worst ? where[k] : static_cast<int>(count);
-    first = candidate < first ? candidate : first;
+    const std::int32_t key = (std::bit_cast<std::int32_t>(most[k]) & ~15) | static_cast<std::int32_t>(15 - k);
+    best = key > best ? key : best;
   }
-  return {worst, static_cast<std::size_t>(first)};
+  const auto lane = static_cast<std::size_t>(15 - (best & 15));
+  return {most[lane], static_cast<std::size_t>(where[lane])};
 }
 
 LIMN_SIMD std::size_t farthest_from(const Packed* points, std::size_t count, Packed from) {

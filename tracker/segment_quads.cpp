@@ -225,8 +225,8 @@ void SegmentQuadFinder::join_collinear() {
     double least = reach;
     const Probe probe = probe_of(a);
     const auto match = [&](std::uint32_t first, int entries, std::uint8_t* matches) {
-      match_collinear(probe, static_cast<float>(reach), &cells_.x[first], &cells_.y[first],
-                      &cells_.dx[first], &cells_.dy[first], entries, matches);
+      match_collinear(probe, static_cast<float>(reach), &cells_.x[first], &cells_.y[first], &cells_.dx[first],
+                      &cells_.dy[first], entries, matches);
     };
     visit(a.to, reach, match, [&](std::uint32_t j) {
       const Segment& b = segments_[j];

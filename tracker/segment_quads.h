@@ -37,7 +37,7 @@ class SegmentQuadFinder {
   };
   std::vector<Segment> segments_;  // those found, and those joined of two on one line
   Cells cells_;
-  std::vector<Corner> found_;  // scratch: of one segment
+  std::vector<Corner> found_;    // scratch: of one segment
   std::vector<Corner> corners_;  // of all segments, each one's best first
   std::vector<std::uint32_t> corner_begin_;
   std::vector<std::uint8_t> matches_;  // scratch: of a run of entries, 1 or 0

@@ -13,7 +13,7 @@ constexpr int k_black_share = 46;  // 256ths of the way from the darkest to the 
 constexpr int k_black_reach = 3;   // tiles of 8 pixels of the whole picture
 
 // Lengths at half or a quarter of the size.
-constexpr double k_min_side = 6;  // as quadrilaterals of them want (segment_quads.cpp)
+constexpr double k_min_side = 6;           // as quadrilaterals of them want (segment_quads.cpp)
 constexpr double k_min_blurred_side = 10;  // cells smaller than a quarter of it would blur into each other
 constexpr double k_min_width = 0.8;        // half of a stroke's: writing, lines
 constexpr double k_corner_px = 1.4;        // distance at which a boundary point makes a corner

@@ -43,16 +43,14 @@ std::vector<RefinedQuad> frames_in(const cv::Mat& grey) {
   Threshold threshold;
   CornerCodes codes;
   QuadFinder finder;
-  std::vector<Quad> quads;
   threshold.apply(grey, {k_min_contrast}, codes);
-  finder.find(codes, {k_min_search_px}, quads);
   EdgeRefiner refiner;
   std::vector<RefinedQuad> frames;
-  for (const Quad& quad : quads) {
-    if (!may_be_marker(grey, quad, k_min_contrast)) continue;
+  finder.find(codes, {k_min_search_px}, [&](const Quad& quad) {
+    if (!may_be_marker(grey, quad, k_min_contrast)) return;
     const auto refined = refiner.refine(grey, quad, k_min_contrast, nullptr);
     if (refined && has_quarter_border(grey, *refined)) frames.push_back(*refined);
-  }
+  });
   std::sort(frames.begin(), frames.end(), [](const RefinedQuad& a, const RefinedQuad& b) {
     return area(a.corners_px) > area(b.corners_px);
   });
