@@ -96,6 +96,7 @@ class DeviceLoop {
     const std::map<scene::Screen, cv::Mat> pictures = screen_pictures();
     shown.screen_ms = pictures.empty() ? -1 : milliseconds_since(begun);
     show_screens(pictures);
+    session_->look_for_drift(painting_at);
     if (session_->watched().captured_at != Stamp{}) {  // something was seen
       books_->shown(shown, painted);
       if (desk_) desk_->shown(shown);

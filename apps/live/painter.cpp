@@ -210,7 +210,6 @@ const Painted& Painter::paint(const Watched& watched,
   const Imager& viewer = painted_.viewer;
   const bool refill = options_.refill && rig_.projectors.size() > 1;
   if (refill) shadows_.look(watched, painted_.posed, shown_, &renderer_);
-  drifts_.look(watched, painted_.posed, shown_, &renderer_);
   const std::vector<LooseMarker> waiting = waiting_markers(scene_, staging, watched);
   std::vector<Body> bodies = bodies_;
   for (const LooseMarker& loose : watched.loose)
@@ -312,6 +311,10 @@ void Painter::note_changes(const scene::PosedScene& posed, const scene::Staging&
   std::erase_if(
       labels_, [&](const auto& entry) { return seconds_between(entry.second.since, at) > options_.label_s; });
   last_ = posed;
+}
+
+void Painter::look_for_drift(const Watched& watched) {
+  drifts_.look(watched, painted_.posed, shown_, &renderer_);
 }
 
 // A projector's picture of the parts, of those that fade only a share.

@@ -80,6 +80,10 @@ class Painter {
                        Stamp shown_at,
                        std::span<const GuestPlace> places = {});
 
+  /// Whether the light lies where the rig says, as the same frames show it that were painted for last. When
+  /// the prototype has come to rest this takes longer than a picture: call it when that is shown.
+  void look_for_drift(const Watched& watched);
+
   /// A large screen's picture for the newest frame of camera 0, at that frame's own stamp; empty before the
   /// first frame and for Screen::off.
   cv::Mat screen(const Watched& watched, const scene::Staging& staging, scene::Screen what);

@@ -184,7 +184,9 @@ class Replay {
     const Stamp shown_at = stamp_of(event.at("paint").at("shown_at_ns"));
     LIMN_TRY_STATUS(watch_until(event.at("moments")));
     wait_for(shown_at);
-    const Painted& painted = session_.paint(stamp_of(event.at("paint").at("painted_at_ns")), shown_at);
+    const Stamp painted_at = stamp_of(event.at("paint").at("painted_at_ns"));
+    const Painted& painted = session_.paint(painted_at, shown_at);
+    session_.look_for_drift(painted_at);
     ++pictures_;
     const double at_s = seconds_between(Stamp{}, shown_at);
     if (pose_log(painted) != event.at("paint") && ++other_poses_ == 1) first_pose_ = at_s;

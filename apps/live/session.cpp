@@ -358,7 +358,6 @@ const Painted& Session::paint(Stamp now, Stamp shown_at) {
   const auto recording = std::chrono::steady_clock::now();
   if (recorder_) recorder_->painted(painted_, moments_);
   record_ms_ = recorder_ ? milliseconds_since(recording) : -1;
-  tell_of_drift(now);
   return painted_;
 }
 
@@ -388,15 +387,16 @@ void Session::draw_anew(Stamp now, Stamp shown_at) {
   warn(now, what);
 }
 
-void Session::tell_of_drift(Stamp at) {
+void Session::look_for_drift(Stamp now) {
   if (!painter_) return;
+  painter_->look_for_drift(watched_);
   const std::optional<Drift>& drift = painter_->drift();
   const bool is_news =
       drift.has_value() != told_drift_.has_value() || (drift && drift->devices != told_drift_->devices);
   if (!is_news) return;
   told_drift_ = drift;
   const std::string what = drift ? sentence(*drift) : "all light is where the rig says again";
-  warn(at, what);
+  warn(now, what);
 }
 
 ShownFrame Session::measured() const {

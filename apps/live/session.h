@@ -83,6 +83,8 @@ class Session {
 
   /// The projectors' pictures for a moment to come.
   const Painted& paint(Stamp now, Stamp shown_at);
+  /// To be called when what was painted is shown: tells of a device that was nudged.
+  void look_for_drift(Stamp now);
   /// A screen's picture (Painter::screen), of what was chosen for all or of `what`.
   cv::Mat screen() { return screen(staging_.screen); }
   cv::Mat screen(scene::Screen what);
@@ -108,7 +110,6 @@ class Session {
  private:
   Session(SessionSetup setup, Painter painter, Telemetry* telemetry, Recorder* recorder);
   void load_looks();
-  void tell_of_drift(Stamp at);
   void tell_of_swapped_cameras();
   void draw_anew(Stamp now, Stamp shown_at);
   Status show_if_whole(SceneNews news, Stamp at);

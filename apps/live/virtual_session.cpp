@@ -110,6 +110,7 @@ class VirtualLoop {
       LIMN_TRY(const Stamp shown_at, rig_->projector(static_cast<int>(i)).show(lit(painted, i)));
       LIMN_CHECK(shown_at == painted.shown_at);
     }
+    session_->look_for_drift(rig_->now());
     if (osc_) osc_->tell(*session_);
     if (server_) serve();  // what came while it painted need not wait for the next exposure
     ShownFrame shown = session_->measured();

@@ -63,6 +63,7 @@ std::vector<Told> found(const json& nudge, double seconds) {
     const Painted& painted = painter.paint(watched, staging, rig.now(), shifted(rig.now(), 0.033));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i)
       EXPECT_TRUE(rig.projector(static_cast<int>(i)).show(painted.projectors[i]));
+    painter.look_for_drift(watched);
     if (painter.drift().has_value() == before.has_value()) continue;
     before = painter.drift();
     out.push_back({seconds_between(Stamp{}, watched.captured_at), before.value_or(Drift{})});

@@ -184,6 +184,7 @@ FrameCost session_cost(const std::vector<Shot>& shots, SessionSetup setup, const
     if (recorder) recorder->watched(frames);
     session.take(watcher.watch(frames), ++moments);
     session.paint(shifted(shot.captured_at, 0.02), shifted(shot.captured_at, k_lag_s));
+    session.look_for_drift(shifted(shot.captured_at, 0.02));
     times.push_back(wall_ms() - begun);
   }
   if (recorder) {
@@ -215,11 +216,12 @@ void print_edits(const std::vector<Shot>& shots, const SessionSetup& setup) {
     const std::vector<Frame> frames = {{setup.rig.cameras[0].name, decoded(shots[i]), shots[i].captured_at}};
     session.take(watcher.watch(frames), i + 1);
     session.paint(shifted(shots[i].captured_at, 0.02), shifted(shots[i].captured_at, k_lag_s));
-    const double frame_ms = wall_ms() - begun;
+    const double painted_ms = wall_ms() - begun;
+    session.look_for_drift(shifted(shots[i].captured_at, 0.02));
     constexpr int k_moments = 20;
     if (is_edited)
-      for (int k = 0; k < k_moments; ++k) waits.push_back((k + 0.5) / k_moments * before_ms + frame_ms);
-    before_ms = frame_ms;
+      for (int k = 0; k < k_moments; ++k) waits.push_back((k + 0.5) / k_moments * before_ms + painted_ms);
+    before_ms = wall_ms() - begun;
   }
   fmt::print("from an edit to its first pictures, display excluded: {:.0f} ms (median), {:.0f} ms (95 %)\n",
              percentile(waits, 0.5), percentile(waits, 0.95));
