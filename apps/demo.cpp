@@ -357,7 +357,7 @@ Result<std::vector<DemoPicture>> shown_session(Session* session, sim::VirtualRig
 
   const std::string other_variant = session->scene.slots.at(0).variants.at(1).name;
   LIMN_TRY(const Moment swapped, looked(session, room, {other_variant}));
-  renderer.set_contact_shadow(&session->scene);
+  LIMN_TRY_STATUS(renderer.set_contact_shadow(&session->scene));
   room->camera_effects(0).srgb = true;  // pictures for people; those that are measured in are linear
   LIMN_TRY(const cv::Mat unlit, shone(room, {}));
   const auto pictures = drawn(&renderer, projector_count, posed, eye);

@@ -322,7 +322,7 @@ Status run_render(const RenderOptions& options) {
   log_info("render: {}", context.description());
   LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, rig));
   LIMN_TRY_STATUS(set_light(options.light, options.rig, rig, scene, posed, &renderer));
-  if (options.contact_shadow == "on") renderer.set_contact_shadow(&scene);
+  if (options.contact_shadow == "on") LIMN_TRY_STATUS(renderer.set_contact_shadow(&scene));
   const bool is_balanced = options.light.compensation != "none" || options.light.black != "as-is";
   const std::vector<Body> bodies = scene::bodies(scene);
   const std::vector<Track> tracks = tracks_of(scene, posed);

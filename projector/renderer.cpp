@@ -163,7 +163,14 @@ struct Renderer::Impl {
   struct LayerPrograms {
     Program where, centre, edges;
   };
-  LayerPrograms light_layer, parts_layer, view_layer;
+  LayerPrograms light_layer;
+  struct CompositePrograms {
+    LayerPrograms parts, view;
+    static Result<CompositePrograms> link(const std::string& defined);
+  };
+  CompositePrograms unshadowed;
+  std::optional<CompositePrograms> shadowed;  // linked when it is asked for
+  CompositePrograms& composites() { return has_contact_shadow ? *shadowed : unshadowed; }
   GlName list;  // of pixels, shaders/listed.glsl
   int list_room = 0;
   std::vector<GlName> responses;
@@ -303,17 +310,24 @@ Status Renderer::Impl::link_programs() {
   const std::pair<Program*, const char*> computed[] = {{&edges, "edges.comp"},
                                                        {&light_layer.where, "light_where.comp"},
                                                        {&light_layer.centre, "light_centre.comp"},
-                                                       {&light_layer.edges, "light_edges.comp"},
-                                                       {&parts_layer.where, "parts_where.comp"},
-                                                       {&parts_layer.centre, "parts_centre.comp"},
-                                                       {&parts_layer.edges, "parts_edges.comp"},
-                                                       {&view_layer.where, "view_where.comp"},
-                                                       {&view_layer.centre, "view_centre.comp"},
-                                                       {&view_layer.edges, "view_edges.comp"}};
+                                                       {&light_layer.edges, "light_edges.comp"}};
   for (const auto& [program, file] : computed) {
     LIMN_TRY(*program, Program::link_compute(file));
   }
+  LIMN_TRY(unshadowed, CompositePrograms::link(""));
   return {};
+}
+
+auto Renderer::Impl::CompositePrograms::link(const std::string& defined) -> Result<CompositePrograms> {
+  CompositePrograms out;
+  const std::pair<Program*, const char*> computed[] = {
+      {&out.parts.where, "parts_where.comp"}, {&out.parts.centre, "parts_centre.comp"},
+      {&out.parts.edges, "parts_edges.comp"}, {&out.view.where, "view_where.comp"},
+      {&out.view.centre, "view_centre.comp"}, {&out.view.edges, "view_edges.comp"}};
+  for (const auto& [program, file] : computed) {
+    LIMN_TRY(*program, Program::link_compute(file, defined));
+  }
+  return out;
 }
 
 // CV_32F of the texture's size. False when it is there already.
@@ -535,7 +549,6 @@ cv::Mat Renderer::Impl::laid_over(const cv::Mat& bgr,
       set_up(program, lens_of(imager), &imager);
       program.set("s_distances", k_distances_unit);
       if (has_contact_shadow) contact_shadow->bind(program, k_distances_unit);
-      program.set("u_contact_shadow", has_contact_shadow);
       set_up_layer(program);
     });
     overlay.posed = posed;
@@ -562,7 +575,7 @@ cv::Mat Renderer::Impl::composite_over(const Imager& imager,
   LIMN_CHECK(picture.cols == imager.width && picture.rows == imager.height && picture.depth() == CV_8U);
   cv::Mat bgr = picture;
   if (picture.channels() == 1) cv::cvtColor(picture, bgr, cv::COLOR_GRAY2BGR);
-  return laid_over(bgr, imager, posed, parts_layer, kind, whole,
+  return laid_over(bgr, imager, posed, composites().parts, kind, whole,
                    [&](const Program& program) { program.set_bits("u_whole", whole); });
 }
 
@@ -683,12 +696,16 @@ void Renderer::set_smoothing(const Smoothing& smoothing) {
 
 void Renderer::set_quick_motion(bool wanted) { impl_->quick_motion = wanted; }
 
-void Renderer::set_contact_shadow(const scene::Scene* scene) {
+Status Renderer::set_contact_shadow(const scene::Scene* scene) {
   const bool wanted = scene != nullptr;
+  if (wanted && !impl_->shadowed) {
+    LIMN_TRY(impl_->shadowed, Impl::CompositePrograms::link("CONTACT_SHADOW"));
+  }
   if (wanted && !impl_->contact_shadow) impl_->contact_shadow.emplace(*scene);
   if (impl_->has_contact_shadow != wanted)
     for (Impl::Overlay& overlay : impl_->overlays) overlay.posed.reset();
   impl_->has_contact_shadow = wanted;
+  return {};
 }
 
 cv::Mat Renderer::clipped(std::size_t index) const { return impl_->shown.at(index).clipped; }
@@ -845,10 +862,11 @@ cv::Mat Renderer::composite(const Imager& camera,
 
 cv::Mat Renderer::view(const Imager& imager, const scene::PosedScene& posed, const cv::Scalar& background) {
   const cv::Mat plain(imager.height, imager.width, CV_8UC3, background);
-  return impl_->laid_over(plain, imager, posed, impl_->view_layer, k_view, {}, [&](const Program& program) {
-    program.bind("s_albedo", k_albedo_unit, impl_->albedo);
-    program.set("u_mean_albedo", impl_->mean_albedo);
-  });
+  return impl_->laid_over(plain, imager, posed, impl_->composites().view, k_view, {},
+                          [&](const Program& program) {
+                            program.bind("s_albedo", k_albedo_unit, impl_->albedo);
+                            program.set("u_mean_albedo", impl_->mean_albedo);
+                          });
 }
 
 std::vector<PartCoverage> Renderer::coverage(const scene::PosedScene& posed, const Imager& viewer) {

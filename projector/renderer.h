@@ -76,8 +76,8 @@ class Renderer {
 
   /// View parts of `scene`, the one given to create, darken the prototype around them in composites and views
   /// (ContactShadow); null: they do not, as at first. Light cannot darken: projector pictures stay the same.
-  /// Takes some 0.2 s for each variant the first time.
-  void set_contact_shadow(const scene::Scene* scene);
+  /// Takes some 0.2 s for each variant the first time. Error: the driver's message.
+  Status set_contact_shadow(const scene::Scene* scene);
 
   /// What projector `index` of the rig is to show, CV_8UC3 BGR display values by its measured response
   /// (gamma 2.2 without). `view` parts are drawn as seen from the viewer's eye, also beyond its picture;

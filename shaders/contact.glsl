@@ -1,4 +1,11 @@
 // How much of even light from all sides the view parts near a point keep from it (projector/contact_shadow.h).
+// Nothing where CONTACT_SHADOW is not defined: software GL would go through all of it.
+
+#ifndef CONTACT_SHADOW
+const bool k_contact_shadow = false;
+float contact_shadow(vec3 p, vec3 d_normal) { return 0.0; }
+#else
+const bool k_contact_shadow = true;
 
 struct Field {
   vec4 lower;  // of the nodes, owner frame; w: 1 when the part is shown
@@ -7,7 +14,6 @@ struct Field {
 };
 layout(std430, binding = 7) readonly buffer Fields { Field s_fields[]; };  // by owner
 uniform sampler3D s_distances;
-uniform bool u_contact_shadow;
 uniform float u_free;      // m; what is met this far off keeps no light
 uniform float u_widening;  // radius a length of the cones
 uniform int u_placement_count;
@@ -53,3 +59,4 @@ float contact_shadow(vec3 p, vec3 d_normal) {
   }
   return 1.0 - left;
 }
+#endif

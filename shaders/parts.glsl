@@ -23,7 +23,7 @@ bool is_left_to_screen(vec2 px) {
 
 // `whole`: what light can show is drawn, too.
 vec4 part_seen(Seen seen, bool whole) {
-  if (seen.how == k_nothing) return u_contact_shadow ? shadow_at(seen.d) : vec4(0);
+  if (seen.how == k_nothing) return k_contact_shadow ? shadow_at(seen.d) : vec4(0);
   float share = seen.how == k_if_reached && !whole ? whole_share(owner_of(seen.part.id)) : 1.0;
   if (share < 1.0 && !is_reached(seen.behind)) share = 1.0;
   if (share == 0.0) return vec4(0);

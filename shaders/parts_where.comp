@@ -12,7 +12,7 @@ void main() {
   Sight eye = s_sights[u_eye];
   vec3 d = ray_of(eye, vec2(at));
   if (ids_around(s_eye_ids, eye, 1, d, share) != uvec4(0) ||
-      (u_contact_shadow && ids_around(s_eye_ids, eye, 0, d, share) != uvec4(0))) {
+      (k_contact_shadow && ids_around(s_eye_ids, eye, 0, d, share) != uvec4(0))) {
     list_pixel(at);
   }
 }

@@ -22,6 +22,6 @@ vec4 view_at(vec2 px) {
   vec3 n = facing_normal(prototype, d);
   vec2 uv = uv_of(prototype);
   vec3 colour = lit(u_mean_albedo * texture(s_albedo, vec2(uv.x, 1.0 - uv.y)).rgb, vec2(0, 1), n, -d);
-  float shadow = u_contact_shadow ? contact_shadow(eye.p_eye.xyz + prototype.t * d, n) : 0.0;
+  float shadow = k_contact_shadow ? contact_shadow(eye.p_eye.xyz + prototype.t * d, n) : 0.0;
   return vec4((1.0 - shadow) * colour, 1);
 }

@@ -76,7 +76,9 @@ class ContactShadowTest : public test::GlTest {
   static Renderer renderer(const scene::Scene& scene, const Rig& rig, bool with_shadow) {
     auto made = Renderer::create(scene, rig);
     if (!made) throw std::runtime_error(made.message());
-    if (with_shadow) made->set_contact_shadow(&scene);
+    if (with_shadow) {
+      EXPECT_TRUE(made->set_contact_shadow(&scene));
+    }
     return std::move(made).value();
   }
 };
@@ -174,9 +176,9 @@ TEST_F(ContactShadowTest, LeavesProjectorPicturesAndSurfacePartsAndWhatIsFarAlon
       const cv::Mat plain = without.composite(0, grey_picture(), posed, what);
       const bool expected = mode == scene::Mode::view && gap == 0;
       EXPECT_EQ(cv::norm(dark, plain, cv::NORM_INF) > 30, expected);
-      with.set_contact_shadow(nullptr);
+      EXPECT_TRUE(with.set_contact_shadow(nullptr));
       EXPECT_EQ(cv::norm(with.composite(0, grey_picture(), posed, what), plain, cv::NORM_INF), 0);
-      with.set_contact_shadow(&scene);
+      EXPECT_TRUE(with.set_contact_shadow(&scene));
     }
   }
 }
