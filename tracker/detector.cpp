@@ -180,8 +180,8 @@ std::optional<Detection> Detector::found_again(const cv::Mat& grey, const Lens* 
   return read_quads(Reading::covered);
 }
 
-// Quads and segments at once. Whoever has the segments reads quads ahead, where there is a lens to read them
-// with, into read_, until the last is found.
+// Quads and segments at once. Whoever has the segments reads quads into read_ until the last is found, through
+// the lens (or none) that `ahead` points to; null: nobody reads ahead.
 void Detector::find_candidates(const cv::Mat& grey, bool with_segments, const Lens* const* ahead) {
   threshold_.apply(grey, {options_.min_contrast}, corner_codes_, options_.threads);
   quads_.clear();
