@@ -126,7 +126,7 @@ void Detector::detect_more(const cv::Mat& grey,
   if (grey.empty()) return;
   const bool broken = options_.broken_markers && reading == Reading::covered;
   const bool is_first = detections->empty();
-  find_candidates(grey, broken, is_first ? &lens : nullptr);
+  find_candidates(grey, lens, broken, is_first);
   if (!is_first) std::erase_if(quads_, [&](const Quad& quad) { return is_known(quad, *detections); });
   read_rest(grey, lens, Reading::open, detections);
   if (!broken) return;
@@ -173,16 +173,16 @@ std::optional<Detection> Detector::found_again(const cv::Mat& grey, const Lens* 
     }
     return std::nullopt;
   };
-  find_candidates(part, options_.broken_markers, nullptr);
+  find_candidates(part, lens, options_.broken_markers, false);
   if (auto regular = read_quads(Reading::open)) return regular;
   if (!options_.broken_markers) return std::nullopt;
   join_segments(part, {});
   return read_quads(Reading::covered);
 }
 
-// Quads and segments at once. Whoever has the segments reads quads into read_ until the last is found, through
-// the lens (or none) that `ahead` points to; null: nobody reads ahead.
-void Detector::find_candidates(const cv::Mat& grey, bool with_segments, const Lens* const* ahead) {
+// Quads and segments at once. With `ahead`, whoever has the segments reads quads into read_ until the last is
+// found.
+void Detector::find_candidates(const cv::Mat& grey, const Lens* lens, bool with_segments, bool ahead) {
   threshold_.apply(grey, {options_.min_contrast}, corner_codes_, options_.threads);
   quads_.clear();
   read_.clear();
@@ -203,7 +203,7 @@ void Detector::find_candidates(const cv::Mat& grey, bool with_segments, const Le
   const auto find_segments = [&] {
     segment_finder_.find(grey, options_.min_contrast, segments_);
     while (const auto quad = ahead ? next_quad() : std::nullopt)
-      read_.push_back(read(grey, *quad, *ahead, Reading::open, workers_.back()));
+      read_.push_back(read(grey, *quad, lens, Reading::open, workers_.back()));
   };
   at_once(with_segments ? 2 : 1, options_.threads, [&](int i) { i == 0 ? find_quads() : find_segments(); });
 }

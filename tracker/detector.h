@@ -92,7 +92,7 @@ class Detector {
   std::vector<std::optional<Detection>> read_;  // what quads_ show, so far
 
   std::optional<Detection> found_again(const cv::Mat& grey, const Lens* lens, const Detection& last);
-  void find_candidates(const cv::Mat& grey, bool with_segments, const Lens* const* ahead);
+  void find_candidates(const cv::Mat& grey, const Lens* lens, bool with_segments, bool ahead);
   void join_segments(const cv::Mat& grey, const std::vector<Detection>& found);
   void read_rest(const cv::Mat& grey, const Lens* lens, Reading reading, std::vector<Detection>* detections);
   std::optional<Detection> read(const cv::Mat& grey,
