@@ -5,8 +5,6 @@
 #include <mutex>
 #include <utility>
 
-#include "tracker/at_once.h"
-
 namespace limn::tracker {
 namespace {
 
@@ -100,6 +98,45 @@ bool is_known(const Quad& quad, const std::vector<Detection>& detections) {
 
 }  // namespace
 
+// Some of the crew find quads while others read them.
+class Detector::UnreadQuads {
+ public:
+  struct Next {
+    std::size_t number;
+    Quad quad;
+  };
+  explicit UnreadQuads(std::vector<Quad>& quads) : quads_(quads), count_(quads.size()) {}
+
+  void add(const Quad& quad) {
+    const std::lock_guard lock(mutex_);
+    quads_.push_back(quad);
+    ++count_;
+  }
+  void end() { ended_ = true; }
+
+  // Waits for one, unless all are taken and there will be no more.
+  std::optional<Next> take() {
+    for (;;) {
+      bool ended = false;
+      Crew::wait_until([&] { return (ended = ended_) || taken_ < count_; });
+      const std::lock_guard lock(mutex_);
+      if (taken_ < count_) {
+        const std::size_t number = taken_++;
+        return Next{number, quads_[number]};
+      }
+      if (ended) return std::nullopt;
+    }
+  }
+
+  std::mutex& mutex() { return mutex_; }
+
+ private:
+  std::mutex mutex_;
+  std::vector<Quad>& quads_;
+  std::atomic<std::size_t> count_, taken_ = 0;
+  std::atomic<bool> ended_ = false;
+};
+
 Detector::Detector(Families families, DetectorOptions options)
     : families_(std::move(families)), options_(options) {
   options_.threads = std::max(1, options_.threads);
@@ -125,14 +162,49 @@ void Detector::detect_more(const cv::Mat& grey,
   LIMN_CHECK(grey.empty() || grey.type() == CV_8UC1);
   if (grey.empty()) return;
   const bool broken = options_.broken_markers && reading == Reading::covered;
-  const bool is_first = detections->empty();
-  find_candidates(grey, lens, broken, is_first);
-  if (!is_first) std::erase_if(quads_, [&](const Quad& quad) { return is_known(quad, *detections); });
-  read_rest(grey, lens, Reading::open, detections);
+  Crew crew(options_.threads);
+  crew.work([&] { find_markers(grey, lens, broken, detections, crew); });
+}
+
+void Detector::find_markers(
+    const cv::Mat& grey, const Lens* lens, bool broken, std::vector<Detection>* detections, Crew& crew) {
+  threshold_.apply(grey, {options_.min_contrast}, corner_codes_, crew);
+  quads_.clear();
+  UnreadQuads open(quads_);
+  crew.at_once(crew.size(), [&](int worker) {
+    if (worker == 0) {
+      finder_.find(corner_codes_, {options_.min_side_px}, [&](const Quad& quad) {
+        if (!is_known(quad, *detections)) open.add(quad);
+      });
+      open.end();
+    }
+    if (worker == crew.size() - 1 && broken) segment_finder_.find(grey, options_.min_contrast, segments_);
+    read_quads(grey, lens, Reading::open, open, worker);
+  });
+  add_read(detections);
   if (!broken) return;
-  join_segments(grey, *detections);
+  join_segments(grey, *detections, crew);
+  UnreadQuads covered(quads_);
+  covered.end();
+  crew.at_once(crew.size(), [&](int worker) { read_quads(grey, lens, Reading::covered, covered, worker); });
+  add_read(detections);
+}
+
+// Until none is left.
+void Detector::read_quads(
+    const cv::Mat& grey, const Lens* lens, Reading reading, UnreadQuads& unread, int worker) {
+  while (const auto next = unread.take())
+    if (auto found = read(grey, next->quad, lens, reading, workers_[static_cast<std::size_t>(worker)])) {
+      const std::lock_guard lock(unread.mutex());
+      read_.push_back({next->number, std::move(*found)});
+    }
+}
+
+// What read_quads() has read, as if it had been read one after the other.
+void Detector::add_read(std::vector<Detection>* detections) {
+  std::sort(read_.begin(), read_.end(), [](const Read& a, const Read& b) { return a.number < b.number; });
+  for (Read& read : read_) add_best_of_square(std::move(read.detection), detections);
   read_.clear();
-  read_rest(grey, lens, Reading::covered, detections);
 }
 
 void Detector::follow(const cv::Mat& grey,
@@ -173,80 +245,39 @@ std::optional<Detection> Detector::found_again(const cv::Mat& grey, const Lens* 
     }
     return std::nullopt;
   };
-  find_candidates(part, lens, options_.broken_markers, false);
+  Crew alone(1);
+  threshold_.apply(part, {options_.min_contrast}, corner_codes_, alone);
+  quads_.clear();
+  finder_.find(corner_codes_, {options_.min_side_px},
+               [&](const Quad& candidate) { quads_.push_back(candidate); });
   if (auto regular = read_quads(Reading::open)) return regular;
   if (!options_.broken_markers) return std::nullopt;
-  join_segments(part, {});
+  segment_finder_.find(part, options_.min_contrast, segments_);
+  join_segments(part, {}, alone);
   return read_quads(Reading::covered);
 }
 
-// Quads and segments at once. With `ahead`, whoever has the segments reads quads into read_ until the last is
-// found.
-void Detector::find_candidates(const cv::Mat& grey, const Lens* lens, bool with_segments, bool ahead) {
-  threshold_.apply(grey, {options_.min_contrast}, corner_codes_, options_.threads);
-  quads_.clear();
-  read_.clear();
-  std::mutex mutex;  // of quads_
-  std::atomic<bool> found_all = false;
-  const auto find_quads = [&] {
-    finder_.find(corner_codes_, {options_.min_side_px}, [&](const Quad& quad) {
-      const std::lock_guard lock(mutex);
-      quads_.push_back(quad);
-    });
-    found_all = true;
-  };
-  const auto next_quad = [&]() -> std::optional<Quad> {
-    const std::lock_guard lock(mutex);
-    if (found_all || read_.size() == quads_.size()) return std::nullopt;
-    return quads_[read_.size()];
-  };
-  const auto find_segments = [&] {
-    segment_finder_.find(grey, options_.min_contrast, segments_);
-    while (const auto quad = ahead ? next_quad() : std::nullopt)
-      read_.push_back(read(grey, *quad, lens, Reading::open, workers_.back()));
-  };
-  at_once(with_segments ? 2 : 1, options_.threads, [&](int i) { i == 0 ? find_quads() : find_segments(); });
-}
-
 // The quads that straight edges suggest where none of these markers are, into quads_.
-void Detector::join_segments(const cv::Mat& grey, const std::vector<Detection>& found) {
+void Detector::join_segments(const cv::Mat& grey, const std::vector<Detection>& found, Crew& crew) {
   constexpr std::size_t k_max_candidates = 400;  // of each kind of edges
   squares_.clear();
   for (const Detection& detection : found) squares_.emplace_back(detection);
-  at_once(2, options_.threads, [&](int kind) {
-    std::vector<Segment>& segments = kind == 0 ? segments_.of_black : segments_.of_blurred;
-    Joined& joined = joined_[static_cast<std::size_t>(kind)];
-    std::erase_if(segments, [&](const Segment& segment) {
+  quads_.clear();
+  for (std::vector<Segment>* segments : {&segments_.of_black, &segments_.of_blurred}) {
+    std::erase_if(*segments, [&](const Segment& segment) {
       return std::any_of(squares_.begin(), squares_.end(),
                          [&](const FoundSquare& square) { return square.holds(segment); });
     });
-    joined.finder.find(segments, grey.cols, grey.rows, joined.quads);
-    if (joined.quads.size() > k_max_candidates) joined.quads.resize(k_max_candidates);
-  });
-  quads_.clear();
-  for (const Joined& joined : joined_)
-    for (const SegmentQuad& candidate : joined.quads) {
+    segment_quad_finder_.find(*segments, grey.cols, grey.rows, segment_quads_, crew);
+    if (segment_quads_.size() > k_max_candidates) segment_quads_.resize(k_max_candidates);
+    for (const SegmentQuad& candidate : segment_quads_) {
       if (std::any_of(squares_.begin(), squares_.end(),
                       [&](const FoundSquare& square) { return square.takes(candidate.quad); }))
         continue;
       quads_.push_back(candidate.quad);
       quads_.back().within_px = 5;
     }
-}
-
-// What quads_ show that are not in read_.
-void Detector::read_rest(const cv::Mat& grey,
-                         const Lens* lens,
-                         Reading reading,
-                         std::vector<Detection>* detections) {
-  std::atomic<std::size_t> next = read_.size();
-  read_.resize(quads_.size());
-  at_once(options_.threads, options_.threads, [&](int thread) {
-    for (std::size_t i = next++; i < quads_.size(); i = next++)
-      read_[i] = read(grey, quads_[i], lens, reading, workers_[static_cast<std::size_t>(thread)]);
-  });
-  for (std::optional<Detection>& found : read_)
-    if (found) add_best_of_square(std::move(*found), detections);
+  }
 }
 
 std::optional<Detection> Detector::read(const cv::Mat& grey,

@@ -8,6 +8,7 @@
 
 #include "core/lens.h"
 #include "tracker/candidates.h"
+#include "tracker/crew.h"
 #include "tracker/detection.h"
 #include "tracker/family.h"
 #include "tracker/found_square.h"
@@ -80,21 +81,25 @@ class Detector {
     EdgeRefiner refiner;
     PatternFitBuffers fit;
   };
-  std::vector<Worker> workers_;  // one a thread
+  std::vector<Worker> workers_;  // one for each of the crew
   SegmentFinder segment_finder_;
   Segments segments_;
-  struct Joined {
-    SegmentQuadFinder finder;
-    std::vector<SegmentQuad> quads;
+  std::vector<FoundSquare> squares_;  // of markers found before segments are joined
+  SegmentQuadFinder segment_quad_finder_;
+  std::vector<SegmentQuad> segment_quads_;
+  struct Read {
+    std::size_t number;  // of its quad
+    Detection detection;
   };
-  std::vector<FoundSquare> squares_;            // of markers found before segments are joined
-  std::array<Joined, 2> joined_;                // of black, of blurred edges
-  std::vector<std::optional<Detection>> read_;  // what quads_ show, so far
+  std::vector<Read> read_;
 
+  class UnreadQuads;
   std::optional<Detection> found_again(const cv::Mat& grey, const Lens* lens, const Detection& last);
-  void find_candidates(const cv::Mat& grey, const Lens* lens, bool with_segments, bool ahead);
-  void join_segments(const cv::Mat& grey, const std::vector<Detection>& found);
-  void read_rest(const cv::Mat& grey, const Lens* lens, Reading reading, std::vector<Detection>* detections);
+  void find_markers(
+      const cv::Mat& grey, const Lens* lens, bool broken, std::vector<Detection>* detections, Crew& crew);
+  void read_quads(const cv::Mat& grey, const Lens* lens, Reading reading, UnreadQuads& unread, int worker);
+  void add_read(std::vector<Detection>* detections);
+  void join_segments(const cv::Mat& grey, const std::vector<Detection>& found, Crew& crew);
   std::optional<Detection> read(const cv::Mat& grey,
                                 const Quad& quad,
                                 const Lens* lens,

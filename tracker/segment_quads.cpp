@@ -25,8 +25,8 @@ constexpr std::size_t k_max_corners = 8;  // that are kept of a segment
 constexpr double k_min_visible = 0.5;     // of the outline
 constexpr double k_min_side_visible = 0.15;
 constexpr double k_min_side_px = 12;
-constexpr double k_same_px = 3;  // quads whose corners all lie nearer are the same
-constexpr std::size_t k_max_quads = 20000;
+constexpr double k_same_px = 3;            // quads whose corners all lie nearer are the same
+constexpr std::size_t k_max_quads = 2500;  // of a part
 constexpr double k_max_collinear_sine = 0.06;
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
@@ -141,10 +141,8 @@ bool same(const Quad& a, const Quad& b) {
 
 }  // namespace
 
-void SegmentQuadFinder::find(std::span<const Segment> segments,
-                             int width,
-                             int height,
-                             std::vector<SegmentQuad>& quads) {
+void SegmentQuadFinder::find(
+    std::span<const Segment> segments, int width, int height, std::vector<SegmentQuad>& quads, Crew& crew) {
   quads.clear();
   columns_ = static_cast<int>(width / k_cell_px) + 1;
   rows_ = static_cast<int>(height / k_cell_px) + 1;
@@ -152,10 +150,13 @@ void SegmentQuadFinder::find(std::span<const Segment> segments,
   for (const Segment& s : segments)
     if (s.length >= k_min_length_px) segments_.push_back(s);
   sort_into_cells();
-  join_collinear();
+  for_each_part(crew, [&](Part& part) { join_collinear(part); });
+  for (const Part& part : parts_) segments_.insert(segments_.end(), part.joined.begin(), part.joined.end());
   sort_into_cells();
-  find_corners();
-  for (std::uint32_t i = 0; i < segments_.size() && quads.size() < k_max_quads; ++i) add_quads(i, quads);
+  corners_.resize(segments_.size());
+  for_each_part(crew, [&](Part& part) { find_corners(part); });
+  for_each_part(crew, [&](Part& part) { find_quads(part); });
+  for (const Part& part : parts_) quads.insert(quads.end(), part.quads.begin(), part.quads.end());
   const auto key = [](const SegmentQuad& q) {
     const auto& c = q.quad.corners_px;
     return std::tuple(-q.visible, c[0].x(), c[0].y(), c[2].x(), c[2].y());
@@ -194,7 +195,8 @@ template <typename Match, typename Visit>
 void SegmentQuadFinder::visit(const Eigen::Vector2d& px,
                               double radius,
                               const Match& match,
-                              const Visit& visit) {
+                              std::vector<std::uint8_t>& matches,
+                              const Visit& visit) const {
   const Eigen::Vector2d reach(radius, radius);
   const int low = cell_of(px - reach);
   const int high = cell_of(px + reach);
@@ -202,11 +204,11 @@ void SegmentQuadFinder::visit(const Eigen::Vector2d& px,
   for (int first = low; first + columns <= high; first += columns_) {
     const std::uint32_t begin = cells_.begin[static_cast<std::size_t>(first)];
     const std::uint32_t end = cells_.begin[static_cast<std::size_t>(first + columns) + 1];
-    matches_.resize(std::max<std::size_t>(matches_.size(), end - begin + k_block));
-    match(begin, static_cast<int>(end - begin), matches_.data());
+    matches.resize(std::max<std::size_t>(matches.size(), end - begin + k_block));
+    match(begin, static_cast<int>(end - begin), matches.data());
     for (std::uint32_t i = begin; i < end; i += 8) {
       std::uint64_t word = 0;
-      std::memcpy(&word, &matches_[i - begin], 8);
+      std::memcpy(&word, &matches[i - begin], 8);
       for (; word != 0; word &= word - 1)
         if (const auto at = i + static_cast<std::uint32_t>(std::countr_zero(word) / 8); at < end)
           visit(cells_.segment[at]);
@@ -214,12 +216,23 @@ void SegmentQuadFinder::visit(const Eigen::Vector2d& px,
   }
 }
 
-// Two pieces of one line, what covers it between them: added as one segment more.
-void SegmentQuadFinder::join_collinear() {
+// Calls work(part) with equal shares of the segments.
+template <typename Work>
+void SegmentQuadFinder::for_each_part(Crew& crew, const Work& work) {
+  crew.at_once(static_cast<int>(parts_.size()), [&](int i) {
+    const auto p = static_cast<std::size_t>(i);
+    parts_[p].first = static_cast<std::uint32_t>(segments_.size() * p / parts_.size());
+    parts_[p].last = static_cast<std::uint32_t>(segments_.size() * (p + 1) / parts_.size());
+    work(parts_[p]);
+  });
+}
+
+// Two pieces of one line, what covers it between them: one segment more.
+void SegmentQuadFinder::join_collinear(Part& part) const {
   constexpr double k_max_beside_px = 1.5;
-  const std::size_t count = segments_.size();
-  for (std::size_t i = 0; i < count; ++i) {
-    const Segment a = segments_[i];
+  part.joined.clear();
+  for (std::uint32_t i = part.first; i < part.last; ++i) {
+    const Segment& a = segments_[i];
     const double reach = std::min(k_max_reach_px, a.length + k_gap_px);
     std::uint32_t nearest = 0;
     double least = reach;
@@ -228,7 +241,7 @@ void SegmentQuadFinder::join_collinear() {
       match_collinear(probe, static_cast<float>(reach), &cells_.x[first], &cells_.y[first], &cells_.dx[first],
                       &cells_.dy[first], entries, matches);
     };
-    visit(a.to, reach, match, [&](std::uint32_t j) {
+    visit(a.to, reach, match, part.matches, [&](std::uint32_t j) {
       const Segment& b = segments_[j];
       const Eigen::Vector2d apart = b.from - a.to;
       const double gap = a.direction.dot(apart);
@@ -245,53 +258,59 @@ void SegmentQuadFinder::join_collinear() {
     });
     if (least >= reach) continue;
     const Segment& b = segments_[nearest];
-    const Segment joined{a.from, b.to, (b.to - a.from).normalized(), (b.to - a.from).norm()};
-    segments_.push_back(joined);  // in no cell yet
+    part.joined.push_back({a.from, b.to, (b.to - a.from).normalized(), (b.to - a.from).norm()});
   }
 }
 
 // Corners within reach of either segment, each segment's best first.
-void SegmentQuadFinder::find_corners() {
-  corners_.clear();
-  corner_begin_.assign(segments_.size() + 1, 0);
-  for (std::uint32_t i = 0; i < segments_.size(); ++i) {
+void SegmentQuadFinder::find_corners(Part& part) {
+  part.corners.clear();
+  part.corner_end.clear();
+  for (std::uint32_t i = part.first; i < part.last; ++i) {
     const Segment& here = segments_[i];
     const Probe probe = probe_of(here);
     const auto match = [&](std::uint32_t first, int count, std::uint8_t* matches) {
       match_corners(probe, &cells_.x[first], &cells_.y[first], &cells_.dx[first], &cells_.dy[first],
                     &cells_.length[first], count, matches);
     };
-    found_.clear();
-    visit(here.to, k_max_reach_px, match, [&](std::uint32_t j) {
+    part.found.clear();
+    visit(here.to, k_max_reach_px, match, part.matches, [&](std::uint32_t j) {
       Corner corner{j, 0, {}};
       const Segment& next = segments_[j];
       const double near = reach(here, next);
       if ((next.from - here.to).squaredNorm() <= near * near &&
           corner_of(here, next, &corner.px, &corner.cost))
-        found_.push_back(corner);
+        part.found.push_back(corner);
     });
-    std::sort(found_.begin(), found_.end(), [](const Corner& x, const Corner& y) {
+    std::sort(part.found.begin(), part.found.end(), [](const Corner& x, const Corner& y) {
       return std::tie(x.cost, x.next) < std::tie(y.cost, y.next);
     });
-    if (found_.size() > k_max_corners) found_.resize(k_max_corners);
-    corners_.insert(corners_.end(), found_.begin(), found_.end());
-    corner_begin_[i + 1] = static_cast<std::uint32_t>(corners_.size());
+    if (part.found.size() > k_max_corners) part.found.resize(k_max_corners);
+    part.corners.insert(part.corners.end(), part.found.begin(), part.found.end());
+    part.corner_end.push_back(static_cast<std::uint32_t>(part.corners.size()));
+  }
+  std::size_t begin = 0;
+  for (std::uint32_t i = part.first; i < part.last; ++i) {
+    const std::size_t end = part.corner_end[i - part.first];
+    corners_[i] = std::span(part.corners).subspan(begin, end - begin);
+    begin = end;
   }
 }
 
-std::span<const SegmentQuadFinder::Corner> SegmentQuadFinder::corners_of(std::uint32_t segment) const {
-  return std::span(corners_).subspan(corner_begin_[segment],
-                                     corner_begin_[segment + 1] - corner_begin_[segment]);
+void SegmentQuadFinder::find_quads(Part& part) const {
+  part.quads.clear();
+  for (std::uint32_t i = part.first; i < part.last && part.quads.size() < k_max_quads; ++i)
+    add_quads(i, part.quads);
 }
 
 // All quadrilaterals whose first segment, of the lowest number, is this one.
 void SegmentQuadFinder::add_quads(std::uint32_t first, std::vector<SegmentQuad>& quads) const {
-  for (const Corner& one : corners_of(first)) {
+  for (const Corner& one : corners_[first]) {
     if (one.next <= first) continue;
-    for (const Corner& two : corners_of(one.next)) {
+    for (const Corner& two : corners_[one.next]) {
       if (two.next <= first || segments_[first].direction.dot(segments_[two.next].direction) > k_max_opposite)
         continue;
-      for (const Corner& three : corners_of(two.next)) {
+      for (const Corner& three : corners_[two.next]) {
         if (three.next <= first) continue;
         Eigen::Vector2d last;
         double cost = 0;

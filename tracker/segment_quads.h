@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tracker/candidates.h"
+#include "tracker/crew.h"
 #include "tracker/segments.h"
 
 namespace limn::tracker {
@@ -21,8 +22,9 @@ struct SegmentQuad {
 /// segments likewise). Holds its buffers between calls.
 class SegmentQuadFinder {
  public:
-  /// Best visible first; each once.
-  void find(std::span<const Segment> segments, int width, int height, std::vector<SegmentQuad>& quads);
+  /// Best visible first; each once. The result is the same with any crew.
+  void find(
+      std::span<const Segment> segments, int width, int height, std::vector<SegmentQuad>& quads, Crew& crew);
 
  private:
   struct Corner {
@@ -35,21 +37,35 @@ class SegmentQuadFinder {
     std::vector<std::uint32_t> segment;
     std::vector<float> x, y, dx, dy, length;  // where it begins, its direction and length
   };
+  // A share of the segments, and what it gives.
+  struct Part {
+    std::uint32_t first = 0, last = 0;
+    std::vector<Segment> joined;
+    std::vector<Corner> corners;  // of all its segments, each one's best first
+    std::vector<std::uint32_t> corner_end;
+    std::vector<SegmentQuad> quads;
+    std::vector<Corner> found;          // scratch: of one segment
+    std::vector<std::uint8_t> matches;  // scratch: of a run of entries, 1 or 0
+  };
   std::vector<Segment> segments_;  // those found, and those joined of two on one line
   Cells cells_;
-  std::vector<Corner> found_;    // scratch: of one segment
-  std::vector<Corner> corners_;  // of all segments, each one's best first
-  std::vector<std::uint32_t> corner_begin_;
-  std::vector<std::uint8_t> matches_;  // scratch: of a run of entries, 1 or 0
+  std::array<Part, 8> parts_;
+  std::vector<std::span<const Corner>> corners_;  // of each segment
   int columns_ = 0, rows_ = 0;
 
   int cell_of(const Eigen::Vector2d& px) const;
   void sort_into_cells();
   template <typename Match, typename Visit>
-  void visit(const Eigen::Vector2d& px, double radius, const Match& match, const Visit& visit);
-  void join_collinear();
-  void find_corners();
-  std::span<const Corner> corners_of(std::uint32_t segment) const;
+  void visit(const Eigen::Vector2d& px,
+             double radius,
+             const Match& match,
+             std::vector<std::uint8_t>& matches,
+             const Visit& visit) const;
+  template <typename Work>
+  void for_each_part(Crew& crew, const Work& work);
+  void join_collinear(Part& part) const;
+  void find_corners(Part& part);
+  void find_quads(Part& part) const;
   void add_quads(std::uint32_t first, std::vector<SegmentQuad>& quads) const;
 };
 

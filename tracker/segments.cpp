@@ -53,7 +53,8 @@ void SegmentFinder::add_outlines(const cv::Mat& picture,
                                  double min_side,
                                  const ThresholdOptions& options,
                                  std::vector<Segment>& segments) {
-  threshold_.apply(picture, options, corner_codes_);
+  Crew alone(1);
+  threshold_.apply(picture, options, corner_codes_, alone);
   outlines_.for_each(corner_codes_, [&](const Outlines::Extent& outline) {
     const auto length = static_cast<double>(outline.count);
     if (length < 2 * min_side || std::abs(outline.area) < k_min_width * length) return;

@@ -43,7 +43,8 @@ std::vector<RefinedQuad> frames_in(const cv::Mat& grey) {
   Threshold threshold;
   CornerCodes codes;
   QuadFinder finder;
-  threshold.apply(grey, {k_min_contrast}, codes);
+  Crew alone(1);
+  threshold.apply(grey, {k_min_contrast}, codes, alone);
   EdgeRefiner refiner;
   std::vector<RefinedQuad> frames;
   finder.find(codes, {k_min_search_px}, [&](const Quad& quad) {

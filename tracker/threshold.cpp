@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cstring>
 
-#include "tracker/at_once.h"
 #include "tracker/simd.h"
 
 namespace limn::tracker {
 namespace {
+
+constexpr int k_shares = 3;  // for each of a crew: some come late
 
 constexpr int k_tile = 4;
 
@@ -65,7 +66,7 @@ LIMN_SIMD void middle_levels(const std::uint8_t* low,
 void Threshold::apply(const cv::Mat& grey,
                       const ThresholdOptions& options,
                       CornerCodes& corners,
-                      int threads) {
+                      Crew& crew) {
   tiles_x_ = std::max(1, grey.cols / k_tile);
   tiles_y_ = std::max(1, grey.rows / k_tile);
   const auto count = static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_);
@@ -74,11 +75,12 @@ void Threshold::apply(const cv::Mat& grey,
   corners.height = grey.rows;
   corners.stride = grey.cols + 1;
   corners.codes.resize(static_cast<std::size_t>(corners.stride) * static_cast<std::size_t>(grey.rows + 1));
-  rows_.resize(static_cast<std::size_t>(threads));
-  at_once(threads, threads, [&](int i) {
+  const int shares = crew.size() == 1 ? 1 : k_shares * crew.size();
+  rows_.resize(static_cast<std::size_t>(shares));
+  crew.at_once(shares, [&](int i) {
     Rows& rows = rows_[static_cast<std::size_t>(i)];
-    rows.first = tiles_y_ * i / threads;
-    rows.last = tiles_y_ * (i + 1) / threads;
+    rows.first = tiles_y_ * i / shares;
+    rows.last = tiles_y_ * (i + 1) / shares;
     measure_tiles(grey, rows);
     widen_tiles(rows.first, rows.last);
   });
@@ -86,8 +88,7 @@ void Threshold::apply(const cv::Mat& grey,
     join_rows();
     widen_tiles(0, tiles_y_);
   }
-  at_once(threads, threads,
-          [&](int i) { compare(grey, options, rows_[static_cast<std::size_t>(i)], corners); });
+  crew.at_once(shares, [&](int i) { compare(grey, options, rows_[static_cast<std::size_t>(i)], corners); });
 }
 
 // A tile at the right or lower end also takes the pixels that are too few for one of their own.

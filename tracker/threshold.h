@@ -4,6 +4,8 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
+#include "tracker/crew.h"
+
 namespace limn::tracker {
 
 /// A black-and-white picture as codes of its pixels' corners: which of the four pixels about the corner are
@@ -37,8 +39,8 @@ struct ThresholdOptions {
 /// between calls.
 class Threshold {
  public:
-  /// `grey` is 8-bit, one channel, not empty. The result is the same with any number of threads.
-  void apply(const cv::Mat& grey, const ThresholdOptions& options, CornerCodes& corners, int threads = 1);
+  /// `grey` is 8-bit, one channel, not empty. The result is the same with any crew.
+  void apply(const cv::Mat& grey, const ThresholdOptions& options, CornerCodes& corners, Crew& crew);
 
  private:
   // What a thread writes on the way through its rows of tiles.
@@ -51,7 +53,7 @@ class Threshold {
   int tiles_y_ = 0;
   std::vector<std::uint8_t> darkest_, brightest_;            // per tile
   std::vector<std::uint8_t> wide_darkest_, wide_brightest_;  // per tile, of a row of three
-  std::vector<Rows> rows_;                                   // one a thread
+  std::vector<Rows> rows_;                                   // one for each of the crew
 
   void measure_tiles(const cv::Mat& grey, Rows& rows);
   void widen_tiles(int first, int last);
