@@ -5,6 +5,8 @@
 #include <mutex>
 #include <utility>
 
+#include "tracker/shadow_edges.h"
+
 namespace limn::tracker {
 namespace {
 
@@ -308,6 +310,7 @@ std::optional<Detection> Detector::read(const cv::Mat& grey,
     identity = refined ? identify(grey, *refined, families_, reading) : std::nullopt;
     if (!identity) return std::nullopt;
   }
+  leave_shadow_edges(grey, worker.refiner.light(), identity->cells, &*refined);
   Detection detection;
   if (!refined->separate || is_blurred(*refined, identity->cells))
     detection.by_pattern = settle_overlapping_edges(grey, *identity, worker, last, &*refined);

@@ -1,0 +1,249 @@
+#include "tracker/shadow_edges.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "tracker/quad_levels.h"
+
+namespace limn::tracker {
+namespace {
+
+constexpr double k_dark = 1;            // light, of 255, that is added to both sides of a ratio
+constexpr double k_unlike = 0.15;       // of a side's ratio to the others', natural logarithms
+constexpr double k_like = 0.3;          // of a place's
+constexpr double k_beside_cells = 0.3;  // of a cell, from a border to the places on both sides of it
+constexpr double k_reach_share = 0.14;  // of the shortest side: some more than a cell of most families
+constexpr int k_max_reach = 12;         // pixels
+constexpr int k_edge_px = 3;            // from an edge to where its levels are, at most
+constexpr double k_max_blur_px = 1.2;   // that leaves levels there
+constexpr int k_rows = 40;              // across a side
+constexpr double k_end_share = 0.06;    // of a side, at each end, where other edges are
+constexpr double k_on_line_px = 0.75;
+constexpr double k_min_rows_share = 0.35;   // of the rows, that agree with a line
+constexpr double k_more_rows_share = 1.25;  // times those that agree with the side as it was
+constexpr double k_rows_alike = 3;          // rows that err alike: their samples overlap
+constexpr double k_beside_px = 0.15;        // that another edge nearby moves a line
+constexpr double k_doubt_px = 1.5;  // of a side that a shadow's edge hides: measured on slatted shadow
+constexpr double k_max_slide = 4;   // pixels of a corner for one of its side: blunter ones are no corners
+constexpr double k_min_run = 0.4;   // of the side, between the two places that a line is drawn through
+
+double log_ratio(double outside, double inside) { return std::log((outside + k_dark) / (inside + k_dark)); }
+
+double median(std::array<double, 4> values) {
+  std::sort(values.begin(), values.end());
+  return 0.5 * (values[1] + values[2]);
+}
+
+double light_of(double level, const std::array<double, 256>& light) {
+  return light[static_cast<std::size_t>(std::clamp(std::lround(level), 0L, 255L))];
+}
+
+// By how many times, as a logarithm, black cells are darker than the white ones beside them: shadows end
+// between some, so what the most alike quarter of them says.
+std::optional<double> ratio_of_cells(const cv::Mat& grey,
+                                     const std::array<double, 256>& light,
+                                     const RefinedQuad& refined,
+                                     const SeenCells& cells) {
+  std::vector<float> x, y;  // of a white place and the black one beside it, in turn
+  const auto add = [&](int row, int column, int down, int right) {
+    if (cells.is_white(row, column) == cells.is_white(row + down, column + right)) return;
+    const bool here = cells.is_white(row, column);
+    for (const bool white : {true, false}) {
+      const double beyond = 0.5 + (white == here ? -k_beside_cells : k_beside_cells);
+      x.push_back(static_cast<float>((column + 0.5 + right * beyond) / cells.count));
+      y.push_back(static_cast<float>((row + 0.5 + down * beyond) / cells.count));
+    }
+  };
+  for (int row = 0; row < cells.count; ++row)
+    for (int column = 0; column < cells.count; ++column) {
+      if (column + 1 < cells.count) add(row, column, 0, 1);
+      if (row + 1 < cells.count) add(row, column, 1, 0);
+    }
+  if (x.empty()) return std::nullopt;
+  std::vector<float> levels(x.size());
+  QuadLevels(grey, refined.corners_px).between(x, y, levels.data());
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < levels.size(); i += 2)
+    ratios.push_back(log_ratio(light_of(levels[i], light), light_of(levels[i + 1], light)));
+  std::sort(ratios.begin(), ratios.end());
+  const std::size_t some = ratios.size() / 4;
+  std::size_t best = 0;
+  for (std::size_t i = 1; i + some < ratios.size(); ++i)
+    if (ratios[i + some] - ratios[i] < ratios[best + some] - ratios[best]) best = i;
+  return 0.5 * (ratios[best] + ratios[best + some]);
+}
+
+// Across a side, outside first: `along` the side, 0 to 1, and `across` it, pixels inward.
+struct Place {
+  double along, across;
+};
+
+struct Side {
+  Eigen::Vector2d from, run, inward;
+};
+
+Side side_of(const std::array<Eigen::Vector2d, 4>& corners, std::size_t i) {
+  const Eigen::Vector2d run = corners[(i + 1) % 4] - corners[i];
+  return {corners[i], run, Eigen::Vector2d(-run.y(), run.x()).normalized()};  // clockwise, y down
+}
+
+double light_at(const cv::Mat& grey, const std::array<double, 256>& light, const Eigen::Vector2d& px) {
+  const int x = std::clamp(static_cast<int>(std::floor(px.x())), 0, grey.cols - 2);
+  const int y = std::clamp(static_cast<int>(std::floor(px.y())), 0, grey.rows - 2);
+  const double right = std::clamp(px.x() - x, 0.0, 1.0);
+  const double down = std::clamp(px.y() - y, 0.0, 1.0);
+  const std::uint8_t* upper = grey.ptr(y) + x;
+  const std::uint8_t* lower = grey.ptr(y + 1) + x;
+  return (1 - down) * ((1 - right) * light[upper[0]] + right * light[upper[1]]) +
+         down * ((1 - right) * light[lower[0]] + right * light[lower[1]]);
+}
+
+// Where light falls by about as many times as exp(`expected`).
+std::vector<Place> places_like(
+    const cv::Mat& grey, const std::array<double, 256>& light, const Side& side, int reach, double expected) {
+  std::vector<Place> places;
+  const int around = reach + k_edge_px + 1;
+  std::vector<double> across(static_cast<std::size_t>(2 * around + 1));
+  const Eigen::Vector2d aside = side.run.normalized();
+  for (int row = 0; row < k_rows; ++row) {
+    const double along = k_end_share + (1 - 2 * k_end_share) * row / (k_rows - 1);
+    for (int k = -around; k <= around; ++k) {
+      const Eigen::Vector2d px = side.from + along * side.run + k * side.inward;
+      across[static_cast<std::size_t>(k + around)] =
+          (light_at(grey, light, px - aside) + light_at(grey, light, px) +
+           light_at(grey, light, px + aside)) /
+          3;
+    }
+    const auto at = [&](int k) { return across[static_cast<std::size_t>(k + around)]; };
+    const auto fall = [&](int k) { return log_ratio(at(k), at(k + 1)); };
+    for (int k = -reach; k < reach; ++k) {
+      if (fall(k) < fall(k - 1) || fall(k) <= fall(k + 1)) continue;
+      int before = k;  // where light falls least
+      int after = k;
+      while (before > k - k_edge_px && fall(before - 1) < fall(before)) --before;
+      while (after < k + k_edge_px && fall(after + 1) < fall(after)) ++after;
+      const double outside = 0.5 * (at(before) + at(before + 1));
+      const double inside = 0.5 * (at(after) + at(after + 1));
+      if (std::abs(log_ratio(outside, inside) - expected) > k_like) continue;
+      const double middle = 0.5 * (outside + inside);
+      int crossed = before;
+      while (crossed < after && at(crossed + 1) > middle) ++crossed;
+      const double step = at(crossed) - at(crossed + 1);
+      places.push_back(
+          {along, crossed + std::clamp((at(crossed) - middle) / std::max(step, 1e-6), 0.0, 1.0)});
+    }
+  }
+  return places;
+}
+
+// How far inward a line lies at a side's start and end.
+struct Line {
+  double at_start = 0, at_end = 0;
+  double across(double along) const { return at_start + along * (at_end - at_start); }
+  bool holds(const Place& p) const { return std::abs(p.across - across(p.along)) < k_on_line_px; }
+};
+
+int rows_on(const std::vector<Place>& places, const Line& line) {
+  int count = 0;
+  double last = -1;
+  for (const Place& p : places)
+    if (p.along != last && line.holds(p)) {
+      ++count;
+      last = p.along;
+    }
+  return count;
+}
+
+// The line that most rows agree with.
+struct Agreed {
+  Line line;
+  std::array<double, 2> variance{};  // at its start and end, px^2
+  bool by_many = false, elsewhere = false;
+};
+
+Agreed agreed_line(const std::vector<Place>& places) {
+  Agreed agreed;
+  const int here = rows_on(places, {});
+  int most = here;
+  for (const Place& a : places)
+    for (const Place& b : places) {
+      if (b.along - a.along < k_min_run) continue;
+      const double slope = (b.across - a.across) / (b.along - a.along);
+      const double start = a.across - slope * a.along;
+      const Line line{start, start + slope};
+      const int rows = rows_on(places, line);
+      if (rows <= most || rows <= k_more_rows_share * here) continue;
+      most = rows;
+      agreed.line = line;
+      agreed.elsewhere = true;
+    }
+  agreed.by_many = most >= k_min_rows_share * k_rows;
+  if (!agreed.elsewhere || !agreed.by_many) return agreed;
+  // Least squares of start and end over the places there.
+  Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d right = Eigen::Vector2d::Zero();
+  double squares = 0;
+  double count = 0;
+  for (const Place& p : places) {
+    if (!agreed.line.holds(p)) continue;
+    const Eigen::Vector2d row(1 - p.along, p.along);
+    normal += row * row.transpose();
+    right += p.across * row;
+    squares += p.across * p.across;
+    ++count;
+  }
+  const Eigen::Matrix2d inverse = normal.inverse();
+  const Eigen::Vector2d ends = inverse * right;
+  agreed.line = {ends[0], ends[1]};
+  const double variance = std::max(0.0, squares - right.dot(ends)) / (count - 2);
+  for (int i = 0; i < 2; ++i)
+    agreed.variance[static_cast<std::size_t>(i)] =
+        k_rows_alike * variance * inverse(i, i) + k_beside_px * k_beside_px;
+  return agreed;
+}
+
+// Corners slide along the sides beside a side of the `before` quad that moves inward.
+Eigen::Vector2d slide(const std::array<Eigen::Vector2d, 4>& before, std::size_t side, std::size_t corner) {
+  const Side here = side_of(before, side);
+  const Side beside = side_of(before, corner == side ? (side + 3) % 4 : corner);
+  return beside.run / beside.run.dot(here.inward);
+}
+
+}  // namespace
+
+void leave_shadow_edges(const cv::Mat& grey,
+                        const std::array<double, 256>& light,
+                        const SeenCells& cells,
+                        RefinedQuad* refined) {
+  if (std::min(grey.cols, grey.rows) < 2 || median(refined->blur_px) > k_max_blur_px) return;
+  std::array<double, 4> ratio;
+  for (std::size_t i = 0; i < 4; ++i)
+    ratio[i] =
+        log_ratio(light_of(refined->outside_level[i], light), light_of(refined->inside_level[i], light));
+  const auto [least, most] = std::minmax_element(ratio.begin(), ratio.end());
+  if (*most - *least < k_unlike) return;
+  const double expected = ratio_of_cells(grey, light, *refined, cells).value_or(median(ratio));
+  const std::array<Eigen::Vector2d, 4> before = refined->corners_px;
+  double shortest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < 4; ++i) shortest = std::min(shortest, side_of(before, i).run.norm());
+  const int reach = std::min(k_max_reach, static_cast<int>(k_reach_share * shortest));
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Agreed agreed = agreed_line(places_like(grey, light, side_of(before, i), reach, expected));
+    const bool moves = agreed.by_many && agreed.elsewhere;
+    const bool doubtful = !agreed.by_many && std::abs(ratio[i] - expected) > k_unlike;
+    if (!moves && !doubtful) continue;
+    for (const bool start : {true, false}) {
+      const std::size_t corner = start ? i : (i + 1) % 4;
+      const Eigen::Vector2d way = slide(before, i, corner);
+      if (!(way.norm() < k_max_slide)) continue;
+      refined->corners_px[corner] += (moves ? (start ? agreed.line.at_start : agreed.line.at_end) : 0) * way;
+      const double variance = moves ? agreed.variance[start ? 0 : 1] : k_doubt_px * k_doubt_px;
+      refined->corner_covariance[corner] += variance * way * way.transpose();
+    }
+  }
+}
+
+}  // namespace limn::tracker
