@@ -49,7 +49,7 @@ class Detector {
   std::vector<Detection> detect(const cv::Mat& grey, const Lens* lens = nullptr);
 
   /// The same into `detections`. Allocates nothing once its buffers are large enough, but where a pattern is
-  /// fitted.
+  /// fitted or shadows end along a side.
   void detect(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections);
 
   /// Adds the markers that stand beside the `detections` there are: those of follow() need not be read twice.

@@ -264,7 +264,7 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   for (std::size_t k = low; k < high; ++k) contrast += mean[k];
   // A Gaussian's peak is its area over sigma sqrt(2 pi); v is not the edge's normal when the side leans.
   line->blur_px = 0.4 * contrast / mean[peak] / std::hypot(1.0, slope);
-  // Up to as much light at the window's end moves all crossings up to so far, evenly distributed.
+  // Up to as much light at the window's end moves all crossings up to so far, the less likely the farther.
   const double unknown_px = 0.5 * static_cast<double>(high - low) * beyond / contrast;
   contrast /= static_cast<double>(rows_.size());
   if (!(contrast > 0)) return false;
@@ -301,19 +301,33 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
     const std::uint8_t* pixel = line->flat ? grey.ptr(row.centre) + row.u : grey.ptr(row.u) + row.centre;
     inside_sum += pixel[(static_cast<std::ptrdiff_t>(high) - reach) * v_stride];
     outside_sum += pixel[(static_cast<std::ptrdiff_t>(low) - reach) * v_stride];
-    crossings_.add(row.u, v - bow.at(row.u), std::min(1.0, sum / contrast));
+    crossings_.add(row.u, v - bow.at(row.u), sum / contrast);
   }
   if (static_cast<int>(crossings_.u.size()) < k_min_crossings) return false;
+  settle_shares(effort);
   const auto kept = static_cast<double>(crossings_.u.size());
   line->inside_level = inside_sum / kept;
   line->outside_level = outside_sum / kept;
   if (line->outside_level - line->inside_level < min_contrast) return false;
   double variance = 0;
   if (!fit_line(effort, sides, line, &variance)) return false;
-  line->covariance(0, 0) += unknown_px * unknown_px / 3;
+  line->covariance(0, 0) += unknown_px * unknown_px / 6;
   line->correlation = effort == Effort::full ? correlation_along(*line, variance) : 1;
   see_ends(from[u_axis], to[u_axis], std::max(trim, blur_trim), variance, line);
   return true;
+}
+
+// Of the contrast of rows in the light, where some lie in shadow.
+void EdgeRefiner::settle_shares(Effort effort) {
+  double sum = 0;
+  double count = 0;
+  if (effort == Effort::full)
+    for (const double share : crossings_.share) {
+      sum += share >= 1 ? share : 0;
+      count += share >= 1 ? 1 : 0;
+    }
+  const double scale = count > 0 ? count / sum : 1;
+  for (double& share : crossings_.share) share = std::min(1.0, share * scale);
 }
 
 // A straight line and a bent one, averaged by what speaks for the bow.

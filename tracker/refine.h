@@ -126,6 +126,7 @@ class EdgeRefiner {
                 Sides sides,
                 const EdgeLine* before,
                 EdgeLine* line);
+  void settle_shares(Effort effort);
   bool fit_line(Effort effort, Sides sides, EdgeLine* line, double* variance);
   void see_ends(double from, double to, double trim, double variance, EdgeLine* line) const;
   double correlation_along(const EdgeLine& line, double variance) const;

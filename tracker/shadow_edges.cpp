@@ -19,12 +19,11 @@ constexpr double k_reach_share = 0.14;  // of the shortest side: some more than 
 constexpr int k_max_reach = 12;         // pixels
 constexpr int k_edge_px = 3;            // from an edge to where its levels are, at most
 constexpr double k_max_blur_px = 1.2;   // that leaves levels there
-constexpr int k_rows = 40;              // across a side
+constexpr int k_rows = 24;              // across a side
 constexpr double k_end_share = 0.06;    // of a side, at each end, where other edges are
 constexpr double k_on_line_px = 0.75;
 constexpr double k_min_rows_share = 0.35;   // of the rows, that agree with a line
 constexpr double k_more_rows_share = 1.25;  // times those that agree with the side as it was
-constexpr double k_rows_alike = 3;          // rows that err alike: their samples overlap
 constexpr double k_beside_px = 0.15;        // that another edge nearby moves a line
 constexpr double k_doubt_px = 1.5;  // of a side that a shadow's edge hides: measured on slatted shadow
 constexpr double k_max_slide = 4;   // pixels of a corner for one of its side: blunter ones are no corners
@@ -200,8 +199,7 @@ Agreed agreed_line(const std::vector<Place>& places) {
   agreed.line = {ends[0], ends[1]};
   const double variance = std::max(0.0, squares - right.dot(ends)) / (count - 2);
   for (int i = 0; i < 2; ++i)
-    agreed.variance[static_cast<std::size_t>(i)] =
-        k_rows_alike * variance * inverse(i, i) + k_beside_px * k_beside_px;
+    agreed.variance[static_cast<std::size_t>(i)] = variance * inverse(i, i) + k_beside_px * k_beside_px;
   return agreed;
 }
 

@@ -597,6 +597,59 @@ TEST(Detector, FindsMarkersUnderFingersAndSaysWhichCornersAreCovered) {
   }
 }
 
+// Strips of shadow, 4:1, one of which begins on the paper beside the ink: `angle` off one of the marker's
+// sides, `beside_px` from its middle.
+cv::Mat with_slats(const cv::Mat& light,
+                   const std::array<Eigen::Vector2d, 4>& corners,
+                   std::size_t side,
+                   double beside_px,
+                   double angle) {
+  constexpr double k_strip_px = 17;
+  constexpr double k_penumbra_px = 2;
+  const Eigen::Vector2d run = (corners[(side + 1) % 4] - corners[side]).normalized();
+  const Eigen::Vector2d inward = Eigen::Rotation2Dd(angle) * Eigen::Vector2d(-run.y(), run.x());
+  const Eigen::Vector2d middle = 0.5 * (corners[side] + corners[(side + 1) % 4]);
+  cv::Mat lit = light.clone();
+  for (int y = 0; y < lit.rows; ++y)
+    for (int x = 0; x < lit.cols; ++x) {
+      const double in = inward.dot(Eigen::Vector2d(x, y) - middle) + beside_px;
+      const double wave = std::abs(std::remainder(in - 0.5 * k_strip_px, 2 * k_strip_px)) - 0.5 * k_strip_px;
+      lit.at<float>(y, x) *=
+          static_cast<float>(0.25 + 0.75 * std::clamp(0.5 + wave / k_penumbra_px, 0.0, 1.0));
+    }
+  return lit;
+}
+
+TEST(Detector, TakesNoShadowsEdgeForTheInks) {
+  auto rng = test::test_rng();
+  Detector detector(families({"apriltag_36h11"}));
+  constexpr int k_count = 40;
+  double squares = 0;
+  int near = 0;
+  int corners = 0;
+  for (int i = 0; i < k_count; ++i) {
+    const PlacedMarker marker = test::placed(pinhole_vga(), {"apriltag_36h11", std::to_string(i)}, {320, 240},
+                                             uniform(rng, 70, 120), uniform(rng, 0, 6.28), 20_deg, i);
+    const auto truth = test::true_corners(pinhole_vga(), marker);
+    const cv::Mat light =
+        test::light_of(pinhole_vga(), test::plain(640, 480, 90), std::vector{marker}, {}, rng);
+    const cv::Mat lit = with_slats(light, truth, static_cast<std::size_t>(i % 4), uniform(rng, 2.5, 7),
+                                   uniform(rng, -2_deg, 2_deg));
+    for (const Detection& found : detector.detect(test::noisy_grey(lit, 2, rng))) {
+      ASSERT_EQ(found.marker, marker.marker);
+      for (std::size_t k = 0; k < 4; ++k) {
+        const Eigen::Vector2d e = found.corners_px[k] - truth[k];
+        squares += 0.5 * e.dot(found.corner_covariance[k].inverse() * e);
+        near += e.norm() < 0.5;
+        ++corners;
+      }
+    }
+  }
+  EXPECT_GE(corners, 4 * 0.75 * k_count);
+  EXPECT_GE(near, 0.9 * corners);  // without looking for shadows: half
+  EXPECT_LT(squares / corners, 1.2 * 1.2);
+}
+
 TEST(Detector, HasNoBiasWhereTheWhiteMarginIsAPixelWide) {
   auto rng = test::test_rng();
   Detector detector(families({"aruco_4x4_50"}));
