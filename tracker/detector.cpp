@@ -313,7 +313,7 @@ std::optional<Detection> Detector::read(const cv::Mat& grey,
   leave_shadow_edges(grey, worker.refiner.light(), identity->cells, &*refined);
   Detection detection;
   if (!refined->separate || is_blurred(*refined, identity->cells))
-    detection.by_pattern = settle_overlapping_edges(grey, *identity, worker, last, &*refined);
+    detection.by_pattern = settle_overlapping_edges(grey, lens, *identity, worker, last, &*refined);
   detection.marker = identity->marker;
   detection.score = std::clamp(identity->score, 0.0, 1.0);
   for (std::size_t i = 0; i < 4; ++i) {
@@ -327,6 +327,7 @@ std::optional<Detection> Detector::read(const cv::Mat& grey,
 
 // Edges whose blur overlaps with others': by the whole pattern, or else with the doubt that they deserve.
 std::optional<PatternShift> Detector::settle_overlapping_edges(const cv::Mat& grey,
+                                                               const Lens* lens,
                                                                const Identity& identity,
                                                                Worker& worker,
                                                                const PatternShift* last,
@@ -341,7 +342,8 @@ std::optional<PatternShift> Detector::settle_overlapping_edges(const cv::Mat& gr
   }
   const bool may_fit = identity.cells.count > 0 && shortest_side(Quad{refined->corners_px}) > k_fit_above_px;
   if (may_fit)
-    if (auto fitted = fit_pattern(grey, worker.refiner.light(), *refined, identity.cells, &worker.fit)) {
+    if (auto fitted =
+            fit_pattern(grey, worker.refiner.light(), *refined, identity.cells, lens, &worker.fit)) {
       PatternShift shift;
       shift.blur_px = blur_of(*refined);
       for (std::size_t i = 0; i < 4; ++i) {

@@ -107,6 +107,7 @@ class Detector {
                                 Worker& worker,
                                 const PatternShift* last = nullptr) const;
   std::optional<PatternShift> settle_overlapping_edges(const cv::Mat& grey,
+                                                       const Lens* lens,
                                                        const Identity& identity,
                                                        Worker& worker,
                                                        const PatternShift* last,

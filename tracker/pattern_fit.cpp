@@ -10,6 +10,7 @@
 #include "tracker/pattern_model.h"
 #include "tracker/simd.h"
 #include "tracker/square_to_quad.h"
+#include "tracker/straight_picture.h"
 
 namespace limn::tracker {
 namespace {
@@ -44,6 +45,7 @@ constexpr double k_noise = 0.02;           // of the contrast, RMS: residuals th
 constexpr double k_systematic_px = 0.002;  // as edge lines keep (refine.cpp)
 
 // Unknowns are taken by fours, rounded up with zeros.
+constexpr double k_most_outside_px = 10;  // of the samples, from the marker
 constexpr int k_fours = 4;
 
 LIMN_SIMD void scale_by(const float* __restrict factors, std::size_t count, float* __restrict values) {
@@ -185,14 +187,36 @@ struct Fitted {
   double bend_evidence = 0;
 };
 
+Eigen::Vector2d middle_of(const RefinedQuad& quad) {
+  const auto& c = quad.corners_px;
+  return 0.25 * (c[0] + c[1] + c[2] + c[3]);
+}
+
+// As far as samples are taken.
+StraightPicture straightened(const Lens& lens, const RefinedQuad& quad) {
+  const Eigen::Vector2d middle = middle_of(quad);
+  double radius = 0;
+  for (const Eigen::Vector2d& corner : quad.corners_px)
+    radius = std::max(radius, (corner - middle).lpNorm<Eigen::Infinity>());
+  return {lens, middle, radius + k_most_outside_px};
+}
+
 class PatternFit {
  public:
   PatternFit(const cv::Mat& grey,
              const std::array<double, 256>& light,
              const SeenCells& cells,
              const RefinedQuad& start,
+             const Lens* lens,
              PatternFitBuffers* buffers)
-      : grey_(grey), levels_(light), cells_(cells), start_(start), buffers_(*buffers) {}
+      : grey_(grey),
+        levels_(light),
+        cells_(cells),
+        start_(start),
+        straight_(lens ? straightened(*lens, start) : StraightPicture{}),
+        buffers_(*buffers) {
+    for (Eigen::Vector2d& corner : start_.corners_px) corner = straight_.straight(corner);
+  }
 
   std::optional<RefinedQuad> fit() {
     const State begun = this->begun();
@@ -222,9 +246,9 @@ class PatternFit {
   const cv::Mat& grey_;
   const std::array<double, 256>& levels_;
   const SeenCells& cells_;
-  const RefinedQuad& start_;
-  const Eigen::Vector2d origin_ = 0.25 * (start_.corners_px[0] + start_.corners_px[1] + start_.corners_px[2] +
-                                          start_.corners_px[3]);  // of the samples' pixels
+  RefinedQuad start_;  // corners in the straight picture, as all that follows
+  const StraightPicture straight_;
+  const Eigen::Vector2d origin_ = middle_of(start_);  // of the samples' pixels
   bool has_ground_ = false;
   Eigen::Vector4d margin_;  // at the start
   double contrast_ = 0;     // at the start
@@ -234,7 +258,8 @@ class PatternFit {
   const LightFunctions& light_ = light_functions(light_versions() - 1);
   std::size_t count_ = 0;  // of the samples, of which the last is repeated up to padded_count()
 
-  double light_at(const Eigen::Vector2d& px) const {
+  double light_at(const Eigen::Vector2d& straight_px) const {
+    const Eigen::Vector2d px = straight_.bent(straight_px);
     const int x = std::clamp(static_cast<int>(std::lround(px.x())), 0, grey_.cols - 1);
     const int y = std::clamp(static_cast<int>(std::lround(px.y())), 0, grey_.rows - 1);
     return levels_[grey_.ptr(y)[x]];
@@ -300,21 +325,20 @@ class PatternFit {
     for (auto* values : samples_values()) values->clear();
     const std::array<Eigen::Vector2d, 4>& corners = start_.corners_px;
     const Eigen::Matrix3d square_from_px = SquareToQuad(corners).matrix().inverse();
-    Eigen::Vector2d low = corners[0];
-    Eigen::Vector2d high = corners[0];
-    for (const Eigen::Vector2d& c : corners) low = low.cwiseMin(c), high = high.cwiseMax(c);
+    Eigen::AlignedBox2d box;  // of the grey picture
+    for (const Eigen::Vector2d& c : corners) box.extend(straight_.bent(c));
     const double blur_px = *std::max_element(start_.blur_px.begin(), start_.blur_px.end());
-    const double outside_px = std::clamp(2.5 * blur_px, 2.0, 10.0);
+    const double outside_px = std::clamp(2.5 * blur_px, 2.0, k_most_outside_px);
     const Eigen::Vector2d a = corners[2] - corners[0];
     const Eigen::Vector2d b = corners[3] - corners[1];
     const double side_px = std::sqrt(0.5 * std::abs(a.x() * b.y() - a.y() * b.x()));
     const double out = outside_px / side_px;
     Eigen::Array4d reach = Eigen::Array4d::Constant(out);
     if (has_ground_) reach = reach.min(margin_.array() / cells_.count);
-    const int x0 = std::max(0, static_cast<int>(std::ceil(low.x() - outside_px)));
-    const int y0 = std::max(0, static_cast<int>(std::ceil(low.y() - outside_px)));
-    const int x1 = std::min(grey_.cols - 1, static_cast<int>(std::floor(high.x() + outside_px)));
-    const int y1 = std::min(grey_.rows - 1, static_cast<int>(std::floor(high.y() + outside_px)));
+    const int x0 = std::max(0, static_cast<int>(std::ceil(box.min().x() - outside_px)));
+    const int y0 = std::max(0, static_cast<int>(std::ceil(box.min().y() - outside_px)));
+    const int x1 = std::min(grey_.cols - 1, static_cast<int>(std::floor(box.max().x() + outside_px)));
+    const int y1 = std::min(grey_.rows - 1, static_cast<int>(std::floor(box.max().y() + outside_px)));
     const double pixels = side_px * side_px * (1 + 2 * out) * (1 + 2 * out);
     const bool choose = known && known->motion.isZero();
     const double wanted = static_cast<double>(choose ? k_choice * most : most);
@@ -322,7 +346,8 @@ class PatternFit {
     const int lean = std::max(1, static_cast<int>(std::lround(0.618 * stride)));  // from row to row
     for (int y = y0; y <= y1; ++y)
       for (int x = x0 + (lean * (y - y0)) % stride; x <= x1; x += stride) {
-        const Eigen::Vector3d p = square_from_px * Eigen::Vector3d(x, y, 1);
+        const Eigen::Vector2d px = straight_.straight(Eigen::Vector2d(x, y));
+        const Eigen::Vector3d p = square_from_px * px.homogeneous();
         const Eigen::Vector2d q = p.head<2>() / p.z();
         // Beside a corner, what is behind the paper has no model.
         const bool beside_x = q.x() < 0 || q.x() > 1;
@@ -330,8 +355,8 @@ class PatternFit {
         if ((beside_x && beside_y) ||
             !(q.y() > -reach[0] && q.x() < 1 + reach[1] && q.y() < 1 + reach[2] && q.x() > -reach[3]))
           continue;
-        samples_.x.push_back(static_cast<float>(x - origin_.x()));
-        samples_.y.push_back(static_cast<float>(y - origin_.y()));
+        samples_.x.push_back(static_cast<float>(px.x() - origin_.x()));
+        samples_.y.push_back(static_cast<float>(px.y() - origin_.y()));
         samples_.level_x.push_back(static_cast<float>(2 * q.x() - 1));
         samples_.level_y.push_back(static_cast<float>(2 * q.y() - 1));
         samples_.light.push_back(static_cast<float>(levels_[grey_.ptr(y)[x]]));
@@ -613,7 +638,7 @@ class PatternFit {
         fitted.explained < k_min_explained || fitted.moved_px > k_astray_px)
       return std::nullopt;
     RefinedQuad result = start_;
-    result.corners_px = state.corners;
+    for (std::size_t i = 0; i < 4; ++i) result.corners_px[i] = straight_.bent(state.corners[i]);
     const SquareToQuad px_from_square(state.corners);
     const auto shape_by_all = shape_covariance(fitted);
     const Eigen::Matrix<double, 8, 8> covariance = correlation(shape_by_all) * shape_by_all.topRows<8>();
@@ -639,8 +664,9 @@ std::optional<RefinedQuad> fit_pattern(const cv::Mat& grey,
                                        const std::array<double, 256>& light,
                                        const RefinedQuad& start,
                                        const SeenCells& cells,
+                                       const Lens* lens,
                                        PatternFitBuffers* buffers) {
-  return PatternFit(grey, light, cells, start, buffers).fit();
+  return PatternFit(grey, light, cells, start, lens, buffers).fit();
 }
 
 }  // namespace limn::tracker

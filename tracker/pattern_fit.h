@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/lens.h"
 #include "tracker/refine.h"
 
 namespace limn::tracker {
@@ -45,11 +46,13 @@ struct PatternFitBuffers {
 /// bent paper where the residuals ask for it. Motions in several directions compete before the best is
 /// refined. The covariance comes from the residuals, with neighbouring ones that have one cause counted as
 /// one. nullopt when the pixels do not settle it or contradict the model. `light` is the light of a grey
-/// level; what `buffers` hold from other calls makes no difference.
+/// level; with a `lens` sides are straight as EdgeRefiner's are; what `buffers` hold from other calls makes
+/// no difference.
 std::optional<RefinedQuad> fit_pattern(const cv::Mat& grey,
                                        const std::array<double, 256>& light,
                                        const RefinedQuad& start,
                                        const SeenCells& cells,
+                                       const Lens* lens,
                                        PatternFitBuffers* buffers);
 
 }  // namespace limn::tracker

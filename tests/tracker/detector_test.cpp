@@ -329,6 +329,18 @@ TEST(Detector, SaysHowSureTheCornersOfBlurredMarkersAre) {
   }
 }
 
+TEST(Detector, FindsTheCornersOfBlurredMarkersThroughTheLens) {
+  Sweep sweep{120, 180, 45_deg, {}};
+  sweep.lens = bent_vga();
+  sweep.give_lens = true;
+  sweep.picture.blur_px = 3;
+  sweep.picture.noise_levels = 2;
+  const SweepResult r = swept(sweep, 40);
+  EXPECT_EQ(r.found, r.markers);
+  EXPECT_LT(r.rms_px, 0.08);  // twice as much where patterns are fitted without the lens
+  expect_true_covariance(r);
+}
+
 TEST(Detector, FindsTheCornersOfBentPaper) {
   for (const double bow : {0.003, 0.006, 0.012}) {  // 0.2 to 1 px
     SCOPED_TRACE(bow);
