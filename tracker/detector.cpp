@@ -107,6 +107,10 @@ class Detector::UnreadQuads {
     std::size_t number;
     Quad quad;
   };
+  struct End {  // however the search for them ends, nobody waits for more
+    UnreadQuads& quads;
+    ~End() { quads.end(); }
+  };
   explicit UnreadQuads(std::vector<Quad>& quads) : quads_(quads), count_(quads.size()) {}
 
   void add(const Quad& quad) {
@@ -175,10 +179,10 @@ void Detector::find_markers(
   UnreadQuads open(quads_);
   crew.at_once(crew.size(), [&](int worker) {
     if (worker == 0) {
+      const UnreadQuads::End end{open};
       finder_.find(corner_codes_, {options_.min_side_px}, [&](const Quad& quad) {
         if (!is_known(quad, *detections)) open.add(quad);
       });
-      open.end();
     }
     if (worker == crew.size() - 1 && broken) segment_finder_.find(grey, options_.min_contrast, segments_);
     read_quads(grey, lens, Reading::open, open, worker);
@@ -310,9 +314,10 @@ std::optional<Detection> Detector::read(const cv::Mat& grey,
     identity = refined ? identify(grey, *refined, families_, reading) : std::nullopt;
     if (!identity) return std::nullopt;
   }
-  leave_shadow_edges(grey, worker.refiner.light(), identity->cells, &*refined);
+  const bool moved_from_shadows =
+      leave_shadow_edges(grey, worker.refiner.light(), identity->cells, lens, &*refined);
   Detection detection;
-  if (!refined->separate || is_blurred(*refined, identity->cells))
+  if (!moved_from_shadows && (!refined->separate || is_blurred(*refined, identity->cells)))
     detection.by_pattern = settle_overlapping_edges(grey, lens, *identity, worker, last, &*refined);
   detection.marker = identity->marker;
   detection.score = std::clamp(identity->score, 0.0, 1.0);

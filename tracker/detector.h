@@ -48,8 +48,8 @@ class Detector {
   /// Corners are raw pixels either way.
   std::vector<Detection> detect(const cv::Mat& grey, const Lens* lens = nullptr);
 
-  /// The same into `detections`. Allocates nothing once its buffers are large enough, but where a pattern is
-  /// fitted or shadows end along a side.
+  /// The same into `detections`. Allocates nothing once its buffers are large enough, but what OpenCV's pool
+  /// does with several threads.
   void detect(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections);
 
   /// Adds the markers that stand beside the `detections` there are: those of follow() need not be read twice.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 #include <vector>
 
 #include "tracker/pattern_model.h"
@@ -192,15 +193,6 @@ Eigen::Vector2d middle_of(const RefinedQuad& quad) {
   return 0.25 * (c[0] + c[1] + c[2] + c[3]);
 }
 
-// As far as samples are taken.
-StraightPicture straightened(const Lens& lens, const RefinedQuad& quad) {
-  const Eigen::Vector2d middle = middle_of(quad);
-  double radius = 0;
-  for (const Eigen::Vector2d& corner : quad.corners_px)
-    radius = std::max(radius, (corner - middle).lpNorm<Eigen::Infinity>());
-  return {lens, middle, radius + k_most_outside_px};
-}
-
 class PatternFit {
  public:
   PatternFit(const cv::Mat& grey,
@@ -213,7 +205,7 @@ class PatternFit {
         levels_(light),
         cells_(cells),
         start_(start),
-        straight_(lens ? straightened(*lens, start) : StraightPicture{}),
+        straight_(StraightPicture::about(lens, start.corners_px, k_most_outside_px)),
         buffers_(*buffers) {
     for (Eigen::Vector2d& corner : start_.corners_px) corner = straight_.straight(corner);
   }
@@ -416,37 +408,42 @@ class PatternFit {
     return fitted.misfit < k_noise * k_noise * contrast * contrast;
   }
 
+  static constexpr int k_directions = 8;
+  static constexpr std::array<double, 2> k_lengths = {7, 14};  // pixels
+
   // Motions in all directions compete, the better ones on with more rounds and samples.
   Fitted most_likely_motion(const State& begun) {
-    constexpr int k_directions = 8;
-    std::vector<Fitted> fits;
+    std::array<Fitted, k_directions * k_lengths.size()> all;
+    std::size_t count = 0;
     take_samples(k_few_samples);
     for (int i = 0; i < k_directions; ++i)
-      for (const double length : {7.0, 14.0}) {
+      for (const double length : k_lengths) {
         const double angle = std::numbers::pi * i / k_directions;
         Fitted fitted;
         fitted.state = begun;
         fitted.state.log_blur = std::log(1.5);
         fitted.state.motion = length * Eigen::Vector2d(std::cos(angle), std::sin(angle));
-        if (step({.levels_alone = true}, &fitted)) fits.push_back(fitted);
+        if (step({.levels_alone = true}, &fitted)) all[count++] = fitted;
       }
-    keep_best(1, 6, &fits);
-    keep_best(2, 3, &fits);
+    std::span<Fitted> fits = best_of(std::span(all).first(count), 1, 6);
+    fits = best_of(fits, 2, 3);
     take_samples(k_coarse_samples);
-    keep_best(3, 1, &fits);
+    fits = best_of(fits, 3, 1);
     return fits.empty() ? Fitted{} : fits[0];
   }
 
-  void keep_best(int rounds, std::size_t most, std::vector<Fitted>* fits) {
-    for (Fitted& fitted : *fits)
+  // Those that fit best after some rounds more, at most so many.
+  std::span<Fitted> best_of(std::span<Fitted> fits, int rounds, std::size_t most) {
+    for (Fitted& fitted : fits)
       for (int round = 0; round < rounds; ++round)
         if (!step({.motion = true}, &fitted)) {
           fitted.misfit = std::numeric_limits<double>::infinity();
           break;
         }
-    std::sort(fits->begin(), fits->end(),
-              [](const Fitted& a, const Fitted& b) { return a.misfit < b.misfit; });
-    while (!fits->empty() && (fits->size() > most || std::isinf(fits->back().misfit))) fits->pop_back();
+    std::sort(fits.begin(), fits.end(), [](const Fitted& a, const Fitted& b) { return a.misfit < b.misfit; });
+    while (!fits.empty() && (fits.size() > most || std::isinf(fits.back().misfit)))
+      fits = fits.first(fits.size() - 1);
+    return fits;
   }
 
   std::size_t padded_count() const { return (count_ + k_together - 1) / k_together * k_together; }
@@ -481,7 +478,8 @@ class PatternFit {
   // One Gauss-Newton step on the samples.
   bool step(Free free, Fitted* fitted) {
     if (count_ < 2 * k_unknowns) return false;
-    auto& [samples, shows_edge, residuals, sizes, behind, roots, pulls, derivatives, unused] = buffers_;
+    auto& [samples, shows_edge, residuals, sizes, behind, roots, pulls, derivatives, unused, moves] =
+        buffers_;
     const Active active = this->active(free, fitted->state, has_ground_);
     const std::size_t stride = padded_count();
     residuals.resize(stride);
@@ -564,14 +562,17 @@ class PatternFit {
   // By how much the shape's covariance is larger for neighbouring residuals that have one cause: from the
   // sums over blocks of the last step's samples ("sandwich", Liang and Zeger 1986) over that of independent
   // ones.
-  double correlation(const Eigen::Ref<const Eigen::MatrixXd>& covariance) const {
+  double correlation(const Eigen::Matrix<double, Eigen::Dynamic, 8, 0, k_unknowns, 8>& covariance) const {
     constexpr int k_blocks = 8;  // a side
     const auto stride = static_cast<Eigen::Index>(padded_count());
     const Eigen::Map<const Eigen::VectorXf> pulls(buffers_.pulls.data(), stride);
     const Eigen::Map<const Eigen::MatrixXf> derivatives(buffers_.derivatives.data(), stride,
                                                         covariance.rows());
-    const Eigen::Matrix<float, Eigen::Dynamic, 8> moves =
-        pulls.asDiagonal() * (derivatives * covariance.cast<float>());
+    const Eigen::Matrix<float, Eigen::Dynamic, 8, 0, k_unknowns, 8> by = covariance.cast<float>();
+    buffers_.moves.resize(static_cast<std::size_t>(8 * stride));
+    Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, 8>> moves(buffers_.moves.data(), stride, 8);
+    moves.noalias() = derivatives * by;
+    moves.array().colwise() *= pulls.array();
     Eigen::Matrix<float, k_blocks * k_blocks, 8> sums;
     sums.setZero();
     for (std::size_t i = 0; i < count_; ++i) {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <vector>
 
 #include "tracker/quad_levels.h"
+#include "tracker/straight_picture.h"
 
 namespace limn::tracker {
 namespace {
@@ -20,6 +20,7 @@ constexpr int k_max_reach = 12;         // pixels
 constexpr int k_edge_px = 3;            // from an edge to where its levels are, at most
 constexpr double k_max_blur_px = 1.2;   // that leaves levels there
 constexpr int k_rows = 24;              // across a side
+constexpr int k_most_a_row = 4;         // places: more are texture
 constexpr double k_end_share = 0.06;    // of a side, at each end, where other edges are
 constexpr double k_on_line_px = 0.75;
 constexpr double k_min_rows_share = 0.35;   // of the rows, that agree with a line
@@ -46,14 +47,17 @@ std::optional<double> ratio_of_cells(const cv::Mat& grey,
                                      const std::array<double, 256>& light,
                                      const RefinedQuad& refined,
                                      const SeenCells& cells) {
-  std::vector<float> x, y;  // of a white place and the black one beside it, in turn
+  constexpr std::size_t k_most = 2 * 2 * SeenCells::k_max * (SeenCells::k_max - 1);
+  static_assert(k_most <= QuadLevels::k_most);
+  std::array<float, k_most> x, y;  // of a white place and the black one beside it, in turn
+  std::size_t places = 0;
   const auto add = [&](int row, int column, int down, int right) {
     if (cells.is_white(row, column) == cells.is_white(row + down, column + right)) return;
     const bool here = cells.is_white(row, column);
     for (const bool white : {true, false}) {
       const double beyond = 0.5 + (white == here ? -k_beside_cells : k_beside_cells);
-      x.push_back(static_cast<float>((column + 0.5 + right * beyond) / cells.count));
-      y.push_back(static_cast<float>((row + 0.5 + down * beyond) / cells.count));
+      x[places] = static_cast<float>((column + 0.5 + right * beyond) / cells.count);
+      y[places++] = static_cast<float>((row + 0.5 + down * beyond) / cells.count);
     }
   };
   for (int row = 0; row < cells.count; ++row)
@@ -61,16 +65,17 @@ std::optional<double> ratio_of_cells(const cv::Mat& grey,
       if (column + 1 < cells.count) add(row, column, 0, 1);
       if (row + 1 < cells.count) add(row, column, 1, 0);
     }
-  if (x.empty()) return std::nullopt;
-  std::vector<float> levels(x.size());
-  QuadLevels(grey, refined.corners_px).between(x, y, levels.data());
-  std::vector<double> ratios;
-  for (std::size_t i = 0; i < levels.size(); i += 2)
-    ratios.push_back(log_ratio(light_of(levels[i], light), light_of(levels[i + 1], light)));
-  std::sort(ratios.begin(), ratios.end());
-  const std::size_t some = ratios.size() / 4;
+  if (places == 0) return std::nullopt;
+  std::array<float, k_most> levels;
+  QuadLevels(grey, refined.corners_px).between({x.data(), places}, {y.data(), places}, levels.data());
+  std::array<double, k_most / 2> ratios{};
+  const std::size_t count = places / 2;
+  for (std::size_t i = 0; i < count; ++i)
+    ratios[i] = log_ratio(light_of(levels[2 * i], light), light_of(levels[2 * i + 1], light));
+  std::sort(ratios.begin(), ratios.begin() + static_cast<std::ptrdiff_t>(count));
+  const std::size_t some = count / 4;
   std::size_t best = 0;
-  for (std::size_t i = 1; i + some < ratios.size(); ++i)
+  for (std::size_t i = 1; i + some < count; ++i)
     if (ratios[i + some] - ratios[i] < ratios[best + some] - ratios[best]) best = i;
   return 0.5 * (ratios[best] + ratios[best + some]);
 }
@@ -78,6 +83,13 @@ std::optional<double> ratio_of_cells(const cv::Mat& grey,
 // Across a side, outside first: `along` the side, 0 to 1, and `across` it, pixels inward.
 struct Place {
   double along, across;
+};
+
+struct Places {
+  std::array<Place, static_cast<std::size_t>(k_rows* k_most_a_row)> some;
+  std::size_t count = 0;
+  const Place* begin() const { return some.data(); }
+  const Place* end() const { return some.data() + count; }
 };
 
 struct Side {
@@ -100,17 +112,22 @@ double light_at(const cv::Mat& grey, const std::array<double, 256>& light, const
          down * ((1 - right) * light[lower[0]] + right * light[lower[1]]);
 }
 
-// Where light falls by about as many times as exp(`expected`).
-std::vector<Place> places_like(
-    const cv::Mat& grey, const std::array<double, 256>& light, const Side& side, int reach, double expected) {
-  std::vector<Place> places;
+// Where light falls by about as many times as exp(`expected`), across a side of the straight picture.
+Places places_like(const cv::Mat& grey,
+                   const std::array<double, 256>& light,
+                   const StraightPicture& picture,
+                   const Side& side,
+                   int reach,
+                   double expected) {
+  Places places;
   const int around = reach + k_edge_px + 1;
-  std::vector<double> across(static_cast<std::size_t>(2 * around + 1));
+  std::array<double, 2 * (k_max_reach + k_edge_px + 1) + 1> across;
   const Eigen::Vector2d aside = side.run.normalized();
   for (int row = 0; row < k_rows; ++row) {
     const double along = k_end_share + (1 - 2 * k_end_share) * row / (k_rows - 1);
+    const Eigen::Vector2d middle = picture.bent(side.from + along * side.run);
     for (int k = -around; k <= around; ++k) {
-      const Eigen::Vector2d px = side.from + along * side.run + k * side.inward;
+      const Eigen::Vector2d px = middle + k * side.inward;
       across[static_cast<std::size_t>(k + around)] =
           (light_at(grey, light, px - aside) + light_at(grey, light, px) +
            light_at(grey, light, px + aside)) /
@@ -118,7 +135,8 @@ std::vector<Place> places_like(
     }
     const auto at = [&](int k) { return across[static_cast<std::size_t>(k + around)]; };
     const auto fall = [&](int k) { return log_ratio(at(k), at(k + 1)); };
-    for (int k = -reach; k < reach; ++k) {
+    int found = 0;
+    for (int k = -reach; k < reach && found < k_most_a_row; ++k) {
       if (fall(k) < fall(k - 1) || fall(k) <= fall(k + 1)) continue;
       int before = k;  // where light falls least
       int after = k;
@@ -131,8 +149,9 @@ std::vector<Place> places_like(
       int crossed = before;
       while (crossed < after && at(crossed + 1) > middle) ++crossed;
       const double step = at(crossed) - at(crossed + 1);
-      places.push_back(
-          {along, crossed + std::clamp((at(crossed) - middle) / std::max(step, 1e-6), 0.0, 1.0)});
+      ++found;
+      places.some[places.count++] = {
+          along, crossed + std::clamp((at(crossed) - middle) / std::max(step, 1e-6), 0.0, 1.0)};
     }
   }
   return places;
@@ -145,7 +164,7 @@ struct Line {
   bool holds(const Place& p) const { return std::abs(p.across - across(p.along)) < k_on_line_px; }
 };
 
-int rows_on(const std::vector<Place>& places, const Line& line) {
+int rows_on(const Places& places, const Line& line) {
   int count = 0;
   double last = -1;
   for (const Place& p : places)
@@ -163,7 +182,7 @@ struct Agreed {
   bool by_many = false, elsewhere = false;
 };
 
-Agreed agreed_line(const std::vector<Place>& places) {
+Agreed agreed_line(const Places& places) {
   Agreed agreed;
   const int here = rows_on(places, {});
   int most = here;
@@ -212,36 +231,46 @@ Eigen::Vector2d slide(const std::array<Eigen::Vector2d, 4>& before, std::size_t 
 
 }  // namespace
 
-void leave_shadow_edges(const cv::Mat& grey,
+bool leave_shadow_edges(const cv::Mat& grey,
                         const std::array<double, 256>& light,
                         const SeenCells& cells,
+                        const Lens* lens,
                         RefinedQuad* refined) {
-  if (std::min(grey.cols, grey.rows) < 2 || median(refined->blur_px) > k_max_blur_px) return;
+  if (std::min(grey.cols, grey.rows) < 2 || median(refined->blur_px) > k_max_blur_px) return false;
   std::array<double, 4> ratio;
   for (std::size_t i = 0; i < 4; ++i)
     ratio[i] =
         log_ratio(light_of(refined->outside_level[i], light), light_of(refined->inside_level[i], light));
   const auto [least, most] = std::minmax_element(ratio.begin(), ratio.end());
-  if (*most - *least < k_unlike) return;
+  if (*most - *least < k_unlike) return false;
   const double expected = ratio_of_cells(grey, light, *refined, cells).value_or(median(ratio));
-  const std::array<Eigen::Vector2d, 4> before = refined->corners_px;
+  const StraightPicture picture = StraightPicture::about(lens, refined->corners_px, k_max_reach);
+  std::array<Eigen::Vector2d, 4> before = refined->corners_px;
+  for (Eigen::Vector2d& corner : before) corner = picture.straight(corner);
+  std::array<Eigen::Vector2d, 4> corners = before;
   double shortest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < 4; ++i) shortest = std::min(shortest, side_of(before, i).run.norm());
   const int reach = std::min(k_max_reach, static_cast<int>(k_reach_share * shortest));
+  bool any = false;
   for (std::size_t i = 0; i < 4; ++i) {
-    const Agreed agreed = agreed_line(places_like(grey, light, side_of(before, i), reach, expected));
+    const Agreed agreed = agreed_line(places_like(grey, light, picture, side_of(before, i), reach, expected));
     const bool moves = agreed.by_many && agreed.elsewhere;
     const bool doubtful = !agreed.by_many && std::abs(ratio[i] - expected) > k_unlike;
     if (!moves && !doubtful) continue;
+    any |= moves;
     for (const bool start : {true, false}) {
       const std::size_t corner = start ? i : (i + 1) % 4;
       const Eigen::Vector2d way = slide(before, i, corner);
       if (!(way.norm() < k_max_slide)) continue;
-      refined->corners_px[corner] += (moves ? (start ? agreed.line.at_start : agreed.line.at_end) : 0) * way;
+      if (moves) {
+        corners[corner] += (start ? agreed.line.at_start : agreed.line.at_end) * way;
+        refined->corners_px[corner] = picture.bent(corners[corner]);
+      }
       const double variance = moves ? agreed.variance[start ? 0 : 1] : k_doubt_px * k_doubt_px;
       refined->corner_covariance[corner] += variance * way * way.transpose();
     }
   }
+  return any;
 }
 
 }  // namespace limn::tracker

@@ -1,6 +1,7 @@
 #include "tracker/straight_picture.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 
 namespace limn::tracker {
 
@@ -38,6 +39,17 @@ StraightPicture::StraightPicture(const Lens& lens, const Eigen::Vector2d& middle
   bend_ = px_from_plane * fitted;
   bend_.leftCols<3>().setZero();
   moves_ = bend_.allFinite();
+}
+
+StraightPicture StraightPicture::about(const Lens* lens,
+                                       const std::array<Eigen::Vector2d, 4>& corners_px,
+                                       double outside_px) {
+  if (!lens) return {};
+  const Eigen::Vector2d middle = 0.25 * (corners_px[0] + corners_px[1] + corners_px[2] + corners_px[3]);
+  double radius = 0;
+  for (const Eigen::Vector2d& corner : corners_px)
+    radius = std::max(radius, (corner - middle).lpNorm<Eigen::Infinity>());
+  return {*lens, middle, radius + outside_px};
 }
 
 Eigen::Vector2d StraightPicture::bent(const Eigen::Vector2d& straight_px) const {

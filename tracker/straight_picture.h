@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 
 #include "core/lens.h"
 
@@ -15,6 +16,11 @@ class StraightPicture {
 
   /// About `middle_px`, as far as `radius_px`; moves nothing where the lens's model has no directions.
   StraightPicture(const Lens& lens, const Eigen::Vector2d& middle_px, double radius_px);
+
+  /// About a quadrilateral and as far as `outside_px` from it; with no lens nothing is moved.
+  static StraightPicture about(const Lens* lens,
+                               const std::array<Eigen::Vector2d, 4>& corners_px,
+                               double outside_px);
 
   bool moves() const { return moves_; }
 

@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <new>
+#include <opencv2/imgproc.hpp>
 
 #include "tests/support/matchers.h"
 #include "tests/tracker/marker_pictures.h"
@@ -45,6 +46,44 @@ TEST(Allocation, StopsAfterTheFirstFrame) {
   detector.follow(grey, nullptr, found, &again);
   EXPECT_EQ(allocations - before_follow, 0);
   EXPECT_EQ(again.size(), 4);
+}
+
+// Fitted patterns, motion among them, lines between shadows, covered codes.
+TEST(Allocation, StopsInHardPicturesToo) {
+  auto rng = test::test_rng();
+  const Lens lens =
+      Lens::create("LENSMODEL_OPENCV8", {600, 600, 319.5, 239.5, -0.2, 0.05, 0, 0, 0, 0, 0, 0}).value();
+  std::vector<test::PlacedMarker> markers;
+  for (int i = 0; i < 4; ++i)
+    markers.push_back(test::placed(lens, {"apriltag_36h11", std::to_string(i)}, {100.0 + 140 * i, 240}, 90,
+                                   0.3 * i, i == 3 ? 1.35 : 0.4, 0.7 * i));
+  const auto expect_none = [&](const cv::Mat& grey, std::size_t at_least) {
+    Detector detector(Families::load(std::vector<std::string>{"apriltag_36h11"}).value());
+    std::vector<Detection> found;
+    for (int i = 0; i < 2; ++i) detector.detect(grey, &lens, &found);
+    EXPECT_GE(found.size(), at_least);
+    const long before = allocations;
+    detector.detect(grey, &lens, &found);
+    EXPECT_EQ(allocations - before, 0);
+  };
+  const cv::Mat clutter = test::clutter(640, 480, rng);
+  {
+    SCOPED_TRACE("blurred");
+    expect_none(test::picture_of(lens, clutter, markers, {.blur_px = 2.5, .noise_levels = 2}, rng), 3);
+  }
+  cv::Mat light = test::light_of(lens, clutter, markers, {}, rng);
+  {
+    SCOPED_TRACE("moved");
+    cv::Mat moved;
+    cv::blur(light, moved, {11, 1});
+    expect_none(test::noisy_grey(moved, 2, rng), 3);
+  }
+  {
+    SCOPED_TRACE("slatted shadow");
+    for (int x = 0; x < light.cols; ++x)
+      if (x % 34 < 17) light.col(x) *= 0.25;
+    expect_none(test::noisy_grey(light, 2, rng), 2);
+  }
 }
 
 }  // namespace
