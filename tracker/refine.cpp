@@ -138,6 +138,12 @@ struct Window {
   Profile parts{};  // of each place in [low, high)
 };
 
+Window whole(std::size_t low, std::size_t high) {
+  Window window{low, high};
+  for (std::size_t k = low; k < high; ++k) window.parts[k] = 1;
+  return window;
+}
+
 // A window that reaches as far to both sides of the edge's centre as [from, to) does to either. One that
 // cuts off more of the blur on one side moves all crossings of the line alike, which their residuals do not
 // show.
@@ -156,17 +162,12 @@ Window centred(const Profile& mean, std::size_t size, double from, double to) {
       moment += parts[k] * mean[k] * (at + 0.5);
     }
     if (round == k_rounds) break;
+    if (!(sum > 0)) return whole(static_cast<std::size_t>(from), static_cast<std::size_t>(std::ceil(to)));
     centre = moment / sum;
     half = std::min({std::max(centre - from, to - centre), centre, static_cast<double>(size) - centre});
   }
   return {static_cast<std::size_t>(centre - half),
           std::min(size, static_cast<std::size_t>(std::ceil(centre + half))), parts};
-}
-
-Window whole(std::size_t low, std::size_t high) {
-  Window window{low, high};
-  for (std::size_t k = low; k < high; ++k) window.parts[k] = 1;
-  return window;
 }
 
 }  // namespace
