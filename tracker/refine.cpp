@@ -162,8 +162,9 @@ Window centred(const Profile& mean, std::size_t size, double from, double to) {
       moment += parts[k] * mean[k] * (at + 0.5);
     }
     if (round == k_rounds) break;
-    if (!(sum > 0)) return whole(static_cast<std::size_t>(from), static_cast<std::size_t>(std::ceil(to)));
     centre = moment / sum;
+    if (!(centre > 0 && centre < static_cast<double>(size)))  // light of both signs
+      return whole(static_cast<std::size_t>(from), static_cast<std::size_t>(std::ceil(to)));
     half = std::min({std::max(centre - from, to - centre), centre, static_cast<double>(size) - centre});
   }
   return {static_cast<std::size_t>(centre - half),
