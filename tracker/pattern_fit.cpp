@@ -64,6 +64,43 @@ LIMN_SIMD void compare(const float* __restrict light,
   }
 }
 
+// Where samples lie in the marker, -1 to 1, and whether they are of it or within `reach` of a side, whose
+// length is 1. Beside a corner, what is behind the paper has no model.
+LIMN_SIMD void find_places(const float* __restrict x,
+                           const float* __restrict y,
+                           std::size_t count,
+                           const float* __restrict square_from_px,
+                           const float* __restrict reach,
+                           float* __restrict level_x,
+                           float* __restrict level_y,
+                           std::int32_t* __restrict keeps) {
+  const float* h = square_from_px;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float scale = 1 / (h[6] * x[i] + h[7] * y[i] + h[8]);
+    const float u = (h[0] * x[i] + h[1] * y[i] + h[2]) * scale;
+    const float v = (h[3] * x[i] + h[4] * y[i] + h[5]) * scale;
+    const int beside_x = (u < 0) | (u > 1);
+    const int beside_y = (v < 0) | (v > 1);
+    const int near = (v > -reach[0]) & (u < 1 + reach[1]) & (v < 1 + reach[2]) & (u > -reach[3]);
+    level_x[i] = 2 * u - 1;
+    level_y[i] = 2 * v - 1;
+    keeps[i] = near & ~(beside_x & beside_y);
+  }
+}
+
+// Of values that are not negative, whose order is that of their bits.
+LIMN_SIMD float median(const float* __restrict values, std::size_t count) {
+  std::uint32_t found = 0;
+  for (int bit = 30; bit >= 0; --bit) {
+    const std::uint32_t bound = found | 1U << bit;
+    std::uint32_t below = 0;
+#pragma omp simd reduction(+ : below)
+    for (std::size_t i = 0; i < count; ++i) below += __builtin_bit_cast(std::uint32_t, values[i]) < bound;
+    if (below <= count / 2) found = bound;
+  }
+  return __builtin_bit_cast(float, found);
+}
+
 struct Unlike {
   float squares, weights;
 };
@@ -151,6 +188,45 @@ LIMN_SIMD void add_products(const float* __restrict columns,
       row[0] = s0, row[1] = s1, row[2] = s2, row[3] = s3;
       row += number;
       row[0] = t0, row[1] = t1, row[2] = t2, row[3] = t3;
+    }
+  }
+}
+
+constexpr int k_blocks = 8;  // a side of the marker
+
+struct BlockSums {
+  float blocks[k_blocks * k_blocks * 8];  // of how the samples of each move the shape
+  float products[8 * 8];                  // of the samples' moves
+};
+
+// How each sample moves the shape, by the covariance between the `number` unknowns and the shape's eight.
+LIMN_SIMD void sum_blocks(const float* __restrict derivatives,
+                          const float* __restrict by,
+                          std::size_t number,
+                          std::size_t stride,
+                          const float* __restrict pulls,
+                          const float* __restrict level_x,
+                          const float* __restrict level_y,
+                          std::size_t count,
+                          BlockSums* __restrict sums) {
+  for (std::size_t i = 0; i < count; ++i) {
+    float move[8] = {};
+    for (std::size_t a = 0; a < number; ++a) {
+      const float pulled = pulls[i] * derivatives[a * stride + i];
+#pragma omp simd
+      for (int j = 0; j < 8; ++j) move[j] += pulled * by[8 * a + static_cast<std::size_t>(j)];
+    }
+    int at[2];
+    for (int axis = 0; axis < 2; ++axis) {
+      const float place = (0.5F * (axis == 0 ? level_x : level_y)[i] + 0.5F) * k_blocks;
+      at[axis] = place > 0 ? place < k_blocks ? static_cast<int>(place) : k_blocks - 1 : 0;
+    }
+    float* block = sums->blocks + 8 * (k_blocks * at[1] + at[0]);
+#pragma omp simd
+    for (int j = 0; j < 8; ++j) block[j] += move[j];
+    for (int k = 0; k < 8; ++k) {
+#pragma omp simd
+      for (int j = 0; j < 8; ++j) sums->products[8 * k + j] += move[k] * move[j];
     }
   }
 }
@@ -252,9 +328,10 @@ class PatternFit {
 
   double light_at(const Eigen::Vector2d& straight_px) const {
     const Eigen::Vector2d px = straight_.bent(straight_px);
-    const int x = std::clamp(static_cast<int>(std::lround(px.x())), 0, grey_.cols - 1);
-    const int y = std::clamp(static_cast<int>(std::lround(px.y())), 0, grey_.rows - 1);
-    return levels_[grey_.ptr(y)[x]];
+    const auto nearest = [](double at, int size) {
+      return static_cast<int>(std::min(std::max(0.0, at), size - 1.0) + 0.5);
+    };
+    return levels_[grey_.ptr(nearest(px.y(), grey_.rows))[nearest(px.x(), grey_.cols)]];
   }
   double light_of(double level) const {
     return levels_[static_cast<std::size_t>(std::clamp(level, 0.0, 255.0))];
@@ -336,25 +413,26 @@ class PatternFit {
     const double wanted = static_cast<double>(choose ? k_choice * most : most);
     const int stride = std::max(1, static_cast<int>(std::lround(pixels / wanted)));
     const int lean = std::max(1, static_cast<int>(std::lround(0.618 * stride)));  // from row to row
+    const auto columns = static_cast<std::size_t>((std::max(x1, x0 - 1) - x0) / stride + 1);
+    const auto rows = static_cast<std::size_t>(std::max(y1, y0 - 1) - y0 + 1);
+    for (auto* values : samples_values()) values->resize(columns * rows);
+    count_ = 0;
     for (int y = y0; y <= y1; ++y)
       for (int x = x0 + (lean * (y - y0)) % stride; x <= x1; x += stride) {
-        const Eigen::Vector2d px = straight_.straight(Eigen::Vector2d(x, y));
-        const Eigen::Vector3d p = square_from_px * px.homogeneous();
-        const Eigen::Vector2d q = p.head<2>() / p.z();
-        // Beside a corner, what is behind the paper has no model.
-        const bool beside_x = q.x() < 0 || q.x() > 1;
-        const bool beside_y = q.y() < 0 || q.y() > 1;
-        if ((beside_x && beside_y) ||
-            !(q.y() > -reach[0] && q.x() < 1 + reach[1] && q.y() < 1 + reach[2] && q.x() > -reach[3]))
-          continue;
-        samples_.x.push_back(static_cast<float>(px.x() - origin_.x()));
-        samples_.y.push_back(static_cast<float>(px.y() - origin_.y()));
-        samples_.level_x.push_back(static_cast<float>(2 * q.x() - 1));
-        samples_.level_y.push_back(static_cast<float>(2 * q.y() - 1));
-        samples_.light.push_back(static_cast<float>(levels_[grey_.ptr(y)[x]]));
+        const Eigen::Vector2d px = straight_.straight(Eigen::Vector2d(x, y)) - origin_;
+        samples_.x[count_] = static_cast<float>(px.x());
+        samples_.y[count_] = static_cast<float>(px.y());
+        samples_.light[count_++] = static_cast<float>(levels_[grey_.ptr(y)[x]]);
       }
+    buffers_.keeps.resize(count_);
+    Eigen::Matrix3d square_from_sample = square_from_px;
+    square_from_sample.col(2) += square_from_px.leftCols<2>() * origin_;
+    const Eigen::Matrix<float, 3, 3, Eigen::RowMajor> by = square_from_sample.cast<float>();
+    const Eigen::Array4f reaches = reach.cast<float>();
+    find_places(samples_.x.data(), samples_.y.data(), count_, by.data(), reaches.data(),
+                samples_.level_x.data(), samples_.level_y.data(), buffers_.keeps.data());
+    keep();
     if (choose) keep_edges(*known);
-    count_ = samples_.x.size();
     // Blurred or small, they all show edges.
     if (count_ > k_most_samples) {
       const double every = static_cast<double>(count_) / static_cast<double>(k_most_samples);
@@ -376,20 +454,29 @@ class PatternFit {
 
   // The samples that show an edge of the pattern, and some that do not.
   void keep_edges(const State& known) {
-    count_ = samples_.x.size();
     for (auto* values : samples_values()) values->resize(padded_count(), 0);
-    std::vector<std::int32_t>& shows = buffers_.shows_edge;
+    std::vector<std::int32_t>& shows = buffers_.keeps;
     shows.resize(padded_count());
     light_.see_edges(guess_of(cells_, known, has_ground_, origin_), samples_.x.data(), samples_.y.data(),
                      padded_count(), shows.data());
-    std::size_t kept = 0;
     int flat = 0;
+    for (std::size_t i = 0; i < count_; ++i)
+      if (!shows[i]) shows[i] = ++flat % k_flat_stride == 0;
+    keep();
+  }
+
+  // The samples whose `keeps` is not 0.
+  void keep() {
+    const std::int32_t* keeps = buffers_.keeps.data();
+    float *x = samples_.x.data(), *y = samples_.y.data(), *light = samples_.light.data();
+    float *level_x = samples_.level_x.data(), *level_y = samples_.level_y.data();
+    std::size_t kept = 0;
     for (std::size_t i = 0; i < count_; ++i) {
-      if (!shows[i] && ++flat % k_flat_stride != 0) continue;
-      for (auto* values : samples_values()) (*values)[kept] = (*values)[i];
-      ++kept;
+      x[kept] = x[i], y[kept] = y[i], light[kept] = light[i];
+      level_x[kept] = level_x[i], level_y[kept] = level_y[i];
+      kept += keeps[i] != 0;
     }
-    for (auto* values : samples_values()) values->resize(kept);
+    count_ = kept;
   }
 
   Fitted settled(const State& start, Free free, double settled_px) {
@@ -478,8 +565,7 @@ class PatternFit {
   // One Gauss-Newton step on the samples.
   bool step(Free free, Fitted* fitted) {
     if (count_ < 2 * k_unknowns) return false;
-    auto& [samples, shows_edge, residuals, sizes, behind, roots, pulls, derivatives, unused, moves] =
-        buffers_;
+    auto& [samples, keeps, residuals, sizes, behind, roots, pulls, derivatives, unused] = buffers_;
     const Active active = this->active(free, fitted->state, has_ground_);
     const std::size_t stride = padded_count();
     residuals.resize(stride);
@@ -496,9 +582,7 @@ class PatternFit {
     const Places places{samples.x.data(), samples.y.data(), samples.level_x.data(), samples.level_y.data()};
     light_.see(guess_of(cells_, fitted->state, has_ground_, origin_), places, stride, results);
     compare(samples.light.data(), count_, residuals.data(), sizes.data());
-    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(count_ / 2);
-    std::nth_element(sizes.begin(), middle, sizes.begin() + static_cast<std::ptrdiff_t>(count_));
-    const double scale = std::max(least_scale_, 1.4826 * *middle);
+    const double scale = std::max(least_scale_, 1.4826 * median(sizes.data(), count_));
     // What is behind the paper is one level a side only by chance.
     const Unlike unlike = sum_behind(residuals.data(), behind.data(), count_);
     const double bound = k_bound * k_bound * contrast_ * contrast_;
@@ -563,27 +647,16 @@ class PatternFit {
   // sums over blocks of the last step's samples ("sandwich", Liang and Zeger 1986) over that of independent
   // ones.
   double correlation(const Eigen::Matrix<double, Eigen::Dynamic, 8, 0, k_unknowns, 8>& covariance) const {
-    constexpr int k_blocks = 8;  // a side
-    const auto stride = static_cast<Eigen::Index>(padded_count());
-    const Eigen::Map<const Eigen::VectorXf> pulls(buffers_.pulls.data(), stride);
-    const Eigen::Map<const Eigen::MatrixXf> derivatives(buffers_.derivatives.data(), stride,
-                                                        covariance.rows());
-    const Eigen::Matrix<float, Eigen::Dynamic, 8, 0, k_unknowns, 8> by = covariance.cast<float>();
-    buffers_.moves.resize(static_cast<std::size_t>(8 * stride));
-    Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, 8>> moves(buffers_.moves.data(), stride, 8);
-    moves.noalias() = derivatives * by;
-    moves.array().colwise() *= pulls.array();
-    Eigen::Matrix<float, k_blocks * k_blocks, 8> sums;
-    sums.setZero();
-    for (std::size_t i = 0; i < count_; ++i) {
-      const auto block = [&](float place) {
-        return std::clamp(static_cast<int>(std::floor((0.5F * place + 0.5F) * k_blocks)), 0, k_blocks - 1);
-      };
-      sums.row(k_blocks * block(samples_.level_y[i]) + block(samples_.level_x[i])) +=
-          moves.row(static_cast<Eigen::Index>(i));
-    }
-    const Eigen::Matrix<double, 8, 8> independent = (moves.transpose() * moves).cast<double>();
-    const Eigen::Matrix<double, 8, 8> together = (sums.transpose() * sums).cast<double>();
+    const Eigen::Matrix<float, Eigen::Dynamic, 8, Eigen::RowMajor, k_unknowns, 8> by =
+        covariance.cast<float>();
+    BlockSums sums{};
+    sum_blocks(buffers_.derivatives.data(), by.data(), static_cast<std::size_t>(by.rows()), padded_count(),
+               buffers_.pulls.data(), samples_.level_x.data(), samples_.level_y.data(), count_, &sums);
+    using Moves = Eigen::Matrix<float, Eigen::Dynamic, 8, Eigen::RowMajor>;
+    const Eigen::Map<const Moves> blocks(sums.blocks, k_blocks * k_blocks, 8);
+    const Eigen::Matrix<double, 8, 8> independent =
+        Eigen::Map<const Moves>(sums.products, 8, 8).cast<double>();
+    const Eigen::Matrix<double, 8, 8> together = (blocks.transpose() * blocks).cast<double>();
     return std::max(1.0, independent.ldlt().solve(together).trace() / 8);
   }
 

@@ -32,12 +32,11 @@ struct PatternFitBuffers {
     std::vector<float> light;
   };
   Samples samples;
-  std::vector<std::int32_t> shows_edge;
+  std::vector<std::int32_t> keeps;  ///< of each sample
   std::vector<float> residuals, sizes, behind;
   std::vector<float> roots, pulls;  ///< of the weights; residuals times these
   std::vector<float> derivatives;   ///< one unknown's after the other's, then times the weight's root
   std::vector<float> unused;        ///< derivatives by what takes no part
-  std::vector<float> moves;         ///< of the shape, by each sample
 };
 
 /// Refines a quad whose code is known where edges lie too near to each other for EdgeRefiner: blur wider than

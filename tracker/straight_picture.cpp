@@ -52,8 +52,7 @@ StraightPicture StraightPicture::about(const Lens* lens,
   return {*lens, middle, radius + outside_px};
 }
 
-Eigen::Vector2d StraightPicture::bent(const Eigen::Vector2d& straight_px) const {
-  if (!moves_) return straight_px;
+Eigen::Vector2d StraightPicture::found_bent(const Eigen::Vector2d& straight_px) const {
   constexpr int k_rounds = 6;  // each leaves a tenth or less
   Eigen::Vector2d px = straight_px;
   for (int round = 0; round < k_rounds; ++round) px = straight_px - bend(px);

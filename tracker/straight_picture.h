@@ -30,7 +30,9 @@ class StraightPicture {
   }
 
   /// The lens's pixel of it.
-  Eigen::Vector2d bent(const Eigen::Vector2d& straight_px) const;
+  Eigen::Vector2d bent(const Eigen::Vector2d& straight_px) const {
+    return moves_ ? found_bent(straight_px) : straight_px;
+  }
 
  private:
   static constexpr int k_terms = 15;
@@ -41,6 +43,7 @@ class StraightPicture {
   Eigen::Matrix<double, 2, k_terms> bend_ = Eigen::Matrix<double, 2, k_terms>::Zero();  // pixels
 
   static Terms terms(const Eigen::Vector2d& place);
+  Eigen::Vector2d found_bent(const Eigen::Vector2d& straight_px) const;
   Eigen::Vector2d bend(const Eigen::Vector2d& px) const {
     return bend_ * terms((px - middle_px_) / radius_px_);
   }
