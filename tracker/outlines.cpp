@@ -172,93 +172,158 @@ Outlines::Steps::Steps(std::ptrdiff_t stride) {
   }
 }
 
-// The first code from there on of a corner with black at its lower right alone, not visited; the number of
-// codes when there is none. The upper left pixel of a region's top row has one, so every outer boundary runs
-// through such corners.
-std::size_t Outlines::next_start(const CornerCodes& corners, std::size_t from) {
-  const std::uint8_t* const codes = corners.codes.data();
-  const void* found = std::memchr(codes + from, CornerCodes::k_lower_right, corners.codes.size() - from);
-  return found ? static_cast<std::size_t>(static_cast<const std::uint8_t*>(found) - codes)
-               : corners.codes.size();
+// The middle of the crack to the next corner.
+inline Packed Outlines::End::go_on(const Way& way) {
+  const std::size_t from = direction + *corner;
+  const Step& step = way.steps[from];
+  *corner = step.code;
+  direction = static_cast<std::size_t>(step.next);
+  corner += step.offset;
+  __builtin_prefetch(corner + 8 * std::ptrdiff_t{step.offset});  // every row of codes is another cache line
+  area += std::int64_t{at & 0xFFFF} * step.dy;
+  const Packed middle = at + way.moves[from];
+  at = middle + way.moves[from];
+  return middle;
 }
 
-struct Outlines::End {
-  std::uint8_t* corner;
-  std::size_t direction;  // times 32
-  Packed at;              // the corner
-  long long area = 0;     // half pixels times pixels
-
-  // The middle of the crack to the next corner.
-  Packed go_on(const Way& way) {
-    const std::size_t from = direction + *corner;
-    const Step& step = way.steps[from];
-    *corner = step.code;
-    direction = static_cast<std::size_t>(step.next);
-    corner += step.offset;
-    __builtin_prefetch(corner + 8 * step.offset);  // every row of codes is another cache line
-    area += x_of(at) * step.dy;
-    const Packed middle = at + way.moves[from];
-    at = middle + way.moves[from];
-    return middle;
+// The trail's middle, with room for another block on both sides of what is there.
+Packed* Outlines::Tracing::middle_with_room() {
+  const std::size_t half = std::max(back, on) + k_block + k_together;
+  if (trail.size() < 2 * half) {
+    std::vector<Packed> wider(4 * half);
+    std::copy_n(trail.begin() + static_cast<std::ptrdiff_t>(trail.size() / 2 - back), back + on,
+                wider.begin() + static_cast<std::ptrdiff_t>(2 * half - back));
+    trail.swap(wider);
   }
-};
-
-// Where the trail's middle is, with room for so many points and another block on both sides of it.
-std::size_t Outlines::with_room(std::size_t back, std::size_t on) {
-  const std::size_t half = std::max(back, on) + k_block;
-  if (trail_.size() >= 2 * half) return trail_.size() / 2;
-  std::vector<Packed> wider(4 * half);
-  const std::size_t middle = trail_.size() / 2 - back;
-  std::copy_n(trail_.begin() + static_cast<std::ptrdiff_t>(middle), back + on,
-              wider.begin() + static_cast<std::ptrdiff_t>(2 * half - back));
-  trail_.swap(wider);
-  return 2 * half;
+  return trail.data() + trail.size() / 2;
 }
 
-// Follows the boundary that runs up to this corner and on to its right, black on its right, into the trail:
-// from both of its ends in turn, so that neither has to wait for what it reads.
-Outlines::Extent Outlines::trace(CornerCodes& corners, std::size_t from) {
+void Outlines::begin(CornerCodes& corners) {
+  steps_ = Steps(corners.stride);
+  const std::size_t size = corners.codes.size(), half = size / 2;
+  tracings_[0].next = 0, tracings_[0].until = half;
+  tracings_[1].next = half, tracings_[1].until = size;
+  for (Tracing& tracing : tracings_) start(corners, &tracing);
+}
+
+// The next boundary from a corner on with black at its lower right alone, not visited: the upper left pixel
+// of a region's top row has one, so every outer boundary runs through such corners.
+void Outlines::start(CornerCodes& corners, Tracing* tracing) const {
   constexpr std::size_t k_up = 0, k_right = 32;
-  std::uint8_t* const start = corners.codes.data() + from;
-  const auto stride = static_cast<std::size_t>(corners.stride);
-  const auto at = static_cast<Packed>(2 * (from % stride) + (2 * (from / stride) << 16));
-  End end{start, k_up, at};
-  End begin{start, k_right, at};
-  // Whether the way on from the end is the way that the beginning has come.
-  const auto have_met = [&] {
-    return end.corner == begin.corner &&
-           static_cast<std::size_t>(steps_.on.steps[end.direction + *end.corner].next) == begin.direction;
-  };
-  std::size_t on = 0, back = 0, middle = 0;
-  for (bool closed = false; !closed;) {
-    middle = with_room(back, on);
-    Packed* const trail = trail_.data() + middle;
-    for (const std::size_t until = on + k_block; on < until;) {
-      trail[on++] = end.go_on(steps_.on);
-      if ((closed = have_met())) break;
-      trail[-static_cast<std::ptrdiff_t>(++back)] = begin.go_on(steps_.back);
-      if ((closed = have_met())) break;
-    }
+  std::uint8_t* const codes = corners.codes.data();
+  Tracing& t = *tracing;
+  t.start =
+      static_cast<std::uint8_t*>(std::memchr(codes + t.next, CornerCodes::k_lower_right, t.until - t.next));
+  if (!t.start) {
+    t.next = t.until;
+    return;
   }
-  if (*end.corner == CornerCodes::k_lower_right) *end.corner |= CornerCodes::k_visited;
-  begin_ = middle - back;
-  count_ = on + back;
-  return {count_, 0.5 * static_cast<double>(end.area - begin.area)};
+  const auto from = static_cast<std::size_t>(t.start - codes);
+  const auto stride = static_cast<std::size_t>(corners.stride);
+  t.next = from + 1;
+  const auto at = static_cast<Packed>(2 * (from % stride) + (2 * (from / stride) << 16));
+  t.end = {t.start, k_up, at, 0};
+  t.begin = {t.start, k_right, at, 0};
+  t.on = t.back = 0;
+  Packed* const middle = t.middle_with_room();
+  middle[0] = t.end.go_on(steps_.on);
+  middle[-1] = t.begin.go_on(steps_.back);
+  t.on = t.back = 1;
+  *t.start = CornerCodes::k_lower_right;  // visited when another tracing comes by
+}
+
+// Until its ends have met.
+void Outlines::follow(Tracing* tracing) const {
+  Tracing& t = *tracing;
+  for (bool closed = false; !closed;) {
+    Packed* const middle = t.middle_with_room();
+    Packed *on = middle + t.on, *back = middle - t.back;
+    for (const Packed* const until = on + k_block; on < until;) {
+      *on++ = t.end.go_on(steps_.on);
+      if ((closed = have_met(t.end, t.begin))) break;
+      *--back = t.begin.go_on(steps_.back);
+      if ((closed = have_met(t.end, t.begin))) break;
+    }
+    t.on = static_cast<std::size_t>(on - middle);
+    t.back = static_cast<std::size_t>(middle - back);
+  }
+}
+
+// Until the ends of one have met: that one.
+Outlines::Tracing& Outlines::follow_both() {
+  Tracing &a = tracings_[0], &b = tracings_[1];
+  for (;;) {
+    Packed *const a_middle = a.middle_with_room(), *const b_middle = b.middle_with_room();
+    Packed *a_on = a_middle + a.on, *a_back = a_middle - a.back;
+    Packed *b_on = b_middle + b.on, *b_back = b_middle - b.back;
+    End a_end = a.end, a_begin = a.begin, b_end = b.end, b_begin = b.begin;
+    Tracing* closed = nullptr;
+    for (const Packed* const until = a_on + k_block; a_on < until;) {
+      *a_on++ = a_end.go_on(steps_.on);
+      if (have_met(a_end, a_begin)) {
+        closed = &a;
+        break;
+      }
+      *b_on++ = b_end.go_on(steps_.on);
+      if (have_met(b_end, b_begin)) {
+        closed = &b;
+        break;
+      }
+      *--a_back = a_begin.go_on(steps_.back);
+      if (have_met(a_end, a_begin)) {
+        closed = &a;
+        break;
+      }
+      *--b_back = b_begin.go_on(steps_.back);
+      if (have_met(b_end, b_begin)) {
+        closed = &b;
+        break;
+      }
+    }
+    a.end = a_end, a.begin = a_begin, b.end = b_end, b.begin = b_begin;
+    a.on = static_cast<std::size_t>(a_on - a_middle), a.back = static_cast<std::size_t>(a_middle - a_back);
+    b.on = static_cast<std::size_t>(b_on - b_middle), b.back = static_cast<std::size_t>(b_middle - b_back);
+    if (closed) return *closed;
+  }
+}
+
+// The boundary whose ends meet next; nullopt: all have been traced. What the other tracing has of the same
+// one is dropped.
+std::optional<Outlines::Extent> Outlines::trace_next(CornerCodes& corners) {
+  for (Tracing& tracing : tracings_)
+    if (!tracing.start) start(corners, &tracing);
+  const bool has_first = tracings_[0].start, has_second = tracings_[1].start;
+  if (!has_first && !has_second) return std::nullopt;
+  Tracing* traced = &tracings_[has_first ? 0 : 1];
+  if (has_first && has_second)
+    traced = &follow_both();
+  else
+    follow(traced);
+  *traced->start |= CornerCodes::k_visited;
+  if (*traced->end.corner == CornerCodes::k_lower_right) *traced->end.corner |= CornerCodes::k_visited;
+  traced->start = nullptr;
+  last_ = traced == &tracings_[0] ? 0 : 1;
+  Tracing& other = tracings_[1 - last_];
+  if (other.start && *other.start & CornerCodes::k_visited) other.start = nullptr;
+  begin_ = traced->trail.size() / 2 - traced->back;
+  count_ = traced->on + traced->back;
+  return Extent{count_, 0.5 * static_cast<double>(traced->end.area - traced->begin.area)};
 }
 
 Outlines::Box Outlines::box() const {
-  const Bounds bounds = bounds_of(trail_.data() + begin_, count_);
+  const Bounds bounds = bounds_of(tracings_[last_].trail.data() + begin_, count_);
   return {0.5 * (bounds.high_x - bounds.low_x), 0.5 * (bounds.high_y - bounds.low_y)};
 }
 
 void Outlines::find_corners(double tolerance_px, std::size_t max_count, std::size_t min_run) {
   // The points before the first corner once more behind the last, and what may be looked at beside them.
+  std::vector<Packed>& trail = tracings_[last_].trail;
   const std::size_t most = begin_ + 2 * count_ + k_together;
-  if (trail_.size() < most) trail_.resize(most);
-  const auto begin = trail_.begin() + static_cast<std::ptrdiff_t>(begin_);
+  if (trail.size() < most) trail.resize(most);
+  const auto begin = trail.begin() + static_cast<std::ptrdiff_t>(begin_);
   const std::size_t first = farthest_from(&*begin, count_, *begin);
   std::copy_n(begin, first + 1, begin + static_cast<std::ptrdiff_t>(count_));
-  points_ = std::span(trail_).subspan(begin_ + first, count_ + 1);
+  points_ = std::span(trail).subspan(begin_ + first, count_ + 1);
   const std::size_t second = farthest_from(points_.data(), count_, points_[0]);
   corners_.clear();
   corners_.push_back(0);

@@ -33,16 +33,14 @@ class Outlines {
     double count = 0;
   };
 
-  /// Calls visit(extent) with every boundary; what follows is about that one. Sets the visited bits of
-  /// `corners`.
+  /// Calls visit(extent) with every boundary once, those of the upper and the lower half as they are
+  /// traced; what follows is about that one. Sets the visited bits of `corners`.
   template <typename Visit>
   void for_each(CornerCodes& corners, const Visit& visit) {
     static_assert(2 * k_max_picture_side <= 0xFFFF);
     LIMN_CHECK(corners.width <= k_max_picture_side && corners.height <= k_max_picture_side);
-    steps_ = Steps(corners.stride);
-    for (std::size_t start = next_start(corners, 0); start < corners.codes.size();
-         start = next_start(corners, start + 1))
-      visit(trace(corners, start));
+    begin(corners);
+    while (const auto extent = trace_next(corners)) visit(*extent);
   }
 
   /// Around all points.
@@ -80,20 +78,44 @@ class Outlines {
     explicit Steps(std::ptrdiff_t stride);
   };
   // One end of what has been traced of a boundary.
-  struct End;
+  struct End {
+    std::uint8_t* corner = nullptr;
+    std::size_t direction = 0;  // times 32
+    Packed at = 0;              // the corner
+    std::int64_t area = 0;      // half pixels times pixels
+
+    Packed go_on(const Way& way);
+  };
+  // A boundary as it is traced, from both of its ends in turn, so that neither has to wait for what it reads.
+  struct Tracing {
+    std::vector<Packed> trail;  // of both ends, to both sides from the middle on
+    std::size_t on = 0, back = 0;
+    std::uint8_t* start = nullptr;    // null: there is none
+    std::size_t next = 0, until = 0;  // codes that are still to be looked through for a start
+    End end, begin;
+
+    Packed* middle_with_room();
+  };
   Steps steps_{0};
-  std::vector<Packed> trail_;       // of both ends, to both sides from the middle on
-  std::size_t begin_ = 0;           // of the boundary within the trail
-  std::size_t count_ = 0;           // points
-  std::span<const Packed> points_;  // from the first corner on, and that one again at the end
+  std::array<Tracing, 2> tracings_;  // both at a time, for the same reason
+  std::size_t last_ = 0;             // of the tracings, that of the boundary that was traced last
+  std::size_t begin_ = 0;            // of it within the trail
+  std::size_t count_ = 0;            // points
+  std::span<const Packed> points_;   // from the first corner on, and that one again at the end
   std::vector<std::size_t> corners_, pending_;
 
-  static std::size_t next_start(const CornerCodes& corners, std::size_t from);
   static Eigen::Vector2d at(Packed point) {
     return {0.5 * (point & 0xFFFF) - 0.5, 0.5 * (point >> 16) - 0.5};
   }
-  Extent trace(CornerCodes& corners, std::size_t start);
-  std::size_t with_room(std::size_t back, std::size_t on);
+  void begin(CornerCodes& corners);
+  std::optional<Extent> trace_next(CornerCodes& corners);
+  void start(CornerCodes& corners, Tracing* tracing) const;
+  bool have_met(const End& end, const End& begin) const {
+    return end.corner == begin.corner &&
+           static_cast<std::size_t>(steps_.on.steps[end.direction + *end.corner].next) == begin.direction;
+  }
+  void follow(Tracing* tracing) const;
+  Tracing& follow_both();
 };
 
 }  // namespace limn::tracker
