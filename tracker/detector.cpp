@@ -345,7 +345,8 @@ std::optional<PatternShift> Detector::settle_overlapping_edges(const cv::Mat& gr
     }
     return *last;
   }
-  const bool may_fit = identity.cells.count > 0 && shortest_side(Quad{refined->corners_px}) > k_fit_above_px;
+  const bool may_fit = options_.pattern_fits && identity.cells.count > 0 &&
+                       shortest_side(Quad{refined->corners_px}) > k_fit_above_px;
   if (may_fit)
     if (auto fitted =
             fit_pattern(grey, worker.refiner.light(), *refined, identity.cells, lens, &worker.fit)) {

@@ -31,6 +31,10 @@ struct DetectorOptions {
   /// Also joins straight edges to quadrilaterals, for markers that fingers, bites or slatted shadows break
   /// up. Costs about half as much again as the rest; left out where no family can_be_covered().
   bool broken_markers = true;
+  /// Also fits the whole pattern of markers whose edges blur into each other, as those of small ones do:
+  /// their corners are up to ten times better. Costs several times what reading one does; without it their
+  /// covariances say so, rather too much than too little.
+  bool pattern_fits = true;
   /// How many threads a picture is shared out to, of OpenCV's pool (cv::setNumThreads limits them). The
   /// result is the same with any number.
   int threads = 1;

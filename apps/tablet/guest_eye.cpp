@@ -138,7 +138,8 @@ std::vector<Track> moved_markers(const Imager& view,
 }  // namespace
 
 GuestEye::GuestEye(tracker::Families families, std::span<const calib::LensBelief> lenses)
-    : detector_(std::move(families), {.encoding = tracker::Encoding::srgb, .broken_markers = false}) {
+    : detector_(std::move(families),
+                {.encoding = tracker::Encoding::srgb, .broken_markers = false, .pattern_fits = false}) {
   for (const calib::LensBelief& lens : lenses)
     aspects_.push_back({calib::RoamingLens(lens), lens, lens.focal_stddev_px()});
 }

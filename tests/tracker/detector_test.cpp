@@ -43,6 +43,7 @@ struct Sweep {
   double motion_px = 0;  ///< even, in any direction
   double stains = 0;     ///< of the light, standard deviation: spots some pixels wide on paper and ink
   int jpeg_quality = 0;  ///< 0: none
+  bool pattern_fits = true;
 };
 
 cv::Mat in_motion(const cv::Mat& light, const Eigen::Vector2d& motion) {
@@ -116,6 +117,7 @@ SweepResult swept(const Sweep& sweep, int count) {
   auto rng = test::test_rng();
   DetectorOptions options;
   options.encoding = sweep.encoding;
+  options.pattern_fits = sweep.pattern_fits;
   Detector detector(families({"apriltag_36h11", "aruco_4x4_50"}), options);
   SweepResult result;
   double squares = 0;
@@ -327,6 +329,19 @@ TEST(Detector, SaysHowSureTheCornersOfBlurredMarkersAre) {
     EXPECT_GT(r.mahalanobis, 0.5) << blur;
     EXPECT_LT(r.mahalanobis, 2) << blur;
   }
+}
+
+TEST(Detector, SaysHowSureCornersAreByTheirSidesAlone) {
+  Sweep sweep{16, 40, 40_deg, {}};
+  sweep.picture.blur_px = 1;
+  sweep.picture.noise_levels = 2;
+  const SweepResult fitted = swept(sweep, 80);
+  sweep.pattern_fits = false;
+  const SweepResult r = swept(sweep, 80);
+  EXPECT_EQ(r.found, fitted.found);
+  EXPECT_GT(r.rms_px, 1.5 * fitted.rms_px);
+  EXPECT_LT(r.rms_px, 0.3);
+  EXPECT_LT(r.mahalanobis, 1.5);  // much less: the doubt is made for blurs three times as wide
 }
 
 TEST(Detector, FindsTheCornersOfBlurredMarkersThroughTheLens) {
