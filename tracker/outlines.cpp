@@ -252,33 +252,26 @@ void Outlines::follow(Tracing* tracing) const {
 // Until the ends of one have met: that one.
 Outlines::Tracing& Outlines::follow_both() {
   Tracing &a = tracings_[0], &b = tracings_[1];
+  // Whether the ends have met after another crack at one of them.
+  const auto meets = [this](const Way& way, End* moved, Packed* point, const End& end, const End& begin) {
+    *point = moved->go_on(way);
+    return have_met(end, begin);
+  };
   for (;;) {
     Packed *const a_middle = a.middle_with_room(), *const b_middle = b.middle_with_room();
     Packed *a_on = a_middle + a.on, *a_back = a_middle - a.back;
     Packed *b_on = b_middle + b.on, *b_back = b_middle - b.back;
     End a_end = a.end, a_begin = a.begin, b_end = b.end, b_begin = b.begin;
     Tracing* closed = nullptr;
-    for (const Packed* const until = a_on + k_block; a_on < until;) {
-      *a_on++ = a_end.go_on(steps_.on);
-      if (have_met(a_end, a_begin)) {
+    for (const Packed* const until = a_on + k_block; !closed && a_on < until;) {
+      if (meets(steps_.on, &a_end, a_on++, a_end, a_begin))
         closed = &a;
-        break;
-      }
-      *b_on++ = b_end.go_on(steps_.on);
-      if (have_met(b_end, b_begin)) {
+      else if (meets(steps_.on, &b_end, b_on++, b_end, b_begin))
         closed = &b;
-        break;
-      }
-      *--a_back = a_begin.go_on(steps_.back);
-      if (have_met(a_end, a_begin)) {
+      else if (meets(steps_.back, &a_begin, --a_back, a_end, a_begin))
         closed = &a;
-        break;
-      }
-      *--b_back = b_begin.go_on(steps_.back);
-      if (have_met(b_end, b_begin)) {
+      else if (meets(steps_.back, &b_begin, --b_back, b_end, b_begin))
         closed = &b;
-        break;
-      }
     }
     a.end = a_end, a.begin = a_begin, b.end = b_end, b.begin = b_begin;
     a.on = static_cast<std::size_t>(a_on - a_middle), a.back = static_cast<std::size_t>(a_middle - a_back);
