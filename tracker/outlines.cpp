@@ -203,7 +203,7 @@ void Outlines::begin(CornerCodes& corners) {
   const std::size_t size = corners.codes.size(), half = size / 2;
   tracings_[0].next = 0, tracings_[0].until = half;
   tracings_[1].next = half, tracings_[1].until = size;
-  for (Tracing& tracing : tracings_) start(corners, &tracing);
+  for (Tracing& tracing : tracings_) tracing.start = nullptr;
 }
 
 // The next boundary from a corner on with black at its lower right alone, not visited: the upper left pixel
@@ -232,18 +232,23 @@ void Outlines::start(CornerCodes& corners, Tracing* tracing) const {
   *t.start = CornerCodes::k_lower_right;  // visited when another tracing comes by
 }
 
+// Whether the ends have met after another crack at one of them.
+inline bool Outlines::meets(
+    const Way& way, End* moved, Packed* point, const End& end, const End& begin) const {
+  *point = moved->go_on(way);
+  return end.corner == begin.corner &&
+         static_cast<std::size_t>(steps_.on.steps[end.direction + *end.corner].next) == begin.direction;
+}
+
 // Until its ends have met.
 void Outlines::follow(Tracing* tracing) const {
   Tracing& t = *tracing;
   for (bool closed = false; !closed;) {
     Packed* const middle = t.middle_with_room();
     Packed *on = middle + t.on, *back = middle - t.back;
-    for (const Packed* const until = on + k_block; on < until;) {
-      *on++ = t.end.go_on(steps_.on);
-      if ((closed = have_met(t.end, t.begin))) break;
-      *--back = t.begin.go_on(steps_.back);
-      if ((closed = have_met(t.end, t.begin))) break;
-    }
+    for (const Packed* const until = on + k_block; !closed && on < until;)
+      closed = meets(steps_.on, &t.end, on++, t.end, t.begin) ||
+               meets(steps_.back, &t.begin, --back, t.end, t.begin);
     t.on = static_cast<std::size_t>(on - middle);
     t.back = static_cast<std::size_t>(middle - back);
   }
@@ -252,11 +257,6 @@ void Outlines::follow(Tracing* tracing) const {
 // Until the ends of one have met: that one.
 Outlines::Tracing& Outlines::follow_both() {
   Tracing &a = tracings_[0], &b = tracings_[1];
-  // Whether the ends have met after another crack at one of them.
-  const auto meets = [this](const Way& way, End* moved, Packed* point, const End& end, const End& begin) {
-    *point = moved->go_on(way);
-    return have_met(end, begin);
-  };
   for (;;) {
     Packed *const a_middle = a.middle_with_room(), *const b_middle = b.middle_with_room();
     Packed *a_on = a_middle + a.on, *a_back = a_middle - a.back;

@@ -110,10 +110,7 @@ class Outlines {
   void begin(CornerCodes& corners);
   std::optional<Extent> trace_next(CornerCodes& corners);
   void start(CornerCodes& corners, Tracing* tracing) const;
-  bool have_met(const End& end, const End& begin) const {
-    return end.corner == begin.corner &&
-           static_cast<std::size_t>(steps_.on.steps[end.direction + *end.corner].next) == begin.direction;
-  }
+  bool meets(const Way& way, End* moved, Packed* point, const End& end, const End& begin) const;
   void follow(Tracing* tracing) const;
   Tracing& follow_both();
 };
