@@ -472,7 +472,9 @@ class PatternFit {
     const Eigen::Matrix<double, 8, 8> independent =
         Eigen::Map<const Moves>(sums.products, 8, 8).cast<double>();
     const Eigen::Matrix<double, 8, 8> together = (blocks.transpose() * blocks).cast<double>();
-    return std::max(1.0, independent.ldlt().solve(together).trace() / 8);
+    constexpr double k_number = k_blocks * k_blocks;
+    constexpr double k_unseen = k_number / (k_number - 8);  // the shape has taken up so much of the sums
+    return std::max(1.0, k_unseen * independent.ldlt().solve(together).trace() / 8);
   }
 
   bool moved(const Vector& change, Fitted* fitted) const {

@@ -19,6 +19,8 @@ constexpr double k_flat_share = 0.05;
 // just outside counts more and more as the edge's tail.
 constexpr double k_tail_share = 0.02;
 constexpr double k_tail_lead = 1.5;
+// Of the square of two noisy sums' larger one, in their variance: 1.64 is its mean.
+constexpr double k_noise_of_two = 2;
 // Below this share a rise means another edge of the same direction behind the first: grey paper, then a white
 // table.
 constexpr double k_valley_share = 0.35;
@@ -171,6 +173,23 @@ Window centred(const Profile& mean, std::size_t size, double from, double to) {
           std::min(size, static_cast<std::size_t>(std::ceil(centre + half))), parts};
 }
 
+// Size of the sum of a place's gradients over all rows, less what noise alone gives the larger of two places.
+double surely(const std::vector<double>& gradients,
+              std::size_t rows,
+              std::size_t profile,
+              std::size_t place) {
+  double sum = 0;
+  double squares = 0;
+  for (std::size_t i = 0; i < rows; ++i) {
+    const double gradient = gradients[i * profile + place];
+    sum += gradient;
+    squares += gradient * gradient;
+  }
+  const auto number = static_cast<double>(rows);
+  const double noise = (number * squares - sum * sum) / (number - 1);
+  return std::sqrt(std::max(0.0, sum * sum - k_noise_of_two * noise));
+}
+
 }  // namespace
 
 // Crossings of one side. First the gradient profile averaged along the side says how wide the edge is (blur,
@@ -260,8 +279,8 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
                    std::abs(mean[high]) <= flat_below && std::abs(mean[low - 2]) <= 4 * flat_below &&
                    std::abs(mean[high + 1]) <= 4 * flat_below;
   double beyond = 0;  // the window
-  if (low > 1) beyond = std::abs(mean[low - 2]);
-  if (high + 1 < profile) beyond = std::max(beyond, std::abs(mean[high + 1]));
+  if (low > 1) beyond = surely(gradients_, rows_.size(), profile, low - 2);
+  if (high + 1 < profile) beyond = std::max(beyond, surely(gradients_, rows_.size(), profile, high + 1));
   double contrast = 0;  // in light
   for (std::size_t k = low; k < high; ++k) contrast += mean[k];
   // A Gaussian's peak is its area over sigma sqrt(2 pi); v is not the edge's normal when the side leans.
@@ -495,7 +514,7 @@ double EdgeRefiner::fit_terms(int terms, bool from_line, EdgeLine* line) {
 // How many times larger the line's variance is where neighbouring crossings err alike: print, paper, shadows
 // and JPEG do that. From sums of residuals over blocks (the "sandwich", Liang and Zeger 1986).
 double EdgeRefiner::correlation_along(const EdgeLine& line, double variance) const {
-  constexpr std::size_t k_blocks = 12;
+  constexpr std::size_t k_blocks = 10;
   constexpr std::size_t k_least_rows = 4;
   const std::size_t count = crossings_.u.size();
   const std::size_t rows = std::max(k_least_rows, (count + k_blocks - 1) / k_blocks);
