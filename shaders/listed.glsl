@@ -11,7 +11,7 @@ layout(std430, binding = 6) buffer List {
 uint list_pixel(ivec2 at) {
   uint i = atomicAdd(s_list_count, 1u);
   s_list[i] = uint(at.y) << 16 | uint(at.x);
-  atomicMax(s_list_groups[0], i / k_group + 1u);
+  if (i % k_group == 0u) atomicMax(s_list_groups[0], i / k_group + 1u);
   return i;
 }
 

@@ -44,7 +44,7 @@ struct Place {
 Place place_at(Hit hit, vec3 d) {
   uint first = 3u * (hit.id - 1u);
   vec3 p = mat3(s_corners[first].xyz, s_corners[first + 1u].xyz, s_corners[first + 2u].xyz) * hit.weights;
-  Place place = Place(p, flat_normal(hit.id), smooth_normal(hit));
+  Place place = Place(p, flat_normal_in_owner(hit.id), smooth_normal_in_owner(hit));
   if (dot(place.d_flat, d) > 0.0) place.d_flat = -place.d_flat;
   if (dot(place.d_smooth, place.d_flat) < 0.0) place.d_smooth = -place.d_smooth;
   return place;

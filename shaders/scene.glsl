@@ -58,11 +58,9 @@ vec3 to_owner(uint owner, vec3 p) { return (s_placements[owner].owner_from_scene
 vec3 turned_to_owner(uint owner, vec3 d) { return mat3(s_placements[owner].owner_from_scene) * d; }
 vec3 turned_to_scene(uint owner, vec3 d) { return d * mat3(s_placements[owner].owner_from_scene); }
 
-// Where the ray meets the plane of a triangle (scene frame, d of unit length). False when it runs along it.
-bool plane_hit(uint id, vec3 p_origin, vec3 d, out Hit hit) {
-  uint owner = owner_of(id);
-  vec3 o = to_owner(owner, p_origin);
-  vec3 w = turned_to_owner(owner, d);
+// Where the ray from o along w (unit length, both in the frame of the triangle's owner) meets the plane of a triangle.
+// False when it runs along it.
+bool plane_hit_in_owner(uint id, vec3 o, vec3 w, out Hit hit) {
   uint first = 3u * (id - 1u);
   vec3 a = s_corners[first].xyz - o;
   vec3 ab = s_corners[first + 1u].xyz - o - a;
@@ -79,6 +77,17 @@ bool plane_hit(uint id, vec3 p_origin, vec3 d, out Hit hit) {
   hit.weights.x = 1.0 - hit.weights.y - hit.weights.z;
   hit.slack = 1e-6 + k_rounding * inversesqrt(length(n));
   return true;
+}
+
+// The same in the scene's frame.
+bool plane_hit(uint id, vec3 p_origin, vec3 d, out Hit hit) {
+  uint owner = owner_of(id);
+  return plane_hit_in_owner(id, to_owner(owner, p_origin), turned_to_owner(owner, d), hit);
+}
+
+// The same of the prototype, whose frame is the scene's.
+bool prototype_plane_hit(uint id, vec3 p_origin, vec3 d, out Hit hit) {
+  return plane_hit_in_owner(id, p_origin, d, hit);
 }
 
 bool is_inside(Hit hit) { return all(greaterThanEqual(hit.weights, vec3(-hit.slack))); }
@@ -151,7 +160,8 @@ Hit first_hit(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
   if (ids == uvec4(0)) return best;
   for (uvec4 left = each_once(ids); left.x != 0u; left = uvec4(left.yzw, 0u)) {
     Hit hit;
-    if (plane_hit(left.x, sight.p_eye.xyz, d, hit) && is_inside(hit) && hit.t > 0.0 && hit.t < best.t) best = hit;
+    bool is_met = layer == 0 ? prototype_plane_hit(left.x, sight.p_eye.xyz, d, hit) : plane_hit(left.x, sight.p_eye.xyz, d, hit);
+    if (is_met && is_inside(hit) && hit.t > 0.0 && hit.t < best.t) best = hit;
   }
   if (best.id != 0u) return best;
   float cover = dot(share, vec4(notEqual(ids, uvec4(0))));
@@ -169,7 +179,7 @@ bool is_met_beside(uint id, vec3 p_origin, vec3 d, float t) {
   uint from = 0u;
   for (int i = 0; i < k_most_steps && id != 0u; ++i) {
     Hit hit;
-    if (!plane_hit(id, p_origin, d, hit)) return false;
+    if (!prototype_plane_hit(id, p_origin, d, hit)) return false;
     if (is_inside(hit)) return hit.t < t;
     int side = hit.weights.x < hit.weights.y ? (hit.weights.x < hit.weights.z ? 0 : 2) : hit.weights.y < hit.weights.z ? 1 : 2;
     uint next = s_triangles[id - 1u].beside[side];
@@ -200,20 +210,22 @@ bool is_hidden(usampler2DArray s_ids, Sight sight, vec3 p) {
   return false;
 }
 
-// Unit normal of the triangle itself, scene frame.
-vec3 flat_normal(uint id) {
+// Unit normal of the triangle itself, frame of its owner.
+vec3 flat_normal_in_owner(uint id) {
   uint first = 3u * (id - 1u);
   vec3 a = s_corners[first].xyz;
-  vec3 n = cross(s_corners[first + 1u].xyz - a, s_corners[first + 2u].xyz - a);
-  return turned_to_scene(owner_of(id), normalize(n));
+  return normalize(cross(s_corners[first + 1u].xyz - a, s_corners[first + 2u].xyz - a));
 }
 
-// Unit normal interpolated from the corners, scene frame.
-vec3 smooth_normal(Hit hit) {
+// Unit normal interpolated from the corners, frame of its owner.
+vec3 smooth_normal_in_owner(Hit hit) {
   uint first = 3u * (hit.id - 1u);
-  vec3 n = mat3(s_normals[first].xyz, s_normals[first + 1u].xyz, s_normals[first + 2u].xyz) * hit.weights;
-  return turned_to_scene(owner_of(hit.id), normalize(n));
+  return normalize(mat3(s_normals[first].xyz, s_normals[first + 1u].xyz, s_normals[first + 2u].xyz) * hit.weights);
 }
+
+// The same in the scene's frame.
+vec3 flat_normal(uint id) { return turned_to_scene(owner_of(id), flat_normal_in_owner(id)); }
+vec3 smooth_normal(Hit hit) { return turned_to_scene(owner_of(hit.id), smooth_normal_in_owner(hit)); }
 
 // The interpolated normal turned to where d comes from, as its triangle is; at a silhouette it looks aside, not away.
 vec3 facing_normal(Hit hit, vec3 d) {

@@ -65,16 +65,30 @@ GlName program_of(const char* vertex, const char* fragment) {
   return {program, [](GLuint n) { glDeleteProgram(n); }};
 }
 
+// The corners of the scene's triangles, three each, in a box that fills clip space nearly.
+std::vector<Eigen::Vector3f> all_corners(const scene::Scene& scene, const scene::PosedScene& posed) {
+  std::vector<Eigen::Vector3f> corners;
+  const auto add = [&](const scene::Mesh& mesh, const Pose& world_from_mesh) {
+    for (const auto& triangle : mesh.triangles)
+      for (const std::uint32_t i : triangle)
+        corners.emplace_back((world_from_mesh * mesh.positions[i].cast<double>()).cast<float>());
+  };
+  add(scene.prototype->mesh, *posed.world_from_prototype);
+  for (const scene::PosedPart& part : posed.parts)
+    for (const scene::Slot& slot : scene.slots)
+      for (const scene::Variant& variant : slot.variants)
+        if (slot.name == part.slot && variant.name == part.variant) add(variant.mesh, part.world_from_part);
+  Eigen::AlignedBox3f box;
+  for (const auto& p : corners) box.extend(p);
+  for (auto& p : corners) p = ((p - box.center()).cwiseQuotient(box.sizes()) * 1.9F).eval();
+  return corners;
+}
+
 // The simplest passes of their kinds, into a picture of the projector's size.
 class Yardsticks {
  public:
-  explicit Yardsticks(const scene::Mesh& mesh) : triangle_count_(static_cast<int>(mesh.triangles.size())) {
-    std::vector<Eigen::Vector3f> corners;
-    Eigen::AlignedBox3f box;
-    for (const auto& p : mesh.positions) box.extend(p);
-    for (const auto& triangle : mesh.triangles)
-      for (const std::uint32_t i : triangle)  // fills the picture
-        corners.push_back(((mesh.positions[i] - box.center()).cwiseQuotient(box.sizes()) * 1.9F).eval());
+  explicit Yardsticks(const std::vector<Eigen::Vector3f>& corners)
+      : triangle_count_(static_cast<int>(corners.size() / 3)) {
     corners_ = projector::make_buffer(corners.data(), corners.size() * sizeof(corners[0]));
     vertices_ = projector::make_vertex_array();
     glVertexArrayVertexBuffer(*vertices_, 0, *corners_, 0, sizeof(Eigen::Vector3f));
@@ -170,19 +184,19 @@ int run(int frames) {
   }
   const scene::PosedScene posed = sim::true_poses(world);
   const Imager viewer = *world.scene->viewers.at(0).fixed;
-  std::size_t triangles = world.scene->prototype->mesh.triangles.size();
-  for (const scene::Slot& slot : world.scene->slots) triangles += slot.variants[0].mesh.triangles.size();
+  const std::vector<Eigen::Vector3f> corners = all_corners(*world.scene, posed);
+  const std::size_t triangles = corners.size() / 3;
+  const std::size_t projectors = world.rig.projectors.size();
   fmt::print("{}; {} triangles, {}x{}; ms, median of {}\n\n", context->description(), triangles, k_width,
              k_height, frames);
 
-  const Yardsticks yardsticks(world.scene->prototype->mesh);
+  const Yardsticks yardsticks(corners);
   const double copy = median_ms(frames, [&] { yardsticks.clear(), yardsticks.copy(); });
   const double draw = median_ms(frames, [&] { yardsticks.draw_triangles(); });
   const double warp = median_ms(frames, [&] { yardsticks.draw_warp(); });
   fmt::print("  yardsticks                                  ms\n");
   fmt::print("  clear and copy                          {:6.2f}\n", copy);
-  fmt::print("  {} triangles                         {:6.2f}\n",
-             world.scene->prototype->mesh.triangles.size(), draw);
+  fmt::print("  {} triangles                         {:6.2f}\n", triangles, draw);
   fmt::print("  warp by a map, whole picture            {:6.2f}\n", warp);
   fmt::print("  cv::remap                               {:6.2f}\n\n",
              median_ms(frames, [&] { yardsticks.remap(); }));
@@ -203,7 +217,7 @@ int run(int frames) {
   std::map<std::string, std::vector<double>> passes;
   std::vector<std::string> order;
   for (int i = 0; i <= frames; ++i) {
-    renderer->draw_projector(0, prototype_moved(), viewer);
+    renderer->draw_projector(0, getenv("PM") ? moved() : prototype_moved(), viewer);
     for (const projector::PassTime& time : renderer->pass_times()) {
       if (!passes.contains(time.pass)) order.push_back(time.pass);
       if (i > 0)
@@ -220,17 +234,23 @@ int run(int frames) {
                      times.end());
     fmt::print("  {:<38}  {:6.2f}\n", pass, times[times.size() / 2]);
   }
-  const double sum = copy + draw + warp;
-  fmt::print("\n  frames                                      ms   of triangles + warp + copy\n");
-  const auto frame = [&](const char* name, double ms) {
+  // What all projectors share, ids above all, is drawn once for all of them.
+  const double sum = static_cast<double>(projectors) * (copy + draw + warp);
+  fmt::print("\n  frames of {} projectors                      ms   of triangles + warp + copy for each\n",
+             projectors);
+  const auto frame = [&](const char* name, const std::function<scene::PosedScene()>& place) {
+    const double ms = median_ms(frames, [&] {
+      const scene::PosedScene placed = place();
+      for (std::size_t i = 0; i < projectors; ++i) (void)renderer->projector_picture(i, placed, viewer);
+    });
     fmt::print("  {:<38}  {:6.2f}  {:5.2f}\n", name, ms, ms / sum);
+    return ms;
   };
-  frame("prototype and part move",
-        median_ms(frames, [&] { (void)renderer->projector_picture(0, prototype_moved(), viewer); }));
-  frame("a part moves", median_ms(frames, [&] { (void)renderer->projector_picture(0, moved(), viewer); }));
-  const double still = median_ms(frames, [&] { (void)renderer->projector_picture(0, posed, viewer); });
-  frame("nothing moves", still);
-  fmt::print("  nothing moves, of clear and copy                {:5.2f}\n", still / copy);
+  frame("prototype and part move", prototype_moved);
+  frame("a part moves", moved);
+  const double still = frame("nothing moves", [&] { return posed; });
+  fmt::print("  nothing moves, of clear and copy                {:5.2f}\n",
+             still / (static_cast<double>(projectors) * copy));
 
   // Composites: the picture is new each time. Their yardstick has the camera's size.
   const Imager& camera = world.rig.cameras[0];
