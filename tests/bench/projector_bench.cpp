@@ -217,7 +217,7 @@ int run(int frames) {
   std::map<std::string, std::vector<double>> passes;
   std::vector<std::string> order;
   for (int i = 0; i <= frames; ++i) {
-    renderer->draw_projector(0, getenv("PM") ? moved() : prototype_moved(), viewer);
+    renderer->draw_projector(0, prototype_moved(), viewer);
     for (const projector::PassTime& time : renderer->pass_times()) {
       if (!passes.contains(time.pass)) order.push_back(time.pass);
       if (i > 0)
