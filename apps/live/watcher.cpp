@@ -21,8 +21,10 @@ constexpr double k_forgotten_s = 2;
 constexpr double k_still_m = 0.005, k_still_rad = 5 * std::numbers::pi / 180;
 constexpr double k_lying_m = 0.01, k_lying_rad = 45 * std::numbers::pi / 180;
 constexpr double k_once_s = 0.4;  // two cameras that see one gesture within it
-// Every how many searches also look for markers that are partly covered, while all of the scene's are seen.
-constexpr int k_covered_every = 4;
+// While all of the scene's markers are seen, searches are so many times rarer, and every second one alone
+// looks for markers that are partly covered.
+constexpr int k_rarer = 3;
+constexpr int k_covered_every = 2;
 constexpr double k_trembles_m = 0.5e-3, k_trembles_rad = 1e-3;
 
 Result<tracker::Gesture> gesture_of(const scene::Control& control) {
@@ -71,7 +73,7 @@ Result<Watcher> Watcher::create(const scene::Scene& scene, const Rig& rig, const
   }
   for (const Imager& camera : rig.cameras)
     out.eyes_.push_back(
-        {tracker::Detector(families, {.encoding = encoding_of(rig, camera)}), gestures, 0, 0, {}});
+        {tracker::Detector(families, {.encoding = encoding_of(rig, camera)}), gestures, 0, 0, {}, {}});
   out.used_at_.resize(scene.controls.size());
   out.watched_.frames.resize(rig.cameras.size());
   out.watched_.detections.resize(rig.cameras.size());
@@ -117,15 +119,15 @@ void Watcher::look(std::size_t camera, const Frame& frame) {
   const Lens* lens = &rig_.cameras[camera].lens;
   std::vector<tracker::Detection>& detections = watched_.detections[camera];
   watched_.frames[camera] = frame;
-  const cv::Mat grey = to_grey(frame.image);
-  eye.detector.follow(grey, lens, detections, &eye.followed);
-  const bool search =
-      eye.pictures++ % options_.full_scan_every == 0 || eye.followed.size() < detections.size();
+  eye.grey = to_grey(frame.image);
+  eye.detector.follow(eye.grey, lens, detections, &eye.followed);
+  const bool is_one_gone = eye.followed.size() < detections.size();
   std::swap(detections, eye.followed);
-  if (!search) return;
+  if (--eye.until_search > 0 && !is_one_gone) return;
   const bool covered = eye.searches++ % k_covered_every == 0 || !all_are_seen();
-  eye.detector.detect_more(grey, lens, &detections,
+  eye.detector.detect_more(eye.grey, lens, &detections,
                            covered ? tracker::Reading::covered : tracker::Reading::open);
+  eye.until_search = (all_are_seen() ? k_rarer : 1) * options_.full_scan_every;
 }
 
 // Whether some camera sees each of the markers that bodies and controls use.
@@ -193,9 +195,8 @@ void Watcher::read_gestures(std::span<const std::size_t> cameras) {
   for (const std::size_t camera : cameras) {
     Eye& eye = eyes_[camera];
     const Frame& frame = watched_.frames[camera];
-    const cv::Mat grey = eye.gestures.empty() ? cv::Mat() : to_grey(frame.image);
     for (std::size_t i = 0; i < eye.gestures.size(); ++i) {
-      const int steps = eye.gestures[i].read(grey, watched_.detections[camera], frame.captured_at);
+      const int steps = eye.gestures[i].read(eye.grey, watched_.detections[camera], frame.captured_at);
       if (steps == 0) continue;
       const bool is_seen_elsewhere =
           !eye.gestures[i].is_seen() && std::any_of(eyes_.begin(), eyes_.end(), [&](const Eye& other) {

@@ -48,8 +48,9 @@ struct Watched {
 bool is_elsewhere(const Pose& before, const Pose& now);
 
 struct WatchOptions {
-  /// Every how many pictures of a camera all of it is searched; between, markers are followed where they
-  /// were. Higher is faster and finds new markers later.
+  /// Every how many pictures of a camera all of it is searched, a third as often while all markers of the
+  /// scene are seen; between, markers are followed where they were. Higher is faster and finds new markers
+  /// later.
   int full_scan_every = 3;
   tracker::MotionModel motion;
   int most_loose = 8;  ///< markers that carry nothing; more are not looked at
@@ -75,8 +76,9 @@ class Watcher {
   struct Eye {
     tracker::Detector detector;
     std::vector<tracker::GestureReader> gestures;  // one a control
-    int pictures = 0, searches = 0;
+    int until_search = 0, searches = 0;
     std::vector<tracker::Detection> followed;
+    cv::Mat grey;  // the newest picture
   };
   struct Loose {
     MarkerName marker;
