@@ -75,9 +75,8 @@ std::vector<Eigen::Vector3f> all_corners(const scene::Scene& scene, const scene:
   };
   add(scene.prototype->mesh, *posed.world_from_prototype);
   for (const scene::PosedPart& part : posed.parts)
-    for (const scene::Slot& slot : scene.slots)
-      for (const scene::Variant& variant : slot.variants)
-        if (slot.name == part.slot && variant.name == part.variant) add(variant.mesh, part.world_from_part);
+    for (const scene::Variant& variant : scene.find_slot(part.slot)->variants)
+      if (variant.name == part.variant) add(variant.mesh, part.world_from_part);
   Eigen::AlignedBox3f box;
   for (const auto& p : corners) box.extend(p);
   for (auto& p : corners) p = ((p - box.center()).cwiseQuotient(box.sizes()) * 1.9F).eval();
