@@ -1,7 +1,7 @@
 #include "tracker/threshold.h"
 
 #include <algorithm>
-#include <cstring>
+#include <array>
 
 #include "tracker/simd.h"
 
@@ -16,11 +16,42 @@ std::size_t index(int x, int y, int width) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
 }
 
-LIMN_SIMD void lowest(const std::uint8_t* a, std::uint8_t* into, int count) {
-  for (int i = 0; i < count; ++i) into[i] = std::min(into[i], a[i]);
+// Extremes of rows of pixels.
+LIMN_SIMD void join_four_rows(const std::array<const std::uint8_t*, k_tile> rows,
+                              int count,
+                              std::uint8_t* __restrict low,
+                              std::uint8_t* __restrict high) {
+  static_assert(k_tile == 4);
+  const std::uint8_t *a = rows[0], *b = rows[1], *c = rows[2], *d = rows[3];
+  for (int i = 0; i < count; ++i) {
+    low[i] = std::min(std::min(a[i], b[i]), std::min(c[i], d[i]));
+    high[i] = std::max(std::max(a[i], b[i]), std::max(c[i], d[i]));
+  }
 }
-LIMN_SIMD void highest(const std::uint8_t* a, std::uint8_t* into, int count) {
-  for (int i = 0; i < count; ++i) into[i] = std::max(into[i], a[i]);
+
+LIMN_SIMD void join_row(const std::uint8_t* row,
+                        int count,
+                        std::uint8_t* __restrict low,
+                        std::uint8_t* __restrict high) {
+  for (int i = 0; i < count; ++i) {
+    low[i] = std::min(low[i], row[i]);
+    high[i] = std::max(high[i], row[i]);
+  }
+}
+
+LIMN_SIMD void lowest(const std::uint8_t* a,
+                      const std::uint8_t* b,
+                      const std::uint8_t* c,
+                      int count,
+                      std::uint8_t* __restrict into) {
+  for (int i = 0; i < count; ++i) into[i] = std::min(std::min(a[i], b[i]), c[i]);
+}
+LIMN_SIMD void highest(const std::uint8_t* a,
+                       const std::uint8_t* b,
+                       const std::uint8_t* c,
+                       int count,
+                       std::uint8_t* __restrict into) {
+  for (int i = 0; i < count; ++i) into[i] = std::max(std::max(a[i], b[i]), c[i]);
 }
 
 // Smallest of every four values, largest of every four others.
@@ -49,15 +80,19 @@ LIMN_SIMD void corner_row(const std::uint8_t* above,
     codes[x] = static_cast<std::uint8_t>(above[x] | above[x + 1] << 1 | here[x] << 2 | here[x + 1] << 3);
 }
 
-LIMN_SIMD void middle_levels(const std::uint8_t* low,
-                             const std::uint8_t* high,
-                             int count,
-                             const ThresholdOptions options,
-                             std::uint8_t* middle) {
+// The limits between black and white of tiles, each for the pixels of a row.
+LIMN_SIMD void limits_between(const std::uint8_t* low,
+                              const std::uint8_t* high,
+                              int count,
+                              const ThresholdOptions options,
+                              std::uint8_t* __restrict limit) {
+  static_assert(k_tile == 4);
   for (int t = 0; t < count; ++t) {
     const int range = high[t] - low[t];
     const int level = low[t] + ((range * options.share + 255) >> 8);
-    middle[t] = static_cast<std::uint8_t>(range < options.min_contrast ? 0 : level);
+    const std::uint32_t in_all =
+        (range < options.min_contrast ? 0U : static_cast<std::uint32_t>(level)) * 0x01010101U;
+    __builtin_memcpy(limit + k_tile * t, &in_all, k_tile);
   }
 }
 
@@ -94,15 +129,15 @@ void Threshold::apply(const cv::Mat& grey,
 // A tile at the right or lower end also takes the pixels that are too few for one of their own.
 void Threshold::measure_tiles(const cv::Mat& grey, Rows& rows) {
   const auto width = static_cast<std::size_t>(grey.cols);
+  rows.low.resize(width);
+  rows.high.resize(width);
   for (int tile_y = rows.first; tile_y < rows.last; ++tile_y) {
     const int first = tile_y * k_tile;
     const int last = tile_y + 1 == tiles_y_ ? grey.rows : first + k_tile;
-    rows.low.assign(grey.ptr(first), grey.ptr(first) + width);
-    rows.high = rows.low;
-    for (int y = first + 1; y < last; ++y) {
-      lowest(grey.ptr(y), rows.low.data(), grey.cols);
-      highest(grey.ptr(y), rows.high.data(), grey.cols);
-    }
+    const auto row = [&](int i) { return grey.ptr(std::min(first + i, last - 1)); };
+    join_four_rows({row(0), row(1), row(2), row(3)}, grey.cols, rows.low.data(), rows.high.data());
+    for (int y = first + k_tile; y < last; ++y)
+      join_row(grey.ptr(y), grey.cols, rows.low.data(), rows.high.data());
     std::uint8_t* dark = &darkest_[index(0, tile_y, tiles_x_)];
     std::uint8_t* bright = &brightest_[index(0, tile_y, tiles_x_)];
     const int full = grey.cols >= k_tile ? tiles_x_ : 0;
@@ -118,47 +153,44 @@ void Threshold::measure_tiles(const cv::Mat& grey, Rows& rows) {
   }
 }
 
-// Each tile's extremes over itself and its left and right neighbours; set_limits() joins three such rows.
+// Each tile's extremes over itself and its left and right neighbours; join_wide_rows() joins three such rows.
 void Threshold::widen_tiles(int first, int last) {
   for (int y = first; y < last; ++y) {
     const std::size_t row = index(0, y, tiles_x_);
-    const auto tiles = static_cast<std::size_t>(tiles_x_);
-    std::copy_n(&darkest_[row], tiles, &wide_darkest_[row]);
-    std::copy_n(&brightest_[row], tiles, &wide_brightest_[row]);
-    lowest(&darkest_[row], wide_darkest_.data() + row + 1, tiles_x_ - 1);
-    lowest(darkest_.data() + row + 1, &wide_darkest_[row], tiles_x_ - 1);
-    highest(&brightest_[row], wide_brightest_.data() + row + 1, tiles_x_ - 1);
-    highest(brightest_.data() + row + 1, &wide_brightest_[row], tiles_x_ - 1);
+    const auto widen = [&](const std::uint8_t* tiles, std::uint8_t* wide, const auto& join) {
+      const int end = tiles_x_ - 1;
+      join(tiles, tiles, tiles + std::min(1, end), 1, wide);
+      join(tiles, tiles + 1, tiles + 2, end - 1, wide + 1);
+      join(tiles + std::max(0, end - 1), tiles + end, tiles + end, 1, wide + end);
+    };
+    widen(&darkest_[row], &wide_darkest_[row], lowest);
+    widen(&brightest_[row], &wide_brightest_[row], highest);
   }
 }
 
-// Each tile's extremes over the rows above and below too, as new tiles.
+// What the rows of tiles above, here and below have in them.
+void Threshold::join_wide_rows(int tile_y, std::uint8_t* low, std::uint8_t* high) const {
+  const std::size_t above = index(0, std::max(0, tile_y - 1), tiles_x_), here = index(0, tile_y, tiles_x_);
+  const std::size_t below = index(0, std::min(tiles_y_ - 1, tile_y + 1), tiles_x_);
+  lowest(&wide_darkest_[above], &wide_darkest_[here], &wide_darkest_[below], tiles_x_, low);
+  highest(&wide_brightest_[above], &wide_brightest_[here], &wide_brightest_[below], tiles_x_, high);
+}
+
+// The same as new tiles.
 void Threshold::join_rows() {
-  darkest_ = wide_darkest_;
-  brightest_ = wide_brightest_;
-  for (int y = 0; y < tiles_y_; ++y)
-    for (const int neighbour : {y - 1, y + 1}) {
-      if (neighbour < 0 || neighbour >= tiles_y_) continue;
-      lowest(&wide_darkest_[index(0, neighbour, tiles_x_)], &darkest_[index(0, y, tiles_x_)], tiles_x_);
-      highest(&wide_brightest_[index(0, neighbour, tiles_x_)], &brightest_[index(0, y, tiles_x_)], tiles_x_);
-    }
+  for (int y = 0; y < tiles_y_; ++y) {
+    const std::size_t row = index(0, y, tiles_x_);
+    join_wide_rows(y, &darkest_[row], &brightest_[row]);
+  }
 }
 
 // The limits of the pixels in a row of tiles.
 void Threshold::set_limits(int tile_y, const ThresholdOptions& options, Rows& rows) const {
   const auto tiles = static_cast<std::size_t>(tiles_x_);
-  const std::size_t row = index(0, tile_y, tiles_x_);
-  rows.low.assign(&wide_darkest_[row], &wide_darkest_[row] + tiles);
-  rows.high.assign(&wide_brightest_[row], &wide_brightest_[row] + tiles);
-  for (const int neighbour : {tile_y - 1, tile_y + 1}) {
-    if (neighbour < 0 || neighbour >= tiles_y_) continue;
-    lowest(&wide_darkest_[index(0, neighbour, tiles_x_)], rows.low.data(), tiles_x_);
-    highest(&wide_brightest_[index(0, neighbour, tiles_x_)], rows.high.data(), tiles_x_);
-  }
-  middle_levels(rows.low.data(), rows.high.data(), tiles_x_, options, rows.middle.data());
-  for (std::size_t t = 0; t < tiles; ++t) std::memset(&rows.limit[t * k_tile], rows.middle[t], k_tile);
-  for (std::size_t x = tiles * k_tile; x < rows.limit.size(); ++x)
-    rows.limit[x] = rows.limit[tiles * k_tile - 1];
+  join_wide_rows(tile_y, rows.low.data(), rows.high.data());
+  limits_between(rows.low.data(), rows.high.data(), tiles_x_, options, rows.limit.data());
+  std::fill(rows.limit.begin() + static_cast<std::ptrdiff_t>(tiles * k_tile), rows.limit.end(),
+            rows.limit[tiles * k_tile - 1]);
 }
 
 void Threshold::compare(const cv::Mat& grey,
@@ -170,7 +202,8 @@ void Threshold::compare(const cv::Mat& grey,
   rows.above.assign(width + 2, 0);
   rows.here.assign(width + 2, 0);
   rows.limit.resize(std::max(width, tiles * k_tile));
-  rows.middle.resize(tiles);
+  rows.low.resize(tiles);
+  rows.high.resize(tiles);
   const auto write = [&](int y) {
     corner_row(rows.above.data(), rows.here.data(), grey.cols + 1, corners.at(0, y));
   };

@@ -46,7 +46,7 @@ class Threshold {
   // What a thread writes on the way through its rows of tiles.
   struct Rows {
     int first = 0, last = 0;
-    std::vector<std::uint8_t> low, high, middle, limit;
+    std::vector<std::uint8_t> low, high, limit;
     std::vector<std::uint8_t> above, here;  // black pixels of two rows, from column -1
   };
   int tiles_x_ = 0;
@@ -57,6 +57,7 @@ class Threshold {
 
   void measure_tiles(const cv::Mat& grey, Rows& rows);
   void widen_tiles(int first, int last);
+  void join_wide_rows(int tile_y, std::uint8_t* low, std::uint8_t* high) const;
   void join_rows();
   void set_limits(int tile_y, const ThresholdOptions& options, Rows& rows) const;
   void compare(const cv::Mat& grey, const ThresholdOptions& options, Rows& rows, CornerCodes& corners) const;
