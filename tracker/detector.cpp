@@ -274,8 +274,7 @@ void Detector::join_segments(const cv::Mat& grey, const std::vector<Detection>& 
       return std::any_of(squares_.begin(), squares_.end(),
                          [&](const FoundSquare& square) { return square.holds(segment); });
     });
-    segment_quad_finder_.find(*segments, grey.cols, grey.rows, segment_quads_, crew);
-    if (segment_quads_.size() > k_max_candidates) segment_quads_.resize(k_max_candidates);
+    segment_quad_finder_.find(*segments, grey.cols, grey.rows, k_max_candidates, segment_quads_, crew);
     for (const SegmentQuad& candidate : segment_quads_) {
       if (std::any_of(squares_.begin(), squares_.end(),
                       [&](const FoundSquare& square) { return square.takes(candidate.quad); }))

@@ -141,8 +141,12 @@ bool same(const Quad& a, const Quad& b) {
 
 }  // namespace
 
-void SegmentQuadFinder::find(
-    std::span<const Segment> segments, int width, int height, std::vector<SegmentQuad>& quads, Crew& crew) {
+void SegmentQuadFinder::find(std::span<const Segment> segments,
+                             int width,
+                             int height,
+                             std::size_t most,
+                             std::vector<SegmentQuad>& quads,
+                             Crew& crew) {
   quads.clear();
   columns_ = static_cast<int>(width / k_cell_px) + 1;
   rows_ = static_cast<int>(height / k_cell_px) + 1;
@@ -157,12 +161,20 @@ void SegmentQuadFinder::find(
   for_each_part(crew, [&](Part& part) { find_corners(part); });
   for_each_part(crew, [&](Part& part) { find_quads(part); });
   for (const Part& part : parts_) quads.insert(quads.end(), part.quads.begin(), part.quads.end());
-  const auto key = [](const SegmentQuad& q) {
-    const auto& c = q.quad.corners_px;
-    return std::tuple(-q.visible, c[0].x(), c[0].y(), c[2].x(), c[2].y());
+  const auto is_before = [](const SegmentQuad& a, const SegmentQuad& b) {
+    if (a.visible != b.visible) return a.visible > b.visible;
+    const auto corners = [](const SegmentQuad& q) {
+      const auto& c = q.quad.corners_px;
+      return std::tuple(c[0].x(), c[0].y(), c[2].x(), c[2].y());
+    };
+    return corners(a) < corners(b);
   };
-  std::sort(quads.begin(), quads.end(),
-            [&](const SegmentQuad& a, const SegmentQuad& b) { return key(a) < key(b); });
+  if (quads.size() > most) {
+    std::nth_element(quads.begin(), quads.begin() + static_cast<std::ptrdiff_t>(most), quads.end(),
+                     is_before);
+    quads.resize(most);
+  }
+  std::sort(quads.begin(), quads.end(), is_before);
 }
 
 int SegmentQuadFinder::cell_of(const Eigen::Vector2d& px) const {

@@ -22,9 +22,13 @@ struct SegmentQuad {
 /// segments likewise). Holds its buffers between calls.
 class SegmentQuadFinder {
  public:
-  /// Best visible first; each once. The result is the same with any crew.
-  void find(
-      std::span<const Segment> segments, int width, int height, std::vector<SegmentQuad>& quads, Crew& crew);
+  /// Best visible first, `most` at most; each once. The result is the same with any crew.
+  void find(std::span<const Segment> segments,
+            int width,
+            int height,
+            std::size_t most,
+            std::vector<SegmentQuad>& quads,
+            Crew& crew);
 
  private:
   struct Corner {
