@@ -108,6 +108,13 @@ constexpr std::size_t k_behind_ihdr = 8 + 25;  // signature, then length + "IHDR
 
 Result<cv::Mat> read_picture(const fs::path& path) { return read(path, cv::IMREAD_ANYCOLOR); }
 
+Result<cv::Mat> read_picture_with_alpha(const fs::path& path) {
+  cv::Mat picture;
+  LIMN_TRY(picture, read(path, cv::IMREAD_UNCHANGED));
+  if (picture.depth() == CV_16U) picture.convertTo(picture, CV_8U, 1.0 / 257);
+  return picture;
+}
+
 Result<cv::Mat> read_grey_picture(const fs::path& path) { return read(path, cv::IMREAD_GRAYSCALE); }
 
 cv::Mat to_grey(const cv::Mat& picture) {

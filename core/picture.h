@@ -14,6 +14,8 @@ inline constexpr int k_max_picture_side = 32767;
 /// Reads a PNG or JPEG as 8-bit grey or BGR, as stored (alpha is dropped, 16 bits become 8). A truncated or
 /// damaged file is an error, never a half picture; so is one larger than k_max_picture_side.
 Result<cv::Mat> read_picture(const std::filesystem::path& path);
+/// As read_picture, but BGRA where the file has alpha.
+Result<cv::Mat> read_picture_with_alpha(const std::filesystem::path& path);
 /// As read_picture, converted to one 8-bit grey channel.
 Result<cv::Mat> read_grey_picture(const std::filesystem::path& path);
 /// One channel of an 8-bit grey, BGR or BGRA picture; the same data when it is grey already.

@@ -13,11 +13,12 @@
 namespace limn::projector {
 namespace {
 
-constexpr int k_cluster = 128;  // triangles
+constexpr int k_cluster = 128;      // triangles
+constexpr GLuint k_looks_unit = 1;  // as in shaders/scene.glsl
 
 struct GpuMaterial {
   Eigen::Vector4f colour;  // a: 1 when unlit
-  Eigen::Vector4f look;    // texture layer (-1 when it has none), metallic, roughness
+  Eigen::Vector4f look;    // texture layer (-1 when it has none), metallic, roughness, what cuts out
 };
 
 template <class T>
@@ -142,14 +143,19 @@ TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) 
   for (const scene::Material& material : mesh.materials) {
     GpuMaterial gpu{material.base_colour.homogeneous(), Eigen::Vector4f::Constant(-1)};
     gpu.colour.w() = material.unlit ? 1 : 0;
-    gpu.look.segment<2>(1) << material.metallic, material.roughness;
+    gpu.look.tail<3>() << material.metallic, material.roughness, 0;
     if (!material.texture.empty() && !mesh.uvs.empty()) {
       gpu.look.x() = static_cast<float>(staging->looks.size());
+      if (material.texture.channels() == 4) gpu.look.w() = material.cut_below;
       staging->looks.push_back(&material);
     }
     staging->materials.push_back(gpu);
   }
   TriangleRun run;
+  run.has_cut_outs = std::any_of(staging->materials.begin() + static_cast<std::ptrdiff_t>(first_material),
+                                 staging->materials.end(),
+                                 [](const GpuMaterial& material) { return material.look.w() > 0; });
+  has_cut_outs_ |= run.has_cut_outs;
   run.first = static_cast<int>(staging->corners.size() / 3);
   run.count = static_cast<int>(mesh.triangles.size());
   Eigen::AlignedBox3d bounds;
@@ -194,8 +200,8 @@ void GpuScene::upload_looks(const std::vector<const scene::Material*>& looks) {
   for (std::size_t i = 0; i < looks.size(); ++i) {
     cv::Mat layer;
     cv::resize(fitting_texture(looks[i]->texture, looks[i]->texture_file), layer, cv::Size(width, height));
-    glTextureSubImage3D(*looks_, 0, 0, 0, static_cast<GLint>(i), width, height, 1, GL_BGR, GL_UNSIGNED_BYTE,
-                        layer.data);
+    glTextureSubImage3D(*looks_, 0, 0, 0, static_cast<GLint>(i), width, height, 1,
+                        layer.channels() == 4 ? GL_BGRA : GL_BGR, GL_UNSIGNED_BYTE, layer.data);
   }
   if (!looks.empty()) glGenerateTextureMipmap(*looks_);
 }
@@ -237,6 +243,7 @@ void GpuScene::place(const std::vector<PlacedRun>& runs) {
 void GpuScene::bind() const {
   const GlName* buffers[] = {&corners_, &normals_, &triangles_, &materials_, &placements_};
   for (GLuint i = 0; i < std::size(buffers); ++i) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, **buffers[i]);
+  glBindTextureUnit(k_looks_unit, *looks_);
 }
 
 std::array<Eigen::Vector3d, 8> bounds_of(const PlacedRun& placed, double margin_m) {

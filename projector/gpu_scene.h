@@ -24,6 +24,7 @@ struct TriangleRun {
   };
   int first = 0;
   int count = 0;
+  bool has_cut_outs = false;  ///< a material of it has pieces cut out
   Eigen::Vector3d p_lower = Eigen::Vector3d::Zero();
   Eigen::Vector3d p_upper = Eigen::Vector3d::Zero();
   std::vector<Cluster> clusters = {};  ///< all of the run, in its order
@@ -52,10 +53,10 @@ class GpuScene {
   static Pose scene_from_world(const scene::PosedScene& posed);
   /// Sends the places to the GPU.
   void place(const std::vector<PlacedRun>& runs);
-  /// Binds the buffers for a drawing.
+  /// Binds the buffers and the textures (unit 1) for a drawing.
   void bind() const;
 
-  const GlName& looks() const { return looks_; }
+  bool has_cut_outs() const { return has_cut_outs_; }
   GLuint vertex_array() const { return *vertex_array_; }
   int owner_count() const { return static_cast<int>(slots_.size()) + 1; }
 
@@ -78,6 +79,7 @@ class GpuScene {
 
   std::optional<TriangleRun> prototype_;
   std::vector<SlotRuns> slots_;
+  bool has_cut_outs_ = false;
   std::vector<GpuOwner> owners_shown_;
   GlName corners_, normals_, triangles_, materials_, placements_, looks_, vertex_array_;
 };

@@ -18,10 +18,10 @@ namespace limn::projector {
 namespace {
 
 constexpr int k_response_columns = 1025;
-// Texture units; the sights take four from k_sights_unit on.
-constexpr int k_tangents_unit = 0, k_looks_unit = 1, k_response_unit = 2, k_centre_unit = 3,
-              k_picture_unit = 4, k_sights_unit = 5, k_mixing_unit = 9, k_albedo_unit = 10,
-              k_arriving_unit = 11, k_distances_unit = 12;
+// Texture units; the scene takes unit 1, the sights four from k_sights_unit on.
+constexpr int k_tangents_unit = 0, k_response_unit = 2, k_centre_unit = 3, k_picture_unit = 4,
+              k_sights_unit = 5, k_mixing_unit = 9, k_albedo_unit = 10, k_arriving_unit = 11,
+              k_distances_unit = 12;
 constexpr int k_arriving_side = 256;  // texels of a projector's map of arriving light
 constexpr GLuint k_list_binding = 6;  // of buffers, after the scene's and the sights'
 constexpr GLuint k_known_hits_image = 1, k_known_shares_image = 2;  // shaders/known.glsl
@@ -420,7 +420,7 @@ void Renderer::Impl::set_up(const Program& program, const GpuLens& lens, const I
   program.set("u_tangents",
               Eigen::Vector4f(static_cast<float>(lens.baked.step), static_cast<float>(tangents.cols),
                               static_cast<float>(tangents.rows), 0));
-  program.bind("s_looks", k_looks_unit, scene.looks());
+  program.set("u_has_cut_outs", scene.has_cut_outs());
   program.bind("s_arriving", k_arriving_unit, arriving);
   program.set("u_placement_count", scene.owner_count());
   const auto shown = [&](bool on_surface) {

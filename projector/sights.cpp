@@ -141,6 +141,7 @@ Result<Sights> Sights::create(const Rig& rig) {
   Sights sights;
   const std::vector<Imager>& projectors = rig.projectors;
   LIMN_TRY(sights.program_, Program::link("ids.vert", "ids.frag"));
+  LIMN_TRY(sights.cut_program_, Program::link("ids_cut.vert", "ids_cut.frag"));
   sights.projectors_ = projectors;
   sights.responses_ = rig.responses;
   sights.focuses_ = rig.focuses;
@@ -199,30 +200,34 @@ void Sights::draw(const GpuScene& scene,
   glDisable(GL_CULL_FACE);
   glDisable(GL_BLEND);
   glBindVertexArray(scene.vertex_array());
-  program_.use();
+  scene.bind();
   const TangentRect rect = covered(twin);
-  const auto draw_triangles = [&](int first, int count) {
+  const auto draw_triangles = [](const Program& program, int first, int count) {
     if (count == 0) return;
-    program_.set_id("u_first_id", static_cast<unsigned>(first) + 1);
+    program.set_id("u_first_id", static_cast<unsigned>(first) + 1);
     glDrawArrays(GL_TRIANGLES, 3 * first, 3 * count);
   };
   for (const PlacedRun& placed : runs) {
     if (!wanted(placed)) continue;
     const Pose twin_from_owner = twin.twin_from_scene * placed.scene_from_owner;
     const Eigen::Matrix4d clip_from_owner = clip_from_twin(twin) * twin_from_owner.matrix();
-    program_.set("u_clip_from_owner", Eigen::Matrix4f(clip_from_owner.cast<float>()));
+    const Program& program = placed.run->has_cut_outs ? cut_program_ : program_;
+    program.use();
+    program.set("u_has_cut_outs", placed.run->has_cut_outs);
+    program.set("u_focal", static_cast<float>(twin.focal));
+    program.set("u_clip_from_owner", Eigen::Matrix4f(clip_from_owner.cast<float>()));
     // Those in sight that stand together, at once.
     int first = placed.run->first, count = 0;
     for (const TriangleRun::Cluster& cluster : placed.run->clusters) {
       if (intersected(rect, spanned(twin_from_owner, corners_of(cluster.box))).is_empty()) continue;
       if (cluster.first != first + count) {
-        draw_triangles(first, count);
+        draw_triangles(program, first, count);
         first = cluster.first;
         count = 0;
       }
       count += cluster.count;
     }
-    draw_triangles(first, count);
+    draw_triangles(program, first, count);
   }
   glDisable(GL_DEPTH_TEST);
 }

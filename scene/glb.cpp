@@ -96,6 +96,10 @@ struct Document {
       surface["baseColorTexture"] = {{"index", images.size() - 1}};
     }
     ordered_json json = {{"pbrMetallicRoughness", surface}};
+    if (has_textures && material.cut_below > 0) {
+      json["alphaMode"] = "MASK";
+      json["alphaCutoff"] = material.cut_below;
+    }
     if (material.unlit) json["extensions"] = {{"KHR_materials_unlit", ordered_json::object()}};
     is_unlit |= material.unlit;
     materials.push_back(json);

@@ -16,6 +16,7 @@
 #include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 
 #include "core/picture.h"
@@ -58,24 +59,26 @@ Eigen::Matrix4f to_eigen(const aiMatrix4x4& m) {
 
 Eigen::Vector3f to_eigen(const aiVector3D& v) { return {v.x, v.y, v.z}; }
 
-Result<cv::Mat> embedded_texture(const aiTexture& texture, const fs::path& path) {
+Result<cv::Mat> embedded_texture(const aiTexture& texture, const fs::path& path, bool with_alpha) {
   if (texture.mHeight > 0) {
     static_assert(sizeof(aiTexel) == 4);  // b, g, r, a
     const cv::Mat bgra(static_cast<int>(texture.mHeight), static_cast<int>(texture.mWidth), CV_8UC4,
                        texture.pcData);
+    if (with_alpha) return bgra.clone();
     cv::Mat bgr(bgra.size(), CV_8UC3);
     const int from_to[] = {0, 0, 1, 1, 2, 2};
     cv::mixChannels(&bgra, 1, &bgr, 1, from_to, 3);
     return bgr;
   }
   const cv::Mat bytes(1, static_cast<int>(texture.mWidth), CV_8U, texture.pcData);
-  cv::Mat picture = cv::imdecode(bytes, cv::IMREAD_COLOR);
+  cv::Mat picture = cv::imdecode(bytes, with_alpha ? cv::IMREAD_UNCHANGED : cv::IMREAD_COLOR);
   if (picture.empty()) {
     return error(
         "{}: expected a PNG or JPEG as its embedded texture, found {} bytes that are neither. "
         "Export the mesh again.",
         path.string(), texture.mWidth);
   }
+  if (picture.depth() == CV_16U) picture.convertTo(picture, CV_8U, 1.0 / 257);
   return picture;
 }
 
@@ -89,12 +92,45 @@ fs::path texture_path(const std::string& name, const fs::path& mesh_path) {
   return fs::exists(inside) ? inside : folder / fs::path(slashes).filename();
 }
 
-Result<cv::Mat> texture_beside(const fs::path& path, const fs::path& mesh_path) {
-  auto picture = read_picture(path);
+Result<cv::Mat> texture_beside(const fs::path& path, const fs::path& mesh_path, bool with_alpha) {
+  auto picture = with_alpha ? read_picture_with_alpha(path) : read_picture(path);
   if (!picture) return error("{}: its texture cannot be read: {}", mesh_path.string(), picture.message());
-  cv::Mat bgr = std::move(picture).value();
-  if (bgr.channels() == 1) cv::merge(std::vector<cv::Mat>{bgr, bgr, bgr}, bgr);
-  return bgr;
+  return picture;
+}
+
+// The alpha under which a glTF material has nothing; 0: it has no such places. What is half transparent
+// (alphaMode BLEND) is whole from a half on: light cannot be seen through.
+float cut_below(const aiMaterial& source) {
+  aiString mode;
+  if (source.Get(AI_MATKEY_GLTF_ALPHAMODE, mode) != AI_SUCCESS || mode == aiString("OPAQUE")) return 0;
+  float cutoff = 0.5F;
+  if (mode == aiString("MASK")) source.Get(AI_MATKEY_GLTF_ALPHACUTOFF, cutoff);
+  return cutoff;
+}
+
+// What is cut out takes the colour of what is next to it, which filtering mixes with it.
+void spread_into_holes(float below, cv::Mat* bgra) {
+  cv::Mat alpha, labels, distances;
+  cv::extractChannel(*bgra, alpha, 3);
+  const cv::Mat is_hole = alpha < 255 * below;
+  const int holes = cv::countNonZero(is_hole);
+  if (holes == 0 || holes == is_hole.rows * is_hole.cols) return;
+  cv::distanceTransform(is_hole, distances, labels, cv::DIST_L2, cv::DIST_MASK_5, cv::DIST_LABEL_PIXEL);
+  std::vector<cv::Vec4b> colours(static_cast<std::size_t>(bgra->total()) + 1);
+  const auto label = [&](int row, int column) {
+    return static_cast<std::size_t>(labels.at<int>(row, column));
+  };
+  for (const bool holes_now : {false, true})
+    for (int row = 0; row < bgra->rows; ++row)
+      for (int column = 0; column < bgra->cols; ++column) {
+        if ((is_hole.at<std::uint8_t>(row, column) != 0) != holes_now) continue;
+        cv::Vec4b& texel = bgra->at<cv::Vec4b>(row, column);
+        cv::Vec4b& nearest = colours[label(row, column)];
+        if (!holes_now)
+          nearest = texel;
+        else
+          texel = {nearest[0], nearest[1], nearest[2], texel[3]};
+      }
 }
 
 Result<Material> read_material(const aiMaterial& source, const aiScene& scene, const fs::path& path) {
@@ -114,7 +150,15 @@ Result<Material> read_material(const aiMaterial& source, const aiScene& scene, c
     if (source.GetTexture(type, 0, &name) != AI_SUCCESS || name.length == 0) continue;
     const aiTexture* embedded = scene.GetEmbeddedTexture(name.C_Str());
     const fs::path file = embedded ? path : texture_path(name.C_Str(), path);
-    LIMN_TRY(material.texture, embedded ? embedded_texture(*embedded, path) : texture_beside(file, path));
+    const float below = cut_below(source);
+    LIMN_TRY(material.texture,
+             embedded ? embedded_texture(*embedded, path, below > 0) : texture_beside(file, path, below > 0));
+    if (material.texture.channels() == 1)
+      cv::cvtColor(material.texture, material.texture, cv::COLOR_GRAY2BGR);
+    if (material.texture.channels() == 4) {
+      material.cut_below = below;
+      spread_into_holes(below, &material.texture);
+    }
     material.texture_file = file.string();
     break;
   }

@@ -12,14 +12,15 @@
 
 namespace limn::scene {
 
-/// Surface of one piece of a mesh. Colours are linear light; the texture is sRGB, 8-bit BGR, and multiplies
-/// base_colour. v of uv counts up from the picture's bottom row, as in OBJ.
+/// Surface of one piece of a mesh. Colours are linear light; the texture is sRGB, 8-bit BGR, or BGRA where
+/// pieces are cut out, and multiplies base_colour. v of uv counts up from the picture's bottom row, as in OBJ.
 struct Material {
   Eigen::Vector3f base_colour = {0.8f, 0.8f, 0.8f};
   bool unlit = false;                 ///< KHR_materials_unlit: shown as its base colour
   float metallic = 0, roughness = 1;  ///< glTF's; not metallic and of roughness 1 is diffuse alone
   cv::Mat texture;                    ///< empty: none
   std::string texture_file = {};      ///< that it came from, for messages
+  float cut_below = 0;                ///< where the texture's alpha (0 to 1) is less there is nothing
 };
 
 /// Triangles in metres; coordinates as stored in the file (node transforms applied, no axis swapped).

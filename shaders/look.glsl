@@ -1,7 +1,5 @@
 // What a part's surface looks like: linear light.
 
-uniform sampler2DArray s_looks;  // all textures, one a layer, sRGB decoded on reading
-
 // Shading where a material is not unlit: a hemisphere of soft light around an up direction, and lamps far away. Scene
 // frame; light is that of a white surface that faces it.
 const int k_most_lamps = 4;
@@ -48,19 +46,6 @@ vec3 lit(vec3 base, vec2 metallic_roughness, vec3 n, vec3 d_eye) {
   for (int i = 0; i < u_lamp_count; ++i)
     colour += u_lamps[i].rgb * mirrored_lamp(head_on, roughness, n, d_eye, u_d_lamps[i].xyz);
   return colour;
-}
-
-float texture_lod(Hit hit, float footprint) {
-  uint first = 3u * (hit.id - 1u);
-  vec3 ab = s_corners[first + 1u].xyz - s_corners[first].xyz;
-  vec3 ac = s_corners[first + 2u].xyz - s_corners[first].xyz;
-  vec2 uv = vec2(s_corners[first].w, s_normals[first].w);
-  vec2 uv_ab = vec2(s_corners[first + 1u].w, s_normals[first + 1u].w) - uv;
-  vec2 uv_ac = vec2(s_corners[first + 2u].w, s_normals[first + 2u].w) - uv;
-  vec2 texels = vec2(textureSize(s_looks, 0).xy);
-  float texel_area = abs(uv_ab.x * uv_ac.y - uv_ab.y * uv_ac.x) * texels.x * texels.y;
-  float area = length(cross(ab, ac));
-  return area > 0.0 ? max(0.0, log2(footprint * sqrt(texel_area / area))) : 0.0;
 }
 
 // Own colour at a hit; `footprint` is the side (m) of the pixel's patch on the surface.

@@ -21,7 +21,7 @@ Hit surface_part_at(usampler2DArray s_ids, Sight sight, vec3 p, vec3 d_normal) {
   const float k_heights[5] = float[](0.0, 0.5, -0.5, 1.0, -1.0);
   Hit best = k_no_hit, missed = k_no_hit;
   float missed_by = 0.5;  // of a triangle's height
-  bool in_middle = false;
+  bool in_middle = false, is_through = false;  // what is cut out
   uvec4 tried = uvec4(0);
   for (int i = 0; i < 5 && best.id == 0u; ++i) {
     vec4 share;
@@ -36,6 +36,10 @@ Hit surface_part_at(usampler2DArray s_ids, Sight sight, vec3 p, vec3 d_normal) {
       Hit hit;
       if (!plane_hit(left.x, p, d_normal, hit) || abs(hit.t) > k_on_surface) continue;
       float outside = -min(hit.weights.x, min(hit.weights.y, hit.weights.z));
+      if (outside <= hit.slack && is_cut_out(hit, distance(p, sight.p_eye.xyz) / sight.focal_centre.x)) {
+        is_through = true;
+        continue;
+      }
       if (outside <= hit.slack) {
         if (abs(hit.t) < abs(best.t)) best = hit;
       } else if (outside < missed_by) {
@@ -44,6 +48,6 @@ Hit surface_part_at(usampler2DArray s_ids, Sight sight, vec3 p, vec3 d_normal) {
       }
     }
   }
-  if (best.id == 0u && in_middle) best = missed;
+  if (best.id == 0u && in_middle && !is_through) best = missed;
   return best;
 }

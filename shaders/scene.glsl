@@ -13,9 +13,11 @@ layout(std430, binding = 2) readonly buffer Triangles { Triangle s_triangles[]; 
 
 struct Material {
   vec4 colour;  // linear light; a: 1 when unlit
-  vec4 look;    // texture layer (-1 when it has none), metallic, roughness
+  vec4 look;    // texture layer (-1 when it has none), metallic, roughness, alpha below which there is nothing
 };
 layout(std430, binding = 3) readonly buffer Materials { Material s_materials[]; };
+layout(binding = 1) uniform sampler2DArray s_looks;  // all textures, one a layer, sRGB decoded on reading
+uniform bool u_has_cut_outs;  // whether any alpha of s_looks means anything
 
 struct Owner {
   mat4 owner_from_scene;
@@ -135,6 +137,36 @@ uvec4 each_once(uvec4 ids) {
   return ids;
 }
 
+// Texture coordinates, v up.
+vec2 uv_of(Hit hit) {
+  uint first = 3u * (hit.id - 1u);
+  return mat3x2(vec2(s_corners[first].w, s_normals[first].w),
+                vec2(s_corners[first + 1u].w, s_normals[first + 1u].w),
+                vec2(s_corners[first + 2u].w, s_normals[first + 2u].w)) * hit.weights;
+}
+
+float texture_lod(Hit hit, float footprint) {
+  uint first = 3u * (hit.id - 1u);
+  vec3 ab = s_corners[first + 1u].xyz - s_corners[first].xyz;
+  vec3 ac = s_corners[first + 2u].xyz - s_corners[first].xyz;
+  vec2 uv = vec2(s_corners[first].w, s_normals[first].w);
+  vec2 uv_ab = vec2(s_corners[first + 1u].w, s_normals[first + 1u].w) - uv;
+  vec2 uv_ac = vec2(s_corners[first + 2u].w, s_normals[first + 2u].w) - uv;
+  vec2 texels = vec2(textureSize(s_looks, 0).xy);
+  float texel_area = abs(uv_ab.x * uv_ac.y - uv_ab.y * uv_ac.x) * texels.x * texels.y;
+  float area = length(cross(ab, ac));
+  return area > 0.0 ? max(0.0, log2(footprint * sqrt(texel_area / area))) : 0.0;
+}
+
+// Whether the material of what is hit has nothing there; `footprint` is the side (m) of a pixel's patch on the surface.
+bool is_cut_out(Hit hit, float footprint) {
+  if (!u_has_cut_outs) return false;
+  vec4 look = s_materials[s_triangles[hit.id - 1u].material].look;
+  if (look.w <= 0.0) return false;
+  vec2 uv = uv_of(hit);
+  return textureLod(s_looks, vec3(uv.x, 1.0 - uv.y, look.x), texture_lod(hit, footprint)).a < look.w;
+}
+
 // Where the ray meets a triangle that it just misses: its plane, or its nearest point where the plane is too steep
 // to be trusted beyond its triangle.
 Hit beside_hit(uint id, vec3 p_origin, vec3 d, Sight sight) {
@@ -152,18 +184,24 @@ Hit beside_hit(uint id, vec3 p_origin, vec3 d, Sight sight) {
 }
 
 // First surface that the ray from the sight's eye meets: exactly, by intersecting the triangles that the texels
-// around it saw. Triangles thinner than texels can all be missed: then the texels decide, by bilinear coverage.
+// around it saw. Triangles thinner than texels can all be missed: then the texels decide, by bilinear coverage. Parts
+// may have pieces cut out, the prototype has none.
 Hit first_hit(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
   vec4 share;
   uvec4 ids = ids_around(s_ids, sight, layer, d, share);
   Hit best = k_no_hit;
   if (ids == uvec4(0)) return best;
+  bool is_through = false;  // what is cut out
   for (uvec4 left = each_once(ids); left.x != 0u; left = uvec4(left.yzw, 0u)) {
     Hit hit;
     bool is_met = layer == 0 ? prototype_plane_hit(left.x, sight.p_eye.xyz, d, hit) : plane_hit(left.x, sight.p_eye.xyz, d, hit);
-    if (is_met && is_inside(hit) && hit.t > 0.0 && hit.t < best.t) best = hit;
+    if (!is_met || !is_inside(hit) || hit.t <= 0.0 || hit.t >= best.t) continue;
+    if (layer == 1 && is_cut_out(hit, hit.t / sight.focal_centre.x))
+      is_through = true;
+    else
+      best = hit;
   }
-  if (best.id != 0u) return best;
+  if (best.id != 0u || is_through) return best;
   float cover = dot(share, vec4(notEqual(ids, uvec4(0))));
   if (cover < 0.5) return best;
   uint id = ids.x != 0u ? ids.x : ids.y != 0u ? ids.y : ids.z != 0u ? ids.z : ids.w;
@@ -234,12 +272,4 @@ vec3 facing_normal(Hit hit, vec3 d) {
   if (dot(n, flat_one) < 0.0) n = -n;
   float away = dot(n, d);
   return away > 0.0 ? normalize(n - away * d) : n;
-}
-
-// Texture coordinates, v up.
-vec2 uv_of(Hit hit) {
-  uint first = 3u * (hit.id - 1u);
-  return mat3x2(vec2(s_corners[first].w, s_normals[first].w),
-                vec2(s_corners[first + 1u].w, s_normals[first + 1u].w),
-                vec2(s_corners[first + 2u].w, s_normals[first + 2u].w)) * hit.weights;
 }

@@ -2,16 +2,19 @@
 
 #include <embree3/rtcore.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 
 #include "core/result.h"
+#include "sim/texture.h"
 
 namespace limn::sim {
 namespace {
 
-constexpr double k_surface_gap = 1e-4;  // m; below it a shadow ray's own surface is not an occluder
+constexpr float k_behind_cut_out = 1e-6F;  // m, at 1 m: where a ray goes on
+constexpr double k_surface_gap = 1e-4;     // m; below it a shadow ray's own surface is not an occluder
 
 RTCRay ray_between(const Eigen::Vector3f& from, const Eigen::Vector3f& d, float near, float far) {
   RTCRay ray{};
@@ -112,14 +115,23 @@ RayScene::RayScene(RayScene&&) noexcept = default;
 RayScene& RayScene::operator=(RayScene&&) noexcept = default;
 
 Hit RayScene::first_hit(const Ray& ray) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  RTCRayHit query{};
-  query.ray =
-      ray_between(ray.p_origin.cast<float>(), ray.d.cast<float>(), 0, std::numeric_limits<float>::infinity());
-  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(impl_->scene, &context, &query);
-  return impl_->completed(query, ray.p_origin, ray.d);
+  constexpr int k_most_cut_out = 64;  // layers that a ray goes through
+  float from = 0;
+  for (int layer = 0; layer < k_most_cut_out; ++layer) {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRayHit query{};
+    query.ray = ray_between(ray.p_origin.cast<float>(), ray.d.cast<float>(), from,
+                            std::numeric_limits<float>::infinity());
+    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(impl_->scene, &context, &query);
+    const Hit hit = impl_->completed(query, ray.p_origin, ray.d);
+    if (hit.object < 0) return hit;
+    const scene::Mesh& mesh = *impl_->placed[static_cast<std::size_t>(hit.object)].mesh;
+    if (!is_cut_out(mesh, hit.triangle, uv(hit))) return hit;
+    from = query.ray.tfar + k_behind_cut_out * std::max(1.0F, query.ray.tfar);
+  }
+  return {};
 }
 
 void RayScene::first_hits(const Eigen::Vector3d& p_origin,

@@ -35,6 +35,7 @@ class RayScene {
   RayScene(RayScene&&) noexcept;
   RayScene& operator=(RayScene&&) noexcept;
 
+  /// Goes through what a material cuts out; many rays at once and light do not.
   Hit first_hit(const Ray& ray) const;
   /// Many rays from one point; directions that are NaN hit nothing.
   void first_hits(const Eigen::Vector3d& p_origin,

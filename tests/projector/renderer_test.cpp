@@ -919,6 +919,120 @@ TEST_F(RendererTest, TextureStandsTheRightWayUp) {
   EXPECT_NEAR(colour_at(-0.05, 0.05)[2], 128, 1);
 }
 
+// A ring on a sheet of 0.2 x 0.2 m: what is beside it is cut out, in a colour that must not be seen.
+constexpr double k_ring_in = 0.04, k_ring_out = 0.08;
+bool is_on_ring(double x, double y) { return std::hypot(x, y) > k_ring_in && std::hypot(x, y) < k_ring_out; }
+
+Mesh ring(double z, const cv::Scalar& colour_bgr) {
+  Mesh part = coloured(sheet(0.2, 0.2, z), {1, 1, 1});
+  for (const auto& p : part.positions) part.uvs.push_back({p.x() / 0.2f + 0.5f, 0.5f - p.y() / 0.2f});
+  constexpr int k_side = 512;
+  cv::Mat texture(k_side, k_side, CV_8UC4, cv::Scalar(colour_bgr[0], colour_bgr[1], colour_bgr[2], 0));
+  for (int row = 0; row < k_side; ++row)
+    for (int column = 0; column < k_side; ++column)
+      if (is_on_ring(0.2 * (column + 0.5) / k_side - 0.1, 0.2 * (row + 0.5) / k_side - 0.1))
+        texture.at<cv::Vec4b>(row, column)[3] = 255;
+  part.materials[0].texture = texture;
+  part.materials[0].cut_below = 0.5f;
+  return part;
+}
+
+TEST_F(RendererTest, WhatAMaterialCutsOutIsNotThere) {
+  // Through the hole in the ring another part is seen, and the camera's picture around it.
+  const cv::Scalar red(0, 0, 255), grey(90, 90, 90);
+  const Scene scene = scene_of(
+      sheet(0.5, 0.4), {slot("ring", scene::Mode::view, ring(-0.05, red)),
+                        slot("plate", scene::Mode::view, coloured(sheet(0.1, 0.1, -0.02), {0, 1, 0}))});
+  const Rig rig = two_projectors();
+  const Imager& camera = rig.cameras[0];
+  const cv::Mat picture(480, 640, CV_8UC3, grey);
+  const cv::Mat found = renderer(scene, rig).composite(0, picture, posed_at_origin(scene), Composite::full);
+  int green = 0, wrong = 0;
+  double ring_found = 0, ring_expected = 0;
+  for (int row = 0; row < found.rows; ++row)
+    for (int column = 0; column < found.cols; ++column) {
+      const auto seen_at = [&](const Vector2d& px) {
+        const Ray ray = *camera.ray(px);
+        const auto p = on_sheet(ray, 0.2, 0.2, -0.05);
+        if (p && is_on_ring(p->x(), p->y())) return 2;
+        return on_sheet(ray, 0.1, 0.1, -0.02) ? 1 : 0;
+      };
+      const int seen = seen_at(Vector2d(column, row));
+      const auto& colour = found.at<cv::Vec3b>(row, column);
+      ring_expected += pixel_mean(column, row, [&](const Vector2d& px) { return seen_at(px) == 2 ? 1 : 0; });
+      ring_found += colour[2] == 90 ? 0 : light_of(colour[2]);
+      bool is_inside = true;  // no edge within a pixel
+      for (int k = 0; k < 9 && is_inside; ++k)
+        is_inside = seen_at(Vector2d(column + k % 3 - 1, row + k / 3 - 1)) == seen;
+      if (!is_inside) continue;
+      const cv::Vec3b wanted = seen == 2   ? cv::Vec3b(0, 0, 255)
+                               : seen == 1 ? cv::Vec3b(0, 255, 0)
+                                           : cv::Vec3b(90, 90, 90);
+      wrong += colour != wanted;
+      green += seen == 1;
+    }
+  EXPECT_EQ(wrong, 0);
+  EXPECT_GT(green, 500);
+  EXPECT_NEAR(ring_found, ring_expected, 0.01 * ring_expected);  // edges by their share
+}
+
+TEST_F(RendererTest, WhatAMaterialCutsOutGivesNoLight) {
+  const Rig rig = two_projectors();
+  for (const scene::Mode mode : {scene::Mode::view, scene::Mode::surface}) {
+    const double z = mode == scene::Mode::view ? -0.05 : -0.0005;
+    const Scene scene = scene_of(sheet(0.5, 0.4), {slot("ring", mode, ring(z, {255, 255, 255}))});
+    Renderer drawing = renderer(scene, rig);
+    const Vector3d p_eye(-0.3, -0.3, -1.2);
+    const PosedScene posed = posed_at_origin(scene);
+    const cv::Mat light = drawing.projector_picture(0, posed, viewer_from(p_eye));
+    int same = 0, either = 0, beside = 0;
+    for (int row = 0; row < light.rows; ++row)
+      for (int column = 0; column < light.cols; ++column) {
+        const auto expected_at = [&](const Vector2d& px) {
+          const auto p = on_sheet(*rig.projectors[0].ray(px), 0.5, 0.4, 0);
+          if (!p) return false;
+          if (mode == scene::Mode::surface) return is_on_ring(p->x(), p->y());
+          const auto q = on_sheet(Ray{p_eye, (*p - p_eye).normalized()}, 0.2, 0.2, z);
+          return q && is_on_ring(q->x(), q->y());
+        };
+        const bool expected = expected_at(Vector2d(column, row));
+        const bool is_lit = light.at<cv::Vec3b>(row, column)[1] > 0;
+        const bool is_bright = light_of(light.at<cv::Vec3b>(row, column)[1]) > 0.2;  // half of a half share
+        same += expected && is_bright;
+        either += expected || is_bright;
+        bool is_near = false;
+        for (int k = 0; k < 9; ++k) is_near |= expected_at(Vector2d(column + k % 3 - 1, row + k / 3 - 1));
+        beside += is_lit && !is_near;
+      }
+    EXPECT_GT(either, 5000);
+    EXPECT_GT(1.0 * same / either, 0.98) << (mode == scene::Mode::view ? "view" : "surface");
+    EXPECT_EQ(beside, 0);
+  }
+}
+
+// The judge goes through what is cut out, too.
+TEST_F(RendererTest, CutOutPartsAgreeWithARayTracer) {
+  const Mesh part = ring(-0.05, {0, 0, 255});
+  const Scene scene = scene_of(sheet(0.5, 0.4), {slot("ring", scene::Mode::view, part)});
+  const Rig rig = two_projectors();
+  PosedScene posed = posed_at_origin(scene);
+  posed.parts[0].world_from_part = Pose(exp_rotation({0.4, -0.5, 0.3}), {0.02, 0.01, -0.1});
+  const cv::Mat found =
+      renderer(scene, rig).composite(0, cv::Mat::zeros(480, 640, CV_8UC3), posed, Composite::full);
+  const sim::PlacedMesh placed{&part, posed.parts[0].world_from_part};
+  const sim::RayScene rays(std::span(&placed, 1));
+  int same = 0, either = 0;
+  for (int row = 0; row < found.rows; ++row)
+    for (int column = 0; column < found.cols; ++column) {
+      const bool expected = rays.first_hit(*rig.cameras[0].ray(Vector2d(column, row))).object >= 0;
+      const bool is_drawn = light_of(found.at<cv::Vec3b>(row, column)[2]) > 0.5;
+      same += expected && is_drawn;
+      either += expected || is_drawn;
+    }
+  EXPECT_GT(either, 5000);
+  EXPECT_GT(1.0 * same / either, 0.99);
+}
+
 TEST_F(RendererTest, SceneWithoutPrototypeOrProjectorsIsClassicAugmentedReality) {
   Scene scene;
   scene.slots = {slot("mirror", scene::Mode::view, coloured(sheet(0.1, 0.1), {0, 1, 0}))};

@@ -178,6 +178,39 @@ TEST(Mesh, TextureBesideTheMeshOrAnErrorThatNamesIt) {
   EXPECT_EQ(mesh->materials[mesh->triangle_materials[0]].texture.cols, 2);
 }
 
+// glTF's alphaMode, in the material of textured_gltf.
+std::string gltf_with(const std::string& alpha, const std::string& image) {
+  std::string text = textured_gltf(image);
+  const std::string before = R"("materials":[{)";
+  return text.insert(text.find(before) + before.size(), alpha);
+}
+
+TEST(Mesh, AlphaOfATextureCutsOut) {
+  // Clear at the left, in black; the right is half clear, then whole.
+  cv::Mat picture(1, 3, CV_8UC4, cv::Scalar(10, 200, 30, 255));
+  picture.at<cv::Vec4b>(0, 0) = {0, 0, 0, 0};
+  picture.at<cv::Vec4b>(0, 1) = {10, 200, 30, 100};
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".png", picture, bytes);
+  written("decal/paint.png", std::string(bytes.begin(), bytes.end()));
+  const auto loaded = [&](const std::string& alpha) {
+    const auto mesh = load_mesh(written("decal/part.gltf", gltf_with(alpha, R"("uri":"paint.png")")), "m");
+    EXPECT_TRUE(mesh) << mesh.message();
+    return mesh->materials[mesh->triangle_materials[0]];
+  };
+  const Material opaque = loaded("");
+  EXPECT_EQ(opaque.texture.type(), CV_8UC3);
+  EXPECT_EQ(opaque.cut_below, 0);
+  EXPECT_EQ(loaded(R"("alphaMode":"BLEND",)").cut_below, 0.5f);
+  const Material masked = loaded(R"("alphaMode":"MASK","alphaCutoff":0.25,)");
+  EXPECT_EQ(masked.cut_below, 0.25f);
+  ASSERT_EQ(masked.texture.type(), CV_8UC4);
+  EXPECT_EQ(masked.texture.at<cv::Vec4b>(0, 0), cv::Vec4b(10, 200, 30, 0));  // no black to bleed in
+  EXPECT_EQ(masked.texture.at<cv::Vec4b>(0, 1), cv::Vec4b(10, 200, 30, 100));
+  written("decal/paint.png", small_png());  // without alpha
+  EXPECT_EQ(loaded(R"("alphaMode":"MASK",)").cut_below, 0);
+}
+
 TEST(Mesh, ObjAndPlyLoadWithNormalsMade) {
   const auto obj = load_mesh(written("quad.obj", "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n"), "in");
   ASSERT_TRUE(obj) << obj.message();
@@ -282,7 +315,10 @@ TEST(Glb, PutsMeshesInTheirPlaces) {
   plain.materials[0].roughness = 0.25f;
   Mesh textured = plain;
   textured.uvs = {{0, 0}, {1, 0}, {0, 0.25f}};
-  textured.materials = {{.texture = cv::Mat(4, 4, CV_8UC3, cv::Scalar(10, 200, 30))}};
+  textured.materials = {{.texture = cv::Mat(4, 4, CV_8UC3, cv::Scalar(10, 200, 30))},
+                        {.texture = cv::Mat(4, 4, CV_8UC4, cv::Scalar(10, 20, 30, 255)), .cut_below = 0.25f}};
+  textured.triangles.push_back({0, 2, 1});
+  textured.triangle_materials = {0, 1};
   const Pose lifted(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized())), {1, -2, 0.5});
   const std::vector<PlacedMesh> placed = {
       {"plain", &plain, {}}, {"lifted", &textured, lifted}, {"again", &plain, lifted}};
@@ -292,7 +328,7 @@ TEST(Glb, PutsMeshesInTheirPlaces) {
 
   const auto loaded = load_mesh(written("placed.glb", bytes), "m");
   ASSERT_TRUE(loaded) << loaded.message();
-  ASSERT_EQ(loaded->triangles.size(), 3U);
+  ASSERT_EQ(loaded->triangles.size(), 4U);
   const auto has = [&](const Vector3d& p) {
     return std::any_of(loaded->positions.begin(), loaded->positions.end(),
                        [&](const Vector3f& q) { return (q.cast<double>() - p).norm() < 1e-6; });
@@ -301,14 +337,17 @@ TEST(Glb, PutsMeshesInTheirPlaces) {
     EXPECT_TRUE(has(p.cast<double>()));
     EXPECT_TRUE(has(lifted * p.cast<double>().eval()));
   }
-  int textures = 0, unlit = 0;
+  int textures = 0, unlit = 0, cut = 0;
   for (const Material& material : loaded->materials) {
+    cut += material.cut_below == 0.25f && material.texture.at<cv::Vec4b>(1, 1) == cv::Vec4b(10, 20, 30, 255);
+    if (material.cut_below > 0) continue;
     textures += !material.texture.empty() && material.texture.at<cv::Vec3b>(1, 1) == cv::Vec3b(10, 200, 30);
     unlit += material.unlit && (material.base_colour - plain.materials[0].base_colour).norm() < 1e-6 &&
              material.metallic == 0.5f && material.roughness == 0.25f;
   }
   EXPECT_GE(textures, 1);
   EXPECT_GE(unlit, 1);
+  EXPECT_GE(cut, 1);
 }
 
 }  // namespace
