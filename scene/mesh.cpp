@@ -19,6 +19,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "core/log.h"
 #include "core/picture.h"
 
 namespace limn::scene {
@@ -108,13 +109,13 @@ float cut_below(const aiMaterial& source) {
   return cutoff;
 }
 
-// What is cut out takes the colour of what is next to it, which filtering mixes with it.
-void spread_into_holes(float below, cv::Mat* bgra) {
+// What is cut out takes the colour of what is next to it, which filtering mixes with it. False: nothing is
+// left.
+bool spread_into_holes(float below, cv::Mat* bgra) {
   cv::Mat alpha, labels, distances;
   cv::extractChannel(*bgra, alpha, 3);
   const cv::Mat is_hole = alpha < 255 * below;
-  const int holes = cv::countNonZero(is_hole);
-  if (holes == 0 || holes == is_hole.rows * is_hole.cols) return;
+  if (cv::countNonZero(is_hole) == is_hole.rows * is_hole.cols) return false;
   cv::distanceTransform(is_hole, distances, labels, cv::DIST_L2, cv::DIST_MASK_5, cv::DIST_LABEL_PIXEL);
   std::vector<cv::Vec4b> colours(static_cast<std::size_t>(bgra->total()) + 1);
   const auto label = [&](int row, int column) {
@@ -131,6 +132,7 @@ void spread_into_holes(float below, cv::Mat* bgra) {
         else
           texel = {nearest[0], nearest[1], nearest[2], texel[3]};
       }
+  return true;
 }
 
 Result<Material> read_material(const aiMaterial& source, const aiScene& scene, const fs::path& path) {
@@ -155,11 +157,18 @@ Result<Material> read_material(const aiMaterial& source, const aiScene& scene, c
              embedded ? embedded_texture(*embedded, path, below > 0) : texture_beside(file, path, below > 0));
     if (material.texture.channels() == 1)
       cv::cvtColor(material.texture, material.texture, cv::COLOR_GRAY2BGR);
-    if (material.texture.channels() == 4) {
-      material.cut_below = below;
-      spread_into_holes(below, &material.texture);
-    }
     material.texture_file = file.string();
+    if (material.texture.channels() != 4) break;
+    if (spread_into_holes(below, &material.texture)) {
+      material.cut_below = below;
+    } else {
+      cv::cvtColor(material.texture, material.texture, cv::COLOR_BGRA2BGR);
+      log_warning(
+          "{}: expected a texture with an alpha of {} or more somewhere, found less all over; it is shown as "
+          "if "
+          "it were opaque. Raise its alpha where the part is to be seen.",
+          file.string(), below);
+    }
     break;
   }
   return material;

@@ -366,6 +366,8 @@ Status load_variants(std::span<const MeshFile> listed,
 Status load_files(const Reader& reader, const fs::path& path, Scene* scene, std::vector<LeftOut>* left_out) {
   if (scene->prototype) {
     LIMN_TRY(scene->prototype->mesh, load_named_mesh(*reader.prototype_mesh, path));
+    for (Material& material : scene->prototype->mesh.materials)
+      material.cut_below = 0;  // what stands there is whole
     if (reader.albedo_picture) {
       LIMN_TRY_STATUS(load_albedo_picture(*reader.albedo_picture, path, &*scene->prototype));
     }

@@ -7,8 +7,8 @@
 
 namespace limn::sim {
 
-/// Linear BGR of a texture (8-bit sRGB; grey, BGR or BGRA) at uv, interpolated between its pixels, or with `sharp`
-/// the pixel's; beyond the border the border's.
+/// Linear BGR of a texture (8-bit sRGB; grey, BGR or BGRA) at uv, interpolated between its pixels, or with
+/// `sharp` the pixel's; beyond the border the border's.
 Eigen::Vector3f textured(const cv::Mat& texture, const Eigen::Vector2f& uv, bool sharp);
 
 /// Whether a mesh's material has nothing at a place of a triangle.

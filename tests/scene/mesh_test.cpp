@@ -207,6 +207,13 @@ TEST(Mesh, AlphaOfATextureCutsOut) {
   ASSERT_EQ(masked.texture.type(), CV_8UC4);
   EXPECT_EQ(masked.texture.at<cv::Vec4b>(0, 0), cv::Vec4b(10, 200, 30, 0));  // no black to bleed in
   EXPECT_EQ(masked.texture.at<cv::Vec4b>(0, 1), cv::Vec4b(10, 200, 30, 100));
+  // Thin everywhere: shown rather than lost.
+  picture.setTo(cv::Scalar(10, 200, 30, 100));
+  cv::imencode(".png", picture, bytes);
+  written("decal/paint.png", std::string(bytes.begin(), bytes.end()));
+  const Material thin = loaded(R"("alphaMode":"BLEND",)");
+  EXPECT_EQ(thin.cut_below, 0);
+  EXPECT_EQ(thin.texture.type(), CV_8UC3);
   written("decal/paint.png", small_png());  // without alpha
   EXPECT_EQ(loaded(R"("alphaMode":"MASK",)").cut_below, 0);
 }
