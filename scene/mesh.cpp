@@ -165,8 +165,7 @@ Result<Material> read_material(const aiMaterial& source, const aiScene& scene, c
       cv::cvtColor(material.texture, material.texture, cv::COLOR_BGRA2BGR);
       log_warning(
           "{}: expected a texture with an alpha of {} or more somewhere, found less all over; it is shown as "
-          "if "
-          "it were opaque. Raise its alpha where the part is to be seen.",
+          "if it were opaque. Raise its alpha where the part is to be seen.",
           file.string(), below);
     }
     break;
