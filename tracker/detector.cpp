@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
 #include <mutex>
 #include <utility>
 
@@ -53,6 +54,8 @@ constexpr double k_fit_above_px = 12;  // smaller markers have too few pixels fo
 
 // Cells narrower than so many sigmas of the blur lie within each other's edges.
 constexpr double k_cell_sigmas = 5;
+// The middles of narrower cells are no longer black or white.
+constexpr double k_retreat_sigmas = 3.5;
 
 // Error of a corner whose edges overlap, in their blur: measured on sigma 2.5 to 3.5 and motion of 8 to 16
 // px.
@@ -62,8 +65,8 @@ double blur_of(const RefinedQuad& quad) {
   return *std::max_element(quad.blur_px.begin(), quad.blur_px.end());
 }
 
-bool is_blurred(const RefinedQuad& quad, const SeenCells& cells) {
-  return shortest_side(Quad{quad.corners_px}) < k_cell_sigmas * blur_of(quad) * cells.count;
+bool is_blurred(const RefinedQuad& quad, const SeenCells& cells, double cell_sigmas) {
+  return shortest_side(Quad{quad.corners_px}) < cell_sigmas * blur_of(quad) * cells.count;
 }
 
 // A shift is kept for so many pictures, and while the blur and all sides are as when it was fitted.
@@ -187,13 +190,13 @@ void Detector::find_markers(
     if (worker == crew.size() - 1 && broken) segment_finder_.find(grey, options_.min_contrast, segments_);
     read_quads(grey, lens, Reading::open, open, worker);
   });
-  add_read(detections);
+  const auto retreat = add_read(std::nullopt, detections);
   if (!broken) return;
   join_segments(grey, *detections, crew);
   UnreadQuads covered(quads_);
   covered.end();
   crew.at_once(crew.size(), [&](int worker) { read_quads(grey, lens, Reading::covered, covered, worker); });
-  add_read(detections);
+  add_read(retreat, detections);
 }
 
 // Until none is left.
@@ -202,15 +205,29 @@ void Detector::read_quads(
   while (const auto next = unread.take())
     if (auto found = read(grey, next->quad, lens, reading, workers_[static_cast<std::size_t>(worker)])) {
       const std::lock_guard lock(unread.mutex());
-      read_.push_back({next->number, std::move(*found)});
+      found->number = next->number;
+      read_.push_back(std::move(*found));
     }
 }
 
-// What read_quads() has read, as if it had been read one after the other.
-void Detector::add_read(std::vector<Detection>* detections) {
+// What has been read, as if it had been read one after the other, less the retreat of the ink that it shows,
+// or else the one that is known. What it shows.
+std::optional<InkRetreat> Detector::add_read(const std::optional<InkRetreat>& known,
+                                             std::vector<Detection>* detections) {
   std::sort(read_.begin(), read_.end(), [](const Read& a, const Read& b) { return a.number < b.number; });
-  for (Read& read : read_) add_best_of_square(std::move(read.detection), detections);
+  retreats_.clear();
+  for (const Read& read : read_)
+    if (read.retreat) retreats_.push_back(*read.retreat);
+  const std::optional<InkRetreat> seen = common_retreat(retreats_);
+  const std::optional<InkRetreat>& retreat = seen ? seen : known;
+  for (Read& read : read_) {
+    Detection& detection = read.detection;
+    if (retreat && !detection.by_pattern)
+      undo_ink_retreat(*retreat, &detection.corners_px, &detection.corner_covariance);
+    add_best_of_square(std::move(detection), detections);
+  }
   read_.clear();
+  return retreat;
 }
 
 void Detector::follow(const cv::Mat& grey,
@@ -221,17 +238,23 @@ void Detector::follow(const cv::Mat& grey,
   detections->clear();
   if (grey.empty()) return;
   for (const Detection& marker : last)
-    if (auto found = found_again(grey, lens, marker)) add_best_of_square(std::move(*found), detections);
+    if (auto found = found_again(grey, lens, marker)) {
+      found->number = read_.size();
+      read_.push_back(std::move(*found));
+    }
+  add_read(std::nullopt, detections);
 }
 
 // First from its old corners at once, then from all quads about there, then from what covers it has left.
-std::optional<Detection> Detector::found_again(const cv::Mat& grey, const Lens* lens, const Detection& last) {
+std::optional<Detector::Read> Detector::found_again(const cv::Mat& grey,
+                                                    const Lens* lens,
+                                                    const Detection& last) {
   const double reach = 0.5 * longest_side(last);
   Quad quad{last.corners_px, reach};
   std::optional<PatternShift> shift = last.by_pattern;
   if (shift) ++shift->age;
   auto found = read(grey, quad, lens, Reading::open, workers_[0], shift ? &*shift : nullptr);
-  if (found && found->marker == last.marker) return found;
+  if (found && found->detection.marker == last.marker) return found;
   Eigen::AlignedBox2d box;
   for (const Eigen::Vector2d& corner : last.corners_px) box.extend(corner);
   const double around = reach + k_around_region_px;
@@ -243,11 +266,11 @@ std::optional<Detection> Detector::found_again(const cv::Mat& grey, const Lens* 
   if (region.empty()) return std::nullopt;
   const cv::Mat part = grey(region);
   const Eigen::Vector2d origin(region.x, region.y);
-  const auto read_quads = [&](Reading reading) -> std::optional<Detection> {
+  const auto read_quads = [&](Reading reading) -> std::optional<Read> {
     for (Quad& candidate : quads_) {
       for (Eigen::Vector2d& corner : candidate.corners_px) corner += origin;
       found = read(grey, candidate, lens, reading, workers_[0]);
-      if (found && found->marker == last.marker) return found;
+      if (found && found->detection.marker == last.marker) return found;
     }
     return std::nullopt;
   };
@@ -285,12 +308,12 @@ void Detector::join_segments(const cv::Mat& grey, const std::vector<Detection>& 
   }
 }
 
-std::optional<Detection> Detector::read(const cv::Mat& grey,
-                                        const Quad& quad,
-                                        const Lens* lens,
-                                        Reading reading,
-                                        Worker& worker,
-                                        const PatternShift* last) const {
+std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
+                                             const Quad& quad,
+                                             const Lens* lens,
+                                             Reading reading,
+                                             Worker& worker,
+                                             const PatternShift* last) const {
   if (!may_be_marker(grey, quad, options_.min_contrast)) return std::nullopt;
   const bool covered = reading == Reading::covered;
   if (covered && !may_be_covered_code(grey, quad)) return std::nullopt;
@@ -315,9 +338,15 @@ std::optional<Detection> Detector::read(const cv::Mat& grey,
   }
   const bool moved_from_shadows =
       leave_shadow_edges(grey, worker.refiner.light(), identity->cells, lens, &*refined);
-  Detection detection;
-  if (!moved_from_shadows && (!refined->separate || is_blurred(*refined, identity->cells)))
-    detection.by_pattern = settle_overlapping_edges(grey, lens, *identity, worker, last, &*refined);
+  Read read;
+  Detection& detection = read.detection;
+  if (!moved_from_shadows) {
+    if (!refined->separate || is_blurred(*refined, identity->cells, k_cell_sigmas))
+      detection.by_pattern = settle_overlapping_edges(grey, lens, *identity, worker, last, &*refined);
+    if (!detection.by_pattern && !covered && !is_blurred(*refined, identity->cells, k_retreat_sigmas) &&
+        std::ranges::all_of(refined->corner_visible, std::identity()))
+      read.retreat = find_ink_retreat(grey, worker.refiner.light(), refined->corners_px, identity->cells);
+  }
   detection.marker = identity->marker;
   detection.score = std::clamp(identity->score, 0.0, 1.0);
   for (std::size_t i = 0; i < 4; ++i) {
@@ -326,7 +355,7 @@ std::optional<Detection> Detector::read(const cv::Mat& grey,
     detection.corner_covariance[i] = refined->corner_covariance[corner];
     detection.corner_visible[i] = refined->corner_visible[corner];
   }
-  return detection;
+  return read;
 }
 
 // Edges whose blur overlaps with others': by the whole pattern, or else with the doubt that they deserve.

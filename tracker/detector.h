@@ -13,6 +13,7 @@
 #include "tracker/family.h"
 #include "tracker/found_square.h"
 #include "tracker/identify.h"
+#include "tracker/ink_retreat.h"
 #include "tracker/refine.h"
 #include "tracker/segment_quads.h"
 #include "tracker/segments.h"
@@ -26,7 +27,8 @@ struct DetectorOptions {
   int min_contrast = 16;
   /// Smallest side, as CandidateOptions.
   double min_side_px = 6;
-  /// How the camera writes light. Wrong, markers shrink, the more the softer their edges.
+  /// How the camera writes light. Wrong, markers shrink, the more the softer their edges; the edges of their
+  /// cells show and undo most of it (ink_retreat.h).
   Encoding encoding = Encoding::linear;
   /// Also joins straight edges to quadrilaterals, for markers that fingers, bites or slatted shadows break
   /// up. Costs about half as much again as the rest; left out where no family can_be_covered().
@@ -92,24 +94,27 @@ class Detector {
   SegmentQuadFinder segment_quad_finder_;
   std::vector<SegmentQuad> segment_quads_;
   struct Read {
-    std::size_t number;  // of its quad
+    std::size_t number = 0;  // of its quad
     Detection detection;
+    std::optional<InkRetreat> retreat;
   };
   std::vector<Read> read_;
+  std::vector<InkRetreat> retreats_;  // of those read
 
   class UnreadQuads;
-  std::optional<Detection> found_again(const cv::Mat& grey, const Lens* lens, const Detection& last);
+  std::optional<Read> found_again(const cv::Mat& grey, const Lens* lens, const Detection& last);
   void find_markers(
       const cv::Mat& grey, const Lens* lens, bool broken, std::vector<Detection>* detections, Crew& crew);
   void read_quads(const cv::Mat& grey, const Lens* lens, Reading reading, UnreadQuads& unread, int worker);
-  void add_read(std::vector<Detection>* detections);
+  std::optional<InkRetreat> add_read(const std::optional<InkRetreat>& known,
+                                     std::vector<Detection>* detections);
   void join_segments(const cv::Mat& grey, const std::vector<Detection>& found, Crew& crew);
-  std::optional<Detection> read(const cv::Mat& grey,
-                                const Quad& quad,
-                                const Lens* lens,
-                                Reading reading,
-                                Worker& worker,
-                                const PatternShift* last = nullptr) const;
+  std::optional<Read> read(const cv::Mat& grey,
+                           const Quad& quad,
+                           const Lens* lens,
+                           Reading reading,
+                           Worker& worker,
+                           const PatternShift* last = nullptr) const;
   std::optional<PatternShift> settle_overlapping_edges(const cv::Mat& grey,
                                                        const Lens* lens,
                                                        const Identity& identity,

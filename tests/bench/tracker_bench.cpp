@@ -416,8 +416,9 @@ Eigen::Vector2d place_on_charuco(int id) {
       return 2 * Eigen::Vector2d(square % 5, square / 5) + Eigen::Vector2d(0.5, 0.5);
 }
 
-// Distances of all found corners from the plane that fits them best, lens undistorted by OpenCV's file.
-void bench_board(const std::filesystem::path& folder, const Board& board) {
+// Distances of all found corners from the plane that fits them best, lens undistorted by OpenCV's file; added
+// to those of `all` boards.
+void bench_board(const std::filesystem::path& folder, const Board& board, std::vector<double>* all) {
   const std::string family =
       board.family[0] == '/' ? "aruco:" + (folder / (board.family + 1)).string() : board.family;
   const auto found = tracker::Detector(tracker::Families::load(std::vector{family}).value())
@@ -441,6 +442,7 @@ void bench_board(const std::filesystem::path& folder, const Board& board) {
   for (std::size_t i = 0; i < seen.size(); ++i) apart.push_back(cv::norm(seen[i] - fitted[i]));
   fmt::print("  {:<28}{:>3} markers, px from the board's plane: median {:.3f}, worst {:.3f}\n", board.picture,
              found.size(), median(apart), *std::max_element(apart.begin(), apart.end()));
+  all->insert(all->end(), apart.begin(), apart.end());
 }
 
 std::optional<Options> parsed(int argc, char** argv) {
@@ -488,11 +490,14 @@ int main(int argc, char** argv) {
   if (options->only.empty()) bench_hostile(*options);
   if (!options->photographs.empty()) {
     bench_photographs(options->photographs);
+    std::vector<double> all;
     for (const Board& board :
          {Board{"gboriginal.png", "/tutorial_dict.yml", "tutorial_camera_params.yml", place_on_grid},
           Board{"choriginal.jpg", "aruco_6x6_250", "tutorial_camera_charuco.yml", place_on_charuco},
           Board{"chocclusion_original.jpg", "aruco_6x6_250", "tutorial_camera_charuco.yml",
                 place_on_charuco}})
-      bench_board(options->photographs, board);
+      bench_board(options->photographs, board, &all);
+    fmt::print("  {:<28}{:>3} markers, px from the board's plane: median {:.3f}, worst {:.3f}\n", "all boards",
+               all.size() / 4, median(all), *std::max_element(all.begin(), all.end()));
   }
 }

@@ -207,7 +207,8 @@ TEST(Detector, HasNoBiasInPicturesOfAnSrgbCameraWhenToldSo) {
   const SweepResult told = swept(sweep, 40);
   EXPECT_EQ(told.found, told.markers);
   EXPECT_LT(std::abs(told.outward), 0.012);
-  EXPECT_LT(untold.outward, -0.05);
+  EXPECT_GT(untold.outward, -0.04);  // .06 without what the cells' own edges say (ink_retreat.h)
+  EXPECT_LT(untold.outward, -0.012);
 }
 
 TEST(Detector, FindsSmallMarkers) {
