@@ -416,9 +416,48 @@ Eigen::Vector2d place_on_charuco(int id) {
       return 2 * Eigen::Vector2d(square % 5, square / 5) + Eigen::Vector2d(0.5, 0.5);
 }
 
-// Distances of all found corners from the plane that fits them best, lens undistorted by OpenCV's file; added
-// to those of `all` boards.
-void bench_board(const std::filesystem::path& folder, const Board& board, std::vector<double>* all) {
+// What is left of `apart` when paper may bend and the lens file may err smoothly: a cubic in the picture for
+// each coordinate, with the share of freedom that it takes up given back.
+std::vector<double> beside_smooth(const std::vector<cv::Point2d>& seen,
+                                  const std::vector<cv::Point2d>& fitted) {
+  constexpr int k_terms = 10;
+  const auto count = static_cast<Eigen::Index>(seen.size());
+  Eigen::MatrixXd terms(count, k_terms), apart(count, 2);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const cv::Point2d& at = fitted[static_cast<std::size_t>(i)];
+    const double x = at.x / 320 - 1, y = at.y / 240 - 1;
+    terms.row(i) << 1, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y;
+    const cv::Point2d off = seen[static_cast<std::size_t>(i)] - at;
+    apart.row(i) << off.x, off.y;
+  }
+  const Eigen::MatrixXd left = apart - terms * terms.colPivHouseholderQr().solve(apart);
+  const double freedom =
+      std::sqrt(static_cast<double>(count) / static_cast<double>(std::max<Eigen::Index>(1, count - k_terms)));
+  std::vector<double> distances;
+  for (Eigen::Index i = 0; i < count; ++i) distances.push_back(freedom * left.row(i).norm());
+  return distances;
+}
+
+// Pixels of corners beside their boards' planes, and what is left of them beside_smooth().
+struct BesidePlane {
+  std::size_t markers = 0;
+  std::vector<double> px, bent_px;
+
+  void add(const BesidePlane& other) {
+    markers += other.markers;
+    px.insert(px.end(), other.px.begin(), other.px.end());
+    bent_px.insert(bent_px.end(), other.bent_px.begin(), other.bent_px.end());
+  }
+  void print(const char* name) const {
+    fmt::print(
+        "  {:<28}{:>3} markers, px from the board's plane: median {:.3f}, worst {:.3f}; bent: median "
+        "{:.3f}\n",
+        name, markers, median(px), *std::max_element(px.begin(), px.end()), median(bent_px));
+  }
+};
+
+// Of all found corners, lens undistorted by OpenCV's file.
+BesidePlane bench_board(const std::filesystem::path& folder, const Board& board) {
   const std::string family =
       board.family[0] == '/' ? "aruco:" + (folder / (board.family + 1)).string() : board.family;
   const auto found = tracker::Detector(tracker::Families::load(std::vector{family}).value())
@@ -438,11 +477,10 @@ void bench_board(const std::filesystem::path& folder, const Board& board, std::v
   const cv::Mat plane = cv::findHomography(on_board, seen, 0);
   std::vector<cv::Point2d> fitted;
   cv::perspectiveTransform(on_board, fitted, plane);
-  std::vector<double> apart;
-  for (std::size_t i = 0; i < seen.size(); ++i) apart.push_back(cv::norm(seen[i] - fitted[i]));
-  fmt::print("  {:<28}{:>3} markers, px from the board's plane: median {:.3f}, worst {:.3f}\n", board.picture,
-             found.size(), median(apart), *std::max_element(apart.begin(), apart.end()));
-  all->insert(all->end(), apart.begin(), apart.end());
+  BesidePlane beside{found.size(), {}, beside_smooth(seen, fitted)};
+  for (std::size_t i = 0; i < seen.size(); ++i) beside.px.push_back(cv::norm(seen[i] - fitted[i]));
+  beside.print(board.picture);
+  return beside;
 }
 
 std::optional<Options> parsed(int argc, char** argv) {
@@ -490,14 +528,13 @@ int main(int argc, char** argv) {
   if (options->only.empty()) bench_hostile(*options);
   if (!options->photographs.empty()) {
     bench_photographs(options->photographs);
-    std::vector<double> all;
+    BesidePlane all;
     for (const Board& board :
          {Board{"gboriginal.png", "/tutorial_dict.yml", "tutorial_camera_params.yml", place_on_grid},
           Board{"choriginal.jpg", "aruco_6x6_250", "tutorial_camera_charuco.yml", place_on_charuco},
           Board{"chocclusion_original.jpg", "aruco_6x6_250", "tutorial_camera_charuco.yml",
                 place_on_charuco}})
-      bench_board(options->photographs, board, &all);
-    fmt::print("  {:<28}{:>3} markers, px from the board's plane: median {:.3f}, worst {:.3f}\n", "all boards",
-               all.size() / 4, median(all), *std::max_element(all.begin(), all.end()));
+      all.add(bench_board(options->photographs, board));
+    all.print("all boards");
   }
 }
