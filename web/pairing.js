@@ -44,6 +44,9 @@ function make_form(purpose, name_hint) {
     h("label", {}, "PIN", h("input", pin)),
     h("p", { id: "pairing-why", role: "alert" }),
     h("button", { class: "main" }, "Pair"),
+    location.protocol === "https:"
+      ? h("p", { class: "soft" }, "For an app without warnings, ", h("a", { href: "/limn.crt" }, "trust this Limn"), " once.")
+      : undefined,
   );
 }
 

@@ -61,7 +61,7 @@ std::vector<OperatorView::Slot> slots_of(const Session& session, const std::stri
 }  // namespace
 
 OperatorView::Remote shown(const Invitation& invitation) {
-  OperatorView::Remote out{invitation.url, invitation.fingerprint, {}};
+  OperatorView::Remote out{invitation.url, invitation.fingerprint, invitation.authority_fingerprint, {}};
   for (const Role role : {Role::look, Role::work, Role::operate}) {
     cv::Mat code = qr_code(invitation.url_for(role));
     if (!code.empty()) cv::resize(code, code, {}, k_module_px, k_module_px, cv::INTER_NEAREST);

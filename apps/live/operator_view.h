@@ -52,7 +52,8 @@ struct OperatorView {
       cv::Mat code;  ///< QR code of the page that pairs by itself
     };
     std::string url;
-    std::string fingerprint;  ///< of the certificate; empty without
+    std::string fingerprint;            ///< of the certificate; empty without
+    std::string authority_fingerprint;  ///< of /limn.crt, likewise
     std::vector<Entrance> entrances;
     std::string projector = {};  ///< that shows a code; empty: none
   };

@@ -17,7 +17,9 @@
 #include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <optional>
 
+#include "apps/serve/own_addresses.h"
 #include "core/file.h"
 
 namespace limn::apps {
@@ -25,8 +27,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* k_file = "remote.pem";
+constexpr const char *k_file = "remote.pem", *k_authority_file = "authority.pem";
 constexpr long k_day_s = 24 * 60 * 60;
+// What an authority may speak for, besides the hosts that it is made for: networks that nobody reaches from
+// outside (RFC 1918, 3927, 4193, 4291), this machine, and names of mDNS.
+constexpr const char* k_permitted =
+    "critical,permitted;DNS:local,permitted;DNS:localhost,permitted;IP:127.0.0.0/"
+    "255.0.0.0,permitted;IP:10.0.0.0/"
+    "255.0.0.0,permitted;IP:172.16.0.0/255.240.0.0,permitted;IP:192.168.0.0/"
+    "255.255.0.0,permitted;IP:169.254.0.0/"
+    "255.255.0.0,permitted;IP:fc00::/fe00::,permitted;IP:fe80::/ffc0::,permitted;IP:::1/"
+    "ffff:ffff:ffff:ffff:ffff:ffff:ffff:ffff";
 
 template <auto free>
 struct Free {
@@ -39,6 +50,12 @@ using Key = std::unique_ptr<EVP_PKEY, Free<EVP_PKEY_free>>;
 using X509Certificate = std::unique_ptr<X509, Free<X509_free>>;
 using Bio = std::unique_ptr<BIO, Free<BIO_free>>;
 using Extension = std::unique_ptr<X509_EXTENSION, Free<X509_EXTENSION_free>>;
+using NameConstraints = std::unique_ptr<NAME_CONSTRAINTS, Free<NAME_CONSTRAINTS_free>>;
+
+struct Pair {
+  Key key;
+  X509Certificate certificate;
+};
 
 bool is_address(const std::string& host) {
   in6_addr ignored{};
@@ -56,8 +73,8 @@ bool is_for_all(X509* certificate, const std::vector<std::string>& hosts) {
   return true;
 }
 
-bool ends_soon(X509* certificate) {
-  std::time_t then = std::time(nullptr) + k_renewed_days_before * k_day_s;
+bool ends_within(long days, X509* certificate) {
+  std::time_t then = std::time(nullptr) + days * k_day_s;
   return X509_cmp_time(X509_get0_notAfter(certificate), &then) <= 0;
 }
 
@@ -70,48 +87,113 @@ std::string fingerprint_of(X509* certificate) {
   return text;
 }
 
-void add_extension(X509* certificate, int kind, const std::string& value) {
+void add_extension(X509* certificate, X509* issuer, int kind, const std::string& value) {
   X509V3_CTX context;
   X509V3_set_ctx_nodb(&context);
-  X509V3_set_ctx(&context, certificate, certificate, nullptr, nullptr, 0);
+  X509V3_set_ctx(&context, issuer, certificate, nullptr, nullptr, 0);
   const Extension extension(X509V3_EXT_conf_nid(nullptr, &context, kind, value.c_str()));
   LIMN_CHECK(extension && X509_add_ext(certificate, extension.get(), -1) == 1);
 }
 
-X509Certificate made_for(const std::vector<std::string>& hosts, EVP_PKEY* key) {
-  X509Certificate out(X509_new());
-  std::array<unsigned char, 16> serial{};
-  LIMN_CHECK(out && RAND_bytes(serial.data(), static_cast<int>(serial.size())) == 1);
-  serial[0] &= 0x7f;
-  const std::unique_ptr<BIGNUM, Free<BN_free>> number(
-      BN_bin2bn(serial.data(), static_cast<int>(serial.size()), nullptr));
-  LIMN_CHECK(number && BN_to_ASN1_INTEGER(number.get(), X509_get_serialNumber(out.get())));
-  X509_set_version(out.get(), X509_VERSION_3);
-  X509_gmtime_adj(X509_getm_notBefore(out.get()), -k_day_s);  // clocks of phones differ
-  X509_gmtime_adj(X509_getm_notAfter(out.get()), k_certificate_days * k_day_s);
-  X509_NAME* name = X509_get_subject_name(out.get());
-  X509_NAME_add_entry_by_txt(name, "CN", MBSTRING_ASC, reinterpret_cast<const unsigned char*>("Limn"), -1, -1,
-                             0);
-  X509_set_issuer_name(out.get(), name);
-  X509_set_pubkey(out.get(), key);
+std::string alternative_names(const std::vector<std::string>& hosts) {
   std::string names;
   for (const std::string& host : hosts)
     names += fmt::format("{}{}:{}", names.empty() ? "" : ",", is_address(host) ? "IP" : "DNS", host);
-  add_extension(out.get(), NID_subject_alt_name, names);
-  add_extension(out.get(), NID_basic_constraints, "critical,CA:FALSE");
-  add_extension(out.get(), NID_key_usage, "critical,digitalSignature");
-  add_extension(out.get(), NID_ext_key_usage, "serverAuth");
-  LIMN_CHECK(X509_sign(out.get(), key, EVP_sha256()) > 0);
+  return names;
+}
+
+std::string permitted_names(const std::vector<std::string>& hosts) {
+  std::string names = k_permitted;
+  for (const std::string& host : hosts) {
+    const bool is_v6 = host.find(':') != std::string::npos;
+    names += is_address(host)
+                 ? fmt::format(",permitted;IP:{}/{}", host,
+                               is_v6 ? "ffff:ffff:ffff:ffff:ffff:ffff:ffff:ffff" : "255.255.255.255")
+                 : fmt::format(",permitted;DNS:{}", host);
+  }
+  return names;
+}
+
+// A key and its certificate, without extensions, not yet signed.
+Pair begun(const std::string& name, int days) {
+  Pair out{Key(EVP_EC_gen("P-256")), X509Certificate(X509_new())};
+  X509* certificate = out.certificate.get();
+  std::array<unsigned char, 16> serial{};
+  LIMN_CHECK(out.key && certificate && RAND_bytes(serial.data(), static_cast<int>(serial.size())) == 1);
+  serial[0] &= 0x7f;
+  const std::unique_ptr<BIGNUM, Free<BN_free>> number(
+      BN_bin2bn(serial.data(), static_cast<int>(serial.size()), nullptr));
+  LIMN_CHECK(number && BN_to_ASN1_INTEGER(number.get(), X509_get_serialNumber(certificate)));
+  X509_set_version(certificate, X509_VERSION_3);
+  X509_gmtime_adj(X509_getm_notBefore(certificate), -k_day_s);  // clocks of phones differ
+  X509_gmtime_adj(X509_getm_notAfter(certificate), days * k_day_s);
+  X509_NAME_add_entry_by_txt(X509_get_subject_name(certificate), "CN", MBSTRING_UTF8,
+                             reinterpret_cast<const unsigned char*>(name.c_str()), -1, -1, 0);
+  X509_set_pubkey(certificate, out.key.get());
   return out;
 }
 
-std::string pem_of(EVP_PKEY* key, X509* certificate) {
+void sign(const Pair& authority, X509* certificate) {
+  X509_set_issuer_name(certificate, X509_get_subject_name(authority.certificate.get()));
+  LIMN_CHECK(X509_sign(certificate, authority.key.get(), EVP_sha256()) > 0);
+}
+
+Pair authority_for(const std::vector<std::string>& hosts) {
+  constexpr std::size_t k_most = 40;  // letters of the machine's name; a certificate's has 64 at most
+  const std::string machine = own_name().substr(0, k_most);
+  Pair out = begun(machine.empty() ? "Limn" : "Limn on " + machine, k_authority_days);
+  X509* certificate = out.certificate.get();
+  add_extension(certificate, certificate, NID_basic_constraints, "critical,CA:TRUE,pathlen:0");
+  add_extension(certificate, certificate, NID_key_usage, "critical,keyCertSign");
+  add_extension(certificate, certificate, NID_subject_key_identifier, "hash");
+  add_extension(certificate, certificate, NID_name_constraints, permitted_names(hosts));
+  sign(out, certificate);
+  return out;
+}
+
+Pair certified(const Pair& authority, const std::vector<std::string>& hosts) {
+  Pair out = begun("Limn", k_certificate_days);
+  X509 *certificate = out.certificate.get(), *issuer = authority.certificate.get();
+  add_extension(certificate, issuer, NID_subject_alt_name, alternative_names(hosts));
+  add_extension(certificate, issuer, NID_basic_constraints, "critical,CA:FALSE");
+  add_extension(certificate, issuer, NID_key_usage, "critical,digitalSignature");
+  add_extension(certificate, issuer, NID_ext_key_usage, "serverAuth");
+  add_extension(certificate, issuer, NID_authority_key_identifier, "keyid:always");
+  sign(authority, certificate);
+  return out;
+}
+
+bool is_signed_by(const Pair& authority, X509* certificate) {
+  const bool is_so = X509_verify(certificate, authority.key.get()) == 1;
+  ERR_clear_error();
+  return is_so;
+}
+
+bool may_sign(const Pair& authority, X509* certificate) {
+  const NameConstraints permitted(static_cast<NAME_CONSTRAINTS*>(
+      X509_get_ext_d2i(authority.certificate.get(), NID_name_constraints, nullptr, nullptr)));
+  X509_check_purpose(certificate, -1, 0);  // reads the names that are checked
+  return permitted && NAME_CONSTRAINTS_check(certificate, permitted.get()) == X509_V_OK;
+}
+
+std::string pem_of(const Pair& pair, X509* authority = nullptr) {
   const Bio memory(BIO_new(BIO_s_mem()));
-  LIMN_CHECK(memory && PEM_write_bio_PrivateKey(memory.get(), key, nullptr, nullptr, 0, nullptr, nullptr) &&
-             PEM_write_bio_X509(memory.get(), certificate));
+  LIMN_CHECK(memory &&
+             PEM_write_bio_PrivateKey(memory.get(), pair.key.get(), nullptr, nullptr, 0, nullptr, nullptr) &&
+             PEM_write_bio_X509(memory.get(), pair.certificate.get()) &&
+             (!authority || PEM_write_bio_X509(memory.get(), authority)));
   char* text = nullptr;
   const long length = BIO_get_mem_data(memory.get(), &text);
   return std::string(text, text + length);
+}
+
+std::string der_of(X509* certificate) {
+  unsigned char* bytes = nullptr;
+  const int length = i2d_X509(certificate, &bytes);
+  LIMN_CHECK(length > 0);
+  const std::string out(bytes, bytes + length);
+  OPENSSL_free(bytes);
+  return out;
 }
 
 Error write_error(const fs::path& path) {
@@ -150,26 +232,24 @@ Status check_is_secret(const fs::path& path) {
       path.string(), found.st_mode & 07777u, found.st_uid);
 }
 
-struct Found {
-  Key key;
-  X509Certificate certificate;
-};
-
-Result<Found> read_from(const fs::path& path) {
+// The key and the certificate of a file; nullopt: there is none.
+Result<std::optional<Pair>> read_from(const fs::path& path) {
+  LIMN_TRY_STATUS(check_is_secret(path));
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) return std::optional<Pair>();
   LIMN_TRY(const std::string pem, read_file(path));
   const auto opened = [&] { return Bio(BIO_new_mem_buf(pem.data(), static_cast<int>(pem.size()))); };
-  Found found{Key(PEM_read_bio_PrivateKey(opened().get(), nullptr, nullptr, nullptr)),
-              X509Certificate(PEM_read_bio_X509(opened().get(), nullptr, nullptr, nullptr))};
+  Pair found{Key(PEM_read_bio_PrivateKey(opened().get(), nullptr, nullptr, nullptr)),
+             X509Certificate(PEM_read_bio_X509(opened().get(), nullptr, nullptr, nullptr))};
+  const bool is_pair =
+      found.key && found.certificate && X509_check_private_key(found.certificate.get(), found.key.get()) == 1;
   ERR_clear_error();
-  if (!found.key || !found.certificate ||
-      X509_check_private_key(found.certificate.get(), found.key.get()) != 1) {
-    ERR_clear_error();
+  if (!is_pair)
     return error(
         "{}: expected a private key and its certificate, found something else. Remove the file, and "
         "another one is made.",
         path.string());
-  }
-  return found;
+  return std::optional(std::move(found));
 }
 
 }  // namespace
@@ -184,22 +264,25 @@ Result<fs::path> own_folder() {
 }
 
 Result<Certificate> certificate_in(const fs::path& folder, const std::vector<std::string>& hosts) {
-  const fs::path path = folder / k_file;
   LIMN_TRY_STATUS(make_folder(folder));
-  LIMN_TRY_STATUS(check_is_secret(path));
-  std::error_code ignored;
-  if (fs::exists(path, ignored)) {
-    LIMN_TRY(const Found found, read_from(path));
-    X509* certificate = found.certificate.get();
-    if (is_for_all(certificate, hosts) && !ends_soon(certificate))
-      return Certificate{pem_of(found.key.get(), certificate), fingerprint_of(certificate)};
+  LIMN_TRY(std::optional<Pair> authority, read_from(folder / k_authority_file));
+  LIMN_TRY(std::optional<Pair> own, read_from(folder / k_file));
+  if (authority && ends_within(k_certificate_days, authority->certificate.get())) authority.reset();
+  const bool is_known = authority && own && is_signed_by(*authority, own->certificate.get()) &&
+                        is_for_all(own->certificate.get(), hosts) &&
+                        !ends_within(k_renewed_days_before, own->certificate.get());
+  if (!is_known) {
+    if (authority) own = certified(*authority, hosts);
+    if (!authority || !may_sign(*authority, own->certificate.get())) {
+      authority = authority_for(hosts);
+      own = certified(*authority, hosts);
+      LIMN_TRY_STATUS(write_secret(folder / k_authority_file, pem_of(*authority)));
+    }
+    LIMN_TRY_STATUS(write_secret(folder / k_file, pem_of(*own)));
   }
-  const Key key(EVP_EC_gen("P-256"));
-  LIMN_CHECK(key != nullptr);
-  const X509Certificate certificate = made_for(hosts, key.get());
-  const std::string pem = pem_of(key.get(), certificate.get());
-  LIMN_TRY_STATUS(write_secret(path, pem));
-  return Certificate{pem, fingerprint_of(certificate.get())};
+  X509* signer = authority->certificate.get();
+  return Certificate{pem_of(*own, signer), fingerprint_of(own->certificate.get()), der_of(signer),
+                     fingerprint_of(signer)};
 }
 
 }  // namespace limn::apps

@@ -16,7 +16,7 @@ using nlohmann::ordered_json;
 
 constexpr const char* k_schema = "limn.remote/1";
 constexpr const char* k_comments = "comments.json";
-constexpr const char* k_live = "/api/live";
+constexpr const char *k_live = "/api/live", *k_authority = "/limn.crt";
 constexpr int k_jpeg_quality = 85;
 constexpr int k_bad = 400, k_unpaired = 401, k_forbidden = 403, k_absent = 404, k_wrong_method = 405,
               k_not_json = 415, k_too_many = 429, k_unavailable = 503;
@@ -149,6 +149,8 @@ void Reception::answer(const HttpRequest& request, Answering answering) {
 }
 
 HttpAnswer Reception::file(const HttpRequest& request, const std::string& path) const {
+  if (path == k_authority && request.method == "GET" && !setup_.authority.empty())
+    return {200, "application/x-x509-ca-cert", setup_.authority, {{"Cache-Control", "no-cache"}}};
   const StaticFiles::File* file = setup_.files.find(path);
   if (!file) return refusal(k_absent, "expected a file of the page, found another path.");
   if (request.method != "GET" && request.method != "HEAD")

@@ -68,6 +68,7 @@ class Reception {
   struct Setup {
     bool is_encrypted = false;
     bool is_loopback = true;  ///< only this machine's own names are answered
+    std::string authority;    ///< certificate (DER) that devices may trust; empty: there is none
     std::string cookie;       ///< its name: another for every port, since browsers keep one for all of a host
     StaticFiles files;
     Eyes eyes;

@@ -108,6 +108,7 @@ Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, Eyes e
   out->reception_ = std::make_unique<Reception>(Reception::Setup{
       .is_encrypted = certificate->has_value(),
       .is_loopback = is_loopback(place->host),
+      .authority = certificate->has_value() ? (*certificate)->authority : "",
       .cookie = fmt::format("limn-{}", out->network_->port()),
       .files = std::move(*files),
       .eyes = std::move(eyes),
@@ -128,10 +129,15 @@ Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, Eyes e
   const bool is_encrypted = certificate->has_value();
   out->invitation_ = {fmt::format("{}://{}:{}/", is_encrypted ? "https" : "http", shown_host(place->host),
                                   out->network_->port()),
-                      is_encrypted ? (*certificate)->fingerprint : "", out->reception_->guests().pins()};
+                      is_encrypted ? (*certificate)->fingerprint : "",
+                      is_encrypted ? (*certificate)->authority_fingerprint : "",
+                      out->reception_->guests().pins()};
   const Invitation& told = out->invitation_;
   log_info("live: the remote is at {}", told.url);
-  if (is_encrypted) log_info("live: its certificate's SHA-256 is {}", told.fingerprint);
+  if (is_encrypted) {
+    log_info("live: its certificate's SHA-256 is {}", told.fingerprint);
+    log_info("live: that of limn.crt, for devices that shall trust it, is {}", told.authority_fingerprint);
+  }
   log_info("live: PINs of the remote: look {}, work {}, operate {}", told.pins[0], told.pins[1],
            told.pins[2]);
   out->network_->start(out->reception_.get());

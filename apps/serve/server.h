@@ -35,9 +35,10 @@ struct ServeOptions {
 
 /// What people are to know who want to come in.
 struct Invitation {
-  std::string url;                  ///< "https://192.168.7.2:8443/"
-  std::string fingerprint;          ///< of the certificate, SHA-256; empty without TLS
-  std::array<std::string, 3> pins;  ///< by Role
+  std::string url;                    ///< "https://192.168.7.2:8443/"
+  std::string fingerprint;            ///< of the certificate, SHA-256; empty without TLS
+  std::string authority_fingerprint;  ///< of /limn.crt, likewise
+  std::array<std::string, 3> pins;    ///< by Role
 
   /// The page that pairs by itself: what a QR code says.
   std::string url_for(Role role) const { return url + "#pin=" + pins[static_cast<std::size_t>(role)]; }

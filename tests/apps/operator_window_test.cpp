@@ -222,6 +222,8 @@ TEST(OperatorPanel, InvitesGuestsByACodeOrByPin) {
   const Invitation invitation{"https://192.168.7.2:8443/",
                               "0F:1E:2D:3C:4B:5A:69:78:87:96:A5:B4:C3:D2:E1:F0:"
                               "0F:1E:2D:3C:4B:5A:69:78:87:96:A5:B4:C3:D2:E1:F0",
+                              "1F:2E:3D:4C:5B:6A:79:88:97:A6:B5:C4:D3:E2:F1:00:"
+                              "1F:2E:3D:4C:5B:6A:79:88:97:A6:B5:C4:D3:E2:F1:00",
                               {"123456", "234567", "345678"}};
   view.remote = shown(invitation);
   canvas.click({435, 25}, draw);  // Remote

@@ -1,7 +1,6 @@
 // What the remote lets in, without a network: messages, PINs and sessions, roles, what is kept for slow
-// readers, the certificate.
+// readers.
 #include <gtest/gtest.h>
-#include <sys/stat.h>
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -9,7 +8,6 @@
 #include <set>
 
 #include "apps/live/osc.h"
-#include "apps/serve/certificate.h"
 #include "apps/serve/guests.h"
 #include "apps/serve/http.h"
 #include "apps/serve/messages.h"
@@ -364,34 +362,6 @@ TEST(StaticFiles, AreTheFolderAsItWasAndNothingElse) {
   for (const char* other : {"/../secret.txt", "/link.txt", "/.hidden.txt", "/notes.unknown", "/inside", "",
                             "//index.html", "/inside/../index.html"})
     EXPECT_FALSE(files->find(other)) << other;
-}
-
-TEST(Certificate, IsMadeOnceForItsOwnerAlone) {
-  const fs::path folder = test::test_folder() / "limn", file = folder / "remote.pem";
-  const auto first = certificate_in(folder, {"localhost", "192.168.7.2"});
-  ASSERT_TRUE(first) << first.message();
-  struct stat found {};
-  ASSERT_EQ(::stat(file.c_str(), &found), 0);
-  EXPECT_EQ(found.st_mode & 07777u, 0600u);
-  EXPECT_TRUE(std::regex_match(first->fingerprint, std::regex("([0-9A-F]{2}:){31}[0-9A-F]{2}")));
-  EXPECT_EQ(certificate_in(folder, {"192.168.7.2"})->fingerprint, first->fingerprint) << "known already";
-  const auto other = certificate_in(folder, {"192.168.7.3", "fe80::1"});
-  ASSERT_TRUE(other);
-  EXPECT_NE(other->fingerprint, first->fingerprint) << "another host";
-  int files = 0;
-  for ([[maybe_unused]] const auto& each : fs::directory_iterator(folder)) ++files;
-  EXPECT_EQ(files, 1) << "temporary files stay";
-
-  ::chmod(file.c_str(), 0640);
-  const auto readable = certificate_in(folder, {"192.168.7.3"});
-  ASSERT_FALSE(readable);
-  EXPECT_NE(readable.message().find("found mode 640"), std::string::npos) << readable.message();
-  ::chmod(file.c_str(), 0600);
-  ASSERT_TRUE(write_file(file, "something else"));
-  ::chmod(file.c_str(), 0600);
-  const auto broken = certificate_in(folder, {"192.168.7.3"});
-  ASSERT_FALSE(broken);
-  EXPECT_NE(broken.message().find("expected a private key"), std::string::npos) << broken.message();
 }
 
 TEST(QrCode, HasAMarginAndThreeEyes) {

@@ -413,6 +413,7 @@ TEST_F(AServer, IsEncryptedFromTheFirstByteAwayFromTheLoopback) {
   RemoteClient encrypted(server_->port(), true, own.front());
   EXPECT_EQ(encrypted.get("/").status, 200);
   EXPECT_EQ(encrypted.fingerprint(), server_->invitation().fingerprint);
+  EXPECT_EQ(encrypted.get("/limn.crt").headers.at("content-type"), "application/x-x509-ca-cert");
 }
 
 TEST_F(AServer, SpeaksTlsAllTheWay) {

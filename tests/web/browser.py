@@ -34,8 +34,11 @@ def wait_for(what, condition, timeout_s=WAIT_S):
 class Driver:
     """chromedriver, and the pages that it has opened."""
 
-    def __init__(self):
-        self.process = subprocess.Popen(["chromedriver", "--port=0"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    def __init__(self, home=None):
+        """`home`: of the browsers, instead of one's own."""
+        environment = os.environ | ({"HOME": home} if home else {})
+        self.process = subprocess.Popen(["chromedriver", "--port=0"], env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                                        text=True)
         for line in self.process.stdout:
             if "started successfully on port" in line:
                 self.url = "http://127.0.0.1:" + line.rstrip(". \n").split()[-1]
@@ -50,7 +53,8 @@ class Driver:
 class Browser:
     """One Chromium with a profile of its own."""
 
-    def __init__(self, driver, camera=None, arguments=()):
+    def __init__(self, driver, camera=None, arguments=(), believes_all=True):
+        """`believes_all`: certificates."""
         self.driver = driver
         self.profile = tempfile.mkdtemp(prefix="limn-web-")
         arguments = ["--headless=new", "--disable-gpu", "--enable-unsafe-swiftshader", "--hide-scrollbars", "--no-first-run",
@@ -61,7 +65,7 @@ class Browser:
         if camera:
             arguments += ["--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream",
                           f"--use-file-for-fake-video-capture={camera}"]
-        wanted = {"browserName": "chrome", "acceptInsecureCerts": True,
+        wanted = {"browserName": "chrome", "acceptInsecureCerts": believes_all,
                   "goog:chromeOptions": {"args": arguments}, "goog:loggingPrefs": {"browser": "ALL", "performance": "ALL"}}
         answer = self._call("POST", "/session", {"capabilities": {"alwaysMatch": wanted}})
         self.session = "/session/" + answer["sessionId"]

@@ -55,7 +55,9 @@ def with_laid_marker(world):
 class Live:
     """limn live --serve on the virtual rig, on a copy of its project: looks and comments are kept in it."""
 
-    def __init__(self, limn, folder):
+    def __init__(self, limn, folder, serve="0", config=None):
+        """`config`: where it keeps its certificate, instead of one's own folder."""
+        environment = os.environ | ({"XDG_CONFIG_HOME": config} if config else {})
         project = os.path.join(folder, "project")
         shutil.rmtree(project, ignore_errors=True)
         shutil.copytree(CONFIG, project, ignore=shutil.ignore_patterns("looks"))
@@ -67,7 +69,7 @@ class Live:
         self.log_path = os.path.join(folder, "live.log")
         with open(self.log_path, "w") as log:
             self.process = subprocess.Popen(
-                [limn, "live", "--serve", "0", "--world", world, "--resolution", "0.25"], stdout=log, stderr=log)
+                [limn, "live", "--serve", serve, "--world", world, "--resolution", "0.25"], env=environment, stdout=log, stderr=log)
         self.url = wait_for("the remote's address", lambda: self._told(r"the remote is at (\S+)/"), 60)[0]
         pins = wait_for("the PINs", lambda: self._told(r"look (\d{6}), work (\d{6}), operate (\d{6})"))
         self.pins = dict(zip(["look", "work", "operate"], pins))
