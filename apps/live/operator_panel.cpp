@@ -365,17 +365,17 @@ void OperatorPanel::draw_remote(Gui& gui, const OperatorView& view, ImVec2 size)
                  {12 * gui.em(), 1.9F * gui.em()}))
         asked_.code = {projector.name, chosen.role};
   }
+  draw_viewers(gui, view);
   const std::pair<const char*, const std::string&> fingerprints[] = {
       {"SHA-256 of the certificate", remote.fingerprint}, {"and of /limn.crt", remote.authority_fingerprint}};
   for (const auto& [what, fingerprint] : fingerprints) {
     if (fingerprint.empty()) continue;
     ImGui::Dummy({0, 0.4F * gui.em()});
     ImGui::TextDisabled("%s", what);
-    constexpr std::size_t k_line = 48;  // sixteen bytes
+    constexpr std::size_t k_line = 36;  // twelve bytes
     for (std::size_t i = 0; i < fingerprint.size(); i += k_line)
       ImGui::TextUnformatted(fingerprint.substr(i, k_line - 1).c_str());
   }
-  draw_viewers(gui, view);
   ImGui::EndChild();
 }
 
