@@ -34,7 +34,8 @@ struct Document {
                images = ordered_json::array();
   ordered_json meshes = ordered_json::array(), nodes = ordered_json::array();
   ordered_json materials = ordered_json::array();
-  std::map<const Mesh*, int> numbers = {};  // of meshes that are in already
+  std::map<const Mesh*, int> numbers = {};                   // of meshes that are in already
+  std::map<const std::uint8_t*, std::size_t> textures = {};  // their number by their pixels
   bool has_textures = true, is_unlit = false;
 
   std::size_t add_view(const std::string& data) {
@@ -84,22 +85,48 @@ struct Document {
         {{"componentType", small ? k_unsigned_short : k_unsigned_int}, {"count", count}, {"type", "SCALAR"}});
   }
 
+  // The index of a texture; a picture that is in already is not put in again.
+  ordered_json add_texture(const cv::Mat& picture) {
+    const auto [known, is_new] = textures.try_emplace(picture.data, images.size());
+    if (is_new) {
+      std::vector<std::uint8_t> png;
+      cv::imencode(".png", picture, png);
+      images.push_back({{"bufferView", add_view({png.begin(), png.end()})}, {"mimeType", "image/png"}});
+    }
+    return {{"index", known->second}};
+  }
+
+  void add_maps(const SurfaceMaps& maps, ordered_json* surface, ordered_json* json) {
+    if (!maps.metallic_roughness.picture.empty())
+      (*surface)["metallicRoughnessTexture"] = add_texture(maps.metallic_roughness.picture);
+    if (!maps.normals.picture.empty()) {
+      (*json)["normalTexture"] = add_texture(maps.normals.picture);
+      (*json)["normalTexture"]["scale"] = maps.normal_scale;
+    }
+    if (!maps.occlusion.picture.empty()) {
+      (*json)["occlusionTexture"] = add_texture(maps.occlusion.picture);
+      (*json)["occlusionTexture"]["strength"] = maps.occlusion_strength;
+    }
+    if (!maps.emission.picture.empty()) (*json)["emissiveTexture"] = add_texture(maps.emission.picture);
+  }
+
   std::size_t add_material(const Material& material) {
     const Eigen::Vector3f& c = material.base_colour;
     ordered_json surface = {{"baseColorFactor", {c.x(), c.y(), c.z(), 1}},
                             {"metallicFactor", material.metallic},
                             {"roughnessFactor", material.roughness}};
-    if (has_textures && !material.texture.empty()) {
-      std::vector<std::uint8_t> png;
-      cv::imencode(".png", material.texture, png);
-      images.push_back({{"bufferView", add_view({png.begin(), png.end()})}, {"mimeType", "image/png"}});
-      surface["baseColorTexture"] = {{"index", images.size() - 1}};
-    }
-    ordered_json json = {{"pbrMetallicRoughness", surface}};
+    ordered_json json;
+    if (has_textures && !material.texture.empty())
+      surface["baseColorTexture"] = add_texture(material.texture);
+    if (has_textures) add_maps(material.maps, &surface, &json);
+    json["pbrMetallicRoughness"] = surface;
     if (has_textures && material.cut_below > 0) {
       json["alphaMode"] = "MASK";
       json["alphaCutoff"] = material.cut_below;
     }
+    const Eigen::Vector3f& e = material.emitted;
+    const bool glows_in_places = !material.maps.emission.picture.empty();
+    if (!e.isZero() && (has_textures || !glows_in_places)) json["emissiveFactor"] = {e.x(), e.y(), e.z()};
     if (material.unlit) json["extensions"] = {{"KHR_materials_unlit", ordered_json::object()}};
     is_unlit |= material.unlit;
     materials.push_back(json);
@@ -115,6 +142,7 @@ struct Document {
       for (Eigen::Vector2f& uv : flipped) uv.y() = 1 - uv.y();
       attributes["TEXCOORD_0"] = add_vectors(flipped, "VEC2", false);
     }
+    if (!mesh.tangents.empty()) attributes["TANGENT"] = add_vectors(mesh.tangents, "VEC4", false);
     ordered_json primitives = ordered_json::array();
     for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
       const std::size_t material = add_material(mesh.materials[m]);

@@ -16,8 +16,8 @@ struct PlacedMesh {
 };
 
 /// The bytes of a binary glTF 2.0 file, metres: a node for each mesh with its pose, one primitive per
-/// material; positions, normals, uv when present, base colours, metalness, roughness, textures as PNG inside.
-/// The same meshes give the same bytes. Needs at least one mesh.
+/// material; positions, normals, uv and tangents when present, base colours, metalness, roughness, textures
+/// and maps of the surface as PNG inside. The same meshes give the same bytes. Needs at least one mesh.
 std::string glb(std::span<const PlacedMesh> placed);
 
 /// The same of one mesh in its own frame, without its textures.

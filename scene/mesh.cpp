@@ -1,7 +1,5 @@
 #include "scene/mesh.h"
 
-#include <assimp/GltfMaterial.h>
-#include <assimp/material.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 #include <meshoptimizer.h>
@@ -14,13 +12,10 @@
 #include <cctype>
 #include <cmath>
 #include <map>
-#include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
-#include <optional>
 
 #include "core/log.h"
-#include "core/picture.h"
+#include "scene/read_materials.h"
+#include "scene/tangents.h"
 
 namespace limn::scene {
 namespace {
@@ -41,6 +36,7 @@ static_assert(sizeof(Corner) == 8 * sizeof(float));
 // A mesh as it comes from the file: three corners a triangle, nothing shared.
 struct Soup {
   std::vector<Corner> corners;
+  std::vector<Eigen::Vector4f> tangents;  // of the corners, as in Mesh; empty: the file has none
   std::vector<std::uint16_t> triangle_materials;
   bool has_uvs = false;
   bool needs_normals = false;
@@ -60,117 +56,12 @@ Eigen::Matrix4f to_eigen(const aiMatrix4x4& m) {
 
 Eigen::Vector3f to_eigen(const aiVector3D& v) { return {v.x, v.y, v.z}; }
 
-Result<cv::Mat> embedded_texture(const aiTexture& texture, const fs::path& path, bool with_alpha) {
-  if (texture.mHeight > 0) {
-    static_assert(sizeof(aiTexel) == 4);  // b, g, r, a
-    const cv::Mat bgra(static_cast<int>(texture.mHeight), static_cast<int>(texture.mWidth), CV_8UC4,
-                       texture.pcData);
-    if (with_alpha) return bgra.clone();
-    cv::Mat bgr(bgra.size(), CV_8UC3);
-    const int from_to[] = {0, 0, 1, 1, 2, 2};
-    cv::mixChannels(&bgra, 1, &bgr, 1, from_to, 3);
-    return bgr;
-  }
-  const cv::Mat bytes(1, static_cast<int>(texture.mWidth), CV_8U, texture.pcData);
-  cv::Mat picture = cv::imdecode(bytes, with_alpha ? cv::IMREAD_UNCHANGED : cv::IMREAD_COLOR);
-  if (picture.empty()) {
-    return error(
-        "{}: expected a PNG or JPEG as its embedded texture, found {} bytes that are neither. "
-        "Export the mesh again.",
-        path.string(), texture.mWidth);
-  }
-  if (picture.depth() == CV_16U) picture.convertTo(picture, CV_8U, 1.0 / 257);
-  return picture;
-}
-
-// Where a texture named by a mesh is: as written there, else by its bare name beside the mesh.
-fs::path texture_path(const std::string& name, const fs::path& mesh_path) {
-  std::string slashes = name;
-  std::replace(slashes.begin(), slashes.end(), '\\', '/');
-  const fs::path folder = mesh_path.parent_path();
-  const fs::path inside =
-      fs::path(slashes).is_relative() ? folder / slashes : folder / fs::path(slashes).filename();
-  return fs::exists(inside) ? inside : folder / fs::path(slashes).filename();
-}
-
-Result<cv::Mat> texture_beside(const fs::path& path, const fs::path& mesh_path, bool with_alpha) {
-  auto picture = with_alpha ? read_picture_with_alpha(path) : read_picture(path);
-  if (!picture) return error("{}: its texture cannot be read: {}", mesh_path.string(), picture.message());
-  return picture;
-}
-
-// The alpha under which a glTF material has nothing; 0: it has no such places. What is half transparent
-// (alphaMode BLEND) is whole from a half on: light cannot be seen through.
-float cut_below(const aiMaterial& source) {
-  aiString mode;
-  if (source.Get(AI_MATKEY_GLTF_ALPHAMODE, mode) != AI_SUCCESS || mode == aiString("OPAQUE")) return 0;
-  float cutoff = 0.5F;
-  if (mode == aiString("MASK")) source.Get(AI_MATKEY_GLTF_ALPHACUTOFF, cutoff);
-  return cutoff;
-}
-
-// What is cut out takes the colour of what is next to it, which filtering mixes with it. False: nothing is
-// left.
-bool spread_into_holes(float below, cv::Mat* bgra) {
-  cv::Mat alpha, labels, distances;
-  cv::extractChannel(*bgra, alpha, 3);
-  const cv::Mat is_hole = alpha < 255 * below;
-  if (cv::countNonZero(is_hole) == is_hole.rows * is_hole.cols) return false;
-  cv::distanceTransform(is_hole, distances, labels, cv::DIST_L2, cv::DIST_MASK_5, cv::DIST_LABEL_PIXEL);
-  std::vector<cv::Vec4b> colours(static_cast<std::size_t>(bgra->total()) + 1);
-  const auto label = [&](int row, int column) {
-    return static_cast<std::size_t>(labels.at<int>(row, column));
-  };
-  for (const bool holes_now : {false, true})
-    for (int row = 0; row < bgra->rows; ++row)
-      for (int column = 0; column < bgra->cols; ++column) {
-        if ((is_hole.at<std::uint8_t>(row, column) != 0) != holes_now) continue;
-        cv::Vec4b& texel = bgra->at<cv::Vec4b>(row, column);
-        cv::Vec4b& nearest = colours[label(row, column)];
-        if (!holes_now)
-          nearest = texel;
-        else
-          texel = {nearest[0], nearest[1], nearest[2], texel[3]};
-      }
-  return true;
-}
-
-Result<Material> read_material(const aiMaterial& source, const aiScene& scene, const fs::path& path) {
-  Material material;
-  aiColor4D colour;
-  if (source.Get(AI_MATKEY_BASE_COLOR, colour) == AI_SUCCESS ||
-      source.Get(AI_MATKEY_COLOR_DIFFUSE, colour) == AI_SUCCESS) {
-    material.base_colour = {colour.r, colour.g, colour.b};
-  }
-  int shading = 0;
-  material.unlit =
-      source.Get(AI_MATKEY_SHADING_MODEL, shading) == AI_SUCCESS && shading == aiShadingMode_Unlit;
-  source.Get(AI_MATKEY_METALLIC_FACTOR, material.metallic);
-  source.Get(AI_MATKEY_ROUGHNESS_FACTOR, material.roughness);
-  for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
-    aiString name;
-    if (source.GetTexture(type, 0, &name) != AI_SUCCESS || name.length == 0) continue;
-    const aiTexture* embedded = scene.GetEmbeddedTexture(name.C_Str());
-    const fs::path file = embedded ? path : texture_path(name.C_Str(), path);
-    const float below = cut_below(source);
-    LIMN_TRY(material.texture,
-             embedded ? embedded_texture(*embedded, path, below > 0) : texture_beside(file, path, below > 0));
-    if (material.texture.channels() == 1)
-      cv::cvtColor(material.texture, material.texture, cv::COLOR_GRAY2BGR);
-    material.texture_file = file.string();
-    if (material.texture.channels() != 4) break;
-    if (spread_into_holes(below, &material.texture)) {
-      material.cut_below = below;
-    } else {
-      cv::cvtColor(material.texture, material.texture, cv::COLOR_BGRA2BGR);
-      log_warning(
-          "{}: expected a texture with an alpha of {} or more somewhere, found less all over; it is shown as "
-          "if it were opaque. Raise its alpha where the part is to be seen.",
-          file.string(), below);
-    }
-    break;
-  }
-  return material;
+// A vertex's tangent in the file's frame; `turn` may mirror, which turns its handedness around.
+Eigen::Vector4f tangent_of(const aiMesh& mesh, unsigned i, const Eigen::Matrix3f& turn) {
+  const Eigen::Vector3f t = to_eigen(mesh.mTangents[i]), b = to_eigen(mesh.mBitangents[i]);
+  const float hand = to_eigen(mesh.mNormals[i]).cross(t).dot(b) * turn.determinant();
+  const Eigen::Vector3f turned = (turn * t).normalized();
+  return {turned.x(), turned.y(), turned.z(), hand < 0 ? -1.F : 1.F};
 }
 
 void append(const aiMesh& mesh, const Eigen::Matrix4f& file_from_node, float metres, Soup* soup) {
@@ -180,6 +71,8 @@ void append(const aiMesh& mesh, const Eigen::Matrix4f& file_from_node, float met
   const bool has_normals = mesh.HasNormals();
   soup->needs_normals |= !has_normals;
   soup->has_uvs |= mesh.HasTextureCoords(0);
+  const bool has_tangents = has_normals && mesh.HasTangentsAndBitangents();
+  if (has_tangents) soup->tangents.resize(soup->corners.size(), Eigen::Vector4f::Zero());
   for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
     const aiFace& face = mesh.mFaces[f];
     if (face.mNumIndices != 3) continue;
@@ -195,9 +88,11 @@ void append(const aiMesh& mesh, const Eigen::Matrix4f& file_from_node, float met
                       ? Eigen::Vector2f(mesh.mTextureCoords[0][i].x, mesh.mTextureCoords[0][i].y)
                       : Eigen::Vector2f::Zero().eval();
       soup->corners.push_back(corner);
+      if (has_tangents) soup->tangents.push_back(tangent_of(mesh, i, turn));
     }
     soup->triangle_materials.push_back(static_cast<std::uint16_t>(mesh.mMaterialIndex));
   }
+  if (!soup->tangents.empty()) soup->tangents.resize(soup->corners.size(), Eigen::Vector4f::Zero());
 }
 
 void append(const aiScene& scene,
@@ -262,7 +157,8 @@ void make_normals(Soup* soup) {
   }
 }
 
-Mesh joined(const Soup& soup) {
+// `corner_tangents`: of the corners of the triangles that are left.
+Mesh joined(const Soup& soup, std::vector<Eigen::Vector4f>* corner_tangents) {
   const std::size_t corner_count = soup.corners.size();
   std::vector<unsigned> remap(corner_count);
   const std::size_t count = meshopt_generateVertexRemap(remap.data(), nullptr, corner_count,
@@ -280,8 +176,25 @@ Mesh joined(const Soup& soup) {
     if (!(face_normal(soup, t).squaredNorm() > 0)) continue;  // without area
     mesh.triangles.push_back({remap[3 * t], remap[3 * t + 1], remap[3 * t + 2]});
     mesh.triangle_materials.push_back(soup.triangle_materials[t]);
+    if (soup.tangents.empty()) continue;
+    for (std::size_t k = 0; k < 3; ++k) corner_tangents->push_back(soup.tangents[3 * t + k]);
   }
   return mesh;
+}
+
+// Of a mesh without uvs. What glows in places does not glow.
+void leave_out_maps(const fs::path& path, Mesh* mesh) {
+  bool has_textures = false;
+  for (Material& material : mesh->materials) {
+    has_textures |= !material.texture.empty() || !material.maps.is_none();
+    if (!material.maps.emission.picture.empty()) material.emitted.setZero();
+    material.maps = {};
+  }
+  if (!has_textures) return;
+  log_warning(
+      "{}: expected texture coordinates, for its materials have textures, found none; it is shown without "
+      "them. Export the mesh with its coordinates.",
+      path.string());
 }
 
 Status checked(const Soup& soup, const fs::path& path) {
@@ -393,17 +306,19 @@ Result<Mesh> load_mesh(const fs::path& path, const std::string& units) {
   });
   if (soup.needs_normals || broken_normal) make_normals(&soup);
 
-  Mesh mesh = joined(soup);
+  std::vector<Eigen::Vector4f> corner_tangents;
+  Mesh mesh = joined(soup, &corner_tangents);
   if (mesh.triangles.empty()) return no_triangles(path);
-  mesh.materials.clear();
-  for (unsigned i = 0; i < scene->mNumMaterials; ++i) {
-    LIMN_TRY(Material material, read_material(*scene->mMaterials[i], *scene, path));
-    mesh.materials.push_back(std::move(material));
-  }
+  LIMN_TRY(mesh.materials,
+           read_materials(*scene, path, extension(path) == ".glb" || extension(path) == ".gltf"));
   if (mesh.materials.empty()) mesh.materials.emplace_back();
   for (std::uint16_t& index : mesh.triangle_materials) {
     if (index >= mesh.materials.size()) index = 0;
   }
+  if (mesh.uvs.empty()) leave_out_maps(path, &mesh);
+  const auto has_normal_map = [](const Material& m) { return !m.maps.normals.picture.empty(); };
+  if (std::any_of(mesh.materials.begin(), mesh.materials.end(), has_normal_map))
+    add_tangents(&mesh, corner_tangents);
   return mesh;
 }
 

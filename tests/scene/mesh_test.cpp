@@ -10,6 +10,7 @@
 #include "core/picture.h"
 #include "scene/glb.h"
 #include "scene/nearest.h"
+#include "scene/tangents.h"
 #include "tests/support/matchers.h"
 
 namespace limn::scene {
@@ -218,6 +219,159 @@ TEST(Mesh, AlphaOfATextureCutsOut) {
   EXPECT_EQ(loaded(R"("alphaMode":"MASK",)").cut_below, 0);
 }
 
+TEST(Mesh, TheBaseColoursAlphaMultipliesTheTextures) {
+  cv::Mat picture(1, 2, CV_8UC4, cv::Scalar(10, 200, 30, 255));
+  picture.at<cv::Vec4b>(0, 1)[3] = 100;
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".png", picture, bytes);
+  written("faint/paint.png", std::string(bytes.begin(), bytes.end()));
+  const auto loaded = [&](const std::string& factor) {
+    std::string text = gltf_with(R"("alphaMode":"MASK",)", R"("uri":"paint.png")");
+    text.replace(text.find("0.75,1]"), 7, "0.75," + factor + "]");
+    const auto mesh = load_mesh(written("faint/part.gltf", text), "m");
+    EXPECT_TRUE(mesh) << mesh.message();
+    return mesh->materials[mesh->triangle_materials[0]];
+  };
+  EXPECT_EQ(loaded("1").cut_below, 0.5f);
+  EXPECT_NEAR(loaded("0.8").cut_below, 0.625, 1e-6);  // of the texture's own alpha
+  testing::internal::CaptureStderr();
+  const Material faint = loaded("0.25");
+  const std::string told = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(faint.cut_below, 0);
+  EXPECT_EQ(faint.texture.type(), CV_8UC3);
+  for (const char* word : {"part.gltf", "alpha of 0.5", "opaque"})
+    EXPECT_NE(told.find(word), std::string::npos) << told;
+}
+
+// textured_gltf with more in its material, whose textures 1 to 4 are these pictures, and a normal at each
+// corner.
+std::string gltf_with_maps(const std::string& more, const std::vector<std::string>& files) {
+  std::string images = R"("uri":"paint.png")", textures = R"("textures":[{"source":0})";
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    images += R"(},{"uri":")" + files[i] + "\"";
+    textures += R"(,{"source":)" + std::to_string(i + 1) + "}";
+  }
+  std::string text = gltf_with(more, images);
+  const std::string before = R"("textures":[{"source":0})";
+  return text.replace(text.find(before), before.size(), textures);
+}
+
+std::string png_of(const cv::Mat& picture) {
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".png", picture, bytes);
+  return {bytes.begin(), bytes.end()};
+}
+
+TEST(Mesh, SurfaceMapsOfGltfAreRead) {
+  const char* k_maps =
+      R"("normalTexture":{"index":1,"scale":0.5},"occlusionTexture":{"index":2,"strength":0.75},
+"emissiveTexture":{"index":3},"emissiveFactor":[1,0.5,0.25],)";
+  std::string text = gltf_with_maps(k_maps, {"normals.png", "rough.png", "glow.png"});
+  const std::string before = R"("metallicFactor")";
+  text.insert(text.find(before), R"("metallicRoughnessTexture":{"index":2},)");
+  written("maps/paint.png", small_png());
+  written("maps/normals.png", png_of(cv::Mat(2, 2, CV_8UC3, cv::Scalar(255, 128, 128))));
+  written("maps/rough.png", png_of(cv::Mat(2, 2, CV_8UC3, cv::Scalar(51, 102, 153))));
+  written("maps/glow.png", png_of(cv::Mat(2, 2, CV_8U, cv::Scalar(77))));
+  const auto mesh = load_mesh(written("maps/part.gltf", text), "m");
+  ASSERT_TRUE(mesh) << mesh.message();
+  const Material& material = mesh->materials[mesh->triangle_materials[0]];
+  EXPECT_EQ(material.maps.normals.picture.at<cv::Vec3b>(0, 0), cv::Vec3b(255, 128, 128));
+  EXPECT_EQ(material.maps.metallic_roughness.picture.at<cv::Vec3b>(1, 1), cv::Vec3b(51, 102, 153));
+  EXPECT_EQ(material.maps.occlusion.picture.data,
+            material.maps.metallic_roughness.picture.data);  // read once
+  EXPECT_EQ(material.maps.emission.picture.at<cv::Vec3b>(0, 1), cv::Vec3b(77, 77, 77));
+  EXPECT_NE(material.maps.normals.file.find("normals.png"), std::string::npos);
+  EXPECT_EQ(material.maps.normal_scale, 0.5f);
+  EXPECT_EQ(material.maps.occlusion_strength, 0.75f);
+  EXPECT_EQ(material.emitted, Vector3f(1, 0.5f, 0.25f));
+  EXPECT_EQ(mesh->tangents.size(), mesh->positions.size());
+}
+
+TEST(Mesh, MapsThatCannotBeReadAreToldAndLeftOut) {
+  written("gone/paint.png", small_png());
+  written("gone/torn.png", small_png().substr(0, 40));
+  const auto loaded = [&](const std::string& maps, const std::string& file, std::string* told) {
+    const auto path = written("gone/part.gltf", gltf_with_maps(R"("name":"chrome",)" + maps, {file}));
+    testing::internal::CaptureStderr();
+    const auto mesh = load_mesh(path, "m");
+    *told = testing::internal::GetCapturedStderr();
+    EXPECT_TRUE(mesh) << mesh.message();
+    return mesh->materials[mesh->triangle_materials[0]];
+  };
+  std::string told;
+  const auto expect_told = [&](std::initializer_list<const char*> words) {
+    for (const char* word : words) EXPECT_NE(told.find(word), std::string::npos) << word << " in: " << told;
+  };
+  EXPECT_TRUE(loaded(R"("normalTexture":{"index":1},)", "gone.png", &told).maps.is_none());
+  expect_told({"gone/part.gltf", "'chrome'", "normal texture", "gone.png", "shown smooth"});
+  EXPECT_TRUE(loaded(R"("occlusionTexture":{"index":1},)", "torn.png", &told).maps.is_none());
+  expect_told({"gone/part.gltf", "'chrome'", "occlusion texture", "torn.png", "soft light everywhere"});
+  // Not full white all over.
+  EXPECT_TRUE(loaded(R"("emissiveFactor":[1,1,1],"emissiveTexture":{"index":1},)", "gone.png", &told)
+                  .emitted.isZero());
+  expect_told({"'chrome'", "emissive texture", "without light of its own"});
+  EXPECT_FALSE(loaded(R"("emissiveFactor":[1,1,1],)", "paint.png", &told).emitted.isZero());
+  EXPECT_EQ(told, "");
+  loaded(R"("normalTexture":{"index":1,"texCoord":1},)", "paint.png", &told);
+  expect_told({"'chrome'", "normal texture", "coordinates 1"});
+}
+
+// Two squares side by side, the right one's uvs mirrored; both share the corners between them.
+Mesh mirrored_squares() {
+  Mesh mesh;
+  for (const float y : {0.f, 1.f})
+    for (const float x : {-1.f, 0.f, 1.f}) {
+      mesh.positions.push_back({0.2f * x, 0.1f * y, 0.3f * x});
+      mesh.normals.push_back(Vector3f(-3, 0, 2).normalized());
+      mesh.uvs.push_back({1 - std::abs(x), y});
+    }
+  mesh.triangles = {{0, 1, 4}, {0, 4, 3}, {1, 2, 5}, {1, 5, 4}};
+  mesh.triangle_materials.assign(4, 0);
+  return mesh;
+}
+
+void expect_tangents_along_uvs(const Mesh& mesh) {
+  ASSERT_EQ(mesh.tangents.size(), mesh.positions.size());
+  for (const auto& triangle : mesh.triangles) {
+    const Vector3f p = mesh.positions[triangle[0]];
+    for (const std::uint32_t corner : triangle) {
+      const Eigen::Vector4f& tangent = mesh.tangents[corner];
+      const Vector3f t = tangent.head<3>(), b = tangent.w() * mesh.normals[corner].cross(t);
+      EXPECT_NEAR(t.norm(), 1, 1e-5);
+      EXPECT_NEAR(t.dot(mesh.normals[corner]), 0, 1e-5);
+      for (const std::uint32_t other : triangle) {  // in a plane uvs change along tangent and bitangent alone
+        const Vector3f step = mesh.positions[other] - p;
+        const Eigen::Vector2f uv = mesh.uvs[other] - mesh.uvs[triangle[0]];
+        EXPECT_NEAR(step.dot(t), uv.x() * std::hypot(0.2f, 0.3f), 1e-5);
+        EXPECT_NEAR(step.dot(b), uv.y() * 0.1f, 1e-5);
+      }
+    }
+  }
+}
+
+TEST(Mesh, TangentsFollowTheUvsAlsoWhereTheseAreMirrored) {
+  Mesh mesh = mirrored_squares();
+  add_tangents(&mesh);
+  EXPECT_EQ(mesh.positions.size(), 8u);  // the two corners between the squares have two
+  expect_tangents_along_uvs(mesh);
+}
+
+TEST(Mesh, TangentsOfTheFileAreKept) {
+  Mesh mesh = mirrored_squares();
+  std::vector<Eigen::Vector4f> own(12, Eigen::Vector4f(0, 1, 0, -1));
+  own[4].setZero();  // one that the file lacks
+  add_tangents(&mesh, own);
+  int kept = 0, made = 0;
+  for (const auto& triangle : mesh.triangles)
+    for (const std::uint32_t corner : triangle) {
+      kept += mesh.tangents[corner] == own[0];
+      made += std::abs(mesh.tangents[corner].y()) < 1e-5f;
+    }
+  EXPECT_EQ(kept, 11);
+  EXPECT_EQ(made, 1);
+}
+
 TEST(Mesh, ObjAndPlyLoadWithNormalsMade) {
   const auto obj = load_mesh(written("quad.obj", "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n"), "in");
   ASSERT_TRUE(obj) << obj.message();
@@ -355,6 +509,34 @@ TEST(Glb, PutsMeshesInTheirPlaces) {
   EXPECT_GE(textures, 1);
   EXPECT_GE(unlit, 1);
   EXPECT_GE(cut, 1);
+}
+
+// In a node that is turned and mirrored, too.
+TEST(Glb, MapsOfASurfaceComeBack) {
+  Mesh mesh = mirrored_squares();
+  add_tangents(&mesh);
+  const cv::Mat packed(4, 4, CV_8UC3, cv::Scalar(51, 102, 153));
+  mesh.materials[0] = {.texture = cv::Mat(4, 4, CV_8UC3, cv::Scalar(10, 200, 30)),
+                       .emitted = {0.5f, 1, 0.25f},
+                       .maps = {.metallic_roughness = {packed, ""},
+                                .normals = {cv::Mat(4, 4, CV_8UC3, cv::Scalar(200, 140, 90)), ""},
+                                .occlusion = {packed, ""},
+                                .emission = {cv::Mat(4, 4, CV_8UC3, cv::Scalar(1, 2, 3)), ""},
+                                .normal_scale = 0.5f,
+                                .occlusion_strength = 0.75f}};
+  const Pose lifted(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized())), {1, -2, 0.5});
+  const std::vector<PlacedMesh> placed = {{"part", &mesh, lifted}};
+  const auto loaded = load_mesh(written("maps.glb", glb(placed)), "m");
+  ASSERT_TRUE(loaded) << loaded.message();
+  const Material& material = loaded->materials[loaded->triangle_materials[0]];
+  EXPECT_EQ(material.maps.metallic_roughness.picture.at<cv::Vec3b>(3, 3), cv::Vec3b(51, 102, 153));
+  EXPECT_EQ(material.maps.occlusion.picture.data, material.maps.metallic_roughness.picture.data);
+  EXPECT_EQ(material.maps.normals.picture.at<cv::Vec3b>(3, 3), cv::Vec3b(200, 140, 90));
+  EXPECT_EQ(material.maps.emission.picture.at<cv::Vec3b>(3, 3), cv::Vec3b(1, 2, 3));
+  EXPECT_EQ(material.maps.normal_scale, 0.5f);
+  EXPECT_EQ(material.maps.occlusion_strength, 0.75f);
+  EXPECT_TRUE(test::near(material.emitted.cast<double>(), Vector3d(0.5, 1, 0.25), 1e-6));
+  expect_tangents_along_uvs(*loaded);
 }
 
 }  // namespace

@@ -1,0 +1,244 @@
+#include "scene/read_materials.h"
+
+#include <assimp/GltfMaterial.h>
+#include <assimp/material.h>
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <map>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <utility>
+
+#include "core/log.h"
+#include "core/picture.h"
+
+namespace limn::scene {
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<cv::Mat> embedded_texture(const aiTexture& texture, const fs::path& path, bool with_alpha) {
+  if (texture.mHeight > 0) {
+    static_assert(sizeof(aiTexel) == 4);  // b, g, r, a
+    const cv::Mat bgra(static_cast<int>(texture.mHeight), static_cast<int>(texture.mWidth), CV_8UC4,
+                       texture.pcData);
+    if (with_alpha) return bgra.clone();
+    cv::Mat bgr(bgra.size(), CV_8UC3);
+    const int from_to[] = {0, 0, 1, 1, 2, 2};
+    cv::mixChannels(&bgra, 1, &bgr, 1, from_to, 3);
+    return bgr;
+  }
+  const cv::Mat bytes(1, static_cast<int>(texture.mWidth), CV_8U, texture.pcData);
+  cv::Mat picture = cv::imdecode(bytes, with_alpha ? cv::IMREAD_UNCHANGED : cv::IMREAD_COLOR);
+  if (picture.empty()) {
+    return error(
+        "{}: expected a PNG or JPEG as its embedded texture, found {} bytes that are neither. "
+        "Export the mesh again.",
+        path.string(), texture.mWidth);
+  }
+  if (picture.depth() == CV_16U) picture.convertTo(picture, CV_8U, 1.0 / 257);
+  return picture;
+}
+
+// Where a texture named by a mesh is: as written there, else by its bare name beside the mesh.
+fs::path texture_path(const std::string& name, const fs::path& mesh_path) {
+  std::string slashes = name;
+  std::replace(slashes.begin(), slashes.end(), '\\', '/');
+  const fs::path folder = mesh_path.parent_path();
+  const fs::path inside =
+      fs::path(slashes).is_relative() ? folder / slashes : folder / fs::path(slashes).filename();
+  return fs::exists(inside) ? inside : folder / fs::path(slashes).filename();
+}
+
+Result<cv::Mat> texture_beside(const fs::path& path, const fs::path& mesh_path, bool with_alpha) {
+  auto picture = with_alpha ? read_picture_with_alpha(path) : read_picture(path);
+  if (!picture) return error("{}: its texture cannot be read: {}", mesh_path.string(), picture.message());
+  return picture;
+}
+
+// The alpha under which a glTF material has nothing; 0: it has no such places. What is half transparent
+// (alphaMode BLEND) is whole from a half on: light cannot be seen through.
+float cut_below(const aiMaterial& source) {
+  aiString mode;
+  if (source.Get(AI_MATKEY_GLTF_ALPHAMODE, mode) != AI_SUCCESS || mode == aiString("OPAQUE")) return 0;
+  float cutoff = 0.5F;
+  if (mode == aiString("MASK")) source.Get(AI_MATKEY_GLTF_ALPHACUTOFF, cutoff);
+  return cutoff;
+}
+
+// What is cut out takes the colour of what is next to it, which filtering mixes with it. False: nothing is
+// left.
+bool spread_into_holes(float below, cv::Mat* bgra) {
+  cv::Mat alpha, labels, distances;
+  cv::extractChannel(*bgra, alpha, 3);
+  const cv::Mat is_hole = alpha < 255 * below;
+  if (cv::countNonZero(is_hole) == is_hole.rows * is_hole.cols) return false;
+  cv::distanceTransform(is_hole, distances, labels, cv::DIST_L2, cv::DIST_MASK_5, cv::DIST_LABEL_PIXEL);
+  std::vector<cv::Vec4b> colours(static_cast<std::size_t>(bgra->total()) + 1);
+  const auto label = [&](int row, int column) {
+    return static_cast<std::size_t>(labels.at<int>(row, column));
+  };
+  for (const bool holes_now : {false, true})
+    for (int row = 0; row < bgra->rows; ++row)
+      for (int column = 0; column < bgra->cols; ++column) {
+        if ((is_hole.at<std::uint8_t>(row, column) != 0) != holes_now) continue;
+        cv::Vec4b& texel = bgra->at<cv::Vec4b>(row, column);
+        cv::Vec4b& nearest = colours[label(row, column)];
+        if (!holes_now)
+          nearest = texel;
+        else
+          texel = {nearest[0], nearest[1], nearest[2], texel[3]};
+      }
+  return true;
+}
+
+// The pictures that a file's materials name: each is read once and shared.
+class Pictures {
+ public:
+  Pictures(const aiScene& scene, const fs::path& path) : scene_(scene), path_(path) {}
+
+  // 8-bit BGR, or BGRA where it has alpha and that is wanted.
+  Result<Texture> read(const aiString& name, bool with_alpha) {
+    const auto known = known_.find({name.C_Str(), with_alpha});
+    if (known != known_.end()) return known->second;
+    const aiTexture* embedded = scene_.GetEmbeddedTexture(name.C_Str());
+    const fs::path file = embedded ? path_ : texture_path(name.C_Str(), path_);
+    LIMN_TRY(cv::Mat picture, embedded ? embedded_texture(*embedded, path_, with_alpha)
+                                       : texture_beside(file, path_, with_alpha));
+    if (picture.channels() == 1) cv::cvtColor(picture, picture, cv::COLOR_GRAY2BGR);
+    return known_[{name.C_Str(), with_alpha}] = Texture{picture, file.string()};
+  }
+
+ private:
+  const aiScene& scene_;
+  const fs::path& path_;
+  std::map<std::pair<std::string, bool>, Texture> known_;
+};
+
+// One material while it is read.
+class MaterialReader {
+ public:
+  MaterialReader(const aiMaterial& source, std::string name, Pictures* pictures)
+      : source_(source), name_(std::move(name)), pictures_(*pictures) {}
+
+  Result<Material> read(bool is_gltf) {
+    Material material;
+    aiColor4D colour(1, 1, 1, 1);
+    if (source_.Get(AI_MATKEY_BASE_COLOR, colour) == AI_SUCCESS ||
+        source_.Get(AI_MATKEY_COLOR_DIFFUSE, colour) == AI_SUCCESS) {
+      material.base_colour = {colour.r, colour.g, colour.b};
+    }
+    int shading = 0;
+    material.unlit =
+        source_.Get(AI_MATKEY_SHADING_MODEL, shading) == AI_SUCCESS && shading == aiShadingMode_Unlit;
+    source_.Get(AI_MATKEY_METALLIC_FACTOR, material.metallic);
+    source_.Get(AI_MATKEY_ROUGHNESS_FACTOR, material.roughness);
+    LIMN_TRY_STATUS(read_base_texture(colour.a, &material));
+    if (is_gltf) read_maps(&material);
+    return material;
+  }
+
+ private:
+  // `alpha` multiplies the texture's.
+  Status read_base_texture(float alpha, Material* material) {
+    const float below = cut_below(source_);
+    const float texture_below = below > 0 ? below / std::max(alpha, 1e-6F) : 0;
+    for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
+      aiString name;
+      if (source_.GetTexture(type, 0, &name) != AI_SUCCESS || name.length == 0) continue;
+      note_place(type, 0, "base colour texture");
+      LIMN_TRY(const Texture texture, pictures_.read(name, below > 0));
+      material->texture = texture.picture;
+      material->texture_file = texture.file;
+      break;
+    }
+    if (below <= 0) return {};
+    const bool has_alpha = material->texture.channels() == 4;
+    if (has_alpha) material->texture = material->texture.clone();  // what is in its holes is this material's
+    const bool is_seen = has_alpha ? spread_into_holes(texture_below, &material->texture) : alpha >= below;
+    if (is_seen && has_alpha) material->cut_below = texture_below;
+    if (is_seen) return {};
+    if (has_alpha) cv::cvtColor(material->texture, material->texture, cv::COLOR_BGRA2BGR);
+    log_warning(
+        "{}: expected an alpha of {} or more somewhere in its texture and base colour, found less all over; "
+        "it is shown as if it were opaque. Raise its alpha where the part is to be seen.",
+        name_, below);
+    return {};
+  }
+
+  void read_maps(Material* material) {
+    SurfaceMaps& maps = material->maps;
+    aiColor4D emitted(0, 0, 0, 1);
+    source_.Get(AI_MATKEY_COLOR_EMISSIVE, emitted);
+    material->emitted = {emitted.r, emitted.g, emitted.b};
+    maps.metallic_roughness = map_of(aiTextureType_UNKNOWN, "metallic-roughness texture",
+                                     fmt::format("with metalness {} and roughness {} all over",
+                                                 material->metallic, material->roughness))
+                                  .value_or(Texture{});
+    maps.normals = map_of(aiTextureType_NORMALS, "normal texture", "smooth").value_or(Texture{});
+    maps.occlusion =
+        map_of(aiTextureType_LIGHTMAP, "occlusion texture", "in soft light everywhere").value_or(Texture{});
+    source_.Get(AI_MATKEY_GLTF_TEXTURE_SCALE(aiTextureType_NORMALS, 0), maps.normal_scale);
+    source_.Get(AI_MATKEY_GLTF_TEXTURE_STRENGTH(aiTextureType_LIGHTMAP, 0), maps.occlusion_strength);
+    if (material->emitted.isZero()) return;
+    if (const auto emission = map_of(aiTextureType_EMISSIVE, "emissive texture", "without light of its own"))
+      maps.emission = *emission;
+    else
+      material->emitted.setZero();
+  }
+
+  // Without a picture: the material names none. nullopt: it cannot be read, which is told, and what is shown
+  // instead.
+  std::optional<Texture> map_of(aiTextureType type, const std::string& what, const std::string& instead) {
+    aiString name;
+    if (source_.GetTexture(type, 0, &name) != AI_SUCCESS || name.length == 0) return Texture{};
+    note_place(type, 0, what);
+    auto texture = pictures_.read(name, false);
+    if (texture) return std::move(texture).value();
+    log_warning(
+        "{}: expected a readable {}, found none ({}); it is shown {}. Save the texture beside the mesh, or "
+        "export it again.",
+        name_, what, texture.message(), instead);
+    return std::nullopt;
+  }
+
+  // Textures lie in the first uv as it is.
+  void note_place(aiTextureType type, unsigned index, const std::string& what) const {
+    int uv = 0;
+    aiUVTransform moved;
+    source_.Get(AI_MATKEY_UVWSRC(type, index), uv);
+    const bool is_moved = source_.Get(AI_MATKEY_UVTRANSFORM(type, index), moved) == AI_SUCCESS &&
+                          !(moved.mTranslation == aiVector2D(0, 0) && moved.mScaling == aiVector2D(1, 1) &&
+                            moved.mRotation == 0);
+    if (uv == 0 && !is_moved) return;
+    log_warning(
+        "{}: expected its {} in the first texture coordinates as they are, found {}; it is shown in these. "
+        "Bake it into them.",
+        name_, what, uv != 0 ? fmt::format("coordinates {}", uv) : std::string("a KHR_texture_transform"));
+  }
+
+  const aiMaterial& source_;
+  std::string name_;  // of file and material, for messages
+  Pictures& pictures_;
+};
+
+}  // namespace
+
+Result<std::vector<Material>> read_materials(const aiScene& scene, const fs::path& path, bool is_gltf) {
+  std::vector<Material> materials;
+  Pictures pictures(scene, path);
+  for (unsigned i = 0; i < scene.mNumMaterials; ++i) {
+    const aiMaterial& source = *scene.mMaterials[i];
+    const std::string own = source.GetName().C_Str();
+    const std::string name =
+        fmt::format("{}: material {}", path.string(), own.empty() ? std::to_string(i) : "'" + own + "'");
+    LIMN_TRY(Material material, MaterialReader(source, name, &pictures).read(is_gltf));
+    materials.push_back(std::move(material));
+  }
+  return materials;
+}
+
+}  // namespace limn::scene

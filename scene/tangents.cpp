@@ -1,0 +1,106 @@
+#include "scene/tangents.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "core/result.h"
+
+namespace limn::scene {
+namespace {
+
+using Eigen::Vector3f;
+using Eigen::Vector4f;
+
+Vector3f unit_or_zero(const Vector3f& v) {
+  const float length = v.norm();
+  return length > 0 ? Vector3f(v / length) : Vector3f::Zero().eval();
+}
+
+// Of a triangle's corner: towards growing u in the plane of its normal, handedness, and its weight (0:
+// unknown).
+struct CornerTangent {
+  Vector3f d_u = Vector3f::Zero();
+  bool is_mirrored = false;
+  float angle = 0;
+};
+
+CornerTangent corner_tangent(const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle, std::size_t k) {
+  const std::uint32_t a = triangle[k], b = triangle[(k + 1) % 3], c = triangle[(k + 2) % 3];
+  const Vector3f ab = mesh.positions[b] - mesh.positions[a], ac = mesh.positions[c] - mesh.positions[a];
+  const Eigen::Vector2f uv_ab = mesh.uvs[b] - mesh.uvs[a], uv_ac = mesh.uvs[c] - mesh.uvs[a];
+  const float area = uv_ab.x() * uv_ac.y() - uv_ac.x() * uv_ab.y();
+  if (!(std::abs(area) > 0)) return {};
+  const float side = area > 0 ? 1.F : -1.F;
+  const Vector3f to_u = side * (uv_ac.y() * ab - uv_ab.y() * ac);
+  const Vector3f to_v = side * (uv_ab.x() * ac - uv_ac.x() * ab);
+  const Vector3f& n = mesh.normals[a];
+  CornerTangent tangent;
+  tangent.d_u = unit_or_zero(to_u - n.dot(to_u) * n);
+  tangent.is_mirrored = n.cross(to_u).dot(to_v) < 0;
+  tangent.angle = std::acos(std::clamp(unit_or_zero(ab).dot(unit_or_zero(ac)), -1.F, 1.F));
+  return tangent;
+}
+
+// One for each corner of each triangle.
+std::vector<Vector4f> made_from_uvs(const Mesh& mesh) {
+  using BothHands = std::array<Vector3f, 2>;
+  std::vector<BothHands> sums(mesh.positions.size(), BothHands{Vector3f::Zero(), Vector3f::Zero()});
+  std::vector<CornerTangent> corners;
+  corners.reserve(3 * mesh.triangles.size());
+  for (const auto& triangle : mesh.triangles)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const CornerTangent& tangent = corners.emplace_back(corner_tangent(mesh, triangle, k));
+      sums[triangle[k]][tangent.is_mirrored ? 1 : 0] += tangent.angle * tangent.d_u;
+    }
+  std::vector<Vector4f> tangents;
+  tangents.reserve(corners.size());
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const std::uint32_t vertex = mesh.triangles[i / 3][i % 3];
+    const bool is_mirrored = corners[i].is_mirrored;
+    Vector3f t = unit_or_zero(sums[vertex][is_mirrored ? 1 : 0]);
+    if (t.isZero()) t = mesh.normals[vertex].unitOrthogonal();
+    tangents.push_back((Vector4f() << t, is_mirrored ? -1.F : 1.F).finished());
+  }
+  return tangents;
+}
+
+bool is_usable(const Vector4f& tangent) {
+  return tangent.allFinite() && tangent.head<3>().squaredNorm() > 0.25F;
+}
+
+}  // namespace
+
+void add_tangents(Mesh* mesh, std::span<const Vector4f> of_corners) {
+  LIMN_CHECK(mesh->uvs.size() == mesh->positions.size() && mesh->normals.size() == mesh->positions.size());
+  LIMN_CHECK(of_corners.empty() || of_corners.size() == 3 * mesh->triangles.size());
+  std::vector<Vector4f> wanted(of_corners.begin(), of_corners.end());
+  if (wanted.empty() || !std::all_of(wanted.begin(), wanted.end(), is_usable)) {
+    const std::vector<Vector4f> made = made_from_uvs(*mesh);
+    wanted.resize(made.size(), Vector4f::Zero());
+    for (std::size_t i = 0; i < made.size(); ++i)
+      if (!is_usable(wanted[i])) wanted[i] = made[i];
+  }
+  mesh->tangents.assign(mesh->positions.size(), Vector4f::Zero());
+  std::map<std::pair<std::uint32_t, std::array<float, 4>>, std::uint32_t> parted;
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    std::uint32_t& vertex = mesh->triangles[i / 3][i % 3];
+    const Vector4f& t = wanted[i];
+    if (mesh->tangents[vertex].isZero()) mesh->tangents[vertex] = t;
+    if (mesh->tangents[vertex] == t) continue;
+    const auto next = static_cast<std::uint32_t>(mesh->positions.size());
+    const auto [other, is_new] = parted.try_emplace({vertex, {t.x(), t.y(), t.z(), t.w()}}, next);
+    if (is_new) {
+      mesh->positions.push_back(Vector3f(mesh->positions[vertex]));
+      mesh->normals.push_back(Vector3f(mesh->normals[vertex]));
+      mesh->uvs.push_back(Eigen::Vector2f(mesh->uvs[vertex]));
+      mesh->tangents.push_back(t);
+    }
+    vertex = other->second;
+  }
+}
+
+}  // namespace limn::scene
