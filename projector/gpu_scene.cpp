@@ -9,16 +9,22 @@
 
 #include "core/log.h"
 #include "core/result.h"
+#include "projector/mirrored_light.h"
 
 namespace limn::projector {
 namespace {
 
-constexpr int k_cluster = 128;      // triangles
-constexpr GLuint k_looks_unit = 1;  // as in shaders/scene.glsl
+constexpr int k_cluster = 128;  // triangles
+// Texture units, as in shaders/scene.glsl, material.glsl and look.glsl.
+constexpr GLuint k_looks_unit = 1, k_maps_unit = 13, k_mirrored_unit = 14;
 
+// As in shaders/scene.glsl.
 struct GpuMaterial {
   Eigen::Vector4f colour;  // a: 1 when unlit
   Eigen::Vector4f look;    // texture layer (-1 when it has none), metallic, roughness, what cuts out
+  Eigen::Vector4f emitted = {0, 0, 0, -1};
+  Eigen::Vector4f maps = {-1, -1, 1, 1};
+  Eigen::Vector4i more = Eigen::Vector4i::Zero();
 };
 
 template <class T>
@@ -30,6 +36,15 @@ std::size_t triangles_of(const scene::Scene& scene) {
   std::size_t count = scene.prototype ? scene.prototype->mesh.triangles.size() : 0;
   for (const scene::Slot& slot : scene.slots)
     for (const scene::Variant& variant : slot.variants) count += variant.mesh.triangles.size();
+  return count;
+}
+
+// Of them, those whose tangents follow the normals.
+std::size_t triangles_with_tangents(const scene::Scene& scene) {
+  const auto of = [](const scene::Mesh& mesh) { return mesh.tangents.empty() ? 0 : mesh.triangles.size(); };
+  std::size_t count = scene.prototype ? of(scene.prototype->mesh) : 0;
+  for (const scene::Slot& slot : scene.slots)
+    for (const scene::Variant& variant : slot.variants) count += of(variant.mesh);
   return count;
 }
 
@@ -83,24 +98,86 @@ void append_linked(const scene::Mesh& mesh, std::vector<GpuTriangle>* triangles)
 
 int level_count(int side) { return 1 + static_cast<int>(std::floor(std::log2(side))); }
 
+cv::Mat resized(const cv::Mat& picture, const cv::Size& size) {
+  cv::Mat out;
+  cv::resize(picture, out, size);
+  return out;
+}
+
+// The layer of a texture in an array of textures, where it is put if it is not there yet.
+float layer_of(const scene::Texture& texture, std::vector<scene::Texture>* layers) {
+  const auto known = std::find_if(layers->begin(), layers->end(), [&](const scene::Texture& layer) {
+    return layer.picture.data == texture.picture.data;
+  });
+  const auto layer = static_cast<float>(known - layers->begin());
+  if (known == layers->end()) layers->push_back(texture);
+  return layer;
+}
+
+// One layer a texture, all brought to the size of the largest, so that one sampler serves and uv stays 0
+// to 1.
+GlName make_layers(const std::vector<scene::Texture>& textures, GLenum format) {
+  const int most = largest_texture();
+  int width = 1, height = 1;
+  for (const scene::Texture& texture : textures) {
+    width = std::min(most, std::max(width, texture.picture.cols));
+    height = std::min(most, std::max(height, texture.picture.rows));
+  }
+  const int count = std::max(1, static_cast<int>(textures.size()));
+  GlName layers =
+      make_texture(GL_TEXTURE_2D_ARRAY, format, width, height, count, level_count(std::max(width, height)));
+  glTextureParameteri(*layers, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
+  glTextureParameteri(*layers, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  glTextureParameteri(*layers, GL_TEXTURE_WRAP_S, GL_REPEAT);
+  glTextureParameteri(*layers, GL_TEXTURE_WRAP_T, GL_REPEAT);
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  for (std::size_t i = 0; i < textures.size(); ++i) {
+    const cv::Mat layer = resized(fitting_texture(textures[i].picture, textures[i].file), {width, height});
+    glTextureSubImage3D(*layers, 0, 0, 0, static_cast<GLint>(i), width, height, 1,
+                        layer.channels() == 4 ? GL_BGRA : GL_BGR, GL_UNSIGNED_BYTE, layer.data);
+  }
+  if (!textures.empty()) glGenerateTextureMipmap(*layers);
+  return layers;
+}
+
+// Occlusion, roughness and metalness in red, green and blue, 1 where there is none. A picture that has them
+// all is taken as it is.
+scene::Texture packed(const scene::SurfaceMaps& maps) {
+  const scene::Texture &metal = maps.metallic_roughness, &open = maps.occlusion;
+  if (metal.picture.data == open.picture.data) return metal;
+  cv::Mat of_metal, of_open;
+  if (!metal.picture.empty()) of_metal = fitting_texture(metal.picture, metal.file);
+  if (!open.picture.empty()) of_open = fitting_texture(open.picture, open.file);
+  const cv::Size size(std::max(of_metal.cols, of_open.cols), std::max(of_metal.rows, of_open.rows));
+  for (cv::Mat* picture : {&of_metal, &of_open})
+    *picture = picture->empty() ? cv::Mat(size, CV_8UC3, cv::Scalar::all(255)) : resized(*picture, size);
+  const cv::Mat from[] = {of_metal, of_open};
+  cv::Mat all(size, CV_8UC3);
+  const int from_to[] = {0, 0, 1, 1, 5, 2};  // blue and green of the one, red of the other
+  cv::mixChannels(from, 2, &all, 1, from_to, 3);
+  return {all, metal.file.empty() ? open.file : metal.file};
+}
+
 }  // namespace
 
 struct GpuScene::Staging {
   std::vector<Eigen::Vector4f> corners, normals;
+  std::vector<Eigen::Vector4f> tangents;  // of the corners of meshes that have some, to follow the normals
   std::vector<GpuTriangle> triangles;
   std::vector<GpuMaterial> materials;
-  std::vector<const scene::Material*> looks;  // those with a texture
+  std::vector<scene::Texture> looks, maps;
 };
 
 Status GpuScene::check_fits(const scene::Scene& scene) {
   GLint64 largest = 0;
   glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &largest);
   const std::size_t most = static_cast<std::size_t>(largest) / (3 * sizeof(Eigen::Vector4f));
-  const std::size_t count = triangles_of(scene);
+  const std::size_t count = triangles_of(scene) + triangles_with_tangents(scene);
   if (count <= most) return {};
   return error(
-      "scene: expected at most {} triangles in the prototype and all variants (the largest buffer of {}), "
-      "found {}. Simplify the largest mesh.",
+      "scene: expected at most {} triangles in the prototype and all variants (the largest buffer of {}; "
+      "those of "
+      "meshes with a map of normals count twice), found {}. Simplify the largest mesh.",
       most, reinterpret_cast<const char*>(glGetString(GL_RENDERER)), count);
 }
 
@@ -124,12 +201,20 @@ GpuScene::GpuScene(const scene::Scene& scene) {
     slots_.push_back(std::move(runs));
   }
   corners_ = buffer_of(std::exchange(staging.corners, {}));  // freed one by one
+  staging.normals.insert(staging.normals.end(), staging.tangents.begin(), staging.tangents.end());
   normals_ = buffer_of(std::exchange(staging.normals, {}));
   triangles_ = buffer_of(std::exchange(staging.triangles, {}));
   materials_ = buffer_of(staging.materials);
   owners_shown_.resize(static_cast<std::size_t>(owner_count()));
   placements_ = buffer_of(owners_shown_);
-  upload_looks(staging.looks);
+  looks_ = make_layers(staging.looks, GL_SRGB8_ALPHA8);
+  maps_ = make_layers(staging.maps,
+                      GL_RGBA16);  // finer than their 8 bits: software GL mixes texels in the format's
+  const cv::Mat& mirrored = mirrored_light();
+  mirrored_ = make_texture(GL_TEXTURE_2D, GL_RGBA32F, mirrored.cols, mirrored.rows);
+  for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
+    glTextureParameteri(*mirrored_, filter, GL_LINEAR);
+  upload(mirrored_, mirrored);
 
   vertex_array_ = make_vertex_array();
   glVertexArrayVertexBuffer(*vertex_array_, 0, *corners_, 0, sizeof(Eigen::Vector4f));
@@ -138,19 +223,46 @@ GpuScene::GpuScene(const scene::Scene& scene) {
   glEnableVertexArrayAttrib(*vertex_array_, 0);
 }
 
+void GpuScene::add_material(const scene::Material& material, bool has_uvs, Staging* staging) {
+  GpuMaterial gpu{material.base_colour.homogeneous(), Eigen::Vector4f::Constant(-1)};
+  gpu.colour.w() = material.unlit ? 1 : 0;
+  gpu.look.tail<3>() << material.metallic, material.roughness, 0;
+  gpu.emitted.head<3>() = material.emitted;
+  has_surface_maps_ |= !material.emitted.isZero();
+  if (has_uvs && !material.texture.empty()) {
+    gpu.look.x() = layer_of({material.texture, material.texture_file}, &staging->looks);
+    if (material.texture.channels() == 4) gpu.look.w() = material.cut_below;
+  }
+  const scene::SurfaceMaps& maps = material.maps;
+  if (has_uvs && !maps.is_none()) {
+    has_surface_maps_ = true;
+    if (!maps.emission.picture.empty()) gpu.emitted.w() = layer_of(maps.emission, &staging->looks);
+    if (!maps.metallic_roughness.picture.empty() || !maps.occlusion.picture.empty())
+      gpu.maps.x() = layer_of(packed(maps), &staging->maps);
+    if (!maps.normals.picture.empty()) gpu.maps.y() = layer_of(maps.normals, &staging->maps);
+    gpu.more.y() = maps.metallic_roughness.picture.empty() ? 0 : 1;
+    gpu.maps.tail<2>() << maps.normal_scale, maps.occlusion_strength;
+  }
+  staging->materials.push_back(gpu);
+}
+
+// Before the mesh's own corners are in.
+void GpuScene::add_tangents(const scene::Mesh& mesh, std::size_t first_material, Staging* staging) {
+  // They will follow all normals, of which `triangles` knows the number.
+  const std::size_t first = 3 * staging->triangles.size() + staging->tangents.size();
+  for (std::size_t i = first_material; i < staging->materials.size(); ++i) {
+    GpuMaterial& material = staging->materials[i];
+    if (mesh.tangents.empty()) material.maps.y() = -1;
+    material.more.x() = static_cast<int>(first) - static_cast<int>(staging->corners.size());
+  }
+  if (mesh.tangents.empty()) return;
+  for (const auto& triangle : mesh.triangles)
+    for (const std::uint32_t i : triangle) staging->tangents.push_back(mesh.tangents[i]);
+}
+
 TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) {
   const auto first_material = static_cast<std::uint32_t>(staging->materials.size());
-  for (const scene::Material& material : mesh.materials) {
-    GpuMaterial gpu{material.base_colour.homogeneous(), Eigen::Vector4f::Constant(-1)};
-    gpu.colour.w() = material.unlit ? 1 : 0;
-    gpu.look.tail<3>() << material.metallic, material.roughness, 0;
-    if (!material.texture.empty() && !mesh.uvs.empty()) {
-      gpu.look.x() = static_cast<float>(staging->looks.size());
-      if (material.texture.channels() == 4) gpu.look.w() = material.cut_below;
-      staging->looks.push_back(&material);
-    }
-    staging->materials.push_back(gpu);
-  }
+  for (const scene::Material& material : mesh.materials) add_material(material, !mesh.uvs.empty(), staging);
   TriangleRun run;
   run.has_cut_outs = std::any_of(staging->materials.begin() + static_cast<std::ptrdiff_t>(first_material),
                                  staging->materials.end(),
@@ -158,6 +270,7 @@ TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) 
   has_cut_outs_ |= run.has_cut_outs;
   run.first = static_cast<int>(staging->corners.size() / 3);
   run.count = static_cast<int>(mesh.triangles.size());
+  add_tangents(mesh, first_material, staging);
   Eigen::AlignedBox3d bounds;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     if (t % k_cluster == 0) run.clusters.push_back({run.first + static_cast<int>(t), 0, {}});
@@ -178,32 +291,6 @@ TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) 
     run.p_upper = bounds.max();
   }
   return run;
-}
-
-// One layer a texture, all brought to the size of the largest, so that one sampler serves and uv stays 0
-// to 1.
-void GpuScene::upload_looks(const std::vector<const scene::Material*>& looks) {
-  const int most = largest_texture();
-  int width = 1, height = 1;
-  for (const scene::Material* look : looks) {
-    width = std::min(most, std::max(width, look->texture.cols));
-    height = std::min(most, std::max(height, look->texture.rows));
-  }
-  const int layers = std::max(1, static_cast<int>(looks.size()));
-  looks_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_SRGB8_ALPHA8, width, height, layers,
-                        level_count(std::max(width, height)));
-  glTextureParameteri(*looks_, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
-  glTextureParameteri(*looks_, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
-  glTextureParameteri(*looks_, GL_TEXTURE_WRAP_S, GL_REPEAT);
-  glTextureParameteri(*looks_, GL_TEXTURE_WRAP_T, GL_REPEAT);
-  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  for (std::size_t i = 0; i < looks.size(); ++i) {
-    cv::Mat layer;
-    cv::resize(fitting_texture(looks[i]->texture, looks[i]->texture_file), layer, cv::Size(width, height));
-    glTextureSubImage3D(*looks_, 0, 0, 0, static_cast<GLint>(i), width, height, 1,
-                        layer.channels() == 4 ? GL_BGRA : GL_BGR, GL_UNSIGNED_BYTE, layer.data);
-  }
-  if (!looks.empty()) glGenerateTextureMipmap(*looks_);
 }
 
 Pose GpuScene::scene_from_world(const scene::PosedScene& posed) {
@@ -244,6 +331,8 @@ void GpuScene::bind() const {
   const GlName* buffers[] = {&corners_, &normals_, &triangles_, &materials_, &placements_};
   for (GLuint i = 0; i < std::size(buffers); ++i) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, **buffers[i]);
   glBindTextureUnit(k_looks_unit, *looks_);
+  glBindTextureUnit(k_maps_unit, *maps_);
+  glBindTextureUnit(k_mirrored_unit, *mirrored_);
 }
 
 std::array<Eigen::Vector3d, 8> bounds_of(const PlacedRun& placed, double margin_m) {

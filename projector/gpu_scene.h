@@ -53,10 +53,12 @@ class GpuScene {
   static Pose scene_from_world(const scene::PosedScene& posed);
   /// Sends the places to the GPU.
   void place(const std::vector<PlacedRun>& runs);
-  /// Binds the buffers and the textures (unit 1) for a drawing.
+  /// Binds the buffers and the textures (units 1, 13 and 14) for a drawing.
   void bind() const;
 
   bool has_cut_outs() const { return has_cut_outs_; }
+  /// Whether a material has maps beyond its colour, or light of its own: shaders then need SURFACE_MAPS.
+  bool has_surface_maps() const { return has_surface_maps_; }
   GLuint vertex_array() const { return *vertex_array_; }
   int owner_count() const { return static_cast<int>(slots_.size()) + 1; }
 
@@ -75,13 +77,15 @@ class GpuScene {
     Eigen::Vector4f look = Eigen::Vector4f::Constant(-1);
   };
   TriangleRun add(const scene::Mesh& mesh, int owner, Staging* staging);
-  void upload_looks(const std::vector<const scene::Material*>& looks);
+  void add_material(const scene::Material& material, bool has_uvs, Staging* staging);
+  void add_tangents(const scene::Mesh& mesh, std::size_t first_material, Staging* staging);
 
   std::optional<TriangleRun> prototype_;
   std::vector<SlotRuns> slots_;
-  bool has_cut_outs_ = false;
+  bool has_cut_outs_ = false, has_surface_maps_ = false;
   std::vector<GpuOwner> owners_shown_;
-  GlName corners_, normals_, triangles_, materials_, placements_, looks_, vertex_array_;
+  GlName corners_, normals_, triangles_, materials_, placements_, vertex_array_;
+  GlName looks_, maps_, mirrored_;
 };
 
 /// The corners of a run's bounds, with a margin, in the scene's frame.

@@ -166,7 +166,7 @@ struct Renderer::Impl {
   LayerPrograms light_layer;
   struct CompositePrograms {
     LayerPrograms parts, view;
-    static Result<CompositePrograms> link(const std::string& defined);
+    static Result<CompositePrograms> link(std::span<const std::string> defined);
   };
   CompositePrograms unshadowed;
   std::optional<CompositePrograms> shadowed;  // linked when it is asked for
@@ -249,6 +249,13 @@ struct Renderer::Impl {
     upload(albedo, colours);
   }
 
+  // What programs that draw looks are made for: the scene's materials, and shadows.
+  std::vector<std::string> defined(bool with_contact_shadow) const {
+    std::vector<std::string> names;
+    if (scene.has_surface_maps()) names.emplace_back("SURFACE_MAPS");
+    if (with_contact_shadow) names.emplace_back("CONTACT_SHADOW");
+    return names;
+  }
   Status link_programs();
   bool set_arriving(std::size_t index, const cv::Mat& map);
   const GpuLens& lens_of(const Imager& imager);
@@ -312,13 +319,14 @@ Status Renderer::Impl::link_programs() {
                                                        {&light_layer.centre, "light_centre.comp"},
                                                        {&light_layer.edges, "light_edges.comp"}};
   for (const auto& [program, file] : computed) {
-    LIMN_TRY(*program, Program::link_compute(file));
+    LIMN_TRY(*program, Program::link_compute(file, defined(false)));
   }
-  LIMN_TRY(unshadowed, CompositePrograms::link(""));
+  LIMN_TRY(unshadowed, CompositePrograms::link(defined(false)));
   return {};
 }
 
-auto Renderer::Impl::CompositePrograms::link(const std::string& defined) -> Result<CompositePrograms> {
+auto Renderer::Impl::CompositePrograms::link(std::span<const std::string> defined)
+    -> Result<CompositePrograms> {
   CompositePrograms out;
   const std::pair<Program*, const char*> computed[] = {
       {&out.parts.where, "parts_where.comp"}, {&out.parts.centre, "parts_centre.comp"},
@@ -699,7 +707,7 @@ void Renderer::set_quick_motion(bool wanted) { impl_->quick_motion = wanted; }
 Status Renderer::set_contact_shadow(const scene::Scene* scene) {
   const bool wanted = scene != nullptr;
   if (wanted && !impl_->shadowed) {
-    LIMN_TRY(impl_->shadowed, Impl::CompositePrograms::link("CONTACT_SHADOW"));
+    LIMN_TRY(impl_->shadowed, Impl::CompositePrograms::link(impl_->defined(true)));
   }
   if (wanted && !impl_->contact_shadow) impl_->contact_shadow.emplace(*scene);
   if (impl_->has_contact_shadow != wanted)

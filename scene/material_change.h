@@ -10,8 +10,8 @@
 
 namespace limn::scene {
 
-/// What people want otherwise of a whole part than its file says; textures still multiply the colour. An
-/// unlit part is lit once its metalness or roughness is given.
+/// What people want otherwise of a whole part than its file says; textures still multiply the colour, but not
+/// the metalness or roughness. An unlit part is lit once one of these is given.
 struct MaterialChange {
   std::optional<Eigen::Vector3d> base_colour;  ///< linear light, 0 … 1
   std::optional<double> metallic, roughness;   ///< glTF's, 0 … 1

@@ -1,4 +1,5 @@
 // What a part's surface looks like: linear light.
+#include "material.glsl"
 
 // Shading where a material is not unlit: a hemisphere of soft light around an up direction, and lamps far away. Scene
 // frame; light is that of a white surface that faces it.
@@ -8,19 +9,36 @@ uniform vec4 u_d_lamps[k_most_lamps], u_lamps[k_most_lamps];
 uniform int u_lamp_count;
 uniform bool u_is_room_known;  // else the light stands with the viewer
 
-vec3 soft_light(float up) { return mix(u_soft_below.rgb, u_soft_above.rgb, 0.5 + 0.5 * up); }
+// From the horizon (0) up to the zenith (1), as `above` of it says.
+vec3 soft_light(float above) { return mix(u_soft_below.rgb, u_soft_above.rgb, above); }
 
-// Share of the soft light that a surface mirrors, for its colour head on (Karis 2014, "Physically Based Shading on
-// Mobile", a fit of the split sum).
-vec3 mirrored_share(vec3 head_on, float roughness, float cosine) {
-  vec4 r = roughness * vec4(-1, -0.0275, -0.572, 0.022) + vec4(1, 0.0425, 1.04, -0.04);
-  float a = min(r.x * r.x, exp2(-9.28 * cosine)) * r.x + r.y;
-  vec2 ab = vec2(-1.04, 1.04) * a + r.zw;
-  return head_on * ab.x + ab.y;
+// Light of a white diffuse surface, of whose soft light a share `open` arrives.
+vec3 diffuse_light(vec3 n, float open) {
+  vec3 light = open * soft_light(0.5 + 0.5 * dot(n, u_d_up.xyz));
+  for (int i = 0; i < u_lamp_count; ++i) light += u_lamps[i].rgb * max(0.0, dot(n, u_d_lamps[i].xyz));
+  return light;
 }
 
-// Mirrored light of a lamp of strength 1: GGX with Smith's shadowing (Walter et al. 2007; glTF 2.0, appendix B).
-vec3 mirrored_lamp(vec3 head_on, float roughness, vec3 n, vec3 d_eye, vec3 d_lamp) {
+// projector/mirrored_light.h. By cosine and roughness: the share of the soft light that a surface mirrors (red of its
+// colour head on, green of white), and how far from its normal to the mirrored direction most of that comes from
+// (alpha). By height (-1 ... 1) and roughness: the share of what is mirrored that comes from above (blue).
+layout(binding = 14) uniform sampler2D s_mirrored;
+
+vec4 mirrored_at(float x, float roughness) {
+  const float k_nodes = 32.0;
+  return textureLod(s_mirrored, (vec2(x, roughness) * (k_nodes - 1.0) + 0.5) / k_nodes, 0.0);
+}
+
+vec3 mirrored_soft_light(vec3 head_on, float roughness, vec3 n, vec3 d_eye) {
+  vec4 share = mirrored_at(max(0.0, dot(n, d_eye)), roughness);
+  vec3 d = normalize(mix(n, reflect(-d_eye, n), share.a));
+  float above = mirrored_at(0.5 + 0.5 * dot(d, u_d_up.xyz), roughness).b;
+  return soft_light(above) * (head_on * share.r + share.g);
+}
+
+// Light of a lamp of strength 1, diffuse of a colour and mirrored: GGX with Smith's shadowing, the layers mixed by
+// Fresnel's share (glTF 2.0, appendix B; Walter et al. 2007).
+vec3 lamp_light(vec3 diffuse, vec3 head_on, float roughness, vec3 n, vec3 d_eye, vec3 d_lamp) {
   const float k_smoothest = 0.2;  // lamps have a size
   float a = pow(max(roughness, k_smoothest), 2.0), a2 = a * a;
   vec3 h = normalize(d_eye + d_lamp);
@@ -29,61 +47,37 @@ vec3 mirrored_lamp(vec3 head_on, float roughness, vec3 n, vec3 d_eye, vec3 d_lam
   float peak = nh * nh * (a2 - 1.0) + 1.0;
   float visible = nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2);
   vec3 fresnel = head_on + (1.0 - head_on) * pow(1.0 - max(0.0, dot(d_eye, h)), 5.0);
-  return nl * a2 / (peak * peak) * 0.5 / visible * fresnel;  // pi of strength and 1 / pi of GGX cancel
+  return nl * ((1.0 - fresnel) * diffuse + a2 / (peak * peak) * 0.5 / visible * fresnel);  // pi of strength and 1 / pi cancel
 }
 
-// A material's colour in the room's light.
-vec3 lit(vec3 base, vec2 metallic_roughness, vec3 n, vec3 d_eye) {
-  float metallic = metallic_roughness.x, roughness = metallic_roughness.y;
-  vec3 light = soft_light(dot(n, u_d_up.xyz));
-  for (int i = 0; i < u_lamp_count; ++i) light += u_lamps[i].rgb * max(0.0, dot(n, u_d_lamps[i].xyz));
-  vec3 colour = base * (1.0 - metallic) * light;
-  if (metallic == 0.0 && roughness == 1.0) return colour;
-  vec3 head_on = mix(vec3(0.04), base, metallic);
-  float up = dot(reflect(-d_eye, n), u_d_up.xyz);
-  float horizon = mix(2.0 * smoothstep(-0.3, 0.3, up) - 1.0, up, roughness);
-  colour += soft_light(horizon) * mirrored_share(head_on, roughness, max(0.0, dot(n, d_eye)));
+// A finish in the room's light, seen from d_eye; n is its normal on that side.
+vec3 lit(Finish finish, vec3 n, vec3 d_eye) {
+  vec3 diffuse = finish.base * (1.0 - finish.metallic);
+  if (finish.is_plain) return diffuse * diffuse_light(n, finish.open) + finish.emitted;
+  vec3 head_on = mix(vec3(0.04), finish.base, finish.metallic);
+  vec3 colour = (1.0 - head_on) * diffuse * soft_light(0.5 + 0.5 * dot(n, u_d_up.xyz));
+  colour += mirrored_soft_light(head_on, finish.roughness, n, d_eye);
+  colour *= finish.open;
   for (int i = 0; i < u_lamp_count; ++i)
-    colour += u_lamps[i].rgb * mirrored_lamp(head_on, roughness, n, d_eye, u_d_lamps[i].xyz);
-  return colour;
+    colour += u_lamps[i].rgb * lamp_light(diffuse, head_on, finish.roughness, n, d_eye, u_d_lamps[i].xyz);
+  return colour + finish.emitted;
 }
 
-// Own colour at a hit; `footprint` is the side (m) of the pixel's patch on the surface.
-vec3 base_colour(Hit hit, float footprint) {
-  Triangle triangle = s_triangles[hit.id - 1u];
-  Material material = s_materials[triangle.material];
-  vec4 wanted = s_placements[triangle.owner].colour;
-  vec3 colour = wanted.a > 0.5 ? wanted.rgb : material.colour.rgb;
-  if (material.look.x < 0.0) return colour;
-  vec2 uv = uv_of(hit);
-  return colour * textureLod(s_looks, vec3(uv.x, 1.0 - uv.y, material.look.x), texture_lod(hit, footprint)).rgb;
-}
-
-bool is_unlit(Hit hit) {
-  Triangle triangle = s_triangles[hit.id - 1u];
-  return s_materials[triangle.material].colour.a > 0.5 && all(lessThan(s_placements[triangle.owner].look.xy, vec2(0)));
-}
-
-vec2 metallic_roughness(Hit hit) {
-  Triangle triangle = s_triangles[hit.id - 1u];
-  vec2 wanted = s_placements[triangle.owner].look.xy;
-  return mix(wanted, s_materials[triangle.material].look.yz, lessThan(wanted, vec2(0)));
-}
-
-// Colour seen along d.
+// Colour seen along d; `footprint` is the side (m) of the pixel's patch on the surface.
 vec3 look_along(vec3 d, Hit hit, float footprint) {
-  vec3 colour = base_colour(hit, footprint);
-  if (is_unlit(hit)) return colour;
-  return lit(colour, metallic_roughness(hit), facing_normal(hit, d), -d);
+  if (is_unlit(hit)) return base_colour(hit, footprint);
+  Finish finish = finish_at(hit, footprint);
+  return lit(finish, not_away(side_seen(finish.n_smooth, hit, d) * finish.n, d), -d);
 }
 
 // Colour of a part that lies on the surface, the same for every eye: seen along the prototype's normal, and in light
 // from there where no room is known.
 vec3 look_on_surface(Hit hit, vec3 d_prototype_normal, float footprint) {
-  vec3 colour = base_colour(hit, footprint);
-  if (is_unlit(hit)) return colour;
-  vec3 n = smooth_normal(hit);
-  if (dot(n, d_prototype_normal) < 0.0) n = -n;
-  if (!u_is_room_known) return colour * (u_soft_above.rgb + u_lamps[0].rgb * dot(n, d_prototype_normal));
-  return lit(colour, metallic_roughness(hit), n, d_prototype_normal);
+  if (is_unlit(hit)) return base_colour(hit, footprint);
+  Finish finish = finish_at(hit, footprint);
+  float side = dot(finish.n_smooth, d_prototype_normal) < 0.0 ? -1.0 : 1.0;
+  vec3 n = not_away(side * finish.n, -d_prototype_normal);
+  if (u_is_room_known) return lit(finish, n, d_prototype_normal);
+  vec3 light = finish.open * u_soft_above.rgb + u_lamps[0].rgb * dot(n, d_prototype_normal);
+  return finish.base * light + finish.emitted;
 }

@@ -14,6 +14,11 @@ layout(std430, binding = 2) readonly buffer Triangles { Triangle s_triangles[]; 
 struct Material {
   vec4 colour;  // linear light; a: 1 when unlit
   vec4 look;    // texture layer (-1 when it has none), metallic, roughness, alpha below which there is nothing
+  vec4 emitted; // linear light; a: layer of s_looks that multiplies it, or -1
+  vec4 maps;    // layers of s_maps, or -1: of occlusion, roughness and metalness, and of normals; scale of the normals'
+                // x and y, strength of the occlusion
+  ivec4 more;   // added to the number of a corner: where its tangent is in s_normals (w: handedness); 1 when there is a
+                // map of roughness and metalness
 };
 layout(std430, binding = 3) readonly buffer Materials { Material s_materials[]; };
 layout(binding = 1) uniform sampler2DArray s_looks;  // all textures, one a layer, sRGB decoded on reading
@@ -145,18 +150,20 @@ vec2 uv_of(Hit hit) {
                 vec2(s_corners[first + 2u].w, s_normals[first + 2u].w)) * hit.weights;
 }
 
-float texture_lod(Hit hit, float footprint) {
+// Level of detail of a texture of so many texels whose pixel covers a patch with sides of `footprint` (m).
+float lod_of(vec2 texels, Hit hit, float footprint) {
   uint first = 3u * (hit.id - 1u);
   vec3 ab = s_corners[first + 1u].xyz - s_corners[first].xyz;
   vec3 ac = s_corners[first + 2u].xyz - s_corners[first].xyz;
   vec2 uv = vec2(s_corners[first].w, s_normals[first].w);
   vec2 uv_ab = vec2(s_corners[first + 1u].w, s_normals[first + 1u].w) - uv;
   vec2 uv_ac = vec2(s_corners[first + 2u].w, s_normals[first + 2u].w) - uv;
-  vec2 texels = vec2(textureSize(s_looks, 0).xy);
   float texel_area = abs(uv_ab.x * uv_ac.y - uv_ab.y * uv_ac.x) * texels.x * texels.y;
   float area = length(cross(ab, ac));
   return area > 0.0 ? max(0.0, log2(footprint * sqrt(texel_area / area))) : 0.0;
 }
+
+float texture_lod(Hit hit, float footprint) { return lod_of(vec2(textureSize(s_looks, 0).xy), hit, footprint); }
 
 // Whether the material of what is hit has nothing there; `footprint` is the side (m) of a pixel's patch on the surface.
 bool is_cut_out(Hit hit, float footprint) {
@@ -265,11 +272,21 @@ vec3 smooth_normal_in_owner(Hit hit) {
 vec3 flat_normal(uint id) { return turned_to_scene(owner_of(id), flat_normal_in_owner(id)); }
 vec3 smooth_normal(Hit hit) { return turned_to_scene(owner_of(hit.id), smooth_normal_in_owner(hit)); }
 
-// The interpolated normal turned to where d comes from, as its triangle is; at a silhouette it looks aside, not away.
-vec3 facing_normal(Hit hit, vec3 d) {
-  vec3 n = smooth_normal(hit), flat_one = flat_normal(hit.id);
+// -1 where d comes from behind the corners' normals, as the triangle is turned, else 1.
+float side_seen(vec3 n_smooth, Hit hit, vec3 d) {
+  vec3 flat_one = flat_normal(hit.id);
   if (dot(flat_one, d) > 0.0) flat_one = -flat_one;
-  if (dot(n, flat_one) < 0.0) n = -n;
+  return dot(n_smooth, flat_one) < 0.0 ? -1.0 : 1.0;
+}
+
+// A normal that looks aside where it would look along d.
+vec3 not_away(vec3 n, vec3 d) {
   float away = dot(n, d);
   return away > 0.0 ? normalize(n - away * d) : n;
+}
+
+// The interpolated normal turned to where d comes from, as its triangle is; at a silhouette it looks aside, not away.
+vec3 facing_normal(Hit hit, vec3 d) {
+  vec3 n = smooth_normal(hit);
+  return not_away(side_seen(n, hit, d) * n, d);
 }

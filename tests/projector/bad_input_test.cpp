@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "projector/renderer.h"
+#include "scene/tangents.h"
 #include "tests/projector/gl_test.h"
 
 namespace limn::projector {
@@ -95,6 +96,26 @@ TEST_F(BadInput, ATextureBeyondTheLimitIsNamedAndShownReduced) {
   };
   EXPECT_EQ(at(-0.05), cv::Vec3b(0, 255, 0));
   EXPECT_EQ(at(0.05), cv::Vec3b(255, 0, 0));
+}
+
+TEST_F(BadInput, MapsBeyondTheLimitAreNamedAndReduced) {
+  scene::Scene scene = wall_and_part();
+  scene::Mesh& mesh = scene.slots[0].variants[0].mesh;
+  mesh.materials[0].unlit = false;
+  scene::SurfaceMaps& maps = mesh.materials[0].maps;
+  maps.normals = {cv::Mat(8, 5000, CV_8UC3, cv::Scalar(255, 128, 128)), "skins/bumps.png"};
+  maps.metallic_roughness = {cv::Mat(5001, 8, CV_8UC3, cv::Scalar(0, 128, 0)), "skins/rough.png"};
+  maps.occlusion = {cv::Mat(8, 5002, CV_8UC3, cv::Scalar(0, 0, 200)), "skins/folds.png"};
+  scene::add_tangents(&mesh);
+  testing::internal::CaptureStderr();
+  Renderer drawing = renderer(scene, one_projector());
+  const std::string told = testing::internal::GetCapturedStderr();
+  for (const char* word :
+       {"skins/bumps.png", "5000 x 8", "skins/rough.png", "8 x 5001", "skins/folds.png", "5002 x 8"})
+    EXPECT_NE(told.find(word), std::string::npos) << word << " in: " << told;
+  const cv::Mat seen =
+      drawing.composite(0, cv::Mat::zeros(240, 320, CV_8UC3), posed_at_origin(), Composite::full);
+  EXPECT_GT(brightest(seen), 50);
 }
 
 TEST_F(BadInput, AnAlbedoBeyondTheLimitIsNamedAndReduced) {

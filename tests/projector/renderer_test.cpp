@@ -8,6 +8,7 @@
 #include "core/picture.h"
 #include "core/response.h"
 #include "projector/treatment.h"
+#include "scene/tangents.h"
 #include "sim/ray_scene.h"
 #include "tests/projector/gl_test.h"
 #include "tests/support/matchers.h"
@@ -801,35 +802,55 @@ TEST_F(RendererTest, WhatMovesIsDrawnQuicklyAndWholeOnceItStandsStill) {
   EXPECT_EQ(cv::norm(drawn.projector_picture(0, moved, viewer), whole, cv::NORM_INF), 0);
 }
 
-// The look of shaders/look.glsl spelled once more: soft light from up, one lamp.
+// Mirrored light of strength pi towards d_eye, of what a colour mirrors head on: GGX, Smith, Fresnel
+// (glTF 2.0, appendix B).
+Vector3d mirrored(const Vector3d& head_on,
+                  double roughness,
+                  const Vector3d& n,
+                  const Vector3d& d_eye,
+                  const Vector3d& d_light) {
+  const double nl = n.dot(d_light), nv = n.dot(d_eye), a2 = std::pow(roughness, 4);
+  if (nl <= 0) return Vector3d::Zero();
+  const Vector3d h = (d_eye + d_light).normalized();
+  const double peak = std::pow(n.dot(h), 2) * (a2 - 1) + 1;
+  const double visible = nl * std::sqrt(nv * nv * (1 - a2) + a2) + nv * std::sqrt(nl * nl * (1 - a2) + a2);
+  const Vector3d fresnel = head_on + (Vector3d::Ones() - head_on) * std::pow(1 - d_eye.dot(h), 5);
+  return nl * a2 / (peak * peak) * 0.5 / visible * fresnel;
+}
+
+// The look of shaders/look.glsl spelled once more, the soft light direction by direction: below and above a
+// horizon that is soft over heights from -0.3 to 0.3, one lamp.
 Vector3d lit(const Vector3d& base,
              double metallic,
              double roughness,
              const Vector3d& n,
              const Vector3d& d_eye,
-             const scene::RoomLight& room) {
-  const auto soft = [&](double up) -> Vector3d {
-    return room.below_rgb + (0.5 + 0.5 * up) * (room.above_rgb - room.below_rgb);
+             const scene::RoomLight& room,
+             double open = 1) {
+  const auto soft = [&](double above) -> Vector3d {
+    return open * room.below_rgb + open * above * (room.above_rgb - room.below_rgb);
   };
-  const Vector3d& d_lamp = room.lamps[0].d_world;
-  const Vector3d& lamp = room.lamps[0].strength_rgb;
-  const double nl = std::max(0.0, n.dot(d_lamp)), nv = n.dot(d_eye);
-  Vector3d colour = (1 - metallic) * base.cwiseProduct(soft(n.dot(room.d_up_world)) + nl * lamp);
+  const Vector3d diffuse = (1 - metallic) * base;
   const Vector3d head_on = (1 - metallic) * Vector3d::Constant(0.04) + metallic * base;
-  const Vector3d mirrored = 2 * nv * n - d_eye;
-  const double up = mirrored.dot(room.d_up_world), t = std::clamp((up + 0.3) / 0.6, 0.0, 1.0);
-  const double horizon = (1 - roughness) * (2 * t * t * (3 - 2 * t) - 1) + roughness * up;
-  const double rx = 1 - roughness, ry = 0.0425 - 0.0275 * roughness, rz = 1.04 - 0.572 * roughness,
-               rw = 0.022 * roughness - 0.04;
-  const double a = std::min(rx * rx, std::exp2(-9.28 * nv)) * rx + ry;
-  const Vector3d share = head_on * (rz - 1.04 * a) + Vector3d::Constant(rw + 1.04 * a);
-  colour += soft(horizon).cwiseProduct(share);
-  const double a2 = std::pow(roughness, 4);
+  const double diffuse_above = 0.5 + 0.5 * n.dot(room.d_up_world);
+  Vector3d colour = (Vector3d::Ones() - head_on).cwiseProduct(diffuse).cwiseProduct(soft(diffuse_above));
+  const Vector3d d_u = n.unitOrthogonal(), d_v = n.cross(d_u);
+  constexpr int k_rings = 300, k_steps = 300;
+  for (int i = 0; i < k_rings; ++i)
+    for (int k = 0; k < k_steps; ++k) {
+      const double z = (i + 0.5) / k_rings, ring = std::sqrt(1 - z * z),
+                   angle = 2 * M_PI * (k + 0.5) / k_steps;
+      const Vector3d d = ring * (std::cos(angle) * d_u + std::sin(angle) * d_v) + z * n;
+      const double t = std::clamp((d.dot(room.d_up_world) + 0.3) / 0.6, 0.0, 1.0);
+      const Vector3d light = soft(t * t * (3 - 2 * t)) * (2.0 / (k_rings * k_steps));  // solid angle over pi
+      colour += mirrored(head_on, roughness, n, d_eye, d).cwiseProduct(light);
+    }
+  const Vector3d& d_lamp = room.lamps[0].d_world;
   const Vector3d h = (d_eye + d_lamp).normalized();
-  const double peak = std::pow(n.dot(h), 2) * (a2 - 1) + 1;
-  const double visible = nl * std::sqrt(nv * nv * (1 - a2) + a2) + nv * std::sqrt(nl * nl * (1 - a2) + a2);
   const Vector3d fresnel = head_on + (Vector3d::Ones() - head_on) * std::pow(1 - d_eye.dot(h), 5);
-  return colour + nl * a2 / (peak * peak) * 0.5 / visible * fresnel.cwiseProduct(lamp);
+  const Vector3d by_lamp = std::max(0.0, n.dot(d_lamp)) * (Vector3d::Ones() - fresnel).cwiseProduct(diffuse) +
+                           mirrored(head_on, roughness, n, d_eye, d_lamp);
+  return colour + by_lamp.cwiseProduct(room.lamps[0].strength_rgb);
 }
 
 TEST_F(RendererTest, MetalAndGlossAreAsInGltf) {
@@ -857,6 +878,136 @@ TEST_F(RendererTest, MetalAndGlossAreAsInGltf) {
       }
     EXPECT_LT(worst, 1) << "of 255, metallic " << metallic << ", roughness " << roughness;
   }
+}
+
+// A sheet of 0.2 x 0.2 m in four fields, two by two, that differ in their maps alone.
+constexpr double k_normal_scale = 0.5, k_flat = k_normal_scale * (2 * 128 / 255.0 - 1);  // 8 bits have no 0
+struct Field {
+  double metallic = 0, roughness = 0.6, open = 1;
+  Vector3d along = {k_flat, k_flat, 1};  // the map's normal: to the right, up, out of the sheet
+  double glow = 0;
+};
+constexpr double k_field_glow = 100 / 255.0;
+const Field k_fields[] = {
+    {.metallic = 1, .roughness = 0.4},
+    {.along = Vector3d(0.5 * (2 * 200 / 255.0 - 1), 0.5 * (2 * 60 / 255.0 - 1), 2 * 220 / 255.0 - 1)},
+    {.open = 0.5},
+    {.glow = 1}};
+const Vector3d k_field_colour(0.7, 0.45, 0.2);
+
+Mesh fields(double z) {
+  Mesh part = coloured(sheet(0.2, 0.2, z), k_field_colour.cast<float>(), false);
+  for (const auto& p : part.positions) part.uvs.push_back({p.x() / 0.2f + 0.5f, 0.5f - p.y() / 0.2f});
+  constexpr int k_side = 64;
+  const auto picture = [&](const cv::Scalar& colour) {
+    return cv::Mat(2 * k_side, 2 * k_side, CV_8UC3, colour);
+  };
+  const auto field = [&](cv::Mat& whole, int k) {
+    return whole(cv::Rect(k % 2 * k_side, k / 2 * k_side, k_side, k_side));
+  };
+  scene::Material& material = part.materials[0];
+  scene::SurfaceMaps& maps = material.maps;
+  cv::Mat rough = picture({0, 153, 0}), normals = picture({255, 128, 128}), open = picture({0, 0, 255}),
+          glow = picture({});
+  field(rough, 0).setTo(cv::Scalar(255, 102, 0));
+  field(normals, 1).setTo(cv::Scalar(220, 60, 200));
+  field(open, 2).setTo(cv::Scalar(255, 255, 51));  // of which the strength takes 5 / 8
+  field(glow, 3).setTo(cv::Scalar(188, 188, 188));
+  material.metallic = material.roughness = 1;
+  material.emitted = Eigen::Vector3f::Constant(static_cast<float>(k_field_glow));
+  maps.metallic_roughness.picture = rough;
+  maps.normals.picture = normals;
+  maps.occlusion.picture = open;
+  maps.emission.picture = glow;
+  maps.normal_scale = static_cast<float>(k_normal_scale);
+  maps.occlusion_strength = 0.625f;
+  scene::add_tangents(&part);
+  return part;
+}
+
+Vector3d middle_of_field(int k, double z) { return {k % 2 ? 0.05 : -0.05, k / 2 ? 0.05 : -0.05, z}; }
+
+// Of the middle of a field, the sheet facing -z with up -y.
+Vector3d wanted_of_field(int k, const Vector3d& d_eye, const scene::RoomLight& room) {
+  const Field& field = k_fields[k];
+  const Vector3d n = Vector3d(field.along.x(), -field.along.y(), -field.along.z()).normalized();
+  return lit(k_field_colour, field.metallic, field.roughness, n, d_eye, room, field.open) +
+         Vector3d::Constant(field.glow * k_field_glow * linear_of_srgb(188 / 255.0));
+}
+
+// Levels between a picture's colour where p is and a wanted colour, by the encoding of what shows it.
+double levels_off(const cv::Mat& bgr,
+                  const Imager& imager,
+                  const Vector3d& p,
+                  const Vector3d& wanted,
+                  const std::function<double(double)>& encoded) {
+  const Vector2d px = *imager.project(p);
+  const auto& found = bgr.at<cv::Vec3b>(cvRound(px.y()), cvRound(px.x()));
+  double worst = 0;
+  for (int c = 0; c < 3; ++c)
+    worst = std::max(worst, std::abs(found[2 - c] - 255 * encoded(std::min(1.0, wanted[c]))));
+  return worst;
+}
+
+TEST_F(RendererTest, MapsOfASurfaceAreReadInLightCompositesAndViews) {
+  const scene::RoomLight room{
+      k_up, {0.05, 0.08, 0.1}, {0.3, 0.28, 0.25}, {{Vector3d(0.2, -0.5, -1).normalized(), {0.5, 0.45, 0.4}}}};
+  Rig rig = two_projectors();
+  rig.projectors.pop_back();
+  const Imager &eye = rig.cameras[0], &projector = rig.projectors[0];
+  const Imager viewer = viewer_from({-0.3, -0.3, -1.2});
+  const Vector3d p_eye = eye.imager_from_world.inverse().translation;
+  const Vector3d p_viewer = viewer.imager_from_world.inverse().translation;
+  const auto srgb = [](double light) { return srgb_of_linear(light); };
+  const auto gamma = [](double light) { return std::pow(light, 1 / 2.2); };
+  for (const scene::Mode mode : {scene::Mode::view, scene::Mode::surface}) {
+    const double z = mode == scene::Mode::view ? -0.05 : -0.0005;
+    Scene scene = scene_of(sheet(0.5, 0.4), {slot("panel", mode, fields(z))});
+    scene.light = room;
+    const PosedScene posed = posed_at_origin(scene);
+    Renderer drawing = renderer(scene, rig);
+    const cv::Mat composite = drawing.composite(0, cv::Mat::zeros(480, 640, CV_8UC1), posed, Composite::full);
+    const cv::Mat view = drawing.view(eye, posed, cv::Scalar());
+    const cv::Mat light = drawing.projector_picture(0, posed, viewer);
+    for (int k = 0; k < 4; ++k) {
+      const Vector3d p = middle_of_field(k, z), d_eye = (p_eye - p).normalized(),
+                     d_viewer = (p_viewer - p).normalized();
+      const bool on_surface = mode == scene::Mode::surface;
+      const Vector3d d_up(0, 0, -1);
+      SCOPED_TRACE(fmt::format("field {} {}", k, on_surface ? "on the surface" : "for the viewer"));
+      const Vector3d seen = wanted_of_field(k, on_surface ? d_up : d_eye, room);
+      EXPECT_LT(levels_off(composite, eye, p, seen, srgb), 1.5);
+      EXPECT_LT(levels_off(view, eye, p, wanted_of_field(k, d_eye, room), srgb), 1.5);
+      const Vector3d p_lit =
+          on_surface ? p : Vector3d(p - d_viewer * (z / d_viewer.z()));  // where the viewer sees it
+      EXPECT_LT(
+          levels_off(light, projector, p_lit, wanted_of_field(k, on_surface ? d_up : d_viewer, room), gamma),
+          1.5);
+    }
+  }
+}
+
+// A scene without maps is drawn by programs without them; one part's maps change nothing of the others.
+TEST_F(RendererTest, MapsOfOnePartLeaveOthersAsTheyAre) {
+  const Mesh plain = coloured(sheet(0.1, 0.1, -0.02), {0.3f, 0.6f, 0.1f}, false);
+  Mesh glossy = coloured(sheet(0.1, 0.1, -0.03), {0.3f, 0.6f, 0.1f}, false);
+  glossy.materials[0].roughness = 0.5f;
+  for (auto& p : glossy.positions) p.y() += 0.15f;
+  std::vector<Slot> slots = {slot("plain", scene::Mode::view, plain),
+                             slot("glossy", scene::Mode::view, glossy)};
+  const Rig rig = two_projectors();
+  const cv::Mat black = cv::Mat::zeros(480, 640, CV_8UC1);
+  const Scene without = scene_of(sheet(0.5, 0.4), slots);
+  Mesh aside = fields(-0.01);
+  for (auto& p : aside.positions) p.x() += 0.25f;
+  slots.push_back(slot("fields", scene::Mode::view, aside));
+  const Scene with = scene_of(sheet(0.5, 0.4), slots);
+  PosedScene posed = posed_at_origin(with);
+  posed.parts.pop_back();
+  const cv::Mat wanted = renderer(without, rig).composite(0, black, posed, Composite::full);
+  EXPECT_GT(cv::countNonZero(wanted.reshape(1)), 5000);
+  EXPECT_EQ(cv::norm(renderer(with, rig).composite(0, black, posed, Composite::full), wanted, cv::NORM_INF),
+            0);
 }
 
 // What people chose instead is drawn as if the files had said it, and what they chose not as the files say.

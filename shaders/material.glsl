@@ -1,0 +1,81 @@
+// What a part's material is at a hit. Maps beyond the colour (glTF 2.0's) are read where SURFACE_MAPS is defined:
+// software GL would go through all of it.
+
+struct Finish {
+  vec3 base;                // linear
+  float metallic, roughness;
+  bool is_plain;            // diffuse alone
+  float open;               // share of soft light that arrives
+  vec3 emitted;             // light of its own
+  vec3 n_smooth, n;         // unit, interpolated and as the map of normals has it, scene frame, not yet turned to an eye
+};
+
+// Own colour at a hit; `footprint` is the side (m) of the pixel's patch on the surface.
+vec3 base_colour(Hit hit, float footprint) {
+  Triangle triangle = s_triangles[hit.id - 1u];
+  Material material = s_materials[triangle.material];
+  vec4 wanted = s_placements[triangle.owner].colour;
+  vec3 colour = wanted.a > 0.5 ? wanted.rgb : material.colour.rgb;
+  if (material.look.x < 0.0) return colour;
+  vec2 uv = uv_of(hit);
+  return colour * textureLod(s_looks, vec3(uv.x, 1.0 - uv.y, material.look.x), texture_lod(hit, footprint)).rgb;
+}
+
+bool is_unlit(Hit hit) {
+  Triangle triangle = s_triangles[hit.id - 1u];
+  return s_materials[triangle.material].colour.a > 0.5 && all(lessThan(s_placements[triangle.owner].look.xy, vec2(0)));
+}
+
+#ifdef SURFACE_MAPS
+layout(binding = 13) uniform sampler2DArray s_maps;
+
+vec3 map_at(Hit hit, float footprint, float layer) {
+  vec2 uv = uv_of(hit);
+  float lod = lod_of(vec2(textureSize(s_maps, 0).xy), hit, footprint);
+  return textureLod(s_maps, vec3(uv.x, 1.0 - uv.y, layer), lod).rgb;
+}
+
+// The normal of a map, frame of the hit's owner.
+vec3 mapped_normal_in_owner(Hit hit, vec3 n, Material material, float footprint) {
+  int first = 3 * int(hit.id - 1u) + material.more.x;
+  vec4 tangent = mat3x4(s_normals[first], s_normals[first + 1], s_normals[first + 2]) * hit.weights;
+  vec3 d_u = normalize(tangent.xyz - dot(tangent.xyz, n) * n);
+  vec3 d_v = (tangent.w < 0.0 ? -1.0 : 1.0) * cross(n, d_u);
+  vec3 along = (2.0 * map_at(hit, footprint, material.maps.y) - 1.0) * vec3(material.maps.zz, 1);
+  return normalize(along.x * d_u + along.y * d_v + along.z * n);
+}
+
+void read_maps(Hit hit, Material material, float footprint, inout Finish finish) {
+  finish.emitted = material.emitted.rgb;
+  vec2 uv = uv_of(hit);
+  if (material.emitted.a >= 0.0)
+    finish.emitted *= textureLod(s_looks, vec3(uv.x, 1.0 - uv.y, material.emitted.a), texture_lod(hit, footprint)).rgb;
+  if (material.maps.x >= 0.0) {
+    vec3 map = map_at(hit, footprint, material.maps.x);
+    finish.open = 1.0 + material.maps.w * (map.r - 1.0);
+    finish.roughness *= map.g;
+    finish.metallic *= map.b;
+    finish.is_plain = material.more.y == 0;
+  }
+  if (material.maps.y >= 0.0) {
+    vec3 n = mapped_normal_in_owner(hit, smooth_normal_in_owner(hit), material, footprint);
+    finish.n = turned_to_scene(owner_of(hit.id), n);
+  }
+}
+#else
+void read_maps(Hit hit, Material material, float footprint, inout Finish finish) {}
+#endif
+
+// Of what is not unlit. A metalness or roughness that people chose is the whole part's, maps or not.
+Finish finish_at(Hit hit, float footprint) {
+  Triangle triangle = s_triangles[hit.id - 1u];
+  Material material = s_materials[triangle.material];
+  vec2 wanted = s_placements[triangle.owner].look.xy;
+  vec3 n = smooth_normal(hit);
+  Finish finish = Finish(base_colour(hit, footprint), material.look.y, material.look.z, true, 1.0, vec3(0), n, n);
+  read_maps(hit, material, footprint, finish);
+  if (wanted.x >= 0.0) finish.metallic = wanted.x;
+  if (wanted.y >= 0.0) finish.roughness = wanted.y;
+  finish.is_plain = finish.is_plain && finish.metallic == 0.0 && finish.roughness == 1.0;
+  return finish;
+}
