@@ -16,11 +16,6 @@ constexpr double k_on_surface = 2e-3;  // m, interfaces.md: a surface part this 
 constexpr int k_sub_samples = 8;       // a side of a pixel on an edge: its cover is then right to 1/128
 constexpr float k_same_light = 0.004F;  // of full light, 1/255: samples that differ by less are one colour
 
-// The shading of parts that are not unlit, as shaders/look.glsl says: soft light around the viewer's up
-// direction and a lamp above the left shoulder.
-constexpr float k_soft_below = 0.15F, k_soft_above = 0.35F, k_lamp = 0.65F;
-const Eigen::Vector3d k_d_lamp_viewer = Eigen::Vector3d(-0.36, -0.64, -0.68).normalized();
-
 std::vector<PlacedMesh> prototype_of(const World& world) {
   const Object* prototype = world.find("prototype");
   if (prototype == nullptr) return {};
@@ -33,20 +28,20 @@ Eigen::Vector3d turned_against(const Eigen::Vector3d& n, const Eigen::Vector3d& 
   return n.dot(d) > 0 ? Eigen::Vector3d(-n) : n;
 }
 
-}  // namespace
-
-Aim::Shading::Shading(const Imager& eye) {
-  const Eigen::Quaterniond world_from_eye = eye.imager_from_world.inverse().rotation;
-  d_up = world_from_eye * -Eigen::Vector3d::UnitY();
-  d_lamp = world_from_eye * k_d_lamp_viewer;
+// A normal that looks away along d looks aside instead: at a silhouette.
+Eigen::Vector3d aside(const Eigen::Vector3d& n, const Eigen::Vector3d& d) {
+  return n.dot(d) > 0 ? Eigen::Vector3d((n - n.dot(d) * d).normalized()) : n;
 }
+
+}  // namespace
 
 Aim::Aim(const World& world, const scene::PosedScene& parts, const Imager& viewer)
     : world_(world),
       prototype_(prototype_of(world)),
       p_eye_(viewer.imager_from_world.inverse().translation),
-      shading_(viewer) {
+      light_(PartsLight::beside(viewer)) {
   LIMN_CHECK(world.scene.has_value());
+  if (const auto& room = parts.light ? parts.light : world.scene->light) light_ = {*room, true};
   for (const scene::PosedPart& posed : parts.parts) {
     const scene::Slot* slot = world.scene->find_slot(posed.slot);
     LIMN_CHECK(slot != nullptr);
@@ -133,36 +128,29 @@ bool Aim::is_hidden(const Nearest& nearest, const Ray& ray, const Hit& behind) c
   return (nearest.hit.distance - behind.distance) * cosine > (on_surface ? k_on_surface : 0);
 }
 
-Eigen::Vector3f Aim::base_colour(const Part& part, const Hit& hit) const {
-  return material_albedo(*part.mesh, hit.triangle, part.rays.uv(hit));
-}
-
-bool Aim::is_unlit(const Part& part, const Hit& hit) const {
-  const auto& materials = part.mesh->triangle_materials;
-  return part.mesh->materials[materials.empty() ? 0 : materials[static_cast<std::size_t>(hit.triangle)]]
-      .unlit;
-}
-
 Eigen::Vector3f Aim::look_along(const Eigen::Vector3d& d,
                                 const Nearest& nearest,
-                                const Shading& shading) const {
+                                const PartsLight& light) const {
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
-  const Eigen::Vector3f colour = base_colour(part, nearest.hit);
-  if (is_unlit(part, nearest.hit)) return colour;
+  const Substance substance = substance_of(*part.mesh, nearest.hit.triangle, part.rays.uv(nearest.hit));
+  if (substance.is_unlit) return substance.base.cast<float>();
   const Eigen::Vector3d face = turned_against(part.rays.face_normal(nearest.hit), d);
-  Eigen::Vector3d n = turned_against(part.rays.shading_normal(nearest.hit), -face);
-  if (n.dot(d) > 0) n = (n - n.dot(d) * d).normalized();  // at a silhouette
-  const auto above = static_cast<float>(0.5 + 0.5 * n.dot(shading.d_up));
-  const auto lamp = static_cast<float>(std::max(0.0, n.dot(shading.d_lamp)));
-  return colour * (k_soft_below + (k_soft_above - k_soft_below) * above + k_lamp * lamp);
+  const double side = part.rays.shading_normal(nearest.hit).dot(face) < 0 ? -1 : 1;
+  const Eigen::Vector3d n = aside(side * part.rays.mapped_normal(nearest.hit, substance.along), d);
+  return shaded(substance, n, -d, light.room).cast<float>();
 }
 
+// Where no room is known light comes from along the normal of the prototype, and nothing is mirrored.
 Eigen::Vector3f Aim::look_on_surface(const Nearest& nearest, const Eigen::Vector3d& d_normal) const {
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
-  const Eigen::Vector3f colour = base_colour(part, nearest.hit);
-  if (is_unlit(part, nearest.hit)) return colour;
-  const double facing = std::abs(part.rays.shading_normal(nearest.hit).dot(d_normal));
-  return colour * (k_soft_above + k_lamp * static_cast<float>(facing));
+  const Substance substance = substance_of(*part.mesh, nearest.hit.triangle, part.rays.uv(nearest.hit));
+  if (substance.is_unlit) return substance.base.cast<float>();
+  const double side = part.rays.shading_normal(nearest.hit).dot(d_normal) < 0 ? -1 : 1;
+  const Eigen::Vector3d n = aside(side * part.rays.mapped_normal(nearest.hit, substance.along), -d_normal);
+  if (light_.is_known) return shaded(substance, n, d_normal, light_.room).cast<float>();
+  const Eigen::Vector3d light = substance.open * light_.room.above_rgb.reverse() +
+                                n.dot(d_normal) * light_.room.lamps[0].strength_rgb.reverse();
+  return (substance.base.cwiseProduct(light) + substance.emitted).cast<float>();
 }
 
 // The view part that the viewer sees before p, a point of the prototype.
@@ -174,7 +162,7 @@ Aim::Sample Aim::view_sample(const Eigen::Vector3d& p, const Eigen::Vector3d& n_
   if (nearest.part < 0 || nearest.hit.distance > distance) return {};
   if (parts_[static_cast<std::size_t>(nearest.part)].on_surface) return {};
   if (!prototype_.lit(p_eye_, p)) return {};
-  return {nearest.part, look_along(ray.d, nearest, shading_)};
+  return {nearest.part, look_along(ray.d, nearest, light_)};
 }
 
 // The surface part nearest to p along the normal, within 2 mm on either side.
@@ -205,12 +193,12 @@ Aim::Sample Aim::light_along(const Ray& ray) const {
   return surface_sample(p, turned_against(prototype_.shading_normal(hit), -n_face));
 }
 
-Aim::Sample Aim::seen_along(const Ray& ray, const Shading& shading) const {
+Aim::Sample Aim::seen_along(const Ray& ray, const PartsLight& light) const {
   const Nearest nearest = nearest_part(ray);
   if (nearest.part < 0 || is_hidden(nearest, ray, prototype_.first_hit(ray))) return {};
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
   if (part.on_surface) return {nearest.part, look_on_surface(nearest, part.rays.shading_normal(nearest.hit))};
-  return {nearest.part, look_along(ray.d, nearest, shading)};
+  return {nearest.part, look_along(ray.d, nearest, light)};
 }
 
 PartPicture Aim::projector_picture(std::size_t index) const {
@@ -218,8 +206,8 @@ PartPicture Aim::projector_picture(std::size_t index) const {
 }
 
 PartPicture Aim::seen(const Imager& imager) const {
-  const Shading shading(imager);
-  return averaged(imager, [&](const Ray& ray) { return seen_along(ray, shading); });
+  const PartsLight light = light_.is_known ? light_ : PartsLight::beside(imager);
+  return averaged(imager, [&](const Ray& ray) { return seen_along(ray, light); });
 }
 
 DepthOrder Aim::order(const Imager& imager) const {

@@ -6,6 +6,7 @@
 
 #include "core/imager.h"
 #include "scene/posed.h"
+#include "sim/part_look.h"
 #include "sim/ray_scene.h"
 #include "sim/world.h"
 
@@ -31,15 +32,16 @@ struct DepthOrder {
 /// Borrows the world and its scene's meshes, which must outlive it unchanged.
 class Aim {
  public:
-  /// `viewer` is whose eye `view` parts are drawn for, and beside whom the lamp stands that shades parts.
+  /// `viewer` is whose eye `view` parts are drawn for, and beside whom the lamp stands that shades parts
+  /// where neither they nor the scene name a room's light.
   Aim(const World& world, const scene::PosedScene& parts, const Imager& viewer);
 
   /// The light that projector `index` is to give if it were alone: for each point that a pixel lights the
   /// colour of the view part that the viewer sees before it, else of the surface part within 2 mm of it.
   PartPicture projector_picture(std::size_t index) const;
 
-  /// The parts as an imager sees them, those that the prototype hides left out; the shading lamp stands with
-  /// the imager.
+  /// The parts as an imager sees them, those that the prototype hides left out; where no room's light is
+  /// known the shading lamp stands with the imager.
   PartPicture seen(const Imager& imager) const;
 
   DepthOrder order(const Imager& imager) const;
@@ -58,30 +60,23 @@ class Aim {
     int part = -1;
     Hit hit;
   };
-  // Directions in the world of the light that shades parts: up, and towards the lamp.
-  struct Shading {
-    explicit Shading(const Imager& eye);
-    Eigen::Vector3d d_up, d_lamp;
-  };
   template <class SampleAt>
   static PartPicture averaged(const Imager& imager, const SampleAt& sample_at);
 
   Nearest nearest_part(const Ray& ray) const;
   bool is_hidden(const Nearest& nearest, const Ray& ray, const Hit& behind) const;
-  Eigen::Vector3f base_colour(const Part& part, const Hit& hit) const;
-  bool is_unlit(const Part& part, const Hit& hit) const;
-  Eigen::Vector3f look_along(const Eigen::Vector3d& d, const Nearest& nearest, const Shading& shading) const;
+  Eigen::Vector3f look_along(const Eigen::Vector3d& d, const Nearest& nearest, const PartsLight& light) const;
   Eigen::Vector3f look_on_surface(const Nearest& nearest, const Eigen::Vector3d& d_normal) const;
   Sample view_sample(const Eigen::Vector3d& p, const Eigen::Vector3d& n_face) const;
   Sample surface_sample(const Eigen::Vector3d& p, const Eigen::Vector3d& n) const;
   Sample light_along(const Ray& ray) const;
-  Sample seen_along(const Ray& ray, const Shading& shading) const;
+  Sample seen_along(const Ray& ray, const PartsLight& light) const;
 
   const World& world_;
   RayScene prototype_;
   std::vector<Part> parts_;
   Eigen::Vector3d p_eye_;
-  Shading shading_;
+  PartsLight light_;
 };
 
 }  // namespace limn::sim

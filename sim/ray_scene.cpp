@@ -193,6 +193,20 @@ Eigen::Vector3d RayScene::shading_normal(const Hit& hit) const {
   return (placed.world_from_mesh.rotation * n.cast<double>()).normalized();
 }
 
+Eigen::Vector3d RayScene::mapped_normal(const Hit& hit, const Eigen::Vector3d& along) const {
+  const Placed& placed = impl_->placed[static_cast<std::size_t>(hit.object)];
+  const Eigen::Vector3d n = shading_normal(hit);
+  const auto& tangents = placed.mesh->tangents;
+  if (tangents.empty()) return n;
+  const auto& c = impl_->corners(hit);
+  const float u = hit.barycentric.x(), v = hit.barycentric.y();
+  const Eigen::Vector4f t = (1 - u - v) * tangents[c[0]] + u * tangents[c[1]] + v * tangents[c[2]];
+  const Eigen::Vector3d to_u = placed.world_from_mesh.rotation * t.head<3>().cast<double>();
+  const Eigen::Vector3d d_v = (t.w() < 0 ? -1.0 : 1.0) * n.cross(to_u).normalized();
+  const Eigen::Vector3d d_u = (to_u - to_u.dot(n) * n).normalized();
+  return (along.x() * d_u + along.y() * d_v + along.z() * n).normalized();
+}
+
 Eigen::Vector2f RayScene::uv(const Hit& hit) const {
   const auto& uvs = impl_->placed[static_cast<std::size_t>(hit.object)].mesh->uvs;
   if (uvs.empty()) return Eigen::Vector2f::Zero();

@@ -52,6 +52,9 @@ class RayScene {
   Eigen::Vector3d face_normal(const Hit& hit) const;
   /// Normal interpolated from the mesh's, unit; the geometric one when the mesh has none.
   Eigen::Vector3d shading_normal(const Hit& hit) const;
+  /// Normal that lies so many lengths along the mesh's tangent, its bitangent and the interpolated normal
+  /// (the first two made perpendicular to that), unit; the interpolated one when the mesh has no tangents.
+  Eigen::Vector3d mapped_normal(const Hit& hit, const Eigen::Vector3d& along) const;
   /// Coordinates in the picture of the mesh's uv; zero when it has none.
   Eigen::Vector2f uv(const Hit& hit) const;
 

@@ -30,10 +30,22 @@ Eigen::Vector3f texel(const cv::Mat& texture, int x, int y) {
   return {linear[p[0]], linear[p[1]], linear[p[2]]};
 }
 
+int repeated(int at, int count) { return (at % count + count) % count; }
+
+// The same; beyond the border the texture repeats.
+Eigen::Vector3f repeated_texel(const cv::Mat& texture, int x, int y) {
+  return texel(texture, repeated(x, texture.cols), repeated(y, texture.rows));
+}
+
+// The numbers in a pixel, 0 ... 1, BGR.
+Eigen::Vector3f repeated_numbers(const cv::Mat& texture, int x, int y) {
+  const auto& p = texture.at<cv::Vec3b>(repeated(y, texture.rows), repeated(x, texture.cols));
+  return Eigen::Vector3f(p[0], p[1], p[2]) / 255;
+}
+
 float alpha_of_texel(const cv::Mat& texture, int x, int y) {
-  x = std::clamp(x, 0, texture.cols - 1);
-  y = std::clamp(y, 0, texture.rows - 1);
-  return static_cast<float>(texture.at<cv::Vec4b>(y, x)[3]) / 255;
+  const auto& p = texture.at<cv::Vec4b>(repeated(y, texture.rows), repeated(x, texture.cols));
+  return static_cast<float>(p[3]) / 255;
 }
 
 // Between the middles of texels, v up.
@@ -72,7 +84,39 @@ Eigen::Vector3f material_albedo(const scene::Mesh& mesh, int triangle, const Eig
   const scene::Material& material = material_of(mesh, triangle);
   const Eigen::Vector3f bgr = material.base_colour.reverse();
   if (material.texture.empty()) return bgr;
-  return bgr.cwiseProduct(textured(material.texture, uv, false));
+  return bgr.cwiseProduct(between_texels(material.texture, uv, repeated_texel));
+}
+
+Substance substance_of(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv) {
+  const scene::Material& material = material_of(mesh, triangle);
+  const scene::SurfaceMaps& maps = material.maps;
+  Substance found;
+  found.base = material_albedo(mesh, triangle, uv).cast<double>();
+  found.is_unlit = material.unlit;
+  found.metallic = static_cast<double>(material.metallic);
+  found.roughness = static_cast<double>(material.roughness);
+  found.is_plain =
+      material.metallic == 0 && material.roughness == 1 && maps.metallic_roughness.picture.empty();
+  found.emitted = material.emitted.reverse().cast<double>();
+  found.along = Eigen::Vector3d::UnitZ();
+  if (!maps.metallic_roughness.picture.empty()) {
+    const Eigen::Vector3f numbers = between_texels(maps.metallic_roughness.picture, uv, repeated_numbers);
+    found.metallic *= static_cast<double>(numbers[0]);
+    found.roughness *= static_cast<double>(numbers[1]);
+  }
+  if (!maps.occlusion.picture.empty()) {
+    const auto red = static_cast<double>(between_texels(maps.occlusion.picture, uv, repeated_numbers)[2]);
+    found.open = 1 - static_cast<double>(maps.occlusion_strength) * (1 - red);
+  }
+  if (!maps.emission.picture.empty())
+    found.emitted.array() *= between_texels(maps.emission.picture, uv, repeated_texel).cast<double>().array();
+  if (!maps.normals.picture.empty() && !mesh.tangents.empty()) {
+    const Eigen::Vector3f numbers = between_texels(maps.normals.picture, uv, repeated_numbers);
+    const auto scale = static_cast<double>(maps.normal_scale);
+    const Eigen::Vector3d around = 2 * numbers.reverse().cast<double>() - Eigen::Vector3d::Ones();
+    found.along = around.cwiseProduct(Eigen::Vector3d(scale, scale, 1));
+  }
+  return found;
 }
 
 }  // namespace limn::sim

@@ -4,6 +4,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "scene/tangents.h"
 #include "tests/support/matchers.h"
 
 namespace limn::sim {
@@ -147,6 +148,37 @@ TEST(Aim, ShadingFollowsTheLampOverTheEyesLeftShoulder) {
     return middle(Pose(exp_rotation({w, 0, 0}), Eigen::Vector3d::Zero()));
   };
   EXPECT_GT(tilted(-0.4), tilted(0.4) + 0.2) << "what looks up is brighter";
+}
+
+// A sheet that faces the eye and whose map of normals looks half to its texture's right and up.
+scene::Mesh mapped_sheet() {
+  scene::Mesh part = sheet_at(0.2, 0.2, 0, -0.1);
+  for (const auto& p : part.positions) part.uvs.emplace_back(p.x() / 0.2F + 0.5F, 0.5F - p.y() / 0.2F);
+  part.materials[0] = {.base_colour = {1, 1, 1}, .texture = {}};
+  part.materials[0].maps.normals.picture = cv::Mat(2, 2, CV_8UC3, cv::Scalar(255, 191, 191));
+  scene::add_tangents(&part);
+  return part;
+}
+
+TEST(Aim, NormalsOfAMapAreLitByTheScenesRoom) {
+  const double aside = 2 * 191 / 255.0 - 1;
+  const Eigen::Vector3d n = Eigen::Vector3d(aside, -aside, -1).normalized();  // up is -y
+  for (const scene::Mode mode : {scene::Mode::view, scene::Mode::surface}) {
+    World world = plane_world(mode, mapped_sheet());
+    if (mode == scene::Mode::surface)
+      for (auto& p : world.scene->slots[0].variants[0].mesh.positions) p.z() = -0.001F;
+    world.scene->light.emplace();
+    for (const Eigen::Vector3d& d_lamp :
+         {Eigen::Vector3d(0.5, -0.1, -0.8), Eigen::Vector3d(-0.5, 0.1, -0.8)}) {
+      world.scene->light->lamps = {{d_lamp.normalized(), {0.2, 0.3, 0.4}}};
+      const double nl = n.dot(d_lamp.normalized());
+      for (const PartPicture& picture :
+           {Aim(world, posed(world), eye_at({0.1, 0, 0})).projector_picture(0),
+            Aim(world, posed(world), eye_at({0.1, 0, 0})).seen(world.rig.cameras[0])})
+        for (int c = 0; c < 3; ++c)
+          EXPECT_NEAR(picture.light.at<cv::Vec3f>(119, 159)[c], nl * (0.4 - 0.1 * c), 1e-4);
+    }
+  }
 }
 
 }  // namespace
