@@ -53,6 +53,13 @@ GlName make_buffer(const void* data, std::size_t bytes) {
   return {name, [](GLuint n) { glDeleteBuffers(1, &n); }};
 }
 
+GlName make_texels(const GlName& buffer, GLenum format) {
+  GLuint name = 0;
+  glCreateTextures(GL_TEXTURE_BUFFER, 1, &name);
+  glTextureBuffer(name, format, *buffer);
+  return {name, [](GLuint n) { glDeleteTextures(1, &n); }};
+}
+
 void upload(const GlName& texture, const cv::Mat& picture) {
   LIMN_CHECK(picture.depth() == CV_8U || picture.depth() == CV_32F);
   const cv::Mat whole = picture.isContinuous() ? picture : picture.clone();

@@ -37,6 +37,8 @@ GlName make_vertex_array();
 GlName make_depth_buffer(int width, int height);
 /// A buffer with this content.
 GlName make_buffer(const void* data, std::size_t bytes);
+/// All of a buffer as the texels of a GL_TEXTURE_BUFFER, which shows what the buffer holds by then.
+GlName make_texels(const GlName& buffer, GLenum format);
 
 /// Fills a GL_TEXTURE_2D of make_texture from a picture of 1-4 channels, 8-bit or float; first row first.
 void upload(const GlName& texture, const cv::Mat& picture);

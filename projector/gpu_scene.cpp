@@ -15,8 +15,9 @@ namespace limn::projector {
 namespace {
 
 constexpr int k_cluster = 128;  // triangles
-// Texture units, as in shaders/scene.glsl, material.glsl and look.glsl.
-constexpr GLuint k_looks_unit = 1, k_maps_unit = 13, k_mirrored_unit = 14;
+// Texture units and bindings, as in shaders/scene.glsl, material.glsl and look.glsl.
+constexpr GLuint k_looks_unit = 1, k_first_texels_unit = 13, k_maps_unit = 18, k_mirrored_unit = 19;
+constexpr GLuint k_materials_binding = 3;
 
 // As in shaders/scene.glsl.
 struct GpuMaterial {
@@ -53,6 +54,8 @@ struct GpuTriangle {
   std::uint32_t owner = 0, material = 0;
   std::array<std::uint32_t, 3> beside = {0, 0, 0};  // ids
 };
+
+constexpr std::size_t k_triangle_texels = sizeof(GpuTriangle) / sizeof(std::uint32_t);
 
 // Appends a mesh's triangles that know their neighbours: one of them where many share a side. Corners in one
 // place are one corner.
@@ -168,10 +171,13 @@ struct GpuScene::Staging {
   std::vector<scene::Texture> looks, maps;
 };
 
-Status GpuScene::check_fits(const scene::Scene& scene) {
-  GLint64 largest = 0;
-  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &largest);
-  const std::size_t most = static_cast<std::size_t>(largest) / (3 * sizeof(Eigen::Vector4f));
+std::size_t GpuScene::most_triangles() {
+  GLint64 texels = 0;
+  glGetInteger64v(GL_MAX_TEXTURE_BUFFER_SIZE, &texels);
+  return static_cast<std::size_t>(texels) / k_triangle_texels;
+}
+
+Status GpuScene::check_fits(const scene::Scene& scene, std::size_t most) {
   const std::size_t count = triangles_of(scene) + triangles_with_tangents(scene);
   if (count <= most) return {};
   return error(
@@ -207,6 +213,10 @@ GpuScene::GpuScene(const scene::Scene& scene) {
   materials_ = buffer_of(staging.materials);
   owners_shown_.resize(static_cast<std::size_t>(owner_count()));
   placements_ = buffer_of(owners_shown_);
+  corner_texels_ = make_texels(corners_, GL_RGBA32F);
+  normal_texels_ = make_texels(normals_, GL_RGBA32F);
+  triangle_texels_ = make_texels(triangles_, GL_R32UI);
+  placement_texels_ = make_texels(placements_, GL_RGBA32F);
   looks_ = make_layers(staging.looks, GL_SRGB8_ALPHA8);
   maps_ = make_layers(staging.maps,
                       GL_RGBA16);  // finer than their 8 bits: software GL mixes texels in the format's
@@ -328,8 +338,9 @@ void GpuScene::place(const std::vector<PlacedRun>& runs) {
 }
 
 void GpuScene::bind() const {
-  const GlName* buffers[] = {&corners_, &normals_, &triangles_, &materials_, &placements_};
-  for (GLuint i = 0; i < std::size(buffers); ++i) glBindBufferBase(GL_SHADER_STORAGE_BUFFER, i, **buffers[i]);
+  const GlName* texels[] = {&corner_texels_, &normal_texels_, &triangle_texels_, &placement_texels_};
+  for (GLuint i = 0; i < std::size(texels); ++i) glBindTextureUnit(k_first_texels_unit + i, **texels[i]);
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_materials_binding, *materials_);
   glBindTextureUnit(k_looks_unit, *looks_);
   glBindTextureUnit(k_maps_unit, *maps_);
   glBindTextureUnit(k_mirrored_unit, *mirrored_);

@@ -42,8 +42,10 @@ struct PlacedRun {
 /// All meshes of a scene on the GPU, as shaders/scene.glsl reads them.
 class GpuScene {
  public:
-  /// Error: more triangles than the driver's largest buffer holds.
-  static Status check_fits(const scene::Scene& scene);
+  /// How many triangles the driver's largest texel buffer holds.
+  static std::size_t most_triangles();
+  /// Error: more than `most` triangles.
+  static Status check_fits(const scene::Scene& scene, std::size_t most);
   /// A texture larger than 4096 texels a side, or than the driver's limit, is reduced to it, with a warning.
   explicit GpuScene(const scene::Scene& scene);
 
@@ -53,7 +55,7 @@ class GpuScene {
   static Pose scene_from_world(const scene::PosedScene& posed);
   /// Sends the places to the GPU.
   void place(const std::vector<PlacedRun>& runs);
-  /// Binds the buffers and the textures (units 1, 13 and 14) for a drawing.
+  /// Binds the buffers and the textures (units 1, 13 to 16, 18 and 19) for a drawing.
   void bind() const;
 
   bool has_cut_outs() const { return has_cut_outs_; }
@@ -85,6 +87,7 @@ class GpuScene {
   bool has_cut_outs_ = false, has_surface_maps_ = false;
   std::vector<GpuOwner> owners_shown_;
   GlName corners_, normals_, triangles_, materials_, placements_, vertex_array_;
+  GlName corner_texels_, normal_texels_, triangle_texels_, placement_texels_;  // of those buffers
   GlName looks_, maps_, mirrored_;
 };
 

@@ -23,7 +23,7 @@ constexpr int k_tangents_unit = 0, k_response_unit = 2, k_centre_unit = 3, k_pic
               k_sights_unit = 5, k_mixing_unit = 9, k_albedo_unit = 10, k_arriving_unit = 11,
               k_distances_unit = 12;
 constexpr int k_arriving_side = 256;  // texels of a projector's map of arriving light
-constexpr GLuint k_list_binding = 6;  // of buffers, after the scene's and the sights'
+constexpr GLuint k_list_binding = 6;  // of buffers, after the scene's
 constexpr GLuint k_known_hits_image = 1, k_known_shares_image = 2;  // shaders/known.glsl
 constexpr int k_each = 2, k_view = 3;  // overlays of parts treated each in its way, and of a virtual camera
 // Steps of light that ask for more samples: beside light, and between blacks.
@@ -663,7 +663,7 @@ Renderer::~Renderer() = default;
 
 Result<Renderer> Renderer::create(const scene::Scene& scene, const Rig& rig) {
   LIMN_TRY_STATUS(check_context());
-  LIMN_TRY_STATUS(GpuScene::check_fits(scene));
+  LIMN_TRY_STATUS(GpuScene::check_fits(scene, GpuScene::most_triangles()));
   LIMN_TRY(Sights sights, Sights::create(rig));
   auto impl = std::make_unique<Impl>(scene, rig, std::move(sights));
   LIMN_TRY_STATUS(impl->link_programs());

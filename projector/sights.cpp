@@ -13,6 +13,7 @@ constexpr double k_oversampling = 1.5;
 constexpr int k_eye_side = 2560;
 // Nodes of the pixel maps: 4-5 px a cell, within 0.01 px of the lens between them.
 constexpr int k_map_columns = 321, k_map_rows = 241;
+constexpr GLuint k_sight_texels_unit = 17;  // as in shaders/scene.glsl
 // Share of the picture's smaller side over which a projector fades towards its border.
 constexpr double k_soft_border = 0.1;
 
@@ -173,6 +174,7 @@ Result<Sights> Sights::create(const Rig& rig) {
   glNamedFramebufferTexture(*sights.framebuffer_, GL_DEPTH_ATTACHMENT, *sights.depth_, 0);
   const std::vector<std::byte> empty((projectors.size() + 2) * sizeof(GpuSight));
   sights.sights_ = make_buffer(empty.data(), empty.size());
+  sights.sight_texels_ = make_texels(sights.sights_, GL_RGBA32F);
   return sights;
 }
 
@@ -385,7 +387,7 @@ void Sights::light_places(std::size_t projector,
 }
 
 void Sights::bind(const Program& program, int first_unit) const {
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 5, *sights_);
+  glBindTextureUnit(k_sight_texels_unit, *sight_texels_);
   program.bind("s_projector_ids", first_unit, projector_ids_);
   program.bind("s_eye_ids", first_unit + 1, eye_ids_);
   program.bind("s_pixel_maps", first_unit + 2, pixel_maps_);

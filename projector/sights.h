@@ -107,7 +107,7 @@ class Sights {
   std::vector<GpuLens> lenses_;
   Program program_, cut_program_;        // of triangles whole, and of such as have pieces cut out
   std::optional<SoftEdges> soft_edges_;  // with several projectors
-  GlName framebuffer_, depth_, projector_ids_, eye_ids_, pixel_maps_, sights_;
+  GlName framebuffer_, depth_, projector_ids_, eye_ids_, pixel_maps_, sights_, sight_texels_;
   int ids_width_ = 1, ids_height_ = 1;    // room of the projectors' ids
   std::vector<cv::Rect> surface_places_;  // texels of each projector's ids that surface parts are within
 };

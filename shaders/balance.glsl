@@ -32,7 +32,7 @@ vec4 mixing_at(vec2 px, int layer) {
 // As measured for projector i or, where that one was not seen there, for another; else the mean.
 Surface measured_surface(int i, vec3 p) {
   Surface surface = Surface(u_mean_mixing, vec3(0));
-  Sight witness = s_sights[u_witness];
+  Sight witness = sight_at(u_witness);
   vec3 q = (witness.sight_from_scene * vec4(p, 1)).xyz;
   if (q.z <= 0.0 || is_hidden(s_projector_ids, witness, p)) return surface;
   vec2 px = pixel_of(witness, q.xy / q.z);

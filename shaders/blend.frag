@@ -8,7 +8,7 @@ layout(location = 0) out vec2 o_blend;
 uniform int u_projector;
 
 void main() {
-  Sight projector = s_sights[u_projector];
+  Sight projector = sight_at(u_projector);
   vec3 d = ray_of(projector, floor(gl_FragCoord.xy));
   Hit hit = first_hit(s_projector_ids, projector, 0, d);
   o_blend = vec2(0);

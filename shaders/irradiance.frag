@@ -8,7 +8,7 @@ uniform usampler2DArray s_eye_ids;
 uniform int u_eye, u_projector;
 
 void main() {
-  Sight eye = s_sights[u_eye];
+  Sight eye = sight_at(u_eye);
   vec3 d = ray_of(eye, floor(gl_FragCoord.xy));
   Hit hit = first_hit(s_eye_ids, eye, 0, d);
   o_irradiance = 0.0;

@@ -12,7 +12,7 @@ uniform ivec2 u_blocks;
 
 // Whether projector j sees a jump of depth in the blocks around a point (scene frame).
 bool is_beside_jump(int j, vec3 p) {
-  Sight sight = s_sights[j];
+  Sight sight = sight_at(j);
   vec3 q = (sight.sight_from_scene * vec4(p, 1)).xyz;
   vec2 texel = sight.focal_centre.xy * q.xy / q.z + sight.focal_centre.zw + 0.5;
   ivec2 block = ivec2(floor(texel / float(k_block))), last = (ivec2(sight.size.xy) - 1) / k_block;
@@ -24,7 +24,7 @@ bool is_beside_jump(int j, vec3 p) {
 
 // Whether another projector lights what this one sees in a texel, and sees no jump there.
 bool goes_on(vec2 texel) {
-  Sight own = s_sights[u_projector];
+  Sight own = sight_at(u_projector);
   vec3 d = normalize(vec3((texel - own.focal_centre.zw) / own.focal_centre.xy, 1)) * mat3(own.sight_from_scene);
   Hit hit = first_hit(s_projector_ids, own, 0, d);
   if (hit.id == 0u) return false;
@@ -37,7 +37,7 @@ bool goes_on(vec2 texel) {
 void main() {
   ivec2 block = ivec2(gl_GlobalInvocationID.xy);
   if (any(greaterThanEqual(block, u_blocks))) return;
-  vec4 jump = texelFetch(s_jumps, ivec3(block, int(s_sights[u_projector].quality.z)), 0);
+  vec4 jump = texelFetch(s_jumps, ivec3(block, int(sight_at(u_projector).quality.z)), 0);
   bool is_handed = jump.x >= 0.0 && (goes_on(jump.xy) || (jump.z >= 0.0 && goes_on(jump.zw)));
   imageStore(u_marks, block, vec4(is_handed ? 1.0 : 0.0));
 }

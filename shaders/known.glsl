@@ -11,7 +11,7 @@ Hit centre_hit(ivec2 at) {
     vec2 weights = uintBitsToFloat(known.yz);
     return Hit(known.x, 0.0, vec3(1.0 - weights.x - weights.y, weights), 0.0);
   }
-  Sight projector = s_sights[u_projector];
+  Sight projector = sight_at(u_projector);
   Hit hit = first_hit(s_projector_ids, projector, 0, ray_of(projector, vec2(at)));
   imageStore(u_known_hits, at, uvec4(hit.id, floatBitsToUint(hit.weights.yz), u_known_stamp));
   imageStore(u_known_shares, at, vec4(-1));

@@ -36,7 +36,7 @@ void main() {
     o_display = vec4(light.a > 0.0 ? display_value(light.rgb) : vec3(0), clipped);
     return;
   }
-  float black = s_sights[u_projector].quality.w;
+  float black = sight_at(u_projector).quality.w;
   vec3 value = light.a > 0.0 ? display_value(black + (1.0 - black) * light.rgb) : vec3(0);
   // Without noise smooth light would have bands of whole levels; black and white stay what they are.
   vec3 inner = step(vec3(0.5 / 255.0), value) * step(value, vec3(254.5 / 255.0));

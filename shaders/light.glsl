@@ -15,20 +15,20 @@ uniform bool u_has_view_parts, u_has_surface_parts;
 
 // Colour of the view part that the viewer sees before p; a: 0 when none, or when p is hidden from the viewer.
 vec4 view_colour(vec3 p, vec3 d_normal, float footprint) {
-  Sight eye = s_sights[u_eye];
+  Sight eye = sight_at(u_eye);
   vec3 d = p - eye.p_eye.xyz;
   float t = length(d);
   d /= t;
   if (dot(d_normal, d) >= 0.0) return vec4(0);  // the viewer looks at the other side
   Hit hit = first_hit(s_eye_ids, eye, 1, d);
-  if (hit.id == 0u || hit.t > t || s_placements[owner_of(hit.id)].upper.w > 0.5) return vec4(0);
+  if (hit.id == 0u || hit.t > t || owner_at(owner_of(hit.id)).upper.w > 0.5) return vec4(0);
   if (is_hidden(s_eye_ids, eye, p)) return vec4(0);
   return vec4(look_along(d, hit, footprint), 1);
 }
 
 vec4 surface_colour(Place place, float footprint) {
   if (!may_hold_surface_part(place.p, u_placement_count)) return vec4(0);
-  Hit hit = surface_part_at(s_projector_ids, s_sights[u_projector], place.p, place.d_smooth);
+  Hit hit = surface_part_at(s_projector_ids, sight_at(u_projector), place.p, place.d_smooth);
   return hit.id == 0u ? vec4(0) : vec4(look_on_surface(hit, place.d_smooth, footprint), 1);
 }
 
@@ -46,8 +46,8 @@ CentreShare centre_share(ivec2 at) {
   if (u_even_black) return k_no_centre;
   Hit prototype = centre_hit(at);
   if (prototype.id == 0u) return k_no_centre;
-  Place place = place_at(prototype, ray_of(s_sights[u_projector], vec2(at)));
-  return CentreShare(distance(place.p, s_sights[u_projector].p_eye.xyz), place.d_flat, known_share(at, place));
+  Place place = place_at(prototype, ray_of(sight_at(u_projector), vec2(at)));
+  return CentreShare(distance(place.p, sight_at(u_projector).p_eye.xyz), place.d_flat, known_share(at, place));
 }
 
 bool is_beside(CentreShare centre, Hit hit, Place place, float footprint) {
@@ -58,7 +58,7 @@ bool is_beside(CentreShare centre, Hit hit, Place place, float footprint) {
 
 // Colour that is to be seen at a place, t along the projector's ray; a: 0 where there is none.
 vec4 wanted_colour(Place place, float t) {
-  float footprint = t / s_sights[u_projector].quality.x;
+  float footprint = t / sight_at(u_projector).quality.x;
   vec4 colour = u_has_view_parts ? view_colour(place.p, place.d_flat, footprint) : vec4(0);
   if (colour.a == 0.0 && u_has_surface_parts) colour = surface_colour(place, footprint);
   return colour;
@@ -67,7 +67,7 @@ vec4 wanted_colour(Place place, float t) {
 // Light of a pixel's centre. rgb: light; a: coverage by what is to be lit.
 vec4 centre_light(ivec2 at) {
   Hit prototype = centre_hit(at);
-  Sight projector = s_sights[u_projector];
+  Sight projector = sight_at(u_projector);
   Place place = place_at(prototype, ray_of(projector, vec2(at)));
   vec4 colour = wanted_colour(place, distance(place.p, projector.p_eye.xyz));
   if (colour.a == 0.0 && !u_even_black) return colour;
@@ -76,7 +76,7 @@ vec4 centre_light(ivec2 at) {
 
 // The same of any sample of a pixel.
 vec4 light_at(vec2 px, CentreShare centre) {
-  Sight projector = s_sights[u_projector];
+  Sight projector = sight_at(u_projector);
   vec3 d = ray_of(projector, px);
   Hit prototype = first_hit(s_projector_ids, projector, 0, d);
   if (prototype.id == 0u) return vec4(0);
@@ -96,9 +96,9 @@ bool may_give_light(ivec2 at) {
   Hit prototype = centre_hit(at);
   if (prototype.id == 0u) return false;
   uint first = 3u * (prototype.id - 1u);
-  vec3 p = mat3(s_corners[first].xyz, s_corners[first + 1u].xyz, s_corners[first + 2u].xyz) * prototype.weights;
+  vec3 p = mat3(corner(first).xyz, corner(first + 1u).xyz, corner(first + 2u).xyz) * prototype.weights;
   vec4 share;
-  Sight eye = s_sights[u_eye];
+  Sight eye = sight_at(u_eye);
   return u_even_black ||
          (u_has_view_parts && ids_around(s_eye_ids, eye, 1, p - eye.p_eye.xyz, share) != uvec4(0)) ||
          (u_has_surface_parts && may_hold_surface_part(p, u_placement_count));

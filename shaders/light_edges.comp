@@ -11,6 +11,9 @@ void main() {
   ivec2 at = listed_pixel(gl_GlobalInvocationID.x);
   CentreShare centre = centre_share(at);
   vec4 sum = vec4(0);
-  for (int k = 0; k < u_samples; ++k) sum += light_at(vec2(at) + sample_offset(k), centre);
+  int k = 0;
+  do {
+    sum += light_at(vec2(at) + sample_offset(k), centre);
+  } while (++k < u_samples);
   imageStore(u_picture, at, sum / float(u_samples));
 }

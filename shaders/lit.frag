@@ -11,7 +11,7 @@ uniform int u_eye, u_projector;
 uniform float u_side;  // of a patch, pixels
 
 void main() {
-  Sight eye = s_sights[u_eye];
+  Sight eye = sight_at(u_eye);
   vec3 d = ray_of(eye, (floor(gl_FragCoord.xy) + 0.5) * u_side - 0.5);
   Hit hit = first_hit(s_eye_ids, eye, 0, d);
   o_lit = vec4(0);
@@ -19,7 +19,7 @@ void main() {
   Place place = place_at(hit, d);
   o_lit = vec4(place.p, 1);
   if (u_projector < 0) return;
-  Sight projector = s_sights[u_projector];
+  Sight projector = sight_at(u_projector);
   Reach reach = reach(u_projector, place, false);
   vec3 q = (projector.sight_from_scene * vec4(place.p, 1)).xyz;
   o_lit.xyz = reach.quality > 0.0 ? vec3(pixel_of(projector, q.xy / q.z), reach.irradiance) : vec3(0);

@@ -22,7 +22,7 @@ vec3 diffuse_light(vec3 n, float open) {
 // projector/mirrored_light.h. By cosine and roughness: the share of the soft light that a surface mirrors (red of its
 // colour head on, green of white), and how far from its normal to the mirrored direction most of that comes from
 // (alpha). By height (-1 ... 1) and roughness: the share of what is mirrored that comes from above (blue).
-layout(binding = 14) uniform sampler2D s_mirrored;
+layout(binding = 19) uniform sampler2D s_mirrored;
 
 vec4 mirrored_at(float x, float roughness) {
   const float k_nodes = 32.0;

@@ -12,9 +12,8 @@ struct Finish {
 
 // Own colour at a hit; `footprint` is the side (m) of the pixel's patch on the surface.
 vec3 base_colour(Hit hit, float footprint) {
-  Triangle triangle = s_triangles[hit.id - 1u];
-  Material material = s_materials[triangle.material];
-  vec4 wanted = s_placements[triangle.owner].colour;
+  Material material = s_materials[material_of(hit.id)];
+  vec4 wanted = owner_at(owner_of(hit.id)).colour;
   vec3 colour = wanted.a > 0.5 ? wanted.rgb : material.colour.rgb;
   if (material.look.x < 0.0) return colour;
   vec2 uv = uv_of(hit);
@@ -22,12 +21,11 @@ vec3 base_colour(Hit hit, float footprint) {
 }
 
 bool is_unlit(Hit hit) {
-  Triangle triangle = s_triangles[hit.id - 1u];
-  return s_materials[triangle.material].colour.a > 0.5 && all(lessThan(s_placements[triangle.owner].look.xy, vec2(0)));
+  return s_materials[material_of(hit.id)].colour.a > 0.5 && all(lessThan(owner_at(owner_of(hit.id)).look.xy, vec2(0)));
 }
 
 #ifdef SURFACE_MAPS
-layout(binding = 13) uniform sampler2DArray s_maps;
+layout(binding = 18) uniform sampler2DArray s_maps;
 
 vec3 map_at(Hit hit, float footprint, float layer) {
   vec2 uv = uv_of(hit);
@@ -37,8 +35,8 @@ vec3 map_at(Hit hit, float footprint, float layer) {
 
 // The normal of a map, frame of the hit's owner.
 vec3 mapped_normal_in_owner(Hit hit, vec3 n, Material material, float footprint) {
-  int first = 3 * int(hit.id - 1u) + material.more.x;
-  vec4 tangent = mat3x4(s_normals[first], s_normals[first + 1], s_normals[first + 2]) * hit.weights;
+  uint first = 3u * (hit.id - 1u) + uint(material.more.x);
+  vec4 tangent = mat3x4(normal(first), normal(first + 1u), normal(first + 2u)) * hit.weights;
   vec3 d_u = normalize(tangent.xyz - dot(tangent.xyz, n) * n);
   vec3 d_v = (tangent.w < 0.0 ? -1.0 : 1.0) * cross(n, d_u);
   vec3 along = (2.0 * map_at(hit, footprint, material.maps.y) - 1.0) * vec3(material.maps.zz, 1);
@@ -68,9 +66,8 @@ void read_maps(Hit hit, Material material, float footprint, inout Finish finish)
 
 // Of what is not unlit. A metalness or roughness that people chose is the whole part's, maps or not.
 Finish finish_at(Hit hit, float footprint) {
-  Triangle triangle = s_triangles[hit.id - 1u];
-  Material material = s_materials[triangle.material];
-  vec2 wanted = s_placements[triangle.owner].look.xy;
+  Material material = s_materials[material_of(hit.id)];
+  vec2 wanted = owner_at(owner_of(hit.id)).look.xy;
   vec3 n = smooth_normal(hit);
   Finish finish = Finish(base_colour(hit, footprint), material.look.y, material.look.z, true, 1.0, vec3(0), n, n);
   read_maps(hit, material, footprint, finish);

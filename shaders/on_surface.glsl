@@ -3,15 +3,15 @@
 const float k_on_surface = 0.002;  // m; a surface part within this of the prototype is on it
 
 bool may_hold_surface_part(vec3 p, int placement_count) {
-  for (int i = 1; i < placement_count; ++i) {
-    Owner owner = s_placements[i];
-    if (owner.lower.w < 0.5 || owner.upper.w < 0.5) continue;
+  int i = 1;
+  bool may_hold = false;
+  do {
+    Owner owner = owner_at(i);
     vec3 q = (owner.owner_from_scene * vec4(p, 1)).xyz;
-    if (all(greaterThan(q, owner.lower.xyz - k_on_surface)) && all(lessThan(q, owner.upper.xyz + k_on_surface))) {
-      return true;
-    }
-  }
-  return false;
+    may_hold = owner.lower.w > 0.5 && owner.upper.w > 0.5 && all(greaterThan(q, owner.lower.xyz - k_on_surface)) &&
+               all(lessThan(q, owner.upper.xyz + k_on_surface));
+  } while (!may_hold && ++i < placement_count);
+  return may_hold;
 }
 
 // The surface part on the prototype's point p with unit normal d_normal: the hit of the normal line with a triangle
@@ -23,31 +23,34 @@ Hit surface_part_at(usampler2DArray s_ids, Sight sight, vec3 p, vec3 d_normal) {
   float missed_by = 0.5;  // of a triangle's height
   bool in_middle = false, is_through = false;  // what is cut out
   uvec4 tried = uvec4(0);
-  for (int i = 0; i < 5 && best.id == 0u; ++i) {
+  int height = 0;
+  do {
     vec4 share;
-    uvec4 ids = ids_around(s_ids, sight, 1, p + k_heights[i] * k_on_surface * d_normal - sight.p_eye.xyz, share);
-    if (i == 0) in_middle = all(notEqual(ids, uvec4(0)));
+    uvec4 ids = ids_around(s_ids, sight, 1, p + k_heights[height] * k_on_surface * d_normal - sight.p_eye.xyz, share);
+    if (height == 0) in_middle = all(notEqual(ids, uvec4(0)));
     for (int k = 0; k < 4; ++k)
       if (any(equal(tried, uvec4(ids[k])))) ids[k] = 0u;
     uvec4 left = each_once(ids);
     tried = left.y == 0u ? uvec4(left.x, tried.xyz) : left.z == 0u ? uvec4(left.xy, tried.xy) : left;
-    for (; left.x != 0u; left = uvec4(left.yzw, 0u)) {
-      if (s_placements[owner_of(left.x)].upper.w < 0.5) continue;
+    if (left.x == 0u) continue;
+    do {
+      uint id = left.x;
+      left = uvec4(left.yzw, 0u);
       Hit hit;
-      if (!plane_hit(left.x, p, d_normal, hit) || abs(hit.t) > k_on_surface) continue;
+      if (owner_at(owner_of(id)).upper.w < 0.5 || !plane_hit(id, p, d_normal, hit) || abs(hit.t) > k_on_surface) continue;
       float outside = -min(hit.weights.x, min(hit.weights.y, hit.weights.z));
-      if (outside <= hit.slack && is_cut_out(hit, distance(p, sight.p_eye.xyz) / sight.focal_centre.x)) {
+      if (outside > hit.slack) {
+        if (outside < missed_by) {
+          missed = hit;
+          missed_by = outside;
+        }
+      } else if (is_cut_out(hit, distance(p, sight.p_eye.xyz) / sight.focal_centre.x)) {
         is_through = true;
-        continue;
+      } else if (abs(hit.t) < abs(best.t)) {
+        best = hit;
       }
-      if (outside <= hit.slack) {
-        if (abs(hit.t) < abs(best.t)) best = hit;
-      } else if (outside < missed_by) {
-        missed = hit;
-        missed_by = outside;
-      }
-    }
-  }
+    } while (left.x != 0u);
+  } while (best.id == 0u && ++height < 5);
   if (best.id == 0u && in_middle && !is_through) best = missed;
   return best;
 }

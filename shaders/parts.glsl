@@ -9,7 +9,7 @@ float whole_share(uint owner) {
 }
 
 vec4 shadow_at(vec3 d) {
-  Sight eye = s_sights[u_eye];
+  Sight eye = sight_at(u_eye);
   Hit prototype = first_hit(s_eye_ids, eye, 0, d);
   if (prototype.id == 0u) return vec4(0);
   return vec4(0, 0, 0, contact_shadow(eye.p_eye.xyz + prototype.t * d, facing_normal(prototype, d)));
@@ -27,8 +27,8 @@ vec4 part_seen(Seen seen, bool whole) {
   float share = seen.how == k_if_reached && !whole ? whole_share(owner_of(seen.part.id)) : 1.0;
   if (share < 1.0 && !is_reached(seen.behind)) share = 1.0;
   if (share == 0.0) return vec4(0);
-  float footprint = seen.part.t / s_sights[u_eye].quality.x;
-  if (s_placements[owner_of(seen.part.id)].upper.w > 0.5) {  // as the projectors show it
+  float footprint = seen.part.t / sight_at(u_eye).quality.x;
+  if (owner_at(owner_of(seen.part.id)).upper.w > 0.5) {  // as the projectors show it
     return share * vec4(look_on_surface(seen.part, smooth_normal(seen.part), footprint), 1);
   }
   return share * vec4(look_along(seen.d, seen.part, footprint), 1);

@@ -9,7 +9,7 @@ void main() {
   ivec2 at = u_first + ivec2(gl_GlobalInvocationID.xy);
   if (any(greaterThanEqual(at, u_end))) return;
   vec4 share;
-  Sight eye = s_sights[u_eye];
+  Sight eye = sight_at(u_eye);
   vec3 d = ray_of(eye, vec2(at));
   if (ids_around(s_eye_ids, eye, 1, d, share) != uvec4(0) ||
       (k_contact_shadow && ids_around(s_eye_ids, eye, 0, d, share) != uvec4(0))) {

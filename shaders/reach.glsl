@@ -43,7 +43,7 @@ struct Place {
 // prototype's.
 Place place_at(Hit hit, vec3 d) {
   uint first = 3u * (hit.id - 1u);
-  vec3 p = mat3(s_corners[first].xyz, s_corners[first + 1u].xyz, s_corners[first + 2u].xyz) * hit.weights;
+  vec3 p = mat3(corner(first).xyz, corner(first + 1u).xyz, corner(first + 2u).xyz) * hit.weights;
   Place place = Place(p, flat_normal_in_owner(hit.id), smooth_normal_in_owner(hit));
   if (dot(place.d_flat, d) > 0.0) place.d_flat = -place.d_flat;
   if (dot(place.d_smooth, place.d_flat) < 0.0) place.d_smooth = -place.d_smooth;
@@ -68,7 +68,7 @@ struct Reach {
 
 // `is_seen`: it is known that the prototype does not hide the place from it.
 Reach reach(int j, Place place, bool is_seen) {
-  Sight projector = s_sights[j];
+  Sight projector = sight_at(j);
   vec3 to_eye = projector.p_eye.xyz - place.p;
   float distance_2 = dot(to_eye, to_eye);
   vec3 q = (projector.sight_from_scene * vec4(place.p, 1)).xyz;
@@ -96,7 +96,7 @@ Reach reach(int j, Place place, bool is_seen) {
 
 // Whether projector j's light falls on a place: reach(j, place, false).quality > 0, for less.
 bool reaches(int j, Place place) {
-  Sight projector = s_sights[j];
+  Sight projector = sight_at(j);
   vec3 q = (projector.sight_from_scene * vec4(place.p, 1)).xyz;
   if (dot(place.d_flat, projector.p_eye.xyz - place.p) <= 0.0 || q.z <= 0.0) return false;
   vec2 px = pixel_of(projector, q.xy / q.z);
@@ -105,9 +105,12 @@ bool reaches(int j, Place place) {
 }
 
 bool is_reached(Place place) {
-  for (int j = 0; j < u_projector_count; ++j)
-    if (reaches(j, place)) return true;
-  return false;
+  int j = 0;
+  bool is_lit = false;
+  do {
+    is_lit = reaches(j, place);
+  } while (!is_lit && ++j < u_projector_count);
+  return is_lit;
 }
 
 // What projector i is to give at a place that it sees.
@@ -125,29 +128,36 @@ const float k_blocked = 1e-3;   // weight of a blocked projector against others
 const float k_watch = 0.07;     // of the light, all that keep watch together
 const float k_well_in = 0.25;   // share of the light above which a projector keeps its watch whole
 
+// Weight of a projector against others.
+float weight_of(Reach reach) { return reach.quality * pow(k_blocked, 1.0 - reach.arriving); }
+
 Share share_of(int i, Place place) {
-  float own = 0.0, sum = 0.0, own_quality = 0.0, quality = 0.0, own_blocked = 0.0, blocked = 0.0;
-  Share share = Share(0.0, 0.0, 0.0, 0.0);
-  for (int j = 0; j < u_projector_count; ++j) {
-    Reach reach = reach(j, place, j == i);
-    bool is_reached = reach.quality > 0.0;
-    float weight = reach.quality * pow(k_blocked, 1.0 - reach.arriving);
-    sum += weight;
-    quality += reach.quality;
-    if (is_reached) blocked += 1.0 - reach.arriving;
-    float black = s_sights[j].quality.w * reach.irradiance;
-    if (is_reached) share.blocked_black += black * (1.0 - reach.arriving);
-    if (!is_reached) share.missing_black += black;
-    if (j != i) continue;
-    own = weight;
-    own_quality = reach.quality;
-    own_blocked = 1.0 - reach.arriving;
-    share.irradiance = reach.irradiance;
+  Reach own = reach(i, place, true);
+  float weight = weight_of(own), sum = weight, quality = own.quality;
+  float own_blocked = 1.0 - own.arriving, blocked = own.quality > 0.0 ? own_blocked : 0.0;
+  float black = sight_at(i).quality.w * own.irradiance;
+  Share share = Share(0.0, own.irradiance, own.quality > 0.0 ? 0.0 : black, black * blocked);
+  int j = i == 0 ? 1 : 0;  // the others
+  if (u_projector_count > 1) {
+    do {
+      Reach reach = reach(j, place, false);
+      bool is_reached = reach.quality > 0.0;
+      sum += weight_of(reach);
+      quality += reach.quality;
+      black = sight_at(j).quality.w * reach.irradiance;
+      if (is_reached) {
+        blocked += 1.0 - reach.arriving;
+        share.blocked_black += black * (1.0 - reach.arriving);
+      } else {
+        share.missing_black += black;
+      }
+      if (++j == i) ++j;
+    } while (j < u_projector_count);
   }
   share.missing_black += share.blocked_black;
   if (sum == 0.0) return share;
-  float watch = k_watch * own_blocked / max(1.0, blocked) * min(1.0, own_quality / (k_well_in * quality));
-  share.share = max(own / sum, watch);
+  float watch = k_watch * own_blocked / max(1.0, blocked) * min(1.0, own.quality / (k_well_in * quality));
+  share.share = max(weight / sum, watch);
   return share;
 }
 

@@ -1,15 +1,19 @@
 // The triangles of the prototype and of every variant, and where they stand. A triangle's number counts from 0 over
-// all of them; an id is the number + 1, so that 0 means none. "scene" is the frame that rays are cast in.
+// all of them; an id is the number + 1, so that 0 means none. "scene" is the frame that rays are cast in. What is read
+// most comes from texel buffers: software GL reads them several times faster than storage buffers, whose lanes it
+// loads one by one.
 
-layout(std430, binding = 0) readonly buffer Corners { vec4 s_corners[]; };  // 3 a triangle: p in its owner's frame, u
-layout(std430, binding = 1) readonly buffer Normals { vec4 s_normals[]; };  // 3 a triangle: unit normal, v
+layout(binding = 13) uniform samplerBuffer s_corners;  // 3 a triangle: p in its owner's frame, u
+layout(binding = 14) uniform samplerBuffer s_normals;  // 3 a triangle: unit normal, v
+// 5 a triangle: owner (0 prototype, slot + 1), material, ids of the triangles across the sides that lie opposite each
+// corner (0 where the mesh ends)
+layout(binding = 15) uniform usamplerBuffer s_triangles;
 
-struct Triangle {
-  uint owner;      // 0 prototype, slot + 1
-  uint material;
-  uint beside[3];  // id of the triangle across the side that lies opposite each corner; 0 where the mesh ends
-};
-layout(std430, binding = 2) readonly buffer Triangles { Triangle s_triangles[]; };
+vec4 corner(uint i) { return texelFetch(s_corners, int(i)); }
+vec4 normal(uint i) { return texelFetch(s_normals, int(i)); }
+uint owner_of(uint id) { return texelFetch(s_triangles, int(5u * (id - 1u))).x; }
+uint material_of(uint id) { return texelFetch(s_triangles, int(5u * (id - 1u) + 1u)).x; }
+uint beside(uint id, int side) { return texelFetch(s_triangles, int(5u * (id - 1u) + 2u) + side).x; }
 
 struct Material {
   vec4 colour;  // linear light; a: 1 when unlit
@@ -31,7 +35,18 @@ struct Owner {
   vec4 colour; // linear light, instead of its materials' where w is 1
   vec4 look;   // metallic, roughness, instead of its materials' where not negative
 };
-layout(std430, binding = 4) readonly buffer Placements { Owner s_placements[]; };
+layout(binding = 16) uniform samplerBuffer s_placements;  // 8 an owner
+
+mat4 matrix_at(samplerBuffer texels, int first) {
+  return mat4(texelFetch(texels, first), texelFetch(texels, first + 1), texelFetch(texels, first + 2),
+              texelFetch(texels, first + 3));
+}
+
+Owner owner_at(uint owner) {
+  int first = 8 * int(owner);
+  return Owner(matrix_at(s_placements, first), texelFetch(s_placements, first + 4), texelFetch(s_placements, first + 5),
+               texelFetch(s_placements, first + 6), texelFetch(s_placements, first + 7));
+}
 
 // A place that rays start from, with the ids that a pinhole picture from there holds: layer 0 the prototype, layer 1
 // the parts. Pixel (0,0) is the centre of the top-left texel.
@@ -46,7 +61,14 @@ struct Sight {
   vec4 vignetting;    // tilt (xy), r2, r4 of core/response.h
   vec4 focus;         // a point's disc at depth z is |x - y / z| pixels wide
 };
-layout(std430, binding = 5) readonly buffer Sights { Sight s_sights[]; };
+layout(binding = 17) uniform samplerBuffer s_sights;  // 11 a sight
+
+Sight sight_at(int i) {
+  int first = 11 * i;
+  return Sight(matrix_at(s_sights, first), texelFetch(s_sights, first + 4), texelFetch(s_sights, first + 5),
+               texelFetch(s_sights, first + 6), texelFetch(s_sights, first + 7), texelFetch(s_sights, first + 8),
+               texelFetch(s_sights, first + 9), texelFetch(s_sights, first + 10));
+}
 
 struct Hit {
   uint id;       // 0: nothing
@@ -59,19 +81,17 @@ const Hit k_no_hit = Hit(0u, 1e30, vec3(0), 0.0);
 const float k_rounding = 2e-6;     // m; of single precision a few metres away, closes cracks between neighbours
 const float k_same_place = 1e-4;   // m; nearer than this two hits are one surface
 
-uint owner_of(uint id) { return s_triangles[id - 1u].owner; }
-
-vec3 to_owner(uint owner, vec3 p) { return (s_placements[owner].owner_from_scene * vec4(p, 1)).xyz; }
-vec3 turned_to_owner(uint owner, vec3 d) { return mat3(s_placements[owner].owner_from_scene) * d; }
-vec3 turned_to_scene(uint owner, vec3 d) { return d * mat3(s_placements[owner].owner_from_scene); }
+vec3 to_owner(uint owner, vec3 p) { return (owner_at(owner).owner_from_scene * vec4(p, 1)).xyz; }
+vec3 turned_to_owner(uint owner, vec3 d) { return mat3(owner_at(owner).owner_from_scene) * d; }
+vec3 turned_to_scene(uint owner, vec3 d) { return d * mat3(owner_at(owner).owner_from_scene); }
 
 // Where the ray from o along w (unit length, both in the frame of the triangle's owner) meets the plane of a triangle.
 // False when it runs along it.
 bool plane_hit_in_owner(uint id, vec3 o, vec3 w, out Hit hit) {
   uint first = 3u * (id - 1u);
-  vec3 a = s_corners[first].xyz - o;
-  vec3 ab = s_corners[first + 1u].xyz - o - a;
-  vec3 ac = s_corners[first + 2u].xyz - o - a;
+  vec3 a = corner(first).xyz - o;
+  vec3 ab = corner(first + 1u).xyz - o - a;
+  vec3 ac = corner(first + 2u).xyz - o - a;
   vec3 n = cross(ab, ac);
   float along = dot(n, w);
   hit = k_no_hit;
@@ -99,12 +119,13 @@ bool prototype_plane_hit(uint id, vec3 p_origin, vec3 d, out Hit hit) {
 
 bool is_inside(Hit hit) { return all(greaterThanEqual(hit.weights, vec3(-hit.slack))); }
 
-// Whether a triangle, as seen along d, is thinner than two texels of the sight: then texels can miss it.
-bool is_thin(uint id, float t, vec3 d, Sight sight) {
+// Whether a triangle, as seen along w (frame of its owner), is thinner than two texels of the sight: then texels can miss
+// it.
+bool is_thin(uint id, float t, vec3 w, Sight sight) {
   uint first = 3u * (id - 1u);
-  vec3 a = s_corners[first].xyz, b = s_corners[first + 1u].xyz, c = s_corners[first + 2u].xyz;
+  vec3 a = corner(first).xyz, b = corner(first + 1u).xyz, c = corner(first + 2u).xyz;
   float side = max(distance(a, b), max(distance(b, c), distance(c, a)));
-  float area = abs(dot(cross(b - a, c - a), turned_to_owner(owner_of(id), d)));
+  float area = abs(dot(cross(b - a, c - a), w));
   return area * sight.focal_centre.x < 2.0 * t * side;
 }
 
@@ -145,19 +166,19 @@ uvec4 each_once(uvec4 ids) {
 // Texture coordinates, v up.
 vec2 uv_of(Hit hit) {
   uint first = 3u * (hit.id - 1u);
-  return mat3x2(vec2(s_corners[first].w, s_normals[first].w),
-                vec2(s_corners[first + 1u].w, s_normals[first + 1u].w),
-                vec2(s_corners[first + 2u].w, s_normals[first + 2u].w)) * hit.weights;
+  return mat3x2(vec2(corner(first).w, normal(first).w),
+                vec2(corner(first + 1u).w, normal(first + 1u).w),
+                vec2(corner(first + 2u).w, normal(first + 2u).w)) * hit.weights;
 }
 
 // Level of detail of a texture of so many texels whose pixel covers a patch with sides of `footprint` (m).
 float lod_of(vec2 texels, Hit hit, float footprint) {
   uint first = 3u * (hit.id - 1u);
-  vec3 ab = s_corners[first + 1u].xyz - s_corners[first].xyz;
-  vec3 ac = s_corners[first + 2u].xyz - s_corners[first].xyz;
-  vec2 uv = vec2(s_corners[first].w, s_normals[first].w);
-  vec2 uv_ab = vec2(s_corners[first + 1u].w, s_normals[first + 1u].w) - uv;
-  vec2 uv_ac = vec2(s_corners[first + 2u].w, s_normals[first + 2u].w) - uv;
+  vec3 ab = corner(first + 1u).xyz - corner(first).xyz;
+  vec3 ac = corner(first + 2u).xyz - corner(first).xyz;
+  vec2 uv = vec2(corner(first).w, normal(first).w);
+  vec2 uv_ab = vec2(corner(first + 1u).w, normal(first + 1u).w) - uv;
+  vec2 uv_ac = vec2(corner(first + 2u).w, normal(first + 2u).w) - uv;
   float texel_area = abs(uv_ab.x * uv_ac.y - uv_ab.y * uv_ac.x) * texels.x * texels.y;
   float area = length(cross(ab, ac));
   return area > 0.0 ? max(0.0, log2(footprint * sqrt(texel_area / area))) : 0.0;
@@ -168,23 +189,20 @@ float texture_lod(Hit hit, float footprint) { return lod_of(vec2(textureSize(s_l
 // Whether the material of what is hit has nothing there; `footprint` is the side (m) of a pixel's patch on the surface.
 bool is_cut_out(Hit hit, float footprint) {
   if (!u_has_cut_outs) return false;
-  vec4 look = s_materials[s_triangles[hit.id - 1u].material].look;
+  vec4 look = s_materials[material_of(hit.id)].look;
   if (look.w <= 0.0) return false;
   vec2 uv = uv_of(hit);
   return textureLod(s_looks, vec3(uv.x, 1.0 - uv.y, look.x), texture_lod(hit, footprint)).a < look.w;
 }
 
-// Where the ray meets a triangle that it just misses: its plane, or its nearest point where the plane is too steep
-// to be trusted beyond its triangle.
-Hit beside_hit(uint id, vec3 p_origin, vec3 d, Sight sight) {
-  Hit hit;
-  if (!plane_hit(id, p_origin, d, hit)) return k_no_hit;
+// Where a ray (frame of the owner) that meets a triangle's plane beside it is taken to meet the triangle: on the plane, or
+// at its nearest point where the plane is too steep to be trusted beyond it.
+Hit moved_beside(Hit hit, vec3 o, vec3 w, Sight sight) {
   hit.weights = max(hit.weights, vec3(0));
   hit.weights /= hit.weights.x + hit.weights.y + hit.weights.z;
-  uint first = 3u * (id - 1u);
-  vec3 p = mat3(s_corners[first].xyz, s_corners[first + 1u].xyz, s_corners[first + 2u].xyz) * hit.weights;
-  uint owner = owner_of(id);
-  float t = dot(p - to_owner(owner, p_origin), turned_to_owner(owner, d));
+  uint first = 3u * (hit.id - 1u);
+  vec3 p = mat3(corner(first).xyz, corner(first + 1u).xyz, corner(first + 2u).xyz) * hit.weights;
+  float t = dot(p - o, w);
   const float k_steepest = 4.0;  // texels of depth a texel, 76 degrees
   if (!(abs(hit.t - t) < k_steepest * t / sight.focal_centre.x)) hit.t = t;
   return hit;
@@ -192,47 +210,44 @@ Hit beside_hit(uint id, vec3 p_origin, vec3 d, Sight sight) {
 
 // First surface that the ray from the sight's eye meets: exactly, by intersecting the triangles that the texels
 // around it saw. Triangles thinner than texels can all be missed: then the texels decide, by bilinear coverage. Parts
-// may have pieces cut out, the prototype has none.
+// may have pieces cut out, the prototype has none. (Software GL goes through all of a branch that nobody takes, and once
+// too often through a loop that asks before its body: what is rare is a further round of a loop that asks after it.)
 Hit first_hit(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
   vec4 share;
   uvec4 ids = ids_around(s_ids, sight, layer, d, share);
   Hit best = k_no_hit;
   if (ids == uvec4(0)) return best;
+  uvec4 left = each_once(ids);
+  uint nearest = left.x;
+  bool is_covered = dot(share, vec4(notEqual(ids, uvec4(0)))) >= 0.5, is_whole = all(notEqual(ids, uvec4(0)));
   bool is_through = false;  // what is cut out
-  for (uvec4 left = each_once(ids); left.x != 0u; left = uvec4(left.yzw, 0u)) {
+  bool is_beside = false;   // all were missed: the nearest once more
+  do {
+    vec3 o = sight.p_eye.xyz, w = d;  // of the owner's frame; the prototype's is the scene's
+    if (layer != 0) {
+      uint owner = owner_of(left.x);
+      o = to_owner(owner, o);
+      w = turned_to_owner(owner, w);
+    }
     Hit hit;
-    bool is_met = layer == 0 ? prototype_plane_hit(left.x, sight.p_eye.xyz, d, hit) : plane_hit(left.x, sight.p_eye.xyz, d, hit);
-    if (!is_met || !is_inside(hit) || hit.t <= 0.0 || hit.t >= best.t) continue;
-    if (layer == 1 && is_cut_out(hit, hit.t / sight.focal_centre.x))
-      is_through = true;
-    else
-      best = hit;
-  }
-  if (best.id != 0u || is_through) return best;
-  float cover = dot(share, vec4(notEqual(ids, uvec4(0))));
-  if (cover < 0.5) return best;
-  uint id = ids.x != 0u ? ids.x : ids.y != 0u ? ids.y : ids.z != 0u ? ids.z : ids.w;
-  Hit hit = beside_hit(id, sight.p_eye.xyz, d, sight);
-  if (hit.t <= 0.0 || (any(equal(ids, uvec4(0))) && !is_thin(id, hit.t, d, sight))) return best;
-  return hit;
-}
-
-// Whether a ray meets the prototype nearer than t in or beside a triangle that a texel saw: where a smooth surface turns
-// away its last triangles are seen so much aslant that texels miss them.
-bool is_met_beside(uint id, vec3 p_origin, vec3 d, float t) {
-  const int k_most_steps = 6;
-  uint from = 0u;
-  for (int i = 0; i < k_most_steps && id != 0u; ++i) {
-    Hit hit;
-    if (!prototype_plane_hit(id, p_origin, d, hit)) return false;
-    if (is_inside(hit)) return hit.t < t;
-    int side = hit.weights.x < hit.weights.y ? (hit.weights.x < hit.weights.z ? 0 : 2) : hit.weights.y < hit.weights.z ? 1 : 2;
-    uint next = s_triangles[id - 1u].beside[side];
-    if (next == from) return false;  // folded back: the ray passes beside both
-    from = id;
-    id = next;
-  }
-  return false;
+    bool is_met = plane_hit_in_owner(left.x, o, w, hit);
+    left = uvec4(left.yzw, 0u);
+    if (is_beside) {
+      if (!is_met) break;
+      hit = moved_beside(hit, o, w, sight);
+      if (hit.t > 0.0 && (is_whole || is_thin(hit.id, hit.t, w, sight))) best = hit;
+      break;
+    }
+    if (is_met && is_inside(hit) && hit.t > 0.0 && hit.t < best.t) {
+      if (layer == 1 && is_cut_out(hit, hit.t / sight.focal_centre.x))
+        is_through = true;
+      else
+        best = hit;
+    }
+    is_beside = left.x == 0u && best.id == 0u && !is_through && is_covered;
+    if (is_beside) left.x = nearest;
+  } while (left.x != 0u);
+  return best;
 }
 
 // Whether the prototype hides p (a point on it) from the sight's eye.
@@ -245,27 +260,54 @@ bool is_hidden(usampler2DArray s_ids, Sight sight, vec3 p) {
   float texel = t / sight.focal_centre.x;
   float slack = k_same_place + (exact ? 1e-5 * t : 2.0 * texel);
   if (hit.id != 0u && hit.t < t - slack) return true;
+  // Or in or beside another triangle that a texel saw: where a smooth surface turns away its last triangles are seen so
+  // much aslant that texels miss them.
   vec4 share;
   uvec4 left = each_once(ids_around(s_ids, sight, 0, d, share));
   if (left.y == 0u) return false;
-  for (; left.x != 0u; left = uvec4(left.yzw, 0u)) {
-    if (left.x == hit.id || dot(s_corners[3u * (left.x - 1u)].xyz - p, d) > -2.0 * texel) continue;
-    if (is_met_beside(left.x, sight.p_eye.xyz, d, t - slack)) return true;
+  for (int k = 0; k < 4; ++k) {
+    if (left[k] == hit.id || left[k] == 0u || dot(corner(3u * (left[k] - 1u)).xyz - p, d) > -2.0 * texel) left[k] = 0u;
   }
+  left = each_once(left);
+  if (left.x == 0u) return false;
+  const int k_most_steps = 6;
+  uint id = left.x, from = 0u;
+  int step = 0;
+  do {
+    Hit beside_it;
+    uint next = 0u;
+    if (prototype_plane_hit(id, sight.p_eye.xyz, d, beside_it)) {
+      if (is_inside(beside_it)) {
+        if (beside_it.t < t - slack) return true;
+      } else {
+        vec3 w = beside_it.weights;
+        next = beside(id, w.x < w.y ? (w.x < w.z ? 0 : 2) : w.y < w.z ? 1 : 2);
+        if (next == from || ++step == k_most_steps) next = 0u;  // folded back: the ray passes beside both
+      }
+    }
+    from = id;
+    id = next;
+    if (id == 0u) {
+      left = uvec4(left.yzw, 0u);
+      id = left.x;
+      from = 0u;
+      step = 0;
+    }
+  } while (id != 0u);
   return false;
 }
 
 // Unit normal of the triangle itself, frame of its owner.
 vec3 flat_normal_in_owner(uint id) {
   uint first = 3u * (id - 1u);
-  vec3 a = s_corners[first].xyz;
-  return normalize(cross(s_corners[first + 1u].xyz - a, s_corners[first + 2u].xyz - a));
+  vec3 a = corner(first).xyz;
+  return normalize(cross(corner(first + 1u).xyz - a, corner(first + 2u).xyz - a));
 }
 
 // Unit normal interpolated from the corners, frame of its owner.
 vec3 smooth_normal_in_owner(Hit hit) {
   uint first = 3u * (hit.id - 1u);
-  return normalize(mat3(s_normals[first].xyz, s_normals[first + 1u].xyz, s_normals[first + 2u].xyz) * hit.weights);
+  return normalize(mat3(normal(first).xyz, normal(first + 1u).xyz, normal(first + 2u).xyz) * hit.weights);
 }
 
 // The same in the scene's frame.

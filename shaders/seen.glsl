@@ -20,11 +20,11 @@ struct Seen {
 // The part at px that the prototype does not hide. A surface part counts as visible within 2 mm behind the surface.
 // k_if_reached: projected if light reaches the prototype there, else left to the screen.
 Seen in_sight_at(vec2 px) {
-  Sight eye = s_sights[u_eye];
+  Sight eye = sight_at(u_eye);
   vec3 d = ray_of(eye, px);
   Seen seen = Seen(k_nothing, first_hit(s_eye_ids, eye, 1, d), d, Place(vec3(0), vec3(0), vec3(0)));
   if (seen.part.id == 0u) return seen;
-  bool on_surface = s_placements[owner_of(seen.part.id)].upper.w > 0.5;
+  bool on_surface = owner_at(owner_of(seen.part.id)).upper.w > 0.5;
   Hit prototype = first_hit(s_eye_ids, eye, 0, d);
   if (prototype.id == 0u) {
     seen.how = k_screen;

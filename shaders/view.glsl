@@ -10,7 +10,7 @@ uniform sampler2D s_albedo;  // of the prototype, over its mean
 uniform float u_mean_albedo;
 
 vec4 view_at(vec2 px) {
-  Sight eye = s_sights[u_eye];
+  Sight eye = sight_at(u_eye);
   vec3 d = ray_of(eye, px);
   Hit part = first_hit(s_eye_ids, eye, 1, d), prototype = first_hit(s_eye_ids, eye, 0, d);
   // A part that lies on the surface is seen before it.
