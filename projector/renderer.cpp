@@ -10,6 +10,8 @@
 
 #include "projector/contact_shadow.h"
 #include "projector/gpu_scene.h"
+#include "projector/light_layer.h"
+#include "projector/pixel_list.h"
 #include "projector/shader.h"
 #include "projector/sights.h"
 #include "projector/treatment.h"
@@ -23,7 +25,6 @@ constexpr int k_tangents_unit = 0, k_response_unit = 2, k_centre_unit = 3, k_pic
               k_sights_unit = 5, k_mixing_unit = 9, k_albedo_unit = 10, k_arriving_unit = 11,
               k_distances_unit = 12;
 constexpr int k_arriving_side = 256;  // texels of a projector's map of arriving light
-constexpr GLuint k_list_binding = 6;  // of buffers, after the scene's
 constexpr GLuint k_known_hits_image = 1, k_known_shares_image = 2;  // shaders/known.glsl
 constexpr int k_each = 2, k_view = 3;  // overlays of parts treated each in its way, and of a virtual camera
 // Steps of light that ask for more samples: beside light, and between blacks.
@@ -159,25 +160,27 @@ struct Renderer::Impl {
   bool has_contact_shadow = false;
   Smoothing smoothing;
   Program points, blend, light, irradiance, lit, coverage, composite, edges;
-  // A layer of the parts' light: where there may be some, at pixel centres, by more samples at edges.
+  LightLayer light_layer;
+  std::optional<LightLayer> measured_light_layer;  // linked when it is asked for
+  // A layer of the parts' light in a composite: where there may be some, at pixel centres, by more samples at
+  // edges.
   struct LayerPrograms {
     Program where, centre, edges;
   };
-  LayerPrograms light_layer;
   struct CompositePrograms {
     LayerPrograms parts, view;
-    static Result<CompositePrograms> link(std::span<const std::string> defined);
+    static Result<CompositePrograms> link(const std::string& defined);
   };
   CompositePrograms unshadowed;
   std::optional<CompositePrograms> shadowed;  // linked when it is asked for
   CompositePrograms& composites() { return has_contact_shadow ? *shadowed : unshadowed; }
-  GlName list;  // of pixels, shaders/listed.glsl
-  int list_room = 0;
+  PixelList list;
   std::vector<GlName> responses;
   // Of the projectors' last pictures.
   struct Shown {
     Canvas display;
     GlName known_hits, known_shares;  // shaders/known.glsl
+    GLuint known_stamp = 0;           // of its time
     scene::PosedScene posed;
     Pose imager_from_world;    // of the viewer
     cv::Mat picture, clipped;  // once read back
@@ -204,7 +207,8 @@ struct Renderer::Impl {
   // What is drawn of it from the projectors.
   bool is_prototype_seen = false, are_soft_edges_seen = false, are_surface_parts_seen = false;
   std::vector<PlacedRun> runs;
-  std::vector<cv::Rect> light_places;  // of the projector drawn last
+  PlacesByMode light_places;  // of the projector drawn last
+  std::vector<cv::Rect> view_places, surface_places, all_places;
   Pose scene_from_world;
   enum class EyeKind { none, imager, parts_of_imager, eye };
   EyeKind eye_kind = EyeKind::none;
@@ -249,13 +253,8 @@ struct Renderer::Impl {
     upload(albedo, colours);
   }
 
-  // What programs that draw looks are made for: the scene's materials, and shadows.
-  std::vector<std::string> defined(bool with_contact_shadow) const {
-    std::vector<std::string> names;
-    if (scene.has_surface_maps()) names.emplace_back("SURFACE_MAPS");
-    if (with_contact_shadow) names.emplace_back("CONTACT_SHADOW");
-    return names;
-  }
+  // What programs that draw looks are made for: the scene's materials.
+  std::string defined() const { return scene.has_surface_maps() ? "SURFACE_MAPS " : ""; }
   Status link_programs();
   bool set_arriving(std::size_t index, const cv::Mat& map);
   const GpuLens& lens_of(const Imager& imager);
@@ -270,7 +269,6 @@ struct Renderer::Impl {
   void set_up_light(const Program& program, const scene::PosedScene& posed);
   void draw(const Program& program, const Canvas& into) const;
   void draw(const Program& program, const Canvas& into, const std::vector<cv::Rect>& places) const;
-  void start_list(int pixels);
   template <class SetUp>
   void draw_layer(LayerPrograms& layer,
                   const Canvas& into,
@@ -314,19 +312,13 @@ Status Renderer::Impl::link_programs() {
   for (const auto& [program, file] : drawn) {
     LIMN_TRY(*program, Program::link("whole.vert", file));
   }
-  const std::pair<Program*, const char*> computed[] = {{&edges, "edges.comp"},
-                                                       {&light_layer.where, "light_where.comp"},
-                                                       {&light_layer.centre, "light_centre.comp"},
-                                                       {&light_layer.edges, "light_edges.comp"}};
-  for (const auto& [program, file] : computed) {
-    LIMN_TRY(*program, Program::link_compute(file, defined(false)));
-  }
-  LIMN_TRY(unshadowed, CompositePrograms::link(defined(false)));
+  LIMN_TRY(edges, Program::link_compute("edges.comp"));
+  LIMN_TRY(light_layer, LightLayer::link(defined(), false));
+  LIMN_TRY(unshadowed, CompositePrograms::link(defined()));
   return {};
 }
 
-auto Renderer::Impl::CompositePrograms::link(std::span<const std::string> defined)
-    -> Result<CompositePrograms> {
+auto Renderer::Impl::CompositePrograms::link(const std::string& defined) -> Result<CompositePrograms> {
   CompositePrograms out;
   const std::pair<Program*, const char*> computed[] = {
       {&out.parts.where, "parts_where.comp"}, {&out.parts.centre, "parts_centre.comp"},
@@ -431,12 +423,6 @@ void Renderer::Impl::set_up(const Program& program, const GpuLens& lens, const I
   program.set("u_has_cut_outs", scene.has_cut_outs());
   program.bind("s_arriving", k_arriving_unit, arriving);
   program.set("u_placement_count", scene.owner_count());
-  const auto shown = [&](bool on_surface) {
-    return std::any_of(runs.begin(), runs.end(),
-                       [&](const PlacedRun& r) { return r.owner != 0 && r.on_surface == on_surface; });
-  };
-  program.set("u_has_view_parts", shown(false));
-  program.set("u_has_surface_parts", shown(true));
   if (!viewer) return;
   const Eigen::Quaterniond world_from_viewer = viewer->imager_from_world.rotation.inverse();
   viewer_light.d_up_world = world_from_viewer * -Eigen::Vector3d::UnitY();
@@ -470,18 +456,6 @@ void Renderer::Impl::set_up_light(const Program& program, const scene::PosedScen
   program.bind("s_albedo", k_albedo_unit, albedo);
 }
 
-// An empty list with room for so many pixels.
-void Renderer::Impl::start_list(int pixels) {
-  if (list_room < pixels) {
-    list = make_buffer(nullptr, sizeof(std::uint32_t) * (static_cast<std::size_t>(pixels) + 4));
-    list_room = pixels;
-  }
-  const std::uint32_t head[] = {0, 0, 1, 1};
-  glNamedBufferSubData(*list, 0, sizeof(head), head);
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_list_binding, *list);
-  glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, *list);
-}
-
 // Draws a layer (linear light, alpha: coverage) into a canvas of GL_RGBA32F, within `places` alone.
 // `set_up` gives every program what it needs.
 template <class SetUp>
@@ -491,23 +465,14 @@ void Renderer::Impl::draw_layer(LayerPrograms& layer,
                                 const Smoothing& smoothing,
                                 const SetUp& set_up) {
   const auto over_places = [&](const Program& program) {
-    start_list(into.width * into.height * static_cast<int>(std::max<std::size_t>(1, places.size())));
-    program.use();
-    for (const cv::Rect& place : places) {
-      program.set("u_first", place.x, place.y);
-      program.set("u_end", place.x + place.width, place.y + place.height);
-      glDispatchCompute(static_cast<GLuint>(place.width + 15) / 16, static_cast<GLuint>(place.height + 3) / 4,
-                        1);
-    }
-    glMemoryBarrier(GL_ALL_BARRIER_BITS);
+    list.start(into.width * into.height * static_cast<int>(std::max<std::size_t>(1, places.size())));
+    list.bind();
+    look_through(program, places);
   };
   const auto over_list = [&](const Program& program) {
-    constexpr GLintptr k_groups = sizeof(std::uint32_t);  // after the count
     set_up(program);
-    program.use();
     glBindImageTexture(0, *into.texture, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
-    glDispatchComputeIndirect(k_groups);
-    glMemoryBarrier(GL_ALL_BARRIER_BITS);
+    list.work_through(program);
   };
   const cv::Rect whole(0, 0, into.width, into.height);
   for (const cv::Rect& place : places) {  // with the neighbours that edges are judged by
@@ -675,6 +640,9 @@ Status Renderer::set_light(const LightOptions& options, const MeasuredSurface* s
     LIMN_CHECK(surface != nullptr);
     LIMN_TRY_STATUS(check_fits(*surface, impl_->rig));
     LIMN_TRY(impl_->surface, impl_->measured(*surface));
+    if (!impl_->measured_light_layer) {
+      LIMN_TRY(impl_->measured_light_layer, LightLayer::link(impl_->defined(), true));
+    }
   }
   if (options.compensation == Compensation::measured || !is_same(impl_->light_options, options))
     for (Impl::Shown& shown : impl_->shown) shown.is_current = false;
@@ -707,7 +675,7 @@ void Renderer::set_quick_motion(bool wanted) { impl_->quick_motion = wanted; }
 Status Renderer::set_contact_shadow(const scene::Scene* scene) {
   const bool wanted = scene != nullptr;
   if (wanted && !impl_->shadowed) {
-    LIMN_TRY(impl_->shadowed, Impl::CompositePrograms::link(impl_->defined(true)));
+    LIMN_TRY(impl_->shadowed, Impl::CompositePrograms::link(impl_->defined() + "CONTACT_SHADOW"));
   }
   if (wanted && !impl_->contact_shadow) impl_->contact_shadow.emplace(*scene);
   if (impl_->has_contact_shadow != wanted)
@@ -747,27 +715,37 @@ unsigned Renderer::draw_projector(std::size_t index, const scene::PosedScene& po
     glBindImageTexture(k_known_shares_image, *shown.known_shares, 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
     impl_->set_up_light(program, posed);
   };
-  std::vector<cv::Rect>& places = impl_->light_places;
-  if (options.even_black)
-    places.assign(1, impl_->sights.prototype_place(index, impl_->runs, impl_->scene_from_world));
-  else
+  PlacesByMode& places = impl_->light_places;
+  if (options.even_black) {
+    places.clear();
+    places.both.push_back(impl_->sights.prototype_place(index, impl_->runs, impl_->scene_from_world));
+  } else {
     impl_->sights.light_places(index, impl_->runs, impl_->scene_from_world,
                                (impl_->scene_from_world * viewer.imager_from_world.inverse()).translation,
-                               &places);
+                               &impl_->view_places, &impl_->surface_places);
+    places.divide(impl_->view_places, impl_->surface_places);
+  }
   // Even black begins and ends within a pixel: it would be seen to jump.
   shown.is_quick = impl_->quick_motion && !is_still && !options.even_black;
-  impl_->draw_layer(impl_->light_layer, centre, places,
-                    options.even_black ? k_dark_edges
-                    : shown.is_quick   ? k_quick_edges
-                                       : k_light_edges,
-                    set_up);
+  LightLayer& layer =
+      options.compensation == Compensation::measured ? *impl_->measured_light_layer : impl_->light_layer;
+  layer.draw({centre.texture, {projector.width, projector.height}, shown.known_stamp != impl_->known_stamp},
+             places,
+             options.even_black ? k_dark_edges
+             : shown.is_quick   ? k_quick_edges
+                                : k_light_edges,
+             std::cref(set_up), &impl_->times);
+  shown.known_stamp = impl_->known_stamp;
   {
     const PassTimes::Scope scope(&impl_->times, "response");
     set_up(impl_->light);
     impl_->light.set("u_is_balanced", options.compensation != Compensation::none || options.even_black);
     impl_->light.bind("s_centre", k_centre_unit, centre.texture);
     impl_->light.bind("s_response", k_response_unit, impl_->responses[index]);
-    impl_->draw(impl_->light, shown.display, places);
+    impl_->all_places.clear();
+    for (const std::vector<cv::Rect>* of_mode : places.each())
+      impl_->all_places.insert(impl_->all_places.end(), of_mode->begin(), of_mode->end());
+    impl_->draw(impl_->light, shown.display, impl_->all_places);
   }
   shown.posed = posed;
   shown.imager_from_world = viewer.imager_from_world;

@@ -45,11 +45,14 @@ std::string numbered(const std::vector<std::string>& files) {
   return text;
 }
 
-Result<GlName> compile(GLenum stage, const std::string& file, std::span<const std::string> defined = {}) {
+Result<GlName> compile(GLenum stage, const std::string& file, const std::string& defined = "") {
   Unrolled source;
   LIMN_TRY_STATUS(unroll(file, &source));
-  for (const std::string& name : defined)  // after the first line, which says the version
-    source.text.insert(source.text.find('\n') + 1, fmt::format("#define {}\n#line 2 0\n", name));
+  std::string definitions;
+  std::istringstream names(defined);
+  for (std::string name; names >> name;) definitions += fmt::format("#define {}\n", name);
+  if (!definitions.empty())  // after the first line, which says the version
+    source.text.insert(source.text.find('\n') + 1, definitions + "#line 2 0\n");
   GlName shader(glCreateShader(stage), [](GLuint n) { glDeleteShader(n); });
   const char* text = source.text.c_str();
   glShaderSource(*shader, 1, &text, nullptr);
@@ -72,7 +75,7 @@ Result<Program> Program::link(const std::string& vertex_file, const std::string&
   return linked(shaders, vertex_file + " and " + fragment_file);
 }
 
-Result<Program> Program::link_compute(const std::string& file, std::span<const std::string> defined) {
+Result<Program> Program::link_compute(const std::string& file, const std::string& defined) {
   std::array<GlName, 1> shaders;
   LIMN_TRY(shaders[0], compile(GL_COMPUTE_SHADER, file, defined));
   return linked(shaders, file);

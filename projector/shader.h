@@ -22,8 +22,8 @@ class Program {
   /// that the driver's messages name the true line. Error: the driver's message with file names.
   static Result<Program> link(const std::string& vertex_file, const std::string& fragment_file);
 
-  /// A compute shader, likewise; with names that are defined in it.
-  static Result<Program> link_compute(const std::string& file, std::span<const std::string> defined = {});
+  /// A compute shader, likewise; with names, parted by blanks, that are defined in it.
+  static Result<Program> link_compute(const std::string& file, const std::string& defined = "");
 
   void use() const { glUseProgram(*name_); }
   void set(const char* uniform, int value) const { glProgramUniform1i(*name_, at(uniform), value); }

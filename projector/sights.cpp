@@ -14,6 +14,7 @@ constexpr int k_eye_side = 2560;
 // Nodes of the pixel maps: 4-5 px a cell, within 0.01 px of the lens between them.
 constexpr int k_map_columns = 321, k_map_rows = 241;
 constexpr GLuint k_sight_texels_unit = 17;  // as in shaders/scene.glsl
+constexpr double k_on_surface = 0.002;      // m, as in shaders/on_surface.glsl
 // Share of the picture's smaller side over which a projector fades towards its border.
 constexpr double k_soft_border = 0.1;
 
@@ -373,16 +374,18 @@ void Sights::light_places(std::size_t projector,
                           const std::vector<PlacedRun>& runs,
                           const Pose& scene_from_world,
                           const Eigen::Vector3d& p_eye_scene,
-                          std::vector<cv::Rect>* places) const {
+                          std::vector<cv::Rect>* of_view,
+                          std::vector<cv::Rect>* of_surface) const {
   const Pose pose = sight_pose(projectors_[projector], scene_from_world);
   const cv::Rect whole = prototype_place(projector, runs, scene_from_world);
-  places->clear();
+  of_view->clear();
+  of_surface->clear();
   for (const PlacedRun& part : runs) {
     if (!is_part(part)) continue;
-    const TangentRect rect =
-        part.on_surface ? spanned(pose, bounds_of(part)) : spanned_behind(pose, part, runs, p_eye_scene);
+    const TangentRect rect = part.on_surface ? spanned(pose, bounds_of(part, k_on_surface))
+                                             : spanned_behind(pose, part, runs, p_eye_scene);
     const cv::Rect place = whole & pixels_of(projectors_[projector], lenses_[projector].baked, rect);
-    if (!place.empty()) places->push_back(place);
+    if (!place.empty()) (part.on_surface ? of_surface : of_view)->push_back(place);
   }
 }
 

@@ -53,12 +53,13 @@ class Sights {
                     const Eigen::Vector3d& d_up_scene);
 
   /// Rectangles of the projector's picture, outside of which it gives no light for the parts: each part's
-  /// own, where it lies or where the eye sees the prototype behind it.
+  /// own, where the eye sees the prototype behind it, or where it lies on the surface.
   void light_places(std::size_t projector,
                     const std::vector<PlacedRun>& runs,
                     const Pose& scene_from_world,
                     const Eigen::Vector3d& p_eye_scene,
-                    std::vector<cv::Rect>* places) const;
+                    std::vector<cv::Rect>* of_view,
+                    std::vector<cv::Rect>* of_surface) const;
   /// Rectangles of an imager's picture, outside of which it sees none of the parts (and of the prototype),
   /// nor anything within `around_m` of them.
   std::vector<cv::Rect> seen_places(const Imager& imager,

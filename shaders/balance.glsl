@@ -1,15 +1,17 @@
 // From a part's colour to the light that one projector gives for it: distance, incidence and vignetting divided out, and
 // what the surface does to light (projector/compensation.h).
 
-const int k_as_it_is = 0, k_by_geometry = 1, k_by_measurement = 2;
+const int k_as_it_is = 0;  // else by geometry or, where BY_MEASUREMENT is defined, by measurement
 uniform int u_compensation;
 uniform float u_level;      // irradiance (1/m^2) that a colour of 1 is to look like on the mean surface
 uniform bool u_even_black;  // gives the black light of projectors that do not reach a point
-uniform int u_witness;      // sight of the camera that measured the surface
 uniform mat3 u_mean_mixing;
+#ifdef BY_MEASUREMENT
+uniform int u_witness;  // sight of the camera that measured the surface
 // Layer 3 i + c: what channel c of projector i gives in the camera at an irradiance of 1, a: 0 where unknown; the last
 // one: what is there without projectors.
 uniform sampler2DArray s_mixing;
+#endif
 uniform sampler2D s_albedo;  // of the prototype, over its mean
 
 struct Surface {
@@ -17,6 +19,7 @@ struct Surface {
   vec3 offset;  // what is there without
 };
 
+#ifdef BY_MEASUREMENT
 vec4 mixing_at(vec2 px, int layer) {
   ivec2 first = ivec2(floor(px));
   ivec2 last = textureSize(s_mixing, 0).xy - 1;
@@ -30,7 +33,7 @@ vec4 mixing_at(vec2 px, int layer) {
 }
 
 // As measured for projector i or, where that one was not seen there, for another; else the mean.
-Surface measured_surface(int i, vec3 p) {
+Surface surface_at(int i, vec3 p, Hit prototype) {
   Surface surface = Surface(u_mean_mixing, vec3(0));
   Sight witness = sight_at(u_witness);
   vec3 q = (witness.sight_from_scene * vec4(p, 1)).xyz;
@@ -47,14 +50,15 @@ Surface measured_surface(int i, vec3 p) {
   return surface;
 }
 
+#else
 Surface surface_at(int i, vec3 p, Hit prototype) {
-  if (u_compensation == k_by_measurement) return measured_surface(i, p);
   vec2 uv = uv_of(prototype);
   vec3 albedo = texture(s_albedo, vec2(uv.x, 1.0 - uv.y)).rgb;
   const float k_darkest = 0.02;  // of the mean: what is darker stays dark
   albedo = max(albedo, vec3(k_darkest));
   return Surface(mat3(albedo.r, 0, 0, 0, albedo.g, 0, 0, 0, albedo.b), vec3(0));
 }
+#endif
 
 // Light over black of projector i at a place of the prototype, its share there; outside 0 ... 1 where it cannot give what
 // is wanted. `colour` has a: 0 where nothing is to be shown.

@@ -1,6 +1,11 @@
 #version 450 core
-// Lists the pixels of a picture of one sample a pixel that need more: beside an edge of coverage or colour.
+// Lists the pixels of a picture of one sample a pixel that need more: beside an edge of coverage or colour. KNOWN_SHARES: in
+// a projector's picture those at whose centres the share of the light is not known are left to light_shares.comp.
 #include "listed.glsl"
+#ifdef KNOWN_SHARES
+#include "rest.glsl"
+layout(rgba32f, binding = 2) uniform readonly image2D u_known_shares;  // as shaders/known.glsl
+#endif
 layout(local_size_x = 16, local_size_y = 4) in;
 uniform sampler2D s_centre;  // linear light, a: coverage
 uniform ivec2 u_first, u_end;  // of the rectangle to look through
@@ -18,5 +23,9 @@ void main() {
       highest = max(highest, c);
     }
   }
-  if (any(greaterThan(highest - lowest, vec4(u_least_step)))) list_pixel(at);
+  if (!any(greaterThan(highest - lowest, vec4(u_least_step)))) return;
+  list_pixel(at);
+#ifdef KNOWN_SHARES
+  if (imageLoad(u_known_shares, at).x < 0.0) leave_pixel(at);
+#endif
 }

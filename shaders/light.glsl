@@ -1,4 +1,4 @@
-// The light that one pixel sample of a projector should give.
+// The light that one pixel sample of a projector should give. VIEW_PARTS, SURFACE_PARTS: what may be there.
 #include "scene.glsl"
 #include "lens.glsl"
 #include "reach.glsl"
@@ -10,7 +10,6 @@ uniform usampler2DArray s_eye_ids;
 uniform int u_projector;
 uniform int u_eye;  // sight of the viewer
 uniform int u_placement_count;
-uniform bool u_has_view_parts, u_has_surface_parts;
 #include "known.glsl"
 
 // Colour of the view part that the viewer sees before p; a: 0 when none, or when p is hidden from the viewer.
@@ -39,15 +38,15 @@ struct CentreShare {
   vec3 d_flat;  // of the place there
   Share share;
 };
-const CentreShare k_no_centre = CentreShare(0.0, vec3(0), Share(0.0, 0.0, 0.0, 0.0));
 
-// None where the ray meets nothing, and where black is to be even, which begins and ends within a pixel.
+// None where the ray meets nothing, where the share is not known, and where black is to be even, which begins and ends
+// within a pixel.
 CentreShare centre_share(ivec2 at) {
-  if (u_even_black) return k_no_centre;
-  Hit prototype = centre_hit(at);
-  if (prototype.id == 0u) return k_no_centre;
+  CentreShare none = CentreShare(0.0, vec3(0), Share(0.0, 0.0, 0.0, 0.0));
+  Hit prototype = known_hit(at);
+  if (u_even_black || prototype.id == 0u || !is_share_known(at)) return none;
   Place place = place_at(prototype, ray_of(sight_at(u_projector), vec2(at)));
-  return CentreShare(distance(place.p, sight_at(u_projector).p_eye.xyz), place.d_flat, known_share(at, place));
+  return CentreShare(distance(place.p, sight_at(u_projector).p_eye.xyz), place.d_flat, known_share(at));
 }
 
 bool is_beside(CentreShare centre, Hit hit, Place place, float footprint) {
@@ -59,47 +58,54 @@ bool is_beside(CentreShare centre, Hit hit, Place place, float footprint) {
 // Colour that is to be seen at a place, t along the projector's ray; a: 0 where there is none.
 vec4 wanted_colour(Place place, float t) {
   float footprint = t / sight_at(u_projector).quality.x;
-  vec4 colour = u_has_view_parts ? view_colour(place.p, place.d_flat, footprint) : vec4(0);
-  if (colour.a == 0.0 && u_has_surface_parts) colour = surface_colour(place, footprint);
+  vec4 colour = vec4(0);
+#ifdef VIEW_PARTS
+  colour = view_colour(place.p, place.d_flat, footprint);
+#endif
+#ifdef SURFACE_PARTS
+  if (colour.a == 0.0) colour = surface_colour(place, footprint);
+#endif
   return colour;
 }
 
-// Light of a pixel's centre. rgb: light; a: coverage by what is to be lit.
-vec4 centre_light(ivec2 at) {
-  Hit prototype = centre_hit(at);
-  Sight projector = sight_at(u_projector);
-  Place place = place_at(prototype, ray_of(projector, vec2(at)));
-  vec4 colour = wanted_colour(place, distance(place.p, projector.p_eye.xyz));
-  if (colour.a == 0.0 && !u_even_black) return colour;
-  return vec4(balanced(u_projector, colour, known_share(at, place), place, prototype), 1);
-}
+// A sample of a pixel.
+struct Sample {
+  Hit prototype;
+  Place place;
+  vec4 colour;     // as wanted_colour
+  bool is_lit;     // it gives light
+  bool is_beside;  // the centre's share is good for it
+};
 
-// The same of any sample of a pixel.
-vec4 light_at(vec2 px, CentreShare centre) {
+Sample sample_at(vec2 px, CentreShare centre) {
   Sight projector = sight_at(u_projector);
   vec3 d = ray_of(projector, px);
   Hit prototype = first_hit(s_projector_ids, projector, 0, d);
-  if (prototype.id == 0u) return vec4(0);
   Place place = place_at(prototype, d);
   vec4 colour = wanted_colour(place, prototype.t);
-  if (colour.a == 0.0 && !u_even_black) return colour;
-  Share share;
-  if (is_beside(centre, prototype, place, prototype.t / projector.quality.x))
-    share = centre.share;
-  else
-    share = share_of(u_projector, place);
-  return vec4(balanced(u_projector, colour, share, place, prototype), 1);
+  bool is_lit = prototype.id != 0u && (colour.a > 0.0 || u_even_black);
+  return Sample(prototype, place, colour, is_lit, is_beside(centre, prototype, place, prototype.t / projector.quality.x));
 }
 
-// False only where centre_light is 0 for certain: no part is seen there from the viewer's eye, and none lies there.
+// rgb: light; a: coverage by what is to be lit.
+vec4 light_of(Sample lit, Share share) {
+  return vec4(balanced(u_projector, lit.colour, share, lit.place, lit.prototype), 1);
+}
+
+// False only where a centre gives no light for certain: no part is seen there from the viewer's eye, and none lies there.
 bool may_give_light(ivec2 at) {
-  Hit prototype = centre_hit(at);
+  Hit prototype = known_hit(at);
   if (prototype.id == 0u) return false;
   uint first = 3u * (prototype.id - 1u);
   vec3 p = mat3(corner(first).xyz, corner(first + 1u).xyz, corner(first + 2u).xyz) * prototype.weights;
+  bool may_give = u_even_black;
+#ifdef VIEW_PARTS
   vec4 share;
   Sight eye = sight_at(u_eye);
-  return u_even_black ||
-         (u_has_view_parts && ids_around(s_eye_ids, eye, 1, p - eye.p_eye.xyz, share) != uvec4(0)) ||
-         (u_has_surface_parts && may_hold_surface_part(p, u_placement_count));
+  may_give = may_give || ids_around(s_eye_ids, eye, 1, p - eye.p_eye.xyz, share) != uvec4(0);
+#endif
+#ifdef SURFACE_PARTS
+  may_give = may_give || may_hold_surface_part(p, u_placement_count);
+#endif
+  return may_give;
 }

@@ -1,12 +1,23 @@
 #version 450 core
-// A projector's picture: the listed pixels, one sample each at their centres.
+// A projector's picture: the listed pixels, one sample each at their centres. Where the share of the light is not known yet,
+// the picture gets the colour that is to be seen, and the pixel is left to light_shares.comp.
 #include "light.glsl"
 #include "listed.glsl"
+#include "rest.glsl"
 layout(local_size_x = 64) in;
 layout(rgba32f, binding = 0) uniform writeonly image2D u_picture;
 
 void main() {
   if (gl_GlobalInvocationID.x >= s_list_count) return;
   ivec2 at = listed_pixel(gl_GlobalInvocationID.x);
-  imageStore(u_picture, at, centre_light(at));
+  Hit prototype = known_hit(at);
+  Sight projector = sight_at(u_projector);
+  Place place = place_at(prototype, ray_of(projector, vec2(at)));
+  vec4 colour = wanted_colour(place, distance(place.p, projector.p_eye.xyz));
+  if (colour.a == 0.0 && !u_even_black) return;
+  if (is_share_known(at))
+    colour = vec4(balanced(u_projector, colour, known_share(at), place, prototype), 1);
+  else
+    leave_pixel(at);
+  imageStore(u_picture, at, colour);
 }

@@ -1,7 +1,9 @@
 #version 450 core
-// A projector's picture: the listed pixels by many samples.
+// A projector's picture: the listed pixels by many samples. Those for which the centre's share is not good enough are left
+// to light_rest.comp.
 #include "light.glsl"
 #include "listed.glsl"
+#include "rest.glsl"
 #include "samples.glsl"
 layout(local_size_x = 64) in;
 layout(rgba32f, binding = 0) uniform writeonly image2D u_picture;
@@ -11,9 +13,15 @@ void main() {
   ivec2 at = listed_pixel(gl_GlobalInvocationID.x);
   CentreShare centre = centre_share(at);
   vec4 sum = vec4(0);
+  bool is_left = false;
   int k = 0;
   do {
-    sum += light_at(vec2(at) + sample_offset(k), centre);
+    Sample seen = sample_at(vec2(at) + sample_offset(k), centre);
+    if (seen.is_lit) sum += light_of(seen, centre.share);
+    is_left = is_left || (seen.is_lit && !seen.is_beside);
   } while (++k < u_samples);
-  imageStore(u_picture, at, sum / float(u_samples));
+  if (is_left)
+    leave_pixel(at);
+  else
+    imageStore(u_picture, at, sum / float(u_samples));
 }

@@ -1,0 +1,19 @@
+#version 450 core
+// Finds out what the centres of a projector's pixels see of the prototype: in a rectangle, or (LISTED) of those listed.
+#include "light.glsl"
+#ifdef LISTED
+#include "listed.glsl"
+layout(local_size_x = 64) in;
+
+void main() {
+  if (gl_GlobalInvocationID.x < s_list_count) learn_hit(listed_pixel(gl_GlobalInvocationID.x));
+}
+#else
+layout(local_size_x = 16, local_size_y = 4) in;
+uniform ivec2 u_first, u_end;  // of the rectangle
+
+void main() {
+  ivec2 at = u_first + ivec2(gl_GlobalInvocationID.xy);
+  if (all(lessThan(at, u_end))) learn_hit(at);
+}
+#endif

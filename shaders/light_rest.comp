@@ -1,0 +1,23 @@
+#version 450 core
+// A projector's picture: the listed pixels by many samples, each with a share of its own where the centre's is not good
+// enough for it.
+#include "light.glsl"
+#include "listed.glsl"
+#include "samples.glsl"
+layout(local_size_x = 64) in;
+layout(rgba32f, binding = 0) uniform writeonly image2D u_picture;
+
+void main() {
+  if (gl_GlobalInvocationID.x >= s_list_count) return;
+  ivec2 at = listed_pixel(gl_GlobalInvocationID.x);
+  CentreShare centre = centre_share(at);
+  vec4 sum = vec4(0);
+  int k = 0;
+  do {
+    Sample seen = sample_at(vec2(at) + sample_offset(k), centre);
+    Share share = centre.share;
+    if (!seen.is_beside) share = share_of(u_projector, seen.place);
+    if (seen.is_lit) sum += light_of(seen, share);
+  } while (++k < u_samples);
+  imageStore(u_picture, at, sum / float(u_samples));
+}

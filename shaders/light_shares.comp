@@ -1,0 +1,19 @@
+#version 450 core
+// Shares of the light at the centres of the listed pixels; and their light, where the picture has the colour that is to be
+// seen there.
+#include "light.glsl"
+#include "listed.glsl"
+layout(local_size_x = 64) in;
+layout(rgba32f, binding = 0) uniform image2D u_picture;
+
+void main() {
+  if (gl_GlobalInvocationID.x >= s_list_count) return;
+  ivec2 at = listed_pixel(gl_GlobalInvocationID.x);
+  Hit prototype = known_hit(at);
+  if (prototype.id == 0u) return;
+  Place place = place_at(prototype, ray_of(sight_at(u_projector), vec2(at)));
+  Share share = learn_share(at, place);
+  vec4 colour = imageLoad(u_picture, at);
+  if (colour.a > 0.0 || u_even_black)
+    imageStore(u_picture, at, vec4(balanced(u_projector, colour, share, place, prototype), 1));
+}

@@ -1,0 +1,13 @@
+// Pixels that a pass leaves to another one, which does what few of them need.
+
+layout(std430, binding = 8) buffer Rest {
+  uint s_rest_count;
+  uint s_rest_groups[3];
+  uint s_rest[];  // as shaders/listed.glsl, which reads it
+};
+
+void leave_pixel(ivec2 at) {
+  uint i = atomicAdd(s_rest_count, 1u);
+  s_rest[i] = uint(at.y) << 16 | uint(at.x);
+  if (i % k_group == 0u) atomicMax(s_rest_groups[0], i / k_group + 1u);
+}
