@@ -205,10 +205,8 @@ void Sights::draw(const GpuScene& scene,
   glBindVertexArray(scene.vertex_array());
   scene.bind();
   const TangentRect rect = covered(twin);
-  const auto draw_triangles = [](const Program& program, int first, int count) {
-    if (count == 0) return;
-    program.set_id("u_first_id", static_cast<unsigned>(first) + 1);
-    glDrawArrays(GL_TRIANGLES, 3 * first, 3 * count);
+  const auto draw_triangles = [](int first, int count) {
+    if (count > 0) glDrawArrays(GL_TRIANGLES, 3 * first, 3 * count);
   };
   for (const PlacedRun& placed : runs) {
     if (!wanted(placed)) continue;
@@ -224,13 +222,13 @@ void Sights::draw(const GpuScene& scene,
     for (const TriangleRun::Cluster& cluster : placed.run->clusters) {
       if (intersected(rect, spanned(twin_from_owner, corners_of(cluster.box))).is_empty()) continue;
       if (cluster.first != first + count) {
-        draw_triangles(program, first, count);
+        draw_triangles(first, count);
         first = cluster.first;
         count = 0;
       }
       count += cluster.count;
     }
-    draw_triangles(program, first, count);
+    draw_triangles(first, count);
   }
   glDisable(GL_DEPTH_TEST);
 }

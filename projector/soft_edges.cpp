@@ -22,12 +22,14 @@ void run(const Program& program, cv::Size blocks) {
 
 Result<SoftEdges> SoftEdges::create(int projectors, int width, int height) {
   SoftEdges edges;
+  LIMN_TRY(edges.where_, Program::link_compute("jumps_where.comp"));
   LIMN_TRY(edges.find_, Program::link_compute("jumps.comp"));
   LIMN_TRY(edges.handed_, Program::link_compute("jump_handed.comp"));
   LIMN_TRY(edges.rows_, Program::link_compute("jump_rows.comp"));
   LIMN_TRY(edges.fade_, Program::link_compute("jump_fade.comp"));
   const int columns = blocks_of(width), rows = blocks_of(height);
   edges.blocks_.resize(static_cast<std::size_t>(projectors));
+  edges.jumping_.resize(static_cast<std::size_t>(projectors));
   edges.jumps_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_RGBA32F, columns, rows, projectors);
   edges.marks_ = make_texture(GL_TEXTURE_2D, GL_R8, columns, rows);
   edges.along_rows_ = make_texture(GL_TEXTURE_2D, GL_R8, columns, rows);
@@ -40,12 +42,23 @@ Result<SoftEdges> SoftEdges::create(int projectors, int width, int height) {
 void SoftEdges::find(int projector, const GlName& depth, const Twin& twin) {
   cv::Size& blocks = blocks_[static_cast<std::size_t>(projector)];
   blocks = {blocks_of(twin.width), blocks_of(twin.height)};
-  find_.bind("s_depth", 0, depth);
-  find_.set("u_last", twin.width - 1, twin.height - 1);
-  find_.set("u_near", static_cast<float>(k_near));
-  find_.set("u_focal", static_cast<float>(twin.focal));
+  for (const Program* program : {&where_, &find_}) {
+    program->bind("s_depth", 0, depth);
+    program->set("u_last", twin.width - 1, twin.height - 1);
+    program->set("u_near", static_cast<float>(k_near));
+    program->set("u_focal", static_cast<float>(twin.focal));
+  }
+  may_jump_.start(blocks.area());
+  may_jump_.bind();
+  const cv::Rect all({0, 0}, blocks);
+  look_through(where_, {&all, 1});
+  const float none[] = {-1, -1, -1, -1};
+  glClearTexSubImage(*jumps_, 0, 0, 0, projector, blocks.width, blocks.height, 1, GL_RGBA, GL_FLOAT, none);
   glBindImageTexture(0, *jumps_, 0, GL_FALSE, projector, GL_WRITE_ONLY, GL_RGBA32F);
-  run(find_, blocks);
+  PixelList& jumping = jumping_[static_cast<std::size_t>(projector)];
+  jumping.start(blocks.area());
+  jumping.bind_as_rest();
+  may_jump_.work_through(find_);
 }
 
 void SoftEdges::soften(const std::function<void(const Program&)>& bind_sights) {
@@ -55,8 +68,9 @@ void SoftEdges::soften(const std::function<void(const Program&)>& bind_sights) {
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     const int projector = static_cast<int>(i);
     handed_.set("u_projector", projector);
+    glClearTexImage(*marks_, 0, GL_RED, GL_FLOAT, nullptr);
     glBindImageTexture(0, *marks_, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R8);
-    run(handed_, blocks_[i]);
+    jumping_[i].work_through(handed_);
     glBindImageTexture(0, *marks_, 0, GL_FALSE, 0, GL_READ_ONLY, GL_R8);
     glBindImageTexture(1, *along_rows_, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R8);
     run(rows_, blocks_[i]);

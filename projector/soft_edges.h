@@ -6,6 +6,7 @@
 
 #include "core/result.h"
 #include "projector/gl.h"
+#include "projector/pixel_list.h"
 #include "projector/shader.h"
 #include "projector/twin.h"
 
@@ -27,9 +28,11 @@ class SoftEdges {
   void bind(const Program& program, int unit) const;
 
  private:
-  Program find_, handed_, rows_, fade_;
+  Program where_, find_, handed_, rows_, fade_;
   GlName jumps_, marks_, along_rows_, kept_;
-  std::vector<cv::Size> blocks_;  // of each projector's picture
+  std::vector<cv::Size> blocks_;    // of each projector's picture
+  PixelList may_jump_;              // blocks
+  std::vector<PixelList> jumping_;  // blocks of each projector's picture
 };
 
 }  // namespace limn::projector

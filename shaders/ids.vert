@@ -1,6 +1,10 @@
 #version 450 core
-// Triangles of one owner, to be drawn as their ids.
+// Triangles of one owner, to be drawn as their ids. (gl_PrimitiveID would make software GL take its triangles apart.)
 layout(location = 0) in vec4 a_corner;
+layout(location = 0) flat out uint o_id;
 uniform mat4 u_clip_from_owner;
 
-void main() { gl_Position = u_clip_from_owner * vec4(a_corner.xyz, 1); }
+void main() {
+  o_id = uint(gl_VertexID) / 3u + 1u;
+  gl_Position = u_clip_from_owner * vec4(a_corner.xyz, 1);
+}

@@ -2,12 +2,12 @@
 // The id of the front triangle of every texel, without what is cut out.
 #include "scene.glsl"
 layout(location = 0) in vec3 i_weights;
+layout(location = 1) flat in uint i_id;
 layout(location = 0) out uint o_id;
-uniform uint u_first_id;
 uniform float u_focal;  // of the picture of ids, texels
 
 void main() {
-  o_id = u_first_id + uint(gl_PrimitiveID);
+  o_id = i_id;
   float depth = 1.0 / gl_FragCoord.w;
   if (is_cut_out(Hit(o_id, depth, i_weights, 0.0), depth / u_focal)) discard;
 }

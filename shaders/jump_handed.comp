@@ -1,14 +1,14 @@
 #version 450 core
-// Marks the blocks of a projector's picture in which depth jumps and another projector's light goes on: there it hands its
-// own over. Where the prototype ends for all of them there is nobody to hand it to.
+// Marks those of the listed blocks, in which depth jumps in a projector's picture, where another projector's light goes on:
+// there it hands its own over. Where the prototype ends for all of them there is nobody to hand it to.
 #include "scene.glsl"
 #include "lens.glsl"
 #include "reach.glsl"
-layout(local_size_x = 8, local_size_y = 8) in;
+#include "listed.glsl"
+layout(local_size_x = 64) in;
 layout(r8, binding = 0) uniform writeonly image2D u_marks;
 uniform sampler2DArray s_jumps;  // shaders/jumps.comp, for each projector
 uniform int u_projector;
-uniform ivec2 u_blocks;
 
 // Whether projector j sees a jump of depth in the blocks around a point (scene frame).
 bool is_beside_jump(int j, vec3 p) {
@@ -16,10 +16,12 @@ bool is_beside_jump(int j, vec3 p) {
   vec3 q = (sight.sight_from_scene * vec4(p, 1)).xyz;
   vec2 texel = sight.focal_centre.xy * q.xy / q.z + sight.focal_centre.zw + 0.5;
   ivec2 block = ivec2(floor(texel / float(k_block))), last = (ivec2(sight.size.xy) - 1) / k_block;
-  for (int y = max(0, block.y - 1); y <= min(last.y, block.y + 1); ++y)
-    for (int x = max(0, block.x - 1); x <= min(last.x, block.x + 1); ++x)
-      if (texelFetch(s_jumps, ivec3(x, y, int(sight.quality.z)), 0).x >= 0.0) return true;
-  return false;
+  bool is_beside = false;
+  for (int i = 0; i < 9; ++i) {
+    ivec2 at = clamp(block + ivec2(i % 3, i / 3) - 1, ivec2(0), last);
+    is_beside = is_beside || texelFetch(s_jumps, ivec3(at, int(sight.quality.z)), 0).x >= 0.0;
+  }
+  return is_beside;
 }
 
 // Whether another projector lights what this one sees in a texel, and sees no jump there.
@@ -29,15 +31,25 @@ bool goes_on(vec2 texel) {
   Hit hit = first_hit(s_projector_ids, own, 0, d);
   if (hit.id == 0u) return false;
   Place place = place_at(hit, d);
-  for (int j = 0; j < u_projector_count; ++j)
-    if (j != u_projector && !is_beside_jump(j, place.p) && reaches(j, place)) return true;
-  return false;
+  int j = u_projector == 0 ? 1 : 0;
+  bool is_lit = false;
+  do {
+    is_lit = !is_beside_jump(j, place.p) && reaches(j, place);
+    if (++j == u_projector) ++j;
+  } while (!is_lit && j < u_projector_count);
+  return is_lit;
 }
 
 void main() {
-  ivec2 block = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(block, u_blocks))) return;
+  if (gl_GlobalInvocationID.x >= s_list_count) return;
+  ivec2 block = listed_pixel(gl_GlobalInvocationID.x);
   vec4 jump = texelFetch(s_jumps, ivec3(block, int(sight_at(u_projector).quality.z)), 0);
-  bool is_handed = jump.x >= 0.0 && (goes_on(jump.xy) || (jump.z >= 0.0 && goes_on(jump.zw)));
-  imageStore(u_marks, block, vec4(is_handed ? 1.0 : 0.0));
+  bool is_handed = false;
+  vec2 side = jump.xy;
+  int k = 0;
+  do {
+    is_handed = goes_on(side);
+    side = jump.zw;
+  } while (!is_handed && side.x >= 0.0 && ++k < 2);
+  if (is_handed) imageStore(u_marks, block, vec4(1));
 }

@@ -1,0 +1,26 @@
+#version 450 core
+// Lists the blocks of a depth picture in which depth may jump, by every fourth texel.
+#include "jumps.glsl"
+#include "listed.glsl"
+layout(local_size_x = 16, local_size_y = 4) in;
+uniform ivec2 u_first, u_end;  // of the blocks to look through
+
+bool may_jump(ivec2 first) {
+  const int k_apart = 4;
+  float grid[4][4];
+  for (int y = 0; y < 4; ++y)
+    for (int x = 0; x < 4; ++x) grid[y][x] = nearness(first + k_apart * ivec2(x, y) - 3);
+  bool is_found = false;
+  for (int i = 1; i < 3; ++i) {
+    for (int k = 1; k < 3; ++k) {
+      is_found = is_found || is_jump(grid[i][k - 1], grid[i][k], grid[i][k + 1]) ||
+                 is_jump(grid[k - 1][i], grid[k][i], grid[k + 1][i]);
+    }
+  }
+  return is_found;
+}
+
+void main() {
+  ivec2 block = u_first + ivec2(gl_GlobalInvocationID.xy);
+  if (all(lessThan(block, u_end)) && may_jump(k_block * block)) list_pixel(block);
+}
