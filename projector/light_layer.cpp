@@ -69,8 +69,9 @@ void LightLayer::draw(const Target& target,
   const int pixels = target.size.area();
   const auto for_modes = [&](const auto& draw_mode) {
     for (std::size_t i = 0; i < modes_.size(); ++i)
-      if (!places.each()[i]->empty()) draw_mode(modes_[i], *places.each()[i]);
+      if (modes_[i].is_used) draw_mode(modes_[i], *places.each()[i]);
   };
+  for (std::size_t i = 0; i < modes_.size(); ++i) modes_[i].is_used = !places.each()[i]->empty();
   const auto work_through = [&](const PixelList& list, const Program& program) {
     set_up(program);
     glBindImageTexture(0, *target.light, 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
@@ -96,8 +97,8 @@ void LightLayer::draw(const Target& target,
   {
     const PassTimes::Scope scope(times, "where there may be light");
     for_modes([&](ByMode& mode, const std::vector<cv::Rect>& parted) {
-      mode.list.start(pixels);
-      mode.list.bind();
+      mode.lit.start(pixels);
+      mode.lit.bind();
       set_up(mode.where);
       look_through(mode.where, parted);
     });
@@ -106,7 +107,7 @@ void LightLayer::draw(const Target& target,
     const PassTimes::Scope scope(times, "light at pixel centres");
     rest_list_.start(pixels);
     rest_list_.bind_as_rest();
-    for_modes([&](ByMode& mode, const std::vector<cv::Rect>&) { work_through(mode.list, mode.centre); });
+    for_modes([&](ByMode& mode, const std::vector<cv::Rect>&) { work_through(mode.lit, mode.centre); });
     work_through(rest_list_, shares_);
   }
   {
@@ -116,8 +117,8 @@ void LightLayer::draw(const Target& target,
     where_edges_.bind("s_centre", k_picture_unit, target.light);
     where_edges_.set("u_least_step", static_cast<float>(smoothing.least_step));
     for_modes([&](ByMode& mode, const std::vector<cv::Rect>& parted) {
-      mode.list.start(pixels);
-      mode.list.bind();
+      mode.at_edges.start(pixels);
+      mode.at_edges.bind();
       look_through(where_edges_, parted);
     });
     work_through(rest_list_, shares_);
@@ -127,10 +128,18 @@ void LightLayer::draw(const Target& target,
   rest_list_.bind_as_rest();
   for_modes([&](ByMode& mode, const std::vector<cv::Rect>&) {
     mode.edges.set("u_samples", smoothing.samples);
-    work_through(mode.list, mode.edges);
+    work_through(mode.at_edges, mode.edges);
   });
   rest_.set("u_samples", smoothing.samples);
   work_through(rest_list_, rest_);
+}
+
+void LightLayer::work_through_lit(const Program& program) const {
+  for (const ByMode& mode : modes_) {
+    if (!mode.is_used) continue;
+    mode.lit.work_through(program);
+    mode.at_edges.work_through(program);
+  }
 }
 
 }  // namespace limn::projector

@@ -45,11 +45,14 @@ class LightLayer {
             const Smoothing& smoothing,
             const std::function<void(const Program&)>& set_up,
             PassTimes* times);
+  /// Runs a program over all pixels that may have light since the last draw (shaders/listed.glsl).
+  void work_through_lit(const Program& program) const;
 
  private:
   struct ByMode {
     Program where, centre, edges;
-    PixelList list;
+    PixelList lit, at_edges;  // pixels that may be
+    bool is_used = false;     // by the last draw
   };
   Program hits_, unknown_, listed_hits_, shares_, where_edges_, rest_;
   std::array<ByMode, 3> modes_;  // in the order of PlacesByMode

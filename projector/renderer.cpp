@@ -208,7 +208,7 @@ struct Renderer::Impl {
   bool is_prototype_seen = false, are_soft_edges_seen = false, are_surface_parts_seen = false;
   std::vector<PlacedRun> runs;
   PlacesByMode light_places;  // of the projector drawn last
-  std::vector<cv::Rect> view_places, surface_places, all_places;
+  std::vector<cv::Rect> view_places, surface_places;
   Pose scene_from_world;
   enum class EyeKind { none, imager, parts_of_imager, eye };
   EyeKind eye_kind = EyeKind::none;
@@ -306,14 +306,14 @@ struct Renderer::Impl {
 
 Status Renderer::Impl::link_programs() {
   const std::pair<Program*, const char*> drawn[] = {
-      {&points, "points.frag"},         {&blend, "blend.frag"}, {&light, "light.frag"},
-      {&irradiance, "irradiance.frag"}, {&lit, "lit.frag"},     {&coverage, "coverage.frag"},
-      {&composite, "composite.frag"}};
+      {&points, "points.frag"}, {&blend, "blend.frag"},       {&irradiance, "irradiance.frag"},
+      {&lit, "lit.frag"},       {&coverage, "coverage.frag"}, {&composite, "composite.frag"}};
   for (const auto& [program, file] : drawn) {
     LIMN_TRY(*program, Program::link("whole.vert", file));
   }
   LIMN_TRY(edges, Program::link_compute("edges.comp"));
   LIMN_TRY(light_layer, LightLayer::link(defined(), false));
+  LIMN_TRY(light, Program::link_compute("light_response.comp"));
   LIMN_TRY(unshadowed, CompositePrograms::link(defined()));
   return {};
 }
@@ -742,10 +742,9 @@ unsigned Renderer::draw_projector(std::size_t index, const scene::PosedScene& po
     impl_->light.set("u_is_balanced", options.compensation != Compensation::none || options.even_black);
     impl_->light.bind("s_centre", k_centre_unit, centre.texture);
     impl_->light.bind("s_response", k_response_unit, impl_->responses[index]);
-    impl_->all_places.clear();
-    for (const std::vector<cv::Rect>* of_mode : places.each())
-      impl_->all_places.insert(impl_->all_places.end(), of_mode->begin(), of_mode->end());
-    impl_->draw(impl_->light, shown.display, impl_->all_places);
+    glClearTexImage(*shown.display.texture, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
+    glBindImageTexture(0, *shown.display.texture, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA8);
+    layer.work_through_lit(impl_->light);
   }
   shown.posed = posed;
   shown.imager_from_world = viewer.imager_from_world;

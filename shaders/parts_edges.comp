@@ -11,20 +11,28 @@ void main() {
   ivec2 at = listed_pixel(gl_GlobalInvocationID.x);
   vec4 sum = vec4(0);
   bool may_lack = false;  // of a part that is not drawn whole
-  for (int k = 0; k < u_samples; ++k) {
+  int k = 0;
+  do {
     Seen seen = in_sight_at(vec2(at) + sample_offset(k));
     may_lack = may_lack || (seen.how == k_if_reached && whole_share(owner_of(seen.part.id)) < 1.0);
     sum += part_seen(seen, false);
-  }
+  } while (++k < u_samples);
   // Light ends within a pixel of the projector's, and a pixel half of light, half of screen would be dark: beside what is
   // left to the screen the part is drawn whole, over its light.
   const float k_around = 3.0;  // pixels across that are looked at
   bool whole = false;
-  for (int k = 0; k < u_samples && may_lack && !whole; ++k)
-    whole = is_left_to_screen(vec2(at) + k_around * sample_offset(k));
+  if (may_lack) {
+    k = 0;
+    do {
+      whole = is_left_to_screen(vec2(at) + k_around * sample_offset(k));
+    } while (!whole && ++k < u_samples);
+  }
   if (whole) {
     sum = vec4(0);
-    for (int k = 0; k < u_samples; ++k) sum += part_seen(in_sight_at(vec2(at) + sample_offset(k)), true);
+    k = 0;
+    do {
+      sum += part_seen(in_sight_at(vec2(at) + sample_offset(k)), true);
+    } while (++k < u_samples);
   }
   imageStore(u_picture, at, sum / float(u_samples));
 }

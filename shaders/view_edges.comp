@@ -10,6 +10,9 @@ void main() {
   if (gl_GlobalInvocationID.x >= s_list_count) return;
   ivec2 at = listed_pixel(gl_GlobalInvocationID.x);
   vec4 sum = vec4(0);
-  for (int k = 0; k < u_samples; ++k) sum += view_at(vec2(at) + sample_offset(k));
+  int k = 0;
+  do {
+    sum += view_at(vec2(at) + sample_offset(k));
+  } while (++k < u_samples);
   imageStore(u_picture, at, sum / float(u_samples));
 }

@@ -1,7 +1,10 @@
 #version 450 core
-// A projector's picture from its light: display values by the projector's response. Alpha says what was clipped.
+// A projector's picture from its light, in the listed pixels: display values by the projector's response. Alpha says what
+// was clipped.
 #include "scene.glsl"
-layout(location = 0) out vec4 o_display;
+#include "listed.glsl"
+layout(local_size_x = 64) in;
+layout(rgba8, binding = 0) uniform writeonly image2D u_display;
 uniform sampler2D s_centre;    // linear light, a: coverage
 uniform sampler2D s_response;  // display value over the root of light, evenly spaced from 0 to 1
 uniform int u_projector;
@@ -25,20 +28,20 @@ vec3 display_value(vec3 light) {
 }
 
 void main() {
-  ivec2 at = ivec2(gl_FragCoord.xy);
+  if (gl_GlobalInvocationID.x >= s_list_count) return;
+  ivec2 at = listed_pixel(gl_GlobalInvocationID.x);
   vec4 light = texelFetch(s_centre, at, 0);
   // 1: brighter than light can be is wanted, 0.5: darker.
   const float k_tolerance = 0.004;
   float clipped = any(greaterThan(light.rgb, vec3(1.0 + k_tolerance))) ? 1.0
                   : any(lessThan(light.rgb, vec3(-k_tolerance)))       ? 0.5
                                                                        : 0.0;
-  if (!u_is_balanced) {
-    o_display = vec4(light.a > 0.0 ? display_value(light.rgb) : vec3(0), clipped);
-    return;
-  }
-  float black = sight_at(u_projector).quality.w;
+  float black = u_is_balanced ? sight_at(u_projector).quality.w : 0.0;
   vec3 value = light.a > 0.0 ? display_value(black + (1.0 - black) * light.rgb) : vec3(0);
-  // Without noise smooth light would have bands of whole levels; black and white stay what they are.
-  vec3 inner = step(vec3(0.5 / 255.0), value) * step(value, vec3(254.5 / 255.0));
-  o_display = vec4(value + inner * (dither(at) - 0.5) / 255.0, clipped);
+  if (u_is_balanced) {
+    // Without noise smooth light would have bands of whole levels; black and white stay what they are.
+    vec3 inner = step(vec3(0.5 / 255.0), value) * step(value, vec3(254.5 / 255.0));
+    value += inner * (dither(at) - 0.5) / 255.0;
+  }
+  imageStore(u_display, at, vec4(value, clipped));
 }
