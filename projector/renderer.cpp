@@ -163,9 +163,10 @@ struct Renderer::Impl {
   LightLayer light_layer;
   std::optional<LightLayer> measured_light_layer;  // linked when it is asked for
   // A layer of the parts' light in a composite: where there may be some, at pixel centres, by more samples at
-  // edges.
+  // edges, and what few of those need.
   struct LayerPrograms {
     Program where, centre, edges;
+    std::optional<Program> rest;
   };
   struct CompositePrograms {
     LayerPrograms parts, view;
@@ -174,7 +175,7 @@ struct Renderer::Impl {
   CompositePrograms unshadowed;
   std::optional<CompositePrograms> shadowed;  // linked when it is asked for
   CompositePrograms& composites() { return has_contact_shadow ? *shadowed : unshadowed; }
-  PixelList list;
+  PixelList list, rest_list;
   std::vector<GlName> responses;
   // Of the projectors' last pictures.
   struct Shown {
@@ -327,6 +328,7 @@ auto Renderer::Impl::CompositePrograms::link(const std::string& defined) -> Resu
   for (const auto& [program, file] : computed) {
     LIMN_TRY(*program, Program::link_compute(file, defined));
   }
+  LIMN_TRY(out.parts.rest, Program::link_compute("parts_rest.comp", defined));
   return out;
 }
 
@@ -464,15 +466,17 @@ void Renderer::Impl::draw_layer(LayerPrograms& layer,
                                 const std::vector<cv::Rect>& places,
                                 const Smoothing& smoothing,
                                 const SetUp& set_up) {
+  // Where places lie over each other pixels are listed again.
+  const int room = into.width * into.height * static_cast<int>(std::max<std::size_t>(1, places.size()));
   const auto over_places = [&](const Program& program) {
-    list.start(into.width * into.height * static_cast<int>(std::max<std::size_t>(1, places.size())));
+    list.start(room);
     list.bind();
     look_through(program, places);
   };
-  const auto over_list = [&](const Program& program) {
+  const auto work_through = [&](const PixelList& pixels, const Program& program) {
     set_up(program);
     glBindImageTexture(0, *into.texture, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
-    list.work_through(program);
+    pixels.work_through(program);
   };
   const cv::Rect whole(0, 0, into.width, into.height);
   for (const cv::Rect& place : places) {  // with the neighbours that edges are judged by
@@ -487,7 +491,7 @@ void Renderer::Impl::draw_layer(LayerPrograms& layer,
   }
   {
     const PassTimes::Scope scope(&times, "light at pixel centres");
-    over_list(layer.centre);
+    work_through(list, layer.centre);
   }
   {
     const PassTimes::Scope scope(&times, "where edges are");
@@ -497,7 +501,12 @@ void Renderer::Impl::draw_layer(LayerPrograms& layer,
   }
   const PassTimes::Scope scope(&times, "light at edges");
   layer.edges.set("u_samples", smoothing.samples);
-  over_list(layer.edges);
+  rest_list.start(room);
+  rest_list.bind_as_rest();
+  work_through(list, layer.edges);
+  if (!layer.rest) return;
+  layer.rest->set("u_samples", smoothing.samples);
+  work_through(rest_list, *layer.rest);
 }
 
 // What an imager sees of a layer, over its picture (BGR); the layer is drawn again only where it has changed.

@@ -1,7 +1,9 @@
 #version 450 core
-// A composite: the listed pixels by many samples.
+// A composite: the listed pixels by many samples. Those with a part that is not drawn whole are left to parts_rest.comp,
+// too.
 #include "parts.glsl"
 #include "listed.glsl"
+#include "rest.glsl"
 #include "samples.glsl"
 layout(local_size_x = 64) in;
 layout(rgba32f, binding = 0) uniform writeonly image2D u_picture;
@@ -10,29 +12,13 @@ void main() {
   if (gl_GlobalInvocationID.x >= s_list_count) return;
   ivec2 at = listed_pixel(gl_GlobalInvocationID.x);
   vec4 sum = vec4(0);
-  bool may_lack = false;  // of a part that is not drawn whole
+  bool may_lack = false;
   int k = 0;
   do {
     Seen seen = in_sight_at(vec2(at) + sample_offset(k));
     may_lack = may_lack || (seen.how == k_if_reached && whole_share(owner_of(seen.part.id)) < 1.0);
     sum += part_seen(seen, false);
   } while (++k < u_samples);
-  // Light ends within a pixel of the projector's, and a pixel half of light, half of screen would be dark: beside what is
-  // left to the screen the part is drawn whole, over its light.
-  const float k_around = 3.0;  // pixels across that are looked at
-  bool whole = false;
-  if (may_lack) {
-    k = 0;
-    do {
-      whole = is_left_to_screen(vec2(at) + k_around * sample_offset(k));
-    } while (!whole && ++k < u_samples);
-  }
-  if (whole) {
-    sum = vec4(0);
-    k = 0;
-    do {
-      sum += part_seen(in_sight_at(vec2(at) + sample_offset(k)), true);
-    } while (++k < u_samples);
-  }
   imageStore(u_picture, at, sum / float(u_samples));
+  if (may_lack) leave_pixel(at);
 }
