@@ -6,7 +6,7 @@ namespace limn::projector {
 namespace {
 
 constexpr GLuint k_listed_binding = 6,
-                 k_rest_binding = 8;  // of buffers, as in shaders/listed.glsl and rest.glsl
+                 k_rest_binding = 5;  // of buffers, as in shaders/listed.glsl and rest.glsl
 
 }  // namespace
 

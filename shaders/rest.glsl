@@ -1,6 +1,6 @@
 // Pixels that a pass leaves to another one, which does what few of them need.
 
-layout(std430, binding = 8) buffer Rest {
+layout(std430, binding = 5) buffer Rest {
   uint s_rest_count;
   uint s_rest_groups[3];
   uint s_rest[];  // as shaders/listed.glsl, which reads it
