@@ -18,6 +18,13 @@ struct PatternShift {
   int age = 0;                                ///< pictures since
 };
 
+/// The light at a marker's sides when none of them was found to lie on a shadow's edge (shadow_edges.h).
+/// While it stays, no shadow has come, and Detector::follow need not look for one.
+struct UnshadowedSides {
+  std::array<double, 4> outside_level, inside_level;  ///< grey levels
+  int age = 0;                                        ///< pictures since
+};
+
 /// A marker found in a picture.
 struct Detection {
   MarkerName marker;
@@ -33,6 +40,7 @@ struct Detection {
   /// is as sure as this, so many are right.
   double score = 0;
   std::optional<PatternShift> by_pattern;
+  std::optional<UnshadowedSides> unshadowed;
 };
 
 }  // namespace limn::tracker

@@ -69,9 +69,11 @@ bool is_blurred(const RefinedQuad& quad, const SeenCells& cells, double cell_sig
   return shortest_side(Quad{quad.corners_px}) < cell_sigmas * blur_of(quad) * cells.count;
 }
 
-// A shift is kept for so many pictures, and while the blur and all sides are as when it was fitted.
+// A shift is kept for so many pictures, and while the blur and all sides are as when it was fitted; that no
+// shadow's edge lies at a side, while the light on both sides of it is.
 constexpr int k_keep_pictures = 30;
 constexpr double k_like_blur = 0.15, k_like_side = 0.03;
+constexpr double k_like_level = 0.06, k_like_dark_level = 3;  // a share of it, and grey levels at least
 
 double side_of(const RefinedQuad& quad, std::size_t i) {
   return (quad.corners_px[(i + 1) % 4] - quad.corners_px[i]).norm();
@@ -87,6 +89,36 @@ bool still_holds(const PatternShift& shift, const Identity& identity, const Refi
     if (std::abs(side_of(quad, corner_of(identity, i)) - shift.side_px[i]) > k_like_side * shift.side_px[i])
       return false;
   return true;
+}
+
+bool is_like_level(double before, double now) {
+  return std::abs(now - before) < std::max(k_like_dark_level, k_like_level * before);
+}
+
+bool still_holds(const UnshadowedSides& known, const Identity& identity, const RefinedQuad& quad) {
+  if (known.age >= k_keep_pictures) return false;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const std::size_t side = corner_of(identity, i);
+    if (!is_like_level(known.outside_level[i], quad.outside_level[side]) ||
+        !is_like_level(known.inside_level[i], quad.inside_level[side]))
+      return false;
+  }
+  return true;
+}
+
+UnshadowedSides unshadowed_sides(const Identity& identity, const RefinedQuad& quad) {
+  UnshadowedSides sides;
+  for (std::size_t i = 0; i < 4; ++i) {
+    sides.outside_level[i] = quad.outside_level[corner_of(identity, i)];
+    sides.inside_level[i] = quad.inside_level[corner_of(identity, i)];
+  }
+  return sides;
+}
+
+template <class T>
+std::optional<T> aged(std::optional<T> known) {
+  if (known) ++known->age;
+  return known;
 }
 
 // Whether it is the square of a marker found before: another one may lie inside or around it.
@@ -251,9 +283,7 @@ std::optional<Detector::Read> Detector::found_again(const cv::Mat& grey,
                                                     const Detection& last) {
   const double reach = 0.5 * longest_side(last);
   Quad quad{last.corners_px, reach};
-  std::optional<PatternShift> shift = last.by_pattern;
-  if (shift) ++shift->age;
-  auto found = read(grey, quad, lens, Reading::open, workers_[0], shift ? &*shift : nullptr);
+  auto found = read(grey, quad, lens, Reading::open, workers_[0], &last);
   if (found && found->detection.marker == last.marker) return found;
   Eigen::AlignedBox2d box;
   for (const Eigen::Vector2d& corner : last.corners_px) box.extend(corner);
@@ -269,7 +299,7 @@ std::optional<Detector::Read> Detector::found_again(const cv::Mat& grey,
   const auto read_quads = [&](Reading reading) -> std::optional<Read> {
     for (Quad& candidate : quads_) {
       for (Eigen::Vector2d& corner : candidate.corners_px) corner += origin;
-      found = read(grey, candidate, lens, reading, workers_[0]);
+      found = read(grey, candidate, lens, reading, workers_[0], &last);
       if (found && found->detection.marker == last.marker) return found;
     }
     return std::nullopt;
@@ -313,7 +343,7 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
                                              const Lens* lens,
                                              Reading reading,
                                              Worker& worker,
-                                             const PatternShift* last) const {
+                                             const Detection* last) const {
   if (!may_be_marker(grey, quad, options_.min_contrast)) return std::nullopt;
   const bool covered = reading == Reading::covered;
   if (covered && !may_be_covered_code(grey, quad)) return std::nullopt;
@@ -324,7 +354,7 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
   };
   std::optional<RefinedQuad> rough;
   Quad start = quad;
-  if (covered || shortest_side(quad) > k_rough_above_px) {
+  if (covered || (!last && shortest_side(quad) > k_rough_above_px)) {
     rough = refine(quad, Effort::rough);
     if (!rough || !identify(grey, *rough, families_, reading, Certainty::any)) return std::nullopt;
     start.corners_px = rough->corners_px;
@@ -336,13 +366,22 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
     identity = refined ? identify(grey, *refined, families_, reading) : std::nullopt;
     if (!identity) return std::nullopt;
   }
-  const bool moved_from_shadows =
-      leave_shadow_edges(grey, worker.refiner.light(), identity->cells, lens, &*refined);
+  const bool is_followed = last && last->marker == identity->marker;
   Read read;
   Detection& detection = read.detection;
-  if (!moved_from_shadows) {
-    if (!refined->separate || is_blurred(*refined, identity->cells, k_cell_sigmas))
-      detection.by_pattern = settle_overlapping_edges(grey, lens, *identity, worker, last, &*refined);
+  if (is_followed) detection.unshadowed = aged(last->unshadowed);
+  auto shadows = ShadowEdges::none;
+  if (!detection.unshadowed || !still_holds(*detection.unshadowed, *identity, *refined)) {
+    detection.unshadowed.reset();
+    const UnshadowedSides sides = unshadowed_sides(*identity, *refined);
+    shadows = leave_shadow_edges(grey, worker.refiner.light(), identity->cells, lens, &*refined);
+    if (shadows == ShadowEdges::none) detection.unshadowed = sides;
+  }
+  if (shadows != ShadowEdges::left) {
+    const auto shift = is_followed ? aged(last->by_pattern) : std::nullopt;
+    const bool overlap = !refined->separate || is_blurred(*refined, identity->cells, k_cell_sigmas);
+    if (overlap || (shift && still_holds(*shift, *identity, *refined)))
+      detection.by_pattern = settle_overlapping_edges(grey, lens, *identity, worker, shift, &*refined);
     if (!detection.by_pattern && !covered && !is_blurred(*refined, identity->cells, k_retreat_sigmas) &&
         std::ranges::all_of(refined->corner_visible, std::identity()))
       read.retreat = find_ink_retreat(grey, worker.refiner.light(), refined->corners_px, identity->cells);
@@ -363,7 +402,7 @@ std::optional<PatternShift> Detector::settle_overlapping_edges(const cv::Mat& gr
                                                                const Lens* lens,
                                                                const Identity& identity,
                                                                Worker& worker,
-                                                               const PatternShift* last,
+                                                               const std::optional<PatternShift>& last,
                                                                RefinedQuad* refined) const {
   if (last && still_holds(*last, identity, *refined)) {
     for (std::size_t i = 0; i < 4; ++i) {

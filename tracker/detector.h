@@ -68,7 +68,8 @@ class Detector {
   /// Finds markers again that were at `last`, looking only about there: a marker that moved by more than half
   /// of its side is lost, and new ones want detect_more(). Each square once, in the order of `last`, which
   /// `detections` must not be. A pattern is fitted anew now and then, and when the marker's view or blur
-  /// changes; between, corners keep their distance from what the sides alone say.
+  /// changes; between, corners keep their distance from what the sides alone say. Shadows are looked for anew
+  /// now and then, and when the light at a side changes.
   void follow(const cv::Mat& grey,
               const Lens* lens,
               std::span<const Detection> last,
@@ -114,12 +115,12 @@ class Detector {
                            const Lens* lens,
                            Reading reading,
                            Worker& worker,
-                           const PatternShift* last = nullptr) const;
+                           const Detection* last = nullptr) const;
   std::optional<PatternShift> settle_overlapping_edges(const cv::Mat& grey,
                                                        const Lens* lens,
                                                        const Identity& identity,
                                                        Worker& worker,
-                                                       const PatternShift* last,
+                                                       const std::optional<PatternShift>& last,
                                                        RefinedQuad* refined) const;
 };
 

@@ -134,7 +134,7 @@ Places places_like(const cv::Mat& grey,
           3;
     }
     const auto at = [&](int k) { return across[static_cast<std::size_t>(k + around)]; };
-    const auto fall = [&](int k) { return log_ratio(at(k), at(k + 1)); };
+    const auto fall = [&](int k) { return (at(k) + k_dark) / (at(k + 1) + k_dark); };
     int found = 0;
     for (int k = -reach; k < reach && found < k_most_a_row; ++k) {
       if (fall(k) < fall(k - 1) || fall(k) <= fall(k + 1)) continue;
@@ -231,18 +231,19 @@ Eigen::Vector2d slide(const std::array<Eigen::Vector2d, 4>& before, std::size_t 
 
 }  // namespace
 
-bool leave_shadow_edges(const cv::Mat& grey,
-                        const std::array<double, 256>& light,
-                        const SeenCells& cells,
-                        const Lens* lens,
-                        RefinedQuad* refined) {
-  if (std::min(grey.cols, grey.rows) < 2 || median(refined->blur_px) > k_max_blur_px) return false;
+ShadowEdges leave_shadow_edges(const cv::Mat& grey,
+                               const std::array<double, 256>& light,
+                               const SeenCells& cells,
+                               const Lens* lens,
+                               RefinedQuad* refined) {
+  if (std::min(grey.cols, grey.rows) < 2 || median(refined->blur_px) > k_max_blur_px)
+    return ShadowEdges::none;
   std::array<double, 4> ratio;
   for (std::size_t i = 0; i < 4; ++i)
     ratio[i] =
         log_ratio(light_of(refined->outside_level[i], light), light_of(refined->inside_level[i], light));
   const auto [least, most] = std::minmax_element(ratio.begin(), ratio.end());
-  if (*most - *least < k_unlike) return false;
+  if (*most - *least < k_unlike) return ShadowEdges::none;
   const double expected = ratio_of_cells(grey, light, *refined, cells).value_or(median(ratio));
   const StraightPicture picture = StraightPicture::about(lens, refined->corners_px, k_max_reach);
   std::array<Eigen::Vector2d, 4> before = refined->corners_px;
@@ -251,13 +252,13 @@ bool leave_shadow_edges(const cv::Mat& grey,
   double shortest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < 4; ++i) shortest = std::min(shortest, side_of(before, i).run.norm());
   const int reach = std::min(k_max_reach, static_cast<int>(k_reach_share * shortest));
-  bool any = false;
+  ShadowEdges made = ShadowEdges::none;
   for (std::size_t i = 0; i < 4; ++i) {
     const Agreed agreed = agreed_line(places_like(grey, light, picture, side_of(before, i), reach, expected));
     const bool moves = agreed.by_many && agreed.elsewhere;
     const bool doubtful = !agreed.by_many && std::abs(ratio[i] - expected) > k_unlike;
     if (!moves && !doubtful) continue;
-    any |= moves;
+    made = std::max(made, moves ? ShadowEdges::left : ShadowEdges::doubtful);
     for (const bool start : {true, false}) {
       const std::size_t corner = start ? i : (i + 1) % 4;
       const Eigen::Vector2d way = slide(before, i, corner);
@@ -270,7 +271,7 @@ bool leave_shadow_edges(const cv::Mat& grey,
       refined->corner_covariance[corner] += variance * way * way.transpose();
     }
   }
-  return any;
+  return made;
 }
 
 }  // namespace limn::tracker

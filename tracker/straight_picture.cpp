@@ -54,8 +54,13 @@ StraightPicture StraightPicture::about(const Lens* lens,
 
 Eigen::Vector2d StraightPicture::found_bent(const Eigen::Vector2d& straight_px) const {
   constexpr int k_rounds = 6;  // each leaves a tenth or less
+  constexpr double k_settled_px = 1e-6;
   Eigen::Vector2d px = straight_px;
-  for (int round = 0; round < k_rounds; ++round) px = straight_px - bend(px);
+  for (int round = 0; round < k_rounds; ++round) {
+    const Eigen::Vector2d before = px;
+    px = straight_px - bend(px);
+    if ((px - before).lpNorm<Eigen::Infinity>() < k_settled_px) break;
+  }
   return px;
 }
 

@@ -680,6 +680,34 @@ void expect_no_shadows_edge(const Lens& lens, double low_px, double high_px, dou
 TEST(Detector, TakesNoShadowsEdgeForTheInks) { expect_no_shadows_edge(pinhole_vga(), 70, 120, 1.2); }
 TEST(Detector, TakesNoShadowsEdgeForTheInksThroughALens) { expect_no_shadows_edge(bent_vga(), 120, 160, 2); }
 
+// What was known of a marker's light is not believed when a shadow has come.
+TEST(Detector, SeesAShadowComeUponAMarkerThatItFollows) {
+  auto rng = test::test_rng();
+  const Lens lens = pinhole_vga();
+  Detector detector(families({"apriltag_36h11"}));
+  constexpr int k_count = 20;
+  int kept = 0, near = 0, corners = 0;
+  for (int i = 0; i < k_count; ++i) {
+    const PlacedMarker marker = test::placed(lens, {"apriltag_36h11", std::to_string(i)}, {320, 240},
+                                             uniform(rng, 70, 120), uniform(rng, 0, 6.28), 20_deg, i);
+    const auto truth = test::true_corners(lens, marker);
+    const cv::Mat light = test::light_of(lens, test::plain(640, 480, 90), std::vector{marker}, {}, rng);
+    const cv::Mat slats = with_slats(light, truth, static_cast<std::size_t>(i % 4), uniform(rng, 2.5, 7),
+                                     uniform(rng, -2_deg, 2_deg));
+    const auto first = detector.detect(test::noisy_grey(light, 2, rng), &lens);
+    std::vector<Detection> unchanged, shaded;
+    detector.follow(test::noisy_grey(light, 2, rng), &lens, first, &unchanged);
+    ASSERT_EQ(unchanged.size(), 1u) << i;
+    kept += unchanged[0].unshadowed && unchanged[0].unshadowed->age == 1;
+    detector.follow(test::noisy_grey(slats, 2, rng), &lens, unchanged, &shaded);
+    for (const Detection& found : shaded)
+      for (std::size_t k = 0; k < 4; ++k, ++corners) near += (found.corners_px[k] - truth[k]).norm() < 0.5;
+  }
+  EXPECT_GE(kept, 0.9 * k_count);  // in unchanged light
+  EXPECT_GE(corners, 4 * 0.75 * k_count);
+  EXPECT_GE(near, 0.9 * corners);
+}
+
 TEST(Detector, HasNoBiasWhereTheWhiteMarginIsAPixelWide) {
   auto rng = test::test_rng();
   Detector detector(families({"aruco_4x4_50"}));
