@@ -221,9 +221,12 @@ BodyMotion seen_again(const BodyMotion& known,
                       const MotionModel& model) {
   BodyMotion after = known;
   after.looked_at = captured_at;
-  const std::vector<PoseFit> fits = minima(seen);
-  if (fits.empty()) return after;
   const double unseen = seconds_between(known.measured_at, captured_at);
+  std::vector<Pose> foretold;
+  if (unseen <= model.extrapolation_limit_s)
+    for (const Branch& branch : known.branches) foretold.push_back(pose_after(branch.moving, unseen));
+  const std::vector<PoseFit> fits = minima(seen, foretold);
+  if (fits.empty()) return after;
   if (unseen > model.extrapolation_limit_s) return started(body, seen, fits, captured_at);
   if (auto branches = advanced(known, seen, fits, unseen, model)) {
     after.branches = std::move(*branches);

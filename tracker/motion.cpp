@@ -65,10 +65,18 @@ double log_determinant(const Matrix6d& m) {
   return 2 * Eigen::LLT<Matrix6d>(m).matrixL().toDenseMatrix().diagonal().array().log().sum();
 }
 
+Vector6d moved_by(const Motion& motion, double seconds) {
+  return seconds * motion.velocity + 0.5 * seconds * seconds * motion.acceleration;
+}
+
 }  // namespace
 
+Pose pose_after(const Motion& motion, double seconds) {
+  return boxplus(motion.world_from_body, moved_by(motion, seconds));
+}
+
 Motion propagated(const Motion& motion, double seconds, const MotionNoise& noise) {
-  const Vector6d delta = seconds * motion.velocity + 0.5 * seconds * seconds * motion.acceleration;
+  const Vector6d delta = moved_by(motion, seconds);
   Motion later = motion;
   later.world_from_body = boxplus(motion.world_from_body, delta);
   later.velocity += seconds * motion.acceleration;

@@ -33,6 +33,9 @@ struct MotionNoise {
 /// The motion `seconds` (>= 0) later: acceleration constant but for the noise, covariance grown.
 Motion propagated(const Motion& motion, double seconds, const MotionNoise& noise);
 
+/// Its pose alone.
+Pose pose_after(const Motion& motion, double seconds);
+
 /// The motion after its pose was measured: `fit` is the posterior of a pose whose prior was the motion's own
 /// (fit_pose with prior_of). Velocity and acceleration follow by their correlation with the pose.
 Motion corrected(const Motion& motion, const PoseFit& fit);

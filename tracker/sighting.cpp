@@ -21,6 +21,8 @@ constexpr double k_same_basin = 0.1;
 constexpr double k_same_minimum = 1e-3;
 // Proposals that are refined in search of a second minimum.
 constexpr int k_max_refined = 3;
+// Robust cost of a pose that is no worse than its corners are, for each of their coordinates: pulls of two.
+constexpr double k_explained_cost = 4;
 
 using CornerSights = std::array<PointSight, 4>;
 
@@ -65,12 +67,13 @@ struct Proposal {
   double cost = 0;
 };
 
-// Both branches of every detection of the largest markers, as poses of the body, the most suitable first.
-std::vector<Proposal> proposals(const Sighting& sighting) {
+// Both branches of every detection of the `most` largest markers, as poses of the body, the most suitable
+// first.
+std::vector<Proposal> proposals(const Sighting& sighting, std::size_t most) {
   Sighting largest = sighting;
   std::stable_sort(largest.begin(), largest.end(),
                    [](const SeenMarker& a, const SeenMarker& b) { return width_px(a) > width_px(b); });
-  largest.resize(std::min(largest.size(), k_max_proposers));
+  largest.resize(std::min(largest.size(), most));
   std::vector<Proposal> found;
   for (const SeenMarker& seen : largest)
     for (const Detection* detection : seen.detections)
@@ -116,25 +119,40 @@ ChosenCorners corners_at(const Sighting& sighting, const Pose& world_from_body) 
   return chosen;
 }
 
-std::vector<PoseFit> minima(const Sighting& sighting) {
+std::vector<PoseFit> minima(const Sighting& sighting, std::span<const Pose> foretold) {
   std::vector<PoseFit> found;
+  if (sighting.empty()) return found;
+  const auto refine = [&](const Pose& start, double most_cost) {
+    const std::vector<PointSight> sights = corners_at(sighting, start).sights;
+    const auto fit = fit_pose(sights, start, k_huber);
+    if (fit && fit->chi_square < most_cost * 2 * static_cast<double>(sights.size()) &&
+        !is_near(found, fit->world_from_body, k_same_minimum))
+      found.push_back(*fit);
+  };
+  for (const Pose& pose : foretold.first(std::min<std::size_t>(2, foretold.size())))
+    refine(pose, k_explained_cost);
+  const std::size_t proposers = found.empty() ? k_max_proposers : 1;
   // A lone marker's proposals are its two minima already.
   const double basin = sighting.size() == 1 ? k_same_minimum : k_same_basin;
   int refined = 0;
-  for (const Proposal& proposal : proposals(sighting)) {
-    if (refined == k_max_refined || found.size() == 2) break;
-    if (is_near(found, proposal.world_from_body, basin)) continue;
-    ++refined;
-    const auto fit =
-        fit_pose(corners_at(sighting, proposal.world_from_body).sights, proposal.world_from_body, k_huber);
-    if (fit && !is_near(found, fit->world_from_body, k_same_minimum)) found.push_back(*fit);
-  }
+  if (found.size() < 2)
+    for (const Proposal& proposal : proposals(sighting, proposers)) {
+      if (refined == k_max_refined || found.size() == 2) break;
+      if (is_near(found, proposal.world_from_body, basin)) continue;
+      ++refined;
+      refine(proposal.world_from_body, std::numeric_limits<double>::infinity());
+    }
   std::stable_sort(found.begin(), found.end(),
                    [](const PoseFit& a, const PoseFit& b) { return a.chi_square < b.chi_square; });
   return found;
 }
 
 bool is_marker(const MarkerName& found, const MarkerName& wanted) {
+  if (found == wanted) return true;
+  const auto is_of_file = [](const MarkerName& name) {
+    return name.family.find('/') != std::string::npos || name.id.find('/') != std::string::npos;
+  };
+  if (!is_of_file(found) && !is_of_file(wanted)) return false;
   const auto bare = [](const MarkerName& name) {
     // aruco:FOLDER/FILE.yml and artoolkit:FOLDER/FILE.patt
     const auto slash = name.family.find_last_of('/');

@@ -40,8 +40,9 @@ struct ChosenCorners {
 ChosenCorners corners_at(const Sighting& sighting, const Pose& world_from_body);
 
 /// The local minima of the body's robust reprojection error, likeliest first, at most two: the second is the
-/// other branch of the planar ambiguity, where there is one. Every marker proposes both of its branches.
-std::vector<PoseFit> minima(const Sighting& sighting);
+/// other branch of the planar ambiguity, where there is one. Every marker proposes both of its branches;
+/// where the body was foretold to stand by one of the `foretold` poses and does, the largest marker alone.
+std::vector<PoseFit> minima(const Sighting& sighting, std::span<const Pose> foretold = {});
 
 /// Whether a detection is this marker. Names of files compare without their folders.
 bool is_marker(const MarkerName& found, const MarkerName& wanted);

@@ -1,6 +1,7 @@
 #include "tracker/body_motion.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cstdio>
 #include <opencv2/core.hpp>
 
@@ -72,6 +73,39 @@ bool is_flipped(const Pose& found, const Pose& truth) {
   const Eigen::Vector3d d_mirrored = 2 * d_true.dot(d_sight) * d_sight - d_true;
   const Eigen::Vector3d d_found = found.rotation * Eigen::Vector3d::UnitZ();
   return d_found.dot(d_mirrored) > d_found.dot(d_true);
+}
+
+// From where the body was foretold to be, from where it is not, and from nowhere: the same minima.
+TEST(Minima, AreTheSameFromWhereverTheyAreLookedFor) {
+  auto rng = test::test_rng();
+  const Imager camera = camera_1080p();
+  int second = 0;
+  for (int i = 0; i < 60; ++i) {
+    const Body body = body_of(i % 2 ? 1 : 4);
+    const Pose truth = Tilting(uniform(rng, 1, 2), rng).at(i);
+    const auto detections = detections_of(body, camera, truth, 0.2, rng);
+    const View view{&camera, detections};
+    const Sighting seen = sighting(body, std::span(&view, 1));
+    const std::vector<PoseFit> alone = minima(seen);
+    ASSERT_FALSE(alone.empty());
+    std::vector<Pose> near, far = {Pose(exp_rotation({2, 1, 0.5}), {0.4, 0.3, 3})};
+    for (const PoseFit& fit : alone) {
+      const Vector6d off = 0.01 * Vector6d::Random();
+      near.push_back(boxplus(fit.world_from_body, off));
+    }
+    std::reverse(near.begin(), near.end());
+    second += alone.size() == 2;
+    for (const std::vector<Pose>& foretold : {near, std::vector{near.back()}, far}) {
+      const std::vector<PoseFit> found = minima(seen, foretold);
+      ASSERT_EQ(found.size(), alone.size()) << i;
+      for (std::size_t k = 0; k < found.size(); ++k) {
+        const Vector6d off = boxminus(found[k].world_from_body, alone[k].world_from_body);
+        if (alone[k].chi_square > 500) continue;  // hopeless: left on its way
+        EXPECT_LT(std::sqrt(off.dot(alone[k].covariance.inverse() * off)), 0.01) << i;
+      }
+    }
+  }
+  EXPECT_GE(second, 20);
 }
 
 TEST(BodyMotion, NeverFlipsOnceItHasASecondOfHistory) {
