@@ -159,7 +159,7 @@ struct Renderer::Impl {
   std::optional<ContactShadow> contact_shadow;
   bool has_contact_shadow = false;
   Smoothing smoothing;
-  Program points, blend, light, irradiance, lit, coverage, composite, edges;
+  Program points, blend, response, irradiance, lit, coverage, composite, edges;
   LightLayer light_layer;
   std::optional<LightLayer> measured_light_layer;  // linked when it is asked for
   // A layer of the parts' light in a composite: where there may be some, at pixel centres, by more samples at
@@ -314,7 +314,7 @@ Status Renderer::Impl::link_programs() {
   }
   LIMN_TRY(edges, Program::link_compute("edges.comp"));
   LIMN_TRY(light_layer, LightLayer::link(defined(), false));
-  LIMN_TRY(light, Program::link_compute("light_response.comp"));
+  LIMN_TRY(response, Program::link_compute("light_response.comp"));
   LIMN_TRY(unshadowed, CompositePrograms::link(defined()));
   return {};
 }
@@ -648,10 +648,10 @@ Status Renderer::set_light(const LightOptions& options, const MeasuredSurface* s
   if (options.compensation == Compensation::measured) {
     LIMN_CHECK(surface != nullptr);
     LIMN_TRY_STATUS(check_fits(*surface, impl_->rig));
-    LIMN_TRY(impl_->surface, impl_->measured(*surface));
     if (!impl_->measured_light_layer) {
       LIMN_TRY(impl_->measured_light_layer, LightLayer::link(impl_->defined(), true));
     }
+    LIMN_TRY(impl_->surface, impl_->measured(*surface));
   }
   if (options.compensation == Compensation::measured || !is_same(impl_->light_options, options))
     for (Impl::Shown& shown : impl_->shown) shown.is_current = false;
@@ -747,13 +747,13 @@ unsigned Renderer::draw_projector(std::size_t index, const scene::PosedScene& po
   shown.known_stamp = impl_->known_stamp;
   {
     const PassTimes::Scope scope(&impl_->times, "response");
-    set_up(impl_->light);
-    impl_->light.set("u_is_balanced", options.compensation != Compensation::none || options.even_black);
-    impl_->light.bind("s_centre", k_centre_unit, centre.texture);
-    impl_->light.bind("s_response", k_response_unit, impl_->responses[index]);
+    set_up(impl_->response);
+    impl_->response.set("u_is_balanced", options.compensation != Compensation::none || options.even_black);
+    impl_->response.bind("s_centre", k_centre_unit, centre.texture);
+    impl_->response.bind("s_response", k_response_unit, impl_->responses[index]);
     glClearTexImage(*shown.display.texture, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
     glBindImageTexture(0, *shown.display.texture, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA8);
-    layer.work_through_lit(impl_->light);
+    layer.work_through_lit(impl_->response);
   }
   shown.posed = posed;
   shown.imager_from_world = viewer.imager_from_world;
