@@ -770,9 +770,10 @@ TEST_F(RendererTest, APictureAfterOthersIsTheSameAsTheFirstOfItsKind) {
            anew_in_shadow = renderer(scene, two_projectors());
   anew_in_shadow.set_arriving(1, shadow);
   (void)drawing.projector_picture(0, still, viewer);
-  EXPECT_EQ(cv::norm(drawing.projector_picture(0, part_moved, viewer),
-                     renderer(scene, two_projectors()).projector_picture(0, part_moved, viewer), cv::NORM_INF),
-            0);
+  EXPECT_EQ(
+      cv::norm(drawing.projector_picture(0, part_moved, viewer),
+               renderer(scene, two_projectors()).projector_picture(0, part_moved, viewer), cv::NORM_INF),
+      0);
   EXPECT_EQ(cv::norm(drawing.projector_picture(0, all_moved, viewer),
                      anew.projector_picture(0, all_moved, viewer), cv::NORM_INF),
             0);
