@@ -182,8 +182,7 @@ Status GpuScene::check_fits(const scene::Scene& scene, std::size_t most) {
   if (count <= most) return {};
   return error(
       "scene: expected at most {} triangles in the prototype and all variants (the largest buffer of {}; "
-      "those of "
-      "meshes with a map of normals count twice), found {}. Simplify the largest mesh.",
+      "those of meshes with a map of normals count twice), found {}. Simplify the largest mesh.",
       most, reinterpret_cast<const char*>(glGetString(GL_RENDERER)), count);
 }
 
@@ -218,8 +217,8 @@ GpuScene::GpuScene(const scene::Scene& scene) {
   triangle_texels_ = make_texels(triangles_, GL_R32UI);
   placement_texels_ = make_texels(placements_, GL_RGBA32F);
   looks_ = make_layers(staging.looks, GL_SRGB8_ALPHA8);
-  maps_ = make_layers(staging.maps,
-                      GL_RGBA16);  // finer than their 8 bits: software GL mixes texels in the format's
+  // Finer than their 8 bits: software GL mixes texels in the format's own.
+  maps_ = make_layers(staging.maps, GL_RGBA16);
   const cv::Mat& mirrored = mirrored_light();
   mirrored_ = make_texture(GL_TEXTURE_2D, GL_RGBA32F, mirrored.cols, mirrored.rows);
   for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})

@@ -9,9 +9,15 @@ namespace limn::projector {
 namespace {
 
 constexpr int k_nodes = 32;        // as in shaders/look.glsl
-constexpr int k_samples = 512;     // of a node: right to 0.002, see mirrored_light_test
+constexpr int k_samples = 512;     // of a node; 16 times as many change no level in renderer_test
 constexpr double k_horizon = 0.3;  // height where all light is that from above
 constexpr double k_least_roughness = 0.03, k_least_cosine = 1e-3, k_most_cosine = 0.999;
+
+// Of light from a direction of height -1 … 1 (its sine): share that is that from above.
+double share_from_above(double height) {
+  const double t = std::clamp((height / k_horizon + 1) / 2, 0.0, 1.0);
+  return t * t * (3 - 2 * t);
+}
 
 // Of 0 … count - 1: spread evenly over 0 … 1 whatever their number (van der Corput).
 double spread(unsigned i) {
@@ -88,11 +94,6 @@ cv::Mat made() {
 }
 
 }  // namespace
-
-double share_from_above(double height) {
-  const double t = std::clamp((height / k_horizon + 1) / 2, 0.0, 1.0);
-  return t * t * (3 - 2 * t);
-}
 
 const cv::Mat& mirrored_light() {
   static const cv::Mat table = made();

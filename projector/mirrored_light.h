@@ -11,8 +11,4 @@ namespace limn::projector {
 /// mirrored light that comes from above the horizon (2). Made at the first call.
 const cv::Mat& mirrored_light();
 
-/// Share of light from a direction of height -1 … 1 (its sine) that is that from above: the horizon is some
-/// 17 degrees wide on either side.
-double share_from_above(double height);
-
 }  // namespace limn::projector

@@ -15,9 +15,10 @@ namespace {
 using Eigen::Vector3f;
 using Eigen::Vector4f;
 
-Vector3f unit_or_zero(const Vector3f& v) {
+Vector3f unit_or_zero(Vector3f v) {
   const float length = v.norm();
-  return length > 0 ? Vector3f(v / length) : Vector3f::Zero().eval();
+  if (length > 0) v /= length;
+  return v;
 }
 
 // Of a triangle's corner: towards growing u in the plane of its normal, handedness, and its weight (0:
@@ -63,7 +64,7 @@ std::vector<Vector4f> made_from_uvs(const Mesh& mesh) {
     const bool is_mirrored = corners[i].is_mirrored;
     Vector3f t = unit_or_zero(sums[vertex][is_mirrored ? 1 : 0]);
     if (t.isZero()) t = mesh.normals[vertex].unitOrthogonal();
-    tangents.push_back((Vector4f() << t, is_mirrored ? -1.F : 1.F).finished());
+    tangents.emplace_back(t.x(), t.y(), t.z(), is_mirrored ? -1.F : 1.F);
   }
   return tangents;
 }

@@ -9,12 +9,12 @@ uniform vec4 u_d_lamps[k_most_lamps], u_lamps[k_most_lamps];
 uniform int u_lamp_count;
 uniform bool u_is_room_known;  // else the light stands with the viewer
 
-// From the horizon (0) up to the zenith (1), as `above` of it says.
+// Soft light, a share `above` of which comes from above.
 vec3 soft_light(float above) { return mix(u_soft_below.rgb, u_soft_above.rgb, above); }
 
-// Light of a white diffuse surface, of whose soft light a share `open` arrives.
-vec3 diffuse_light(vec3 n, float open) {
-  vec3 light = open * soft_light(0.5 + 0.5 * dot(n, u_d_up.xyz));
+// Light of a white diffuse surface.
+vec3 diffuse_light(vec3 n) {
+  vec3 light = soft_light(0.5 + 0.5 * dot(n, u_d_up.xyz));
   for (int i = 0; i < u_lamp_count; ++i) light += u_lamps[i].rgb * max(0.0, dot(n, u_d_lamps[i].xyz));
   return light;
 }
@@ -36,30 +36,31 @@ vec3 mirrored_soft_light(vec3 head_on, float roughness, vec3 n, vec3 d_eye) {
   return soft_light(above) * (head_on * share.r + share.g);
 }
 
-// Light of a lamp of strength 1, diffuse of a colour and mirrored: GGX with Smith's shadowing, the layers mixed by
-// Fresnel's share (glTF 2.0, appendix B; Walter et al. 2007).
-vec3 lamp_light(vec3 diffuse, vec3 head_on, float roughness, vec3 n, vec3 d_eye, vec3 d_lamp) {
+// What a surface gives of a lamp's light, of a diffuse colour and of what it mirrors head on: GGX with Smith's
+// shadowing, the layers mixed by Fresnel's share (glTF 2.0, appendix B; Walter et al. 2007). All of it is diffuse where
+// `gloss` is 0, which takes no branch: software GL would go through both.
+vec3 of_lamp(vec3 diffuse, vec3 head_on, float gloss, float roughness, vec3 n, vec3 d_eye, vec3 d_lamp) {
   const float k_smoothest = 0.2;  // lamps have a size
-  float a = pow(max(roughness, k_smoothest), 2.0), a2 = a * a;
-  vec3 h = normalize(d_eye + d_lamp);
-  float nl = dot(n, d_lamp), nv = max(1e-3, dot(n, d_eye)), nh = dot(n, h);
-  if (nl <= 0.0) return vec3(0);
+  float r = max(roughness, k_smoothest), a2 = r * r * r * r;
+  vec3 h = d_eye + d_lamp;
+  h *= inversesqrt(max(1e-12, dot(h, h)));  // opposite each other
+  float nl = max(0.0, dot(n, d_lamp)), nv = max(1e-3, dot(n, d_eye)), nh = dot(n, h);
   float peak = nh * nh * (a2 - 1.0) + 1.0;
   float visible = nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2);
-  vec3 fresnel = head_on + (1.0 - head_on) * pow(1.0 - max(0.0, dot(d_eye, h)), 5.0);
+  float x = 1.0 - max(0.0, dot(d_eye, h)), grazing = x * x * x * x * x;
+  vec3 fresnel = gloss * (head_on + (1.0 - head_on) * grazing);
   return nl * ((1.0 - fresnel) * diffuse + a2 / (peak * peak) * 0.5 / visible * fresnel);  // pi of strength and 1 / pi cancel
 }
 
 // A finish in the room's light, seen from d_eye; n is its normal on that side.
 vec3 lit(Finish finish, vec3 n, vec3 d_eye) {
-  vec3 diffuse = finish.base * (1.0 - finish.metallic);
-  if (finish.is_plain) return diffuse * diffuse_light(n, finish.open) + finish.emitted;
-  vec3 head_on = mix(vec3(0.04), finish.base, finish.metallic);
-  vec3 colour = (1.0 - head_on) * diffuse * soft_light(0.5 + 0.5 * dot(n, u_d_up.xyz));
-  colour += mirrored_soft_light(head_on, finish.roughness, n, d_eye);
+  float gloss = finish.is_plain ? 0.0 : 1.0;
+  vec3 diffuse = finish.base * (1.0 - finish.metallic), head_on = mix(vec3(0.04), finish.base, finish.metallic);
+  vec3 colour = (1.0 - gloss * head_on) * diffuse * soft_light(0.5 + 0.5 * dot(n, u_d_up.xyz));
+  colour += gloss * mirrored_soft_light(head_on, finish.roughness, n, d_eye);
   colour *= finish.open;
   for (int i = 0; i < u_lamp_count; ++i)
-    colour += u_lamps[i].rgb * lamp_light(diffuse, head_on, finish.roughness, n, d_eye, u_d_lamps[i].xyz);
+    colour += u_lamps[i].rgb * of_lamp(diffuse, head_on, gloss, finish.roughness, n, d_eye, u_d_lamps[i].xyz);
   return colour + finish.emitted;
 }
 

@@ -21,7 +21,7 @@ vec4 view_at(vec2 px) {
   if (prototype.id == 0u) return vec4(0);
   vec3 n = facing_normal(prototype, d);
   vec2 uv = uv_of(prototype);
-  vec3 colour = u_mean_albedo * texture(s_albedo, vec2(uv.x, 1.0 - uv.y)).rgb * diffuse_light(n, 1.0);
+  vec3 colour = u_mean_albedo * texture(s_albedo, vec2(uv.x, 1.0 - uv.y)).rgb * diffuse_light(n);
   float shadow = k_contact_shadow ? contact_shadow(eye.p_eye.xyz + prototype.t * d, n) : 0.0;
   return vec4((1.0 - shadow) * colour, 1);
 }

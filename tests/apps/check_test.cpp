@@ -201,6 +201,26 @@ TEST_F(CheckJudge, AnotherColourMissesWhatTheLooksAreJudgedBy) {
   expect_missed(good, wrong);
 }
 
+TEST_F(CheckJudge, AMapLeftOutOrAnotherLightMissesWhatTheLooksAreJudgedBy) {
+  const fs::path scene = fs::relative(k_config / "scenes/finishes", test::test_folder());
+  const Check good = check("studio", fmt::format(R"("scene": "{}", "viewer": {}, "resolution": 0.5,
+      "poses": {{"shown": ["emblem"], "slots": {{"emblem": {{"prototype_from_part":
+      {{"rotation_wxyz": [1, 0, 0, 0], "translation_m": [-0.03, 0.06, 0.02]}}}}}}}},
+      "limits": {{"drawn_inner_over4_share": 0.005}})",
+                                                 scene.string(), k_viewer));
+  const auto share = [](const Check& told) { return readings(told).at("drawn_inner_over4_share"); };
+  EXPECT_TRUE(share(good).good()) << share(good).value;
+  using Maps = scene::SurfaceMaps;
+  for (const auto map : {&Maps::metallic_roughness, &Maps::normals, &Maps::occlusion, &Maps::emission}) {
+    Check wrong = good;
+    (wrong.told.scene.slots[0].variants[0].mesh.materials[0].maps.*map).picture.release();
+    EXPECT_FALSE(share(wrong).good());
+  }
+  Check wrong = good;
+  wrong.told.scene.light->lamps[0].d_world = Eigen::Vector3d(0.5, -0.7, 0.6).normalized();
+  EXPECT_FALSE(share(wrong).good());
+}
+
 TEST_F(CheckJudge, APartElsewhereMissesWhatItsPlaceIsJudgedBy) {
   const Check good =
       check("bench", fmt::format(R"("viewer": {}, "resolution": 0.5, "poses": {{"slots": {{"mirror":

@@ -511,7 +511,6 @@ TEST(Glb, PutsMeshesInTheirPlaces) {
   EXPECT_GE(cut, 1);
 }
 
-// In a node that is turned and mirrored, too.
 TEST(Glb, MapsOfASurfaceComeBack) {
   Mesh mesh = mirrored_squares();
   add_tangents(&mesh);
