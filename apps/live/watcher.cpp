@@ -25,6 +25,8 @@ constexpr double k_once_s = 0.4;  // two cameras that see one gesture within it
 // looks for markers that are partly covered.
 constexpr int k_rarer = 3;
 constexpr int k_covered_every = 2;
+// Between pictures, as shares of the one before: a longer one says nothing of the next.
+constexpr double k_like_moments = 3;
 constexpr double k_trembles_m = 0.5e-3, k_trembles_rad = 1e-3;
 
 Result<tracker::Gesture> gesture_of(const scene::Control& control) {
@@ -36,6 +38,24 @@ Result<tracker::Gesture> gesture_of(const scene::Control& control) {
   if (found != gestures.end()) return found->second;
   return error("scene.json: controls: {}: expected the gesture cover, turn or lay, found '{}'.",
                control.marker.text(), control.gesture);
+}
+
+// Where markers should be after another `seconds`, as they moved in the `seconds_before`.
+std::vector<tracker::Detection> foretold(const std::vector<tracker::Detection>& last,
+                                         const std::vector<tracker::Detection>& before,
+                                         double seconds,
+                                         double seconds_before) {
+  std::vector<tracker::Detection> next = last;
+  if (!(seconds_before > 0 && seconds > 0 && seconds < k_like_moments * seconds_before)) return next;
+  for (tracker::Detection& marker : next) {
+    const auto was = std::find_if(before.begin(), before.end(), [&](const tracker::Detection& other) {
+      return other.marker == marker.marker;
+    });
+    if (was == before.end()) continue;
+    for (std::size_t i = 0; i < 4; ++i)
+      marker.corners_px[i] += seconds / seconds_before * (marker.corners_px[i] - was->corners_px[i]);
+  }
+  return next;
 }
 
 // What to look for: bodies and controls.
@@ -72,8 +92,7 @@ Result<Watcher> Watcher::create(const scene::Scene& scene, const Rig& rig, const
     gestures.emplace_back(control.marker, gesture);
   }
   for (const Imager& camera : rig.cameras)
-    out.eyes_.push_back(
-        {tracker::Detector(families, {.encoding = encoding_of(rig, camera)}), gestures, 0, 0, {}, {}});
+    out.eyes_.push_back({tracker::Detector(families, {.encoding = encoding_of(rig, camera)}), gestures});
   out.used_at_.resize(scene.controls.size());
   out.watched_.frames.resize(rig.cameras.size());
   out.watched_.detections.resize(rig.cameras.size());
@@ -120,9 +139,13 @@ void Watcher::look(std::size_t camera, const Frame& frame) {
   std::vector<tracker::Detection>& detections = watched_.detections[camera];
   watched_.frames[camera] = frame;
   eye.grey = to_grey(frame.image);
-  eye.detector.follow(eye.grey, lens, detections, &eye.followed);
-  const bool is_one_gone = eye.followed.size() < detections.size();
-  std::swap(detections, eye.followed);
+  const double seconds = seconds_between(eye.seen_at, frame.captured_at);
+  const std::vector<tracker::Detection> next =
+      foretold(detections, eye.before, seconds, std::exchange(eye.seconds, seconds));
+  eye.seen_at = frame.captured_at;
+  std::swap(eye.before, detections);
+  eye.detector.follow(eye.grey, lens, next, &detections);
+  const bool is_one_gone = detections.size() < next.size();
   if (--eye.until_search > 0 && !is_one_gone) return;
   const bool covered = eye.searches++ % k_covered_every == 0 || !all_are_seen();
   eye.detector.detect_more(eye.grey, lens, &detections,

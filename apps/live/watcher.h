@@ -77,8 +77,10 @@ class Watcher {
     tracker::Detector detector;
     std::vector<tracker::GestureReader> gestures;  // one a control
     int until_search = 0, searches = 0;
-    std::vector<tracker::Detection> followed;
-    cv::Mat grey;  // the newest picture
+    std::vector<tracker::Detection> before = {};  // in the picture before the newest
+    Stamp seen_at = {};                           // the newest
+    double seconds = 0;                           // between the two
+    cv::Mat grey = {};                            // the newest picture
   };
   struct Loose {
     MarkerName marker;

@@ -749,6 +749,33 @@ TEST(Live, LooksForCoveredMarkersWhileOneIsMissing) {
   ASSERT_TRUE(found) << "in " << pictures << " pictures";
 }
 
+// A camera that is swung round: markers are found where they should be by now, not searched for.
+TEST(Live, FollowsMarkersThatMoveByMoreThanHalfTheirSideAPicture) {
+  sim::World world = studio(1);
+  sim::VirtualRig rig(world, {.grab_waits_for_light = false});
+  const int camera = 0;
+  const Frame still = rig.expose(std::span(&camera, 1))[0];
+  auto watcher = Watcher::create(*world.scene, world.rig);
+  ASSERT_TRUE(watcher) << watcher.message();
+  const std::size_t all = watcher->watch(std::span(&still, 1)).detections[0].size();
+  ASSERT_GE(all, 5u);
+  const auto& c = watcher->watched().detections[0][0].corners_px;
+  const double side = (c[1] - c[0]).norm();
+  double moved = 0;
+  int picture = 0;
+  for (const double sides : {0.3, 0.6, 0.8, 0.8, 0.8}) {
+    moved += std::round(sides * side);
+    Frame frame{still.camera, {}, shifted(still.captured_at, ++picture / 30.0)};
+    const cv::Matx23d away(1, 0, -moved, 0, 1, 0);
+    cv::warpAffine(still.image, frame.image, away, still.image.size(), cv::INTER_NEAREST);
+    std::size_t followed = 0;
+    for (const tracker::Detection& found : watcher->watch(std::span(&frame, 1)).detections[0])
+      followed +=
+          (found.unshadowed && found.unshadowed->age > 0) || (found.by_pattern && found.by_pattern->age > 0);
+    EXPECT_EQ(followed, all) << picture;
+  }
+}
+
 TEST(Live, MakesARoomForARigAndAScene) {
   const sim::World studio_world = studio(0.5);
   const auto room = room_for(studio_world.rig, *studio_world.scene);
