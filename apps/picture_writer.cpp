@@ -1,20 +1,19 @@
 #include "apps/picture_writer.h"
 
+#include "core/file.h"
 #include "core/picture.h"
 
 namespace limn::apps {
-namespace {
 
 // An exception must not leave the thread.
-Status stored(const std::filesystem::path& path, const cv::Mat& picture) {
+Status PictureWriter::stored(const Job& job) {
   try {
-    return write_png(path, picture, {.compression = 1});
+    return job.bytes ? write_file(job.path, *job.bytes)
+                     : write_png(job.path, job.picture, {.compression = 1});
   } catch (const std::exception& problem) {
-    return error("{}: cannot encode this picture: {}.", path.string(), problem.what());
+    return error("{}: cannot encode this picture: {}.", job.path.string(), problem.what());
   }
 }
-
-}  // namespace
 
 PictureWriter::PictureWriter(std::size_t most_queued)
     : most_queued_(most_queued), thread_([this] { run(); }) {}
@@ -40,9 +39,17 @@ Status PictureWriter::store(const std::filesystem::path& path, const cv::Mat& pi
 }
 
 bool PictureWriter::offer(const std::filesystem::path& path, const cv::Mat& picture) {
+  return offer({path, picture});
+}
+
+bool PictureWriter::offer(const std::filesystem::path& path, std::shared_ptr<const std::string> bytes) {
+  return offer({path, {}, std::move(bytes)});
+}
+
+bool PictureWriter::offer(Job job) {
   const std::lock_guard lock(mutex_);
   if (failure_ || jobs_.size() >= most_queued_) return false;
-  jobs_.push_back({path, picture});
+  jobs_.push_back(std::move(job));
   ++unwritten_;
   changed_.notify_all();
   return true;
@@ -63,7 +70,7 @@ void PictureWriter::run() {
     jobs_.pop_front();
     changed_.notify_all();
     lock.unlock();
-    const Status written = stored(job.path, job.picture);
+    const Status written = stored(job);
     lock.lock();
     if (!written && !failure_) failure_ = written.error();
     --unwritten_;

@@ -4,9 +4,11 @@
 #include <cstddef>
 #include <deque>
 #include <filesystem>
+#include <memory>
 #include <mutex>
 #include <opencv2/core/mat.hpp>
 #include <optional>
+#include <string>
 #include <thread>
 
 #include "core/result.h"
@@ -28,6 +30,8 @@ class PictureWriter {
   /// The same without waiting: false when the queue is full (the disk is too slow) or an earlier picture
   /// could not be written, and the picture is dropped.
   bool offer(const std::filesystem::path& path, const cv::Mat& picture);
+  /// Likewise a file's bytes as they are.
+  bool offer(const std::filesystem::path& path, std::shared_ptr<const std::string> bytes);
   /// Waits until all is written; the first error, if any.
   Status finish();
 
@@ -35,7 +39,10 @@ class PictureWriter {
   struct Job {
     std::filesystem::path path;
     cv::Mat picture;
+    std::shared_ptr<const std::string> bytes = {};  // instead
   };
+  static Status stored(const Job& job);
+  bool offer(Job job);
   void run();
   Status failure() const;  // call with mutex_ held
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <memory>
 #include <opencv2/core/mat.hpp>
 #include <string>
 
@@ -25,6 +26,10 @@ struct Frame {
   std::string camera;
   cv::Mat image;
   Stamp captured_at;
+  /// Its brightness alone, where a camera's bytes hold that by themselves (JPEG); else empty.
+  cv::Mat grey = {};
+  /// The JPEG that image and brightness were decoded from, if they were; else null.
+  std::shared_ptr<const std::string> jpeg = {};
 };
 
 }  // namespace limn

@@ -3,8 +3,11 @@
 #include <turbojpeg.h>
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <string>
+
+#include "core/picture.h"
 
 namespace limn::device {
 namespace {
@@ -27,6 +30,69 @@ Handle new_decoder() {
 Error damaged(std::span<const std::uint8_t> bytes, const Handle& decoder) {
   return error("expected a whole JPEG picture, found a truncated or damaged one ({} bytes: {}).",
                bytes.size(), tjGetErrorStr2(decoder.get()));
+}
+
+// Whether what the decoder warned of cost no picture.
+bool is_whole(const Handle& decoder) {
+  return tjGetErrorCode(decoder.get()) == TJERR_WARNING && is_harmless(tjGetErrorStr2(decoder.get()));
+}
+
+struct Header {
+  cv::Size size;
+  int subsampling = 0, colours = 0;
+};
+
+Result<Header> read_header(std::span<const std::uint8_t> bytes,
+                           const JpegOptions& options,
+                           const Handle& decoder) {
+  Header header;
+  int width = 0, height = 0;
+  if (tjDecompressHeader3(decoder.get(), bytes.data(), bytes.size(), &width, &height, &header.subsampling,
+                          &header.colours) != 0 ||
+      width < 1 || height < 1)  // a header that ends too early
+    return damaged(bytes, decoder);
+  header.size = {width, height};
+  if (!options.size.empty() && header.size != options.size)
+    return error("expected a picture of {}x{}, found {}x{}. Set the camera back or start again.",
+                 options.size.width, options.size.height, width, height);
+  if (static_cast<long>(width) * height > k_max_pixels)
+    return error("expected a camera's picture, found one of {}x{} pixels.", width, height);
+  return header;
+}
+
+// Brightness and the two differences of colour, each of its own resolution.
+using Planes = std::array<cv::Mat, 3>;
+
+Result<Planes> decode_planes(std::span<const std::uint8_t> bytes,
+                             const Header& header,
+                             const Handle& decoder) {
+  Planes planes;
+  std::array<unsigned char*, 3> data{};
+  std::array<int, 3> strides{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const int plane = static_cast<int>(i);
+    planes[i].create(tjPlaneHeight(plane, header.size.height, header.subsampling),
+                     tjPlaneWidth(plane, header.size.width, header.subsampling), CV_8UC1);
+    data[i] = planes[i].data;
+    strides[i] = static_cast<int>(planes[i].step);
+  }
+  const int done = tjDecompressToYUVPlanes(decoder.get(), bytes.data(), bytes.size(), data.data(),
+                                           header.size.width, strides.data(), header.size.height, 0);
+  if (done != 0 && !is_whole(decoder)) return damaged(bytes, decoder);
+  return planes;
+}
+
+cv::Mat coloured(const Planes& planes, const Header& header, const Handle& decoder) {
+  cv::Mat picture(header.size, CV_8UC3);
+  std::array<const unsigned char*, 3> data{};
+  std::array<int, 3> strides{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    data[i] = planes[i].data;
+    strides[i] = static_cast<int>(planes[i].step);
+  }
+  LIMN_CHECK(tjDecodeYUVPlanes(decoder.get(), data.data(), strides.data(), header.subsampling, picture.data,
+                               picture.cols, static_cast<int>(picture.step), picture.rows, TJPF_BGR, 0) == 0);
+  return picture;
 }
 
 // The largest n/8 of a size that has no side longer than that.
@@ -55,22 +121,31 @@ Result<cv::Size> jpeg_size(std::span<const std::uint8_t> bytes) {
 
 Result<cv::Mat> decode_jpeg(std::span<const std::uint8_t> bytes, const JpegOptions& options) {
   const Handle decoder = new_decoder();
-  int width = 0, height = 0, subsampling = 0, colours = 0;
-  if (tjDecompressHeader3(decoder.get(), bytes.data(), bytes.size(), &width, &height, &subsampling,
-                          &colours) != 0)
-    return damaged(bytes, decoder);
-  if (!options.size.empty() && cv::Size(width, height) != options.size)
-    return error("expected a picture of {}x{}, found {}x{}. Set the camera back or start again.",
-                 options.size.width, options.size.height, width, height);
-  if (static_cast<long>(width) * height > k_max_pixels)
-    return error("expected a camera's picture, found one of {}x{} pixels.", width, height);
-  const bool grey = options.grey || colours == TJCS_GRAY;
-  cv::Mat picture(reduced({width, height}, options.longest_side), grey ? CV_8UC1 : CV_8UC3);
-  if (tjDecompress2(decoder.get(), bytes.data(), bytes.size(), picture.data, picture.cols,
-                    static_cast<int>(picture.step), picture.rows, grey ? TJPF_GRAY : TJPF_BGR, 0) != 0 &&
-      !(tjGetErrorCode(decoder.get()) == TJERR_WARNING && is_harmless(tjGetErrorStr2(decoder.get()))))
-    return damaged(bytes, decoder);
+  LIMN_TRY(const Header header, read_header(bytes, options, decoder));
+  const bool grey = options.grey || header.colours == TJCS_GRAY;
+  cv::Mat picture(reduced(header.size, options.longest_side), grey ? CV_8UC1 : CV_8UC3);
+  const int done =
+      tjDecompress2(decoder.get(), bytes.data(), bytes.size(), picture.data, picture.cols,
+                    static_cast<int>(picture.step), picture.rows, grey ? TJPF_GRAY : TJPF_BGR, 0);
+  if (done != 0 && !is_whole(decoder)) return damaged(bytes, decoder);
   return picture;
+}
+
+Result<Frame> decode_frame(std::string jpeg, const JpegOptions& options) {
+  const std::span bytes(reinterpret_cast<const std::uint8_t*>(jpeg.data()), jpeg.size());
+  const Handle decoder = new_decoder();
+  LIMN_TRY(const Header header, read_header(bytes, options, decoder));
+  Frame frame;
+  if (options.grey || header.colours != TJCS_YCbCr || header.subsampling < 0) {
+    LIMN_TRY(frame.image, decode_jpeg(bytes, {.grey = options.grey}));
+    frame.grey = to_grey(frame.image);
+  } else {
+    LIMN_TRY(const Planes planes, decode_planes(bytes, header, decoder));
+    frame.image = coloured(planes, header, decoder);
+    frame.grey = planes[0](cv::Rect({}, header.size));
+  }
+  frame.jpeg = std::make_shared<const std::string>(std::move(jpeg));
+  return frame;
 }
 
 std::vector<std::uint8_t> encode_jpeg(const cv::Mat& picture, int quality) {

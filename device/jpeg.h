@@ -3,8 +3,10 @@
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "core/frame.h"
 #include "core/result.h"
 
 namespace limn::device {
@@ -23,6 +25,12 @@ Result<cv::Size> jpeg_size(std::span<const std::uint8_t> bytes);
 /// webcams leave out are the standard's. A truncated or damaged picture is an error, never a half picture;
 /// the message is a sentence without a place.
 Result<cv::Mat> decode_jpeg(std::span<const std::uint8_t> bytes, const JpegOptions& options = {});
+
+/// A camera's JPEG as a frame, without name and stamp: its image as decode_jpeg() gives it but that colours,
+/// mostly of half the resolution, are not smoothed between their pixels, its brightness, which is what JPEG
+/// itself holds, and its bytes. Takes two thirds of the time that decode_jpeg() and a conversion to grey
+/// take. Of the options longest_side is not looked at.
+Result<Frame> decode_frame(std::string jpeg, const JpegOptions& options = {});
 
 /// 8-bit grey or BGR as JPEG, colour at half the resolution (4:2:0). `quality` is 1 … 100.
 std::vector<std::uint8_t> encode_jpeg(const cv::Mat& picture, int quality);

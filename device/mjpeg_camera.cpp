@@ -89,15 +89,16 @@ Status MjpegCamera::Impl::read_waiting(bool* heard) {
 }
 
 std::optional<Frame> MjpegCamera::Impl::decoded(MjpegPart part) {
-  const auto* bytes = reinterpret_cast<const std::uint8_t*>(part.jpeg.data());
-  auto image = decode_jpeg({bytes, part.jpeg.size()}, {.grey = options.grey, .size = size});
-  if (!image) {
+  auto frame = decode_frame(std::move(part.jpeg), {.grey = options.grey, .size = size});
+  if (!frame) {
     ++damaged;
-    retry.note(image.message());
+    retry.note(frame.message());
     return std::nullopt;
   }
   retry.worked();
-  return Frame{options.name, *image, part.arrived_at};
+  frame->camera = options.name;
+  frame->captured_at = part.arrived_at;
+  return std::move(*frame);
 }
 
 Result<Frame> MjpegCamera::Impl::next() {

@@ -311,20 +311,20 @@ cv::Mat from_yuyv(const cv::Mat& yuyv, bool grey) {
   return picture;
 }
 
-Result<cv::Mat> decoded(const Buffers::Map& map,
-                        std::size_t bytes,
-                        const v4l2_pix_format& format,
-                        bool grey) {
+// A frame without name and stamp.
+Result<Frame> decoded(const Buffers::Map& map, std::size_t bytes, const v4l2_pix_format& format, bool grey) {
   const cv::Size size(static_cast<int>(format.width), static_cast<int>(format.height));
   if (bytes > map.size || bytes < least_bytes(format))
     return error("expected a frame of at least {} bytes ({}), found {}.", least_bytes(format), shown(format),
                  bytes);
   if (format.pixelformat == V4L2_PIX_FMT_MJPEG)
-    return decode_jpeg({map.data, bytes}, {.grey = grey, .size = size});
+    return decode_frame({reinterpret_cast<const char*>(map.data), bytes}, {.grey = grey, .size = size});
   const bool yuyv = format.pixelformat == V4L2_PIX_FMT_YUYV;
   const std::size_t row = std::max<std::size_t>(format.bytesperline, format.width * (yuyv ? 2u : 1u));
   const cv::Mat raw(size, yuyv ? CV_8UC2 : CV_8UC1, map.data, row);
-  return yuyv ? from_yuyv(raw, grey) : raw.clone();
+  Frame frame;
+  frame.image = yuyv ? from_yuyv(raw, grey) : raw.clone();
+  return frame;
 }
 
 }  // namespace
@@ -434,12 +434,15 @@ Result<std::optional<Frame>> V4l2Camera::Impl::grabbed(Stamp deadline) {
     retry.note("the driver marks its frames as damaged. Try another cable or port.");
   } else {
     const Stamp captured_at = stamp_of(*buffer);
-    auto image =
+    auto fresh =
         decoded(session->buffers.maps()[buffer->index], buffer->bytesused, session->format, options.grey);
-    if (image) frame = Frame{options.name, *image, captured_at};
-    if (!image) {
+    if (fresh) {
+      frame = std::move(*fresh);
+      frame->camera = options.name;
+      frame->captured_at = captured_at;
+    } else {
       ++damaged;
-      retry.note(image.message());
+      retry.note(fresh.message());
     }
   }
   if (const int problem = session->device.ask(VIDIOC_QBUF, &*buffer))

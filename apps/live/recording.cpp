@@ -5,6 +5,8 @@
 
 #include "core/config.h"
 #include "core/file.h"
+#include "core/picture.h"
+#include "device/jpeg.h"
 
 namespace limn::apps {
 namespace {
@@ -91,8 +93,10 @@ void Recorder::watched(std::span<const Frame> frames) {
   if (ended_) return;
   nlohmann::ordered_json event = {{"watch", nlohmann::ordered_json::array()}};
   for (const Frame& frame : frames) {
-    const std::string file = fmt::format("frames/{}/{:06}.png", frame.camera, frames_++);
-    if (!pictures_.offer(folder_ / file, frame.image))
+    const std::string file =
+        fmt::format("frames/{}/{:06}.{}", frame.camera, frames_++, frame.jpeg ? "jpg" : "png");
+    if (!(frame.jpeg ? pictures_.offer(folder_ / file, frame.jpeg)
+                     : pictures_.offer(folder_ / file, frame.image)))
       return end("the disk is full or too slow for the cameras' pictures");
     event["watch"].push_back(
         {{"camera", frame.camera}, {"file", file}, {"captured_at_ns", nanoseconds(frame.captured_at)}});
@@ -195,6 +199,18 @@ nlohmann::ordered_json pose_log(const Painted& painted) {
         {{"slot", part.slot}, {"variant", part.variant}, {"world_from_part", to_json(part.world_from_part)}});
   if (const auto& p = painted.p_guest_eye_world) json["guest_eye"] = {p->x(), p->y(), p->z()};
   return json;
+}
+
+Result<Frame> load_frame(const fs::path& file) {
+  Frame frame;
+  if (file.extension() != ".jpg") {
+    LIMN_TRY(frame.image, read_picture(file));
+    return frame;
+  }
+  LIMN_TRY(std::string bytes, read_file(file));
+  Result<Frame> decoded = device::decode_frame(std::move(bytes));
+  if (!decoded) return error("{}: {}", file.string(), decoded.message());
+  return decoded;
 }
 
 Result<SessionSetup> load_setup(const fs::path& folder) {

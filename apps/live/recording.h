@@ -28,10 +28,10 @@ struct SessionSetup {
   std::vector<std::string> screens = {};  ///< names of displays that are no projectors
 };
 
-/// Writes a session's folder (limn.session/1): rig and scene as they were, frames as PNG, and events.jsonl,
-/// what happened in its order: frames watched, edits, where a tablet looked from that was followed, pictures
-/// painted with their poses. Frames are written
-/// on a thread of their own; when the disk is full or too slow for them the recording ends there, complete up
+/// Writes a session's folder (limn.session/1): rig and scene as they were, frames as the JPEG that a camera
+/// sent, others as PNG, and events.jsonl, what happened in its order: frames watched, edits, where a tablet
+/// looked from that was followed, pictures painted with their poses. Frames are written on a thread of their
+/// own; when the disk is full or too slow for them the recording ends there, complete up
 /// to that moment, and says so, and the session goes on. Safe from several threads.
 class Recorder {
  public:
@@ -75,6 +75,9 @@ std::uint64_t fingerprint(std::span<const cv::Mat> pictures);
 
 /// A line of events.jsonl that replay compares: shown_at and the tracks, numbers in full.
 nlohmann::ordered_json pose_log(const Painted& painted);
+
+/// Reads a frame's file, but its camera's name and its stamp, as it was watched. Error: damaged, or none.
+Result<Frame> load_frame(const std::filesystem::path& file);
 
 /// Reads what a session was set up with. Error: no session, another schema, a damaged file.
 Result<SessionSetup> load_setup(const std::filesystem::path& folder);

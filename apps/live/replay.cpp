@@ -13,7 +13,6 @@
 #include "apps/live/session.h"
 #include "apps/live/watcher.h"
 #include "core/log.h"
-#include "core/picture.h"
 #include "device/gl_context.h"
 #include "device/window.h"
 
@@ -122,8 +121,10 @@ class Replay {
           !session_.setup().rig.find(camera))
         return error("{}: expected a frame of one of the rig's cameras inside the folder, found {} of {}.",
                      options_.session.string(), file, camera);
-      LIMN_TRY(cv::Mat image, read_picture(options_.session / file));
-      frames.push_back({camera, std::move(image), stamp_of(item.at("captured_at_ns"))});
+      LIMN_TRY(Frame frame, load_frame(options_.session / file));
+      frame.camera = camera;
+      frame.captured_at = stamp_of(item.at("captured_at_ns"));
+      frames.push_back(std::move(frame));
     }
     watcher_.watch(frames);
     ++moments_;

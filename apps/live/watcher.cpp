@@ -138,7 +138,7 @@ void Watcher::look(std::size_t camera, const Frame& frame) {
   const Lens* lens = &rig_.cameras[camera].lens;
   std::vector<tracker::Detection>& detections = watched_.detections[camera];
   watched_.frames[camera] = frame;
-  eye.grey = to_grey(frame.image);
+  eye.grey = frame.grey.empty() ? to_grey(frame.image) : frame.grey;
   const double seconds = seconds_between(eye.seen_at, frame.captured_at);
   const std::vector<tracker::Detection> next =
       foretold(detections, eye.before, seconds, std::exchange(eye.seconds, seconds));

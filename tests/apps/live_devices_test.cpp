@@ -21,6 +21,7 @@
 #include "core/file.h"
 #include "core/picture.h"
 #include "device/gl_context.h"
+#include "device/jpeg.h"
 #include "device/picture_camera.h"
 #include "sim/virtual_rig.h"
 #include "tests/apps/remote_client.h"
@@ -54,7 +55,7 @@ class Canvas : public device::Display {
   cv::Size size_;
 };
 
-// A camera whose cable is out for a while.
+// A camera that sends JPEG, whose cable is out for a while.
 class LooseCamera : public device::CameraSource {
  public:
   LooseCamera(device::PictureCamera camera, int from, int until)
@@ -64,7 +65,12 @@ class LooseCamera : public device::CameraSource {
   Result<Frame> next() override {
     ++asked_;
     if (asked_ >= from_ && asked_ < until_) return error("camera0: the cable is out.");
-    return camera_.next();
+    LIMN_TRY(const Frame taken, camera_.next());
+    const std::vector<std::uint8_t> jpeg = device::encode_jpeg(taken.image, 85);
+    LIMN_TRY(Frame frame, device::decode_frame({jpeg.begin(), jpeg.end()}));
+    frame.camera = taken.camera;
+    frame.captured_at = taken.captured_at;
+    return frame;
   }
 
  private:
@@ -143,6 +149,34 @@ TEST(CameraThreads, ACameraThatDoesNotComeBackIsLeft) {
   EXPECT_EQ(health.use_count(), 1) << "its thread has ended and taken everything with it";
 }
 
+// Brightness by JPEG itself is not what its colours make of it.
+TEST(Recorder, AFrameIsReadAsItWasWatched) {
+  const fs::path folder = test::test_folder();
+  const sim::World world =
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture).value();
+  SessionSetup setup;
+  setup.rig = world.rig;
+  setup.scene = *world.scene;
+  cv::Mat colours(48, 64, CV_8UC3);
+  cv::randu(colours, 0, 256);
+  const std::vector<std::uint8_t> jpeg = device::encode_jpeg(colours, 90);
+  Frame sent = device::decode_frame({jpeg.begin(), jpeg.end()}).value();
+  sent.camera = "camera0";
+  const Frame taken{"camera0", colours, {}};
+  auto recorder = Recorder::create(folder / "recording", setup).value();
+  recorder->watched(std::vector{sent, taken});
+  ASSERT_TRUE(recorder->finish().ok());
+  const auto first = load_frame(folder / "recording/frames/camera0/000000.jpg");
+  ASSERT_TRUE(first) << first.message();
+  EXPECT_TRUE(test::image_near(first->image, sent.image, 0, 0, "image"));
+  EXPECT_TRUE(test::image_near(first->grey, sent.grey, 0, 0, "brightness"));
+  EXPECT_GT(cv::norm(first->grey, to_grey(sent.image), cv::NORM_INF), 0);
+  const auto second = load_frame(folder / "recording/frames/camera0/000001.png");
+  ASSERT_TRUE(second) << second.message();
+  EXPECT_TRUE(test::image_near(second->image, colours, 0, 0, "picture"));
+  EXPECT_FALSE(load_frame(folder / "recording/frames/camera0/000002.jpg"));
+}
+
 // Threads as of a real rig, on stored pictures of the studio at their pace; a recording of it replays as the
 // threads ran.
 TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
@@ -201,6 +235,9 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
   EXPECT_NE(page.find("camera0 is back"), std::string::npos);
   EXPECT_NE(page.find("next_variant mirror (clicker)"), std::string::npos);
 
+  const std::string events = read_file(folder / "recording/events.jsonl").value();
+  EXPECT_NE(events.find("frames/camera0/000000.jpg"), std::string::npos);
+  EXPECT_EQ(events.find(".png"), std::string::npos);
   ReplayOptions replay;
   replay.session = folder / "recording";
   const Status replayed = run_replay(replay);

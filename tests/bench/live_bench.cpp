@@ -84,7 +84,7 @@ sim::World studio() {
 }
 
 struct Shot {
-  std::vector<std::uint8_t> jpeg;
+  std::string jpeg;
   Stamp captured_at;
 };
 
@@ -104,8 +104,9 @@ std::vector<Shot> shots(int count, SessionSetup* setup) {
     room.set(seconds_between(Stamp{}, rig.next_exposure()));
     const int camera = 0;
     const auto frames = rig.expose(std::span(&camera, 1));
-    out.push_back({{}, frames[0].captured_at});
-    cv::imencode(".jpg", frames[0].image, out.back().jpeg, {cv::IMWRITE_JPEG_QUALITY, 90});
+    std::vector<std::uint8_t> jpeg;
+    cv::imencode(".jpg", frames[0].image, jpeg, {cv::IMWRITE_JPEG_QUALITY, 90});
+    out.push_back({std::string(jpeg.begin(), jpeg.end()), frames[0].captured_at});
     session.take(watcher.watch(frames), static_cast<std::size_t>(i) + 1);
     const auto& painted = session.paint(rig.now(), shifted(rig.now(), 0.04));
     for (std::size_t k = 0; k < painted.projectors.size(); ++k)
@@ -114,7 +115,12 @@ std::vector<Shot> shots(int count, SessionSetup* setup) {
   return out;
 }
 
-cv::Mat decoded(const Shot& shot) { return device::decode_jpeg(shot.jpeg).value(); }
+Frame decoded(const Shot& shot, const SessionSetup& setup) {
+  Frame frame = device::decode_frame(shot.jpeg).value();
+  frame.camera = setup.rig.cameras[0].name;
+  frame.captured_at = shot.captured_at;
+  return frame;
+}
 
 constexpr std::size_t k_rounds = 10;
 
@@ -130,9 +136,10 @@ void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup) {
     const Shot& shot = shots[i % shots.size()];
     const Stamp captured_at = shifted(shots[0].captured_at, static_cast<double>(i) / 30);
     const double begun = processor_ms();
-    cv::Mat image = decoded(shot);
+    Frame frame = decoded(shot, setup);
     const double was_decoded = processor_ms();
-    frames.put({{setup.rig.cameras[0].name, std::move(image), captured_at}});
+    frame.captured_at = captured_at;
+    frames.put({std::move(frame)});
     const auto taken = frames.take({});
     const double was_taken = processor_ms();
     const Watched& watched = watcher.watch(*taken);
@@ -180,7 +187,7 @@ FrameCost session_cost(const std::vector<Shot>& shots, SessionSetup setup, const
   const double begun_processor = processor_ms();
   for (const Shot& shot : shots) {
     const double begun = wall_ms();
-    const std::vector<Frame> frames = {{setup.rig.cameras[0].name, decoded(shot), shot.captured_at}};
+    const std::vector<Frame> frames = {decoded(shot, setup)};
     if (recorder) recorder->watched(frames);
     session.take(watcher.watch(frames), ++moments);
     session.paint(shifted(shot.captured_at, 0.02), shifted(shot.captured_at, k_lag_s));
@@ -213,7 +220,7 @@ void print_edits(const std::vector<Shot>& shots, const SessionSetup& setup) {
     const double begun = wall_ms();
     const bool is_edited = i % 3 == 2;
     if (is_edited) LIMN_CHECK(session.edit({"next_variant", "mirror", ""}, "bench", shots[i].captured_at));
-    const std::vector<Frame> frames = {{setup.rig.cameras[0].name, decoded(shots[i]), shots[i].captured_at}};
+    const std::vector<Frame> frames = {decoded(shots[i], setup)};
     session.take(watcher.watch(frames), i + 1);
     session.paint(shifted(shots[i].captured_at, 0.02), shifted(shots[i].captured_at, k_lag_s));
     const double painted_ms = wall_ms() - begun;
@@ -252,9 +259,9 @@ void print_memory(const std::vector<Shot>& shots, const SessionSetup& setup) {
   for (std::size_t round = 0; round < k_rounds; ++round) {
     for (const Shot& shot : shots) {
       at_s += 1 / 30.0;
-      const std::vector<Frame> frames = {
-          {setup.rig.cameras[0].name, decoded(shot), shifted(shot.captured_at, at_s)}};
-      (void)watcher.watch(frames);
+      Frame frame = decoded(shot, setup);
+      frame.captured_at = shifted(shot.captured_at, at_s);
+      (void)watcher.watch(std::span(&frame, 1));
     }
     if (round == 0) first_mib = resident_mib();
   }

@@ -1,5 +1,7 @@
 #include "device/jpeg.h"
 
+#include <turbojpeg.h>
+
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -20,6 +22,20 @@ cv::Mat ramp() {
 std::vector<uchar> encoded(const cv::Mat& picture) {
   std::vector<uchar> bytes;
   cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, 98});
+  return bytes;
+}
+
+// Its colours at a lower resolution (TJSAMP_…).
+std::vector<uchar> sampled(const cv::Mat& picture, int sampling) {
+  const tjhandle encoder = tjInitCompress();
+  unsigned char* data = nullptr;
+  unsigned long size = 0;
+  EXPECT_EQ(tjCompress2(encoder, picture.data, picture.cols, static_cast<int>(picture.step), picture.rows,
+                        TJPF_BGR, &data, &size, sampling, 95, 0),
+            0);
+  const std::vector<uchar> bytes(data, data + size);
+  tjFree(data);
+  tjDestroy(encoder);
   return bytes;
 }
 
@@ -101,6 +117,25 @@ TEST(Jpeg, LargePicturesComeOutSmaller) {
   const auto least = decode_jpeg(bytes, {.longest_side = 2});
   ASSERT_TRUE(least);
   EXPECT_EQ(least->size(), cv::Size(8, 6));
+}
+
+TEST(Jpeg, AFrameHoldsItsBrightnessAndItsBytes) {
+  const cv::Mat odd = ramp()(cv::Rect(0, 0, 61, 47));
+  for (const int sampling : {TJSAMP_444, TJSAMP_422, TJSAMP_420}) {
+    const std::vector<uchar> bytes = sampled(odd, sampling);
+    const std::string jpeg(bytes.begin(), bytes.end());
+    const auto frame = decode_frame(jpeg, {.size = odd.size()});
+    ASSERT_TRUE(frame) << frame.message();
+    EXPECT_TRUE(test::image_near(frame->image, odd, 4, 40, "frame"));
+    EXPECT_TRUE(test::image_near(frame->grey, *decode_jpeg(bytes, {.grey = true}), 0, 0, "brightness"));
+    EXPECT_EQ(*frame->jpeg, jpeg);
+    EXPECT_FALSE(decode_frame(jpeg.substr(0, jpeg.size() / 2)));
+    EXPECT_FALSE(decode_frame(jpeg, {.size = {64, 48}}));
+    const auto grey = decode_frame(jpeg, {.grey = true});
+    ASSERT_TRUE(grey);
+    EXPECT_TRUE(test::image_near(grey->image, frame->grey, 0, 0, "grey"));
+  }
+  EXPECT_FALSE(decode_frame(""));
 }
 
 TEST(Jpeg, WhatIsEncodedIsDecodedAgain) {
