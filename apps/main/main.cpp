@@ -1,8 +1,23 @@
+#include <malloc.h>
+
 #include <csignal>
 
 #include "apps/command_line.h"
 
+namespace {
+
+// Pictures come and go with each frame. Memory that is given back to the system for each of them is asked for
+// again, page by page, which costs a live session a twentieth of its time.
+void keep_freed_memory() {
+  constexpr int k_mib = 1 << 20;
+  mallopt(M_MMAP_THRESHOLD, 32 * k_mib);
+  mallopt(M_TRIM_THRESHOLD, 256 * k_mib);
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);  // a file-size limit is then an error of write(), with a message
+  keep_freed_memory();
   return limn::apps::run_command_line(argc, argv);
 }
