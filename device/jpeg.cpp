@@ -144,7 +144,7 @@ Result<Frame> decode_frame(std::string jpeg, const JpegOptions& options) {
     frame.image = coloured(planes, header, decoder);
     frame.grey = planes[0](cv::Rect({}, header.size));
   }
-  frame.jpeg = std::make_shared<const std::string>(std::move(jpeg));
+  if (!options.grey) frame.jpeg = std::make_shared<const std::string>(std::move(jpeg));
   return frame;
 }
 

@@ -48,10 +48,13 @@ std::vector<tracker::Detection> foretold(const std::vector<tracker::Detection>& 
   std::vector<tracker::Detection> next = last;
   if (!(seconds_before > 0 && seconds > 0 && seconds < k_like_moments * seconds_before)) return next;
   for (tracker::Detection& marker : next) {
-    const auto was = std::find_if(before.begin(), before.end(), [&](const tracker::Detection& other) {
-      return other.marker == marker.marker;
-    });
-    if (was == before.end()) continue;
+    const tracker::Detection* was = nullptr;  // the nearest of that name
+    const auto moved = [&](const tracker::Detection& other) {
+      return (marker.corners_px[0] - other.corners_px[0]).norm();
+    };
+    for (const tracker::Detection& other : before)
+      if (other.marker == marker.marker && (!was || moved(other) < moved(*was))) was = &other;
+    if (!was) continue;
     for (std::size_t i = 0; i < 4; ++i)
       marker.corners_px[i] += seconds / seconds_before * (marker.corners_px[i] - was->corners_px[i]);
   }
@@ -131,8 +134,8 @@ const Watched& Watcher::watch(std::span<const Frame> frames) {
   return watched_;
 }
 
-// Markers are followed where they were; all of the picture is searched for others now and then, and when one
-// is gone.
+// Markers are followed where they should be by now; all of the picture is searched for others now and then,
+// and when one is gone.
 void Watcher::look(std::size_t camera, const Frame& frame) {
   Eye& eye = eyes_[camera];
   const Lens* lens = &rig_.cameras[camera].lens;

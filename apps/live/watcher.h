@@ -49,8 +49,8 @@ bool is_elsewhere(const Pose& before, const Pose& now);
 
 struct WatchOptions {
   /// Every how many pictures of a camera all of it is searched, a third as often while all markers of the
-  /// scene are seen; between, markers are followed where they were. Higher is faster and finds new markers
-  /// later.
+  /// scene are seen; between, markers are followed where they should be by now. Higher is faster and finds
+  /// new markers later.
   int full_scan_every = 3;
   tracker::MotionModel motion;
   int most_loose = 8;  ///< markers that carry nothing; more are not looked at

@@ -134,6 +134,7 @@ TEST(Jpeg, AFrameHoldsItsBrightnessAndItsBytes) {
     const auto grey = decode_frame(jpeg, {.grey = true});
     ASSERT_TRUE(grey);
     EXPECT_TRUE(test::image_near(grey->image, frame->grey, 0, 0, "grey"));
+    EXPECT_FALSE(grey->jpeg) << "a recording would show colours that the session did not";
   }
   EXPECT_FALSE(decode_frame(""));
 }
