@@ -70,7 +70,7 @@ struct OperatorView {
   std::vector<ShownFrame> recent;  ///< pictures shown, the newest last
   std::vector<Notice> notices;     ///< the newest last
   std::optional<Remote> remote = {};
-  std::string moved = {};  ///< devices that do not stand where the rig says; empty: none is known of
+  std::string moved = {};      ///< devices that do not stand where the rig says; empty: none is known of
   std::string repairing = {};  ///< how far a repair is; empty: there is none
 };
 
