@@ -32,12 +32,11 @@ constexpr long k_day_s = 24 * 60 * 60;
 // What an authority may speak for, besides the hosts that it is made for: networks that nobody reaches from
 // outside (RFC 1918, 3927, 4193, 4291), this machine, and names of mDNS.
 constexpr const char* k_permitted =
-    "critical,permitted;DNS:local,permitted;DNS:localhost,permitted;IP:127.0.0.0/"
-    "255.0.0.0,permitted;IP:10.0.0.0/"
-    "255.0.0.0,permitted;IP:172.16.0.0/255.240.0.0,permitted;IP:192.168.0.0/"
-    "255.255.0.0,permitted;IP:169.254.0.0/"
-    "255.255.0.0,permitted;IP:fc00::/fe00::,permitted;IP:fe80::/ffc0::,permitted;IP:::1/"
-    "ffff:ffff:ffff:ffff:ffff:ffff:ffff:ffff";
+    "critical,permitted;DNS:local,permitted;DNS:localhost,"
+    "permitted;IP:127.0.0.0/255.0.0.0,permitted;IP:10.0.0.0/255.0.0.0,permitted;IP:172.16.0.0/255.240.0.0,"
+    "permitted;IP:192.168.0.0/255.255.0.0,permitted;IP:169.254.0.0/255.255.0.0,"
+    "permitted;IP:fc00::/fe00::,permitted;IP:fe80::/ffc0::,"
+    "permitted;IP:::1/ffff:ffff:ffff:ffff:ffff:ffff:ffff:ffff";
 
 template <auto free>
 struct Free {
