@@ -231,6 +231,7 @@ void Sights::draw(const GpuScene& scene,
     draw_triangles(first, count);
   }
   glDisable(GL_DEPTH_TEST);
+  glFlush();  // softpipe hands what was drawn to compute programs no sooner
 }
 
 void Sights::send(int index, const GpuSight& sight) {

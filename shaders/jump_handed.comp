@@ -41,8 +41,8 @@ bool goes_on(vec2 texel) {
 }
 
 void main() {
-  if (gl_GlobalInvocationID.x >= s_list_count) return;
-  ivec2 block = listed_pixel(gl_GlobalInvocationID.x);
+  if (!is_listed()) return;
+  ivec2 block = listed_pixel();
   vec4 jump = texelFetch(s_jumps, ivec3(block, int(sight_at(u_projector).quality.z)), 0);
   bool is_handed = false;
   vec2 side = jump.xy;

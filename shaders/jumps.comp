@@ -32,8 +32,8 @@ vec4 jump(ivec2 first) {
 }
 
 void main() {
-  if (gl_GlobalInvocationID.x >= s_list_count) return;
-  ivec2 block = listed_pixel(gl_GlobalInvocationID.x);
+  if (!is_listed()) return;
+  ivec2 block = listed_pixel();
   vec4 found = jump(k_block * block);
   if (found.x < 0.0) return;
   imageStore(u_jumps, block, found);

@@ -6,7 +6,7 @@
 layout(local_size_x = 64) in;
 
 void main() {
-  if (gl_GlobalInvocationID.x < s_list_count) learn_hit(listed_pixel(gl_GlobalInvocationID.x));
+  if (is_listed()) learn_hit(listed_pixel());
 }
 #else
 layout(local_size_x = 16, local_size_y = 4) in;

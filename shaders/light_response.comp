@@ -28,8 +28,8 @@ vec3 display_value(vec3 light) {
 }
 
 void main() {
-  if (gl_GlobalInvocationID.x >= s_list_count) return;
-  ivec2 at = listed_pixel(gl_GlobalInvocationID.x);
+  if (!is_listed()) return;
+  ivec2 at = listed_pixel();
   vec4 light = texelFetch(s_centre, at, 0);
   // 1: brighter than light can be is wanted, 0.5: darker.
   const float k_tolerance = 0.004;

@@ -7,8 +7,8 @@ layout(local_size_x = 64) in;
 layout(rgba32f, binding = 0) uniform image2D u_picture;
 
 void main() {
-  if (gl_GlobalInvocationID.x >= s_list_count) return;
-  ivec2 at = listed_pixel(gl_GlobalInvocationID.x);
+  if (!is_listed()) return;
+  ivec2 at = listed_pixel();
   Hit prototype = known_hit(at);
   if (prototype.id == 0u) return;
   Place place = place_at(prototype, ray_of(sight_at(u_projector), vec2(at)));

@@ -9,5 +9,7 @@ layout(std430, binding = 5) buffer Rest {
 void leave_pixel(ivec2 at) {
   uint i = atomicAdd(s_rest_count, 1u);
   s_rest[i] = uint(at.y) << 16 | uint(at.x);
-  if (i % k_group == 0u) atomicMax(s_rest_groups[0], i / k_group + 1u);
+  if (i % k_group != 0u) return;
+  atomicMax(s_rest_groups[0], min(i / k_group + 1u, k_row));
+  atomicMax(s_rest_groups[1], i / (k_group * k_row) + 1u);
 }

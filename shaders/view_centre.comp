@@ -6,7 +6,7 @@ layout(local_size_x = 64) in;
 layout(rgba32f, binding = 0) uniform writeonly image2D u_picture;
 
 void main() {
-  if (gl_GlobalInvocationID.x >= s_list_count) return;
-  ivec2 at = listed_pixel(gl_GlobalInvocationID.x);
+  if (!is_listed()) return;
+  ivec2 at = listed_pixel();
   imageStore(u_picture, at, view_at(vec2(at)));
 }

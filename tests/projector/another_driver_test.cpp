@@ -1,0 +1,126 @@
+// Two drivers that share no rasteriser and no compiler of shaders draw the same: Mesa's llvmpipe and softpipe.
+#include <epoxy/gl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <opencv2/core.hpp>
+#include <string>
+
+#include "core/picture.h"
+#include "projector/treatment.h"
+#include "scene/scene.h"
+#include "tests/projector/sheet_room.h"
+#include "tests/support/matchers.h"
+
+namespace limn::projector {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Gold, steel and lacquer by maps, one part off the surface, one on it.
+Scene finishes() {
+  Scene scene = scene::load_scene(fs::path(LIMN_SOURCE_DIR) / "config/scenes/finishes").value();
+  scene.prototype = scene::Prototype{
+      grid(12, 9,
+           [](double u, double v) {
+             return Vector3d(0.6 * (u - 0.5), 0.45 * (v - 0.5), 0.12 * std::pow(u - 0.45, 2));
+           }),
+      {},
+      0.75,
+      {}};
+  return scene;
+}
+
+// softpipe is slow.
+Imager half_as_large(Imager imager) {
+  std::vector<double> values = imager.lens.values;
+  for (std::size_t i = 0; i < 4; ++i) values[i] /= 2;
+  imager.lens = Lens::create(imager.lens.model.name(), values).value();
+  imager.width /= 2;
+  imager.height /= 2;
+  return imager;
+}
+
+std::map<std::string, cv::Mat> pictures() {
+  const Scene scene = finishes();
+  Rig rig;
+  rig.cameras = {half_as_large(camera())};
+  rig.projectors = {half_as_large(projector_left()), half_as_large(projector_right())};
+  const Eigen::Quaterniond towards_us = exp_rotation(Vector3d(M_PI, 0, 0));
+  PosedScene posed;
+  posed.world_from_prototype = Pose();
+  posed.parts = {{"emblem", "gold", Pose(towards_us, Vector3d(-0.08, -0.03, -0.05))},
+                 {"plate", "steel", Pose(towards_us, Vector3d(0.06, 0.08, -0.002))}};
+  const Imager viewer = half_as_large(viewer_from({0.2, -0.3, -1.2}));
+  Renderer drawing = Renderer::create(scene, rig).value();
+  std::map<std::string, cv::Mat> out;
+  out["light0"] = drawing.projector_picture(0, posed, viewer);
+  out["light1"] = drawing.projector_picture(1, posed, viewer);
+  EXPECT_TRUE(drawing.set_light({.compensation = Compensation::geometry, .even_black = true}));
+  out["balanced0"] = drawing.projector_picture(0, posed, viewer);
+  out["balanced1"] = drawing.projector_picture(1, posed, viewer);
+  const cv::Mat grey(240, 320, CV_8UC3, cv::Scalar(90, 100, 110));
+  out["full"] = drawing.composite(0, grey, posed, Composite::full);
+  out["rest"] = drawing.composite(0, grey, posed, Composite::rest);
+  out["view"] = drawing.view(viewer, posed, cv::Scalar(40, 30, 20));
+  EXPECT_TRUE(drawing.set_contact_shadow(&scene));
+  out["shadowed"] = drawing.composite(0, grey, posed, Composite::full);
+  return out;
+}
+
+// In a process of its own, as a process keeps its driver; false when Mesa has no such driver here.
+bool draw_with(const std::string& driver, const fs::path& folder) {
+  const pid_t child = fork();
+  if (child == 0) {
+    setenv("GALLIUM_DRIVER", driver.c_str(), 1);
+    setenv("LIBGL_ALWAYS_SOFTWARE", "1", 1);
+    setenv("MESA_GL_VERSION_OVERRIDE", "4.5", 1);  // softpipe says 3.3, and does what is asked of it here
+    setenv("MESA_GLSL_VERSION_OVERRIDE", "450", 1);
+    const auto context = device::GlContext::create();
+    const auto name = [] { return std::string(reinterpret_cast<const char*>(glGetString(GL_RENDERER))); };
+    if (!context || name().find(driver) == std::string::npos) _exit(1);
+    for (const auto& [of, picture] : pictures())
+      if (!write_png(folder / (of + ".png"), picture)) _exit(2);
+    _exit(testing::Test::HasFailure() ? 2 : 0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) < 2) << driver;
+  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+// "On another machine at most 2 levels on 0.1 % of pixels": those of the part, as most of a picture is black.
+TEST(AnotherDriver, DrawsTheSame) {
+  const fs::path folder = test::test_folder();
+  std::map<std::string, fs::path> folders;
+  for (const std::string driver : {"llvmpipe", "softpipe"}) {
+    fs::create_directories(folders[driver] = folder / driver);
+    if (!draw_with(driver, folders[driver])) GTEST_SKIP() << "Mesa's " << driver << " is not here";
+  }
+  int compared = 0;
+  for (const auto& file : fs::directory_iterator(folders["llvmpipe"])) {
+    const cv::Mat expected = read_picture(file.path()).value();
+    const cv::Mat actual = read_picture(folders["softpipe"] / file.path().filename()).value();
+    ASSERT_EQ(actual.size(), expected.size());
+    ASSERT_EQ(actual.type(), expected.type());
+    cv::Mat apart;
+    cv::absdiff(actual, expected, apart);
+    int lit = 0, far = 0;
+    for (int row = 0; row < apart.rows; ++row)
+      for (int column = 0; column < apart.cols; ++column) {
+        const auto& levels = apart.at<cv::Vec3b>(row, column);
+        lit += expected.at<cv::Vec3b>(row, column) != expected.at<cv::Vec3b>(0, 0);
+        far += std::max({levels[0], levels[1], levels[2]}) > 2;
+      }
+    EXPECT_GT(lit, 1000) << file.path();
+    EXPECT_LE(far, 0.001 * lit) << file.path();
+    ++compared;
+  }
+  EXPECT_EQ(compared, 8);
+}
+
+}  // namespace
+}  // namespace limn::projector
