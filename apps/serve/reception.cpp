@@ -436,6 +436,7 @@ void Reception::hear(const std::shared_ptr<Visitor>& visitor, const RemarkMessag
 void Reception::hear(const std::shared_ptr<Visitor>& visitor, const PicturesMessage& message) {
   if (message.room && !setup_.eyes.room)
     return refuse(visitor, std::nullopt, "this session has no live composite.");
+  if (!visitor->wants_room) visitor->room_sent.reset();
   visitor->wants_room = message.room;
   visitor->room_in_flight.reset();
   ask_for_room(Clock::now());
@@ -516,10 +517,17 @@ void Reception::looked(const std::shared_ptr<Visitor>& visitor,
 }
 
 void Reception::ask_for_room(Clock::time_point now) {
-  const bool is_wanted = std::any_of(visitors_.begin(), visitors_.end(), [](const auto& visitor) {
-    return visitor->wants_room && !visitor->room_in_flight;
-  });
-  if (!is_wanted || room_is_asked_ || now < room_next_at_) return;
+  const bool is_resting = now < room_next_at_, is_recent = now - room_came_at_ < k_room_lasts;
+  bool is_wanted = false;
+  for (const auto& visitor : visitors_) {
+    if (!visitor->wants_room || visitor->room_in_flight) continue;
+    if (is_resting && visitor->room_sent == room_number_) continue;
+    if (is_resting && is_recent)
+      show_room(visitor);
+    else
+      is_wanted = true;
+  }
+  if (!is_wanted || room_is_asked_) return;
   room_is_asked_ = true;
   room_asked_at_ = now;
   setup_.eyes.room([this, post = setup_.post](Eyes::Seen seen) {
@@ -529,23 +537,28 @@ void Reception::ask_for_room(Clock::time_point now) {
 
 void Reception::room_came(Eyes::Seen seen) {
   room_is_asked_ = false;
-  const auto took = Clock::now() - room_asked_at_;
+  room_came_at_ = Clock::now();
+  const auto took = room_came_at_ - room_asked_at_;
   room_next_at_ = room_asked_at_ + std::max<Clock::duration>(k_between_rooms, k_room_rest * took);
   if (!room_message_ || seen.jpeg != room_.jpeg || seen.json != room_.json) {
     room_message_ = std::make_shared<const std::string>(
         picture_message(PictureKind::room, ++room_number_, seen.json, seen.jpeg));
     room_ = std::move(seen);
+    room_role_ = room_asked_at_ < hidden_.second ? hidden_.first : Role::look;
   }
-  for (const auto& visitor : visitors_) {
-    if (!visitor->wants_room || visitor->room_in_flight || visitor->room_sent == room_number_) continue;
-    visitor->room_in_flight = visitor->room_sent = room_number_;
-    const bool may_see = may_see_room(visitor->guest);
-    visitor->outbox.show(PictureKind::room,
-                         may_see ? room_message_
-                                 : std::make_shared<const std::string>(picture_message(
-                                       PictureKind::room, room_number_, dumped({{"why", k_hidden}}), {})));
-    visitor->wake();
-  }
+  for (const auto& visitor : visitors_)
+    if (visitor->wants_room && !visitor->room_in_flight && visitor->room_sent != room_number_)
+      show_room(visitor);
+}
+
+void Reception::show_room(const std::shared_ptr<Visitor>& visitor) {
+  visitor->room_in_flight = visitor->room_sent = room_number_;
+  const bool may_see = may_see_room(visitor->guest) && visitor->guest.role >= room_role_;
+  visitor->outbox.show(PictureKind::room,
+                       may_see ? room_message_
+                               : std::make_shared<const std::string>(picture_message(
+                                     PictureKind::room, room_number_, dumped({{"why", k_hidden}}), {})));
+  visitor->wake();
 }
 
 void Reception::take(SessionNews news) {

@@ -34,6 +34,9 @@ constexpr std::chrono::milliseconds k_between_rooms{66}, k_longest_look{10000};
 /// A room picture that took so long to draw is followed by another after so many times as long: projectors go
 /// first, also where one processor draws for all.
 constexpr int k_room_rest = 8;
+/// Who does not have the last one is given it during that rest, unless it came longer ago: then another is
+/// drawn at once.
+constexpr std::chrono::seconds k_room_lasts{3};
 /// Tablets whose windows are open at once.
 constexpr std::ptrdiff_t k_most_windows = 8;
 /// Of a project's comments, how many the state has: the newest.
@@ -154,6 +157,7 @@ class Reception {
   void looked(const std::shared_ptr<Visitor>& visitor, std::uint32_t number, const Eyes::Seen& seen);
   void ask_for_room(Clock::time_point now);
   void room_came(Eyes::Seen seen);
+  void show_room(const std::shared_ptr<Visitor>& visitor);
   bool may_see_room(const Guests::Guest& guest) const;
   void publish();
 
@@ -178,8 +182,9 @@ class Reception {
   std::uint64_t last_wish_ = 0;
   std::optional<Result<std::vector<scene::Comment>>> comments_;  // none before the first news
   bool room_is_asked_ = false;
-  Clock::time_point room_asked_at_, room_next_at_;
+  Clock::time_point room_asked_at_, room_came_at_, room_next_at_;
   Eyes::Seen room_;
+  Role room_role_ = Role::look;  // the least that may see it, also when nothing is hidden any more
   std::shared_ptr<const std::string> room_message_;
   std::uint32_t room_number_ = 0;
   // Which of a guest's windows is its tablet: the one that was opened last, until it has given no place for
