@@ -130,16 +130,21 @@ TEST_F(BadInput, AnAlbedoBeyondTheLimitIsNamedAndReduced) {
 }
 
 TEST_F(BadInput, MoreTrianglesThanTheDriverHoldsAreRefused) {
+  const std::size_t most = GpuScene::most_triangles();
+  EXPECT_GT(most, 10'000U);  // GL 4.5 promises 65536 texels
+  if (most > 40'000'000) GTEST_SKIP() << "this driver holds " << most;
   scene::Scene scene = wall_and_part();
-  constexpr std::size_t k_most = 1000;
-  scene.prototype->mesh.triangles.resize(k_most - 1, {0, 2, 1});  // with the part's: one too many
-  scene.prototype->mesh.triangle_materials.resize(k_most - 1, 0);
-  const Status fits = GpuScene::check_fits(scene, k_most);
-  ASSERT_FALSE(fits);
-  EXPECT_NE(fits.message().find(std::to_string(k_most)), std::string::npos) << fits.message();
-  EXPECT_NE(fits.message().find(std::to_string(k_most + 1)), std::string::npos) << fits.message();
-  EXPECT_TRUE(GpuScene::check_fits(scene, k_most + 1));
-  EXPECT_GT(GpuScene::most_triangles(), 10'000U);  // GL 4.5 promises 65536 texels
+  scene::Mesh& mesh = scene.prototype->mesh;
+  mesh.tangents.resize(mesh.positions.size());  // its triangles count twice
+  const std::size_t parts = 2, fits = (most - parts) / 2, count = 2 * (fits + 1) + parts;
+  mesh.triangles.resize(fits + 1, {0, 2, 1});
+  mesh.triangle_materials.resize(fits + 1, 0);
+  const auto made = Renderer::create(scene, one_projector());
+  ASSERT_FALSE(made);
+  EXPECT_NE(made.message().find(std::to_string(most)), std::string::npos) << made.message();
+  EXPECT_NE(made.message().find(std::to_string(count)), std::string::npos) << made.message();
+  mesh.triangles.pop_back();
+  EXPECT_TRUE(GpuScene::check_fits(scene, most));
 }
 
 TEST_F(BadInput, AProjectorThatSeesNothingIsBlackAndTakesNoShare) {
