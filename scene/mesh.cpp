@@ -64,14 +64,26 @@ Eigen::Vector4f tangent_of(const aiMesh& mesh, unsigned i, const Eigen::Matrix3f
   return {turned.x(), turned.y(), turned.z(), hand < 0 ? -1.F : 1.F};
 }
 
-void append(const aiMesh& mesh, const Eigen::Matrix4f& file_from_node, float metres, Soup* soup) {
+// Whether a texture's axes go along its coordinates', as a file's tangents take it.
+bool is_upright(const TexturePlace& place) {
+  const Eigen::Matrix2f m = place.moved.linear();
+  return m(0, 0) > 0 && m(1, 1) > 0 && std::max(std::abs(m(0, 1)), std::abs(m(1, 0))) < 1e-6F;
+}
+
+void append(const aiMesh& mesh,
+            const TexturePlace& place,
+            const Eigen::Matrix4f& file_from_node,
+            float metres,
+            Soup* soup) {
   const Eigen::Matrix3f turn = file_from_node.topLeftCorner<3, 3>();
   const Eigen::Matrix3f normal_turn = turn.inverse().transpose();
   const bool mirrored = turn.determinant() < 0;  // a mirroring transform turns the triangles inside out
   const bool has_normals = mesh.HasNormals();
   soup->needs_normals |= !has_normals;
-  soup->has_uvs |= mesh.HasTextureCoords(0);
-  const bool has_tangents = has_normals && mesh.HasTangentsAndBitangents();
+  const auto coordinates = static_cast<unsigned>(place.coordinates);
+  const aiVector3D* uvs = mesh.HasTextureCoords(coordinates) ? mesh.mTextureCoords[coordinates] : nullptr;
+  soup->has_uvs |= uvs != nullptr;
+  const bool has_tangents = has_normals && mesh.HasTangentsAndBitangents() && is_upright(place);
   if (has_tangents) soup->tangents.resize(soup->corners.size(), Eigen::Vector4f::Zero());
   for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
     const aiFace& face = mesh.mFaces[f];
@@ -84,9 +96,7 @@ void append(const aiMesh& mesh, const Eigen::Matrix4f& file_from_node, float met
           0.f;
       corner.normal = has_normals ? Eigen::Vector3f((normal_turn * to_eigen(mesh.mNormals[i])).normalized())
                                   : Eigen::Vector3f::Zero().eval();
-      corner.uv = mesh.HasTextureCoords(0)
-                      ? Eigen::Vector2f(mesh.mTextureCoords[0][i].x, mesh.mTextureCoords[0][i].y)
-                      : Eigen::Vector2f::Zero().eval();
+      corner.uv = uvs ? place.moved * Eigen::Vector2f(uvs[i].x, uvs[i].y) : Eigen::Vector2f::Zero().eval();
       soup->corners.push_back(corner);
       if (has_tangents) soup->tangents.push_back(tangent_of(mesh, i, turn));
     }
@@ -101,8 +111,12 @@ void append(const aiScene& scene,
             float metres,
             Soup* soup) {
   const Eigen::Matrix4f file_from_node = file_from_parent * to_eigen(node.mTransformation);
-  for (unsigned i = 0; i < node.mNumMeshes; ++i)
-    append(*scene.mMeshes[node.mMeshes[i]], file_from_node, metres, soup);
+  for (unsigned i = 0; i < node.mNumMeshes; ++i) {
+    const aiMesh& mesh = *scene.mMeshes[node.mMeshes[i]];
+    const bool has_material = mesh.mMaterialIndex < scene.mNumMaterials;
+    append(mesh, has_material ? texture_place(*scene.mMaterials[mesh.mMaterialIndex]) : TexturePlace{},
+           file_from_node, metres, soup);
+  }
   for (unsigned i = 0; i < node.mNumChildren; ++i)
     append(scene, *node.mChildren[i], file_from_node, metres, soup);
 }

@@ -5,6 +5,7 @@
 #include <assimp/scene.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -95,6 +96,22 @@ bool spread_into_holes(float below, cv::Mat* bgra) {
   return true;
 }
 
+// Assimp's translation belongs to a turn about the picture's middle; glTF turns about its upper left corner.
+TexturePlace place_of(const aiMaterial& source, aiTextureType type) {
+  TexturePlace out;
+  source.Get(AI_MATKEY_UVWSRC(type, 0), out.coordinates);
+  aiUVTransform of_middle;
+  if (source.Get(AI_MATKEY_UVTRANSFORM(type, 0), of_middle) != AI_SUCCESS) return out;
+  const Eigen::Vector2f scale(of_middle.mScaling.x, of_middle.mScaling.y);
+  const float c = std::cos(of_middle.mRotation), s = -std::sin(of_middle.mRotation);
+  const Eigen::Translation2f offset(of_middle.mTranslation.x - scale.x() / 2 * (1 - c + s),
+                                    1 - scale.y() - of_middle.mTranslation.y + scale.y() / 2 * (s + c - 1));
+  const Eigen::Affine2f v_down = Eigen::Translation2f(0, 1) * Eigen::Scaling(1.F, -1.F);
+  const Eigen::Rotation2Df turn(of_middle.mRotation);
+  out.moved = v_down * offset * turn * Eigen::Scaling(scale.x(), scale.y()) * v_down;
+  return out;
+}
+
 // The pictures that a file's materials name: each is read once and shared.
 class Pictures {
  public:
@@ -122,7 +139,7 @@ class Pictures {
 class MaterialReader {
  public:
   MaterialReader(const aiMaterial& source, std::string name, Pictures* pictures)
-      : source_(source), name_(std::move(name)), pictures_(*pictures) {}
+      : source_(source), place_(texture_place(source)), name_(std::move(name)), pictures_(*pictures) {}
 
   Result<Material> read(bool is_gltf) {
     Material material;
@@ -149,7 +166,6 @@ class MaterialReader {
     for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
       aiString name;
       if (source_.GetTexture(type, 0, &name) != AI_SUCCESS || name.length == 0) continue;
-      note_place(type, 0, "base colour texture");
       LIMN_TRY(const Texture texture, pictures_.read(name, below > 0));
       material->texture = texture.picture;
       material->texture_file = texture.file;
@@ -195,7 +211,7 @@ class MaterialReader {
   std::optional<Texture> map_of(aiTextureType type, const std::string& what, const std::string& instead) {
     aiString name;
     if (source_.GetTexture(type, 0, &name) != AI_SUCCESS || name.length == 0) return Texture{};
-    note_place(type, 0, what);
+    note_place(type, what);
     auto texture = pictures_.read(name, false);
     if (texture) return std::move(texture).value();
     log_warning(
@@ -205,27 +221,33 @@ class MaterialReader {
     return std::nullopt;
   }
 
-  // Textures lie in the first uv as it is.
-  void note_place(aiTextureType type, unsigned index, const std::string& what) const {
-    int uv = 0;
-    aiUVTransform moved;
-    source_.Get(AI_MATKEY_UVWSRC(type, index), uv);
-    const bool is_moved = source_.Get(AI_MATKEY_UVTRANSFORM(type, index), moved) == AI_SUCCESS &&
-                          !(moved.mTranslation == aiVector2D(0, 0) && moved.mScaling == aiVector2D(1, 1) &&
-                            moved.mRotation == 0);
-    if (uv == 0 && !is_moved) return;
+  // All textures of a material lie in one place.
+  void note_place(aiTextureType type, const std::string& what) const {
+    const TexturePlace own = place_of(source_, type);
+    const bool is_moved = !own.moved.isApprox(place_.moved, 1e-5F);
+    if (own.coordinates == place_.coordinates && !is_moved) return;
     log_warning(
-        "{}: expected its {} in the first texture coordinates as they are, found {}; it is shown in these. "
-        "Bake it into them.",
-        name_, what, uv != 0 ? fmt::format("coordinates {}", uv) : std::string("a KHR_texture_transform"));
+        "{}: expected its {} where its first texture is, in texture coordinates {}, found {}; it is shown "
+        "there. Bake all its textures into one set of coordinates.",
+        name_, what, place_.coordinates,
+        own.coordinates != place_.coordinates ? fmt::format("coordinates {}", own.coordinates)
+                                              : std::string("another KHR_texture_transform"));
   }
 
   const aiMaterial& source_;
+  TexturePlace place_;
   std::string name_;  // of file and material, for messages
   Pictures& pictures_;
 };
 
 }  // namespace
+
+TexturePlace texture_place(const aiMaterial& material) {
+  for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE, aiTextureType_UNKNOWN,
+                                   aiTextureType_NORMALS, aiTextureType_LIGHTMAP, aiTextureType_EMISSIVE})
+    if (material.GetTextureCount(type) > 0) return place_of(material, type);
+  return {};
+}
 
 Result<std::vector<Material>> read_materials(const aiScene& scene, const fs::path& path, bool is_gltf) {
   std::vector<Material> materials;

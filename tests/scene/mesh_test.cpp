@@ -16,6 +16,7 @@
 namespace limn::scene {
 namespace {
 
+using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 namespace fs = std::filesystem;
@@ -315,6 +316,132 @@ TEST(Mesh, MapsThatCannotBeReadAreToldAndLeftOut) {
   EXPECT_EQ(told, "");
   loaded(R"("normalTexture":{"index":1,"texCoord":1},)", "paint.png", &told);
   expect_told({"'chrome'", "normal texture", "coordinates 1"});
+}
+
+// textured_gltf whose base colour texture says this of its place; its second coordinates are x and y of the
+// positions, read as pairs: (0, 0), (0, 1), (0, 0).
+std::string placed_gltf(const std::string& place, const std::string& more = "") {
+  std::string text = gltf_with_maps(more, {"paint.png"});
+  const auto replace = [&](const std::string& before, const std::string& after) {
+    text.replace(text.find(before), before.size(), after);
+  };
+  replace(R"("extensionsUsed":[)", R"("extensionsUsed":["KHR_texture_transform",)");
+  replace(R"("baseColorTexture":{"index":0)", R"("baseColorTexture":{"index":0,)" + place);
+  replace(R"("TEXCOORD_0":1)", R"("TEXCOORD_0":1,"TEXCOORD_1":2)");
+  replace(R"(],
+"bufferViews")",
+          R"(,{"bufferView":0,"componentType":5126,"count":3,"type":"VEC2"}],
+"bufferViews")");
+  return text;
+}
+
+std::string moved(const std::string& how) {
+  return R"("extensions":{"KHR_texture_transform":{)" + how + "}}";
+}
+
+// The uv of a corner that is at (x, y) in the mesh's own frame.
+Vector2d uv_at(const Mesh& mesh, double x, double y) {
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i)
+    if (test::near(mesh.positions[i].cast<double>(), Vector3d(10 + 2 * x, 20, 30 + 2 * y), 1e-4))
+      return mesh.uvs[i].cast<double>();
+  ADD_FAILURE() << "no corner at " << x << ", " << y;
+  return {};
+}
+
+// glTF's uv have v down, the mesh's up: (0, 0), (1, 0), (0, 1) of the file are (0, 1), (1, 1), (0, 0).
+TEST(Mesh, ATextureTransformMovesTheUvs) {
+  written("moved/paint.png", small_png());
+  const auto loaded = [&](const std::string& how) {
+    testing::internal::CaptureStderr();
+    auto mesh = load_mesh(written("moved/part.gltf", placed_gltf(moved(how))), "m");
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "") << how;
+    EXPECT_TRUE(mesh) << mesh.message();
+    return std::move(mesh).value();
+  };
+  const auto expect_uvs = [&](const std::string& how, Vector2d origin, Vector2d along_u, Vector2d along_v) {
+    const Mesh mesh = loaded(how);
+    const auto in_file = [&](double x, double y) {
+      const Vector2d uv = uv_at(mesh, x, y);
+      return Vector2d(uv.x(), 1 - uv.y());
+    };
+    EXPECT_TRUE(test::near(in_file(0, 0), origin, 1e-5)) << how;
+    EXPECT_TRUE(test::near(in_file(1, 0), along_u, 1e-5)) << how;
+    EXPECT_TRUE(test::near(in_file(0, 1), along_v, 1e-5)) << how;
+  };
+  expect_uvs("", {0, 0}, {1, 0}, {0, 1});
+  expect_uvs(R"("offset":[0.25,0.5])", {0.25, 0.5}, {1.25, 0.5}, {0.25, 1.5});
+  expect_uvs(R"("scale":[2,3])", {0, 0}, {2, 0}, {0, 3});
+  // A quarter of a turn, counter-clockwise as the picture is seen.
+  expect_uvs(R"("rotation":1.5707963)", {0, 0}, {0, -1}, {1, 0});
+  expect_uvs(R"("offset":[0.25,0.5],"rotation":1.5707963,"scale":[2,3])", {0.25, 0.5}, {0.25, -1.5},
+             {3.25, 0.5});
+}
+
+TEST(Mesh, TexturesLieInTheCoordinatesThatTheMaterialNames) {
+  written("second/paint.png", small_png());
+  testing::internal::CaptureStderr();
+  const auto mesh = load_mesh(written("second/part.gltf", placed_gltf(R"("texCoord":1)")), "m");
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  ASSERT_TRUE(mesh) << mesh.message();
+  EXPECT_TRUE(test::near(uv_at(*mesh, 0, 0), Vector2d(0, 1), 1e-6));
+  EXPECT_TRUE(test::near(uv_at(*mesh, 1, 0), Vector2d(0, 0), 1e-6));
+  EXPECT_TRUE(test::near(uv_at(*mesh, 0, 1), Vector2d(0, 1), 1e-6));
+}
+
+TEST(Mesh, ATextureInAnotherPlaceThanTheFirstIsTold) {
+  written("apart/paint.png", small_png());
+  const auto told = [&](const std::string& base, const std::string& normal) {
+    testing::internal::CaptureStderr();
+    const auto mesh = load_mesh(
+        written("apart/part.gltf",
+                placed_gltf(base, R"("name":"chrome","normalTexture":{"index":1,)" + normal + "},")),
+        "m");
+    EXPECT_TRUE(mesh) << mesh.message();
+    return testing::internal::GetCapturedStderr();
+  };
+  const std::string twice = moved(R"("scale":[2,2])");
+  EXPECT_EQ(told(twice, twice), "");
+  EXPECT_EQ(told(R"("texCoord":1)", R"("texCoord":1)"), "");
+  const std::string unmoved = told(twice, R"("texCoord":0)");
+  for (const char* word : {"apart/part.gltf", "'chrome'", "normal texture", "KHR_texture_transform"})
+    EXPECT_NE(unmoved.find(word), std::string::npos) << word << " in: " << unmoved;
+  const std::string second = told(R"("texCoord":0)", R"("texCoord":1)");
+  for (const char* word : {"'chrome'", "normal texture", "found coordinates 1"})
+    EXPECT_NE(second.find(word), std::string::npos) << word << " in: " << second;
+}
+
+// placed_gltf with a map of normals in the same place, and normals and tangents of its own.
+std::string gltf_with_tangents(const std::string& place, const Vector3f& tangent) {
+  std::string text = placed_gltf(place, R"("normalTexture":{"index":1,)" + place + "},");
+  std::vector<float> data;
+  for (int i = 0; i < 3; ++i) data.insert(data.end(), {0, 0, 1});
+  for (int i = 0; i < 3; ++i) data.insert(data.end(), {tangent.x(), tangent.y(), tangent.z(), 1});
+  const std::string buffer(reinterpret_cast<const char*>(data.data()), data.size() * sizeof(float));
+  const auto add = [&](const std::string& before, const std::string& more) {
+    text.insert(text.find(before) + before.size(), more);
+  };
+  add(R"("TEXCOORD_0":1,)", R"("NORMAL":3,"TANGENT":4,)");
+  add(R"("count":3,"type":"VEC2"},{"bufferView":0,"componentType":5126,"count":3,"type":"VEC2"})",
+      R"(,{"bufferView":2,"componentType":5126,"count":3,"type":"VEC3"},{"bufferView":3,"componentType":5126,"count":3,"type":"VEC4"})");
+  add(R"("byteOffset":36,"byteLength":24})",
+      R"(,{"buffer":1,"byteLength":36},{"buffer":1,"byteOffset":36,"byteLength":48})");
+  text.insert(text.rfind("]}"),
+              R"(,{"byteLength":84,"uri":"data:application/octet-stream;base64,)" + base64(buffer) + R"("})");
+  return text;
+}
+
+// The normals of a picture follow it where a transform turns it.
+TEST(Mesh, TangentsOfTheFileGoWhereATransformTurnsTheTexture) {
+  written("turned/paint.png", small_png());
+  const auto tangent = [&](const std::string& how) {
+    const auto mesh =
+        load_mesh(written("turned/part.gltf", gltf_with_tangents(moved(how), {0.6f, 0.8f, 0})), "m");
+    EXPECT_TRUE(mesh) << mesh.message();
+    return Vector3d(mesh->tangents.at(0).head<3>().cast<double>());
+  };
+  EXPECT_TRUE(test::near(tangent(R"("offset":[0.5,0],"scale":[2,3])"), Vector3d(0.6, 0, 0.8), 1e-5));
+  EXPECT_TRUE(test::near(tangent(R"("rotation":1.5707963)"), Vector3d(0, 0, 1), 1e-5));
+  EXPECT_TRUE(test::near(tangent(R"("scale":[-1,1])"), Vector3d(-1, 0, 0), 1e-5));
 }
 
 // Two squares side by side, the right one's uvs mirrored; both share the corners between them.
