@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
 
 #include "apps/check_file.h"
 #include "apps/check_judge.h"
@@ -80,6 +81,36 @@ Status write_pictures(const CheckResult& result, const fs::path& out) {
   return {};
 }
 
+// Share of a picture's pixels that are more than two levels from another run's.
+Result<double> share_apart(const CheckPicture& picture, const fs::path& theirs) {
+  constexpr double k_same_levels = 2;
+  LIMN_TRY(const cv::Mat expected, read_picture(theirs));
+  if (expected.size() != picture.actual.size() || expected.type() != picture.actual.type())
+    return error("{}: expected a picture of {}x{} as here, found another kind of {}x{}. Run the same checks.",
+                 theirs.string(), picture.actual.cols, picture.actual.rows, expected.cols, expected.rows);
+  const int pixels = static_cast<int>(expected.total());
+  cv::Mat apart, farthest;
+  cv::absdiff(picture.actual, expected, apart);
+  cv::reduce(apart.reshape(1, pixels), farthest, 1, cv::REDUCE_MAX);  // over channels
+  return cv::countNonZero(farthest > k_same_levels) / static_cast<double>(pixels);
+}
+
+// One reading more: the picture that is farthest from what the run in `against` drew.
+void compare(const fs::path& against, CheckResult* result) {
+  static const CheckMeasure measure = {"apart_share", "pixels more than two levels from the other run's", ""};
+  constexpr double k_most = 0.001;
+  double worst = 0;
+  for (const CheckPicture& picture : result->pictures) {
+    const auto share = share_apart(picture, against / result->name / (picture.file + "-actual.png"));
+    if (!share) {
+      result->problem = share.message();
+      return;
+    }
+    worst = std::max(worst, *share);
+  }
+  if (!result->pictures.empty()) result->readings.push_back({{measure, k_most}, worst});
+}
+
 Status verdict_of(const std::vector<CheckResult>& results, const fs::path& page) {
   std::string failed, problems;
   for (const CheckResult& result : results) {
@@ -99,6 +130,8 @@ Status run_check(const CheckOptions& options) {
     LIMN_TRY(files, shipped_checks());
   }
   LIMN_TRY(const std::vector<Check> checks, read_checks(files));
+  if (!options.against.empty() && !fs::is_directory(options.against))
+    return error("{}: expected the folder of another run (its --out), found none.", options.against.string());
   LIMN_TRY_STATUS(make_folder(options.out));
   LIMN_TRY(const device::GlContext context, device::GlContext::create());
   log_info("check: {}", context.description());
@@ -107,6 +140,7 @@ Status run_check(const CheckOptions& options) {
     log_info("{} ...", check.name);
     auto result = judged(check);
     if (!result) result = CheckResult{check.name, check.about, {}, {}, 0, result.message()};
+    if (!options.against.empty()) compare(options.against, &*result);
     LIMN_TRY_STATUS(write_pictures(*result, options.out));
     results.push_back(std::move(*result));
   }

@@ -355,11 +355,15 @@ void add_check(CLI::App& app, Run& run) {
       "A check names a world, poses and limits (config/README.md); without files all of config/checks run. OUT/check.html\n"
       "shows what was drawn, what was expected and the difference. Exits 1 when a limit is missed.\n"
       "Example: limn check\n"
-      "Example: limn check config/checks/door-moved.json --out checked");
+      "Example: limn check config/checks/door-moved.json --out checked\n"
+      "Example: limn check --against from-the-other-machine");
   auto options = std::make_shared<CheckOptions>();
   command->add_option("checks", options->files, "check files (limn.check/1)");
   command->add_option("--out", options->out, "folder for check.html, check.json and pictures")->capture_default_str();
   command->add_flag("--json", options->json, "print check.json instead of a table");
+  command->add_option("--against", options->against,
+                      "OUT of another run of the same checks, on another machine or driver: at most 0.1 % of a picture's\n"
+                      "pixels may differ from it by more than two levels");
   command->callback([options, &run] { run = [options] { return finished(run_check(*options)); }; });
 }
 

@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -306,6 +307,39 @@ TEST(Check, ALimitThatCannotHoldFailsAndIsNamed) {
   EXPECT_NE(read_file(folder / "out" / "check.html").value().find("1 of 1 failed"), std::string::npos);
   EXPECT_FALSE(
       nlohmann::json::parse(read_file(folder / "out" / "check.json").value()).at("passed").get<bool>());
+}
+
+TEST(Check, AnotherRunsPicturesAreComparedWith) {
+  const fs::path folder = test::test_folder(), there = folder / "there", here = folder / "here";
+  const std::string file =
+      written(folder, "bench",
+              fmt::format(R"("viewer": {}, "resolution": 0.25, "limits": {{"mask_iou": 0.5}})", k_viewer))
+          .string();
+  ASSERT_EQ(run({file, "--out", there.string()}).code, 0);
+  const auto compared = [&] { return run({file, "--out", here.string(), "--against", there.string()}); };
+  const Outcome same = compared();
+  EXPECT_EQ(same.code, 0) << same.err;
+  EXPECT_NE(same.out.find("apart_share"), std::string::npos) << same.out;
+
+  const fs::path theirs = there / "small" / "mask-actual.png";
+  const cv::Mat drawn = read_picture(theirs).value();
+  const int side = static_cast<int>(std::sqrt(0.0015 * static_cast<double>(drawn.total()))) + 1;
+  const auto other = [&](int levels) {
+    cv::Mat changed = drawn.clone();
+    changed(cv::Rect(0, 0, side, side)) += cv::Scalar::all(levels);
+    EXPECT_TRUE(write_png(theirs, changed));
+    return compared();
+  };
+  EXPECT_EQ(other(2).code, 0);
+  const Outcome apart = other(3);
+  EXPECT_EQ(apart.code, 1);
+  EXPECT_NE(apart.out.find("MISSED"), std::string::npos) << apart.out;
+  EXPECT_TRUE(write_png(theirs, drawn(cv::Rect(0, 0, 8, 8))));
+  EXPECT_NE(compared().err.find("Run the same checks"), std::string::npos);
+  fs::remove(theirs);
+  EXPECT_NE(compared().err.find("mask-actual.png"), std::string::npos);
+  fs::remove_all(there);
+  EXPECT_NE(compared().err.find("another run"), std::string::npos);
 }
 
 TEST(Check, WhatCannotBeJudgedFailsAloneAndTheOthersAreJudged) {
