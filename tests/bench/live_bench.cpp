@@ -17,7 +17,6 @@
 #include <numeric>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "apps/live/latest.h"
 #include "apps/live/recording.h"
@@ -124,7 +123,29 @@ Frame decoded(const Shot& shot, const SessionSetup& setup) {
 
 constexpr std::size_t k_rounds = 10;
 
-void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup) {
+// What a camera hands over and what becomes of it.
+struct Wire {
+  std::string name;
+  std::function<std::function<Frame()>(const Shot&)> decoder;  // of a shot: decodes it
+};
+
+std::vector<Wire> wires() {
+  const auto jpeg = [](bool grey) {
+    return [grey](const Shot& shot) {
+      return [&shot, grey] { return device::decode_frame(shot.jpeg, {.grey = grey}).value(); };
+    };
+  };
+  const auto raw = [](const Shot& shot) {
+    return [sent = device::decode_frame(shot.jpeg, {.grey = true}).value().image] {
+      Frame frame;
+      frame.image = sent.clone();  // out of the driver's buffer
+      return frame;
+    };
+  };
+  return {{"colour JPEG", jpeg(false)}, {"JPEG, brightness alone", jpeg(true)}, {"raw brightness", raw}};
+}
+
+void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup, const Wire& wire) {
   const std::string family = "apriltag_36h11";
   const Peer apriltag = apriltag_peer(std::span(&family, 1), 2, 1);
   auto watcher = Watcher::create(setup.scene, setup.rig, setup.watch).value();
@@ -132,12 +153,14 @@ void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup) {
   apps::Latest<Watched> seen;
   std::vector<double> decode, watch, filter, hand, theirs;
   std::size_t markers = 0;
+  std::vector<std::function<Frame()>> decoders;
+  for (const Shot& shot : shots) decoders.push_back(wire.decoder(shot));
   for (std::size_t i = 0; i < k_rounds * shots.size(); ++i) {
-    const Shot& shot = shots[i % shots.size()];
     const Stamp captured_at = shifted(shots[0].captured_at, static_cast<double>(i) / 30);
     const double begun = processor_ms();
-    Frame frame = decoded(shot, setup);
+    Frame frame = decoders[i % shots.size()]();
     const double was_decoded = processor_ms();
+    frame.camera = setup.rig.cameras[0].name;
     frame.captured_at = captured_at;
     frames.put({std::move(frame)});
     const auto taken = frames.take({});
@@ -154,14 +177,13 @@ void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup) {
     filter.push_back(watched.filter_ms);
     hand.push_back(was_taken - was_decoded + was_handed - was_watched);
     LIMN_CHECK(!tracks.empty());
-    cv::Mat grey;
-    cv::cvtColor(taken->front().image, grey, cv::COLOR_BGR2GRAY);
+    const cv::Mat grey = to_grey(taken->front().image);
     const double peer_begun = processor_ms();
     (void)apriltag.detect(grey, nullptr);
     theirs.push_back(processor_ms() - peer_begun);
   }
   const double ours = mean(decode) + mean(watch) + mean(hand);
-  fmt::print("{} frames of 1280x1024, {:.1f} markers each; mean processor ms\n", decode.size(),
+  fmt::print("{}: {} frames of 1280x1024, {:.1f} markers each; mean processor ms\n", wire.name, decode.size(),
              static_cast<double>(markers) / static_cast<double>(decode.size()));
   fmt::print(
       "decode {:.2f}, find markers {:.2f}, poses and motions {:.2f}, hand-over and prediction {:.2f}: "
@@ -171,6 +193,20 @@ void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup) {
       "libapriltag (36h11, decimate 2, one thread), detection alone: {:.2f}; ours, of that: {:.2f} "
       "(without decoding {:.2f})\n",
       mean(theirs), ours / mean(theirs), (ours - mean(decode)) / mean(theirs));
+}
+
+// What no decoder of JPEG is spared: its codes are read one after the other, whatever is made of them.
+void print_codes(const std::vector<Shot>& shots) {
+  std::vector<double> times;
+  for (std::size_t i = 0; i < k_rounds * shots.size(); ++i) {
+    const std::string& jpeg = shots[i % shots.size()].jpeg;
+    const double begun = processor_ms();
+    (void)device::decode_jpeg({reinterpret_cast<const std::uint8_t*>(jpeg.data()), jpeg.size()},
+                              {.grey = true, .longest_side = 160})
+        .value();
+    times.push_back(processor_ms() - begun);
+  }
+  fmt::print("to read a JPEG's codes (brightness at an eighth of the size): {:.2f}\n", mean(times));
 }
 
 // A frame of a session, decoded, watched and painted.
@@ -287,7 +323,8 @@ int run(int argc, char** argv) {
   }
   SessionSetup setup;
   const std::vector<Shot> frames = shots(count, &setup);
-  print_cost(frames, setup);
+  for (const Wire& wire : wires()) print_cost(frames, setup, wire);
+  print_codes(frames);
   print_edits(frames, setup);
   print_recording(frames, setup);
   print_memory(frames, setup);
