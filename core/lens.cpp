@@ -6,6 +6,7 @@ extern "C" {
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <thread>
@@ -17,6 +18,35 @@ struct LensModel::Impl {
   mrcal_lensmodel_t model{};
   int value_count = 0;
   bool projects_behind = false;
+
+  bool may_show(const Eigen::Vector3d& p) const {
+    return p.allFinite() && !p.isZero(0) && (projects_behind || p.z() > 0);
+  }
+
+  // Derivatives by the values are those of a single point. mrcal 2.2 mixes up the derivatives of several
+  // points of one call, and their pixels in mrcal_project_pinhole.
+  bool project(std::span<const double> values,
+               std::span<const Eigen::Vector3d> p,
+               Eigen::Vector2d* px,
+               PixelByPoint* d_px_d_p,
+               double* d_px_d_values) const {
+    static_assert(sizeof(Eigen::Vector3d) == sizeof(mrcal_point3_t) &&
+                  sizeof(Eigen::Vector2d) == sizeof(mrcal_point2_t) &&
+                  sizeof(PixelByPoint) == 2 * sizeof(mrcal_point3_t));
+    const auto* points = reinterpret_cast<const mrcal_point3_t*>(p.data());
+    auto* pixels = reinterpret_cast<mrcal_point2_t*>(px);
+    auto* gradients = reinterpret_cast<mrcal_point3_t*>(d_px_d_p);
+    const int count = static_cast<int>(p.size());
+    if (!gradients || d_px_d_values)
+      return mrcal_project(pixels, gradients, d_px_d_values, points, count, &model, values.data());
+    for (int i = 0; i < count; ++i) {
+      if (model.type == MRCAL_LENSMODEL_PINHOLE)
+        mrcal_project_pinhole(pixels + i, gradients + 2 * i, points + i, 1, values.data());
+      else if (!mrcal_project(pixels + i, gradients + 2 * i, nullptr, points + i, 1, &model, values.data()))
+        return false;
+    }
+    return true;
+  }
 };
 
 namespace {
@@ -40,12 +70,10 @@ bool has_sound_grid(const mrcal_lensmodel_t& model) {
          grid.fov_x_deg > 0 && grid.fov_x_deg < 360;
 }
 
-using Jacobian2x3 = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
-
 // Determinant of d(px)/d(x, y) at (x, y, 1): positive where the lens keeps the picture's orientation.
 bool keeps_orientation(const LensModel& model, std::span<const double> values, const Eigen::Vector2d& xy) {
   Eigen::Vector2d px;
-  Jacobian2x3 jacobian;
+  PixelByPoint jacobian;
   if (!model.project(values, xy.homogeneous(), &px, jacobian.data())) return false;
   return jacobian.leftCols<2>().determinant() > 0;
 }
@@ -67,7 +95,7 @@ bool newton_unproject(const LensModel& model,
                       Eigen::Vector2d xy,
                       Eigen::Vector3d* d_imager) {
   Eigen::Vector2d found;
-  Jacobian2x3 jacobian;
+  PixelByPoint jacobian;
   if (!model.project(values, xy.homogeneous(), &found, jacobian.data())) return false;
   double residual = (found - px).norm();
   for (int step = 0; step < k_max_newton_steps && residual > k_unproject_tolerance_px; ++step) {
@@ -125,21 +153,24 @@ bool LensModel::project(std::span<const double> values,
                         double* d_px_d_p,
                         double* d_px_d_values) const {
   LIMN_CHECK(static_cast<int>(values.size()) == impl_->value_count);
-  if (!p.allFinite() || p.isZero(0) || (!impl_->projects_behind && p.z() <= 0)) return false;
-  const mrcal_point3_t point{.xyz = {p.x(), p.y(), p.z()}};
-  mrcal_point2_t pixel{};
-  mrcal_point3_t gradient[2];
-  if (!mrcal_project(&pixel, d_px_d_p ? gradient : nullptr, d_px_d_values, &point, 1, &impl_->model,
-                     values.data())) {
+  if (!impl_->may_show(p)) return false;
+  PixelByPoint gradient;
+  if (!impl_->project(values, std::span(&p, 1), px, d_px_d_p ? &gradient : nullptr, d_px_d_values))
     return false;
-  }
-  *px = {pixel.x, pixel.y};
-  if (d_px_d_p) {
-    for (int row = 0; row < 2; ++row) {
-      for (int col = 0; col < 3; ++col) d_px_d_p[3 * row + col] = gradient[row].xyz[col];
-    }
-  }
+  if (d_px_d_p) std::copy_n(gradient.data(), gradient.size(), d_px_d_p);
   return px->allFinite();
+}
+
+bool LensModel::project_all(std::span<const double> values,
+                            std::span<const Eigen::Vector3d> p,
+                            std::span<Eigen::Vector2d> px,
+                            std::span<PixelByPoint> d_px_d_p) const {
+  LIMN_CHECK(static_cast<int>(values.size()) == impl_->value_count);
+  LIMN_CHECK(px.size() == p.size() && (d_px_d_p.empty() || d_px_d_p.size() == p.size()));
+  const auto is_finite = [](const Eigen::Vector2d& pixel) { return pixel.allFinite(); };
+  return std::ranges::all_of(p, [&](const Eigen::Vector3d& point) { return impl_->may_show(point); }) &&
+         impl_->project(values, p, px.data(), d_px_d_p.empty() ? nullptr : d_px_d_p.data(), nullptr) &&
+         std::ranges::all_of(px, is_finite);
 }
 
 bool LensModel::unproject(std::span<const double> values,

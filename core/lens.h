@@ -11,8 +11,11 @@
 
 namespace limn {
 
+/// Derivative of a pixel by the point that it shows.
+using PixelByPoint = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
+
 /// One of mrcal's lens models, without its values: `LENSMODEL_PINHOLE`, `LENSMODEL_OPENCV4/5/8/12`,
-/// `LENSMODEL_SPLINED_STEREOGRAPHIC_order=…`, and so on. The formulas are mrcal's alone (mrcal_project).
+/// `LENSMODEL_SPLINED_STEREOGRAPHIC_order=…`, and so on. The formulas are mrcal's alone (mrcal.h).
 /// Cheap to copy; safe to use from several threads.
 class LensModel {
  public:
@@ -34,6 +37,13 @@ class LensModel {
                Eigen::Vector2d* px,
                double* d_px_d_p = nullptr,
                double* d_px_d_values = nullptr) const;
+
+  /// The same of many points at once, which costs less. `px` has one for each; `d_px_d_p`, too, unless it is
+  /// empty. False when one of them has no finite pixel: then neither is of use.
+  bool project_all(std::span<const double> values,
+                   std::span<const Eigen::Vector3d> p,
+                   std::span<Eigen::Vector2d> px,
+                   std::span<PixelByPoint> d_px_d_p = {}) const;
 
   /// Unit direction that project() takes to px. False when there is none (outside the model's domain).
   bool unproject(std::span<const double> values, const Eigen::Vector2d& px, Eigen::Vector3d* d_imager) const;

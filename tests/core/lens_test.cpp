@@ -91,6 +91,35 @@ TEST_P(LensModels, JacobiansEqualFiniteDifferences) {
   }
 }
 
+TEST_P(LensModels, ManyPointsAtOnceEqualSingleOnes) {
+  const LensModel model = lens().model;
+  const std::vector<Eigen::Vector3d> points = directions();
+  std::vector<Eigen::Vector2d> px(points.size()), px_alone(points.size());
+  std::vector<PixelByPoint> d_p(points.size());
+  ASSERT_TRUE(model.project_all(GetParam().values, points, px, d_p));
+  ASSERT_TRUE(model.project_all(GetParam().values, points, px_alone));
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    Eigen::Vector2d expected;
+    PixelByPoint d_expected;
+    ASSERT_TRUE(model.project(GetParam().values, points[i], &expected, d_expected.data()));
+    EXPECT_TRUE(test::near(px[i], expected, 1e-9));
+    EXPECT_TRUE(test::near(px_alone[i], expected, 1e-9));
+    EXPECT_LT((d_p[i] - d_expected).norm(), 1e-9);
+  }
+}
+
+TEST_P(LensModels, ManyPointsHaveNoPixelsWhenOneHasNone) {
+  const LensModel model = lens().model;
+  std::vector<Eigen::Vector3d> points = directions();
+  std::vector<Eigen::Vector2d> px(points.size());
+  std::vector<Eigen::Vector3d> hopeless = {Eigen::Vector3d::Zero(), {std::nan(""), 0, 1}};
+  if (!model.projects_behind()) hopeless.push_back({0.1, 0, -1});
+  for (const Eigen::Vector3d& bad : hopeless) {
+    points[7] = bad;
+    EXPECT_FALSE(model.project_all(GetParam().values, points, px)) << bad.transpose();
+  }
+}
+
 TEST_P(LensModels, DirectionMapEqualsSingleUnprojections) {
   const auto map = direction_map(lens(), 1280, 800, 64);
   ASSERT_EQ(map.size(), 20u * 13u);
