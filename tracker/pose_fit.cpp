@@ -1,6 +1,8 @@
 #include "tracker/pose_fit.h"
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -10,16 +12,14 @@ namespace limn::tracker {
 namespace {
 
 constexpr int k_max_steps = 60;
-constexpr double k_small_gain = 1e-10;  // of the cost: a hundred thousandth of a standard deviation
+constexpr double k_small_gain = 1e-7;  // of the cost: three ten-thousandths of a standard deviation
+// A step that is foretold to gain less and gains nothing has met the error of the prior's derivative.
+constexpr double k_vain_gain = 1e-4;
 // Far from corners that miss by much the robust cost is all but flat, and falls little for many steps.
 constexpr int k_patient_steps = 10;
 constexpr double k_slow_gain = 1e-3;       // of the cost
 constexpr double k_min_condition = 1e-13;  // smallest over largest eigenvalue of the scaled normal matrix
-
-struct Normal {
-  Matrix6d matrix = Matrix6d::Zero();
-  Vector6d gradient = Vector6d::Zero();
-};
+constexpr double k_surely_regular = 1e8;   // norm of one times its inverse's, below which its factors suffice
 
 // Robust weight of a squared normalised residual.
 double weight(double square, double huber) {
@@ -29,32 +29,121 @@ double loss(double square, double huber) {
   return huber > 0 && square > huber * huber ? 2 * huber * std::sqrt(square) - huber * huber : square;
 }
 
-double prior_cost(const PosePrior* prior, const Pose& pose) {
-  if (!prior) return 0;
-  const Vector6d delta = boxminus(pose, prior->world_from_body);
-  return delta.dot(prior->information * delta);
+// Sights that one call of the lens projects, and what it makes of them.
+struct Batch {
+  static constexpr std::size_t k_most = 16;
+  std::span<const PointSight> sights;            // of one camera
+  std::array<Eigen::Vector3d, k_most> d_turned;  // from the body's origin, along the world's axes
+  std::array<Eigen::Vector2d, k_most> px;
+  std::array<PixelByPoint, k_most> by_camera;
+  Eigen::Matrix3d camera_from_world;
+};
+
+bool is_same_camera(const PointSight& a, const PointSight& b) {
+  return a.lens == b.lens && a.camera_from_world.translation == b.camera_from_world.translation &&
+         a.camera_from_world.rotation.coeffs() == b.camera_from_world.rotation.coeffs();
+}
+
+std::span<const PointSight> first_batch(std::span<const PointSight> sights) {
+  const std::size_t most = std::min(sights.size(), Batch::k_most);
+  std::size_t count = 1;
+  while (count < most && is_same_camera(sights[count], sights[0])) ++count;
+  return sights.first(count);
+}
+
+// False when a point has no pixel.
+bool project(const Pose& world_from_body, bool with_derivatives, Batch* batch) {
+  const std::size_t count = batch->sights.size();
+  const PointSight& first = batch->sights[0];
+  batch->camera_from_world = first.camera_from_world.rotation_matrix();
+  const Eigen::Matrix3d world_from_body_turn = world_from_body.rotation_matrix();
+  std::array<Eigen::Vector3d, Batch::k_most> p_camera;
+  for (std::size_t i = 0; i < count; ++i) {
+    batch->d_turned[i] = world_from_body_turn * batch->sights[i].p_body;
+    p_camera[i] = batch->camera_from_world * (batch->d_turned[i] + world_from_body.translation) +
+                  first.camera_from_world.translation;
+    // Beside the camera some lens models go on projecting; a marker there is turned through itself.
+    if (!(p_camera[i].z() > 0)) return false;
+  }
+  return first.lens->model.project_all(
+      first.lens->values, std::span(p_camera).first(count), std::span(batch->px).first(count),
+      with_derivatives ? std::span(batch->by_camera).first(count) : std::span<PixelByPoint>());
+}
+
+// Derivative of a residual by the delta of boxplus; transposed, it is summed up in half the time.
+using Gradients = Eigen::Matrix<double, 6, 2>;
+
+// Of a batch's i-th sight.
+Gradients gradients(const Batch& batch, std::size_t i) {
+  const Eigen::Matrix<double, 3, 2> by_world = (batch.by_camera[i] * batch.camera_from_world).transpose();
+  Gradients by_delta;
+  for (int k = 0; k < 2; ++k)  // a^T [t]x = (a x t)^T
+    by_delta.col(k).head<3>() = by_world.col(k).cross(batch.d_turned[i]);
+  by_delta.bottomRows<3>() = -by_world;
+  return by_delta;
+}
+
+// Calls take(batch) for all sights, a batch at a time; false when a point has no pixel.
+template <class Take>
+bool each_batch(std::span<const PointSight> sights,
+                const Pose& world_from_body,
+                bool with_derivatives,
+                const Take& take) {
+  Batch batch;
+  for (; !sights.empty(); sights = sights.subspan(batch.sights.size())) {
+    batch.sights = first_batch(sights);
+    if (!project(world_from_body, with_derivatives, &batch)) return false;
+    take(batch);
+  }
+  return true;
+}
+
+// A pose as the sights and its prior judge it.
+struct Judged {
+  double cost = 0;     // robust, in squared standard deviations, the prior's included
+  double squares = 0;  // px^2
+  Matrix6d normal = Matrix6d::Zero();
+  Vector6d gradient = Vector6d::Zero();
+};
+
+void add_sight(const PointSight& sight,
+               const Eigen::Vector2d& px,
+               const Gradients& by_delta,
+               double huber,
+               Judged* judged) {
+  const Eigen::Vector2d r = sight.px - px;
+  const Eigen::Vector2d weighed = sight.information * r;
+  const double square = r.dot(weighed), w = weight(square, huber);
+  judged->cost += loss(square, huber);
+  judged->squares += r.squaredNorm();
+  const Gradients weighed_by_delta = by_delta * (w * sight.information);
+  judged->normal.noalias() += weighed_by_delta * by_delta.transpose();
+  judged->gradient.noalias() += by_delta * (w * weighed);
 }
 
 // The delta's own derivative by a further small step is taken for the identity: a prior is far narrower than
 // a radian.
-std::optional<Normal> normal_equations(std::span<const PointSight> sights,
-                                       const Pose& pose,
-                                       double huber,
-                                       const PosePrior* prior) {
-  Normal normal;
-  if (prior) {
-    normal.matrix = prior->information;
-    normal.gradient = prior->information * boxminus(pose, prior->world_from_body);
-  }
-  for (const PointSight& sight : sights) {
-    Eigen::Vector2d r;
-    Eigen::Matrix<double, 2, 6> j;
-    if (!residual(sight, pose, &r, &j)) return std::nullopt;
-    const double w = weight(r.dot(sight.information * r), huber);
-    normal.matrix += w * j.transpose() * sight.information * j;
-    normal.gradient += w * j.transpose() * (sight.information * r);
-  }
-  return normal;
+void add_prior(const PosePrior& prior, const Pose& pose, Judged* judged) {
+  const Vector6d delta = boxminus(pose, prior.world_from_body);
+  const Vector6d weighed = prior.information * delta;
+  judged->cost += delta.dot(weighed);
+  judged->normal += prior.information;
+  judged->gradient += weighed;
+}
+
+// nullopt when a point has no pixel.
+std::optional<Judged> judged(std::span<const PointSight> sights,
+                             const Pose& pose,
+                             double huber,
+                             const PosePrior* prior) {
+  Judged sum;
+  const bool is_seen = each_batch(sights, pose, true, [&](const Batch& batch) {
+    for (std::size_t i = 0; i < batch.sights.size(); ++i)
+      add_sight(batch.sights[i], batch.px[i], gradients(batch, i), huber, &sum);
+  });
+  if (!is_seen) return std::nullopt;
+  if (prior) add_prior(*prior, pose, &sum);
+  return sum;
 }
 
 // Inverse of a normal matrix, scaled so that radians and metres compare; nullopt when it is singular.
@@ -63,21 +152,17 @@ std::optional<Matrix6d> inverse(const Matrix6d& matrix) {
   if (!matrix.allFinite() || !(diagonal.minCoeff() > 0)) return std::nullopt;
   const Vector6d scale = diagonal.cwiseSqrt().cwiseInverse();
   const Matrix6d scaled = scale.asDiagonal() * matrix * scale.asDiagonal();
+  const Eigen::LLT<Matrix6d> factor(scaled);
+  if (factor.info() == Eigen::Success) {
+    const Matrix6d middle = factor.solve(Matrix6d::Identity());
+    if (scaled.norm() * middle.norm() < k_surely_regular)
+      return Matrix6d(scale.asDiagonal() * middle * scale.asDiagonal());
+  }
   const EigenPairs6 eigen = eigen_pairs(scaled);
   if (!(eigen.values[0] > k_min_condition * eigen.values[5])) return std::nullopt;
   const Matrix6d middle = eigen.vectors * eigen.values.cwiseInverse().asDiagonal() *
                           eigen.vectors.transpose();
   return Matrix6d(scale.asDiagonal() * middle * scale.asDiagonal());
-}
-
-double rms(std::span<const PointSight> sights, const Pose& pose) {
-  double squares = 0;
-  for (const PointSight& sight : sights) {
-    Eigen::Vector2d r;
-    if (!residual(sight, pose, &r)) return std::numeric_limits<double>::infinity();
-    squares += r.squaredNorm();
-  }
-  return std::sqrt(squares / static_cast<double>(sights.size()));
 }
 
 }  // namespace
@@ -92,32 +177,21 @@ bool residual(const PointSight& sight,
               const Pose& world_from_body,
               Eigen::Vector2d* difference,
               Eigen::Matrix<double, 2, 6>* d_difference) {
-  const Eigen::Vector3d turned = world_from_body.rotation * sight.p_body;
-  const Eigen::Vector3d p_camera = sight.camera_from_world * (turned + world_from_body.translation);
-  Eigen::Vector2d px;
-  Eigen::Matrix<double, 2, 3, Eigen::RowMajor> d_px;
-  // Beside the camera some lens models go on projecting; a marker there is turned through itself.
-  if (!(p_camera.z() > 0)) return false;
-  if (!sight.lens->model.project(sight.lens->values, p_camera, &px, d_difference ? d_px.data() : nullptr))
-    return false;
-  if (!px.allFinite()) return false;
-  *difference = sight.px - px;
-  if (d_difference) {
-    const Eigen::Matrix<double, 2, 3> d_world = d_px * sight.camera_from_world.rotation_matrix();
-    d_difference->leftCols<3>() = d_world * skew(turned);  // minus from the residual, minus from -[R p]x
-    d_difference->rightCols<3>() = -d_world;
-  }
-  return true;
+  return each_batch(std::span(&sight, 1), world_from_body, d_difference, [&](const Batch& batch) {
+    *difference = sight.px - batch.px[0];
+    if (d_difference) *d_difference = gradients(batch, 0).transpose();
+  });
 }
 
 double cost(std::span<const PointSight> sights, const Pose& world_from_body, double huber) {
   double sum = 0;
-  for (const PointSight& sight : sights) {
-    Eigen::Vector2d r;
-    if (!residual(sight, world_from_body, &r)) return std::numeric_limits<double>::infinity();
-    sum += loss(r.dot(sight.information * r), huber);
-  }
-  return sum;
+  const bool is_seen = each_batch(sights, world_from_body, false, [&](const Batch& batch) {
+    for (std::size_t i = 0; i < batch.sights.size(); ++i) {
+      const Eigen::Vector2d r = batch.sights[i].px - batch.px[i];
+      sum += loss(r.dot(batch.sights[i].information * r), huber);
+    }
+  });
+  return is_seen ? sum : std::numeric_limits<double>::infinity();
 }
 
 std::optional<PoseFit> fit_pose(std::span<const PointSight> sights,
@@ -126,35 +200,32 @@ std::optional<PoseFit> fit_pose(std::span<const PointSight> sights,
                                 const PosePrior* prior) {
   if (sights.size() < 3 || !start.is_finite()) return std::nullopt;
   Pose pose = start;
-  double best = cost(sights, pose, huber) + prior_cost(prior, pose);
-  if (!std::isfinite(best)) return std::nullopt;
+  auto best = judged(sights, pose, huber, prior);
+  if (!best || !std::isfinite(best->cost)) return std::nullopt;
   double damping = 1e-6;
   for (int step = 0; step < k_max_steps; ++step) {
-    const auto normal = normal_equations(sights, pose, huber, prior);
-    if (!normal) return std::nullopt;
-    Matrix6d damped = normal->matrix;
+    Matrix6d damped = best->normal;
     damped.diagonal() *= 1 + damping;
-    const Vector6d delta = solved(damped, -normal->gradient);
+    const Vector6d delta = solved(damped, -best->gradient);
     if (!delta.allFinite()) return std::nullopt;
-    const double gain = -normal->gradient.dot(delta);
-    const bool is_last = gain < k_small_gain || (step >= k_patient_steps && gain < k_slow_gain * best);
+    const double gain = -best->gradient.dot(delta);
+    const bool is_last = gain < k_small_gain || (step >= k_patient_steps && gain < k_slow_gain * best->cost);
     const Pose next = boxplus(pose, delta);
-    const double next_cost = cost(sights, next, huber) + prior_cost(prior, next);
-    if (next_cost <= best) {
+    const auto after = judged(sights, next, huber, prior);
+    if (after && after->cost <= best->cost) {
       pose = next;
-      best = next_cost;
+      best = after;
       damping = std::max(1e-12, damping * 0.1);
     } else {
       damping = std::max(damping, 1e-9) * 10;
-      if (damping > 1e8) break;
+      if (damping > 1e8 || gain < k_vain_gain) break;
     }
     if (is_last) break;
   }
-  const auto normal = normal_equations(sights, pose, huber, prior);
-  if (!normal) return std::nullopt;
-  const auto covariance = inverse(normal->matrix);
+  const auto covariance = inverse(best->normal);
   if (!covariance || !covariance->allFinite() || !pose.is_finite()) return std::nullopt;
-  return PoseFit{pose, *covariance, best, rms(sights, pose)};
+  return PoseFit{pose, *covariance, best->cost,
+                 std::sqrt(best->squares / static_cast<double>(sights.size()))};
 }
 
 }  // namespace limn::tracker
