@@ -24,10 +24,8 @@ constexpr int k_max_refined = 3;
 // Robust cost of a pose that is no worse than its corners are, for each of their coordinates: pulls of two.
 constexpr double k_explained_cost = 4;
 
-using CornerSights = std::array<PointSight, 4>;
-
-CornerSights sights_of(const SeenMarker& seen, const Detection& detection) {
-  CornerSights sights;
+std::array<PointSight, 4> corners_of(const SeenMarker& seen, const Detection& detection) {
+  std::array<PointSight, 4> sights;
   const auto corners = square_corners(seen.marker->size_m);
   for (std::size_t i = 0; i < 4; ++i)
     sights[i] = {&seen.camera->lens, seen.camera->imager_from_world,
@@ -36,15 +34,17 @@ CornerSights sights_of(const SeenMarker& seen, const Detection& detection) {
   return sights;
 }
 
-// The detection of this marker that agrees best with a pose, and its cost.
-std::pair<const Detection*, double> most_consistent(const SeenMarker& seen, const Pose& world_from_body) {
-  const Detection* best = nullptr;
+// The corners of this marker's detection that agrees best with a pose, and their cost; nullptr when none has
+// pixels.
+std::pair<const std::array<PointSight, 4>*, double> most_consistent(const SeenMarker& seen,
+                                                                    const Pose& world_from_body) {
+  const std::array<PointSight, 4>* best = nullptr;
   double least = std::numeric_limits<double>::infinity();
-  for (const Detection* detection : seen.detections) {
-    const double value = cost(sights_of(seen, *detection), world_from_body, k_huber);
+  for (const std::array<PointSight, 4>& corners : seen.corners) {
+    const double value = cost(corners, world_from_body, k_huber);
     if (value < least) {
       least = value;
-      best = detection;
+      best = &corners;
     }
   }
   return {best, least};
@@ -100,9 +100,12 @@ Sighting sighting(const Body& body, std::span<const View> views) {
   Sighting all;
   for (const View& view : views)
     for (const BodyMarker& marker : body.markers) {
-      SeenMarker seen{&marker, view.camera, {}};
+      SeenMarker seen{&marker, view.camera, {}, {}};
       for (const Detection& detection : view.detections)
-        if (is_marker(detection.marker, marker.marker)) seen.detections.push_back(&detection);
+        if (is_marker(detection.marker, marker.marker)) {
+          seen.detections.push_back(&detection);
+          seen.corners.push_back(corners_of(seen, detection));
+        }
       if (!seen.detections.empty()) all.push_back(std::move(seen));
     }
   return all;
@@ -110,11 +113,12 @@ Sighting sighting(const Body& body, std::span<const View> views) {
 
 ChosenCorners corners_at(const Sighting& sighting, const Pose& world_from_body) {
   ChosenCorners chosen;
+  chosen.sights.reserve(4 * sighting.size());
   for (const SeenMarker& seen : sighting) {
-    const Detection* detection = most_consistent(seen, world_from_body).first;
-    if (!detection) continue;
+    const std::array<PointSight, 4>* corners = most_consistent(seen, world_from_body).first;
+    if (!corners) continue;
     ++chosen.marker_count;
-    for (const PointSight& sight : sights_of(seen, *detection)) chosen.sights.push_back(sight);
+    chosen.sights.insert(chosen.sights.end(), corners->begin(), corners->end());
   }
   return chosen;
 }

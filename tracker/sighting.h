@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -24,6 +25,7 @@ struct SeenMarker {
   const BodyMarker* marker = nullptr;
   const Imager* camera = nullptr;
   std::vector<const Detection*> detections;
+  std::vector<std::array<PointSight, 4>> corners;  ///< of each of them
 };
 
 /// A body's markers in the pictures of one moment. Borrows bodies, cameras and detections.
