@@ -23,18 +23,30 @@ Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& w) {
   return Eigen::Matrix3d::Identity() + first * cross + second * cross * cross;
 }
 
-Matrix18d transition(const Vector6d& delta, double dt) {
-  Matrix18d f = Matrix18d::Identity();
-  const Matrix6d one = Matrix6d::Identity();
-  f.block<6, 6>(0, 6) = dt * one;
-  f.block<6, 6>(0, 12) = 0.5 * dt * dt * one;
-  f.block<6, 6>(6, 12) = dt * one;
-  const Eigen::Matrix3d jacobian = left_jacobian(delta.head<3>());
-  f.block<3, 3>(0, 0) = exp_rotation(delta.head<3>()).toRotationMatrix();
-  f.block<3, 3>(0, 6) = dt * jacobian;
-  f.block<3, 3>(0, 12) = 0.5 * dt * dt * jacobian;
-  return f;
-}
+// Derivative of a motion after `dt` seconds, in which it moves by `delta`, by the motion before:
+//   [diag(R, 1)  dt diag(J, 1)  dt²/2 diag(J, 1)]
+//   [    0             1               dt       ]
+//   [    0             0               1        ]
+class Transition {
+ public:
+  Transition(const Vector6d& delta, double dt)
+      : dt_(dt),
+        turn_(exp_rotation(delta.head<3>()).toRotationMatrix()),
+        jacobian_(left_jacobian(delta.head<3>())) {}
+
+  Matrix18d operator*(const Matrix18d& m) const {
+    const Eigen::Matrix<double, 6, 18> way = dt_ * m.middleRows<6>(6) + 0.5 * dt_ * dt_ * m.bottomRows<6>();
+    Matrix18d out = m;
+    out.topRows<3>() = turn_ * m.topRows<3>() + jacobian_ * way.topRows<3>();
+    out.middleRows<3>(3) += way.bottomRows<3>();
+    out.middleRows<6>(6) += dt_ * m.bottomRows<6>();
+    return out;
+  }
+
+ private:
+  double dt_;
+  Eigen::Matrix3d turn_, jacobian_;
+};
 
 // Integral of white jerk over dt (Bar-Shalom, Li and Kirubarajan, "Estimation with applications to tracking
 // and navigation", 6.2.3), and of white velocity.
@@ -80,8 +92,8 @@ Motion propagated(const Motion& motion, double seconds, const MotionNoise& noise
   Motion later = motion;
   later.world_from_body = boxplus(motion.world_from_body, delta);
   later.velocity += seconds * motion.acceleration;
-  const Matrix18d f = transition(delta, seconds);
-  later.covariance = symmetric(f * motion.covariance * f.transpose() + grown(noise, seconds));
+  const Transition f(delta, seconds);
+  later.covariance = symmetric(f * (f * motion.covariance).transpose() + grown(noise, seconds));
   return later;
 }
 
@@ -94,7 +106,8 @@ Motion corrected(const Motion& motion, const PoseFit& fit) {
   const Eigen::Matrix<double, 18, 6> gain =
       prior.llt().solve(motion.covariance.leftCols<6>().transpose()).transpose();
   Motion after = moved(motion, gain * boxminus(fit.world_from_body, motion.world_from_body));
-  after.covariance = symmetric(motion.covariance + gain * (fit.covariance - prior) * gain.transpose());
+  const Eigen::Matrix<double, 18, 6> change = gain * (fit.covariance - prior);
+  after.covariance = symmetric(motion.covariance + change.lazyProduct(gain.transpose()));
   return after;
 }
 
