@@ -9,7 +9,37 @@ EigenPairs6 eigen_pairs(const Matrix6d& symmetric) {
   return {solver.eigenvalues(), solver.eigenvectors()};
 }
 
-Vector6d solved(const Matrix6d& symmetric, const Vector6d& b) { return symmetric.ldlt().solve(b); }
+namespace {
+
+// By L D L^T without pivots; false when the matrix is not surely positive definite.
+bool solve_definite(const Matrix6d& m, const Vector6d& b, Vector6d* x) {
+  constexpr double k_least_pivot = 1e-12;  // of its diagonal
+  Matrix6d l, ld;
+  for (int j = 0; j < 6; ++j) {
+    for (int i = j; i < 6; ++i) {
+      double sum = m(i, j);
+      for (int k = 0; k < j; ++k) sum -= l(i, k) * ld(j, k);
+      ld(i, j) = sum;
+    }
+    if (!(ld(j, j) > k_least_pivot * m(j, j))) return false;
+    for (int i = j; i < 6; ++i) l(i, j) = ld(i, j) / ld(j, j);
+  }
+  *x = b;
+  for (int i = 0; i < 6; ++i)
+    for (int k = 0; k < i; ++k) (*x)[i] -= l(i, k) * (*x)[k];
+  for (int i = 5; i >= 0; --i) {
+    (*x)[i] /= ld(i, i);
+    for (int k = i + 1; k < 6; ++k) (*x)[i] -= l(k, i) * (*x)[k];
+  }
+  return true;
+}
+
+}  // namespace
+
+Vector6d solved(const Matrix6d& symmetric, const Vector6d& b) {
+  Vector6d x;
+  return solve_definite(symmetric, b, &x) ? x : Vector6d(symmetric.ldlt().solve(b));
+}
 
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& m) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);

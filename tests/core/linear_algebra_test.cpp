@@ -24,9 +24,12 @@ TEST(LinearAlgebra, EigenPairsAscendAndMakeTheMatrix) {
 
 TEST(LinearAlgebra, SolvesSymmetricEquations) {
   auto rng = test::test_rng();
-  const Matrix6d root = random_matrix(&rng), symmetric = root * root.transpose() + Matrix6d::Identity();
+  const Matrix6d root = random_matrix(&rng);
   const Vector6d b = root.col(0);
-  EXPECT_LT((symmetric * solved(symmetric, b) - b).norm(), 1e-11);
+  const Matrix6d definite = root * root.transpose() + Matrix6d::Identity(),
+                 indefinite = root + root.transpose();
+  for (const Matrix6d& symmetric : {definite, indefinite})
+    EXPECT_LT((symmetric * solved(symmetric, b) - b).norm(), 1e-11);
 }
 
 TEST(LinearAlgebra, NearestRotationIsOneAndIsFoundInNoise) {
