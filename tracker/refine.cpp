@@ -424,6 +424,36 @@ LIMN_SIMD Spread new_residuals(const double* __restrict d,
   return {squares, kept, largest};
 }
 
+constexpr std::size_t k_few = 64;
+
+// The middle one of values that are not negative, k_few at most: all are compared with all, and no branch
+// goes wrong.
+LIMN_SIMD float median_of_few(const float* __restrict values, std::size_t count) {
+  std::array<float, k_few> lanes;
+  std::array<std::int32_t, k_few> smaller{};
+  for (std::size_t k = 0; k < k_few; ++k)
+    lanes[k] = k < count ? values[k] : std::numeric_limits<float>::infinity();
+  for (std::size_t i = 0; i < count; ++i) {
+    const float value = values[i];
+    for (std::size_t k = 0; k < k_few; ++k) smaller[k] += value < lanes[k] ? 1 : 0;
+  }
+  const auto rank = static_cast<std::int32_t>(count / 2);
+  float middle = 0;
+#pragma omp simd reduction(max : middle)
+  for (std::size_t k = 0; k < k_few; ++k) {
+    const float value = smaller[k] <= rank ? lanes[k] : 0;
+    middle = value > middle ? value : middle;
+  }
+  return middle;
+}
+
+float median(std::vector<float>& values) {
+  if (values.size() <= k_few) return median_of_few(values.data(), values.size());
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 // The line through two crossings that the most others lie on: least squares would start between a side's own
 // edge and that of what covers a part of it (Torr and Zisserman 2000, "MLESAC").
 void EdgeRefiner::find_consensus(EdgeLine* line) {
@@ -503,10 +533,11 @@ double EdgeRefiner::fit_terms(int terms, bool from_line, EdgeLine* line) {
     // Settled, with nothing to reject in the rounds to come.
     if (round > 0 && moved < k_settled_px && spread.largest < k_reject * std::max(scale, k_min_scale_px))
       break;
-    deviations_.assign(residual, residual + count);
-    const auto middle = deviations_.begin() + static_cast<std::ptrdiff_t>(count / 2);
-    std::nth_element(deviations_.begin(), middle, deviations_.end());
-    scale = std::max(1.4826 * *middle, 1e-3);
+    if (round + 1 == k_rounds) break;
+    deviations_.resize(count);
+    std::transform(residual, residual + count, deviations_.begin(),
+                   [](double deviation) { return static_cast<float>(deviation); });
+    scale = std::max(1.4826 * median(deviations_), 1e-3);
   }
   return variance;
 }

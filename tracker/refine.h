@@ -84,8 +84,8 @@ class EdgeRefiner {
   std::array<double, 256> light_;  // of a grey level, 0 ... 255
   std::vector<Row> rows_;
   Crossings crossings_;
-  std::vector<double> gradients_;   // of all rows, reach_ * 2 each
-  std::vector<double> deviations_;  // scratch of the robust scale
+  std::vector<double> gradients_;  // of all rows, reach_ * 2 each
+  std::vector<float> deviations_;  // scratch of the robust scale
 
  public:
   /// A side's line v = offset + slope * d + curvature * d^2, d = u - u_middle, in the raw picture less the
