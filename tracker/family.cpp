@@ -15,6 +15,7 @@
 #include "core/opencv_file.h"
 #include "core/predefined_family.h"
 #include "tracker/barcode.h"
+#include "tracker/simd.h"
 
 namespace limn::tracker {
 namespace {
@@ -282,21 +283,33 @@ cv::Mat drawn_template(const TemplatePattern& pattern, int pixels_per_cell) {
 
 }  // namespace
 
+namespace {
+
+// (1, 2, 1) / 4 of three lines, value by value.
+LIMN_SIMD void smooth_across(const float* __restrict before,
+                             const float* __restrict here,
+                             const float* __restrict after,
+                             std::size_t count,
+                             float* __restrict into) {
+  for (std::size_t i = 0; i < count; ++i) into[i] = 0.25f * (before[i] + 2 * here[i] + after[i]);
+}
+
+}  // namespace
+
+// The ends go on outside.
 void smooth(std::span<float> values, std::span<float> scratch, int size) {
   const auto count = static_cast<std::size_t>(size);
-  // Along lines of values that lie `step` apart; the lines begin `line` apart. The ends go on outside.
-  const auto smooth_lines = [&](std::span<const float> from, std::span<float> to, std::size_t line,
-                                std::size_t step) {
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t first = i * line;
-      const std::size_t last = first + (count - 1) * step;
-      for (std::size_t at = first; at <= last; at += step)
-        to[at] =
-            0.25f * (from[at == first ? at : at - step] + 2 * from[at] + from[at == last ? at : at + step]);
-    }
-  };
-  smooth_lines(values, scratch, count, 1);
-  smooth_lines(scratch, values, 1, count);
+  const std::size_t last = count - 1;
+  for (std::size_t row = 0; row < count; ++row) {
+    const float* line = &values[row * count];
+    float* into = &scratch[row * count];
+    into[0] = 0.25f * (3 * line[0] + line[std::min<std::size_t>(1, last)]);
+    if (count > 2) smooth_across(line, line + 1, line + 2, count - 2, into + 1);
+    into[last] = 0.25f * (line[last == 0 ? 0 : last - 1] + 3 * line[last]);
+  }
+  for (std::size_t row = 0; row < count; ++row)
+    smooth_across(&scratch[(row == 0 ? row : row - 1) * count], &scratch[row * count],
+                  &scratch[(row == last ? row : row + 1) * count], count, &values[row * count]);
 }
 
 std::vector<float> smoothed(std::vector<float> values, int size) {

@@ -249,16 +249,26 @@ double mean_relative(const float* fractions, std::size_t places, double limit) {
   return sum / static_cast<double>(places);
 }
 
+LIMN_SIMD float sum_of(const float* __restrict values, std::size_t count) {
+  float sum = 0;
+#pragma omp simd reduction(+ : sum)
+  for (std::size_t i = 0; i < count; ++i) sum += values[i];
+  return sum;
+}
+
+LIMN_SIMD float product_of(const float* a, const float* b, std::size_t count) {
+  float sum = 0;
+#pragma omp simd reduction(+ : sum)
+  for (std::size_t i = 0; i < count; ++i) sum += a[i] * b[i];
+  return sum;
+}
+
 void SeenSquare::normalise(Values* values) {
   Values scratch;
   smooth(*values, scratch, k_places);
-  const float mean = std::accumulate(values->begin(), values->end(), 0.0f) / (k_places * k_places);
-  float squares = 1e-9f;
-  for (float& value : *values) {
-    value -= mean;
-    squares += value * value;
-  }
-  const float scale = 1 / std::sqrt(squares);
+  const float mean = sum_of(values->data(), values->size()) / (k_places * k_places);
+  for (float& value : *values) value -= mean;
+  const float scale = 1 / std::sqrt(1e-9f + product_of(values->data(), values->data(), values->size()));
   for (float& value : *values) value *= scale;
 }
 
@@ -298,7 +308,7 @@ double SeenSquare::correlation(const Pattern& pattern) const {
     }
   }
   normalise(&shown);
-  return std::inner_product(shown.begin(), shown.end(), values_.begin(), 0.0f);
+  return product_of(shown.data(), values_.data(), values_.size());
 }
 
 // Logarithm of the likelihood ratio of a pattern to none: `k_independent` values in Gaussian noise whose
