@@ -196,6 +196,7 @@ void Watcher::note_loose(std::span<const std::size_t> cameras) {
 // Which of them lie still.
 void Watcher::follow_loose() {
   watched_.loose.clear();
+  if (loose_.empty()) return;
   for (const Track& track : tracker::predicted(watched_.motions, watched_.captured_at,
                                                tracker::Prediction::filtered, options_.motion)) {
     const auto loose = std::find_if(loose_.begin(), loose_.end(), [&](const Loose& l) {
