@@ -281,10 +281,6 @@ cv::Mat drawn_template(const TemplatePattern& pattern, int pixels_per_cell) {
   });
 }
 
-}  // namespace
-
-namespace {
-
 // (1, 2, 1) / 4 of three lines, value by value.
 LIMN_SIMD void smooth_across(const float* __restrict before,
                              const float* __restrict here,
