@@ -222,12 +222,14 @@ BodyMotion seen_again(const BodyMotion& known,
   BodyMotion after = known;
   after.looked_at = captured_at;
   const double unseen = seconds_between(known.measured_at, captured_at);
+  const bool was_lost = unseen > lost_after_s(known, model);
   std::vector<Pose> foretold;
-  if (unseen <= model.extrapolation_limit_s)
-    for (const Branch& branch : known.branches) foretold.push_back(pose_after(branch.moving, unseen));
+  if (!was_lost)
+    for (const Branch& branch : known.branches)
+      foretold.push_back(pose_after(branch.moving, std::min(unseen, model.extrapolation_limit_s)));
   const std::vector<PoseFit> fits = minima(seen, foretold);
   if (fits.empty()) return after;
-  if (unseen > model.extrapolation_limit_s) return started(body, seen, fits, captured_at);
+  if (was_lost) return started(body, seen, fits, captured_at);
   if (auto branches = advanced(known, seen, fits, unseen, model)) {
     after.branches = std::move(*branches);
     note_measured(seen, fits, captured_at, &after);
@@ -238,6 +240,11 @@ BodyMotion seen_again(const BodyMotion& known,
 }
 
 }  // namespace
+
+double lost_after_s(const BodyMotion& motion, const MotionModel& model) {
+  constexpr double k_gaps = 1.5;
+  return std::max(model.extrapolation_limit_s, k_gaps * std::min(motion.gaps_s[0], motion.gaps_s[1]));
+}
 
 MotionNoise still_noise(const MotionModel& model) {
   return {.turn_drift = model.turn_drift * model.turn_drift, .drift = model.drift * model.drift};
@@ -263,7 +270,10 @@ std::vector<BodyMotion> observed(std::span<const BodyMotion> known,
     } else if (captured_at <= before->looked_at) {
       motions.push_back(*before);
     } else {
-      motions.push_back(seen_again(*before, body, seen, captured_at, model));
+      BodyMotion last = *before;
+      last.gaps_s = {before->gaps_s[1], seconds_between(before->looked_at, captured_at)};
+      motions.push_back(seen_again(last, body, seen, captured_at, model));
+      motions.back().gaps_s = last.gaps_s;
     }
   }
   return motions;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <span>
 #include <string>
 #include <vector>
@@ -24,7 +25,8 @@ struct MotionModel {
   double turn_drift = 0.9e-3;  ///< rad per square root of a second (0.05°)
   double starts_per_s = 0.5;   ///< how often a still body begins to move
   double stops_per_s = 1;      ///< how often a moving one comes to rest
-  /// For so long an unseen body is carried on; then it is lost.
+  /// For so long an unseen body is carried on; then it is lost. Where pictures come more rarely, it stays there
+  /// until one and a half times between them have passed.
   double extrapolation_limit_s = 0.3;
 };
 
@@ -58,7 +60,13 @@ struct BodyMotion {
   int misfits = 0;    ///< pictures in a row that contradict the motion
   Stamp measured_at;  ///< of the newest picture that showed the body
   Stamp looked_at;    ///< of the newest picture
+  /// Between the newest three pictures, the older first; 0: not known yet.
+  std::array<double, 2> gaps_s = {};
 };
+
+/// A body unseen for longer is lost: the model's limit, or one and a half times between pictures where these
+/// come more rarely. Of the last two the shorter: a pause is no rate.
+double lost_after_s(const BodyMotion& motion, const MotionModel& model);
 
 /// What is known after one more moment's pictures (of all cameras that took one): the step of the filter. The
 /// corners themselves are its measurement, with their covariance, so that a marker seen from straight ahead,

@@ -69,9 +69,12 @@ std::vector<Track> predicted(std::span<const BodyMotion> known,
   std::vector<Track> tracks;
   for (const BodyMotion& motion : known) {
     const double unseen = std::max(0.0, seconds_between(motion.measured_at, at));
-    const bool lost =
-        seconds_between(motion.measured_at, decided_at.value_or(at)) > model.extrapolation_limit_s;
-    const Believed now = believed(motion, lost ? 0 : unseen, how, model);
+    const Stamp decided = decided_at.value_or(at);
+    const bool lost = seconds_between(motion.measured_at, decided) > lost_after_s(motion, model);
+    const double carried = std::min(unseen, model.extrapolation_limit_s + seconds_between(decided, at));
+    Believed now = believed(motion, lost ? 0 : carried, how, model);
+    const double stayed = lost ? 0 : unseen - carried;
+    now.covariance += left_out(k_hand_turn * stayed, k_hand_speed * stayed);
     Track track;
     track.body = motion.body;
     track.world_from_body = now.world_from_body;

@@ -307,6 +307,30 @@ TEST(Predicted, UnseenBodyIsExtrapolatedThenLostAtTheLimit) {
   EXPECT_TRUE(test::pose_near(predicted(known, at(now))[0].world_from_body, hand.at(now), 1_deg, 2_mm));
 }
 
+TEST(BodyMotion, IsFilteredAndNotLostWhereACameraTakesTwoPicturesASecond) {
+  auto rng = test::test_rng();
+  const Imager camera = camera_1080p();
+  const Body body = body_of(1);
+  const Pose truth(exp_rotation({0.4, 0.1, 0}), {0.05, 0, 1.2});
+  constexpr double k_every_s = 0.5;
+  std::vector<BodyMotion> known;
+  double filtered = 0, alone = 0, now = 0;
+  for (int i = 0; i < 80; ++i) {
+    now = k_every_s * i;
+    known = step(known, body, camera, detections_of(body, camera, truth, 0.1, rng), now);
+    ASSERT_EQ(known.size(), 1u);
+    if (i < 20) continue;
+    EXPECT_NE(predicted(known, at(now + 0.49))[0].sight, Sight::lost);
+    filtered += boxminus(predicted(known, at(now))[0].world_from_body, truth).tail<3>().squaredNorm();
+    alone += boxminus(known[0].fixes.back().world_from_body, truth).tail<3>().squaredNorm();
+  }
+  EXPECT_LT(filtered, 0.25 * alone);
+  EXPECT_EQ(predicted(known, at(now + 0.74))[0].sight, Sight::measured);
+  EXPECT_GT(predicted(known, at(now + 0.74))[0].covariance(3, 3),
+            predicted(known, at(now + 0.3))[0].covariance(3, 3));
+  EXPECT_EQ(predicted(known, at(now + 0.76))[0].sight, Sight::lost);
+}
+
 TEST(BodyMotion, PassesOverAFalseMarkerButBelievesTwo) {
   auto rng = test::test_rng();
   const Imager camera = camera_1080p();
