@@ -186,7 +186,7 @@ void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup, const
   fmt::print("{}: {} frames of 1280x1024, {:.1f} markers each; mean processor ms\n", wire.name, decode.size(),
              static_cast<double>(markers) / static_cast<double>(decode.size()));
   fmt::print(
-      "decode {:.2f}, find markers {:.2f}, poses and motions {:.2f}, hand-over and prediction {:.2f}: "
+      "decode {:.2f}, find markers {:.2f}, poses and motions {:.2f} (by the wall), hand-over and prediction {:.2f}: "
       "{:.2f}\n",
       mean(decode), mean(watch) - mean(filter), mean(filter), mean(hand), ours);
   fmt::print(
