@@ -24,6 +24,8 @@ constexpr double k_same_branch = 0.02;
 // (1e-10).
 constexpr double k_max_excess = 60;
 constexpr int k_misfits_believed = 2;
+// While there is one branch, a second is looked for in one of so many pictures.
+constexpr int k_second_every = 3;
 // Standard deviations of velocity and acceleration of a body that has just come into view, and of one that
 // was still.
 constexpr double k_seen_turn = 2, k_seen_speed = 0.5;                     // rad/s, m/s
@@ -227,7 +229,9 @@ BodyMotion seen_again(const BodyMotion& known,
   if (!was_lost)
     for (const Branch& branch : known.branches)
       foretold.push_back(pose_after(branch.moving, std::min(unseen, model.extrapolation_limit_s)));
-  const std::vector<PoseFit> fits = minima(seen, foretold);
+  after.of_one = known.branches.size() == 1 ? known.of_one + 1 : 0;
+  const std::vector<PoseFit> fits =
+      minima(seen, foretold, after.of_one % k_second_every == 0 ? Minima::all : Minima::foretold);
   if (fits.empty()) return after;
   if (was_lost) return started(body, seen, fits, captured_at);
   if (auto branches = advanced(known, seen, fits, unseen, model)) {

@@ -58,6 +58,7 @@ struct BodyMotion {
   int marker_count = 0;
   double rms_px = 0;
   int misfits = 0;    ///< pictures in a row that contradict the motion
+  int of_one = 0;     ///< pictures with one branch alone
   Stamp measured_at;  ///< of the newest picture that showed the body
   Stamp looked_at;    ///< of the newest picture
   /// Between the newest three pictures, the older first; 0: not known yet.

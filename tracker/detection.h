@@ -5,24 +5,16 @@
 #include <optional>
 
 #include "core/marker.h"
+#include "tracker/seen_pattern.h"
 
 namespace limn::tracker {
-
-/// What the fit of a marker's whole pattern made of its corners, where blur mixes neighbouring edges
-/// (pattern_fit.h): it changes little from picture to picture, so that Detector::follow need not fit each.
-struct PatternShift {
-  std::array<Eigen::Vector2d, 4> px;          ///< corners by the pattern minus corners by the sides alone
-  std::array<Eigen::Matrix2d, 4> covariance;  ///< of the corners, as fitted (px^2)
-  std::array<double, 4> side_px;              ///< when it was fitted
-  double blur_px = 0;                         ///< likewise, as the sides alone showed it
-  int age = 0;                                ///< pictures since
-};
 
 /// The light at a marker's sides when none of them was found to lie on a shadow's edge (shadow_edges.h).
 /// While it stays, no shadow has come, and Detector::follow need not look for one.
 struct UnshadowedSides {
   std::array<double, 4> outside_level, inside_level;  ///< grey levels
   int age = 0;                                        ///< pictures since
+  int kept_for = 0;                                   ///< pictures
 };
 
 /// A marker found in a picture.
@@ -39,7 +31,9 @@ struct Detection {
   /// Probability that the id is right, 0.9 … 1, for codes, barcodes and templates alike (identify.h): of what
   /// is as sure as this, so many are right.
   double score = 0;
-  std::optional<PatternShift> by_pattern;
+  /// Where blur mixes neighbouring edges: the marker's whole pattern, by which the corners were found, and
+  /// from which Detector::follow finds it in the next picture.
+  std::optional<SeenPattern> by_pattern;
   std::optional<UnshadowedSides> unshadowed;
 };
 

@@ -69,34 +69,23 @@ bool is_blurred(const RefinedQuad& quad, const SeenCells& cells, double cell_sig
   return shortest_side(Quad{quad.corners_px}) < cell_sigmas * blur_of(quad) * cells.count;
 }
 
-// A shift is kept for so many pictures, and while the blur and all sides are as when it was fitted; that no
-// shadow's edge lies at a side, while the light on both sides of it is.
-constexpr int k_keep_pictures = 30;
-constexpr double k_like_blur = 0.15, k_like_side = 0.03;
+// A pattern is followed from picture to picture, and no shadow's edge is looked for at a side while the light
+// on both sides of it is as it was. Either for so many pictures, and for twice as many, up to a limit, each
+// time that it is found again.
+constexpr int k_keep_pictures = 30, k_keep_at_most = 120;
 constexpr double k_like_level = 0.06, k_like_dark_level = 3;  // a share of it, and grey levels at least
 
-double side_of(const RefinedQuad& quad, std::size_t i) {
-  return (quad.corners_px[(i + 1) % 4] - quad.corners_px[i]).norm();
-}
-
 // Corner i of the marker is corner_of(i) of the quadrilateral that showed it.
-std::size_t corner_of(const Identity& identity, std::size_t i) { return (i + identity.first_corner) % 4; }
-
-bool still_holds(const PatternShift& shift, const Identity& identity, const RefinedQuad& quad) {
-  if (shift.age >= k_keep_pictures) return false;
-  if (std::abs(blur_of(quad) - shift.blur_px) > k_like_blur * shift.blur_px) return false;
-  for (std::size_t i = 0; i < 4; ++i)
-    if (std::abs(side_of(quad, corner_of(identity, i)) - shift.side_px[i]) > k_like_side * shift.side_px[i])
-      return false;
-  return true;
+template <class Shown>
+std::size_t corner_of(const Shown& shown, std::size_t i) {
+  return (i + shown.first_corner) % 4;
 }
 
 bool is_like_level(double before, double now) {
   return std::abs(now - before) < std::max(k_like_dark_level, k_like_level * before);
 }
 
-bool still_holds(const UnshadowedSides& known, const Identity& identity, const RefinedQuad& quad) {
-  if (known.age >= k_keep_pictures) return false;
+bool is_like(const UnshadowedSides& known, const Identity& identity, const RefinedQuad& quad) {
   for (std::size_t i = 0; i < 4; ++i) {
     const std::size_t side = corner_of(identity, i);
     if (!is_like_level(known.outside_level[i], quad.outside_level[side]) ||
@@ -105,6 +94,8 @@ bool still_holds(const UnshadowedSides& known, const Identity& identity, const R
   }
   return true;
 }
+
+int kept_longer(int pictures) { return std::min(2 * pictures, k_keep_at_most); }
 
 UnshadowedSides unshadowed_sides(const Identity& identity, const RefinedQuad& quad) {
   UnshadowedSides sides;
@@ -277,13 +268,36 @@ void Detector::follow(const cv::Mat& grey,
   add_read(std::nullopt, detections);
 }
 
-// First from its old corners at once, then from all quads about there, then from what covers it has left.
+// By the pattern that it showed there.
+std::optional<Detector::Read> Detector::follow_by_pattern(const cv::Mat& grey,
+                                                          const Lens* lens,
+                                                          const Detection& last) {
+  const auto known = aged(last.by_pattern);
+  if (!known || known->age >= known->kept_for) return std::nullopt;
+  std::array<Eigen::Vector2d, 4> corners_px;
+  for (std::size_t i = 0; i < 4; ++i) corners_px[corner_of(*known, i)] = last.corners_px[i];
+  const auto found =
+      follow_pattern(grey, workers_[0].refiner.light(), corners_px, *known, lens, &workers_[0].fit);
+  if (!found) return std::nullopt;
+  Read read;
+  Detection& detection = read.detection = last;
+  for (std::size_t i = 0; i < 4; ++i) {
+    detection.corners_px[i] = found->corners_px[corner_of(*known, i)];
+    detection.corner_covariance[i] = found->corner_covariance[corner_of(*known, i)];
+  }
+  detection.by_pattern = found->seen;
+  detection.unshadowed = aged(last.unshadowed);
+  return read;
+}
+
+// By its pattern, or else first from its old corners at once, then from all quads about there, then from what
+// covers it has left.
 std::optional<Detector::Read> Detector::found_again(const cv::Mat& grey,
                                                     const Lens* lens,
                                                     const Detection& last) {
+  if (auto followed = follow_by_pattern(grey, lens, last)) return followed;
   const double reach = 0.5 * longest_side(last);
-  Quad quad{last.corners_px, reach};
-  auto found = read(grey, quad, lens, Reading::open, workers_[0], &last);
+  auto found = read(grey, {last.corners_px, reach}, lens, Reading::open, workers_[0], &last);
   if (found && found->detection.marker == last.marker) return found;
   Eigen::AlignedBox2d box;
   for (const Eigen::Vector2d& corner : last.corners_px) box.extend(corner);
@@ -371,17 +385,18 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
   Detection& detection = read.detection;
   if (is_followed) detection.unshadowed = aged(last->unshadowed);
   auto shadows = ShadowEdges::none;
-  if (!detection.unshadowed || !still_holds(*detection.unshadowed, *identity, *refined)) {
+  const bool is_light_known = detection.unshadowed && is_like(*detection.unshadowed, *identity, *refined);
+  if (!is_light_known || detection.unshadowed->age >= detection.unshadowed->kept_for) {
+    UnshadowedSides sides = unshadowed_sides(*identity, *refined);
+    sides.kept_for = is_light_known ? kept_longer(detection.unshadowed->kept_for) : k_keep_pictures;
     detection.unshadowed.reset();
-    const UnshadowedSides sides = unshadowed_sides(*identity, *refined);
     shadows = leave_shadow_edges(grey, worker.refiner.light(), identity->cells, lens, &*refined);
     if (shadows == ShadowEdges::none) detection.unshadowed = sides;
   }
   if (shadows != ShadowEdges::left) {
-    const auto shift = is_followed ? aged(last->by_pattern) : std::nullopt;
-    const bool overlap = !refined->separate || is_blurred(*refined, identity->cells, k_cell_sigmas);
-    if (overlap || (shift && still_holds(*shift, *identity, *refined)))
-      detection.by_pattern = settle_overlapping_edges(grey, lens, *identity, worker, shift, &*refined);
+    const auto known = is_followed ? aged(last->by_pattern) : std::nullopt;
+    if (!refined->separate || is_blurred(*refined, identity->cells, k_cell_sigmas))
+      detection.by_pattern = settle_overlapping_edges(grey, lens, *identity, worker, known, &*refined);
     if (!detection.by_pattern && !covered && !is_blurred(*refined, identity->cells, k_retreat_sigmas) &&
         std::ranges::all_of(refined->corner_visible, std::identity()))
       read.retreat = find_ink_retreat(grey, worker.refiner.light(), refined->corners_px, identity->cells);
@@ -398,35 +413,36 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
 }
 
 // Edges whose blur overlaps with others': by the whole pattern, or else with the doubt that they deserve.
-std::optional<PatternShift> Detector::settle_overlapping_edges(const cv::Mat& grey,
-                                                               const Lens* lens,
-                                                               const Identity& identity,
-                                                               Worker& worker,
-                                                               const std::optional<PatternShift>& last,
-                                                               RefinedQuad* refined) const {
-  if (last && still_holds(*last, identity, *refined)) {
-    for (std::size_t i = 0; i < 4; ++i) {
-      const std::size_t corner = corner_of(identity, i);
-      refined->corners_px[corner] += last->px[i];
-      refined->corner_covariance[corner] += last->covariance[i];
+std::optional<SeenPattern> Detector::settle_overlapping_edges(const cv::Mat& grey,
+                                                              const Lens* lens,
+                                                              const Identity& identity,
+                                                              Worker& worker,
+                                                              const std::optional<SeenPattern>& known,
+                                                              RefinedQuad* refined) const {
+  const auto& light = worker.refiner.light();
+  const bool is_kept = known && known->age < known->kept_for;
+  if (is_kept) {
+    std::array<Eigen::Vector2d, 4> corners_px;
+    for (std::size_t i = 0; i < 4; ++i)
+      corners_px[corner_of(*known, i)] = refined->corners_px[corner_of(identity, i)];
+    if (const auto followed = follow_pattern(grey, light, corners_px, *known, lens, &worker.fit)) {
+      for (std::size_t i = 0; i < 4; ++i) {
+        const std::size_t corner = corner_of(identity, i);
+        refined->corners_px[corner] = followed->corners_px[corner_of(*known, i)];
+        refined->corner_covariance[corner] = followed->corner_covariance[corner_of(*known, i)];
+      }
+      return followed->seen;
     }
-    return *last;
   }
   const bool may_fit = options_.pattern_fits && identity.cells.count > 0 &&
                        shortest_side(Quad{refined->corners_px}) > k_fit_above_px;
   if (may_fit)
-    if (auto fitted =
-            fit_pattern(grey, worker.refiner.light(), *refined, identity.cells, lens, &worker.fit)) {
-      PatternShift shift;
-      shift.blur_px = blur_of(*refined);
-      for (std::size_t i = 0; i < 4; ++i) {
-        const std::size_t corner = corner_of(identity, i);
-        shift.px[i] = fitted->corners_px[corner] - refined->corners_px[corner];
-        shift.covariance[i] = fitted->corner_covariance[corner];
-        shift.side_px[i] = side_of(*refined, corner);
-      }
-      *refined = *fitted;
-      return shift;
+    if (auto fitted = fit_pattern(grey, light, *refined, identity.cells, lens, &worker.fit)) {
+      refined->corners_px = fitted->corners_px;
+      refined->corner_covariance = fitted->corner_covariance;
+      fitted->seen.first_corner = identity.first_corner;
+      fitted->seen.kept_for = known && !is_kept ? kept_longer(known->kept_for) : k_keep_pictures;
+      return fitted->seen;
     }
   const double doubt_px = k_overlap_doubt * blur_of(*refined);
   for (Eigen::Matrix2d& covariance : refined->corner_covariance)

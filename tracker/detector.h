@@ -103,6 +103,7 @@ class Detector {
   std::vector<InkRetreat> retreats_;  // of those read
 
   class UnreadQuads;
+  std::optional<Read> follow_by_pattern(const cv::Mat& grey, const Lens* lens, const Detection& last);
   std::optional<Read> found_again(const cv::Mat& grey, const Lens* lens, const Detection& last);
   void find_markers(
       const cv::Mat& grey, const Lens* lens, bool broken, std::vector<Detection>* detections, Crew& crew);
@@ -116,12 +117,12 @@ class Detector {
                            Reading reading,
                            Worker& worker,
                            const Detection* last = nullptr) const;
-  std::optional<PatternShift> settle_overlapping_edges(const cv::Mat& grey,
-                                                       const Lens* lens,
-                                                       const Identity& identity,
-                                                       Worker& worker,
-                                                       const std::optional<PatternShift>& last,
-                                                       RefinedQuad* refined) const;
+  std::optional<SeenPattern> settle_overlapping_edges(const cv::Mat& grey,
+                                                      const Lens* lens,
+                                                      const Identity& identity,
+                                                      Worker& worker,
+                                                      const std::optional<SeenPattern>& known,
+                                                      RefinedQuad* refined) const;
 };
 
 }  // namespace limn::tracker

@@ -23,7 +23,9 @@ constexpr std::size_t k_coarse_samples = 300;
 constexpr std::size_t k_moving_samples = 600;
 constexpr std::size_t k_samples = 400;
 constexpr std::size_t k_most_samples = 600;
+constexpr std::size_t k_followed_samples = 300;
 constexpr int k_rounds = 16;
+constexpr int k_rounds_followed = 4;
 constexpr double k_may_move_px = 1.0;     // blur below which motion tells nothing of its own
 constexpr double k_clearly_better = 0.9;  // in mean square residuals: motion against blur alone
 constexpr double k_max_motion_px = 30;
@@ -33,16 +35,21 @@ constexpr double k_max_residual = 0.075;  // of the contrast, RMS: above it the 
 constexpr double k_min_explained = 0.77;  // of perfect Gaussian residuals: 0.89
 constexpr double k_settled_px = 0.02;     // of a round: the next ones would add a quarter of it
 constexpr double k_roughly_settled_px = 0.03;
-constexpr double k_astray_px = 0.1;        // corners that still move so far at last have not settled
-constexpr double k_max_moved_px = 6;       // and half the motion
-constexpr double k_bend_evidence = 20;     // chi-square of four: flat paper shows as much once in 2000 times
-constexpr double k_max_bend = 0.1;         // of half a side
-constexpr std::size_t k_choice = 3;        // times as many pixels, of which the flat ones are left out
-constexpr int k_flat_stride = 8;           // but one in so many
-constexpr double k_rough_scale = 0.1;      // of the contrast
-constexpr double k_least_scale = 0.5;      // of light
-constexpr double k_bound = 0.15;           // of the contrast: residuals beyond tell no more
-constexpr double k_noise = 0.02;           // of the contrast, RMS: residuals that ask for no motion
+constexpr double k_followed_settled_px = 0.1;  // a quarter of it is less than the corners' noise
+constexpr double k_astray_px = 0.1;            // corners that still move so far at last have not settled
+constexpr double k_max_moved_px = 6;           // and half the motion
+constexpr double k_bend_evidence = 20;  // chi-square of four: flat paper shows as much once in 2000 times
+constexpr double k_max_bend = 0.1;      // of half a side
+constexpr std::size_t k_choice = 3;     // times as many pixels, of which the flat ones are left out
+constexpr std::size_t k_choice_of_seen = 2;
+constexpr double k_steep = 0.8;        // of the most that light changes over two pixels at an edge
+constexpr int k_flat_stride = 8;       // but one in so many
+constexpr double k_rough_scale = 0.1;  // of the contrast
+constexpr double k_least_scale = 0.5;  // of light
+constexpr double k_bound = 0.15;       // of the contrast: residuals beyond tell no more
+constexpr double k_noise = 0.02;       // of the contrast, RMS: residuals that ask for no motion
+// A pattern looks as it did while its contrast, blur, misfit and what is explained are within these.
+constexpr double k_like_contrast = 0.5, k_like_log_blur = 0.3, k_like_misfit = 1.5, k_like_explained = 0.06;
 constexpr double k_systematic_px = 0.002;  // as edge lines keep (refine.cpp)
 constexpr double k_most_outside_px = 10;   // of the samples, from the marker
 
@@ -84,6 +91,13 @@ Eigen::Vector2d middle_of(const RefinedQuad& quad) {
   return 0.25 * (c[0] + c[1] + c[2] + c[3]);
 }
 
+// Which of the pixels a fit takes, most of them at least.
+enum class Taken {
+  evenly,
+  at_known_edges,  // of the pattern
+  at_seen_edges
+};
+
 class PatternFit {
  public:
   PatternFit(const cv::Mat& grey,
@@ -101,7 +115,7 @@ class PatternFit {
     for (Eigen::Vector2d& corner : start_.corners_px) corner = straight_.straight(corner);
   }
 
-  std::optional<RefinedQuad> fit() {
+  std::optional<FittedPattern> fit() {
     const State begun = this->begun();
     take_samples(k_coarse_samples);
     Fitted rough;
@@ -116,13 +130,41 @@ class PatternFit {
         free.motion = true;
       }
     }
-    take_samples(free.motion ? k_moving_samples : k_samples, &rough.state);
+    least_scale_ = k_least_scale;
+    if (free.motion)
+      take_samples(k_moving_samples);
+    else
+      take_samples(k_samples, Taken::at_known_edges, &rough.state);
     Fitted fitted = settled(rough.state, free, k_settled_px);
     if (fitted.bend_evidence > k_bend_evidence) {
       free.bend = Bend::fitted;
       fitted = settled(fitted.state, free, k_settled_px);
     }
     return finished(fitted);
+  }
+
+  std::optional<FittedPattern> follow(const SeenPattern& known) {
+    has_ground_ = (known.look.margin.array() < k_no_margin).any();
+    margin_ = known.look.margin;
+    contrast_ = known.look.contrast();
+    least_scale_ = k_least_scale;
+    const bool moves = !known.look.motion.isZero();
+    if (moves)
+      take_samples(k_moving_samples);
+    else
+      take_samples(k_followed_samples, Taken::at_seen_edges);
+    Fitted fitted;
+    static_cast<Look&>(fitted.state) = known.look;
+    fitted.state.corners = start_.corners_px;
+    const Free free{.motion = moves, .bend = known.look.bend.isZero() ? Bend::none : Bend::fitted};
+    fitted = settled(fitted.state, free, k_followed_settled_px, k_rounds_followed);
+    if (!is_like(known, fitted)) return std::nullopt;
+    auto found = finished(fitted, known.correlation);
+    if (!found) return std::nullopt;
+    SeenPattern seen = known;
+    seen.look = found->seen.look;
+    found->seen = seen;
+    return found;
   }
 
  private:
@@ -141,8 +183,7 @@ class PatternFit {
   const LightFunctions& light_ = light_functions(light_versions() - 1);
   std::size_t count_ = 0;  // of the samples, of which the last is repeated up to padded_count()
 
-  double light_at(const Eigen::Vector2d& straight_px) const {
-    const Eigen::Vector2d px = straight_.bent(straight_px);
+  double light_at(const Eigen::Vector2d& px) const {
     const auto nearest = [](double at, int size) {
       return static_cast<int>(std::min(std::max(0.0, at), size - 1.0) + 0.5);
     };
@@ -172,7 +213,8 @@ class PatternFit {
       find_margin(s, &state);
     }
     margin_ = state.margin;
-    contrast_ = state.paper[0] - state.ink[0];
+    contrast_ = state.contrast();
+    least_scale_ = k_rough_scale * contrast_;
     return state;
   }
 
@@ -183,10 +225,12 @@ class PatternFit {
     constexpr int k_columns = 16;
     constexpr int k_reach = 24;  // half pixels
     std::array<double, k_reach> level{};
-    for (int d = 0; d < k_reach; ++d)
-      for (int i = 0; i < k_columns; ++i)
-        level[static_cast<std::size_t>(d)] +=
-            light_at(from + (i + 0.5) / k_columns * along + 0.5 * (d + 1) * outward) / k_columns;
+    for (int i = 0; i < k_columns; ++i) {
+      const Eigen::Vector2d at = from + (i + 0.5) / k_columns * along;
+      const Eigen::Vector2d bent = straight_.bent(at);  // and what is near by as much
+      for (int d = 0; d < k_reach; ++d)
+        level[static_cast<std::size_t>(d)] += light_at(bent + 0.5 * (d + 1) * outward) / k_columns;
+    }
     std::size_t top = 0;
     while (top + 1 < k_reach && level[top + 1] >= level[top]) ++top;
     const double lowest = *std::min_element(level.begin() + static_cast<std::ptrdiff_t>(top), level.end());
@@ -202,10 +246,8 @@ class PatternFit {
       }
   }
 
-  // About so many pixels over the marker and what blur mixes with it; those that show an edge of the `known`
-  // pattern come first.
-  void take_samples(std::size_t most, const State* known = nullptr) {
-    least_scale_ = known ? k_least_scale : k_rough_scale * contrast_;
+  // About so many pixels over the marker and what blur mixes with it.
+  void take_samples(std::size_t most, Taken taken = Taken::evenly, const State* known = nullptr) {
     for (auto* values : samples_values()) values->clear();
     const std::array<Eigen::Vector2d, 4>& corners = start_.corners_px;
     const Eigen::Matrix3d square_from_px = SquareToQuad(corners).matrix().inverse();
@@ -224,16 +266,23 @@ class PatternFit {
     const int x1 = std::min(grey_.cols - 1, static_cast<int>(std::floor(box.max().x() + outside_px)));
     const int y1 = std::min(grey_.rows - 1, static_cast<int>(std::floor(box.max().y() + outside_px)));
     const double pixels = side_px * side_px * (1 + 2 * out) * (1 + 2 * out);
-    const bool choose = known && known->motion.isZero();
-    const double wanted = static_cast<double>(choose ? k_choice * most : most);
+    const std::size_t choice = taken == Taken::evenly          ? 1
+                               : taken == Taken::at_seen_edges ? k_choice_of_seen
+                                                               : k_choice;
+    const double wanted = static_cast<double>(choice * most);
     const int stride = std::max(1, static_cast<int>(std::lround(pixels / wanted)));
     const int lean = std::max(1, static_cast<int>(std::lround(0.618 * stride)));  // from row to row
     const auto columns = static_cast<std::size_t>((std::max(x1, x0 - 1) - x0) / stride + 1);
     const auto rows = static_cast<std::size_t>(std::max(y1, y0 - 1) - y0 + 1);
     for (auto* values : samples_values()) values->resize(columns * rows);
     count_ = 0;
+    int flat = 0;
+    // Of a step under the blur.
+    const double least_rise = k_steep * contrast_ * std::erf(1 / (std::numbers::sqrt2 * blur_px));
     for (int y = y0; y <= y1; ++y)
       for (int x = x0 + (lean * (y - y0)) % stride; x <= x1; x += stride) {
+        if (taken == Taken::at_seen_edges && rise_at(x, y) < least_rise && ++flat % k_flat_stride != 0)
+          continue;
         const Eigen::Vector2d px = straight_.straight(Eigen::Vector2d(x, y)) - origin_;
         samples_.x[count_] = static_cast<float>(px.x());
         samples_.y[count_] = static_cast<float>(px.y());
@@ -247,7 +296,7 @@ class PatternFit {
     find_places(samples_.x.data(), samples_.y.data(), count_, by.data(), reaches.data(),
                 samples_.level_x.data(), samples_.level_y.data(), buffers_.keeps.data());
     keep();
-    if (choose) keep_edges(*known);
+    if (taken == Taken::at_known_edges) keep_edges(*known);
     // Blurred or small, they all show edges.
     if (count_ > k_most_samples) {
       const double every = static_cast<double>(count_) / static_cast<double>(k_most_samples);
@@ -261,6 +310,15 @@ class PatternFit {
       values->resize(count_);
       values->resize(padded_count(), last);
     }
+  }
+
+  // By how much light changes over the two pixels about this one, along both axes; its own noise has no part.
+  double rise_at(int x, int y) const {
+    const int left = std::max(0, x - 1), right = std::min(grey_.cols - 1, x + 1);
+    const std::uint8_t* row = grey_.ptr(y);
+    const std::uint8_t above = grey_.ptr(std::max(0, y - 1))[x];
+    const std::uint8_t below = grey_.ptr(std::min(grey_.rows - 1, y + 1))[x];
+    return std::abs(levels_[row[right]] - levels_[row[left]]) + std::abs(levels_[below] - levels_[above]);
   }
 
   std::array<std::vector<float>*, 5> samples_values() {
@@ -294,10 +352,19 @@ class PatternFit {
     count_ = kept;
   }
 
-  Fitted settled(const State& start, Free free, double settled_px) {
+  // Whether the pattern looks as it did.
+  static bool is_like(const SeenPattern& known, const Fitted& now) {
+    const double contrast = now.state.contrast(), before = known.look.contrast();
+    return contrast > k_like_contrast * before && contrast * k_like_contrast < before &&
+           std::abs(now.state.log_blur - known.look.log_blur) < k_like_log_blur &&
+           now.misfit < (k_like_misfit * known.misfit + k_noise * k_noise) * contrast * contrast &&
+           now.explained > known.explained - k_like_explained && now.moved_px < k_followed_settled_px;
+  }
+
+  Fitted settled(const State& start, Free free, double settled_px, int rounds = k_rounds) {
     Fitted fitted;
     fitted.state = start;
-    for (int round = 0; round < k_rounds; ++round) {
+    for (int round = 0; round < rounds; ++round) {
       if (!step(free, &fitted)) return {};
       if (fitted.moved_px < settled_px) break;
     }
@@ -306,7 +373,7 @@ class PatternFit {
 
   // Whether blur alone leaves no more than noise.
   static bool is_explained(const Fitted& fitted) {
-    const double contrast = fitted.state.paper[0] - fitted.state.ink[0];
+    const double contrast = fitted.state.contrast();
     return fitted.misfit < k_noise * k_noise * contrast * contrast;
   }
 
@@ -522,17 +589,23 @@ class PatternFit {
     return m;
   }
 
-  std::optional<RefinedQuad> finished(const Fitted& fitted) const {
+  std::optional<FittedPattern> finished(const Fitted& fitted,
+                                        std::optional<double> known_correlation = std::nullopt) const {
     const State& state = fitted.state;
-    const double contrast = state.paper[0] - state.ink[0];
+    const double contrast = state.contrast();
     if (!(fitted.misfit < k_max_residual * k_max_residual * contrast * contrast) || !(contrast > 0) ||
         fitted.explained < k_min_explained || fitted.moved_px > k_astray_px)
       return std::nullopt;
-    RefinedQuad result = start_;
+    FittedPattern result;
+    result.seen.cells = cells_;
+    result.seen.look = state;
+    result.seen.misfit = fitted.misfit / (contrast * contrast);
+    result.seen.explained = fitted.explained;
     for (std::size_t i = 0; i < 4; ++i) result.corners_px[i] = straight_.bent(state.corners[i]);
     const SquareToQuad px_from_square(state.corners);
     const auto shape_by_all = shape_covariance(fitted);
-    const Eigen::Matrix<double, 8, 8> covariance = correlation(shape_by_all) * shape_by_all.topRows<8>();
+    result.seen.correlation = known_correlation ? *known_correlation : correlation(shape_by_all);
+    const Eigen::Matrix<double, 8, 8> covariance = result.seen.correlation * shape_by_all.topRows<8>();
     for (std::size_t i = 0; i < 4; ++i) {
       const Eigen::Vector2d at = corner_place(i);
       constexpr double k_step = 1e-4;
@@ -551,13 +624,27 @@ class PatternFit {
 
 }  // namespace
 
-std::optional<RefinedQuad> fit_pattern(const cv::Mat& grey,
-                                       const std::array<double, 256>& light,
-                                       const RefinedQuad& start,
-                                       const SeenCells& cells,
-                                       const Lens* lens,
-                                       PatternFitBuffers* buffers) {
+std::optional<FittedPattern> fit_pattern(const cv::Mat& grey,
+                                         const std::array<double, 256>& light,
+                                         const RefinedQuad& start,
+                                         const SeenCells& cells,
+                                         const Lens* lens,
+                                         PatternFitBuffers* buffers) {
   return PatternFit(grey, light, cells, start, lens, buffers).fit();
+}
+
+std::optional<FittedPattern> follow_pattern(const cv::Mat& grey,
+                                            const std::array<double, 256>& light,
+                                            const std::array<Eigen::Vector2d, 4>& corners_px,
+                                            const SeenPattern& known,
+                                            const Lens* lens,
+                                            PatternFitBuffers* buffers) {
+  RefinedQuad start{};
+  start.corners_px = corners_px;
+  start.corner_covariance.fill(Eigen::Matrix2d::Zero());
+  // An even motion's deviation is its length over sqrt(12).
+  start.blur_px.fill(std::sqrt(std::exp(2 * known.look.log_blur) + known.look.motion.squaredNorm() / 12));
+  return PatternFit(grey, light, known.cells, start, lens, buffers).follow(known);
 }
 
 }  // namespace limn::tracker

@@ -9,20 +9,9 @@
 
 #include "core/lens.h"
 #include "tracker/refine.h"
+#include "tracker/seen_pattern.h"
 
 namespace limn::tracker {
-
-/// The black and white cells of a code as the quad shows them, border included: rows from the side between
-/// corners 0 and 1, columns from corner 0.
-struct SeenCells {
-  static constexpr int k_max = 9;
-  int count = 0;  ///< a side
-  std::array<std::uint8_t, k_max * k_max> white{};
-
-  bool is_white(int row, int column) const {
-    return white[static_cast<std::size_t>(row * count + column)] != 0;
-  }
-};
 
 /// The memory of fit_pattern, kept between calls.
 struct PatternFitBuffers {
@@ -39,6 +28,13 @@ struct PatternFitBuffers {
   std::vector<float> unused;        ///< derivatives by what takes no part
 };
 
+/// A quad by its whole pattern; of `seen` the fit knows no age.
+struct FittedPattern {
+  std::array<Eigen::Vector2d, 4> corners_px;
+  std::array<Eigen::Matrix2d, 4> corner_covariance;
+  SeenPattern seen;
+};
+
 /// Refines a quad whose code is known where edges lie too near to each other for EdgeRefiner: blur wider than
 /// the cells leave room for, motion, small or steep cells, white margins of a pixel. The marker's pixels are
 /// fitted as what they are: a homography's picture of black border, cells, white margin and what lies behind,
@@ -48,11 +44,21 @@ struct PatternFitBuffers {
 /// one. nullopt when the pixels do not settle it or contradict the model. `light` is the light of a grey
 /// level; with a `lens` sides are straight as EdgeRefiner's are; what `buffers` hold from other calls makes
 /// no difference.
-std::optional<RefinedQuad> fit_pattern(const cv::Mat& grey,
-                                       const std::array<double, 256>& light,
-                                       const RefinedQuad& start,
-                                       const SeenCells& cells,
-                                       const Lens* lens,
-                                       PatternFitBuffers* buffers);
+std::optional<FittedPattern> fit_pattern(const cv::Mat& grey,
+                                         const std::array<double, 256>& light,
+                                         const RefinedQuad& start,
+                                         const SeenCells& cells,
+                                         const Lens* lens,
+                                         PatternFitBuffers* buffers);
+
+/// The same pattern in another picture, at about `corners_px`, in a tenth of the time: the look it had is all
+/// but right there. nullopt also when it does not look like that any more: light or blur have changed,
+/// something lies over it, it is another marker.
+std::optional<FittedPattern> follow_pattern(const cv::Mat& grey,
+                                            const std::array<double, 256>& light,
+                                            const std::array<Eigen::Vector2d, 4>& corners_px,
+                                            const SeenPattern& known,
+                                            const Lens* lens,
+                                            PatternFitBuffers* buffers);
 
 }  // namespace limn::tracker

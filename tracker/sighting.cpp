@@ -123,7 +123,7 @@ ChosenCorners corners_at(const Sighting& sighting, const Pose& world_from_body) 
   return chosen;
 }
 
-std::vector<PoseFit> minima(const Sighting& sighting, std::span<const Pose> foretold) {
+std::vector<PoseFit> minima(const Sighting& sighting, std::span<const Pose> foretold, Minima wanted) {
   std::vector<PoseFit> found;
   if (sighting.empty()) return found;
   const auto refine = [&](const Pose& start, double most_cost) {
@@ -139,7 +139,7 @@ std::vector<PoseFit> minima(const Sighting& sighting, std::span<const Pose> fore
   // A lone marker's proposals are its two minima already.
   const double basin = sighting.size() == 1 ? k_same_minimum : k_same_basin;
   int refined = 0;
-  if (found.size() < 2)
+  if (found.empty() || (found.size() < 2 && wanted == Minima::all))
     for (const Proposal& proposal : proposals(sighting, proposers)) {
       if (refined == k_max_refined || found.size() == 2) break;
       if (is_near(found, proposal.world_from_body, basin)) continue;

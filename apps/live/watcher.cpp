@@ -40,6 +40,17 @@ Result<tracker::Gesture> gesture_of(const scene::Control& control) {
                control.marker.text(), control.gesture);
 }
 
+// By more than its corners' noise.
+bool has_moved(const tracker::Detection& now, const tracker::Detection& before) {
+  constexpr double k_deviations = 3;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double variance = (now.corner_covariance[i] + before.corner_covariance[i]).trace();
+    if ((now.corners_px[i] - before.corners_px[i]).squaredNorm() > k_deviations * k_deviations * variance)
+      return true;
+  }
+  return false;
+}
+
 // Where markers should be after another `seconds`, as they moved in the `seconds_before`.
 std::vector<tracker::Detection> foretold(const std::vector<tracker::Detection>& last,
                                          const std::vector<tracker::Detection>& before,
@@ -54,7 +65,7 @@ std::vector<tracker::Detection> foretold(const std::vector<tracker::Detection>& 
     };
     for (const tracker::Detection& other : before)
       if (other.marker == marker.marker && (!was || moved(other) < moved(*was))) was = &other;
-    if (!was) continue;
+    if (!was || !has_moved(marker, *was)) continue;
     for (std::size_t i = 0; i < 4; ++i)
       marker.corners_px[i] += seconds / seconds_before * (marker.corners_px[i] - was->corners_px[i]);
   }
