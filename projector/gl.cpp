@@ -49,7 +49,7 @@ GlName make_buffer(const void* data, std::size_t bytes) {
   glCreateBuffers(1, &name);
   constexpr std::size_t k_least = 16;  // an empty buffer cannot be bound
   glNamedBufferData(name, static_cast<GLsizeiptr>(std::max(bytes, k_least)), nullptr, GL_DYNAMIC_DRAW);
-  if (bytes > 0) glNamedBufferSubData(name, 0, static_cast<GLsizeiptr>(bytes), data);
+  if (data && bytes > 0) glNamedBufferSubData(name, 0, static_cast<GLsizeiptr>(bytes), data);
   return {name, [](GLuint n) { glDeleteBuffers(1, &n); }};
 }
 
