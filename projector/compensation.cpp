@@ -94,6 +94,28 @@ Vignetting vignetting_of(const Rig& rig, const Imager& projector) {
 
 }  // namespace
 
+Status check_fits(const MeasuredSurface& surface, const Rig& rig) {
+  const Imager& camera = surface.camera;
+  if (surface.mixings.size() != rig.projectors.size()) {
+    return error(
+        "colour mixing: expected that of the rig's {} projectors, found {}. Measure the response of all.",
+        rig.projectors.size(), surface.mixings.size());
+  }
+  for (std::size_t i = 0; i < surface.mixings.size(); ++i) {
+    const ColourMixing& mixing = surface.mixings[i];
+    if (mixing.projector != rig.projectors[i].name || mixing.camera != camera.name) {
+      return error("colour mixing {} of the rig: expected {} seen by {}, found {} seen by {}.", i,
+                   rig.projectors[i].name, camera.name, mixing.projector, mixing.camera);
+    }
+    if (mixing.red.cols != camera.width || mixing.red.rows != camera.height) {
+      return error(
+          "colour mixing of {}: expected maps of {}'s size {}x{}, found {}x{}. Measure the response again.",
+          mixing.projector, camera.name, camera.width, camera.height, mixing.red.cols, mixing.red.rows);
+    }
+  }
+  return {};
+}
+
 Result<SurfaceMixing> surface_mixing(const MeasuredSurface& surface, std::span<const cv::Mat> irradiance) {
   const std::size_t count = surface.mixings.size();
   const cv::Size size(surface.camera.width, surface.camera.height);

@@ -38,6 +38,9 @@ struct MeasuredSurface {
   std::vector<ColourMixing> mixings;  ///< one a projector, in the rig's order
 };
 
+/// Whether it is of this rig's projectors, and its maps of the camera's size; says which is not.
+Status check_fits(const MeasuredSurface& surface, const Rig& rig);
+
 /// What light does on a surface, freed of distance and incidence: in each pixel of the camera that measured.
 struct SurfaceMixing {
   /// CV_32FC4. 3 i + c: what channel c (r, g, b) of projector i looks like (r, g, b) at an irradiance of 1;

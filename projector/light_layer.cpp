@@ -7,8 +7,6 @@
 namespace limn::projector {
 namespace {
 
-constexpr int k_picture_unit = 3;  // of textures; edges.comp has no other
-
 // Adds what a rectangle has outside of others, and outside of what is there already.
 void add_outside(const cv::Rect& place, std::span<const cv::Rect> others, std::vector<cv::Rect>* places) {
   if (place.empty()) return;
@@ -114,7 +112,7 @@ void LightLayer::draw(const Target& target,
     const PassTimes::Scope scope(times, "where edges are");
     rest_list_.start(pixels);
     rest_list_.bind_as_rest();
-    where_edges_.bind("s_centre", k_picture_unit, target.light);
+    where_edges_.bind("s_centre", k_edges_unit, target.light);
     where_edges_.set("u_least_step", static_cast<float>(smoothing.least_step));
     for_modes([&](ByMode& mode, const std::vector<cv::Rect>& parted) {
       mode.at_edges.start(pixels);

@@ -26,6 +26,9 @@ class PixelList {
   int room_ = 0;
 };
 
+/// Unit of the picture whose edges shaders/edges.comp lists, its only texture.
+constexpr int k_edges_unit = 3;
+
 /// Runs a program over rectangles of a picture, 16 x 4 pixels a group, which are u_first ... u_end to it.
 void look_through(const Program& program, std::span<const cv::Rect> places);
 

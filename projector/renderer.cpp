@@ -11,7 +11,7 @@
 #include "projector/contact_shadow.h"
 #include "projector/gpu_scene.h"
 #include "projector/light_layer.h"
-#include "projector/pixel_list.h"
+#include "projector/parts_layer.h"
 #include "projector/shader.h"
 #include "projector/sights.h"
 #include "projector/treatment.h"
@@ -105,28 +105,6 @@ Status check_context() {
                epoxy_gl_version() / 10, epoxy_gl_version() % 10);
 }
 
-Status check_fits(const MeasuredSurface& surface, const Rig& rig) {
-  const Imager& camera = surface.camera;
-  if (surface.mixings.size() != rig.projectors.size()) {
-    return error(
-        "colour mixing: expected that of the rig's {} projectors, found {}. Measure the response of all.",
-        rig.projectors.size(), surface.mixings.size());
-  }
-  for (std::size_t i = 0; i < surface.mixings.size(); ++i) {
-    const ColourMixing& mixing = surface.mixings[i];
-    if (mixing.projector != rig.projectors[i].name || mixing.camera != camera.name) {
-      return error("colour mixing {} of the rig: expected {} seen by {}, found {} seen by {}.", i,
-                   rig.projectors[i].name, camera.name, mixing.projector, mixing.camera);
-    }
-    if (mixing.red.cols != camera.width || mixing.red.rows != camera.height) {
-      return error(
-          "colour mixing of {}: expected maps of {}'s size {}x{}, found {}x{}. Measure the response again.",
-          mixing.projector, camera.name, camera.width, camera.height, mixing.red.cols, mixing.red.rows);
-    }
-  }
-  return {};
-}
-
 // The mask and shares of the part of one owner in what coverage.frag wrote.
 PartCoverage counted(const scene::PosedPart& part, const cv::Mat& seen, std::uint8_t owner) {
   constexpr std::uint8_t k_projected = 2;  // as in shaders/seen.glsl
@@ -159,23 +137,10 @@ struct Renderer::Impl {
   std::optional<ContactShadow> contact_shadow;
   bool has_contact_shadow = false;
   Smoothing smoothing;
-  Program points, blend, response, irradiance, lit, coverage, composite, edges;
+  Program points, blend, response, irradiance, lit, coverage, composite;
   LightLayer light_layer;
   std::optional<LightLayer> measured_light_layer;  // linked when it is asked for
-  // A layer of the parts' light in a composite: where there may be some, at pixel centres, by more samples at
-  // edges, and what few of those need.
-  struct LayerPrograms {
-    Program where, centre, edges;
-    std::optional<Program> rest;
-  };
-  struct CompositePrograms {
-    LayerPrograms parts, view;
-    static Result<CompositePrograms> link(const std::string& defined);
-  };
-  CompositePrograms unshadowed;
-  std::optional<CompositePrograms> shadowed;  // linked when it is asked for
-  CompositePrograms& composites() { return has_contact_shadow ? *shadowed : unshadowed; }
-  PixelList list, rest_list;
+  PartsLayer parts_layer;
   std::vector<GlName> responses;
   // Of the projectors' last pictures.
   struct Shown {
@@ -271,16 +236,9 @@ struct Renderer::Impl {
   void draw(const Program& program, const Canvas& into) const;
   void draw(const Program& program, const Canvas& into, const std::vector<cv::Rect>& places) const;
   template <class SetUp>
-  void draw_layer(LayerPrograms& layer,
-                  const Canvas& into,
-                  const std::vector<cv::Rect>& places,
-                  const Smoothing& smoothing,
-                  const SetUp& set_up);
-  template <class SetUp>
   cv::Mat laid_over(const cv::Mat& bgr,
                     const Imager& imager,
                     const scene::PosedScene& posed,
-                    LayerPrograms& layer,
                     int kind,
                     const Whole& whole,
                     const SetUp& set_up_layer);
@@ -312,24 +270,10 @@ Status Renderer::Impl::link_programs() {
   for (const auto& [program, file] : drawn) {
     LIMN_TRY(*program, Program::link("whole.vert", file));
   }
-  LIMN_TRY(edges, Program::link_compute("edges.comp"));
   LIMN_TRY(light_layer, LightLayer::link(defined(), false));
   LIMN_TRY(response, Program::link_compute("light_response.comp"));
-  LIMN_TRY(unshadowed, CompositePrograms::link(defined()));
+  LIMN_TRY(parts_layer, PartsLayer::link(defined()));
   return {};
-}
-
-auto Renderer::Impl::CompositePrograms::link(const std::string& defined) -> Result<CompositePrograms> {
-  CompositePrograms out;
-  const std::pair<Program*, const char*> computed[] = {
-      {&out.parts.where, "parts_where.comp"}, {&out.parts.centre, "parts_centre.comp"},
-      {&out.parts.edges, "parts_edges.comp"}, {&out.view.where, "view_where.comp"},
-      {&out.view.centre, "view_centre.comp"}, {&out.view.edges, "view_edges.comp"}};
-  for (const auto& [program, file] : computed) {
-    LIMN_TRY(*program, Program::link_compute(file, defined));
-  }
-  LIMN_TRY(out.parts.rest, Program::link_compute("parts_rest.comp", defined));
-  return out;
 }
 
 // CV_32F of the texture's size. False when it is there already.
@@ -458,64 +402,12 @@ void Renderer::Impl::set_up_light(const Program& program, const scene::PosedScen
   program.bind("s_albedo", k_albedo_unit, albedo);
 }
 
-// Draws a layer (linear light, alpha: coverage) into a canvas of GL_RGBA32F, within `places` alone.
-// `set_up` gives every program what it needs.
-template <class SetUp>
-void Renderer::Impl::draw_layer(LayerPrograms& layer,
-                                const Canvas& into,
-                                const std::vector<cv::Rect>& places,
-                                const Smoothing& smoothing,
-                                const SetUp& set_up) {
-  // Where places lie over each other pixels are listed again.
-  const int room = into.width * into.height * static_cast<int>(std::max<std::size_t>(1, places.size()));
-  const auto over_places = [&](const Program& program) {
-    list.start(room);
-    list.bind();
-    look_through(program, places);
-  };
-  const auto work_through = [&](const PixelList& pixels, const Program& program) {
-    set_up(program);
-    glBindImageTexture(0, *into.texture, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
-    pixels.work_through(program);
-  };
-  const cv::Rect whole(0, 0, into.width, into.height);
-  for (const cv::Rect& place : places) {  // with the neighbours that edges are judged by
-    const cv::Rect around = whole & cv::Rect(place.x - 1, place.y - 1, place.width + 2, place.height + 2);
-    glClearTexSubImage(*into.texture, 0, around.x, around.y, 0, around.width, around.height, 1, GL_RGBA,
-                       GL_FLOAT, nullptr);
-  }
-  {
-    const PassTimes::Scope scope(&times, "where there may be light");
-    set_up(layer.where);
-    over_places(layer.where);
-  }
-  {
-    const PassTimes::Scope scope(&times, "light at pixel centres");
-    work_through(list, layer.centre);
-  }
-  {
-    const PassTimes::Scope scope(&times, "where edges are");
-    edges.bind("s_centre", k_centre_unit, into.texture);
-    edges.set("u_least_step", static_cast<float>(smoothing.least_step));
-    over_places(edges);
-  }
-  const PassTimes::Scope scope(&times, "light at edges");
-  layer.edges.set("u_samples", smoothing.samples);
-  rest_list.start(room);
-  rest_list.bind_as_rest();
-  work_through(list, layer.edges);
-  if (!layer.rest) return;
-  layer.rest->set("u_samples", smoothing.samples);
-  work_through(rest_list, *layer.rest);
-}
-
 // What an imager sees of a layer, over its picture (BGR); the layer is drawn again only where it has changed.
 // `kind` tells layers of one imager apart.
 template <class SetUp>
 cv::Mat Renderer::Impl::laid_over(const cv::Mat& bgr,
                                   const Imager& imager,
                                   const scene::PosedScene& posed,
-                                  LayerPrograms& layer,
                                   int kind,
                                   const Whole& whole,
                                   const SetUp& set_up_layer) {
@@ -527,12 +419,15 @@ cv::Mat Renderer::Impl::laid_over(const cv::Mat& bgr,
     overlay.places = sights.seen_places(imager, lens_of(imager).baked, runs, scene_from_world, kind == k_view,
                                         has_contact_shadow ? ContactShadow::k_reach : 0);
     if (has_contact_shadow) contact_shadow->place(posed);
-    draw_layer(layer, overlay.parts, overlay.places, smoothing, [&](const Program& program) {
+    const auto set_up_all = [&](const Program& program) {
       set_up(program, lens_of(imager), &imager);
       program.set("s_distances", k_distances_unit);
       if (has_contact_shadow) contact_shadow->bind(program, k_distances_unit);
       set_up_layer(program);
-    });
+    };
+    parts_layer.draw({.is_view = kind == k_view, .is_shadowed = has_contact_shadow},
+                     {overlay.parts.texture, {imager.width, imager.height}}, overlay.places, smoothing,
+                     std::cref(set_up_all), &times);
     overlay.posed = posed;
     overlay.imager = imager;
     overlay.whole = whole;
@@ -557,7 +452,7 @@ cv::Mat Renderer::Impl::composite_over(const Imager& imager,
   LIMN_CHECK(picture.cols == imager.width && picture.rows == imager.height && picture.depth() == CV_8U);
   cv::Mat bgr = picture;
   if (picture.channels() == 1) cv::cvtColor(picture, bgr, cv::COLOR_GRAY2BGR);
-  return laid_over(bgr, imager, posed, composites().parts, kind, whole,
+  return laid_over(bgr, imager, posed, kind, whole,
                    [&](const Program& program) { program.set_bits("u_whole", whole); });
 }
 
@@ -683,9 +578,7 @@ void Renderer::set_quick_motion(bool wanted) { impl_->quick_motion = wanted; }
 
 Status Renderer::set_contact_shadow(const scene::Scene* scene) {
   const bool wanted = scene != nullptr;
-  if (wanted && !impl_->shadowed) {
-    LIMN_TRY(impl_->shadowed, Impl::CompositePrograms::link(impl_->defined() + "CONTACT_SHADOW"));
-  }
+  if (wanted) LIMN_TRY_STATUS(impl_->parts_layer.link_shadowed());
   if (wanted && !impl_->contact_shadow) impl_->contact_shadow.emplace(*scene);
   if (impl_->has_contact_shadow != wanted)
     for (Impl::Overlay& overlay : impl_->overlays) overlay.posed.reset();
@@ -856,11 +749,10 @@ cv::Mat Renderer::composite(const Imager& camera,
 
 cv::Mat Renderer::view(const Imager& imager, const scene::PosedScene& posed, const cv::Scalar& background) {
   const cv::Mat plain(imager.height, imager.width, CV_8UC3, background);
-  return impl_->laid_over(plain, imager, posed, impl_->composites().view, k_view, {},
-                          [&](const Program& program) {
-                            program.bind("s_albedo", k_albedo_unit, impl_->albedo);
-                            program.set("u_mean_albedo", impl_->mean_albedo);
-                          });
+  return impl_->laid_over(plain, imager, posed, k_view, {}, [&](const Program& program) {
+    program.bind("s_albedo", k_albedo_unit, impl_->albedo);
+    program.set("u_mean_albedo", impl_->mean_albedo);
+  });
 }
 
 std::vector<PartCoverage> Renderer::coverage(const scene::PosedScene& posed, const Imager& viewer) {
