@@ -174,6 +174,7 @@ TEST(Soak, ALongSessionWithAllThatGoesWrong) {
   EXPECT_EQ(static_cast<double>(lines), 1 + summary.at("pictures").get<double>()) << "none is lost";
   EXPECT_GT(summary.at("seconds").get<double>(), seconds - 1);
   EXPECT_LT(summary.at("placement_mm").at("median").get<double>(), 1);
+  EXPECT_LT(summary.at("placement_mm").at("p95").get<double>(), 5);
   const auto last = last_row(csv);
   ASSERT_FALSE(last.empty());
   EXPECT_EQ(last[k_lost], 0);
