@@ -55,16 +55,17 @@ void check(const tracker::Detection& detection, const Lens* lens) {
     LIMN_CHECK(pose.camera_from_marker.is_finite() && pose.covariance.allFinite());
 }
 
-// Also where the picture has moved on.
+// Also where the picture has moved on, and once more from there.
 void check_followed(tracker::Detector& detector,
                     const cv::Mat& grey,
                     const Lens* lens,
-                    const std::vector<tracker::Detection>& last) {
+                    std::vector<tracker::Detection> last) {
   std::vector<tracker::Detection> found;
-  for (const int moved : {0, 3}) {
+  for (const int moved : {0, 3, 4}) {
     detector.follow(grey.colRange(std::min(moved, grey.cols), grey.cols), lens, last, &found);
     LIMN_CHECK(found.size() <= last.size());
     for (const tracker::Detection& detection : found) check(detection, lens);
+    std::swap(found, last);
   }
 }
 
