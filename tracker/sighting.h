@@ -41,11 +41,12 @@ struct ChosenCorners {
 };
 ChosenCorners corners_at(const Sighting& sighting, const Pose& world_from_body);
 
+enum class Minima { all, foretold };
+
 /// The local minima of the body's robust reprojection error, likeliest first, at most two: the second is the
 /// other branch of the planar ambiguity, where there is one. Every marker proposes both of its branches;
 /// where the body was foretold to stand by one of the `foretold` poses and does, the largest marker alone,
-/// and none where only the foretold minima are asked for.
-enum class Minima { all, foretold };
+/// and none where only the foretold minima are wanted.
 std::vector<PoseFit> minima(const Sighting& sighting,
                             std::span<const Pose> foretold = {},
                             Minima wanted = Minima::all);
