@@ -75,14 +75,8 @@ void LightLayer::draw(const Target& target,
     glBindImageTexture(0, *target.light, 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
     list.work_through(program);
   };
-  const cv::Rect whole({0, 0}, target.size);
-  for_modes([&](ByMode&, const std::vector<cv::Rect>& parted) {
-    for (const cv::Rect& place : parted) {  // with the neighbours that edges are judged by
-      const cv::Rect around = whole & cv::Rect(place.x - 1, place.y - 1, place.width + 2, place.height + 2);
-      glClearTexSubImage(*target.light, 0, around.x, around.y, 0, around.width, around.height, 1, GL_RGBA,
-                         GL_FLOAT, nullptr);
-    }
-  });
+  for_modes(
+      [&](ByMode&, const std::vector<cv::Rect>& parted) { clear_light(target.light, target.size, parted); });
   {
     const PassTimes::Scope scope(times, "what is lit");
     const Program& program = target.is_unknown ? hits_ : unknown_;

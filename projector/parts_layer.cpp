@@ -54,12 +54,7 @@ void PartsLayer::draw(What what,
     glBindImageTexture(0, *target.light, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
     pixels.work_through(program);
   };
-  const cv::Rect whole({0, 0}, target.size);
-  for (const cv::Rect& place : places) {  // with the neighbours that edges are judged by
-    const cv::Rect around = whole & cv::Rect(place.x - 1, place.y - 1, place.width + 2, place.height + 2);
-    glClearTexSubImage(*target.light, 0, around.x, around.y, 0, around.width, around.height, 1, GL_RGBA,
-                       GL_FLOAT, nullptr);
-  }
+  clear_light(target.light, target.size, places);
   {
     const PassTimes::Scope scope(times, "where there may be light");
     set_up(programs.where);

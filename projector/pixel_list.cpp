@@ -32,6 +32,15 @@ void PixelList::work_through(const Program& program) const {
   glMemoryBarrier(GL_ALL_BARRIER_BITS);
 }
 
+void clear_light(const GlName& light, cv::Size size, std::span<const cv::Rect> places) {
+  const cv::Rect whole({0, 0}, size);
+  for (const cv::Rect& place : places) {
+    const cv::Rect around = whole & cv::Rect(place.x - 1, place.y - 1, place.width + 2, place.height + 2);
+    glClearTexSubImage(*light, 0, around.x, around.y, 0, around.width, around.height, 1, GL_RGBA, GL_FLOAT,
+                       nullptr);
+  }
+}
+
 void look_through(const Program& program, std::span<const cv::Rect> places) {
   program.use();
   for (const cv::Rect& place : places) {

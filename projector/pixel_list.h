@@ -26,6 +26,10 @@ class PixelList {
   int room_ = 0;
 };
 
+/// Empties a picture of linear light (GL_RGBA32F) within rectangles, and their neighbours, by which edges are
+/// judged.
+void clear_light(const GlName& light, cv::Size size, std::span<const cv::Rect> places);
+
 /// Unit of the picture whose edges shaders/edges.comp lists, its only texture.
 constexpr int k_edges_unit = 3;
 

@@ -67,9 +67,9 @@ class Detector {
 
   /// Finds markers again that were at `last`, looking only about there: a marker that moved by more than half
   /// of its side is lost, and new ones want detect_more(). Each square once, in the order of `last`, which
-  /// `detections` must not be. A pattern is fitted anew now and then, and when the marker's view or blur
-  /// changes; between, corners keep their distance from what the sides alone say. Shadows are looked for anew
-  /// now and then, and when the light at a side changes.
+  /// `detections` must not be. A marker that was found by its whole pattern is found by how that looked; it
+  /// is read from nothing now and then, and when it looks otherwise. Shadows are looked for anew now and
+  /// then, and when the light at a side changes.
   void follow(const cv::Mat& grey,
               const Lens* lens,
               std::span<const Detection> last,

@@ -158,7 +158,10 @@ class PatternFit {
     fitted.state.corners = start_.corners_px;
     const Free free{.motion = moves, .bend = known.look.bend.isZero() ? Bend::none : Bend::fitted};
     fitted = settled(fitted.state, free, k_followed_settled_px, k_rounds_followed);
-    if (!is_like(known, fitted)) return std::nullopt;
+    // Residuals are those before the last step, which may have been a large one.
+    if (!is_like(known, fitted) &&
+        !(fitted.moved_px > k_settled_px && step(free, &fitted) && is_like(known, fitted)))
+      return std::nullopt;
     auto found = finished(fitted, known.correlation);
     if (!found) return std::nullopt;
     SeenPattern seen = known;
