@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 namespace limn::tracker {
 namespace {
@@ -18,6 +19,8 @@ constexpr double k_memory_s = 3;
 constexpr double k_patch_sides = 3;  // of what is watched for stillness: a hand's outline is in it
 constexpr int k_patch_cells = 20;
 constexpr int k_few_cells = 4;
+constexpr double k_mostly = 2 / 3.0, k_alike = 0.1;  // of the marker's contrast
+constexpr double k_noise_blend = 0.2, k_deviations_per_median = 1.4826, k_noise_deviations = 4;
 constexpr double k_tremor_px = 1;  // of a hand that rests
 
 double direction(const Detection& detection) {
@@ -49,16 +52,20 @@ double tilt(const std::array<Eigen::Vector2d, 4>& c) {
   return std::acos(std::clamp(stretch(1) / stretch(0), 0.0, 1.0));
 }
 
-// The marker's place and one side more all around it, as means over cells.
-cv::Mat patch_of(const cv::Mat& grey, const std::array<Eigen::Vector2d, 4>& corners) {
+// The marker and one side more all around it.
+cv::Rect place_of(const std::array<Eigen::Vector2d, 4>& corners, cv::Size picture) {
   const Eigen::Vector2d px = centre(corners);
   const double half = 0.5 * k_patch_sides * std::sqrt(area(corners));
-  const cv::Rect box =
-      cv::Rect(cvRound(px.x() - half), cvRound(px.y() - half), cvCeil(2 * half), cvCeil(2 * half)) &
-      cv::Rect(0, 0, grey.cols, grey.rows);
-  cv::Mat patch;
-  if (box.width >= k_patch_cells && box.height >= k_patch_cells)
-    cv::resize(grey(box), patch, {k_patch_cells, k_patch_cells}, 0, 0, cv::INTER_AREA);
+  return cv::Rect(cvRound(px.x() - half), cvRound(px.y() - half), cvCeil(2 * half), cvCeil(2 * half)) &
+         cv::Rect({0, 0}, picture);
+}
+
+// Means over its cells.
+cv::Mat patch_of(const cv::Mat& grey, const cv::Rect& place) {
+  cv::Mat levels, patch;
+  if (place.width < k_patch_cells || place.height < k_patch_cells) return patch;
+  grey(place).convertTo(levels, CV_32F);
+  cv::resize(levels, patch, {k_patch_cells, k_patch_cells}, 0, 0, cv::INTER_AREA);
   return patch;
 }
 
@@ -83,6 +90,9 @@ int GestureReader::read(const cv::Mat& grey, std::span<const Detection> detectio
   const auto found = std::find_if(detections.begin(), detections.end(),
                                   [&](const Detection& d) { return d.marker == marker_; });
   is_seen_ = found != detections.end();
+  hidden_since_.reset();
+  if (!is_seen_ && seen_at_ != Stamp{} && seconds_between(seen_at_, captured_at) > k_gap_s)
+    hidden_since_ = seen_at_;
   note_neighbours(detections, captured_at);
   return is_seen_ ? seen(grey, *found, captured_at) : hidden(grey, captured_at);
 }
@@ -91,7 +101,10 @@ int GestureReader::seen(const cv::Mat& grey, const Detection& detection, Stamp a
   if (seen_at_ == Stamp{} || seconds_between(seen_at_, at) > k_gap_s) seen_since_ = at;
   seen_at_ = at;
   corners_px_ = detection.corners_px;
-  patch_ = patch_of(grey, corners_px_);
+  const cv::Rect place = place_of(corners_px_, grey.size());
+  const cv::Mat patch = patch_of(grey, place);
+  if (place == std::exchange(place_, place)) note_noise(patch);
+  patch_ = seen_patch_ = patch;
   patch_since_ = at;
   if (seconds_between(seen_since_, at) >= k_armed_s) is_armed_ = true;
   if (gesture_ == Gesture::turn) return turned(detection, at);
@@ -102,10 +115,12 @@ int GestureReader::seen(const cv::Mat& grey, const Detection& detection, Stamp a
 int GestureReader::hidden(const cv::Mat& grey, Stamp at) {
   if (gesture_ == Gesture::turn) return 0;
   if (!is_armed_ || is_tipped_) return 0;
-  const double still = still_for(grey, at);
-  if (seconds_between(seen_at_, at) < options_.cover_s || still < options_.still_s || hides_across(at))
-    return 0;
+  const cv::Mat patch = patch_of(grey, place_);
+  const double still_s = still_for(patch, at);
+  if (seconds_between(seen_at_, at) < options_.cover_s || still_s < options_.still_s) return 0;
+  if (is_mostly_there(patch) || hides_across(at)) return 0;
   is_armed_ = false;
+  is_tipped_ = gesture_ == Gesture::lay;  // if it is, once it is seen again
   return 1;
 }
 
@@ -168,14 +183,35 @@ bool GestureReader::hides_across(Stamp at) const {
 }
 
 // For how long the marker's place has looked as it does.
-double GestureReader::still_for(const cv::Mat& grey, Stamp at) {
-  const cv::Mat now = patch_of(grey, corners_px_);
+double GestureReader::still_for(const cv::Mat& patch, Stamp at) {
   const double cell_px = k_patch_sides * std::sqrt(area(corners_px_)) / k_patch_cells;
-  if (!is_still(now, patch_, options_.still_levels, cell_px)) {
-    patch_ = now;
+  if (!is_still(patch, patch_, std::max(options_.still_levels, k_noise_deviations * noise_levels_),
+                cell_px)) {
+    patch_ = patch;
     patch_since_ = at;
   }
   return seconds_between(patch_since_, at);
+}
+
+void GestureReader::note_noise(const cv::Mat& patch) {
+  if (patch.empty() || patch.size() != seen_patch_.size()) return;
+  cv::Mat1f change;
+  cv::absdiff(patch, seen_patch_, change);
+  const auto middle = change.begin() + static_cast<int>(change.total() / 2);
+  std::nth_element(change.begin(), middle, change.end());
+  noise_levels_ += k_noise_blend * (k_deviations_per_median * *middle - noise_levels_);
+}
+
+// Whether the marker itself looks as it did, but for an edge that a hand beside it hides.
+bool GestureReader::is_mostly_there(const cv::Mat& patch) const {
+  if (patch.empty() || patch.size() != seen_patch_.size()) return false;
+  const int side = cvFloor(k_patch_cells / k_patch_sides), first = (k_patch_cells - side) / 2;
+  const cv::Rect marker(first, first, side, side);
+  cv::Mat change;
+  cv::absdiff(patch(marker), seen_patch_(marker), change);
+  double darkest = 0, brightest = 0;
+  cv::minMaxLoc(seen_patch_(marker), &darkest, &brightest);
+  return cv::countNonZero(change <= k_alike * (brightest - darkest)) > k_mostly * side * side;
 }
 
 }  // namespace limn::tracker

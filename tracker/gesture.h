@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <opencv2/core/mat.hpp>
+#include <opencv2/core/types.hpp>
 #include <optional>
 #include <span>
 #include <vector>
@@ -24,16 +25,16 @@ struct GestureOptions {
   double still_s = 0.35;  ///< and what covers it is still for so long; shorter: arms at work act
   double turn_deg = 30;   ///< one step
   double lay_deg = 50;    ///< from how it stood
-  /// Grey levels by which what is still may change, seen in cells of a seventh of the marker's side, beside
-  /// what the tremor of a resting hand does: noise.
-  double still_levels = 6;
+  /// Grey levels by which what is still may change at least, seen in cells of a seventh of the marker's side,
+  /// beside what the tremor of a resting hand does; more where the camera's noise is more.
+  double still_levels = 2;
 };
 
 /// Reads one control marker's gestures from one camera's pictures. Give it every picture, in order.
 ///
-/// A cover is told from a hand that passes by what hides the marker: it stays, still, and does not hide
-/// markers nearby on both sides of it (an arm that lies across does). It acts once; the marker must be seen
-/// again before the next.
+/// A cover is told from a hand that passes by what hides the marker: it stays, still, hides more than an edge
+/// of it, and does not hide markers nearby on both sides of it (an arm that lies across does). It acts once;
+/// the marker must be seen again before the next.
 class GestureReader {
  public:
   GestureReader(MarkerName marker, Gesture gesture, const GestureOptions& options = {});
@@ -44,6 +45,8 @@ class GestureReader {
 
   /// Whether the newest picture showed the marker.
   bool is_seen() const { return is_seen_; }
+  /// When it was seen last, where it has been out of sight for longer than the detector misses a marker.
+  std::optional<Stamp> hidden_since() const { return hidden_since_; }
   const MarkerName& marker() const { return marker_; }
 
  private:
@@ -58,16 +61,22 @@ class GestureReader {
   int laid(const Detection& detection, Stamp at);
   void note_neighbours(std::span<const Detection> detections, Stamp at);
   bool hides_across(Stamp at) const;
-  double still_for(const cv::Mat& grey, Stamp at);
+  double still_for(const cv::Mat& patch, Stamp at);
+  void note_noise(const cv::Mat& patch);
+  bool is_mostly_there(const cv::Mat& patch) const;
 
   MarkerName marker_;
   Gesture gesture_;
   GestureOptions options_;
   bool is_seen_ = false;
+  std::optional<Stamp> hidden_since_;
   bool is_armed_ = false;  // has been seen for long enough
   std::array<Eigen::Vector2d, 4> corners_px_{};
+  cv::Rect place_;           // the marker's and what is around it
+  double noise_levels_ = 0;  // standard deviation of a cell's change from picture to picture
   Stamp seen_since_, seen_at_;
-  cv::Mat patch_;  // what the marker's place looked like when it last changed
+  cv::Mat seen_patch_;  // what the marker's place looked like when it was seen last
+  cv::Mat patch_;       // what the marker's place looked like when it last changed
   Stamp patch_since_;
   std::vector<Neighbour> neighbours_;
   std::optional<double> turn_rest_;  // direction of its upper side when it last acted, radians

@@ -228,23 +228,28 @@ void Watcher::follow_loose() {
                    [](const LooseMarker& a, const LooseMarker& b) { return a.still_since < b.still_since; });
 }
 
-// A control is used when one camera sees the gesture and none of the others sees the marker uncovered.
+// A control is used when one camera sees the gesture and none of the others sees the marker uncovered. Of
+// controls that are hidden together the last one is meant: an arm hides the others on the hand's way there.
 void Watcher::read_gestures(std::span<const std::size_t> cameras) {
   for (const std::size_t camera : cameras) {
-    Eye& eye = eyes_[camera];
-    const Frame& frame = watched_.frames[camera];
-    for (std::size_t i = 0; i < eye.gestures.size(); ++i) {
-      const int steps = eye.gestures[i].read(eye.grey, watched_.detections[camera], frame.captured_at);
-      if (steps == 0) continue;
+    std::vector<tracker::GestureReader>& gestures = eyes_[camera].gestures;
+    const Stamp at = watched_.frames[camera].captured_at;
+    std::vector<int> steps;
+    for (tracker::GestureReader& gesture : gestures)
+      steps.push_back(gesture.read(eyes_[camera].grey, watched_.detections[camera], at));
+    for (std::size_t i = 0; i < gestures.size(); ++i) {
+      if (steps[i] == 0) continue;
       const bool is_seen_elsewhere =
-          !eye.gestures[i].is_seen() && std::any_of(eyes_.begin(), eyes_.end(), [&](const Eye& other) {
-            return &other != &eye && other.gestures[i].is_seen();
+          !gestures[i].is_seen() && std::any_of(eyes_.begin(), eyes_.end(), [&](const Eye& other) {
+            return &other.gestures != &gestures && other.gestures[i].is_seen();
           });
-      const bool is_known =
-          used_at_[i] != Stamp{} && seconds_between(used_at_[i], frame.captured_at) < k_once_s;
-      if (is_seen_elsewhere || is_known) continue;
-      used_at_[i] = frame.captured_at;
-      watched_.uses.push_back({i, steps});
+      const bool is_arms = std::any_of(gestures.begin(), gestures.end(), [&](const auto& other) {
+        return gestures[i].hidden_since() && other.hidden_since() > gestures[i].hidden_since();
+      });
+      const bool is_known = used_at_[i] != Stamp{} && seconds_between(used_at_[i], at) < k_once_s;
+      if (is_seen_elsewhere || is_arms || is_known) continue;
+      used_at_[i] = at;
+      watched_.uses.push_back({i, steps[i]});
     }
   }
 }
