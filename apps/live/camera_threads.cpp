@@ -2,8 +2,8 @@
 
 #include <atomic>
 
+#include "apps/live/camera_intake.h"
 #include "apps/live/latest.h"
-#include "apps/live/source_clock.h"
 #include "core/log.h"
 
 namespace limn::apps {
@@ -56,28 +56,14 @@ std::optional<Frames> CameraThreads::take(std::chrono::nanoseconds wait) {
 std::size_t CameraThreads::missed() { return shared_->missed.exchange(0); }
 
 void CameraThreads::grab(device::CameraSource* camera, std::size_t number, Shared* shared) try {
-  SourceClock clock;
+  CameraIntake intake(camera->name(), camera->size(), number, shared->health.get());
   while (!shared->is_stopping) {
-    Result<Frame> frame = camera->next();
-    if (!frame) {
-      shared->health->fails(number, frame.message());
-      std::this_thread::sleep_for(k_retry);
-      continue;
-    }
-    if (frame->image.size() != camera->size()) {
-      const cv::Size size = camera->size();
-      shared->health->fails(
-          number, fmt::format("expected pictures of {}x{}, found one of {}x{}. Set the mode that the "
-                              "rig was measured in.",
-                              size.width, size.height, frame->image.cols, frame->image.rows));
-      continue;
-    }
-    shared->health->works(number);
-    const SourceClock::Time time = clock.on_session_clock(frame->captured_at, now());
-    if (time.has_stepped)
-      shared->health->note(camera->name() + "'s clock has stepped; its pictures count from now on");
-    frame->captured_at = time.captured_at;
-    if (clock.is_other()) std::this_thread::sleep_until(frame->captured_at);
+    Result<Frame> sent = camera->next();
+    const bool is_there = sent.ok();
+    std::optional<Frame> frame = intake.taken(std::move(sent), now());
+    if (!is_there) std::this_thread::sleep_for(k_retry);
+    if (!frame) continue;
+    if (intake.is_of_other_clock()) std::this_thread::sleep_until(frame->captured_at);
     Frames frames;
     frames.emplace(frame->camera, std::move(*frame));
     shared->frames.put(std::move(frames), [shared](const Frames& old, Frames& newest) {

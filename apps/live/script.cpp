@@ -1,8 +1,11 @@
 #include "apps/live/script.h"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <opencv2/imgproc.hpp>
 
 #include "core/config.h"
 
@@ -11,6 +14,7 @@ namespace {
 
 constexpr double k_never_s = 1e9;
 constexpr double k_most_periods = 1000;
+constexpr double k_largest_side_px = 16384, k_largest_step_s = 1e6;
 constexpr double k_hand_albedo = 0.35;
 constexpr double k_hand_above_m = 0.006;
 // A hand in a projector's light: so far along the way to the prototype's middle, and its size.
@@ -30,6 +34,14 @@ void read_span(const ConfigNode& node, double* from_s, double* until_s) {
   *from_s = time_of(node.at("at_s"));
   *until_s = time_of(node.at("until_s"));
   if (*until_s <= *from_s) node.at("until_s").problem("expected a later moment than at_s, found none.");
+}
+
+cv::Size size_of(const ConfigNode& node) {
+  const std::vector<double> size = node.numbers(2);
+  for (const double side : size)
+    if (side != std::round(side) || side < 1 || side > k_largest_side_px)
+      node.problem(fmt::format("expected whole pixels from 1 to {}, found {}.", k_largest_side_px, side));
+  return size.size() == 2 ? cv::Size(static_cast<int>(size[0]), static_cast<int>(size[1])) : cv::Size();
 }
 
 scene::Edit read_edit(const ConfigNode& node) {
@@ -73,12 +85,32 @@ void read_event(const ConfigNode& node, Script* script) {
       nudge.home_from_device.rotation = exp_rotation(turn->vector3() * std::numbers::pi / 180);
     if (const auto shift = node.find("mm")) nudge.home_from_device.translation = 1e-3 * shift->vector3();
     script->nudges.push_back(nudge);
+  } else if (const auto resized = node.find("resize")) {
+    node.only({"at_s", "until_s", "resize", "size"});
+    Script::Resize resize{resized->text(), 0, 0, size_of(node.at("size"))};
+    read_span(node, &resize.from_s, &resize.until_s);
+    script->resizes.push_back(resize);
+  } else if (const auto stepped = node.find("clock_step")) {
+    node.only({"at_s", "clock_step", "seconds"});
+    const double step_s = node.at("seconds").number();
+    if (std::abs(step_s) > k_largest_step_s)
+      node.at("seconds").problem(
+          fmt::format("expected at most {} either way, found {}.", k_largest_step_s, step_s));
+    script->clock_steps.push_back({stepped->text(), time_of(node.at("at_s")), step_s});
   } else if (const auto edit = node.find("edit")) {
     node.only({"at_s", "edit"});
     script->edits.push_back({time_of(node.at("at_s")), read_edit(*edit)});
   } else {
-    node.problem("expected one of sway, move, cover, block, unplug, nudge, edit, found none of them.");
+    node.problem(
+        "expected one of sway, move, cover, block, unplug, nudge, resize, clock_step, edit, found none of "
+        "them.");
   }
+}
+
+Status in_room(const char* what, const std::string& name, const std::vector<std::string>& known) {
+  if (std::find(known.begin(), known.end(), name) != known.end()) return {};
+  return error("script: expected a {} that stands in the room ({}), found '{}'.", what,
+               fmt::join(known, ", "), name);
 }
 
 // The same events again and again, `period_s` apart, until the end.
@@ -103,6 +135,8 @@ Script repeated(const Script& once, double period_s) {
     later(once.blocks, by_s, &all.blocks);
     later(once.unplugs, by_s, &all.unplugs);
     later(once.nudges, by_s, &all.nudges);
+    later(once.resizes, by_s, &all.resizes);
+    later(once.clock_steps, by_s, &all.clock_steps);
     later(once.edits, by_s, &all.edits);
   }
   return all;
@@ -144,28 +178,23 @@ Result<ScriptedRoom> ScriptedRoom::create(Script script, sim::VirtualRig* rig) {
   out.rig_ = rig;
   for (const sim::PlacedMarker& placed : rig->world().markers)
     out.homes_.push_back({placed, rig->world().find(placed.object)->world_from_object});
-  std::vector<std::string> named;
-  for (const auto& sway : script.sways) named.push_back(sway.marker);
-  for (const auto& move : script.moves) named.push_back(move.marker);
-  for (const auto& cover : script.covers) named.push_back(cover.marker);
-  for (const std::string& name : named) {
-    std::string known;
-    bool stands = false;
-    for (const Home& home : out.homes_) {
-      known += (known.empty() ? "" : ", ") + home.placed.marker.text();
-      stands |= home.placed.marker.text() == name;
-    }
-    if (!stands)
-      return error("script: expected a marker that stands in the room ({}), found '{}'.", known, name);
-  }
-  for (const Script::Block& block : script.blocks)
-    if (!rig->world().rig.find(block.projector))
-      return error("script: expected a projector of the room, found '{}'.", block.projector);
-  for (const Script::Nudge& nudge : script.nudges) {
-    const Imager* imager = rig->world().rig.find(nudge.device);
-    if (!imager)
-      return error("script: expected a camera or projector of the room, found '{}'.", nudge.device);
-    out.devices_.emplace_back(nudge.device, imager->imager_from_world);
+  std::vector<std::string> markers, cameras, projectors;
+  for (const Home& home : out.homes_) markers.push_back(home.placed.marker.text());
+  for (const Imager& camera : rig->world().rig.cameras) cameras.push_back(camera.name);
+  for (const Imager& projector : rig->world().rig.projectors) projectors.push_back(projector.name);
+  std::vector<std::string> devices = cameras;
+  devices.insert(devices.end(), projectors.begin(), projectors.end());
+
+  for (const auto& sway : script.sways) LIMN_TRY_STATUS(in_room("marker", sway.marker, markers));
+  for (const auto& move : script.moves) LIMN_TRY_STATUS(in_room("marker", move.marker, markers));
+  for (const auto& cover : script.covers) LIMN_TRY_STATUS(in_room("marker", cover.marker, markers));
+  for (const auto& block : script.blocks) LIMN_TRY_STATUS(in_room("projector", block.projector, projectors));
+  for (const auto& unplug : script.unplugs) LIMN_TRY_STATUS(in_room("device", unplug.device, devices));
+  for (const auto& resize : script.resizes) LIMN_TRY_STATUS(in_room("camera", resize.camera, cameras));
+  for (const auto& step : script.clock_steps) LIMN_TRY_STATUS(in_room("camera", step.camera, cameras));
+  for (const auto& nudge : script.nudges) {
+    LIMN_TRY_STATUS(in_room("device", nudge.device, devices));
+    out.devices_.emplace_back(nudge.device, rig->world().rig.find(nudge.device)->imager_from_world);
   }
   out.script_ = std::move(script);
   return out;
@@ -241,6 +270,17 @@ void ScriptedRoom::put(const std::string& name, bool is_due, const std::function
   object.name = name;
   object.albedo.setConstant(k_hand_albedo);
   rig_->place(object);
+}
+
+Frame ScriptedRoom::sent(Frame exposed, double at_s) const {
+  for (const Script::Resize& resize : script_.resizes)
+    if (resize.camera == exposed.camera && at_s >= resize.from_s && at_s < resize.until_s)
+      cv::resize(exposed.image, exposed.image, resize.size, 0, 0, cv::INTER_AREA);
+  double step_s = 0;
+  for (const Script::ClockStep& step : script_.clock_steps)
+    if (step.camera == exposed.camera && at_s >= step.at_s) step_s += step.step_s;
+  exposed.captured_at = shifted(exposed.captured_at, step_s);
+  return exposed;
 }
 
 Pose ScriptedRoom::world_from_marker(const MarkerName& marker, double at_s) const {

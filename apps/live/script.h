@@ -2,9 +2,11 @@
 
 #include <filesystem>
 #include <functional>
+#include <opencv2/core/types.hpp>
 #include <string>
 #include <vector>
 
+#include "core/frame.h"
 #include "core/pose.h"
 #include "core/result.h"
 #include "scene/staging.h"
@@ -42,6 +44,18 @@ struct Script {
     std::string device;
     double from_s = 0, until_s = 0;
   };
+  /// A camera sends pictures of another size.
+  struct Resize {
+    std::string camera;
+    double from_s = 0, until_s = 0;
+    cv::Size size;
+  };
+  /// From then on a camera's stamps are so much later, or earlier.
+  struct ClockStep {
+    std::string camera;
+    double at_s = 0;
+    double step_s = 0;
+  };
   /// A camera or projector is knocked out of its place, where the rig has it, and later put back.
   struct Nudge {
     std::string device;
@@ -60,6 +74,8 @@ struct Script {
   std::vector<Block> blocks;
   std::vector<Unplug> unplugs;
   std::vector<Nudge> nudges;
+  std::vector<Resize> resizes;
+  std::vector<ClockStep> clock_steps;
   std::vector<Action> edits;  ///< in the order of time
 
   bool is_plugged(const std::string& device, double at_s) const;
@@ -76,6 +92,8 @@ class ScriptedRoom {
   const Script& script() const { return script_; }
   /// Sets the room to a moment.
   void set(double at_s);
+  /// What its camera sends of a frame that was exposed at a moment.
+  Frame sent(Frame exposed, double at_s) const;
   /// Where the script has a placed marker at a moment, in the world.
   Pose world_from_marker(const MarkerName& marker, double at_s) const;
 

@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "apps/live/books.h"
+#include "apps/live/camera_intake.h"
 #include "apps/live/device_health.h"
 #include "apps/live/repair.h"
 #include "apps/live/scene_watch.h"
@@ -20,6 +21,7 @@ namespace {
 constexpr auto k_errand_wait = std::chrono::milliseconds(10);  // for what a repair wants
 
 double seconds_of(Stamp at) { return seconds_between(Stamp{}, at); }
+
 // RMS distance of the parts' origins from where they truly are when the light arrives, on the prototype; -1
 // when none is shown.
 double placement_mm(const Painted& painted,
@@ -78,8 +80,10 @@ class VirtualLoop {
         osc_(osc),
         server_(server),
         files_(session->setup().scene.folder) {
-    for (const Imager& camera : rig->world().rig.cameras)
+    for (const Imager& camera : rig->world().rig.cameras) {
       cameras_.push_back(health_.add({camera.name, "camera"}));
+      intakes_.emplace_back(camera.name, cv::Size(camera.width, camera.height), cameras_.back(), &health_);
+    }
     for (const Imager& projector : session->setup().rig.projectors)
       projectors_.push_back(health_.add({projector.name, "projector"}));
   }
@@ -106,7 +110,7 @@ class VirtualLoop {
     }
     const Painted& painted = session_->paint(rig_->now(), shifted(rig_->now(), k_virtual_display_s));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i) {
-      if (!is_plugged(session_->setup().rig.projectors[i].name, projectors_[i], rig_->now())) continue;
+      if (!is_there(session_->setup().rig.projectors[i].name, projectors_[i], rig_->now())) continue;
       LIMN_TRY(const Stamp shown_at, rig_->projector(static_cast<int>(i)).show(lit(painted, i)));
       LIMN_CHECK(shown_at == painted.shown_at);
     }
@@ -162,23 +166,38 @@ class VirtualLoop {
     return server_ ? server_->lit(session_, projector) : painted.projectors[projector];
   }
 
+  // What is taken of this moment's pictures.
   std::vector<Frame> exposed(Stamp at) {
     std::vector<int> plugged;
     const std::vector<Imager>& cameras = rig_->world().rig.cameras;
     for (std::size_t i = 0; i < cameras.size(); ++i)
-      if (is_plugged(cameras[i].name, cameras_[i], at)) plugged.push_back(static_cast<int>(i));
-    return rig_->expose(plugged);
+      if (room_->script().is_plugged(cameras[i].name, seconds_of(at)))
+        plugged.push_back(static_cast<int>(i));
+      else
+        health_.fails(cameras_[i], "");
+    std::vector<Frame> exposed = rig_->expose(plugged), taken;
+    for (std::size_t k = 0; k < plugged.size(); ++k) {
+      CameraIntake& intake = intakes_[static_cast<std::size_t>(plugged[k])];
+      auto frame = intake.taken(room_->sent(std::move(exposed[k]), seconds_of(at)), rig_->now());
+      if (frame) taken.push_back(std::move(*frame));
+    }
+    tell_of_devices(at);
+    return taken;
   }
 
-  // Tells of a device that comes or goes.
-  bool is_plugged(const std::string& device, std::size_t number, Stamp at) {
-    const bool is = room_->script().is_plugged(device, seconds_of(at));
+  bool is_there(const std::string& projector, std::size_t number, Stamp at) {
+    const bool is = room_->script().is_plugged(projector, seconds_of(at));
     is ? health_.works(number) : health_.fails(number, "");
+    tell_of_devices(at);
+    return is;
+  }
+
+  // Of those that came or went, or whose clocks stepped.
+  void tell_of_devices(Stamp at) {
     for (const std::string& what : health_.news()) {
       books_->telemetry().note(at, what);
       log_warning("live: {:.2f} s: {}", seconds_of(at), what);
     }
-    return is;
   }
 
   void play_edits(Stamp at) {
@@ -201,6 +220,7 @@ class VirtualLoop {
   SceneWatch files_;
   DeviceHealth health_;
   std::vector<std::size_t> cameras_, projectors_;  // as health_ calls them
+  std::vector<CameraIntake> intakes_;              // of cameras_
   std::size_t moments_ = 0, played_ = 0;
 };
 

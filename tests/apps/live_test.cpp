@@ -31,6 +31,7 @@
 #include "device/gl_context.h"
 #include "device/picture_camera.h"
 #include "sim/virtual_rig.h"
+#include "tests/apps/studio.h"
 #include "tests/support/matchers.h"
 #include "tracker/predict.h"
 
@@ -42,105 +43,6 @@ using namespace test::literals;
 using nlohmann::json;
 
 constexpr double k_mended_s = 5.4;  // what a repair takes of the virtual clock, and half a second
-constexpr const char* k_mirror = "aruco_4x4_50:0";  // the marker of the door's slot
-
-sim::World studio(double resolution) {
-  sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture).value();
-  EXPECT_TRUE(make_coarser(resolution, &world.rig).ok());
-  return world;
-}
-
-json script_of(double seconds, const json& events) {
-  return {{"schema", "limn.script/1"}, {"seconds", seconds}, {"events", events}};
-}
-
-fs::path written(const fs::path& path, const json& content) {
-  EXPECT_TRUE(write_file(path, content.dump(2)));
-  return path;
-}
-
-json read_json(const fs::path& path) {
-  const auto text = read_file(path);
-  return text ? json::parse(*text) : json();
-}
-
-std::vector<std::string> lines_of(const fs::path& path) {
-  std::ifstream file(path);
-  std::vector<std::string> lines;
-  for (std::string line; std::getline(file, line);) lines.push_back(line);
-  return lines;
-}
-
-// The studio and its scene, to be changed: world.json and door/.
-void copy_studio_to(const fs::path& folder) {
-  const fs::path config = fs::path(LIMN_SOURCE_DIR) / "config";
-  fs::copy(config / "scenes/door", folder / "door");
-  std::string world = read_file(config / "worlds/studio.json").value();
-  const std::string named = "../scenes/door";
-  world.replace(world.find(named), named.size(), "door");
-  ASSERT_TRUE(write_file(folder / "world.json", world));
-}
-
-// Light on a marker in a hand arrives where the marker then is: 0.5 Hz, 0.25 m/s at most, 60 ms late.
-TEST(Live, PredictionMakesUpForTheLag) {
-  constexpr double k_lag_s = 0.060, k_begins_s = 0.5, k_ends_s = 2.0, k_runs_s = 2.4;
-  constexpr double k_amplitude_m = 0.25 / (2 * M_PI * 0.5);
-  const fs::path folder = test::test_folder();
-  const auto script = load_script(
-      written(folder / "script.json", script_of(k_runs_s, {{{"at_s", k_begins_s},
-                                                            {"until_s", k_ends_s},
-                                                            {"sway", k_mirror},
-                                                            {"amplitude_m", {k_amplitude_m, 0, 0}},
-                                                            {"hz", 0.5}}})));
-  ASSERT_TRUE(script) << script.message();
-  const MarkerName marker = MarkerName::parse(k_mirror).value();
-  sim::World world = studio(1);
-  const Pose world_from_marker = *sim::world_from_marker(world, marker);
-  const Eigen::Vector3d p_eye = world.rig.cameras[0].imager_from_world.inverse().translation;
-  const Pose camera_from_world = looking_at(p_eye, world_from_marker.translation, Eigen::Vector3d::UnitZ());
-  world.rig.cameras[0] = viewer_imager(camera_from_world.inverse(), 640, 320, 11);  // the marker: 62 px
-  world.rig.cameras[0].name = "camera0";
-  sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
-  auto room = ScriptedRoom::create(*script, &rig);
-  ASSERT_TRUE(room) << room.message();
-  auto watcher = Watcher::create(*rig.world().scene, rig.world().rig);
-  ASSERT_TRUE(watcher) << watcher.message();
-  double filtered = 0, held = 0, still = 0, overshoot_m = 0;
-  int moving = 0, resting = 0;
-  while (rig.next_exposure() < shifted(Stamp{}, k_runs_s)) {
-    const double captured_s = seconds_between(Stamp{}, rig.next_exposure());
-    room->set(captured_s);
-    const int camera = 0;
-    const Watched& watched = watcher->watch(rig.expose(std::span(&camera, 1)));
-    const double shown_s = captured_s + k_lag_s;
-    const Eigen::Vector3d p_true = room->world_from_marker(marker, shown_s).translation;
-    const auto off = [&](tracker::Prediction how) {
-      for (const Track& track : tracker::predicted(watched.motions, shifted(Stamp{}, shown_s), how))
-        if (track.body == "mirror") return (track.world_from_body.translation - p_true).norm();
-      return 1.0;
-    };
-    const double now = off(tracker::Prediction::filtered);
-    if (shown_s > 0.3 && shown_s < k_begins_s) {
-      still += now * now;
-      ++resting;
-    }
-    if (shown_s > k_begins_s + 0.3 && shown_s < k_ends_s) {
-      filtered += now * now;
-      held += std::pow(off(tracker::Prediction::hold), 2);
-      ++moving;
-    }
-    if (shown_s >= k_ends_s) overshoot_m = std::max(overshoot_m, now);  // at the turn, where it stops
-  }
-  const double filtered_mm = 1e3 * std::sqrt(filtered / moving), held_mm = 1e3 * std::sqrt(held / moving);
-  std::printf("in motion %.2f mm RMS, without prediction %.2f; after the stop at most %.2f; still %.3f\n",
-              filtered_mm, held_mm, 1e3 * overshoot_m, 1e3 * std::sqrt(still / resting));
-  EXPECT_LE(filtered_mm, 1.5);
-  EXPECT_LE(filtered_mm, 0.15 * held_mm);
-  EXPECT_LE(1e3 * overshoot_m, 3);
-  EXPECT_LE(1e3 * std::sqrt(still / resting), 0.1);
-}
-
 TEST(Live, ASessionIsReplayedToTheLastDigit) {
   const fs::path folder = test::test_folder();
   LiveOptions options;
@@ -445,6 +347,47 @@ TEST(Live, GoesOnWithoutItsCamera) {
   EXPECT_NE(read_file(folder / "out/session.html").value().find("camera0 is back"), std::string::npos);
 }
 
+// Pictures of a size that the rig was not measured in are none, and said to be; a camera whose clock steps is
+// as good as before.
+TEST(Live, GoesOnWhenItsCamerasPicturesAndClockChange) {
+  const fs::path folder = test::test_folder();
+  const auto lived = [&](const std::string& name, const json& events) {
+    LiveOptions options;
+    options.resolution = 0.5;
+    options.script = written(folder / (name + ".json"), script_of(1.6, events));
+    options.out = folder / name;
+    const Status status = run_live(options);
+    EXPECT_TRUE(status.ok()) << status.message();
+    return read_json(options.out / "session.json");
+  };
+  const auto last_light = [&](const std::string& name) {
+    return read_picture(folder / name / "projector-projector0.png").value();
+  };
+  const json sway = {{"at_s", 0.2}, {"until_s", 5}, {"sway", k_mirror}, {"amplitude_m", {0.03, 0, 0}}};
+  lived("calm", json::array({sway}));
+  const json stepped = lived("stepped", {sway,
+                                         {{"at_s", 0.5}, {"clock_step", "camera0"}, {"seconds", 3600}},
+                                         {{"at_s", 0.9}, {"clock_step", "camera0"}, {"seconds", -9000}}});
+  EXPECT_TRUE(test::image_near(last_light("stepped"), last_light("calm"), 0, 0, "light"));
+  EXPECT_EQ(stepped.at("missed_frames"), 0);
+  int told = 0;
+  for (const json& note : stepped.at("notes"))
+    told += note.at("what").get<std::string>().find("camera0's clock has stepped") == 0;
+  EXPECT_EQ(told, 2);
+
+  const json resized =
+      lived("resized", {{{"at_s", 0.3}, {"until_s", 1.3}, {"resize", "camera0"}, {"size", {640, 480}}}});
+  EXPECT_EQ(resized.at("missed_frames"), 30);
+  EXPECT_GT(resized.at("pictures_with_lost_bodies").get<int>(), 15);
+  std::vector<std::string> notes;
+  for (const json& note : resized.at("notes")) notes.push_back(note.at("what"));
+  ASSERT_EQ(notes.size(), 2u);
+  EXPECT_NE(notes[0].find("expected pictures of 960x540, found one of 640x480"), std::string::npos)
+      << notes[0];
+  EXPECT_EQ(notes[1], "camera0 is back");
+  EXPECT_GT(cv::countNonZero(last_light("resized").reshape(1)), 1000);
+}
+
 // A hand in one projector's light: the other gives what is lost. Without a hand nothing changes.
 TEST(Live, RefillsASomebodysShadow) {
   const fs::path folder = test::test_folder();
@@ -715,67 +658,6 @@ TEST(Live, ViewersOfAllKindsShareAnEyeThatNeverJumps) {
   EXPECT_GT(farthest_m, 0.01);
 }
 
-TEST(Live, LooksForCoveredMarkersWhileOneIsMissing) {
-  sim::World world = studio(1);
-  const MarkerName control = MarkerName::parse("apriltag_36h11:9").value();
-  world.scene->controls = {{control, "next_variant", "mirror", "cover"}};
-  const Pose lying(Eigen::Quaterniond(0.707106781, -0.707106781, 0, 0), {-0.35, -0.15, 0.45});
-  ASSERT_TRUE(sim::add_marker(world, {control, 0.05, lying}, false, marker_picture));
-  sim::VirtualRig rig(world, {.grab_waits_for_light = false});
-  const int camera = 0;
-  Frame whole = rig.expose(std::span(&camera, 1))[0];
-  auto watcher = Watcher::create(*world.scene, world.rig);
-  ASSERT_TRUE(watcher) << watcher.message();
-  const auto found_in = [&](const Frame& frame) -> std::optional<tracker::Detection> {
-    whole.captured_at = shifted(whole.captured_at, 1 / 30.0);
-    for (const tracker::Detection& found :
-         watcher->watch(std::vector<Frame>{{frame.camera, frame.image, whole.captured_at}}).detections[0])
-      if (found.marker == control) return found;
-    return std::nullopt;
-  };
-  const auto marker = found_in(whole);
-  ASSERT_TRUE(marker);
-  std::vector<cv::Point> outline;
-  for (const Eigen::Vector2d& corner : marker->corners_px)
-    outline.emplace_back(static_cast<int>(corner.x()), static_cast<int>(corner.y()));
-  const int side = static_cast<int>(cv::norm(outline[1] - outline[0]));
-  Frame gone{whole.camera, whole.image.clone(), {}}, covered{whole.camera, whole.image.clone(), {}};
-  cv::fillConvexPoly(gone.image, outline, cv::Scalar::all(40));
-  cv::circle(covered.image, 0.5 * (outline[0] + outline[1]), side / 7, cv::Scalar::all(40), cv::FILLED);
-  EXPECT_FALSE(found_in(gone));
-  std::optional<tracker::Detection> found;
-  int pictures = 0;
-  for (; pictures < 3 && !found; ++pictures) found = found_in(covered);
-  ASSERT_TRUE(found) << "in " << pictures << " pictures";
-}
-
-// A camera that is swung round: markers are found where they should be by now, not searched for.
-TEST(Live, FollowsMarkersThatMoveByMoreThanHalfTheirSideAPicture) {
-  sim::World world = studio(1);
-  sim::VirtualRig rig(world, {.grab_waits_for_light = false});
-  const int camera = 0;
-  const Frame still = rig.expose(std::span(&camera, 1))[0];
-  auto watcher = Watcher::create(*world.scene, world.rig);
-  ASSERT_TRUE(watcher) << watcher.message();
-  const std::size_t all = watcher->watch(std::span(&still, 1)).detections[0].size();
-  ASSERT_GE(all, 5u);
-  const auto& c = watcher->watched().detections[0][0].corners_px;
-  const double side = (c[1] - c[0]).norm();
-  double moved = 0;
-  int picture = 0;
-  for (const double sides : {0.3, 0.6, 0.8, 0.8, 0.8}) {
-    moved += std::round(sides * side);
-    Frame frame{still.camera, {}, shifted(still.captured_at, ++picture / 30.0)};
-    const cv::Matx23d away(1, 0, -moved, 0, 1, 0);
-    cv::warpAffine(still.image, frame.image, away, still.image.size(), cv::INTER_NEAREST);
-    std::size_t followed = 0;
-    for (const tracker::Detection& found : watcher->watch(std::span(&frame, 1)).detections[0])
-      followed +=
-          (found.unshadowed && found.unshadowed->age > 0) || (found.by_pattern && found.by_pattern->age > 0);
-    EXPECT_EQ(followed, all) << picture;
-  }
-}
-
 TEST(Live, MakesARoomForARigAndAScene) {
   const sim::World studio_world = studio(0.5);
   const auto room = room_for(studio_world.rig, *studio_world.scene);
@@ -786,41 +668,6 @@ TEST(Live, MakesARoomForARigAndAScene) {
   const int camera = 0;
   const Watched& watched = watcher->watch(rig.expose(std::span(&camera, 1)));
   EXPECT_EQ(watched.motions.size(), 3u);  // the door and both slots
-}
-
-TEST(Live, ReadsWhatControlMarkersSay) {
-  sim::World world = studio(0.5);
-  world.scene->controls = {{MarkerName::parse("aruco_4x4_50:9").value(), "next_variant", "mirror", "cover"}};
-  ASSERT_TRUE(
-      sim::add_marker(world,
-                      {world.scene->controls[0].marker, 0.05,
-                       Pose(Eigen::Quaterniond(0.707106781, -0.707106781, 0, 0), {-0.35, -0.15, 0.45})},
-                      false, marker_picture));
-  const fs::path folder = test::test_folder();
-  const auto script =
-      load_script(written(folder / "script.json",
-                          script_of(2, {{{"at_s", 0.4}, {"until_s", 1.5}, {"cover", "aruco_4x4_50:9"}}})));
-  ASSERT_TRUE(script) << script.message();
-  const scene::Scene scene = *world.scene;
-  sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
-  auto room = ScriptedRoom::create(*script, &rig);
-  auto watcher = Watcher::create(scene, rig.world().rig);
-  ASSERT_TRUE(room);
-  ASSERT_TRUE(watcher);
-  std::vector<double> used_s;
-  for (int i = 0; i < 55; ++i) {
-    const double at_s = seconds_between(Stamp{}, rig.next_exposure());
-    room->set(at_s);
-    const int camera = 0;
-    for (const ControlUse& use : watcher->watch(rig.expose(std::span(&camera, 1))).uses) {
-      EXPECT_EQ(use.control, 0u);
-      EXPECT_EQ(use.steps, 1);
-      used_s.push_back(at_s);
-    }
-  }
-  ASSERT_EQ(used_s.size(), 1u);
-  EXPECT_GT(used_s[0], 0.85);
-  EXPECT_LT(used_s[0], 1.05);
 }
 
 TEST(Live, SaysWhatIsWrong) {
@@ -834,8 +681,10 @@ TEST(Live, SaysWhatIsWrong) {
   EXPECT_NE(message(one).find("--rig and --scene together"), std::string::npos);
   LiveOptions script;
   script.script = written(folder / "a.json", script_of(1, {{{"at_s", 0.2}, {"dance", "x"}}}));
-  EXPECT_NE(message(script).find("events[0]: expected one of sway, move, cover, block, unplug, nudge, edit"),
-            std::string::npos)
+  EXPECT_NE(
+      message(script).find(
+          "events[0]: expected one of sway, move, cover, block, unplug, nudge, resize, clock_step, edit"),
+      std::string::npos)
       << message(script);
   script.script =
       written(folder / "b.json", script_of(1, {{{"at_s", 2}, {"until_s", 1}, {"cover", k_mirror}}}));
@@ -843,6 +692,15 @@ TEST(Live, SaysWhatIsWrong) {
   script.script =
       written(folder / "c.json", script_of(1, {{{"at_s", 0}, {"until_s", 1}, {"cover", "aruco_4x4_50:44"}}}));
   EXPECT_NE(message(script).find("a marker that stands in the room"), std::string::npos);
+  for (const json& event :
+       json::array({{{"at_s", 0}, {"until_s", 1}, {"unplug", "camera7"}},
+                    {{"at_s", 0}, {"until_s", 1}, {"block", "camera0"}},
+                    {{"at_s", 0}, {"until_s", 1}, {"resize", "camera7"}, {"size", {64, 48}}},
+                    {{"at_s", 0}, {"until_s", 1}, {"resize", "camera0"}, {"size", {64, 0.5}}},
+                    {{"at_s", 0}, {"clock_step", "projector0"}, {"seconds", 1}}})) {
+    script.script = written(folder / "d.json", script_of(1, {event}));
+    EXPECT_NE(message(script).find("expected"), std::string::npos) << event << message(script);
+  }
   LiveOptions other_rig;  // of other devices
   sim::World world = studio(1);
   world.rig.projectors[1].width = 1024;

@@ -1,6 +1,7 @@
-// A long session in which things go wrong again and again: cameras and projectors come and go, hands cover
-// markers and hide the light, files break and are mended, the disk is full for a while. LIMN_SOAK_S: seconds
-// of the session's clock (20), an hour for what the README tells.
+// A long session in which things go wrong again and again: cameras and projectors come and go, pictures come
+// in another size, a camera's clock steps, hands cover markers and hide the light, files break and are
+// mended, the disk is full for a while. LIMN_SOAK_S: seconds of the session's clock (20), an hour for what
+// the README tells.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -20,6 +21,7 @@
 #include "apps/live/live.h"
 #include "apps/live/stopwatch.h"
 #include "core/file.h"
+#include "tests/apps/studio.h"
 #include "tests/support/matchers.h"
 #include "tests/support/small_disk.h"
 
@@ -53,8 +55,12 @@ json events() {
   const auto span = [](double from_s, double until_s, const std::string& what, const std::string& whose) {
     return json{{"at_s", from_s}, {"until_s", until_s}, {what, whose}};
   };
+  const auto clock_step = [](double at_s, double seconds) {
+    return json{{"at_s", at_s}, {"clock_step", "camera0"}, {"seconds", seconds}};
+  };
   return {span(1, 2.5, "unplug", "camera0"),
           span(2, 3, "unplug", "projector0"),
+          {{"at_s", 3.2}, {"until_s", 4.4}, {"resize", "camera0"}, {"size", {320, 240}}},
           span(4, 5, "unplug", "projector1"),
           span(6, 7.5, "block", "projector0"),
           span(7, 8, "block", "projector1"),
@@ -72,7 +78,10 @@ json events() {
           edit(15.2, "next_variant"),
           edit(15.4, "restore_look", "soaked"),
           edit(15.6, "restore_look", "there is none of that name"),
-          edit(16, "screen", "next")};
+          edit(16, "screen", "next"),
+          clock_step(10.6, 3600),
+          clock_step(16.4, -7200),
+          clock_step(17, 3595)};
 }
 
 // Last whole row of a session's telemetry.csv; empty before the first.
@@ -92,16 +101,12 @@ std::vector<double> last_row(const fs::path& path) {
 }
 
 TEST(Soak, ALongSessionWithAllThatGoesWrong) {
-  const fs::path folder = test::test_folder(), config = fs::path(LIMN_SOURCE_DIR) / "config";
-  fs::copy(config / "scenes/door", folder / "door");
-  std::string world = read_file(config / "worlds/studio.json").value();
-  const std::string named = "../scenes/door";
-  world.replace(world.find(named), named.size(), "door");
-  ASSERT_TRUE(write_file(folder / "world.json", world));
+  const fs::path folder = test::test_folder();
+  copy_studio_to(folder);
   const double seconds = soak_s();
-  const json script = {
-      {"schema", "limn.script/1"}, {"seconds", seconds}, {"again_every_s", k_period_s}, {"events", events()}};
-  ASSERT_TRUE(write_file(folder / "script.json", script.dump()));
+  json script = script_of(seconds, events());
+  script["again_every_s"] = k_period_s;
+  written(folder / "script.json", script);
   const fs::path dropped = folder / "door/slots/mirror/dropped.glb", csv = folder / "out/telemetry.csv";
   fs::create_directories(dropped.parent_path());
   fs::path part;
@@ -147,12 +152,14 @@ TEST(Soak, ALongSessionWithAllThatGoesWrong) {
   outside.join();
   ASSERT_TRUE(lived.ok()) << lived.message();
 
-  const json summary = json::parse(read_file(folder / "out/session.json").value());
-  int gone = 0, back = 0, moved = 0, full = 0, written_again = 0;
+  const json summary = read_json(folder / "out/session.json");
+  int gone = 0, back = 0, resized = 0, stepped = 0, moved = 0, full = 0, written_again = 0;
   for (const json& note : summary.at("notes")) {
     const std::string what = note.at("what");
     gone += what.find(" is gone") != std::string::npos;
     back += what.find(" is back") != std::string::npos;
+    resized += what.find("found one of 320x240") != std::string::npos;
+    stepped += what.find("clock has stepped") != std::string::npos;
     moved += what.find("has moved") != std::string::npos;
     full += what.find("Its lines wait") != std::string::npos;
     written_again += what.find("is written again") != std::string::npos;
@@ -166,6 +173,8 @@ TEST(Soak, ALongSessionWithAllThatGoesWrong) {
               summary.at("placement_mm").at("p99").get<double>());
   EXPECT_GE(gone, 3);
   EXPECT_LE(std::abs(gone - back), seconds > 1000 ? 2 : 0);  // of a long session the newest notes are kept
+  EXPECT_GE(resized, 1);
+  EXPECT_GE(stepped, 3);
   EXPECT_EQ(moved, 0);
   EXPECT_GE(full, 1);
   EXPECT_LE(std::abs(written_again - full), seconds > 1000 ? 2 : 0);
