@@ -23,7 +23,7 @@ h1 { font-weight: 600; margin: 0 0 .3rem; } h2 { font-weight: 500; margin: 2rem 
 .lead { color: #a9a69f; margin: 0 0 2rem; }
 table { border-collapse: collapse; } th { text-align: left; color: #a9a69f; font-weight: 500; }
 td, th { padding: .3rem 1.6rem .3rem 0; border-bottom: 1px solid #2b2f36; }
-td.n { font-variant-numeric: tabular-nums; text-align: right; }
+td.n { font-variant-numeric: tabular-nums; text-align: right; white-space: nowrap; }
 svg { width: 100%; height: 140px; background: #1b1e24; border-radius: 4px; }
 polyline { fill: none; stroke: #7fb4ff; stroke-width: 1.5; } text { fill: #a9a69f; font-size: 12px; }
 )";
@@ -39,12 +39,12 @@ std::string chart(const std::string& title,
   const double begin = points.front().first, span = std::max(1e-9, points.back().first - begin);
   std::string line;
   for (const auto& [x, y] : points)
-    line += fmt::format("{:.1f},{:.1f} ", 10 + 980 * (x - begin) / span, 130 - 110 * y / high);
+    line += fmt::format("{:.1f},{:.1f} ", 10 + 980 * (x - begin) / span, 120 - 95 * y / high);
   return fmt::format(
       "<h2>{}</h2><svg viewBox=\"0 0 1000 140\" preserveAspectRatio=\"none\" role=\"img\" aria-label=\"{}\">"
-      "<polyline points=\"{}\"/><text x=\"14\" y=\"16\">{:.3g} {}</text>"
-      "<text x=\"900\" y=\"136\">{:.0f} s</text></svg>\n",
-      escaped(title), escaped(title), line, high, unit, begin + span);
+      "<polyline points=\"{}\"/><text x=\"10\" y=\"16\">{:.{}f} {}</text>"
+      "<text x=\"990\" y=\"136\" text-anchor=\"end\">{:.0f} s</text></svg>\n",
+      escaped(title), escaped(title), line, high, high < 10 ? 2 : 0, unit, begin + span);
 }
 
 }  // namespace
@@ -159,8 +159,7 @@ Status Telemetry::write_page(const std::filesystem::path& path, const std::strin
   std::string html = fmt::format(
       "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>{0}</title><style>{1}</style>"
       "<h1>{0}</h1><p class=\"lead\">{2:.1f} s, {3} pictures shown, {4} camera frames missed, {5} pictures "
-      "with a "
-      "lost body.</p>\n<table><tr><th>what</th><th>median</th><th>95 %</th><th>99 %</th></tr>\n",
+      "with a lost body.</p>\n<table><tr><th>what</th><th>median</th><th>95 %</th><th>99 %</th></tr>\n",
       escaped(title), k_telemetry_style, json["seconds"].get<double>(), frames_, missed_, with_lost_);
   for (const Measure& measure : measures_) {
     if (measure.all.count() == 0) continue;
