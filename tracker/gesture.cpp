@@ -20,8 +20,8 @@ constexpr double k_patch_sides = 3;  // of what is watched for stillness: a hand
 constexpr int k_patch_cells = 20;
 constexpr int k_few_cells = 4;
 constexpr double k_mostly = 2 / 3.0, k_alike = 0.1;  // of the marker's contrast
-constexpr double k_noise_blend = 0.2, k_deviations_per_median = 1.4826, k_noise_deviations = 4;
-constexpr double k_tremor_px = 1;  // of a hand that rests
+constexpr double k_noise_blend = 0.2, k_deviations_per_median = 1.4826, k_noise_deviations = 3;
+constexpr double k_tremor = 1 / 25.0;  // of a hand that rests, in sides of the marker
 
 double direction(const Detection& detection) {
   const Eigen::Vector2d d =
@@ -69,15 +69,16 @@ cv::Mat patch_of(const cv::Mat& grey, const cv::Rect& place) {
   return patch;
 }
 
-// Whether nothing has moved by more than a tremor: a step of brightness that shifts by k_tremor_px changes
-// the mean of the cell that it runs through by that share of the cell.
-bool is_still(const cv::Mat& a, const cv::Mat& b, double levels, double cell_px) {
-  if (a.empty() || b.empty() || a.size() != b.size()) return false;
-  cv::Mat change, brightest, darkest;
-  cv::absdiff(a, b, change);
-  cv::dilate(b, brightest, {});
-  cv::erode(b, darkest, {});
-  const cv::Mat allowed = (brightest - darkest) * (k_tremor_px / cell_px) + levels;
+// Whether nothing has moved by more than a tremor: a step of brightness that shifts by it changes the mean of
+// the cell that it runs through by that share of the cell.
+bool is_still(const cv::Mat& now, const cv::Mat& before, double levels) {
+  if (now.empty() || now.size() != before.size()) return false;
+  cv::Mat change, brightest, darkest, allowed;
+  cv::absdiff(now, before, change);
+  cv::dilate(before, brightest, {});
+  cv::erode(before, darkest, {});
+  cv::magnitude((brightest - darkest) * (k_tremor * k_patch_cells / k_patch_sides),
+                cv::Mat(now.size(), CV_32F, cv::Scalar(levels)), allowed);
   return cv::countNonZero(change > allowed) < k_few_cells;
 }
 
@@ -104,8 +105,8 @@ int GestureReader::seen(const cv::Mat& grey, const Detection& detection, Stamp a
   const cv::Rect place = place_of(corners_px_, grey.size());
   const cv::Mat patch = patch_of(grey, place);
   if (place == std::exchange(place_, place)) note_noise(patch);
-  patch_ = seen_patch_ = patch;
-  patch_since_ = at;
+  seen_patch_ = patch;
+  still_patch_.release();
   if (seconds_between(seen_since_, at) >= k_armed_s) is_armed_ = true;
   if (gesture_ == Gesture::turn) return turned(detection, at);
   if (gesture_ == Gesture::lay) return laid(detection, at);
@@ -182,15 +183,17 @@ bool GestureReader::hides_across(Stamp at) const {
   });
 }
 
-// For how long the marker's place has looked as it does.
+// For how long the marker's place has looked as it does: as the mean of its pictures since then.
 double GestureReader::still_for(const cv::Mat& patch, Stamp at) {
-  const double cell_px = k_patch_sides * std::sqrt(area(corners_px_)) / k_patch_cells;
-  if (!is_still(patch, patch_, std::max(options_.still_levels, k_noise_deviations * noise_levels_),
-                cell_px)) {
-    patch_ = patch;
-    patch_since_ = at;
+  const double levels = std::max(options_.still_levels, k_noise_deviations * noise_levels_);
+  if (is_still(patch, still_patch_, levels)) {
+    still_patch_ += (patch - still_patch_) / ++still_pictures_;
+  } else {
+    still_patch_ = patch.clone();
+    still_pictures_ = 1;
+    still_since_ = at;
   }
-  return seconds_between(patch_since_, at);
+  return seconds_between(still_since_, at);
 }
 
 void GestureReader::note_noise(const cv::Mat& patch) {

@@ -22,7 +22,7 @@ enum class Gesture {
 
 struct GestureOptions {
   double cover_s = 0.5;   ///< a cover lasts so long; shorter: hands that pass act
-  double still_s = 0.35;  ///< and what covers it is still for so long; shorter: arms at work act
+  double still_s = 0.45;  ///< and what covers it is still for so long; shorter: arms at work act
   double turn_deg = 30;   ///< one step
   double lay_deg = 50;    ///< from how it stood
   /// Grey levels by which what is still may change at least, seen in cells of a seventh of the marker's side,
@@ -75,9 +75,10 @@ class GestureReader {
   cv::Rect place_;           // the marker's and what is around it
   double noise_levels_ = 0;  // standard deviation of a cell's change from picture to picture
   Stamp seen_since_, seen_at_;
-  cv::Mat seen_patch_;  // what the marker's place looked like when it was seen last
-  cv::Mat patch_;       // what the marker's place looked like when it last changed
-  Stamp patch_since_;
+  cv::Mat seen_patch_;   // what the marker's place looked like when it was seen last
+  cv::Mat still_patch_;  // what it has looked like since it last changed, on average over so many pictures
+  int still_pictures_ = 0;
+  Stamp still_since_;
   std::vector<Neighbour> neighbours_;
   std::optional<double> turn_rest_;  // direction of its upper side when it last acted, radians
   double turn_now_ = 0;              // newest, and since when it has rested there
