@@ -692,14 +692,20 @@ TEST(Live, SaysWhatIsWrong) {
   script.script =
       written(folder / "c.json", script_of(1, {{{"at_s", 0}, {"until_s", 1}, {"cover", "aruco_4x4_50:44"}}}));
   EXPECT_NE(message(script).find("a marker that stands in the room"), std::string::npos);
-  for (const json& event :
-       json::array({{{"at_s", 0}, {"until_s", 1}, {"unplug", "camera7"}},
-                    {{"at_s", 0}, {"until_s", 1}, {"block", "camera0"}},
-                    {{"at_s", 0}, {"until_s", 1}, {"resize", "camera7"}, {"size", {64, 48}}},
-                    {{"at_s", 0}, {"until_s", 1}, {"resize", "camera0"}, {"size", {64, 0.5}}},
-                    {{"at_s", 0}, {"clock_step", "projector0"}, {"seconds", 1}}})) {
-    script.script = written(folder / "d.json", script_of(1, {event}));
-    EXPECT_NE(message(script).find("expected"), std::string::npos) << event << message(script);
+  const std::vector<std::pair<json, std::string>> refused = {
+      {{{"at_s", 0}, {"until_s", 1}, {"unplug", "camera7"}}, "a device that stands in the room (camera0, "},
+      {{{"at_s", 0}, {"until_s", 1}, {"block", "camera0"}},
+       "a projector that stands in the room (projector0, "},
+      {{{"at_s", 0}, {"until_s", 1}, {"resize", "camera7"}, {"size", {64, 48}}},
+       "a camera that stands in the room (camera0), found 'camera7'"},
+      {{{"at_s", 0}, {"until_s", 1}, {"resize", "camera0"}, {"size", {64, 0.5}}},
+       "expected whole pixels from 1 to 16384, found 0.5"},
+      {{{"at_s", 0}, {"clock_step", "projector0"}, {"seconds", 1}},
+       "a camera that stands in the room (camera0), found 'projector0'"},
+      {{{"at_s", 0}, {"clock_step", "camera0"}, {"seconds", 1e300}}, "expected at most"}};
+  for (const auto& [event, why] : refused) {
+    script.script = written(folder / "d.json", script_of(1, json::array({event})));
+    EXPECT_NE(message(script).find(why), std::string::npos) << event << message(script);
   }
   LiveOptions other_rig;  // of other devices
   sim::World world = studio(1);
