@@ -374,7 +374,7 @@ void write_standing_mirror(const fs::path& folder) {
 // How it looks a person judged; what stays is that the foot covers the marker of the photograph, and no more.
 TEST(RenderPhotograph, StandsAMirrorOnAMarker) {
   const auto data = test::real_data("markers/opencv");
-  if (!data) GTEST_SKIP() << "markers/opencv";
+  if (!data) GTEST_SKIP() << "no photographs: markers/opencv";
   const fs::path folder = test::test_folder();
   auto camera = load_imager(*data / "tutorial_camera_params.yml");
   ASSERT_TRUE(camera) << camera.message();

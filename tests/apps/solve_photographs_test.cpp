@@ -221,7 +221,7 @@ void judge(const Measured& m,
 
 TEST(SolvePhotographs, FiveRealPosesHoldOutByTheReportAndByAnIndependentJudge) {
   const auto data = test::real_data("graycode");
-  if (!data) GTEST_SKIP() << "graycode";
+  if (!data) GTEST_SKIP() << "no photographs: graycode";
   const fs::path folder = test::test_folder();
   const Status status = run_solve(five_poses(*data, folder / "rig"));
   ASSERT_TRUE(status.ok()) << status.message();

@@ -134,7 +134,7 @@ TEST(SoundCaptures, OfAProjectorWhoseGammaIsNearlyTheWavesHaveNoFault) {
 
 TEST(SoundCaptures, PhotographedInARealRoomHaveNoFault) {
   const auto folder = real_data("graycode");
-  if (!folder) GTEST_SKIP() << "graycode";
+  if (!folder) GTEST_SKIP() << "no photographs: graycode";
   const auto captures = import_opencv_gray(
       {*folder, 1024, 768, Board::parse("chessboard:9x7:75mm").value(), "capture_*", "graycode_*.png", {}});
   ASSERT_TRUE(captures.ok()) << captures.message();

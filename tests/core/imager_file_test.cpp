@@ -109,7 +109,7 @@ TEST(ImagerFile, DamagedFilesAreNamed) {
 
 TEST(ImagerFile, ReadsTheRealFiles) {
   const auto data = test::real_data("markers");
-  if (!data) GTEST_SKIP() << "data/markers is absent";
+  if (!data) GTEST_SKIP() << "no real data: markers";
   for (const char* name : {"artoolkit/camera_para.dat", "artoolkit/hiro_frame_camera_para.dat",
                            "opencv/tutorial_camera_params.yml", "opencv/tutorial_camera_charuco.yml"}) {
     const auto camera = load_imager(*data / name);

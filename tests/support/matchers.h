@@ -43,7 +43,7 @@ std::mt19937_64 test_rng();
 std::filesystem::path test_folder();
 
 /// The folder of real photographs ($LIMN_REAL_DATA or ../shared/data beside the checkout); nullopt when
-/// absent. Tests then GTEST_SKIP() << the folder's name.
+/// absent. Tests then GTEST_SKIP() and name the folder.
 std::optional<std::filesystem::path> real_data(const std::string& inside);
 
 }  // namespace limn::test
