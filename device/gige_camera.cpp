@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "device/retry.h"
+#include "device/wall_clock.h"
 
 namespace limn::device {
 namespace {
@@ -18,8 +19,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int k_buffers = 4;
-constexpr guint k_socket_frames = 4;    // that the kernel may hold (as far as net.core.rmem_max lets it)
-constexpr double k_oldest_stamp_s = 1;  // an older stamp means that the wall clock was set meanwhile
+constexpr guint k_socket_frames = 4;  // that the kernel may hold (as far as net.core.rmem_max lets it)
+constexpr double k_oldest_stamp_s = 1;
 
 template <class Object>
 struct Unref {
@@ -217,11 +218,7 @@ Result<cv::Mat> decoded(ArvBuffer* buffer, const Format& format, cv::Size size, 
 
 // Aravis stamps by the wall clock.
 Stamp arrival(ArvBuffer* buffer) {
-  const Stamp now = Clock::now();
-  const double wall_s =
-      std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-  const double age_s = wall_s - 1e-9 * static_cast<double>(arv_buffer_get_system_timestamp(buffer));
-  return age_s >= 0 && age_s < k_oldest_stamp_s ? shifted(now, -age_s) : now;
+  return from_wall_clock(std::chrono::nanoseconds(arv_buffer_get_system_timestamp(buffer)), k_oldest_stamp_s);
 }
 
 }  // namespace
@@ -248,16 +245,23 @@ void GigeCamera::Impl::end(bool lost) {
   session.reset();
 }
 
-// The newest filled buffer; older ones go back unread. Null when none came in time.
+// The newest filled buffer; older ones go back unread, and all of them when the reader was away for so long
+// that what came later found no room. Null when none came in time.
 ArvBuffer* GigeCamera::Impl::newest(Stamp deadline) {
   ArvStream* stream = session->stream.get();
-  const double left_s = std::max(0.0, seconds_between(Clock::now(), deadline));
-  ArvBuffer* kept = arv_stream_timeout_pop_buffer(stream, static_cast<guint64>(1e6 * left_s));
-  while (ArvBuffer* newer = kept ? arv_stream_try_pop_buffer(stream) : nullptr) {
-    arv_stream_push_buffer(stream, std::exchange(kept, newer));
+  for (;;) {
+    const double left_s = std::max(0.0, seconds_between(Clock::now(), deadline));
+    ArvBuffer* kept = arv_stream_timeout_pop_buffer(stream, static_cast<guint64>(1e6 * left_s));
+    int filled = kept ? 1 : 0;
+    while (ArvBuffer* newer = kept ? arv_stream_try_pop_buffer(stream) : nullptr) {
+      arv_stream_push_buffer(stream, std::exchange(kept, newer));
+      ++dropped;
+      ++filled;
+    }
+    if (filled < k_buffers || Clock::now() >= deadline) return kept;
+    arv_stream_push_buffer(stream, kept);
     ++dropped;
   }
-  return kept;
 }
 
 std::optional<Frame> GigeCamera::Impl::grabbed(ArvBuffer* buffer) {

@@ -52,6 +52,7 @@ struct MjpegCamera::Impl {
   cv::Size size;
   std::optional<Connection> connection;
   Retry retry;
+  std::string fault;  // that ended a connection since the last picture; "" without one
   long connections = 0, dropped = 0, damaged = 0;
 
   Status connect(Stamp deadline);
@@ -66,13 +67,17 @@ Status MjpegCamera::Impl::connect(Stamp deadline) {
   LIMN_TRY_STATUS(socket.send(request(address)));
   connection.emplace(Connection{std::move(socket), MjpegStream(options.max_part_bytes)});
   ++connections;
-  retry.note("the connection stands, but no whole picture has come.");
+  retry.note("the connection stands, but no whole picture has come." +
+             (fault.empty() ? "" : " Before: " + fault));
   return {};
 }
 
 void MjpegCamera::Impl::disconnect(const std::string& why) {
-  if (connection) dropped += connection->stream.dropped();
-  connection.reset();
+  if (connection) {
+    dropped += connection->stream.dropped();
+    fault = why;
+    connection.reset();
+  }
   retry.failed(why);
 }
 
@@ -96,6 +101,7 @@ std::optional<Frame> MjpegCamera::Impl::decoded(MjpegPart part) {
     return std::nullopt;
   }
   retry.worked();
+  fault.clear();
   frame->camera = options.name;
   frame->captured_at = part.arrived_at;
   return std::move(*frame);

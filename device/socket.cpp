@@ -13,10 +13,12 @@
 #include <memory>
 #include <utility>
 
+#include "device/wall_clock.h"
+
 namespace limn::device {
 namespace {
 
-constexpr double k_credible_age_s = 10;  // an older arrival means that the wall clock was set meanwhile
+constexpr double k_oldest_stamp_s = 10;
 
 int milliseconds_until(Stamp deadline) {
   const double seconds = seconds_between(std::chrono::steady_clock::now(), deadline);
@@ -34,18 +36,14 @@ bool wait_for(int fd, short events, Stamp deadline) {
 
 // The kernel's stamp of arrival, which is the wall clock's, on the monotonic clock.
 Stamp arrival(msghdr* message) {
-  const Stamp now = std::chrono::steady_clock::now();
   for (cmsghdr* item = CMSG_FIRSTHDR(message); item; item = CMSG_NXTHDR(message, item)) {
     if (item->cmsg_level != SOL_SOCKET || item->cmsg_type != SCM_TIMESTAMPNS) continue;
     timespec stamp{};
     std::memcpy(&stamp, CMSG_DATA(item), sizeof(stamp));
-    const auto since_epoch = std::chrono::seconds(stamp.tv_sec) + std::chrono::nanoseconds(stamp.tv_nsec);
-    const double age =
-        std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch() - since_epoch)
-            .count();
-    if (age >= 0 && age < k_credible_age_s) return shifted(now, -age);
+    return from_wall_clock(std::chrono::seconds(stamp.tv_sec) + std::chrono::nanoseconds(stamp.tv_nsec),
+                           k_oldest_stamp_s);
   }
-  return now;
+  return now();
 }
 
 // Waits for the answer to a connect() that was begun; 0 or the errno.

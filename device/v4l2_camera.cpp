@@ -365,6 +365,7 @@ struct V4l2Camera::Impl {
   long openings = 0, dropped = 0, damaged = 0, odd_stamps = 0;
 
   Status dequeue(v4l2_buffer* buffer, bool* got);
+  Status drop(v4l2_buffer* buffer);
   Result<std::optional<v4l2_buffer>> newest(Stamp deadline);
   Stamp stamp_of(const v4l2_buffer& buffer);
   Result<std::optional<Frame>> grabbed(Stamp deadline);
@@ -382,28 +383,40 @@ Status V4l2Camera::Impl::dequeue(v4l2_buffer* buffer, bool* got) {
   return {};
 }
 
-// The newest frame; older ones go back unread.
+// Gives a frame back unread.
+Status V4l2Camera::Impl::drop(v4l2_buffer* buffer) {
+  ++dropped;
+  if (const int problem = session->device.ask(VIDIOC_QBUF, buffer))
+    return refused("queueing a buffer", problem);
+  return {};
+}
+
+// The newest frame; older ones go back unread, and all of them when the reader was away for so long that what
+// came later found no room.
 Result<std::optional<v4l2_buffer>> V4l2Camera::Impl::newest(Stamp deadline) {
-  const double left_s = std::max(0.0, seconds_between(Clock::now(), deadline));
-  std::optional<v4l2_buffer> kept;
-  if (!system.wait(session->device.fd(), left_s)) {
-    if (heard) return kept;
-    return error("it sends no frame. {}", advice_for(0));
-  }
-  for (bool got = true; got;) {
-    v4l2_buffer buffer{};
-    LIMN_TRY_STATUS(dequeue(&buffer, &got));
-    if (!got) break;
-    if (kept) {
-      ++dropped;
-      if (const int problem = session->device.ask(VIDIOC_QBUF, &*kept))
-        return refused("queueing a buffer", problem);
+  for (;;) {
+    const double left_s = std::max(0.0, seconds_between(Clock::now(), deadline));
+    std::optional<v4l2_buffer> kept;
+    if (!system.wait(session->device.fd(), left_s)) {
+      if (heard) return kept;
+      return error("it sends no frame. {}", advice_for(0));
     }
-    kept = buffer;
-    heard = true;
-    if (!system.wait(session->device.fd(), 0)) break;
+    std::size_t filled = 0;
+    do {
+      v4l2_buffer buffer{};
+      bool got = false;
+      LIMN_TRY_STATUS(dequeue(&buffer, &got));
+      if (!got) break;
+      if (kept) {
+        LIMN_TRY_STATUS(drop(&*kept));
+      }
+      kept = buffer;
+      heard = true;
+      ++filled;
+    } while (system.wait(session->device.fd(), 0));
+    if (filled < session->buffers.maps().size() || Clock::now() >= deadline) return kept;
+    LIMN_TRY_STATUS(drop(&*kept));
   }
-  return kept;
 }
 
 Stamp V4l2Camera::Impl::stamp_of(const v4l2_buffer& buffer) {

@@ -77,7 +77,7 @@ TEST(GigeCamera, DeliversFramesLockedAndStamped) {
     EXPECT_EQ(frame->camera, "left");
     EXPECT_EQ(frame->image.type(), CV_8UC3);
     EXPECT_GT(frame->captured_at, last);
-    EXPECT_LT(seconds_between(frame->captured_at, Clock::now()), 0.2);
+    EXPECT_LT(seconds_between(frame->captured_at, Clock::now()), 0.5);
     last = frame->captured_at;
   }
   const auto settings = camera->settings();
@@ -87,12 +87,12 @@ TEST(GigeCamera, DeliversFramesLockedAndStamped) {
   EXPECT_EQ(settings[1].problem, "");
   EXPECT_NEAR(settings[1].found.value_or(0), 3, 0.1);
   contains(settings[2].problem, "nothing that GigE Vision cameras have");
-  // A reader that was away gets the newest.
-  std::this_thread::sleep_for(std::chrono::milliseconds(600));
+  // A reader that was away gets the newest, not one of those that filled the buffers at first.
+  std::this_thread::sleep_for(std::chrono::milliseconds(1000));
   const Stamp begun = Clock::now();
   const auto frame = camera->next();
   ASSERT_TRUE(frame);
-  EXPECT_LT(seconds_between(frame->captured_at, begun), 0.5) << camera->description();
+  EXPECT_LT(seconds_between(frame->captured_at, begun), 0.6) << camera->description();
   EXPECT_EQ(camera->description().find(" 0 frames skipped"), std::string::npos) << camera->description();
 }
 

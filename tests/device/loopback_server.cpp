@@ -6,15 +6,29 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <stdexcept>
 
 namespace limn::test {
 
 LoopbackClient::~LoopbackClient() { close(fd_); }
 
+namespace {
+
+// `call` again while a signal that is no concern of ours interrupts it.
+template <class Call>
+ssize_t finished(Call call) {
+  ssize_t result = 0;
+  do result = call();
+  while (result < 0 && errno == EINTR);
+  return result;
+}
+
+}  // namespace
+
 bool LoopbackClient::send(std::string_view bytes) {
   while (!bytes.empty()) {
-    const ssize_t count = ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    const ssize_t count = finished([&] { return ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL); });
     if (count <= 0) return false;
     bytes.remove_prefix(static_cast<std::size_t>(count));
   }
@@ -24,7 +38,7 @@ bool LoopbackClient::send(std::string_view bytes) {
 std::string LoopbackClient::receive_until(const std::string& end) {
   std::string text;
   char c = 0;
-  while (!text.ends_with(end) && recv(fd_, &c, 1, 0) == 1) text += c;
+  while (!text.ends_with(end) && finished([&] { return recv(fd_, &c, 1, 0); }) == 1) text += c;
   return text;
 }
 

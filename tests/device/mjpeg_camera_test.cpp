@@ -42,6 +42,8 @@ std::string url(const LoopbackServer& server, const std::string& login = "") {
   return fmt::format("http://{}127.0.0.1:{}/stream", login, server.port());
 }
 
+constexpr double k_clocks_apart_s = 1e-3;  // the kernel stamps by the wall clock, which is regulated
+
 // Sends pictures of growing brightness every 5 ms until the client goes.
 void stream_well(LoopbackClient& client) {
   client.receive_until("\r\n\r\n");
@@ -81,9 +83,8 @@ TEST(MjpegCamera, DeliversPicturesInOrderStampedOnArrival) {
     EXPECT_GT(value_of(*frame), last);
     last = value_of(*frame);
     const std::lock_guard lock(mutex);
-    const double late = seconds_between(sent[static_cast<std::size_t>(last)], frame->captured_at);
-    EXPECT_GE(late, 0);
-    EXPECT_LT(late, 0.05);
+    EXPECT_GE(seconds_between(sent[static_cast<std::size_t>(last)], frame->captured_at), -k_clocks_apart_s);
+    EXPECT_LE(frame->captured_at, Clock::now());
   }
   EXPECT_NE(asked.find("GET /stream HTTP/1.0\r\n"), std::string::npos) << asked;
   EXPECT_NE(asked.find("Authorization: Basic bWU6c2VjcmV0\r\n"), std::string::npos) << asked;
@@ -106,8 +107,9 @@ TEST(MjpegCamera, OldPicturesThatWaitAreDropped) {
     while (phase != 1) pause(1);
     for (int i = 1; i <= 40; ++i) {
       pause(2);
+      const std::string bytes = part(jpeg(i));
       last_sent = Clock::now();
-      client.send(part(jpeg(i)));
+      client.send(bytes);
     }
     phase = 2;
     while (phase != 3) pause(1);
@@ -116,11 +118,13 @@ TEST(MjpegCamera, OldPicturesThatWaitAreDropped) {
   ASSERT_TRUE(camera) << camera.message();
   phase = 1;
   while (phase != 2) pause(1);
-  pause(150);
+  pause(150);  // the kernel has long handed it over, however busy the machine is
+  const Stamp read_at = Clock::now();
   const auto frame = camera->next();
   ASSERT_TRUE(frame) << frame.message();
   EXPECT_EQ(value_of(*frame), 40);
-  EXPECT_NEAR(seconds_between(last_sent, frame->captured_at), 0, 0.05);
+  EXPECT_GE(seconds_between(last_sent, frame->captured_at), -k_clocks_apart_s);
+  EXPECT_LT(frame->captured_at, read_at);
   EXPECT_NE(camera->description().find("39 pictures skipped"), std::string::npos) << camera->description();
   phase = 3;
 }
@@ -178,6 +182,7 @@ TEST(MjpegCamera, ALostConnectionIsMendedInsideOneCall) {
 
 // The camera's error when after one good picture the server sends `rest` again and again.
 std::string problem_after_one_picture(const std::string& rest) {
+  constexpr double k_limit_s = 1;
   LoopbackServer server([&, first = true](LoopbackClient& client) mutable {
     client.receive_until("\r\n\r\n");
     bool there = client.send(std::string(k_answer) + (std::exchange(first, false) ? part(jpeg(50)) : ""));
@@ -188,11 +193,11 @@ std::string problem_after_one_picture(const std::string& rest) {
     }
     if (there) client.receive_until("the client's end");
   });
-  auto camera = MjpegCamera::open(url(server), {.limit_s = 0.4, .max_part_bytes = 20000});
+  auto camera = MjpegCamera::open(url(server), {.limit_s = k_limit_s, .max_part_bytes = 20000});
   if (!camera) return "not opened: " + camera.message();
   const Stamp begun = Clock::now();
   const auto frame = camera->next();
-  EXPECT_LT(seconds_between(begun, Clock::now()), 0.6);
+  EXPECT_LT(seconds_between(begun, Clock::now()), 2 * k_limit_s);
   return frame ? "a picture came" : frame.message();
 }
 
@@ -236,7 +241,9 @@ TEST(MjpegCamera, ARefusingServerIsNotStormed) {
   });
   const Stamp begun = Clock::now();
   const auto camera = MjpegCamera::open(url(server, "me:secret@"), {.limit_s = 1.7});
-  EXPECT_NEAR(seconds_between(begun, Clock::now()), 1.7, 0.2);
+  const double took_s = seconds_between(begun, Clock::now());
+  EXPECT_GE(took_s, 1.7);
+  EXPECT_LT(took_s, 2.7);
   ASSERT_FALSE(camera);
   EXPECT_NE(camera.message().find("503 Busy"), std::string::npos) << camera.message();
   EXPECT_EQ(camera.message().find("secret"), std::string::npos) << camera.message();
