@@ -348,7 +348,10 @@ V4l2System V4l2System::kernel() {
       .wait =
           [](int fd, double seconds) {
             pollfd wanted{fd, POLLIN, 0};
-            return poll(&wanted, 1, static_cast<int>(std::ceil(1000 * seconds))) > 0;
+            int ready = 0;
+            do ready = poll(&wanted, 1, static_cast<int>(std::ceil(1000 * seconds)));
+            while (ready < 0 && errno == EINTR);
+            return ready > 0;
           },
   };
 }

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <chrono>
 
 namespace limn::test {
@@ -66,6 +67,7 @@ bool RemoteClient::send(std::string_view bytes) {
     const auto sent = tls_ ? SSL_write(tls_->session, bytes.data(),
                                        static_cast<int>(std::min<std::size_t>(bytes.size(), 16384)))
                            : ::send(handle_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    if (sent < 0 && !tls_ && errno == EINTR) continue;
     if (sent <= 0) return false;
     bytes.remove_prefix(static_cast<std::size_t>(sent));
   }
@@ -77,7 +79,10 @@ bool RemoteClient::fill(double patience_s) {
   std::array<char, 65536> bytes{};
   if (!tls_ || SSL_pending(tls_->session) == 0) {
     pollfd wanted{handle_, POLLIN, 0};
-    if (::poll(&wanted, 1, static_cast<int>(1e3 * patience_s)) <= 0) return false;
+    int ready = 0;
+    do ready = ::poll(&wanted, 1, static_cast<int>(1e3 * patience_s));
+    while (ready < 0 && errno == EINTR);
+    if (ready <= 0) return false;
   }
   const auto count = tls_ ? SSL_read(tls_->session, bytes.data(), static_cast<int>(bytes.size()))
                           : ::recv(handle_, bytes.data(), bytes.size(), 0);
