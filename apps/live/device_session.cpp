@@ -89,7 +89,7 @@ class DeviceLoop {
     ShownFrame shown = session_->measured();
     paint_s_ += k_blend * (1e-3 * shown.paint_ms - paint_s_);
     show(painted);
-    if (osc_) osc_->tell(*session_);
+    if (osc_) osc_->tell(*session_, now());
     if (server_) serve();  // what came while it painted need not wait for screens and news
     shown.missed = static_cast<int>(cameras_.missed());
     const Stamp begun = now();

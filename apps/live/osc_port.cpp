@@ -60,35 +60,33 @@ Result<OscPort> OscPort::open(const std::string& hear, const std::string& tell) 
 void OscPort::hear(Session* session, Telemetry* telemetry, Stamp at) {
   if (!ear_) return;
   std::array<std::uint8_t, k_longest_osc + 1> bytes;
-  const auto begun = Clock::now();
-  for (int i = 0; i < k_most_at_once && Clock::now() - begun < k_longest_hearing; ++i) {
+  const Stamp begun = now();
+  for (int i = 0; i < k_most_at_once && now() - begun < k_longest_hearing; ++i) {
     const auto length = ear_->next(bytes);
     if (!length) break;
     const auto edit = edit_of_osc({bytes.data(), std::min(*length, bytes.size())});
     const Status done = edit ? session->edit(*edit, "osc", at) : Status(edit.error());
     if (!done) refuse(done.message(), telemetry, at);
   }
-  if (untold_ > 0 && begun - *refused_at_ >= k_between_refusals) refuse("as before", telemetry, at);
+  if (untold_ > 0 && at - *refused_at_ >= k_between_refusals) refuse("as before", telemetry, at);
 }
 
 void OscPort::refuse(const std::string& why, Telemetry* telemetry, Stamp at) {
-  const auto now = Clock::now();
-  if (refused_at_ && now - *refused_at_ < k_between_refusals) {
+  if (refused_at_ && at - *refused_at_ < k_between_refusals) {
     ++untold_;
     return;
   }
   const std::string more = untold_ > 0 ? fmt::format(" ({} more refused meanwhile)", untold_) : "";
   telemetry->note(at, fmt::format("OSC refused: {}{}", why, more));
   log_warning("live: OSC: {}{}", why, more);
-  refused_at_ = now;
+  refused_at_ = at;
   untold_ = 0;
 }
 
-void OscPort::tell(const Session& session) {
+void OscPort::tell(const Session& session, Stamp at) {
   if (!mouth_) return;
-  const auto now = Clock::now();
-  if (now - told_all_at_ >= k_between_all) {
-    told_all_at_ = now;
+  if (!told_all_at_ || at - *told_all_at_ >= k_between_all) {
+    told_all_at_ = at;
     told_.clear();
   }
   const scene::Staging& staging = session.staging();

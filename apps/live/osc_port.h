@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <map>
 #include <optional>
 #include <string>
@@ -25,9 +24,10 @@ class OscPort {
 
   /// Edits of the messages that wait, at most k_most_at_once of them and for at most 5 ms; the others wait
   /// for the next call. What cannot be done is told, at most once a second, with how many more there were.
+  /// `at`: this moment on the session's clock.
   void hear(Session* session, Telemetry* telemetry, Stamp at);
   /// What has changed since it was told last; once a second everything, for datagrams get lost.
-  void tell(const Session& session);
+  void tell(const Session& session, Stamp at);
 
   /// The port that it hears on, 0: none.
   int port() const { return ear_ ? ear_->port() : 0; }
@@ -35,15 +35,14 @@ class OscPort {
   static constexpr int k_most_at_once = 64;
 
  private:
-  using Clock = std::chrono::steady_clock;
   void refuse(const std::string& why, Telemetry* telemetry, Stamp at);
   void put(const std::string& key, const std::string& path, std::vector<OscValue> arguments);
 
   std::optional<UdpSocket> ear_, mouth_;
-  std::optional<Clock::time_point> refused_at_;
+  std::optional<Stamp> refused_at_;
   std::size_t untold_ = 0;  // refusals
   std::map<std::string, std::vector<OscValue>> told_;
-  Clock::time_point told_all_at_;
+  std::optional<Stamp> told_all_at_;
 };
 
 }  // namespace limn::apps

@@ -115,7 +115,7 @@ class VirtualLoop {
       LIMN_CHECK(shown_at == painted.shown_at);
     }
     session_->look_for_drift(rig_->now());
-    if (osc_) osc_->tell(*session_);
+    if (osc_) osc_->tell(*session_, rig_->now());
     if (server_) serve();  // what came while it painted need not wait for the next exposure
     ShownFrame shown = session_->measured();
     if (shown.record_ms >= 0) shown.record_ms += frames_ms;

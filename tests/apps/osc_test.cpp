@@ -291,8 +291,7 @@ TEST_F(AnOscSession, AFloodIsTakenInPortionsAndToldOnce) {
   const auto first = text.find("OSC refused");
   ASSERT_NE(first, std::string::npos);
   EXPECT_EQ(text.find("OSC refused", first + 1), std::string::npos);
-  std::this_thread::sleep_for(std::chrono::milliseconds(1050));
-  port->hear(&*session_, &*telemetry_, Stamp{});
+  port->hear(&*session_, &*telemetry_, shifted(Stamp{}, 1));
   EXPECT_NE(page().find("more refused meanwhile"), std::string::npos);
   lo_address_free(to);
 }
@@ -318,9 +317,9 @@ TEST_F(AnOscSession, TellsWhatChanges) {
   lo_server_add_method(ear, nullptr, nullptr, note_told, &told);
   auto port = OscPort::open("", fmt::format("127.0.0.1:{}", lo_server_get_port(ear)));
   ASSERT_TRUE(port) << port.message();
-  const auto heard = [&] {
+  const auto heard = [&](Stamp at = Stamp{}) {
     told.lines.clear();
-    port->tell(*session_);
+    port->tell(*session_, at);
     while (lo_server_recv_noblock(ear, 20) > 0) {
     }
     return told.lines;
@@ -374,8 +373,8 @@ TEST_F(AnOscSession, TellsWhatChanges) {
     return line.rfind(begin, 0) == 0;
   })) << begin;
   EXPECT_TRUE(heard().empty());
-  std::this_thread::sleep_for(std::chrono::milliseconds(1050));
-  EXPECT_GT(heard().size(), all.size());  // everything again, for those who came later
+  EXPECT_TRUE(heard(shifted(Stamp{}, 0.9)).empty());
+  EXPECT_GT(heard(shifted(Stamp{}, 1)).size(), all.size());  // everything again, for those who came later
   lo_server_free(ear);
 }
 
