@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <future>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "device/retry.h"
@@ -21,6 +23,7 @@ using Clock = std::chrono::steady_clock;
 constexpr int k_buffers = 4;
 constexpr guint k_socket_frames = 4;  // that the kernel may hold (as far as net.core.rmem_max lets it)
 constexpr double k_oldest_stamp_s = 1;
+constexpr auto k_longest_release = std::chrono::seconds(1);  // of a camera that may be gone, at the end
 
 template <class Object>
 struct Unref {
@@ -229,20 +232,37 @@ struct GigeCamera::Impl {
   cv::Size size;  // as asked for, or as at first
   Retry retry;
   std::optional<Session> session;
+  std::future<void> is_released;  // the session before; not valid: there was none
   long openings = 0, dropped = 0, damaged = 0;
 
-  ~Impl() { end(false); }
+  ~Impl() {
+    end(false);
+    if (is_released.valid()) is_released.wait_for(k_longest_release);
+  }
   void end(bool lost);
+  bool may_begin(Stamp deadline);
   ArvBuffer* newest(Stamp deadline);
   std::optional<Frame> grabbed(ArvBuffer* buffer);
   Result<Frame> next();
 };
 
+// Aravis asks a camera that is gone for seconds before it lets go of it: that goes on beside what follows.
 void GigeCamera::Impl::end(bool lost) {
   if (!session) return;
-  Complaint complaint;
-  if (!lost) arv_camera_stop_acquisition(session->camera.get(), &complaint);  // a lost one is waited for
+  std::promise<void> released;
+  is_released = released.get_future();
+  std::thread([last = std::move(session), lost, released = std::move(released)]() mutable {
+    Complaint complaint;
+    if (!lost) arv_camera_stop_acquisition(last->camera.get(), &complaint);  // a lost one is not told
+    last.reset();
+    released.set_value();
+  }).detach();
   session.reset();
+}
+
+// Whether the session before has let go of the camera by then: it would take the next one's control with it.
+bool GigeCamera::Impl::may_begin(Stamp deadline) {
+  return !is_released.valid() || is_released.wait_until(deadline) == std::future_status::ready;
 }
 
 // The newest filled buffer; older ones go back unread, and all of them when the reader was away for so long
@@ -282,7 +302,7 @@ Result<Frame> GigeCamera::Impl::next() {
   bool heard = false;
   while (Clock::now() < deadline) {
     if (!session) {
-      if (!retry.wait(deadline)) break;
+      if (!retry.wait(deadline) || !may_begin(deadline)) break;
       auto fresh = begun(id, options, size);
       if (!fresh) {
         retry.failed(fresh.message());

@@ -19,7 +19,8 @@ struct GigeCameraOptions {
 /// An industrial camera (GigE Vision; USB3 Vision goes the same way) through Aravis: Mono8, 8-bit Bayer, RGB8
 /// or BGR8. Stamps are the arrival of a frame's first packet as Aravis' own thread saw it, less half the
 /// exposure. Of the frames that wait only the newest is decoded. A lost camera is searched for again, after
-/// 0.1 s, doubling to 2 s.
+/// 0.1 s, doubling to 2 s, once Aravis has let go of it. At its end a camera that is gone holds nobody up for
+/// more than a second.
 class GigeCamera : public CameraSource {
  public:
   /// `id` as Aravis has it (`Vendor-Model-Serial`), or the camera's IP address; empty: the first that

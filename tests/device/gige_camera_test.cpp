@@ -120,14 +120,24 @@ TEST(GigeCamera, APulledCableIsNamedAndTheCameraComesBack) {
   auto camera = opened();
   ASSERT_TRUE(camera) << camera.message();
   fake.pull_out();
+  Stamp begun = Clock::now();
   Result<Frame> frame = camera->next();
-  for (int i = 0; frame && i < 20; ++i) frame = camera->next();
+  for (int i = 0; frame && i < 20; ++i) {
+    begun = Clock::now();
+    frame = camera->next();
+  }
+  EXPECT_LT(seconds_between(begun, Clock::now()), 4) << "its limit, and time for a search";
   ASSERT_FALSE(frame);
   contains(frame.message(), "it sends no frame");
-  const FakeCamera again;
-  for (int i = 0; !frame && i < 6; ++i) frame = camera->next();
-  EXPECT_TRUE(frame) << frame.message();
-  contains(camera->description(), "opened 2 times");
+  {
+    const FakeCamera again;
+    for (int i = 0; !frame && i < 15; ++i) frame = camera->next();
+    EXPECT_TRUE(frame) << frame.message();
+    contains(camera->description(), "opened 2 times");
+  }
+  begun = Clock::now();
+  camera = error("left");
+  EXPECT_LT(seconds_between(begun, Clock::now()), 3) << "it ends in time though nobody is there to be told";
 }
 
 TEST(GigeCamera, NobodyIsNamed) {
