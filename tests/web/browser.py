@@ -10,7 +10,7 @@ import time
 import urllib.error
 import urllib.request
 
-WAIT_S = 20.0  # for a condition: long, for a machine that does other work; a test that passes does not wait for it
+WAIT_S = 60.0  # for a condition: long, for a machine that does other work; a test that passes does not wait for it
 ENTER, ESCAPE, TAB = "\ue007", "\ue00c", "\ue004"  # as WebDriver has them
 ELEMENT = "element-6066-11e4-a52e-4f735466cecf"
 

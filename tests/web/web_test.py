@@ -452,7 +452,7 @@ class Checks:
         self.size("tablet")
         self.tab("window")
         self.browser.click("#window button.main")
-        found = wait_for("the mirror where it is in truth", self._mirror_in_place, 40)
+        found = wait_for("the mirror where it is in truth", self._mirror_in_place, 90)
         expect(found["belong"] == found["answers"], "every picture to belong to its frame", found)
         expect(found["is_shown"], "the picture of its number in the window", found)
         self.screenshots("window")
