@@ -11,7 +11,7 @@ namespace limn::apps {
 
 struct DetectOptions {
   std::vector<std::filesystem::path> images;
-  /// Families as in interfaces.md. The default pair is what `limn markers` is used with most.
+  /// Families as in docs/formats.md. The default pair is what `limn markers` is used with most.
   std::vector<std::string> families = {"apriltag_36h11", "aruco_4x4_50"};
   std::filesystem::path camera;  ///< anything load_imager reads; empty: no lens, no poses
   double size_mm = 0;            ///< side of the black square; poses need it and the camera

@@ -24,7 +24,7 @@ struct CapturedPose {
   std::vector<std::vector<std::vector<std::filesystem::path>>> pictures;
 };
 
-/// A captures folder (interfaces.md): what was shown, what was photographed, where the pictures are.
+/// A captures folder (docs/formats.md): what was shown, what was photographed, where the pictures are.
 struct Captures {
   std::filesystem::path folder;
   std::vector<CapturedDevice> cameras;

@@ -25,7 +25,7 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr const char* k_ended = "captures: it was ended while they were looked at.";
-constexpr int k_cells = 2;          // to a square's side, as interfaces.md's held-out score averages
+constexpr int k_cells = 2;          // to a side of a square; the held-out score averages over the same cells
 constexpr double k_inset_px = 2;    // from a square's edge: pixels across it see the light of one side only
 constexpr double k_inset = 0.06;    // of a square, likewise
 constexpr int k_least_pixels = 12;  // in a cell: three times a plane's unknowns and some

@@ -40,7 +40,7 @@ struct Imager {
 std::optional<Imager> resized(const Imager& imager, int width, int height);
 
 /// An imager without distortion, horizontal field of view `fov_deg`, principal point at ((w-1)/2, (h-1)/2):
-/// the Viewer of interfaces.md.
+/// the Viewer of docs/formats.md.
 Imager viewer_imager(const Pose& world_from_viewer, int width, int height, double fov_deg);
 
 }  // namespace limn

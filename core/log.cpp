@@ -17,7 +17,7 @@ double now_s() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-constexpr double k_silent_s = 1;  // shorter work shows no progress (interfaces.md)
+constexpr double k_silent_s = 1;  // shorter work shows no progress (docs/formats.md)
 constexpr double k_terminal_every_s = 0.1;
 constexpr double k_file_every_s = 5;
 

@@ -54,7 +54,7 @@ std::optional<Imager> viewer_of(const Scene& scene,
                                 const PosedScene& posed,
                                 const Eigen::Vector3d& d_up_world);
 
-/// POSES.json of interfaces.md. Unknown slots and variants are errors; a missing variant is the slot's first.
+/// POSES.json (docs/formats.md). An unknown slot or variant is an error; a missing variant is the first one.
 Result<PosedScene> load_poses(const std::filesystem::path& path, const Scene& scene);
 
 }  // namespace limn::scene

@@ -101,7 +101,7 @@ std::string units_question(const Slot& slot, const Variant& variant);
 /// slots/NAME/units.json with one more answer.
 std::string units_json(const Slot& slot, const std::string& variant, const std::string& units);
 
-/// A viewer file of interfaces.md: {"world_from_viewer": POSE, "size": [w,h], "fov_deg": 40}.
+/// A viewer file (docs/formats.md): {"world_from_viewer": POSE, "size": [w,h], "fov_deg": 40}.
 Result<Imager> load_viewer(const std::filesystem::path& path);
 
 /// What the tracker is to look for: the body "prototype", one body per slot, named as the slot, and

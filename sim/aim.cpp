@@ -12,8 +12,8 @@
 namespace limn::sim {
 namespace {
 
-constexpr double k_on_surface = 2e-3;  // m, interfaces.md: a surface part this near to the prototype is on it
-constexpr int k_sub_samples = 8;       // a side of a pixel on an edge: its cover is then right to 1/128
+constexpr double k_on_surface = 2e-3;   // m; a surface part this near is on the prototype (docs/formats.md)
+constexpr int k_sub_samples = 8;        // a side of a pixel on an edge: its cover is then right to 1/128
 constexpr float k_same_light = 0.004F;  // of full light, 1/255: samples that differ by less are one colour
 
 std::vector<PlacedMesh> prototype_of(const World& world) {

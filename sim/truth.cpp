@@ -11,8 +11,7 @@
 namespace limn::sim {
 namespace {
 
-constexpr double k_surface_reach =
-    2e-3;  // m, interfaces.md: a surface part this near to the prototype is on it
+constexpr double k_surface_reach = 2e-3;  // m; a surface part this near is on the prototype (docs/formats.md)
 
 std::vector<PlacedMesh> physical_meshes(const World& world) {
   std::vector<PlacedMesh> meshes;

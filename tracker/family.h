@@ -46,7 +46,7 @@ void smooth(std::span<float> values, std::span<float> scratch, int size);
 /// What the detector looks for.
 class Families {
  public:
-  /// Names as in interfaces.md: `apriltag_36h11`, `apriltag_25h9`, `apriltag_16h5`, `apriltag_36h10`,
+  /// Names as in docs/formats.md: `apriltag_36h11`, `apriltag_25h9`, `apriltag_16h5`, `apriltag_36h10`,
   /// `aruco_4x4_50` … `aruco_7x7_1000`, `aruco_original`, `aruco:FILE.yml` (OpenCV dictionary file),
   /// `artoolkit_3x3` and the other barcodes (barcode.h), `artoolkit:FILE.patt`. Relative files are looked up
   /// in `folder`; a family or id that comes from a file is named by the file's own name without folders.

@@ -15,7 +15,7 @@ enum class BoardKind { charuco, chessboard };
 /// corner, not the sheet's), x right, y down, z into the sheet; metres. The top-left square is black; on a
 /// ChArUco board every white square carries a marker, ids counted row by row from 0.
 ///
-/// Text form, as in interfaces.md:
+/// Text form, as in docs/formats.md:
 ///   `charuco:11x8:25mm`                        11 x 8 squares of 25 mm
 ///   `charuco:11x8:25mm:aruco_5x5_100:0.7`      with its dictionary and the marker's side as a share of the
 ///   square `chessboard:9x7:75mm`                      9 x 7 INNER corners, that is 10 x 8 squares

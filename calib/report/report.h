@@ -29,7 +29,7 @@ struct Report {
   std::vector<LengthCheck> known_lengths = {};
 };
 
-/// report.json, as interfaces.md describes it.
+/// report.json, as docs/formats.md describes it.
 std::string report_json(const Report& report);
 
 /// report.html: self-contained, pictures first (SVG): the verdict in words, faults and advice; the predicted

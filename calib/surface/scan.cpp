@@ -16,7 +16,7 @@ namespace {
 constexpr double k_changed_m =
     1e-3;  // a pixel's range that differs by more (and 5 sigma) shows something else
 constexpr double k_changed_share = 0.05;   // of the pixels: more than edges and noise explain
-constexpr double k_bad_epipolar_px = 0.7;  // RMS; a good rig leaves a quarter of a pixel (numbers.md)
+constexpr double k_bad_epipolar_px = 0.7;  // RMS; a good rig leaves 0.27 px (docs/measurements.md)
 constexpr double k_other_rig_share = 0.5;  // of the decoded pixels whose rays pass each other
 
 double seconds_since(std::chrono::steady_clock::time_point begun) {

@@ -24,7 +24,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using nlohmann::json;
 
-// What a joint mrcal solve gets from the same kind of judge (numbers.md).
+// What a joint mrcal solve gets from the same kind of judge (docs/measurements.md).
 constexpr double k_max_cells_px = 0.165, k_max_worst_cells_px = 0.228;
 constexpr double k_max_corners_px = 0.262, k_max_worst_corners_px = 0.385;
 constexpr double k_max_held_out_px = 0.20;

@@ -155,7 +155,7 @@ TEST(Priors, DoNotBiasALensShiftedProjector) {
   const World world = make_world(options);
   const World unseen = unseen_boards(world, 3, 1.4);
   std::mt19937_64 rng = test_rng();
-  constexpr int k_draws = 30;  // as numbers.md's 3.1 px (mrcal's prior) and 0.5 px
+  constexpr int k_draws = 30;  // docs/measurements.md: 3.1 px (mrcal's prior) and 0.5 px
   std::vector<Vector2d> mean;
   double scatter = 0;
   for (int draw = 0; draw < k_draws; ++draw) {

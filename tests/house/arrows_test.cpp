@@ -1,4 +1,4 @@
-// The house's arrows (architecture): which room may include which.
+// The order of the layers (docs/architecture.md): which room may include which.
 
 #include <gtest/gtest.h>
 

@@ -15,7 +15,7 @@ using namespace test::literals;
 using Eigen::Vector3d;
 
 constexpr double k_depth = 1.6;
-constexpr double k_noise_px = 0.06;  // gives the 2.5 mm of depth noise of numbers.md
+constexpr double k_noise_px = 0.06;  // gives the 2.5 mm of depth noise of docs/measurements.md
 
 // A strip of the surface with that curvature (1/m; 0: flat) about the y axis, facing -z, its middle in the
 // origin.

@@ -42,8 +42,9 @@ std::mt19937_64 test_rng();
 /// A fresh folder of the running test, removed and made anew at the call.
 std::filesystem::path test_folder();
 
-/// The folder of real photographs ($LIMN_REAL_DATA or ../shared/data beside the checkout); nullopt when
-/// absent. Tests then GTEST_SKIP() and name the folder.
+/// The folder of real photographs: $LIMN_REAL_DATA, else ../shared/data beside the checkout. They are not in
+/// the repository; docs/measurements.md says where they come from. Nullopt when absent: tests then
+/// GTEST_SKIP() and name the folder.
 std::optional<std::filesystem::path> real_data(const std::string& inside);
 
 }  // namespace limn::test

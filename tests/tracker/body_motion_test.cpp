@@ -110,7 +110,7 @@ TEST(Minima, AreTheSameFromWhereverTheyAreLookedFor) {
 
 TEST(BodyMotion, NeverFlipsOnceItHasASecondOfHistory) {
   auto rng = test::test_rng();
-  // 24 px; 0.1 px along each axis is the 0.14 px RMS of numbers.md for small markers.
+  // 24 px; 0.1 px along each axis is the 0.14 px RMS of docs/measurements.md for small markers.
   const Imager camera = {"camera0", 1280, 960, Lens::pinhole(1200, 1200, 639.5, 479.5), Pose{}};
   const Body body = body_of(1);
   int frames = 0, alone = 0, with_history = 0;
