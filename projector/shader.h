@@ -18,7 +18,7 @@ const std::map<std::string, std::string>& embedded_shaders();
 /// A linked vertex and fragment shader, or a compute shader.
 class Program {
  public:
-  /// By file names in shaders/. `#include "x.glsl"` is replaced by the file once, with #line directives, so
+  /// By file names in shaders/. `#include "x.glsl"` is replaced by the file once, with `#line` directives, so
   /// that the driver's messages name the true line. Error: the driver's message with file names.
   static Result<Program> link(const std::string& vertex_file, const std::string& fragment_file);
 
