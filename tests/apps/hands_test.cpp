@@ -1,6 +1,6 @@
 // Hands over a table with control markers, as the camera side of a session sees them: pictures at 30 a
 // second, gestures that must act once and hands that pass, stop and work, which must not. LIMN_SOAK_S:
-// seconds of the pictures' clock (60), an hour for what the README tells.
+// seconds of the pictures' clock (60); an hour gives the numbers of docs/measurements.md.
 #include <gtest/gtest.h>
 
 #include <algorithm>
