@@ -17,6 +17,10 @@ namespace {
 namespace fs = std::filesystem;
 
 const fs::path k_source = LIMN_SOURCE_DIR;
+constexpr const char* k_pages[] = {
+    "README.md",         "CONTRIBUTING.md",      "config/README.md", "docs/architecture.md",
+    "docs/formats.md",   "docs/measurements.md", "docs/osc.md",      "docs/remote.md",
+    "docs/setting-up.md"};
 
 std::string printed(std::vector<std::string> arguments, int* code) {
   arguments.insert(arguments.begin(), "limn");
@@ -55,7 +59,7 @@ std::vector<Quoted> quoted_commands(const fs::path& page) {
 TEST(Documents, EveryCommandAndOptionExists) {
   std::map<std::string, std::string> helps;
   std::size_t options = 0;
-  for (const char* page : {"README.md", "docs/setting-up.md", "docs/osc.md", "docs/remote.md", "config/README.md"}) {
+  for (const char* page : k_pages) {
     for (const Quoted& quoted : quoted_commands(page)) {
       auto help = helps.find(quoted.command);
       if (help == helps.end()) {
@@ -95,7 +99,7 @@ TEST(Documents, QuoteWhatLimnPlanPrints) {
 
 TEST(Documents, NameFilesThatAreThere) {
   static const std::regex path(R"((config/[a-z/-]+\.(?:json|glb)|docs/[a-z-]+\.md))");
-  for (const char* page : {"README.md", "docs/setting-up.md", "docs/osc.md", "docs/remote.md"}) {
+  for (const char* page : k_pages) {
     const std::string text = read_file(k_source / page).value();
     for (std::sregex_iterator at(text.begin(), text.end(), path), end; at != end; ++at)
       EXPECT_TRUE(fs::exists(k_source / at->str())) << page << ": " << at->str();
