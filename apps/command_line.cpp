@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <functional>
+#include <iostream>
 #include <memory>
 
 #include "apps/align.h"
@@ -28,6 +29,7 @@
 #include "apps/solve.h"
 #include "apps/simulate.h"
 #include "core/log.h"
+#include "core/version.h"
 
 namespace limn::apps {
 namespace {
@@ -497,6 +499,7 @@ void add_doctor(CLI::App& app, Run& run) {
 int run_command_line(int argc, char** argv) {
   CLI::App app{"Limn paints virtual parts onto a physical prototype with light."};
   app.name("limn");
+  app.set_version_flag("--version", fmt::format("limn {}", version()), "Print the version and exit");
   app.require_subcommand(1);
   Run run;
   // In the order of a session: add_NAME(app, run).
@@ -521,6 +524,10 @@ int run_command_line(int argc, char** argv) {
   add_simulate(app, run);
   add_doctor(app, run);
 
+  if (argc == 1) {
+    std::cout << app.help() << std::flush;
+    return 2;
+  }
   const auto commands = app.get_subcommands({});
   const auto is_named = [&](const CLI::App* command) { return argc > 1 && command->get_name() == argv[1]; };
   if (argc > 1 && argv[1][0] != '-' && std::none_of(commands.begin(), commands.end(), is_named)) {
