@@ -22,6 +22,12 @@ int level_of(double light) {
 
 }  // namespace
 
+std::string listed(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+  return list.empty() ? "none" : list;
+}
+
 std::string words_of(const MaterialChange& change) {
   if (change.is_none()) return {};
   const auto share = [](const std::optional<double>& value) {
@@ -35,23 +41,22 @@ std::string words_of(const MaterialChange& change) {
       share(change.metallic), share(change.roughness));
 }
 
-std::optional<std::array<double, 5>> numbers_of(const RoomLight& light,
-                                                const Eigen::Vector3d& d_front_world) {
+std::optional<LightNumbers> numbers_of(const RoomLight& light, const Eigen::Vector3d& d_front_world) {
   if (light.lamps.size() != 1 || !is_white(light.lamps[0].strength_rgb) || !is_white(light.above_rgb) ||
       !is_white(light.below_rgb))
     return std::nullopt;
   // As a lamp to the front and one 90 degrees to the right of it stand.
-  const auto lamp_at = [&](const char* words) {
-    return room_light_of(words, light.d_up_world, d_front_world)->lamps[0].d_world;
+  const auto lamp_at = [&](const LightNumbers& numbers) {
+    return room_light_of(numbers, light.d_up_world, d_front_world).lamps[0].d_world;
   };
-  const Eigen::Vector3d d_front = lamp_at("0 0 1 0 0"), d_right = lamp_at("90 0 1 0 0");
+  const Eigen::Vector3d d_front = lamp_at({0, 0, 1, 0, 0}), d_right = lamp_at({90, 0, 1, 0, 0});
   const Eigen::Vector3d& d_lamp = light.lamps[0].d_world;
   const double degrees = 180 / std::numbers::pi;
   const double up = std::asin(std::clamp(d_lamp.dot(light.d_up_world), -1.0, 1.0));
   const double right = std::atan2(d_lamp.dot(d_right), d_lamp.dot(d_front));
-  return std::array<double, 5>{rounded(degrees * right, 0.1), rounded(degrees * up, 0.1),
-                               rounded(light.lamps[0].strength_rgb.x(), 1e-3),
-                               rounded(light.above_rgb.x(), 1e-3), rounded(light.below_rgb.x(), 1e-3)};
+  return LightNumbers{rounded(degrees * right, 0.1), rounded(degrees * up, 0.1),
+                      rounded(light.lamps[0].strength_rgb.x(), 1e-3), rounded(light.above_rgb.x(), 1e-3),
+                      rounded(light.below_rgb.x(), 1e-3)};
 }
 
 }  // namespace limn::scene

@@ -56,9 +56,7 @@ nlohmann::ordered_json to_json(const RoomLight& light) {
           {"lamps", lamps}};
 }
 
-Result<RoomLight> room_light_of(const std::string& words,
-                                const Eigen::Vector3d& d_up_world,
-                                const Eigen::Vector3d& d_front_world) {
+Result<LightNumbers> light_numbers_of(const std::string& words) {
   std::istringstream text(words);
   double right_deg = 0, up_deg = 0;
   Eigen::Vector3d strengths;  // of the lamp, above, below
@@ -71,6 +69,13 @@ Result<RoomLight> room_light_of(const std::string& words,
         "from "
         "above and below (0 to {}), found '{}'.",
         k_most_light, words);
+  return LightNumbers{right_deg, up_deg, strengths.x(), strengths.y(), strengths.z()};
+}
+
+RoomLight room_light_of(const LightNumbers& numbers,
+                        const Eigen::Vector3d& d_up_world,
+                        const Eigen::Vector3d& d_front_world) {
+  const auto [right_deg, up_deg, strength, above, below] = numbers;
   const Eigen::Vector3d d_up = d_up_world.normalized();
   Eigen::Vector3d d_front = d_front_world - d_front_world.dot(d_up) * d_up;
   d_front = d_front.norm() > 1e-6 ? Eigen::Vector3d(d_front.normalized()) : d_up.unitOrthogonal();
@@ -78,10 +83,10 @@ Result<RoomLight> room_light_of(const std::string& words,
   const Eigen::Vector3d d_level = std::cos(right) * d_front + std::sin(right) * d_up.cross(d_front);
   RoomLight light;
   light.d_up_world = d_up;
-  light.above_rgb.setConstant(strengths.y());
-  light.below_rgb.setConstant(strengths.z());
-  light.lamps.push_back({(std::cos(up) * d_level + std::sin(up) * d_up).normalized(),
-                         Eigen::Vector3d::Constant(strengths.x())});
+  light.above_rgb.setConstant(above);
+  light.below_rgb.setConstant(below);
+  light.lamps.push_back(
+      {(std::cos(up) * d_level + std::sin(up) * d_up).normalized(), Eigen::Vector3d::Constant(strength)});
   return light;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
@@ -31,11 +32,15 @@ RoomLight read_room_light(const ConfigNode& node);
 /// The same back, numbers in full.
 nlohmann::ordered_json to_json(const RoomLight& light);
 
-/// White light in a person's words: degrees to the right and up of a lamp as seen by somebody who stands in
-/// front, its strength, and soft light from above and below: "30 45 0.6 0.3 0.1". Of `d_front_world` what is
-/// level counts. Error: other than five numbers, degrees over 360, light that is negative or over 10.
-Result<RoomLight> room_light_of(const std::string& words,
-                                const Eigen::Vector3d& d_up_world,
-                                const Eigen::Vector3d& d_front_world);
+/// White light in five numbers: a lamp's degrees to the right and up as seen by somebody who stands in front,
+/// its strength, and soft light from above and below.
+using LightNumbers = std::array<double, 5>;
+/// Those of a text, "30 45 0.6 0.3 0.1". Error: other than five numbers, degrees over 360, light that is
+/// negative or over 10.
+Result<LightNumbers> light_numbers_of(const std::string& words);
+/// The light of such numbers. Of `d_front_world` what is level counts.
+RoomLight room_light_of(const LightNumbers& numbers,
+                        const Eigen::Vector3d& d_up_world,
+                        const Eigen::Vector3d& d_front_world);
 
 }  // namespace limn::scene

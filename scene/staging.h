@@ -80,45 +80,26 @@ struct Staging {
 /// Each slot's first variant, no looks.
 Staging first_staging(const Scene& scene);
 
-/// One action of a person: by control marker, key, script or another program.
-struct Edit {
-  std::string action;  ///< by its name in actions()
-  std::string slot;    ///< of actions on a slot; of `screen`: the one that is meant, empty: all
-  std::string value;   ///< as the action wants it; may be empty
-};
-
-/// What an action takes as its value.
-enum class Takes {
-  nothing,
-  text,         ///< required
-  maybe_text,   ///< or nothing
-  number,       ///< "12.5"
-  millimetres,  ///< three numbers, "1 0 -2.5"
-  pose,         ///< seven: x y z in mm and a quaternion w x y z, "120 0 -35.5 1 0 0 0"
-  on_off        ///< "on", "off", "toggle"; nothing: toggle
-};
-
-/// What can be done, for people and programs alike.
-struct Action {
-  std::string name;
-  bool of_slot = false;
-  Takes takes = Takes::nothing;
-  std::string value;  ///< what Edit::value says, in words; empty: nothing
-  std::string what;
-  std::string of =
-      {};  ///< what Edit::slot may name of an action that is on no slot, in words; empty: nothing
-};
-const std::vector<Action>& actions();
-
-/// The staging after an edit. `posed` is what was shown last: looks are saved from it. Error, and nothing has
-/// changed: an unknown action, slot, variant or look, or a value that is not what the action wants.
-Result<Staging> edited(const Scene& scene, const Staging& staging, const PosedScene& posed, const Edit& edit);
+/// The names of the looks, in their order.
+std::vector<std::string> look_names(const Staging& staging);
+/// Whether a look may have the name: it is also a file's.
+bool is_look_name(const std::string& name);
+/// The look of that name; nullptr: there is none.
+const Look* find_look(const Staging& staging, const std::string& name);
+/// The staging with a look's parts where the look has them, in its light; it is then the look last shown.
+Staging with_look(const Scene& scene, Staging staging, const Look& look);
+/// Makes it the look last shown; the one before it is the other one.
+void remember_look(const std::string& name, Staging* staging);
 
 /// What a screen shows; one that the staging does not know: what was chosen for all.
 Screen shown_on(const Staging& staging, const std::string& screen);
 
 /// The marker that carries a slot's part.
 const MarkerName& carrier(const Scene& scene, const Staging& staging, std::size_t slot);
+
+/// Whether a marker may carry a slot's part. Error: it is of no family that the scene uses, or carries or
+/// does something else.
+Status check_carrier(const Scene& scene, const Staging& staging, const MarkerName& marker, std::size_t slot);
 
 /// Tracks by what they carry: a slot's is its carrier's, under the slot's name; loose markers keep theirs.
 std::vector<Track> carried(const Scene& scene, const Staging& staging, std::span<const Track> tracks);

@@ -1,45 +1,44 @@
-// Everything that can be done, as of scene::actions(); a test compares the two. The rows are JSON. `role` is the least that
-// may do it (the server decides and tells its own), `label` is what the page calls it.
-export const actions = [
-  {"name": "next_variant", "of_slot": true, "takes": "nothing", "role": "work", "label": "next variant"},
-  {"name": "previous_variant", "of_slot": true, "takes": "nothing", "role": "work", "label": "previous variant"},
-  {"name": "choose_variant", "of_slot": true, "takes": "text", "role": "work", "label": "variant"},
-  {"name": "nudge", "of_slot": true, "takes": "millimetres", "role": "work", "label": "nudged"},
-  {"name": "place", "of_slot": true, "takes": "pose", "role": "work", "label": "placed"},
-  {"name": "release", "of_slot": true, "takes": "nothing", "role": "work", "label": "follows its marker again"},
-  {"name": "pair", "of_slot": true, "takes": "maybe_text", "role": "operate", "label": "carried by"},
-  {"name": "unpair", "of_slot": true, "takes": "nothing", "role": "operate", "label": "has its own marker again"},
-  {"name": "units", "of_slot": true, "takes": "text", "role": "operate", "label": "unit"},
-  {"name": "material", "of_slot": true, "takes": "maybe_text", "role": "work", "label": "material"},
-  {"name": "save_look", "of_slot": false, "takes": "maybe_text", "role": "work", "label": "saved look"},
-  {"name": "restore_look", "of_slot": false, "takes": "text", "role": "work", "label": "look"},
-  {"name": "next_look", "of_slot": false, "takes": "nothing", "role": "work", "label": "next look"},
-  {"name": "previous_look", "of_slot": false, "takes": "nothing", "role": "work", "label": "previous look"},
-  {"name": "flip", "of_slot": false, "takes": "maybe_text", "role": "work", "label": "flipped to the other look"},
-  {"name": "split", "of_slot": false, "takes": "on_off", "role": "work", "label": "split"},
-  {"name": "split_at", "of_slot": false, "takes": "number", "role": "work", "label": "split moved"},
-  {"name": "delete_look", "of_slot": false, "takes": "text", "role": "work", "label": "deleted look"},
-  {"name": "undelete_look", "of_slot": false, "takes": "nothing", "role": "work", "label": "brought the look back"},
-  {"name": "repair", "of_slot": false, "takes": "nothing", "role": "operate", "label": "repair"},
-  {"name": "light", "of_slot": false, "takes": "maybe_text", "role": "work", "label": "light"},
-  {"name": "blackout", "of_slot": false, "takes": "on_off", "role": "work", "label": "blackout"},
-  {"name": "freeze", "of_slot": false, "takes": "on_off", "role": "work", "label": "freeze"},
-  {"name": "grid", "of_slot": false, "takes": "on_off", "role": "work", "label": "grid"},
-  {"name": "marker_states", "of_slot": false, "takes": "on_off", "role": "operate", "label": "marker states"},
-  {"name": "screen", "of_slot": false, "takes": "maybe_text", "role": "operate", "label": "screen"},
-  {"name": "viewer", "of_slot": false, "takes": "maybe_text", "role": "work", "label": "view parts for"}
-];
+// What somebody did, in words, and which role may do it. The table of actions is the session's own (`hello` brings it), so an
+// action stands here only where the page calls it otherwise than its name; a test compares the two.
 
-const known = new Map(actions.map((action) => [action.name, action]));
+const k_words = {
+  "choose_variant": "variant",
+  "nudge": "nudged",
+  "place": "placed",
+  "release": "follows its marker again",
+  "pair": "carried by",
+  "unpair": "has its own marker again",
+  "units": "unit",
+  "save_look": "saved look",
+  "restore_look": "look",
+  "flip": "flipped to the other look",
+  "split_at": "split moved",
+  "delete_look": "deleted look",
+  "undelete_look": "brought the look back",
+  "viewer": "view parts for"
+};
+
+const known = new Map(); // the session's table by name
+
+/** Takes over the session's table of actions. */
+export function take_actions(table) {
+  for (const action of table ?? []) known.set(action.name, action);
+}
 
 /** The role that an action needs. */
 export function role_of(name) {
   return known.get(name)?.role ?? "operate";
 }
 
-/** Takes over the server's own roles, from its table of actions. */
-export function take_roles(table) {
-  for (const { name, role } of table ?? []) if (role && known.has(name)) known.get(name).role = role;
+const label_of = (name) => k_words[name] ?? name.replaceAll("_", " ");
+
+// The value of an edit, in words.
+function value_of(edit, state) {
+  const takes = known.get(edit.action)?.takes;
+  if (takes === "on_off") return state[edit.action === "freeze" ? "frozen" : edit.action] ? "on" : "off";
+  if (takes === "pose") return "";
+  if (edit.action === "viewer") return edit.value || "the scene's own viewer";
+  return edit.value && (takes === "millimetres" || takes === "number") ? `${edit.value} mm` : edit.value;
 }
 
 /** What somebody did, in words for people. */
@@ -50,10 +49,5 @@ export function in_words(edit, state) {
   if (edit.action.endsWith("_variant") && slot) return `${who}: ${slot.name} is ${slot.variant}`;
   if (["restore_look", "next_look", "previous_look", "flip", "save_look"].includes(edit.action) && state.look)
     return `${who}: ${edit.action === "save_look" ? "saved look" : "look"} ${state.look}`;
-  const is_on = { blackout: state.blackout, freeze: state.frozen, grid: state.grid, marker_states: state.marker_states,
-                  split: state.split }[edit.action];
-  const named = edit.action === "viewer" ? edit.value || "the scene's own viewer" : edit.value;
-  const value = edit.action === "place" ? "" : is_on === undefined ? named : is_on ? "on" : "off";
-  const unit = edit.action === "nudge" || edit.action === "split_at" ? " mm" : "";
-  return `${who}: ${[edit.slot, known.get(edit.action)?.label ?? edit.action, value && value + unit].filter(Boolean).join(" ")}`;
+  return `${who}: ${[edit.slot, label_of(edit.action), value_of(edit, state)].filter(Boolean).join(" ")}`;
 }

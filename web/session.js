@@ -1,5 +1,5 @@
 // What both pages share: the link, pairing, the words about the connection, edits and what came of them.
-import { role_of, take_roles } from "/actions.js";
+import { role_of, take_actions } from "/actions.js";
 import { by_id, h, icon, set_text } from "/dom.js";
 import { Link } from "/link.js";
 import { prepare_pairing, tell_pairing } from "/pairing.js";
@@ -61,7 +61,7 @@ export function begin_session({ on_state, on_hello, purpose, name_hint }) {
   };
 
   link.addEventListener("hello", ({ detail }) => {
-    take_roles(detail.actions);
+    take_actions(detail.actions);
     document.body.dataset.role = link.role;
     for (const node of document.querySelectorAll("[data-action]")) {
       node.dataset.needs = role_of(node.dataset.action);

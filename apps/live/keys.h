@@ -2,16 +2,13 @@
 
 #include <optional>
 
+#include "scene/actions.h"
 #include "scene/scene.h"
-#include "scene/staging.h"
 
 namespace limn::apps {
 
-/// What keys do, of a keyboard, a presentation clicker or a pedal. One slot is chosen at a time.
-///   right, page down, n: next variant    left, page up, p: previous    tab: next slot
-///   b, full stop: blackout    f: freeze    m: markers' states    s: save a look    l, k: next, previous look
-///   o: what the screen shows    r: the part follows its marker again
-///   a: pair the part with the marker that glows    v: the look before, and back    x: both, beside a line    g: grid
+/// What keys do, of a keyboard, a presentation clicker or a pedal: the actions that have them
+/// (scene/actions.cpp). One slot is chosen at a time; tab chooses the next one.
 class Keys {
  public:
   explicit Keys(const scene::Scene& scene);

@@ -12,6 +12,8 @@
 namespace limn::apps {
 namespace {
 
+using scene::ActionId;
+
 constexpr float k_small_share = 0.32F, k_most_small = 0.25F;  // of all the pictures' height and width
 constexpr float k_most_split_mm = 2000;                       // by dragging
 constexpr double k_plain = 0.8;        // colour of a material before somebody chooses one, linear
@@ -234,20 +236,20 @@ const OperatorView::Device* device_of(const OperatorView& view, const std::strin
 void OperatorPanel::draw_bar(const Gui& gui, const OperatorView& view) {
   const scene::Staging& staging = view.staging;
   const ImVec2 size{0, 1.9F * gui.em()};
-  if (toggle("Blackout", staging.blackout, colour::k_warn, size)) ask("blackout");
+  if (toggle("Blackout", staging.blackout, colour::k_warn, size)) ask(ActionId::blackout);
   ImGui::SameLine();
-  if (toggle("Freeze", staging.frozen, colour::k_warn, size)) ask("freeze");
+  if (toggle("Freeze", staging.frozen, colour::k_warn, size)) ask(ActionId::freeze);
   ImGui::SameLine();
-  if (toggle("Marker rings", staging.marker_states, colour::k_blue, size)) ask("marker_states");
+  if (toggle("Marker rings", staging.marker_states, colour::k_blue, size)) ask(ActionId::marker_states);
   ImGui::SameLine();
-  if (toggle("Grid", staging.grid, colour::k_blue, size)) ask("grid");
+  if (toggle("Grid", staging.grid, colour::k_blue, size)) ask(ActionId::grid);
   if (!view.repairing.empty()) {
     ImGui::SameLine();
     ImGui::AlignTextToFramePadding();
     ImGui::TextUnformatted(("Repair: " + view.repairing).c_str());
   } else if (!view.moved.empty()) {
     ImGui::SameLine();
-    if (toggle("Repair " + view.moved, true, colour::k_bad, size)) ask("repair");
+    if (toggle("Repair " + view.moved, true, colour::k_bad, size)) ask(ActionId::repair);
     if (ImGui::IsItemHovered())
       ImGui::SetTooltip("%s", "It has moved. Patterns on the prototype for some 15 s.");
   }
@@ -265,7 +267,7 @@ void OperatorPanel::draw_bar(const Gui& gui, const OperatorView& view) {
   if (ImGui::BeginCombo("##screen", k_screens[static_cast<std::size_t>(staging.screen)])) {
     for (std::size_t i = 0; i < scene::screen_names().size(); ++i)
       if (ImGui::Selectable(k_screens[i], static_cast<std::size_t>(staging.screen) == i))
-        ask("screen", "", scene::screen_names()[i]);
+        ask(ActionId::screen, "", scene::screen_names()[i]);
     ImGui::EndCombo();
   }
   ImGui::AlignTextToFramePadding();
@@ -389,10 +391,10 @@ void OperatorPanel::draw_viewers(const Gui& gui, const OperatorView& view) {
   if (all.empty()) ImGui::TextDisabled("the scene's own viewer: no guest's window is open");
   if (all.empty()) return;
   const ImVec2 size{18 * gui.em(), 1.9F * gui.em()};
-  if (toggle("the scene's own viewer", chosen.empty(), colour::k_blue, size)) ask("viewer");
+  if (toggle("the scene's own viewer", chosen.empty(), colour::k_blue, size)) ask(ActionId::viewer);
   for (const std::string& guest : all) {
     ImGui::PushID(guest.c_str());
-    if (toggle(guest + "'s tablet", guest == chosen, colour::k_blue, size)) ask("viewer", "", guest);
+    if (toggle(guest + "'s tablet", guest == chosen, colour::k_blue, size)) ask(ActionId::viewer, "", guest);
     ImGui::PopID();
     if (guest != chosen || guest == view.follows) continue;
     ImGui::TextDisabled("sees no markers: the scene's own viewer meanwhile");
@@ -410,7 +412,7 @@ void OperatorPanel::draw_slots(const Gui& gui, const OperatorView& view) {
                 slot.is_chosen ? colour::k_blue : colour::k_quiet,
                 slot.is_chosen && view.slots.size() > 1 ? slot.name + "  (keys)" : slot.name);
     draw_material(gui, slot.name, view.staging.slots[i].material);
-    if (ImGui::Button("◀", arrow)) ask("previous_variant", slot.name);
+    if (ImGui::Button("◀", arrow)) ask(ActionId::previous_variant, slot.name);
     ImGui::SameLine(0, 4);
     const float room = ImGui::GetContentRegionAvail().x - arrow.x - 4;
     ImGui::SetNextItemWidth(room);
@@ -420,19 +422,20 @@ void OperatorPanel::draw_slots(const Gui& gui, const OperatorView& view) {
     if (ImGui::BeginCombo("##variant", fmt::format("{}   {}/{}", shown, at + 1, slot.variants.size()).c_str(),
                           ImGuiComboFlags_NoArrowButton)) {
       for (const std::string& variant : slot.variants)
-        if (ImGui::Selectable(variant.c_str(), variant == shown)) ask("choose_variant", slot.name, variant);
+        if (ImGui::Selectable(variant.c_str(), variant == shown))
+          ask(ActionId::choose_variant, slot.name, variant);
       ImGui::EndCombo();
     }
     ImGui::PopStyleVar();
     ImGui::SameLine(0, 4);
-    if (ImGui::Button("▶", arrow)) ask("next_variant", slot.name);
-    if (slot.is_held && ImGui::Button("follow the marker again", {-1, 0})) ask("release", slot.name);
+    if (ImGui::Button("▶", arrow)) ask(ActionId::next_variant, slot.name);
+    if (slot.is_held && ImGui::Button("follow the marker again", {-1, 0})) ask(ActionId::release, slot.name);
     if (!view.waiting.empty() &&
         ImGui::Button(fmt::format("let {} carry it", view.waiting.back()).c_str(), {-1, 0}))
-      ask("pair", slot.name, view.waiting.back());
+      ask(ActionId::pair, slot.name, view.waiting.back());
     if (const auto& carrier = view.staging.slots[i].marker)
       if (ImGui::Button(fmt::format("no longer {}", carrier->text()).c_str(), {-1, 0}))
-        ask("unpair", slot.name);
+        ask(ActionId::unpair, slot.name);
     ImGui::PopID();
   }
   if (view.slots.empty()) ImGui::TextDisabled("the scene has none");
@@ -453,8 +456,8 @@ void OperatorPanel::draw_material(const Gui& gui, const std::string& slot, const
   if (ImGui::SliderFloat("metal", &metallic, 0, 1, "%.2f")) wanted.metallic = std::clamp(metallic, 0.F, 1.F);
   if (ImGui::SliderFloat("rough", &roughness, 0, 1, "%.2f"))
     wanted.roughness = std::clamp(roughness, 0.F, 1.F);
-  if (wanted != now) ask("material", slot, scene::words_of(wanted));
-  if (ImGui::Button("as its file says", {-1, 0})) ask("material", slot);
+  if (wanted != now) ask(ActionId::material, slot, scene::words_of(wanted));
+  if (ImGui::Button("as its file says", {-1, 0})) ask(ActionId::material, slot);
   ImGui::EndPopup();
 }
 
@@ -473,10 +476,10 @@ void OperatorPanel::draw_light(const Gui& gui, const scene::Staging& staging) {
   is_changed |= ImGui::SliderFloat("above", &light_[3], 0, 2, "%.2f");
   is_changed |= ImGui::SliderFloat("below", &light_[4], 0, 2, "%.2f");
   if (is_changed)
-    ask("light", "",
+    ask(ActionId::light, "",
         fmt::format("{:.0f} {:.0f} {:.2f} {:.2f} {:.2f}", light_[0], light_[1], light_[2], light_[3],
                     light_[4]));
-  if (ImGui::Button("the scene's own", {-1, 0})) ask("light");
+  if (ImGui::Button("the scene's own", {-1, 0})) ask(ActionId::light);
   ImGui::EndPopup();
 }
 
@@ -489,7 +492,7 @@ void OperatorPanel::draw_looks(const Gui& gui, const OperatorView& view) {
                                                    ImGuiInputTextFlags_EnterReturnsTrue);
   ImGui::SameLine();
   if (ImGui::Button("Save", {save, 0}) || is_entered) {
-    ask("save_look", "", look_.data());
+    ask(ActionId::save_look, "", look_.data());
     look_.fill('\0');
   }
   draw_comparison(gui, view.staging);
@@ -498,12 +501,12 @@ void OperatorPanel::draw_looks(const Gui& gui, const OperatorView& view) {
     const float cross = 1.6F * gui.em();
     const float room = ImGui::GetContentRegionAvail().x - cross - 4;
     if (toggle(look.name, look.name == view.staging.look, colour::k_blue, {room, 0}))
-      ask("restore_look", "", look.name);
+      ask(ActionId::restore_look, "", look.name);
     ImGui::SameLine(0, 4);
     if (ImGui::Button("x", {cross, 0})) ImGui::OpenPopup("delete");
     if (ImGui::BeginPopup("delete")) {
       if (ImGui::Button(fmt::format("Delete {}", look.name).c_str())) {
-        ask("delete_look", "", look.name);
+        ask(ActionId::delete_look, "", look.name);
         ImGui::CloseCurrentPopup();
       }
       ImGui::EndPopup();
@@ -511,7 +514,8 @@ void OperatorPanel::draw_looks(const Gui& gui, const OperatorView& view) {
     ImGui::PopID();
   }
   if (const auto& gone = view.staging.deleted_look)
-    if (ImGui::Button(fmt::format("bring {} back", gone->name).c_str(), {-1, 0})) ask("undelete_look");
+    if (ImGui::Button(fmt::format("bring {} back", gone->name).c_str(), {-1, 0}))
+      ask(ActionId::undelete_look);
 }
 
 // The look shown before the present one, in its place or left of a line.
@@ -519,14 +523,14 @@ void OperatorPanel::draw_comparison(const Gui& gui, const scene::Staging& stagin
   if (staging.other_look.empty()) return;
   const float room = ImGui::GetContentRegionAvail().x, gap = ImGui::GetStyle().ItemSpacing.x;
   const ImVec2 half{0.5F * (room - gap), 1.9F * gui.em()};
-  if (ImGui::Button(fmt::format("A/B: {}", staging.other_look).c_str(), half)) ask("flip");
+  if (ImGui::Button(fmt::format("A/B: {}", staging.other_look).c_str(), half)) ask(ActionId::flip);
   ImGui::SameLine();
-  if (toggle("Side by side", staging.split, colour::k_blue, half)) ask("split");
+  if (toggle("Side by side", staging.split, colour::k_blue, half)) ask(ActionId::split);
   if (!staging.split) return;
   float mm = static_cast<float>(staging.split_mm);
   ImGui::SetNextItemWidth(-1);
   if (ImGui::DragFloat("##split", &mm, 2, -k_most_split_mm, k_most_split_mm, "line at %.0f mm"))
-    ask("split_at", "", fmt::format("{:.1f}", mm));
+    ask(ActionId::split_at, "", fmt::format("{:.1f}", mm));
 }
 
 // Whether the session is to end: a clicker's stray Escape must not end it.

@@ -34,8 +34,8 @@ class OperatorPanel {
   void draw_light(const Gui& gui, const scene::Staging& staging);
   void draw_comparison(const Gui& gui, const scene::Staging& staging);
   void draw_question(const Gui& gui);
-  void ask(const std::string& action, const std::string& slot = "", const std::string& value = "") {
-    asked_.edits.push_back({action, slot, value});
+  void ask(scene::ActionId action, const std::string& slot = "", const std::string& value = "") {
+    asked_.edits.push_back(scene::make_edit(action, slot, value));
   }
 
   OperatorAsked asked_;

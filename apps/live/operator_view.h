@@ -10,6 +10,7 @@
 #include "apps/live/device_health.h"
 #include "apps/live/telemetry.h"
 #include "core/track.h"
+#include "scene/actions.h"
 #include "scene/staging.h"
 
 namespace limn::apps {

@@ -26,25 +26,25 @@ std::string arguments_of(const scene::Action& action) {
     case scene::Takes::nothing:
       break;
     case scene::Takes::text:
-      words.push_back(action.value + " (text)");
+      words.push_back(fmt::format("{} (text)", action.value));
       break;
     case scene::Takes::maybe_text:
-      words.push_back(action.value + " (text, may be left out)");
+      words.push_back(fmt::format("{} (text, may be left out)", action.value));
       break;
     case scene::Takes::number:
-      words.push_back(action.value + " (a number)");
+      words.push_back(fmt::format("{} (a number)", action.value));
       break;
     case scene::Takes::millimetres:
       words.push_back("three numbers, mm");
       break;
     case scene::Takes::pose:
-      words.push_back(action.value);
+      words.emplace_back(action.value);
       break;
     case scene::Takes::on_off:
       words.push_back("on, off or toggle (text; or true, false, a number: 0 is off; left out: toggle)");
       break;
   }
-  if (!action.of.empty()) words.push_back(action.of + " (text)");
+  if (!action.of.empty()) words.push_back(fmt::format("{} (text)", action.of));
   std::string all;
   for (const std::string& word : words) all += (all.empty() ? "" : "; ") + word;
   return all.empty() ? "none" : all;
@@ -123,7 +123,7 @@ struct Reader {
 
   bool is_at_end() const { return next == arguments.size(); }
 
-  Result<std::string> text(const std::string& what) {
+  Result<std::string> text(std::string_view what) {
     const auto found = is_at_end() ? std::nullopt : arguments[next].text();
     if (!found) return error("{}: expected {} as text, found {}.", path, what, found_here());
     if (found->size() > k_longest_text || !is_printable(*found))
@@ -161,7 +161,7 @@ Result<std::string> switch_of(Reader* reader) {
   return std::string(*number == 0 ? "off" : "on");
 }
 
-Result<std::string> value_of(scene::Takes takes, const std::string& what, Reader* reader) {
+Result<std::string> value_of(scene::Takes takes, std::string_view what, Reader* reader) {
   switch (takes) {
     case scene::Takes::nothing:
       return std::string();
@@ -198,7 +198,8 @@ Result<std::string> value_of(scene::Takes takes, const std::string& what, Reader
 std::vector<OscAddress> osc_heard() {
   std::vector<OscAddress> all;
   for (const scene::Action& action : scene::actions())
-    all.push_back({k_root + action.name, arguments_of(action), action.what});
+    all.push_back({fmt::format("{}{}", k_root, action.name), arguments_of(action), std::string(action.what),
+                   name_of(action.role)});
   return all;
 }
 
@@ -241,17 +242,15 @@ Result<scene::Edit> edit_of_osc(std::span<const std::uint8_t> datagram) {
   if (!message)
     return error("expected a message of Open Sound Control 1.0, found {} other bytes.", bytes.size());
   Reader reader{reinterpret_cast<const char*>(bytes.data()), {}};
-  const auto& actions = scene::actions();
-  const auto action = std::find_if(actions.begin(), actions.end(), [&](const scene::Action& known) {
-    return reader.path == k_root + known.name;
-  });
-  if (action == actions.end())
+  const scene::Action* action =
+      reader.path.starts_with(k_root) ? scene::find_action(reader.path.substr(k_root.size())) : nullptr;
+  if (!action)
     return error("expected an address of docs/osc.md ({}{} and so on), found '{}'.", k_root,
-                 actions.front().name, printable(reader.path));
+                 scene::actions().front().name, printable(reader.path));
   lo_arg** values = lo_message_get_argv(message.get());
   for (int i = 0; i < lo_message_get_argc(message.get()); ++i)
     reader.arguments.push_back({(*types)[static_cast<std::size_t>(i)], values[i]});
-  scene::Edit edit{action->name, "", ""};
+  scene::Edit edit = scene::make_edit(action->id);
   if (action->of_slot) {
     LIMN_TRY(edit.slot, reader.text("a slot"));
   }

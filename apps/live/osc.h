@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/result.h"
-#include "scene/staging.h"
+#include "scene/actions.h"
 
 namespace limn::apps {
 
@@ -16,6 +16,7 @@ struct OscAddress {
   std::string path;       ///< "/limn/next_variant"
   std::string arguments;  ///< in words, as docs/osc.md has them
   std::string what;
+  std::string role = {};  ///< that the action needs on the remote; nobody asks for it here
 };
 
 /// What a session hears: one for each of scene::actions(), in their order.

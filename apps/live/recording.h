@@ -15,7 +15,7 @@
 #include "core/frame.h"
 #include "core/result.h"
 #include "core/rig.h"
-#include "scene/staging.h"
+#include "scene/actions.h"
 
 namespace limn::apps {
 

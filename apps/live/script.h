@@ -9,7 +9,7 @@
 #include "core/frame.h"
 #include "core/pose.h"
 #include "core/result.h"
-#include "scene/staging.h"
+#include "scene/actions.h"
 #include "sim/virtual_rig.h"
 
 namespace limn::apps {

@@ -22,17 +22,9 @@ constexpr const char* k_deleted = "deleted";  // in the folder of looks
 
 // A turn backwards undoes what a turn forwards does.
 scene::Edit edit_of(const scene::Control& control, int steps) {
-  scene::Edit edit{control.action, control.slot, ""};
-  if (steps > 0) return edit;
-  if (edit.action == "next_variant")
-    edit.action = "previous_variant";
-  else if (edit.action == "previous_variant")
-    edit.action = "next_variant";
-  else if (edit.action == "next_look")
-    edit.action = "previous_look";
-  else if (edit.action == "previous_look")
-    edit.action = "next_look";
-  return edit;
+  const scene::Action* action = scene::find_action(control.action);
+  LIMN_CHECK(action != nullptr);  // Session::create() has seen to it
+  return scene::make_edit(steps > 0 ? action->id : action->opposite.value_or(action->id), control.slot);
 }
 
 // What is not there is not moved.
@@ -90,15 +82,11 @@ Result<Session> Session::create(const SessionSetup& setup,
                                 Telemetry* telemetry,
                                 Recorder* recorder,
                                 bool keeps_looks) {
-  const std::vector<scene::Action>& actions = scene::actions();
   for (const scene::Control& control : setup.scene.controls) {
-    const auto action = std::find_if(actions.begin(), actions.end(),
-                                     [&](const scene::Action& a) { return a.name == control.action; });
-    std::string names;
-    for (const scene::Action& known : actions) names += (names.empty() ? "" : ", ") + known.name;
-    if (action == actions.end())
+    const scene::Action* action = scene::find_action(control.action);
+    if (!action)
       return error("scene.json: controls: {}: expected an action ({}), found '{}'.", control.marker.text(),
-                   names, control.action);
+                   scene::action_names(), control.action);
     if (action->of_slot && control.slot.empty())
       return error("scene.json: controls: {}: expected a slot for {}, found none.", control.marker.text(),
                    control.action);
@@ -202,18 +190,21 @@ void Session::tell_of_swapped_cameras() {
 
 Status Session::edit(const scene::Edit& wanted, const std::string& source, Stamp at) {
   scene::Edit edit = wanted;
-  if (edit.action == "pair" && edit.value.empty())
-    if (const auto waiting = waiting_markers(setup_.scene, staging_, watched_); !waiting.empty())
-      edit.value = waiting.back().marker.text();
-  LIMN_TRY(scene::Staging changed, scene::edited(setup_.scene, staging_, painted_.posed, edit));
+  LIMN_TRY(scene::Command command, scene::command_of(setup_.scene, edit));
+  if (auto* marker = std::get_if<std::optional<MarkerName>>(&command.value); marker && !*marker)
+    if (const auto waiting = waiting_markers(setup_.scene, staging_, watched_); !waiting.empty()) {
+      *marker = waiting.back().marker;  // the one that glows; it is recorded by its name
+      edit.value = (*marker)->text();
+    }
+  LIMN_TRY(scene::Staging changed, scene::edited(setup_.scene, staging_, painted_.posed, command));
   std::swap(staging_, changed);
   last_edit_ = Edited{edit, source, last_edit_ ? last_edit_->count + 1 : 1};
   if (recorder_) recorder_->edited(edit, source, moments_);
-  repair_asked_ |= edit.action == "repair";
+  repair_asked_ |= command.action == scene::ActionId::repair;
   if (telemetry_)
     telemetry_->note(at, fmt::format("{}{}{}{}{} ({})", edit.action, edit.slot.empty() ? "" : " ", edit.slot,
                                      edit.value.empty() ? "" : " ", edit.value, source));
-  return keeps_looks_ ? keep(changed, edit) : Status();
+  return keeps_looks_ ? keep(changed, command) : Status();
 }
 
 void Session::see(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at) {
@@ -293,9 +284,10 @@ Status Session::show_if_whole(SceneNews news, Stamp at) {
   return {};
 }
 
-Status Session::keep(const scene::Staging& before, const scene::Edit& edit) {
+Status Session::keep(const scene::Staging& before, const scene::Command& command) {
   LIMN_TRY_STATUS(keep_pairings(before));
-  if (edit.action == "units") LIMN_TRY_STATUS(keep_units(edit));
+  if (const auto* unit = std::get_if<scene::PartUnit>(&command.value))
+    LIMN_TRY_STATUS(keep_unit(setup_.scene.slots[command.slot], *unit));
   return keep_looks(before);
 }
 
@@ -310,11 +302,9 @@ Status Session::keep_pairings(const scene::Staging& before) {
 }
 
 // The part comes anew when SceneWatch sees the answer.
-Status Session::keep_units(const scene::Edit& edit) {
-  const auto blank = edit.value.rfind(' ');
-  return write_file(setup_.scene.folder / "slots" / edit.slot / "units.json",
-                    scene::units_json(*setup_.scene.find_slot(edit.slot), edit.value.substr(0, blank),
-                                      edit.value.substr(blank + 1)));
+Status Session::keep_unit(const scene::Slot& slot, const scene::PartUnit& unit) {
+  return write_file(setup_.scene.folder / "slots" / slot.name / "units.json",
+                    scene::units_json(slot, unit.part, unit.unit));
 }
 
 // Looks that were saved or deleted, on disk, and the page of all.

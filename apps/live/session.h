@@ -16,6 +16,7 @@
 #include "apps/live/telemetry.h"
 #include "apps/live/watcher.h"
 #include "core/result.h"
+#include "scene/actions.h"
 #include "scene/staging.h"
 
 namespace limn::apps {
@@ -115,10 +116,10 @@ class Session {
   Status show_if_whole(SceneNews news, Stamp at);
   void load_pairings();
   void ask_units();
-  Status keep(const scene::Staging& before, const scene::Edit& edit);
+  Status keep(const scene::Staging& before, const scene::Command& command);
   Status keep_looks(const scene::Staging& before);
   Status keep_pairings(const scene::Staging& before);
-  Status keep_units(const scene::Edit& edit);
+  Status keep_unit(const scene::Slot& slot, const scene::PartUnit& unit);
 
   SessionSetup setup_;
   Drawing drawing_;

@@ -108,10 +108,9 @@ scene::Edit read_edit(Reader* reader) {
   edit.action = reader->text("action", k_longest_word, false);
   edit.slot = reader->text("slot", k_longest_word, true);
   edit.value = reader->text("value", k_longest_word, true);
-  const auto& actions = scene::actions();
-  if (std::none_of(actions.begin(), actions.end(),
-                   [&](const scene::Action& known) { return known.name == edit.action; }))
-    reader->problem("action", "one of GET /api/actions (" + actions.front().name + " and so on)",
+  if (!scene::find_action(edit.action))
+    reader->problem("action",
+                    fmt::format("one of GET /api/actions ({} and so on)", scene::actions().front().name),
                     in_quotes(edit.action));
   return edit;
 }

@@ -11,8 +11,8 @@
 
 #include "apps/tablet/window_parts.h"
 #include "core/result.h"
+#include "scene/actions.h"
 #include "scene/comments.h"
-#include "scene/staging.h"
 
 namespace limn::apps {
 

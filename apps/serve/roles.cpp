@@ -1,8 +1,6 @@
 #include "apps/serve/roles.h"
 
-#include <array>
 #include <nlohmann/json.hpp>
-#include <set>
 
 namespace limn::apps {
 namespace {
@@ -29,18 +27,9 @@ const char* name_of(scene::Takes takes) {
 
 }  // namespace
 
-const std::string& name_of(Role role) {
-  static const std::array<std::string, 3> names = {"look", "work", "operate"};
-  return names[static_cast<std::size_t>(role)];
-}
-
 Role role_for(const std::string& action) {
-  static const std::set<std::string> work = {
-      "next_variant", "previous_variant", "choose_variant", "nudge",  "release", "save_look",
-      "restore_look", "next_look",        "previous_look",  "flip",   "split",   "split_at",
-      "delete_look",  "undelete_look",    "blackout",       "freeze", "grid",    "viewer",
-      "place",        "material",         "light"};
-  return work.contains(action) ? Role::work : Role::operate;
+  const scene::Action* found = scene::find_action(action);
+  return found ? found->role : Role::operate;
 }
 
 std::string actions_json() {
@@ -51,7 +40,7 @@ std::string actions_json() {
                    {"takes", name_of(action.takes)},
                    {"value", action.value},
                    {"what", action.what},
-                   {"role", name_of(role_for(action.name))}});
+                   {"role", name_of(action.role)}});
   return all.dump();
 }
 

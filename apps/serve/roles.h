@@ -2,17 +2,13 @@
 
 #include <string>
 
-#include "scene/staging.h"
+#include "scene/actions.h"
 
 namespace limn::apps {
 
-/// What a guest of the remote may do; each may do what those before it may (docs/remote.md).
-enum class Role { look, work, operate };
+using scene::Role;
 
-/// "look", "work", "operate".
-const std::string& name_of(Role role);
-
-/// Who may do an action of scene::actions(); `operate` for an action that this table does not know.
+/// Who may do an action, by its name; `operate` for one that is not in scene::actions().
 Role role_for(const std::string& action);
 
 /// The table of actions as GET /api/actions tells it: JSON.

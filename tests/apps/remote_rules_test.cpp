@@ -7,7 +7,6 @@
 #include <regex>
 #include <set>
 
-#include "apps/live/osc.h"
 #include "apps/serve/guests.h"
 #include "apps/serve/http.h"
 #include "apps/serve/messages.h"
@@ -27,30 +26,50 @@ using nlohmann::json;
 
 const fs::path k_source = LIMN_SOURCE_DIR;
 
-// The page's rows of actions are JSON.
-json actions_of_the_page() {
-  const std::string text = read_file(k_source / "web/actions.js").value();
-  const std::size_t begin = text.find('['), end = text.find("];");
-  return json::parse(text.substr(begin, end - begin) + "]");
+std::set<std::string> names_of_the_table() {
+  std::set<std::string> names;
+  for (const scene::Action& action : scene::actions()) names.emplace(action.name);
+  return names;
 }
 
-TEST(RemoteActions, TheTableThePageAndOscAgree) {
-  const json table = json::parse(actions_json()), page = actions_of_the_page();
+TEST(RemoteActions, AreToldRowByRow) {
+  const json table = json::parse(actions_json());
   ASSERT_EQ(table.size(), scene::actions().size());
-  ASSERT_EQ(page.size(), table.size());
-  ASSERT_EQ(osc_heard().size(), table.size());
   for (std::size_t i = 0; i < table.size(); ++i) {
-    EXPECT_EQ(table[i]["name"], scene::actions()[i].name);
-    EXPECT_EQ("/limn/" + table[i]["name"].get<std::string>(), osc_heard()[i].path);
-    for (const char* key : {"name", "of_slot", "takes", "role"}) EXPECT_EQ(page[i][key], table[i][key]) << i;
+    const scene::Action& action = scene::actions()[i];
+    EXPECT_EQ(table[i]["name"].get<std::string>(), action.name);
+    EXPECT_EQ(table[i]["of_slot"].get<bool>(), action.of_slot);
+    EXPECT_EQ(table[i]["role"].get<std::string>(), name_of(action.role));
+    EXPECT_EQ(table[i]["value"].get<std::string>(), action.value);
+    EXPECT_EQ(table[i]["value"].get<std::string>().empty(), table[i]["takes"] == "nothing");
     EXPECT_FALSE(table[i]["what"].get<std::string>().empty());
   }
+}
+
+// What the page has a word of its own for, and what something on it does: buttons, sliders and switches.
+TEST(RemoteActions, ThePageHasEachAndNoOther) {
+  const std::set<std::string> table = names_of_the_table();
+  const std::string words = read_file(k_source / "web/actions.js").value();
+  const std::size_t begin = words.find("k_words = {") + 10, end = words.find("};", begin);
+  for (const auto& [name, label] : json::parse(words.substr(begin, end + 1 - begin)).items())
+    EXPECT_TRUE(table.contains(name)) << "web/actions.js has a word for '" << name << "'";
+
+  static const std::regex done(
+      R"re((?:\b(?:button|act|role_of)\(|make_switch\(\s*session,|"data-action":)\s*"(\w+)")re");
+  std::set<std::string> on_the_page;
+  for (const auto& entry : fs::directory_iterator(k_source / "web")) {
+    if (entry.path().extension() != ".js") continue;
+    const std::string text = read_file(entry.path()).value();
+    for (std::sregex_iterator at(text.begin(), text.end(), done), none; at != none; ++at)
+      on_the_page.insert((*at)[1]);
+  }
+  EXPECT_EQ(on_the_page, table);
 }
 
 TEST(RemoteActions, DesignersDoAllButWhatBelongsToTheOperator) {
   std::set<std::string> operate;
   for (const scene::Action& action : scene::actions())
-    if (role_for(action.name) == Role::operate) operate.insert(action.name);
+    if (role_for(std::string(action.name)) == Role::operate) operate.emplace(action.name);
   EXPECT_EQ(operate, (std::set<std::string>{"pair", "unpair", "units", "marker_states", "screen", "repair"}));
   EXPECT_EQ(role_for("an action of tomorrow"), Role::operate);
 }

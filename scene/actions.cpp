@@ -1,0 +1,558 @@
+#include "scene/actions.h"
+
+#include <algorithm>
+#include <type_traits>
+
+#include "scene/in_words.h"
+#include "scene/mesh.h"
+
+namespace limn::scene {
+
+struct Change {
+  const Scene& scene;
+  const PosedScene& posed;      // what was shown last
+  const std::string_view name;  // of the action, for errors
+  const std::size_t slot_index;
+  Staging staging;  // before the action, then after it
+
+  const Slot& slot() const { return scene.slots[slot_index]; }
+  Staging::Slot& chosen() { return staging.slots[slot_index]; }
+};
+
+namespace {
+
+std::vector<std::string> variant_names(const Slot& slot) {
+  std::vector<std::string> names;
+  for (const Variant& variant : slot.variants) names.push_back(variant.name);
+  return names;
+}
+
+// The element `steps` after `name`, round and round.
+const std::string& stepped(const std::vector<std::string>& names, const std::string& name, int steps) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  const int count = static_cast<int>(names.size());
+  // Before the first one stands nothing: a step on leads to it, a step back to the last.
+  const int at = found == names.end() ? (steps > 0 ? -1 : 0) : static_cast<int>(found - names.begin());
+  return names[static_cast<std::size_t>(((at + steps) % count + count) % count)];
+}
+
+// ---- What actions do. Each takes a value that was read; on an error the change is thrown away. ----
+
+template <int k_steps>
+Status step_variant(Change* change, std::monostate) {
+  std::string& variant = change->chosen().variant;
+  variant = stepped(variant_names(change->slot()), variant, k_steps);
+  return {};
+}
+
+Status choose_variant(Change* change, const std::string& variant) {
+  const std::vector<std::string> names = variant_names(change->slot());
+  if (std::find(names.begin(), names.end(), variant) == names.end())
+    return error("{}: expected a variant of slot '{}' ({}), found '{}'.", change->name, change->slot().name,
+                 listed(names), variant);
+  change->chosen().variant = variant;
+  return {};
+}
+
+Status nudge(Change* change, const Eigen::Vector3d& mm) {
+  Staging::Slot& slot = change->chosen();
+  slot.nudge += 1e-3 * mm;
+  if (slot.pin)
+    slot.pin->prototype_from_part =
+        slot.pin->prototype_from_part * Pose(Eigen::Quaterniond::Identity(), 1e-3 * mm);
+  return {};
+}
+
+Status place(Change* change, const Pose& prototype_from_part) {
+  change->chosen().nudge.setZero();
+  change->chosen().pin = Pin{prototype_from_part, std::nullopt};
+  return {};
+}
+
+Status release(Change* change, std::monostate) {
+  change->chosen().nudge.setZero();
+  change->chosen().pin.reset();
+  return {};
+}
+
+Status pair(Change* change, const std::optional<MarkerName>& marker) {
+  if (!marker)
+    return error(
+        "{}: expected a marker that lies still and carries nothing, found none. Lay one down for a second.",
+        change->name);
+  if (const Status can = check_carrier(change->scene, change->staging, *marker, change->slot_index); !can)
+    return error("{}: {}", change->name, can.message());
+  change->chosen().pin.reset();
+  if (*marker == change->slot().marker)
+    change->chosen().marker.reset();
+  else
+    change->chosen().marker = *marker;
+  return {};
+}
+
+Status unpair(Change* change, std::monostate) { return pair(change, change->slot().marker); }
+
+// The staging stays: the session keeps the unit beside the part's file.
+Status set_unit(Change* change, const PartUnit& wanted) {
+  std::vector<std::string> dropped;
+  for (const Variant& variant : change->slot().variants)
+    if (variant.dropped) dropped.push_back(variant.name);
+  if (std::find(dropped.begin(), dropped.end(), wanted.part) == dropped.end())
+    return error("{}: expected a part that was dropped into slot '{}' ({}) and its unit, found '{}'.",
+                 change->name, change->slot().name, listed(dropped), wanted.words);
+  if (!metres_per_unit(wanted.unit))
+    return error("{}: expected m, cm, mm, in or ft after the part's name, found '{}'.", change->name,
+                 wanted.unit);
+  return {};
+}
+
+Status set_material(Change* change, const MaterialChange& material) {
+  change->chosen().material = material;
+  return {};
+}
+
+std::string unused_look_name(const Staging& staging) {
+  for (int i = 1;; ++i)
+    if (const std::string name = fmt::format("look-{:02}", i); !find_look(staging, name)) return name;
+}
+
+Status save_look(Change* change, const std::string& name) {
+  Staging& staging = change->staging;
+  const PosedScene& posed = change->posed;
+  Look look;
+  look.name = name.empty() ? unused_look_name(staging) : name;
+  if (!is_look_name(look.name))
+    return error("{}: expected a name of letters, digits, blanks, '-', '_' and '.', found '{}'.",
+                 change->name, look.name);
+  const Pose prototype_from_world =
+      posed.world_from_prototype ? posed.world_from_prototype->inverse() : Pose{};
+  for (const PosedPart& part : posed.parts)
+    look.parts.push_back(
+        {part.slot, part.variant, prototype_from_world * part.world_from_part, part.material});
+  look.light = posed.light ? posed.light : change->scene.light;
+  remember_look(look.name, &staging);
+  std::erase_if(staging.looks, [&](const Look& known) { return known.name == look.name; });
+  staging.looks.push_back(std::move(look));
+  return {};
+}
+
+Error no_such_look(const Change& change, const std::string& name) {
+  return error("{}: expected one of {}, found '{}'.", change.name, listed(look_names(change.staging)), name);
+}
+
+Status restore_look(Change* change, const std::string& name) {
+  const Look* found = find_look(change->staging, name);
+  if (!found) return no_such_look(*change, name);
+  const Look look = *found;
+  change->staging = with_look(change->scene, std::move(change->staging), look);
+  return {};
+}
+
+template <int k_steps>
+Status step_look(Change* change, std::monostate) {
+  const std::vector<std::string> names = look_names(change->staging);
+  if (names.empty()) return error("{}: expected a saved look, found none. Save one.", change->name);
+  return restore_look(change, stepped(names, change->staging.look, k_steps));
+}
+
+Status flip(Change* change, const std::string& name) {
+  const Staging& staging = change->staging;
+  if (name.empty() && staging.other_look.empty())
+    return error("{}: expected two looks shown before, found {}. Save or restore another.", change->name,
+                 staging.look.empty() ? "none" : "one");
+  return restore_look(change, std::string(name.empty() ? staging.other_look : name));
+}
+
+Status delete_look(Change* change, const std::string& name) {
+  Staging& staging = change->staging;
+  const Look* found = find_look(staging, name);
+  if (!found) return no_such_look(*change, name);
+  staging.deleted_look = *found;
+  staging.looks.erase(staging.looks.begin() + (found - staging.looks.data()));
+  if (staging.look == name) staging.look.clear();
+  if (staging.other_look == name) {
+    staging.other_look.clear();
+    staging.split = false;
+  }
+  return {};
+}
+
+Status undelete_look(Change* change, std::monostate) {
+  Staging& staging = change->staging;
+  if (!staging.deleted_look) return error("{}: expected a look that was deleted, found none.", change->name);
+  if (find_look(staging, staging.deleted_look->name))
+    return error("{}: expected no look of that name, found another '{}'. Delete it first.", change->name,
+                 staging.deleted_look->name);
+  staging.looks.push_back(std::move(*staging.deleted_look));
+  staging.deleted_look.reset();
+  return {};
+}
+
+// The staging stays: the session's devices do it.
+Status repair(Change* change, std::monostate) {
+  if (!change->staging.blackout) return {};
+  return error("{}: expected light, found blackout. End the blackout first.", change->name);
+}
+
+Status set_light(Change* change, const std::optional<LightNumbers>& numbers) {
+  Staging& staging = change->staging;
+  const std::optional<RoomLight>& own = change->scene.light;
+  staging.light.reset();
+  if (numbers)
+    staging.light =
+        room_light_of(*numbers, own ? own->d_up_world : staging.d_up_world, staging.d_front_world);
+  return {};
+}
+
+// A switch of the staging.
+template <bool Staging::*k_flag>
+Status set_flag(Change* change, Switch wanted) {
+  bool& flag = change->staging.*k_flag;
+  flag = wanted == Switch::toggle ? !flag : wanted == Switch::on;
+  return {};
+}
+
+Status set_split(Change* change, Switch wanted) {
+  LIMN_TRY_STATUS(set_flag<&Staging::split>(change, wanted));
+  if (change->staging.split && change->staging.other_look.empty())
+    return error("{}: expected a look shown before the present one, found none. Save or restore two.",
+                 change->name);
+  return {};
+}
+
+Status move_split(Change* change, double mm) {
+  change->staging.split_mm = mm;
+  return {};
+}
+
+Status set_screen(Change* change, const ScreenChoice& choice) {
+  Staging& staging = change->staging;
+  const auto output = std::find_if(staging.screens.begin(), staging.screens.end(),
+                                   [&](const Output& known) { return known.name == choice.screen; });
+  const bool is_all = choice.screen.empty();
+  if (!is_all && output == staging.screens.end()) {
+    std::vector<std::string> outputs;
+    for (const Output& known : staging.screens) outputs.push_back(known.name);
+    return error("{}: expected a screen of the devices file ({}), or none for all, found '{}'.", change->name,
+                 listed(outputs), choice.screen);
+  }
+  const auto before = static_cast<std::size_t>(is_all ? staging.screen : output->shows);
+  const auto shows = choice.shows.value_or(static_cast<Screen>((before + 1) % screen_names().size()));
+  if (!is_all) {
+    output->shows = shows;
+    return {};
+  }
+  staging.screen = shows;
+  for (Output& each : staging.screens) each.shows = shows;
+  return {};
+}
+
+Status set_viewer(Change* change, const std::string& guest) {
+  change->staging.viewer = guest;
+  return {};
+}
+
+// ---- The table. ----
+
+template <auto k_read>
+using ValueOf = std::decay_t<decltype(*k_read(std::declval<const Edit&>()))>;
+
+template <auto k_read>
+Result<ActionValue> read_with(const Edit& edit) {
+  LIMN_TRY(ValueOf<k_read> value, k_read(edit));
+  return ActionValue(std::move(value));
+}
+
+template <auto k_read, auto k_apply>
+Status apply_with(Change* change, const ActionValue& value) {
+  return k_apply(change, std::get<ValueOf<k_read>>(value));
+}
+
+// Reads the value with the one and does the action with the other, which takes just that.
+template <auto k_read, auto k_apply>
+constexpr Action::Functions k_by = {&read_with<k_read>, &apply_with<k_read, k_apply>};
+
+using enum Takes;
+using enum Role;
+
+constexpr std::array<Action, k_action_count> k_actions = {{
+    {.id = ActionId::next_variant,
+     .name = "next_variant",
+     .role = work,
+     .of_slot = true,
+     .what = "the slot's next variant",
+     .opposite = ActionId::previous_variant,
+     .keys = {Key::right, Key::page_down, Key{'N'}},
+     .functions = k_by<read_nothing, step_variant<1>>},
+    {.id = ActionId::previous_variant,
+     .name = "previous_variant",
+     .role = work,
+     .of_slot = true,
+     .what = "the slot's previous variant",
+     .opposite = ActionId::next_variant,
+     .keys = {Key::left, Key::page_up, Key{'P'}},
+     .functions = k_by<read_nothing, step_variant<-1>>},
+    {.id = ActionId::choose_variant,
+     .name = "choose_variant",
+     .role = work,
+     .of_slot = true,
+     .takes = text,
+     .value = "a variant",
+     .what = "a variant by name",
+     .functions = k_by<read_text, choose_variant>},
+    {.id = ActionId::nudge,
+     .name = "nudge",
+     .role = work,
+     .of_slot = true,
+     .takes = millimetres,
+     .value = "three numbers, mm",
+     .what = "moves the part along its own axes",
+     .functions = k_by<read_millimetres, nudge>},
+    {.id = ActionId::place,
+     .name = "place",
+     .role = work,
+     .of_slot = true,
+     .takes = Takes::pose,
+     .value = "x, y, z in mm; quaternion w, x, y, z",
+     .what = "puts the part there on the prototype, until its marker is moved",
+     .functions = k_by<read_place, place>},
+    {.id = ActionId::release,
+     .name = "release",
+     .role = work,
+     .of_slot = true,
+     .what = "the part follows its marker again, without nudges",
+     .keys = {Key{'R'}},
+     .functions = k_by<read_nothing, release>},
+    {.id = ActionId::pair,
+     .name = "pair",
+     .role = operate,
+     .of_slot = true,
+     .takes = maybe_text,
+     .value = "a marker; empty: the one that glows",
+     .what = "the part is carried by that marker from now on",
+     .keys = {Key{'A'}},
+     .functions = k_by<read_marker, pair>},
+    {.id = ActionId::unpair,
+     .name = "unpair",
+     .role = operate,
+     .of_slot = true,
+     .what = "the scene's own marker carries the part again",
+     .functions = k_by<read_nothing, unpair>},
+    {.id = ActionId::units,
+     .name = "units",
+     .role = operate,
+     .of_slot = true,
+     .takes = text,
+     .value = "a variant and m, cm, mm, in or ft",
+     .what = "the unit of a part that was dropped in",
+     .functions = k_by<read_part_unit, set_unit>},
+    {.id = ActionId::material,
+     .name = "material",
+     .role = work,
+     .of_slot = true,
+     .takes = maybe_text,
+     .value = "a colour, metalness, roughness, - for the file's: #c02818 0 0.4",
+     .what = "the part's material, of every variant; empty: as its file says",
+     .functions = k_by<read_material, set_material>},
+    {.id = ActionId::save_look,
+     .name = "save_look",
+     .role = work,
+     .takes = maybe_text,
+     .value = "a name; empty: look-01 and so on",
+     .what = "keeps variants, places, materials and light, as JSON and PNG",
+     .keys = {Key{'S'}},
+     .functions = k_by<read_text, save_look>},
+    {.id = ActionId::restore_look,
+     .name = "restore_look",
+     .role = work,
+     .takes = text,
+     .value = "a look",
+     .what = "shows a look until its markers are moved",
+     .functions = k_by<read_text, restore_look>},
+    {.id = ActionId::next_look,
+     .name = "next_look",
+     .role = work,
+     .what = "the look after the one last shown",
+     .opposite = ActionId::previous_look,
+     .keys = {Key{'L'}},
+     .functions = k_by<read_nothing, step_look<1>>},
+    {.id = ActionId::previous_look,
+     .name = "previous_look",
+     .role = work,
+     .what = "the look before it",
+     .opposite = ActionId::next_look,
+     .keys = {Key{'K'}},
+     .functions = k_by<read_nothing, step_look<-1>>},
+    {.id = ActionId::flip,
+     .name = "flip",
+     .role = work,
+     .takes = maybe_text,
+     .value = "a look; empty: the one shown before",
+     .what = "shows the other of two looks",
+     .keys = {Key{'V'}},
+     .functions = k_by<read_text, flip>},
+    {.id = ActionId::split,
+     .name = "split",
+     .role = work,
+     .takes = on_off,
+     .value = "on, off or toggle",
+     .what = "left of a line the look shown before",
+     .keys = {Key{'X'}},
+     .functions = k_by<read_switch, set_split>},
+    {.id = ActionId::split_at,
+     .name = "split_at",
+     .role = work,
+     .takes = number,
+     .value = "mm to the right of the prototype's middle",
+     .what = "where that line is",
+     .functions = k_by<read_millimetre, move_split>},
+    {.id = ActionId::delete_look,
+     .name = "delete_look",
+     .role = work,
+     .takes = text,
+     .value = "a look",
+     .what = "forgets a look",
+     .functions = k_by<read_text, delete_look>},
+    {.id = ActionId::undelete_look,
+     .name = "undelete_look",
+     .role = work,
+     .what = "brings back the look that was last deleted",
+     .functions = k_by<read_nothing, undelete_look>},
+    {.id = ActionId::repair,
+     .name = "repair",
+     .role = operate,
+     .what =
+         "patterns on the prototype for some 15 s: the session goes on with a rig that knows what was nudged",
+     .functions = k_by<read_nothing, repair>},
+    {.id = ActionId::light,
+     .name = "light",
+     .role = work,
+     .takes = maybe_text,
+     .value = "a lamp's degrees right and up, its strength, soft light above and below: 30 45 0.6 0.3 0.1",
+     .what = "the light that parts are shaded by, as seen from camera 0; empty: the scene's own",
+     .functions = k_by<read_light, set_light>},
+    {.id = ActionId::blackout,
+     .name = "blackout",
+     .role = work,
+     .takes = on_off,
+     .value = "on, off or toggle",
+     .what = "bare model: no light",
+     .keys = {Key{'B'}, Key{'.'}},
+     .functions = k_by<read_switch, set_flag<&Staging::blackout>>},
+    {.id = ActionId::freeze,
+     .name = "freeze",
+     .role = work,
+     .takes = on_off,
+     .value = "on, off or toggle",
+     .what = "what is shown stays",
+     .keys = {Key{'F'}},
+     .functions = k_by<read_switch, set_flag<&Staging::frozen>>},
+    {.id = ActionId::grid,
+     .name = "grid",
+     .role = work,
+     .takes = on_off,
+     .value = "on, off or toggle",
+     .what = "lines on the prototype, every 10 mm",
+     .keys = {Key{'G'}},
+     .functions = k_by<read_switch, set_flag<&Staging::grid>>},
+    {.id = ActionId::marker_states,
+     .name = "marker_states",
+     .role = operate,
+     .takes = on_off,
+     .value = "on, off or toggle",
+     .what = "rings around markers: green seen, amber carried on",
+     .keys = {Key{'M'}},
+     .functions = k_by<read_switch, set_flag<&Staging::marker_states>>},
+    {.id = ActionId::screen,
+     .name = "screen",
+     .role = operate,
+     .takes = maybe_text,
+     .value = "rest, full, camera, view, stereo, off or next",
+     .of = "a screen; left out: all",
+     .what = "what screens show, or the one that is named",
+     .keys = {Key{'O'}},
+     .value_of_keys = "next",
+     .functions = k_by<read_screen, set_screen>},
+    {.id = ActionId::viewer,
+     .name = "viewer",
+     .role = work,
+     .takes = maybe_text,
+     .value = "a guest's name; empty: the scene's own viewer",
+     .what = "whose eye view parts are drawn for: a guest's tablet while its window sees markers",
+     .functions = k_by<read_text, set_viewer>},
+}};
+
+constexpr bool has_every_row() {
+  for (std::size_t i = 0; i < k_action_count; ++i)
+    if (static_cast<std::size_t>(k_actions[i].id) != i || k_actions[i].name.empty()) return false;
+  return true;
+}
+static_assert(has_every_row(), "k_actions has a row for every ActionId, in their order");
+
+}  // namespace
+
+const std::string& name_of(Role role) {
+  static const std::array<std::string, 3> names = {"look", "work", "operate"};
+  return names[static_cast<std::size_t>(role)];
+}
+
+std::span<const Action, k_action_count> actions() { return k_actions; }
+
+const Action& action_of(ActionId id) {
+  LIMN_CHECK(id < ActionId::count);
+  return k_actions[static_cast<std::size_t>(id)];
+}
+
+const Action* find_action(std::string_view name) {
+  const auto found = std::find_if(k_actions.begin(), k_actions.end(),
+                                  [&](const Action& action) { return action.name == name; });
+  return found == k_actions.end() ? nullptr : &*found;
+}
+
+std::string action_names() {
+  std::vector<std::string> names;
+  for (const Action& action : k_actions) names.emplace_back(action.name);
+  return listed(names);
+}
+
+Edit make_edit(ActionId action, std::string slot, std::string value) {
+  return {std::string(action_of(action).name), std::move(slot), std::move(value)};
+}
+
+Result<Command> command_of(const Scene& scene, const Edit& edit) {
+  const Action* action = find_action(edit.action);
+  if (!action) return error("edit: expected an action ({}), found '{}'.", action_names(), edit.action);
+  Command command{.action = action->id, .value = {}};
+  if (action->of_slot) {
+    const Slot* slot = scene.find_slot(edit.slot);
+    if (!slot) {
+      std::vector<std::string> names;
+      for (const Slot& known : scene.slots) names.push_back(known.name);
+      return error("{}: expected a slot of the scene ({}), found '{}'.", edit.action, listed(names),
+                   edit.slot);
+    }
+    command.slot = static_cast<std::size_t>(slot - scene.slots.data());
+  }
+  LIMN_TRY(command.value, action->functions.read(edit));
+  return command;
+}
+
+Result<Staging> edited(const Scene& scene,
+                       const Staging& staging,
+                       const PosedScene& posed,
+                       const Command& command) {
+  const Action& action = action_of(command.action);
+  Change change{scene, posed, action.name, command.slot, staging};
+  LIMN_TRY_STATUS(action.functions.apply(&change, command.value));
+  return std::move(change.staging);
+}
+
+Result<Staging> edited(const Scene& scene,
+                       const Staging& staging,
+                       const PosedScene& posed,
+                       const Edit& edit) {
+  LIMN_TRY(const Command command, command_of(scene, edit));
+  return edited(scene, staging, posed, command);
+}
+
+}  // namespace limn::scene
