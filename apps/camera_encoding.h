@@ -1,7 +1,5 @@
 #pragma once
 
-#include <opencv2/core/mat.hpp>
-
 #include "core/rig.h"
 #include "tracker/refine.h"
 
@@ -9,11 +7,5 @@ namespace limn::apps {
 
 /// How a camera writes light, as near as the detector can tell apart: by what was measured, else linear.
 tracker::Encoding encoding_of(const Rig& rig, const Imager& camera);
-
-/// An 8-bit picture whose values are proportional to light, as screens want it: sRGB.
-cv::Mat srgb_picture(const cv::Mat& linear);
-
-/// Whether a response was measured of the camera and is linear: then its pictures are too dark for screens.
-bool is_measured_linear(const Rig& rig, const Imager& camera);
 
 }  // namespace limn::apps

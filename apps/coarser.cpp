@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace limn::apps {
+namespace limn {
 
 Status make_coarser(double share, Rig* rig) {
   if (!(share > 0 && share <= 1))
@@ -20,4 +20,4 @@ Status make_coarser(double share, Rig* rig) {
   return {};
 }
 
-}  // namespace limn::apps
+}  // namespace limn

@@ -2,7 +2,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-namespace limn::apps {
+namespace limn {
 
 std::string escaped(const std::string& text) {
   std::string html;
@@ -26,4 +26,4 @@ cv::Mat at_most_wide(const cv::Mat& picture, int width) {
   return scaled;
 }
 
-}  // namespace limn::apps
+}  // namespace limn

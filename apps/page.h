@@ -3,7 +3,7 @@
 #include <opencv2/core/mat.hpp>
 #include <string>
 
-namespace limn::apps {
+namespace limn {
 
 /// Text as HTML shows it.
 std::string escaped(const std::string& text);
@@ -11,4 +11,4 @@ std::string escaped(const std::string& text);
 /// The picture, made smaller where it is wider than `width` pixels.
 cv::Mat at_most_wide(const cv::Mat& picture, int width);
 
-}  // namespace limn::apps
+}  // namespace limn

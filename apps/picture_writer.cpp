@@ -3,7 +3,7 @@
 #include "core/file.h"
 #include "core/picture.h"
 
-namespace limn::apps {
+namespace limn {
 
 // An exception must not leave the thread.
 Status PictureWriter::stored(const Job& job) {
@@ -78,4 +78,4 @@ void PictureWriter::run() {
   }
 }
 
-}  // namespace limn::apps
+}  // namespace limn

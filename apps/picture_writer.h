@@ -13,7 +13,7 @@
 
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn {
 
 /// Writes captured pictures as lightly compressed PNG on a thread of its own, so that the next picture is
 /// taken meanwhile. The queue is short: store() waits when the disk is slower than the camera.
@@ -56,4 +56,4 @@ class PictureWriter {
   std::thread thread_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn

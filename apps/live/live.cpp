@@ -6,7 +6,6 @@
 #include <limits>
 #include <optional>
 
-#include "apps/camera_encoding.h"
 #include "apps/coarser.h"
 #include "apps/devices.h"
 #include "apps/live/books.h"
@@ -18,6 +17,7 @@
 #include "apps/live/session.h"
 #include "apps/live/virtual_session.h"
 #include "apps/live/watcher.h"
+#include "apps/screen_encoding.h"
 #include "apps/serve/server.h"
 #include "apps/tablet/onlooker.h"
 #include "apps/world_markers.h"

@@ -6,9 +6,9 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
-#include "apps/camera_encoding.h"
 #include "apps/live/aids.h"
 #include "apps/live/feedback.h"
+#include "apps/screen_encoding.h"
 
 namespace limn::apps {
 namespace {

@@ -4,11 +4,11 @@
 
 #include "core/frame.h"
 
-namespace limn::apps {
+namespace limn {
 
 /// How long something took, by the wall.
 inline double milliseconds_since(Stamp begun) {
   return 1e3 * seconds_between(begun, std::chrono::steady_clock::now());
 }
 
-}  // namespace limn::apps
+}  // namespace limn

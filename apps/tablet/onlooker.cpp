@@ -16,9 +16,9 @@
 #include <set>
 #include <thread>
 
-#include "apps/camera_encoding.h"
 #include "apps/live/aids.h"
 #include "apps/live/stopwatch.h"
+#include "apps/screen_encoding.h"
 #include "apps/tablet/guest_eye.h"
 #include "apps/tablet/guest_picture.h"
 #include "apps/tablet/lens_book.h"

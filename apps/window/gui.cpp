@@ -10,7 +10,7 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
-#include "apps/camera_encoding.h"
+#include "apps/screen_encoding.h"
 #include "core/result.h"
 
 namespace limn::apps {
