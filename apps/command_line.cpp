@@ -191,13 +191,14 @@ void add_solve(CLI::App& app, Run& run) {
   command->add_option("--known-length", options->known_lengths,
                       "a measured length, such as 'apriltag_36h11:3 apriltag_36h11:7 250mm'; again for another")
       ->allow_extra_args(false);
-  command->add_flag("--json", options->json, "print report.json instead of a table");
+  auto json = std::make_shared<bool>(false);
+  command->add_flag("--json", *json, "print report.json instead of a table");
   command->add_option("--import", options->import_format, "read somebody else's captures: opencv-gray");
   command->add_option("--projector", options->projector, "with --import: the projector's size, such as 1024x768");
   command->add_option("--board", options->board, "with --import: such as chessboard:9x7:75mm (inner corners)");
   command->add_option("--poses", options->poses, "with --import: pattern of the pose folders")->capture_default_str();
   command->add_option("--shots", options->shots, "with --import: pattern of the pictures")->capture_default_str();
-  command->callback([options, &run] { run = [options] { return finished(run_solve(*options)); }; });
+  command->callback([options, json, &run] { run = [options, json] { return finished(run_solve(*options, *json)); }; });
 }
 
 void add_calibrate(CLI::App& app, Run& run) {

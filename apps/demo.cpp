@@ -9,10 +9,11 @@
 #include <optional>
 #include <thread>
 
-#include "apps/capture.h"
 #include "apps/demo_page.h"
 #include "apps/judge.h"
-#include "apps/solve.h"
+#include "apps/plan.h"
+#include "apps/solve_captures.h"
+#include "apps/virtual_capture.h"
 #include "apps/world_markers.h"
 #include "core/file.h"
 #include "core/log.h"

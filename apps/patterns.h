@@ -21,11 +21,4 @@ struct PatternsOptions {
 /// `limn patterns`: the code's (or the response's) numbered PNGs and patterns.json.
 Status run_patterns(const PatternsOptions& options);
 
-/// "1280x800" as numbers; anything else is wrong usage.
-struct PixelSize {
-  int width = 0;
-  int height = 0;
-};
-Result<PixelSize> parse_pixel_size(const std::string& text);
-
 }  // namespace limn::apps

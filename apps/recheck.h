@@ -1,13 +1,9 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 
-#include "apps/calibrate.h"
-#include "calib/captures.h"
-#include "calib/judge/recheck.h"
+#include "apps/rig_recheck.h"
 #include "core/result.h"
-#include "core/rig.h"
 
 namespace limn::apps {
 
@@ -24,32 +20,11 @@ struct RecheckCommand {
   bool json = false;                 ///< print recheck.json instead of a table
 };
 
-struct Rechecked {
-  calib::Recheck result;
-  int pictures = 0;  ///< shown and photographed, all cameras at once
-};
-
 /// Captures of the board, or of the prototype alone where three devices share it, against a calibrated rig:
 /// has a camera or a projector moved? Writes the rig folder,
 /// with that device's pose re-solved, and recheck.json. Where no single move explains what is seen, only
 /// recheck.json is written and that is an error.
 Result<Rechecked> rechecked(const RecheckCommand& command);
-
-/// One pose of whatever stands before the devices of `around`, into the captures' folder; the projectors'
-/// latencies as the rig has them.
-Status captured_once(const calib::Captures& captures, const Rig& rig, const Surroundings& around);
-
-/// The prototype as it stands, captured once by devices that are open already (those of `around`, with the
-/// names and in the order of the rig's; of it stage, written and use_latency are needed), against the rig.
-/// The result's rig is the mended one; it, recheck.json and captures/ are in `folder`. Error, and no rig is
-/// written: no single move explains what is seen, or `goes_on`, which is asked now and then, says false.
-Result<Rechecked> rechecked_in_place(const Rig& rig,
-                                     const Surroundings& around,
-                                     const std::filesystem::path& folder,
-                                     const std::function<bool()>& goes_on = {});
-
-/// How many pictures that shows.
-int recheck_pictures(const Rig& rig);
 
 /// `limn recheck`: as rechecked(), and prints a table.
 Status run_recheck(const RecheckCommand& command);

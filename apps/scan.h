@@ -4,10 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "calib/captures.h"
-#include "calib/surface/scan.h"
 #include "core/result.h"
-#include "core/rig.h"
 
 namespace limn::apps {
 
@@ -24,13 +21,6 @@ struct ScanCommand {
   int smooth_px = 3;
   bool json = false;
 };
-
-/// Measures the surface as calib::scanned does and writes points.ply, mesh.ply (metres, the rig's world),
-/// scan.json and pictures into `out`. Everything is measured before the first file is written.
-Result<calib::Scan> written_scan(const calib::Captures& captures,
-                                 const Rig& rig,
-                                 const calib::ScanOptions& options,
-                                 const std::filesystem::path& out);
 
 /// `limn scan`: scene captures and a calibrated rig to written_scan.
 Status run_scan(const ScanCommand& command);

@@ -8,22 +8,22 @@
 #include <optional>
 #include <string>
 
-#include "apps/calibrate.h"
 #include "apps/live/session.h"
 #include "apps/live/watcher.h"
 #include "apps/picture_writer.h"
-#include "apps/recheck.h"
+#include "apps/rig_recheck.h"
 #include "apps/wizard/main_errands.h"
+#include "apps/wizard/surroundings.h"
 
 namespace limn::apps {
 
 /// Where mended rigs of a session go: a new folder in `out`, in Limn's own folder without one.
 Result<std::filesystem::path> repair_folder(const std::filesystem::path& out);
 
-/// The rig of a running session is checked by the prototype as it stands (apps/recheck.h), with the session's
-/// own devices, on a thread of its own: what it shows and photographs is done by serve(), so that the
-/// session's thread answers people in between. When all is photographed the session may paint again while the
-/// rest is computed, with low priority.
+/// The rig of a running session is checked by the prototype as it stands (apps/rig_recheck.h), with the
+/// session's own devices, on a thread of its own: what it shows and photographs is done by serve(), so that
+/// the session's thread answers people in between. When all is photographed the session may paint again while
+/// the rest is computed, with low priority.
 class Repair {
  public:
   /// `around` needs stage, written and use_latency, which store pictures in the writer that it is given.

@@ -3,9 +3,11 @@
 #include <optional>
 #include <vector>
 
-#include "apps/calibrate.h"
 #include "apps/wizard/display_latency.h"
 #include "apps/wizard/light_check.h"
+#include "apps/wizard/surroundings.h"
+#include "apps/wizard/wizard_steps.h"
+#include "calib/captures.h"
 #include "core/result.h"
 
 namespace limn::apps {

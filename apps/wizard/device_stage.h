@@ -4,11 +4,12 @@
 #include <memory>
 #include <vector>
 
-#include "apps/calibrate.h"
 #include "apps/devices.h"
 #include "apps/picture_writer.h"
 #include "apps/wizard/still_board.h"
 #include "apps/wizard/still_room.h"
+#include "apps/wizard/surroundings.h"
+#include "apps/wizard/wizard_request.h"
 #include "device/camera_source.h"
 #include "device/desktop.h"
 #include "device/display.h"
@@ -53,12 +54,6 @@ class DeviceStage {
 
 /// Cameras and projectors of a devices file; every one must work, and there must be some of both.
 Result<DeviceStage::Devices> opened_devices(const Devices& named, const Result<device::Desktop>& desktop);
-
-/// `limn calibrate` on devices that are open (of `options` devices is not read); in a window of `desktop`, as
-/// run_calibrate() does it. The displays are used by the calling thread alone.
-Status calibrate_on(const CalibrateOptions& options,
-                    DeviceStage::Devices devices,
-                    const Result<device::Desktop>& desktop);
 
 /// As captures name them.
 template <typename AllDevices>

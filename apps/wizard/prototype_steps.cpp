@@ -4,8 +4,8 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "apps/align.h"
-#include "apps/scan.h"
+#include "apps/scan_alignment.h"
+#include "apps/scan_files.h"
 #include "apps/wizard/worth_colour.h"
 #include "calib/capture.h"
 #include "core/picture.h"
@@ -94,7 +94,7 @@ class Steps {
       return {};
     }
     step(WizardStep::align, WizardState::runs, "");
-    AlignCommand command;
+    AlignOptions command;
     command.scan = out_;
     command.scene = steps_.scene;
     command.rig = steps_.rig;

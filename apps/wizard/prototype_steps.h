@@ -1,11 +1,13 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "apps/calibrate.h"
+#include "apps/wizard/surroundings.h"
+#include "apps/wizard/wizard_steps.h"
 #include "calib/captures.h"
 #include "calib/judge/error_map.h"
 #include "core/result.h"
@@ -18,6 +20,16 @@ struct PrototypeSteps {
   std::filesystem::path scene;  ///< whose prototype is laid onto the scan; empty: the scan alone
   calib::Captures captures;     ///< planned: devices and patterns
   std::vector<calib::ErrorMap> maps;
+};
+
+/// What came of the prototype.
+struct PrototypeSeen {
+  std::size_t points = 0;              ///< of the scan
+  double scan_stddev_mm = 0;           ///< median
+  std::optional<double> align_rms_mm;  ///< of the scan from the CAD; none: not aligned
+  double painted_p95_mm = 0;           ///< predicted error of light on it
+  double painted_good = 0;             ///< share of it with at most calib::k_good_mm
+  std::vector<std::string> warnings;
 };
 
 /// After the rig is solved: the prototype is waited for and scanned, the scene's CAD laid onto the scan (from

@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
-#include "apps/capture.h"
+#include "apps/virtual_capture.h"
 #include "calib/board/board_finder.h"
 #include "core/picture.h"
 

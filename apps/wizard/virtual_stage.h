@@ -1,8 +1,8 @@
 #pragma once
 
-#include "apps/calibrate.h"
 #include "apps/picture_writer.h"
 #include "apps/plan.h"
+#include "apps/wizard/surroundings.h"
 #include "sim/virtual_rig.h"
 
 namespace limn::apps {

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "apps/calibrate.h"
 #include "apps/window/gui.h"
+#include "apps/wizard/wizard_request.h"
 #include "apps/wizard/wizard_view.h"
 
 namespace limn::apps {

@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/calibrate.h"
+#include "apps/wizard/light_check.h"
+#include "apps/wizard/wizard_steps.h"
 #include "calib/judge/assess.h"
 #include "calib/observations.h"
 

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "apps/wizard/wizard_panel.h"
+#include "apps/wizard/wizard_view.h"
 #include "calib/board/board_finder.h"
 
 namespace limn::apps {

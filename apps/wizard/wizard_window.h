@@ -1,14 +1,16 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <atomic>
 #include <functional>
 #include <string>
 #include <vector>
 
-#include "apps/calibrate.h"
 #include "apps/window/gui_window.h"
 #include "apps/wizard/main_errands.h"
-#include "apps/wizard/wizard_view.h"
+#include "apps/wizard/surroundings.h"
+#include "apps/wizard/wizard_sequence.h"
+#include "apps/wizard/wizard_steps.h"
 #include "core/result.h"
 
 namespace limn::apps {

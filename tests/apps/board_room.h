@@ -5,8 +5,8 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "apps/capture.h"
 #include "apps/plan.h"
+#include "apps/virtual_capture.h"
 #include "apps/wizard/device_stage.h"
 #include "apps/world_markers.h"
 #include "sim/virtual_rig.h"

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/board_place.h"
+#include "apps/wizard/pose_quality.h"
 #include "apps/world_markers.h"
 #include "core/file.h"
 #include "core/picture.h"

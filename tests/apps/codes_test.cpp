@@ -5,8 +5,9 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "apps/capture.h"
+#include "apps/plan.h"
 #include "apps/solve.h"
+#include "apps/virtual_capture.h"
 #include "apps/world_markers.h"
 #include "core/file.h"
 #include "core/rig.h"

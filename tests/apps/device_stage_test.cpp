@@ -5,10 +5,11 @@
 #include <opencv2/core.hpp>
 
 #include "apps/board_place.h"
-#include "apps/capture.h"
 #include "apps/plan.h"
-#include "apps/recheck.h"
+#include "apps/rig_recheck.h"
+#include "apps/virtual_capture.h"
 #include "apps/wizard/guided_poses.h"
+#include "apps/wizard/wizard_sequence.h"
 #include "core/file.h"
 #include "tests/apps/board_room.h"
 #include "tests/apps/small_plan.h"
@@ -75,7 +76,7 @@ TEST(DeviceStage, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
   test::BoardRoom room(load_plan(test::small_plan(folder)).value());
   DeviceStage stage(room.devices(), room.plan.board, nullptr);
   PictureWriter writer;
-  const CalibrateOptions options{.out = folder / "rig"};
+  const WizardOptions options{.out = folder / "rig"};
   const calib::Captures captures = planned(room.plan, room.rig, options.out / "captures").value();
   const auto places =
       places_in_words(room.rig.world().rig.cameras[0], room.plan.board, room.plan.world_from_board);

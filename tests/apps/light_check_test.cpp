@@ -4,8 +4,8 @@
 
 #include <opencv2/core.hpp>
 
-#include "apps/capture.h"
 #include "apps/plan.h"
+#include "apps/virtual_capture.h"
 #include "apps/wizard/display_latency.h"
 #include "apps/world_markers.h"
 #include "sim/virtual_rig.h"

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/align.h"
-#include "apps/capture.h"
 #include "apps/plan.h"
+#include "apps/virtual_capture.h"
 #include "apps/world_markers.h"
 #include "core/config.h"
 #include "core/file.h"

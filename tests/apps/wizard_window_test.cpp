@@ -15,6 +15,8 @@
 #include "tests/apps/small_plan.h"
 #include "tests/support/matchers.h"
 // X's macros go last.
+#include "apps/calibrate.h"
+#include "apps/virtual_capture.h"
 #include "tests/apps/x_person.h"
 
 namespace limn::apps {

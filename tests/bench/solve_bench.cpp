@@ -1,3 +1,4 @@
+#include "apps/solve_captures.h"
 // The whole `limn solve` over the real captures beside cv::imread alone over the same pictures on one thread.
 // Usage: solve_bench FOLDER_OF_GRAYCODE OUT [REPEATS]
 #include <fmt/core.h>
@@ -9,8 +10,6 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
-
-#include "apps/solve.h"
 
 namespace {
 

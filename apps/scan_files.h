@@ -1,0 +1,22 @@
+#pragma once
+
+#include <filesystem>
+
+#include "calib/captures.h"
+#include "calib/surface/scan.h"
+#include "core/result.h"
+#include "core/rig.h"
+
+namespace limn::apps {
+
+/// Measures the surface as calib::scanned does and writes points.ply, mesh.ply (metres, the rig's world),
+/// scan.json and pictures into `out`. Everything is measured before the first file is written.
+Result<calib::Scan> written_scan(const calib::Captures& captures,
+                                 const Rig& rig,
+                                 const calib::ScanOptions& options,
+                                 const std::filesystem::path& out);
+
+/// The standard deviation that this share (0 to 1) of the scan's points does not exceed; 0 without points.
+double stddev_mm(const calib::Scan& scan, double share);
+
+}  // namespace limn::apps

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "apps/picture_writer.h"
+#include "apps/plan.h"
+#include "calib/capture.h"
+#include "calib/captures.h"
+#include "core/result.h"
+#include "sim/virtual_rig.h"
+
+namespace limn::apps {
+
+/// The board as a thing in the world, called "board".
+sim::Object board_object(const calib::Board& board, const Pose& world_from_board);
+
+/// The captures folder that a plan makes of this rig, still without poses.
+Result<calib::Captures> planned(const Plan& plan,
+                                const sim::VirtualRig& rig,
+                                const std::filesystem::path& out);
+
+/// The rig's devices as calib asks for them; pictures go to `writer`.
+calib::Stage stage_of(sim::VirtualRig* rig, PictureWriter* writer, calib::Tell tell);
+
+/// Captures the response pictures of whatever stands before the rig.
+Status capture_lit(const calib::Captures& captures, sim::VirtualRig* rig);
+
+/// Captures every pose of the plan with the board in a virtual rig, whose prototype is put away meanwhile.
+Status capture_virtually(const Plan& plan, sim::VirtualRig* rig, const std::filesystem::path& out);
+
+/// Captures the world's prototype itself, standing at each of the places in turn, without a board: scene
+/// captures (limn scan).
+Status capture_prototype(const Plan& plan,
+                         const std::vector<Pose>& world_from_prototype,
+                         sim::VirtualRig* rig,
+                         const std::filesystem::path& out);
+
+}  // namespace limn::apps
