@@ -16,13 +16,13 @@
 #include "apps/detect.h"
 #include "apps/doctor.h"
 #include "apps/export.h"
-#include "apps/foresee.h"
 #include "apps/import.h"
 #include "apps/learn_body.h"
 #include "apps/live/live.h"
 #include "apps/live/replay.h"
 #include "apps/markers.h"
 #include "apps/patterns.h"
+#include "apps/plan_rig.h"
 #include "apps/recheck.h"
 #include "apps/render.h"
 #include "apps/scan.h"
@@ -145,11 +145,11 @@ void add_capture(CLI::App& app, Run& run) {
 void add_plan(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand("plan", "what a described rig would reach in mm, before anything is bought");
   command->footer("Example: limn plan config/described/bench.json --out plan   (then open plan/plan.html)");
-  auto options = std::make_shared<ForeseeOptions>();
+  auto options = std::make_shared<PlanRigOptions>();
   command->add_option("described", options->described, "the rig (limn.described/1)")->required();
   command->add_option("--out", options->out, "folder for plan.html, the rig from above and from the side, and plan.json");
   command->add_flag("--json", options->json, "print JSON instead of a table");
-  command->callback([options, &run] { run = [options] { return finished(run_foresee(*options)); }; });
+  command->callback([options, &run] { run = [options] { return finished(run_plan_rig(*options)); }; });
 }
 
 void add_patterns(CLI::App& app, Run& run) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "apps/design/design_report.h"
 #include "apps/page.h"
 #include "calib/judge/assess.h"
 
@@ -159,7 +160,7 @@ std::string plan_page(const Described& described, const Foreseen& foreseen) {
   html += "<div class=\"views\">\n";
   for (const View& view : {View{"from above", 0, 1}, View{"from the side", 1, 2}})
     html += view_svg(view, described);
-  return html + fmt::format("</div>\n<pre>{}</pre>\n</html>\n", escaped(foreseen_table(foreseen, described)));
+  return html + fmt::format("</div>\n<pre>{}</pre>\n</html>\n", escaped(design_table(foreseen, described)));
 }
 
 }  // namespace limn::apps

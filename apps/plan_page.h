@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "apps/foresee.h"
+#include "apps/design/rig_design.h"
 
 namespace limn::apps {
 

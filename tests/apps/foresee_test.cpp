@@ -1,10 +1,11 @@
-#include "apps/foresee.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "apps/design/design_report.h"
+#include "apps/design/rig_design.h"
+#include "apps/plan_rig.h"
 #include "core/file.h"
 #include "tests/support/matchers.h"
 
@@ -55,7 +56,7 @@ TEST(Foresee, TheExamplesLoadAndTheNumbersRepeat) {
 TEST(Foresee, APageShowsTheRig) {
   const fs::path out = test::test_folder() / "plan";
   testing::internal::CaptureStdout();
-  const Status done = run_foresee({.described = k_described / "bench.json", .out = out});
+  const Status done = run_plan_rig({.described = k_described / "bench.json", .out = out});
   const std::string table = testing::internal::GetCapturedStdout();
   ASSERT_TRUE(done.ok()) << done.message();
   const std::string page = read_file(out / "plan.html").value();

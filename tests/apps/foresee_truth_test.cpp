@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/calibrate.h"
-#include "apps/foresee.h"
+#include "apps/design/rig_design.h"
 #include "apps/plan.h"
 #include "apps/world_markers.h"
 #include "calib/solve.h"

@@ -1,34 +1,12 @@
 #pragma once
 
-#include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "calib/board/board.h"
+#include "apps/design/rig_description.h"
 #include "core/result.h"
-#include "core/rig.h"
 
 namespace limn::apps {
-
-/// A rig that is thought of, not bought: a limn.described/1 file (config/README.md).
-struct Described {
-  Rig rig;  ///< lenses without distortion; world: metres, z up
-  Eigen::Vector3d p_centre = Eigen::Vector3d::Zero(), size_m = Eigen::Vector3d::Zero();  ///< working volume
-  Eigen::Vector3d d_front = -Eigen::Vector3d::UnitY();  ///< where the prototype's lit side looks
-  double room_lux = 0;                                  ///< other light on that side; 0: not known
-  std::vector<double> lumens;                           ///< of each projector; 0: not known
-  calib::Board board;
-  int poses = 12;  ///< placements of the board
-  double corner_px =
-      0.08;  ///< noise of a board corner in a camera's picture, standard deviation of a coordinate
-  double match_px = 0.05;  ///< of a decoded place on a projector's panel
-  double marker_m = 0.04;  ///< side of a designer's marker
-  double marker_px = 0.1;  ///< noise of its corners
-};
-
-/// Errors name the file and the key.
-Result<Described> load_described(const std::filesystem::path& path);
 
 /// An imager and the prototype's lit side in the middle of the volume.
 struct ForeseenImager {
@@ -74,15 +52,5 @@ struct Foreseen {
 /// and a lens that its model does not hold are not in it. The same file gives the same numbers. Errors: no
 /// solve, with what the solve says.
 Result<Foreseen> foresee(const Described& described);
-
-/// What `limn plan` prints.
-std::string foreseen_table(const Foreseen& foreseen, const Described& described);
-
-struct ForeseeOptions {
-  std::filesystem::path described;
-  std::filesystem::path out;  ///< folder for plan.html and plan.json; empty: none
-  bool json = false;          ///< JSON on stdout instead of a table
-};
-Status run_foresee(const ForeseeOptions& options);
 
 }  // namespace limn::apps
