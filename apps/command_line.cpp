@@ -395,8 +395,9 @@ void add_export(CLI::App& app, Run& run) {
   command->add_option("--scene", options->scene, "scene folder or its scene.json")->required();
   command->add_option("--poses", options->poses, "POSES.json: where the prototype stands")->required();
   command->add_option("--viewer", options->viewer, "viewer file for --profile 3d and --looks; without it the scene's");
-  command->add_flag("--json", options->json, "print JSON instead of a line a projector");
-  command->callback([options, &run] { run = [options] { return finished(run_export(*options)); }; });
+  auto json = std::make_shared<bool>(false);
+  command->add_flag("--json", *json, "print JSON instead of a line a projector");
+  command->callback([options, json, &run] { run = [options, json] { return finished(run_export(*options, *json)); }; });
 }
 
 void add_import(CLI::App& app, Run& run) {
