@@ -15,7 +15,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double k_frontal_deg = 5;     // less is told as facing the camera
-constexpr double k_turned_deg = 10;     // in the picture; less is told as upright
+constexpr double k_turned_deg = 10;     // in the image; less is told as upright
 constexpr double k_little_depth = 0.1;  // of the distance; poses that differ less are neither near nor far
 constexpr double k_both = 0.4;          // of the larger direction: the smaller one is told, too
 
@@ -28,7 +28,7 @@ std::string third(double share, const char* first, const char* last) {
   return share < 1.0 / 3 ? first : share > 2.0 / 3 ? last : "";
 }
 
-// "up", "left", "up and left": where a direction in the picture points.
+// "up", "left", "up and left": where a direction in the image points.
 std::string direction(const Vector2d& d) {
   const std::string vertical = d.y() < 0 ? "up" : "down", horizontal = d.x() < 0 ? "left" : "right";
   const double x = std::abs(d.x()), y = std::abs(d.y());
@@ -63,7 +63,7 @@ std::string place(const Imager& camera, const Vector3d& p_world) {
 
 }  // namespace
 
-std::vector<std::string> places_in_words(const Imager& camera,
+std::vector<std::string> pose_instructions(const Imager& camera,
                                          const calib::Board& board,
                                          const std::vector<Pose>& world_from_board) {
   std::vector<double> distances;

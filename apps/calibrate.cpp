@@ -73,7 +73,7 @@ std::string to_json(const Calibrated& done) {
 void say_end(const CalibrateOptions& options, const Calibrated& done, const Say& say) {
   for (const calib::Fault& fault : done.report.assessment.faults)
     say(fmt::format("fault {}: {}; {}.", fault.name, fault.evidence, fault.advice));
-  for (const std::string& sentence : done.report.words.advice) say("advice: " + sentence);
+  for (const std::string& sentence : done.report.explanation.advice) say("advice: " + sentence);
   std::vector<std::string> times;
   for (const auto& [projector, seconds] : done.capture_s)
     times.push_back(fmt::format("{} {:.1f} s", projector, seconds));
@@ -81,14 +81,14 @@ void say_end(const CalibrateOptions& options, const Calibrated& done, const Say&
                                    [](const PoseJudged& judged) { return !judged.before; });
   say(fmt::format("captured {} of {} poses in this run, at the cameras' pace: {}", taken, done.poses.size(),
                   fmt::join(times, ", ")));
-  say(done.report.words.verdict);
+  say(done.report.explanation.verdict);
   if (!done.no_prototype.empty())
     say(fmt::format("the prototype was not scanned: {} The rig is saved; the same command tries again.",
                     done.no_prototype));
   say(fmt::format("rig and report in {} ({:.0f} s)", options.out.string(), done.seconds));
 }
 
-std::string devices_in_words(const calib::Captures& captures, const char* where) {
+std::string devices_in_words(const calib::CaptureSet& captures, const char* where) {
   const auto counted = [](std::size_t count, const char* what) {
     return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
   };
@@ -114,7 +114,7 @@ Status played(const CalibrateOptions& options,
               const Surroundings& around,
               std::optional<GuiWindow> window,
               std::atomic<WizardWish>* wish,
-              MainErrands* errands) {
+              MainThreadExecutor* executor) {
   const Say say = [&](const std::string& line) {
     if (options.json) return log_info("{}", line);
     fmt::print("{}\n", line);
@@ -125,7 +125,7 @@ Status played(const CalibrateOptions& options,
                       plan.places, where, audience);
   };
   LIMN_TRY(const Calibrated done, window
-                                      ? calibrated_in_window(&*window, plan, around, say, wish, errands, work)
+                                      ? calibrated_in_window(&*window, plan, around, say, wish, executor, work)
                                       : work(around, {.say = say}));
   say_end(options, done, say);
   if (options.json) fmt::print("{}", to_json(done));
@@ -135,40 +135,40 @@ Status played(const CalibrateOptions& options,
 Status calibrate_virtually(const CalibrateOptions& asked) {
   CalibrateOptions options = asked;
   LIMN_TRY(const Plan plan, load_plan(options.plan));
-  LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_picture));
+  LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_image));
   LIMN_TRY(const std::string text, captured_plan(options.plan, plan.world));
   if (options.scene.empty() && world.scene) options.scene = world.scene->folder;
   sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
   const std::vector<Imager> cameras = rig.world().rig.cameras;
-  LIMN_TRY(const calib::Captures captures, planned(plan, rig, options.out / "captures"));
-  PictureWriter writer;
-  rig.clear_stage();
+  LIMN_TRY(const calib::CaptureSet captures, planned(plan, rig, options.out / "captures"));
+  ImageWriter writer;
+  rig.remove_prototype();
   std::atomic<WizardWish> wish = WizardWish::none;
-  MainErrands errands;
+  MainThreadExecutor executor;
   return played(
       options, text,
-      {captures, places_in_words(cameras[0], plan.board, plan.world_from_board),
+      {captures, pose_instructions(cameras[0], plan.board, plan.world_from_board),
        outlines(plan.board, plan.world_from_board, cameras), devices_in_words(captures, "virtual rig: ")},
-      virtual_surroundings(plan, &rig, &writer), window_for(options, device::Desktop::open()), &wish,
-      &errands);
+      virtual_backend(plan, &rig, &writer), window_for(options, device::Desktop::open()), &wish,
+      &executor);
 }
 
 // A display of the main thread, for another one.
 class ErrandDisplay : public device::Display {
  public:
-  ErrandDisplay(std::unique_ptr<device::Display> display, MainErrands* errands)
-      : display_(std::move(display)), errands_(errands) {}
+  ErrandDisplay(std::unique_ptr<device::Display> display, MainThreadExecutor* executor)
+      : display_(std::move(display)), executor_(executor) {}
   const std::string& name() const override { return display_->name(); }
   cv::Size size() const override { return display_->size(); }
-  Result<Stamp> show(const cv::Mat& picture) override {
+  Result<Stamp> show(const cv::Mat& image) override {
     std::optional<Result<Stamp>> shown;
-    errands_->run([&] { shown = display_->show(picture); });
+    executor_->run([&] { shown = display_->show(image); });
     return *shown;
   }
 
  private:
   std::unique_ptr<device::Display> display_;
-  MainErrands* errands_;
+  MainThreadExecutor* executor_;
 };
 
 Status calibrate_devices(const CalibrateOptions& options) {
@@ -176,18 +176,18 @@ Status calibrate_devices(const CalibrateOptions& options) {
     return usage_error("--board: {}", board.message());
   LIMN_TRY(const Devices named, load_devices(options.devices));
   const Result<device::Desktop> desktop = device::Desktop::open();
-  LIMN_TRY(DeviceStage::Devices devices, opened_devices(named, desktop));
+  LIMN_TRY(DeviceBackend::Devices devices, opened_devices(named, desktop));
   return calibrate_on(options, std::move(devices), desktop);
 }
 
 }  // namespace
 
 Status calibrate_on(const CalibrateOptions& options,
-                    DeviceStage::Devices devices,
+                    DeviceBackend::Devices devices,
                     const Result<device::Desktop>& desktop) {
   const auto board = calib::Board::parse(options.board);
   if (!board) return usage_error("--board: {}", board.message());
-  const calib::Captures captures =
+  const calib::CaptureSet captures =
       calib::plan_captures(options.out / "captures", captured_devices(devices.cameras),
                            captured_devices(devices.projectors), *board, options.code);
   const calib::CapturedDevice& first = captures.cameras.front();
@@ -199,17 +199,17 @@ Status calibrate_on(const CalibrateOptions& options,
     return outlines(*board, placed_alike(poses, *board, assumed, rig), rig.cameras);
   };
   std::atomic<WizardWish> wish = WizardWish::none;
-  MainErrands errands;
+  MainThreadExecutor executor;
   std::optional<GuiWindow> window = window_for(options, desktop);
   if (window)
     for (auto& display : devices.projectors)
-      display = std::make_unique<ErrandDisplay>(std::move(display), &errands);
-  DeviceStage stage(std::move(devices), *board, &wish);
-  PictureWriter writer;
+      display = std::make_unique<ErrandDisplay>(std::move(display), &executor);
+  DeviceBackend stage(std::move(devices), *board, &wish);
+  ImageWriter writer;
   return played(options, captured_plan(options.board, options.code, captures),
-                {captures, places_in_words(assumed, *board, poses), targets, devices_in_words(captures, ""),
+                {captures, pose_instructions(assumed, *board, poses), targets, devices_in_words(captures, ""),
                  targets_by},
-                stage.surroundings(&writer), std::move(window), &wish, &errands);
+                stage.surroundings(&writer), std::move(window), &wish, &executor);
 }
 
 Status run_calibrate(const CalibrateOptions& options) {

@@ -14,7 +14,7 @@ struct CalibrateOptions {
   std::filesystem::path devices = {};  ///< limn.devices/1, instead of a plan
   std::string board = {};              ///< with devices: `charuco:11x8:25mm`
   std::string code = "gray";           ///< with devices
-  std::filesystem::path out;           ///< the rig folder; its captures/ keeps every picture
+  std::filesystem::path out;           ///< the rig folder; its captures/ keeps every image
   std::filesystem::path scene = {};    ///< of the prototype; with a plan its world's
   bool scan = false;                   ///< scan the prototype at the end, and paint it
   bool all = false;                    ///< take every pose of the plan, although fewer are enough
@@ -29,7 +29,7 @@ Status run_calibrate(const CalibrateOptions& options);
 /// `limn calibrate` on devices that are open (of `options` devices is not read); in a window of `desktop`, as
 /// run_calibrate() does it. The displays are used by the calling thread alone.
 Status calibrate_on(const CalibrateOptions& options,
-                    DeviceStage::Devices devices,
+                    DeviceBackend::Devices devices,
                     const Result<device::Desktop>& desktop);
 
 }  // namespace limn::apps

@@ -11,7 +11,7 @@ struct CaptureOptions {
   std::filesystem::path out;
 };
 
-/// `limn capture`: shows the patterns and takes the pictures of every pose of a plan, on its virtual rig.
+/// `limn capture`: shows the patterns and takes the images of every pose of a plan, on its virtual rig.
 Status run_capture(const CaptureOptions& options);
 
 }  // namespace limn::apps

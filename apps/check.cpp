@@ -13,7 +13,7 @@
 #include "apps/check_page.h"
 #include "core/file.h"
 #include "core/log.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "device/gl_context.h"
 
 namespace limn::apps {
@@ -69,46 +69,46 @@ nlohmann::ordered_json json_of(const std::vector<CheckResult>& results, const st
   return json;
 }
 
-Status write_pictures(const CheckResult& result, const fs::path& out) {
-  if (result.pictures.empty()) return {};
+Status write_images(const CheckResult& result, const fs::path& out) {
+  if (result.images.empty()) return {};
   const fs::path folder = out / result.name;
   LIMN_TRY_STATUS(make_folder(folder));
-  for (const CheckPicture& picture : result.pictures) {
-    LIMN_TRY_STATUS(write_png(folder / (picture.file + "-actual.png"), picture.actual));
-    LIMN_TRY_STATUS(write_png(folder / (picture.file + "-expected.png"), picture.expected));
-    LIMN_TRY_STATUS(write_png(folder / (picture.file + "-difference.png"), picture.difference));
+  for (const CheckImage& image : result.images) {
+    LIMN_TRY_STATUS(write_png(folder / (image.file + "-actual.png"), image.actual));
+    LIMN_TRY_STATUS(write_png(folder / (image.file + "-expected.png"), image.expected));
+    LIMN_TRY_STATUS(write_png(folder / (image.file + "-difference.png"), image.difference));
   }
   return {};
 }
 
-// Share of a picture's pixels that are more than two levels from another run's.
-Result<double> share_apart(const CheckPicture& picture, const fs::path& theirs) {
+// Share of an image's pixels that are more than two levels from another run's.
+Result<double> share_apart(const CheckImage& image, const fs::path& theirs) {
   constexpr double k_same_levels = 2;
-  LIMN_TRY(const cv::Mat expected, read_picture(theirs));
-  if (expected.size() != picture.actual.size() || expected.type() != picture.actual.type())
+  LIMN_TRY(const cv::Mat expected, read_image(theirs));
+  if (expected.size() != image.actual.size() || expected.type() != image.actual.type())
     return error("{}: expected a picture of {}x{} as here, found another kind of {}x{}. Run the same checks.",
-                 theirs.string(), picture.actual.cols, picture.actual.rows, expected.cols, expected.rows);
+                 theirs.string(), image.actual.cols, image.actual.rows, expected.cols, expected.rows);
   const int pixels = static_cast<int>(expected.total());
   cv::Mat apart, farthest;
-  cv::absdiff(picture.actual, expected, apart);
+  cv::absdiff(image.actual, expected, apart);
   cv::reduce(apart.reshape(1, pixels), farthest, 1, cv::REDUCE_MAX);  // over channels
   return cv::countNonZero(farthest > k_same_levels) / static_cast<double>(pixels);
 }
 
-// One reading more: the picture that is farthest from what the run in `against` drew.
+// One reading more: the image that is farthest from what the run in `against` drew.
 void compare(const fs::path& against, CheckResult* result) {
   static const CheckMeasure measure = {"apart_share", "pixels more than two levels from the other run's", ""};
   constexpr double k_most = 0.001;
   double worst = 0;
-  for (const CheckPicture& picture : result->pictures) {
-    const auto share = share_apart(picture, against / result->name / (picture.file + "-actual.png"));
+  for (const CheckImage& image : result->images) {
+    const auto share = share_apart(image, against / result->name / (image.file + "-actual.png"));
     if (!share) {
       result->problem = share.message();
       return;
     }
     worst = std::max(worst, *share);
   }
-  if (!result->pictures.empty()) result->readings.push_back({{measure, k_most}, worst});
+  if (!result->images.empty()) result->readings.push_back({{measure, k_most}, worst});
 }
 
 Status verdict_of(const std::vector<CheckResult>& results, const fs::path& page) {
@@ -141,7 +141,7 @@ Status run_check(const CheckOptions& options) {
     auto result = judged(check);
     if (!result) result = CheckResult{check.name, check.about, {}, {}, 0, result.message()};
     if (!options.against.empty()) compare(options.against, &*result);
-    LIMN_TRY_STATUS(write_pictures(*result, options.out));
+    LIMN_TRY_STATUS(write_images(*result, options.out));
     results.push_back(std::move(*result));
   }
   const auto json = json_of(results, context.description());

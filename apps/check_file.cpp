@@ -157,7 +157,7 @@ scene::PosedScene read_poses(const ConfigNode& node, sim::World* world) {
       if (known_slot(scene, name.text(), name)) shown.insert(name.text());
   }
   const scene::PosedScene standing = sim::true_poses(*world, variants);
-  scene::PosedScene posed{world->world_from_prototype, {}, standing.eyes};
+  scene::PosedScene posed{world->world_from_prototype, {}, standing.viewpoints};
   for (std::size_t i = 0; i < scene.slots.size(); ++i) {
     const scene::Slot& slot = scene.slots[i];
     if (!shown.contains(slot.name)) continue;
@@ -185,20 +185,20 @@ Result<scene::PosedScene> poses_of(const std::optional<ConfigNode>& node,
   LIMN_TRY(scene::PosedScene posed, scene::load_poses(folder / node->text(), *world->scene));
   if (posed.world_from_prototype) sim::move_prototype(*world, *posed.world_from_prototype);
   posed.world_from_prototype = world->world_from_prototype;
-  posed.eyes = sim::true_poses(*world).eyes;
+  posed.viewpoints = sim::true_poses(*world).viewpoints;
   return posed;
 }
 
 void coarsen(const ConfigNode& node, Rig* rig) {
-  const Status done = make_coarser(node.positive(), rig);
+  const Status done = scale_resolution(node.positive(), rig);
   if (!done) node.problem(done.message());
 }
 
-// Those of the file, else of the scene. Of several the eye that they share, in a picture like the first
+// Those of the file, else of the scene. Of several the eye that they share, in an image like the first
 // one's.
 Status choose_viewer(const std::vector<Viewer>& told, Check* check) {
   const scene::Scene& scene = check->told.scene;
-  std::vector<scene::Eye> eyes = check->posed.eyes;
+  std::vector<scene::Viewpoint> eyes = check->posed.viewpoints;
   std::optional<Imager> like;
   if (!told.empty()) {
     eyes.clear();
@@ -216,7 +216,7 @@ Status choose_viewer(const std::vector<Viewer>& told, Check* check) {
   }
   const Eigen::Vector3d d_up_world = Eigen::Vector3d::UnitZ();
   if (eyes.empty()) return error("viewer: expected one, for the scene has none in the world, found nothing.");
-  const scene::SharedEye shared = scene::followed({}, eyes, *scene::middle_of(scene, check->posed), 0);
+  const scene::SharedViewpoint shared = scene::updated_viewpoint({}, eyes, *scene::middle_of(scene, check->posed), 0);
   const auto viewer = scene::viewer_at(*shared.p_world(), scene, check->posed, d_up_world);
   if (!viewer)
     return error("viewer: expected viewers apart from the prototype, found their eye in its middle.");
@@ -308,7 +308,7 @@ Result<Check> load_check(const fs::path& path) {
   const std::string scene_folder = scene ? scene->text() : "";
   LIMN_TRY_STATUS(config.status());
 
-  LIMN_TRY(check.truth, sim::load_world(world_file, marker_picture));
+  LIMN_TRY(check.truth, sim::load_world(world_file, marker_image));
   if (!scene_folder.empty()) {
     LIMN_TRY(scene::Scene other, scene::load_scene((config.folder() / scene_folder).lexically_normal()));
     put_on_stage(std::move(other), &check.truth);

@@ -8,7 +8,7 @@
 #include "apps/refill.h"
 #include "core/result.h"
 #include "core/rig.h"
-#include "scene/posed.h"
+#include "scene/posed_scene.h"
 #include "scene/scene.h"
 #include "sim/world.h"
 
@@ -29,7 +29,7 @@ struct CheckLimit {
 };
 
 /// What the renderer is told of a world.
-struct Told {
+struct RendererInput {
   Rig rig;
   scene::Scene scene;
   scene::PosedScene posed;
@@ -41,12 +41,12 @@ struct Check {
   std::string about;
   std::vector<CheckLimit> limits;
   Imager viewer;                                ///< whose eye view parts are drawn for
-  std::vector<scene::SharedEye::Share> shares;  ///< of the viewers, where several share that eye
+  std::vector<scene::SharedViewpoint::Share> shares;  ///< of the viewers, where several share that eye
   Hand hand;                                    ///< that shades in `refill_…`
 
   sim::World truth;         ///< with the injected nudges
   scene::PosedScene posed;  ///< where the parts truly are
-  Told told;                ///< the same, but for the nudges
+  RendererInput told;                ///< the same, but for the nudges
 };
 
 /// Reads a check file (limn.check/1; config/README.md says its keys) with the world, scene and poses that it

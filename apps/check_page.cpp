@@ -7,7 +7,7 @@
 
 #include "apps/page.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 
 namespace limn::apps {
 namespace {
@@ -77,18 +77,18 @@ std::string table_html(std::span<const CheckResult> results) {
   return html + "</table>\n";
 }
 
-std::string pictures_html(const CheckResult& result) {
+std::string images_html(const CheckResult& result) {
   std::string html;
-  for (const CheckPicture& picture : result.pictures) {
-    html += fmt::format("<h3>{}</h3>\n<div class=\"pictures\">\n", escaped(picture.title));
+  for (const CheckImage& image : result.images) {
+    html += fmt::format("<h3>{}</h3>\n<div class=\"pictures\">\n", escaped(image.title));
     const std::pair<const char*, const cv::Mat*> three[] = {
-        {"actual", &picture.actual}, {"expected", &picture.expected}, {"difference", &picture.difference}};
+        {"actual", &image.actual}, {"expected", &image.expected}, {"difference", &image.difference}};
     for (const auto& [what, pixels] : three) {
       html += fmt::format(
           "<figure><img loading=\"lazy\" alt=\"{0}\" src=\"{1}\"><figcaption>{0}</figcaption></figure>\n",
           what, data_uri(at_most_wide(*pixels, k_shown_width)));
     }
-    html += fmt::format("</div><p class=\"lead\">{}</p>\n", escaped(picture.caption));
+    html += fmt::format("</div><p class=\"lead\">{}</p>\n", escaped(image.caption));
   }
   return html;
 }
@@ -114,7 +114,7 @@ Status write_check_page(std::span<const CheckResult> results,
   for (const CheckResult& result : results) {
     html += fmt::format("<h2 id=\"{0}\">{0}</h2>\n<p class=\"lead\">{1} ({2:.1f} s)</p>\n",
                         escaped(result.name), escaped(result.about), result.seconds);
-    html += pictures_html(result);
+    html += images_html(result);
   }
   return write_file(path, html + "</html>\n");
 }

@@ -10,7 +10,7 @@
 namespace limn::apps {
 
 /// Writes one HTML file that needs no other: a table of all readings, the most strained limit first, then the
-/// checks with their pictures.
+/// checks with their images.
 Status write_check_page(std::span<const CheckResult> results,
                         const std::string& renderer,
                         const std::filesystem::path& path);

@@ -4,7 +4,7 @@
 
 namespace limn {
 
-Status make_coarser(double share, Rig* rig) {
+Status scale_resolution(double share, Rig* rig) {
   if (!(share > 0 && share <= 1))
     return error("expected a share of the resolution, over 0 and at most 1, found {}.", share);
   for (std::vector<Imager>* imagers : {&rig->cameras, &rig->projectors}) {

@@ -181,14 +181,14 @@ void add_solve(CLI::App& app, Run& run) {
       "Example: limn solve captures --out rig\n"
       "Example: limn solve photos --import opencv-gray --projector 1024x768 --board chessboard:9x7:75mm "
       "--poses 'capture_*' --shots 'graycode_*.png' --out rig");
-  auto options = std::make_shared<SolveOptions>();
+  auto options = std::make_shared<SolveCommandOptions>();
   command->add_option("captures", options->captures, "captures folder")->required();
   command->add_option("--out", options->out, "rig folder to write")->required();
   command->add_option("--skip-poses", options->skip_poses, "poses to leave out, by name, with commas")->delimiter(',');
   command->add_option("--camera-model", options->camera_model, "mrcal lens model of cameras; auto: by held-out error")->capture_default_str();
   command->add_option("--projector-model", options->projector_model, "mrcal lens model of projectors; auto: by held-out error")
       ->capture_default_str();
-  command->add_option("--known-length", options->known_lengths,
+  command->add_option("--known-length", options->scale_bar_lengths,
                       "a measured length, such as 'apriltag_36h11:3 apriltag_36h11:7 250mm'; again for another")
       ->allow_extra_args(false);
   auto json = std::make_shared<bool>(false);

@@ -11,7 +11,7 @@
 #include "apps/validate/demo_session.h"
 #include "core/file.h"
 #include "core/frame.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "device/gl_context.h"
 #include "device/window.h"
 
@@ -21,8 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 
 Status write_results(const fs::path& out, const DemoResult& result) {
-  for (const DemoPicture& picture : result.pictures) {
-    LIMN_TRY_STATUS(write_png(out / (picture.file + ".png"), picture.picture));
+  for (const DemoImage& image : result.images) {
+    LIMN_TRY_STATUS(write_png(out / (image.file + ".png"), image.image));
   }
   LIMN_TRY_STATUS(write_file(out / "demo.json", result.json));
   const DemoPage page{
@@ -30,18 +30,18 @@ Status write_results(const fs::path& out, const DemoResult& result) {
       "from "
       "simulated captures, the markers were found in a simulated photograph, the parts were painted onto the "
       "door, and a ray tracer that shares no code with the renderer measured where the light fell.",
-      result.rows, result.pictures};
+      result.rows, result.images};
   return write_demo_page(page, out / "demo.html");
 }
 
-// One picture after the other; space shows the next at once, Escape ends.
-void show_in(device::Window& window, const std::vector<DemoPicture>& pictures) {
+// One image after the other; space shows the next at once, Escape ends.
+void show_in(device::Window& window, const std::vector<DemoImage>& images) {
   constexpr double k_seconds_each = 4;
   auto shown_at = std::chrono::steady_clock::time_point();
   for (std::size_t i = 0; window.is_open();) {
     const auto now = std::chrono::steady_clock::now();
-    if (seconds_between(shown_at, now) > k_seconds_each || window.pressed_key() == ' ') {
-      window.show(pictures[i++ % pictures.size()].picture);
+    if (seconds_between(shown_at, now) > k_seconds_each || window.poll_pressed_key() == ' ') {
+      window.show(images[i++ % images.size()].image);
       shown_at = now;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(15));
@@ -61,7 +61,7 @@ Status run_demo(const DemoOptions& options) {
   LIMN_TRY_STATUS(write_results(options.out, result));
   fmt::print("{}\n{}\n", text_table(result.rows), (options.out / "demo.html").string());
   std::fflush(stdout);
-  if (window) show_in(*window, result.pictures);
+  if (window) show_in(*window, result.images);
   return {};
 }
 

@@ -7,7 +7,7 @@
 
 #include "apps/page.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 
 namespace limn::apps {
 namespace {
@@ -46,11 +46,11 @@ Status write_demo_page(const DemoPage& page, const std::filesystem::path& path) 
       "class=\"lead\">{}</p>\n",
       k_demo_style, escaped(page.headline));
   html += rows_html(page.rows) + "<div class=\"pictures\">\n";
-  for (const DemoPicture& picture : page.pictures) {
+  for (const DemoImage& image : page.images) {
     html +=
         fmt::format("<figure><img alt=\"{}\" src=\"{}\"><figcaption><b>{}.</b> {}</figcaption></figure>\n",
-                    escaped(picture.title), data_uri(at_most_wide(picture.picture, k_embedded_width)),
-                    escaped(picture.title), escaped(picture.caption));
+                    escaped(image.title), data_uri(at_most_wide(image.image, k_embedded_width)),
+                    escaped(image.title), escaped(image.caption));
   }
   return write_file(path, html + "</div></html>\n");
 }

@@ -17,21 +17,21 @@ struct DemoRow {
   bool good = true;
 };
 
-struct DemoPicture {
+struct DemoImage {
   std::string file;  ///< its name in the output folder, without .png
   std::string title;
   std::string caption;
-  cv::Mat picture;  ///< 8-bit BGR or grey
+  cv::Mat image;  ///< 8-bit BGR or grey
 };
 
 /// The demo's result as people look at it.
 struct DemoPage {
   std::string headline;
   std::vector<DemoRow> rows;
-  std::vector<DemoPicture> pictures;
+  std::vector<DemoImage> images;
 };
 
-/// Writes one HTML file that needs no other: pictures are embedded, scaled to at most 1280 pixels across.
+/// Writes one HTML file that needs no other: images are embedded, scaled to at most 1280 pixels across.
 Status write_demo_page(const DemoPage& page, const std::filesystem::path& path);
 
 /// The rows as a table for a terminal.

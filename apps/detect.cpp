@@ -15,7 +15,7 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/log.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "core/rig.h"
 #include "tracker/detector.h"
 #include "tracker/marker_pose.h"
@@ -37,7 +37,7 @@ struct Outcome {
   std::string problem;  // empty: done
 };
 
-// The camera for a picture of this size. ARToolKit's files are meant to be scaled to the picture (its own
+// The camera for an image of this size. ARToolKit's files are meant to be scaled to the image (its own
 // programs do); all others say their size for good.
 Result<Imager> camera_for(const Imager& camera, const std::filesystem::path& file, int width, int height) {
   if (camera.width == 0 || (camera.width == width && camera.height == height)) return camera;
@@ -96,7 +96,7 @@ std::vector<tracker::MarkerPose> poses_of(const tracker::Detection& detection,
   return {only};
 }
 
-// ---- pictures ----
+// ---- images ----
 
 constexpr double k_shift = 16;  // OpenCV's fractional bits: 4
 
@@ -104,51 +104,51 @@ cv::Point fixed(const Eigen::Vector2d& px) {
   return {static_cast<int>(std::lround(px.x() * k_shift)), static_cast<int>(std::lround(px.y() * k_shift))};
 }
 
-void draw_line(cv::Mat& picture,
+void draw_line(cv::Mat& image,
                const Eigen::Vector2d& a,
                const Eigen::Vector2d& b,
                const cv::Scalar& colour,
                int thickness) {
-  cv::line(picture, fixed(a), fixed(b), cv::Scalar(0, 0, 0), thickness + 2, cv::LINE_AA, 4);
-  cv::line(picture, fixed(a), fixed(b), colour, thickness, cv::LINE_AA, 4);
+  cv::line(image, fixed(a), fixed(b), cv::Scalar(0, 0, 0), thickness + 2, cv::LINE_AA, 4);
+  cv::line(image, fixed(a), fixed(b), colour, thickness, cv::LINE_AA, 4);
 }
 
-void draw_text(cv::Mat& picture, const std::string& text, const Eigen::Vector2d& centre, double scale) {
+void draw_text(cv::Mat& image, const std::string& text, const Eigen::Vector2d& centre, double scale) {
   int baseline = 0;
   const cv::Size size = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, scale, 1, &baseline);
   const cv::Point at(static_cast<int>(centre.x()) - size.width / 2,
                      static_cast<int>(centre.y()) + size.height / 2);
-  cv::putText(picture, text, at, cv::FONT_HERSHEY_SIMPLEX, scale, cv::Scalar(0, 0, 0), 3, cv::LINE_AA);
-  cv::putText(picture, text, at, cv::FONT_HERSHEY_SIMPLEX, scale, cv::Scalar(80, 255, 255), 1, cv::LINE_AA);
+  cv::putText(image, text, at, cv::FONT_HERSHEY_SIMPLEX, scale, cv::Scalar(0, 0, 0), 3, cv::LINE_AA);
+  cv::putText(image, text, at, cv::FONT_HERSHEY_SIMPLEX, scale, cv::Scalar(80, 255, 255), 1, cv::LINE_AA);
 }
 
 // x red, y green, z blue; z points into the paper, so its line leads away from the viewer.
-void draw_axes(cv::Mat& picture, const Lens& lens, const Pose& camera_from_marker, double size_m) {
+void draw_axes(cv::Mat& image, const Lens& lens, const Pose& camera_from_marker, double size_m) {
   const auto origin = lens.project(camera_from_marker.translation);
   const std::array<cv::Scalar, 3> colours = {cv::Scalar(60, 60, 255), cv::Scalar(60, 220, 60),
                                              cv::Scalar(255, 120, 40)};
   for (int axis : {2, 0, 1}) {
     const auto tip =
         lens.project(camera_from_marker * Eigen::Vector3d(0.5 * size_m * Eigen::Vector3d::Unit(axis)));
-    if (origin && tip) draw_line(picture, *origin, *tip, colours[static_cast<std::size_t>(axis)], 1);
+    if (origin && tip) draw_line(image, *origin, *tip, colours[static_cast<std::size_t>(axis)], 1);
   }
 }
 
 cv::Mat drawn(const cv::Mat& grey, const Outcome& outcome, const Lens* lens, double size_m) {
-  cv::Mat picture;
-  cv::cvtColor(grey, picture, cv::COLOR_GRAY2BGR);
+  cv::Mat image;
+  cv::cvtColor(grey, image, cv::COLOR_GRAY2BGR);
   for (const Marker& marker : outcome.markers) {
     const auto& c = marker.detection.corners_px;
-    for (std::size_t i = 0; i < 4; ++i) draw_line(picture, c[i], c[(i + 1) % 4], cv::Scalar(80, 255, 80), 1);
-    if (lens && !marker.poses.empty()) draw_axes(picture, *lens, marker.poses[0].camera_from_marker, size_m);
-    cv::circle(picture, fixed(c[0]), static_cast<int>(3 * k_shift), cv::Scalar(0, 0, 0), 3, cv::LINE_AA, 4);
-    cv::circle(picture, fixed(c[0]), static_cast<int>(3 * k_shift), cv::Scalar(40, 40, 255), -1, cv::LINE_AA,
+    for (std::size_t i = 0; i < 4; ++i) draw_line(image, c[i], c[(i + 1) % 4], cv::Scalar(80, 255, 80), 1);
+    if (lens && !marker.poses.empty()) draw_axes(image, *lens, marker.poses[0].camera_from_marker, size_m);
+    cv::circle(image, fixed(c[0]), static_cast<int>(3 * k_shift), cv::Scalar(0, 0, 0), 3, cv::LINE_AA, 4);
+    cv::circle(image, fixed(c[0]), static_cast<int>(3 * k_shift), cv::Scalar(40, 40, 255), -1, cv::LINE_AA,
                4);
     const double side = std::min((c[2] - c[0]).norm(), (c[3] - c[1]).norm());
     const Eigen::Vector2d centre = 0.25 * (c[0] + c[1] + c[2] + c[3]);
-    draw_text(picture, marker.detection.marker.id, centre, std::clamp(side / 110, 0.35, 1.2));
+    draw_text(image, marker.detection.marker.id, centre, std::clamp(side / 110, 0.35, 1.2));
   }
-  return picture;
+  return image;
 }
 
 // ---- results ----
@@ -236,7 +236,7 @@ Status detect_in(const DetectOptions& options,
                  const std::optional<Imager>& camera,
                  tracker::Detector& detector,
                  Outcome* outcome) {
-  LIMN_TRY(const cv::Mat grey, read_grey_picture(outcome->path));
+  LIMN_TRY(const cv::Mat grey, read_grey_image(outcome->path));
   outcome->width = grey.cols;
   outcome->height = grey.rows;
   std::optional<Lens> lens;
@@ -262,9 +262,9 @@ void detect_all(const DetectOptions& options,
                 const tracker::Families& families,
                 std::vector<Outcome>* outcomes) {
   const int count = static_cast<int>(outcomes->size());
-  // Timed pictures come one after the other; threads beyond one a picture share out the picture.
-  const int pictures = options.repeat > 0 ? 1 : std::max(1, count);
-  const int threads = std::clamp(options.threads, 1, pictures);
+  // Timed images come one after the other; threads beyond one an image share out the image.
+  const int images = options.repeat > 0 ? 1 : std::max(1, count);
+  const int threads = std::clamp(options.threads, 1, images);
   std::atomic<int> next = 0;
   std::atomic<int> done = 0;
   std::mutex progress_mutex;

@@ -19,11 +19,11 @@ struct DetectOptions {
   /// linear: grey levels are proportional to light; srgb: webcams, photographs.
   std::string encoding = "linear";
   std::filesystem::path csv, json, draw;  ///< what to write; empty: nothing. `draw` is a folder
-  int threads = 1;                        ///< pictures worked on at a time; with `repeat` always one
-  int repeat = 0;  ///< N: also the median time of N detections of the picture in memory
+  int threads = 1;                        ///< images worked on at a time; with `repeat` always one
+  int repeat = 0;  ///< N: also the median time of N detections of the image in memory
 };
 
-/// One line a marker on stdout, and the files asked for. A picture that cannot be read is reported on stderr,
+/// One line a marker on stdout, and the files asked for. An image that cannot be read is reported on stderr,
 /// the others are still done, and the status is an error that counts them.
 Status run_detect(const DetectOptions& options);
 

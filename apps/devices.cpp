@@ -33,9 +33,9 @@ std::string source_of(const ConfigNode& node, const std::filesystem::path& folde
   return (folder / source).lexically_normal().string();
 }
 
-device::CameraWanted read_camera(const ConfigNode& node, const std::filesystem::path& folder) {
+device::CameraConfig read_camera(const ConfigNode& node, const std::filesystem::path& folder) {
   node.only({"name", "source", "size", "exposure_ms", "gain", "white_balance_k"});
-  device::CameraWanted camera;
+  device::CameraConfig camera;
   camera.name = node.at("name").text();
   camera.source = source_of(node.at("source"), folder);
   camera.size = size_of(node);
@@ -45,9 +45,9 @@ device::CameraWanted read_camera(const ConfigNode& node, const std::filesystem::
   return camera;
 }
 
-device::DisplayWanted read_display(const ConfigNode& node) {
+device::DisplayConfig read_display(const ConfigNode& node) {
   node.only({"name", "monitor", "size", "latency_ms"});
-  device::DisplayWanted display;
+  device::DisplayConfig display;
   display.name = node.at("name").text();
   display.monitor = node.at("monitor").text();
   display.size = size_of(node);
@@ -140,7 +140,7 @@ Result<Devices> matched(const Devices& devices, const Rig& rig) {
   LIMN_TRY_STATUS(all_there(devices, devices.cameras, rig.cameras, "cameras"));
   LIMN_TRY_STATUS(all_there(devices, devices.displays, rig.projectors, "displays"));
   Devices fitted = devices;
-  for (device::CameraWanted& camera : fitted.cameras) {
+  for (device::CameraConfig& camera : fitted.cameras) {
     const Imager* imager = find_in(rig.cameras, camera.name);
     if (!imager)
       return error(
@@ -152,7 +152,7 @@ Result<Devices> matched(const Devices& devices, const Rig& rig) {
       return size_differs(devices, camera.name, camera.size, *imager);
     camera.size = size;
   }
-  for (device::DisplayWanted& display : fitted.displays) {
+  for (device::DisplayConfig& display : fitted.displays) {
     const Imager* imager = find_in(rig.projectors, display.name);
     if (!imager) continue;
     const cv::Size size(imager->width, imager->height);

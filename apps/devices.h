@@ -14,12 +14,12 @@ namespace limn::apps {
 /// The cameras, displays and keys of a place (limn.devices/1).
 struct Devices {
   std::filesystem::path file;
-  std::vector<device::CameraWanted> cameras;
-  std::vector<device::DisplayWanted> displays;
-  std::vector<device::KeysWanted> keys = {};
+  std::vector<device::CameraConfig> cameras;
+  std::vector<device::DisplayConfig> displays;
+  std::vector<device::KeysConfig> keys = {};
 };
 
-/// Reads a devices file; paths of pictures and videos are relative to its folder. Errors name the place:
+/// Reads a devices file; paths of images and videos are relative to its folder. Errors name the place:
 /// unknown or missing keys, a name used twice, two cameras of one source, two displays on one monitor.
 Result<Devices> load_devices(const std::filesystem::path& path);
 

@@ -161,7 +161,7 @@ std::string shown(const device::CameraSetting& setting) {
 }
 
 // Opens the camera, grabs from it and compares what was asked with what it says.
-Finding tested(const std::string& area, const device::CameraWanted& wanted) {
+Finding tested(const std::string& area, const device::CameraConfig& wanted) {
   auto camera = device::open_camera(wanted);
   if (!camera) return failed(area, wanted.name, camera.message());
   const auto rate = measured(**camera);
@@ -184,10 +184,10 @@ Finding tested(const std::string& area, const device::CameraWanted& wanted) {
 Findings cameras(const Devices& devices) {
   const auto named = [&](const std::string& source) {
     return std::any_of(devices.cameras.begin(), devices.cameras.end(),
-                       [&](const device::CameraWanted& camera) { return camera.source == source; });
+                       [&](const device::CameraConfig& camera) { return camera.source == source; });
   };
   Findings findings;
-  for (const device::V4l2Found& found : device::v4l2_cameras()) {
+  for (const device::V4l2Device& found : device::v4l2_cameras()) {
     const std::string source = fmt::format("v4l2:{}", found.path);
     if (named(source)) continue;
     if (!found.problem.empty()) findings.push_back(failed("cameras", found.path, found.problem));
@@ -227,14 +227,14 @@ void add(Findings* findings, const Findings& more) {
 // The displays of the file, or all monitors. Those that cannot be opened are told.
 Findings signs(const DoctorOptions& options, const Devices& devices, const Result<device::Desktop>& desktop) {
   const device::Desktop* there = desktop ? &*desktop : nullptr;
-  std::vector<device::DisplayWanted> wanted = devices.displays;
+  std::vector<device::DisplayConfig> wanted = devices.displays;
   if (options.devices.empty() && options.show_s > 0 && there)
     for (const device::Monitor& monitor : there->monitors())
       wanted.push_back({.name = monitor.name, .monitor = monitor.name});
   Findings findings;
   std::vector<std::unique_ptr<device::Display>> shown;
-  for (device::DisplayWanted& one : wanted) {
-    one.waits = shown.empty();
+  for (device::DisplayConfig& one : wanted) {
+    one.vsync = shown.empty();
     auto display = device::open_display(one, there);
     if (!display) {
       findings.push_back(failed("devices", one.name, display.message()));
@@ -296,7 +296,7 @@ std::vector<Finding> examined(const DoctorOptions& options) {
   const auto desktop = device::Desktop::open();
   add(&findings, displays(desktop, desktop_asked_for));
   add(&findings, cameras(wanted));
-  for (const device::CameraWanted& camera : wanted.cameras) findings.push_back(tested("devices", camera));
+  for (const device::CameraConfig& camera : wanted.cameras) findings.push_back(tested("devices", camera));
   add(&findings, signs(options, wanted, desktop));
   return findings;
 }

@@ -25,13 +25,13 @@ constexpr double k_min_sight_cosine =
 constexpr double k_flat_m = 0.001;  // how far the surface may leave a dot's plane there
 constexpr int k_dot_corners = 12;
 constexpr int k_tries_per_dot = 30;  // of random places, to pack dots as close as their spacing allows
-constexpr double k_border_px = 4;    // of a projector's picture, that a dot must stay away from
+constexpr double k_border_px = 4;    // of a projector's image, that a dot must stay away from
 constexpr double k_dot_lift_m = 0.0002;
 // 70 degrees: beyond, a dot is under two projector pixels wide and its centroid measures itself.
 constexpr double k_min_incidence_cosine = 0.34;
 
 // Corners of a disc around a sample, in the tangent plane.
-std::vector<Eigen::Vector3d> rim(const sim::SurfacePoint& sample, double radius_m) {
+std::vector<Eigen::Vector3d> rim(const sim::SampledPoint& sample, double radius_m) {
   const Eigen::Vector3d u = sample.n.unitOrthogonal(), v = sample.n.cross(u);
   std::vector<Eigen::Vector3d> corners;
   for (int i = 0; i < k_dot_corners; ++i) {
@@ -51,7 +51,7 @@ bool well_inside(const Imager& projector, const Eigen::Vector3d& p_world) {
 bool reached_by(const sim::World& world,
                 const sim::Truth& truth,
                 const Imager& projector,
-                const sim::SurfacePoint& sample,
+                const sim::SampledPoint& sample,
                 double free_radius_m) {
   const Eigen::Vector3d p_light = projector.imager_from_world.inverse().translation;
   const Eigen::Vector3d p_world = world.world_from_prototype * sample.p;
@@ -71,7 +71,7 @@ bool reached_by(const sim::World& world,
 
 bool reached(const sim::World& world,
              const sim::Truth& truth,
-             const sim::SurfacePoint& sample,
+             const sim::SampledPoint& sample,
              double free_radius_m) {
   return std::any_of(world.rig.projectors.begin(), world.rig.projectors.end(),
                      [&](const Imager& p) { return reached_by(world, truth, p, sample, free_radius_m); });
@@ -125,7 +125,7 @@ std::array<double, 256> light_of_values(double gamma) {
   return light;
 }
 
-void append_disc(const sim::SurfacePoint& sample, scene::Mesh* mesh) {
+void append_disc(const sim::SampledPoint& sample, scene::Mesh* mesh) {
   const auto first = static_cast<std::uint32_t>(mesh->positions.size());
   const auto add = [&](const Eigen::Vector3d& p) {
     mesh->positions.push_back((p + k_dot_lift_m * sample.n).cast<float>());
@@ -147,14 +147,14 @@ AimedDots no_dots(double spacing_m) {
 }
 
 // Where on the prototype the viewer sees p (both in its frame), if on it.
-std::optional<sim::SurfacePoint> seen_behind(const sim::World& world,
+std::optional<sim::SampledPoint> seen_behind(const sim::World& world,
                                              const sim::Truth& truth,
                                              const Imager& viewer,
                                              const Eigen::Vector3d& p) {
   const auto px = viewer.project(world.world_from_prototype * p);
   const auto landing = px ? truth.landing(viewer, *px) : std::nullopt;
   if (!landing || landing->object != "prototype") return std::nullopt;
-  return sim::SurfacePoint{landing->p_object,
+  return sim::SampledPoint{landing->p_object,
                            world.world_from_prototype.rotation.inverse() * landing->n_world};
 }
 
@@ -190,7 +190,7 @@ AimedDots floating_dots(
   AimedDots dots = no_dots(k_floating_spacing_m);
   dots.p_eye = world.world_from_prototype.inverse() * viewer.imager_from_world.inverse().translation;
   NearestPoints taken(&dots.p_aimed, k_floating_spacing_m);
-  for (const sim::SurfacePoint& sample :
+  for (const sim::SampledPoint& sample :
        sim::surface_points(prototype_mesh(world), k_tries_per_dot * count, seed)) {
     if (static_cast<int>(dots.p_aimed.size()) == count) break;
     const Eigen::Vector3d p_centre = sample.p + height_m * sample.n;
@@ -198,7 +198,7 @@ AimedDots floating_dots(
     if (!behind || (behind->p - dots.p_eye).norm() < (p_centre - dots.p_eye).norm()) continue;
     if (behind->n.dot((dots.p_eye - behind->p).normalized()) < k_min_sight_cosine) continue;
     if (taken.nearest(behind->p, k_floating_spacing_m)) continue;
-    const sim::SurfacePoint disc{p_centre, (dots.p_eye - p_centre).normalized()};
+    const sim::SampledPoint disc{p_centre, (dots.p_eye - p_centre).normalized()};
     const auto corners = rim(disc, k_floating_free_radius_m);
     const bool whole = std::all_of(corners.begin(), corners.end(), [&](const Eigen::Vector3d& corner) {
       const auto beside = seen_behind(world, truth, viewer, corner);
@@ -217,7 +217,7 @@ AimedDots aimed_dots(const sim::World& world, int count, std::uint64_t seed) {
   const sim::Truth truth(world);
   AimedDots dots = no_dots(k_dot_spacing_m);
   NearestPoints taken(&dots.p_aimed, k_dot_spacing_m);
-  for (const sim::SurfacePoint& sample :
+  for (const sim::SampledPoint& sample :
        sim::surface_points(prototype_mesh(world), k_tries_per_dot * count, seed)) {
     if (static_cast<int>(dots.p_aimed.size()) == count) break;
     if (taken.nearest(sample.p, k_dot_spacing_m)) continue;
@@ -231,17 +231,17 @@ AimedDots aimed_dots(const sim::World& world, int count, std::uint64_t seed) {
 
 Registration judged_registration(const sim::World& world,
                                  const AimedDots& dots,
-                                 std::span<const cv::Mat> projector_pictures) {
+                                 std::span<const cv::Mat> projector_images) {
   const sim::Truth truth(world);
   const double reach_m = dots.spacing_m / 2;  // light nearer to a dot than this is the dot's
   NearestPoints aimed(&dots.p_aimed, dots.spacing_m);
   for (std::size_t i = 0; i < dots.p_aimed.size(); ++i) aimed.add(i);
   std::vector<double> energy(dots.p_aimed.size(), 0);
   std::vector<Eigen::Vector3d> moment(dots.p_aimed.size(), Eigen::Vector3d::Zero());
-  for (std::size_t i = 0; i < projector_pictures.size(); ++i) {
+  for (std::size_t i = 0; i < projector_images.size(); ++i) {
     const auto light = light_of_values(world.projector_effects[i].gamma);
     cv::Mat grey;
-    cv::extractChannel(projector_pictures[i], grey, 0);
+    cv::extractChannel(projector_images[i], grey, 0);
     for (int row = 0; row < grey.rows; ++row) {
       for (int column = 0; column < grey.cols; ++column) {
         const std::uint8_t value = grey.at<std::uint8_t>(row, column);

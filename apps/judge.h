@@ -27,7 +27,7 @@ struct AimedDots {
 };
 
 /// About `count` random points on the prototype with a disc on each. Only points that some true projector
-/// reaches with its whole disc, well inside its picture.
+/// reaches with its whole disc, well inside its image.
 AimedDots aimed_dots(const sim::World& world, int count, std::uint64_t seed);
 
 /// About `count` discs that float `height_m` off random points of the prototype and face the viewer's eye,
@@ -45,21 +45,21 @@ struct Registration {
   std::vector<double> errors_mm;  ///< per dot
 };
 
-/// Shines the projectors' 8-bit pictures (true gamma) through the true rig onto the true prototype, pixel by
+/// Shines the projectors' 8-bit images (true gamma) through the true rig onto the true prototype, pixel by
 /// pixel, and compares the centroid of each dot's light with the point it was aimed at.
 Registration judged_registration(const sim::World& world,
                                  const AimedDots& dots,
-                                 std::span<const cv::Mat> projector_pictures);
+                                 std::span<const cv::Mat> projector_images);
 
 /// RMS distance in pixels between the outlines of two masks (non-zero is inside), both ways; outlines along
-/// the picture's border do not count. Infinite when one of them is empty.
+/// the image's border do not count. Infinite when one of them is empty.
 double outline_distance_px(const cv::Mat& found, const cv::Mat& truth);
 
-/// Intersection over union of two labelled pictures: pixels where both have the same label other than 0, over
+/// Intersection over union of two labelled images: pixels where both have the same label other than 0, over
 /// pixels where either has one.
 double label_iou(const cv::Mat& found, const cv::Mat& truth);
 
-/// The largest difference of any level between two series of 8-bit pictures; infinite when their number or
+/// The largest difference of any level between two series of 8-bit images; infinite when their number or
 /// sizes differ.
 double worst_difference(std::span<const cv::Mat> a, std::span<const cv::Mat> b);
 

@@ -8,8 +8,8 @@
 #include "core/file.h"
 #include "core/imager_file.h"
 #include "core/log.h"
-#include "core/picture.h"
-#include "tracker/body_learn.h"
+#include "core/image_io.h"
+#include "tracker/marker_mapping.h"
 #include "tracker/detector.h"
 
 namespace limn::apps {
@@ -20,7 +20,7 @@ constexpr double k_degrees = 180 / std::numbers::pi;
 Result<std::vector<tracker::Detection>> found_in(const std::filesystem::path& path,
                                                  const Imager& camera,
                                                  tracker::Detector* detector) {
-  LIMN_TRY(const cv::Mat grey, read_grey_picture(path));
+  LIMN_TRY(const cv::Mat grey, read_grey_image(path));
   if (camera.width > 0 && (grey.cols != camera.width || grey.rows != camera.height))
     return error(
         "{}: expected a picture of the camera's size {}x{}, found {}x{}. Use pictures of the same camera and "
@@ -36,31 +36,31 @@ nlohmann::ordered_json deviations(const Matrix6d& covariance, int first, double 
   return values;
 }
 
-nlohmann::ordered_json json_of(const tracker::LearnedBody& learned, const std::string& name) {
+nlohmann::ordered_json json_of(const tracker::MarkerMap& learned, const std::string& name) {
   nlohmann::ordered_json json = {
       {"schema", "limn.body/1"},       {"name", name},
-      {"frame", learned.frame.text()}, {"pictures", learned.pictures},
+      {"frame", learned.frame.text()}, {"pictures", learned.images},
       {"rms_px", learned.rms_px},      {"markers", nlohmann::ordered_json::array()}};
-  for (const tracker::LearnedMarker& marker : learned.markers)
+  for (const tracker::MappedMarker& marker : learned.markers)
     json["markers"].push_back({{"name", marker.marker.marker.text()},
                                {"size_mm", 1e3 * marker.marker.size_m},
                                {"body_from_marker", to_json(marker.marker.body_from_marker)},
                                {"stddev_deg", deviations(marker.covariance, 0, k_degrees)},
                                {"stddev_mm", deviations(marker.covariance, 3, 1e3)},
-                               {"pictures", marker.pictures}});
+                               {"pictures", marker.images}});
   return json;
 }
 
-void print(const tracker::LearnedBody& learned) {
-  for (const tracker::LearnedMarker& marker : learned.markers) {
+void print(const tracker::MarkerMap& learned) {
+  for (const tracker::MappedMarker& marker : learned.markers) {
     const Eigen::Vector3d p_mm = 1e3 * marker.marker.body_from_marker.translation;
     fmt::print("{:<24} at ({:.2f}, {:.2f}, {:.2f}) mm, +- {:.2f} mm, {:.2f} degrees, {} pictures\n",
                marker.marker.marker.text(), p_mm.x(), p_mm.y(), p_mm.z(),
                1e3 * std::sqrt(marker.covariance.bottomRightCorner<3, 3>().trace()),
-               k_degrees * std::sqrt(marker.covariance.topLeftCorner<3, 3>().trace()), marker.pictures);
+               k_degrees * std::sqrt(marker.covariance.topLeftCorner<3, 3>().trace()), marker.images);
   }
   fmt::print("{} markers from {} pictures, {:.3f} px; the frame is {}'s\n", learned.markers.size(),
-             learned.pictures, learned.rms_px, learned.frame.text());
+             learned.images, learned.rms_px, learned.frame.text());
   for (const MarkerName& marker : learned.unplaced)
     log_warning(
         "{}: seen in no picture together with the others; left out. Add a picture that shows it beside one "
@@ -92,7 +92,7 @@ Status run_learn_body(const LearnBodyOptions& options) {
   }
   std::vector<tracker::View> views;
   for (const auto& found : detections) views.push_back({&at_origin, found});
-  const auto learned = tracker::learned_body(views, 1e-3 * options.size_mm);
+  const auto learned = tracker::map_markers(views, 1e-3 * options.size_mm);
   if (!learned) return error("--learn-body: {}", learned.message());
   print(*learned);
   return write_file(options.out, json_of(*learned, options.out.stem().string()).dump(1) + "\n");

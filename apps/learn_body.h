@@ -16,7 +16,7 @@ struct LearnBodyOptions {
   std::filesystem::path out;  ///< body.json (limn.body/1)
 };
 
-/// Learns from pictures of a rigid thing where its markers stand on it and writes that as limn.body/1
+/// Learns from images of a rigid thing where its markers stand on it and writes that as limn.body/1
 /// (config/README).
 Status run_learn_body(const LearnBodyOptions& options);
 

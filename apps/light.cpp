@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
-#include "core/response.h"
+#include "core/photometric_response.h"
 
 namespace limn::apps {
 namespace {
@@ -95,7 +95,7 @@ nlohmann::ordered_json light_report(const LightArguments& arguments,
                                   {"too_dark_wanted", share(128)}});
   }
   double sum = 0, most = 0;
-  for (const Response& response : rig.responses) {
+  for (const ProjectorResponse& response : rig.responses) {
     if (!response.black_level) continue;
     sum += response.black_level->value;
     most = std::max(most, response.black_level->value);

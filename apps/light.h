@@ -14,7 +14,7 @@ struct LightArguments {
   std::string compensation = "none";  ///< none, geometry or measured
   std::string black = "as-is";        ///< or even
   std::optional<double> level;        ///< LightOptions::level
-  std::filesystem::path measured_at;  ///< POSES.json of the response pictures; empty: as posed
+  std::filesystem::path measured_at;  ///< POSES.json of the response images; empty: as posed
 };
 
 /// Tells the renderer. `measured` takes the first camera of the rig whose colour mixing response.json beside
@@ -27,7 +27,7 @@ Status set_light(const LightArguments& arguments,
                  const scene::PosedScene& posed,
                  projector::Renderer* renderer);
 
-/// "light" of coverage.json: how light was balanced and what share of each projector's last picture could not
+/// "light" of coverage.json: how light was balanced and what share of each projector's last image could not
 /// be given; with even black, contrast (white over black) where one projector reaches, and what it was.
 nlohmann::ordered_json light_report(const LightArguments& arguments,
                                     const Rig& rig,

@@ -13,7 +13,7 @@ struct MarkersOptions {
   std::string ids = "0-11";     ///< such as 0-11,15; unused by a template file, which is one marker
   double size_mm = 40;          ///< side of the black square
   std::string board;            ///< instead of markers: charuco:11x8:25mm, chessboard:9x7:75mm
-  std::filesystem::path train;  ///< instead: a picture whose frame becomes the template `out`
+  std::filesystem::path train;  ///< instead: an image whose frame becomes the template `out`
   std::vector<std::filesystem::path> compare;  ///< instead: template files to tell apart
   std::filesystem::path json;                  ///< of the comparison; empty: none
   std::filesystem::path mount;                 ///< also a holder for a marker (apps/marker_mount.h): .stl

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "tracker/identify.h"
 #include "tracker/template_comparison.h"
 #include "tracker/template_training.h"
@@ -14,47 +14,47 @@
 namespace limn::apps {
 namespace {
 
-using tracker::Telling;
-using tracker::TemplateLikeness;
+using tracker::Discriminability;
+using tracker::TemplateSimilarity;
 
-std::string_view name_of(Telling telling) {
+std::string_view name_of(Discriminability telling) {
   switch (telling) {
-    case Telling::confused:
+    case Discriminability::confused:
       return "confused";
-    case Telling::alike:
+    case Discriminability::alike:
       return "alike";
-    case Telling::apart:
+    case Discriminability::apart:
       return "apart";
   }
   return "";
 }
 
-void print_table(const std::vector<TemplateLikeness>& pairs) {
+void print_table(const std::vector<TemplateSimilarity>& pairs) {
   fmt::print("{:<24} {:<24} {:>6} {:>12}  verdict\n", "template", "and", "turned", "correlation");
-  for (const TemplateLikeness& pair : pairs)
+  for (const TemplateSimilarity& pair : pairs)
     fmt::print("{:<24} {:<24} {:>5}° {:>12.3f}  {}\n", pair.a, pair.a == pair.b ? "itself" : pair.b,
                90 * pair.quarter_turns, pair.correlation, name_of(pair.telling));
 }
 
-void print_verdict(const TemplateLikeness& worst) {
+void print_verdict(const TemplateSimilarity& worst) {
   const std::string who = worst.a == worst.b ? worst.a + " and itself turned" : worst.a + " and " + worst.b;
   switch (worst.telling) {
-    case Telling::confused:
+    case Discriminability::confused:
       fmt::print("Worst: {}: confused, correlation above {:g}: change one.\n", who,
                  1 - tracker::k_min_rotation_lead);
       return;
-    case Telling::alike:
+    case Discriminability::alike:
       fmt::print("Worst: {}: alike, correlation of {:g} or more: the detector may take one for the other.\n",
                  who, tracker::k_min_correlation);
       return;
-    case Telling::apart:
+    case Discriminability::apart:
       fmt::print("Worst: {}: apart; all are told apart.\n", who);
   }
 }
 
-std::string json_text(const std::vector<TemplateLikeness>& pairs) {
+std::string json_text(const std::vector<TemplateSimilarity>& pairs) {
   nlohmann::json list = nlohmann::json::array();
-  for (const TemplateLikeness& pair : pairs)
+  for (const TemplateSimilarity& pair : pairs)
     list.push_back({{"a", pair.a},
                     {"b", pair.b},
                     {"quarter_turns", pair.quarter_turns},
@@ -69,12 +69,12 @@ std::string json_text(const std::vector<TemplateLikeness>& pairs) {
 
 }  // namespace
 
-Status train_template(const std::filesystem::path& picture, const std::filesystem::path& out) {
+Status train_template(const std::filesystem::path& image, const std::filesystem::path& out) {
   if (out.extension() != ".patt")
     return usage_error("--out: expected a file that ends in .patt for a template, found '{}'.", out.string());
-  LIMN_TRY(const cv::Mat pixels, read_picture(picture));
+  LIMN_TRY(const cv::Mat pixels, read_image(image));
   const auto trained = tracker::train_template(pixels);
-  if (!trained) return error("{}: {}", picture.string(), trained.message());
+  if (!trained) return error("{}: {}", image.string(), trained.message());
   LIMN_TRY_STATUS(write_file(out, tracker::template_text(*trained)));
   fmt::print("{}: the frame at ({:.0f}, {:.0f}), {:.0f} px wide\n", out.string(), trained->corners_px[0].x(),
              trained->corners_px[0].y(), trained->side_px);

@@ -19,10 +19,10 @@ std::string escaped(const std::string& text) {
   return html;
 }
 
-cv::Mat at_most_wide(const cv::Mat& picture, int width) {
-  if (picture.cols <= width) return picture;
+cv::Mat at_most_wide(const cv::Mat& image, int width) {
+  if (image.cols <= width) return image;
   cv::Mat scaled;
-  cv::resize(picture, scaled, {width, picture.rows * width / picture.cols}, 0, 0, cv::INTER_AREA);
+  cv::resize(image, scaled, {width, image.rows * width / image.cols}, 0, 0, cv::INTER_AREA);
   return scaled;
 }
 

@@ -8,7 +8,7 @@ namespace limn {
 /// Text as HTML shows it.
 std::string escaped(const std::string& text);
 
-/// The picture, made smaller where it is wider than `width` pixels.
-cv::Mat at_most_wide(const cv::Mat& picture, int width);
+/// The image, made smaller where it is wider than `width` pixels.
+cv::Mat at_most_wide(const cv::Mat& image, int width);
 
 }  // namespace limn

@@ -8,26 +8,26 @@
 #include "calib/response/response_patterns.h"
 #include "core/file.h"
 #include "core/log.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 
 namespace limn::apps {
 namespace {
 
-Status write_pictures(const std::filesystem::path& out,
+Status write_images(const std::filesystem::path& out,
                       int count,
-                      const std::function<cv::Mat(int)>& picture) {
+                      const std::function<cv::Mat(int)>& image) {
   LIMN_TRY_STATUS(make_folder(out));
   Progress progress("patterns", count);
   for (int i = 0; i < count; ++i) {
-    LIMN_TRY_STATUS(write_png(out / calib::picture_name(i), picture(i)));
+    LIMN_TRY_STATUS(write_png(out / calib::image_name(i), image(i)));
     progress.step(i + 1);
   }
   return {};
 }
 
 Status write_response(const PatternsOptions& options, const PixelSize& size) {
-  const int count = static_cast<int>(calib::response_pictures().size());
-  LIMN_TRY_STATUS(write_pictures(options.out, count,
+  const int count = static_cast<int>(calib::response_images().size());
+  LIMN_TRY_STATUS(write_images(options.out, count,
                                  [&](int i) { return calib::draw_response(i, size.width, size.height); }));
   LIMN_TRY_STATUS(calib::save_response_patterns(size.width, size.height, options.out / "patterns.json"));
   fmt::print("{} response pictures of {}x{} in {}\n", count, size.width, size.height, options.out.string());
@@ -40,7 +40,7 @@ Result<calib::Patterns> by_response(const PatternsOptions& options, const calib:
   if (options.code != "phase")
     return usage_error("--linearise: expected --code phase, found {}, which shows black and white alone.",
                        options.code);
-  LIMN_TRY(const Responses responses, load_responses(options.linearise));
+  LIMN_TRY(const RigResponses responses, load_responses(options.linearise));
   if (options.name.empty() && responses.projectors.size() != 1)
     return usage_error("--linearise {}: it holds {} projectors; say which with --name.",
                        options.linearise.string(), responses.projectors.size());
@@ -58,7 +58,7 @@ Status run_patterns(const PatternsOptions& options) {
   if (!plain) return usage_error("{}", plain.message());
   if (options.response) return write_response(options, size);
   LIMN_TRY(const calib::Patterns patterns, by_response(options, *plain));
-  LIMN_TRY_STATUS(write_pictures(options.out, patterns.count(), [&](int i) { return patterns.picture(i); }));
+  LIMN_TRY_STATUS(write_images(options.out, patterns.count(), [&](int i) { return patterns.image(i); }));
   LIMN_TRY_STATUS(calib::save_patterns(patterns, options.out / "patterns.json"));
   fmt::print("{} pictures of {}x{} in {}\n", patterns.count(), size.width, size.height, options.out.string());
   return {};

@@ -14,7 +14,7 @@ struct PatternsOptions {
   calib::CodeOptions code_options = calib::CodeOptions();
   std::filesystem::path linearise = {};  ///< phase: the response.json that the waves are drawn by
   std::string name = {};                 ///< of the projector in it; may be left out where it holds one alone
-  bool response = false;  ///< the pictures that measure the projector's response instead of a code
+  bool response = false;  ///< the images that measure the projector's response instead of a code
   std::filesystem::path out;
 };
 

@@ -2,7 +2,7 @@
 
 #include "calib/code/patterns.h"
 #include "core/config.h"
-#include "core/response.h"
+#include "core/photometric_response.h"
 
 namespace limn::apps {
 namespace {
@@ -44,7 +44,7 @@ Result<Plan> load_plan(const std::filesystem::path& path) {
   if (plan.world_from_board.empty()) poses.problem("expected at least one pose of the board, found none.");
   LIMN_TRY_STATUS(config.status());
   if (response_json.empty()) return plan;
-  LIMN_TRY(Responses responses, load_responses(response_json));
+  LIMN_TRY(RigResponses responses, load_responses(response_json));
   plan.responses = std::move(responses.projectors);
   if (plan.responses.empty())
     return error("{}: projectors: expected the curves of the plan's projectors, found none. Measure them.",

@@ -54,7 +54,7 @@ struct Sheet {
 };
 
 // What an imager reaches, up to the far end of the volume: its corners' rays.
-std::vector<Vector3d> reach_of(const Imager& imager, const Described& described) {
+std::vector<Vector3d> reach_of(const Imager& imager, const DescribedRig& described) {
   const Pose world_from_imager = imager.imager_from_world.inverse();
   const double far_m =
       (described.p_centre - world_from_imager.translation).norm() + 0.5 * described.size_m.norm();
@@ -89,7 +89,7 @@ std::vector<Vector2d> hull(std::vector<Vector2d> points) {
 
 std::string imager_svg(const Imager& imager,
                        const char* kind,
-                       const Described& described,
+                       const DescribedRig& described,
                        const Sheet& sheet) {
   const Vector3d p_eye = imager.imager_from_world.inverse().translation;
   std::vector<Vector2d> points = {sheet.at(p_eye)};
@@ -103,7 +103,7 @@ std::string imager_svg(const Imager& imager,
       kind, polygon, kind, at.x(), at.y(), at.x() + 10, at.y() + 5, escaped(imager.name));
 }
 
-std::string view_svg(const View& view, const Described& described) {
+std::string view_svg(const View& view, const DescribedRig& described) {
   Eigen::AlignedBox3d box(described.p_centre - described.size_m / 2,
                           described.p_centre + described.size_m / 2);
   for (const auto* imagers : {&described.rig.cameras, &described.rig.projectors})
@@ -139,7 +139,7 @@ std::string view_svg(const View& view, const Described& described) {
 
 }  // namespace
 
-std::string plan_page(const Described& described, const Foreseen& foreseen) {
+std::string plan_page(const DescribedRig& described, const PredictedAccuracy& predicted_accuracy) {
   std::string html = fmt::format(
       "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" "
       "content=\"width=device-width\"><title>The rig as planned</title><style>{}</style><h1>The rig as "
@@ -148,19 +148,19 @@ std::string plan_page(const Described& described, const Foreseen& foreseen) {
       "defocus and "
       "a board that bends are not in it.</p>\n",
       k_plan_style);
-  for (std::size_t i = 0; i < foreseen.error_mm.size(); ++i) {
-    const double mm = foreseen.error_mm[i];
+  for (std::size_t i = 0; i < predicted_accuracy.error_mm.size(); ++i) {
+    const double mm = predicted_accuracy.error_mm[i];
     const char* worth = mm <= calib::k_good_mm ? "good" : mm <= calib::k_usable_mm ? "doubt" : "bad";
     html +=
         fmt::format("<p class=\"light\">{}: light lands within <b class=\"{}\">{:.2f} mm</b> (95 %)</p>\n",
                     escaped(described.rig.projectors[i].name), worth, mm);
   }
-  for (const std::string& sentence : foreseen.advice)
+  for (const std::string& sentence : predicted_accuracy.advice)
     html += fmt::format("<p class=\"doubt\">{}</p>\n", escaped(sentence));
   html += "<div class=\"views\">\n";
   for (const View& view : {View{"from above", 0, 1}, View{"from the side", 1, 2}})
     html += view_svg(view, described);
-  return html + fmt::format("</div>\n<pre>{}</pre>\n</html>\n", escaped(design_table(foreseen, described)));
+  return html + fmt::format("</div>\n<pre>{}</pre>\n</html>\n", escaped(design_table(predicted_accuracy, described)));
 }
 
 }  // namespace limn::apps

@@ -10,19 +10,19 @@
 namespace limn::apps {
 
 Status run_plan_rig(const PlanRigOptions& options) {
-  LIMN_TRY(const Described described, load_described(options.described));
-  auto foreseen = foresee(described);
-  if (!foreseen)
-    return error("{}: no calibration comes of this rig: {}", options.described.string(), foreseen.message());
+  LIMN_TRY(const DescribedRig described, load_described(options.described));
+  auto predicted_accuracy = predict_accuracy(described);
+  if (!predicted_accuracy)
+    return error("{}: no calibration comes of this rig: {}", options.described.string(), predicted_accuracy.message());
   if (options.json) {
-    fmt::print("{}\n", design_json(*foreseen));
+    fmt::print("{}\n", design_json(*predicted_accuracy));
   } else {
-    fmt::print("{}", design_table(*foreseen, described));
+    fmt::print("{}", design_table(*predicted_accuracy, described));
   }
   if (!options.out.empty()) {
     LIMN_TRY_STATUS(make_folder(options.out));
-    LIMN_TRY_STATUS(write_file(options.out / "plan.json", design_json(*foreseen) + "\n"));
-    LIMN_TRY_STATUS(write_file(options.out / "plan.html", plan_page(described, *foreseen)));
+    LIMN_TRY_STATUS(write_file(options.out / "plan.json", design_json(*predicted_accuracy) + "\n"));
+    LIMN_TRY_STATUS(write_file(options.out / "plan.html", plan_page(described, *predicted_accuracy)));
   }
   return {};
 }

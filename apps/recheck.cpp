@@ -7,12 +7,12 @@
 #include <system_error>
 
 #include "apps/devices.h"
-#include "apps/picture_writer.h"
+#include "apps/image_writer.h"
 #include "apps/plan.h"
 #include "apps/virtual_capture.h"
 #include "apps/wizard/device_stage.h"
 #include "apps/world_markers.h"
-#include "calib/captures.h"
+#include "calib/capture_set.h"
 #include "core/file.h"
 #include "core/rig.h"
 #include "device/desktop.h"
@@ -22,24 +22,24 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double k_pictures_a_second = 10;  // shown, settled, photographed by an ordinary camera
+constexpr double k_images_a_second = 10;  // shown, settled, photographed by an ordinary camera
 constexpr double k_most_seconds = 15;
 
 // As many as fit into the time that a recheck may take, at least one.
 size_t affordable_poses(const Plan& plan, const Rig& rig) {
-  int pictures = 0;
+  int images = 0;
   for (const Imager& projector : rig.projectors) {
     if (const auto patterns =
             calib::Patterns::create(plan.code, projector.width, projector.height, plan.code_options))
-      pictures += patterns->count();
+      images += patterns->count();
   }
-  return static_cast<size_t>(std::max(1.0, k_most_seconds * k_pictures_a_second / std::max(1, pictures)));
+  return static_cast<size_t>(std::max(1.0, k_most_seconds * k_images_a_second / std::max(1, images)));
 }
 
 Status captured_virtually(const RecheckCommand& command, const fs::path& folder) {
   LIMN_TRY(Plan plan, load_plan(command.plan));
-  plan.code_options.inverses = false;  // the rig is all but known: sparse pictures, more devices in the time
-  LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_picture));
+  plan.code_options.inverses = false;  // the rig is all but known: sparse images, more devices in the time
+  LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_image));
   if (command.prototype && !world.scene)
     return error("{}: scene: expected a prototype for --prototype, found none.", plan.world.string());
   plan.world_from_board.resize(std::min(plan.world_from_board.size(), affordable_poses(plan, world.rig)));
@@ -53,13 +53,13 @@ Status captured_by_devices(const RecheckCommand& command, const fs::path& folder
   LIMN_TRY(const Devices all, load_devices(command.devices));
   LIMN_TRY(const Devices named, matched(all, rig));
   const Result<device::Desktop> desktop = device::Desktop::open();
-  LIMN_TRY(DeviceStage::Devices devices, opened_devices(named, desktop));
+  LIMN_TRY(DeviceBackend::Devices devices, opened_devices(named, desktop));
   LIMN_TRY(const calib::Board board, calibration_board(rig));
-  const calib::Captures captures =
+  const calib::CaptureSet captures =
       calib::plan_captures(folder, captured_devices(devices.cameras), captured_devices(devices.projectors),
                            board, "gray", {.inverses = false});
-  DeviceStage stage(std::move(devices), board, nullptr);
-  PictureWriter writer;
+  DeviceBackend stage(std::move(devices), board, nullptr);
+  ImageWriter writer;
   return captured_once(captures, rig, stage.surroundings(&writer));
 }
 
@@ -78,7 +78,7 @@ Result<fs::path> captured(const RecheckCommand& command) {
   return folder;
 }
 
-Status write_rig(const calib::Recheck& result, const RecheckCommand& command) {
+Status write_rig(const calib::RigCheck& result, const RecheckCommand& command) {
   LIMN_TRY_STATUS(save_rig(result.rig, command.out));
   const fs::path folder = fs::is_directory(command.rig) ? command.rig : command.rig.parent_path();
   const fs::path response = folder / "response.json";
@@ -89,7 +89,7 @@ Status write_rig(const calib::Recheck& result, const RecheckCommand& command) {
 }
 
 void print_table(const Rechecked& checked) {
-  const calib::Recheck& result = checked.result;
+  const calib::RigCheck& result = checked.result;
   fmt::print("{:<14} {:>12} {:>10} {:>10}\n", "device", "observations", "before px", "after px");
   for (const calib::CheckedDevice& device : result.devices) {
     if (device.observations == 0)
@@ -103,15 +103,15 @@ void print_table(const Rechecked& checked) {
                move.device, move.degrees, move.degrees_stddev, move.mm, move.mm_stddev, move.px,
                move.mm_on_board);
   if (result.board_moved) fmt::print("the board has been touched: --still is not used\n");
-  fmt::print("{} ({} pictures, {:.1f} s at {:.0f} a second)\n", recheck_sentence(result), checked.pictures,
-             checked.pictures / k_pictures_a_second, k_pictures_a_second);
+  fmt::print("{} ({} pictures, {:.1f} s at {:.0f} a second)\n", recheck_sentence(result), checked.images,
+             checked.images / k_images_a_second, k_images_a_second);
 }
 
 Result<CheckedRig> check(const RecheckCommand& command) {
   LIMN_TRY(const Rig rig, load_rig(command.rig));
   LIMN_TRY(const fs::path folder, captured(command));
   LIMN_TRY(CheckedRig checked, recheck_rig(rig, folder, command.still, command.out));
-  if (checked.rechecked.result.verdict != calib::RecheckVerdict::unexplained)
+  if (checked.rechecked.result.verdict != calib::RigVerdict::unexplained)
     LIMN_TRY_STATUS(write_rig(checked.rechecked.result, command));
   return checked;
 }

@@ -5,9 +5,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include "apps/judge.h"
-#include "projector/arriving.h"
+#include "projector/shadow_detector.h"
 #include "projector/renderer.h"
-#include "sim/photograph.h"
+#include "sim/sensor_model.h"
 #include "sim/trace.h"
 
 namespace limn::apps {
@@ -20,7 +20,7 @@ constexpr int k_stay_frames = 6, k_move_frames = 5, k_gone_frames = 6;
 constexpr int k_allowed_frames = 3;    // from a shadow to light
 constexpr float k_least_loss = 0.05F;  // of a pixel's light: below, it is not in the shadow
 constexpr int k_least_pixels = 100;    // of a shadow
-constexpr int k_blur_px = 5;           // of the viewer's picture, over which light is the same
+constexpr int k_blur_px = 5;           // of the viewer's image, over which light is the same
 constexpr int k_light_end = 9;         // pixels: nearer to its end light fades over a projector's last pixel
 constexpr float k_least_light = 0.1F;  // of the brightest: below, nobody sees a flash
 constexpr float k_edge = 0.1F;  // of the light between neighbours: beyond, another projector's pixels show
@@ -30,11 +30,11 @@ constexpr double k_skin_bgr[] = {0.28, 0.40, 0.62};
 void add_responses(const sim::World& world, Rig* rig) {
   for (std::size_t i = 0; i < rig->projectors.size(); ++i) {
     const sim::ProjectorEffects& effects = world.projector_effects[i];
-    Response response{rig->projectors[i].name, {}, {}, {}};
+    ProjectorResponse response{rig->projectors[i].name, {}, {}, {}};
     std::vector<double>* curves[] = {&response.blue, &response.green, &response.red};
     for (int c = 0; c < 3; ++c)
       for (int v = 0; v < 256; ++v) curves[c]->push_back(sim::light_share(effects, c, v / 255.0));
-    response.black_level = Measured{effects.black_level, 0};
+    response.black_level = Measurement{effects.black_level, 0};
     response.vignetting = Vignetting{Eigen::Vector2d::Zero(), -effects.vignetting, 0, 0};
     rig->responses.push_back(response);
   }
@@ -44,7 +44,7 @@ void add_responses(const sim::World& world, Rig* rig) {
     response.camera = rig->cameras[i].name;
     for (int v = 0; v < 256; ++v) {
       const double level = std::max(0.0, (v - effects.black_level) / (255 - effects.black_level));
-      response.light.push_back(effects.srgb ? linear_of_srgb(level) : level);
+      response.light.push_back(effects.srgb ? linear_from_srgb(level) : level);
     }
     rig->camera_responses.push_back(response);
   }
@@ -71,7 +71,7 @@ class Session {
           std::uint64_t seed)
       : world_(world), posed_(posed), viewer_(viewer), hand_(hand), seed_(seed) {}
 
-  Result<RefillReading> run(const scene::Scene& scene) {
+  Result<ShadowFillReading> run(const scene::Scene& scene) {
     Rig rig = world_.rig;
     rig.responses.clear();
     rig.camera_responses.clear();
@@ -80,14 +80,14 @@ class Session {
     LIMN_TRY_STATUS(renderer_->set_light({.compensation = projector::Compensation::geometry}));
     arriving_.emplace(rig);
     for (std::size_t i = 0; i < rig.cameras.size(); ++i)
-      arriving_->place(i, renderer_->lit_patches(i, posed_, k_side_px));
+      arriving_->place(i, renderer_->illuminated_patches(i, posed_, k_side_px));
     const Traced free = traced(std::nullopt);
     const std::vector<cv::Mat> black(rig.projectors.size());
     for (int k = 0; k < k_dark_frames; ++k) watch(free, black);
     draw();
     first_ = shown_;
     before_ = light(free, shown_);
-    RefillReading reading;
+    ShadowFillReading reading;
     for (int k = 0; k < k_still_frames; ++k) {
       watch(free, shown_);
       draw();
@@ -144,9 +144,9 @@ class Session {
   void draw() {
     shown_.clear();
     for (std::size_t i = 0; i < world_.rig.projectors.size(); ++i)
-      renderer_->set_arriving(i, arriving_->map(i));
+      renderer_->set_occlusion(i, arriving_->map(i));
     for (std::size_t i = 0; i < world_.rig.projectors.size(); ++i)
-      shown_.push_back(renderer_->projector_picture(i, posed_, viewer_));
+      shown_.push_back(renderer_->projector_image(i, posed_, viewer_));
   }
 
   // The projectors' light on the prototype as the eye sees it; 0 elsewhere.
@@ -213,14 +213,14 @@ class Session {
   }
 
   // A frame with these things in their places: judged as it is, then seen by the cameras.
-  void step(const Traced& traced, const std::string& phase, RefillReading* reading) {
+  void step(const Traced& traced, const std::string& phase, ShadowFillReading* reading) {
     const cv::Mat actual = light(traced, shown_);
     const Loss lost = loss(traced);
     cv::Mat since(since_.size(), CV_32S, cv::Scalar(0));
     cv::Mat(since_ + 1).copyTo(since, lost.where);
     since_ = since;
     const cv::Mat old = since_ > k_allowed_frames;
-    RefillFrame frame{phase, back_share(lost, actual, lost.where), flash(traced, actual),
+    ShadowFillFrame frame{phase, back_share(lost, actual, lost.where), flash(traced, actual),
                       worst_difference(shown_, first_)};
     if (cv::countNonZero(old) >= k_least_pixels)
       reading->share = std::min(reading->share, back_share(lost, actual, old));
@@ -263,7 +263,7 @@ class Session {
   std::uint64_t seed_;
   std::uint64_t frames_ = 0;
   std::optional<projector::Renderer> renderer_;
-  std::optional<projector::ArrivingLight> arriving_;
+  std::optional<projector::ShadowDetector> arriving_;
   std::vector<cv::Mat> shown_, first_;
   cv::Mat before_;
   cv::Mat since_;  // CV_32S: frames that a pixel has been in the shadow
@@ -271,7 +271,7 @@ class Session {
 
 }  // namespace
 
-Result<RefillReading> judged_refill(const sim::World& world,
+Result<ShadowFillReading> measured_shadow_fill(const sim::World& world,
                                     const scene::Scene& scene,
                                     const scene::PosedScene& posed,
                                     const Imager& viewer,

@@ -8,7 +8,7 @@
 
 #include "core/imager.h"
 #include "core/result.h"
-#include "scene/posed.h"
+#include "scene/posed_scene.h"
 #include "scene/scene.h"
 #include "sim/world.h"
 
@@ -24,27 +24,27 @@ struct Hand {
 };
 
 /// One frame of a session with a hand in it, as the ray tracer judges it.
-struct RefillFrame {
+struct ShadowFillFrame {
   std::string phase;          ///< "still", "stays", "moves", "gone"
   double share = 1;           ///< of the light lost to the shadow, where others can give it: what is back
   double flash = 0;           ///< light over what was there without the hand, as a share of it, worst pixel
-  double picture_change = 0;  ///< worst level of the projectors' pictures from those without a hand
+  double image_change = 0;  ///< worst level of the projectors' images from those without a hand
 };
 
-struct RefillReading {
+struct ShadowFillReading {
   double share = 1;         ///< the least share from the fourth frame of a shadow on
   double flash = 0;         ///< the largest, over all frames
-  double still_levels = 0;  ///< largest change of the projectors' pictures over 30 frames without a hand
+  double still_levels = 0;  ///< largest change of the projectors' images over 30 frames without a hand
   double back_levels = 0;   ///< the same, four frames after the hand has gone
-  std::vector<RefillFrame> frames;
+  std::vector<ShadowFillFrame> frames;
   cv::Mat before, lost, refilled;  ///< from the viewer's eye, linear light (CV_32FC3)
 };
 
-/// Plays a session on the virtual rig: a renderer and projector::ArrivingLight in a loop with every camera's
+/// Plays a session on the virtual rig: a renderer and projector::ShadowDetector in a loop with every camera's
 /// noisy frames of `world`, one frame from light to light. 30 frames without a hand; the hand suddenly there,
 /// staying, moving, suddenly gone. Light is what the projectors' light makes of the prototype in the viewer's
-/// picture. Error where the hand shades nothing that others could light.
-Result<RefillReading> judged_refill(const sim::World& world,
+/// image. Error where the hand shades nothing that others could light.
+Result<ShadowFillReading> measured_shadow_fill(const sim::World& world,
                                     const scene::Scene& scene,
                                     const scene::PosedScene& posed,
                                     const Imager& viewer,

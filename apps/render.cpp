@@ -13,22 +13,22 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/log.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "core/rig.h"
 #include "device/gl_context.h"
 #include "projector/renderer.h"
-#include "scene/posed.h"
+#include "scene/posed_scene.h"
 #include "scene/scene.h"
-#include "scene/viewers.h"
+#include "scene/viewpoint.h"
 #include "tracker/detector.h"
 #include "tracker/family.h"
 #include "tracker/marker_light.h"
-#include "tracker/observed.h"
+#include "tracker/body_estimate.h"
 
 namespace limn::apps {
 namespace {
 
-// Pictures by camera, in the rig's order; empty where none was given.
+// Images by camera, in the rig's order; empty where none was given.
 using Frames = std::vector<cv::Mat>;
 
 std::string names_of(const std::vector<Imager>& imagers) {
@@ -37,16 +37,16 @@ std::string names_of(const std::vector<Imager>& imagers) {
   return names.empty() ? "none" : names;
 }
 
-// A camera file without a size (OpenCV's calibration writes none at times) takes its picture's.
-Status accept(const cv::Mat& picture, const std::string& file, Imager* camera) {
+// A camera file without a size (OpenCV's calibration writes none at times) takes its image's.
+Status accept(const cv::Mat& image, const std::string& file, Imager* camera) {
   if (camera->width == 0 && camera->height == 0) {
-    camera->width = picture.cols;
-    camera->height = picture.rows;
+    camera->width = image.cols;
+    camera->height = image.rows;
   }
-  if (picture.cols == camera->width && picture.rows == camera->height) return {};
+  if (image.cols == camera->width && image.rows == camera->height) return {};
   return error(
       "{}: expected a picture of {}'s size {}x{}, found {}x{}. Give the picture as the camera took it.", file,
-      camera->name, camera->width, camera->height, picture.cols, picture.rows);
+      camera->name, camera->width, camera->height, image.cols, image.rows);
 }
 
 Result<Frames> read_frames(const std::vector<std::string>& arguments, Rig* rig) {
@@ -63,9 +63,9 @@ Result<Frames> read_frames(const std::vector<std::string>& arguments, Rig* rig) 
       return usage_error("--frame {}: expected a camera of the rig ({}), found '{}'.", argument,
                          names_of(rig->cameras), name);
     }
-    LIMN_TRY(cv::Mat picture, read_picture(file));
-    LIMN_TRY_STATUS(accept(picture, file, &*camera));
-    frames[static_cast<std::size_t>(camera - rig->cameras.begin())] = std::move(picture);
+    LIMN_TRY(cv::Mat image, read_image(file));
+    LIMN_TRY_STATUS(accept(image, file, &*camera));
+    frames[static_cast<std::size_t>(camera - rig->cameras.begin())] = std::move(image);
   }
   return frames;
 }
@@ -105,7 +105,7 @@ void report_missing(const scene::Scene& scene, const scene::PosedScene& posed) {
   }
 }
 
-// What makes pictures that surely are not meant.
+// What makes images that surely are not meant.
 void report_odd(const scene::Scene& scene,
                 const Rig& rig,
                 const scene::PosedScene& posed,
@@ -165,7 +165,7 @@ Result<Imager> told_viewer(std::span<const std::filesystem::path> files,
                            const scene::Scene& scene,
                            const scene::PosedScene& posed,
                            const Eigen::Vector3d& d_up_world) {
-  std::vector<scene::Eye> eyes;
+  std::vector<scene::Viewpoint> eyes;
   for (const std::filesystem::path& file : files) {
     LIMN_TRY(const Imager viewer, scene::load_viewer(file));
     if (files.size() == 1) return viewer;
@@ -178,8 +178,8 @@ Result<Imager> told_viewer(std::span<const std::filesystem::path> files,
         "look at together.",
         files.size());
   }
-  const scene::SharedEye shared = scene::followed({}, eyes, *p_middle, 0);
-  for (const scene::SharedEye::Share& share : shared.shares)
+  const scene::SharedViewpoint shared = scene::updated_viewpoint({}, eyes, *p_middle, 0);
+  for (const scene::SharedViewpoint::Share& share : shared.shares)
     fmt::print("{}: {:.0f} % of the eye{}\n", share.viewer, 100 * share.share,
                share.viewer == shared.leader ? ", leads" : "");
   const auto viewer = scene::viewer_at(*shared.p_world(), scene, posed, d_up_world);
@@ -229,9 +229,9 @@ Status write_coverage(const std::vector<projector::PartCoverage>& parts,
   return write_file(out / "coverage.json", json.dump(2) + "\n");
 }
 
-// The picture without the lens's distortion: the same focal length, its principal point in the middle.
-cv::Mat undistorted(const cv::Mat& picture, const Imager& imager) {
-  cv::Mat map(picture.size(), CV_32FC2);
+// The image without the lens's distortion: the same focal length, its principal point in the middle.
+cv::Mat undistorted(const cv::Mat& image, const Imager& imager) {
+  cv::Mat map(image.size(), CV_32FC2);
   for (int row = 0; row < map.rows; ++row)
     for (int column = 0; column < map.cols; ++column) {
       const Eigen::Vector3d d((column - 0.5 * (map.cols - 1)) / imager.lens.fx(),
@@ -241,7 +241,7 @@ cv::Mat undistorted(const cv::Mat& picture, const Imager& imager) {
           px ? cv::Vec2f(static_cast<float>(px->x()), static_cast<float>(px->y())) : cv::Vec2f(-10, -10);
     }
   cv::Mat out;
-  cv::remap(picture, out, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT);
+  cv::remap(image, out, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT);
   return out;
 }
 
@@ -260,13 +260,13 @@ Status write_composites(projector::Renderer* renderer,
     }
     if (behind.empty()) continue;
     const auto file = options.out / ("composite-" + camera.name + ".png");
-    const cv::Mat picture = renderer->composite(i, behind, posed, what);
-    LIMN_TRY_STATUS(write_png(file, options.undistorted ? undistorted(picture, camera) : picture));
+    const cv::Mat image = renderer->composite(i, behind, posed, what);
+    LIMN_TRY_STATUS(write_png(file, options.undistorted ? undistorted(image, camera) : image));
   }
   return {};
 }
 
-// What a virtual camera sees, or two eyes on a line through its middle, the left one's picture on the left.
+// What a virtual camera sees, or two eyes on a line through its middle, the left one's image on the left.
 Status write_view(const RenderOptions& options,
                   const scene::PosedScene& posed,
                   projector::Renderer* renderer) {
@@ -328,9 +328,9 @@ Status run_render(const RenderOptions& options) {
   const std::vector<Track> tracks = tracks_of(scene, posed);
   for (std::size_t i = 0; i < rig.projectors.size(); ++i) {
     const auto file = options.out / ("projector-" + rig.projectors[i].name + ".png");
-    const cv::Mat picture = renderer.projector_picture(i, posed, viewer);
+    const cv::Mat image = renderer.projector_image(i, posed, viewer);
     const cv::Mat mask = tracker::marker_mask(rig.projectors[i], bodies, tracks);
-    LIMN_TRY_STATUS(write_png(file, tracker::with_marker_light(picture, mask, *marker_light)));
+    LIMN_TRY_STATUS(write_png(file, tracker::with_marker_light(image, mask, *marker_light)));
     if (is_balanced)
       LIMN_TRY_STATUS(
           write_png(options.out / ("clipped-" + rig.projectors[i].name + ".png"), renderer.clipped(i)));

@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-// A rig that foretells pixels better than this has not been asked outside its poses.
+// A rig that predicts pixels better than this has not been asked outside its poses.
 constexpr double k_least_rig_px = 0.05;
 constexpr double k_guard_s = 0.001;  // beyond a measured latency
 constexpr const char* k_code_in_place = "gray";
@@ -32,9 +32,9 @@ Json provenance_of(const Rig& rig) {
   return provenance.is_object() ? provenance : Json::object();
 }
 
-// How well the rig foretells, and how its board is bent, as its solve noted them.
-calib::RecheckOptions options_for(const Rig& rig, const calib::Board& board) {
-  calib::RecheckOptions options;
+// How well the rig predicts, and how its board is bent, as its solve noted them.
+calib::RigCheckOptions options_for(const Rig& rig, const calib::Board& board) {
+  calib::RigCheckOptions options;
   const Json provenance = provenance_of(rig);
   if (const auto held_out = provenance.find("held_out_px");
       held_out != provenance.end() && held_out->is_number())
@@ -77,7 +77,7 @@ Json json_of(const calib::Move& move) {
 }
 
 Json json_of(const Rechecked& checked, const std::vector<std::string>& poses) {
-  const calib::Recheck& result = checked.result;
+  const calib::RigCheck& result = checked.result;
   Json devices = Json::array(), candidates = Json::array(), boards = Json::object();
   for (const calib::CheckedDevice& device : result.devices)
     devices.push_back({{"name", device.name},
@@ -92,11 +92,11 @@ Json json_of(const Rechecked& checked, const std::vector<std::string>& poses) {
   return {{"schema", "limn.recheck/1"},        {"verdict", calib::to_text(result.verdict)},
           {"candidates", candidates},          {"devices", devices},
           {"board_moved", result.board_moved}, {"boards", boards},
-          {"pictures", checked.pictures}};
+          {"pictures", checked.images}};
 }
 
 // The rig with its first candidate's pose re-solved. What was known about errors is no longer so.
-Rig repaired(const calib::Recheck& result) {
+Rig repaired(const calib::RigCheck& result) {
   Rig rig = result.rig;
   if (result.candidates.empty()) return rig;
   Json provenance = provenance_of(rig);
@@ -110,10 +110,10 @@ Rig repaired(const calib::Recheck& result) {
   return rig;
 }
 
-int shown_pictures(const calib::Captures& captures) {
-  int pictures = 0;
-  for (const calib::Patterns& patterns : captures.patterns) pictures += patterns.count();
-  return pictures * static_cast<int>(captures.poses.size());
+int shown_images(const calib::CaptureSet& captures) {
+  int images = 0;
+  for (const calib::Patterns& patterns : captures.patterns) images += patterns.count();
+  return images * static_cast<int>(captures.poses.size());
 }
 
 }  // namespace
@@ -125,19 +125,19 @@ Result<calib::Board> calibration_board(const Rig& rig) {
   return calib::Board::parse(is_told ? text->get<std::string>() : k_any_board);
 }
 
-std::string recheck_sentence(const calib::Recheck& result) {
-  using calib::RecheckVerdict;
-  if (result.verdict == RecheckVerdict::sound) return "sound: nothing has moved";
-  if (result.verdict == RecheckVerdict::unexplained)
+std::string recheck_sentence(const calib::RigCheck& result) {
+  using calib::RigVerdict;
+  if (result.verdict == RigVerdict::sound) return "sound: nothing has moved";
+  if (result.verdict == RigVerdict::unexplained)
     return "no move of one device explains what is seen: several have moved, or a lens was turned";
   std::string names;
   for (const calib::Move& move : result.candidates) names += (names.empty() ? "" : " or ") + move.device;
-  if (result.verdict == RecheckVerdict::nudged) return names + " has moved";
+  if (result.verdict == RigVerdict::moved) return names + " has moved";
   return names + " has moved relative to the other; a board that stands still (--still) tells which";
 }
 
-Status check_explained(const calib::Recheck& result) {
-  if (result.verdict != calib::RecheckVerdict::unexplained) return {};
+Status check_explained(const calib::RigCheck& result) {
+  if (result.verdict != calib::RigVerdict::unexplained) return {};
   return error("{}. Calibrate again (limn solve).", recheck_sentence(result));
 }
 
@@ -146,17 +146,17 @@ Result<CheckedRig> recheck_rig(const Rig& rig,
                                const fs::path& still,
                                const fs::path& out,
                                const std::function<bool()>& goes_on) {
-  LIMN_TRY(const calib::Captures captures, calib::load_captures(folder));
+  LIMN_TRY(const calib::CaptureSet captures, calib::load_captures(folder));
   LIMN_TRY(const calib::Observed observed, calib::observe(captures, {}, goes_on));
   const std::vector<std::string>& poses = observed.observations.poses;
-  calib::RecheckOptions options = options_for(rig, captures.board);
+  calib::RigCheckOptions options = options_for(rig, captures.board);
   options.goes_on = goes_on;
   if (!still.empty()) {
     LIMN_TRY(options.still_boards, still_boards(still, poses));
   }
   CheckedRig checked;
-  LIMN_TRY(checked.rechecked.result, calib::recheck(rig, observed.observations, options));
-  checked.rechecked.pictures = shown_pictures(captures);
+  LIMN_TRY(checked.rechecked.result, calib::check_rig(rig, observed.observations, options));
+  checked.rechecked.images = shown_images(captures);
   checked.json = json_of(checked.rechecked, poses).dump(2) + "\n";
   checked.rechecked.result.rig = repaired(checked.rechecked.result);
   LIMN_TRY_STATUS(make_folder(out));
@@ -164,7 +164,7 @@ Result<CheckedRig> recheck_rig(const Rig& rig,
   return checked;
 }
 
-Status captured_once(const calib::Captures& captures, const Rig& rig, const Surroundings& around) {
+Status captured_once(const calib::CaptureSet& captures, const Rig& rig, const Surroundings& around) {
   LIMN_TRY_STATUS(calib::begin_captures(captures));
   const Json latencies_ms = provenance_of(rig).value("display_latency_ms", Json::object());
   for (std::size_t i = 0; i < captures.projectors.size(); ++i)
@@ -176,13 +176,13 @@ Status captured_once(const calib::Captures& captures, const Rig& rig, const Surr
   return taken ? written : taken;
 }
 
-int recheck_pictures(const Rig& rig) {
-  int pictures = 0;
+int recheck_images(const Rig& rig) {
+  int images = 0;
   for (const Imager& projector : rig.projectors)
     if (const auto patterns =
             calib::Patterns::create(k_code_in_place, projector.width, projector.height, k_sparse))
-      pictures += patterns->count();
-  return pictures;
+      images += patterns->count();
+  return images;
 }
 
 Result<Rechecked> rechecked_in_place(const Rig& rig,

@@ -6,16 +6,16 @@
 
 #include "apps/wizard/surroundings.h"
 #include "calib/board/board.h"
-#include "calib/captures.h"
-#include "calib/judge/recheck.h"
+#include "calib/capture_set.h"
+#include "calib/judge/rig_check.h"
 #include "core/result.h"
 #include "core/rig.h"
 
 namespace limn::apps {
 
 struct Rechecked {
-  calib::Recheck result;
-  int pictures = 0;  ///< shown and photographed, all cameras at once
+  calib::RigCheck result;
+  int images = 0;  ///< shown and photographed, all cameras at once
 };
 
 /// What captures say of a rig, and how recheck.json says it.
@@ -34,17 +34,17 @@ Result<CheckedRig> recheck_rig(const Rig& rig,
                                const std::function<bool()>& goes_on = {});
 
 /// What a recheck found, as a sentence.
-std::string recheck_sentence(const calib::Recheck& result);
+std::string recheck_sentence(const calib::RigCheck& result);
 
 /// Error: no move of a single device explains what is seen.
-Status check_explained(const calib::Recheck& result);
+Status check_explained(const calib::RigCheck& result);
 
 /// The board that the rig was calibrated with, should that be in view.
 Result<calib::Board> calibration_board(const Rig& rig);
 
 /// One pose of whatever stands before the devices of `around`, into the captures' folder; the projectors'
 /// latencies as the rig has them.
-Status captured_once(const calib::Captures& captures, const Rig& rig, const Surroundings& around);
+Status captured_once(const calib::CaptureSet& captures, const Rig& rig, const Surroundings& around);
 
 /// The prototype as it stands, captured once by devices that are open already (those of `around`, with the
 /// names and in the order of the rig's; of it stage, written and use_latency are needed), against the rig.
@@ -55,7 +55,7 @@ Result<Rechecked> rechecked_in_place(const Rig& rig,
                                      const std::filesystem::path& folder,
                                      const std::function<bool()>& goes_on = {});
 
-/// How many pictures that shows.
-int recheck_pictures(const Rig& rig);
+/// How many images that shows.
+int recheck_images(const Rig& rig);
 
 }  // namespace limn::apps

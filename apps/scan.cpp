@@ -6,7 +6,7 @@
 #include "apps/scan_files.h"
 #include "apps/virtual_capture.h"
 #include "apps/world_markers.h"
-#include "calib/captures.h"
+#include "calib/capture_set.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "core/rig.h"
@@ -48,13 +48,13 @@ Status run_scan(const ScanCommand& command) {
   std::filesystem::path folder = command.captures;
   if (!command.plan.empty()) {
     LIMN_TRY(const Plan plan, load_plan(command.plan));
-    LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_picture));
+    LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_image));
     sim::VirtualRig virtual_rig(std::move(world));
     folder = command.out / "captures";
     LIMN_TRY_STATUS(
         capture_prototype(plan, {virtual_rig.world().world_from_prototype}, &virtual_rig, folder));
   }
-  LIMN_TRY(const calib::Captures captures, calib::load_captures(folder));
+  LIMN_TRY(const calib::CaptureSet captures, calib::load_captures(folder));
   LIMN_TRY(const calib::Scan scan, written_scan(captures, rig, options_of(command), command.out));
   for (const std::string& warning : scan.warnings) log_warning("scan: {}", warning);
   if (command.json) {

@@ -9,7 +9,7 @@
 namespace limn::apps {
 
 struct ScanCommand {
-  std::filesystem::path captures;  ///< captures folder; with `plan` its pictures are taken first
+  std::filesystem::path captures;  ///< captures folder; with `plan` its images are taken first
   std::filesystem::path plan;      ///< limn.plan/1: the prototype of its world is captured on the virtual rig
   std::filesystem::path rig;
   std::filesystem::path out;

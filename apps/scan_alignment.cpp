@@ -11,9 +11,9 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/log.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "core/rig.h"
-#include "scene/drawn.h"
+#include "scene/scan_preview.h"
 #include "scene/marker_file.h"
 #include "scene/scene.h"
 #include "tracker/body_pose.h"
@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using Eigen::Vector3d;
 
-constexpr int k_picture_width = 1200, k_picture_height = 800;
+constexpr int k_image_width = 1200, k_image_height = 800;
 constexpr double k_residual_reach_m = 0.02;  // further from the mesh is another thing
 constexpr double k_colour_limit_mm = 2;      // end of the residual map's colours
 constexpr double k_symmetric = 0.9;          // a rival that explains this share of the best pose's points
@@ -64,7 +64,7 @@ Result<Start> start_from_picks(const fs::path& path, double metres_per_unit) {
 // CAMERA=PICTURE, read and of the camera's size.
 struct Shot {
   const Imager* camera = nullptr;
-  cv::Mat picture;
+  cv::Mat image;
 };
 Result<Shot> read_shot(const std::string& argument, const Rig& rig) {
   const auto equals = argument.find('=');
@@ -73,11 +73,11 @@ Result<Shot> read_shot(const std::string& argument, const Rig& rig) {
       std::find_if(rig.cameras.begin(), rig.cameras.end(), [&](const Imager& c) { return c.name == name; });
   if (equals == std::string::npos || camera == rig.cameras.end())
     return usage_error("--frame {}: expected CAMERA=PICTURE with a camera of the rig.", argument);
-  LIMN_TRY(cv::Mat picture, read_grey_picture(argument.substr(equals + 1)));
-  if (picture.cols != camera->width || picture.rows != camera->height)
+  LIMN_TRY(cv::Mat image, read_grey_image(argument.substr(equals + 1)));
+  if (image.cols != camera->width || image.rows != camera->height)
     return error("{}: expected a picture of {}'s size {}x{}, found {}x{}.", argument.substr(equals + 1), name,
-                 camera->width, camera->height, picture.cols, picture.rows);
-  return Shot{&*camera, std::move(picture)};
+                 camera->width, camera->height, image.cols, image.rows);
+  return Shot{&*camera, std::move(image)};
 }
 
 // Where a body stands in the frames, by all cameras' markers at once.
@@ -90,7 +90,7 @@ Result<Track> track_in_frames(const AlignOptions& command, const Body& body, con
   std::vector<std::vector<tracker::Detection>> detections;
   for (const std::string& frame : command.frames) {
     LIMN_TRY(Shot shot, read_shot(frame, rig));
-    detections.push_back(detector.detect(shot.picture, &shot.camera->lens));
+    detections.push_back(detector.detect(shot.image, &shot.camera->lens));
     shots.push_back(std::move(shot));
   }
   std::vector<tracker::View> views;
@@ -167,16 +167,16 @@ Result<std::optional<Start>> start_of(const AlignOptions& command, double metres
 
 Result<MeshAligned> align(const AlignOptions& command,
                           const scene::Mesh& mesh,
-                          const scene::SurfaceIndex& index,
-                          const scene::Surface& scan,
+                          const scene::MeshBvh& index,
+                          const scene::ScanSurface& scan,
                           const std::optional<Start>& start) {
   MeshAligned result;
   if (start) {
-    LIMN_TRY(result.alignment, calib::aligned(mesh, index, scan, start->world_from_prototype));
+    LIMN_TRY(result.alignment, calib::refined_registration(mesh, index, scan, start->world_from_prototype));
     result.how = start->how;
   } else {
     log_info("align: no start given, looking everywhere");
-    const auto found = calib::found_anywhere(mesh, index, scan);
+    const auto found = calib::global_registration(mesh, index, scan);
     if (!found) return error("{}: {}", command.scan.string(), found.message());
     result.alignment = found->alignment;
     result.how = "search";
@@ -208,7 +208,7 @@ std::string text_of(const calib::Difference& d) {
 nlohmann::ordered_json json_of(const MeshAligned& aligned,
                                const std::vector<calib::Difference>& differences,
                                double seconds) {
-  const calib::Alignment& a = aligned.alignment;
+  const calib::Registration& a = aligned.alignment;
   nlohmann::ordered_json json;
   json["schema"] = "limn.align/1";
   json["start"] = aligned.how;
@@ -234,12 +234,12 @@ nlohmann::ordered_json json_of(const MeshAligned& aligned,
 }
 
 // The scan's points near the mesh in the colours of their residuals, in the prototype's frame.
-scene::Surface coloured(const scene::Surface& scan,
+scene::ScanSurface coloured(const scene::ScanSurface& scan,
                         const std::vector<float>& residuals,
                         const Pose& world_from_prototype) {
   std::vector<bool> keep;
   for (const float residual : residuals) keep.push_back(!std::isnan(residual));
-  scene::Surface part = scan;
+  scene::ScanSurface part = scan;
   const Pose inverse = world_from_prototype.inverse();
   for (auto& p : part.positions) p = (inverse * p.cast<double>()).cast<float>();
   for (auto& n : part.normals) n = (inverse.rotation * n.cast<double>()).cast<float>();
@@ -247,10 +247,10 @@ scene::Surface coloured(const scene::Surface& scan,
   for (const float residual : residuals)
     part.colours_rgb.push_back(scene::signed_colour_rgb(
         std::isnan(residual) ? 0 : 1e3 * static_cast<double>(residual) / k_colour_limit_mm));
-  return scene::kept(part, keep);
+  return scene::with_vertices_kept(part, keep);
 }
 
-Status write_pictures(const scene::Surface& map, const fs::path& out) {
+Status write_images(const scene::ScanSurface& map, const fs::path& out) {
   Vector3d d_seen = Vector3d::Zero();
   for (const auto& n : map.normals) d_seen += n.cast<double>();
   d_seen.normalize();
@@ -258,8 +258,8 @@ Status write_pictures(const scene::Surface& map, const fs::path& out) {
   const std::string caption = "scan over the CAD: red stands outside, blue inside";
   for (const auto& [name, turn] : {std::pair{"residual.png", 0.0}, std::pair{"residual-side.png", 0.9}}) {
     const Vector3d d_from = Eigen::AngleAxisd(turn, up) * d_seen;
-    const auto viewer = scene::viewer_of(map, d_from, up, k_picture_width, k_picture_height);
-    LIMN_TRY_STATUS(write_png(out / name, scene::with_scale(scene::drawn(map, viewer), -k_colour_limit_mm,
+    const auto viewer = scene::viewer_of(map, d_from, up, k_image_width, k_image_height);
+    LIMN_TRY_STATUS(write_png(out / name, scene::with_scale(scene::draw_scan_preview(map, viewer), -k_colour_limit_mm,
                                                             k_colour_limit_mm, caption)));
   }
   return {};
@@ -303,10 +303,10 @@ Result<MeshAligned> written_alignment(const AlignOptions& command) {
   LIMN_TRY(const auto start, start_of(command, *metres));
   if (command.scan.empty()) return written_markers_pose(*start, command, 1e-3 * milliseconds_since(begun));
   const fs::path file = fs::is_directory(command.scan) ? command.scan / "mesh.ply" : command.scan;
-  LIMN_TRY(const scene::Surface scan, scene::load_ply(file, *scan_metres));
+  LIMN_TRY(const scene::ScanSurface scan, scene::load_ply(file, *scan_metres));
   if (const Status sizes = calib::comparable_sizes(mesh, scan); !sizes)
     return error("{}: {}", (command.mesh.empty() ? command.scene : command.mesh).string(), sizes.message());
-  const scene::SurfaceIndex index(mesh);
+  const scene::MeshBvh index(mesh);
   LIMN_TRY(MeshAligned aligned, align(command, mesh, index, scan, start));
   const auto residuals = calib::residuals(index, scan, aligned.alignment, k_residual_reach_m);
   const auto differences =
@@ -318,9 +318,9 @@ Result<MeshAligned> written_alignment(const AlignOptions& command) {
         fmt::format("{} smaller regions differ, too: see align.json", differences.size() - k_told));
 
   LIMN_TRY_STATUS(make_folder(command.out));
-  const scene::Surface map = coloured(scan, residuals, aligned.alignment.world_from_prototype);
+  const scene::ScanSurface map = coloured(scan, residuals, aligned.alignment.world_from_prototype);
   LIMN_TRY_STATUS(scene::save_ply(map, command.out / "residual.ply"));
-  LIMN_TRY_STATUS(write_pictures(map, command.out));
+  LIMN_TRY_STATUS(write_images(map, command.out));
   LIMN_TRY_STATUS(write_file(command.out / "align.json",
                              json_of(aligned, differences, 1e-3 * milliseconds_since(begun)).dump(2) + "\n"));
   LIMN_TRY_STATUS(write_pose(aligned.alignment.world_from_prototype, command.out));

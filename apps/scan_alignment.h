@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "calib/surface/align.h"
+#include "calib/surface/registration.h"
 #include "core/result.h"
 
 namespace limn::apps {
@@ -27,7 +27,7 @@ struct AlignOptions {
 
 /// Where a mesh was found to stand.
 struct MeshAligned {
-  calib::Alignment alignment;
+  calib::Registration alignment;
   std::string how;                    ///< what it started from
   std::vector<std::string> warnings;  ///< symmetric or free shapes, and where the CAD and the scan differ
 };

@@ -9,13 +9,13 @@
 #include "apps/live/stopwatch.h"
 #include "core/config.h"
 #include "core/file.h"
-#include "core/picture.h"
-#include "scene/drawn.h"
+#include "core/image_io.h"
+#include "scene/scan_preview.h"
 
 namespace limn::apps {
 namespace {
 
-constexpr int k_picture_width = 1200, k_picture_height = 800;
+constexpr int k_image_width = 1200, k_image_height = 800;
 constexpr double k_deviation_limit_mm = 0.5;  // end of the colours of the deviation map
 
 double percentile(std::vector<float> values, double share) {
@@ -49,7 +49,7 @@ nlohmann::ordered_json view_json(const calib::ScanView& seen) {
 }
 
 nlohmann::ordered_json scan_json(const calib::Scan& scan, double seconds) {
-  const scene::Pieces pieces = scene::pieces_of(scan.mesh);
+  const scene::ConnectedComponents pieces = scene::connected_components(scan.mesh);
   double area = 0;
   for (const double piece : pieces.areas) area += piece;
   nlohmann::ordered_json json;
@@ -77,35 +77,35 @@ nlohmann::ordered_json scan_json(const calib::Scan& scan, double seconds) {
   return json;
 }
 
-// The camera's own picture of what it measured: lit from beside it, nothing where there is no point.
+// The camera's own image of what it measured: lit from beside it, nothing where there is no point.
 cv::Mat shaded(const calib::RangeView& view) {
   const Eigen::Vector3d d_light =
       view.camera.imager_from_world.rotation.conjugate() * Eigen::Vector3d(-0.45, -0.6, -1).normalized();
-  cv::Mat picture(view.range.size(), CV_8UC3, cv::Scalar(46, 42, 40));
-  for (int y = 0; y < picture.rows; ++y)
-    for (int x = 0; x < picture.cols; ++x) {
+  cv::Mat image(view.range.size(), CV_8UC3, cv::Scalar(46, 42, 40));
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols; ++x) {
       if (!view.has(x, y)) continue;
       const auto& n = view.d_normal.at<cv::Vec3f>(y, x);
       const double light = 40 + 190 * std::max(0.0, d_light.dot(Eigen::Vector3d(n[0], n[1], n[2])));
-      picture.at<cv::Vec3b>(y, x) = cv::Vec3b::all(static_cast<uchar>(light));
+      image.at<cv::Vec3b>(y, x) = cv::Vec3b::all(static_cast<uchar>(light));
     }
-  return picture;
+  return image;
 }
 
-// The camera's picture with the standard deviation of each point as a colour.
+// The camera's image with the standard deviation of each point as a colour.
 cv::Mat deviation(const calib::RangeView& view) {
-  cv::Mat picture(view.range.size(), CV_8UC3, cv::Scalar(46, 42, 40));
-  for (int y = 0; y < picture.rows; ++y)
-    for (int x = 0; x < picture.cols; ++x) {
+  cv::Mat image(view.range.size(), CV_8UC3, cv::Scalar(46, 42, 40));
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols; ++x) {
       if (!view.has(x, y)) continue;
       const auto rgb = scene::signed_colour_rgb(1e3 * static_cast<double>(view.stddev.at<float>(y, x)) /
                                                 k_deviation_limit_mm);
-      picture.at<cv::Vec3b>(y, x) = {rgb[2], rgb[1], rgb[0]};
+      image.at<cv::Vec3b>(y, x) = {rgb[2], rgb[1], rgb[0]};
     }
-  return scene::with_scale(picture, 0, k_deviation_limit_mm, "standard deviation of the range");
+  return scene::with_scale(image, 0, k_deviation_limit_mm, "standard deviation of the range");
 }
 
-Status write_pictures(const calib::Scan& scan, const std::filesystem::path& out) {
+Status write_images(const calib::Scan& scan, const std::filesystem::path& out) {
   for (const calib::ScanView& seen : scan.views) {
     const std::string name = seen.pose + "-" + seen.camera + ".png";
     LIMN_TRY_STATUS(write_png(out / ("shaded-" + name), shaded(seen.view)));
@@ -115,20 +115,20 @@ Status write_pictures(const calib::Scan& scan, const std::filesystem::path& out)
   const Eigen::Quaterniond world_from_camera = camera_from_world.rotation.conjugate();
   const Eigen::Vector3d d_from =
       world_from_camera * Eigen::Vector3d(0.5, -0.35, -1);  // beside the camera, above it
-  const scene::Pieces pieces = scene::pieces_of(scan.mesh);
+  const scene::ConnectedComponents pieces = scene::connected_components(scan.mesh);
   std::vector<bool> largest;
   for (const int piece : pieces.of_vertex) largest.push_back(piece == 0);
   const Imager viewer =
-      scene::viewer_of(scene::kept(scan.mesh, largest), d_from, world_from_camera * Eigen::Vector3d(0, -1, 0),
-                       k_picture_width, k_picture_height);
-  return write_png(out / "mesh.png", scene::drawn(scan.mesh, viewer));
+      scene::viewer_of(scene::with_vertices_kept(scan.mesh, largest), d_from, world_from_camera * Eigen::Vector3d(0, -1, 0),
+                       k_image_width, k_image_height);
+  return write_png(out / "mesh.png", scene::draw_scan_preview(scan.mesh, viewer));
 }
 
 Status write_scan(const calib::Scan& scan, double seconds, const std::filesystem::path& out) {
   LIMN_TRY_STATUS(make_folder(out));
   LIMN_TRY_STATUS(scene::save_ply(scan.points, out / "points.ply"));
   LIMN_TRY_STATUS(scene::save_ply(scan.mesh, out / "mesh.ply"));
-  LIMN_TRY_STATUS(write_pictures(scan, out));
+  LIMN_TRY_STATUS(write_images(scan, out));
   return write_file(out / "scan.json", scan_json(scan, seconds).dump(2) + "\n");
 }
 
@@ -138,12 +138,12 @@ double stddev_mm(const calib::Scan& scan, double share) {
   return 1e3 * percentile(scan.points.stddevs, share);
 }
 
-Result<calib::Scan> written_scan(const calib::Captures& captures,
+Result<calib::Scan> written_scan(const calib::CaptureSet& captures,
                                  const Rig& rig,
                                  const calib::ScanOptions& options,
                                  const std::filesystem::path& out) {
   const auto begun = std::chrono::steady_clock::now();
-  LIMN_TRY(calib::Scan scan, calib::scanned(captures, rig, options));
+  LIMN_TRY(calib::Scan scan, calib::scan_captures(captures, rig, options));
   LIMN_TRY_STATUS(write_scan(scan, 1e-3 * milliseconds_since(begun), out));
   return scan;
 }

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "calib/captures.h"
+#include "calib/capture_set.h"
 #include "calib/surface/scan.h"
 #include "core/result.h"
 #include "core/rig.h"
@@ -10,8 +10,8 @@
 namespace limn::apps {
 
 /// Measures the surface as calib::scanned does and writes points.ply, mesh.ply (metres, the rig's world),
-/// scan.json and pictures into `out`. Everything is measured before the first file is written.
-Result<calib::Scan> written_scan(const calib::Captures& captures,
+/// scan.json and images into `out`. Everything is measured before the first file is written.
+Result<calib::Scan> written_scan(const calib::CaptureSet& captures,
                                  const Rig& rig,
                                  const calib::ScanOptions& options,
                                  const std::filesystem::path& out);

@@ -3,15 +3,15 @@
 #include <algorithm>
 #include <opencv2/core.hpp>
 
-#include "core/response.h"
+#include "core/photometric_response.h"
 
 namespace limn {
 
-cv::Mat srgb_picture(const cv::Mat& linear) {
+cv::Mat srgb_image(const cv::Mat& linear) {
   static const cv::Mat table = [] {
     cv::Mat values(1, 256, CV_8UC1);
     for (int i = 0; i < 256; ++i)
-      values.at<std::uint8_t>(0, i) = cv::saturate_cast<std::uint8_t>(255 * srgb_of_linear(i / 255.0));
+      values.at<std::uint8_t>(0, i) = cv::saturate_cast<std::uint8_t>(255 * srgb_from_linear(i / 255.0));
     return values;
   }();
   cv::Mat out;

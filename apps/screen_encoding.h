@@ -6,10 +6,10 @@
 
 namespace limn {
 
-/// An 8-bit picture whose values are proportional to light, as screens want it: sRGB.
-cv::Mat srgb_picture(const cv::Mat& linear);
+/// An 8-bit image whose values are proportional to light, as screens want it: sRGB.
+cv::Mat srgb_image(const cv::Mat& linear);
 
-/// Whether a response was measured of the camera and is linear: then its pictures are too dark for screens.
+/// Whether a response was measured of the camera and is linear: then its images are too dark for screens.
 bool is_measured_linear(const Rig& rig, const Imager& camera);
 
 }  // namespace limn

@@ -9,9 +9,9 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/log.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "core/rig.h"
-#include "sim/photograph.h"
+#include "sim/sensor_model.h"
 #include "sim/truth.h"
 #include "sim/world.h"
 
@@ -21,8 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-// The pictures to shine, one per projector; those not named stay black.
-Result<std::vector<cv::Mat>> shown_pictures(const std::vector<std::string>& show, const Rig& rig) {
+// The images to shine, one per projector; those not named stay black.
+Result<std::vector<cv::Mat>> shown_images(const std::vector<std::string>& show, const Rig& rig) {
   std::vector<cv::Mat> shown(rig.projectors.size());
   for (const std::string& text : show) {
     const std::size_t equals = text.find('=');
@@ -34,12 +34,12 @@ Result<std::vector<cv::Mat>> shown_pictures(const std::vector<std::string>& show
           "--show: expected PROJECTOR=PICTURE with a projector of the world, found '{}'. Try --show "
           "projector0=picture.png.",
           text);
-    LIMN_TRY(const cv::Mat picture, read_picture(text.substr(equals + 1)));
-    if (picture.cols != projector->width || picture.rows != projector->height)
+    LIMN_TRY(const cv::Mat image, read_image(text.substr(equals + 1)));
+    if (image.cols != projector->width || image.rows != projector->height)
       return error("{}: expected {}x{}, the size of {}, found {}x{}. Draw it at the projector's size.",
-                   text.substr(equals + 1), projector->width, projector->height, name, picture.cols,
-                   picture.rows);
-    shown[static_cast<std::size_t>(projector - rig.projectors.begin())] = picture;
+                   text.substr(equals + 1), projector->width, projector->height, name, image.cols,
+                   image.rows);
+    shown[static_cast<std::size_t>(projector - rig.projectors.begin())] = image;
   }
   return shown;
 }
@@ -69,7 +69,7 @@ Result<std::vector<std::string>> chosen_variants(const std::string& text, const 
 
 ordered_json pose_json(const Pose& pose) { return ordered_json(to_json(pose)); }
 
-// Outer corners of the black square, pixel per camera; whether each is in the picture with nothing before it.
+// Outer corners of the black square, pixel per camera; whether each is in the image with nothing before it.
 ordered_json marker_json(const sim::World& world, const sim::Truth& truth, const sim::PlacedMarker& marker) {
   const Pose world_from_marker = *sim::world_from_marker(world, marker.marker);
   ordered_json json = {{"name", marker.marker.text()},
@@ -130,11 +130,11 @@ Status shoot(Shooting& shooting,
              const std::string& what) {
   const fs::path file = out / (shooting.camera + "-" + what + ".png");
   const auto begin = std::chrono::steady_clock::now();
-  const cv::Mat picture = sim::photograph(world, shooting.samples, shown, world.seed + ++shooting.shots);
+  const cv::Mat image = sim::photograph(world, shooting.samples, shown, world.seed + ++shooting.shots);
   const double shot_ms =
       1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  LIMN_TRY_STATUS(write_png(file, picture));
-  fmt::print("{}  {}x{}, shot in {:.0f} ms\n", file.string(), picture.cols, picture.rows, shot_ms);
+  LIMN_TRY_STATUS(write_png(file, image));
+  fmt::print("{}  {}x{}, shot in {:.0f} ms\n", file.string(), image.cols, image.rows, shot_ms);
   return {};
 }
 
@@ -161,8 +161,8 @@ Status shoot_camera(const sim::World& world,
 }  // namespace
 
 Status run_simulate(const SimulateOptions& options) {
-  LIMN_TRY(sim::World world, sim::load_world(options.world, marker_picture));
-  LIMN_TRY(const std::vector<cv::Mat> shown, shown_pictures(options.show, world.rig));
+  LIMN_TRY(sim::World world, sim::load_world(options.world, marker_image));
+  LIMN_TRY(const std::vector<cv::Mat> shown, shown_images(options.show, world.rig));
   LIMN_TRY(const std::vector<std::string> variants, chosen_variants(options.variants, world));
   LIMN_TRY_STATUS(make_folder(options.out));
   const scene::PosedScene parts = sim::true_poses(world, variants);

@@ -6,14 +6,14 @@
 #include <string>
 #include <vector>
 
-#include "calib/lens_choice.h"
+#include "calib/model_selection.h"
 #include "calib/report/report.h"
 
 namespace limn::apps {
 namespace {
 
-void print_lenses(const std::vector<calib::LensTrial>& trials) {
-  for (const calib::LensTrial& trial : trials)
+void print_lenses(const std::vector<calib::ModelTrial>& trials) {
+  for (const calib::ModelTrial& trial : trials)
     fmt::print("{:<14} {:<20} {}{}\n", trial.device, trial.model,
                std::isfinite(trial.held_out_px) ? fmt::format("held-out {:.3f} px", trial.held_out_px)
                                                 : "no solution",
@@ -29,7 +29,7 @@ void print_report(const calib::Report& report) {
   fmt::print("{:<14} {:>8} {:>9}\n", "held-out pose", "RMS px", "cells");
   for (const calib::HeldOutPose& pose : assessment.held_out.poses)
     fmt::print("{:<14} {:>8.3f} {:>9}\n", pose.pose, pose.rms_px, pose.cells);
-  for (const calib::LengthCheck& check : report.known_lengths) {
+  for (const calib::ScaleBarCheck& check : report.scale_bar_lengths) {
     if (!check.views.empty())
       fmt::print("length {} to {}: expected {:.2f} mm, measured {:.2f} mm, deviation {:.2f} mm\n",
                  check.known.from, check.known.to, 1e3 * check.known.length_m, 1e3 * check.measured_m,
@@ -37,14 +37,14 @@ void print_report(const calib::Report& report) {
   }
   for (const calib::Fault& fault : assessment.faults)
     fmt::print("fault {}: {}; {}.\n", fault.name, fault.evidence, fault.advice);
-  for (const std::string& sentence : report.words.advice) fmt::print("advice: {}\n", sentence);
+  for (const std::string& sentence : report.explanation.advice) fmt::print("advice: {}\n", sentence);
   fmt::print("held-out {:.3f} px RMS, worst {:.3f} px; decoded {:.0f} %\n{}\n", assessment.held_out.rms_px,
-             assessment.held_out.worst_px, 100 * assessment.decoded_share, report.words.verdict);
+             assessment.held_out.worst_px, 100 * assessment.decoded_share, report.explanation.verdict);
 }
 
 }  // namespace
 
-Status run_solve(const SolveOptions& options, bool is_json) {
+Status run_solve(const SolveCommandOptions& options, bool is_json) {
   LIMN_TRY(const calib::Report report, solved(options));
   if (is_json) {
     fmt::print("{}", calib::report_json(report));

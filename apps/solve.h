@@ -6,6 +6,6 @@
 namespace limn::apps {
 
 /// `limn solve`: as solved(), and prints a table; `is_json`: report.json instead.
-Status run_solve(const SolveOptions& options, bool is_json = false);
+Status run_solve(const SolveCommandOptions& options, bool is_json = false);
 
 }  // namespace limn::apps

@@ -6,16 +6,16 @@
 
 #include "apps/known_lengths.h"
 #include "apps/pixel_size.h"
-#include "calib/captures.h"
+#include "calib/capture_set.h"
 #include "calib/judge/assess.h"
 #include "calib/judge/board_check.h"
 #include "calib/judge/capture_faults.h"
-#include "calib/judge/picture_check.h"
-#include "calib/lens_choice.h"
+#include "calib/judge/image_check.h"
+#include "calib/model_selection.h"
 #include "calib/observations.h"
 #include "calib/report/failed_report.h"
 #include "calib/report/report.h"
-#include "calib/response/response.h"
+#include "calib/response/measure_response.h"
 #include "calib/response/vignetting.h"
 #include "calib/solve.h"
 #include "core/file.h"
@@ -33,7 +33,7 @@ double seconds_since(Clock::time_point begun) {
   return std::chrono::duration<double>(Clock::now() - begun).count();
 }
 
-Result<calib::Captures> foreign_captures(const SolveOptions& options) {
+Result<calib::CaptureSet> foreign_captures(const SolveCommandOptions& options) {
   if (options.import_format != "opencv-gray")
     return usage_error("--import: expected opencv-gray, found '{}'.", options.import_format);
   if (options.projector.empty() || options.board.empty())
@@ -46,14 +46,14 @@ Result<calib::Captures> foreign_captures(const SolveOptions& options) {
       {options.captures, size.width, size.height, *board, options.poses, options.shots, options.skip_poses});
 }
 
-Result<calib::Captures> captures_of(const SolveOptions& options) {
+Result<calib::CaptureSet> captures_of(const SolveCommandOptions& options) {
   if (!options.import_format.empty()) return foreign_captures(options);
   if (!options.projector.empty() || !options.board.empty())
     return usage_error("--projector and --board describe foreign captures: they need --import opencv-gray.");
   return calib::load_captures(options.captures, options.skip_poses);
 }
 
-Status check_models(const SolveOptions& options) {
+Status check_models(const SolveCommandOptions& options) {
   for (const std::string& name : {options.camera_model, options.projector_model}) {
     if (name == calib::k_auto_lens) continue;
     if (const auto model = LensModel::parse(name); !model) return usage_error("{}", model.message());
@@ -63,23 +63,23 @@ Status check_models(const SolveOptions& options) {
 
 // The known lengths as light measures them; what is wrong with them is a fault, and nothing with a fault of
 // scale is good.
-Status check_lengths(const calib::Captures& captures,
-                     const std::vector<calib::KnownLength>& lengths,
+Status check_lengths(const calib::CaptureSet& captures,
+                     const std::vector<calib::ScaleBar>& lengths,
                      calib::Report* report) {
   if (lengths.empty()) return {};
-  LIMN_TRY(const auto marks, seen_marks(captures, report->solution.rig, lengths));
+  LIMN_TRY(const auto marks, scale_bar_marks(captures, report->solution.rig, lengths));
   const double widened = std::max(1.0, report->assessment.pulls.held_out.stddev);
-  LIMN_TRY(report->known_lengths,
-           calib::measured_lengths(captures, report->solution, marks, lengths, widened));
-  for (const calib::LengthCheck& check : report->known_lengths) {
-    if (const auto fault = calib::fault_of(check, captures.board))
+  LIMN_TRY(report->scale_bar_lengths,
+           calib::measure_scale_bars(captures, report->solution, marks, lengths, widened));
+  for (const calib::ScaleBarCheck& check : report->scale_bar_lengths) {
+    if (const auto fault = calib::scale_fault(check, captures.board))
       calib::add_faults({*fault}, &report->assessment);
   }
   return {};
 }
 
 // What kept a rig from being made, with the faults that explain it; they also stand in report.json.
-Error explained(const Error& failure, const std::vector<calib::Fault>& faults, const SolveOptions& options) {
+Error explained(const Error& failure, const std::vector<calib::Fault>& faults, const SolveCommandOptions& options) {
   if (faults.empty()) return failure;
   if (const auto written = calib::write_failed_report(failure.message, faults, options.out); !written)
     log_warning("{}", written.message());
@@ -87,7 +87,7 @@ Error explained(const Error& failure, const std::vector<calib::Fault>& faults, c
 }
 
 // What the rig says against the one that it replaces.
-void compare_with_earlier(const SolveOptions& options,
+void compare_with_earlier(const SolveCommandOptions& options,
                           const calib::Solution& solution,
                           calib::Assessment* assessment) {
   if (!std::filesystem::exists(options.out / "rig.json")) return;
@@ -97,9 +97,9 @@ void compare_with_earlier(const SolveOptions& options,
 
 // What the lit boards say of how light falls off towards corners; only cameras whose encoding is known can
 // tell.
-Status measure_vignetting(const calib::Captures& captures,
+Status measure_vignetting(const calib::CaptureSet& captures,
                           const calib::Report& report,
-                          Responses* responses) {
+                          RigResponses* responses) {
   if (responses->cameras.empty()) return {};
   LIMN_TRY(const auto light,
            calib::paper_light(captures, report.observed.observations, report.solution, responses->cameras));
@@ -109,13 +109,13 @@ Status measure_vignetting(const calib::Captures& captures,
 
 }  // namespace
 
-Result<calib::Report> solved(const SolveOptions& options) {
+Result<calib::Report> solved(const SolveCommandOptions& options) {
   const auto begun = Clock::now();
   LIMN_TRY_STATUS(check_models(options));
-  LIMN_TRY(const calib::Captures captures, captures_of(options));
-  LIMN_TRY(const auto lengths, known_lengths(captures, options.known_lengths));
-  LIMN_TRY_STATUS(calib::check_pictures(captures));
-  LIMN_TRY(calib::MeasuredResponse response, calib::measured_response(captures));
+  LIMN_TRY(const calib::CaptureSet captures, captures_of(options));
+  LIMN_TRY(const auto lengths, scale_bar_lengths(captures, options.scale_bar_lengths));
+  LIMN_TRY_STATUS(calib::check_images(captures));
+  LIMN_TRY(calib::MeasuredResponse response, calib::measure_response(captures));
   for (const std::string& warning : response.warnings) log_warning("response: {}", warning);
   const double response_seconds = seconds_since(begun);
   LIMN_TRY(calib::Observed observed, calib::observe(captures));
@@ -125,7 +125,7 @@ Result<calib::Report> solved(const SolveOptions& options) {
   solving.camera_model = options.camera_model;
   solving.projector_model = options.projector_model;
   const auto solving_begun = Clock::now();
-  auto choice = calib::solve_choosing_lenses(observed.observations, solving);
+  auto choice = calib::solve_selecting_models(observed.observations, solving);
   if (!choice) return explained(choice.error(), calib::unsolved_faults(observed), options);
   solving = choice->options;
   calib::Solution* const solution = &choice->solution;
@@ -146,7 +146,7 @@ Result<calib::Report> solved(const SolveOptions& options) {
                        std::move(choice->trials)};
   LIMN_TRY_STATUS(measure_vignetting(captures, report, &response.responses));
   LIMN_TRY_STATUS(check_lengths(captures, lengths, &report));
-  report.words = calib::in_words(report.observed, report.solution, report.assessment);
+  report.explanation = calib::explain(report.observed, report.solution, report.assessment);
   report.made_at = time_now();
   report.history = calib::read_history(options.out);
   LIMN_TRY_STATUS(calib::write_rig_folder(report, solving, options.out));

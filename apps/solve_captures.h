@@ -9,7 +9,7 @@
 
 namespace limn::apps {
 
-struct SolveOptions {
+struct SolveCommandOptions {
   std::filesystem::path captures;
   std::filesystem::path out;
   std::vector<std::string> skip_poses = {};  ///< names of poses to leave out
@@ -18,7 +18,7 @@ struct SolveOptions {
   std::string projector_model = "auto";
   /// Lengths that the cameras can see, "apriltag_36h11:3 apriltag_36h11:7 250mm" each, besides
   /// capture.json's.
-  std::vector<std::string> known_lengths = {};
+  std::vector<std::string> scale_bar_lengths = {};
 
   std::string import_format = {};  ///< "opencv-gray": somebody else's captures; then also
   std::string projector = {};      ///< the projector's size, "1024x768"
@@ -29,6 +29,6 @@ struct SolveOptions {
 
 /// Captures -> rig folder (rig.json, .cameramodel files, report.json, report.html, observations.json).
 /// Nothing is written unless everything is solved.
-Result<calib::Report> solved(const SolveOptions& options);
+Result<calib::Report> solved(const SolveCommandOptions& options);
 
 }  // namespace limn::apps

@@ -2,7 +2,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "sim/photograph.h"
+#include "sim/sensor_model.h"
 
 namespace limn::apps {
 
@@ -12,23 +12,23 @@ cv::Mat binned(const cv::Mat& fine, int factor) {
   return out;
 }
 
-TracedEye::TracedEye(const sim::World& stage, const Imager& viewer, int rays) : finer(rays), world(stage) {
+ReferenceView::ReferenceView(const sim::World& stage, const Imager& viewer, int rays) : finer(rays), world(stage) {
   world.rig.cameras = {resized(viewer, rays * viewer.width, rays * viewer.height).value()};
   world.camera_effects = {sim::CameraEffects{.colour = true}};
   samples = sim::trace(world, 0);
 }
 
-cv::Mat TracedEye::seen(const sim::World& projectors, const std::vector<cv::Mat>& shown) const {
+cv::Mat ReferenceView::seen(const sim::World& projectors, const std::vector<cv::Mat>& shown) const {
   return binned(sim::ideal_light(projectors, samples, shown), finer);
 }
 
-cv::Mat TracedEye::seen(std::size_t projector, const cv::Mat& shown) const {
+cv::Mat ReferenceView::seen(std::size_t projector, const cv::Mat& shown) const {
   std::vector<cv::Mat> all(world.rig.projectors.size());
   all[projector] = shown;
   return seen(all);
 }
 
-std::vector<cv::Mat> TracedEye::reaches() const {
+std::vector<cv::Mat> ReferenceView::reaches() const {
   std::vector<cv::Mat> reaches;
   for (std::size_t i = 0; i < world.rig.projectors.size(); ++i) {
     const Imager& projector = world.rig.projectors[i];

@@ -3,10 +3,10 @@
 #include <filesystem>
 #include <vector>
 
-#include "apps/picture_writer.h"
+#include "apps/image_writer.h"
 #include "apps/plan.h"
 #include "calib/capture.h"
-#include "calib/captures.h"
+#include "calib/capture_set.h"
 #include "core/result.h"
 #include "sim/virtual_rig.h"
 
@@ -16,15 +16,15 @@ namespace limn::apps {
 sim::Object board_object(const calib::Board& board, const Pose& world_from_board);
 
 /// The captures folder that a plan makes of this rig, still without poses.
-Result<calib::Captures> planned(const Plan& plan,
+Result<calib::CaptureSet> planned(const Plan& plan,
                                 const sim::VirtualRig& rig,
                                 const std::filesystem::path& out);
 
-/// The rig's devices as calib asks for them; pictures go to `writer`.
-calib::Stage stage_of(sim::VirtualRig* rig, PictureWriter* writer, calib::Tell tell);
+/// The rig's devices as calib asks for them; images go to `writer`.
+calib::CaptureBackend stage_of(sim::VirtualRig* rig, ImageWriter* writer, calib::ReportProgress tell);
 
-/// Captures the response pictures of whatever stands before the rig.
-Status capture_lit(const calib::Captures& captures, sim::VirtualRig* rig);
+/// Captures the response images of whatever stands before the rig.
+Status capture_lit(const calib::CaptureSet& captures, sim::VirtualRig* rig);
 
 /// Captures every pose of the plan with the board in a virtual rig, whose prototype is put away meanwhile.
 Status capture_virtually(const Plan& plan, sim::VirtualRig* rig, const std::filesystem::path& out);

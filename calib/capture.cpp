@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 
 namespace limn::calib {
 namespace {
@@ -16,30 +16,30 @@ nlohmann::ordered_json devices_json(const std::vector<CapturedDevice>& devices) 
 }
 
 // patterns.json for the first projector's size, patterns-NAME.json for projectors of other sizes.
-std::string patterns_file(const Captures& plan, size_t projector) {
+std::string patterns_file(const CaptureSet& plan, size_t projector) {
   if (plan.patterns[projector] == plan.patterns[0]) return "patterns.json";
   return "patterns-" + plan.projectors[projector].name + ".json";
 }
 
-Status capture_picture(const Captures& plan, int pose, int projector, int pattern, const Stage& stage) {
+Status capture_image(const CaptureSet& plan, int pose, int projector, int pattern, const CaptureBackend& backend) {
   for (int camera = 0; camera < static_cast<int>(plan.cameras.size()); ++camera) {
     const CapturedDevice& device = plan.cameras[static_cast<size_t>(camera)];
-    LIMN_TRY(const cv::Mat picture, stage.grab(camera));
-    if (picture.cols != device.width || picture.rows != device.height)
+    LIMN_TRY(const cv::Mat image, backend.grab(camera));
+    if (image.cols != device.width || image.rows != device.height)
       return error("{}: expected pictures of {}x{}, the camera gave {}x{}. Has its mode changed?",
-                   device.name, device.width, device.height, picture.cols, picture.rows);
-    LIMN_TRY_STATUS(stage.store(picture_path(plan, pose, projector, camera, pattern), picture));
+                   device.name, device.width, device.height, image.cols, image.rows);
+    LIMN_TRY_STATUS(backend.store(image_path(plan, pose, projector, camera, pattern), image));
   }
   return {};
 }
 
 }  // namespace
 
-Status store_now(const std::filesystem::path& path, const cv::Mat& picture) {
-  return write_png(path, picture, {.compression = 1});
+Status store_image_now(const std::filesystem::path& path, const cv::Mat& image) {
+  return write_png(path, image, {.compression = 1});
 }
 
-Status begin_captures(const Captures& plan) {
+Status begin_captures(const CaptureSet& plan) {
   const auto path = plan.folder / "capture.json";
   if (std::filesystem::exists(path))
     return error("{}: there are captures here already. Choose another folder, or remove this one.",
@@ -59,7 +59,7 @@ Status begin_captures(const Captures& plan) {
   return write_file(path, json.dump(2) + "\n");
 }
 
-Status capture_pose(const Captures& plan, int pose, const Stage& stage) {
+Status capture_pose(const CaptureSet& plan, int pose, const CaptureBackend& backend) {
   const int projectors = static_cast<int>(plan.projectors.size()),
             cameras = static_cast<int>(plan.cameras.size());
   int done = 0, total = 0;
@@ -67,12 +67,12 @@ Status capture_pose(const Captures& plan, int pose, const Stage& stage) {
   for (int projector = 0; projector < projectors; ++projector) {
     const Patterns& patterns = plan.patterns[static_cast<size_t>(projector)];
     for (int camera = 0; camera < cameras; ++camera)
-      LIMN_TRY_STATUS(make_folder(picture_path(plan, pose, projector, camera, 0).parent_path()));
+      LIMN_TRY_STATUS(make_folder(image_path(plan, pose, projector, camera, 0).parent_path()));
     for (int pattern = 0; pattern < patterns.count(); ++pattern) {
-      LIMN_TRY_STATUS(stage.show(projector, patterns.picture(pattern)));
-      LIMN_TRY_STATUS(capture_picture(plan, pose, projector, pattern, stage));
+      LIMN_TRY_STATUS(backend.show(projector, patterns.image(pattern)));
+      LIMN_TRY_STATUS(capture_image(plan, pose, projector, pattern, backend));
       done += cameras;
-      if (stage.tell) stage.tell(done, total);
+      if (backend.report_progress) backend.report_progress(done, total);
     }
   }
   return {};

@@ -13,11 +13,11 @@
 #include <optional>
 #include <thread>
 
-#include "calib/free_points.h"
+#include "calib/tie_points.h"
 #include "core/file.h"
 #include "core/frame.h"
 #include "core/log.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 
 namespace limn::calib {
 namespace {
@@ -198,13 +198,13 @@ void collect(const std::array<Vector2d, 4>& quad,
   }
 }
 
-// The mean of the projectors' white pictures: wherever any of them lights the board it is visible.
-Result<cv::Mat> lit_picture(const Captures& captures, size_t pose, size_t camera) {
+// The mean of the projectors' white images: wherever any of them lights the board it is visible.
+Result<cv::Mat> bright_image(const CaptureSet& captures, size_t pose, size_t camera) {
   const CapturedDevice& device = captures.cameras[camera];
   cv::Mat sum(device.height, device.width, CV_32F, cv::Scalar(0));
   for (size_t p = 0; p < captures.projectors.size(); ++p) {
     const auto& path =
-        captures.poses[pose].pictures[p][camera][static_cast<size_t>(captures.patterns[p].white())];
+        captures.poses[pose].images[p][camera][static_cast<size_t>(captures.patterns[p].white())];
     LIMN_TRY(const cv::Mat white, read_shot(path, device.width, device.height));
     cv::add(sum, white, sum, cv::noArray(), CV_32F);
   }
@@ -231,14 +231,14 @@ bool on_one_surface(const Decoded& decoded, int x, int y) {
   return least >= k_bright * most;
 }
 
-// Decoded pixels on a coarse grid over the whole picture.
+// Decoded pixels on a coarse grid over the whole image.
 std::vector<DensePixel> thinned(const Decoded& decoded, const std::vector<BoardCorner>& corners) {
   std::vector<cv::Point2f> px_corners, hull;
   for (const BoardCorner& corner : corners)
     px_corners.emplace_back(static_cast<float>(corner.px.x()), static_cast<float>(corner.px.y()));
   cv::convexHull(px_corners, hull);
   std::vector<DensePixel> dense;
-  constexpr double k_most = 5000;  // of a picture: an RMS to a percent, at some 10 us each
+  constexpr double k_most = 5000;  // of an image: an RMS to a percent, at some 10 us each
   const cv::Mat& labels = decoded.px_projector;
   const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(labels.cols * labels.rows / k_most))));
   for (int y = step / 2; y < labels.rows; y += step) {
@@ -260,14 +260,14 @@ double now() {
 }
 
 // A hundred fields: the lenses' edges want a few points each, and each point costs the solve time.
-constexpr FreePointOptions k_room_points{.columns = 12, .rows = 9};
+constexpr TiePointOptions k_room_points{.columns = 12, .rows = 9};
 
 // What one camera saw of one pose.
-Result<Observed> observe_pose(const Captures& captures, int pose, int camera, const DecodeOptions& options) {
+Result<Observed> observe_pose(const CaptureSet& captures, int pose, int camera, const DecodeOptions& options) {
   const auto at_pose = static_cast<size_t>(pose), at_camera = static_cast<size_t>(camera);
   Observed seen;
   const double started = now();
-  LIMN_TRY(const cv::Mat lit, lit_picture(captures, at_pose, at_camera));
+  LIMN_TRY(const cv::Mat lit, bright_image(captures, at_pose, at_camera));
   const std::vector<BoardCorner> corners = find_board(captures.board, lit);
   seen.seconds_board = now() - started;
   if (corners.empty()) return seen;
@@ -277,15 +277,15 @@ Result<Observed> observe_pose(const Captures& captures, int pose, int camera, co
   std::vector<Decoded> by_projector;
   for (size_t p = 0; p < captures.projectors.size(); ++p) {
     const CapturedDevice& device = captures.cameras[at_camera];
-    LIMN_TRY(Decoded decoded, decode(captures.patterns[p], captures.poses[at_pose].pictures[p][at_camera],
+    LIMN_TRY(Decoded decoded, decode(captures.patterns[p], captures.poses[at_pose].images[p][at_camera],
                                      device.width, device.height, options));
     const int projector = static_cast<int>(p);
     seen.decoded.push_back(
         {camera, projector, pose, decoded.lit, decoded.decoded, decoded.outliers, decoded.contrasted});
-    seen.health.push_back(decoded.health);
-    seen.health.back().camera = camera;
-    seen.health.back().projector = projector;
-    seen.health.back().pose = pose;
+    seen.quality.push_back(decoded.quality);
+    seen.quality.back().camera = camera;
+    seen.quality.back().projector = projector;
+    seen.quality.back().pose = pose;
     for (DensePixel pixel : thinned(decoded, corners)) {
       pixel.camera = camera;
       pixel.projector = projector;
@@ -310,41 +310,41 @@ void append(const Observed& seen, Observed* all) {
   const auto put = [](const auto& from, auto* to) { to->insert(to->end(), from.begin(), from.end()); };
   const int points = static_cast<int>(all->observations.points.size());
   put(seen.observations.points, &all->observations.points);
-  for (Sighting sighting : seen.observations.sightings) {
-    sighting.point += points;
-    all->observations.sightings.push_back(sighting);
+  for (TiePointObservation tie_observation : seen.observations.tie_observations) {
+    tie_observation.point += points;
+    all->observations.tie_observations.push_back(tie_observation);
   }
   put(seen.observations.corners, &all->observations.corners);
   put(seen.observations.matches, &all->observations.matches);
   put(seen.decoded, &all->decoded);
-  put(seen.health, &all->health);
+  put(seen.quality, &all->quality);
   put(seen.dense, &all->dense);
   all->seconds_board += seen.seconds_board;
   all->seconds_decode += seen.seconds_decode;
 }
 
 // A pose in which no camera sees the board shows the scene alone.
-Status observe_scenes(const Captures& captures,
+Status observe_scenes(const CaptureSet& captures,
                       const DecodeOptions& options,
-                      const std::function<bool()>& goes_on,
+                      const std::function<bool()>& should_continue,
                       Observed* observed) {
   for (size_t pose = 0; pose < captures.poses.size(); ++pose) {
     const bool has_board =
         std::any_of(observed->observations.corners.begin(), observed->observations.corners.end(),
-                    [&](const CornerSeen& corner) { return static_cast<size_t>(corner.pose) == pose; });
+                    [&](const CornerObservation& corner) { return static_cast<size_t>(corner.pose) == pose; });
     if (has_board) continue;
     const double started = now();
     std::vector<std::vector<Decoded>> decoded(captures.cameras.size());
     for (size_t camera = 0; camera < captures.cameras.size(); ++camera) {
       const CapturedDevice& device = captures.cameras[camera];
       for (size_t p = 0; p < captures.projectors.size(); ++p) {
-        if (goes_on && !goes_on()) return error("{}", k_ended);
-        LIMN_TRY(Decoded seen, decode(captures.patterns[p], captures.poses[pose].pictures[p][camera],
+        if (should_continue && !should_continue()) return error("{}", k_ended);
+        LIMN_TRY(Decoded seen, decode(captures.patterns[p], captures.poses[pose].images[p][camera],
                                       device.width, device.height, options));
         decoded[camera].push_back(std::move(seen));
       }
     }
-    add_free_points(decoded, static_cast<int>(pose), {}, &observed->observations);
+    add_tie_points(decoded, static_cast<int>(pose), {}, &observed->observations);
     observed->seconds_decode += now() - started;
   }
   return {};
@@ -352,9 +352,9 @@ Status observe_scenes(const Captures& captures,
 
 }  // namespace
 
-Result<Observed> observe(const Captures& captures,
+Result<Observed> observe(const CaptureSet& captures,
                          const DecodeOptions& options,
-                         const std::function<bool()>& goes_on) {
+                         const std::function<bool()>& should_continue) {
   Observed observed;
   observed.observations.board = captures.board;
   observed.observations.cameras = captures.cameras;
@@ -370,7 +370,7 @@ Result<Observed> observe(const Captures& captures,
   int done = 0;
   const auto work = [&] {
     for (int i = next++; i < count; i = next++) {
-      if (goes_on && !goes_on()) {
+      if (should_continue && !should_continue()) {
         parts[static_cast<size_t>(i)] = error("{}", k_ended);
         continue;
       }
@@ -387,7 +387,7 @@ Result<Observed> observe(const Captures& captures,
     LIMN_TRY_STATUS(part->ok() ? Status() : Status(part->error()));
     append(**part, &observed);
   }
-  LIMN_TRY_STATUS(observe_scenes(captures, options, goes_on, &observed));
+  LIMN_TRY_STATUS(observe_scenes(captures, options, should_continue, &observed));
   return observed;
 }
 
@@ -400,7 +400,7 @@ Observed joined(Observed first, Observed more) {
   shift(&more.observations.matches);
   shift(&more.observations.points);
   shift(&more.decoded);
-  shift(&more.health);
+  shift(&more.quality);
   shift(&more.dense);
   append(more, &first);
   auto& names = first.observations.poses;
@@ -441,21 +441,21 @@ Status save_observations(const Observations& observations, const std::filesystem
                                    "projector_y", "stddev_px", "pixels"}},
                                  {"point", {"camera", "pose", "x", "y"}},
                                  {"sighting", {"point", "by_projector", "imager", "x", "y", "stddev_px"}}};
-  for (const CornerSeen& c : observations.corners)
+  for (const CornerObservation& c : observations.corners)
     json["corners"].push_back({c.camera, c.pose, c.corner, c.px.x(), c.px.y(), c.stddev_px});
   for (const Match& m : observations.matches)
     json["matches"].push_back({m.camera, m.projector, m.pose, m.px_camera.x(), m.px_camera.y(),
                                m.px_projector.x(), m.px_projector.y(), m.stddev_px, m.pixels});
-  for (const FreePoint& p : observations.points)
+  for (const TiePoint& p : observations.points)
     json["points"].push_back({p.camera, p.pose, p.px_camera.x(), p.px_camera.y()});
-  for (const Sighting& s : observations.sightings)
+  for (const TiePointObservation& s : observations.tie_observations)
     json["sightings"].push_back({s.point, s.by_projector ? 1 : 0, s.imager, s.px.x(), s.px.y(), s.stddev_px});
   return write_file(path, json.dump() + "\n");
 }
 
 Observations without_pose(const Observations& observations, int pose) {
   Observations left = observations;
-  std::erase_if(left.corners, [&](const CornerSeen& corner) { return corner.pose == pose; });
+  std::erase_if(left.corners, [&](const CornerObservation& corner) { return corner.pose == pose; });
   std::erase_if(left.matches, [&](const Match& match) { return match.pose == pose; });
   return left;
 }

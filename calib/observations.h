@@ -7,14 +7,14 @@
 #include <vector>
 
 #include "calib/board/board_finder.h"
-#include "calib/captures.h"
+#include "calib/capture_set.h"
 #include "calib/code/decode.h"
 #include "core/result.h"
 
 namespace limn::calib {
 
-/// A board corner in a camera's picture.
-struct CornerSeen {
+/// A board corner in a camera's image.
+struct CornerObservation {
   int camera = 0;
   int pose = 0;
   int corner = 0;  ///< its id on the board
@@ -36,14 +36,14 @@ struct Match {
 
 /// A point of a scene, or of the room around a board, that no board tells the place of: a camera's pixel. Its
 /// distance is an unknown.
-struct FreePoint {
+struct TiePoint {
   int pose = 0;
   int camera = 0;
   Eigen::Vector2d px_camera = Eigen::Vector2d::Zero();
 };
 
-/// Where a projector or another camera sees a free point.
-struct Sighting {
+/// Where a projector or another camera sees a tie point.
+struct TiePointObservation {
   int point = 0;
   bool by_projector = true;
   int imager = 0;  ///< which projector or camera
@@ -57,13 +57,13 @@ struct Observations {
   std::vector<CapturedDevice> cameras;
   std::vector<CapturedDevice> projectors;
   std::vector<std::string> poses;
-  std::vector<CornerSeen> corners;
+  std::vector<CornerObservation> corners;
   std::vector<Match> matches;
-  std::vector<FreePoint> points;
-  std::vector<Sighting> sightings;  ///< those of a point stand together
+  std::vector<TiePoint> points;
+  std::vector<TiePointObservation> tie_observations;  ///< those of a point stand together
 };
 
-/// What became of one series of pictures.
+/// What became of one series of images.
 struct DecodeShare {
   int camera = 0;
   int projector = 0;
@@ -74,7 +74,7 @@ struct DecodeShare {
   int contrasted = 0;  ///< pixels that white alone makes brighter, lit by reflections or not (Decoded)
 };
 
-/// A camera pixel with its projector pixel, anywhere in the picture, on the board or off it: what the
+/// A camera pixel with its projector pixel, anywhere in the image, on the board or off it: what the
 /// epipolar residual is measured on. The solve does not see them.
 struct DensePixel {
   int camera = 0;
@@ -88,19 +88,19 @@ struct DensePixel {
 struct Observed {
   Observations observations;
   std::vector<DecodeShare> decoded;
-  std::vector<SeriesHealth> health;  ///< parallel to decoded
+  std::vector<CaptureQuality> quality;  ///< parallel to decoded
   double seconds_board = 0;
   double seconds_decode = 0;
-  std::vector<DensePixel> dense = {};  ///< on a coarse grid, some 5000 of a picture; none on edges
+  std::vector<DensePixel> dense = {};  ///< on a coarse grid, some 5000 of an image; none on edges
 };
 
 /// The corners and matches of all captures. Poses in which no camera sees the board are scene captures: they
-/// give free points (calib/free_points.h). A camera that does not see the board that another sees gives
-/// nothing. An unreadable picture is an error that names it.
-/// `goes_on` is asked between series of pictures, from any thread; false ends it with an error.
-Result<Observed> observe(const Captures& captures,
+/// give tie points (calib/tie_points.h). A camera that does not see the board that another sees gives
+/// nothing. An unreadable image is an error that names it.
+/// `should_continue` is asked between series of images, from any thread; false ends it with an error.
+Result<Observed> observe(const CaptureSet& captures,
                          const DecodeOptions& options = {},
-                         const std::function<bool()>& goes_on = {});
+                         const std::function<bool()>& should_continue = {});
 
 /// Both together: the poses of `more`, captures of the same board and devices, come after those of `first`.
 /// The same as observe() on all their poses at once, but for the order of observations.

@@ -7,7 +7,7 @@
 #include <map>
 #include <opencv2/calib3d.hpp>
 
-#include "calib/predict.h"
+#include "calib/measurement_model.h"
 
 namespace limn::calib {
 namespace {
@@ -41,7 +41,7 @@ Views views_of(const Observations& observations, int camera) {
   for (int pose = 0; pose < static_cast<int>(observations.poses.size()); ++pose) {
     std::vector<cv::Point3f> p_board;
     std::vector<cv::Point2f> px;
-    for (const CornerSeen& seen : observations.corners) {
+    for (const CornerObservation& seen : observations.corners) {
       if (seen.camera != camera || seen.pose != pose) continue;
       const Vector3d p = observations.board.p_corner(seen.corner);
       p_board.emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()), 0.F);
@@ -158,7 +158,7 @@ void place_remaining(const Observations& observations, Seed* into) {
     auto& world_from_board = into->world_from_board[static_cast<size_t>(pose)];
     if (world_from_board) continue;
     Observations only = observations;
-    std::erase_if(only.corners, [&](const CornerSeen& corner) { return corner.pose != pose; });
+    std::erase_if(only.corners, [&](const CornerObservation& corner) { return corner.pose != pose; });
     if (const auto found = board_pose_seed(only, rig)) world_from_board = *found;
   }
 }
@@ -178,7 +178,7 @@ Points points_of(const Observations& observations, const Seed& seeded, int proje
     if (!world_from_board) continue;
     const Imager& camera = seeded.cameras[static_cast<size_t>(match.camera)];
     Vector3d p;
-    if (!meet_board({camera.lens.model, camera.lens.values, camera.imager_from_world}, *world_from_board,
+    if (!intersect_board({camera.lens.model, camera.lens.values, camera.imager_from_world}, *world_from_board,
                     shape, Vector2d::Zero(), match.px_camera, &p))
       continue;
     points.p_world.push_back(p);
@@ -284,12 +284,12 @@ std::optional<LinearCamera> linear_camera(const std::vector<Vector3d>& p_world,
 
 Result<Pose> board_pose_seed(const Observations& observations, const Rig& rig) {
   std::vector<int> counts(rig.cameras.size(), 0);
-  for (const CornerSeen& seen : observations.corners) ++counts[static_cast<size_t>(seen.camera)];
+  for (const CornerObservation& seen : observations.corners) ++counts[static_cast<size_t>(seen.camera)];
   const auto best = static_cast<size_t>(std::max_element(counts.begin(), counts.end()) - counts.begin());
   const Imager& camera = rig.cameras[best];
   std::vector<cv::Point3d> p_board;
   std::vector<cv::Point2d> flat;  // on the plane z = 1
-  for (const CornerSeen& seen : observations.corners) {
+  for (const CornerObservation& seen : observations.corners) {
     const auto d = static_cast<size_t>(seen.camera) == best ? camera.lens.unproject(seen.px) : std::nullopt;
     if (!d || !(d->z() > 0)) continue;
     const Vector3d p = observations.board.p_corner(seen.corner);

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "calib/joint.h"
+#include "calib/bundle_adjustment.h"
 #include "calib/seed.h"
 
 namespace limn::calib {
@@ -38,15 +38,15 @@ double noise_of(const std::vector<Vector2d>& residuals) {
   return median_noise(std::move(deviations), Noise().corner_px);
 }
 
-// A point's own distance takes one of its sightings' degrees of freedom; of the others' sum of squares the
+// A point's own distance takes one of its tie-point observations' degrees of freedom; of the others' sum of squares the
 // median is Wilson's and Hilferty's.
 double sighting_noise(const Observations& observations, const std::vector<Vector2d>& residuals) {
   std::vector<double> deviations;
   for (size_t i = 0; i < residuals.size();) {
-    const int point = observations.sightings[i].point;
+    const int point = observations.tie_observations[i].point;
     double squares = 0;
     int degrees = -1;
-    for (; i < residuals.size() && observations.sightings[i].point == point; ++i) {
+    for (; i < residuals.size() && observations.tie_observations[i].point == point; ++i) {
       if (!residuals[i].allFinite()) continue;
       squares += residuals[i].squaredNorm();
       degrees += 2;
@@ -54,30 +54,30 @@ double sighting_noise(const Observations& observations, const std::vector<Vector
     if (degrees < 1) continue;
     deviations.push_back(std::sqrt(squares / degrees / std::pow(1 - 2.0 / (9 * degrees), 3)));
   }
-  return median_noise(std::move(deviations), Noise().sighting_px);
+  return median_noise(std::move(deviations), Noise().tie_point_px);
 }
 
-Solution solution_at(const Unknowns& unknowns, const Noise& noise, int steps) {
+Solution solution_at(const Parameters& parameters, const Noise& noise, int steps) {
   Solution solution;
-  solution.rig.cameras = unknowns.cameras;
-  solution.rig.projectors = unknowns.projectors;
-  solution.world_from_board = unknowns.world_from_board;
-  solution.bend_m = unknowns.bend_m;
+  solution.rig.cameras = parameters.cameras;
+  solution.rig.projectors = parameters.projectors;
+  solution.world_from_board = parameters.world_from_board;
+  solution.bend_m = parameters.bend_m;
   solution.corner_noise_px = noise.corner_px;
   solution.match_noise_px = noise.match_px;
-  solution.sighting_noise_px = noise.sighting_px;
+  solution.tie_point_noise_px = noise.tie_point_px;
   solution.iterations = steps;
   return solution;
 }
 
 Noise noise_of(const Solution& solution) {
-  return {solution.corner_noise_px, solution.match_noise_px, solution.sighting_noise_px};
+  return {solution.corner_noise_px, solution.match_noise_px, solution.tie_point_noise_px};
 }
 
-std::vector<std::optional<Eigen::Vector3d>> places_of(const Observations& observations, const Unknowns& at) {
+std::vector<std::optional<Eigen::Vector3d>> places_of(const Observations& observations, const Parameters& at) {
   std::vector<std::optional<Eigen::Vector3d>> places;
   for (size_t i = 0; i < observations.points.size(); ++i) {
-    const FreePoint& point = observations.points[i];
+    const TiePoint& point = observations.points[i];
     const Imager& camera = at.cameras[static_cast<size_t>(point.camera)];
     LensRay ray;
     const double inverse_depth = at.inverse_depths[i];
@@ -90,7 +90,7 @@ std::vector<std::optional<Eigen::Vector3d>> places_of(const Observations& observ
   return places;
 }
 
-void add_residuals(const Observations& observations, const Unknowns& at, const Noise& noise, Solution* into) {
+void add_residuals(const Observations& observations, const Parameters& at, const Noise& noise, Solution* into) {
   const BoardShape shape{observations.board.width_m(), observations.board.height_m()};
   const Vector2d none = Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   const auto is_outlier = [](const Vector2d& r, double own, double common) {
@@ -100,8 +100,8 @@ void add_residuals(const Observations& observations, const Unknowns& at, const N
   into->match_residuals.clear();
   into->corner_outlier.clear();
   into->match_outlier.clear();
-  into->sighting_residuals.clear();
-  for (const CornerSeen& seen : observations.corners) {
+  into->tie_point_residuals.clear();
+  for (const CornerObservation& seen : observations.corners) {
     const auto& pose = into->world_from_board[static_cast<size_t>(seen.pose)];
     const Imager& camera = into->rig.cameras[static_cast<size_t>(seen.camera)];
     Vector2d px, r = none;
@@ -119,38 +119,38 @@ void add_residuals(const Observations& observations, const Unknowns& at, const N
     into->match_outlier.push_back(is_outlier(r, match.stddev_px, noise.match_px));
   }
   into->points = places_of(observations, at);
-  for (const Sighting& sighting : observations.sightings) {
-    const auto& p = into->points[static_cast<size_t>(sighting.point)];
-    const auto& imagers = sighting.by_projector ? into->rig.projectors : into->rig.cameras;
-    const auto px = p ? imagers[static_cast<size_t>(sighting.imager)].project(*p) : std::nullopt;
-    into->sighting_residuals.push_back(px ? Vector2d(*px - sighting.px) : none);
+  for (const TiePointObservation& tie_observation : observations.tie_observations) {
+    const auto& p = into->points[static_cast<size_t>(tie_observation.point)];
+    const auto& imagers = tie_observation.by_projector ? into->rig.projectors : into->rig.cameras;
+    const auto px = p ? imagers[static_cast<size_t>(tie_observation.imager)].project(*p) : std::nullopt;
+    into->tie_point_residuals.push_back(px ? Vector2d(*px - tie_observation.px) : none);
   }
 }
 
 // What the places of one device weigh: each round with the noise that the last one left.
 Result<Solution> rounds(const Observations& observations,
                         const SolveOptions& options,
-                        Unknowns start,
+                        Parameters start,
                         Noise noise) {
-  Joint joint(observations, options);
+  BundleAdjuster joint(observations, options);
   Solution solution;
   int steps = 0;
   for (int round = 0;; ++round) {
     const bool is_last = round == k_rounds - 1;
-    LIMN_TRY(Joint::Descent descent,
-             joint.minimised(std::move(start), noise, is_last ? Joint::k_to_rounding : Joint::k_unfelt));
+    LIMN_TRY(BundleAdjuster::Summary descent,
+             joint.minimise(std::move(start), noise, is_last ? BundleAdjuster::k_to_rounding : BundleAdjuster::k_to_significance));
     steps += descent.steps;
-    solution = solution_at(descent.unknowns, noise, steps);
-    add_residuals(observations, descent.unknowns, noise, &solution);
+    solution = solution_at(descent.parameters, noise, steps);
+    add_residuals(observations, descent.parameters, noise, &solution);
     const Noise found{noise_of(solution.corner_residuals),
                       observations.matches.empty() ? noise.match_px : noise_of(solution.match_residuals),
-                      sighting_noise(observations, solution.sighting_residuals)};
+                      sighting_noise(observations, solution.tie_point_residuals)};
     if (is_last) {
-      solution.covariance = joint.covariance(descent.unknowns, found);
+      solution.covariance = joint.covariance(descent.parameters, found);
       break;
     }
     noise = found;
-    start = std::move(descent.unknowns);
+    start = std::move(descent.parameters);
   }
   if (!solution.covariance.allFinite())
     return error(
@@ -186,7 +186,7 @@ Result<Models> models_of(const Observations& observations, const SolveOptions& o
 }
 
 // A chessboard that looks the same when turned may be read differently by two cameras.
-Status check_board(const Observations& observations) {
+Status check_board_symmetry(const Observations& observations) {
   const Board& board = observations.board;
   const bool ambiguous = board.kind == BoardKind::chessboard && (board.columns + board.rows) % 2 == 0;
   if (ambiguous && observations.cameras.size() > 1)
@@ -202,16 +202,16 @@ Status check_finite(const Observations& observations) {
     return error("{} of {}: a coordinate is not a finite number. Decode the captures again.", what,
                  observations.poses[static_cast<size_t>(pose)]);
   };
-  for (const CornerSeen& seen : observations.corners) {
+  for (const CornerObservation& seen : observations.corners) {
     if (!seen.px.allFinite() || !std::isfinite(seen.stddev_px)) return broken("a board corner", seen.pose);
   }
   for (const Match& match : observations.matches) {
     if (!match.px_camera.allFinite() || !match.px_projector.allFinite() || !std::isfinite(match.stddev_px))
       return broken("a match", match.pose);
   }
-  for (const Sighting& sighting : observations.sightings) {
-    const FreePoint& point = observations.points[static_cast<size_t>(sighting.point)];
-    if (!sighting.px.allFinite() || !point.px_camera.allFinite() || !std::isfinite(sighting.stddev_px))
+  for (const TiePointObservation& tie_observation : observations.tie_observations) {
+    const TiePoint& point = observations.points[static_cast<size_t>(tie_observation.point)];
+    if (!tie_observation.px.allFinite() || !point.px_camera.allFinite() || !std::isfinite(tie_observation.stddev_px))
       return broken("a scene point", point.pose);
   }
   return {};
@@ -224,25 +224,25 @@ Lens with_model(const Lens& lens, const LensModel& model) {
   return changed;
 }
 
-Unknowns unknowns_of(const Solution& solution) {
-  Unknowns unknowns;
-  unknowns.cameras = solution.rig.cameras;
-  unknowns.projectors = solution.rig.projectors;
-  unknowns.world_from_board = solution.world_from_board;
-  unknowns.bend_m = solution.bend_m;
-  return unknowns;
+Parameters unknowns_of(const Solution& solution) {
+  Parameters parameters;
+  parameters.cameras = solution.rig.cameras;
+  parameters.projectors = solution.rig.projectors;
+  parameters.world_from_board = solution.world_from_board;
+  parameters.bend_m = solution.bend_m;
+  return parameters;
 }
 
-Result<Unknowns> unknowns_with_models(const Observations& observations,
+Result<Parameters> unknowns_with_models(const Observations& observations,
                                       const SolveOptions& options,
                                       const Solution& start) {
   LIMN_TRY(const Models models, models_of(observations, options));
-  Unknowns unknowns = unknowns_of(start);
-  for (size_t i = 0; i < unknowns.cameras.size(); ++i)
-    unknowns.cameras[i].lens = with_model(unknowns.cameras[i].lens, models.cameras[i]);
-  for (size_t i = 0; i < unknowns.projectors.size(); ++i)
-    unknowns.projectors[i].lens = with_model(unknowns.projectors[i].lens, models.projectors[i]);
-  return unknowns;
+  Parameters parameters = unknowns_of(start);
+  for (size_t i = 0; i < parameters.cameras.size(); ++i)
+    parameters.cameras[i].lens = with_model(parameters.cameras[i].lens, models.cameras[i]);
+  for (size_t i = 0; i < parameters.projectors.size(); ++i)
+    parameters.projectors[i].lens = with_model(parameters.projectors[i].lens, models.projectors[i]);
+  return parameters;
 }
 
 }  // namespace
@@ -263,21 +263,21 @@ int Solution::projector_at(size_t projector) const {
 
 Result<Solution> solve(const Observations& observations, const SolveOptions& options) {
   LIMN_TRY(const Models models, models_of(observations, options));
-  LIMN_TRY_STATUS(check_board(observations));
+  LIMN_TRY_STATUS(check_board_symmetry(observations));
   LIMN_TRY_STATUS(check_finite(observations));
   LIMN_TRY(const Seed seeded, seed(observations, models.cameras, models.projectors));
-  Unknowns unknowns;
-  unknowns.cameras = seeded.cameras;
-  unknowns.projectors = seeded.projectors;
-  unknowns.world_from_board = seeded.world_from_board;
-  return rounds(observations, options, std::move(unknowns), Noise());
+  Parameters parameters;
+  parameters.cameras = seeded.cameras;
+  parameters.projectors = seeded.projectors;
+  parameters.world_from_board = seeded.world_from_board;
+  return rounds(observations, options, std::move(parameters), Noise());
 }
 
 Result<Solution> solve_from(const Observations& observations,
                             const SolveOptions& options,
                             const Solution& start) {
-  LIMN_TRY(Unknowns unknowns, unknowns_with_models(observations, options, start));
-  return rounds(observations, options, std::move(unknowns), noise_of(start));
+  LIMN_TRY(Parameters parameters, unknowns_with_models(observations, options, start));
+  return rounds(observations, options, std::move(parameters), noise_of(start));
 }
 
 Result<Solution> solve_again(const Observations& observations,
@@ -285,25 +285,25 @@ Result<Solution> solve_again(const Observations& observations,
                              const Solution& start,
                              int left_out,
                              bool to_rounding) {
-  LIMN_TRY(Unknowns unknowns, unknowns_with_models(observations, options, start));
+  LIMN_TRY(Parameters parameters, unknowns_with_models(observations, options, start));
   const Noise noise = noise_of(start);
-  if (left_out >= 0) unknowns.world_from_board[static_cast<size_t>(left_out)].reset();
-  Joint joint(observations, options, left_out);
-  LIMN_TRY(const Joint::Descent descent,
-           joint.minimised(std::move(unknowns), noise, to_rounding ? Joint::k_to_rounding : Joint::k_unfelt));
-  return solution_at(descent.unknowns, noise, descent.steps);
+  if (left_out >= 0) parameters.world_from_board[static_cast<size_t>(left_out)].reset();
+  BundleAdjuster joint(observations, options, left_out);
+  LIMN_TRY(const BundleAdjuster::Summary descent,
+           joint.minimise(std::move(parameters), noise, to_rounding ? BundleAdjuster::k_to_rounding : BundleAdjuster::k_to_significance));
+  return solution_at(descent.parameters, noise, descent.steps);
 }
 
 Result<Pose> board_pose_from_cameras(const Observations& observations, const Solution& solution, int pose) {
   Observations only;
   only.board = observations.board;
   only.poses = observations.poses;
-  for (const CornerSeen& corner : observations.corners) {
+  for (const CornerObservation& corner : observations.corners) {
     if (corner.pose == pose) only.corners.push_back(corner);
   }
   LIMN_TRY(const Pose first, board_pose_seed(only, solution.rig));
   const SolveOptions options;
-  const Joint joint(only, options);
+  const BundleAdjuster joint(only, options);
   return joint.board_pose(unknowns_of(solution), pose, noise_of(solution), first);
 }
 
@@ -328,7 +328,7 @@ std::optional<Eigen::Vector3d> surface_point(const Observations& observations,
                                              const Match& match) {
   const Imager& camera = solution.rig.cameras[static_cast<size_t>(match.camera)];
   Eigen::Vector3d p;
-  if (!meet_board({camera.lens.model, camera.lens.values, camera.imager_from_world}, world_from_board,
+  if (!intersect_board({camera.lens.model, camera.lens.values, camera.imager_from_world}, world_from_board,
                   {observations.board.width_m(), observations.board.height_m()}, solution.bend_m,
                   match.px_camera, &p))
     return std::nullopt;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "calib/observations.h"
-#include "calib/predict.h"
+#include "calib/measurement_model.h"
 #include "core/result.h"
 #include "core/rig.h"
 
@@ -21,9 +21,9 @@ struct SolveOptions {
   std::vector<std::string> lens_models = {};
   /// Whether the board may be bent (two unknowns for all poses).
   bool bend = true;
-  /// Residuals beyond this many standard deviations are told down (Cauchy).
+  /// Residuals beyond this many standard deviations are down-weighted (Cauchy).
   double robust_at = 2;
-  /// Weak knowledge about lenses, standard deviations. Of the principal point from the picture's centre, as
+  /// Weak knowledge about lenses, standard deviations. Of the principal point from the image's centre, as
   /// shares of the width; a projector's vertical place is left free, for projectors shift their lens upwards
   /// by anything.
   double camera_centre = 0.1;
@@ -45,11 +45,11 @@ struct Solution {
   Eigen::Vector2d bend_m = Eigen::Vector2d::Zero();
   std::vector<Eigen::Vector2d> corner_residuals, match_residuals;
   std::vector<bool> corner_outlier, match_outlier;  ///< beyond 4 standard deviations
-  /// Places of the free points, m, world; none where no sighting tells the distance.
+  /// Places of the tie points, m, world; none where no tie-point observation tells the distance.
   std::vector<std::optional<Eigen::Vector3d>> points;
-  std::vector<Eigen::Vector2d> sighting_residuals;
+  std::vector<Eigen::Vector2d> tie_point_residuals;
   /// What one coordinate scatters by beyond its own stddev, px: estimated from the residuals.
-  double corner_noise_px = 0, match_noise_px = 0, sighting_noise_px = 0;
+  double corner_noise_px = 0, match_noise_px = 0, tie_point_noise_px = 0;
   int iterations = 0;
   /// Of the devices' unknowns, from the final Jacobian (robust weights and priors included), board poses and
   /// bend marginalised: camera 0's values and pose (boxplus's delta), camera 1's …, then the projectors'.
@@ -59,8 +59,8 @@ struct Solution {
   int projector_at(size_t projector) const;
 };
 
-/// One least-squares problem over all cameras, projectors, board poses, the board's bend and free points
-/// (calib/joint.h): cameras see corners; a match says that the camera's ray meets the board where the
+/// One least-squares problem over all cameras, projectors, board poses, the board's bend and tie points
+/// (calib/bundle_adjustment.h): cameras see corners; a match says that the camera's ray meets the board where the
 /// projector's pixel does. Starts from nothing but the observations. Without projectors only the cameras are
 /// solved. Deterministic. Errors: too few poses, a device that saw none, a camera that shares no pose with
 /// the others, observations that are not finite, no convergence.

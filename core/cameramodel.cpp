@@ -96,7 +96,7 @@ class ModelText {
   explicit ModelText(std::string_view text) : text_(text) {}
 
   // Whether `mark` comes next; takes it.
-  bool take(char mark) {
+  bool accept(char mark) {
     skip_ignored();
     if (at_ >= text_.size() || text_[at_] != mark) return false;
     ++at_;
@@ -115,16 +115,16 @@ class ModelText {
   }
 
   std::optional<std::vector<double>> numbers() {
-    if (!take('[') && !take('(')) return std::nullopt;
+    if (!accept('[') && !accept('(')) return std::nullopt;
     std::vector<double> values;
-    while (!take(']') && !take(')')) {
+    while (!accept(']') && !accept(')')) {
       skip_ignored();
       double value = 0;
       const auto [end, problem] = std::from_chars(text_.data() + at_, text_.data() + text_.size(), value);
       if (problem != std::errc{}) return std::nullopt;
       values.push_back(value);
       at_ = static_cast<std::size_t>(end - text_.data());
-      if (!take(',') && next() != ']' && next() != ')') return std::nullopt;
+      if (!accept(',') && next() != ']' && next() != ')') return std::nullopt;
     }
     return values;
   }
@@ -171,10 +171,10 @@ struct ModelFields {
 // nullopt where the text is no dictionary; `text` then stands at the place.
 std::optional<ModelFields> fields_of(ModelText& text) {
   ModelFields fields;
-  if (!text.take('{')) return std::nullopt;
-  while (!text.take('}')) {
+  if (!text.accept('{')) return std::nullopt;
+  while (!text.accept('}')) {
     const auto key = text.quoted();
-    if (!key || !text.take(':')) return std::nullopt;
+    if (!key || !text.accept(':')) return std::nullopt;
     if (*key == "lensmodel") {
       const auto name = text.quoted();
       if (!name) return std::nullopt;
@@ -188,7 +188,7 @@ std::optional<ModelFields> fields_of(ModelText& text) {
     } else if (!text.skip_value()) {
       return std::nullopt;
     }
-    text.take(',');
+    text.accept(',');
   }
   return fields;
 }

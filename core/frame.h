@@ -21,7 +21,7 @@ inline Stamp shifted(Stamp at, double seconds) {
   return at + std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(seconds));
 }
 
-/// One picture of one camera: 8-bit, one channel (grey) or three (BGR, sRGB).
+/// One image of one camera: 8-bit, one channel (grey) or three (BGR, sRGB).
 struct Frame {
   std::string camera;
   cv::Mat image;

@@ -9,7 +9,7 @@
 
 namespace limn {
 
-/// Pixels: no picture's side is longer; the largest that GL 4.5 must hold.
+/// Pixels: no image's side is longer; the largest that GL 4.5 must hold.
 inline constexpr int k_max_side = 16384;
 
 /// A half-line: origin (m) and unit direction.
@@ -27,11 +27,11 @@ struct Imager {
   Lens lens;
   Pose imager_from_world;
 
-  /// Pixel of a world point, also when outside the picture; nullopt when it has none (behind).
+  /// Pixel of a world point, also when outside the image; nullopt when it has none (behind).
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& p_world) const;
   /// Ray of a pixel in the world.
   std::optional<Ray> ray(const Eigen::Vector2d& px) const;
-  /// Whether px lies on the picture, its outer pixels' areas included.
+  /// Whether px lies on the image, its outer pixels' areas included.
   bool contains(const Eigen::Vector2d& px) const;
 };
 

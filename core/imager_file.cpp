@@ -92,7 +92,7 @@ Result<Imager> load_opencv(const fs::path& path, const std::string& text) {
 
 // ---- ARToolKit ----
 
-// Parameters of camera_para.dat: an ideal pixel by the 3x4 matrix, then a distortion in the picture's plane.
+// Parameters of camera_para.dat: an ideal pixel by the 3x4 matrix, then a distortion in the image's plane.
 struct ArtoolkitCamera {
   int version = 0;
   int width = 0;
@@ -151,7 +151,7 @@ std::vector<double> fitted_lens_values(const LensModel& model,
     Eigen::Matrix<double, k_value_count, k_value_count> hessian = jacobian.transpose() * jacobian;
     Eigen::Vector<double, k_value_count> gradient = jacobian.transpose() * residuals;
     hessian.diagonal().array() += 1e-9;
-    // Numerator and denominator of OPENCV8 cancel: without a weight the fit puts poles into the picture.
+    // Numerator and denominator of OPENCV8 cancel: without a weight the fit puts poles into the image.
     constexpr double k_distortion_weight = 1e-2;  // (0.1 px / 1)^2
     for (int i = 4; i < k_value_count; ++i) {
       hessian(i, i) += k_distortion_weight;
@@ -166,7 +166,7 @@ std::vector<double> fitted_lens_values(const LensModel& model,
   return values;
 }
 
-// Whether the ideal pixel is a pinhole's, and no corner of the picture is bent beyond its neighbourhood.
+// Whether the ideal pixel is a pinhole's, and no corner of the image is bent beyond its neighbourhood.
 bool is_camera(const ArtoolkitCamera& camera) {
   const auto& m = camera.matrix;
   const bool is_pinhole = m[0] > 0 && m[5] > 0 && m[8] == 0 && m[9] == 0 && m[10] == 1;
@@ -179,7 +179,7 @@ bool is_camera(const ArtoolkitCamera& camera) {
   return is_pinhole;
 }
 
-// Grid of directions over the picture with the pixels where ARToolKit's model puts them.
+// Grid of directions over the image with the pixels where ARToolKit's model puts them.
 std::vector<LensSample> samples_of(const ArtoolkitCamera& camera, int grid) {
   Eigen::Matrix3d pinhole;
   for (int row = 0; row < 3; ++row) {
@@ -203,7 +203,7 @@ Result<ArtoolkitCamera> parse_artoolkit(const std::string& bytes, const fs::path
   constexpr std::size_t k_factor_counts[] = {4, 5, 6, 9};  // versions 1 to 4, told apart by the file's size
   ArtoolkitCamera camera;
   std::size_t at = 0;
-  const auto take = [&](std::size_t size) {
+  const auto read_bytes = [&](std::size_t size) {
     std::uint64_t value = 0;
     for (std::size_t i = 0; i < size; ++i) value = value << 8 | static_cast<unsigned char>(bytes[at++]);
     return value;
@@ -212,10 +212,10 @@ Result<ArtoolkitCamera> parse_artoolkit(const std::string& bytes, const fs::path
     const std::size_t factor_count = k_factor_counts[version - 1];
     if (bytes.size() != 8 + 8 * (12 + factor_count)) continue;
     camera.version = version;
-    camera.width = static_cast<int>(take(4));
-    camera.height = static_cast<int>(take(4));
-    for (int i = 0; i < 12; ++i) camera.matrix.push_back(std::bit_cast<double>(take(8)));
-    for (std::size_t i = 0; i < factor_count; ++i) camera.factors.push_back(std::bit_cast<double>(take(8)));
+    camera.width = static_cast<int>(read_bytes(4));
+    camera.height = static_cast<int>(read_bytes(4));
+    for (int i = 0; i < 12; ++i) camera.matrix.push_back(std::bit_cast<double>(read_bytes(8)));
+    for (std::size_t i = 0; i < factor_count; ++i) camera.factors.push_back(std::bit_cast<double>(read_bytes(8)));
   }
   const auto is_side = [](int side) { return side > 0 && side <= k_max_side; };
   bool sane = camera.version != 0 && is_side(camera.width) && is_side(camera.height);

@@ -70,7 +70,7 @@ bool has_sound_grid(const mrcal_lensmodel_t& model) {
          grid.fov_x_deg > 0 && grid.fov_x_deg < 360;
 }
 
-// Determinant of d(px)/d(x, y) at (x, y, 1): positive where the lens keeps the picture's orientation.
+// Determinant of d(px)/d(x, y) at (x, y, 1): positive where the lens keeps the image's orientation.
 bool keeps_orientation(const LensModel& model, std::span<const double> values, const Eigen::Vector2d& xy) {
   Eigen::Vector2d px;
   PixelByPoint jacobian;

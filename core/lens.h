@@ -77,7 +77,7 @@ struct Lens {
   std::optional<Eigen::Vector3d> unproject(const Eigen::Vector2d& px) const;
 };
 
-/// Unit directions of every `step`-th pixel of a width x height picture, row by row, for baked maps and ray
+/// Unit directions of every `step`-th pixel of a width x height image, row by row, for baked maps and ray
 /// tracing: (ceil(height / step) * ceil(width / step)) entries, entry (row, col) is pixel (col, row) * step.
 /// Uses all cores. Pixels without a direction are NaN.
 std::vector<Eigen::Vector3f> direction_map(const Lens& lens, int width, int height, int step = 1);

@@ -36,7 +36,7 @@ bool solve_definite(const Matrix6d& m, const Vector6d& b, Vector6d* x) {
 
 }  // namespace
 
-Vector6d solved(const Matrix6d& symmetric, const Vector6d& b) {
+Vector6d solve_ldlt(const Matrix6d& symmetric, const Vector6d& b) {
   Vector6d x;
   return solve_definite(symmetric, b, &x) ? x : Vector6d(symmetric.ldlt().solve(b));
 }
@@ -49,7 +49,7 @@ Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& m) {
   return u * Eigen::Vector3d(1, 1, sign).asDiagonal() * v.transpose();
 }
 
-Eigen::Quaterniond turn_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   return Eigen::Quaterniond::FromTwoVectors(from, to);
 }
 

@@ -70,7 +70,7 @@ std::vector<Focus> read_focuses(const ConfigNode& root) {
 // What was measured beside the rig, if anything.
 Status add_responses(const fs::path& folder, Rig* rig) {
   if (std::error_code ignored; !fs::exists(folder / "response.json", ignored)) return {};
-  LIMN_TRY(Responses responses, load_responses(folder / "response.json"));
+  LIMN_TRY(RigResponses responses, load_responses(folder / "response.json"));
   rig->responses = std::move(responses.projectors);
   rig->camera_responses = std::move(responses.cameras);
   return {};

@@ -7,7 +7,7 @@
 #include "core/cameramodel.h"
 #include "core/imager.h"
 #include "core/imager_file.h"
-#include "core/response.h"
+#include "core/photometric_response.h"
 #include "core/result.h"
 
 namespace limn {
@@ -24,7 +24,7 @@ struct Focus {
 struct Rig {
   std::vector<Imager> cameras;
   std::vector<Imager> projectors;
-  std::vector<Response> responses;  ///< of projectors; none where none was measured
+  std::vector<ProjectorResponse> responses;  ///< of projectors; none where none was measured
   /// Kept verbatim from and to rig.json; empty when absent. JSON texts.
   std::string covariance_json;
   std::string provenance_json;

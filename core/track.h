@@ -8,8 +8,8 @@
 namespace limn {
 
 /// What a track's pose rests on.
-enum class Sight {
-  measured,      ///< seen in the newest picture
+enum class TrackingState {
+  measured,      ///< seen in the newest image
   extrapolated,  ///< not seen there: carried on from what was seen before, for a limited time
   lost           ///< unseen for longer than that; the pose is the last one known and not to be shown
 };
@@ -21,9 +21,9 @@ struct Track {
   Matrix6d covariance = Matrix6d::Zero();
   int marker_count = 0;
   double rms_px = 0;
-  Stamp captured_at;  ///< of the newest picture that the body was measured in
+  Stamp captured_at;  ///< of the newest image that the body was measured in
   Stamp at;           ///< the moment that the pose is for: captured_at, or later when predicted
-  Sight sight = Sight::measured;
+  TrackingState tracking = TrackingState::measured;
 };
 
 }  // namespace limn

@@ -18,7 +18,7 @@ struct CameraSetting {
   std::string problem;          ///< a sentence, where the device did not do as asked; else empty
 };
 
-/// Where frames come from: a real camera, a folder of pictures, the virtual rig.
+/// Where frames come from: a real camera, a folder of images, the virtual rig.
 class CameraSource {
  public:
   virtual ~CameraSource() = default;
@@ -32,7 +32,7 @@ class CameraSource {
   /// says why no frame came, and tries again at the next call.
   virtual Result<Frame> next() = 0;
 
-  /// Whether it ends by itself: stored pictures, a video file.
+  /// Whether it ends by itself: stored images, a video file.
   virtual bool is_finite() const { return false; }
   /// What is known of it, for people, in one line: how it is read, what was lost so far.
   virtual std::string description() const { return {}; }

@@ -49,7 +49,7 @@ Result<Desktop> Desktop::open() {
   return Desktop(std::make_shared<Impl>());
 }
 
-std::vector<std::pair<Monitor, GLFWmonitor*>> plugged_monitors() {
+std::vector<std::pair<Monitor, GLFWmonitor*>> list_monitors() {
   glfwPollEvents();  // what was plugged in or out since
   int count = 0;
   GLFWmonitor** list = glfwGetMonitors(&count);
@@ -70,7 +70,7 @@ std::vector<std::pair<Monitor, GLFWmonitor*>> plugged_monitors() {
 
 std::vector<Monitor> Desktop::monitors() const {
   std::vector<Monitor> found;
-  for (const auto& [monitor, handle] : plugged_monitors()) found.push_back(monitor);
+  for (const auto& [monitor, handle] : list_monitors()) found.push_back(monitor);
   return found;
 }
 

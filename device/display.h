@@ -8,19 +8,19 @@
 
 namespace limn::device {
 
-/// Where pictures go: a projector's output, a screen, a virtual projector.
+/// Where images go: a projector's output, a screen, a virtual projector.
 class Display {
  public:
   virtual ~Display() = default;
 
   /// The device's name (`projector0`).
   virtual const std::string& name() const = 0;
-  /// Width and height that every picture must have.
+  /// Width and height that every image must have.
   virtual cv::Size size() const = 0;
-  /// Shows an 8-bit grey or BGR picture until the next call. Returns the moment at which its light leaves the
-  /// device (`shown_at`), which may lie ahead. Error when the picture's size or type is wrong or the device
+  /// Shows an 8-bit grey or BGR image until the next call. Returns the moment at which its light leaves the
+  /// device (`shown_at`), which may lie ahead. Error when the image's size or type is wrong or the device
   /// is gone.
-  virtual Result<Stamp> show(const cv::Mat& picture) = 0;
+  virtual Result<Stamp> show(const cv::Mat& image) = 0;
 };
 
 }  // namespace limn::device

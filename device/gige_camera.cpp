@@ -50,11 +50,11 @@ class Complaint {
   GError* error_ = nullptr;
 };
 
-// A pixel format that we read, and what turns it into a picture.
+// A pixel format that we read, and what turns it into an image.
 struct Format {
   ArvPixelFormat format;
   const char* name;
-  int type;             // of the raw picture
+  int type;             // of the raw image
   int to_bgr, to_grey;  // cv::ColorConversionCodes; -1: as it is
 };
 
@@ -214,9 +214,9 @@ Result<cv::Mat> decoded(ArvBuffer* buffer, const Format& format, cv::Size size, 
   const cv::Mat raw(size, format.type, const_cast<void*>(data));
   const int conversion = grey ? format.to_grey : format.to_bgr;
   if (conversion < 0) return raw.clone();
-  cv::Mat picture;
-  cv::cvtColor(raw, picture, conversion);
-  return picture;
+  cv::Mat image;
+  cv::cvtColor(raw, image, conversion);
+  return image;
 }
 
 // Aravis stamps by the wall clock.
@@ -305,7 +305,7 @@ Result<Frame> GigeCamera::Impl::next() {
       if (!retry.wait(deadline) || !may_begin(deadline)) break;
       auto fresh = begun(id, options, size);
       if (!fresh) {
-        retry.failed(fresh.message());
+        retry.note_failure(fresh.message());
         continue;
       }
       session.emplace(std::move(*fresh));
@@ -315,12 +315,12 @@ Result<Frame> GigeCamera::Impl::next() {
     if (ArvBuffer* buffer = newest(deadline)) {
       heard = true;
       if (auto frame = grabbed(buffer)) {
-        retry.worked();
+        retry.note_success();
         return std::move(*frame);
       }
     } else if (!heard) {
       end(true);
-      retry.failed("it sends no frame. Check its cable, trigger mode and the firewall.");
+      retry.note_failure("it sends no frame. Check its cable, trigger mode and the firewall.");
     }
   }
   return error("{} (gige:{}): expected a picture within {:g} s, found none: {}", options.name, id,

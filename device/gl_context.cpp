@@ -39,7 +39,7 @@ bool has_word(const char* list, const char* word) {
 
 // Displays to try: hardware devices, software devices, then Mesa without a surface; `apart`: that before the
 // software devices. Mesa's software has its threads by display.
-std::vector<EGLDisplay> candidate_displays(bool apart) {
+std::vector<EGLDisplay> candidate_displays(bool own_threads) {
   std::vector<EGLDisplay> displays;
   std::ptrdiff_t hardware = 0;
   const char* client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
@@ -57,7 +57,7 @@ std::vector<EGLDisplay> candidate_displays(bool apart) {
     }
   }
   if (has_word(client, "EGL_MESA_platform_surfaceless")) {
-    displays.insert(apart ? displays.begin() + hardware : displays.end(),
+    displays.insert(own_threads ? displays.begin() + hardware : displays.end(),
                     eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr));
   }
   std::erase(displays, EGL_NO_DISPLAY);
@@ -93,14 +93,14 @@ GlContext::GlContext(GlContext&&) noexcept = default;
 GlContext& GlContext::operator=(GlContext&&) noexcept = default;
 GlContext::~GlContext() = default;
 
-Result<GlContext> GlContext::create(bool apart) {
+Result<GlContext> GlContext::create(bool own_threads) {
   constexpr const char* k_advice =
       "Install a driver (Debian: libegl1 and libgl1-mesa-dri for software rendering).";
   // epoxy ends the process when the library itself is missing, so ask for it first.
   if (!dlopen("libEGL.so.1", RTLD_LAZY | RTLD_GLOBAL)) {
     return error("OpenGL: expected the library libEGL.so.1, found none. {}", k_advice);
   }
-  const std::vector<EGLDisplay> displays = candidate_displays(apart);
+  const std::vector<EGLDisplay> displays = candidate_displays(own_threads);
   for (const EGLDisplay display : displays) {
     auto impl = std::make_unique<Impl>();
     impl->display = display;

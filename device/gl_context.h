@@ -15,7 +15,7 @@ class GlContext {
   /// Error when the machine has no EGL, or none that gives OpenGL 4.5; it says what was tried. `apart`: where
   /// software draws, by other threads than for contexts that are not, of the calling thread's priority, so
   /// that neither waits for the other's drawing.
-  static Result<GlContext> create(bool apart = false);
+  static Result<GlContext> create(bool own_threads = false);
   GlContext(GlContext&&) noexcept;
   GlContext& operator=(GlContext&&) noexcept;
   ~GlContext();

@@ -58,7 +58,7 @@ std::string glfw_problem() {
 
 Result<GlfwSurface> GlfwSurface::open(const Options& options) {
   const ContextKept kept;  // GLFW makes the new window's context current for a moment, then none
-  // One API for windows and headless pictures.
+  // One API for windows and headless images.
   glfwWindowHint(GLFW_CONTEXT_CREATION_API, GLFW_EGL_CONTEXT_API);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
@@ -71,7 +71,7 @@ Result<GlfwSurface> GlfwSurface::open(const Options& options) {
   if (!surface.window_)
     return error("window: expected one with OpenGL 4.5, the display gives none ({}).", glfw_problem());
   const Current current(surface.window_);
-  glfwSwapInterval(options.waits ? 1 : 0);
+  glfwSwapInterval(options.vsync ? 1 : 0);
   return surface;
 }
 
@@ -99,8 +99,8 @@ GlfwSurface::~GlfwSurface() {
   glfwDestroyWindow(window_);
 }
 
-void GlfwSurface::upload(const cv::Mat& picture) {
-  const cv::Mat whole = picture.isContinuous() ? picture : picture.clone();
+void GlfwSurface::upload(const cv::Mat& image) {
+  const cv::Mat whole = image.isContinuous() ? image : image.clone();
   if (texture_ == 0 || whole.size() != size_) {
     glDeleteTextures(1, &texture_);
     glCreateTextures(GL_TEXTURE_2D, 1, &texture_);
@@ -115,7 +115,7 @@ void GlfwSurface::upload(const cv::Mat& picture) {
   glTextureSubImage2D(texture_, 0, 0, 0, size_.width, size_.height, GL_BGR, GL_UNSIGNED_BYTE, bgr.data);
 }
 
-// The picture as large as fits, centred. Its first row is the texture's first, so the window's y is turned.
+// The image as large as fits, centred. Its first row is the texture's first, so the window's y is turned.
 void GlfwSurface::draw() const {
   const cv::Size window = pixels();
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
@@ -132,12 +132,12 @@ void GlfwSurface::draw() const {
   glfwSwapBuffers(window_);
 }
 
-void GlfwSurface::show(const cv::Mat& picture, bool finished) {
-  LIMN_CHECK(picture.depth() == CV_8U && (picture.channels() == 1 || picture.channels() == 3));
+void GlfwSurface::show(const cv::Mat& image, bool wait_for_swap) {
+  LIMN_CHECK(image.depth() == CV_8U && (image.channels() == 1 || image.channels() == 3));
   const Current current(window_);
-  upload(picture);
+  upload(image);
   draw();
-  if (finished) glFinish();
+  if (wait_for_swap) glFinish();
 }
 
 void GlfwSurface::redraw() const {

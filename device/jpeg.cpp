@@ -7,14 +7,14 @@
 #include <memory>
 #include <string>
 
-#include "core/picture.h"
+#include "core/image_io.h"
 
 namespace limn::device {
 namespace {
 
 constexpr long k_max_pixels = 200'000'000;  // of the largest sensors; more is a damaged header
 
-// libjpeg carries on behind what it warns of: bytes between segments cost nothing, all else costs picture.
+// libjpeg carries on behind what it warns of: bytes between segments cost nothing, all else costs image.
 bool is_harmless(const std::string& warning) {
   return warning.find("extraneous bytes before marker") != std::string::npos;
 }
@@ -32,7 +32,7 @@ Error damaged(std::span<const std::uint8_t> bytes, const Handle& decoder) {
                bytes.size(), tjGetErrorStr2(decoder.get()));
 }
 
-// Whether what the decoder warned of cost no picture.
+// Whether what the decoder warned of cost no image.
 bool is_whole(const Handle& decoder) {
   return tjGetErrorCode(decoder.get()) == TJERR_WARNING && is_harmless(tjGetErrorStr2(decoder.get()));
 }
@@ -83,16 +83,16 @@ Result<Planes> decode_planes(std::span<const std::uint8_t> bytes,
 }
 
 cv::Mat coloured(const Planes& planes, const Header& header, const Handle& decoder) {
-  cv::Mat picture(header.size, CV_8UC3);
+  cv::Mat image(header.size, CV_8UC3);
   std::array<const unsigned char*, 3> data{};
   std::array<int, 3> strides{};
   for (std::size_t i = 0; i < 3; ++i) {
     data[i] = planes[i].data;
     strides[i] = static_cast<int>(planes[i].step);
   }
-  LIMN_CHECK(tjDecodeYUVPlanes(decoder.get(), data.data(), strides.data(), header.subsampling, picture.data,
-                               picture.cols, static_cast<int>(picture.step), picture.rows, TJPF_BGR, 0) == 0);
-  return picture;
+  LIMN_CHECK(tjDecodeYUVPlanes(decoder.get(), data.data(), strides.data(), header.subsampling, image.data,
+                               image.cols, static_cast<int>(image.step), image.rows, TJPF_BGR, 0) == 0);
+  return image;
 }
 
 // The largest n/8 of a size that has no side longer than that.
@@ -123,12 +123,12 @@ Result<cv::Mat> decode_jpeg(std::span<const std::uint8_t> bytes, const JpegOptio
   const Handle decoder = new_decoder();
   LIMN_TRY(const Header header, read_header(bytes, options, decoder));
   const bool grey = options.grey || header.colours == TJCS_GRAY;
-  cv::Mat picture(reduced(header.size, options.longest_side), grey ? CV_8UC1 : CV_8UC3);
+  cv::Mat image(reduced(header.size, options.longest_side), grey ? CV_8UC1 : CV_8UC3);
   const int done =
-      tjDecompress2(decoder.get(), bytes.data(), bytes.size(), picture.data, picture.cols,
-                    static_cast<int>(picture.step), picture.rows, grey ? TJPF_GRAY : TJPF_BGR, 0);
+      tjDecompress2(decoder.get(), bytes.data(), bytes.size(), image.data, image.cols,
+                    static_cast<int>(image.step), image.rows, grey ? TJPF_GRAY : TJPF_BGR, 0);
   if (done != 0 && !is_whole(decoder)) return damaged(bytes, decoder);
-  return picture;
+  return image;
 }
 
 Result<Frame> decode_frame(std::string jpeg, const JpegOptions& options) {
@@ -148,17 +148,17 @@ Result<Frame> decode_frame(std::string jpeg, const JpegOptions& options) {
   return frame;
 }
 
-std::vector<std::uint8_t> encode_jpeg(const cv::Mat& picture, int quality) {
-  LIMN_CHECK(!picture.empty() && (picture.type() == CV_8UC1 || picture.type() == CV_8UC3));
+std::vector<std::uint8_t> encode_jpeg(const cv::Mat& image, int quality) {
+  LIMN_CHECK(!image.empty() && (image.type() == CV_8UC1 || image.type() == CV_8UC3));
   const Handle encoder(tjInitCompress(), tjDestroy);
   LIMN_CHECK(encoder != nullptr);
-  const bool grey = picture.channels() == 1;
+  const bool grey = image.channels() == 1;
   const int sampling = grey ? TJSAMP_GRAY : TJSAMP_420;
-  std::vector<std::uint8_t> jpeg(tjBufSize(picture.cols, picture.rows, sampling));
+  std::vector<std::uint8_t> jpeg(tjBufSize(image.cols, image.rows, sampling));
   unsigned char* at = jpeg.data();
   unsigned long size = jpeg.size();
-  LIMN_CHECK(tjCompress2(encoder.get(), picture.data, picture.cols, static_cast<int>(picture.step),
-                         picture.rows, grey ? TJPF_GRAY : TJPF_BGR, &at, &size, sampling, quality,
+  LIMN_CHECK(tjCompress2(encoder.get(), image.data, image.cols, static_cast<int>(image.step),
+                         image.rows, grey ? TJPF_GRAY : TJPF_BGR, &at, &size, sampling, quality,
                          TJFLAG_NOREALLOC) == 0);
   jpeg.resize(size);
   return jpeg;

@@ -14,7 +14,7 @@ namespace limn::device {
 struct JpegOptions {
   bool grey = false;   ///< brightness alone, in half the time
   cv::Size size = {};  ///< expected; another one is an error before anything is decoded. Empty: any
-  /// A larger picture comes out at n/8 of its size (its own, averaged), so that no side is longer. 0: any.
+  /// A larger image comes out at n/8 of its size (its own, averaged), so that no side is longer. 0: any.
   int longest_side = 0;
 };
 
@@ -22,7 +22,7 @@ struct JpegOptions {
 Result<cv::Size> jpeg_size(std::span<const std::uint8_t> bytes);
 
 /// A camera's JPEG as 8-bit BGR, or grey where it holds one channel or `grey` asks for it. Tables that
-/// webcams leave out are the standard's. A truncated or damaged picture is an error, never a half picture;
+/// webcams leave out are the standard's. A truncated or damaged image is an error, never a half image;
 /// the message is a sentence without a place.
 Result<cv::Mat> decode_jpeg(std::span<const std::uint8_t> bytes, const JpegOptions& options = {});
 
@@ -33,6 +33,6 @@ Result<cv::Mat> decode_jpeg(std::span<const std::uint8_t> bytes, const JpegOptio
 Result<Frame> decode_frame(std::string jpeg, const JpegOptions& options = {});
 
 /// 8-bit grey or BGR as JPEG, colour at half the resolution (4:2:0). `quality` is 1 … 100.
-std::vector<std::uint8_t> encode_jpeg(const cv::Mat& picture, int quality);
+std::vector<std::uint8_t> encode_jpeg(const cv::Mat& image, int quality);
 
 }  // namespace limn::device

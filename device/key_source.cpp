@@ -31,12 +31,12 @@ std::optional<int> code_of(int key) {
   return std::nullopt;
 }
 
-Result<int> opened(const KeysWanted& wanted) {
-  const int file = ::open(wanted.path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+Result<int> opened(const KeysConfig& config) {
+  const int file = ::open(config.path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (file < 0) {
     const char* advice = errno == EACCES ? "Add yourself to the group `input`."
                                          : "ls /dev/input/by-id lists what is plugged in.";
-    return error("{}: {}: expected an input device, found: {}. {}", wanted.name, wanted.path.string(),
+    return error("{}: {}: expected an input device, found: {}. {}", config.name, config.path.string(),
                  std::strerror(errno), advice);
   }
   ::ioctl(file, EVIOCGRAB, 1);  // else its keys go to the window in front, too; not every file can do it
@@ -45,13 +45,13 @@ Result<int> opened(const KeysWanted& wanted) {
 
 }  // namespace
 
-Result<KeySource> KeySource::open(const KeysWanted& wanted) {
-  LIMN_TRY(const int file, opened(wanted));
-  return KeySource(wanted, file);
+Result<KeySource> KeySource::open(const KeysConfig& config) {
+  LIMN_TRY(const int file, opened(config));
+  return KeySource(config, file);
 }
 
 KeySource::KeySource(KeySource&& other) noexcept
-    : wanted_(std::move(other.wanted_)),
+    : config_(std::move(other.config_)),
       file_(std::exchange(other.file_, -1)),
       why_gone_(std::move(other.why_gone_)),
       tried_at_(other.tried_at_) {}
@@ -62,12 +62,12 @@ void KeySource::close() {
   if (file_ >= 0) ::close(std::exchange(file_, -1));
 }
 
-Result<std::vector<int>> KeySource::pressed() {
+Result<std::vector<int>> KeySource::poll_pressed_keys() {
   const auto now = std::chrono::steady_clock::now();
   if (file_ < 0) {
     if (now - tried_at_ < k_retry) return error("{}", why_gone_);
     tried_at_ = now;
-    const Result<int> again = opened(wanted_);
+    const Result<int> again = opened(config_);
     if (!again) {
       why_gone_ = again.message();
       return again.error();
@@ -81,8 +81,8 @@ Result<std::vector<int>> KeySource::pressed() {
     if (got < 0 && errno == EINTR) continue;
     if (got == 0 || (got < 0 && errno == EAGAIN)) return keys;
     if (got != sizeof event) {
-      why_gone_ = fmt::format("{}: {}: it is gone ({}). Plug it in again.", wanted_.name,
-                              wanted_.path.string(), got < 0 ? std::strerror(errno) : "half an event");
+      why_gone_ = fmt::format("{}: {}: it is gone ({}). Plug it in again.", config_.name,
+                              config_.path.string(), got < 0 ? std::strerror(errno) : "half an event");
       close();
       tried_at_ = now;
       return error("{}", why_gone_);

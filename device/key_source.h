@@ -10,7 +10,7 @@
 namespace limn::device {
 
 /// A presentation clicker, pedal or keyboard by its input device of Linux (evdev).
-struct KeysWanted {
+struct KeysConfig {
   std::string name;
   std::filesystem::path path;  ///< `/dev/input/by-id/…-event-kbd` keeps to one device
 };
@@ -19,22 +19,22 @@ struct KeysWanted {
 class KeySource {
  public:
   /// Error: no such device, or no right to read it.
-  static Result<KeySource> open(const KeysWanted& wanted);
+  static Result<KeySource> open(const KeysConfig& config);
   KeySource(KeySource&& other) noexcept;
   KeySource& operator=(KeySource&&) = delete;
   ~KeySource();
 
-  const std::string& name() const { return wanted_.name; }
+  const std::string& name() const { return config_.name; }
 
   /// Keys pressed since the last call, GLFW's codes; never waits. Error: the device is gone; it is opened
   /// again when it comes back, tried once a second.
-  Result<std::vector<int>> pressed();
+  Result<std::vector<int>> poll_pressed_keys();
 
  private:
-  KeySource(const KeysWanted& wanted, int file) : wanted_(wanted), file_(file) {}
+  KeySource(const KeysConfig& config, int file) : config_(config), file_(file) {}
   void close();
 
-  KeysWanted wanted_;
+  KeysConfig config_;
   int file_ = -1;
   std::string why_gone_;
   std::chrono::steady_clock::time_point tried_at_{};

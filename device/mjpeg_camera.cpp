@@ -15,7 +15,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double k_draining_s = 0.1;  // of old bytes, before the newest picture so far must do
+constexpr double k_draining_s = 0.1;  // of old bytes, before the newest image so far must do
 
 std::string base64(const std::string& bytes) {
   static constexpr char k_digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -52,7 +52,7 @@ struct MjpegCamera::Impl {
   cv::Size size;
   std::optional<Connection> connection;
   Retry retry;
-  std::string fault;  // that ended a connection since the last picture; "" without one
+  std::string fault;  // that ended a connection since the last image; "" without one
   long connections = 0, dropped = 0, damaged = 0;
 
   Status connect(Stamp deadline);
@@ -78,7 +78,7 @@ void MjpegCamera::Impl::disconnect(const std::string& why) {
     fault = why;
     connection.reset();
   }
-  retry.failed(why);
+  retry.note_failure(why);
 }
 
 // Everything that has arrived goes to the stream; `heard` is set when that is anything.
@@ -100,7 +100,7 @@ std::optional<Frame> MjpegCamera::Impl::decoded(MjpegPart part) {
     retry.note(frame.message());
     return std::nullopt;
   }
-  retry.worked();
+  retry.note_success();
   fault.clear();
   frame->camera = options.name;
   frame->captured_at = part.arrived_at;

@@ -161,7 +161,7 @@ Status MjpegStream::read_part_head(std::string_view head) {
   return {};
 }
 
-// The first bytes of the buffer are a whole picture.
+// The first bytes of the buffer are a whole image.
 void MjpegStream::keep(std::size_t jpeg_bytes) {
   dropped_ += newest_ ? 1 : 0;
   newest_ = MjpegPart{buffer_.substr(0, jpeg_bytes), part_arrived_at_.value()};
@@ -218,7 +218,7 @@ Result<bool> MjpegStream::step(Stamp arrived_at) {
 
 Status MjpegStream::feed(std::string_view bytes, Stamp arrived_at) {
   if (chunk_ == Chunk::none) buffer_ += bytes;
-  Status chunks;  // pictures before a bad chunk are still good
+  Status chunks;  // images before a bad chunk are still good
   if (chunk_ != Chunk::none) chunks = unchunk(bytes);
   for (bool more = true; more;) {
     LIMN_TRY(more, step(arrived_at));

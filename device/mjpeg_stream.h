@@ -9,14 +9,14 @@
 
 namespace limn::device {
 
-/// One picture of a stream, as sent.
+/// One image of a stream, as sent.
 struct MjpegPart {
   std::string jpeg;
   Stamp arrived_at;  ///< of its first byte
 };
 
 /// The answer of an HTTP server that sends JPEGs as multipart/x-mixed-replace, read as its bytes come in, cut
-/// anywhere. Keeps the newest whole picture alone. Pictures end where their Content-Length says or, without
+/// anywhere. Keeps the newest whole image alone. Images end where their Content-Length says or, without
 /// one, at the next boundary; chunked answers are unwrapped. No sockets here.
 class MjpegStream {
  public:
@@ -26,9 +26,9 @@ class MjpegStream {
   /// large, end of the stream); nothing more can be fed then. The message is a sentence without a place.
   Status feed(std::string_view bytes, Stamp arrived_at);
   bool has_part() const { return newest_.has_value(); }
-  /// The newest whole picture, once.
+  /// The newest whole image, once.
   std::optional<MjpegPart> take_newest();
-  /// Whole pictures that a newer one replaced before they were taken.
+  /// Whole images that a newer one replaced before they were taken.
   long dropped() const { return dropped_; }
 
  private:

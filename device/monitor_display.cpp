@@ -18,7 +18,7 @@ using Handle = std::pair<Monitor, GLFWmonitor*>;
 // The monitor of that name in the mode of that size (any, when empty).
 Result<Handle> found_monitor(const MonitorDisplayOptions& options) {
   std::string others;
-  for (const Handle& found : plugged_monitors()) {
+  for (const Handle& found : list_monitors()) {
     const cv::Size size = found.first.size;
     if (found.first.name == options.monitor && (options.size.empty() || size == options.size)) return found;
     if (found.first.name == options.monitor)
@@ -40,7 +40,7 @@ struct MonitorDisplay::Impl {
   std::optional<GlfwSurface> surface;  // none while the monitor is away
 
   Status begin(const Handle& monitor);
-  Result<Stamp> show(const cv::Mat& picture);
+  Result<Stamp> show(const cv::Mat& image);
 };
 
 Status MonitorDisplay::Impl::begin(const Handle& monitor) {
@@ -50,7 +50,7 @@ Status MonitorDisplay::Impl::begin(const Handle& monitor) {
                                        .height = size.height,
                                        .monitor = monitor.second,
                                        .refresh_hz = monitor.first.refresh_hz,
-                                       .waits = options.waits}));
+                                       .vsync = options.vsync}));
   glfwSetInputMode(surface->window(), GLFW_CURSOR, GLFW_CURSOR_HIDDEN);
   glfwPollEvents();
   const cv::Size pixels = surface->pixels();
@@ -61,14 +61,14 @@ Status MonitorDisplay::Impl::begin(const Handle& monitor) {
       options.name, size.width, size.height, options.monitor, pixels.width, pixels.height);
 }
 
-Result<Stamp> MonitorDisplay::Impl::show(const cv::Mat& picture) {
-  LIMN_TRY_STATUS(fits(picture, options.name, options.size));
+Result<Stamp> MonitorDisplay::Impl::show(const cv::Mat& image) {
+  LIMN_TRY_STATUS(check_image(image, options.name, options.size));
   const auto monitor = found_monitor(options);
   // A window whose monitor has gone would stand on another one.
   if (!monitor || (surface && glfwGetWindowMonitor(surface->window()) != monitor->second)) surface.reset();
   if (!monitor) return monitor.error();
   if (!surface) LIMN_TRY_STATUS(begin(*monitor));
-  surface->show(picture, true);
+  surface->show(image, true);
   return shifted(std::chrono::steady_clock::now(), options.latency_s);
 }
 
@@ -87,6 +87,6 @@ Result<MonitorDisplay> MonitorDisplay::open(const Desktop& desktop, const Monito
 
 const std::string& MonitorDisplay::name() const { return impl_->options.name; }
 cv::Size MonitorDisplay::size() const { return impl_->options.size; }
-Result<Stamp> MonitorDisplay::show(const cv::Mat& picture) { return impl_->show(picture); }
+Result<Stamp> MonitorDisplay::show(const cv::Mat& image) { return impl_->show(image); }
 
 }  // namespace limn::device

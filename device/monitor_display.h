@@ -12,10 +12,10 @@ struct MonitorDisplayOptions {
   std::string monitor;   ///< its name on the desktop (limn doctor lists them)
   cv::Size size = {};    ///< the rig's; a monitor in another mode is refused. Empty: as the monitor stands
   double latency_s = 0;  ///< measured, from the swap to light
-  bool waits = true;     ///< for the next refresh at each picture; of several, let one wait
+  bool vsync = true;     ///< for the next refresh at each image; of several, let one wait
 };
 
-/// A projector or screen, full screen in the mode it is in: a picture's pixel is the device's. Belongs to the
+/// A projector or screen, full screen in the mode it is in: an image's pixel is the device's. Belongs to the
 /// main thread. While the monitor is unplugged, or in another mode, nothing of it shows elsewhere and show()
 /// says so; it goes on when the monitor of that name is back.
 class MonitorDisplay : public Display {
@@ -30,7 +30,7 @@ class MonitorDisplay : public Display {
   const std::string& name() const override;
   cv::Size size() const override;
   /// Uploads and swaps; the moment is when the driver had swapped, plus the latency.
-  Result<Stamp> show(const cv::Mat& picture) override;
+  Result<Stamp> show(const cv::Mat& image) override;
 
  private:
   struct Impl;

@@ -6,7 +6,7 @@
 
 namespace limn::device {
 
-/// A display without light: it keeps the picture that it was shown last.
+/// A display without light: it keeps the image that it was shown last.
 class OffscreenDisplay : public Display {
  public:
   OffscreenDisplay(std::string name, cv::Size size, double latency_s = 0)
@@ -14,17 +14,17 @@ class OffscreenDisplay : public Display {
 
   const std::string& name() const override { return name_; }
   cv::Size size() const override { return size_; }
-  Result<Stamp> show(const cv::Mat& picture) override;
-  const cv::Mat& picture() const { return picture_; }
+  Result<Stamp> show(const cv::Mat& image) override;
+  const cv::Mat& image() const { return image_; }
 
  private:
   std::string name_;
   cv::Size size_;
   double latency_s_;
-  cv::Mat picture_;
+  cv::Mat image_;
 };
 
-/// Error unless a display of that name and size can show the picture: 8-bit grey or BGR.
-Status fits(const cv::Mat& picture, const std::string& name, cv::Size size);
+/// Error unless a display of that name and size can show the image: 8-bit grey or BGR.
+Status check_image(const cv::Mat& image, const std::string& name, cv::Size size);
 
 }  // namespace limn::device

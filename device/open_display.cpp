@@ -16,52 +16,52 @@ using Opened = Result<std::unique_ptr<Display>>;
 // A display in a window: scaled to it, gone once the person closes it.
 class WindowDisplay : public Display {
  public:
-  WindowDisplay(Window window, const DisplayWanted& wanted) : window_(std::move(window)), wanted_(wanted) {}
-  const std::string& name() const override { return wanted_.name; }
-  cv::Size size() const override { return wanted_.size; }
-  Result<Stamp> show(const cv::Mat& picture) override {
-    LIMN_TRY_STATUS(fits(picture, wanted_.name, wanted_.size));
-    if (!window_.is_open()) return error("{}: its window has been closed.", wanted_.name);
-    window_.show(picture);
-    return shifted(std::chrono::steady_clock::now(), wanted_.latency_s);
+  WindowDisplay(Window window, const DisplayConfig& config) : window_(std::move(window)), config_(config) {}
+  const std::string& name() const override { return config_.name; }
+  cv::Size size() const override { return config_.size; }
+  Result<Stamp> show(const cv::Mat& image) override {
+    LIMN_TRY_STATUS(check_image(image, config_.name, config_.size));
+    if (!window_.is_open()) return error("{}: its window has been closed.", config_.name);
+    window_.show(image);
+    return shifted(std::chrono::steady_clock::now(), config_.latency_s);
   }
 
  private:
   Window window_;
-  DisplayWanted wanted_;
+  DisplayConfig config_;
 };
 
 constexpr int k_window_width = 960;  // a larger one would hide the operator's
 
-Opened open_window(const DisplayWanted& wanted, const Desktop& desktop) {
-  const int width = std::min(wanted.size.width, k_window_width);
-  LIMN_TRY(Window window, Window::open(desktop, {.title = wanted.name,
+Opened open_window(const DisplayConfig& config, const Desktop& desktop) {
+  const int width = std::min(config.size.width, k_window_width);
+  LIMN_TRY(Window window, Window::open(desktop, {.title = config.name,
                                                  .width = width,
-                                                 .height = width * wanted.size.height / wanted.size.width,
-                                                 .waits = wanted.waits}));
-  return Opened(std::make_unique<WindowDisplay>(std::move(window), wanted));
+                                                 .height = width * config.size.height / config.size.width,
+                                                 .vsync = config.vsync}));
+  return Opened(std::make_unique<WindowDisplay>(std::move(window), config));
 }
 
 }  // namespace
 
-bool needs_desktop(const DisplayWanted& wanted) { return wanted.monitor != "offscreen"; }
+bool needs_desktop(const DisplayConfig& config) { return config.monitor != "offscreen"; }
 
-Result<std::unique_ptr<Display>> open_display(const DisplayWanted& wanted, const Desktop* desktop) {
-  const bool monitor = wanted.monitor != "offscreen" && wanted.monitor != "window";
-  if (!monitor && wanted.size.empty())
-    return error("{}: expected a size for the display {}, found none. Give it, or a rig.", wanted.name,
-                 wanted.monitor);
-  if (wanted.monitor == "offscreen")
-    return Opened(std::make_unique<OffscreenDisplay>(wanted.name, wanted.size, wanted.latency_s));
+Result<std::unique_ptr<Display>> open_display(const DisplayConfig& config, const Desktop* desktop) {
+  const bool monitor = config.monitor != "offscreen" && config.monitor != "window";
+  if (!monitor && config.size.empty())
+    return error("{}: expected a size for the display {}, found none. Give it, or a rig.", config.name,
+                 config.monitor);
+  if (config.monitor == "offscreen")
+    return Opened(std::make_unique<OffscreenDisplay>(config.name, config.size, config.latency_s));
   if (!desktop)
     return error("{}: expected a desktop for the display {}, found none. Log in to a desktop or set DISPLAY.",
-                 wanted.name, wanted.monitor);
-  if (!monitor) return open_window(wanted, *desktop);
-  LIMN_TRY(MonitorDisplay display, MonitorDisplay::open(*desktop, {.name = wanted.name,
-                                                                   .monitor = wanted.monitor,
-                                                                   .size = wanted.size,
-                                                                   .latency_s = wanted.latency_s,
-                                                                   .waits = wanted.waits}));
+                 config.name, config.monitor);
+  if (!monitor) return open_window(config, *desktop);
+  LIMN_TRY(MonitorDisplay display, MonitorDisplay::open(*desktop, {.name = config.name,
+                                                                   .monitor = config.monitor,
+                                                                   .size = config.size,
+                                                                   .latency_s = config.latency_s,
+                                                                   .vsync = config.vsync}));
   return Opened(std::make_unique<MonitorDisplay>(std::move(display)));
 }
 

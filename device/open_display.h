@@ -8,19 +8,19 @@
 namespace limn::device {
 
 /// A display as people write it down.
-struct DisplayWanted {
+struct DisplayConfig {
   std::string name = "projector0";
   std::string monitor;   ///< its name on the desktop; `window`: a window of any size; `offscreen`: no light
-  cv::Size size = {};    ///< of the pictures, the rig's; empty only for a monitor: as it stands
+  cv::Size size = {};    ///< of the images, the rig's; empty only for a monitor: as it stands
   double latency_s = 0;  ///< measured, from the swap to light
-  bool waits = true;     ///< for the next refresh at each picture; of several, let one wait
+  bool vsync = true;     ///< for the next refresh at each image; of several, let one wait
 };
 
 /// Whether it needs a desktop.
-bool needs_desktop(const DisplayWanted& wanted);
+bool needs_desktop(const DisplayConfig& config);
 
 /// Opens it; `desktop` may be null for `offscreen`. Errors: no desktop, no such monitor, a monitor in another
 /// mode, no size.
-Result<std::unique_ptr<Display>> open_display(const DisplayWanted& wanted, const Desktop* desktop);
+Result<std::unique_ptr<Display>> open_display(const DisplayConfig& config, const Desktop* desktop);
 
 }  // namespace limn::device

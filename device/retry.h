@@ -12,12 +12,12 @@ namespace limn::device {
 /// When a lost device is tried again: after 0.1 s, doubling to 2 s while it fails. Keeps why it failed.
 class Retry {
  public:
-  void failed(const std::string& why) {
+  void note_failure(const std::string& why) {
     problem_ = why;
     due_ = shifted(std::chrono::steady_clock::now(), pause_s_);
     pause_s_ = std::min(2 * pause_s_, k_longest_pause_s);
   }
-  void worked() { pause_s_ = k_first_pause_s; }
+  void note_success() { pause_s_ = k_first_pause_s; }
   /// A fault that does not end the connection.
   void note(const std::string& problem) { problem_ = problem; }
   const std::string& problem() const { return problem_; }

@@ -94,7 +94,7 @@ Result<v4l2_capability> capability(const Device& device) {
   return found;
 }
 
-bool takes_pictures(const v4l2_capability& found) {
+bool captures_video(const v4l2_capability& found) {
   const std::uint32_t able =
       found.capabilities & V4L2_CAP_DEVICE_CAPS ? found.device_caps : found.capabilities;
   return able & V4L2_CAP_VIDEO_CAPTURE && able & V4L2_CAP_STREAMING;
@@ -293,7 +293,7 @@ Result<Session> begun(const std::string& path,
                       cv::Size size) {
   LIMN_TRY(Device device, opened(path, system));
   LIMN_TRY(const v4l2_capability able, capability(device));
-  if (!takes_pictures(able))
+  if (!captures_video(able))
     return error(
         "expected a camera, found a device that gives no pictures. Take its neighbour (limn doctor lists "
         "them).");
@@ -305,10 +305,10 @@ Result<Session> begun(const std::string& path,
 }
 
 cv::Mat from_yuyv(const cv::Mat& yuyv, bool grey) {
-  cv::Mat picture;
-  if (grey) cv::extractChannel(yuyv, picture, 0);
-  if (!grey) cv::cvtColor(yuyv, picture, cv::COLOR_YUV2BGR_YUYV);
-  return picture;
+  cv::Mat image;
+  if (grey) cv::extractChannel(yuyv, image, 0);
+  if (!grey) cv::cvtColor(yuyv, image, cv::COLOR_YUV2BGR_YUYV);
+  return image;
 }
 
 // A frame without name and stamp.
@@ -474,7 +474,7 @@ Result<Frame> V4l2Camera::Impl::next() {
       if (!retry.wait(deadline)) break;
       auto fresh = begun(path, system, options, size);
       if (!fresh) {
-        retry.failed(fresh.message());
+        retry.note_failure(fresh.message());
         continue;
       }
       session.emplace(std::move(*fresh));
@@ -483,12 +483,12 @@ Result<Frame> V4l2Camera::Impl::next() {
     }
     auto frame = grabbed(deadline);
     if (frame && *frame) {
-      retry.worked();
+      retry.note_success();
       return std::move(**frame);
     }
     if (!frame) {
       session.reset();
-      retry.failed(frame.message());
+      retry.note_failure(frame.message());
     }
   }
   return error("{} ({}): expected a picture within {:g} s, found none: {}", options.name, path,
@@ -528,10 +528,10 @@ std::vector<CameraSetting> V4l2Camera::settings() const {
   return impl_->session ? impl_->session->settings : std::vector<CameraSetting>{};
 }
 
-std::vector<V4l2Found> v4l2_cameras(const V4l2System& system) {
-  std::vector<V4l2Found> cameras;
+std::vector<V4l2Device> v4l2_cameras(const V4l2System& system) {
+  std::vector<V4l2Device> cameras;
   for (int number = 0; number < 64; ++number) {
-    V4l2Found found{fmt::format("/dev/video{}", number), "", ""};
+    V4l2Device found{fmt::format("/dev/video{}", number), "", ""};
     const int fd = system.open(found.path);
     if (fd < 0 && errno == ENOENT) continue;
     if (fd < 0) {
@@ -542,7 +542,7 @@ std::vector<V4l2Found> v4l2_cameras(const V4l2System& system) {
     const Device device(&system, fd);
     const auto able = capability(device);
     if (!able) found.problem = able.message();
-    if (able && !takes_pictures(*able)) continue;
+    if (able && !captures_video(*able)) continue;
     if (able) found.card = reinterpret_cast<const char*>(able->card);
     cameras.push_back(found);
   }

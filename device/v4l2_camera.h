@@ -61,13 +61,13 @@ class V4l2Camera : public CameraSource {
 };
 
 /// A capture device of this machine.
-struct V4l2Found {
+struct V4l2Device {
   std::string path;     ///< /dev/video0
   std::string card;     ///< the driver's name for it
   std::string problem;  ///< a sentence when it cannot be opened; else empty
 };
 
-/// The cameras at /dev/video0 to /dev/video63; nodes that give no pictures (metadata) are left out.
-std::vector<V4l2Found> v4l2_cameras(const V4l2System& system = V4l2System::kernel());
+/// The cameras at /dev/video0 to /dev/video63; nodes that give no images (metadata) are left out.
+std::vector<V4l2Device> v4l2_cameras(const V4l2System& system = V4l2System::kernel());
 
 }  // namespace limn::device

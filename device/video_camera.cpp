@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "device/address.h"
 #include "device/retry.h"
 #include "device/socket.h"
@@ -34,14 +34,14 @@ struct VideoCamera::Impl {
 
   Status connect(Stamp deadline);
   Status catch_up(Stamp deadline);
-  Result<cv::Mat> retrieved();
+  Result<cv::Mat> retrieve();
   Result<Frame> next_of_file();
   Result<Frame> next_of_stream();
-  Result<Frame> grabbed(Stamp deadline);
+  Result<Frame> grab_newest(Stamp deadline);
 };
 
-// The picture of the frame grabbed last.
-Result<cv::Mat> VideoCamera::Impl::retrieved() {
+// The image of the frame grabbed last.
+Result<cv::Mat> VideoCamera::Impl::retrieve() {
   cv::Mat image;
   if (!video.retrieve(image) || image.empty() || image.depth() != CV_8U)
     return error("expected a frame of 8 bits, found one that cannot be decoded.");
@@ -54,7 +54,7 @@ Result<cv::Mat> VideoCamera::Impl::retrieved() {
 Result<Frame> VideoCamera::Impl::next_of_file() {
   if (!video.grab()) return error("{}: all {} frames of {} have been played.", options.name, frames, source);
   ++frames;
-  auto image = retrieved();
+  auto image = retrieve();
   if (!image) return error("{}: frame {}: {}", source, frames - 1, image.message());
   return Frame{options.name, *image, shifted(Stamp{}, video.get(cv::CAP_PROP_POS_MSEC) / 1000)};
 }
@@ -95,7 +95,7 @@ Status VideoCamera::Impl::catch_up(Stamp deadline) {
 }
 
 // The newest frame of an open stream.
-Result<Frame> VideoCamera::Impl::grabbed(Stamp deadline) {
+Result<Frame> VideoCamera::Impl::grab_newest(Stamp deadline) {
   for (;;) {
     if (!video.grab()) return error("the stream broke off, or was silent.");
     const Stamp now = Clock::now();
@@ -104,7 +104,7 @@ Result<Frame> VideoCamera::Impl::grabbed(Stamp deadline) {
       ++dropped;
       continue;
     }
-    LIMN_TRY(const cv::Mat image, retrieved());
+    LIMN_TRY(const cv::Mat image, retrieve());
     return Frame{options.name, image, arrived_at};
   }
 }
@@ -116,18 +116,18 @@ Result<Frame> VideoCamera::Impl::next_of_stream() {
       if (!retry.wait(deadline)) break;
       if (const Status done = connect(deadline); !done) {
         video.release();
-        retry.failed(done.message());
+        retry.note_failure(done.message());
       }
       continue;
     }
-    auto frame = grabbed(deadline);
+    auto frame = grab_newest(deadline);
     if (frame) {
-      retry.worked();
+      retry.note_success();
       ++frames;
       return frame;
     }
     video.release();
-    retry.failed(frame.message());
+    retry.note_failure(frame.message());
   }
   return error("{} ({}): expected a picture within {:g} s, found none: {}", options.name, address->shown,
                options.limit_s, retry.problem());

@@ -70,14 +70,14 @@ Result<Window> Window::open(const Desktop& desktop, const WindowOptions& options
   LIMN_TRY(GlfwSurface surface, GlfwSurface::open({.title = options.title,
                                                    .width = options.width,
                                                    .height = options.height,
-                                                   .waits = options.waits}));
+                                                   .vsync = options.vsync}));
   auto impl = std::make_unique<Impl>(Impl{desktop, std::move(surface), options.escape_closes});
   impl->listen();
   return Window(std::move(impl));
 }
 
-void Window::show(const cv::Mat& picture) {
-  impl_->surface.show(picture);
+void Window::show(const cv::Mat& image) {
+  impl_->surface.show(image);
   glfwPollEvents();
 }
 
@@ -88,7 +88,7 @@ bool Window::is_open() {
   return true;
 }
 
-int Window::pressed_key() { return std::exchange(impl_->key, 0); }
+int Window::poll_pressed_key() { return std::exchange(impl_->key, 0); }
 
 void Window::draw(const std::function<void(cv::Size)>& paint) { impl_->surface.draw_with(paint); }
 void Window::in_context(const std::function<void()>& work) { impl_->surface.in_context(work); }

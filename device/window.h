@@ -15,7 +15,7 @@ namespace limn::device {
 struct WindowOptions {
   std::string title = "Limn";
   int width = 0, height = 0;
-  bool waits = true;          ///< for the monitor's next refresh at each picture
+  bool vsync = true;          ///< for the monitor's next refresh at each image
   bool escape_closes = true;  ///< false: Escape is a key like any other
 };
 
@@ -32,7 +32,7 @@ struct WindowInput {
   std::vector<unsigned> characters = {};  ///< typed, Unicode
 };
 
-/// A window on the desktop that shows pictures, scaled to fit with black bars. Belongs to the main thread.
+/// A window on the desktop that shows images, scaled to fit with black bars. Belongs to the main thread.
 /// Its own GL context is current only inside its functions; what was current before is current again after.
 class Window {
  public:
@@ -44,12 +44,12 @@ class Window {
   Window& operator=(Window&&) noexcept;
   ~Window();
 
-  /// Shows an 8-bit grey or BGR picture from now on and handles pending events.
-  void show(const cv::Mat& picture);
-  /// Handles events and redraws its picture; false once the person has closed the window or pressed Escape.
+  /// Shows an 8-bit grey or BGR image from now on and handles pending events.
+  void show(const cv::Mat& image);
+  /// Handles events and redraws its image; false once the person has closed the window or pressed Escape.
   bool is_open();
   /// The key pressed since the last call (GLFW's codes; letters are upper-case ASCII), 0 when none.
-  int pressed_key();
+  int poll_pressed_key();
 
   /// Calls `paint` with the window's context current and its framebuffer bound, then shows what it drew;
   /// instead of show().

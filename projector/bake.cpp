@@ -10,11 +10,11 @@ namespace {
 
 constexpr int k_widest_step = 4;
 constexpr double k_tolerance_px = 0.005;  // of the table between its nodes
-constexpr int k_probes = 24;              // a side of the picture, for checking that
+constexpr int k_probes = 24;              // a side of the image, for checking that
 
 cv::Vec2f tangent_of(const Eigen::Vector3f& d) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  constexpr float k_least_z = 0.2f;  // 78 degrees off axis: beyond a pinhole picture
+  constexpr float k_least_z = 0.2f;  // 78 degrees off axis: beyond a pinhole image
   return d.z() > k_least_z ? cv::Vec2f(d.x() / d.z(), d.y() / d.z()) : cv::Vec2f(nan, nan);
 }
 
@@ -86,7 +86,7 @@ BakedLens baked(const Imager& imager) {
     lens.rect.lower = lens.rect.lower.cwiseMin(tangent);
     lens.rect.upper = lens.rect.upper.cwiseMax(tangent);
   }
-  // The first nodes are pixel centres; the picture begins half a pixel before.
+  // The first nodes are pixel centres; the image begins half a pixel before.
   const Eigen::Vector2d half_pixel(0.5 / imager.lens.fx(), 0.5 / imager.lens.fy());
   lens.rect.lower -= 2 * half_pixel;
   return lens;
@@ -127,7 +127,7 @@ cv::Rect pixels_of(const Imager& imager, const BakedLens& lens, const TangentRec
   return cv::Rect(first, end) & cv::Rect(0, 0, imager.width, imager.height);
 }
 
-cv::Mat response_table(const Response* response, int columns) {
+cv::Mat response_table(const ProjectorResponse* response, int columns) {
   cv::Mat table(1, columns, CV_32FC3);
   for (int k = 0; k < columns; ++k) {
     const double light = std::pow(static_cast<double>(k) / (columns - 1), 2);

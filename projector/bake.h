@@ -4,16 +4,16 @@
 
 #include "core/imager.h"
 #include "core/rig.h"
-#include "projector/twin.h"
+#include "projector/pinhole_view.h"
 
 namespace limn::projector {
 
 /// A lens as tables for the GPU, so that mrcal's formulas are spelled nowhere else.
 struct BakedLens {
-  cv::Mat tangents;  ///< CV_32FC2: x/z, y/z of every `step`-th pixel, at least one node beyond the picture;
+  cv::Mat tangents;  ///< CV_32FC2: x/z, y/z of every `step`-th pixel, at least one node beyond the image;
                      ///< NaN: none
   int step = 1;
-  TangentRect rect;  ///< of all directions of the picture
+  TangentRect rect;  ///< of all directions of the image
 };
 
 /// Nodes are as far apart (4 pixels or fewer) as keeps the lens within 0.005 px of the exact one between
@@ -29,6 +29,6 @@ cv::Rect pixels_of(const Imager& imager, const BakedLens& lens, const TangentRec
 
 /// CV_32FC3 (r, g, b), 1 row: display value that gives the light (k / (columns - 1))^2 by the measured
 /// response, gamma 2.2 when `response` is null.
-cv::Mat response_table(const Response* response, int columns);
+cv::Mat response_table(const ProjectorResponse* response, int columns);
 
 }  // namespace limn::projector

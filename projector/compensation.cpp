@@ -75,19 +75,19 @@ double irradiance_at(const Imager& projector,
   return cosine / to_eye.squaredNorm() * vignetting.gain(*px, projector.width, projector.height);
 }
 
-// Of the albedo picture: linear r, g, b.
+// Of the albedo image: linear r, g, b.
 cv::Mat linear_albedo(const scene::Prototype& prototype) {
-  cv::Mat linear(prototype.albedo_picture.size(), CV_32FC3);
+  cv::Mat linear(prototype.albedo_image.size(), CV_32FC3);
   for (int row = 0; row < linear.rows; ++row)
     for (int column = 0; column < linear.cols; ++column)
       for (int c = 0; c < 3; ++c)
         linear.at<cv::Vec3f>(row, column)[c] = static_cast<float>(
-            linear_of_srgb(prototype.albedo_picture.at<cv::Vec3b>(row, column)[2 - c] / 255.0));
+            linear_from_srgb(prototype.albedo_image.at<cv::Vec3b>(row, column)[2 - c] / 255.0));
   return linear;
 }
 
 Vignetting vignetting_of(const Rig& rig, const Imager& projector) {
-  for (const Response& response : rig.responses)
+  for (const ProjectorResponse& response : rig.responses)
     if (response.projector == projector.name && response.vignetting) return *response.vignetting;
   return {};
 }
@@ -122,7 +122,7 @@ Result<SurfaceMixing> surface_mixing(const MeasuredSurface& surface, std::span<c
   SurfaceMixing out;
   for (std::size_t i = 0; i < 3 * count + 1; ++i) out.layers.emplace_back(size, CV_32FC4, cv::Scalar::all(0));
   std::vector<cv::Mat> lit;
-  for (const cv::Mat& picture : irradiance) lit.push_back(lit_inside(picture));
+  for (const cv::Mat& image : irradiance) lit.push_back(lit_inside(image));
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   std::size_t seen = 0;
   std::vector<Eigen::Vector3f> whites;  // of pixels, all projectors on
@@ -199,12 +199,12 @@ double geometric_level(const scene::Prototype& prototype, const Rig& rig, const 
 }
 
 cv::Mat relative_albedo(const scene::Prototype& prototype) {
-  if (prototype.albedo_picture.empty()) return {1, 1, CV_32FC3, cv::Scalar::all(1)};
+  if (prototype.albedo_image.empty()) return {1, 1, CV_32FC3, cv::Scalar::all(1)};
   return linear_albedo(prototype) / std::max(1e-3, mean_albedo_of(prototype));
 }
 
 double mean_albedo_of(const scene::Prototype& prototype) {
-  if (prototype.albedo_picture.empty()) return prototype.albedo;
+  if (prototype.albedo_image.empty()) return prototype.albedo;
   const cv::Scalar mean = cv::mean(linear_albedo(prototype));
   return (mean[0] + mean[1] + mean[2]) / 3;
 }

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "core/response.h"
+#include "core/photometric_response.h"
 #include "core/rig.h"
 #include "scene/scene.h"
 
@@ -20,7 +20,7 @@ enum class Compensation {
   measured   ///< as geometry, but albedo, colour mixing, ambient and black light as a camera measured them
 };
 
-/// How wanted colours become light. Everything may change from picture to picture.
+/// How wanted colours become light. Everything may change from image to image.
 struct LightOptions {
   Compensation compensation = Compensation::none;
   /// Where only some projectors reach, gives the black light of the others, too, so that overlaps do not show
@@ -57,8 +57,8 @@ Result<SurfaceMixing> surface_mixing(const MeasuredSurface& surface, std::span<c
 /// LightOptions::level by geometry: shadows are left out.
 double geometric_level(const scene::Prototype& prototype, const Rig& rig, const Pose& world_from_prototype);
 
-/// The prototype's albedo picture as linear light over its mean, CV_32FC3 (r, g, b); one pixel without a
-/// picture.
+/// The prototype's albedo image as linear light over its mean, CV_32FC3 (r, g, b); one pixel without an
+/// image.
 cv::Mat relative_albedo(const scene::Prototype& prototype);
 /// That mean, over r, g and b.
 double mean_albedo_of(const scene::Prototype& prototype);

@@ -3,7 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
-#include "scene/nearest.h"
+#include "scene/mesh_bvh.h"
 
 namespace limn::projector {
 namespace {
@@ -23,7 +23,7 @@ DistanceField distance_field(const scene::Mesh& mesh, double farthest_m) {
   field.p_lower = box.min() - margin;
   field.p_upper = box.max() + margin;
   const Eigen::Vector3f step = (field.p_upper - field.p_lower) / (DistanceField::k_nodes - 1);
-  const scene::SurfaceIndex surface(mesh);
+  const scene::MeshBvh surface(mesh);
   field.distances.reserve(static_cast<std::size_t>(DistanceField::k_nodes) * DistanceField::k_nodes *
                           DistanceField::k_nodes);
   for (int z = 0; z < DistanceField::k_nodes; ++z)

@@ -7,7 +7,7 @@
 
 #include "projector/gl.h"
 #include "projector/shader.h"
-#include "scene/posed.h"
+#include "scene/posed_scene.h"
 #include "scene/scene.h"
 
 namespace limn::projector {

@@ -60,9 +60,9 @@ GlName make_texels(const GlName& buffer, GLenum format) {
   return {name, [](GLuint n) { glDeleteTextures(1, &n); }};
 }
 
-void upload(const GlName& texture, const cv::Mat& picture) {
-  LIMN_CHECK(picture.depth() == CV_8U || picture.depth() == CV_32F);
-  const cv::Mat whole = picture.isContinuous() ? picture : picture.clone();
+void upload(const GlName& texture, const cv::Mat& image) {
+  LIMN_CHECK(image.depth() == CV_8U || image.depth() == CV_32F);
+  const cv::Mat whole = image.isContinuous() ? image : image.clone();
   const bool bytes = whole.depth() == CV_8U;
   const GLenum formats[] = {GL_RED, GL_RG, static_cast<GLenum>(bytes ? GL_BGR : GL_RGB),
                             static_cast<GLenum>(bytes ? GL_BGRA : GL_RGBA)};
@@ -71,34 +71,34 @@ void upload(const GlName& texture, const cv::Mat& picture) {
                       bytes ? GL_UNSIGNED_BYTE : GL_FLOAT, whole.data);
 }
 
-void upload(const GlName& texture, const cv::Mat& picture, const cv::Rect& place) {
-  LIMN_CHECK(picture.type() == CV_8UC3 && picture.isContinuous());
+void upload(const GlName& texture, const cv::Mat& image, const cv::Rect& place) {
+  LIMN_CHECK(image.type() == CV_8UC3 && image.isContinuous());
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  glPixelStorei(GL_UNPACK_ROW_LENGTH, picture.cols);
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, image.cols);
   glTextureSubImage2D(*texture, 0, place.x, place.y, place.width, place.height, GL_BGR, GL_UNSIGNED_BYTE,
-                      picture.ptr(place.y, place.x));
+                      image.ptr(place.y, place.x));
   glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
 }
 
-void read_back(const GlName& framebuffer, const cv::Rect& place, cv::Mat* picture) {
-  LIMN_CHECK(picture->type() == CV_8UC3 && picture->isContinuous());
+void read_back(const GlName& framebuffer, const cv::Rect& place, cv::Mat* image) {
+  LIMN_CHECK(image->type() == CV_8UC3 && image->isContinuous());
   glBindFramebuffer(GL_READ_FRAMEBUFFER, *framebuffer);
   glReadBuffer(GL_COLOR_ATTACHMENT0);
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glPixelStorei(GL_PACK_ROW_LENGTH, picture->cols);
+  glPixelStorei(GL_PACK_ROW_LENGTH, image->cols);
   glReadPixels(place.x, place.y, place.width, place.height, GL_BGR, GL_UNSIGNED_BYTE,
-               picture->ptr(place.y, place.x));
+               image->ptr(place.y, place.x));
   glPixelStorei(GL_PACK_ROW_LENGTH, 0);
 }
 
 cv::Mat read_back(const GlName& framebuffer, int width, int height, int type, GLenum format) {
-  cv::Mat picture(height, width, type);
+  cv::Mat image(height, width, type);
   glBindFramebuffer(GL_READ_FRAMEBUFFER, *framebuffer);
   glReadBuffer(GL_COLOR_ATTACHMENT0);
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
   glReadPixels(0, 0, width, height, format, CV_MAT_DEPTH(type) == CV_8U ? GL_UNSIGNED_BYTE : GL_FLOAT,
-               picture.data);
-  return picture;
+               image.data);
+  return image;
 }
 
 int largest_texture() {
@@ -108,16 +108,16 @@ int largest_texture() {
   return std::min(most, k_most);
 }
 
-cv::Mat fitting_texture(const cv::Mat& picture, const std::string& name) {
+cv::Mat fitting_texture(const cv::Mat& image, const std::string& name) {
   const int most = largest_texture();
-  if (picture.cols <= most && picture.rows <= most) return picture;
-  const cv::Size size(std::min(most, picture.cols), std::min(most, picture.rows));
+  if (image.cols <= most && image.rows <= most) return image;
+  const cv::Size size(std::min(most, image.cols), std::min(most, image.rows));
   log_warning(
       "{}: expected a texture of at most {} x {} texels, found {} x {}; it is shown reduced to {} x {}. "
       "Save it smaller.",
-      name, most, most, picture.cols, picture.rows, size.width, size.height);
+      name, most, most, image.cols, image.rows, size.width, size.height);
   cv::Mat reduced;
-  cv::resize(picture, reduced, size, 0, 0, cv::INTER_AREA);
+  cv::resize(image, reduced, size, 0, 0, cv::INTER_AREA);
   return reduced;
 }
 

@@ -40,18 +40,18 @@ GlName make_buffer(const void* data, std::size_t bytes);
 /// All of a buffer as the texels of a GL_TEXTURE_BUFFER, which shows what the buffer holds by then.
 GlName make_texels(const GlName& buffer, GLenum format);
 
-/// Fills a GL_TEXTURE_2D of make_texture from a picture of 1-4 channels, 8-bit or float; first row first.
-void upload(const GlName& texture, const cv::Mat& picture);
-/// The same for a rectangle of the picture alone, to the same place of the texture.
-void upload(const GlName& texture, const cv::Mat& picture, const cv::Rect& place);
-/// A rectangle of the colour attachment of a framebuffer to the same place of the picture (CV_8UC3, BGR).
-void read_back(const GlName& framebuffer, const cv::Rect& place, cv::Mat* picture);
-/// The colour attachment of a framebuffer, first row first, as a picture of `type` (CV_8UC3 comes as BGR).
+/// Fills a GL_TEXTURE_2D of make_texture from an image of 1-4 channels, 8-bit or float; first row first.
+void upload(const GlName& texture, const cv::Mat& image);
+/// The same for a rectangle of the image alone, to the same place of the texture.
+void upload(const GlName& texture, const cv::Mat& image, const cv::Rect& place);
+/// A rectangle of the colour attachment of a framebuffer to the same place of the image (CV_8UC3, BGR).
+void read_back(const GlName& framebuffer, const cv::Rect& place, cv::Mat* image);
+/// The colour attachment of a framebuffer, first row first, as an image of `type` (CV_8UC3 comes as BGR).
 cv::Mat read_back(const GlName& framebuffer, int width, int height, int type, GLenum format);
 
-/// Texels a side that a picture of a scene may have: what the context holds, 4096 at most.
+/// Texels a side that an image of a scene may have: what the context holds, 4096 at most.
 int largest_texture();
-/// The picture, reduced to largest_texture() where it is larger; that is told, under its name.
-cv::Mat fitting_texture(const cv::Mat& picture, const std::string& name);
+/// The image, reduced to largest_texture() where it is larger; that is told, under its name.
+cv::Mat fitting_texture(const cv::Mat& image, const std::string& name);
 
 }  // namespace limn::projector

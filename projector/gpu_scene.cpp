@@ -9,7 +9,7 @@
 
 #include "core/log.h"
 #include "core/result.h"
-#include "projector/mirrored_light.h"
+#include "projector/brdf_lut.h"
 
 namespace limn::projector {
 namespace {
@@ -101,16 +101,16 @@ void append_linked(const scene::Mesh& mesh, std::vector<GpuTriangle>* triangles)
 
 int level_count(int side) { return 1 + static_cast<int>(std::floor(std::log2(side))); }
 
-cv::Mat resized(const cv::Mat& picture, const cv::Size& size) {
+cv::Mat resized(const cv::Mat& image, const cv::Size& size) {
   cv::Mat out;
-  cv::resize(picture, out, size);
+  cv::resize(image, out, size);
   return out;
 }
 
 // The layer of a texture in an array of textures, where it is put if it is not there yet.
 float layer_of(const scene::Texture& texture, std::vector<scene::Texture>* layers) {
   const auto known = std::find_if(layers->begin(), layers->end(), [&](const scene::Texture& layer) {
-    return layer.picture.data == texture.picture.data;
+    return layer.image.data == texture.image.data;
   });
   const auto layer = static_cast<float>(known - layers->begin());
   if (known == layers->end()) layers->push_back(texture);
@@ -123,8 +123,8 @@ GlName make_layers(const std::vector<scene::Texture>& textures, GLenum format) {
   const int most = largest_texture();
   int width = 1, height = 1;
   for (const scene::Texture& texture : textures) {
-    width = std::min(most, std::max(width, texture.picture.cols));
-    height = std::min(most, std::max(height, texture.picture.rows));
+    width = std::min(most, std::max(width, texture.image.cols));
+    height = std::min(most, std::max(height, texture.image.rows));
   }
   const int count = std::max(1, static_cast<int>(textures.size()));
   GlName layers =
@@ -135,7 +135,7 @@ GlName make_layers(const std::vector<scene::Texture>& textures, GLenum format) {
   glTextureParameteri(*layers, GL_TEXTURE_WRAP_T, GL_REPEAT);
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
   for (std::size_t i = 0; i < textures.size(); ++i) {
-    const cv::Mat layer = resized(fitting_texture(textures[i].picture, textures[i].file), {width, height});
+    const cv::Mat layer = resized(fitting_texture(textures[i].image, textures[i].file), {width, height});
     glTextureSubImage3D(*layers, 0, 0, 0, static_cast<GLint>(i), width, height, 1,
                         layer.channels() == 4 ? GL_BGRA : GL_BGR, GL_UNSIGNED_BYTE, layer.data);
   }
@@ -143,17 +143,17 @@ GlName make_layers(const std::vector<scene::Texture>& textures, GLenum format) {
   return layers;
 }
 
-// Occlusion, roughness and metalness in red, green and blue, 1 where there is none. A picture that has them
+// Occlusion, roughness and metalness in red, green and blue, 1 where there is none. An image that has them
 // all is taken as it is.
 scene::Texture packed(const scene::SurfaceMaps& maps) {
   const scene::Texture &metal = maps.metallic_roughness, &open = maps.occlusion;
-  if (metal.picture.data == open.picture.data) return metal;
+  if (metal.image.data == open.image.data) return metal;
   cv::Mat of_metal, of_open;
-  if (!metal.picture.empty()) of_metal = fitting_texture(metal.picture, metal.file);
-  if (!open.picture.empty()) of_open = fitting_texture(open.picture, open.file);
+  if (!metal.image.empty()) of_metal = fitting_texture(metal.image, metal.file);
+  if (!open.image.empty()) of_open = fitting_texture(open.image, open.file);
   const cv::Size size(std::max(of_metal.cols, of_open.cols), std::max(of_metal.rows, of_open.rows));
-  for (cv::Mat* picture : {&of_metal, &of_open})
-    *picture = picture->empty() ? cv::Mat(size, CV_8UC3, cv::Scalar::all(255)) : resized(*picture, size);
+  for (cv::Mat* image : {&of_metal, &of_open})
+    *image = image->empty() ? cv::Mat(size, CV_8UC3, cv::Scalar::all(255)) : resized(*image, size);
   const cv::Mat from[] = {of_metal, of_open};
   cv::Mat all(size, CV_8UC3);
   const int from_to[] = {0, 0, 1, 1, 5, 2};  // blue and green of the one, red of the other
@@ -219,7 +219,7 @@ GpuScene::GpuScene(const scene::Scene& scene) {
   looks_ = make_layers(staging.looks, GL_SRGB8_ALPHA8);
   // Finer than their 8 bits: software GL mixes texels in the format's own.
   maps_ = make_layers(staging.maps, GL_RGBA16);
-  const cv::Mat& mirrored = mirrored_light();
+  const cv::Mat& mirrored = brdf_lut();
   mirrored_ = make_texture(GL_TEXTURE_2D, GL_RGBA32F, mirrored.cols, mirrored.rows);
   for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
     glTextureParameteri(*mirrored_, filter, GL_LINEAR);
@@ -245,11 +245,11 @@ void GpuScene::add_material(const scene::Material& material, bool has_uvs, Stagi
   const scene::SurfaceMaps& maps = material.maps;
   if (has_uvs && !maps.is_none()) {
     has_surface_maps_ = true;
-    if (!maps.emission.picture.empty()) gpu.emitted.w() = layer_of(maps.emission, &staging->looks);
-    if (!maps.metallic_roughness.picture.empty() || !maps.occlusion.picture.empty())
+    if (!maps.emission.image.empty()) gpu.emitted.w() = layer_of(maps.emission, &staging->looks);
+    if (!maps.metallic_roughness.image.empty() || !maps.occlusion.image.empty())
       gpu.maps.x() = layer_of(packed(maps), &staging->maps);
-    if (!maps.normals.picture.empty()) gpu.maps.y() = layer_of(maps.normals, &staging->maps);
-    gpu.more.y() = maps.metallic_roughness.picture.empty() ? 0 : 1;
+    if (!maps.normals.image.empty()) gpu.maps.y() = layer_of(maps.normals, &staging->maps);
+    gpu.more.y() = maps.metallic_roughness.image.empty() ? 0 : 1;
     gpu.maps.tail<2>() << maps.normal_scale, maps.occlusion_strength;
   }
   staging->materials.push_back(gpu);

@@ -10,7 +10,7 @@
 
 #include "core/result.h"
 #include "projector/gl.h"
-#include "scene/posed.h"
+#include "scene/posed_scene.h"
 
 namespace limn::projector {
 
@@ -36,7 +36,7 @@ struct PlacedRun {
   const TriangleRun* run = nullptr;
   Pose scene_from_owner;
   bool on_surface = false;  ///< its slot's mode is surface
-  scene::MaterialChange material = {};
+  scene::MaterialOverride material = {};
 };
 
 /// All meshes of a scene on the GPU, as shaders/scene.glsl reads them.

@@ -13,7 +13,7 @@
 
 namespace limn::projector {
 
-/// Rectangles of a projector's picture in which it may give light, none over another: for parts of one mode,
+/// Rectangles of a projector's image in which it may give light, none over another: for parts of one mode,
 /// or of both.
 struct PlacesByMode {
   std::vector<cv::Rect> view, surface, both;

@@ -9,14 +9,14 @@ namespace limn::projector {
 cv::Mat light_of_display(const Rig& rig, const std::string& projector) {
   cv::Mat light(1, 256, CV_32FC3);
   const auto found = std::find_if(rig.responses.begin(), rig.responses.end(),
-                                  [&](const Response& r) { return r.projector == projector; });
+                                  [&](const ProjectorResponse& r) { return r.projector == projector; });
   for (int v = 0; v < 256; ++v) {
     const double at = v / 255.0;
     cv::Vec3f& bgr = light.at<cv::Vec3f>(v);
     bgr = cv::Vec3f::all(static_cast<float>(std::pow(at, 2.2)));
     if (found == rig.responses.end()) continue;
-    bgr = {static_cast<float>(looked_up(found->blue, at)), static_cast<float>(looked_up(found->green, at)),
-           static_cast<float>(looked_up(found->red, at))};
+    bgr = {static_cast<float>(lookup(found->blue, at)), static_cast<float>(lookup(found->green, at)),
+           static_cast<float>(lookup(found->red, at))};
   }
   return light;
 }
@@ -28,7 +28,7 @@ cv::Mat light_of_levels(const Rig& rig, const std::string& camera) {
   const bool measured = found != rig.camera_responses.end() && found->light.size() == 256;
   for (int v = 0; v < 256; ++v)
     light.at<float>(v) =
-        static_cast<float>(measured ? found->light[static_cast<std::size_t>(v)] : linear_of_srgb(v / 255.0));
+        static_cast<float>(measured ? found->light[static_cast<std::size_t>(v)] : linear_from_srgb(v / 255.0));
   return light;
 }
 

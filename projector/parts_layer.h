@@ -25,7 +25,7 @@ class PartsLayer {
   Status link_shadowed();
 
   struct What {
-    bool is_view;      ///< of a virtual camera, with the prototype; else of parts over a camera's picture
+    bool is_view;      ///< of a virtual camera, with the prototype; else of parts over a camera's image
     bool is_shadowed;  ///< with contact shadows: link_shadowed() has been called
   };
   struct Target {

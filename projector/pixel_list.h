@@ -26,14 +26,14 @@ class PixelList {
   int room_ = 0;
 };
 
-/// Empties a picture of linear light (GL_RGBA32F) within rectangles, and their neighbours, by which edges are
+/// Empties an image of linear light (GL_RGBA32F) within rectangles, and their neighbours, by which edges are
 /// judged.
 void clear_light(const GlName& light, cv::Size size, std::span<const cv::Rect> places);
 
-/// Unit of the picture whose edges shaders/edges.comp lists, its only texture.
+/// Unit of the image whose edges shaders/edges.comp lists, its only texture.
 constexpr int k_edges_unit = 3;
 
-/// Runs a program over rectangles of a picture, 16 x 4 pixels a group, which are u_first ... u_end to it.
+/// Runs a program over rectangles of an image, 16 x 4 pixels a group, which are u_first ... u_end to it.
 void look_through(const Program& program, std::span<const cv::Rect> places);
 
 }  // namespace limn::projector

@@ -13,15 +13,15 @@
 #include "projector/light_layer.h"
 #include "projector/parts_layer.h"
 #include "projector/shader.h"
-#include "projector/sights.h"
-#include "projector/treatment.h"
+#include "projector/visibility_buffers.h"
+#include "projector/composite_policy.h"
 
 namespace limn::projector {
 namespace {
 
 constexpr int k_response_columns = 1025;
 // Texture units; the scene takes unit 1, the sights four from k_sights_unit on.
-constexpr int k_tangents_unit = 0, k_response_unit = 2, k_centre_unit = 3, k_picture_unit = 4,
+constexpr int k_tangents_unit = 0, k_response_unit = 2, k_centre_unit = 3, k_image_unit = 4,
               k_sights_unit = 5, k_mixing_unit = 9, k_albedo_unit = 10, k_arriving_unit = 11,
               k_distances_unit = 12;
 constexpr int k_arriving_side = 256;  // texels of a projector's map of arriving light
@@ -35,7 +35,7 @@ constexpr Smoothing k_light_edges, k_quick_edges{.samples = 4},
 constexpr double k_soft_below = 0.15, k_soft_above = 0.35, k_lamp = 0.65;
 const Eigen::Vector3d k_d_lamp_viewer = Eigen::Vector3d(-0.36, -0.64, -0.68).normalized();
 
-// A picture that is drawn into.
+// An image that is drawn into.
 struct Canvas {
   int width = 0, height = 0;
   GlName texture, framebuffer;
@@ -57,10 +57,10 @@ Whole whole_of(Composite what) {
   return whole;
 }
 
-Whole whole_of(std::span<const Treatment> treatments, std::span<const std::string> slots) {
+Whole whole_of(std::span<const CompositePolicy> policies, std::span<const std::string> slots) {
   Whole whole{};
   for (std::size_t owner = 1; owner <= slots.size() && owner < 4 * whole.size(); ++owner)
-    for (const Treatment& treatment : treatments)
+    for (const CompositePolicy& treatment : policies)
       if (treatment.slot == slots[owner - 1])
         whole[owner / 4] |= static_cast<GLuint>(std::lround(255 * treatment.whole())) << owner % 4 * 8;
   return whole;
@@ -93,9 +93,9 @@ bool is_same_lens(const Imager& a, const Imager& b) {
          a.lens.values == b.lens.values;
 }
 
-const Response* find_response(const Rig& rig, const std::string& projector) {
+const ProjectorResponse* find_response(const Rig& rig, const std::string& projector) {
   const auto found = std::find_if(rig.responses.begin(), rig.responses.end(),
-                                  [&](const Response& r) { return r.projector == projector; });
+                                  [&](const ProjectorResponse& r) { return r.projector == projector; });
   return found == rig.responses.end() ? nullptr : &*found;
 }
 
@@ -133,7 +133,7 @@ struct Renderer::Impl {
   Rig rig;
   std::vector<std::string> slot_names;
   GpuScene scene;
-  Sights sights;
+  VisibilityBuffers visibility;
   std::optional<ContactShadow> contact_shadow;
   bool has_contact_shadow = false;
   Smoothing smoothing;
@@ -142,14 +142,14 @@ struct Renderer::Impl {
   std::optional<LightLayer> measured_light_layer;  // linked when it is asked for
   PartsLayer parts_layer;
   std::vector<GlName> responses;
-  // Of the projectors' last pictures.
+  // Of the projectors' last images.
   struct Shown {
     Canvas display;
     GlName known_hits, known_shares;  // shaders/known.glsl
     GLuint known_stamp = 0;           // of its time
     scene::PosedScene posed;
     Pose imager_from_world;    // of the viewer
-    cv::Mat picture, clipped;  // once read back
+    cv::Mat image, clipped;  // once read back
     bool is_current = false;
     bool is_quick = false;
   };
@@ -173,7 +173,7 @@ struct Renderer::Impl {
   // What is drawn of it from the projectors.
   bool is_prototype_seen = false, are_soft_edges_seen = false, are_surface_parts_seen = false;
   std::vector<PlacedRun> runs;
-  PlacesByMode light_places;  // of the projector drawn last
+  PlacesByMode lit_rects;  // of the projector drawn last
   std::vector<cv::Rect> view_places, surface_places;
   Pose scene_from_world;
   enum class EyeKind { none, imager, parts_of_imager, eye };
@@ -182,10 +182,10 @@ struct Renderer::Impl {
   std::vector<std::pair<Imager, GpuLens>> lenses;  // of cameras and viewers, the newest last
   std::map<std::tuple<int, int, GLenum>, Canvas> canvases;
 
-  Impl(const scene::Scene& scene_in, const Rig& rig_in, Sights sights_in)
+  Impl(const scene::Scene& scene_in, const Rig& rig_in, VisibilityBuffers sights_in)
       : rig(rig_in),
         scene(scene_in),
-        sights(std::move(sights_in)),
+        visibility(std::move(sights_in)),
         shown(rig_in.projectors.size()),
         prototype(scene_in.prototype),
         room(scene_in.light) {
@@ -207,7 +207,7 @@ struct Renderer::Impl {
     glTextureParameteri(*arriving, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
     arriving_maps.resize(rig.projectors.size());
     for (std::size_t i = 0; i < rig.projectors.size(); ++i)
-      set_arriving(i, cv::Mat(k_arriving_side, k_arriving_side, CV_32F, cv::Scalar(1)));
+      set_occlusion(i, cv::Mat(k_arriving_side, k_arriving_side, CV_32F, cv::Scalar(1)));
     const scene::Prototype surface_of = prototype.value_or(scene::Prototype{});
     const cv::Mat colours = fitting_texture(relative_albedo(surface_of), "the prototype's albedo");
     mean_albedo = static_cast<float>(mean_albedo_of(surface_of));
@@ -222,10 +222,10 @@ struct Renderer::Impl {
   // What programs that draw looks are made for: the scene's materials.
   std::string defined() const { return scene.has_surface_maps() ? "SURFACE_MAPS " : ""; }
   Status link_programs();
-  bool set_arriving(std::size_t index, const cv::Mat& map);
+  bool set_occlusion(std::size_t index, const cv::Mat& map);
   const GpuLens& lens_of(const Imager& imager);
   const Canvas& canvas(int width, int height, GLenum format);
-  // Of what projectors see: their own pictures need all, others whether the prototype hides a place from
+  // Of what projectors see: their own images need all, others whether the prototype hides a place from
   // them.
   enum class FromProjectors { nothing, prototype, all };
   void prepare(const scene::PosedScene& posed, FromProjectors needed);
@@ -243,11 +243,11 @@ struct Renderer::Impl {
                     const Whole& whole,
                     const SetUp& set_up_layer);
   cv::Mat composite_over(const Imager& imager,
-                         const cv::Mat& picture,
+                         const cv::Mat& image,
                          const scene::PosedScene& posed,
                          int kind,
                          const Whole& whole);
-  // What was laid over an imager's pictures.
+  // What was laid over an imager's images.
   struct Overlay {
     Imager imager;
     int kind = 0;
@@ -255,7 +255,7 @@ struct Renderer::Impl {
     std::optional<scene::PosedScene> posed;  // of the parts
     std::vector<cv::Rect> places;            // where there may be some
     Canvas parts;
-    GlName behind;  // the picture
+    GlName behind;  // the image
     Canvas out;
   };
   std::vector<Overlay> overlays;
@@ -277,7 +277,7 @@ Status Renderer::Impl::link_programs() {
 }
 
 // CV_32F of the texture's size. False when it is there already.
-bool Renderer::Impl::set_arriving(std::size_t index, const cv::Mat& map) {
+bool Renderer::Impl::set_occlusion(std::size_t index, const cv::Mat& map) {
   cv::Mat& known = arriving_maps[index];
   if (!known.empty() && cv::norm(known, map, cv::NORM_INF) == 0) return false;
   known = map;
@@ -325,12 +325,12 @@ void Renderer::Impl::prepare(const scene::PosedScene& posed, FromProjectors need
     return;
   const PassTimes::Scope scope(&times, "ids from projectors");
   if (!is_prototype_seen || (all && !are_soft_edges_seen)) {
-    sights.see_prototype_from_projectors(scene, runs, scene_from_world, all);
+    visibility.draw_prototype_from_projectors(scene, runs, scene_from_world, all);
     is_prototype_seen = true;
     are_soft_edges_seen = all;
   }
   if (!all) return;
-  sights.see_surface_parts_from_projectors(scene, runs, scene_from_world);
+  visibility.draw_surface_parts_from_projectors(scene, runs, scene_from_world);
   are_surface_parts_seen = true;
 }
 
@@ -338,7 +338,7 @@ void Renderer::Impl::look_from_eye(const Imager& viewer) {
   if (eye_kind == EyeKind::eye && is_same(eye.imager_from_world, viewer.imager_from_world)) return;
   const Pose scene_from_viewer = scene_from_world * viewer.imager_from_world.inverse();
   const PassTimes::Scope scope(&times, "ids from the eye");
-  sights.see_from_eye(scene, runs, scene_from_world, scene_from_viewer.translation,
+  visibility.draw_from_eye(scene, runs, scene_from_world, scene_from_viewer.translation,
                       scene_from_viewer.rotation * -Eigen::Vector3d::UnitY());
   eye_kind = EyeKind::eye;
   eye = viewer;
@@ -351,7 +351,7 @@ void Renderer::Impl::look_from_imager(const Imager& imager, bool parts_alone) {
     return;
   }
   const PassTimes::Scope scope(&times, "ids from a camera");
-  sights.see_from_imager(scene, runs, scene_from_world, imager, lens_of(imager).baked, parts_alone);
+  visibility.draw_from_imager(scene, runs, scene_from_world, imager, lens_of(imager).baked, parts_alone);
   eye_kind = wanted;
   eye = imager;
 }
@@ -360,7 +360,7 @@ void Renderer::Impl::look_from_imager(const Imager& imager, bool parts_alone) {
 // looks.
 void Renderer::Impl::set_up(const Program& program, const GpuLens& lens, const Imager* viewer) {
   scene.bind();
-  sights.bind(program, k_sights_unit);
+  visibility.bind(program, k_sights_unit);
   program.bind("s_tangents", k_tangents_unit, lens.tangents);
   const cv::Mat& tangents = lens.baked.tangents;
   program.set("u_tangents",
@@ -397,12 +397,12 @@ void Renderer::Impl::set_up_light(const Program& program, const scene::PosedScen
   program.set("u_even_black", light_options.even_black);
   program.set("u_level", static_cast<float>(light_options.level.value_or(level)));
   program.set("u_mean_mixing", by_measurement ? surface->mean : Eigen::Matrix3f(Eigen::Matrix3f::Identity()));
-  program.set("u_witness", sights.witness());
+  program.set("u_witness", visibility.reference_camera());
   program.bind("s_mixing", k_mixing_unit, mixing);
   program.bind("s_albedo", k_albedo_unit, albedo);
 }
 
-// What an imager sees of a layer, over its picture (BGR); the layer is drawn again only where it has changed.
+// What an imager sees of a layer, over its image (BGR); the layer is drawn again only where it has changed.
 // `kind` tells layers of one imager apart.
 template <class SetUp>
 cv::Mat Renderer::Impl::laid_over(const cv::Mat& bgr,
@@ -416,7 +416,7 @@ cv::Mat Renderer::Impl::laid_over(const cv::Mat& bgr,
       !is_same(overlay.imager.imager_from_world, imager.imager_from_world)) {
     prepare(posed, kind == k_view ? FromProjectors::nothing : FromProjectors::prototype);
     look_from_imager(imager, kind != k_view && !has_contact_shadow);
-    overlay.places = sights.seen_places(imager, lens_of(imager).baked, runs, scene_from_world, kind == k_view,
+    overlay.places = visibility.visible_rects(imager, lens_of(imager).baked, runs, scene_from_world, kind == k_view,
                                         has_contact_shadow ? ContactShadow::k_reach : 0);
     if (has_contact_shadow) contact_shadow->place(posed);
     const auto set_up_all = [&](const Program& program) {
@@ -435,7 +435,7 @@ cv::Mat Renderer::Impl::laid_over(const cv::Mat& bgr,
   cv::Mat out = bgr.clone();
   for (const cv::Rect& place : overlay.places) upload(overlay.behind, out, place);
   composite.bind("s_centre", k_centre_unit, overlay.parts.texture);
-  composite.bind("s_picture", k_picture_unit, overlay.behind);
+  composite.bind("s_picture", k_image_unit, overlay.behind);
   {
     const PassTimes::Scope scope(&times, "over the picture");
     draw(composite, overlay.out, overlay.places);
@@ -445,13 +445,13 @@ cv::Mat Renderer::Impl::laid_over(const cv::Mat& bgr,
 }
 
 cv::Mat Renderer::Impl::composite_over(const Imager& imager,
-                                       const cv::Mat& picture,
+                                       const cv::Mat& image,
                                        const scene::PosedScene& posed,
                                        int kind,
                                        const Whole& whole) {
-  LIMN_CHECK(picture.cols == imager.width && picture.rows == imager.height && picture.depth() == CV_8U);
-  cv::Mat bgr = picture;
-  if (picture.channels() == 1) cv::cvtColor(picture, bgr, cv::COLOR_GRAY2BGR);
+  LIMN_CHECK(image.cols == imager.width && image.rows == imager.height && image.depth() == CV_8U);
+  cv::Mat bgr = image;
+  if (image.channels() == 1) cv::cvtColor(image, bgr, cv::COLOR_GRAY2BGR);
   return laid_over(bgr, imager, posed, kind, whole,
                    [&](const Program& program) { program.set_bits("u_whole", whole); });
 }
@@ -489,7 +489,7 @@ Result<SurfaceMixing> Renderer::Impl::measured(const MeasuredSurface& measured) 
     irradiances.push_back(read_back(canvas.framebuffer, camera.width, camera.height, CV_32FC1, GL_RED));
   }
   LIMN_TRY(SurfaceMixing found, surface_mixing(measured, irradiances));
-  sights.see_from_witness(scene, runs, scene_from_world, camera, lens_of(camera).baked);
+  visibility.draw_from_reference_camera(scene, runs, scene_from_world, camera, lens_of(camera).baked);
   mixing = make_texture(GL_TEXTURE_2D_ARRAY, GL_RGBA16F, camera.width, camera.height,
                         static_cast<int>(found.layers.size()));
   for (std::size_t i = 0; i < found.layers.size(); ++i)
@@ -533,8 +533,8 @@ Renderer::~Renderer() = default;
 Result<Renderer> Renderer::create(const scene::Scene& scene, const Rig& rig) {
   LIMN_TRY_STATUS(check_context());
   LIMN_TRY_STATUS(GpuScene::check_fits(scene, GpuScene::most_triangles()));
-  LIMN_TRY(Sights sights, Sights::create(rig));
-  auto impl = std::make_unique<Impl>(scene, rig, std::move(sights));
+  LIMN_TRY(VisibilityBuffers visibility, VisibilityBuffers::create(rig));
+  auto impl = std::make_unique<Impl>(scene, rig, std::move(visibility));
   LIMN_TRY_STATUS(impl->link_programs());
   return Renderer(std::move(impl));
 }
@@ -554,7 +554,7 @@ Status Renderer::set_light(const LightOptions& options, const MeasuredSurface* s
   return {};
 }
 
-void Renderer::set_arriving(std::size_t index, const cv::Mat& map) {
+void Renderer::set_occlusion(std::size_t index, const cv::Mat& map) {
   LIMN_CHECK(index < impl_->rig.projectors.size());
   LIMN_CHECK(map.empty() || map.type() == CV_32FC1 || map.type() == CV_8UC1);
   cv::Mat whole(k_arriving_side, k_arriving_side, CV_32F, cv::Scalar(1));
@@ -565,7 +565,7 @@ void Renderer::set_arriving(std::size_t index, const cv::Mat& map) {
                finer ? cv::INTER_AREA : cv::INTER_LINEAR);
     whole = cv::max(0.0, cv::min(1.0, whole));
   }
-  if (!impl_->set_arriving(index, whole)) return;
+  if (!impl_->set_occlusion(index, whole)) return;
   for (Impl::Shown& shown : impl_->shown) shown.is_current = false;
 }
 
@@ -610,19 +610,19 @@ unsigned Renderer::draw_projector(std::size_t index, const scene::PosedScene& po
   }
   const LightOptions& options = impl_->light_options;
   const auto set_up = [&](const Program& program) {
-    impl_->set_up(program, impl_->sights.projector_lens(index), &viewer);
+    impl_->set_up(program, impl_->visibility.projector_lens(index), &viewer);
     program.set("u_projector", static_cast<int>(index));
     program.set_id("u_known_stamp", impl_->known_stamp);
     glBindImageTexture(k_known_hits_image, *shown.known_hits, 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32UI);
     glBindImageTexture(k_known_shares_image, *shown.known_shares, 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
     impl_->set_up_light(program, posed);
   };
-  PlacesByMode& places = impl_->light_places;
+  PlacesByMode& places = impl_->lit_rects;
   if (options.even_black) {
     places.clear();
-    places.both.push_back(impl_->sights.prototype_place(index, impl_->runs, impl_->scene_from_world));
+    places.both.push_back(impl_->visibility.prototype_rect(index, impl_->runs, impl_->scene_from_world));
   } else {
-    impl_->sights.light_places(index, impl_->runs, impl_->scene_from_world,
+    impl_->visibility.lit_rects(index, impl_->runs, impl_->scene_from_world,
                                (impl_->scene_from_world * viewer.imager_from_world.inverse()).translation,
                                &impl_->view_places, &impl_->surface_places);
     places.divide(impl_->view_places, impl_->surface_places);
@@ -650,21 +650,21 @@ unsigned Renderer::draw_projector(std::size_t index, const scene::PosedScene& po
   }
   shown.posed = posed;
   shown.imager_from_world = viewer.imager_from_world;
-  shown.picture.release();
+  shown.image.release();
   shown.is_current = true;
   return *shown.display.texture;
 }
 
-cv::Mat Renderer::projector_picture(std::size_t index, const scene::PosedScene& posed, const Imager& viewer) {
+cv::Mat Renderer::projector_image(std::size_t index, const scene::PosedScene& posed, const Imager& viewer) {
   draw_projector(index, posed, viewer);
   Impl::Shown& shown = impl_->shown[index];
-  if (shown.picture.empty()) {
+  if (shown.image.empty()) {
     const Canvas& display = shown.display;
     const cv::Mat bgra = read_back(display.framebuffer, display.width, display.height, CV_8UC4, GL_BGRA);
-    cv::cvtColor(bgra, shown.picture, cv::COLOR_BGRA2BGR);
+    cv::cvtColor(bgra, shown.image, cv::COLOR_BGRA2BGR);
     cv::extractChannel(bgra, shown.clipped, 3);
   }
-  return shown.picture.clone();
+  return shown.image.clone();
 }
 
 cv::Mat Renderer::surface_points(std::size_t index, const scene::PosedScene& posed) {
@@ -672,7 +672,7 @@ cv::Mat Renderer::surface_points(std::size_t index, const scene::PosedScene& pos
   const Imager& projector = impl_->rig.projectors[index];
   impl_->prepare(posed, Impl::FromProjectors::prototype);
   const Canvas& canvas = impl_->canvas(projector.width, projector.height, GL_RGBA32F);
-  impl_->set_up(impl_->points, impl_->sights.projector_lens(index), nullptr);
+  impl_->set_up(impl_->points, impl_->visibility.projector_lens(index), nullptr);
   impl_->points.set("u_projector", static_cast<int>(index));
   impl_->draw(impl_->points, canvas);
   const cv::Mat points = read_back(canvas.framebuffer, projector.width, projector.height, CV_32FC4, GL_RGBA);
@@ -691,13 +691,13 @@ cv::Mat Renderer::blend(std::size_t index, const scene::PosedScene& posed) {
   const Imager& projector = impl_->rig.projectors[index];
   impl_->prepare(posed, Impl::FromProjectors::all);
   const Canvas& canvas = impl_->canvas(projector.width, projector.height, GL_RG32F);
-  impl_->set_up(impl_->blend, impl_->sights.projector_lens(index), nullptr);
+  impl_->set_up(impl_->blend, impl_->visibility.projector_lens(index), nullptr);
   impl_->blend.set("u_projector", static_cast<int>(index));
   impl_->draw(impl_->blend, canvas);
   return read_back(canvas.framebuffer, projector.width, projector.height, CV_32FC2, GL_RG);
 }
 
-LitPatches Renderer::lit_patches(std::size_t camera, const scene::PosedScene& posed, int side_px) {
+IlluminatedPatches Renderer::illuminated_patches(std::size_t camera, const scene::PosedScene& posed, int side_px) {
   LIMN_CHECK(camera < impl_->rig.cameras.size() && side_px > 0);
   const Imager& imager = impl_->rig.cameras[camera];
   impl_->prepare(posed, Impl::FromProjectors::prototype);
@@ -711,40 +711,40 @@ LitPatches Renderer::lit_patches(std::size_t camera, const scene::PosedScene& po
     impl_->draw(impl_->lit, canvas);
     return read_back(canvas.framebuffer, canvas.width, canvas.height, CV_32FC4, GL_RGBA);
   };
-  LitPatches patches{side_px, impl_->scene_from_world, drawn(-1), {}};
+  IlluminatedPatches patches{side_px, impl_->scene_from_world, drawn(-1), {}};
   for (std::size_t i = 0; i < impl_->rig.projectors.size(); ++i)
     patches.by_projector.push_back(drawn(static_cast<int>(i)));
   return patches;
 }
 
 cv::Mat Renderer::composite(std::size_t camera,
-                            const cv::Mat& picture,
+                            const cv::Mat& image,
                             const scene::PosedScene& posed,
                             Composite what) {
   LIMN_CHECK(camera < impl_->rig.cameras.size());
-  return composite(impl_->rig.cameras[camera], picture, posed, what);
+  return composite(impl_->rig.cameras[camera], image, posed, what);
 }
 
 cv::Mat Renderer::composite(std::size_t camera,
-                            const cv::Mat& picture,
+                            const cv::Mat& image,
                             const scene::PosedScene& posed,
-                            std::span<const Treatment> treatments) {
+                            std::span<const CompositePolicy> policies) {
   LIMN_CHECK(camera < impl_->rig.cameras.size());
-  return composite(impl_->rig.cameras[camera], picture, posed, treatments);
+  return composite(impl_->rig.cameras[camera], image, posed, policies);
 }
 
 cv::Mat Renderer::composite(const Imager& camera,
-                            const cv::Mat& picture,
+                            const cv::Mat& image,
                             const scene::PosedScene& posed,
                             Composite what) {
-  return impl_->composite_over(camera, picture, posed, static_cast<int>(what), whole_of(what));
+  return impl_->composite_over(camera, image, posed, static_cast<int>(what), whole_of(what));
 }
 
 cv::Mat Renderer::composite(const Imager& camera,
-                            const cv::Mat& picture,
+                            const cv::Mat& image,
                             const scene::PosedScene& posed,
-                            std::span<const Treatment> treatments) {
-  return impl_->composite_over(camera, picture, posed, k_each, whole_of(treatments, impl_->slot_names));
+                            std::span<const CompositePolicy> policies) {
+  return impl_->composite_over(camera, image, posed, k_each, whole_of(policies, impl_->slot_names));
 }
 
 cv::Mat Renderer::view(const Imager& imager, const scene::PosedScene& posed, const cv::Scalar& background) {
@@ -761,7 +761,7 @@ std::vector<PartCoverage> Renderer::coverage(const scene::PosedScene& posed, con
   const Canvas& canvas = impl_->canvas(viewer.width, viewer.height, GL_RG8);
   impl_->set_up(impl_->coverage, impl_->lens_of(viewer), &viewer);
   impl_->draw(impl_->coverage, canvas,
-              impl_->sights.seen_places(viewer, impl_->lens_of(viewer).baked, impl_->runs,
+              impl_->visibility.visible_rects(viewer, impl_->lens_of(viewer).baked, impl_->runs,
                                         impl_->scene_from_world, false, 0));
   const cv::Mat seen = read_back(canvas.framebuffer, viewer.width, viewer.height, CV_8UC2, GL_RG);
   std::vector<PartCoverage> out;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "scene/in_words.h"
+#include "scene/command_text.h"
 
 namespace limn::scene {
 namespace {
@@ -82,7 +82,7 @@ Result<std::optional<MarkerName>> read_marker(const Edit& edit) {
   return std::optional(std::move(*marker));
 }
 
-Result<MaterialChange> read_material(const Edit& edit) { return material_change_of(edit.value); }
+Result<MaterialOverride> read_material(const Edit& edit) { return parse_material_override(edit.value); }
 
 Result<std::optional<LightNumbers>> read_light(const Edit& edit) {
   if (edit.value.empty()) return std::optional<LightNumbers>();

@@ -8,9 +8,9 @@
 #include "core/marker.h"
 #include "core/pose.h"
 #include "core/result.h"
-#include "scene/material_change.h"
+#include "scene/material_override.h"
 #include "scene/room_light.h"
-#include "scene/staging.h"
+#include "scene/show_state.h"
 
 namespace limn::scene {
 
@@ -22,7 +22,7 @@ struct Edit {
 };
 
 /// What an action takes as its value, as text.
-enum class Takes {
+enum class ArgumentKind {
   nothing,
   text,         ///< required
   maybe_text,   ///< or nothing
@@ -57,7 +57,7 @@ using ActionValue = std::variant<std::monostate,
                                  ScreenChoice,
                                  PartUnit,
                                  std::optional<MarkerName>,
-                                 MaterialChange,
+                                 MaterialOverride,
                                  std::optional<LightNumbers>>;
 
 /// The value of an edit, once for each kind. Errors name the action, what it expects and what was found.
@@ -70,7 +70,7 @@ Result<Switch> read_switch(const Edit& edit);
 Result<ScreenChoice> read_screen(const Edit& edit);
 Result<PartUnit> read_part_unit(const Edit& edit);
 Result<std::optional<MarkerName>> read_marker(const Edit& edit);
-Result<MaterialChange> read_material(const Edit& edit);
+Result<MaterialOverride> read_material(const Edit& edit);
 Result<std::optional<LightNumbers>> read_light(const Edit& edit);
 
 }  // namespace limn::scene

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <type_traits>
 
-#include "scene/in_words.h"
+#include "scene/command_text.h"
 #include "scene/mesh.h"
 
 namespace limn::scene {
@@ -13,10 +13,10 @@ struct Change {
   const PosedScene& posed;      // what was shown last
   const std::string_view name;  // of the action, for errors
   const std::size_t slot_index;
-  Staging staging;  // before the action, then after it
+  ShowState show_state;  // before the action, then after it
 
   const Slot& slot() const { return scene.slots[slot_index]; }
-  Staging::Slot& chosen() { return staging.slots[slot_index]; }
+  ShowState::Slot& chosen() { return show_state.slots[slot_index]; }
 };
 
 namespace {
@@ -55,7 +55,7 @@ Status choose_variant(Change* change, const std::string& variant) {
 }
 
 Status nudge(Change* change, const Eigen::Vector3d& mm) {
-  Staging::Slot& slot = change->chosen();
+  ShowState::Slot& slot = change->chosen();
   slot.nudge += 1e-3 * mm;
   if (slot.pin)
     slot.pin->prototype_from_part =
@@ -80,7 +80,7 @@ Status pair(Change* change, const std::optional<MarkerName>& marker) {
     return error(
         "{}: expected a marker that lies still and carries nothing, found none. Lay one down for a second.",
         change->name);
-  if (const Status can = check_carrier(change->scene, change->staging, *marker, change->slot_index); !can)
+  if (const Status can = check_carrier(change->scene, change->show_state, *marker, change->slot_index); !can)
     return error("{}: {}", change->name, can.message());
   change->chosen().pin.reset();
   if (*marker == change->slot().marker)
@@ -92,7 +92,7 @@ Status pair(Change* change, const std::optional<MarkerName>& marker) {
 
 Status unpair(Change* change, std::monostate) { return pair(change, change->slot().marker); }
 
-// The staging stays: the session keeps the unit beside the part's file.
+// The show state stays: the session keeps the unit beside the part's file.
 Status set_unit(Change* change, const PartUnit& wanted) {
   std::vector<std::string> dropped;
   for (const Variant& variant : change->slot().variants)
@@ -106,21 +106,21 @@ Status set_unit(Change* change, const PartUnit& wanted) {
   return {};
 }
 
-Status set_material(Change* change, const MaterialChange& material) {
+Status set_material(Change* change, const MaterialOverride& material) {
   change->chosen().material = material;
   return {};
 }
 
-std::string unused_look_name(const Staging& staging) {
+std::string unused_look_name(const ShowState& show_state) {
   for (int i = 1;; ++i)
-    if (const std::string name = fmt::format("look-{:02}", i); !find_look(staging, name)) return name;
+    if (const std::string name = fmt::format("look-{:02}", i); !find_look(show_state, name)) return name;
 }
 
 Status save_look(Change* change, const std::string& name) {
-  Staging& staging = change->staging;
+  ShowState& show_state = change->show_state;
   const PosedScene& posed = change->posed;
   Look look;
-  look.name = name.empty() ? unused_look_name(staging) : name;
+  look.name = name.empty() ? unused_look_name(show_state) : name;
   if (!is_look_name(look.name))
     return error("{}: expected a name of letters, digits, blanks, '-', '_' and '.', found '{}'.",
                  change->name, look.name);
@@ -130,125 +130,125 @@ Status save_look(Change* change, const std::string& name) {
     look.parts.push_back(
         {part.slot, part.variant, prototype_from_world * part.world_from_part, part.material});
   look.light = posed.light ? posed.light : change->scene.light;
-  remember_look(look.name, &staging);
-  std::erase_if(staging.looks, [&](const Look& known) { return known.name == look.name; });
-  staging.looks.push_back(std::move(look));
+  remember_look(look.name, &show_state);
+  std::erase_if(show_state.looks, [&](const Look& known) { return known.name == look.name; });
+  show_state.looks.push_back(std::move(look));
   return {};
 }
 
 Error no_such_look(const Change& change, const std::string& name) {
-  return error("{}: expected one of {}, found '{}'.", change.name, listed(look_names(change.staging)), name);
+  return error("{}: expected one of {}, found '{}'.", change.name, listed(look_names(change.show_state)), name);
 }
 
 Status restore_look(Change* change, const std::string& name) {
-  const Look* found = find_look(change->staging, name);
+  const Look* found = find_look(change->show_state, name);
   if (!found) return no_such_look(*change, name);
   const Look look = *found;
-  change->staging = with_look(change->scene, std::move(change->staging), look);
+  change->show_state = with_look(change->scene, std::move(change->show_state), look);
   return {};
 }
 
 template <int k_steps>
 Status step_look(Change* change, std::monostate) {
-  const std::vector<std::string> names = look_names(change->staging);
+  const std::vector<std::string> names = look_names(change->show_state);
   if (names.empty()) return error("{}: expected a saved look, found none. Save one.", change->name);
-  return restore_look(change, stepped(names, change->staging.look, k_steps));
+  return restore_look(change, stepped(names, change->show_state.look, k_steps));
 }
 
 Status flip(Change* change, const std::string& name) {
-  const Staging& staging = change->staging;
-  if (name.empty() && staging.other_look.empty())
+  const ShowState& show_state = change->show_state;
+  if (name.empty() && show_state.other_look.empty())
     return error("{}: expected two looks shown before, found {}. Save or restore another.", change->name,
-                 staging.look.empty() ? "none" : "one");
-  return restore_look(change, std::string(name.empty() ? staging.other_look : name));
+                 show_state.look.empty() ? "none" : "one");
+  return restore_look(change, std::string(name.empty() ? show_state.other_look : name));
 }
 
 Status delete_look(Change* change, const std::string& name) {
-  Staging& staging = change->staging;
-  const Look* found = find_look(staging, name);
+  ShowState& show_state = change->show_state;
+  const Look* found = find_look(show_state, name);
   if (!found) return no_such_look(*change, name);
-  staging.deleted_look = *found;
-  staging.looks.erase(staging.looks.begin() + (found - staging.looks.data()));
-  if (staging.look == name) staging.look.clear();
-  if (staging.other_look == name) {
-    staging.other_look.clear();
-    staging.split = false;
+  show_state.deleted_look = *found;
+  show_state.looks.erase(show_state.looks.begin() + (found - show_state.looks.data()));
+  if (show_state.look == name) show_state.look.clear();
+  if (show_state.other_look == name) {
+    show_state.other_look.clear();
+    show_state.split = false;
   }
   return {};
 }
 
 Status undelete_look(Change* change, std::monostate) {
-  Staging& staging = change->staging;
-  if (!staging.deleted_look) return error("{}: expected a look that was deleted, found none.", change->name);
-  if (find_look(staging, staging.deleted_look->name))
+  ShowState& show_state = change->show_state;
+  if (!show_state.deleted_look) return error("{}: expected a look that was deleted, found none.", change->name);
+  if (find_look(show_state, show_state.deleted_look->name))
     return error("{}: expected no look of that name, found another '{}'. Delete it first.", change->name,
-                 staging.deleted_look->name);
-  staging.looks.push_back(std::move(*staging.deleted_look));
-  staging.deleted_look.reset();
+                 show_state.deleted_look->name);
+  show_state.looks.push_back(std::move(*show_state.deleted_look));
+  show_state.deleted_look.reset();
   return {};
 }
 
-// The staging stays: the session's devices do it.
+// The show state stays: the session's devices do it.
 Status repair(Change* change, std::monostate) {
-  if (!change->staging.blackout) return {};
+  if (!change->show_state.blackout) return {};
   return error("{}: expected light, found blackout. End the blackout first.", change->name);
 }
 
 Status set_light(Change* change, const std::optional<LightNumbers>& numbers) {
-  Staging& staging = change->staging;
+  ShowState& show_state = change->show_state;
   const std::optional<RoomLight>& own = change->scene.light;
-  staging.light.reset();
+  show_state.light.reset();
   if (numbers)
-    staging.light =
-        room_light_of(*numbers, own ? own->d_up_world : staging.d_up_world, staging.d_front_world);
+    show_state.light =
+        parse_room_light(*numbers, own ? own->d_up_world : show_state.d_up_world, show_state.d_front_world);
   return {};
 }
 
 // A switch of the staging.
-template <bool Staging::*k_flag>
+template <bool ShowState::*k_flag>
 Status set_flag(Change* change, Switch wanted) {
-  bool& flag = change->staging.*k_flag;
+  bool& flag = change->show_state.*k_flag;
   flag = wanted == Switch::toggle ? !flag : wanted == Switch::on;
   return {};
 }
 
 Status set_split(Change* change, Switch wanted) {
-  LIMN_TRY_STATUS(set_flag<&Staging::split>(change, wanted));
-  if (change->staging.split && change->staging.other_look.empty())
+  LIMN_TRY_STATUS(set_flag<&ShowState::split>(change, wanted));
+  if (change->show_state.split && change->show_state.other_look.empty())
     return error("{}: expected a look shown before the present one, found none. Save or restore two.",
                  change->name);
   return {};
 }
 
 Status move_split(Change* change, double mm) {
-  change->staging.split_mm = mm;
+  change->show_state.split_mm = mm;
   return {};
 }
 
 Status set_screen(Change* change, const ScreenChoice& choice) {
-  Staging& staging = change->staging;
-  const auto output = std::find_if(staging.screens.begin(), staging.screens.end(),
+  ShowState& show_state = change->show_state;
+  const auto output = std::find_if(show_state.screens.begin(), show_state.screens.end(),
                                    [&](const Output& known) { return known.name == choice.screen; });
   const bool is_all = choice.screen.empty();
-  if (!is_all && output == staging.screens.end()) {
+  if (!is_all && output == show_state.screens.end()) {
     std::vector<std::string> outputs;
-    for (const Output& known : staging.screens) outputs.push_back(known.name);
+    for (const Output& known : show_state.screens) outputs.push_back(known.name);
     return error("{}: expected a screen of the devices file ({}), or none for all, found '{}'.", change->name,
                  listed(outputs), choice.screen);
   }
-  const auto before = static_cast<std::size_t>(is_all ? staging.screen : output->shows);
+  const auto before = static_cast<std::size_t>(is_all ? show_state.screen : output->shows);
   const auto shows = choice.shows.value_or(static_cast<Screen>((before + 1) % screen_names().size()));
   if (!is_all) {
     output->shows = shows;
     return {};
   }
-  staging.screen = shows;
-  for (Output& each : staging.screens) each.shows = shows;
+  show_state.screen = shows;
+  for (Output& each : show_state.screens) each.shows = shows;
   return {};
 }
 
 Status set_viewer(Change* change, const std::string& guest) {
-  change->staging.viewer = guest;
+  change->show_state.viewer = guest;
   return {};
 }
 
@@ -272,7 +272,7 @@ Status apply_with(Change* change, const ActionValue& value) {
 template <auto k_read, auto k_apply>
 constexpr Action::Functions k_by = {&read_with<k_read>, &apply_with<k_read, k_apply>};
 
-using enum Takes;
+using enum ArgumentKind;
 using enum Role;
 
 constexpr std::array<Action, k_action_count> k_actions = {{
@@ -296,7 +296,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .name = "choose_variant",
      .role = work,
      .of_slot = true,
-     .takes = text,
+     .argument_kind = text,
      .value = "a variant",
      .what = "a variant by name",
      .functions = k_by<read_text, choose_variant>},
@@ -304,7 +304,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .name = "nudge",
      .role = work,
      .of_slot = true,
-     .takes = millimetres,
+     .argument_kind = millimetres,
      .value = "three numbers, mm",
      .what = "moves the part along its own axes",
      .functions = k_by<read_millimetres, nudge>},
@@ -312,7 +312,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .name = "place",
      .role = work,
      .of_slot = true,
-     .takes = Takes::pose,
+     .argument_kind = ArgumentKind::pose,
      .value = "x, y, z in mm; quaternion w, x, y, z",
      .what = "puts the part there on the prototype, until its marker is moved",
      .functions = k_by<read_place, place>},
@@ -327,7 +327,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .name = "pair",
      .role = operate,
      .of_slot = true,
-     .takes = maybe_text,
+     .argument_kind = maybe_text,
      .value = "a marker; empty: the one that glows",
      .what = "the part is carried by that marker from now on",
      .keys = {Key{'A'}},
@@ -342,7 +342,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .name = "units",
      .role = operate,
      .of_slot = true,
-     .takes = text,
+     .argument_kind = text,
      .value = "a variant and m, cm, mm, in or ft",
      .what = "the unit of a part that was dropped in",
      .functions = k_by<read_part_unit, set_unit>},
@@ -350,14 +350,14 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .name = "material",
      .role = work,
      .of_slot = true,
-     .takes = maybe_text,
+     .argument_kind = maybe_text,
      .value = "a colour, metalness, roughness, - for the file's: #c02818 0 0.4",
      .what = "the part's material, of every variant; empty: as its file says",
      .functions = k_by<read_material, set_material>},
     {.id = ActionId::save_look,
      .name = "save_look",
      .role = work,
-     .takes = maybe_text,
+     .argument_kind = maybe_text,
      .value = "a name; empty: look-01 and so on",
      .what = "keeps variants, places, materials and light, as JSON and PNG",
      .keys = {Key{'S'}},
@@ -365,7 +365,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
     {.id = ActionId::restore_look,
      .name = "restore_look",
      .role = work,
-     .takes = text,
+     .argument_kind = text,
      .value = "a look",
      .what = "shows a look until its markers are moved",
      .functions = k_by<read_text, restore_look>},
@@ -386,7 +386,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
     {.id = ActionId::flip,
      .name = "flip",
      .role = work,
-     .takes = maybe_text,
+     .argument_kind = maybe_text,
      .value = "a look; empty: the one shown before",
      .what = "shows the other of two looks",
      .keys = {Key{'V'}},
@@ -394,7 +394,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
     {.id = ActionId::split,
      .name = "split",
      .role = work,
-     .takes = on_off,
+     .argument_kind = on_off,
      .value = "on, off or toggle",
      .what = "left of a line the look shown before",
      .keys = {Key{'X'}},
@@ -402,14 +402,14 @@ constexpr std::array<Action, k_action_count> k_actions = {{
     {.id = ActionId::split_at,
      .name = "split_at",
      .role = work,
-     .takes = number,
+     .argument_kind = number,
      .value = "mm to the right of the prototype's middle",
      .what = "where that line is",
      .functions = k_by<read_millimetre, move_split>},
     {.id = ActionId::delete_look,
      .name = "delete_look",
      .role = work,
-     .takes = text,
+     .argument_kind = text,
      .value = "a look",
      .what = "forgets a look",
      .functions = k_by<read_text, delete_look>},
@@ -427,46 +427,46 @@ constexpr std::array<Action, k_action_count> k_actions = {{
     {.id = ActionId::light,
      .name = "light",
      .role = work,
-     .takes = maybe_text,
+     .argument_kind = maybe_text,
      .value = "a lamp's degrees right and up, its strength, soft light above and below: 30 45 0.6 0.3 0.1",
      .what = "the light that parts are shaded by, as seen from camera 0; empty: the scene's own",
      .functions = k_by<read_light, set_light>},
     {.id = ActionId::blackout,
      .name = "blackout",
      .role = work,
-     .takes = on_off,
+     .argument_kind = on_off,
      .value = "on, off or toggle",
      .what = "bare model: no light",
      .keys = {Key{'B'}, Key{'.'}},
-     .functions = k_by<read_switch, set_flag<&Staging::blackout>>},
+     .functions = k_by<read_switch, set_flag<&ShowState::blackout>>},
     {.id = ActionId::freeze,
      .name = "freeze",
      .role = work,
-     .takes = on_off,
+     .argument_kind = on_off,
      .value = "on, off or toggle",
      .what = "what is shown stays",
      .keys = {Key{'F'}},
-     .functions = k_by<read_switch, set_flag<&Staging::frozen>>},
+     .functions = k_by<read_switch, set_flag<&ShowState::frozen>>},
     {.id = ActionId::grid,
      .name = "grid",
      .role = work,
-     .takes = on_off,
+     .argument_kind = on_off,
      .value = "on, off or toggle",
      .what = "lines on the prototype, every 10 mm",
      .keys = {Key{'G'}},
-     .functions = k_by<read_switch, set_flag<&Staging::grid>>},
+     .functions = k_by<read_switch, set_flag<&ShowState::grid>>},
     {.id = ActionId::marker_states,
      .name = "marker_states",
      .role = operate,
-     .takes = on_off,
+     .argument_kind = on_off,
      .value = "on, off or toggle",
      .what = "rings around markers: green seen, amber carried on",
      .keys = {Key{'M'}},
-     .functions = k_by<read_switch, set_flag<&Staging::marker_states>>},
+     .functions = k_by<read_switch, set_flag<&ShowState::marker_states>>},
     {.id = ActionId::screen,
      .name = "screen",
      .role = operate,
-     .takes = maybe_text,
+     .argument_kind = maybe_text,
      .value = "rest, full, camera, view, stereo, off or next",
      .of = "a screen; left out: all",
      .what = "what screens show, or the one that is named",
@@ -476,7 +476,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
     {.id = ActionId::viewer,
      .name = "viewer",
      .role = work,
-     .takes = maybe_text,
+     .argument_kind = maybe_text,
      .value = "a guest's name; empty: the scene's own viewer",
      .what = "whose eye view parts are drawn for: a guest's tablet while its window sees markers",
      .functions = k_by<read_text, set_viewer>},
@@ -537,22 +537,22 @@ Result<Command> command_of(const Scene& scene, const Edit& edit) {
   return command;
 }
 
-Result<Staging> edited(const Scene& scene,
-                       const Staging& staging,
+Result<ShowState> apply_edit(const Scene& scene,
+                       const ShowState& show_state,
                        const PosedScene& posed,
                        const Command& command) {
   const Action& action = action_of(command.action);
-  Change change{scene, posed, action.name, command.slot, staging};
+  Change change{scene, posed, action.name, command.slot, show_state};
   LIMN_TRY_STATUS(action.functions.apply(&change, command.value));
-  return std::move(change.staging);
+  return std::move(change.show_state);
 }
 
-Result<Staging> edited(const Scene& scene,
-                       const Staging& staging,
+Result<ShowState> apply_edit(const Scene& scene,
+                       const ShowState& show_state,
                        const PosedScene& posed,
                        const Edit& edit) {
   LIMN_TRY(const Command command, command_of(scene, edit));
-  return edited(scene, staging, posed, command);
+  return apply_edit(scene, show_state, posed, command);
 }
 
 }  // namespace limn::scene

@@ -8,9 +8,9 @@
 
 #include "core/result.h"
 #include "scene/action_value.h"
-#include "scene/posed.h"
+#include "scene/posed_scene.h"
 #include "scene/scene.h"
-#include "scene/staging.h"
+#include "scene/show_state.h"
 
 namespace limn::scene {
 
@@ -70,7 +70,7 @@ struct Action {
   std::string_view name;  ///< by which files, messages and OSC call it
   Role role;              ///< the least that may do it
   bool of_slot = false;
-  Takes takes = Takes::nothing;
+  ArgumentKind argument_kind = ArgumentKind::nothing;
   std::string_view value = {};            ///< what Edit::value says, in words; empty: nothing
   std::string_view of = {};               ///< what Edit::slot may name when it is on no slot; empty: nothing
   std::string_view what;                  ///< what it does, a sentence for people
@@ -101,13 +101,13 @@ struct Command {
 /// Error: an unknown action or slot, or a value that is not what the action takes.
 Result<Command> command_of(const Scene& scene, const Edit& edit);
 
-/// The staging after a command. `posed` is what was shown last: looks are saved from it. Error, and nothing
+/// The show state after a command. `posed` is what was shown last: looks are saved from it. Error, and nothing
 /// has changed: a variant, look, marker or screen that is not there, or what cannot be done now.
-Result<Staging> edited(const Scene& scene,
-                       const Staging& staging,
+Result<ShowState> apply_edit(const Scene& scene,
+                       const ShowState& show_state,
                        const PosedScene& posed,
                        const Command& command);
 /// The same from text; errors of command_of(), too.
-Result<Staging> edited(const Scene& scene, const Staging& staging, const PosedScene& posed, const Edit& edit);
+Result<ShowState> apply_edit(const Scene& scene, const ShowState& show_state, const PosedScene& posed, const Edit& edit);
 
 }  // namespace limn::scene

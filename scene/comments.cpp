@@ -34,7 +34,7 @@ Status check(const Comment& comment) {
 
 }  // namespace
 
-Result<Comment> comment_of(const std::string& who,
+Result<Comment> make_comment(const std::string& who,
                            const std::string& look,
                            const std::string& slot,
                            const std::string& text) {

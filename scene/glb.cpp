@@ -85,29 +85,29 @@ struct Document {
         {{"componentType", small ? k_unsigned_short : k_unsigned_int}, {"count", count}, {"type", "SCALAR"}});
   }
 
-  // The index of a texture; a picture that is in already is not put in again.
-  ordered_json add_texture(const cv::Mat& picture) {
-    const auto [known, is_new] = textures.try_emplace(picture.data, images.size());
+  // The index of a texture; an image that is in already is not put in again.
+  ordered_json add_texture(const cv::Mat& image) {
+    const auto [known, is_new] = textures.try_emplace(image.data, images.size());
     if (is_new) {
       std::vector<std::uint8_t> png;
-      cv::imencode(".png", picture, png);
+      cv::imencode(".png", image, png);
       images.push_back({{"bufferView", add_view({png.begin(), png.end()})}, {"mimeType", "image/png"}});
     }
     return {{"index", known->second}};
   }
 
   void add_maps(const SurfaceMaps& maps, ordered_json* surface, ordered_json* json) {
-    if (!maps.metallic_roughness.picture.empty())
-      (*surface)["metallicRoughnessTexture"] = add_texture(maps.metallic_roughness.picture);
-    if (!maps.normals.picture.empty()) {
-      (*json)["normalTexture"] = add_texture(maps.normals.picture);
+    if (!maps.metallic_roughness.image.empty())
+      (*surface)["metallicRoughnessTexture"] = add_texture(maps.metallic_roughness.image);
+    if (!maps.normals.image.empty()) {
+      (*json)["normalTexture"] = add_texture(maps.normals.image);
       (*json)["normalTexture"]["scale"] = maps.normal_scale;
     }
-    if (!maps.occlusion.picture.empty()) {
-      (*json)["occlusionTexture"] = add_texture(maps.occlusion.picture);
+    if (!maps.occlusion.image.empty()) {
+      (*json)["occlusionTexture"] = add_texture(maps.occlusion.image);
       (*json)["occlusionTexture"]["strength"] = maps.occlusion_strength;
     }
-    if (!maps.emission.picture.empty()) (*json)["emissiveTexture"] = add_texture(maps.emission.picture);
+    if (!maps.emission.image.empty()) (*json)["emissiveTexture"] = add_texture(maps.emission.image);
   }
 
   std::size_t add_material(const Material& material) {
@@ -125,7 +125,7 @@ struct Document {
       json["alphaCutoff"] = material.cut_below;
     }
     const Eigen::Vector3f& e = material.emitted;
-    const bool glows_in_places = !material.maps.emission.picture.empty();
+    const bool glows_in_places = !material.maps.emission.image.empty();
     if (!e.isZero() && (has_textures || !glows_in_places)) json["emissiveFactor"] = {e.x(), e.y(), e.z()};
     if (material.unlit) json["extensions"] = {{"KHR_materials_unlit", ordered_json::object()}};
     is_unlit |= material.unlit;
@@ -184,9 +184,9 @@ struct Document {
 
 }  // namespace
 
-std::string glb(std::span<const PlacedMesh> placed) {
+std::string encode_glb(std::span<const GlbNode> placed) {
   Document document;
-  for (const PlacedMesh& mesh : placed) {
+  for (const GlbNode& mesh : placed) {
     const Eigen::Quaterniond& q = mesh.assembly_from_mesh.rotation;
     const Eigen::Vector3d& t = mesh.assembly_from_mesh.translation;
     document.nodes.push_back({{"name", mesh.name},
@@ -197,7 +197,7 @@ std::string glb(std::span<const PlacedMesh> placed) {
   return document.file();
 }
 
-std::string glb(const Mesh& mesh) {
+std::string encode_glb(const Mesh& mesh) {
   Document document;
   document.has_textures = false;
   document.nodes.push_back({{"mesh", document.add_mesh(mesh)}});

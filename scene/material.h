@@ -6,10 +6,10 @@
 
 namespace limn::scene {
 
-/// A picture in a mesh's uv, 8-bit BGR, whose v counts up from its bottom row, as in OBJ; beyond 0 … 1 it
+/// An image in a mesh's uv, 8-bit BGR, whose v counts up from its bottom row, as in OBJ; beyond 0 … 1 it
 /// repeats.
 struct Texture {
-  cv::Mat picture;   ///< empty: none
+  cv::Mat image;   ///< empty: none
   std::string file;  ///< that it came from, for messages
 };
 
@@ -24,13 +24,13 @@ struct SurfaceMaps {
   float occlusion_strength = 1;
 
   bool is_none() const {
-    return metallic_roughness.picture.empty() && normals.picture.empty() && occlusion.picture.empty() &&
-           emission.picture.empty();
+    return metallic_roughness.image.empty() && normals.image.empty() && occlusion.image.empty() &&
+           emission.image.empty();
   }
 };
 
 /// Surface of one piece of a mesh. Colours are linear light; the texture is sRGB, 8-bit BGR, or BGRA where
-/// pieces are cut out, and multiplies base_colour. v of uv counts up from the picture's bottom row, as in
+/// pieces are cut out, and multiplies base_colour. v of uv counts up from the image's bottom row, as in
 /// OBJ.
 struct Material {
   Eigen::Vector3f base_colour = {0.8f, 0.8f, 0.8f};

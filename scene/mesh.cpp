@@ -201,7 +201,7 @@ void leave_out_maps(const fs::path& path, Mesh* mesh) {
   bool has_textures = false;
   for (Material& material : mesh->materials) {
     has_textures |= !material.texture.empty() || !material.maps.is_none();
-    if (!material.maps.emission.picture.empty()) material.emitted.setZero();
+    if (!material.maps.emission.image.empty()) material.emitted.setZero();
     material.maps = {};
   }
   if (!has_textures) return;
@@ -330,7 +330,7 @@ Result<Mesh> load_mesh(const fs::path& path, const std::string& units) {
     if (index >= mesh.materials.size()) index = 0;
   }
   if (mesh.uvs.empty()) leave_out_maps(path, &mesh);
-  const auto has_normal_map = [](const Material& m) { return !m.maps.normals.picture.empty(); };
+  const auto has_normal_map = [](const Material& m) { return !m.maps.normals.image.empty(); };
   if (std::any_of(mesh.materials.begin(), mesh.materials.end(), has_normal_map))
     add_tangents(&mesh, corner_tangents);
   return mesh;

@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "core/log.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 
 namespace limn::scene {
 namespace {
@@ -33,15 +33,15 @@ Result<cv::Mat> embedded_texture(const aiTexture& texture, const fs::path& path,
     return bgr;
   }
   const cv::Mat bytes(1, static_cast<int>(texture.mWidth), CV_8U, texture.pcData);
-  cv::Mat picture = cv::imdecode(bytes, with_alpha ? cv::IMREAD_UNCHANGED : cv::IMREAD_COLOR);
-  if (picture.empty()) {
+  cv::Mat image = cv::imdecode(bytes, with_alpha ? cv::IMREAD_UNCHANGED : cv::IMREAD_COLOR);
+  if (image.empty()) {
     return error(
         "{}: expected a PNG or JPEG as its embedded texture, found {} bytes that are neither. "
         "Export the mesh again.",
         path.string(), texture.mWidth);
   }
-  if (picture.depth() == CV_16U) picture.convertTo(picture, CV_8U, 1.0 / 257);
-  return picture;
+  if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 257);
+  return image;
 }
 
 // Where a texture named by a mesh is: as written there, else by its bare name beside the mesh.
@@ -55,9 +55,9 @@ fs::path texture_path(const std::string& name, const fs::path& mesh_path) {
 }
 
 Result<cv::Mat> texture_beside(const fs::path& path, const fs::path& mesh_path, bool with_alpha) {
-  auto picture = with_alpha ? read_picture_with_alpha(path) : read_picture(path);
-  if (!picture) return error("{}: its texture cannot be read: {}", mesh_path.string(), picture.message());
-  return picture;
+  auto image = with_alpha ? read_image_with_alpha(path) : read_image(path);
+  if (!image) return error("{}: its texture cannot be read: {}", mesh_path.string(), image.message());
+  return image;
 }
 
 // The alpha under which a glTF material has nothing; 0: it has no such places. What is half transparent
@@ -96,7 +96,7 @@ bool spread_into_holes(float below, cv::Mat* bgra) {
   return true;
 }
 
-// Assimp's translation belongs to a turn about the picture's middle; glTF turns about its upper left corner.
+// Assimp's translation belongs to a turn about the image's middle; glTF turns about its upper left corner.
 TexturePlace place_of(const aiMaterial& source, aiTextureType type) {
   TexturePlace out;
   source.Get(AI_MATKEY_UVWSRC(type, 0), out.coordinates);
@@ -112,10 +112,10 @@ TexturePlace place_of(const aiMaterial& source, aiTextureType type) {
   return out;
 }
 
-// The pictures that a file's materials name: each is read once and shared.
-class Pictures {
+// The images that a file's materials name: each is read once and shared.
+class Images {
  public:
-  Pictures(const aiScene& scene, const fs::path& path) : scene_(scene), path_(path) {}
+  Images(const aiScene& scene, const fs::path& path) : scene_(scene), path_(path) {}
 
   // 8-bit BGR, or BGRA where it has alpha and that is wanted.
   Result<Texture> read(const aiString& name, bool with_alpha) {
@@ -123,10 +123,10 @@ class Pictures {
     if (known != known_.end()) return known->second;
     const aiTexture* embedded = scene_.GetEmbeddedTexture(name.C_Str());
     const fs::path file = embedded ? path_ : texture_path(name.C_Str(), path_);
-    LIMN_TRY(cv::Mat picture, embedded ? embedded_texture(*embedded, path_, with_alpha)
+    LIMN_TRY(cv::Mat image, embedded ? embedded_texture(*embedded, path_, with_alpha)
                                        : texture_beside(file, path_, with_alpha));
-    if (picture.channels() == 1) cv::cvtColor(picture, picture, cv::COLOR_GRAY2BGR);
-    return known_[{name.C_Str(), with_alpha}] = Texture{picture, file.string()};
+    if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
+    return known_[{name.C_Str(), with_alpha}] = Texture{image, file.string()};
   }
 
  private:
@@ -138,8 +138,8 @@ class Pictures {
 // One material while it is read.
 class MaterialReader {
  public:
-  MaterialReader(const aiMaterial& source, std::string name, Pictures* pictures)
-      : source_(source), place_(texture_place(source)), name_(std::move(name)), pictures_(*pictures) {}
+  MaterialReader(const aiMaterial& source, std::string name, Images* images)
+      : source_(source), place_(texture_place(source)), name_(std::move(name)), images_(*images) {}
 
   Result<Material> read(bool is_gltf) {
     Material material;
@@ -166,8 +166,8 @@ class MaterialReader {
     for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
       aiString name;
       if (source_.GetTexture(type, 0, &name) != AI_SUCCESS || name.length == 0) continue;
-      LIMN_TRY(const Texture texture, pictures_.read(name, below > 0));
-      material->texture = texture.picture;
+      LIMN_TRY(const Texture texture, images_.read(name, below > 0));
+      material->texture = texture.image;
       material->texture_file = texture.file;
       break;
     }
@@ -206,13 +206,13 @@ class MaterialReader {
       material->emitted.setZero();
   }
 
-  // Without a picture: the material names none. nullopt: it cannot be read, which is told, and what is shown
+  // Without an image: the material names none. nullopt: it cannot be read, which is told, and what is shown
   // instead.
   std::optional<Texture> map_of(aiTextureType type, const std::string& what, const std::string& instead) {
     aiString name;
     if (source_.GetTexture(type, 0, &name) != AI_SUCCESS || name.length == 0) return Texture{};
     note_place(type, what);
-    auto texture = pictures_.read(name, false);
+    auto texture = images_.read(name, false);
     if (texture) return std::move(texture).value();
     log_warning(
         "{}: expected a readable {}, found none ({}); it is shown {}. Save the texture beside the mesh, or "
@@ -237,7 +237,7 @@ class MaterialReader {
   const aiMaterial& source_;
   TexturePlace place_;
   std::string name_;  // of file and material, for messages
-  Pictures& pictures_;
+  Images& images_;
 };
 
 }  // namespace
@@ -251,13 +251,13 @@ TexturePlace texture_place(const aiMaterial& material) {
 
 Result<std::vector<Material>> read_materials(const aiScene& scene, const fs::path& path, bool is_gltf) {
   std::vector<Material> materials;
-  Pictures pictures(scene, path);
+  Images images(scene, path);
   for (unsigned i = 0; i < scene.mNumMaterials; ++i) {
     const aiMaterial& source = *scene.mMaterials[i];
     const std::string own = source.GetName().C_Str();
     const std::string name =
         fmt::format("{}: material {}", path.string(), own.empty() ? std::to_string(i) : "'" + own + "'");
-    LIMN_TRY(Material material, MaterialReader(source, name, &pictures).read(is_gltf));
+    LIMN_TRY(Material material, MaterialReader(source, name, &images).read(is_gltf));
     materials.push_back(std::move(material));
   }
   return materials;

@@ -72,7 +72,7 @@ Result<LightNumbers> light_numbers_of(const std::string& words) {
   return LightNumbers{right_deg, up_deg, strengths.x(), strengths.y(), strengths.z()};
 }
 
-RoomLight room_light_of(const LightNumbers& numbers,
+RoomLight parse_room_light(const LightNumbers& numbers,
                         const Eigen::Vector3d& d_up_world,
                         const Eigen::Vector3d& d_front_world) {
   const auto [right_deg, up_deg, strength, above, below] = numbers;

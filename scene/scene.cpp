@@ -10,7 +10,7 @@
 
 #include "core/config.h"
 #include "core/log.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "scene/marker_file.h"
 
 namespace limn::scene {
@@ -28,7 +28,7 @@ struct MeshFile {
 struct Reader {
   std::vector<MeshFile> part_meshes;  // in the order of slots and variants
   std::optional<MeshFile> prototype_mesh;
-  std::optional<fs::path> albedo_picture;
+  std::optional<fs::path> albedo_image;
   std::map<std::string, std::string> marker_users;  // marker -> where it stands
 };
 
@@ -61,7 +61,7 @@ double read_size_m(const ConfigNode& node) { return node.at("size_mm").positive(
 
 void read_albedo(const ConfigNode& node, Prototype* prototype, Reader* reader) {
   if (node.is_string()) {
-    reader->albedo_picture = node.path_inside();
+    reader->albedo_image = node.path_inside();
     return;
   }
   prototype->albedo = node.number();
@@ -159,7 +159,7 @@ Control read_control(const ConfigNode& node, const Scene& scene) {
 }
 
 int read_side(const ConfigNode& size, double value) {
-  constexpr double k_most = 16384;  // largest picture side that GL 4.5 must hold
+  constexpr double k_most = 16384;  // largest image side that GL 4.5 must hold
   if (value >= 1 && value <= k_most && value == static_cast<int>(value)) return static_cast<int>(value);
   size.problem(fmt::format("expected a whole number of pixels from 1 to {}, found {}.", k_most, value));
   return 1;
@@ -258,13 +258,13 @@ Result<Mesh> load_named_mesh(const MeshFile& file, const fs::path& scene_path) {
   return mesh;
 }
 
-Status load_albedo_picture(const fs::path& path, const fs::path& scene_path, Prototype* prototype) {
-  auto picture = read_picture(path);
-  if (!picture) return error("{}: prototype.albedo: {}", scene_path.string(), picture.message());
-  prototype->albedo_picture = std::move(picture).value();
-  if (prototype->albedo_picture.channels() == 1) {
-    const cv::Mat grey = prototype->albedo_picture;
-    cv::merge(std::vector<cv::Mat>{grey, grey, grey}, prototype->albedo_picture);
+Status load_albedo_image(const fs::path& path, const fs::path& scene_path, Prototype* prototype) {
+  auto image = read_image(path);
+  if (!image) return error("{}: prototype.albedo: {}", scene_path.string(), image.message());
+  prototype->albedo_image = std::move(image).value();
+  if (prototype->albedo_image.channels() == 1) {
+    const cv::Mat grey = prototype->albedo_image;
+    cv::merge(std::vector<cv::Mat>{grey, grey, grey}, prototype->albedo_image);
   }
   if (prototype->mesh.uvs.empty()) {
     return error(
@@ -307,7 +307,7 @@ Result<std::map<std::string, std::string>> load_units(const fs::path& file) {
 }
 
 // A mesh that was laid into a slot's folder; `told`: units by variant, as people have said.
-Result<Variant> load_dropped(const fs::path& file,
+Result<Variant> auto_import_meshes(const fs::path& file,
                              const Slot& slot,
                              const std::map<std::string, std::string>& told) {
   const std::string name = file.stem().string();
@@ -322,7 +322,7 @@ Result<Variant> load_dropped(const fs::path& file,
   LIMN_TRY(Mesh mesh, load_mesh(file, units));
   if (const Status size = check_size(mesh, units); !size)
     return error("{}: {}", file.string(), size.message());
-  Variant variant{name, std::move(mesh), Variant::Dropped{units, is_guess}};
+  Variant variant{name, std::move(mesh), Variant::AutoImported{units, is_guess}};
   if (is_guess) log_info("{}", units_question(slot, variant));
   return variant;
 }
@@ -332,11 +332,11 @@ Status load_variants(std::span<const MeshFile> listed,
                      const fs::path& path,
                      const fs::path& scene_folder,
                      Slot* slot,
-                     std::vector<LeftOut>* left_out) {
+                     std::vector<SkippedVariant>* skipped_variants) {
   std::vector<Variant> variants;
   const auto leave_out = [&](const std::string& name, const Error& why) -> Status {
-    if (!left_out) return why;
-    left_out->push_back({slot->name, name, why.message});
+    if (!skipped_variants) return why;
+    skipped_variants->push_back({slot->name, name, why.message});
     return {};
   };
   for (std::size_t i = 0; i < listed.size(); ++i) {
@@ -353,7 +353,7 @@ Status load_variants(std::span<const MeshFile> listed,
     for (const char* end : {".glb", ".gltf", ".obj", ".stl", ".ply"})
       if (entry.path().extension() == end) files.insert(entry.path());
   for (const fs::path& file : files) {
-    auto variant = load_dropped(file, *slot, told);
+    auto variant = auto_import_meshes(file, *slot, told);
     if (variant)
       variants.push_back(std::move(*variant));
     else
@@ -363,20 +363,20 @@ Status load_variants(std::span<const MeshFile> listed,
   return {};
 }
 
-Status load_files(const Reader& reader, const fs::path& path, Scene* scene, std::vector<LeftOut>* left_out) {
+Status load_files(const Reader& reader, const fs::path& path, Scene* scene, std::vector<SkippedVariant>* skipped_variants) {
   if (scene->prototype) {
     LIMN_TRY(scene->prototype->mesh, load_named_mesh(*reader.prototype_mesh, path));
     for (Material& material : scene->prototype->mesh.materials)
       material.cut_below = 0;  // what stands there is whole
-    if (reader.albedo_picture) {
-      LIMN_TRY_STATUS(load_albedo_picture(*reader.albedo_picture, path, &*scene->prototype));
+    if (reader.albedo_image) {
+      LIMN_TRY_STATUS(load_albedo_image(*reader.albedo_image, path, &*scene->prototype));
     }
   }
   std::span<const MeshFile> listed = reader.part_meshes;
   for (Slot& slot : scene->slots) {
     const auto own = listed.first(slot.variants.size());
     listed = listed.subspan(own.size());
-    LIMN_TRY_STATUS(load_variants(own, path, scene->folder, &slot, left_out));
+    LIMN_TRY_STATUS(load_variants(own, path, scene->folder, &slot, skipped_variants));
   }
   std::erase_if(scene->controls, [&](const Control& control) {
     const Slot* slot = scene->find_slot(control.slot);
@@ -403,7 +403,7 @@ const Slot* Scene::find_slot(const std::string& name) const {
   return found == slots.end() ? nullptr : &*found;
 }
 
-Result<Scene> load_scene(const fs::path& path, std::vector<LeftOut>* left_out) {
+Result<Scene> load_scene(const fs::path& path, std::vector<SkippedVariant>* skipped_variants) {
   std::error_code code;
   const fs::path file = fs::is_directory(path, code) ? path / "scene.json" : path;
   LIMN_TRY(const Config config, Config::load(file, "limn.scene/1"));
@@ -420,21 +420,21 @@ Result<Scene> load_scene(const fs::path& path, std::vector<LeftOut>* left_out) {
   if (const auto node = root.find("viewer")) scene.viewers = read_viewers(*node, scene);
   if (const auto node = root.find("light")) scene.light = read_room_light(*node);
   LIMN_TRY_STATUS(config.status());
-  LIMN_TRY_STATUS(load_files(reader, file, &scene, left_out));
+  LIMN_TRY_STATUS(load_files(reader, file, &scene, skipped_variants));
   return scene;
 }
 
 std::string units_question(const Slot& slot, const Variant& variant) {
-  if (!variant.dropped || !variant.dropped->is_guess) return {};
+  if (!variant.auto_imported || !variant.auto_imported->is_guess) return {};
   return fmt::format("{} of slot '{}' is taken to be in {}, {:.0f} mm long. Is it? If not: units {} {} UNIT",
-                     variant.name, slot.name, variant.dropped->units, 1e3 * longest_side(variant.mesh),
+                     variant.name, slot.name, variant.auto_imported->units, 1e3 * longest_side(variant.mesh),
                      slot.name, variant.name);
 }
 
 std::string units_json(const Slot& slot, const std::string& variant, const std::string& units) {
   nlohmann::ordered_json all = nlohmann::ordered_json::object();
   for (const Variant& known : slot.variants)
-    if (known.dropped && !known.dropped->is_guess) all[known.name] = known.dropped->units;
+    if (known.auto_imported && !known.auto_imported->is_guess) all[known.name] = known.auto_imported->units;
   all[variant] = units;
   return nlohmann::ordered_json({{"schema", "limn.units/1"}, {"units", all}}).dump(2) + "\n";
 }

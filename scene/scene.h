@@ -19,8 +19,8 @@ namespace limn::scene {
 struct Prototype {
   Mesh mesh;
   std::vector<BodyMarker> markers;  ///< body_from_marker is prototype_from_marker
-  double albedo = 0.8;              ///< diffuse, when no picture is given
-  cv::Mat albedo_picture;           ///< 8-bit BGR sRGB in the mesh's uv; empty: none
+  double albedo = 0.8;              ///< diffuse, when no image is given
+  cv::Mat albedo_image;           ///< 8-bit BGR sRGB in the mesh's uv; empty: none
 };
 
 enum class Mode {
@@ -30,13 +30,13 @@ enum class Mode {
 
 struct Variant {
   /// A mesh that was dropped into the slot's folder.
-  struct Dropped {
+  struct AutoImported {
     std::string units;
     bool is_guess = true;  ///< nobody has said that unit
   };
   std::string name;
   Mesh mesh;
-  std::optional<Dropped> dropped = {};
+  std::optional<AutoImported> auto_imported = {};
 };
 
 /// A place for one part, carried by one marker.
@@ -73,10 +73,10 @@ struct Viewer {
 /// What is shown: a project folder's scene.json (limn.scene/1), read with everything that it names.
 struct Scene {
   std::filesystem::path folder;
-  std::optional<Prototype> prototype;  ///< absent: parts over a camera picture only
+  std::optional<Prototype> prototype;  ///< absent: parts over a camera image only
   std::vector<Slot> slots;
   std::vector<Control> controls;
-  std::vector<Viewer> viewers;     ///< several share one eye (scene/viewers.h)
+  std::vector<Viewer> viewers;     ///< several share one eye (scene/viewpoint.h)
   std::optional<RoomLight> light;  ///< absent: soft light and a lamp that stand with the viewer
 
   const Slot* find_slot(const std::string& name) const;
@@ -85,15 +85,15 @@ struct Scene {
 };
 
 /// A variant whose mesh cannot be loaded, and why.
-struct LeftOut {
+struct SkippedVariant {
   std::string slot, variant, why;
 };
 
 /// `path` is the scene.json or its folder. Meshes in its folder slots/NAME/ are variants of slot NAME, too,
 /// called as their files; their units are those of slots/NAME/units.json (limn.units/1), else guessed and
-/// told. A variant that cannot be loaded is an error; with `left_out` it is named there and left out instead,
+/// told. A variant that cannot be loaded is an error; with `skipped_variants` it is named there and left out instead,
 /// and a slot that has no other, with its controls, too.
-Result<Scene> load_scene(const std::filesystem::path& path, std::vector<LeftOut>* left_out = nullptr);
+Result<Scene> load_scene(const std::filesystem::path& path, std::vector<SkippedVariant>* skipped_variants = nullptr);
 
 /// A question for people about a dropped variant whose unit is a guess, and how to answer it; empty for
 /// others.

@@ -1,5 +1,5 @@
 #version 450 core
-// The parts laid over the camera's picture in linear light, out in sRGB.
+// The parts laid over the camera's image in linear light, out in sRGB.
 layout(location = 0) out vec4 o_srgb;
 uniform sampler2D s_centre;   // the parts, linear light, a: coverage
 uniform sampler2D s_picture;  // sRGB values as stored

@@ -1,6 +1,6 @@
 #version 450 core
-// Lists the pixels of a picture of one sample a pixel that need more: beside an edge of coverage or colour. KNOWN_SHARES: in
-// a projector's picture those at whose centres the share of the light is not known are left to light_shares.comp.
+// Lists the pixels of an image of one sample a pixel that need more: beside an edge of coverage or colour. KNOWN_SHARES: in
+// a projector's image those at whose centres the share of the light is not known are left to light_shares.comp.
 #include "listed.glsl"
 #ifdef KNOWN_SHARES
 #include "rest.glsl"

@@ -4,7 +4,7 @@
 layout(location = 0) in vec3 i_weights;
 layout(location = 1) flat in uint i_id;
 layout(location = 0) out uint o_id;
-uniform float u_focal;  // of the picture of ids, texels
+uniform float u_focal;  // of the image of ids, texels
 
 void main() {
   o_id = i_id;

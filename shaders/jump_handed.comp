@@ -1,5 +1,5 @@
 #version 450 core
-// Marks those of the listed blocks, in which depth jumps in a projector's picture, where another projector's light goes on:
+// Marks those of the listed blocks, in which depth jumps in a projector's image, where another projector's light goes on:
 // there it hands its own over. Where the prototype ends for all of them there is nobody to hand it to.
 #include "scene.glsl"
 #include "lens.glsl"

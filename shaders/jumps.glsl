@@ -2,10 +2,10 @@
 #include "blocks.glsl"
 
 uniform sampler2D s_depth;  // nearness: k_near / z, 0 where there is nothing
-uniform ivec2 u_last;       // texel of the picture
+uniform ivec2 u_last;       // texel of the image
 uniform float u_near, u_focal;
 
-// Of three in a row: a plane's nearness is even in a picture, a crease bends it, a jump breaks it.
+// Of three in a row: a plane's nearness is even in an image, a crease bends it, a jump breaks it.
 bool is_jump(float a, float b, float c) {
   const float k_least = 0.0015;  // m
   const float k_bend = 4.0;      // texels of depth; a square corner, seen evenly, has 2

@@ -1,5 +1,5 @@
 #version 450 core
-// Lists the blocks of a depth picture in which depth may jump, by every fourth texel.
+// Lists the blocks of a depth image in which depth may jump, by every fourth texel.
 #include "jumps.glsl"
 #include "listed.glsl"
 layout(local_size_x = 16, local_size_y = 4) in;

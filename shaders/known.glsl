@@ -1,4 +1,4 @@
-// What a projector's pixel centres see of the prototype and its share there, kept from picture to picture while the
+// What a projector's pixel centres see of the prototype and its share there, kept from image to image while the
 // prototype stays and light arrives as it did.
 
 layout(rgba32ui, binding = 1) uniform uimage2D u_known_hits;  // id, bits of two weights, u_known_stamp of its time

@@ -28,7 +28,7 @@ vec4 view_colour(vec3 p, vec3 d_normal, float footprint) {
 vec4 surface_colour(Place place, float footprint) {
   if (!may_hold_surface_part(place.p, u_placement_count)) return vec4(0);
   Hit hit = surface_part_at(s_projector_ids, sight_at(u_projector), place.p, place.d_smooth);
-  return hit.id == 0u ? vec4(0) : vec4(look_on_surface(hit, place.d_smooth, footprint), 1);
+  return hit.id == 0u ? vec4(0) : vec4(radiance_on_surface(hit, place.d_smooth, footprint), 1);
 }
 
 // The share at a pixel's centre, good for samples of the pixel that meet the same smooth surface: there it changes by less

@@ -1,11 +1,11 @@
 #version 450 core
-// A projector's picture: the listed pixels, one sample each at their centres. Where the share of the light is not known yet,
-// the picture gets the colour that is to be seen, and the pixel is left to light_shares.comp.
+// A projector's image: the listed pixels, one sample each at their centres. Where the share of the light is not known yet,
+// the image gets the colour that is to be seen, and the pixel is left to light_shares.comp.
 #include "light.glsl"
 #include "listed.glsl"
 #include "rest.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform writeonly image2D u_picture;
+layout(rgba32f, binding = 0) uniform writeonly image2D u_image;
 
 void main() {
   if (!is_listed()) return;
@@ -19,5 +19,5 @@ void main() {
     colour = vec4(balanced(u_projector, colour, known_share(at), place, prototype), 1);
   else
     leave_pixel(at);
-  imageStore(u_picture, at, colour);
+  imageStore(u_image, at, colour);
 }

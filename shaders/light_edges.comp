@@ -1,12 +1,12 @@
 #version 450 core
-// A projector's picture: the listed pixels by many samples. Those for which the centre's share is not good enough are left
+// A projector's image: the listed pixels by many samples. Those for which the centre's share is not good enough are left
 // to light_rest.comp.
 #include "light.glsl"
 #include "listed.glsl"
 #include "rest.glsl"
 #include "samples.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform writeonly image2D u_picture;
+layout(rgba32f, binding = 0) uniform writeonly image2D u_image;
 
 void main() {
   if (!is_listed()) return;
@@ -23,5 +23,5 @@ void main() {
   if (is_left)
     leave_pixel(at);
   else
-    imageStore(u_picture, at, sum / float(u_samples));
+    imageStore(u_image, at, sum / float(u_samples));
 }

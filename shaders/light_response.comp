@@ -1,5 +1,5 @@
 #version 450 core
-// A projector's picture from its light, in the listed pixels: display values by the projector's response. Alpha says what
+// A projector's image from its light, in the listed pixels: display values by the projector's response. Alpha says what
 // was clipped.
 #include "scene.glsl"
 #include "listed.glsl"

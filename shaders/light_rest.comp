@@ -1,11 +1,11 @@
 #version 450 core
-// A projector's picture: the listed pixels by many samples, each with a share of its own where the centre's is not good
+// A projector's image: the listed pixels by many samples, each with a share of its own where the centre's is not good
 // enough for it.
 #include "light.glsl"
 #include "listed.glsl"
 #include "samples.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform writeonly image2D u_picture;
+layout(rgba32f, binding = 0) uniform writeonly image2D u_image;
 
 void main() {
   if (!is_listed()) return;
@@ -19,5 +19,5 @@ void main() {
     if (!seen.is_beside) share = share_of(u_projector, seen.place);
     if (seen.is_lit) sum += light_of(seen, share);
   } while (++k < u_samples);
-  imageStore(u_picture, at, sum / float(u_samples));
+  imageStore(u_image, at, sum / float(u_samples));
 }

@@ -1,10 +1,10 @@
 #version 450 core
-// Shares of the light at the centres of the listed pixels; and their light, where the picture has the colour that is to be
+// Shares of the light at the centres of the listed pixels; and their light, where the image has the colour that is to be
 // seen there.
 #include "light.glsl"
 #include "listed.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform image2D u_picture;
+layout(rgba32f, binding = 0) uniform image2D u_image;
 
 void main() {
   if (!is_listed()) return;
@@ -13,7 +13,7 @@ void main() {
   if (prototype.id == 0u) return;
   Place place = place_at(prototype, ray_of(sight_at(u_projector), vec2(at)));
   Share share = learn_share(at, place);
-  vec4 colour = imageLoad(u_picture, at);
+  vec4 colour = imageLoad(u_image, at);
   if (colour.a > 0.0 || u_even_black)
-    imageStore(u_picture, at, vec4(balanced(u_projector, colour, share, place, prototype), 1));
+    imageStore(u_image, at, vec4(balanced(u_projector, colour, share, place, prototype), 1));
 }

@@ -1,5 +1,5 @@
 #version 450 core
-// What lights the middle of each square patch of the eye's picture. rgb: pixel of projector u_projector and its irradiance
+// What lights the middle of each square patch of the eye's image. rgb: pixel of projector u_projector and its irradiance
 // there, 0 where it does not reach; for no projector (-1) the prototype's point in the scene's frame. a: 0 where the eye
 // sees no prototype.
 #include "scene.glsl"

@@ -19,7 +19,7 @@ vec3 diffuse_light(vec3 n) {
   return light;
 }
 
-// projector/mirrored_light.h. By cosine and roughness: the share of the soft light that a surface mirrors (red of its
+// projector/brdf_lut.h. By cosine and roughness: the share of the soft light that a surface mirrors (red of its
 // colour head on, green of white), and how far from its normal to the mirrored direction most of that comes from
 // (alpha). By height (-1 ... 1) and roughness: the share of what is mirrored that comes from above (blue).
 layout(binding = 19) uniform sampler2D s_mirrored;
@@ -73,7 +73,7 @@ vec3 look_along(vec3 d, Hit hit, float footprint) {
 
 // Colour of a part that lies on the surface, the same for every eye: seen along the prototype's normal, and in light
 // from there where no room is known.
-vec3 look_on_surface(Hit hit, vec3 d_prototype_normal, float footprint) {
+vec3 radiance_on_surface(Hit hit, vec3 d_prototype_normal, float footprint) {
   if (is_unlit(hit)) return base_colour(hit, footprint);
   Finish finish = finish_at(hit, footprint);
   float side = dot(finish.n_smooth, d_prototype_normal) < 0.0 ? -1.0 : 1.0;

@@ -29,7 +29,7 @@ vec4 part_seen(Seen seen, bool whole) {
   if (share == 0.0) return vec4(0);
   float footprint = seen.part.t / sight_at(u_eye).quality.x;
   if (owner_at(owner_of(seen.part.id)).upper.w > 0.5) {  // as the projectors show it
-    return share * vec4(look_on_surface(seen.part, smooth_normal(seen.part), footprint), 1);
+    return share * vec4(radiance_on_surface(seen.part, smooth_normal(seen.part), footprint), 1);
   }
   return share * vec4(look_along(seen.d, seen.part, footprint), 1);
 }

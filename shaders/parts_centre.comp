@@ -3,10 +3,10 @@
 #include "parts.glsl"
 #include "listed.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform writeonly image2D u_picture;
+layout(rgba32f, binding = 0) uniform writeonly image2D u_image;
 
 void main() {
   if (!is_listed()) return;
   ivec2 at = listed_pixel();
-  imageStore(u_picture, at, part_seen(in_sight_at(vec2(at)), false));
+  imageStore(u_image, at, part_seen(in_sight_at(vec2(at)), false));
 }

@@ -6,7 +6,7 @@
 #include "rest.glsl"
 #include "samples.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform writeonly image2D u_picture;
+layout(rgba32f, binding = 0) uniform writeonly image2D u_image;
 
 void main() {
   if (!is_listed()) return;
@@ -19,6 +19,6 @@ void main() {
     may_lack = may_lack || (seen.how == k_if_reached && whole_share(owner_of(seen.part.id)) < 1.0);
     sum += part_seen(seen, false);
   } while (++k < u_samples);
-  imageStore(u_picture, at, sum / float(u_samples));
+  imageStore(u_image, at, sum / float(u_samples));
   if (may_lack) leave_pixel(at);
 }

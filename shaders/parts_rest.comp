@@ -5,7 +5,7 @@
 #include "listed.glsl"
 #include "samples.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform writeonly image2D u_picture;
+layout(rgba32f, binding = 0) uniform writeonly image2D u_image;
 
 void main() {
   if (!is_listed()) return;
@@ -22,5 +22,5 @@ void main() {
   do {
     sum += part_seen(in_sight_at(vec2(at) + sample_offset(k)), true);
   } while (++k < u_samples);
-  imageStore(u_picture, at, sum / float(u_samples));
+  imageStore(u_image, at, sum / float(u_samples));
 }

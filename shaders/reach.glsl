@@ -3,7 +3,7 @@
 
 uniform usampler2DArray s_projector_ids;
 uniform sampler2DArray s_pixel_maps;  // for each projector: pixels over a grid of tangents
-uniform sampler2DArray s_arriving;    // for each projector, over its picture: how much of its light arrives
+uniform sampler2DArray s_arriving;    // for each projector, over its image: how much of its light arrives
 uniform sampler2DArray s_kept;        // for each projector, over its ids: share of its light kept beside edges and shadows
 uniform int u_projector_count;
 
@@ -12,7 +12,7 @@ uniform int u_projector_count;
 const float k_least_kept = 0.01;
 const float k_least_share = 1e-4;  // at the very border, so that a projector alone there still gives its light
 
-// Pixel of a tangent in a projector's own picture.
+// Pixel of a tangent in a projector's own image.
 vec2 pixel_of(Sight projector, vec2 tangent) {
   vec2 node = (tangent - projector.map.xy) * projector.map.zw;
   ivec2 nodes = textureSize(s_pixel_maps, 0).xy;
@@ -25,7 +25,7 @@ vec2 pixel_of(Sight projector, vec2 tangent) {
                  texelFetch(s_pixel_maps, ivec3(first + ivec2(1, 1), layer), 0).xy, node - vec2(first));
 }
 
-// Gain of a projector's light in its pixel (core/response.h, Vignetting).
+// Gain of a projector's light in its pixel (core/photometric_response.h, Vignetting).
 float vignetting(Sight projector, vec2 px) {
   vec2 half_size = 0.5 * projector.size.zw;
   vec2 q = (px + 0.5 - half_size) / length(half_size);
@@ -60,7 +60,7 @@ float spread(Sight projector, float depth) {
 // How projector j lights a place.
 struct Reach {
   float quality;     // pixels a square metre, fewer where they are out of focus, times the cosine once more against
-                     // grazing light, fading towards the picture's border, the prototype's edges and its shadows; 0 where
+                     // grazing light, fading towards the image's border, the prototype's edges and its shadows; 0 where
                      // its light does not fall: turned away, outside, in a shadow
   float irradiance;  // of white, where 1 m away and head on is 1 (1/m^2); also where p is outside or in a shadow
   float arriving;    // of its light on the way to p, 0 ... 1: the rest is in somebody's shadow

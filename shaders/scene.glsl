@@ -48,17 +48,17 @@ Owner owner_at(uint owner) {
                texelFetch(s_placements, first + 6), texelFetch(s_placements, first + 7));
 }
 
-// A place that rays start from, with the ids that a pinhole picture from there holds: layer 0 the prototype, layer 1
+// A place that rays start from, with the ids that a pinhole image from there holds: layer 0 the prototype, layer 1
 // the parts. Pixel (0,0) is the centre of the top-left texel.
 struct Sight {
   mat4 sight_from_scene;
-  vec4 focal_centre;  // fx, fy, cx, cy of the pinhole picture
+  vec4 focal_centre;  // fx, fy, cx, cy of the pinhole image
   vec4 p_eye;         // scene frame; w: first layer of its ids
-  vec4 size;          // of the pinhole picture; zw: of the imager's own picture
+  vec4 size;          // of the pinhole image; zw: of the imager's own image
   vec4 map;           // tangents of the first node of the imager's pixel map, nodes per tangent
   vec4 quality;       // focal length of the imager (px), width of the soft border (px), layer of its pixel map, light of
                       // black as a share of white
-  vec4 vignetting;    // tilt (xy), r2, r4 of core/response.h
+  vec4 vignetting;    // tilt (xy), r2, r4 of core/photometric_response.h
   vec4 focus;         // a point's disc at depth z is |x - y / z| pixels wide
 };
 layout(binding = 17) uniform samplerBuffer s_sights;  // 11 a sight

@@ -1,12 +1,12 @@
 #version 450 core
-// A virtual camera's picture: the listed pixels, one sample each at their centres.
+// A virtual camera's image: the listed pixels, one sample each at their centres.
 #include "view.glsl"
 #include "listed.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform writeonly image2D u_picture;
+layout(rgba32f, binding = 0) uniform writeonly image2D u_image;
 
 void main() {
   if (!is_listed()) return;
   ivec2 at = listed_pixel();
-  imageStore(u_picture, at, view_at(vec2(at)));
+  imageStore(u_image, at, view_at(vec2(at)));
 }

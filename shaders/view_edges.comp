@@ -1,10 +1,10 @@
 #version 450 core
-// A virtual camera's picture: the listed pixels by many samples.
+// A virtual camera's image: the listed pixels by many samples.
 #include "view.glsl"
 #include "listed.glsl"
 #include "samples.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform writeonly image2D u_picture;
+layout(rgba32f, binding = 0) uniform writeonly image2D u_image;
 
 void main() {
   if (!is_listed()) return;
@@ -14,5 +14,5 @@ void main() {
   do {
     sum += view_at(vec2(at) + sample_offset(k));
   } while (++k < u_samples);
-  imageStore(u_picture, at, sum / float(u_samples));
+  imageStore(u_image, at, sum / float(u_samples));
 }

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "scene/glb.h"
-#include "scene/posed.h"
+#include "scene/posed_scene.h"
 #include "sim/ray_scene.h"
 
 namespace limn::sim {
@@ -172,7 +172,7 @@ scene::Mesh door_mesh() {
 // Height of the triangles themselves, looked up by a ray against z.
 class Clay {
  public:
-  explicit Clay(const scene::Mesh& mesh) : scene_(std::vector<PlacedMesh>{{&mesh, Pose()}}) {}
+  explicit Clay(const scene::Mesh& mesh) : scene_(std::vector<MeshInstance>{{&mesh, Pose()}}) {}
   double height(double x, double y) const {
     const Hit hit = scene_.first_hit({Vector3d(x, y, 1), -Vector3d::UnitZ()});
     LIMN_CHECK(hit.object >= 0);
@@ -507,11 +507,11 @@ std::map<std::string, std::string> car_door_files() {
     json["prototype"]["markers"].push_back({{"name", marker.marker.text()},
                                             {"size_mm", marker.size_m * 1e3},
                                             {"prototype_from_marker", pose_json(marker.body_from_marker)}});
-  files["door.glb"] = scene::glb(scene.prototype->mesh);
+  files["door.glb"] = scene::encode_glb(scene.prototype->mesh);
   for (const scene::Slot& slot : scene.slots) {
     json["slots"].push_back(slot_json(slot));
     for (const scene::Variant& variant : slot.variants)
-      files[slot.name + "-" + variant.name + ".glb"] = scene::glb(variant.mesh);
+      files[slot.name + "-" + variant.name + ".glb"] = scene::encode_glb(variant.mesh);
   }
   json["viewer"]["fixed"] = {{"world_from_viewer", pose_json(world_from_viewer())},
                              {"size", {k_viewer_size[0], k_viewer_size[1]}},

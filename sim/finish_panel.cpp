@@ -7,7 +7,7 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
-#include "core/response.h"
+#include "core/photometric_response.h"
 #include "scene/glb.h"
 #include "scene/tangents.h"
 
@@ -49,14 +49,14 @@ scene::Mesh sheet(int columns, int rows, const std::function<Vector3d(double, do
 
 // A texture by what it has at u, v: red, green, blue of 0 ... 1.
 scene::Texture painted(const std::function<Vector3d(const Vector2d&)>& rgb_at) {
-  cv::Mat picture(k_texels, k_texels, CV_8UC3);
+  cv::Mat image(k_texels, k_texels, CV_8UC3);
   for (int row = 0; row < k_texels; ++row)
     for (int column = 0; column < k_texels; ++column) {
       const Vector3d rgb = rgb_at({(column + 0.5) / k_texels, 1 - (row + 0.5) / k_texels});
       for (int c = 0; c < 3; ++c)
-        picture.at<cv::Vec3b>(row, column)[2 - c] = cv::saturate_cast<std::uint8_t>(255 * rgb[c]);
+        image.at<cv::Vec3b>(row, column)[2 - c] = cv::saturate_cast<std::uint8_t>(255 * rgb[c]);
     }
-  return {picture, ""};
+  return {image, ""};
 }
 
 // Normals of a relief: its slopes along u and v.
@@ -96,7 +96,7 @@ scene::Mesh emblem() {
   material.maps.occlusion_strength = 0.9F;
   material.maps.emission = painted([&](const Vector2d& uv) {
     const double glow = step(radius(uv), 0.33) * step(0.39, radius(uv));
-    return Vector3d(srgb_of_linear(0.9 * glow), srgb_of_linear(0.3 * glow), srgb_of_linear(0.1 * glow));
+    return Vector3d(srgb_from_linear(0.9 * glow), srgb_from_linear(0.3 * glow), srgb_from_linear(0.1 * glow));
   });
   return mesh;
 }
@@ -119,8 +119,8 @@ scene::Mesh plate() {
 
 std::string file_of(scene::Mesh mesh) {
   if (!mesh.materials[0].maps.is_none()) scene::add_tangents(&mesh);
-  const scene::PlacedMesh placed{"", &mesh, Pose()};
-  return scene::glb(std::span(&placed, 1));
+  const scene::GlbNode placed{"", &mesh, Pose()};
+  return scene::encode_glb(std::span(&placed, 1));
 }
 
 }  // namespace

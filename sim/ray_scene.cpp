@@ -89,7 +89,7 @@ struct RayScene::Impl {
   }
 };
 
-RayScene::RayScene(std::span<const PlacedMesh> meshes) : impl_(std::make_unique<Impl>()) {
+RayScene::RayScene(std::span<const MeshInstance> meshes) : impl_(std::make_unique<Impl>()) {
   impl_->device = rtcNewDevice("threads=2");
   LIMN_CHECK(impl_->device != nullptr);
   impl_->scene = rtcNewScene(impl_->device);
@@ -154,9 +154,9 @@ void RayScene::first_hits(const Eigen::Vector3d& p_origin,
     hits[i] = impl_->completed(queries[i], p_origin, d[i].cast<double>());
 }
 
-void RayScene::lit(const Eigen::Vector3d& p_light,
+void RayScene::reached(const Eigen::Vector3d& p_light,
                    std::span<const Eigen::Vector3f> p,
-                   std::span<std::uint8_t> lit) const {
+                   std::span<std::uint8_t> reached) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
@@ -171,13 +171,13 @@ void RayScene::lit(const Eigen::Vector3d& p_light,
   }
   rtcOccluded1M(impl_->scene, &context, queries.data(), static_cast<unsigned>(queries.size()),
                 sizeof(RTCRay));
-  for (std::size_t i = 0; i < p.size(); ++i) lit[i] = queries[i].tfar >= 0 ? 1 : 0;  // blocked: -infinity
+  for (std::size_t i = 0; i < p.size(); ++i) reached[i] = queries[i].tfar >= 0 ? 1 : 0;  // blocked: -infinity
 }
 
-bool RayScene::lit(const Eigen::Vector3d& p_light, const Eigen::Vector3d& p) const {
+bool RayScene::reached(const Eigen::Vector3d& p_light, const Eigen::Vector3d& p) const {
   const Eigen::Vector3f point = p.cast<float>();
   std::uint8_t result = 0;
-  lit(p_light, std::span(&point, 1), std::span(&result, 1));
+  reached(p_light, std::span(&point, 1), std::span(&result, 1));
   return result != 0;
 }
 

@@ -13,7 +13,7 @@
 namespace limn::sim {
 
 /// A mesh in its place.
-struct PlacedMesh {
+struct MeshInstance {
   const scene::Mesh* mesh = nullptr;
   Pose world_from_mesh;
 };
@@ -30,7 +30,7 @@ struct Hit {
 /// Triangles in the world, ready for rays (Embree). Queries are safe from several threads.
 class RayScene {
  public:
-  explicit RayScene(std::span<const PlacedMesh> meshes);
+  explicit RayScene(std::span<const MeshInstance> meshes);
   ~RayScene();
   RayScene(RayScene&&) noexcept;
   RayScene& operator=(RayScene&&) noexcept;
@@ -43,10 +43,10 @@ class RayScene {
                   std::span<Hit> hits) const;
   /// Whether the straight line from each point (on a surface) to p_light is free: what lies within 0.1 mm of
   /// the point does not count.
-  void lit(const Eigen::Vector3d& p_light,
+  void reached(const Eigen::Vector3d& p_light,
            std::span<const Eigen::Vector3f> p,
-           std::span<std::uint8_t> lit) const;
-  bool lit(const Eigen::Vector3d& p_light, const Eigen::Vector3d& p) const;
+           std::span<std::uint8_t> reached) const;
+  bool reached(const Eigen::Vector3d& p_light, const Eigen::Vector3d& p) const;
 
   /// Geometric normal of the triangle, by its corners' order, unit.
   Eigen::Vector3d face_normal(const Hit& hit) const;
@@ -55,7 +55,7 @@ class RayScene {
   /// Normal that lies so many lengths along the mesh's tangent, its bitangent and the interpolated normal
   /// (the first two made perpendicular to that), unit; the interpolated one when the mesh has no tangents.
   Eigen::Vector3d mapped_normal(const Hit& hit, const Eigen::Vector3d& along) const;
-  /// Coordinates in the picture of the mesh's uv; zero when it has none.
+  /// Coordinates in the image of the mesh's uv; zero when it has none.
   Eigen::Vector2f uv(const Hit& hit) const;
 
  private:

@@ -8,7 +8,7 @@
 namespace limn::sim {
 namespace {
 
-const std::array<float, 256>& linear_of_srgb() {
+const std::array<float, 256>& linear_from_srgb() {
   static const std::array<float, 256> table = [] {
     std::array<float, 256> t{};
     for (std::size_t i = 0; i < t.size(); ++i) {
@@ -22,7 +22,7 @@ const std::array<float, 256>& linear_of_srgb() {
 
 // Linear BGR of a texture's pixel; coordinates beyond the border take the border's.
 Eigen::Vector3f texel(const cv::Mat& texture, int x, int y) {
-  const auto& linear = linear_of_srgb();
+  const auto& linear = linear_from_srgb();
   x = std::clamp(x, 0, texture.cols - 1);
   y = std::clamp(y, 0, texture.rows - 1);
   const std::uint8_t* p = texture.ptr(y) + x * texture.channels();
@@ -87,31 +87,31 @@ Eigen::Vector3f material_albedo(const scene::Mesh& mesh, int triangle, const Eig
   return bgr.cwiseProduct(between_texels(material.texture, uv, repeated_texel));
 }
 
-Substance substance_of(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv) {
+SurfaceMaterial surface_material(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv) {
   const scene::Material& material = material_of(mesh, triangle);
   const scene::SurfaceMaps& maps = material.maps;
-  Substance found;
+  SurfaceMaterial found;
   found.base = material_albedo(mesh, triangle, uv).cast<double>();
   found.is_unlit = material.unlit;
   found.metallic = static_cast<double>(material.metallic);
   found.roughness = static_cast<double>(material.roughness);
   found.is_plain =
-      material.metallic == 0 && material.roughness == 1 && maps.metallic_roughness.picture.empty();
+      material.metallic == 0 && material.roughness == 1 && maps.metallic_roughness.image.empty();
   found.emitted = material.emitted.reverse().cast<double>();
   found.along = Eigen::Vector3d::UnitZ();
-  if (!maps.metallic_roughness.picture.empty()) {
-    const Eigen::Vector3f numbers = between_texels(maps.metallic_roughness.picture, uv, repeated_numbers);
+  if (!maps.metallic_roughness.image.empty()) {
+    const Eigen::Vector3f numbers = between_texels(maps.metallic_roughness.image, uv, repeated_numbers);
     found.metallic *= static_cast<double>(numbers[0]);
     found.roughness *= static_cast<double>(numbers[1]);
   }
-  if (!maps.occlusion.picture.empty()) {
-    const auto red = static_cast<double>(between_texels(maps.occlusion.picture, uv, repeated_numbers)[2]);
+  if (!maps.occlusion.image.empty()) {
+    const auto red = static_cast<double>(between_texels(maps.occlusion.image, uv, repeated_numbers)[2]);
     found.open = 1 - static_cast<double>(maps.occlusion_strength) * (1 - red);
   }
-  if (!maps.emission.picture.empty())
-    found.emitted.array() *= between_texels(maps.emission.picture, uv, repeated_texel).cast<double>().array();
-  if (!maps.normals.picture.empty() && !mesh.tangents.empty()) {
-    const Eigen::Vector3f numbers = between_texels(maps.normals.picture, uv, repeated_numbers);
+  if (!maps.emission.image.empty())
+    found.emitted.array() *= between_texels(maps.emission.image, uv, repeated_texel).cast<double>().array();
+  if (!maps.normals.image.empty() && !mesh.tangents.empty()) {
+    const Eigen::Vector3f numbers = between_texels(maps.normals.image, uv, repeated_numbers);
     const auto scale = static_cast<double>(maps.normal_scale);
     const Eigen::Vector3d around = 2 * numbers.reverse().cast<double>() - Eigen::Vector3d::Ones();
     found.along = around.cwiseProduct(Eigen::Vector3d(scale, scale, 1));

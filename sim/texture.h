@@ -19,7 +19,7 @@ bool is_cut_out(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv
 Eigen::Vector3f material_albedo(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv);
 
 /// What glTF 2.0 says of a surface at a place of a triangle, textures and factors multiplied.
-struct Substance {
+struct SurfaceMaterial {
   Eigen::Vector3d base;  ///< colour, linear BGR
   bool is_unlit = false;
   double metallic = 0, roughness = 1;
@@ -28,6 +28,6 @@ struct Substance {
   Eigen::Vector3d emitted;  ///< light of its own, linear BGR
   Eigen::Vector3d along;  ///< its normal: along tangent, bitangent and the mesh's normal; not of unit length
 };
-Substance substance_of(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv);
+SurfaceMaterial surface_material(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv);
 
 }  // namespace limn::sim

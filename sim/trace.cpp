@@ -46,8 +46,8 @@ std::vector<LampPoint> points_of(const Lamp& lamp) {
   return points;
 }
 
-std::vector<PlacedMesh> placed(const std::vector<Object>& objects) {
-  std::vector<PlacedMesh> meshes;
+std::vector<MeshInstance> placed(const std::vector<Object>& objects) {
+  std::vector<MeshInstance> meshes;
   for (const Object& object : objects) meshes.push_back({object.mesh.get(), object.world_from_object});
   return meshes;
 }
@@ -145,12 +145,12 @@ class Tracer {
     return s.n_face.dot(p_light.cast<float>() - s.p) > 0;
   }
 
-  std::vector<std::uint8_t> lit(const Eigen::Vector3d& p_light, std::span<const Surface> surfaces) const {
+  std::vector<std::uint8_t> reached_from(const Eigen::Vector3d& p_light, std::span<const Surface> surfaces) const {
     std::vector<Eigen::Vector3f> points;
     for (const Surface& s : surfaces)  // NaN points cost no traversal
       points.push_back(s.object >= 0 && faces(s, p_light) ? s.p : Eigen::Vector3f::Constant(NAN));
     std::vector<std::uint8_t> result(surfaces.size());
-    scene_.lit(p_light, points, result);
+    scene_.reached(p_light, points, result);
     for (std::size_t i = 0; i < points.size(); ++i)
       result[i] = result[i] != 0 && points[i].allFinite() ? 1 : 0;
     return result;
@@ -205,12 +205,12 @@ class Tracer {
 
   void light_row(std::span<const Surface> row, std::size_t at) {
     for (std::size_t k = 0; k < lit_.size(); ++k) {
-      const std::vector<std::uint8_t> result = lit(p_projectors_[k], row);
+      const std::vector<std::uint8_t> result = reached_from(p_projectors_[k], row);
       std::copy(result.begin(), result.end(), lit_[k].begin() + static_cast<std::ptrdiff_t>(at));
     }
     for (std::size_t i = 0; i < row.size(); ++i) room_[at + i] = ambient_light(row[i]);
     for (const LampPoint& lamp : lamps_) {
-      const std::vector<std::uint8_t> result = lit(lamp.p_world, row);
+      const std::vector<std::uint8_t> result = reached_from(lamp.p_world, row);
       for (std::size_t i = 0; i < row.size(); ++i)
         if (result[i] != 0) room_[at + i] += lamp_light(lamp, row[i]);
     }
@@ -264,11 +264,11 @@ class Tracer {
     }
     const std::vector<Surface> found = surfaces(d);
     std::vector<std::vector<std::uint8_t>> lit_by;
-    for (const Eigen::Vector3d& p_projector : p_projectors_) lit_by.push_back(lit(p_projector, found));
+    for (const Eigen::Vector3d& p_projector : p_projectors_) lit_by.push_back(reached_from(p_projector, found));
     std::vector<float> room(found.size());
     for (std::size_t k = 0; k < found.size(); ++k) room[k] = ambient_light(found[k]);
     for (const LampPoint& lamp : lamps_) {
-      const std::vector<std::uint8_t> result = lit(lamp.p_world, found);
+      const std::vector<std::uint8_t> result = reached_from(lamp.p_world, found);
       for (std::size_t k = 0; k < found.size(); ++k)
         if (result[k] != 0) room[k] += lamp_light(lamp, found[k]);
     }

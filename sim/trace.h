@@ -8,14 +8,14 @@
 
 namespace limn::sim {
 
-/// How a projector sees one sample: everything that its light needs apart from the picture shown.
+/// How a projector sees one sample: everything that its light needs apart from the image shown.
 struct ProjectorView {
   float u = 0, v = 0;  ///< pixel, through the true lens
   float gain = 0;   ///< share that is reached (shadow rays, facing) x cosine of incidence / distance², 1/m²
   float depth = 1;  ///< along the projector's axis, m
 };
 
-/// What a camera's pixels see, traced once per geometry; showing another picture is a lookup. Sample i <
+/// What a camera's pixels see, traced once per geometry; showing another image is a lookup. Sample i <
 /// width * height is the first of pixel i; further samples of pixels on edges follow, sorted by pixel. Arrays
 /// run in parallel.
 struct Samples {

@@ -13,13 +13,13 @@ namespace {
 
 constexpr double k_surface_reach = 2e-3;  // m; a surface part this near is on the prototype (docs/formats.md)
 
-std::vector<PlacedMesh> physical_meshes(const World& world) {
-  std::vector<PlacedMesh> meshes;
+std::vector<MeshInstance> physical_meshes(const World& world) {
+  std::vector<MeshInstance> meshes;
   for (const Object& object : world.objects) meshes.push_back({object.mesh.get(), object.world_from_object});
   return meshes;
 }
 
-std::vector<PlacedMesh> prototype_mesh(const World& world) {
+std::vector<MeshInstance> prototype_mesh(const World& world) {
   const Object* prototype = world.find("prototype");
   if (prototype == nullptr) return {};
   return {{prototype->mesh.get(), prototype->world_from_object}};
@@ -69,7 +69,7 @@ std::optional<Landing> Truth::landing(const Imager& imager, const Eigen::Vector2
 
 bool Truth::visible(const Imager& imager, const Eigen::Vector3d& p_world) const {
   const auto px = imager.project(p_world);
-  return px && imager.contains(*px) && physical_.lit(imager.imager_from_world.inverse().translation, p_world);
+  return px && imager.contains(*px) && physical_.reached(imager.imager_from_world.inverse().translation, p_world);
 }
 
 std::vector<Hit> Truth::hits(const RayScene& scene, const Imager& imager) const {
@@ -85,17 +85,17 @@ std::vector<Hit> Truth::hits(const RayScene& scene, const Imager& imager) const 
   return hits;
 }
 
-ObjectPicture Truth::object_picture(const Imager& imager) const {
-  ObjectPicture result;
-  std::vector<PlacedMesh> meshes = physical_meshes(world_);
+ObjectImage Truth::object_image(const Imager& imager) const {
+  ObjectImage result;
+  std::vector<MeshInstance> meshes = physical_meshes(world_);
   for (const Object& object : world_.objects) result.names.push_back(object.name);
   for (const Part& part : parts_) {
     meshes.push_back({part.mesh, part.posed.world_from_part});
     result.names.push_back("part-" + part.posed.slot);
   }
   const std::vector<Hit> found = hits(RayScene(meshes), imager);
-  result.picture.create(imager.height, imager.width, CV_16S);
-  auto* out = result.picture.ptr<std::int16_t>();
+  result.image.create(imager.height, imager.width, CV_16S);
+  auto* out = result.image.ptr<std::int16_t>();
   for (std::size_t i = 0; i < found.size(); ++i) out[i] = static_cast<std::int16_t>(found[i].object);
   return result;
 }
@@ -106,7 +106,7 @@ bool Truth::projected(const Eigen::Vector3d& p_world, const Eigen::Vector3d& n_w
                        const auto px = projector.project(p_world);
                        if (!px || !projector.contains(*px)) return false;
                        const Eigen::Vector3d p_light = projector.imager_from_world.inverse().translation;
-                       return n_world.dot(p_light - p_world) > 0 && prototype_.lit(p_light, p_world);
+                       return n_world.dot(p_light - p_world) > 0 && prototype_.reached(p_light, p_world);
                      });
 }
 
@@ -120,7 +120,7 @@ cv::Mat Truth::part_mask(const Imager& viewer, const std::string& slot) const {
   cv::Mat mask = cv::Mat::zeros(viewer.height, viewer.width, CV_8U);
   const Part* part = find_part(slot);
   if (part == nullptr) return mask;
-  const std::vector<PlacedMesh> meshes = {{part->mesh, part->posed.world_from_part}};
+  const std::vector<MeshInstance> meshes = {{part->mesh, part->posed.world_from_part}};
   const RayScene part_scene(meshes);
   const std::vector<Hit> part_hits = hits(part_scene, viewer), behind = hits(prototype_, viewer);
   const std::vector<Eigen::Vector3f> d = world_directions(viewer);
@@ -144,7 +144,7 @@ cv::Mat Truth::part_mask(const Imager& viewer, const std::string& slot) const {
   return mask;
 }
 
-std::vector<SurfacePoint> surface_points(const scene::Mesh& mesh, int count, std::uint64_t seed) {
+std::vector<SampledPoint> surface_points(const scene::Mesh& mesh, int count, std::uint64_t seed) {
   const auto corner = [&](std::size_t t, std::size_t k) {
     return mesh.positions[mesh.triangles[t][k]].cast<double>().eval();
   };
@@ -155,12 +155,12 @@ std::vector<SurfacePoint> surface_points(const scene::Mesh& mesh, int count, std
   std::partial_sum(area.begin(), area.end(), until.begin());
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> share(0, 1);
-  std::vector<SurfacePoint> points;
+  std::vector<SampledPoint> points;
   for (int i = 0; i < count; ++i) {
     const auto at = std::upper_bound(until.begin(), until.end(), share(random) * until.back());
     const auto t = std::min(static_cast<std::size_t>(at - until.begin()), area.size() - 1);
     const double r = std::sqrt(share(random)), v = r * share(random), u = 1 - r;  // uniform in a triangle
-    SurfacePoint point;
+    SampledPoint point;
     point.p = u * corner(t, 0) + v * corner(t, 1) + (1 - u - v) * corner(t, 2);
     point.n = (corner(t, 1) - corner(t, 0)).cross(corner(t, 2) - corner(t, 0)).normalized();
     if (!mesh.normals.empty()) {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/imager.h"
-#include "scene/posed.h"
+#include "scene/posed_scene.h"
 #include "sim/ray_scene.h"
 #include "sim/world.h"
 
@@ -23,14 +23,14 @@ struct Landing {
 };
 
 /// A point of a surface, in its mesh's frame.
-struct SurfacePoint {
+struct SampledPoint {
   Eigen::Vector3d p;
   Eigen::Vector3d n;  ///< unit, interpolated
 };
 
-/// Names of what each pixel shows: `picture` (CV_16S) holds indices into `names`, -1 for nothing.
-struct ObjectPicture {
-  cv::Mat picture;
+/// Names of what each pixel shows: `image` (CV_16S) holds indices into `names`, -1 for nothing.
+struct ObjectImage {
+  cv::Mat image;
   std::vector<std::string> names;
 };
 
@@ -45,14 +45,14 @@ class Truth {
   /// there.
   std::optional<Landing> landing(const Imager& imager, const Eigen::Vector2d& px) const;
 
-  /// Whether a point on a surface (within 0.1 mm) is in the imager's picture with nothing in between.
+  /// Whether a point on a surface (within 0.1 mm) is in the imager's image with nothing in between.
   bool visible(const Imager& imager, const Eigen::Vector3d& p_world) const;
 
   /// The nearest thing in every pixel's centre: physical objects and, in front of or behind them, parts
   /// ("part-SLOT").
-  ObjectPicture object_picture(const Imager& imager) const;
+  ObjectImage object_image(const Imager& imager) const;
 
-  /// A part in the viewer's picture: 255 where the ray behind the part meets the prototype at a point that a
+  /// A part in the viewer's image: 255 where the ray behind the part meets the prototype at a point that a
   /// projector reaches, 128 where not, 0 where the part is not seen (the prototype hides it, or it is
   /// elsewhere). Only the prototype hides and shadows: plates and stands are taken for its surface. A part on
   /// the surface (Mode::surface) is seen within 2 mm of it.
@@ -75,7 +75,7 @@ class Truth {
 };
 
 /// At least `count` random points, uniform over the mesh's area; the same seed gives the same points.
-std::vector<SurfacePoint> surface_points(const scene::Mesh& mesh, int count, std::uint64_t seed);
+std::vector<SampledPoint> surface_points(const scene::Mesh& mesh, int count, std::uint64_t seed);
 
 /// The world with the parts in it as if they were physical: what the lit prototype is to look like.
 World with_parts(const World& world, const scene::PosedScene& parts);

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim/photograph.h"
+#include "sim/sensor_model.h"
 
 namespace limn::sim {
 
@@ -25,7 +25,7 @@ class VirtualRig::Projector : public device::Display {
   Projector(VirtualRig& rig, int index) : rig_(rig), index_(index) {}
   const std::string& name() const override { return imager().name; }
   cv::Size size() const override { return {imager().width, imager().height}; }
-  Result<Stamp> show(const cv::Mat& picture) override { return rig_.show(index_, picture); }
+  Result<Stamp> show(const cv::Mat& image) override { return rig_.show(index_, image); }
 
  private:
   const Imager& imager() const { return rig_.world_.rig.projectors[static_cast<std::size_t>(index_)]; }
@@ -79,7 +79,7 @@ void VirtualRig::remove(const std::string& object) {
   std::erase_if(world.markers, [&](const PlacedMarker& m) { return m.object == object; });
 }
 
-void VirtualRig::clear_stage() {
+void VirtualRig::remove_prototype() {
   if (prototype_home_) return;
   prototype_home_ = world_.world_from_prototype;
   effects_home_ = world_.camera_effects;
@@ -88,14 +88,14 @@ void VirtualRig::clear_stage() {
   for (CameraEffects& effects : world_.camera_effects) effects.colour = false;
 }
 
-void VirtualRig::restore_stage() {
+void VirtualRig::restore_prototype() {
   if (!prototype_home_) return;
   move_prototype(edit(), *prototype_home_);
   world_.camera_effects = effects_home_;
   prototype_home_.reset();
 }
 
-void VirtualRig::darken() { shown_.assign(projectors_.size(), {Shown{cv::Mat(), now_}}); }
+void VirtualRig::darken() { shown_.assign(projectors_.size(), {ShownImage{cv::Mat(), now_}}); }
 
 const Samples& VirtualRig::samples(int camera) {
   auto& samples = samples_.at(static_cast<std::size_t>(camera));
@@ -103,16 +103,16 @@ const Samples& VirtualRig::samples(int camera) {
   return *samples;
 }
 
-Result<Stamp> VirtualRig::show(int projector, const cv::Mat& picture) {
+Result<Stamp> VirtualRig::show(int projector, const cv::Mat& image) {
   const cv::Size size = this->projector(projector).size();
-  if (picture.size() != size || (picture.type() != CV_8UC1 && picture.type() != CV_8UC3))
+  if (image.size() != size || (image.type() != CV_8UC1 && image.type() != CV_8UC3))
     return error(
         "{}: expected an 8-bit grey or BGR picture of {}x{}, found {}x{} with {} channels. Draw it at the "
         "projector's size.",
-        this->projector(projector).name(), size.width, size.height, picture.cols, picture.rows,
-        picture.channels());
+        this->projector(projector).name(), size.width, size.height, image.cols, image.rows,
+        image.channels());
   const Stamp shown_at = shifted(now_, options_.display_delay_s);
-  shown_[static_cast<std::size_t>(projector)].push_back({picture.clone(), shown_at});
+  shown_[static_cast<std::size_t>(projector)].push_back({image.clone(), shown_at});
   return shown_at;
 }
 
@@ -122,14 +122,14 @@ Stamp VirtualRig::light_settles_at() const {
   return settled;
 }
 
-std::vector<cv::Mat> VirtualRig::pictures_at(Stamp moment) const {
-  std::vector<cv::Mat> pictures;
+std::vector<cv::Mat> VirtualRig::images_at(Stamp moment) const {
+  std::vector<cv::Mat> images;
   for (const auto& queue : shown_) {
     const auto later =
-        std::find_if(queue.begin() + 1, queue.end(), [&](const Shown& s) { return s.shown_at > moment; });
-    pictures.push_back(std::prev(later)->picture);
+        std::find_if(queue.begin() + 1, queue.end(), [&](const ShownImage& s) { return s.shown_at > moment; });
+    images.push_back(std::prev(later)->image);
   }
-  return pictures;
+  return images;
 }
 
 Stamp VirtualRig::next_exposure() const {
@@ -140,8 +140,8 @@ Stamp VirtualRig::next_exposure() const {
 
 std::vector<Frame> VirtualRig::expose(std::span<const int> cameras) {
   const Stamp captured_at = next_exposure();
-  const std::vector<cv::Mat> shown = pictures_at(captured_at);
-  for (auto& queue : shown_)  // what an earlier picture covered is gone
+  const std::vector<cv::Mat> shown = images_at(captured_at);
+  for (auto& queue : shown_)  // what an earlier image covered is gone
     while (queue.size() > 1 && queue[1].shown_at <= captured_at) queue.erase(queue.begin());
   std::vector<Frame> frames;
   for (const int camera : cameras)

@@ -45,10 +45,10 @@ class VirtualRig {
   CameraEffects& camera_effects(int camera) {
     return world_.camera_effects.at(static_cast<std::size_t>(camera));
   }
-  /// For calibration: the prototype is carried out of the room, cameras deliver grey. restore_stage() undoes
+  /// For calibration: the prototype is carried out of the room, cameras deliver grey. restore_prototype() undoes
   /// it.
-  void clear_stage();
-  void restore_stage();
+  void remove_prototype();
+  void restore_prototype();
   /// All projectors black.
   void darken();
 
@@ -67,14 +67,14 @@ class VirtualRig {
  private:
   class Camera;
   class Projector;
-  struct Shown {
-    cv::Mat picture;
+  struct ShownImage {
+    cv::Mat image;
     Stamp shown_at;
   };
 
-  Result<Stamp> show(int projector, const cv::Mat& picture);
+  Result<Stamp> show(int projector, const cv::Mat& image);
   Stamp light_settles_at() const;
-  std::vector<cv::Mat> pictures_at(Stamp moment) const;
+  std::vector<cv::Mat> images_at(Stamp moment) const;
 
   World world_;
   VirtualRigOptions options_;
@@ -82,7 +82,7 @@ class VirtualRig {
   std::uint64_t frames_ = 0;
   std::optional<Pose> prototype_home_;  // set while the stage is clear
   std::vector<CameraEffects> effects_home_;
-  std::vector<std::vector<Shown>> shown_;  // per projector, oldest first; the first is on the surface
+  std::vector<std::vector<ShownImage>> shown_;  // per projector, oldest first; the first is on the surface
   std::vector<std::optional<Samples>> samples_;
   std::vector<std::unique_ptr<Camera>> cameras_;
   std::vector<std::unique_ptr<Projector>> projectors_;

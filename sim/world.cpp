@@ -277,9 +277,9 @@ std::vector<LoosePlace> read_loose_places(const ConfigNode& node) {
   return places;
 }
 
-// The marker's picture, fine enough, with its white margin around it.
+// The marker's image, fine enough, with its white margin around it.
 struct Plate {
-  cv::Mat picture;
+  cv::Mat image;
   double side_m;
 };
 
@@ -299,14 +299,14 @@ Plate plate_of(const cv::Mat& marker, double size_m, const MarkerPaper& paper) {
 Status add_plate(World& world,
                  const BodyMarker& marker,
                  bool on_prototype,
-                 const MarkerPicture& draw,
+                 const MarkerImage& draw,
                  const MarkerPaper& paper) {
-  LIMN_TRY(const cv::Mat picture, draw(marker.marker));
-  LIMN_CHECK(picture.type() == CV_8UC1 && picture.rows == picture.cols && picture.rows > 0);
-  const Plate plate = plate_of(picture, marker.size_m, paper);
+  LIMN_TRY(const cv::Mat image, draw(marker.marker));
+  LIMN_CHECK(image.type() == CV_8UC1 && image.rows == image.cols && image.rows > 0);
+  const Plate plate = plate_of(image, marker.size_m, paper);
   const Pose place =
       on_prototype ? world.world_from_prototype * marker.body_from_marker : marker.body_from_marker;
-  Object object = sheet("marker-" + marker.marker.text(), plate.side_m, plate.side_m, plate.picture, place);
+  Object object = sheet("marker-" + marker.marker.text(), plate.side_m, plate.side_m, plate.image, place);
   object.albedo.setConstant(paper.white);
   object.ink_albedo = paper.black;
   if (on_prototype) object.prototype_from_object = marker.body_from_marker;
@@ -317,7 +317,7 @@ Status add_plate(World& world,
 
 Status add_slot_markers(World& world,
                         const std::vector<SlotPlace>& places,
-                        const MarkerPicture& draw,
+                        const MarkerImage& draw,
                         const MarkerPaper& paper,
                         const std::string& file) {
   for (const SlotPlace& place : places) {
@@ -334,7 +334,7 @@ Status add_slot_markers(World& world,
 
 Status add_scene(World& world,
                  const std::vector<SlotPlace>& places,
-                 const MarkerPicture& draw,
+                 const MarkerImage& draw,
                  const MarkerPaper& paper,
                  const std::string& file) {
   if (world.scene->prototype) {
@@ -344,8 +344,8 @@ Status add_scene(World& world,
     object.mesh = std::make_shared<scene::Mesh>(prototype.mesh);
     object.world_from_object = world.world_from_prototype;
     object.prototype_from_object = Pose();
-    object.albedo.setConstant(prototype.albedo_picture.empty() ? prototype.albedo : 1.0);
-    object.texture = prototype.albedo_picture;
+    object.albedo.setConstant(prototype.albedo_image.empty() ? prototype.albedo : 1.0);
+    object.texture = prototype.albedo_image;
     world.objects.push_back(std::move(object));
     for (const BodyMarker& marker : prototype.markers)
       LIMN_TRY_STATUS(add_plate(world, marker, true, draw, paper));
@@ -366,8 +366,8 @@ Object* World::find(const std::string& object) {
 }
 
 Result<World> load_world(const std::filesystem::path& path,
-                         const MarkerPicture& marker_picture,
-                         std::vector<scene::LeftOut>* left_out) {
+                         const MarkerImage& marker_image,
+                         std::vector<scene::SkippedVariant>* skipped_variants) {
   LIMN_TRY(const Config config, Config::load(path, "limn.world/1"));
   const ConfigNode root = config.root();
   root.only({"schema", "seed", "scene", "world_from_prototype", "slot_markers", "loose_markers",
@@ -397,11 +397,11 @@ Result<World> load_world(const std::filesystem::path& path,
   }
   LIMN_TRY_STATUS(config.status());
   if (!scene_folder.empty()) {
-    LIMN_TRY(world.scene, scene::load_scene(scene_folder.lexically_normal(), left_out));
-    LIMN_TRY_STATUS(add_scene(world, places, marker_picture, paper, path.string()));
+    LIMN_TRY(world.scene, scene::load_scene(scene_folder.lexically_normal(), skipped_variants));
+    LIMN_TRY_STATUS(add_scene(world, places, marker_image, paper, path.string()));
   }
   for (const LoosePlace& place : loose)
-    LIMN_TRY_STATUS(add_plate(world, place.marker, place.on_prototype, marker_picture, paper));
+    LIMN_TRY_STATUS(add_plate(world, place.marker, place.on_prototype, marker_image, paper));
   return world;
 }
 
@@ -416,15 +416,15 @@ World without_effects(World world) {
 Object sheet(const std::string& name,
              double width_m,
              double height_m,
-             const cv::Mat& picture,
+             const cv::Mat& image,
              const Pose& world_from_sheet) {
   Object object;
   object.name = name;
   object.mesh = sheet_mesh(width_m, height_m);
   object.world_from_object = world_from_sheet;
   object.albedo.setConstant(0.85);
-  object.ink_albedo = picture.empty() ? 0 : 0.04;
-  object.texture = picture;
+  object.ink_albedo = image.empty() ? 0 : 0.04;
+  object.texture = image;
   object.sharp_texture = true;
   return object;
 }
@@ -432,8 +432,8 @@ Object sheet(const std::string& name,
 Status add_marker(World& world,
                   const BodyMarker& marker,
                   bool attached_to_prototype,
-                  const MarkerPicture& marker_picture) {
-  return add_plate(world, marker, attached_to_prototype, marker_picture, {});
+                  const MarkerImage& marker_image) {
+  return add_plate(world, marker, attached_to_prototype, marker_image, {});
 }
 
 void move_prototype(World& world, const Pose& world_from_prototype) {

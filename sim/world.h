@@ -15,7 +15,7 @@
 #include "core/result.h"
 #include "core/rig.h"
 #include "scene/mesh.h"
-#include "scene/posed.h"
+#include "scene/posed_scene.h"
 #include "scene/scene.h"
 
 namespace limn::sim {
@@ -26,7 +26,7 @@ struct CameraEffects {
   bool colour = false;     ///< BGR frames instead of grey ones
   double exposure = 1;     ///< share of full scale per unit of light (albedo x illuminance)
   double psf_px = 0;       ///< stdev of the lens' Gaussian blur; 0: off
-  double vignetting = 0;   ///< share of light lost in the picture's corners, quadratic in radius; 0: off
+  double vignetting = 0;   ///< share of light lost in the image's corners, quadratic in radius; 0: off
   double full_well_e = 0;  ///< electrons at full scale: shot noise variance = signal / full_well_e; 0: off
   double read_noise = 0;   ///< stdev in 8-bit levels of linear signal; 0: off
   double black_level = 0;  ///< 8-bit level of no light
@@ -100,32 +100,32 @@ struct World {
   Object* find(const std::string& object);
 };
 
-/// Grey 8-bit picture of a marker's black square alone, without margin: its edge is the marker's edge.
-using MarkerPicture = std::function<Result<cv::Mat>(const MarkerName&)>;
+/// Grey 8-bit image of a marker's black square alone, without margin: its edge is the marker's edge.
+using MarkerImage = std::function<Result<cv::Mat>(const MarkerName&)>;
 
-/// Reads a limn.world/1 file and the scene that it names; `marker_picture` draws its markers. The prototype
+/// Reads a limn.world/1 file and the scene that it names; `marker_image` draws its markers. The prototype
 /// becomes the object "prototype", its markers "marker-FAMILY:ID", the table "table".
-/// `left_out`: as scene::load_scene's.
+/// `skipped_variants`: as scene::load_scene's.
 Result<World> load_world(const std::filesystem::path& path,
-                         const MarkerPicture& marker_picture,
-                         std::vector<scene::LeftOut>* left_out = nullptr);
+                         const MarkerImage& marker_image,
+                         std::vector<scene::SkippedVariant>* skipped_variants = nullptr);
 
 /// The same world seen by ideal devices: no blur, noise, vignetting, gamma, black level; exposure is kept.
 World without_effects(World world);
 
 /// A flat sheet: frame at its centre, x right, y down, z away from the printed face (as a marker's).
-/// `picture` (8-bit sRGB; may be empty) covers it wholly, its pixels are little squares. The back is plain.
+/// `image` (8-bit sRGB; may be empty) covers it wholly, its pixels are little squares. The back is plain.
 Object sheet(const std::string& name,
              double width_m,
              double height_m,
-             const cv::Mat& picture,
+             const cv::Mat& image,
              const Pose& world_from_sheet);
 
 /// Adds a marker plate with a white margin; `attached_to_prototype` makes it move with the prototype.
 Status add_marker(World& world,
                   const BodyMarker& marker,
                   bool attached_to_prototype,
-                  const MarkerPicture& marker_picture);
+                  const MarkerImage& marker_image);
 
 /// Moves the prototype and everything attached to it.
 void move_prototype(World& world, const Pose& world_from_prototype);

@@ -3,7 +3,7 @@
 namespace limn::tracker {
 
 std::optional<Track> world_from_body(const Body& body, std::span<const View> views, Stamp captured_at) {
-  const Sighting seen = sighting(body, views);
+  const BodyCorrespondences seen = correspondences(body, views);
   const std::vector<PoseFit> fits = minima(seen);
   if (fits.empty()) return std::nullopt;
   const PoseFit& fit = fits.front();

@@ -6,11 +6,11 @@
 #include "core/frame.h"
 #include "core/marker.h"
 #include "core/track.h"
-#include "tracker/sighting.h"
+#include "tracker/body_correspondences.h"
 
 namespace limn::tracker {
 
-/// The pose of a body from its markers in one or several cameras' pictures of one moment, without history:
+/// The pose of a body from its markers in one or several cameras' images of one moment, without history:
 /// the pose of several cameras and markers that suits all their corners best (sighting.h: minima), weighted
 /// by the corners' covariance, with a Huber loss. nullopt when none of the body's markers gives a pose.
 std::optional<Track> world_from_body(const Body& body, std::span<const View> views, Stamp captured_at);

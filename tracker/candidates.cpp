@@ -26,17 +26,17 @@ constexpr double k_side_trim = 0.1;             // of a side at each end: corner
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 // Whether a boundary is an outer one and large enough to be a quadrilateral's.
-bool is_large(const Outlines::Extent& outline, double min_side_px) {
-  return static_cast<double>(outline.count) >= 3 * min_side_px &&
-         outline.area >= 0.5 * min_side_px * min_side_px;
+bool is_large(const Contours::Extent& contour, double min_side_px) {
+  return static_cast<double>(contour.count) >= 3 * min_side_px &&
+         contour.area >= 0.5 * min_side_px * min_side_px;
 }
 
 // Whether it is as long as a quadrilateral's, and holds as much.
-bool is_full(const Outlines::Extent& outline, const Outlines::Box& box, double min_side_px) {
+bool is_full(const Contours::Extent& contour, const Contours::Box& box, double min_side_px) {
   return std::max(box.width, box.height) >= min_side_px &&
          std::min(box.width, box.height) >= 0.5 * min_side_px &&
-         static_cast<double>(outline.count) <= k_max_roughness * 2 * (box.width + box.height) &&
-         outline.area >= k_min_box_share * box.width * box.height;
+         static_cast<double>(contour.count) <= k_max_roughness * 2 * (box.width + box.height) &&
+         contour.area >= k_min_box_share * box.width * box.height;
 }
 
 }  // namespace
@@ -44,14 +44,14 @@ bool is_full(const Outlines::Extent& outline, const Outlines::Box& box, double m
 void QuadFinder::find(CornerCodes& corners,
                       const CandidateOptions& options,
                       const std::function<void(const Quad&)>& tell) {
-  outlines_.for_each(corners, [&](const Outlines::Extent& outline) {
-    if (!is_large(outline, options.min_side_px)) return;
-    if (!is_full(outline, outlines_.box(), options.min_side_px)) return;
-    outlines_.find_corners(k_corner_px + k_corner_share * static_cast<double>(outline.count), k_max_corners);
-    const std::size_t count = outlines_.corners().size();
+  contours_.for_each(corners, [&](const Contours::Extent& contour) {
+    if (!is_large(contour, options.min_side_px)) return;
+    if (!is_full(contour, contours_.box(), options.min_side_px)) return;
+    contours_.find_corners(k_corner_px + k_corner_share * static_cast<double>(contour.count), k_max_corners);
+    const std::size_t count = contours_.corners().size();
     if (count < 4 || count > k_max_corners) return;
     for (std::size_t from = 0; from < count; ++from) {
-      corners_[from] = outlines_.point(outlines_.corners()[from]);
+      corners_[from] = contours_.point(contours_.corners()[from]);
       for (std::size_t to = 0; to < count; ++to) sides_[from][to].known = false;
     }
     Quad quad;
@@ -65,12 +65,12 @@ const QuadFinder::Side& QuadFinder::side(std::size_t from_corner, std::size_t to
   if (side.known) return side;
   side.known = true;
   side.straight = false;
-  const std::size_t from = outlines_.corners()[from_corner];
-  const std::size_t to = outlines_.corners()[to_corner] + (to_corner > from_corner ? 0 : outlines_.size());
+  const std::size_t from = contours_.corners()[from_corner];
+  const std::size_t to = contours_.corners()[to_corner] + (to_corner > from_corner ? 0 : contours_.size());
   const auto trim = static_cast<std::size_t>(k_side_trim * static_cast<double>(to - from) + 1);
   if (to - from < 2 * trim + 3) return side;
   const auto count = static_cast<double>(to - from - 2 * trim);
-  const auto line = outlines_.line(from + trim, to - trim, k_max_side_rms_px + k_max_side_rms_share * count);
+  const auto line = contours_.line(from + trim, to - trim, k_max_side_rms_px + k_max_side_rms_share * count);
   side.straight = line.has_value();
   if (line) side.line = *line;
   return side;
@@ -83,7 +83,7 @@ bool QuadFinder::turns_right(std::size_t a, std::size_t b, std::size_t c) const 
 
 // The four corners among those found, convex, whose sides are straightest.
 bool QuadFinder::choose_quad(double min_side_px, Quad* quad) {
-  const std::size_t n = outlines_.corners().size();
+  const std::size_t n = contours_.corners().size();
   double best = std::numeric_limits<double>::infinity();
   Quad candidate;
   for (std::size_t a = 0; a + 3 < n; ++a)
@@ -107,8 +107,8 @@ bool QuadFinder::choose_quad(double min_side_px, Quad* quad) {
 
 bool QuadFinder::fit_quad(const std::array<std::size_t, 4>& corners, double min_side_px, Quad* quad) {
   for (std::size_t i = 0; i < 4; ++i) {
-    const Outlines::Line& before = side(corners[(i + 3) % 4], corners[i]).line;
-    const Outlines::Line& after = side(corners[i], corners[(i + 1) % 4]).line;
+    const Contours::Line& before = side(corners[(i + 3) % 4], corners[i]).line;
+    const Contours::Line& after = side(corners[i], corners[(i + 1) % 4]).line;
     const double sine = cross(before.d, after.d);
     if (std::abs(sine) < 0.06) return false;  // 3.4 degrees: the sharpest corner of a marker 84 degrees steep
     const double along = cross(after.p - before.p, after.d) / sine;

@@ -4,12 +4,12 @@
 #include <array>
 #include <functional>
 
-#include "tracker/outlines.h"
+#include "tracker/contours.h"
 #include "tracker/threshold.h"
 
 namespace limn::tracker {
 
-/// A dark quadrilateral of the picture; corners clockwise as seen (x right, y down), pixel centres at
+/// A dark quadrilateral of the image; corners clockwise as seen (x right, y down), pixel centres at
 /// integers, good to about a pixel.
 struct Quad {
   std::array<Eigen::Vector2d, 4> corners_px;
@@ -32,11 +32,11 @@ class QuadFinder {
 
  private:
   struct Side {
-    Outlines::Line line;
+    Contours::Line line;
     bool known = false, straight = false;
   };
   static constexpr std::size_t k_max_corners = 10;
-  Outlines outlines_;
+  Contours contours_;
   std::array<Eigen::Vector2d, k_max_corners> corners_;                // of the outline
   std::array<std::array<Side, k_max_corners>, k_max_corners> sides_;  // from corner to corner
 

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "core/marker.h"
-#include "tracker/seen_pattern.h"
+#include "tracker/pattern_appearance.h"
 
 namespace limn::tracker {
 
@@ -13,15 +13,15 @@ namespace limn::tracker {
 /// While it stays, no shadow has come, and Detector::follow need not look for one.
 struct UnshadowedSides {
   std::array<double, 4> outside_level, inside_level;  ///< grey levels
-  int age = 0;                                        ///< pictures since
-  int kept_for = 0;                                   ///< pictures
+  int age = 0;                                        ///< images since
+  int kept_for = 0;                                   ///< images
 };
 
-/// A marker found in a picture.
+/// A marker found in an image.
 struct Detection {
   MarkerName marker;
   /// Top-left, top-right, bottom-right, bottom-left of the black square in the marker's own upright frame;
-  /// pixels of the raw picture, pixel centres at integers.
+  /// pixels of the raw image, pixel centres at integers.
   std::array<Eigen::Vector2d, 4> corners_px;
   /// Covariance of each corner (px^2), from the residuals of its two edge lines, their correlation along the
   /// side and what stands next to the edge; or from those of the whole pattern's fit.
@@ -32,8 +32,8 @@ struct Detection {
   /// is as sure as this, so many are right.
   double score = 0;
   /// Where blur mixes neighbouring edges: the marker's whole pattern, by which the corners were found, and
-  /// from which Detector::follow finds it in the next picture.
-  std::optional<SeenPattern> by_pattern;
+  /// from which Detector::follow finds it in the next image.
+  std::optional<PatternAppearance> by_pattern;
   std::optional<UnshadowedSides> unshadowed;
 };
 

@@ -69,10 +69,10 @@ bool is_blurred(const RefinedQuad& quad, const SeenCells& cells, double cell_sig
   return shortest_side(Quad{quad.corners_px}) < cell_sigmas * blur_of(quad) * cells.count;
 }
 
-// A pattern is followed from picture to picture, and no shadow's edge is looked for at a side while the light
-// on both sides of it is as it was. Either for so many pictures, and for twice as many, up to a limit, each
+// A pattern is followed from image to image, and no shadow's edge is looked for at a side while the light
+// on both sides of it is as it was. Either for so many images, and for twice as many, up to a limit, each
 // time that it is found again.
-constexpr int k_keep_pictures = 30, k_keep_at_most = 120;
+constexpr int k_keep_images = 30, k_keep_at_most = 120;
 constexpr double k_like_level = 0.06, k_like_dark_level = 3;  // a share of it, and grey levels at least
 
 // Corner i of the marker is corner_of(i) of the quadrilateral that showed it.
@@ -95,7 +95,7 @@ bool is_like(const UnshadowedSides& known, const Identity& identity, const Refin
   return true;
 }
 
-int kept_longer(int pictures) { return std::min(2 * pictures, k_keep_at_most); }
+int kept_longer(int images) { return std::min(2 * images, k_keep_at_most); }
 
 UnshadowedSides unshadowed_sides(const Identity& identity, const RefinedQuad& quad) {
   UnshadowedSides sides;
@@ -150,7 +150,7 @@ class Detector::UnreadQuads {
   std::optional<Next> take() {
     for (;;) {
       bool ended = false;
-      Crew::wait_until([&] { return (ended = ended_) || taken_ < count_; });
+      WorkerTeam::wait_until([&] { return (ended = ended_) || taken_ < count_; });
       const std::lock_guard lock(mutex_);
       if (taken_ < count_) {
         const std::size_t number = taken_++;
@@ -194,32 +194,32 @@ void Detector::detect_more(const cv::Mat& grey,
   LIMN_CHECK(grey.empty() || grey.type() == CV_8UC1);
   if (grey.empty()) return;
   const bool broken = options_.broken_markers && reading == Reading::covered;
-  Crew crew(options_.threads);
-  crew.work([&] { find_markers(grey, lens, broken, detections, crew); });
+  WorkerTeam team(options_.threads);
+  team.work([&] { find_markers(grey, lens, broken, detections, team); });
 }
 
 void Detector::find_markers(
-    const cv::Mat& grey, const Lens* lens, bool broken, std::vector<Detection>* detections, Crew& crew) {
-  threshold_.apply(grey, {options_.min_contrast}, corner_codes_, crew);
+    const cv::Mat& grey, const Lens* lens, bool broken, std::vector<Detection>* detections, WorkerTeam& team) {
+  threshold_.apply(grey, {options_.min_contrast}, corner_codes_, team);
   quads_.clear();
   UnreadQuads open(quads_);
-  crew.at_once(crew.size(), [&](int worker) {
+  team.parallel_for(team.size(), [&](int worker) {
     if (worker == 0) {
       const UnreadQuads::End end{open};
       finder_.find(corner_codes_, {options_.min_side_px}, [&](const Quad& quad) {
         if (!is_known(quad, *detections)) open.add(quad);
       });
     }
-    if (worker == crew.size() - 1 && broken) segment_finder_.find(grey, options_.min_contrast, segments_);
+    if (worker == team.size() - 1 && broken) segment_finder_.find(grey, options_.min_contrast, segments_);
     read_quads(grey, lens, Reading::open, open, worker);
   });
-  const auto retreat = add_read(std::nullopt, detections);
+  const auto bleed = add_read(std::nullopt, detections);
   if (!broken) return;
-  join_segments(grey, *detections, crew);
+  join_segments(grey, *detections, team);
   UnreadQuads covered(quads_);
   covered.end();
-  crew.at_once(crew.size(), [&](int worker) { read_quads(grey, lens, Reading::covered, covered, worker); });
-  add_read(retreat, detections);
+  team.parallel_for(team.size(), [&](int worker) { read_quads(grey, lens, Reading::covered, covered, worker); });
+  add_read(bleed, detections);
 }
 
 // Until none is left.
@@ -235,22 +235,22 @@ void Detector::read_quads(
 
 // What has been read, as if it had been read one after the other, less the retreat of the ink that it shows,
 // or else the one that is known. What it shows.
-std::optional<InkRetreat> Detector::add_read(const std::optional<InkRetreat>& known,
+std::optional<EdgeBleed> Detector::add_read(const std::optional<EdgeBleed>& known,
                                              std::vector<Detection>* detections) {
   std::sort(read_.begin(), read_.end(), [](const Read& a, const Read& b) { return a.number < b.number; });
   retreats_.clear();
   for (const Read& read : read_)
-    if (read.retreat) retreats_.push_back(*read.retreat);
-  const std::optional<InkRetreat> seen = common_retreat(retreats_);
-  const std::optional<InkRetreat>& retreat = seen ? seen : known;
+    if (read.bleed) retreats_.push_back(*read.bleed);
+  const std::optional<EdgeBleed> seen = common_edge_bleed(retreats_);
+  const std::optional<EdgeBleed>& bleed = seen ? seen : known;
   for (Read& read : read_) {
     Detection& detection = read.detection;
-    if (retreat && !detection.by_pattern)
-      undo_ink_retreat(*retreat, &detection.corners_px, &detection.corner_covariance);
+    if (bleed && !detection.by_pattern)
+      undo_edge_bleed(*bleed, &detection.corners_px, &detection.corner_covariance);
     add_best_of_square(std::move(detection), detections);
   }
   read_.clear();
-  return retreat;
+  return bleed;
 }
 
 void Detector::follow(const cv::Mat& grey,
@@ -318,7 +318,7 @@ std::optional<Detector::Read> Detector::found_again(const cv::Mat& grey,
     }
     return std::nullopt;
   };
-  Crew alone(1);
+  WorkerTeam alone(1);
   threshold_.apply(part, {options_.min_contrast}, corner_codes_, alone);
   quads_.clear();
   finder_.find(corner_codes_, {options_.min_side_px},
@@ -331,7 +331,7 @@ std::optional<Detector::Read> Detector::found_again(const cv::Mat& grey,
 }
 
 // The quads that straight edges suggest where none of these markers are, into quads_.
-void Detector::join_segments(const cv::Mat& grey, const std::vector<Detection>& found, Crew& crew) {
+void Detector::join_segments(const cv::Mat& grey, const std::vector<Detection>& found, WorkerTeam& team) {
   constexpr std::size_t k_max_candidates = 400;  // of each kind of edges
   squares_.clear();
   for (const Detection& detection : found) squares_.emplace_back(detection);
@@ -339,12 +339,12 @@ void Detector::join_segments(const cv::Mat& grey, const std::vector<Detection>& 
   for (std::vector<Segment>* segments : {&segments_.of_black, &segments_.of_blurred}) {
     std::erase_if(*segments, [&](const Segment& segment) {
       return std::any_of(squares_.begin(), squares_.end(),
-                         [&](const FoundSquare& square) { return square.holds(segment); });
+                         [&](const ExclusionZone& square) { return square.holds(segment); });
     });
-    segment_quad_finder_.find(*segments, grey.cols, grey.rows, k_max_candidates, segment_quads_, crew);
+    segment_quad_finder_.find(*segments, grey.cols, grey.rows, k_max_candidates, segment_quads_, team);
     for (const SegmentQuad& candidate : segment_quads_) {
       if (std::any_of(squares_.begin(), squares_.end(),
-                      [&](const FoundSquare& square) { return square.takes(candidate.quad); }))
+                      [&](const ExclusionZone& square) { return square.takes(candidate.quad); }))
         continue;
       quads_.push_back(candidate.quad);
       quads_.back().within_px = 5;
@@ -388,7 +388,7 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
   const bool is_light_known = detection.unshadowed && is_like(*detection.unshadowed, *identity, *refined);
   if (!is_light_known || detection.unshadowed->age >= detection.unshadowed->kept_for) {
     UnshadowedSides sides = unshadowed_sides(*identity, *refined);
-    sides.kept_for = is_light_known ? kept_longer(detection.unshadowed->kept_for) : k_keep_pictures;
+    sides.kept_for = is_light_known ? kept_longer(detection.unshadowed->kept_for) : k_keep_images;
     detection.unshadowed.reset();
     shadows = leave_shadow_edges(grey, worker.refiner.light(), identity->cells, lens, &*refined);
     if (shadows == ShadowEdges::none) detection.unshadowed = sides;
@@ -399,7 +399,7 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
       detection.by_pattern = settle_overlapping_edges(grey, lens, *identity, worker, known, &*refined);
     if (!detection.by_pattern && !covered && !is_blurred(*refined, identity->cells, k_retreat_sigmas) &&
         std::ranges::all_of(refined->corner_visible, std::identity()))
-      read.retreat = find_ink_retreat(grey, worker.refiner.light(), refined->corners_px, identity->cells);
+      read.bleed = find_edge_bleed(grey, worker.refiner.light(), refined->corners_px, identity->cells);
   }
   detection.marker = identity->marker;
   detection.score = std::clamp(identity->score, 0.0, 1.0);
@@ -413,11 +413,11 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
 }
 
 // Edges whose blur overlaps with others': by the whole pattern, or else with the doubt that they deserve.
-std::optional<SeenPattern> Detector::settle_overlapping_edges(const cv::Mat& grey,
+std::optional<PatternAppearance> Detector::settle_overlapping_edges(const cv::Mat& grey,
                                                               const Lens* lens,
                                                               const Identity& identity,
                                                               Worker& worker,
-                                                              const std::optional<SeenPattern>& known,
+                                                              const std::optional<PatternAppearance>& known,
                                                               RefinedQuad* refined) const {
   const auto& light = worker.refiner.light();
   const bool is_kept = known && known->age < known->kept_for;
@@ -441,7 +441,7 @@ std::optional<SeenPattern> Detector::settle_overlapping_edges(const cv::Mat& gre
       refined->corners_px = fitted->corners_px;
       refined->corner_covariance = fitted->corner_covariance;
       fitted->seen.first_corner = identity.first_corner;
-      fitted->seen.kept_for = known && !is_kept ? kept_longer(known->kept_for) : k_keep_pictures;
+      fitted->seen.kept_for = known && !is_kept ? kept_longer(known->kept_for) : k_keep_images;
       return fitted->seen;
     }
   const double doubt_px = k_overlap_doubt * blur_of(*refined);

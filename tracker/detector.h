@@ -8,12 +8,12 @@
 
 #include "core/lens.h"
 #include "tracker/candidates.h"
-#include "tracker/crew.h"
+#include "tracker/fork_join.h"
 #include "tracker/detection.h"
 #include "tracker/family.h"
-#include "tracker/found_square.h"
+#include "tracker/exclusion_zone.h"
 #include "tracker/identify.h"
-#include "tracker/ink_retreat.h"
+#include "tracker/edge_bleed.h"
 #include "tracker/refine.h"
 #include "tracker/segment_quads.h"
 #include "tracker/segments.h"
@@ -37,7 +37,7 @@ struct DetectorOptions {
   /// their corners are up to ten times better. Costs several times what reading one does; without it their
   /// covariances say so, rather too much than too little.
   bool pattern_fits = true;
-  /// How many threads a picture is shared out to, of OpenCV's pool (cv::setNumThreads limits them). The
+  /// How many threads an image is shared out to, of OpenCV's pool (cv::setNumThreads limits them). The
   /// result is the same with any number.
   int threads = 1;
 };
@@ -49,8 +49,8 @@ class Detector {
  public:
   explicit Detector(Families families, DetectorOptions options = {});
 
-  /// `grey` is the camera's raw picture: 8-bit, one channel, at most k_max_picture_side a side; an empty one
-  /// has no markers. With `lens` sides are straight in undistorted directions, without one in the picture.
+  /// `grey` is the camera's raw image: 8-bit, one channel, at most k_max_image_side a side; an empty one
+  /// has no markers. With `lens` sides are straight in undistorted directions, without one in the image.
   /// Corners are raw pixels either way.
   std::vector<Detection> detect(const cv::Mat& grey, const Lens* lens = nullptr);
 
@@ -91,37 +91,37 @@ class Detector {
   std::vector<Worker> workers_;  // one for each of the crew
   SegmentFinder segment_finder_;
   Segments segments_;
-  std::vector<FoundSquare> squares_;  // of markers found before segments are joined
+  std::vector<ExclusionZone> squares_;  // of markers found before segments are joined
   SegmentQuadFinder segment_quad_finder_;
   std::vector<SegmentQuad> segment_quads_;
   struct Read {
     std::size_t number = 0;  // of its quad
     Detection detection;
-    std::optional<InkRetreat> retreat;
+    std::optional<EdgeBleed> bleed;
   };
   std::vector<Read> read_;
-  std::vector<InkRetreat> retreats_;  // of those read
+  std::vector<EdgeBleed> retreats_;  // of those read
 
   class UnreadQuads;
   std::optional<Read> follow_by_pattern(const cv::Mat& grey, const Lens* lens, const Detection& last);
   std::optional<Read> found_again(const cv::Mat& grey, const Lens* lens, const Detection& last);
   void find_markers(
-      const cv::Mat& grey, const Lens* lens, bool broken, std::vector<Detection>* detections, Crew& crew);
+      const cv::Mat& grey, const Lens* lens, bool broken, std::vector<Detection>* detections, WorkerTeam& team);
   void read_quads(const cv::Mat& grey, const Lens* lens, Reading reading, UnreadQuads& unread, int worker);
-  std::optional<InkRetreat> add_read(const std::optional<InkRetreat>& known,
+  std::optional<EdgeBleed> add_read(const std::optional<EdgeBleed>& known,
                                      std::vector<Detection>* detections);
-  void join_segments(const cv::Mat& grey, const std::vector<Detection>& found, Crew& crew);
+  void join_segments(const cv::Mat& grey, const std::vector<Detection>& found, WorkerTeam& team);
   std::optional<Read> read(const cv::Mat& grey,
                            const Quad& quad,
                            const Lens* lens,
                            Reading reading,
                            Worker& worker,
                            const Detection* last = nullptr) const;
-  std::optional<SeenPattern> settle_overlapping_edges(const cv::Mat& grey,
+  std::optional<PatternAppearance> settle_overlapping_edges(const cv::Mat& grey,
                                                       const Lens* lens,
                                                       const Identity& identity,
                                                       Worker& worker,
-                                                      const std::optional<SeenPattern>& known,
+                                                      const std::optional<PatternAppearance>& known,
                                                       RefinedQuad* refined) const;
 };
 

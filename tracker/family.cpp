@@ -21,7 +21,7 @@ namespace limn::tracker {
 namespace {
 
 // A quad with random cells passes as a marker with at most this probability: clutter gives some hundred quads
-// a picture, and the border and margin tests of identify.cpp take another factor of 1000.
+// an image, and the border and margin tests of identify.cpp take another factor of 1000.
 constexpr double k_max_random_hit = 2e-4;
 constexpr int k_max_cells = 7;  // 49 bits: OpenCV's largest
 constexpr int k_max_codes = 100000;
@@ -246,11 +246,11 @@ std::optional<std::string> file_after(const std::string& name, const std::string
 }
 
 cv::Mat drawn_cells(int cells, int pixels_per_cell, auto&& grey_of_cell) {
-  cv::Mat picture(cells * pixels_per_cell, cells * pixels_per_cell, CV_8UC1);
-  for (int y = 0; y < picture.rows; ++y)
-    for (int x = 0; x < picture.cols; ++x)
-      picture.at<std::uint8_t>(y, x) = grey_of_cell(y / pixels_per_cell, x / pixels_per_cell);
-  return picture;
+  cv::Mat image(cells * pixels_per_cell, cells * pixels_per_cell, CV_8UC1);
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols; ++x)
+      image.at<std::uint8_t>(y, x) = grey_of_cell(y / pixels_per_cell, x / pixels_per_cell);
+  return image;
 }
 
 // In half cells.

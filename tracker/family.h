@@ -37,7 +37,7 @@ struct TemplatePattern {
   std::vector<std::uint8_t> grey;  ///< upright, as stored
 };
 
-/// A size x size picture blurred by (1 2 1)/4 along rows and columns: templates and what is compared with
+/// A size x size image blurred by (1 2 1)/4 along rows and columns: templates and what is compared with
 /// them, so that half a cell of misplacement costs little.
 std::vector<float> smoothed(std::vector<float> values, int size);
 /// The same in place; the scratch is as large.

@@ -53,11 +53,11 @@ double tilt(const std::array<Eigen::Vector2d, 4>& c) {
 }
 
 // The marker and one side more all around it.
-cv::Rect place_of(const std::array<Eigen::Vector2d, 4>& corners, cv::Size picture) {
+cv::Rect place_of(const std::array<Eigen::Vector2d, 4>& corners, cv::Size image) {
   const Eigen::Vector2d px = centre(corners);
   const double half = 0.5 * k_patch_sides * std::sqrt(area(corners));
   return cv::Rect(cvRound(px.x() - half), cvRound(px.y() - half), cvCeil(2 * half), cvCeil(2 * half)) &
-         cv::Rect({0, 0}, picture);
+         cv::Rect({0, 0}, image);
 }
 
 // Means over its cells.
@@ -183,14 +183,14 @@ bool GestureReader::hides_across(Stamp at) const {
   });
 }
 
-// For how long the marker's place has looked as it does: as the mean of its pictures since then.
+// For how long the marker's place has looked as it does: as the mean of its images since then.
 double GestureReader::still_for(const cv::Mat& patch, Stamp at) {
   const double levels = std::max(options_.still_levels, k_noise_deviations * noise_levels_);
   if (is_still(patch, still_patch_, levels)) {
-    still_patch_ += (patch - still_patch_) / ++still_pictures_;
+    still_patch_ += (patch - still_patch_) / ++still_images_;
   } else {
     still_patch_ = patch.clone();
-    still_pictures_ = 1;
+    still_images_ = 1;
     still_since_ = at;
   }
   return seconds_between(still_since_, at);

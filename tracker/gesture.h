@@ -30,7 +30,7 @@ struct GestureOptions {
   double still_levels = 2;
 };
 
-/// Reads one control marker's gestures from one camera's pictures. Give it every picture, in order.
+/// Reads one control marker's gestures from one camera's images. Give it every image, in order.
 ///
 /// A cover is told from a hand that passes by what hides the marker: it stays, still, hides more than an edge
 /// of it, and does not hide markers nearby on both sides of it (an arm that lies across does). It acts once;
@@ -39,11 +39,11 @@ class GestureReader {
  public:
   GestureReader(MarkerName marker, Gesture gesture, const GestureOptions& options = {});
 
-  /// 0: nothing; 1: the gesture was made; -1: a turn backwards. `grey` is the picture that the detections of
+  /// 0: nothing; 1: the gesture was made; -1: a turn backwards. `grey` is the image that the detections of
   /// (all) markers are from.
   int read(const cv::Mat& grey, std::span<const Detection> detections, Stamp captured_at);
 
-  /// Whether the newest picture showed the marker.
+  /// Whether the newest image showed the marker.
   bool is_seen() const { return is_seen_; }
   /// When it was seen last, where it has been out of sight for longer than the detector misses a marker.
   std::optional<Stamp> hidden_since() const { return hidden_since_; }
@@ -73,11 +73,11 @@ class GestureReader {
   bool is_armed_ = false;  // has been seen for long enough
   std::array<Eigen::Vector2d, 4> corners_px_{};
   cv::Rect place_;           // the marker's and what is around it
-  double noise_levels_ = 0;  // standard deviation of a cell's change from picture to picture
+  double noise_levels_ = 0;  // standard deviation of a cell's change from image to image
   Stamp seen_since_, seen_at_;
   cv::Mat seen_patch_;   // what the marker's place looked like when it was seen last
-  cv::Mat still_patch_;  // what it has looked like since it last changed, on average over so many pictures
-  int still_pictures_ = 0;
+  cv::Mat still_patch_;  // what it has looked like since it last changed, on average over so many images
+  int still_images_ = 0;
   Stamp still_since_;
   std::vector<Neighbour> neighbours_;
   std::optional<double> turn_rest_;  // direction of its upper side when it last acted, radians

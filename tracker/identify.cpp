@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "tracker/quad_levels.h"
+#include "tracker/quad_sampler.h"
 #include "tracker/simd.h"
 
 namespace limn::tracker {
@@ -55,7 +55,7 @@ struct Plane {
 // Places of the unit square.
 struct Places {
   std::size_t count = 0;
-  std::array<float, QuadLevels::k_most> x, y;
+  std::array<float, QuadSampler::k_most> x, y;
 
   void add(double at_x, double at_y) {
     x[count] = static_cast<float>(at_x);
@@ -73,7 +73,7 @@ struct Places {
   }
 };
 
-using Fractions = std::array<float, QuadLevels::k_most>;
+using Fractions = std::array<float, QuadSampler::k_most>;
 using Grid = std::array<double, k_max_grid * k_max_grid>;
 
 // Where the limit between black and white lies: the middle, or lower when a shadow crosses, whose white paper
@@ -90,7 +90,7 @@ struct CellSamples {
 
   std::size_t places() const { return several ? 5 : 1; }
 };
-static_assert(5 * k_max_grid * k_max_grid <= QuadLevels::k_most);
+static_assert(5 * k_max_grid * k_max_grid <= QuadSampler::k_most);
 
 // -1 at black, 0 at the limit, 1 as far above it as black lies below.
 inline float relative(float fraction, float limit) {
@@ -117,12 +117,12 @@ LIMN_SIMD void to_fractions(const Plane& dark,
 
 // What one quad shows, between the levels inside and outside its edges.
 struct Reader {
-  QuadLevels levels;
+  QuadSampler levels;
   Plane light, dark;
   double side_px;
 
-  Reader(const cv::Mat& picture, const RefinedQuad& quad)
-      : levels(picture, quad.corners_px),
+  Reader(const cv::Mat& image, const RefinedQuad& quad)
+      : levels(image, quad.corners_px),
         light(quad.outside_level),
         dark(quad.inside_level),
         side_px(std::sqrt(area(quad.corners_px))) {}
@@ -179,7 +179,7 @@ struct Reader {
 
 // ---- how sure ----
 
-// What a quad would show, as it is turned in the picture.
+// What a quad would show, as it is turned in the image.
 struct Pattern {
   double border = 0, cells = 0;  // in cells
   std::uint64_t code = 0;
@@ -717,7 +717,7 @@ std::array<std::uint8_t, count> nearest_levels(const cv::Mat& grey,
                                                const Quad& quad,
                                                const std::array<std::array<float, count>, 2>& places) {
   std::array<std::uint8_t, count> levels;
-  QuadLevels(grey, quad.corners_px).nearest(places[0], places[1], levels.data());
+  QuadSampler(grey, quad.corners_px).nearest(places[0], places[1], levels.data());
   return levels;
 }
 

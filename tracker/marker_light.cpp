@@ -11,7 +11,7 @@
 namespace limn::tracker {
 namespace {
 
-// A side is straight in the world, not in a distorted picture: it is drawn as so many pieces.
+// A side is straight in the world, not in a distorted image: it is drawn as so many pieces.
 constexpr int k_pieces = 6;
 constexpr int k_fraction_bits = 4;
 
@@ -28,7 +28,7 @@ double place_deviation(const Track& track, const Pose& body_from_marker) {
 }
 
 // Outline of a square of half side `reach` about the marker's centre; empty when it is not wholly in front.
-std::vector<cv::Point> outline(const Imager& projector, const Pose& world_from_marker, double reach) {
+std::vector<cv::Point> contour(const Imager& projector, const Pose& world_from_marker, double reach) {
   static const Eigen::Vector2d k_corners[] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
   std::vector<cv::Point> points;
   for (int side = 0; side < 4; ++side)
@@ -36,7 +36,7 @@ std::vector<cv::Point> outline(const Imager& projector, const Pose& world_from_m
       const double t = static_cast<double>(i) / k_pieces;
       const Eigen::Vector2d p = reach * ((1 - t) * k_corners[side] + t * k_corners[(side + 1) % 4]);
       const auto px = projector.project(world_from_marker * Eigen::Vector3d(p.x(), p.y(), 0));
-      // Far beside the picture nothing is drawn, and OpenCV's fixed point would overflow.
+      // Far beside the image nothing is drawn, and OpenCV's fixed point would overflow.
       if (!px || px->cwiseAbs().maxCoeff() > 1e5) return {};
       points.emplace_back(static_cast<int>(std::lround(px->x() * (1 << k_fraction_bits))),
                           static_cast<int>(std::lround(px->y() * (1 << k_fraction_bits))));
@@ -59,13 +59,13 @@ cv::Mat marker_mask(const Imager& projector,
   for (const Track& track : tracks) {
     const auto body =
         std::find_if(bodies.begin(), bodies.end(), [&](const Body& b) { return b.name == track.body; });
-    if (body == bodies.end() || track.sight == Sight::lost) continue;
+    if (body == bodies.end() || track.tracking == TrackingState::lost) continue;
     for (const BodyMarker& marker : body->markers) {
       const Pose world_from_marker = track.world_from_body * marker.body_from_marker;
       if (!faces(projector, world_from_marker)) continue;
       const double reach = (0.5 + options.margin) * marker.size_m +
                            options.deviations * place_deviation(track, marker.body_from_marker);
-      const auto points = outline(projector, world_from_marker, reach);
+      const auto points = contour(projector, world_from_marker, reach);
       if (!points.empty())
         cv::fillPoly(mask, std::vector{points}, cv::Scalar(255), cv::LINE_8, k_fraction_bits);
     }
@@ -85,9 +85,9 @@ std::optional<MarkerLight> marker_light_of(const std::string& name) {
   return static_cast<MarkerLight>(found - names.begin());
 }
 
-cv::Mat with_marker_light(const cv::Mat& picture, const cv::Mat& mask, MarkerLight how) {
-  LIMN_CHECK(picture.size() == mask.size());
-  cv::Mat out = picture.clone();
+cv::Mat with_marker_light(const cv::Mat& image, const cv::Mat& mask, MarkerLight how) {
+  LIMN_CHECK(image.size() == mask.size());
+  cv::Mat out = image.clone();
   if (how == MarkerLight::keep_out) out.setTo(cv::Scalar::all(0), mask);
   if (how == MarkerLight::spotlight) out.setTo(cv::Scalar::all(255), mask);
   return out;

@@ -21,7 +21,7 @@ struct MarkerLightOptions {
   double deviations = 3;
 };
 
-/// Where a projector's light falls on markers: CV_8UC1 of its picture, 255 on every marker's paper, 0
+/// Where a projector's light falls on markers: CV_8UC1 of its image, 255 on every marker's paper, 0
 /// elsewhere. For every body that has a track which is not lost, the outlines of its markers that face the
 /// projector, through the projector's lens. Whether something stands in between is not asked.
 cv::Mat marker_mask(const Imager& projector,
@@ -29,7 +29,7 @@ cv::Mat marker_mask(const Imager& projector,
                     std::span<const Track> tracks,
                     const MarkerLightOptions& options = {});
 
-/// How a projector's picture treats markers.
+/// How a projector's image treats markers.
 enum class MarkerLight {
   as_is,     ///< parts are painted over them
   keep_out,  ///< no light: the room's own shows them
@@ -41,7 +41,7 @@ const std::vector<std::string>& marker_light_names();
 /// nullopt for another word.
 std::optional<MarkerLight> marker_light_of(const std::string& name);
 
-/// The picture (8-bit, display values) with the markers of a mask treated so.
-cv::Mat with_marker_light(const cv::Mat& picture, const cv::Mat& mask, MarkerLight how);
+/// The image (8-bit, display values) with the markers of a mask treated so.
+cv::Mat with_marker_light(const cv::Mat& image, const cv::Mat& mask, MarkerLight how);
 
 }  // namespace limn::tracker

@@ -53,17 +53,17 @@ bool is_clockwise(const std::array<Eigen::Vector2d, 4>& c) {
   return true;
 }
 
-std::optional<std::array<PointSight, 4>> corner_sights(const Lens& lens,
+std::optional<std::array<PointObservation, 4>> corner_sights(const Lens& lens,
                                                        const std::array<Eigen::Vector3d, 4>& corners,
                                                        const std::array<Eigen::Vector2d, 4>& corners_px,
                                                        const std::array<Eigen::Matrix2d, 4>& covariance) {
-  std::array<PointSight, 4> sights;
+  std::array<PointObservation, 4> observations;
   for (std::size_t i = 0; i < 4; ++i) {
     const Eigen::Matrix2d information = covariance[i].inverse();
     if (!information.allFinite() || !(information.determinant() > 0)) return std::nullopt;
-    sights[i] = {&lens, Pose{}, corners[i], corners_px[i], information};
+    observations[i] = {&lens, Pose{}, corners[i], corners_px[i], information};
   }
-  return sights;
+  return observations;
 }
 
 // Likeliest first; weights add up to 1.
@@ -98,10 +98,10 @@ std::vector<Eigen::Matrix3d> planar_rotations(const Eigen::Matrix3d& h) {
   const Eigen::Vector2d v = h.col(2).head<2>() / h(2, 2);
   Eigen::Matrix2d j = h.topLeftCorner<2, 2>() / h(2, 2);
   j -= v * h.row(2).head<2>() / h(2, 2);
-  // Turn the ray through the origin's picture onto the optical axis.
+  // Turn the ray through the origin's image onto the optical axis.
   const Eigen::Vector3d d = Eigen::Vector3d(v.x(), v.y(), 1).normalized();
   const Eigen::Matrix3d ray_turn =
-      turn_between(Eigen::Vector3d::UnitZ(), d).toRotationMatrix();
+      rotation_between(Eigen::Vector3d::UnitZ(), d).toRotationMatrix();
   Eigen::Matrix<double, 2, 3> projection;
   projection << 1, 0, -v.x(), 0, 1, -v.y();
   const Eigen::Matrix2d b = (projection * ray_turn).leftCols<2>();
@@ -137,13 +137,13 @@ std::vector<MarkerPose> marker_poses(const Lens& lens,
   const Eigen::Matrix3d homography = homography_from_square(*points);
   if (homography.isZero(0)) return {};
   const auto corners = square_corners(size_m);
-  const auto sights = corner_sights(lens, corners, corners_px, corner_covariance);
-  if (!sights) return {};
+  const auto observations = corner_sights(lens, corners, corners_px, corner_covariance);
+  if (!observations) return {};
   std::vector<MarkerPose> poses;
   std::vector<double> chi_squares;
   for (const Eigen::Matrix3d& rotation : planar_rotations(homography)) {
     const Eigen::Vector3d translation = best_translation(rotation, corners, *points);
-    const auto fit = fit_pose(*sights, Pose(rotation, translation));
+    const auto fit = fit_pose(*observations, Pose(rotation, translation));
     if (!fit) continue;
     const bool known = std::any_of(poses.begin(), poses.end(), [&](const MarkerPose& other) {
       return angle_between(other.camera_from_marker.rotation, fit->world_from_body.rotation) < k_same_angle;

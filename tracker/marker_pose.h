@@ -21,10 +21,10 @@ struct MarkerPose {
 /// The corners of a square marker in its own frame, in the order of Detection::corners_px.
 std::array<Eigen::Vector3d, 4> square_corners(double size_m);
 
-/// Poses of a square marker from its corners in the raw picture: both branches of the planar ambiguity (IPPE:
+/// Poses of a square marker from its corners in the raw image: both branches of the planar ambiguity (IPPE:
 /// Collins and Bartoli, "Infinitesimal plane-based pose estimation", IJCV 2014), each refined on the pixels
 /// through the lens, likeliest first. One when both branches lead to the same minimum; none when the corners
-/// are no picture of a square: degenerate, not finite, outside the lens's domain, or turned inside out.
+/// are no image of a square: degenerate, not finite, outside the lens's domain, or turned inside out.
 std::vector<MarkerPose> marker_poses(const Lens& lens,
                                      double size_m,
                                      const std::array<Eigen::Vector2d, 4>& corners_px,

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "tracker/pattern_model.h"
-#include "tracker/pattern_sums.h"
+#include "tracker/pattern_normal_sums.h"
 #include "tracker/square_to_quad.h"
-#include "tracker/straight_picture.h"
+#include "tracker/local_undistortion.h"
 
 namespace limn::tracker {
 namespace {
@@ -110,7 +110,7 @@ class PatternFit {
         levels_(light),
         cells_(cells),
         start_(start),
-        straight_(StraightPicture::about(lens, start.corners_px, k_most_outside_px)),
+        straight_(LocalUndistortion::about(lens, start.corners_px, k_most_outside_px)),
         buffers_(*buffers) {
     for (Eigen::Vector2d& corner : start_.corners_px) corner = straight_.straight(corner);
   }
@@ -143,7 +143,7 @@ class PatternFit {
     return finished(fitted);
   }
 
-  std::optional<FittedPattern> follow(const SeenPattern& known) {
+  std::optional<FittedPattern> follow(const PatternAppearance& known) {
     has_ground_ = (known.look.margin.array() < k_no_margin).any();
     margin_ = known.look.margin;
     contrast_ = known.look.contrast();
@@ -154,7 +154,7 @@ class PatternFit {
     else
       take_samples(k_followed_samples, Taken::at_seen_edges);
     Fitted fitted;
-    static_cast<Look&>(fitted.state) = known.look;
+    static_cast<Appearance&>(fitted.state) = known.look;
     fitted.state.corners = start_.corners_px;
     const Free free{.motion = moves, .bend = known.look.bend.isZero() ? Bend::none : Bend::fitted};
     fitted = settled(fitted.state, free, k_followed_settled_px, k_rounds_followed);
@@ -164,7 +164,7 @@ class PatternFit {
       return std::nullopt;
     auto found = finished(fitted, known.correlation);
     if (!found) return std::nullopt;
-    SeenPattern seen = known;
+    PatternAppearance seen = known;
     seen.look = found->seen.look;
     found->seen = seen;
     return found;
@@ -174,8 +174,8 @@ class PatternFit {
   const cv::Mat& grey_;
   const std::array<double, 256>& levels_;
   const SeenCells& cells_;
-  RefinedQuad start_;  // corners in the straight picture, as all that follows
-  const StraightPicture straight_;
+  RefinedQuad start_;  // corners in the straight image, as all that follows
+  const LocalUndistortion straight_;
   const Eigen::Vector2d origin_ = middle_of(start_);  // of the samples' pixels
   bool has_ground_ = false;
   Eigen::Vector4d margin_;  // at the start
@@ -183,7 +183,7 @@ class PatternFit {
   double least_scale_ = 0;  // of residuals: far from the solution most look wrong
   PatternFitBuffers& buffers_;
   PatternFitBuffers::Samples& samples_ = buffers_.samples;
-  const LightFunctions& light_ = light_functions(light_versions() - 1);
+  const PatternKernels& light_ = pattern_kernels(pattern_kernel_versions() - 1);
   std::size_t count_ = 0;  // of the samples, of which the last is repeated up to padded_count()
 
   double light_at(const Eigen::Vector2d& px) const {
@@ -254,7 +254,7 @@ class PatternFit {
     for (auto* values : samples_values()) values->clear();
     const std::array<Eigen::Vector2d, 4>& corners = start_.corners_px;
     const Eigen::Matrix3d square_from_px = SquareToQuad(corners).matrix().inverse();
-    Eigen::AlignedBox2d box;  // of the grey picture
+    Eigen::AlignedBox2d box;  // of the grey image
     for (const Eigen::Vector2d& c : corners) box.extend(straight_.bent(c));
     const double blur_px = *std::max_element(start_.blur_px.begin(), start_.blur_px.end());
     const double outside_px = std::clamp(2.5 * blur_px, 2.0, k_most_outside_px);
@@ -333,7 +333,7 @@ class PatternFit {
     for (auto* values : samples_values()) values->resize(padded_count(), 0);
     std::vector<std::int32_t>& shows = buffers_.keeps;
     shows.resize(padded_count());
-    light_.see_edges(guess_of(cells_, known, has_ground_, origin_), samples_.x.data(), samples_.y.data(),
+    light_.find_edges(guess_of(cells_, known, has_ground_, origin_), samples_.x.data(), samples_.y.data(),
                      padded_count(), shows.data());
     int flat = 0;
     for (std::size_t i = 0; i < count_; ++i)
@@ -356,7 +356,7 @@ class PatternFit {
   }
 
   // Whether the pattern looks as it did.
-  static bool is_like(const SeenPattern& known, const Fitted& now) {
+  static bool is_like(const PatternAppearance& known, const Fitted& now) {
     const double contrast = now.state.contrast(), before = known.look.contrast();
     return contrast > k_like_contrast * before && contrast * k_like_contrast < before &&
            std::abs(now.state.log_blur - known.look.log_blur) < k_like_log_blur &&
@@ -639,7 +639,7 @@ std::optional<FittedPattern> fit_pattern(const cv::Mat& grey,
 std::optional<FittedPattern> follow_pattern(const cv::Mat& grey,
                                             const std::array<double, 256>& light,
                                             const std::array<Eigen::Vector2d, 4>& corners_px,
-                                            const SeenPattern& known,
+                                            const PatternAppearance& known,
                                             const Lens* lens,
                                             PatternFitBuffers* buffers) {
   RefinedQuad start{};

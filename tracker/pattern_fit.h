@@ -9,7 +9,7 @@
 
 #include "core/lens.h"
 #include "tracker/refine.h"
-#include "tracker/seen_pattern.h"
+#include "tracker/pattern_appearance.h"
 
 namespace limn::tracker {
 
@@ -32,12 +32,12 @@ struct PatternFitBuffers {
 struct FittedPattern {
   std::array<Eigen::Vector2d, 4> corners_px;
   std::array<Eigen::Matrix2d, 4> corner_covariance;
-  SeenPattern seen;
+  PatternAppearance seen;
 };
 
 /// Refines a quad whose code is known where edges lie too near to each other for EdgeRefiner: blur wider than
 /// the cells leave room for, motion, small or steep cells, white margins of a pixel. The marker's pixels are
-/// fitted as what they are: a homography's picture of black border, cells, white margin and what lies behind,
+/// fitted as what they are: a homography's image of black border, cells, white margin and what lies behind,
 /// seen through one Gaussian and an even straight motion, in light that changes linearly over the marker;
 /// bent paper where the residuals ask for it. Motions in several directions compete before the best is
 /// refined. The covariance comes from the residuals, with neighbouring ones that have one cause counted as
@@ -51,13 +51,13 @@ std::optional<FittedPattern> fit_pattern(const cv::Mat& grey,
                                          const Lens* lens,
                                          PatternFitBuffers* buffers);
 
-/// The same pattern in another picture, at about `corners_px`, in a tenth of the time: the look it had is all
+/// The same pattern in another image, at about `corners_px`, in a tenth of the time: the look it had is all
 /// but right there. nullopt also when it does not look like that any more: light or blur have changed,
 /// something lies over it, it is another marker.
 std::optional<FittedPattern> follow_pattern(const cv::Mat& grey,
                                             const std::array<double, 256>& light,
                                             const std::array<Eigen::Vector2d, 4>& corners_px,
-                                            const SeenPattern& known,
+                                            const PatternAppearance& known,
                                             const Lens* lens,
                                             PatternFitBuffers* buffers);
 

@@ -3,8 +3,8 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "tracker/pattern_light.h"
-#include "tracker/seen_pattern.h"
+#include "tracker/pattern_kernels.h"
+#include "tracker/pattern_appearance.h"
 
 /// What pattern_fit fits: the light of a code's pixels and its derivatives by all that is unknown.
 namespace limn::tracker::pattern {
@@ -12,7 +12,7 @@ namespace limn::tracker::pattern {
 using Vector = Eigen::Matrix<double, k_unknowns, 1>;
 
 /// One guess of it all.
-struct State : Look {
+struct State : Appearance {
   std::array<Eigen::Vector2d, 4> corners;
 };
 

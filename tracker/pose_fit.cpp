@@ -13,7 +13,7 @@ namespace {
 
 constexpr int k_max_steps = 60;
 constexpr double k_small_gain = 1e-7;  // of the cost: three ten-thousandths of a standard deviation
-// A step that is foretold to gain less and gains nothing has met the error of the prior's derivative.
+// A step that is predicted to gain less and gains nothing has met the error of the prior's derivative.
 constexpr double k_vain_gain = 1e-4;
 // Far from corners that miss by much the robust cost is all but flat, and falls little for many steps.
 constexpr int k_patient_steps = 10;
@@ -32,34 +32,34 @@ double loss(double square, double huber) {
 // Sights that one call of the lens projects, and what it makes of them.
 struct Batch {
   static constexpr std::size_t k_most = 16;
-  std::span<const PointSight> sights;            // of one camera
+  std::span<const PointObservation> observations;            // of one camera
   std::array<Eigen::Vector3d, k_most> d_turned;  // from the body's origin, along the world's axes
   std::array<Eigen::Vector2d, k_most> px;
   std::array<PixelByPoint, k_most> by_camera;
   Eigen::Matrix3d camera_from_world;
 };
 
-bool is_same_camera(const PointSight& a, const PointSight& b) {
+bool is_same_camera(const PointObservation& a, const PointObservation& b) {
   return a.lens == b.lens && a.camera_from_world.translation == b.camera_from_world.translation &&
          a.camera_from_world.rotation.coeffs() == b.camera_from_world.rotation.coeffs();
 }
 
-std::span<const PointSight> first_batch(std::span<const PointSight> sights) {
-  const std::size_t most = std::min(sights.size(), Batch::k_most);
+std::span<const PointObservation> first_batch(std::span<const PointObservation> observations) {
+  const std::size_t most = std::min(observations.size(), Batch::k_most);
   std::size_t count = 1;
-  while (count < most && is_same_camera(sights[count], sights[0])) ++count;
-  return sights.first(count);
+  while (count < most && is_same_camera(observations[count], observations[0])) ++count;
+  return observations.first(count);
 }
 
 // False when a point has no pixel.
 bool project(const Pose& world_from_body, bool with_derivatives, Batch* batch) {
-  const std::size_t count = batch->sights.size();
-  const PointSight& first = batch->sights[0];
+  const std::size_t count = batch->observations.size();
+  const PointObservation& first = batch->observations[0];
   batch->camera_from_world = first.camera_from_world.rotation_matrix();
   const Eigen::Matrix3d world_from_body_turn = world_from_body.rotation_matrix();
   std::array<Eigen::Vector3d, Batch::k_most> p_camera;
   for (std::size_t i = 0; i < count; ++i) {
-    batch->d_turned[i] = world_from_body_turn * batch->sights[i].p_body;
+    batch->d_turned[i] = world_from_body_turn * batch->observations[i].p_body;
     p_camera[i] = batch->camera_from_world * (batch->d_turned[i] + world_from_body.translation) +
                   first.camera_from_world.translation;
     // Beside the camera some lens models go on projecting; a marker there is turned through itself.
@@ -85,13 +85,13 @@ Gradients gradients(const Batch& batch, std::size_t i) {
 
 // Calls take(batch) for all sights, a batch at a time; false when a point has no pixel.
 template <class Take>
-bool each_batch(std::span<const PointSight> sights,
+bool each_batch(std::span<const PointObservation> observations,
                 const Pose& world_from_body,
                 bool with_derivatives,
                 const Take& take) {
   Batch batch;
-  for (; !sights.empty(); sights = sights.subspan(batch.sights.size())) {
-    batch.sights = first_batch(sights);
+  for (; !observations.empty(); observations = observations.subspan(batch.observations.size())) {
+    batch.observations = first_batch(observations);
     if (!project(world_from_body, with_derivatives, &batch)) return false;
     take(batch);
   }
@@ -106,17 +106,17 @@ struct Judged {
   Vector6d gradient = Vector6d::Zero();
 };
 
-void add_sight(const PointSight& sight,
+void add_sight(const PointObservation& observation,
                const Eigen::Vector2d& px,
                const Gradients& by_delta,
                double huber,
                Judged* judged) {
-  const Eigen::Vector2d r = sight.px - px;
-  const Eigen::Vector2d weighed = sight.information * r;
+  const Eigen::Vector2d r = observation.px - px;
+  const Eigen::Vector2d weighed = observation.information * r;
   const double square = r.dot(weighed), w = weight(square, huber);
   judged->cost += loss(square, huber);
   judged->squares += r.squaredNorm();
-  const Gradients weighed_by_delta = by_delta * (w * sight.information);
+  const Gradients weighed_by_delta = by_delta * (w * observation.information);
   judged->normal.noalias() += weighed_by_delta * by_delta.transpose();
   judged->gradient.noalias() += by_delta * (w * weighed);
 }
@@ -132,14 +132,14 @@ void add_prior(const PosePrior& prior, const Pose& pose, Judged* judged) {
 }
 
 // nullopt when a point has no pixel.
-std::optional<Judged> judged(std::span<const PointSight> sights,
+std::optional<Judged> judged(std::span<const PointObservation> observations,
                              const Pose& pose,
                              double huber,
                              const PosePrior* prior) {
   Judged sum;
-  const bool is_seen = each_batch(sights, pose, true, [&](const Batch& batch) {
-    for (std::size_t i = 0; i < batch.sights.size(); ++i)
-      add_sight(batch.sights[i], batch.px[i], gradients(batch, i), huber, &sum);
+  const bool is_seen = each_batch(observations, pose, true, [&](const Batch& batch) {
+    for (std::size_t i = 0; i < batch.observations.size(); ++i)
+      add_sight(batch.observations[i], batch.px[i], gradients(batch, i), huber, &sum);
   });
   if (!is_seen) return std::nullopt;
   if (prior) add_prior(*prior, pose, &sum);
@@ -173,45 +173,45 @@ Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
   return m;
 }
 
-bool residual(const PointSight& sight,
+bool residual(const PointObservation& observation,
               const Pose& world_from_body,
               Eigen::Vector2d* difference,
               Eigen::Matrix<double, 2, 6>* d_difference) {
-  return each_batch(std::span(&sight, 1), world_from_body, d_difference, [&](const Batch& batch) {
-    *difference = sight.px - batch.px[0];
+  return each_batch(std::span(&observation, 1), world_from_body, d_difference, [&](const Batch& batch) {
+    *difference = observation.px - batch.px[0];
     if (d_difference) *d_difference = gradients(batch, 0).transpose();
   });
 }
 
-double cost(std::span<const PointSight> sights, const Pose& world_from_body, double huber) {
+double cost(std::span<const PointObservation> observations, const Pose& world_from_body, double huber) {
   double sum = 0;
-  const bool is_seen = each_batch(sights, world_from_body, false, [&](const Batch& batch) {
-    for (std::size_t i = 0; i < batch.sights.size(); ++i) {
-      const Eigen::Vector2d r = batch.sights[i].px - batch.px[i];
-      sum += loss(r.dot(batch.sights[i].information * r), huber);
+  const bool is_seen = each_batch(observations, world_from_body, false, [&](const Batch& batch) {
+    for (std::size_t i = 0; i < batch.observations.size(); ++i) {
+      const Eigen::Vector2d r = batch.observations[i].px - batch.px[i];
+      sum += loss(r.dot(batch.observations[i].information * r), huber);
     }
   });
   return is_seen ? sum : std::numeric_limits<double>::infinity();
 }
 
-std::optional<PoseFit> fit_pose(std::span<const PointSight> sights,
+std::optional<PoseFit> fit_pose(std::span<const PointObservation> observations,
                                 const Pose& start,
                                 double huber,
                                 const PosePrior* prior) {
-  if (sights.size() < 3 || !start.is_finite()) return std::nullopt;
+  if (observations.size() < 3 || !start.is_finite()) return std::nullopt;
   Pose pose = start;
-  auto best = judged(sights, pose, huber, prior);
+  auto best = judged(observations, pose, huber, prior);
   if (!best || !std::isfinite(best->cost)) return std::nullopt;
   double damping = 1e-6;
   for (int step = 0; step < k_max_steps; ++step) {
     Matrix6d damped = best->normal;
     damped.diagonal() *= 1 + damping;
-    const Vector6d delta = solved(damped, -best->gradient);
+    const Vector6d delta = solve_ldlt(damped, -best->gradient);
     if (!delta.allFinite()) return std::nullopt;
     const double gain = -best->gradient.dot(delta);
     const bool is_last = gain < k_small_gain || (step >= k_patient_steps && gain < k_slow_gain * best->cost);
     const Pose next = boxplus(pose, delta);
-    const auto after = judged(sights, next, huber, prior);
+    const auto after = judged(observations, next, huber, prior);
     if (after && after->cost <= best->cost) {
       pose = next;
       best = after;
@@ -225,7 +225,7 @@ std::optional<PoseFit> fit_pose(std::span<const PointSight> sights,
   const auto covariance = inverse(best->normal);
   if (!covariance || !covariance->allFinite() || !pose.is_finite()) return std::nullopt;
   return PoseFit{pose, *covariance, best->cost,
-                 std::sqrt(best->squares / static_cast<double>(sights.size()))};
+                 std::sqrt(best->squares / static_cast<double>(observations.size()))};
 }
 
 }  // namespace limn::tracker

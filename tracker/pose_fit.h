@@ -10,7 +10,7 @@
 namespace limn::tracker {
 
 /// A point of a body seen at a pixel.
-struct PointSight {
+struct PointObservation {
   const Lens* lens = nullptr;
   Pose camera_from_world;
   Eigen::Vector3d p_body;
@@ -36,20 +36,20 @@ struct PoseFit {
 Eigen::Matrix3d skew(const Eigen::Vector3d& v);
 
 /// Residual px - project(…) and its derivative by the delta of boxplus; false when the point has no pixel.
-bool residual(const PointSight& sight,
+bool residual(const PointObservation& observation,
               const Pose& world_from_body,
               Eigen::Vector2d* difference,
               Eigen::Matrix<double, 2, 6>* d_difference = nullptr);
 
 /// Robust cost of a pose: squared residuals in standard deviations, linear beyond `huber` of them (0: never).
 /// Infinite when a point has no pixel.
-double cost(std::span<const PointSight> sights, const Pose& world_from_body, double huber);
+double cost(std::span<const PointObservation> observations, const Pose& world_from_body, double huber);
 
 /// Levenberg-Marquardt on the pixels through the true lenses, from `start`. nullopt when it has no minimum
 /// there: a point falls behind its camera, or the sights do not fix six degrees of freedom. Never NaN. With a
 /// prior the pose is the nearest mode of the posterior (maximum a posteriori), its covariance the posterior's
 /// there.
-std::optional<PoseFit> fit_pose(std::span<const PointSight> sights,
+std::optional<PoseFit> fit_pose(std::span<const PointObservation> observations,
                                 const Pose& start,
                                 double huber = 0,
                                 const PosePrior* prior = nullptr);

@@ -40,7 +40,7 @@ Believed filtered(const Branch& branch, double seconds, const MotionModel& model
   return {motion.world_from_body, motion.pose_covariance()};
 }
 
-Believed believed(const BodyMotion& known, double seconds, Prediction how, const MotionModel& model) {
+Believed believed(const BodyFilter& known, double seconds, Prediction how, const MotionModel& model) {
   if (how == Prediction::filtered) return filtered(known.branches.front(), seconds, model);
   if (how == Prediction::linear && known.fixes.size() == 2)
     return continued(known.fixes[0], known.fixes[1], seconds);
@@ -61,13 +61,13 @@ std::optional<Prediction> prediction_of(const std::string& name) {
   return static_cast<Prediction>(found - names.begin());
 }
 
-std::vector<Track> predicted(std::span<const BodyMotion> known,
+std::vector<Track> predicted(std::span<const BodyFilter> known,
                              Stamp at,
                              Prediction how,
                              const MotionModel& model,
                              std::optional<Stamp> decided_at) {
   std::vector<Track> tracks;
-  for (const BodyMotion& motion : known) {
+  for (const BodyFilter& motion : known) {
     const double unseen = std::max(0.0, seconds_between(motion.measured_at, at));
     const Stamp decided = decided_at.value_or(at);
     const bool lost = seconds_between(motion.measured_at, decided) > lost_after_s(motion, model);
@@ -83,9 +83,9 @@ std::vector<Track> predicted(std::span<const BodyMotion> known,
     track.rms_px = motion.rms_px;
     track.captured_at = motion.measured_at;
     track.at = std::max(at, motion.measured_at);
-    track.sight = lost                                     ? Sight::lost
-                  : motion.looked_at == motion.measured_at ? Sight::measured
-                                                           : Sight::extrapolated;
+    track.tracking = lost                                     ? TrackingState::lost
+                  : motion.looked_at == motion.measured_at ? TrackingState::measured
+                                                           : TrackingState::extrapolated;
     tracks.push_back(std::move(track));
   }
   return tracks;

@@ -47,7 +47,7 @@ Eigen::Vector3d normal(const cv::Mat& points, int row, int column) {
   return dy.cross(dx).normalized();
 }
 
-// A grid's values at every pixel of the camera's picture; entry (r, c) belongs to pixel (c, r) *
+// A grid's values at every pixel of the camera's image; entry (r, c) belongs to pixel (c, r) *
 // k_light_step.
 cv::Mat at_every_pixel(const cv::Mat& grid, const cv::Size& size) {
   cv::Mat x(size, CV_32FC1), y(size, CV_32FC1), out;
@@ -189,7 +189,7 @@ Discounted discounted(const cv::Mat& grey, const cv::Mat& light, double black_le
   const double gain = best_gain(gradients(level, light), brightest);
   if (gain == 0) return {grey, 0};
   const cv::Mat lit = 1 + gain * light;
-  // As if everything stood in the picture's mean light, so that levels keep their range.
+  // As if everything stood in the image's mean light, so that levels keep their range.
   const double mean = cv::mean(lit)[0];
   cv::Mat even, out;
   cv::divide(level, lit, even, mean);

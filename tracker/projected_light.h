@@ -31,7 +31,7 @@ struct ShownLight {
 
 /// The light that projectors throw on what each camera pixel sees, CV_32FC1 of the camera's size, in units of
 /// full white at 1 m head on: through both lenses, with distance and incidence; 0 where the points are
-/// unknown, turned away or beside the projectors' pictures. Shadows are not known. `points` is as points_seen
+/// unknown, turned away or beside the projectors' images. Shadows are not known. `points` is as points_seen
 /// gives it. `blur_px` is what pixels' areas and lenses make of a sharp edge (standard deviation): too small,
 /// edges of the light stay as bright lines.
 cv::Mat light_seen(const Imager& camera,
@@ -39,15 +39,15 @@ cv::Mat light_seen(const Imager& camera,
                    std::span<const ShownLight> shown,
                    double blur_px = 0.7);
 
-/// A picture with the projected light divided out, for the detector: what the camera would see if the
+/// An image with the projected light divided out, for the detector: what the camera would see if the
 /// projectors shone evenly.
 struct Discounted {
-  cv::Mat grey;     ///< 8-bit; the picture itself when the light explains none of its gradients
+  cv::Mat grey;     ///< 8-bit; the image itself when the light explains none of its gradients
   double gain = 0;  ///< of full white at 1 m over the room's light
 };
 
 /// `grey` (8-bit, one channel, proportional to light above `black_level`) is taken for reflectance x (room +
-/// gain x light); the gain is the one that explains most of the picture's gradients (least sum of absolute
+/// gain x light); the gain is the one that explains most of the image's gradients (least sum of absolute
 /// differences of logarithms), so neither exposure nor room light need be known.
 Discounted discounted(const cv::Mat& grey, const cv::Mat& light, double black_level = 0);
 

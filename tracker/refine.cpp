@@ -10,7 +10,7 @@
 namespace limn::tracker {
 namespace {
 
-// What edge lines keep however little noise there is: .002 to .004 px in pictures without any. What pixels,
+// What edge lines keep however little noise there is: .002 to .004 px in images without any. What pixels,
 // print and paper do changes along a side and shows in its residuals.
 constexpr double k_systematic_px = 0.002;
 // The averaged gradient's tails below this share of its peak count as flat.
@@ -53,7 +53,7 @@ struct Bow {
   }
 };
 
-// How the picture of the straight line between two pixels bends away from their chord.
+// How the image of the straight line between two pixels bends away from their chord.
 Bow bow_of(const Lens& lens, const Eigen::Vector2d& from, const Eigen::Vector2d& to, bool flat) {
   Bow bow;
   const int u = flat ? 0 : 1;
@@ -118,7 +118,7 @@ EdgeRefiner::EdgeLine averaged(const EdgeRefiner::EdgeLine& straight,
 }
 
 // IEC 61966-2-1.
-double linear_of_srgb(double encoded) {
+double linear_from_srgb(double encoded) {
   return encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
 }
 
@@ -127,7 +127,7 @@ double linear_of_srgb(double encoded) {
 EdgeRefiner::EdgeRefiner(Encoding encoding) {
   for (std::size_t level = 0; level < light_.size(); ++level) {
     const double value = static_cast<double>(level);
-    light_[level] = encoding == Encoding::linear ? value : 255 * linear_of_srgb(value / 255);
+    light_[level] = encoding == Encoding::linear ? value : 255 * linear_from_srgb(value / 255);
   }
 }
 
@@ -334,7 +334,7 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   if (!fit_line(effort, sides, line, &variance)) return false;
   line->covariance(0, 0) += unknown_px * unknown_px / 6;
   line->correlation = effort == Effort::full ? correlation_along(*line, variance) : 1;
-  see_ends(from[u_axis], to[u_axis], std::max(trim, blur_trim), variance, line);
+  find_ends(from[u_axis], to[u_axis], std::max(trim, blur_trim), variance, line);
   return true;
 }
 
@@ -571,7 +571,7 @@ double EdgeRefiner::correlation_along(const EdgeLine& line, double variance) con
 
 // Whether most rows next to the side's ends lie on the line. Rows nearer than `trim` to an end are not looked
 // at.
-void EdgeRefiner::see_ends(double from, double to, double trim, double variance, EdgeLine* line) const {
+void EdgeRefiner::find_ends(double from, double to, double trim, double variance, EdgeLine* line) const {
   const double band = std::max(k_end_px, k_end_share * std::abs(to - from));
   const double near = k_reject * std::max(k_min_scale_px, std::sqrt(variance));
   double at_from = 0;

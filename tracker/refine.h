@@ -42,8 +42,8 @@ struct RefinedQuad {
   std::array<bool, 4> corner_visible;
 };
 
-/// Finds where each side's edge crosses the rows (steep sides) or columns (flat sides) of the raw picture and
-/// fits its line. A crossing is the centroid of the grey differences along the row. For the picture of a
+/// Finds where each side's edge crosses the rows (steep sides) or columns (flat sides) of the raw image and
+/// fits its line. A crossing is the centroid of the grey differences along the row. For the image of a
 /// straight edge that pixels of square shape and any symmetric blur have averaged, that centroid is exact at
 /// any phase and slope (the sampled first moment of a function that was twice averaged over a pixel has no
 /// aliasing), which crossings of a middle level are not. With a lens the side is straight in undistorted
@@ -52,7 +52,7 @@ struct RefinedQuad {
 class EdgeRefiner {
  public:
   /// Centroids are taken in linear light: a pixel half covered by ink is no middle level of an encoded
-  /// picture.
+  /// image.
   explicit EdgeRefiner(Encoding encoding = Encoding::linear);
 
   /// nullopt when a side shows no edge from light outside to dark inside of at least `min_contrast` levels.
@@ -88,7 +88,7 @@ class EdgeRefiner {
   std::vector<float> deviations_;  // scratch of the robust scale
 
  public:
-  /// A side's line v = offset + slope * d + curvature * d^2, d = u - u_middle, in the raw picture less the
+  /// A side's line v = offset + slope * d + curvature * d^2, d = u - u_middle, in the raw image less the
   /// lens's bow. Bent paper and a lens that is not given show as curvature; it is 0 where the crossings show
   /// none, and grows steadily with the evidence.
   struct EdgeLine {
@@ -128,7 +128,7 @@ class EdgeRefiner {
                 EdgeLine* line);
   void settle_shares(Effort effort);
   bool fit_line(Effort effort, Sides sides, EdgeLine* line, double* variance);
-  void see_ends(double from, double to, double trim, double variance, EdgeLine* line) const;
+  void find_ends(double from, double to, double trim, double variance, EdgeLine* line) const;
   double correlation_along(const EdgeLine& line, double variance) const;
   double fit_terms(int terms, bool from_line, EdgeLine* line);
   void find_consensus(EdgeLine* line);

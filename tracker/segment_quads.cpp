@@ -146,7 +146,7 @@ void SegmentQuadFinder::find(std::span<const Segment> segments,
                              int height,
                              std::size_t most,
                              std::vector<SegmentQuad>& quads,
-                             Crew& crew) {
+                             WorkerTeam& team) {
   quads.clear();
   columns_ = static_cast<int>(width / k_cell_px) + 1;
   rows_ = static_cast<int>(height / k_cell_px) + 1;
@@ -154,12 +154,12 @@ void SegmentQuadFinder::find(std::span<const Segment> segments,
   for (const Segment& s : segments)
     if (s.length >= k_min_length_px) segments_.push_back(s);
   sort_into_cells();
-  for_each_part(crew, [&](Part& part) { join_collinear(part); });
+  for_each_part(team, [&](Part& part) { join_collinear(part); });
   for (const Part& part : parts_) segments_.insert(segments_.end(), part.joined.begin(), part.joined.end());
   sort_into_cells();
   corners_.resize(segments_.size());
-  for_each_part(crew, [&](Part& part) { find_corners(part); });
-  for_each_part(crew, [&](Part& part) { find_quads(part); });
+  for_each_part(team, [&](Part& part) { find_corners(part); });
+  for_each_part(team, [&](Part& part) { find_quads(part); });
   for (const Part& part : parts_) quads.insert(quads.end(), part.quads.begin(), part.quads.end());
   const auto is_before = [](const SegmentQuad& a, const SegmentQuad& b) {
     if (a.visible != b.visible) return a.visible > b.visible;
@@ -230,8 +230,8 @@ void SegmentQuadFinder::visit(const Eigen::Vector2d& px,
 
 // Calls work(part) with equal shares of the segments.
 template <typename Work>
-void SegmentQuadFinder::for_each_part(Crew& crew, const Work& work) {
-  crew.at_once(static_cast<int>(parts_.size()), [&](int i) {
+void SegmentQuadFinder::for_each_part(WorkerTeam& team, const Work& work) {
+  team.parallel_for(static_cast<int>(parts_.size()), [&](int i) {
     const auto p = static_cast<std::size_t>(i);
     parts_[p].first = static_cast<std::uint32_t>(segments_.size() * p / parts_.size());
     parts_[p].last = static_cast<std::uint32_t>(segments_.size() * (p + 1) / parts_.size());

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "tracker/candidates.h"
-#include "tracker/crew.h"
+#include "tracker/fork_join.h"
 #include "tracker/segments.h"
 
 namespace limn::tracker {
@@ -28,7 +28,7 @@ class SegmentQuadFinder {
             int height,
             std::size_t most,
             std::vector<SegmentQuad>& quads,
-            Crew& crew);
+            WorkerTeam& team);
 
  private:
   struct Corner {
@@ -66,7 +66,7 @@ class SegmentQuadFinder {
              std::vector<std::uint8_t>& matches,
              const Visit& visit) const;
   template <typename Work>
-  void for_each_part(Crew& crew, const Work& work);
+  void for_each_part(WorkerTeam& team, const Work& work);
   void join_collinear(Part& part) const;
   void find_corners(Part& part);
   void find_quads(Part& part) const;

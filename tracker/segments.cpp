@@ -10,7 +10,7 @@ namespace {
 // The limit of black at half size. Shadows that take three quarters of the light leave paper darker than the
 // middle between ink and lit paper, but lighter than this.
 constexpr int k_black_share = 46;  // 256ths of the way from the darkest to the brightest
-constexpr int k_black_reach = 3;   // tiles of 8 pixels of the whole picture
+constexpr int k_black_reach = 3;   // tiles of 8 pixels of the whole image
 
 // Lengths at half or a quarter of the size.
 constexpr double k_min_side = 6;           // as quadrilaterals of them want (segment_quads.cpp)
@@ -29,10 +29,10 @@ LIMN_SIMD void halve_row(const std::uint8_t* __restrict upper,
         (upper[2 * x] + upper[2 * x + 1] + lower[2 * x] + lower[2 * x + 1] + 2) >> 2);
 }
 
-void halve(const cv::Mat& picture, cv::Mat* half) {
-  half->create(picture.rows / 2, picture.cols / 2, CV_8UC1);
+void halve(const cv::Mat& image, cv::Mat* half) {
+  half->create(image.rows / 2, image.cols / 2, CV_8UC1);
   for (int y = 0; y < half->rows; ++y)
-    halve_row(picture.ptr(2 * y), picture.ptr(2 * y + 1), half->cols, half->ptr(y));
+    halve_row(image.ptr(2 * y), image.ptr(2 * y + 1), half->cols, half->ptr(y));
 }
 
 }  // namespace
@@ -43,40 +43,40 @@ void SegmentFinder::find(const cv::Mat& grey, int min_contrast, Segments& segmen
   if (std::min(grey.cols, grey.rows) < 8 * k_min_side) return;
   halve(grey, &half_);
   halve(half_, &quarter_);
-  add_outlines(half_, 2, k_min_side, {min_contrast, k_black_share, k_black_reach}, segments.of_black);
-  add_outlines(quarter_, 4, k_min_blurred_side, {min_contrast}, segments.of_blurred);
+  add_contours(half_, 2, k_min_side, {min_contrast, k_black_share, k_black_reach}, segments.of_black);
+  add_contours(quarter_, 4, k_min_blurred_side, {min_contrast}, segments.of_blurred);
 }
 
-// Of the picture at a `scale`-th of its size.
-void SegmentFinder::add_outlines(const cv::Mat& picture,
+// Of the image at a `scale`-th of its size.
+void SegmentFinder::add_contours(const cv::Mat& image,
                                  int scale,
                                  double min_side,
                                  const ThresholdOptions& options,
                                  std::vector<Segment>& segments) {
-  Crew alone(1);
-  threshold_.apply(picture, options, corner_codes_, alone);
-  outlines_.for_each(corner_codes_, [&](const Outlines::Extent& outline) {
-    const auto length = static_cast<double>(outline.count);
-    if (length < 2 * min_side || std::abs(outline.area) < k_min_width * length) return;
-    const Outlines::Box box = outlines_.box();
+  WorkerTeam alone(1);
+  threshold_.apply(image, options, corner_codes_, alone);
+  contours_.for_each(corner_codes_, [&](const Contours::Extent& contour) {
+    const auto length = static_cast<double>(contour.count);
+    if (length < 2 * min_side || std::abs(contour.area) < k_min_width * length) return;
+    const Contours::Box box = contours_.box();
     if (std::max(box.width, box.height) < min_side) return;
-    outlines_.find_corners(k_corner_px, outline.count, static_cast<std::size_t>(min_side));
+    contours_.find_corners(k_corner_px, contour.count, static_cast<std::size_t>(min_side));
     add_sides(scale, min_side, segments);
   });
 }
 
 // The straight ones of the outline's sides between corners.
 void SegmentFinder::add_sides(int scale, double min_side, std::vector<Segment>& segments) {
-  const auto corners = outlines_.corners();
+  const auto corners = contours_.corners();
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const std::size_t from = corners[i];
-    const std::size_t to = i + 1 < corners.size() ? corners[i + 1] : outlines_.size();
+    const std::size_t to = i + 1 < corners.size() ? corners[i + 1] : contours_.size();
     const auto trim = static_cast<std::size_t>(k_trim_share * static_cast<double>(to - from) + 1);
     if (to - from < 2 * trim + 3) continue;
-    const Eigen::Vector2d start = outlines_.point(from);
-    const Eigen::Vector2d end = outlines_.point(to);
+    const Eigen::Vector2d start = contours_.point(from);
+    const Eigen::Vector2d end = contours_.point(to);
     if ((end - start).norm() < min_side) continue;
-    const auto line = outlines_.line(from + trim, to - trim, k_max_rms_px);
+    const auto line = contours_.line(from + trim, to - trim, k_max_rms_px);
     if (!line) continue;
     const auto on_line = [&](const Eigen::Vector2d& p) {
       const Eigen::Vector2d nearest = line->p + line->d.dot(p - line->p) * line->d;

@@ -5,12 +5,12 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
-#include "tracker/outlines.h"
+#include "tracker/contours.h"
 #include "tracker/threshold.h"
 
 namespace limn::tracker {
 
-/// A straight piece of edge, pixels of the whole picture; dark lies on the right of the way from `from` to
+/// A straight piece of edge, pixels of the whole image; dark lies on the right of the way from `from` to
 /// `to` as seen (x right, y down).
 struct Segment {
   Eigen::Vector2d from, to;
@@ -20,7 +20,7 @@ struct Segment {
 
 /// Straight pieces of outlines.
 struct Segments {
-  /// Of what is nearly black, at half the picture's size: a marker's ink remains where shadows, fingers and
+  /// Of what is nearly black, at half the image's size: a marker's ink remains where shadows, fingers and
   /// light paper that lies over it are cut off.
   std::vector<Segment> of_black;
   /// Of what is darker than the middle, at a quarter: strong blur leaves no black.
@@ -37,9 +37,9 @@ class SegmentFinder {
   cv::Mat half_, quarter_;
   Threshold threshold_;
   CornerCodes corner_codes_;
-  Outlines outlines_;
+  Contours contours_;
 
-  void add_outlines(const cv::Mat& picture,
+  void add_contours(const cv::Mat& image,
                     int scale,
                     double min_side,
                     const ThresholdOptions& options,

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "tracker/quad_levels.h"
-#include "tracker/straight_picture.h"
+#include "tracker/quad_sampler.h"
+#include "tracker/local_undistortion.h"
 
 namespace limn::tracker {
 namespace {
@@ -48,7 +48,7 @@ std::optional<double> ratio_of_cells(const cv::Mat& grey,
                                      const RefinedQuad& refined,
                                      const SeenCells& cells) {
   constexpr std::size_t k_most = 2 * 2 * SeenCells::k_max * (SeenCells::k_max - 1);
-  static_assert(k_most <= QuadLevels::k_most);
+  static_assert(k_most <= QuadSampler::k_most);
   std::array<float, k_most> x, y;  // of a white place and the black one beside it, in turn
   std::size_t places = 0;
   const auto add = [&](int row, int column, int down, int right) {
@@ -67,7 +67,7 @@ std::optional<double> ratio_of_cells(const cv::Mat& grey,
     }
   if (places == 0) return std::nullopt;
   std::array<float, k_most> levels;
-  QuadLevels(grey, refined.corners_px).between({x.data(), places}, {y.data(), places}, levels.data());
+  QuadSampler(grey, refined.corners_px).between({x.data(), places}, {y.data(), places}, levels.data());
   std::array<double, k_most / 2> ratios{};
   const std::size_t count = places / 2;
   for (std::size_t i = 0; i < count; ++i)
@@ -112,10 +112,10 @@ double light_at(const cv::Mat& grey, const std::array<double, 256>& light, const
          down * ((1 - right) * light[lower[0]] + right * light[lower[1]]);
 }
 
-// Where light falls by about as many times as exp(`expected`), across a side of the straight picture.
+// Where light falls by about as many times as exp(`expected`), across a side of the straight image.
 Places places_like(const cv::Mat& grey,
                    const std::array<double, 256>& light,
-                   const StraightPicture& picture,
+                   const LocalUndistortion& image,
                    const Side& side,
                    int reach,
                    double expected) {
@@ -125,7 +125,7 @@ Places places_like(const cv::Mat& grey,
   const Eigen::Vector2d aside = side.run.normalized();
   for (int row = 0; row < k_rows; ++row) {
     const double along = k_end_share + (1 - 2 * k_end_share) * row / (k_rows - 1);
-    const Eigen::Vector2d middle = picture.bent(side.from + along * side.run);
+    const Eigen::Vector2d middle = image.bent(side.from + along * side.run);
     for (int k = -around; k <= around; ++k) {
       const Eigen::Vector2d px = middle + k * side.inward;
       across[static_cast<std::size_t>(k + around)] =
@@ -245,16 +245,16 @@ ShadowEdges leave_shadow_edges(const cv::Mat& grey,
   const auto [least, most] = std::minmax_element(ratio.begin(), ratio.end());
   if (*most - *least < k_unlike) return ShadowEdges::none;
   const double expected = ratio_of_cells(grey, light, *refined, cells).value_or(median(ratio));
-  const StraightPicture picture = StraightPicture::about(lens, refined->corners_px, k_max_reach);
+  const LocalUndistortion image = LocalUndistortion::about(lens, refined->corners_px, k_max_reach);
   std::array<Eigen::Vector2d, 4> before = refined->corners_px;
-  for (Eigen::Vector2d& corner : before) corner = picture.straight(corner);
+  for (Eigen::Vector2d& corner : before) corner = image.straight(corner);
   std::array<Eigen::Vector2d, 4> corners = before;
   double shortest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < 4; ++i) shortest = std::min(shortest, side_of(before, i).run.norm());
   const int reach = std::min(k_max_reach, static_cast<int>(k_reach_share * shortest));
   ShadowEdges made = ShadowEdges::none;
   for (std::size_t i = 0; i < 4; ++i) {
-    const Agreed agreed = agreed_line(places_like(grey, light, picture, side_of(before, i), reach, expected));
+    const Agreed agreed = agreed_line(places_like(grey, light, image, side_of(before, i), reach, expected));
     const bool moves = agreed.by_many && agreed.elsewhere;
     const bool doubtful = !agreed.by_many && std::abs(ratio[i] - expected) > k_unlike;
     if (!moves && !doubtful) continue;
@@ -265,7 +265,7 @@ ShadowEdges leave_shadow_edges(const cv::Mat& grey,
       if (!(way.norm() < k_max_slide)) continue;
       if (moves) {
         corners[corner] += (start ? agreed.line.at_start : agreed.line.at_end) * way;
-        refined->corners_px[corner] = picture.bent(corners[corner]);
+        refined->corners_px[corner] = image.bent(corners[corner]);
       }
       const double variance = moves ? agreed.variance[start ? 0 : 1] : k_doubt_px * k_doubt_px;
       refined->corner_covariance[corner] += variance * way * way.transpose();

@@ -8,14 +8,14 @@
 namespace limn::tracker {
 namespace {
 
-Telling telling_of(double correlation) {
-  if (correlation > 1 - k_min_rotation_lead) return Telling::confused;
-  return correlation >= k_min_correlation ? Telling::alike : Telling::apart;
+Discriminability telling_of(double correlation) {
+  if (correlation > 1 - k_min_rotation_lead) return Discriminability::confused;
+  return correlation >= k_min_correlation ? Discriminability::alike : Discriminability::apart;
 }
 
 // Of itself only turned ones.
-TemplateLikeness likeness(const TemplatePattern& a, const TemplatePattern& b, bool is_itself) {
-  TemplateLikeness most{a.id, b.id, 0, -2, Telling::apart};
+TemplateSimilarity likeness(const TemplatePattern& a, const TemplatePattern& b, bool is_itself) {
+  TemplateSimilarity most{a.id, b.id, 0, -2, Discriminability::apart};
   for (std::size_t k = is_itself ? 1 : 0; k < 4; ++k) {
     const auto& upright = a.rotations[0];
     const double correlation =
@@ -30,8 +30,8 @@ TemplateLikeness likeness(const TemplatePattern& a, const TemplatePattern& b, bo
 
 }  // namespace
 
-std::vector<TemplateLikeness> compared(std::span<const TemplatePattern> templates) {
-  std::vector<TemplateLikeness> all;
+std::vector<TemplateSimilarity> compared(std::span<const TemplatePattern> templates) {
+  std::vector<TemplateSimilarity> all;
   for (std::size_t i = 0; i < templates.size(); ++i)
     for (std::size_t j = 0; j <= i; ++j) {
       LIMN_CHECK(templates[i].size == templates[j].size);

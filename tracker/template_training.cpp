@@ -6,7 +6,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "tracker/candidates.h"
 #include "tracker/identify.h"
 #include "tracker/refine.h"
@@ -16,7 +16,7 @@
 namespace limn::tracker {
 namespace {
 
-constexpr int k_min_contrast = 32;      // levels: a picture to train from is a good one
+constexpr int k_min_contrast = 32;      // levels: an image to train from is a good one
 constexpr double k_min_search_px = 20;  // side; smaller frames are read by nobody
 constexpr double k_min_side_px = 64;    // two pixels a value
 constexpr double k_min_deviation = 15;  // of the grey values: identify's least, a fifteenth of black to white
@@ -43,7 +43,7 @@ std::vector<RefinedQuad> frames_in(const cv::Mat& grey) {
   Threshold threshold;
   CornerCodes codes;
   QuadFinder finder;
-  Crew alone(1);
+  WorkerTeam alone(1);
   threshold.apply(grey, {k_min_contrast}, codes, alone);
   EdgeRefiner refiner;
   std::vector<RefinedQuad> frames;
@@ -64,7 +64,7 @@ std::vector<RefinedQuad> frames_in(const cv::Mat& grey) {
   return outer;
 }
 
-// Corner 0 the one nearest to the picture's top left.
+// Corner 0 the one nearest to the image's top left.
 RefinedQuad upright(const RefinedQuad& frame) {
   std::size_t first = 0;
   for (std::size_t i = 1; i < 4; ++i)
@@ -92,7 +92,7 @@ Error several(const std::vector<RefinedQuad>& frames) {
 }
 
 // The frame's inside upright, one pixel a value, as mean over each value's own area.
-cv::Mat rectified(const cv::Mat& picture, const RefinedQuad& frame, double side_px) {
+cv::Mat rectified(const cv::Mat& image, const RefinedQuad& frame, double side_px) {
   const int size = TrainedTemplate::k_size;
   const int fine = std::clamp(static_cast<int>(std::ceil(side_px / (2 * size))), 4, 16);  // places a value
   const int count = size * fine;
@@ -106,7 +106,7 @@ cv::Mat rectified(const cv::Mat& picture, const RefinedQuad& frame, double side_
       y.at<float>(row, column) = static_cast<float>(px.y());
     }
   cv::Mat seen, values;
-  cv::remap(picture, seen, x, y, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  cv::remap(image, seen, x, y, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
   cv::resize(seen, values, {size, size}, 0, 0, cv::INTER_AREA);
   return values;
 }
@@ -129,8 +129,8 @@ double deviation(const TrainedTemplate& trained) {
 
 }  // namespace
 
-Result<TrainedTemplate> train_template(const cv::Mat& picture) {
-  const cv::Mat grey = to_grey(picture);
+Result<TrainedTemplate> train_template(const cv::Mat& image) {
+  const cv::Mat grey = to_grey(image);
   const std::vector<RefinedQuad> frames = frames_in(grey);
   if (frames.empty())
     return error(
@@ -144,7 +144,7 @@ Result<TrainedTemplate> train_template(const cv::Mat& picture) {
   if (trained.side_px < k_min_side_px)
     return error("the frame is {:.0f} px wide, expected at least {:.0f} (two pixels a value). Go nearer.",
                  trained.side_px, k_min_side_px);
-  const cv::Mat values = rectified(picture, frame, trained.side_px);
+  const cv::Mat values = rectified(image, frame, trained.side_px);
   const double black = mean(frame.inside_level);
   const double scale = 255 / (mean(frame.outside_level) - black);
   const int channels = values.channels();

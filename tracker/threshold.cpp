@@ -71,7 +71,7 @@ LIMN_SIMD void darker(const std::uint8_t* grey, const std::uint8_t* limit, int c
   for (int x = 0; x < count; ++x) black[x] = grey[x] < limit[x];
 }
 
-// Rows of black pixels start with the white one left of the picture.
+// Rows of black pixels start with the white one left of the image.
 LIMN_SIMD void corner_row(const std::uint8_t* above,
                           const std::uint8_t* here,
                           int count,
@@ -101,7 +101,7 @@ LIMN_SIMD void limits_between(const std::uint8_t* low,
 void Threshold::apply(const cv::Mat& grey,
                       const ThresholdOptions& options,
                       CornerCodes& corners,
-                      Crew& crew) {
+                      WorkerTeam& team) {
   tiles_x_ = std::max(1, grey.cols / k_tile);
   tiles_y_ = std::max(1, grey.rows / k_tile);
   const auto count = static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_);
@@ -110,9 +110,9 @@ void Threshold::apply(const cv::Mat& grey,
   corners.height = grey.rows;
   corners.stride = grey.cols + 1;
   corners.codes.resize(static_cast<std::size_t>(corners.stride) * static_cast<std::size_t>(grey.rows + 1));
-  const int shares = crew.size() == 1 ? 1 : k_shares * crew.size();
+  const int shares = team.size() == 1 ? 1 : k_shares * team.size();
   rows_.resize(static_cast<std::size_t>(shares));
-  crew.at_once(shares, [&](int i) {
+  team.parallel_for(shares, [&](int i) {
     Rows& rows = rows_[static_cast<std::size_t>(i)];
     rows.first = tiles_y_ * i / shares;
     rows.last = tiles_y_ * (i + 1) / shares;
@@ -123,7 +123,7 @@ void Threshold::apply(const cv::Mat& grey,
     join_rows();
     widen_tiles(0, tiles_y_);
   }
-  crew.at_once(shares, [&](int i) { compare(grey, options, rows_[static_cast<std::size_t>(i)], corners); });
+  team.parallel_for(shares, [&](int i) { compare(grey, options, rows_[static_cast<std::size_t>(i)], corners); });
 }
 
 // A tile at the right or lower end also takes the pixels that are too few for one of their own.

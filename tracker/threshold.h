@@ -4,18 +4,18 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
-#include "tracker/crew.h"
+#include "tracker/fork_join.h"
 
 namespace limn::tracker {
 
-/// A black-and-white picture as codes of its pixels' corners: which of the four pixels about the corner are
-/// black. Beside the picture all is white. Corner (x, y) is the upper left one of pixel (x, y), so there is
+/// A black-and-white image as codes of its pixels' corners: which of the four pixels about the corner are
+/// black. Beside the image all is white. Corner (x, y) is the upper left one of pixel (x, y), so there is
 /// one more of them along rows and columns than pixels.
 struct CornerCodes {
   static constexpr std::uint8_t k_upper_left = 1, k_upper_right = 2, k_lower_left = 4, k_lower_right = 8;
   static constexpr std::uint8_t k_visited = 16;  ///< bit: the boundary through this corner has been traced
 
-  int width = 0;  ///< of the picture
+  int width = 0;  ///< of the image
   int height = 0;
   std::ptrdiff_t stride = 0;
   std::vector<std::uint8_t> codes;
@@ -40,7 +40,7 @@ struct ThresholdOptions {
 class Threshold {
  public:
   /// `grey` is 8-bit, one channel, not empty. The result is the same with any crew.
-  void apply(const cv::Mat& grey, const ThresholdOptions& options, CornerCodes& corners, Crew& crew);
+  void apply(const cv::Mat& grey, const ThresholdOptions& options, CornerCodes& corners, WorkerTeam& team);
 
  private:
   // What a thread writes on the way through its rows of tiles.

@@ -21,24 +21,24 @@ constexpr double k_most_steep_deg = 60;   // there a pixel is twice as long as w
 constexpr double k_least_marker_px = 32;  // below, poses flip (measured: 6 % at 24 px, none at 48)
 constexpr double k_least_contrast = 5;    // projected white over the room's light: black looks black enough
 
-void advise_on_error(const Foreseen& foreseen, const Described& described, std::vector<std::string>* advice) {
-  for (std::size_t i = 0; i < foreseen.error_mm.size(); ++i) {
-    if (foreseen.error_mm[i] <= calib::k_good_mm) continue;
+void advise_on_error(const PredictedAccuracy& predicted_accuracy, const DescribedRig& described, std::vector<std::string>* advice) {
+  for (std::size_t i = 0; i < predicted_accuracy.error_mm.size(); ++i) {
+    if (predicted_accuracy.error_mm[i] <= calib::k_good_mm) continue;
     const std::string& name = described.rig.projectors[i].name;
     advice->push_back(
-        foreseen.measuring_mm[i] > foreseen.calibration_mm[i]
+        predicted_accuracy.measuring_mm[i] > predicted_accuracy.calibration_mm[i]
             ? fmt::format("{}: {:.2f} mm, most of it from measuring where the prototype stands: give {} more "
                           "pixels on it (narrower lens, nearer).",
-                          name, foreseen.error_mm[i], described.rig.cameras.front().name)
+                          name, predicted_accuracy.error_mm[i], described.rig.cameras.front().name)
             : fmt::format(
                   "{}: {:.2f} mm, most of it from the calibration: more board poses, a larger board, a "
                   "wider angle to {}.",
-                  name, foreseen.error_mm[i], described.rig.cameras.front().name));
+                  name, predicted_accuracy.error_mm[i], described.rig.cameras.front().name));
   }
 }
 
-void advise_on_pairs(const Foreseen& foreseen, const Described& described, std::vector<std::string>* advice) {
-  for (const ForeseenPair& pair : foreseen.pairs) {
+void advise_on_pairs(const PredictedAccuracy& predicted_accuracy, const DescribedRig& described, std::vector<std::string>* advice) {
+  for (const PredictedPair& pair : predicted_accuracy.pairs) {
     if (pair.camera != described.rig.cameras.front().name) continue;
     if (pair.angle_deg < k_least_angle_deg)
       advice->push_back(
@@ -53,11 +53,11 @@ void advise_on_pairs(const Foreseen& foreseen, const Described& described, std::
   }
 }
 
-void advise_on_imagers(const Foreseen& foreseen,
-                       const Described& described,
+void advise_on_imagers(const PredictedAccuracy& predicted_accuracy,
+                       const DescribedRig& described,
                        std::vector<std::string>* advice) {
-  for (const auto* imagers : {&foreseen.cameras, &foreseen.projectors}) {
-    for (const ForeseenImager& imager : *imagers)
+  for (const auto* imagers : {&predicted_accuracy.cameras, &predicted_accuracy.projectors}) {
+    for (const PredictedImager& imager : *imagers)
       if (imager.steep_deg > k_most_steep_deg)
         advice->push_back(
             fmt::format("{}: too steep, {:.0f} degrees from the lit side's normal: below {:g}; more to the "
@@ -65,7 +65,7 @@ void advise_on_imagers(const Foreseen& foreseen,
                         "one that faces this side.",
                         imager.name, imager.steep_deg, k_most_steep_deg));
   }
-  for (const ForeseenImager& projector : foreseen.projectors) {
+  for (const PredictedImager& projector : predicted_accuracy.projectors) {
     if (projector.pixel_mm > k_most_pixel_mm)
       advice->push_back(fmt::format(
           "{}: too far, a pixel is {:.1f} mm on the surface (at most {:g}): nearer, a longer throw, "
@@ -80,10 +80,10 @@ void advise_on_imagers(const Foreseen& foreseen,
   }
 }
 
-void advise_on_markers(const Foreseen& foreseen,
-                       const Described& described,
+void advise_on_markers(const PredictedAccuracy& predicted_accuracy,
+                       const DescribedRig& described,
                        std::vector<std::string>* advice) {
-  for (const ForeseenMarker& marker : foreseen.markers) {
+  for (const PredictedMarker& marker : predicted_accuracy.markers) {
     if (marker.farthest_px >= k_least_marker_px) continue;
     const double needed_mm = 1000 * described.marker_m * k_least_marker_px / marker.farthest_px;
     advice->push_back(fmt::format(
@@ -94,11 +94,11 @@ void advise_on_markers(const Foreseen& foreseen,
   }
 }
 
-void advise_on_coverage(const Foreseen& foreseen,
-                        const Described& described,
+void advise_on_coverage(const PredictedAccuracy& predicted_accuracy,
+                        const DescribedRig& described,
                         const std::vector<Vector3d>& points,
                         std::vector<std::string>* advice) {
-  if (foreseen.coverage >= k_least_coverage) return;
+  if (predicted_accuracy.coverage >= k_least_coverage) return;
   const Imager& camera = described.rig.cameras.front();
   const double seen = share_reached(points, [&](const Vector3d& p) { return reaches(camera, p); });
   if (seen < k_least_coverage)
@@ -117,13 +117,13 @@ void advise_on_coverage(const Foreseen& foreseen,
 
 }  // namespace
 
-std::vector<std::string> design_advice(const Foreseen& foreseen, const Described& described) {
+std::vector<std::string> design_advice(const PredictedAccuracy& predicted_accuracy, const DescribedRig& described) {
   std::vector<std::string> advice;
-  advise_on_error(foreseen, described, &advice);
-  advise_on_coverage(foreseen, described, volume_points(described), &advice);
-  advise_on_pairs(foreseen, described, &advice);
-  advise_on_imagers(foreseen, described, &advice);
-  advise_on_markers(foreseen, described, &advice);
+  advise_on_error(predicted_accuracy, described, &advice);
+  advise_on_coverage(predicted_accuracy, described, volume_points(described), &advice);
+  advise_on_pairs(predicted_accuracy, described, &advice);
+  advise_on_imagers(predicted_accuracy, described, &advice);
+  advise_on_markers(predicted_accuracy, described, &advice);
   return advice;
 }
 

@@ -15,7 +15,7 @@ nlohmann::ordered_json number(double value) {
                               : nlohmann::ordered_json(nullptr);
 }
 
-nlohmann::ordered_json json_of(const ForeseenImager& imager) {
+nlohmann::ordered_json json_of(const PredictedImager& imager) {
   nlohmann::ordered_json json = {{"name", imager.name},
                                  {"distance_m", number(imager.distance_m)},
                                  {"pixel_mm", number(imager.pixel_mm)},
@@ -26,28 +26,28 @@ nlohmann::ordered_json json_of(const ForeseenImager& imager) {
   return json;
 }
 
-nlohmann::ordered_json json_of(const Foreseen& foreseen) {
+nlohmann::ordered_json json_of(const PredictedAccuracy& predicted_accuracy) {
   using Json = nlohmann::ordered_json;
-  Json json = {{"coverage", number(foreseen.coverage)},
+  Json json = {{"coverage", number(predicted_accuracy.coverage)},
                {"cameras", Json::array()},
                {"projectors", Json::array()},
                {"pairs", Json::array()},
                {"markers", Json::array()},
-               {"advice", foreseen.advice}};
-  for (const ForeseenImager& camera : foreseen.cameras) json["cameras"].push_back(json_of(camera));
-  for (std::size_t i = 0; i < foreseen.projectors.size(); ++i) {
-    Json projector = json_of(foreseen.projectors[i]);
-    projector["predicted_error_mm"] = number(foreseen.error_mm[i]);
-    projector["of_calibration_mm"] = number(foreseen.calibration_mm[i]);
-    projector["of_measuring_mm"] = number(foreseen.measuring_mm[i]);
+               {"advice", predicted_accuracy.advice}};
+  for (const PredictedImager& camera : predicted_accuracy.cameras) json["cameras"].push_back(json_of(camera));
+  for (std::size_t i = 0; i < predicted_accuracy.projectors.size(); ++i) {
+    Json projector = json_of(predicted_accuracy.projectors[i]);
+    projector["predicted_error_mm"] = number(predicted_accuracy.error_mm[i]);
+    projector["of_calibration_mm"] = number(predicted_accuracy.calibration_mm[i]);
+    projector["of_measuring_mm"] = number(predicted_accuracy.measuring_mm[i]);
     json["projectors"].push_back(std::move(projector));
   }
-  for (const ForeseenPair& pair : foreseen.pairs)
+  for (const PredictedPair& pair : predicted_accuracy.pairs)
     json["pairs"].push_back({{"camera", pair.camera},
                              {"projector", pair.projector},
                              {"angle_deg", number(pair.angle_deg)},
                              {"coverage", number(pair.coverage)}});
-  for (const ForeseenMarker& marker : foreseen.markers)
+  for (const PredictedMarker& marker : predicted_accuracy.markers)
     json["markers"].push_back({{"camera", marker.camera},
                                {"side_px", number(marker.side_px)},
                                {"farthest_px", number(marker.farthest_px)},
@@ -58,22 +58,22 @@ nlohmann::ordered_json json_of(const Foreseen& foreseen) {
 
 }  // namespace
 
-std::string design_json(const Foreseen& foreseen) { return json_of(foreseen).dump(2); }
+std::string design_json(const PredictedAccuracy& predicted_accuracy) { return json_of(predicted_accuracy).dump(2); }
 
-std::string design_table(const Foreseen& foreseen, const Described& described) {
+std::string design_table(const PredictedAccuracy& predicted_accuracy, const DescribedRig& described) {
   std::string out;
   out += fmt::format("{:<14} {:>8} {:>9} {:>14} {:>7} {:>9} {:>7}\n", "", "away, m", "pixel, mm",
                      "on surface, mm", "steep", "coverage", "lux");
-  for (const auto* imagers : {&foreseen.cameras, &foreseen.projectors}) {
-    for (const ForeseenImager& imager : *imagers)
+  for (const auto* imagers : {&predicted_accuracy.cameras, &predicted_accuracy.projectors}) {
+    for (const PredictedImager& imager : *imagers)
       out += fmt::format("{:<14} {:>8.2f} {:>9.2f} {:>14.2f} {:>5.0f} ° {:>7.0f} %{}\n", imager.name,
                          imager.distance_m, imager.pixel_mm, imager.surface_mm, imager.steep_deg,
                          100 * imager.coverage, imager.lux > 0 ? fmt::format(" {:>7.0f}", imager.lux) : "");
   }
-  for (const ForeseenPair& pair : foreseen.pairs)
+  for (const PredictedPair& pair : predicted_accuracy.pairs)
     out += fmt::format("{} and {}: {:.0f} degrees apart, both reach {:.0f} % of the volume\n", pair.camera,
                        pair.projector, pair.angle_deg, 100 * pair.coverage);
-  for (const ForeseenMarker& marker : foreseen.markers)
+  for (const PredictedMarker& marker : predicted_accuracy.markers)
     out += fmt::format(
         "{}: a {:g} mm marker is {:.0f} px ({:.0f} at the far end), placed within {:.2f} mm across the view "
         "and "
@@ -81,14 +81,14 @@ std::string design_table(const Foreseen& foreseen, const Described& described) {
         marker.camera, 1000 * described.marker_m, marker.side_px, marker.farthest_px, marker.across_mm,
         marker.along_mm);
   out += fmt::format("{} and a projector at least reach {:.0f} % of the volume\n",
-                     described.rig.cameras.front().name, 100 * foreseen.coverage);
-  for (std::size_t i = 0; i < foreseen.error_mm.size(); ++i)
+                     described.rig.cameras.front().name, 100 * predicted_accuracy.coverage);
+  for (std::size_t i = 0; i < predicted_accuracy.error_mm.size(); ++i)
     out += fmt::format(
         "{}: light lands within {:.2f} mm (95 %; calibration {:.2f}, measuring the prototype {:.2f})\n",
-        described.rig.projectors[i].name, foreseen.error_mm[i], foreseen.calibration_mm[i],
-        foreseen.measuring_mm[i]);
-  for (const std::string& sentence : foreseen.advice) out += fmt::format("advice: {}\n", sentence);
-  if (foreseen.advice.empty())
+        described.rig.projectors[i].name, predicted_accuracy.error_mm[i], predicted_accuracy.calibration_mm[i],
+        predicted_accuracy.measuring_mm[i]);
+  for (const std::string& sentence : predicted_accuracy.advice) out += fmt::format("advice: {}\n", sentence);
+  if (predicted_accuracy.advice.empty())
     out += fmt::format("nothing is too small, too far, too steep or out of reach\n");
   return out;
 }

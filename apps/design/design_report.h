@@ -7,9 +7,9 @@
 namespace limn::apps {
 
 /// What `limn plan` prints: the table.
-std::string design_table(const Foreseen& foreseen, const Described& described);
+std::string design_table(const PredictedAccuracy& predicted_accuracy, const DescribedRig& described);
 
 /// The same as JSON (plan.json), without a newline at its end.
-std::string design_json(const Foreseen& foreseen);
+std::string design_json(const PredictedAccuracy& predicted_accuracy);
 
 }  // namespace limn::apps

@@ -61,7 +61,7 @@ Imager imager_of(const ConfigNode& node, const Vector3d& p_centre) {
   return imager;
 }
 
-void read_noise(const ConfigNode& root, Described* described) {
+void read_noise(const ConfigNode& root, DescribedRig* described) {
   const auto noise = root.find("noise");
   if (!noise) return;
   noise->only({"corner_px", "match_px", "marker_px"});
@@ -72,12 +72,12 @@ void read_noise(const ConfigNode& root, Described* described) {
 
 }  // namespace
 
-Result<Described> load_described(const std::filesystem::path& path) {
+Result<DescribedRig> load_described(const std::filesystem::path& path) {
   LIMN_TRY(const Config config, Config::load(path, "limn.described/1"));
   const ConfigNode root = config.root();
   root.only(
       {"schema", "volume", "board", "poses", "noise", "marker_mm", "room_lux", "cameras", "projectors"});
-  Described described;
+  DescribedRig described;
   const ConfigNode volume = root.at("volume");
   volume.only({"centre_m", "size_m", "front"});
   described.p_centre = volume.at("centre_m").vector3();

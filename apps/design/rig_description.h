@@ -11,7 +11,7 @@
 namespace limn::apps {
 
 /// A rig that is thought of, not bought: a limn.described/1 file (config/README.md).
-struct Described {
+struct DescribedRig {
   Rig rig;  ///< lenses without distortion; world: metres, z up
   Eigen::Vector3d p_centre = Eigen::Vector3d::Zero(), size_m = Eigen::Vector3d::Zero();  ///< working volume
   Eigen::Vector3d d_front = -Eigen::Vector3d::UnitY();  ///< where the prototype's lit side looks
@@ -20,13 +20,13 @@ struct Described {
   calib::Board board;
   int poses = 12;  ///< placements of the board
   double corner_px =
-      0.08;  ///< noise of a board corner in a camera's picture, standard deviation of a coordinate
+      0.08;  ///< noise of a board corner in a camera's image, standard deviation of a coordinate
   double match_px = 0.05;  ///< of a decoded place on a projector's panel
   double marker_m = 0.04;  ///< side of a designer's marker
   double marker_px = 0.1;  ///< noise of its corners
 };
 
 /// Errors name the file and the key.
-Result<Described> load_described(const std::filesystem::path& path);
+Result<DescribedRig> load_described(const std::filesystem::path& path);
 
 }  // namespace limn::apps

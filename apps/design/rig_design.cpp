@@ -13,7 +13,7 @@
 #include "apps/design/simulated_observations.h"
 #include "apps/design/volume_points.h"
 #include "calib/judge/assess.h"
-#include "calib/judge/propagate.h"
+#include "calib/judge/uncertainty.h"
 #include "calib/solve.h"
 #include "tracker/pose_fit.h"
 
@@ -28,15 +28,15 @@ const std::array<Vector2d, 4> k_corners = {
     Vector2d(-1, -1), {1, -1}, {1, 1}, {-1, 1}};  // of a marker, halves of its side
 
 // The cosine between an imager's ray to a point and the lit side's normal; 0 when it looks away.
-double facing(const Described& described, const Imager& imager, const Vector3d& p_world) {
+double facing(const DescribedRig& described, const Imager& imager, const Vector3d& p_world) {
   return std::max(0.0, described.d_front.dot((eye_of(imager) - p_world).normalized()));
 }
 
-ForeseenImager imager_foreseen(const Described& described,
+PredictedImager imager_foreseen(const DescribedRig& described,
                                const Imager& imager,
                                double lumens,
                                const std::vector<Vector3d>& points) {
-  ForeseenImager out{.name = imager.name};
+  PredictedImager out{.name = imager.name};
   const Vector3d p_imager = imager.imager_from_world * described.p_centre;
   const double cosine = facing(described, imager, described.p_centre);
   out.distance_m = p_imager.norm();
@@ -44,13 +44,13 @@ ForeseenImager imager_foreseen(const Described& described,
   out.surface_mm = cosine > 0 ? out.pixel_mm / cosine : std::numeric_limits<double>::infinity();
   out.steep_deg = std::acos(cosine) / k_degree;
   out.coverage = share_reached(points, [&](const Vector3d& p) { return reaches(imager, p); });
-  const double picture_m2 = 1e-6 * out.pixel_mm * out.pixel_mm * imager.width * imager.height;
-  out.lux = lumens / picture_m2 * cosine;
+  const double image_m2 = 1e-6 * out.pixel_mm * out.pixel_mm * imager.width * imager.height;
+  out.lux = lumens / image_m2 * cosine;
   return out;
 }
 
-std::vector<ForeseenPair> pairs_of(const Described& described, const std::vector<Vector3d>& points) {
-  std::vector<ForeseenPair> pairs;
+std::vector<PredictedPair> pairs_of(const DescribedRig& described, const std::vector<Vector3d>& points) {
+  std::vector<PredictedPair> pairs;
   for (const Imager& camera : described.rig.cameras) {
     for (const Imager& projector : described.rig.projectors) {
       const Vector3d to_camera = (eye_of(camera) - described.p_centre).normalized();
@@ -65,8 +65,8 @@ std::vector<ForeseenPair> pairs_of(const Described& described, const std::vector
   return pairs;
 }
 
-// Where a marker's corners come to lie in the picture: on the lit side, upright.
-std::optional<std::array<Vector2d, 4>> corners_of(const Described& described,
+// Where a marker's corners come to lie in the image: on the lit side, upright.
+std::optional<std::array<Vector2d, 4>> corners_of(const DescribedRig& described,
                                                   const Imager& camera,
                                                   const Pose& world_from_marker) {
   const double half = described.marker_m / 2;
@@ -80,7 +80,7 @@ std::optional<std::array<Vector2d, 4>> corners_of(const Described& described,
   return corners;
 }
 
-Pose marker_at(const Described& described, const Vector3d& p_world) {
+Pose marker_at(const DescribedRig& described, const Vector3d& p_world) {
   const Pose facing = upright_looking_at(p_world + described.d_front, p_world);
   return Pose(facing.inverse().rotation, p_world);
 }
@@ -94,7 +94,7 @@ double side_px(const std::array<Vector2d, 4>& corners) {
 }
 
 // By the covariance that the tracker itself gives a marker's pose. nullopt: the camera does not see it.
-std::optional<ForeseenMarker> marker_of(const Described& described,
+std::optional<PredictedMarker> marker_of(const DescribedRig& described,
                                         const Imager& camera,
                                         const std::vector<Vector3d>& points) {
   const Pose world_from_marker = marker_at(described, described.p_centre);
@@ -102,7 +102,7 @@ std::optional<ForeseenMarker> marker_of(const Described& described,
   if (!corners || !reaches(camera, described.p_centre) || facing(described, camera, described.p_centre) <= 0)
     return std::nullopt;
   const double half = described.marker_m / 2;
-  std::vector<tracker::PointSight> sights;
+  std::vector<tracker::PointObservation> sights;
   for (std::size_t i = 0; i < 4; ++i)
     sights.push_back({&camera.lens, camera.imager_from_world,
                       Vector3d(k_corners[i].x() * half, k_corners[i].y() * half, 0), (*corners)[i],
@@ -119,7 +119,7 @@ std::optional<ForeseenMarker> marker_of(const Described& described,
         return (a - eye_of(camera)).squaredNorm() < (b - eye_of(camera)).squaredNorm();
       });
   const auto farthest = corners_of(described, camera, marker_at(described, p_farthest));
-  return ForeseenMarker{.camera = camera.name,
+  return PredictedMarker{.camera = camera.name,
                         .side_px = side_px(*corners),
                         .farthest_px = farthest ? side_px(*farthest) : 0,
                         .across_mm = 1000 * calib::p95_of({&across, 1}),
@@ -128,36 +128,36 @@ std::optional<ForeseenMarker> marker_of(const Described& described,
 
 }  // namespace
 
-Result<Foreseen> foresee(const Described& described) {
+Result<PredictedAccuracy> predict_accuracy(const DescribedRig& described) {
   const std::vector<Vector3d> points = volume_points(described);
-  Foreseen foreseen;
-  foreseen.pairs = pairs_of(described, points);
-  foreseen.coverage = share_reached(points, [&](const Vector3d& p) {
+  PredictedAccuracy predicted_accuracy;
+  predicted_accuracy.pairs = pairs_of(described, points);
+  predicted_accuracy.coverage = share_reached(points, [&](const Vector3d& p) {
     return reaches(described.rig.cameras.front(), p) &&
            std::any_of(described.rig.projectors.begin(), described.rig.projectors.end(),
                        [&](const Imager& projector) { return reaches(projector, p); });
   });
   for (const Imager& camera : described.rig.cameras) {
-    foreseen.cameras.push_back(imager_foreseen(described, camera, 0, points));
-    if (const auto marker = marker_of(described, camera, points)) foreseen.markers.push_back(*marker);
+    predicted_accuracy.cameras.push_back(imager_foreseen(described, camera, 0, points));
+    if (const auto marker = marker_of(described, camera, points)) predicted_accuracy.markers.push_back(*marker);
   }
   for (std::size_t i = 0; i < described.rig.projectors.size(); ++i)
-    foreseen.projectors.push_back(
+    predicted_accuracy.projectors.push_back(
         imager_foreseen(described, described.rig.projectors[i], described.lumens[i], points));
   calib::Observed observed;
   observed.observations = simulated_observations(described);
   LIMN_TRY(const calib::Solution solution, calib::solve(observed.observations));
   LIMN_TRY(const calib::Assessment assessment, calib::assess(observed, {}, solution));
-  foreseen.error_mm = assessment.predicted_error_mm;
-  calib::Uncertainty believed = calib::believed(observed.observations, solution, assessment.held_out.rigs);
+  predicted_accuracy.error_mm = assessment.predicted_error_mm;
+  calib::Uncertainty believed = calib::estimated_uncertainty(observed.observations, solution, assessment.held_out.rigs);
   const double measured_px = believed.measured_px;
   believed.measured_px = 0;
-  foreseen.calibration_mm = calib::propagated_error_mm(observed.observations, solution, believed);
+  predicted_accuracy.calibration_mm = calib::propagated_error_mm(observed.observations, solution, believed);
   believed.covariance.setZero();
   believed.measured_px = measured_px;
-  foreseen.measuring_mm = calib::propagated_error_mm(observed.observations, solution, believed);
-  foreseen.advice = design_advice(foreseen, described);
-  return foreseen;
+  predicted_accuracy.measuring_mm = calib::propagated_error_mm(observed.observations, solution, believed);
+  predicted_accuracy.advice = design_advice(predicted_accuracy, described);
+  return predicted_accuracy;
 }
 
 }  // namespace limn::apps

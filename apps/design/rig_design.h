@@ -9,7 +9,7 @@
 namespace limn::apps {
 
 /// An imager and the prototype's lit side in the middle of the volume.
-struct ForeseenImager {
+struct PredictedImager {
   std::string name;
   double distance_m = 0;
   double pixel_mm = 0;    ///< of a surface that faces it
@@ -20,14 +20,14 @@ struct ForeseenImager {
 };
 
 /// A camera and a projector together.
-struct ForeseenPair {
+struct PredictedPair {
   std::string camera, projector;
   double angle_deg = 0;  ///< between their rays in the middle of the volume
   double coverage = 0;   ///< share of the volume that both reach
 };
 
 /// A camera and a designer's marker on the lit side, in the middle of the volume: 95 % errors of its place.
-struct ForeseenMarker {
+struct PredictedMarker {
   std::string camera;
   double side_px = 0;      ///< across its steeper direction
   double farthest_px = 0;  ///< likewise, at the farthest corner of the volume
@@ -35,10 +35,10 @@ struct ForeseenMarker {
   double along_mm = 0;     ///< along the view
 };
 
-struct Foreseen {
-  std::vector<ForeseenImager> cameras, projectors;
-  std::vector<ForeseenPair> pairs;
-  std::vector<ForeseenMarker> markers;  ///< of the cameras that see one
+struct PredictedAccuracy {
+  std::vector<PredictedImager> cameras, projectors;
+  std::vector<PredictedPair> pairs;
+  std::vector<PredictedMarker> markers;  ///< of the cameras that see one
   /// For each projector: 95 % error of its light on the surface as a calibration would state it
   /// (report.json's predicted_error_mm); infinite where nothing is known. Of that, the calibration's part,
   /// and that of measuring where the prototype stands.
@@ -51,6 +51,6 @@ struct Foreseen {
 /// them with normal noise, `calib::solve` and `calib::assess` on that. Room light, defocus, a bending board
 /// and a lens that its model does not hold are not in it. The same file gives the same numbers. Errors: no
 /// solve, with what the solve says.
-Result<Foreseen> foresee(const Described& described);
+Result<PredictedAccuracy> predict_accuracy(const DescribedRig& described);
 
 }  // namespace limn::apps

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "apps/design/sight_lines.h"
-#include "calib/predict.h"
+#include "calib/measurement_model.h"
 
 namespace limn::apps {
 namespace {
@@ -33,7 +33,7 @@ double spread(int i, int base) {
 }
 
 // The board all over the volume, facing the middle of all devices, tilted in turn to all sides.
-std::vector<Pose> board_places(const Described& described) {
+std::vector<Pose> board_places(const DescribedRig& described) {
   Vector3d p_devices = Vector3d::Zero();
   for (const Imager& camera : described.rig.cameras) p_devices += eye_of(camera);
   for (const Imager& projector : described.rig.projectors) p_devices += eye_of(projector);
@@ -64,7 +64,7 @@ calib::ImagerView view(const Imager& imager) {
 }
 
 // What one camera and the projectors would find on the board in one place.
-void observe_place(const Described& described,
+void observe_place(const DescribedRig& described,
                    int pose,
                    int camera_index,
                    const Pose& world_from_board,
@@ -75,14 +75,14 @@ void observe_place(const Described& described,
   const calib::BoardShape shape{board.width_m(), board.height_m()};
   std::normal_distribution<double> scatter(0, 1);
   const auto noise = [&](double px) { return Vector2d(px * scatter(*rng), px * scatter(*rng)); };
-  const auto picture_of = [&](const Vector3d& p_board) -> std::optional<Vector2d> {
+  const auto image_of = [&](const Vector3d& p_board) -> std::optional<Vector2d> {
     const Vector3d p_world = world_from_board * p_board;
     if (!faces(camera, world_from_board, p_world) || !reaches(camera, p_world)) return std::nullopt;
     return camera.project(p_world);
   };
-  std::vector<calib::CornerSeen> corners;
+  std::vector<calib::CornerObservation> corners;
   for (int id = 0; id < board.corner_count(); ++id) {
-    if (const auto px = picture_of(board.p_corner(id)))
+    if (const auto px = image_of(board.p_corner(id)))
       corners.push_back({camera_index, pose, id, *px + noise(described.corner_px), described.corner_px});
   }
   if (corners.size() < k_least_corners) return;
@@ -92,7 +92,7 @@ void observe_place(const Described& described,
     for (int cell = 0; cell < 4 * board.columns * board.rows; ++cell) {  // half squares
       const Vector3d p_board((cell % (2 * board.columns) + 0.5) * board.square_m / 2,
                              (cell / (2 * board.columns) + 0.5) * board.square_m / 2, 0);
-      const auto px = picture_of(p_board);
+      const auto px = image_of(p_board);
       if (!px || !faces(projector, world_from_board, world_from_board * p_board)) continue;
       Vector2d px_projector;
       if (calib::predict_match(view(camera), view(projector), world_from_board, shape, Vector2d::Zero(), *px,
@@ -106,7 +106,7 @@ void observe_place(const Described& described,
 
 }  // namespace
 
-calib::Observations simulated_observations(const Described& described) {
+calib::Observations simulated_observations(const DescribedRig& described) {
   calib::Observations seen;
   seen.board = described.board;
   for (const Imager& camera : described.rig.cameras)

@@ -9,7 +9,7 @@
 namespace limn::apps {
 
 /// A grid of points all over the working volume, world frame.
-std::vector<Eigen::Vector3d> volume_points(const Described& described);
+std::vector<Eigen::Vector3d> volume_points(const DescribedRig& described);
 
 /// Share of the points for which `reached` says true.
 template <class Reached>

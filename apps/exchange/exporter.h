@@ -8,7 +8,7 @@
 #include "apps/exchange/projector_maps.h"
 #include "core/result.h"
 #include "core/rig.h"
-#include "scene/posed.h"
+#include "scene/posed_scene.h"
 #include "scene/scene.h"
 
 namespace limn::apps {

@@ -11,9 +11,9 @@
 
 namespace limn::apps {
 
-std::string exr_bytes(const cv::Mat& picture, const std::string& comment) {
-  LIMN_CHECK(picture.type() == CV_32FC3);
-  Imf::Header header(picture.cols, picture.rows);
+std::string exr_bytes(const cv::Mat& image, const std::string& comment) {
+  LIMN_CHECK(image.type() == CV_32FC3);
+  Imf::Header header(image.cols, image.rows);
   header.compression() = Imf::ZIP_COMPRESSION;
   Imf::addComments(header, comment);
   Imf::FrameBuffer channels;
@@ -21,14 +21,14 @@ std::string exr_bytes(const cv::Mat& picture, const std::string& comment) {
   for (std::size_t c = 0; c < 3; ++c) {
     header.channels().insert(names[c], Imf::Channel(Imf::FLOAT));
     channels.insert(names[c],
-                    Imf::Slice(Imf::FLOAT, const_cast<char*>(picture.ptr<char>()) + c * sizeof(float),
-                               picture.elemSize(), picture.step[0]));
+                    Imf::Slice(Imf::FLOAT, const_cast<char*>(image.ptr<char>()) + c * sizeof(float),
+                               image.elemSize(), image.step[0]));
   }
   Imf::StdOSStream stream;
   {
     Imf::OutputFile file(stream, header);
     file.setFrameBuffer(channels);
-    file.writePixels(picture.rows);
+    file.writePixels(image.rows);
   }
   return stream.str();
 }

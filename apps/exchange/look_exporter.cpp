@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "projector/renderer.h"
 
 namespace limn::apps {

@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 
 constexpr double k_degree = std::numbers::pi / 180;
 
-// The frustum's picture by the tangents of its edges, x right, y down.
+// The frustum's image by the tangents of its edges, x right, y down.
 struct Edges {
   double left = 0, right = 0, top = 0, bottom = 0;
 };
@@ -49,7 +49,7 @@ void set_angles(const Matrix3d& r, MpcdiFrustum* frustum) {
   frustum->yaw = (is_upright ? std::atan2(-r(2, 0), r(0, 0)) : std::atan2(r(0, 2), r(2, 2))) / k_degree;
 }
 
-// Around the tangents of the border of the imager's picture.
+// Around the tangents of the border of the imager's image.
 Edges edges_of(const Imager& imager) {
   constexpr double k_most = std::numeric_limits<double>::max();
   Edges edges{k_most, -k_most, k_most, -k_most};

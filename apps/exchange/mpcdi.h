@@ -10,7 +10,7 @@
 
 namespace limn::apps {
 
-/// A pinhole picture by the angles of its edges from the line of sight (degrees; left and down are negative
+/// A pinhole image by the angles of its edges from the line of sight (degrees; left and down are negative
 /// as a rule), turned from its coordinate frame's forward: to the right by yaw, then up by pitch, then the
 /// right side down by roll.
 struct MpcdiFrustum {
@@ -29,11 +29,11 @@ struct MpcdiFrame {
 
 /// A map of blending, 8 or 16 bits, one channel or BGR, of the region's size.
 struct MpcdiBlendMap {
-  cv::Mat picture;
+  cv::Mat image;
   double gamma_embedded = 1;  ///< light = value ^ gamma; of alpha maps only
 };
 
-/// One projector's picture.
+/// One projector's image.
 struct MpcdiRegion {
   std::string id, buffer;
   int width = 0, height = 0;
@@ -41,11 +41,11 @@ struct MpcdiRegion {
   std::optional<MpcdiFrustum> frustum;
   std::optional<MpcdiFrame> frame;
   /// CV_32FC3, a node for every pixel or for a coarser grid; NaN where there is none. Points (m) of profiles
-  /// a3 and sl; else the place (x right, y down, 0 … 1) in the frustum's or the buffer's picture.
+  /// a3 and sl; else the place (x right, y down, 0 … 1) in the frustum's or the buffer's image.
   cv::Mat warp;
   std::string origin = "unknown";  ///< of the points: centerOfMass, idealEyePoint, floorCenter, unknown
   std::optional<MpcdiBlendMap> alpha, beta;
-  /// CV_32FC3: the place (x right, y down, 0 … 1) in the frustum's picture of what each pixel shows: the
+  /// CV_32FC3: the place (x right, y down, 0 … 1) in the frustum's image of what each pixel shows: the
   /// lens.
   cv::Mat distortion;
   std::optional<Lens> lens;     ///< by Limn's own extension
@@ -64,7 +64,7 @@ struct Mpcdi {
   std::vector<std::string> remarks;  ///< of a reader: what was passed over
 };
 
-/// The pinhole frustum around everything that an imager's picture holds, and its frame, in `world`
+/// The pinhole frustum around everything that an imager's image holds, and its frame, in `world`
 /// coordinates of which `axes` says what is right, down and forward (p_eye is not used).
 void place_frustum(const Imager& imager, const MpcdiFrame& axes, MpcdiRegion* region);
 

@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "apps/exchange/mpcdi_writer.h"
-#include "core/response.h"
+#include "core/photometric_response.h"
 
 namespace limn::apps {
 namespace {
@@ -32,7 +32,7 @@ MpcdiBlendMap alpha_map(const cv::Mat& blend, double gamma, int bits) {
 }
 
 // The display values that give the lift, BGR: what must at least be shown so that black is even.
-MpcdiBlendMap beta_map(const cv::Mat& blend, const Response* response, int bits) {
+MpcdiBlendMap beta_map(const cv::Mat& blend, const ProjectorResponse* response, int bits) {
   const double black = response && response->black_level ? response->black_level->value : 0;
   cv::Mat values(blend.size(), CV_32FC3, cv::Scalar::all(0));
   for (int row = 0; row < blend.rows; ++row) {
@@ -43,14 +43,14 @@ MpcdiBlendMap beta_map(const cv::Mat& blend, const Response* response, int bits)
       const double light = black + (1 - black) * lift;
       for (int c = 0; c < 3; ++c) {
         const auto& table = c == 0 ? response->blue : c == 1 ? response->green : response->red;
-        value[c] = static_cast<float>(inverse_looked_up(table, light));
+        value[c] = static_cast<float>(inverse_lookup(table, light));
       }
     }
   }
   return {as_levels(values, bits), 1};
 }
 
-// CV_32FC3: the place (x right, y down, 0 … 1) of each point in the viewer's picture; NaN outside.
+// CV_32FC3: the place (x right, y down, 0 … 1) of each point in the viewer's image; NaN outside.
 cv::Mat places_for(const Imager& viewer, const Pose& viewer_from_prototype, const cv::Mat& points) {
   cv::Mat places(points.size(), CV_32FC3, cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()));
   for (int row = 0; row < points.rows; ++row) {
@@ -66,8 +66,8 @@ cv::Mat places_for(const Imager& viewer, const Pose& viewer_from_prototype, cons
   return places;
 }
 
-const Response* find_response(const Rig& rig, const std::string& projector) {
-  for (const Response& response : rig.responses)
+const ProjectorResponse* find_response(const Rig& rig, const std::string& projector) {
+  for (const ProjectorResponse& response : rig.responses)
     if (response.projector == projector) return &response;
   return nullptr;
 }
@@ -93,7 +93,7 @@ Mpcdi mpcdi_of(const ExportJob& job, const ExportOptions& options) {
     region.warp = job.maps[i].points;
     region.alpha = alpha_map(job.maps[i].blend, options.gamma, options.bits);
     if (has_lift) {
-      cv::cvtColor(region.alpha->picture, region.alpha->picture,
+      cv::cvtColor(region.alpha->image, region.alpha->image,
                    cv::COLOR_GRAY2BGR);  // as colour level 2 asks
       region.beta = beta_map(job.maps[i].blend, find_response(job.rig, projector.name), options.bits);
     }

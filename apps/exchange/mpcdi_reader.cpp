@@ -158,21 +158,21 @@ Result<cv::Mat> read_png(const std::string& bytes, const cv::Size& wanted, const
     return error("{}: expected the region's size {}x{}, found {}x{}. Export it again.", where, wanted.width,
                  wanted.height, size->width, size->height);
   }
-  cv::Mat picture;
+  cv::Mat image;
   if (bytes.rfind("IEND") != std::string::npos) {
     const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
     try {
-      picture = cv::imdecode(encoded, cv::IMREAD_UNCHANGED);
+      image = cv::imdecode(encoded, cv::IMREAD_UNCHANGED);
     } catch (const cv::Exception&) {
-      picture.release();
+      image.release();
     }
   }
-  if (picture.empty())
+  if (image.empty())
     return error("{}: expected a whole PNG picture, found a truncated or damaged one. Export it again.",
                  where);
-  if (picture.channels() != 1 && picture.channels() != 3)
-    return error("{}: expected a grey or RGB picture, found {} channels.", where, picture.channels());
-  return picture;
+  if (image.channels() != 1 && image.channels() != 3)
+    return error("{}: expected a grey or RGB picture, found {} channels.", where, image.channels());
+  return image;
 }
 
 // The XML document and, in an archive, what it names.
@@ -355,12 +355,12 @@ Result<MpcdiBlendMap> Reader::read_blend_map(const xml_node& map,
   const std::size_t pixels = static_cast<std::size_t>(region.width) * static_cast<std::size_t>(region.height);
   if (pixels > static_cast<std::size_t>(k_most_pixels))
     return error("{}: expected at most {} pixels, found {}.", where, k_most_pixels, pixels);
-  LIMN_TRY(out.picture, read_png(bytes, cv::Size(region.width, region.height), where));
-  unpacked_ += pixels * out.picture.elemSize();
+  LIMN_TRY(out.image, read_png(bytes, cv::Size(region.width, region.height), where));
+  unpacked_ += pixels * out.image.elemSize();
   if (unpacked_ > k_most_map_bytes)
     return error("{}: expected at most {} bytes of maps, found more.", where_, k_most_map_bytes);
   const int bits = child_of(map, "bitDepth").text().as_int(0);
-  const int found = out.picture.depth() == CV_16U ? 16 : 8;
+  const int found = out.image.depth() == CV_16U ? 16 : 8;
   if (bits != 0 && bits != found)
     out_.remarks.push_back(fmt::format("{}: bitDepth says {}, the picture has {}", where, bits, found));
   return out;

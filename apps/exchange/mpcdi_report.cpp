@@ -27,13 +27,13 @@ ordered_json report_of(const cv::Mat& warp, bool has_points) {
 }
 
 ordered_json report_of(const MpcdiBlendMap& map, bool is_alpha) {
-  ordered_json json = {{"size", size_of(map.picture)},
-                       {"bits", map.picture.depth() == CV_16U ? 16 : 8},
-                       {"channels", map.picture.channels()}};
+  ordered_json json = {{"size", size_of(map.image)},
+                       {"bits", map.image.depth() == CV_16U ? 16 : 8},
+                       {"channels", map.image.channels()}};
   if (is_alpha) json["gamma_embedded"] = map.gamma_embedded;
   double least = 0, most = 0;
-  cv::minMaxIdx(map.picture.reshape(1), &least, &most);
-  const double full = map.picture.depth() == CV_16U ? 65535 : 255;
+  cv::minMaxIdx(map.image.reshape(1), &least, &most);
+  const double full = map.image.depth() == CV_16U ? 65535 : 255;
   json["range"] = {least / full, most / full};
   return json;
 }

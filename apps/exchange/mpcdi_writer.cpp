@@ -53,9 +53,9 @@ void add_region(pugi::xml_node buffer, const MpcdiRegion& region) {
   }
 }
 
-ZipFile png_file(const std::string& name, const cv::Mat& picture) {
+ZipFile png_file(const std::string& name, const cv::Mat& image) {
   std::vector<uchar> png;
-  cv::imencode(".png", picture, png);
+  cv::imencode(".png", image, png);
   return {name, std::string(png.begin(), png.end()), true};
 }
 
@@ -65,8 +65,8 @@ void add_blend_map(pugi::xml_node fileset,
                    const MpcdiBlendMap& map) {
   pugi::xml_node node = fileset.append_child(name);
   add(node, "path", path);
-  add(node, "componentDepth", fmt::format("{}", map.picture.channels()));
-  add(node, "bitDepth", map.picture.depth() == CV_16U ? "16" : "8");
+  add(node, "componentDepth", fmt::format("{}", map.image.channels()));
+  add(node, "bitDepth", map.image.depth() == CV_16U ? "16" : "8");
   if (name == std::string("alphaMap")) add(node, "gammaEmbedded", fmt::format("{}", map.gamma_embedded));
 }
 
@@ -91,11 +91,11 @@ void add_fileset(pugi::xml_node parent,
   }
   if (region.alpha) {
     add_blend_map(node, "alphaMap", alpha, *region.alpha);
-    files->push_back(png_file(alpha, region.alpha->picture));
+    files->push_back(png_file(alpha, region.alpha->image));
   }
   if (region.beta) {
     add_blend_map(node, "betaMap", beta, *region.beta);
-    files->push_back(png_file(beta, region.beta->picture));
+    files->push_back(png_file(beta, region.beta->image));
   }
   if (!region.distortion.empty()) {
     add(node.append_child("distortionMap"), "path", distortion);

@@ -35,11 +35,11 @@ void swap_bytes(char* data, std::size_t count) {
 
 }  // namespace
 
-std::string pfm_bytes(const cv::Mat& picture) {
-  LIMN_CHECK(picture.type() == CV_32FC3);
-  std::string bytes = fmt::format("PF\n{} {}\n-1.000000\n", picture.cols, picture.rows);
-  for (int row = picture.rows - 1; row >= 0; --row)
-    bytes.append(picture.ptr<char>(row), static_cast<std::size_t>(picture.cols) * picture.elemSize());
+std::string pfm_bytes(const cv::Mat& image) {
+  LIMN_CHECK(image.type() == CV_32FC3);
+  std::string bytes = fmt::format("PF\n{} {}\n-1.000000\n", image.cols, image.rows);
+  for (int row = image.rows - 1; row >= 0; --row)
+    bytes.append(image.ptr<char>(row), static_cast<std::size_t>(image.cols) * image.elemSize());
   return bytes;
 }
 
@@ -64,13 +64,13 @@ Result<cv::Mat> read_pfm(const std::string& bytes, const std::string& where, std
     return error("{}: expected {} bytes for {}x{} pixels, found {}. Export it again.", where, wanted, *width,
                  *height, text.size());
   }
-  cv::Mat picture(*height, *width, CV_32FC3);
+  cv::Mat image(*height, *width, CV_32FC3);
   const std::size_t row_bytes = wanted / static_cast<std::size_t>(*height);
   for (int row = *height - 1; row >= 0; --row, text.remove_prefix(row_bytes)) {
-    std::memcpy(picture.ptr<char>(row), text.data(), row_bytes);
-    if (*scale > 0) swap_bytes(picture.ptr<char>(row), row_bytes / sizeof(float));
+    std::memcpy(image.ptr<char>(row), text.data(), row_bytes);
+    if (*scale > 0) swap_bytes(image.ptr<char>(row), row_bytes / sizeof(float));
   }
-  return picture;
+  return image;
 }
 
 }  // namespace limn::apps

@@ -4,7 +4,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "projector/renderer.h"
-#include "scene/posed.h"
+#include "scene/posed_scene.h"
 
 namespace limn::apps {
 

@@ -2,7 +2,7 @@
 
 #include <atomic>
 
-#include "apps/live/camera_intake.h"
+#include "apps/live/frame_gate.h"
 #include "apps/live/latest.h"
 #include "core/log.h"
 
@@ -56,14 +56,14 @@ std::optional<Frames> CameraThreads::take(std::chrono::nanoseconds wait) {
 std::size_t CameraThreads::missed() { return shared_->missed.exchange(0); }
 
 void CameraThreads::grab(device::CameraSource* camera, std::size_t number, Shared* shared) try {
-  CameraIntake intake(camera->name(), camera->size(), number, shared->health.get());
+  FrameGate gate(camera->name(), camera->size(), number, shared->health.get());
   while (!shared->is_stopping) {
     Result<Frame> sent = camera->next();
     const bool is_there = sent.ok();
-    std::optional<Frame> frame = intake.taken(std::move(sent), now());
+    std::optional<Frame> frame = gate.taken(std::move(sent), now());
     if (!is_there) std::this_thread::sleep_for(k_retry);
     if (!frame) continue;
-    if (intake.is_of_other_clock()) std::this_thread::sleep_until(frame->captured_at);
+    if (gate.is_of_other_clock()) std::this_thread::sleep_until(frame->captured_at);
     Frames frames;
     frames.emplace(frame->camera, std::move(*frame));
     shared->frames.put(std::move(frames), [shared](const Frames& old, Frames& newest) {

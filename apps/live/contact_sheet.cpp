@@ -5,12 +5,12 @@
 
 #include "apps/page.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 
 namespace limn::apps {
 namespace {
 
-constexpr int k_width = 960;  // of a picture, pixels
+constexpr int k_width = 960;  // of an image, pixels
 
 constexpr const char* k_sheet_style = R"(
 body { margin: 0 auto; max-width: 1320px; padding: 2rem 1.5rem 4rem; background: #14161a; color: #e8e6e1;
@@ -21,12 +21,12 @@ figcaption { margin-top: .5rem; color: #a9a69f; } figcaption b { color: #e8e6e1;
 @media print { body { background: #fff; color: #000; } figcaption, figcaption b { color: #000; } }
 )";
 
-std::string picture_html(const std::filesystem::path& file, const std::string& name) {
-  auto picture = read_picture(file);
-  if (!picture) return "";
-  if (picture->cols > k_width)
-    cv::resize(*picture, *picture, {k_width, picture->rows * k_width / picture->cols}, 0, 0, cv::INTER_AREA);
-  return fmt::format("<img src=\"{}\" alt=\"{}\">", data_uri(*picture), escaped(name));
+std::string image_html(const std::filesystem::path& file, const std::string& name) {
+  auto image = read_image(file);
+  if (!image) return "";
+  if (image->cols > k_width)
+    cv::resize(*image, *image, {k_width, image->rows * k_width / image->cols}, 0, 0, cv::INTER_AREA);
+  return fmt::format("<img src=\"{}\" alt=\"{}\">", data_uri(*image), escaped(name));
 }
 
 }  // namespace
@@ -44,7 +44,7 @@ Status write_contact_sheet(std::span<const scene::Look> looks,
     for (const scene::Look::Part& part : look.parts)
       parts += fmt::format("{}{}: {}", parts.empty() ? "" : ", ", escaped(part.slot), escaped(part.variant));
     html += fmt::format("<figure>{}<figcaption><b>{}</b>{}</figcaption></figure>\n",
-                        picture_html(folder / (look.name + ".png"), look.name), escaped(look.name), parts);
+                        image_html(folder / (look.name + ".png"), look.name), escaped(look.name), parts);
   }
   return write_file(page, html + "</div></html>\n");
 }

@@ -4,12 +4,12 @@
 #include <span>
 
 #include "core/result.h"
-#include "scene/staging.h"
+#include "scene/show_state.h"
 
 namespace limn::apps {
 
-/// A self-contained page of a project's looks for a review: each one's picture (NAME.png in `folder`) and
-/// variants. Looks without a picture are listed without.
+/// A self-contained page of a project's looks for a review: each one's image (NAME.png in `folder`) and
+/// variants. Looks without an image are listed without.
 Status write_contact_sheet(std::span<const scene::Look> looks,
                            const std::filesystem::path& folder,
                            const std::filesystem::path& page);

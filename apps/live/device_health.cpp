@@ -15,7 +15,7 @@ void DeviceHealth::works(std::size_t device) {
   if (!state.works) news_.push_back(state.name + " is back");
   state.works = true;
   state.why.clear();
-  ++state.pictures;
+  ++state.images;
 }
 
 void DeviceHealth::fails(std::size_t device, const std::string& why) {

@@ -12,7 +12,7 @@ struct DeviceState {
   std::string kind;  ///< camera, projector, screen, keys
   bool works = true;
   std::string why = {};      ///< it does not work
-  std::size_t pictures = 0;  ///< taken or shown so far
+  std::size_t images = 0;  ///< taken or shown so far
 };
 
 /// Which devices work. From several threads, but for add().
@@ -21,7 +21,7 @@ class DeviceHealth {
   /// Adds a device; returns what it is called by from then on.
   std::size_t add(DeviceState device);
 
-  /// It took or showed a picture.
+  /// It took or showed an image.
   void works(std::size_t device);
   /// It did not; `why` may be empty.
   void fails(std::size_t device, const std::string& why);

@@ -7,7 +7,7 @@
 
 #include "apps/live/camera_threads.h"
 #include "apps/live/latest.h"
-#include "apps/live/repair.h"
+#include "apps/live/live_recalibration.h"
 #include "apps/live/scene_watch.h"
 #include "apps/live/stopwatch.h"
 #include "core/log.h"
@@ -17,14 +17,14 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr auto k_wait = std::chrono::milliseconds(50);  // for news, before the next picture is painted anyway
+constexpr auto k_wait = std::chrono::milliseconds(50);  // for news, before the next image is painted anyway
 constexpr auto k_errand_wait = std::chrono::milliseconds(10);  // for what a repair wants
-constexpr double k_patience_s = 5;                             // for a picture of a repair
+constexpr double k_patience_s = 5;                             // for an image of a repair
 constexpr double k_longest_exposure_s = 0.1;                   // while a camera's period is not known
 constexpr double k_blend = 0.1;                                // of a new time into the expected one
 
 struct Seen {
-  Watched watched;
+  Percepts watched;
   std::size_t moments = 0;
 };
 
@@ -32,18 +32,18 @@ class DeviceLoop {
  public:
   DeviceLoop(SessionDevices* devices,
              const std::atomic<bool>& is_ended,
-             Watcher* watcher,
+             Perception* perception,
              Session* session,
-             Books* books,
-             OperatorDesk* desk,
+             SessionOutput* output,
+             OperatorConsole* console,
              OscPort* osc,
              Server* server)
       : devices_(devices),
         is_ended_(is_ended),
-        watcher_(watcher),
+        perception_(perception),
         session_(session),
-        books_(books),
-        desk_(desk),
+        output_(output),
+        console_(console),
         osc_(osc),
         server_(server),
         keys_(session->setup().scene),
@@ -61,7 +61,7 @@ class DeviceLoop {
     are_keys_gone_.assign(key_sources_.size(), false);
     for (const DeviceState& missing : devices_->missing) {
       health_->add(missing);
-      books_->telemetry().note(now(), fmt::format("{} is missing: {}", missing.name, missing.why));
+      output_->telemetry().note(now(), fmt::format("{} is missing: {}", missing.name, missing.why));
     }
     for (std::size_t i = 0; i < cameras.size(); ++i)
       if (devices_->cameras[i]) cameras_.add(std::move(devices_->cameras[i]), cameras[i]);
@@ -69,23 +69,23 @@ class DeviceLoop {
   }
 
   ~DeviceLoop() {
-    repair_.reset();
+    recalibration_.reset();
     stop_watching();
   }
 
   // False: the operator ends the session.
   bool step() {
-    if (repair_) go_on_repairing();
-    if (repair_ && repair_->is_capturing()) {  // the light is its own
+    if (recalibration_) continue_recalibration();
+    if (recalibration_ && recalibration_->is_capturing()) {  // the light is its own
       hear_people();
-      return serve_desk({});
+      return serve_console({});
     }
     if (auto seen = seen_.take(k_wait)) session_->take(std::move(seen->watched), seen->moments);
     session_->show_news(&files_, now());
     hear_people();
-    if (session_->takes_repair()) begin_repair();
+    if (session_->take_recalibration_request()) begin_recalibration();
     const Stamp painting_at = now();
-    const Painted& painted = session_->paint(painting_at, shifted(painting_at, paint_s_ + display_s_));
+    const ComposedFrame& painted = session_->paint(painting_at, shifted(painting_at, paint_s_ + display_s_));
     ShownFrame shown = session_->measured();
     paint_s_ += k_blend * (1e-3 * shown.paint_ms - paint_s_);
     show(painted);
@@ -93,38 +93,38 @@ class DeviceLoop {
     if (server_) serve();  // what came while it painted need not wait for screens and news
     shown.missed = static_cast<int>(cameras_.missed());
     const Stamp begun = now();
-    const std::map<scene::Screen, cv::Mat> pictures = screen_pictures();
-    shown.screen_ms = pictures.empty() ? -1 : milliseconds_since(begun);
-    show_screens(pictures);
+    const std::map<scene::Screen, cv::Mat> images = screen_images();
+    shown.screen_ms = images.empty() ? -1 : milliseconds_since(begun);
+    show_screens(images);
     session_->look_for_drift(painting_at);
     if (session_->watched().captured_at != Stamp{}) {  // something was seen
-      books_->shown(shown, painted);
-      if (desk_) desk_->shown(shown);
+      output_->shown(shown, painted);
+      if (console_) console_->shown(shown);
     }
-    const auto screen = pictures.find(session_->staging().screen);
-    return serve_desk(screen == pictures.end() ? cv::Mat() : screen->second);
+    const auto screen = images.find(session_->show_state().screen);
+    return serve_console(screen == images.end() ? cv::Mat() : screen->second);
   }
 
  private:
   void hear_people() {
     hear_keys();
-    if (osc_) osc_->hear(session_, &books_->telemetry(), now());
+    if (osc_) osc_->hear(session_, &output_->telemetry(), now());
     if (server_) serve();
   }
 
   // False: the operator ends the session.
-  bool serve_desk(const cv::Mat& screen) {
+  bool serve_console(const cv::Mat& screen) {
     for (const std::string& what : health_->news()) {
-      books_->telemetry().note(now(), what);
+      output_->telemetry().note(now(), what);
       log_warning("live: {}", what);
     }
-    return !desk_ || desk_->serve(session_, &books_->telemetry(), *health_, screen, now());
+    return !console_ || console_->serve(session_, &output_->telemetry(), *health_, screen, now());
   }
 
   void hear_keys() {
-    Keys& keys = desk_ ? desk_->keys() : keys_;
+    Keys& keys = console_ ? console_->keys() : keys_;
     for (std::size_t i = 0; i < devices_->keys.size(); ++i) {
-      const auto pressed = devices_->keys[i].pressed();
+      const auto pressed = devices_->keys[i].poll_pressed_keys();
       if (static_cast<bool>(pressed) == are_keys_gone_[i])  // it went, or it came back
         pressed ? health_->works(key_sources_[i]) : health_->fails(key_sources_[i], pressed.message());
       are_keys_gone_[i] = !pressed;
@@ -133,7 +133,7 @@ class DeviceLoop {
         const auto edit = keys.edit_of(key);
         const Status done = edit ? session_->edit(*edit, devices_->keys[i].name(), now()) : Status();
         if (done) continue;
-        books_->telemetry().note(now(), done.message());
+        output_->telemetry().note(now(), done.message());
         log_warning("live: {}", done.message());
       }
     }
@@ -141,7 +141,7 @@ class DeviceLoop {
 
   void serve() {
     server_->hear(session_, now());
-    server_->tell(*session_, books_->telemetry(), *health_, now());
+    server_->tell(*session_, output_->telemetry(), *health_, now());
   }
 
   void start_watching() {
@@ -160,43 +160,43 @@ class DeviceLoop {
     if (auto seen = seen_.take({})) session_->take(std::move(seen->watched), seen->moments);
   }
 
-  // Nobody watches while it captures: the cameras' pictures are of patterns.
-  void begin_repair() {
-    if (repair_) return;
-    const auto folder = repair_folder(books_->out());
+  // Nobody watches while it captures: the cameras' images are of patterns.
+  void begin_recalibration() {
+    if (recalibration_) return;
+    const auto folder = recalibration_folder(output_->out());
     if (!folder) return session_->warn(now(), folder.message());
     pause_watching();
-    repair_ = std::make_unique<Repair>(session_->setup().rig, *folder,
-                                       [this](PictureWriter* writer) { return surroundings(writer); });
+    recalibration_ = std::make_unique<LiveRecalibration>(session_->setup().rig, *folder,
+                                       [this](ImageWriter* writer) { return surroundings(writer); });
   }
 
-  void go_on_repairing() {
-    if (repair_->is_capturing()) repair_->serve(k_errand_wait);
-    session_->note_repair(repair_->words());
-    const auto checked = repair_->take();
+  void continue_recalibration() {
+    if (recalibration_->is_capturing()) recalibration_->serve(k_errand_wait);
+    session_->set_recalibration_progress(recalibration_->words());
+    const auto checked = recalibration_->take();
     if (!checked) {
-      if (!repair_->is_capturing() && !watching_.joinable()) start_watching();
+      if (!recalibration_->is_capturing() && !watching_.joinable()) start_watching();
       return;
     }
     pause_watching();
-    go_on_mended(*checked, repair_->folder(), now(), watcher_, session_);
-    repair_.reset();
+    apply_recalibration(*checked, recalibration_->folder(), now(), perception_, session_);
+    recalibration_.reset();
     start_watching();
   }
 
   // The session's devices as a repair wants them.
-  Surroundings surroundings(PictureWriter* writer) {
+  Surroundings surroundings(ImageWriter* writer) {
     grabbed_.clear();
     latency_s_.assign(devices_->projectors.size(), FlashOptions().limit_s);
     Surroundings around;
-    around.stage.show = [this](int projector, const cv::Mat& picture) {
-      return show_pattern(static_cast<std::size_t>(projector), picture);
+    around.stage.show = [this](int projector, const cv::Mat& image) {
+      return show_pattern(static_cast<std::size_t>(projector), image);
     };
     around.stage.grab = [this](int camera) {
       return grab(session_->setup().rig.cameras.at(static_cast<std::size_t>(camera)).name);
     };
-    around.stage.store = [writer](const std::filesystem::path& path, const cv::Mat& picture) {
-      return writer->store(path, picture);
+    around.stage.store = [writer](const std::filesystem::path& path, const cv::Mat& image) {
+      return writer->store(path, image);
     };
     around.written = [writer] { return writer->finish(); };
     around.use_latency = [this](int projector, double seconds) {
@@ -205,8 +205,8 @@ class DeviceLoop {
     return around;
   }
 
-  // One projector shows a picture, the others nothing.
-  Status show_pattern(std::size_t projector, const cv::Mat& picture) {
+  // One projector shows an image, the others nothing.
+  Status show_pattern(std::size_t projector, const cv::Mat& image) {
     for (std::size_t i = 0; i < devices_->projectors.size(); ++i) {
       device::Display* display = devices_->projectors[i].get();
       if (!display)
@@ -214,13 +214,13 @@ class DeviceLoop {
                      session_->setup().rig.projectors[i].name);
       const Stamp begun = now();
       LIMN_TRY(const Stamp shown_at,
-               display->show(i == projector ? picture : cv::Mat(display->size(), CV_8UC1, cv::Scalar(0))));
+               display->show(i == projector ? image : cv::Mat(display->size(), CV_8UC1, cv::Scalar(0))));
       lit_at_ = std::max({lit_at_, shown_at, shifted(begun, latency_s_[i])});
     }
     return {};
   }
 
-  // A picture whose whole exposure lies after what was shown last: a stamp is of an exposure's middle.
+  // An image whose whole exposure lies after what was shown last: a stamp is of an exposure's middle.
   Result<cv::Mat> grab(const std::string& camera) {
     const Stamp begun = now();
     for (;;) {
@@ -251,8 +251,8 @@ class DeviceLoop {
       for (auto& [name, frame] : *newest) frames.push_back(std::move(frame));
       std::sort(frames.begin(), frames.end(),
                 [](const Frame& a, const Frame& b) { return a.captured_at < b.captured_at; });
-      if (books_->recorder()) books_->recorder()->watched(frames);
-      seen_.put({watcher_->watch(frames), ++moments_}, [](const Seen& old, Seen& next) {
+      if (output_->recorder()) output_->recorder()->watched(frames);
+      seen_.put({perception_->watch(frames), ++moments_}, [](const Seen& old, Seen& next) {
         next.watched.uses.insert(next.watched.uses.begin(), old.watched.uses.begin(), old.watched.uses.end());
       });
     }
@@ -261,7 +261,7 @@ class DeviceLoop {
         fmt::format("the tracker stopped: this is a bug in Limn, please report it: {}", bug.what()));
   }
 
-  void show(const Painted& painted) {
+  void show(const ComposedFrame& painted) {
     double latest_s = 0;
     for (std::size_t i = 0; i < devices_->projectors.size(); ++i) {
       device::Display* display = devices_->projectors[i].get();
@@ -280,35 +280,35 @@ class DeviceLoop {
   }
 
   // Of what screens and the desk show: each choice is painted once.
-  std::map<scene::Screen, cv::Mat> screen_pictures() {
-    const scene::Staging& staging = session_->staging();
+  std::map<scene::Screen, cv::Mat> screen_images() {
+    const scene::ShowState& show_state = session_->show_state();
     std::map<scene::Screen, cv::Mat> out;
     for (const auto& screen : devices_->screens)
-      if (screen) out.try_emplace(scene::shown_on(staging, screen->name()));
-    if (desk_ && desk_->is_due()) out.try_emplace(staging.screen);
-    for (auto& [what, picture] : out) picture = session_->screen(what);
+      if (screen) out.try_emplace(scene::screen_content(show_state, screen->name()));
+    if (console_ && console_->is_due()) out.try_emplace(show_state.screen);
+    for (auto& [what, image] : out) image = session_->screen(what);
     return out;
   }
 
   // `off` is black.
-  void show_screens(const std::map<scene::Screen, cv::Mat>& pictures) {
+  void show_screens(const std::map<scene::Screen, cv::Mat>& images) {
     for (std::size_t i = 0; i < devices_->screens.size(); ++i) {
       device::Display* screen = devices_->screens[i].get();
       if (!screen) continue;
-      const scene::Screen what = scene::shown_on(session_->staging(), screen->name());
-      const cv::Mat& picture = pictures.at(what);
-      if (picture.empty() && what != scene::Screen::off) continue;
+      const scene::Screen what = scene::screen_content(session_->show_state(), screen->name());
+      const cv::Mat& image = images.at(what);
+      if (image.empty() && what != scene::Screen::off) continue;
       const Result<Stamp> shown_at =
-          screen->show(picture.empty() ? cv::Mat(screen->size(), CV_8UC3, cv::Scalar::all(0))
-                                       : fitted(picture, screen->size()));
+          screen->show(image.empty() ? cv::Mat(screen->size(), CV_8UC3, cv::Scalar::all(0))
+                                       : fitted(image, screen->size()));
       shown_at ? health_->works(screens_[i]) : health_->fails(screens_[i], shown_at.message());
     }
   }
 
-  // The picture as large as the screen takes it, with black bars.
-  static cv::Mat fitted(const cv::Mat& picture, cv::Size size);
+  // The image as large as the screen takes it, with black bars.
+  static cv::Mat fitted(const cv::Mat& image, cv::Size size);
 
-  // A camera's newest picture during a repair.
+  // A camera's newest image during a repair.
   struct Grabbed {
     Frame frame;
     double period_s = k_longest_exposure_s;
@@ -316,10 +316,10 @@ class DeviceLoop {
 
   SessionDevices* devices_;
   const std::atomic<bool>& is_ended_;
-  Watcher* watcher_;
+  Perception* perception_;
   Session* session_;
-  Books* books_;
-  OperatorDesk* desk_;
+  SessionOutput* output_;
+  OperatorConsole* console_;
   OscPort* osc_;
   Server* server_;
   Keys keys_;  // where there is no desk
@@ -334,19 +334,19 @@ class DeviceLoop {
   std::size_t moments_ = 0;        // of the watching thread
   Latest<Seen> seen_;
   std::atomic<bool> is_stopping_ = false;
-  double paint_s_ = 0.02, display_s_ = 0.02;  // as expected of the next picture
+  double paint_s_ = 0.02, display_s_ = 0.02;  // as expected of the next image
   std::thread watching_;
-  std::unique_ptr<Repair> repair_;
+  std::unique_ptr<LiveRecalibration> recalibration_;
 };
 
-cv::Mat DeviceLoop::fitted(const cv::Mat& picture, cv::Size size) {
-  const double scale = std::min(1.0 * size.width / picture.cols, 1.0 * size.height / picture.rows);
-  const cv::Size inner(std::max(1, cvRound(scale * picture.cols)),
-                       std::max(1, cvRound(scale * picture.rows)));
-  cv::Mat out(size, picture.type(), cv::Scalar::all(0));
+cv::Mat DeviceLoop::fitted(const cv::Mat& image, cv::Size size) {
+  const double scale = std::min(1.0 * size.width / image.cols, 1.0 * size.height / image.rows);
+  const cv::Size inner(std::max(1, cvRound(scale * image.cols)),
+                       std::max(1, cvRound(scale * image.rows)));
+  cv::Mat out(size, image.type(), cv::Scalar::all(0));
   const cv::Rect place((size.width - inner.width) / 2, (size.height - inner.height) / 2, inner.width,
                        inner.height);
-  cv::resize(picture, out(place), inner, 0, 0, cv::INTER_AREA);
+  cv::resize(image, out(place), inner, 0, 0, cv::INTER_AREA);
   return out;
 }
 
@@ -355,10 +355,10 @@ cv::Mat DeviceLoop::fitted(const cv::Mat& picture, cv::Size size) {
 Status play_on_devices(SessionDevices* devices,
                        double seconds,
                        const std::atomic<bool>& is_ended,
-                       Watcher* watcher,
+                       Perception* perception,
                        Session* session,
-                       Books* books,
-                       OperatorDesk* desk,
+                       SessionOutput* output,
+                       OperatorConsole* console,
                        OscPort* osc,
                        Server* server) {
   const auto any = [](const auto& all) {
@@ -369,7 +369,7 @@ Status play_on_devices(SessionDevices* devices,
   if (!any(devices->projectors))
     return error("live: expected a projector that works, found none. Run limn doctor.");
   const Stamp begun = now();
-  DeviceLoop loop(devices, is_ended, watcher, session, books, desk, osc, server);
+  DeviceLoop loop(devices, is_ended, perception, session, output, console, osc, server);
   while (!is_ended && !(seconds > 0 && seconds_between(begun, now()) >= seconds)) {
     if (!loop.step()) break;
   }

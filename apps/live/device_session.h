@@ -4,12 +4,12 @@
 #include <memory>
 #include <vector>
 
-#include "apps/live/books.h"
+#include "apps/live/session_output.h"
 #include "apps/live/device_health.h"
-#include "apps/live/operator_desk.h"
+#include "apps/live/operator_console.h"
 #include "apps/live/osc_port.h"
 #include "apps/live/session.h"
-#include "apps/live/watcher.h"
+#include "apps/live/perception.h"
 #include "apps/serve/server.h"
 #include "core/result.h"
 #include "device/camera_source.h"
@@ -23,7 +23,7 @@ namespace limn::apps {
 struct SessionDevices {
   std::vector<std::unique_ptr<device::CameraSource>> cameras;  ///< of the rig's names
   std::vector<std::unique_ptr<device::Display>> projectors;    ///< in the rig's order
-  std::vector<std::unique_ptr<device::Display>> screens;       ///< show what Staging::screen says
+  std::vector<std::unique_ptr<device::Display>> screens;       ///< show what ShowState::screen says
   std::vector<device::KeySource> keys = {};
   std::vector<DeviceState> missing = {};  ///< what could not be opened, and why
 };
@@ -32,15 +32,15 @@ struct SessionDevices {
 /// the operator ends it (`desk`, `osc` and `server` may be null); at least a camera and a projector must be
 /// there. A thread for each camera takes its newest frame, one thread watches, this one (its GL context
 /// current) paints and shows. Newest wins, nothing queues: what was not taken in time is dropped and counted.
-/// Devices that fail are told of, once, and tried again. Sources with stamps of their own (pictures, videos)
+/// Devices that fail are told of, once, and tried again. Sources with stamps of their own (images, videos)
 /// are played at their pace.
 Status play_on_devices(SessionDevices* devices,
                        double seconds,
                        const std::atomic<bool>& is_ended,
-                       Watcher* watcher,
+                       Perception* perception,
                        Session* session,
-                       Books* books,
-                       OperatorDesk* desk,
+                       SessionOutput* output,
+                       OperatorConsole* console,
                        OscPort* osc,
                        Server* server);
 

@@ -51,9 +51,9 @@ DriftWatch::DriftWatch(const Rig& rig) : rig_(rig) {
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) lights_.emplace_back(rig, i);
 }
 
-void DriftWatch::look(const Watched& watched,
+void DriftWatch::look(const Percepts& watched,
                       const scene::PosedScene& posed,
-                      const ShownPictures& shown,
+                      const ProjectionHistory& shown,
                       projector::Renderer* renderer) {
   if (!posed.world_from_prototype || lights_.empty()) return;
   const Stamp at = watched.captured_at;
@@ -65,9 +65,9 @@ void DriftWatch::look(const Watched& watched,
   if (!placed_ || is_elsewhere(*placed_, *rests_)) {
     placed_ = rests_;
     for (std::size_t i = 0; i < lights_.size(); ++i)
-      lights_[i].place(renderer->lit_patches(i, posed, lights_[i].side_px()));
+      lights_[i].place(renderer->illuminated_patches(i, posed, lights_[i].side_px()));
   }
-  projector::DisplacedLight& light = lights_[turn_];
+  projector::MisalignmentDetector& light = lights_[turn_];
   if (light.is_looking()) {
     const double passed_s = std::clamp(seconds_between(compared_at_, at), 0.0, k_look_s);
     compared_at_ = at;
@@ -105,7 +105,7 @@ std::optional<Drift> DriftWatch::judged() const {
   std::vector<Candidate> candidates;
   for (const Imager& projector : rig_.projectors) candidates.push_back({projector.name});
   for (std::size_t i = 0; i < lights_.size(); ++i) {
-    const projector::LightPlaces places = lights_[i].places();
+    const projector::LightDisplacements places = lights_[i].places();
     for (std::size_t k = 0; k < places.projectors.size(); ++k)
       candidates[k].add(places.projectors[k], places.mm_per_px);
     candidates.push_back({rig_.cameras[i].name});

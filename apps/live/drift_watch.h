@@ -4,12 +4,12 @@
 #include <string>
 #include <vector>
 
-#include "apps/live/shown_pictures.h"
-#include "apps/live/watcher.h"
+#include "apps/live/projection_history.h"
+#include "apps/live/perception.h"
 #include "core/rig.h"
-#include "projector/displaced_light.h"
+#include "projector/misalignment_detector.h"
 #include "projector/renderer.h"
-#include "scene/posed.h"
+#include "scene/posed_scene.h"
 
 namespace limn::apps {
 
@@ -26,15 +26,15 @@ struct Drift {
 std::string sentence(const Drift& drift);
 
 /// Watches by the light itself whether cameras and projectors stand where the rig says: of all devices the
-/// one that, moved, explains best what all cameras see. Some cells of a picture are compared at each call, so
+/// one that, moved, explains best what all cameras see. Some cells of an image are compared at each call, so
 /// that none takes long. Sees only while the prototype rests and something with edges is shown.
 class DriftWatch {
  public:
   explicit DriftWatch(const Rig& rig);
 
-  void look(const Watched& watched,
+  void look(const Percepts& watched,
             const scene::PosedScene& posed,
-            const ShownPictures& shown,
+            const ProjectionHistory& shown,
             projector::Renderer* renderer);
 
   /// What has moved, once that has held for some seconds, until it stands right again for as long.
@@ -45,10 +45,10 @@ class DriftWatch {
   void settle(std::optional<Drift> found, Stamp at);
 
   Rig rig_;
-  std::vector<projector::DisplacedLight> lights_;  // one a camera
+  std::vector<projector::MisalignmentDetector> lights_;  // one a camera
   std::size_t turn_ = 0;                           // the camera that is looked at
   Stamp began_at_, compared_at_;                   // its look
-  std::optional<Pose> placed_;                     // world_from_prototype that light was foretold for
+  std::optional<Pose> placed_;                     // world_from_prototype that light was predicted for
   std::optional<Pose> rests_;                      // where the prototype is
   Stamp rests_since_;
   std::optional<Drift> drift_;

@@ -22,7 +22,7 @@ std::optional<cv::Point2f> pixel(const Imager& projector, const Pose& world_from
   return cv::Point2f(static_cast<float>(px->x()), static_cast<float>(px->y()));
 }
 
-void add(const cv::Mat& light, cv::Mat* picture) { cv::max(*picture, light, *picture); }
+void add(const cv::Mat& light, cv::Mat* image) { cv::max(*image, light, *image); }
 
 }  // namespace
 
@@ -39,7 +39,7 @@ void draw_ring(const Imager& projector,
                double size_m,
                const cv::Scalar& colour,
                double strength,
-               cv::Mat* picture) {
+               cv::Mat* image) {
   constexpr int k_points = 72, k_shift = 4;
   std::vector<cv::Point> outline;
   for (const double radius : {k_ring_radius, k_ring_radius + k_ring_width}) {
@@ -51,9 +51,9 @@ void draw_ring(const Imager& projector,
       outline.emplace_back(cvRound(px->x * (1 << k_shift)), cvRound(px->y * (1 << k_shift)));
     }
   }
-  cv::Mat light(picture->size(), picture->type(), cv::Scalar::all(0));
+  cv::Mat light(image->size(), image->type(), cv::Scalar::all(0));
   cv::fillPoly(light, std::vector<std::vector<cv::Point>>{outline}, colour * strength, cv::LINE_AA, k_shift);
-  add(light, picture);
+  add(light, image);
 }
 
 void draw_word(const Imager& projector,
@@ -61,12 +61,12 @@ void draw_word(const Imager& projector,
                double size_m,
                const std::string& word,
                double strength,
-               cv::Mat* picture) {
+               cv::Mat* image) {
   if (word.empty()) return;
   int below = 0;
   const cv::Size text = cv::getTextSize(word, k_font, k_font_scale, 3, &below);
   const int border = 6;
-  cv::Mat sheet(text.height + below + 2 * border, text.width + 2 * border, picture->type(),
+  cv::Mat sheet(text.height + below + 2 * border, text.width + 2 * border, image->type(),
                 cv::Scalar::all(0));
   cv::putText(sheet, word, {border, border + text.height}, k_font, k_font_scale,
               cv::Scalar::all(255 * strength), 3, cv::LINE_AA);
@@ -84,8 +84,8 @@ void draw_word(const Imager& projector,
     to.push_back(*px);
   }
   cv::Mat light;
-  cv::warpPerspective(sheet, light, cv::getPerspectiveTransform(from, to), picture->size(), cv::INTER_AREA);
-  add(light, picture);
+  cv::warpPerspective(sheet, light, cv::getPerspectiveTransform(from, to), image->size(), cv::INTER_AREA);
+  add(light, image);
 }
 
 }  // namespace limn::apps

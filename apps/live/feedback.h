@@ -12,7 +12,7 @@ namespace limn::apps {
 double head_on(const Imager& projector, const Pose& world_from_marker);
 
 /// Small signs beside a marker, in light. Frame: the marker's (x right, y down, z into the paper), as
-/// `world_from_marker` places it; `size_m` is the marker's side. Drawn into an 8-bit BGR display picture of
+/// `world_from_marker` places it; `size_m` is the marker's side. Drawn into an 8-bit BGR display image of
 /// `projector`, brighter of the two. `strength`
 /// (0 … 1) is the share of full light.
 
@@ -22,7 +22,7 @@ void draw_ring(const Imager& projector,
                double size_m,
                const cv::Scalar& colour,
                double strength,
-               cv::Mat* picture);
+               cv::Mat* image);
 
 /// A word above the marker, half as high as its side.
 void draw_word(const Imager& projector,
@@ -30,6 +30,6 @@ void draw_word(const Imager& projector,
                double size_m,
                const std::string& word,
                double strength,
-               cv::Mat* picture);
+               cv::Mat* image);
 
 }  // namespace limn::apps

@@ -8,18 +8,18 @@
 
 #include "apps/coarser.h"
 #include "apps/devices.h"
-#include "apps/live/books.h"
+#include "apps/live/session_output.h"
 #include "apps/live/device_session.h"
-#include "apps/live/operator_desk.h"
+#include "apps/live/operator_console.h"
 #include "apps/live/osc_port.h"
-#include "apps/live/room.h"
+#include "apps/live/virtual_room.h"
 #include "apps/live/script.h"
 #include "apps/live/session.h"
 #include "apps/live/virtual_session.h"
-#include "apps/live/watcher.h"
+#include "apps/live/perception.h"
 #include "apps/screen_encoding.h"
 #include "apps/serve/server.h"
-#include "apps/tablet/onlooker.h"
+#include "apps/tablet/tablet_view.h"
 #include "apps/world_markers.h"
 #include "core/log.h"
 #include "device/desktop.h"
@@ -62,31 +62,31 @@ Status check_options(const LiveOptions& options) {
 struct Stage {
   sim::World world;
   SessionSetup setup;
-  std::vector<scene::LeftOut> left_out;
+  std::vector<scene::SkippedVariant> skipped_variants;
 };
 
 Result<Stage> virtual_stage(const LiveOptions& options) {
   Stage stage;
   if (!options.rig.empty()) {
     LIMN_TRY(stage.setup.rig, load_rig(options.rig));
-    LIMN_TRY(stage.setup.scene, scene::load_scene(options.scene, &stage.left_out));
+    LIMN_TRY(stage.setup.scene, scene::load_scene(options.scene, &stage.skipped_variants));
   }
   if (options.rig.empty() || !options.world.empty()) {
     const fs::path world =
         options.world.empty() ? fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json" : options.world;
-    LIMN_TRY(stage.world, sim::load_world(world, marker_picture, &stage.left_out));
+    LIMN_TRY(stage.world, sim::load_world(world, marker_image, &stage.skipped_variants));
     if (!stage.world.scene)
       return error("{}: scene: expected a scene for a session, found none.", world.string());
   } else {
     LIMN_TRY(stage.world, room_for(stage.setup.rig, stage.setup.scene));
   }
-  if (const Status coarser = make_coarser(options.resolution, &stage.world.rig); !coarser)
+  if (const Status coarser = scale_resolution(options.resolution, &stage.world.rig); !coarser)
     return usage_error("--resolution: {}", coarser.message());
   if (options.rig.empty()) {
     stage.setup.rig = stage.world.rig;
     stage.setup.scene = *stage.world.scene;
   } else {
-    LIMN_TRY_STATUS(make_coarser(options.resolution, &stage.setup.rig));
+    LIMN_TRY_STATUS(scale_resolution(options.resolution, &stage.setup.rig));
   }
   return stage;
 }
@@ -147,10 +147,10 @@ Result<std::unique_ptr<Server>> served(const LiveOptions& options, const Session
   ServeOptions serve;
   serve.at = options.serve;
   LIMN_TRY(const fs::path own, own_folder());
-  auto onlooker = Onlooker::create(setup, own / "lenses");
-  if (!onlooker) log_warning("live: the remote shows no live pictures: {}", onlooker.message());
+  auto tablet_view = TabletView::create(setup, own / "lenses");
+  if (!tablet_view) log_warning("live: the remote shows no live pictures: {}", tablet_view.message());
   LIMN_TRY(std::unique_ptr<Server> server,
-           Server::open(serve, onlooker ? eyes_of(std::move(*onlooker)) : Eyes{}));
+           Server::open(serve, tablet_view ? image_providers(std::move(*tablet_view)) : ImageProviders{}));
   if (!options.serve_show.empty()) server->show_code(options.serve_show, Role::work);
   return server;
 }
@@ -185,22 +185,22 @@ Status play_in_virtual_room(const LiveOptions& options) {
   log_info("live: {}", context->description());
   LIMN_TRY(OscPort osc, OscPort::open(options.osc, options.osc_to));
   LIMN_TRY(const std::unique_ptr<Server> server, served(options, setup));
-  LIMN_TRY(Books books, Books::open(options.out, options.record, &setup));
-  tell(stage.left_out, {}, &books.telemetry());
-  LIMN_TRY(Watcher watcher, Watcher::create(setup.scene, setup.rig, setup.watch));
-  LIMN_TRY(Session session, Session::create(setup, &books.telemetry(), books.recorder()));
+  LIMN_TRY(SessionOutput output, SessionOutput::open(options.out, options.record, &setup));
+  tell(stage.skipped_variants, {}, &output.telemetry());
+  LIMN_TRY(Perception perception, Perception::create(setup.scene, setup.rig, setup.watch));
+  LIMN_TRY(Session session, Session::create(setup, &output.telemetry(), output.recorder()));
   session.survive_losses(drawing_in(&context));
-  std::optional<OperatorDesk> desk;
+  std::optional<OperatorConsole> console;
   if (options.window) {
     LIMN_TRY(const device::Desktop desktop, device::Desktop::open());
-    LIMN_TRY(desk, OperatorDesk::open(desktop, setup.scene));
-    if (server) desk->invite(server.get());
+    LIMN_TRY(console, OperatorConsole::open(desktop, setup.scene));
+    if (server) console->invite(server.get());
   }
-  LIMN_TRY_STATUS(play_virtually(end_s, g_is_ended, &rig, &room, &watcher, &session, &books,
-                                 desk ? &*desk : nullptr, &osc, server.get()));
-  desk.reset();
+  LIMN_TRY_STATUS(play_virtually(end_s, g_is_ended, &rig, &room, &perception, &session, &output,
+                                 console ? &*console : nullptr, &osc, server.get()));
+  console.reset();
   if (server) server->stop();
-  return books.close(&session, options.json);
+  return output.close(&session, options.json);
 }
 
 bool is_projector(const Rig& rig, const std::string& display) {
@@ -215,14 +215,14 @@ SessionDevices opened(const Devices& devices, const Rig& rig, const device::Desk
     log_warning("live: {}: {} The session goes on without it.", name, why);
     out.missing.push_back({.name = name, .kind = kind, .works = false, .why = why});
   };
-  for (device::CameraWanted wanted : devices.cameras) {
+  for (device::CameraConfig wanted : devices.cameras) {
     wanted.limit_s = k_camera_limit_s;
     auto camera = device::open_camera(wanted);
     if (!camera) miss(wanted.name, "camera", camera.message());
     out.cameras.push_back(camera ? std::move(*camera) : nullptr);
   }
   out.projectors.resize(rig.projectors.size());
-  for (const device::DisplayWanted& wanted : devices.displays) {
+  for (const device::DisplayConfig& wanted : devices.displays) {
     auto display = device::open_display(wanted, desktop);
     const auto projector = std::find_if(rig.projectors.begin(), rig.projectors.end(),
                                         [&](const Imager& p) { return p.name == wanted.name; });
@@ -234,7 +234,7 @@ SessionDevices opened(const Devices& devices, const Rig& rig, const device::Desk
     else
       out.screens.push_back(std::move(opened));
   }
-  for (const device::KeysWanted& wanted : devices.keys) {
+  for (const device::KeysConfig& wanted : devices.keys) {
     auto keys = device::KeySource::open(wanted);
     keys ? out.keys.push_back(std::move(*keys)) : miss(wanted.name, "keys", keys.message());
   }
@@ -245,10 +245,10 @@ Status play_with_devices(const LiveOptions& options) {
   LIMN_TRY(const Devices named, load_devices(options.devices));
   SessionSetup setup;
   LIMN_TRY(setup.rig, load_rig(options.rig));
-  std::vector<scene::LeftOut> left_out;
-  LIMN_TRY(setup.scene, scene::load_scene(options.scene, &left_out));
+  std::vector<scene::SkippedVariant> skipped_variants;
+  LIMN_TRY(setup.scene, scene::load_scene(options.scene, &skipped_variants));
   LIMN_TRY(const Devices devices, matched(named, setup.rig));
-  for (const device::DisplayWanted& display : devices.displays)
+  for (const device::DisplayConfig& display : devices.displays)
     if (!is_projector(setup.rig, display.name)) setup.screens.push_back(display.name);
   LIMN_TRY_STATUS(set_up(options, &setup));
   setup.paint.is_linear_camera =
@@ -264,21 +264,21 @@ Status play_with_devices(const LiveOptions& options) {
   log_info("live: {}", context->description());
   LIMN_TRY(OscPort osc, OscPort::open(options.osc, options.osc_to));
   LIMN_TRY(const std::unique_ptr<Server> server, served(options, setup));
-  LIMN_TRY(Books books, Books::open(options.out, options.record, &setup));
-  tell(left_out, {}, &books.telemetry());
-  LIMN_TRY(Watcher watcher, Watcher::create(setup.scene, setup.rig, setup.watch));
-  LIMN_TRY(Session session, Session::create(setup, &books.telemetry(), books.recorder()));
+  LIMN_TRY(SessionOutput output, SessionOutput::open(options.out, options.record, &setup));
+  tell(skipped_variants, {}, &output.telemetry());
+  LIMN_TRY(Perception perception, Perception::create(setup.scene, setup.rig, setup.watch));
+  LIMN_TRY(Session session, Session::create(setup, &output.telemetry(), output.recorder()));
   session.survive_losses(drawing_in(&context));
-  std::optional<OperatorDesk> desk;
+  std::optional<OperatorConsole> console;
   if (options.window) {
-    LIMN_TRY(desk, OperatorDesk::open(*desktop, setup.scene));
-    if (server) desk->invite(server.get());
+    LIMN_TRY(console, OperatorConsole::open(*desktop, setup.scene));
+    if (server) console->invite(server.get());
   }
-  LIMN_TRY_STATUS(play_on_devices(&open, options.seconds, g_is_ended, &watcher, &session, &books,
-                                  desk ? &*desk : nullptr, &osc, server.get()));
-  desk.reset();
+  LIMN_TRY_STATUS(play_on_devices(&open, options.seconds, g_is_ended, &perception, &session, &output,
+                                  console ? &*console : nullptr, &osc, server.get()));
+  console.reset();
   if (server) server->stop();
-  return books.close(&session, options.json);
+  return output.close(&session, options.json);
 }
 
 }  // namespace

@@ -32,7 +32,7 @@ struct LiveOptions {
 
 /// `limn live`, on devices or on the virtual rig: cameras -> tracker -> prediction to the photon ->
 /// projectors and a screen, until the window is closed, a signal comes or the time is over. With `out`:
-/// poses.csv, telemetry.csv, session.json, session.html and the last pictures. Prints what was measured.
+/// poses.csv, telemetry.csv, session.json, session.html and the last images. Prints what was measured.
 Status run_live(const LiveOptions& options);
 
 }  // namespace limn::apps

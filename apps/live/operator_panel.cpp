@@ -6,18 +6,18 @@
 #include <cmath>
 #include <map>
 
-#include "core/response.h"
-#include "scene/in_words.h"
+#include "core/photometric_response.h"
+#include "scene/command_text.h"
 
 namespace limn::apps {
 namespace {
 
 using scene::ActionId;
 
-constexpr float k_small_share = 0.32F, k_most_small = 0.25F;  // of all the pictures' height and width
+constexpr float k_small_share = 0.32F, k_most_small = 0.25F;  // of all the images' height and width
 constexpr float k_most_split_mm = 2000;                       // by dragging
 constexpr double k_plain = 0.8;        // colour of a material before somebody chooses one, linear
-constexpr std::size_t k_points = 300;  // of the plot: pictures
+constexpr std::size_t k_points = 300;  // of the plot: images
 
 // The names of Screen in words, in its order.
 const char* const k_screens[] = {"camera and what light cannot show",
@@ -31,15 +31,15 @@ float cell_height(const Gui& gui) { return 1.35F * gui.em(); }
 
 ImU32 colour_of(const std::optional<Track>& track) {
   if (!track) return colour::k_quiet;
-  return track->sight == Sight::measured       ? colour::k_good
-         : track->sight == Sight::extrapolated ? colour::k_warn
+  return track->tracking == TrackingState::measured       ? colour::k_good
+         : track->tracking == TrackingState::extrapolated ? colour::k_warn
                                                : colour::k_bad;
 }
 
 std::string words_of(const std::optional<Track>& track) {
   if (!track) return "not seen yet";
-  return track->sight == Sight::measured       ? "tracked"
-         : track->sight == Sight::extrapolated ? "carried on"
+  return track->tracking == TrackingState::measured       ? "tracked"
+         : track->tracking == TrackingState::extrapolated ? "carried on"
                                                : "lost";
 }
 
@@ -73,7 +73,7 @@ double latency_ms(const ShownFrame& frame) {
   return 1e3 * seconds_between(frame.captured_at, frame.shown_at);
 }
 
-// The newest pictures of about a second.
+// The newest images of about a second.
 std::vector<ShownFrame> last_second(const std::vector<ShownFrame>& recent) {
   std::vector<ShownFrame> out;
   for (const ShownFrame& frame : recent)
@@ -216,7 +216,7 @@ void draw_bodies(const Gui& gui, const OperatorView& view) {
     text_within(room, colour::k_text, body.name);
     if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", body.markers.c_str());
     right_text(colour_of(body.track), state);
-    if (!body.track || body.track->sight != Sight::measured) continue;
+    if (!body.track || body.track->tracking != TrackingState::measured) continue;
     ImGui::Indent(1.06F * gui.em());
     ImGui::TextDisabled("%s", fmt::format("{} marker{}, {:.2f} px", body.track->marker_count,
                                           body.track->marker_count == 1 ? "" : "s", body.track->rms_px)
@@ -234,19 +234,19 @@ const OperatorView::Device* device_of(const OperatorView& view, const std::strin
 }  // namespace
 
 void OperatorPanel::draw_bar(const Gui& gui, const OperatorView& view) {
-  const scene::Staging& staging = view.staging;
+  const scene::ShowState& show_state = view.show_state;
   const ImVec2 size{0, 1.9F * gui.em()};
-  if (toggle("Blackout", staging.blackout, colour::k_warn, size)) ask(ActionId::blackout);
+  if (toggle("Blackout", show_state.blackout, colour::k_warn, size)) ask(ActionId::blackout);
   ImGui::SameLine();
-  if (toggle("Freeze", staging.frozen, colour::k_warn, size)) ask(ActionId::freeze);
+  if (toggle("Freeze", show_state.frozen, colour::k_warn, size)) ask(ActionId::freeze);
   ImGui::SameLine();
-  if (toggle("Marker rings", staging.marker_states, colour::k_blue, size)) ask(ActionId::marker_states);
+  if (toggle("Marker rings", show_state.marker_states, colour::k_blue, size)) ask(ActionId::marker_states);
   ImGui::SameLine();
-  if (toggle("Grid", staging.grid, colour::k_blue, size)) ask(ActionId::grid);
-  if (!view.repairing.empty()) {
+  if (toggle("Grid", show_state.grid, colour::k_blue, size)) ask(ActionId::grid);
+  if (!view.recalibration_progress.empty()) {
     ImGui::SameLine();
     ImGui::AlignTextToFramePadding();
-    ImGui::TextUnformatted(("Repair: " + view.repairing).c_str());
+    ImGui::TextUnformatted(("Repair: " + view.recalibration_progress).c_str());
   } else if (!view.moved.empty()) {
     ImGui::SameLine();
     if (toggle("Repair " + view.moved, true, colour::k_bad, size)) ask(ActionId::repair);
@@ -264,9 +264,9 @@ void OperatorPanel::draw_bar(const Gui& gui, const OperatorView& view) {
   ImGui::SameLine();
   const float room = ImGui::GetContentRegionAvail().x - 9 * gui.em();
   ImGui::SetNextItemWidth(std::clamp(room, 6 * gui.em(), 19 * gui.em()));
-  if (ImGui::BeginCombo("##screen", k_screens[static_cast<std::size_t>(staging.screen)])) {
+  if (ImGui::BeginCombo("##screen", k_screens[static_cast<std::size_t>(show_state.screen)])) {
     for (std::size_t i = 0; i < scene::screen_names().size(); ++i)
-      if (ImGui::Selectable(k_screens[i], static_cast<std::size_t>(staging.screen) == i))
+      if (ImGui::Selectable(k_screens[i], static_cast<std::size_t>(show_state.screen) == i))
         ask(ActionId::screen, "", scene::screen_names()[i]);
     ImGui::EndCombo();
   }
@@ -279,27 +279,27 @@ void OperatorPanel::draw_bar(const Gui& gui, const OperatorView& view) {
 }
 
 // True when it was clicked.
-bool OperatorPanel::draw_picture(Gui& gui,
-                                 const OperatorView::Picture& picture,
+bool OperatorPanel::draw_image(Gui& gui,
+                                 const OperatorView::Image& image,
                                  const OperatorView& view,
                                  ImVec2 corner,
                                  ImVec2 size,
                                  bool is_large) {
   const float caption = cell_height(gui);
-  const OperatorView::Device* device = device_of(view, picture.name);
+  const OperatorView::Device* device = device_of(view, image.name);
   const bool is_gone = device && !device->state.works;
   ImDrawList& draw = *ImGui::GetWindowDrawList();
   const ImVec2 inner_corner{corner.x, corner.y + caption}, inner{size.x, size.y - caption};
-  std::string words = picture.name;
-  if (is_large && !picture.found.empty())
-    words += fmt::format(" · {} marker{}", picture.found.size(), picture.found.size() == 1 ? "" : "s");
+  std::string words = image.name;
+  if (is_large && !image.found.empty())
+    words += fmt::format(" · {} marker{}", image.found.size(), image.found.size() == 1 ? "" : "s");
   if (is_gone) words += " · gone";
   ImGui::PushClipRect(corner, {corner.x + size.x, corner.y + size.y}, true);
   draw.AddText({corner.x + 2, corner.y}, is_gone ? colour::k_bad : colour::k_quiet, words.c_str());
   draw.AddRectFilled(inner_corner, {corner.x + size.x, corner.y + size.y}, IM_COL32(12, 13, 15, 255), 3);
-  const std::string texture = picture.name + (is_large ? " large" : "");
-  const PlacedPicture placed = gui.picture(texture, picture.picture, inner_corner, inner, picture.is_linear);
-  for (const OperatorView::Found& found : picture.found) {
+  const std::string texture = image.name + (is_large ? " large" : "");
+  const PlacedImage placed = gui.image(texture, image.image, inner_corner, inner, image.is_linear);
+  for (const OperatorView::Found& found : image.found) {
     std::array<ImVec2, 4> corners;
     for (std::size_t i = 0; i < 4; ++i) corners[i] = placed.of(found.corners_px[i]);
     draw.AddPolyline(corners.data(), 4, colour::k_good, ImDrawFlags_Closed, 2);
@@ -307,37 +307,37 @@ bool OperatorPanel::draw_picture(Gui& gui,
   }
   if (is_gone)
     draw.AddRectFilled(inner_corner, {corner.x + size.x, corner.y + size.y}, IM_COL32(20, 22, 26, 170));
-  if (picture.picture.empty())
+  if (image.image.empty())
     label_at({inner_corner.x + 10, inner_corner.y + 8}, colour::k_quiet, "no picture yet");
   ImGui::PopClipRect();
   ImGui::SetCursorScreenPos(inner_corner);
   return ImGui::InvisibleButton(texture.c_str(), {std::max(1.F, inner.x), std::max(1.F, inner.y)});
 }
 
-// One picture large, all of them small below; a click makes one of those the large one.
-void OperatorPanel::draw_pictures(Gui& gui, const OperatorView& view, ImVec2 size) {
-  std::vector<const OperatorView::Picture*> all;
-  for (const OperatorView::Picture& picture : view.cameras) all.push_back(&picture);
-  if (view.staging.screen != scene::Screen::off) all.push_back(&view.screen);
-  for (const OperatorView::Picture& picture : view.projectors) all.push_back(&picture);
+// One image large, all of them small below; a click makes one of those the large one.
+void OperatorPanel::draw_images(Gui& gui, const OperatorView& view, ImVec2 size) {
+  std::vector<const OperatorView::Image*> all;
+  for (const OperatorView::Image& image : view.cameras) all.push_back(&image);
+  if (view.show_state.screen != scene::Screen::off) all.push_back(&view.screen);
+  for (const OperatorView::Image& image : view.projectors) all.push_back(&image);
   if (all.empty()) return;
   const auto chosen = std::find_if(all.begin(), all.end(), [&](const auto* p) { return p->name == large_; });
-  const OperatorView::Picture& large = chosen == all.end() ? *all.front() : **chosen;
+  const OperatorView::Image& large = chosen == all.end() ? *all.front() : **chosen;
   const ImVec2 corner = ImGui::GetCursorScreenPos();
   const float gap = 0.5F * gui.em(), count = static_cast<float>(all.size());
   const float width = std::floor(std::min((size.x + gap) / count - gap, k_most_small * size.x));
   const float height = std::floor(std::min(k_small_share * size.y, 0.66F * width + cell_height(gui)));
-  draw_picture(gui, large, view, corner, {size.x, size.y - height - gap}, true);
+  draw_image(gui, large, view, corner, {size.x, size.y - height - gap}, true);
   for (std::size_t i = 0; i < all.size(); ++i) {
     const ImVec2 at{corner.x + static_cast<float>(i) * (width + gap), corner.y + size.y - height};
-    if (draw_picture(gui, *all[i], view, at, {width, height}, false)) large_ = all[i]->name;
+    if (draw_image(gui, *all[i], view, at, {width, height}, false)) large_ = all[i]->name;
     if (all[i] == &large)
       ImGui::GetWindowDrawList()->AddRect({at.x - 2, at.y + cell_height(gui) - 2},
                                           {at.x + width + 2, at.y + height + 2}, colour::k_blue, 3, 0, 2);
   }
 }
 
-// In place of the pictures: a code for a phone's camera, and the same to type.
+// In place of the images: a code for a phone's camera, and the same to type.
 void OperatorPanel::draw_remote(Gui& gui, const OperatorView& view, ImVec2 size) {
   const OperatorView::Remote& remote = *view.remote;
   if (remote.entrances.empty()) return;
@@ -346,7 +346,7 @@ void OperatorPanel::draw_remote(Gui& gui, const OperatorView& view, ImVec2 size)
   const ImVec2 at = ImGui::GetCursorPos(), corner = ImGui::GetCursorScreenPos();
   const float gap = 1.5F * gui.em(), column = 20 * gui.em();
   const float side = std::max(1.0F, std::min(size.y, size.x - column - gap));
-  if (!chosen.code.empty()) gui.picture("code of " + chosen.role, chosen.code, corner, {side, side});
+  if (!chosen.code.empty()) gui.image("code of " + chosen.role, chosen.code, corner, {side, side});
   ImGui::SetCursorPos({at.x + side + gap, at.y});
   ImGui::BeginChild("remote", {size.x - side - gap, size.y}, false, ImGuiWindowFlags_AlwaysUseWindowPadding);
   heading(gui, "Remote");
@@ -362,7 +362,7 @@ void OperatorPanel::draw_remote(Gui& gui, const OperatorView& view, ImVec2 size)
   if (!view.projectors.empty()) {
     ImGui::Dummy({0, 0.4F * gui.em()});
     ImGui::TextDisabled("For 60 s in the light of");
-    for (const OperatorView::Picture& projector : view.projectors)
+    for (const OperatorView::Image& projector : view.projectors)
       if (toggle(projector.name, projector.name == remote.projector, colour::k_warn,
                  {12 * gui.em(), 1.9F * gui.em()}))
         asked_.code = {projector.name, chosen.role};
@@ -383,7 +383,7 @@ void OperatorPanel::draw_remote(Gui& gui, const OperatorView& view, ImVec2 size)
 
 // Whose eye view parts are drawn for: of the scene's own viewer and of guests with a tablet.
 void OperatorPanel::draw_viewers(const Gui& gui, const OperatorView& view) {
-  const std::string& chosen = view.staging.viewer;
+  const std::string& chosen = view.show_state.viewer;
   std::vector<std::string> all = view.windows;
   if (!chosen.empty() && std::find(all.begin(), all.end(), chosen) == all.end()) all.push_back(chosen);
   ImGui::Dummy({0, 0.8F * gui.em()});
@@ -407,11 +407,11 @@ void OperatorPanel::draw_slots(const Gui& gui, const OperatorView& view) {
   for (std::size_t i = 0; i < view.slots.size(); ++i) {
     const OperatorView::Slot& slot = view.slots[i];
     ImGui::PushID(slot.name.c_str());
-    const std::string& shown = view.staging.slots[i].variant;
+    const std::string& shown = view.show_state.slots[i].variant;
     text_within(ImGui::GetContentRegionAvail().x - 6 * gui.em(),
                 slot.is_chosen ? colour::k_blue : colour::k_quiet,
                 slot.is_chosen && view.slots.size() > 1 ? slot.name + "  (keys)" : slot.name);
-    draw_material(gui, slot.name, view.staging.slots[i].material);
+    draw_material(gui, slot.name, view.show_state.slots[i].material);
     if (ImGui::Button("◀", arrow)) ask(ActionId::previous_variant, slot.name);
     ImGui::SameLine(0, 4);
     const float room = ImGui::GetContentRegionAvail().x - arrow.x - 4;
@@ -433,7 +433,7 @@ void OperatorPanel::draw_slots(const Gui& gui, const OperatorView& view) {
     if (!view.waiting.empty() &&
         ImGui::Button(fmt::format("let {} carry it", view.waiting.back()).c_str(), {-1, 0}))
       ask(ActionId::pair, slot.name, view.waiting.back());
-    if (const auto& carrier = view.staging.slots[i].marker)
+    if (const auto& carrier = view.show_state.slots[i].marker)
       if (ImGui::Button(fmt::format("no longer {}", carrier->text()).c_str(), {-1, 0}))
         ask(ActionId::unpair, slot.name);
     ImGui::PopID();
@@ -442,30 +442,30 @@ void OperatorPanel::draw_slots(const Gui& gui, const OperatorView& view) {
 }
 
 // Colour, metalness and roughness of a part, in a box that opens.
-void OperatorPanel::draw_material(const Gui& gui, const std::string& slot, const scene::MaterialChange& now) {
+void OperatorPanel::draw_material(const Gui& gui, const std::string& slot, const scene::MaterialOverride& now) {
   if (small_button(gui, "material", !now.is_none())) ImGui::OpenPopup("material");
   if (!ImGui::BeginPopup("material")) return;
-  scene::MaterialChange wanted = now;
+  scene::MaterialOverride wanted = now;
   const Eigen::Vector3d linear = now.base_colour.value_or(Eigen::Vector3d::Constant(k_plain));
-  Eigen::Vector3f rgb = linear.unaryExpr([](double light) { return srgb_of_linear(light); }).cast<float>();
+  Eigen::Vector3f rgb = linear.unaryExpr([](double light) { return srgb_from_linear(light); }).cast<float>();
   auto metallic = static_cast<float>(now.metallic.value_or(0)),
        roughness = static_cast<float>(now.roughness.value_or(1));
   if (ImGui::ColorEdit3("colour", rgb.data()))
     wanted.base_colour =
-        rgb.cast<double>().unaryExpr([](double s) { return linear_of_srgb(std::clamp(s, 0.0, 1.0)); });
+        rgb.cast<double>().unaryExpr([](double s) { return linear_from_srgb(std::clamp(s, 0.0, 1.0)); });
   if (ImGui::SliderFloat("metal", &metallic, 0, 1, "%.2f")) wanted.metallic = std::clamp(metallic, 0.F, 1.F);
   if (ImGui::SliderFloat("rough", &roughness, 0, 1, "%.2f"))
     wanted.roughness = std::clamp(roughness, 0.F, 1.F);
-  if (wanted != now) ask(ActionId::material, slot, scene::words_of(wanted));
+  if (wanted != now) ask(ActionId::material, slot, scene::format_material_override(wanted));
   if (ImGui::Button("as its file says", {-1, 0})) ask(ActionId::material, slot);
   ImGui::EndPopup();
 }
 
 // The light that parts are shaded by, in a box that opens.
-void OperatorPanel::draw_light(const Gui& gui, const scene::Staging& staging) {
-  if (small_button(gui, "light", staging.light.has_value())) ImGui::OpenPopup("light");
+void OperatorPanel::draw_light(const Gui& gui, const scene::ShowState& show_state) {
+  if (small_button(gui, "light", show_state.light.has_value())) ImGui::OpenPopup("light");
   const auto numbers =
-      staging.light ? scene::numbers_of(*staging.light, staging.d_front_world) : std::nullopt;
+      show_state.light ? scene::room_light_numbers(*show_state.light, show_state.d_front_world) : std::nullopt;
   if (numbers && !ImGui::IsAnyItemActive())
     std::transform(numbers->begin(), numbers->end(), light_.begin(),
                    [](double number) { return static_cast<float>(number); });
@@ -485,7 +485,7 @@ void OperatorPanel::draw_light(const Gui& gui, const scene::Staging& staging) {
 
 void OperatorPanel::draw_looks(const Gui& gui, const OperatorView& view) {
   heading(gui, "Looks");
-  draw_light(gui, view.staging);
+  draw_light(gui, view.show_state);
   const float save = 4 * gui.em();
   ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x - save - ImGui::GetStyle().ItemSpacing.x);
   const bool is_entered = ImGui::InputTextWithHint("##name", "a new look", look_.data(), look_.size(),
@@ -495,12 +495,12 @@ void OperatorPanel::draw_looks(const Gui& gui, const OperatorView& view) {
     ask(ActionId::save_look, "", look_.data());
     look_.fill('\0');
   }
-  draw_comparison(gui, view.staging);
-  for (const scene::Look& look : view.staging.looks) {
+  draw_comparison(gui, view.show_state);
+  for (const scene::Look& look : view.show_state.looks) {
     ImGui::PushID(look.name.c_str());
     const float cross = 1.6F * gui.em();
     const float room = ImGui::GetContentRegionAvail().x - cross - 4;
-    if (toggle(look.name, look.name == view.staging.look, colour::k_blue, {room, 0}))
+    if (toggle(look.name, look.name == view.show_state.look, colour::k_blue, {room, 0}))
       ask(ActionId::restore_look, "", look.name);
     ImGui::SameLine(0, 4);
     if (ImGui::Button("x", {cross, 0})) ImGui::OpenPopup("delete");
@@ -513,21 +513,21 @@ void OperatorPanel::draw_looks(const Gui& gui, const OperatorView& view) {
     }
     ImGui::PopID();
   }
-  if (const auto& gone = view.staging.deleted_look)
+  if (const auto& gone = view.show_state.deleted_look)
     if (ImGui::Button(fmt::format("bring {} back", gone->name).c_str(), {-1, 0}))
       ask(ActionId::undelete_look);
 }
 
 // The look shown before the present one, in its place or left of a line.
-void OperatorPanel::draw_comparison(const Gui& gui, const scene::Staging& staging) {
-  if (staging.other_look.empty()) return;
+void OperatorPanel::draw_comparison(const Gui& gui, const scene::ShowState& show_state) {
+  if (show_state.other_look.empty()) return;
   const float room = ImGui::GetContentRegionAvail().x, gap = ImGui::GetStyle().ItemSpacing.x;
   const ImVec2 half{0.5F * (room - gap), 1.9F * gui.em()};
-  if (ImGui::Button(fmt::format("A/B: {}", staging.other_look).c_str(), half)) ask(ActionId::flip);
+  if (ImGui::Button(fmt::format("A/B: {}", show_state.other_look).c_str(), half)) ask(ActionId::flip);
   ImGui::SameLine();
-  if (toggle("Side by side", staging.split, colour::k_blue, half)) ask(ActionId::split);
-  if (!staging.split) return;
-  float mm = static_cast<float>(staging.split_mm);
+  if (toggle("Side by side", show_state.split, colour::k_blue, half)) ask(ActionId::split);
+  if (!show_state.split) return;
+  float mm = static_cast<float>(show_state.split_mm);
   ImGui::SetNextItemWidth(-1);
   if (ImGui::DragFloat("##split", &mm, 2, -k_most_split_mm, k_most_split_mm, "line at %.0f mm"))
     ask(ActionId::split_at, "", fmt::format("{:.1f}", mm));
@@ -565,7 +565,7 @@ OperatorAsked OperatorPanel::draw(Gui& gui, const OperatorView& view) {
   if (shows_remote_ && view.remote)
     draw_remote(gui, view, middle);
   else
-    draw_pictures(gui, view, middle);
+    draw_images(gui, view, middle);
   ImGui::SetCursorPos({at.x, at.y + room.y - foot});
   ImGui::BeginChild("telemetry", {std::floor(0.5F * (left - gap)), foot}, false,
                     ImGuiWindowFlags_AlwaysUseWindowPadding | ImGuiWindowFlags_NoScrollbar);

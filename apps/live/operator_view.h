@@ -11,7 +11,7 @@
 #include "apps/live/telemetry.h"
 #include "core/track.h"
 #include "scene/actions.h"
-#include "scene/staging.h"
+#include "scene/show_state.h"
 
 namespace limn::apps {
 
@@ -21,15 +21,15 @@ struct OperatorView {
     std::string marker;  ///< its id
     std::array<Eigen::Vector2d, 4> corners_px;
   };
-  struct Picture {
+  struct Image {
     std::string name;
-    cv::Mat picture;  ///< 8-bit grey or BGR; empty: none yet
+    cv::Mat image;  ///< 8-bit grey or BGR; empty: none yet
     std::vector<Found> found = {};
     bool is_linear = false;  ///< its values are proportional to light
   };
   struct Device {
     DeviceState state;
-    std::optional<double> per_second;  ///< pictures, by the session's clock; none yet: absent
+    std::optional<double> per_second;  ///< images, by the session's clock; none yet: absent
   };
   struct Body {
     std::string name;
@@ -59,20 +59,20 @@ struct OperatorView {
     std::string projector = {};  ///< that shows a code; empty: none
   };
   double at_s = 0;  ///< of the session's clock, since it began
-  std::vector<Picture> cameras, projectors;
-  Picture screen;
+  std::vector<Image> cameras, projectors;
+  Image screen;
   std::vector<Device> devices;
   std::vector<Body> bodies;
   std::vector<Slot> slots;
   std::vector<std::string> waiting;       ///< loose markers that may carry a part, the next one last
   std::vector<std::string> windows = {};  ///< guests whose tablets can be the eye
   std::string follows = {};               ///< the one whose tablet it is; empty: the scene's own viewer
-  scene::Staging staging;
-  std::vector<ShownFrame> recent;  ///< pictures shown, the newest last
+  scene::ShowState show_state;
+  std::vector<ShownFrame> recent;  ///< images shown, the newest last
   std::vector<Notice> notices;     ///< the newest last
   std::optional<Remote> remote = {};
   std::string moved = {};      ///< devices that do not stand where the rig says; empty: none is known of
-  std::string repairing = {};  ///< how far a repair is; empty: there is none
+  std::string recalibration_progress = {};  ///< how far a repair is; empty: there is none
 };
 
 /// What a person asked for.

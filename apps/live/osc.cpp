@@ -22,25 +22,25 @@ using OscMessage = std::unique_ptr<std::remove_pointer_t<lo_message>, FreeMessag
 std::string arguments_of(const scene::Action& action) {
   std::vector<std::string> words;
   if (action.of_slot) words.push_back("slot (text)");
-  switch (action.takes) {
-    case scene::Takes::nothing:
+  switch (action.argument_kind) {
+    case scene::ArgumentKind::nothing:
       break;
-    case scene::Takes::text:
+    case scene::ArgumentKind::text:
       words.push_back(fmt::format("{} (text)", action.value));
       break;
-    case scene::Takes::maybe_text:
+    case scene::ArgumentKind::maybe_text:
       words.push_back(fmt::format("{} (text, may be left out)", action.value));
       break;
-    case scene::Takes::number:
+    case scene::ArgumentKind::number:
       words.push_back(fmt::format("{} (a number)", action.value));
       break;
-    case scene::Takes::millimetres:
+    case scene::ArgumentKind::millimetres:
       words.push_back("three numbers, mm");
       break;
-    case scene::Takes::pose:
+    case scene::ArgumentKind::pose:
       words.emplace_back(action.value);
       break;
-    case scene::Takes::on_off:
+    case scene::ArgumentKind::on_off:
       words.push_back("on, off or toggle (text; or true, false, a number: 0 is off; left out: toggle)");
       break;
   }
@@ -161,25 +161,25 @@ Result<std::string> switch_of(Reader* reader) {
   return std::string(*number == 0 ? "off" : "on");
 }
 
-Result<std::string> value_of(scene::Takes takes, std::string_view what, Reader* reader) {
-  switch (takes) {
-    case scene::Takes::nothing:
+Result<std::string> value_of(scene::ArgumentKind argument_kind, std::string_view what, Reader* reader) {
+  switch (argument_kind) {
+    case scene::ArgumentKind::nothing:
       return std::string();
-    case scene::Takes::text:
+    case scene::ArgumentKind::text:
       return reader->text(what);
-    case scene::Takes::maybe_text:
+    case scene::ArgumentKind::maybe_text:
       return reader->is_at_end() ? Result<std::string>(std::string()) : reader->text(what);
-    case scene::Takes::number: {
+    case scene::ArgumentKind::number: {
       LIMN_TRY(const double number, reader->number());
       return fmt::format("{}", number);
     }
-    case scene::Takes::millimetres: {
+    case scene::ArgumentKind::millimetres: {
       LIMN_TRY(const double x, reader->number());
       LIMN_TRY(const double y, reader->number());
       LIMN_TRY(const double z, reader->number());
       return fmt::format("{} {} {}", x, y, z);
     }
-    case scene::Takes::pose: {
+    case scene::ArgumentKind::pose: {
       std::string all;
       for (int i = 0; i < 7; ++i) {
         LIMN_TRY(const double number, reader->number(i < 3 ? "a number of millimetres" : "a number"));
@@ -187,7 +187,7 @@ Result<std::string> value_of(scene::Takes takes, std::string_view what, Reader* 
       }
       return all;
     }
-    case scene::Takes::on_off:
+    case scene::ArgumentKind::on_off:
       return switch_of(reader);
   }
   LIMN_CHECK(false);
@@ -254,7 +254,7 @@ Result<scene::Edit> edit_of_osc(std::span<const std::uint8_t> datagram) {
   if (action->of_slot) {
     LIMN_TRY(edit.slot, reader.text("a slot"));
   }
-  LIMN_TRY(edit.value, value_of(action->takes, action->value, &reader));
+  LIMN_TRY(edit.value, value_of(action->argument_kind, action->value, &reader));
   if (!action->of.empty() && !reader.is_at_end()) {
     LIMN_TRY(edit.slot, reader.text(action->of));
   }

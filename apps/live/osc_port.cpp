@@ -90,7 +90,7 @@ void OscPort::tell(const Session& session, Stamp at) {
     told_all_at_ = at;
     told_.clear();
   }
-  const scene::Staging& staging = session.staging();
+  const scene::ShowState& show_state = session.show_state();
   const scene::PosedScene& posed = session.painted().posed;
   const auto put_all = [&](const std::string& name, std::vector<OscValue> values) {
     put(name, "/limn/state/" + name, std::move(values));
@@ -100,7 +100,7 @@ void OscPort::tell(const Session& session, Stamp at) {
   const std::vector<scene::Slot>& slots = session.setup().scene.slots;
   for (std::size_t i = 0; i < slots.size(); ++i) {
     const std::string& slot = slots[i].name;
-    put("variant " + slot, "/limn/state/variant", {slot, staging.slots[i].variant});
+    put("variant " + slot, "/limn/state/variant", {slot, show_state.slots[i].variant});
     const scene::PosedPart* shown = nullptr;
     for (const scene::PosedPart& part : posed.parts)
       if (part.slot == slot) shown = &part;
@@ -110,19 +110,19 @@ void OscPort::tell(const Session& session, Stamp at) {
         values.push_back(std::move(value));
     put("pose " + slot, shown ? "/limn/state/pose" : "/limn/state/lost", std::move(values));
   }
-  const int looks = static_cast<int>(staging.looks.size());
+  const int looks = static_cast<int>(show_state.looks.size());
   for (int i = 0; i < std::max(1, looks); ++i)
     put(fmt::format("looks {}", i), "/limn/state/looks",
-        {i, looks, looks > 0 ? staging.looks[static_cast<std::size_t>(i)].name : std::string()});
-  put_all("look", {staging.look});
-  put_all("blackout", {static_cast<int>(staging.blackout)});
-  put_all("freeze", {static_cast<int>(staging.frozen)});
-  put_all("marker_states", {static_cast<int>(staging.marker_states)});
-  put_all("screen", {scene::screen_names()[static_cast<std::size_t>(staging.screen)]});
-  for (const scene::Output& output : staging.screens)
+        {i, looks, looks > 0 ? show_state.looks[static_cast<std::size_t>(i)].name : std::string()});
+  put_all("look", {show_state.look});
+  put_all("blackout", {static_cast<int>(show_state.blackout)});
+  put_all("freeze", {static_cast<int>(show_state.frozen)});
+  put_all("marker_states", {static_cast<int>(show_state.marker_states)});
+  put_all("screen", {scene::screen_names()[static_cast<std::size_t>(show_state.screen)]});
+  for (const scene::Output& output : show_state.screens)
     put("output " + output.name, "/limn/state/output",
         {output.name, scene::screen_names()[static_cast<std::size_t>(output.shows)]});
-  put_all("viewer", {staging.viewer});
+  put_all("viewer", {show_state.viewer});
 }
 
 void OscPort::put(const std::string& key, const std::string& path, std::vector<OscValue> arguments) {

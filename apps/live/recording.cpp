@@ -5,7 +5,7 @@
 
 #include "core/config.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "device/jpeg.h"
 
 namespace limn::apps {
@@ -35,7 +35,7 @@ Status save_whole_rig(const Rig& rig, const fs::path& folder) {
 
 nlohmann::ordered_json setup_json(const SessionSetup& setup) {
   const tracker::MotionModel& motion = setup.watch.motion;
-  const PaintOptions& paint = setup.paint;
+  const ComposeOptions& paint = setup.paint;
   return {{"schema", "limn.session/1"},
           {"rig", "rig"},
           {"scene", "scene"},
@@ -67,7 +67,7 @@ T read_choice(const ConfigNode& node, const std::vector<std::string>& names) {
 
 }  // namespace
 
-Recorder::Recorder(const fs::path& folder) : folder_(folder), pictures_(k_most_queued) {}
+Recorder::Recorder(const fs::path& folder) : folder_(folder), images_(k_most_queued) {}
 
 Result<std::unique_ptr<Recorder>> Recorder::create(const fs::path& folder, const SessionSetup& setup) {
   if (fs::exists(folder / "session.json"))
@@ -95,8 +95,8 @@ void Recorder::watched(std::span<const Frame> frames) {
   for (const Frame& frame : frames) {
     const std::string file =
         fmt::format("frames/{}/{:06}.{}", frame.camera, frames_++, frame.jpeg ? "jpg" : "png");
-    if (!(frame.jpeg ? pictures_.offer(folder_ / file, frame.jpeg)
-                     : pictures_.offer(folder_ / file, frame.image)))
+    if (!(frame.jpeg ? images_.offer(folder_ / file, frame.jpeg)
+                     : images_.offer(folder_ / file, frame.image)))
       return end("the disk is full or too slow for the cameras' pictures");
     event["watch"].push_back(
         {{"camera", frame.camera}, {"file", file}, {"captured_at_ns", nanoseconds(frame.captured_at)}});
@@ -142,7 +142,7 @@ void Recorder::saw(const std::string& guest, const std::optional<Eigen::Vector3d
   write({{"eye", eye}});
 }
 
-void Recorder::painted(const Painted& painted, std::size_t moments) {
+void Recorder::painted(const ComposedFrame& painted, std::size_t moments) {
   const std::lock_guard lock(mutex_);
   if (ended_) return;
   write({{"paint", pose_log(painted)},
@@ -162,18 +162,18 @@ std::optional<std::string> Recorder::ended() const {
   return ended_;
 }
 
-Status Recorder::finish() { return pictures_.finish(); }
+Status Recorder::finish() { return images_.finish(); }
 
-std::uint64_t fingerprint(std::span<const cv::Mat> pictures) {
+std::uint64_t fingerprint(std::span<const cv::Mat> images) {
   std::uint64_t hash = 0xcbf29ce484222325;  // FNV-1a's, over words of eight bytes
   const auto add = [&](std::uint64_t word) {
     hash = (hash ^ word) * 0x100000001b3;
     hash ^= hash >> 29;
   };
-  for (const cv::Mat& picture : pictures) {
-    const std::size_t length = static_cast<std::size_t>(picture.cols) * picture.elemSize();
-    for (int row = 0; row < picture.rows; ++row) {
-      const std::uint8_t* bytes = picture.ptr(row);
+  for (const cv::Mat& image : images) {
+    const std::size_t length = static_cast<std::size_t>(image.cols) * image.elemSize();
+    for (int row = 0; row < image.rows; ++row) {
+      const std::uint8_t* bytes = image.ptr(row);
       for (std::size_t i = 0; i < length; i += 8) {
         std::uint64_t word = 0;
         std::memcpy(&word, bytes + i, std::min<std::size_t>(8, length - i));
@@ -185,13 +185,13 @@ std::uint64_t fingerprint(std::span<const cv::Mat> pictures) {
   return hash;
 }
 
-nlohmann::ordered_json pose_log(const Painted& painted) {
+nlohmann::ordered_json pose_log(const ComposedFrame& painted) {
   nlohmann::ordered_json json = {{"painted_at_ns", nanoseconds(painted.painted_at)},
                                  {"shown_at_ns", nanoseconds(painted.shown_at)}};
   json["tracks"] = nlohmann::ordered_json::array();
   for (const Track& track : painted.tracks)
     json["tracks"].push_back({{"body", track.body},
-                              {"sight", static_cast<int>(track.sight)},
+                              {"sight", static_cast<int>(track.tracking)},
                               {"world_from_body", to_json(track.world_from_body)}});
   json["parts"] = nlohmann::ordered_json::array();
   for (const scene::PosedPart& part : painted.posed.parts)
@@ -204,7 +204,7 @@ nlohmann::ordered_json pose_log(const Painted& painted) {
 Result<Frame> load_frame(const fs::path& file) {
   Frame frame;
   if (file.extension() != ".jpg") {
-    LIMN_TRY(frame.image, read_picture(file));
+    LIMN_TRY(frame.image, read_image(file));
     return frame;
   }
   LIMN_TRY(std::string bytes, read_file(file));
@@ -245,8 +245,8 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   const fs::path rig = root.at("rig").path_inside(), scene = root.at("scene").path_inside();
   LIMN_TRY_STATUS(config.status());
   LIMN_TRY(setup.rig, load_rig(rig));
-  std::vector<scene::LeftOut> left_out;  // as the session left it out
-  LIMN_TRY(setup.scene, scene::load_scene(scene, &left_out));
+  std::vector<scene::SkippedVariant> skipped_variants;  // as the session left it out
+  LIMN_TRY(setup.scene, scene::load_scene(scene, &skipped_variants));
   return setup;
 }
 

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "apps/live/painter.h"
-#include "apps/picture_writer.h"
+#include "apps/live/frame_composer.h"
+#include "apps/image_writer.h"
 #include "core/frame.h"
 #include "core/result.h"
 #include "core/rig.h"
@@ -19,18 +19,18 @@
 
 namespace limn::apps {
 
-/// What a session's pictures depend on beside frames and edits.
+/// What a session's images depend on beside frames and edits.
 struct SessionSetup {
   Rig rig;
   scene::Scene scene;
-  WatchOptions watch;
-  PaintOptions paint;
+  PerceptionOptions watch;
+  ComposeOptions paint;
   std::vector<std::string> screens = {};  ///< names of displays that are no projectors
 };
 
 /// Writes a session's folder (limn.session/1): rig and scene as they were, frames as the JPEG that a camera
 /// sent, others as PNG, and events.jsonl, what happened in its order: frames watched, edits, where a tablet
-/// looked from that was followed, pictures painted with their poses. Frames are written on a thread of their
+/// looked from that was followed, images painted with their poses. Frames are written on a thread of their
 /// own; when the disk is full or too slow for them the recording ends there, complete up
 /// to that moment, and says so, and the session goes on. Safe from several threads.
 class Recorder {
@@ -50,7 +50,7 @@ class Recorder {
   /// Where a guest's tablet looks from that is followed; nullopt: nowhere any more.
   void saw(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at);
   /// `moments` as of edited().
-  void painted(const Painted& painted, std::size_t moments);
+  void painted(const ComposedFrame& painted, std::size_t moments);
 
   /// Why it ended before the session, if it did.
   std::optional<std::string> ended() const;
@@ -63,18 +63,18 @@ class Recorder {
   void end(const std::string& why);                 // likewise
 
   std::filesystem::path folder_;
-  PictureWriter pictures_;
+  ImageWriter images_;
   mutable std::mutex mutex_;
   std::ofstream events_;
   std::size_t frames_ = 0, scenes_ = 1, rigs_ = 1;
   std::optional<std::string> ended_;
 };
 
-/// Of 8-bit pictures, to tell whether two are the same.
-std::uint64_t fingerprint(std::span<const cv::Mat> pictures);
+/// Of 8-bit images, to tell whether two are the same.
+std::uint64_t fingerprint(std::span<const cv::Mat> images);
 
 /// A line of events.jsonl that replay compares: shown_at and the tracks, numbers in full.
-nlohmann::ordered_json pose_log(const Painted& painted);
+nlohmann::ordered_json pose_log(const ComposedFrame& painted);
 
 /// Reads a frame's file, but its camera's name and its stamp, as it was watched. Error: damaged, or none.
 Result<Frame> load_frame(const std::filesystem::path& file);

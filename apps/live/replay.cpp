@@ -8,10 +8,10 @@
 #include <optional>
 #include <thread>
 
-#include "apps/live/books.h"
+#include "apps/live/session_output.h"
 #include "apps/live/recording.h"
 #include "apps/live/session.h"
-#include "apps/live/watcher.h"
+#include "apps/live/perception.h"
 #include "core/log.h"
 #include "device/gl_context.h"
 #include "device/window.h"
@@ -52,11 +52,11 @@ Result<Events> load_events(const fs::path& path) {
 
 class Replay {
  public:
-  Replay(const ReplayOptions& options, Watcher watcher, Session session, Books books)
+  Replay(const ReplayOptions& options, Perception perception, Session session, SessionOutput output)
       : options_(options),
-        watcher_(std::move(watcher)),
+        perception_(std::move(perception)),
         session_(std::move(session)),
-        books_(std::move(books)) {}
+        output_(std::move(output)) {}
 
   Status play(const Events& events) {
     if (options_.window) {
@@ -75,16 +75,16 @@ class Replay {
 
   // Error: what differs from the recording.
   Status close() {
-    LIMN_TRY_STATUS(books_.close(&session_, options_.json));
+    LIMN_TRY_STATUS(output_.close(&session_, options_.json));
     if (first_pose_)
       return error("{}: expected the recorded poses, found others in {} of {} pictures, first at {:.3f} s.",
-                   options_.session.string(), other_poses_, pictures_, *first_pose_);
-    if (first_picture_)
+                   options_.session.string(), other_poses_, images_, *first_pose_);
+    if (first_image_)
       return error(
           "{}: expected the recorded projector pictures, found others in {} of {}, first at {:.3f} s "
           "(poses are identical; another machine or driver draws a little differently).",
-          options_.session.string(), other_pictures_, pictures_, *first_picture_);
-    log_info("replay: {} pictures, poses and pictures identical to the recording's", pictures_);
+          options_.session.string(), other_images_, images_, *first_image_);
+    log_info("replay: {} pictures, poses and pictures identical to the recording's", images_);
     return {};
   }
 
@@ -126,19 +126,19 @@ class Replay {
       frame.captured_at = stamp_of(item.at("captured_at_ns"));
       frames.push_back(std::move(frame));
     }
-    watcher_.watch(frames);
+    perception_.watch(frames);
     ++moments_;
     return {};
   }
 
-  // Frames that the picture knew of; a thread of its own watched them, perhaps further than that.
+  // Frames that the image knew of; a thread of its own watched them, perhaps further than that.
   Status watch_until(std::size_t moments) {
     if (moments <= moments_) return {};
     while (moments_ < moments && !unwatched_.empty()) {
       LIMN_TRY_STATUS(watch(unwatched_.front()));
       unwatched_.pop_front();
     }
-    Watched watched = watcher_.watched();
+    Percepts watched = perception_.watched();
     watched.uses.clear();  // what came of them was recorded as edits
     session_.take(std::move(watched), moments_);
     return {};
@@ -156,14 +156,14 @@ class Replay {
     LIMN_TRY(Rig rig, load_rig(path));
     LIMN_TRY_STATUS(session_.mend(std::move(rig), session_.watched().captured_at));
     const SessionSetup& setup = session_.setup();
-    LIMN_TRY(watcher_, Watcher::create(setup.scene, setup.rig, setup.watch));
+    LIMN_TRY(perception_, Perception::create(setup.scene, setup.rig, setup.watch));
     return {};
   }
 
   Status show(const std::string& folder) {
     LIMN_TRY(const fs::path path, inside(folder));
-    std::vector<scene::LeftOut> left_out;  // as the session left it out
-    LIMN_TRY(scene::Scene scene, scene::load_scene(path, &left_out));
+    std::vector<scene::SkippedVariant> skipped_variants;  // as the session left it out
+    LIMN_TRY(scene::Scene scene, scene::load_scene(path, &skipped_variants));
     return session_.show(std::move(scene), session_.watched().captured_at);
   }
 
@@ -186,16 +186,16 @@ class Replay {
     LIMN_TRY_STATUS(watch_until(event.at("moments")));
     wait_for(shown_at);
     const Stamp painted_at = stamp_of(event.at("paint").at("painted_at_ns"));
-    const Painted& painted = session_.paint(painted_at, shown_at);
+    const ComposedFrame& painted = session_.paint(painted_at, shown_at);
     session_.look_for_drift(painted_at);
-    ++pictures_;
+    ++images_;
     const double at_s = seconds_between(Stamp{}, shown_at);
     if (pose_log(painted) != event.at("paint") && ++other_poses_ == 1) first_pose_ = at_s;
     const std::string print = fmt::format("{:016x}", fingerprint(painted.projectors));
-    if (print != event.at("pictures") && ++other_pictures_ == 1) first_picture_ = at_s;
+    if (print != event.at("pictures") && ++other_images_ == 1) first_image_ = at_s;
     if (window_)
       if (const cv::Mat screen = session_.screen(); !screen.empty()) window_->show(screen);
-    books_.shown(session_.measured(), painted);
+    output_.shown(session_.measured(), painted);
     return {};
   }
 
@@ -214,14 +214,14 @@ class Replay {
   }
 
   const ReplayOptions& options_;
-  Watcher watcher_;
+  Perception perception_;
   Session session_;
-  Books books_;
+  SessionOutput output_;
   std::optional<device::Window> window_;
   std::optional<std::pair<std::chrono::steady_clock::time_point, Stamp>> begun_;
   std::deque<Json> unwatched_;
-  std::size_t moments_ = 0, pictures_ = 0, other_poses_ = 0, other_pictures_ = 0;
-  std::optional<double> first_pose_, first_picture_;
+  std::size_t moments_ = 0, images_ = 0, other_poses_ = 0, other_images_ = 0;
+  std::optional<double> first_pose_, first_image_;
 };
 
 }  // namespace
@@ -231,10 +231,10 @@ Status run_replay(const ReplayOptions& options) {
   LIMN_TRY(SessionSetup setup, load_setup(options.session));
   LIMN_TRY(const Events events, load_events(options.session / "events.jsonl"));
   LIMN_TRY(const device::GlContext context, device::GlContext::create());
-  LIMN_TRY(Books books, Books::open(options.out, {}, &setup));
-  LIMN_TRY(Watcher watcher, Watcher::create(setup.scene, setup.rig, setup.watch));
+  LIMN_TRY(SessionOutput output, SessionOutput::open(options.out, {}, &setup));
+  LIMN_TRY(Perception perception, Perception::create(setup.scene, setup.rig, setup.watch));
   LIMN_TRY(Session session, Session::create(setup, nullptr, nullptr, false));
-  Replay replay(options, std::move(watcher), std::move(session), std::move(books));
+  Replay replay(options, std::move(perception), std::move(session), std::move(output));
   const Status played = replay.play(events);
   LIMN_TRY_STATUS(replay.close());
   LIMN_TRY_STATUS(played);

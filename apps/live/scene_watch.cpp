@@ -49,7 +49,7 @@ std::optional<Result<SceneNews>> SceneWatch::news() {
   loaded_ = seen_;
   loading_ = std::async(std::launch::async, [folder = folder_]() -> Result<SceneNews> {
     SceneNews news;
-    LIMN_TRY(news.scene, scene::load_scene(folder, &news.left_out));
+    LIMN_TRY(news.scene, scene::load_scene(folder, &news.skipped_variants));
     return news;
   });
   return std::nullopt;

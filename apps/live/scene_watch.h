@@ -17,7 +17,7 @@ namespace limn::apps {
 /// A scene as its files are now, and what of it cannot be loaded.
 struct SceneNews {
   scene::Scene scene;
-  std::vector<scene::LeftOut> left_out;
+  std::vector<scene::SkippedVariant> skipped_variants;
 };
 
 /// Watches a scene's folder while a session runs: files that are added, saved or taken away load the scene

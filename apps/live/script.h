@@ -44,7 +44,7 @@ struct Script {
     std::string device;
     double from_s = 0, until_s = 0;
   };
-  /// A camera sends pictures of another size.
+  /// A camera sends images of another size.
   struct Resize {
     std::string camera;
     double from_s = 0, until_s = 0;

@@ -8,7 +8,7 @@
 #include "apps/live/swapped_cameras.h"
 #include "core/file.h"
 #include "core/log.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 
 namespace limn::apps {
 namespace {
@@ -70,8 +70,8 @@ bool is_carried_alike(const scene::Scene& a, const scene::Scene& b) {
 
 }  // namespace
 
-void tell(std::span<const scene::LeftOut> left_out, Stamp at, Telemetry* telemetry) {
-  for (const scene::LeftOut& part : left_out) {
+void tell(std::span<const scene::SkippedVariant> skipped_variants, Stamp at, Telemetry* telemetry) {
+  for (const scene::SkippedVariant& part : skipped_variants) {
     const std::string what = fmt::format("{} of slot {} is left out: {}", part.variant, part.slot, part.why);
     if (telemetry) telemetry->note(at, what);
     log_warning("live: {}", what);
@@ -91,8 +91,8 @@ Result<Session> Session::create(const SessionSetup& setup,
       return error("scene.json: controls: {}: expected a slot for {}, found none.", control.marker.text(),
                    control.action);
   }
-  LIMN_TRY(Painter painter, Painter::create(setup.scene, setup.rig, setup.paint));
-  Session out(setup, std::move(painter), telemetry, recorder);
+  LIMN_TRY(FrameComposer composer, FrameComposer::create(setup.scene, setup.rig, setup.paint));
+  Session out(setup, std::move(composer), telemetry, recorder);
   out.keeps_looks_ = keeps_looks;
   out.load_looks();
   out.load_pairings();
@@ -100,18 +100,18 @@ Result<Session> Session::create(const SessionSetup& setup,
   return out;
 }
 
-Session::Session(SessionSetup setup, Painter painter, Telemetry* telemetry, Recorder* recorder)
+Session::Session(SessionSetup setup, FrameComposer composer, Telemetry* telemetry, Recorder* recorder)
     : setup_(std::move(setup)),
-      painter_(std::move(painter)),
-      painted_(painter_->painted()),
+      composer_(std::move(composer)),
+      painted_(composer_->painted()),
       telemetry_(telemetry),
       recorder_(recorder),
-      staging_(scene::first_staging(setup_.scene)) {
-  for (const std::string& name : setup_.screens) staging_.screens.push_back({name});
+      show_state_(scene::initial_show_state(setup_.scene)) {
+  for (const std::string& name : setup_.screens) show_state_.screens.push_back({name});
   if (setup_.rig.cameras.empty()) return;
   const Eigen::Quaterniond world_from_camera = setup_.rig.cameras[0].imager_from_world.rotation.inverse();
-  staging_.d_up_world = world_from_camera * -Eigen::Vector3d::UnitY();
-  staging_.d_front_world = world_from_camera * -Eigen::Vector3d::UnitZ();
+  show_state_.d_up_world = world_from_camera * -Eigen::Vector3d::UnitY();
+  show_state_.d_front_world = world_from_camera * -Eigen::Vector3d::UnitZ();
 }
 
 void Session::load_looks() {
@@ -123,7 +123,7 @@ void Session::load_looks() {
   for (const fs::path& file : files) {
     Result<scene::Look> look = scene::load_look(file, setup_.scene);
     if (look)
-      staging_.looks.push_back(std::move(*look));
+      show_state_.looks.push_back(std::move(*look));
     else
       log_warning("live: {} The look is left alone.", look.message());
   }
@@ -133,9 +133,9 @@ void Session::load_pairings() {
   const fs::path file = setup_.scene.folder / k_pairings;
   std::error_code none;
   if (!fs::exists(file, none)) return;
-  auto paired = scene::with_pairings(file, setup_.scene, staging_);
+  auto paired = scene::with_pairings(file, setup_.scene, show_state_);
   if (paired)
-    staging_ = std::move(*paired);
+    show_state_ = std::move(*paired);
   else
     log_warning("live: {} The scene's own markers carry the parts.", paired.message());
 }
@@ -150,12 +150,12 @@ void Session::ask_units() {
     }
 }
 
-void Session::take(Watched watched, std::size_t moments) {
+void Session::take(Percepts watched, std::size_t moments) {
   watched_ = std::move(watched);
   moments_ = moments;
-  staging_ =
-      scene::unpinned(setup_.scene, staging_,
-                      scene::carried(setup_.scene, staging_,
+  show_state_ =
+      scene::without_moved_pins(setup_.scene, show_state_,
+                      scene::assign_tracks(setup_.scene, show_state_,
                                      tracker::predicted(watched_.motions, watched_.captured_at,
                                                         setup_.paint.prediction, setup_.paint.motion)));
   for (const ControlUse& use : watched_.uses) {
@@ -192,15 +192,15 @@ Status Session::edit(const scene::Edit& wanted, const std::string& source, Stamp
   scene::Edit edit = wanted;
   LIMN_TRY(scene::Command command, scene::command_of(setup_.scene, edit));
   if (auto* marker = std::get_if<std::optional<MarkerName>>(&command.value); marker && !*marker)
-    if (const auto waiting = waiting_markers(setup_.scene, staging_, watched_); !waiting.empty()) {
+    if (const auto waiting = waiting_markers(setup_.scene, show_state_, watched_); !waiting.empty()) {
       *marker = waiting.back().marker;  // the one that glows; it is recorded by its name
       edit.value = (*marker)->text();
     }
-  LIMN_TRY(scene::Staging changed, scene::edited(setup_.scene, staging_, painted_.posed, command));
-  std::swap(staging_, changed);
+  LIMN_TRY(scene::ShowState changed, scene::apply_edit(setup_.scene, show_state_, painted_.posed, command));
+  std::swap(show_state_, changed);
   last_edit_ = Edited{edit, source, last_edit_ ? last_edit_->count + 1 : 1};
   if (recorder_) recorder_->edited(edit, source, moments_);
-  repair_asked_ |= command.action == scene::ActionId::repair;
+  recalibration_requested_ |= command.action == scene::ActionId::repair;
   if (telemetry_)
     telemetry_->note(at, fmt::format("{}{}{}{}{} ({})", edit.action, edit.slot.empty() ? "" : " ", edit.slot,
                                      edit.value.empty() ? "" : " ", edit.value, source));
@@ -213,9 +213,9 @@ void Session::see(const std::string& guest, const std::optional<Eigen::Vector3d>
     windows_.insert(guest);
   else
     windows_.erase(guest);
-  const bool counts = guest == staging_.viewer || setup_.scene.find_tablet(guest);
+  const bool counts = guest == show_state_.viewer || setup_.scene.find_tablet(guest);
   const auto known = std::find_if(places_.begin(), places_.end(),
-                                  [&](const GuestPlace& place) { return place.guest == guest; });
+                                  [&](const TabletViewpoint& place) { return place.guest == guest; });
   const bool is_known = known != places_.end();
   if (!counts || (!p_eye_world && !is_known)) return;
   if (is_known) places_.erase(known);
@@ -229,21 +229,21 @@ Status Session::show(scene::Scene scene, Stamp at) {
         "{}: expected the markers, slots and controls that the session began with, found others. Begin a "
         "new session to take them; this one goes on with the parts as they were.",
         (scene.folder / "scene.json").string());
-  LIMN_TRY(Painter painter, Painter::create(scene, setup_.rig, setup_.paint));
+  LIMN_TRY(FrameComposer composer, FrameComposer::create(scene, setup_.rig, setup_.paint));
   for (std::size_t i = 0; i < scene.slots.size(); ++i) {
     const std::vector<std::string> now = variant_names(scene.slots[i]),
                                    before = variant_names(setup_.scene.slots[i]);
     const auto is_in = [](const std::vector<std::string>& names, const std::string& name) {
       return std::find(names.begin(), names.end(), name) != names.end();
     };
-    std::string& shown = staging_.slots[i].variant;
+    std::string& shown = show_state_.slots[i].variant;
     for (const std::string& name : now)
       if (!is_in(before, name)) shown = name;
     if (!is_in(now, shown)) shown = now.front();
   }
   if (recorder_) recorder_->shown(scene);
   if (telemetry_) telemetry_->note(at, "the scene's files have changed; it was loaded anew");
-  painter_ = std::move(painter);
+  composer_ = std::move(composer);
   setup_.scene = std::move(scene);
   ++scenes_;
   ask_units();
@@ -252,8 +252,8 @@ Status Session::show(scene::Scene scene, Stamp at) {
 
 Status Session::mend(Rig rig, Stamp at) {
   if (recorder_) rig = recorder_->mended(std::move(rig), moments_);
-  LIMN_TRY(Painter painter, Painter::create(setup_.scene, rig, setup_.paint));
-  painter_ = std::move(painter);
+  LIMN_TRY(FrameComposer composer, FrameComposer::create(setup_.scene, rig, setup_.paint));
+  composer_ = std::move(composer);
   setup_.rig = std::move(rig);
   ++scenes_;
   told_drift_.reset();
@@ -273,26 +273,26 @@ void Session::show_news(SceneWatch* files, Stamp at) {
 
 // A part that is shown and cannot be loaded any more stays; one that never could be is no reason.
 Status Session::show_if_whole(SceneNews news, Stamp at) {
-  for (const scene::LeftOut& left_out : news.left_out) {
-    const scene::Slot* slot = setup_.scene.find_slot(left_out.slot);
+  for (const scene::SkippedVariant& skipped_variants : news.skipped_variants) {
+    const scene::Slot* slot = setup_.scene.find_slot(skipped_variants.slot);
     if (!slot) continue;
     for (const std::string& name : variant_names(*slot))
-      if (name == left_out.variant) return error("{}", left_out.why);
+      if (name == skipped_variants.variant) return error("{}", skipped_variants.why);
   }
   LIMN_TRY_STATUS(show(std::move(news.scene), at));
-  tell(news.left_out, at, telemetry_);
+  tell(news.skipped_variants, at, telemetry_);
   return {};
 }
 
-Status Session::keep(const scene::Staging& before, const scene::Command& command) {
+Status Session::keep(const scene::ShowState& before, const scene::Command& command) {
   LIMN_TRY_STATUS(keep_pairings(before));
   if (const auto* unit = std::get_if<scene::PartUnit>(&command.value))
     LIMN_TRY_STATUS(keep_unit(setup_.scene.slots[command.slot], *unit));
   return keep_looks(before);
 }
 
-Status Session::keep_pairings(const scene::Staging& before) {
-  const std::string text = scene::pairings_json(setup_.scene, staging_);
+Status Session::keep_pairings(const scene::ShowState& before) {
+  const std::string text = scene::pairings_json(setup_.scene, show_state_);
   if (text == scene::pairings_json(setup_.scene, before)) return {};
   const fs::path file = setup_.scene.folder / k_pairings;
   if (!text.empty()) return write_file(file, text);
@@ -308,40 +308,40 @@ Status Session::keep_unit(const scene::Slot& slot, const scene::PartUnit& unit) 
 }
 
 // Looks that were saved or deleted, on disk, and the page of all.
-Status Session::keep_looks(const scene::Staging& before) {
-  const auto text_of = [](const scene::Staging& staging, const std::string& name) {
-    for (const scene::Look& look : staging.looks)
+Status Session::keep_looks(const scene::ShowState& before) {
+  const auto text_of = [](const scene::ShowState& show_state, const std::string& name) {
+    for (const scene::Look& look : show_state.looks)
       if (look.name == name) return scene::look_json(look);
     return std::string();
   };
   const fs::path folder = setup_.scene.folder / "looks";
   bool has_changed = false;
   for (const scene::Look& look : before.looks) {
-    if (!text_of(staging_, look.name).empty()) continue;
+    if (!text_of(show_state_, look.name).empty()) continue;
     has_changed = true;
     LIMN_TRY_STATUS(move_look(look.name, folder, folder / k_deleted));
   }
-  for (const scene::Look& look : staging_.looks) {
+  for (const scene::Look& look : show_state_.looks) {
     const std::string text = scene::look_json(look);
     if (text == text_of(before, look.name)) continue;
     has_changed = true;
-    if (before.deleted_look && text == scene::look_json(*before.deleted_look) && !staging_.deleted_look) {
+    if (before.deleted_look && text == scene::look_json(*before.deleted_look) && !show_state_.deleted_look) {
       LIMN_TRY_STATUS(move_look(look.name, folder / k_deleted, folder));
       continue;
     }
     LIMN_TRY_STATUS(make_folder(folder));
     LIMN_TRY_STATUS(write_file(folder / (look.name + ".json"), text));
-    const cv::Mat picture = screen(scene::Screen::view);
-    if (!picture.empty()) LIMN_TRY_STATUS(write_png(folder / (look.name + ".png"), picture));
+    const cv::Mat image = screen(scene::Screen::view);
+    if (!image.empty()) LIMN_TRY_STATUS(write_png(folder / (look.name + ".png"), image));
   }
-  return has_changed ? write_contact_sheet(staging_.looks, folder, folder / "looks.html") : Status();
+  return has_changed ? write_contact_sheet(show_state_.looks, folder, folder / "looks.html") : Status();
 }
 
-const Painted& Session::paint(Stamp now, Stamp shown_at) {
+const ComposedFrame& Session::paint(Stamp now, Stamp shown_at) {
   const auto begun = std::chrono::steady_clock::now();
-  if (painter_) painter_->paint(watched_, staging_, now, shown_at, places_);
-  if (painter_ && !(drawing_.is_lost && drawing_.is_lost()))
-    painted_ = painter_->painted();
+  if (composer_) composer_->paint(watched_, show_state_, now, shown_at, places_);
+  if (composer_ && !(drawing_.is_lost && drawing_.is_lost()))
+    painted_ = composer_->painted();
   else
     draw_anew(now, shown_at);
   paint_ms_ = milliseconds_since(begun);
@@ -351,20 +351,20 @@ const Painted& Session::paint(Stamp now, Stamp shown_at) {
   return painted_;
 }
 
-// The GL context is gone, and what was drawn in it: the picture before it stays until there is another.
+// The GL context is gone, and what was drawn in it: the image before it stays until there is another.
 void Session::draw_anew(Stamp now, Stamp shown_at) {
-  if (!painter_ && seconds_between(renewed_at_, now) < k_renew_every_s) return;
-  const bool was_drawing = painter_.has_value();
-  painter_.reset();
+  if (!composer_ && seconds_between(renewed_at_, now) < k_renew_every_s) return;
+  const bool was_drawing = composer_.has_value();
+  composer_.reset();
   renewed_at_ = now;
   Status renewed = drawing_.renew();
   if (renewed) {
-    auto painter = Painter::create(setup_.scene, setup_.rig, setup_.paint);
-    if (painter) {
-      painter_ = std::move(*painter);
-      painted_ = painter_->paint(watched_, staging_, now, shown_at, places_);
+    auto composer = FrameComposer::create(setup_.scene, setup_.rig, setup_.paint);
+    if (composer) {
+      composer_ = std::move(*composer);
+      painted_ = composer_->paint(watched_, show_state_, now, shown_at, places_);
     } else {
-      renewed = painter.error();
+      renewed = composer.error();
     }
   }
   if (!renewed && !was_drawing) return;
@@ -378,9 +378,9 @@ void Session::draw_anew(Stamp now, Stamp shown_at) {
 }
 
 void Session::look_for_drift(Stamp now) {
-  if (!painter_) return;
-  painter_->look_for_drift(watched_);
-  const std::optional<Drift>& drift = painter_->drift();
+  if (!composer_) return;
+  composer_->look_for_drift(watched_);
+  const std::optional<Drift>& drift = composer_->drift();
   const bool is_news =
       drift.has_value() != told_drift_.has_value() || (drift && drift->devices != told_drift_->devices);
   if (!is_news) return;
@@ -390,7 +390,7 @@ void Session::look_for_drift(Stamp now) {
 }
 
 ShownFrame Session::measured() const {
-  const Painted& painted = painted_;
+  const ComposedFrame& painted = painted_;
   ShownFrame out{.captured_at = watched_.captured_at,
                  .shown_at = painted.shown_at,
                  .detect_ms = watched_.detect_ms,
@@ -400,16 +400,16 @@ ShownFrame Session::measured() const {
                  .record_ms = record_ms_};
   for (const auto& detections : watched_.detections) out.markers += static_cast<int>(detections.size());
   for (const Track& track : painted.tracks)
-    out.lost += track.sight == Sight::lost && !scene::is_loose_body(track.body);
+    out.lost += track.tracking == TrackingState::lost && !scene::is_loose_body(track.body);
   return out;
 }
 
 cv::Mat Session::free_surface(std::size_t projector) {
-  return painter_ && painted_.posed.world_from_prototype ? painter_->free_surface(projector) : cv::Mat();
+  return composer_ && painted_.posed.world_from_prototype ? composer_->free_surface(projector) : cv::Mat();
 }
 
 cv::Mat Session::screen(scene::Screen what) {
-  return painter_ ? painter_->screen(watched_, staging_, what) : cv::Mat();
+  return composer_ ? composer_->screen(watched_, show_state_, what) : cv::Mat();
 }
 
 }  // namespace limn::apps

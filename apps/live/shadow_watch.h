@@ -3,12 +3,12 @@
 #include <optional>
 #include <vector>
 
-#include "apps/live/shown_pictures.h"
-#include "apps/live/watcher.h"
+#include "apps/live/projection_history.h"
+#include "apps/live/perception.h"
 #include "core/rig.h"
-#include "projector/arriving.h"
+#include "projector/shadow_detector.h"
 #include "projector/renderer.h"
-#include "scene/posed.h"
+#include "scene/posed_scene.h"
 
 namespace limn::apps {
 
@@ -19,14 +19,14 @@ class ShadowWatch {
 
   /// Takes in frames that were not seen yet and tells the renderer how much of each projector's light
   /// arrives. Nothing happens without a prototype in `posed`.
-  void look(const Watched& watched,
+  void look(const Percepts& watched,
             const scene::PosedScene& posed,
-            const ShownPictures& shown,
+            const ProjectionHistory& shown,
             projector::Renderer* renderer);
 
  private:
   Rig rig_;
-  projector::ArrivingLight arriving_;
+  projector::ShadowDetector arriving_;
   std::vector<Stamp> seen_at_;  // newest frame of each camera
   std::optional<Pose> placed_;  // world_from_prototype that the patches are for
 };

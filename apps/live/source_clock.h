@@ -8,7 +8,7 @@
 namespace limn::apps {
 
 /// Puts a camera's stamps on the session's clock: those of a clock of its own (a video's, a camera's that was
-/// set wrong) are moved so that the first is now. A clock that steps is moved anew, so that its pictures are
+/// set wrong) are moved so that the first is now. A clock that steps is moved anew, so that its images are
 /// on their way for as long as they were before.
 class SourceClock {
  public:
@@ -31,7 +31,7 @@ class SourceClock {
   bool is_other() const { return offset_s_ && *offset_s_ != 0; }
 
  private:
-  // No camera's picture is from later than a moment from now, or is so long on its way.
+  // No camera's image is from later than a moment from now, or is so long on its way.
   static constexpr double k_ahead_s = 2, k_behind_s = 5;
   std::optional<double> offset_s_;
   double behind_s_ = 0;  // as the newest that fitted was

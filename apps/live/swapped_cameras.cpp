@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "tracker/body_pose.h"
-#include "tracker/sighting.h"
+#include "tracker/body_correspondences.h"
 
 namespace limn::apps {
 namespace {
@@ -22,7 +22,7 @@ double misfit_px(std::span<const Body> bodies,
   double worst = 0;
   for (const Body& body : bodies) {
     int seen_by = 0;
-    for (const tracker::View& view : views) seen_by += !tracker::sighting(body, {&view, 1}).empty();
+    for (const tracker::View& view : views) seen_by += !tracker::correspondences(body, {&view, 1}).empty();
     if (seen_by < 2) continue;
     const auto track = tracker::world_from_body(body, views, captured_at);
     worst = std::max(worst, track ? track->rms_px : std::numeric_limits<double>::infinity());

@@ -13,7 +13,7 @@
 
 namespace limn::apps {
 
-/// Two cameras whose pictures come under each other's names: as named, they see a body in two places; with
+/// Two cameras whose images come under each other's names: as named, they see a body in two places; with
 /// the two exchanged all of them see it in one. `detections`: of one moment, a camera each in the rig's
 /// order. None where no body is seen by two cameras, and where an exchange does not explain what is seen.
 std::optional<std::pair<std::string, std::string>> swapped_cameras(

@@ -86,7 +86,7 @@ Result<Telemetry> Telemetry::create(const std::filesystem::path& folder) {
   if (folder.empty()) return out;
   LIMN_TRY_STATUS(make_folder(folder));
   LIMN_TRY(out.csv_,
-           GrowingFile::create(folder / "telemetry.csv",
+           AppendLog::create(folder / "telemetry.csv",
                                "captured_at_s,shown_at_s,latency_ms,detect_ms,filter_ms,paint_ms,screen_ms,"
                                "record_ms,markers,lost,missed,placement_mm\n"));
   return out;

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/live/growing_file.h"
+#include "apps/live/append_log.h"
 #include "core/frame.h"
 #include "core/result.h"
 
@@ -27,21 +27,21 @@ class Quantiles {
   double sum_ = 0, least_ = 0, most_ = 0;
 };
 
-/// One picture's way from the camera to the light.
+/// One image's way from the camera to the light.
 struct ShownFrame {
-  Stamp captured_at;  ///< of the newest camera picture in it
+  Stamp captured_at;  ///< of the newest camera image in it
   Stamp shown_at;
   double detect_ms = 0, filter_ms = 0, paint_ms = 0, screen_ms = 0, record_ms = 0;
-  int markers = 0;           ///< in the newest pictures
+  int markers = 0;           ///< in the newest images
   int lost = 0;              ///< bodies
-  int missed = 0;            ///< camera pictures that never came or were not looked at
+  int missed = 0;            ///< camera images that never came or were not looked at
   double placement_mm = -1;  ///< RMS over the parts, from their true places; -1: not known
 };
 
 /// What a session measured of itself, in memory that does not grow with time.
 class Telemetry {
  public:
-  /// Begins telemetry.csv in the folder, one row a picture shown; an empty path writes nothing.
+  /// Begins telemetry.csv in the folder, one row an image shown; an empty path writes nothing.
   static Result<Telemetry> create(const std::filesystem::path& folder);
 
   void add(const ShownFrame& frame);
@@ -70,7 +70,7 @@ class Telemetry {
   std::vector<Slice> slices_;
   double slice_s_ = 0.5;
   std::vector<std::pair<double, std::string>> notes_;
-  GrowingFile csv_;
+  AppendLog csv_;
   Stamp begun_at_, last_at_;
   std::size_t frames_ = 0, missed_ = 0, with_lost_ = 0;
 };

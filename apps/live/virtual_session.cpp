@@ -6,10 +6,10 @@
 #include <limits>
 #include <opencv2/core.hpp>
 
-#include "apps/live/books.h"
-#include "apps/live/camera_intake.h"
+#include "apps/live/session_output.h"
+#include "apps/live/frame_gate.h"
 #include "apps/live/device_health.h"
-#include "apps/live/repair.h"
+#include "apps/live/live_recalibration.h"
 #include "apps/live/scene_watch.h"
 #include "apps/live/stopwatch.h"
 #include "apps/wizard/virtual_stage.h"
@@ -24,7 +24,7 @@ double seconds_of(Stamp at) { return seconds_between(Stamp{}, at); }
 
 // RMS distance of the parts' origins from where they truly are when the light arrives, on the prototype; -1
 // when none is shown.
-double placement_mm(const Painted& painted,
+double placement_mm(const ComposedFrame& painted,
                     const Session& session,
                     const ScriptedRoom& room,
                     const sim::World& world) {
@@ -38,10 +38,10 @@ double placement_mm(const Painted& painted,
   if (scene.prototype) add("prototype", world.world_from_prototype);
   const double at_s = seconds_of(painted.shown_at);
   for (std::size_t i = 0; i < scene.slots.size(); ++i) {
-    const MarkerName& marker = scene::carrier(scene, session.staging(), i);
+    const MarkerName& marker = scene::slot_marker(scene, session.show_state(), i);
     if (sim::world_from_marker(world, marker)) add(scene.slots[i].name, room.world_from_marker(marker, at_s));
   }
-  const scene::PosedScene right = scene::staged(scene, session.staging(), truth);
+  const scene::PosedScene right = scene::compose_scene(scene, session.show_state(), truth);
   const auto base = [](const scene::PosedScene& posed) {
     return posed.world_from_prototype ? posed.world_from_prototype->inverse() : Pose{};
   };
@@ -64,25 +64,25 @@ class VirtualLoop {
   VirtualLoop(const std::atomic<bool>& is_ended,
               sim::VirtualRig* rig,
               ScriptedRoom* room,
-              Watcher* watcher,
+              Perception* perception,
               Session* session,
-              Books* books,
-              OperatorDesk* desk,
+              SessionOutput* output,
+              OperatorConsole* console,
               OscPort* osc,
               Server* server)
       : is_ended_(is_ended),
         rig_(rig),
         room_(room),
-        watcher_(watcher),
+        perception_(perception),
         session_(session),
-        books_(books),
-        desk_(desk),
+        output_(output),
+        console_(console),
         osc_(osc),
         server_(server),
         files_(session->setup().scene.folder) {
     for (const Imager& camera : rig->world().rig.cameras) {
       cameras_.push_back(health_.add({camera.name, "camera"}));
-      intakes_.emplace_back(camera.name, cv::Size(camera.width, camera.height), cameras_.back(), &health_);
+      gates_.emplace_back(camera.name, cv::Size(camera.width, camera.height), cameras_.back(), &health_);
     }
     for (const Imager& projector : session->setup().rig.projectors)
       projectors_.push_back(health_.add({projector.name, "projector"}));
@@ -96,19 +96,19 @@ class VirtualLoop {
     double frames_ms = 0;  // to hand over to the recording
     if (!frames.empty()) {
       const auto begun = std::chrono::steady_clock::now();
-      if (books_->recorder()) books_->recorder()->watched(frames);
+      if (output_->recorder()) output_->recorder()->watched(frames);
       frames_ms = milliseconds_since(begun);
-      session_->take(watcher_->watch(frames), ++moments_);
+      session_->take(perception_->watch(frames), ++moments_);
     }
     play_edits(exposed_at);
     session_->show_news(&files_, rig_->now());
-    if (osc_) osc_->hear(session_, &books_->telemetry(), rig_->now());
+    if (osc_) osc_->hear(session_, &output_->telemetry(), rig_->now());
     if (server_) serve();
-    if (session_->takes_repair()) {
-      LIMN_TRY(const bool goes_on, mend());
-      if (!goes_on) return false;
+    if (session_->take_recalibration_request()) {
+      LIMN_TRY(const bool should_continue, mend());
+      if (!should_continue) return false;
     }
-    const Painted& painted = session_->paint(rig_->now(), shifted(rig_->now(), k_virtual_display_s));
+    const ComposedFrame& painted = session_->paint(rig_->now(), shifted(rig_->now(), k_virtual_display_s));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i) {
       if (!is_there(session_->setup().rig.projectors[i].name, projectors_[i], rig_->now())) continue;
       LIMN_TRY(const Stamp shown_at, rig_->projector(static_cast<int>(i)).show(lit(painted, i)));
@@ -122,36 +122,36 @@ class VirtualLoop {
     shown.missed = static_cast<int>(rig_->world().rig.cameras.size() - frames.size());
     shown.placement_mm = placement_mm(painted, *session_, *room_, rig_->world());
     const auto begun = std::chrono::steady_clock::now();
-    const bool wants_screen = desk_ && desk_->is_due();
+    const bool wants_screen = console_ && console_->is_due();
     const cv::Mat screen = wants_screen ? session_->screen() : cv::Mat();
     shown.screen_ms = wants_screen ? milliseconds_since(begun) : -1;
-    books_->shown(shown, painted);
-    if (!desk_) return true;
-    desk_->shown(shown);
-    return desk_->serve(session_, &books_->telemetry(), health_, screen, rig_->now());
+    output_->shown(shown, painted);
+    if (!console_) return true;
+    console_->shown(shown);
+    return console_->serve(session_, &output_->telemetry(), health_, screen, rig_->now());
   }
 
  private:
   // The clock goes on while patterns are shown and stands while the rest is computed; the room stays as it
   // is. People are answered. False: somebody ends the session.
   Result<bool> mend() {
-    LIMN_TRY(const std::filesystem::path folder, repair_folder(books_->out()));
+    LIMN_TRY(const std::filesystem::path folder, recalibration_folder(output_->out()));
     const Plan no_board{};
-    Repair repair(session_->setup().rig, folder, [&](PictureWriter* writer) {
-      Surroundings around = virtual_surroundings(no_board, rig_, writer);
+    LiveRecalibration repair(session_->setup().rig, folder, [&](ImageWriter* writer) {
+      Surroundings around = virtual_backend(no_board, rig_, writer);
       for (std::size_t i = 0; i < projectors_.size(); ++i)
         around.use_latency(static_cast<int>(i), k_virtual_display_s);
       return around;
     });
     for (;;) {
       repair.serve(k_errand_wait);
-      session_->note_repair(repair.words());
-      if (osc_) osc_->hear(session_, &books_->telemetry(), rig_->now());
+      session_->set_recalibration_progress(repair.words());
+      if (osc_) osc_->hear(session_, &output_->telemetry(), rig_->now());
       if (server_) serve();
-      const bool is_left = desk_ && !desk_->serve(session_, &books_->telemetry(), health_, {}, rig_->now());
+      const bool is_left = console_ && !console_->serve(session_, &output_->telemetry(), health_, {}, rig_->now());
       if (is_left || is_ended_) return false;
       if (const auto checked = repair.take()) {
-        go_on_mended(*checked, folder, rig_->now(), watcher_, session_);
+        apply_recalibration(*checked, folder, rig_->now(), perception_, session_);
         return true;
       }
     }
@@ -159,14 +159,14 @@ class VirtualLoop {
 
   void serve() {
     server_->hear(session_, rig_->now());
-    server_->tell(*session_, books_->telemetry(), health_, rig_->now());
+    server_->tell(*session_, output_->telemetry(), health_, rig_->now());
   }
 
-  cv::Mat lit(const Painted& painted, std::size_t projector) {
+  cv::Mat lit(const ComposedFrame& painted, std::size_t projector) {
     return server_ ? server_->lit(session_, projector) : painted.projectors[projector];
   }
 
-  // What is taken of this moment's pictures.
+  // What is taken of this moment's images.
   std::vector<Frame> exposed(Stamp at) {
     std::vector<int> plugged;
     const std::vector<Imager>& cameras = rig_->world().rig.cameras;
@@ -177,8 +177,8 @@ class VirtualLoop {
         health_.fails(cameras_[i], "");
     std::vector<Frame> exposed = rig_->expose(plugged), taken;
     for (std::size_t k = 0; k < plugged.size(); ++k) {
-      CameraIntake& intake = intakes_[static_cast<std::size_t>(plugged[k])];
-      auto frame = intake.taken(room_->sent(std::move(exposed[k]), seconds_of(at)), rig_->now());
+      FrameGate& gate = gates_[static_cast<std::size_t>(plugged[k])];
+      auto frame = gate.taken(room_->sent(std::move(exposed[k]), seconds_of(at)), rig_->now());
       if (frame) taken.push_back(std::move(*frame));
     }
     tell_of_devices(at);
@@ -195,7 +195,7 @@ class VirtualLoop {
   // Of those that came or went, or whose clocks stepped.
   void tell_of_devices(Stamp at) {
     for (const std::string& what : health_.news()) {
-      books_->telemetry().note(at, what);
+      output_->telemetry().note(at, what);
       log_warning("live: {:.2f} s: {}", seconds_of(at), what);
     }
   }
@@ -211,16 +211,16 @@ class VirtualLoop {
   const std::atomic<bool>& is_ended_;
   sim::VirtualRig* rig_;
   ScriptedRoom* room_;
-  Watcher* watcher_;
+  Perception* perception_;
   Session* session_;
-  Books* books_;
-  OperatorDesk* desk_;
+  SessionOutput* output_;
+  OperatorConsole* console_;
   OscPort* osc_;
   Server* server_;
   SceneWatch files_;
   DeviceHealth health_;
   std::vector<std::size_t> cameras_, projectors_;  // as health_ calls them
-  std::vector<CameraIntake> intakes_;              // of cameras_
+  std::vector<FrameGate> gates_;              // of cameras_
   std::size_t moments_ = 0, played_ = 0;
 };
 
@@ -230,19 +230,19 @@ Status play_virtually(double end_s,
                       const std::atomic<bool>& is_ended,
                       sim::VirtualRig* rig,
                       ScriptedRoom* room,
-                      Watcher* watcher,
+                      Perception* perception,
                       Session* session,
-                      Books* books,
-                      OperatorDesk* desk,
+                      SessionOutput* output,
+                      OperatorConsole* console,
                       OscPort* osc,
                       Server* server) {
-  VirtualLoop loop(is_ended, rig, room, watcher, session, books, desk, osc, server);
+  VirtualLoop loop(is_ended, rig, room, perception, session, output, console, osc, server);
   std::optional<Progress> progress;
   if (std::isfinite(end_s)) progress.emplace("live", static_cast<int>(std::ceil(end_s)));
   while (!is_ended && seconds_of(rig->next_exposure()) <= end_s) {
-    LIMN_TRY(const bool goes_on, loop.step());
+    LIMN_TRY(const bool should_continue, loop.step());
     if (progress) progress->step(static_cast<int>(seconds_of(rig->now())));
-    if (!goes_on) break;
+    if (!should_continue) break;
   }
   return {};
 }

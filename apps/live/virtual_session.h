@@ -2,12 +2,12 @@
 
 #include <atomic>
 
-#include "apps/live/books.h"
-#include "apps/live/operator_desk.h"
+#include "apps/live/session_output.h"
+#include "apps/live/operator_console.h"
 #include "apps/live/osc_port.h"
 #include "apps/live/script.h"
 #include "apps/live/session.h"
-#include "apps/live/watcher.h"
+#include "apps/live/perception.h"
 #include "apps/serve/server.h"
 #include "core/result.h"
 #include "sim/virtual_rig.h"
@@ -24,10 +24,10 @@ Status play_virtually(double end_s,
                       const std::atomic<bool>& is_ended,
                       sim::VirtualRig* rig,
                       ScriptedRoom* room,
-                      Watcher* watcher,
+                      Perception* perception,
                       Session* session,
-                      Books* books,
-                      OperatorDesk* desk,
+                      SessionOutput* output,
+                      OperatorConsole* console,
                       OscPort* osc,
                       Server* server);
 

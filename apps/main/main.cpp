@@ -6,7 +6,7 @@
 
 namespace {
 
-// Pictures come and go with each frame. Memory that is given back to the system for each of them is asked for
+// Images come and go with each frame. Memory that is given back to the system for each of them is asked for
 // again, page by page, which costs a live session a twentieth of its time.
 void keep_freed_memory() {
   constexpr int k_mib = 1 << 20;

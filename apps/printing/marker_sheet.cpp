@@ -13,7 +13,7 @@
 
 #include "calib/board/board.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "tracker/family.h"
 
 namespace limn::apps {
@@ -61,19 +61,19 @@ Status write_sheet(Sheet& sheet, const std::filesystem::path& path) {
 
 void set_grey(cairo_t* cairo, double level) { cairo_set_source_rgb(cairo, level, level, level); }
 
-// A picture as vectors: all pixels of a grey level are rectangles of one path, so that neighbours leave no
+// An image as vectors: all pixels of a grey level are rectangles of one path, so that neighbours leave no
 // seam.
-void draw_cells(cairo_t* cairo, const cv::Mat& picture, double x_mm, double y_mm, double mm_per_pixel) {
+void draw_cells(cairo_t* cairo, const cv::Mat& image, double x_mm, double y_mm, double mm_per_pixel) {
   std::map<std::uint8_t, std::vector<cv::Rect>> levels;
-  for (int y = 0; y < picture.rows;) {
+  for (int y = 0; y < image.rows;) {
     int below = y + 1;
-    while (below < picture.rows &&
-           std::equal(picture.ptr(y), picture.ptr(y) + picture.cols, picture.ptr(below)))
+    while (below < image.rows &&
+           std::equal(image.ptr(y), image.ptr(y) + image.cols, image.ptr(below)))
       ++below;
-    for (int x = 0; x < picture.cols;) {
-      const std::uint8_t level = picture.at<std::uint8_t>(y, x);
+    for (int x = 0; x < image.cols;) {
+      const std::uint8_t level = image.at<std::uint8_t>(y, x);
       int right = x + 1;
-      while (right < picture.cols && picture.at<std::uint8_t>(y, right) == level) ++right;
+      while (right < image.cols && image.at<std::uint8_t>(y, right) == level) ++right;
       if (level != 255) levels[level].emplace_back(x, y, right - x, below - y);
       x = right;
     }
@@ -248,14 +248,14 @@ Result<std::string> write_board_sheet(const std::string& text, const std::filesy
   const auto board = calib::Board::parse(text);
   if (!board) return usage_error("--board: {}", board.message());
   const calib::BoardSheet drawing = calib::draw_board(*board);
-  if (extension == ".png") LIMN_TRY_STATUS(write_png(out, drawing.picture, {9, drawing.pixels_per_metre}));
+  if (extension == ".png") LIMN_TRY_STATUS(write_png(out, drawing.image, {9, drawing.pixels_per_metre}));
   if (extension != ".png") {
     const double mm_per_pixel = 1000 / drawing.pixels_per_metre;
-    const double width = drawing.picture.cols * mm_per_pixel;
-    const double height = drawing.picture.rows * mm_per_pixel;
+    const double width = drawing.image.cols * mm_per_pixel;
+    const double height = drawing.image.rows * mm_per_pixel;
     const double page_width = std::max(width, k_bar + 2 * k_edge);
     auto sheet = new_sheet(extension == ".svg", page_width, height + k_foot);
-    draw_cells(sheet->cairo.get(), drawing.picture, 0.5 * (page_width - width), 0, mm_per_pixel);
+    draw_cells(sheet->cairo.get(), drawing.image, 0.5 * (page_width - width), 0, mm_per_pixel);
     draw_bar(sheet->cairo.get(), k_edge, height + 5);
     draw_text(sheet->cairo.get(), board->text(), k_edge, height + 13, 3, page_width - 2 * k_edge);
     LIMN_TRY_STATUS(write_sheet(*sheet, out));

@@ -141,15 +141,15 @@ Message read_message(const std::string& type, Reader* reader) {
     const std::uint64_t id = reader->number("id", k_most_id);
     return RemarkMessage{id, read_remark(reader)};
   }
-  if (type == "pictures") return PicturesMessage{reader->boolean("room")};
+  if (type == "pictures") return ImagesMessage{reader->boolean("room")};
   if (type == "seen") return SeenMessage{static_cast<std::uint32_t>(reader->number("picture", 0xffffffffu))};
   if (type == "window") {
     WindowMessage window{reader->text("device", k_longest_word, false), reader->boolean("on")};
     const std::string parts = reader->text("parts", k_longest_word, true);
     if (parts == "rest")
-      window.parts = WindowParts::rest;
+      window.parts = TabletViewMode::rest;
     else if (parts == "full")
-      window.parts = WindowParts::full;
+      window.parts = TabletViewMode::full;
     else if (!parts.empty() && parts != "screen")
       reader->problem("parts", "screen, rest or full", in_quotes(parts));
     if (!is_device_name(window.device))
@@ -253,7 +253,7 @@ Result<FrameMessage> frame_of(std::span<const std::uint8_t> bytes) {
   return frame;
 }
 
-std::string picture_message(PictureKind kind,
+std::string image_message(ImageKind kind,
                             std::uint32_t number,
                             const std::string& json,
                             std::span<const std::uint8_t> jpeg) {

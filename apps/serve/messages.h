@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "apps/tablet/window_parts.h"
+#include "apps/tablet/tablet_view_mode.h"
 #include "core/result.h"
 #include "scene/actions.h"
 #include "scene/comments.h"
@@ -35,18 +35,18 @@ struct RemarkMessage {
   std::uint64_t id = 0;
   Remark remark;
 };
-struct PicturesMessage {
+struct ImagesMessage {
   bool room = false;
 };
 struct SeenMessage {
-  std::uint32_t picture = 0;
+  std::uint32_t image = 0;
 };
 struct WindowMessage {
   std::string device;
   bool on = false;
-  WindowParts parts = WindowParts::as_screen;  ///< also when it is left out
+  TabletViewMode parts = TabletViewMode::as_screen;  ///< also when it is left out
 };
-using Message = std::variant<EditMessage, RemarkMessage, PicturesMessage, SeenMessage, WindowMessage>;
+using Message = std::variant<EditMessage, RemarkMessage, ImagesMessage, SeenMessage, WindowMessage>;
 
 /// A text message. Errors say what was expected: no JSON object, an unknown type or action, keys that are
 /// missing, unknown or of another kind, text that is too long or has control characters. Slots, variants and
@@ -75,9 +75,9 @@ struct FrameMessage {
 };
 Result<FrameMessage> frame_of(std::span<const std::uint8_t> bytes);
 
-/// A binary message to the page: kind, number, JSON and picture.
-enum class PictureKind : std::uint32_t { room = 1, window = 2 };
-std::string picture_message(PictureKind kind,
+/// A binary message to the page: kind, number, JSON and image.
+enum class ImageKind : std::uint32_t { room = 1, window = 2 };
+std::string image_message(ImageKind kind,
                             std::uint32_t number,
                             const std::string& json,
                             std::span<const std::uint8_t> jpeg);

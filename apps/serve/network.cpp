@@ -147,11 +147,11 @@ class Farewell : public std::enable_shared_from_this<Farewell> {
 template <class Stream>
 class Socket : public std::enable_shared_from_this<Socket<Stream>> {
  public:
-  Socket(Stream stream, House* house, std::unique_ptr<Seats::Seat> seat, std::shared_ptr<Visitor> visitor)
+  Socket(Stream stream, House* house, std::unique_ptr<Seats::Seat> seat, std::shared_ptr<WsClient> client)
       : socket_(std::move(stream)),
         house_(house),
         seat_(std::move(seat)),
-        visitor_(std::move(visitor)),
+        visitor_(std::move(client)),
         late_(house->io) {}
 
   template <class Request>
@@ -232,7 +232,7 @@ class Socket : public std::enable_shared_from_this<Socket<Stream>> {
   websocket::stream<Stream> socket_;
   House* house_;
   std::unique_ptr<Seats::Seat> seat_;
-  std::shared_ptr<Visitor> visitor_;
+  std::shared_ptr<WsClient> visitor_;
   asio::steady_timer late_;
   beast::flat_buffer buffer_;
   std::shared_ptr<const std::string> outgoing_;
@@ -333,7 +333,7 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
       if (auto* refused = std::get_if<HttpAnswer>(&admitted)) return write_last(std::move(*refused));
       const auto socket =
           std::make_shared<Socket<Stream>>(std::move(stream_), house_, std::move(seat_),
-                                           std::move(std::get<std::shared_ptr<Visitor>>(admitted)));
+                                           std::move(std::get<std::shared_ptr<WsClient>>(admitted)));
       return socket->run(parser_->get());
     }
     house_->reception->answer(asked, house_->ticket_of([self = this->shared_from_this()](HttpAnswer answer) {
@@ -466,7 +466,7 @@ struct Network::Impl {
 
   // Ends at once when nobody is left.
   void await_empty() {
-    if (house.reception->visitor_count() == 0) return house.io.stop();
+    if (house.reception->client_count() == 0) return house.io.stop();
     pause.expires_after(std::chrono::milliseconds(5));
     pause.async_wait([this](Problem) { await_empty(); });
   }

@@ -51,7 +51,7 @@ bool is_in(const std::vector<std::string>& names, const std::string& name) {
 
 // A look's parts on the prototype, as a file for other programs; empty: there is nothing in it.
 std::string assembly_of(const scene::Scene& scene, const scene::Look& look) {
-  std::vector<scene::PlacedMesh> placed;
+  std::vector<scene::GlbNode> placed;
   if (scene.prototype) placed.push_back({"prototype", &scene.prototype->mesh, Pose()});
   for (const scene::Look::Part& part : look.parts) {
     const scene::Slot* slot = scene.find_slot(part.slot);
@@ -60,13 +60,13 @@ std::string assembly_of(const scene::Scene& scene, const scene::Look& look) {
       if (variant.name == part.variant)
         placed.push_back({part.slot + " " + part.variant, &variant.mesh, part.prototype_from_part});
   }
-  return placed.empty() ? "" : scene::glb(placed);
+  return placed.empty() ? "" : scene::encode_glb(placed);
 }
 
 const std::string k_hidden = "A code for other guests is in the light. The room comes back in a minute.";
 const std::string k_late = "the session did not answer in time.";
 
-std::string may_not(const Guests::Guest& guest, const std::string& what, Role role) {
+std::string may_not(const AuthSessions::Guest& guest, const std::string& what, Role role) {
   return fmt::format("{}: expected the role {}, found {}. Pair with the PIN of {}.", what, name_of(role),
                      name_of(guest.role), name_of(role));
 }
@@ -89,8 +89,8 @@ const std::vector<Reception::Route>& Reception::routes() {
       {"POST", "/api/edit", Role::look, &Reception::post_edit},  // then by action
       {"GET", "/picture/room.jpg", Role::look, &Reception::get_room},
       {"GET", "/picture/projector/", Role::look, &Reception::get_projector},
-      {"GET", "/picture/look/", Role::look, &Reception::get_look_picture},
-      {"GET", "/picture/variant/", Role::look, &Reception::get_variant_picture},
+      {"GET", "/picture/look/", Role::look, &Reception::get_look_image},
+      {"GET", "/picture/variant/", Role::look, &Reception::get_variant_image},
       {"GET", "/look/", Role::look, &Reception::get_look_assembly},
       {"POST", "/api/comment", Role::work, &Reception::post_comment},
   };
@@ -100,7 +100,7 @@ const std::vector<Reception::Route>& Reception::routes() {
 Reception::Reception(Setup setup)
     : setup_(std::move(setup)),
       encoded_(std::make_shared<std::map<std::string, Encoded>>()),
-      part_pictures_(std::make_shared<PartPictures>()) {}
+      thumbnails_(std::make_shared<Thumbnails>()) {}
 
 // Requests that nobody honest sends: from other pages, or under a name that somebody else gave this machine.
 std::optional<HttpAnswer> Reception::refuse(const HttpRequest& request) const {
@@ -114,7 +114,7 @@ std::optional<HttpAnswer> Reception::refuse(const HttpRequest& request) const {
   return std::nullopt;
 }
 
-std::optional<Guests::Guest> Reception::guest_of(const HttpRequest& request) const {
+std::optional<AuthSessions::Guest> Reception::guest_of(const HttpRequest& request) const {
   constexpr std::string_view k_bearer = "Bearer ";
   const std::string token = request.authorization.starts_with(k_bearer)
                                 ? request.authorization.substr(k_bearer.size())
@@ -167,12 +167,12 @@ HttpAnswer Reception::pair(const HttpRequest& request) {
   const auto wish = pair_of_body(request.body);
   if (!wish) return refusal(k_bad, wish.message());
   auto found = guests_.pair(wish->pin, wish->name, request.address, Clock::now(), guest_of(request));
-  if (const auto* wait = std::get_if<Guests::Wait>(&found)) {
+  if (const auto* wait = std::get_if<AuthSessions::Wait>(&found)) {
     HttpAnswer out = refusal(k_too_many, fmt::format("too many wrong PINs. Wait {} s.", wait->left.count()));
     out.headers.emplace_back("Retry-After", std::to_string(wait->left.count()));
     return out;
   }
-  const auto* paired = std::get_if<Guests::Paired>(&found);
+  const auto* paired = std::get_if<AuthSessions::Paired>(&found);
   if (!paired) return refusal(k_unpaired, "this PIN is wrong. It stands in the operator's window.");
   setup_.watched(true);
   const auto life_s = std::chrono::seconds(k_session_life).count();
@@ -197,21 +197,21 @@ void Reception::hide_room(Role role, Clock::time_point until) {
   hidden_ = {is_hidden ? std::max(role, hidden_.first) : role, std::max(until, hidden_.second)};
 }
 
-bool Reception::may_see_room(const Guests::Guest& guest) const {
+bool Reception::may_see_room(const AuthSessions::Guest& guest) const {
   return guest.role >= hidden_.first || Clock::now() >= hidden_.second;
 }
 
 void Reception::get_room(const Asked& asked, Answering answering) {
   if (!may_see_room(asked.guest)) return answering(refusal(k_unavailable, k_hidden));
-  if (!setup_.eyes.room) return answering(refusal(k_unavailable, "this session has no live composite."));
-  setup_.eyes.room([answering = std::move(answering)](const Eyes::Seen& seen) {
+  if (!setup_.providers.room) return answering(refusal(k_unavailable, "this session has no live composite."));
+  setup_.providers.room([answering = std::move(answering)](const ImageProviders::Seen& seen) {
     answering(seen.jpeg.empty() ? refusal(k_absent, "no camera's picture has come yet.")
                                 : unkept("image/jpeg", {seen.jpeg.begin(), seen.jpeg.end()}));
   });
 }
 
 void Reception::do_in_backroom(std::function<HttpAnswer()> job, Answering answering) {
-  if (!setup_.backroom->take([job = std::move(job), answering] { answering(job()); }))
+  if (!setup_.worker->take([job = std::move(job), answering] { answering(job()); }))
     answering(refusal(k_unavailable, "too many pictures are asked for at once."));
 }
 
@@ -223,18 +223,18 @@ void Reception::get_projector(const Asked& asked, Answering answering) {
   if (!name || index >= count || news_->projectors[index].empty())
     return answering(refusal(k_absent, "expected a projector of the state, found another name."));
   do_in_backroom(
-      [known = encoded_, name = *name, picture = news_->projectors[index]] {
+      [known = encoded_, name = *name, image = news_->projectors[index]] {
         Encoded& encoded = (*known)[name];
-        if (!encoded.jpeg || encoded.picture.data != picture.data) {
-          const auto jpeg = device::encode_jpeg(picture, k_jpeg_quality);
-          encoded = {picture, std::make_shared<const std::string>(jpeg.begin(), jpeg.end())};
+        if (!encoded.jpeg || encoded.image.data != image.data) {
+          const auto jpeg = device::encode_jpeg(image, k_jpeg_quality);
+          encoded = {image, std::make_shared<const std::string>(jpeg.begin(), jpeg.end())};
         }
         return unkept("image/jpeg", *encoded.jpeg);
       },
       std::move(answering));
 }
 
-void Reception::get_look_picture(const Asked& asked, Answering answering) {
+void Reception::get_look_image(const Asked& asked, Answering answering) {
   const auto name = name_in(asked.path, "/picture/look/", ".png");
   if (!name || !news_ || !is_in(news_->state.looks, *name))
     return answering(refusal(k_absent, "expected a look of the state, found another name."));
@@ -262,7 +262,7 @@ void Reception::get_look_assembly(const Asked& asked, Answering answering) {
       std::move(answering));
 }
 
-void Reception::get_variant_picture(const Asked& asked, Answering answering) {
+void Reception::get_variant_image(const Asked& asked, Answering answering) {
   constexpr std::string_view k_begin = "/picture/variant/";
   const auto slash = asked.path.find('/', k_begin.size());
   const auto slot =
@@ -273,8 +273,8 @@ void Reception::get_variant_picture(const Asked& asked, Answering answering) {
   if (!slot || !variant || !news_)
     return answering(refusal(k_absent, "expected a slot and a variant of the state, found others."));
   do_in_backroom(
-      [pictures = part_pictures_, scene = news_->scene, slot = *slot, variant = *variant] {
-        const auto png = pictures->png(scene, slot, variant);
+      [images = thumbnails_, scene = news_->scene, slot = *slot, variant = *variant] {
+        const auto png = images->png(scene, slot, variant);
         return png ? unkept("image/png", **png) : refusal(k_absent, png.message());
       },
       std::move(answering));
@@ -308,7 +308,7 @@ void Reception::post_leave(const Asked& asked, Answering answering) {
   tick(Clock::now());
 }
 
-std::optional<HttpAnswer> Reception::wish(const Guests::Guest& guest, const scene::Edit& edit, Done done) {
+std::optional<HttpAnswer> Reception::wish(const AuthSessions::Guest& guest, const scene::Edit& edit, Done done) {
   const Role role = role_for(edit.action);
   if (guest.role < role) return refusal(k_forbidden, may_not(guest, edit.action, role));
   if (wishes_.size() >= k_most_wishes)
@@ -325,7 +325,7 @@ void Reception::load_comments() {
   if (!*comments_) log_warning("live: {} Nobody can comment.", comments_->message());
 }
 
-std::optional<HttpAnswer> Reception::remark(const Guests::Guest& guest, const Remark& remark, Done done) {
+std::optional<HttpAnswer> Reception::remark(const AuthSessions::Guest& guest, const Remark& remark, Done done) {
   if (guest.role < Role::work) return refusal(k_forbidden, may_not(guest, "comment", Role::work));
   if (!comments_) return refusal(k_unavailable, "the session has not begun yet.");
   if (!*comments_) return refusal(k_unavailable, comments_->message());
@@ -333,13 +333,13 @@ std::optional<HttpAnswer> Reception::remark(const Guests::Guest& guest, const Re
     return refusal(k_bad, "slot: expected one of the state, found another.");
   if (!remark.look.empty() && !is_in(news_->state.looks, remark.look))
     return refusal(k_bad, "look: expected one of the state, found another.");
-  auto comment = scene::comment_of(guest.name, remark.look, remark.slot, remark.text);
+  auto comment = scene::make_comment(guest.name, remark.look, remark.slot, remark.text);
   if (!comment) return refusal(k_bad, comment.message());
   std::vector<scene::Comment>& all = **comments_;
   if (all.size() >= scene::k_most_comments)
     return refusal(k_unavailable, fmt::format("the project keeps {} comments at most.", all.size()));
   all.push_back(std::move(*comment));
-  const bool is_taken = setup_.backroom->take(
+  const bool is_taken = setup_.worker->take(
       [this, post = setup_.post, all, done = std::move(done), path = news_->scene->folder / k_comments] {
         const Status saved = scene::save_comments(path, all);
         post([this, done, why = saved ? "" : saved.message()] { done(why, number_); });
@@ -352,213 +352,213 @@ std::optional<HttpAnswer> Reception::remark(const Guests::Guest& guest, const Re
   return std::nullopt;
 }
 
-std::variant<std::shared_ptr<Visitor>, HttpAnswer> Reception::admit(const HttpRequest& request) {
+std::variant<std::shared_ptr<WsClient>, HttpAnswer> Reception::admit(const HttpRequest& request) {
   if (auto refused = refuse(request)) return std::move(*refused);
   const auto guest = guest_of(request);
   if (!guest) return refusal(k_unpaired, "expected a paired guest. POST /api/pair with a PIN.");
   if (path_of(request.target) != k_live) return refusal(k_absent, "expected /api/live for a WebSocket.");
-  auto visitor = std::make_shared<Visitor>();
-  visitor->guest = *guest;
-  return visitor;
+  auto client = std::make_shared<WsClient>();
+  client->guest = *guest;
+  return client;
 }
 
-void Reception::greet(const std::shared_ptr<Visitor>& visitor) {
-  visitors_.push_back(visitor);
+void Reception::greet(const std::shared_ptr<WsClient>& client) {
+  visitors_.push_back(client);
   const ordered_json hello = {{"type", "hello"},
                               {"schema", k_schema},
-                              {"role", name_of(visitor->guest.role)},
-                              {"name", visitor->guest.name},
+                              {"role", name_of(client->guest.role)},
+                              {"name", client->guest.name},
                               {"actions", ordered_json::parse(actions_json())}};
-  visitor->outbox.answer(dumped(hello));
-  visitor->outbox.tell_state(state_);
+  client->outbox.answer(dumped(hello));
+  client->outbox.tell_state(state_);
   publish();
-  visitor->wake();
+  client->wake();
 }
 
-void Reception::gone(const std::shared_ptr<Visitor>& visitor) {
-  close_window(visitor);
-  if (std::erase(visitors_, visitor) > 0) publish();
+void Reception::gone(const std::shared_ptr<WsClient>& client) {
+  close_window(client);
+  if (std::erase(visitors_, client) > 0) publish();
 }
 
-void Reception::close_window(const std::shared_ptr<Visitor>& visitor) {
-  const std::string& name = visitor->guest.name;
-  const bool was_open = !std::exchange(visitor->device, "").empty();
+void Reception::close_window(const std::shared_ptr<WsClient>& client) {
+  const std::string& name = client->guest.name;
+  const bool was_open = !std::exchange(client->device, "").empty();
   const auto eye = guest_eyes_.find(name);
-  if (eye != guest_eyes_.end() && eye->second.visitor.lock() == visitor) guest_eyes_.erase(eye);
+  if (eye != guest_eyes_.end() && eye->second.client.lock() == client) guest_eyes_.erase(eye);
   const bool is_last = std::none_of(visitors_.begin(), visitors_.end(), [&](const auto& other) {
     return other->guest.name == name && !other->device.empty();
   });
   if (was_open && is_last) setup_.place(name, std::nullopt);
-  visitor->frame_waiting.reset();
+  client->frame_waiting.reset();
 }
 
-void Reception::hear_text(const std::shared_ptr<Visitor>& visitor, std::string_view text) {
-  if (!visitor->pace.takes(Clock::now())) {
-    visitor->outbox.end("too many messages");
-    return visitor->wake();
+void Reception::hear_text(const std::shared_ptr<WsClient>& client, std::string_view text) {
+  if (!client->pace.takes(Clock::now())) {
+    client->outbox.end("too many messages");
+    return client->wake();
   }
   const auto message = message_of(text);
-  if (!message) return refuse(visitor, id_of(text), message.message());
-  std::visit([&](const auto& each) { hear(visitor, each); }, *message);
+  if (!message) return refuse(client, id_of(text), message.message());
+  std::visit([&](const auto& each) { hear(client, each); }, *message);
 }
 
-void Reception::refuse(const std::shared_ptr<Visitor>& visitor,
+void Reception::refuse(const std::shared_ptr<WsClient>& client,
                        std::optional<std::uint64_t> id,
                        const std::string& why) {
   ordered_json out = {{"type", "refused"}, {"id", nullptr}, {"why", why}};
   if (id) out["id"] = *id;
-  visitor->outbox.answer(dumped(out));
-  visitor->wake();
+  client->outbox.answer(dumped(out));
+  client->wake();
 }
 
-Reception::Done Reception::answer_to(const std::shared_ptr<Visitor>& visitor, std::uint64_t id) {
-  return [this, visitor, id](const std::string& why, std::uint64_t number) {
-    if (!why.empty()) return refuse(visitor, std::optional(id), why);
-    visitor->outbox.answer(dumped({{"type", "done"}, {"id", id}, {"number", number}}));
-    visitor->wake();
+Reception::Done Reception::answer_to(const std::shared_ptr<WsClient>& client, std::uint64_t id) {
+  return [this, client, id](const std::string& why, std::uint64_t number) {
+    if (!why.empty()) return refuse(client, std::optional(id), why);
+    client->outbox.answer(dumped({{"type", "done"}, {"id", id}, {"number", number}}));
+    client->wake();
   };
 }
 
-void Reception::refuse(const std::shared_ptr<Visitor>& visitor, std::uint64_t id, const HttpAnswer& refused) {
-  refuse(visitor, std::optional(id), nlohmann::json::parse(refused.body)["error"].get<std::string>());
+void Reception::refuse(const std::shared_ptr<WsClient>& client, std::uint64_t id, const HttpAnswer& refused) {
+  refuse(client, std::optional(id), nlohmann::json::parse(refused.body)["error"].get<std::string>());
 }
 
-void Reception::hear(const std::shared_ptr<Visitor>& visitor, const EditMessage& message) {
-  const auto refused = wish(visitor->guest, message.edit, answer_to(visitor, message.id));
-  if (refused) refuse(visitor, message.id, *refused);
+void Reception::hear(const std::shared_ptr<WsClient>& client, const EditMessage& message) {
+  const auto refused = wish(client->guest, message.edit, answer_to(client, message.id));
+  if (refused) refuse(client, message.id, *refused);
 }
 
-void Reception::hear(const std::shared_ptr<Visitor>& visitor, const RemarkMessage& message) {
-  const auto refused = remark(visitor->guest, message.remark, answer_to(visitor, message.id));
-  if (refused) refuse(visitor, message.id, *refused);
+void Reception::hear(const std::shared_ptr<WsClient>& client, const RemarkMessage& message) {
+  const auto refused = remark(client->guest, message.remark, answer_to(client, message.id));
+  if (refused) refuse(client, message.id, *refused);
 }
 
-void Reception::hear(const std::shared_ptr<Visitor>& visitor, const PicturesMessage& message) {
-  if (message.room && !setup_.eyes.room)
-    return refuse(visitor, std::nullopt, "this session has no live composite.");
-  if (!visitor->wants_room) visitor->room_sent.reset();
-  visitor->wants_room = message.room;
-  visitor->room_in_flight.reset();
+void Reception::hear(const std::shared_ptr<WsClient>& client, const ImagesMessage& message) {
+  if (message.room && !setup_.providers.room)
+    return refuse(client, std::nullopt, "this session has no live composite.");
+  if (!client->wants_room) client->room_sent.reset();
+  client->wants_room = message.room;
+  client->room_in_flight.reset();
   ask_for_room(Clock::now());
 }
 
-void Reception::hear(const std::shared_ptr<Visitor>& visitor, const SeenMessage& message) {
-  if (visitor->room_in_flight == message.picture) visitor->room_in_flight.reset();
+void Reception::hear(const std::shared_ptr<WsClient>& client, const SeenMessage& message) {
+  if (client->room_in_flight == message.image) client->room_in_flight.reset();
   ask_for_room(Clock::now());
 }
 
-void Reception::hear(const std::shared_ptr<Visitor>& visitor, const WindowMessage& message) {
-  if (message.on && !setup_.eyes.look) return refuse(visitor, std::nullopt, "this session has no window.");
+void Reception::hear(const std::shared_ptr<WsClient>& client, const WindowMessage& message) {
+  if (message.on && !setup_.providers.look) return refuse(client, std::nullopt, "this session has no window.");
   const auto windows = std::count_if(visitors_.begin(), visitors_.end(), [&](const auto& other) {
-    return other != visitor && !other->device.empty();
+    return other != client && !other->device.empty();
   });
   if (message.on && windows >= k_most_windows)
-    return refuse(visitor, std::nullopt, fmt::format("{} windows are open; no more at once.", windows));
-  if (!message.on) return close_window(visitor);
-  if (visitor->device.empty()) guest_eyes_[visitor->guest.name] = {visitor, Clock::now()};
-  visitor->device = message.device;
-  visitor->parts = message.parts;
-  visitor->frame_waiting.reset();
+    return refuse(client, std::nullopt, fmt::format("{} windows are open; no more at once.", windows));
+  if (!message.on) return close_window(client);
+  if (client->device.empty()) guest_eyes_[client->guest.name] = {client, Clock::now()};
+  client->device = message.device;
+  client->parts = message.parts;
+  client->frame_waiting.reset();
 }
 
-void Reception::hear_bytes(const std::shared_ptr<Visitor>& visitor, std::span<const std::uint8_t> bytes) {
-  if (!visitor->pace.takes(Clock::now())) {
-    visitor->outbox.end("too many messages");
-    return visitor->wake();
+void Reception::hear_bytes(const std::shared_ptr<WsClient>& client, std::span<const std::uint8_t> bytes) {
+  if (!client->pace.takes(Clock::now())) {
+    client->outbox.end("too many messages");
+    return client->wake();
   }
-  if (visitor->device.empty())
-    return refuse(visitor, std::nullopt, "expected a message that begins the window before its pictures.");
+  if (client->device.empty())
+    return refuse(client, std::nullopt, "expected a message that begins the window before its pictures.");
   const auto found = frame_of(bytes);
-  if (!found) return refuse(visitor, std::nullopt, found.message());
-  Visitor::Frame frame{found->number, {found->jpeg.begin(), found->jpeg.end()}};
-  const bool is_busy = visitor->frame_in_flight && Clock::now() - visitor->frame_since < k_longest_look;
+  if (!found) return refuse(client, std::nullopt, found.message());
+  WsClient::Frame frame{found->number, {found->jpeg.begin(), found->jpeg.end()}};
+  const bool is_busy = client->frame_in_flight && Clock::now() - client->frame_since < k_longest_look;
   if (is_busy)
-    visitor->frame_waiting = std::move(frame);
+    client->frame_waiting = std::move(frame);
   else
-    look(visitor, std::move(frame));
+    look(client, std::move(frame));
 }
 
 // Whether a guest's window, among others of the same guest, is its tablet.
-bool Reception::is_eye(const std::shared_ptr<Visitor>& visitor, Clock::time_point now) const {
-  const auto eye = guest_eyes_.find(visitor->guest.name);
-  return eye == guest_eyes_.end() || eye->second.visitor.lock() == visitor ||
+bool Reception::is_eye(const std::shared_ptr<WsClient>& client, Clock::time_point now) const {
+  const auto eye = guest_eyes_.find(client->guest.name);
+  return eye == guest_eyes_.end() || eye->second.client.lock() == client ||
          now - eye->second.at > std::chrono::duration<double>(k_guest_place_lasts_s);
 }
 
-void Reception::look(const std::shared_ptr<Visitor>& visitor, Visitor::Frame frame) {
-  visitor->frame_in_flight = frame.number;
-  visitor->frame_since = Clock::now();
-  setup_.eyes.look(
-      {visitor->device, is_eye(visitor, visitor->frame_since) ? visitor->guest.name : "", visitor->parts},
+void Reception::look(const std::shared_ptr<WsClient>& client, WsClient::Frame frame) {
+  client->frame_in_flight = frame.number;
+  client->frame_since = Clock::now();
+  setup_.providers.look(
+      {client->device, is_eye(client, client->frame_since) ? client->guest.name : "", client->parts},
       std::move(frame.jpeg),
-      [this, post = setup_.post, weak = std::weak_ptr(visitor), number = frame.number](Eyes::Seen seen) {
+      [this, post = setup_.post, weak = std::weak_ptr(client), number = frame.number](ImageProviders::Seen seen) {
         post([this, weak, number, seen = std::move(seen)] {
-          if (const auto visitor = weak.lock()) looked(visitor, number, seen);
+          if (const auto client = weak.lock()) looked(client, number, seen);
         });
       });
 }
 
-void Reception::looked(const std::shared_ptr<Visitor>& visitor,
+void Reception::looked(const std::shared_ptr<WsClient>& client,
                        std::uint32_t number,
-                       const Eyes::Seen& seen) {
-  if (visitor->frame_in_flight != number) return;
-  visitor->frame_in_flight.reset();
-  if (!visitor->device.empty()) {
+                       const ImageProviders::Seen& seen) {
+  if (client->frame_in_flight != number) return;
+  client->frame_in_flight.reset();
+  if (!client->device.empty()) {
     const auto now = Clock::now();
-    if (seen.p_eye_world && is_eye(visitor, now)) {
-      guest_eyes_[visitor->guest.name] = {visitor, now};
-      setup_.place(visitor->guest.name, seen.p_eye_world);
+    if (seen.p_eye_world && is_eye(client, now)) {
+      guest_eyes_[client->guest.name] = {client, now};
+      setup_.place(client->guest.name, seen.p_eye_world);
     }
-    visitor->outbox.show(PictureKind::window, std::make_shared<const std::string>(picture_message(
-                                                  PictureKind::window, number, seen.json, seen.jpeg)));
-    visitor->wake();
+    client->outbox.show(ImageKind::window, std::make_shared<const std::string>(image_message(
+                                                  ImageKind::window, number, seen.json, seen.jpeg)));
+    client->wake();
   }
-  if (visitor->frame_waiting) look(visitor, *std::exchange(visitor->frame_waiting, std::nullopt));
+  if (client->frame_waiting) look(client, *std::exchange(client->frame_waiting, std::nullopt));
 }
 
 void Reception::ask_for_room(Clock::time_point now) {
   const bool is_resting = now < room_next_at_, is_recent = now - room_came_at_ < k_room_lasts;
   bool is_wanted = false;
-  for (const auto& visitor : visitors_) {
-    if (!visitor->wants_room || visitor->room_in_flight) continue;
-    if (is_resting && visitor->room_sent == room_number_) continue;
+  for (const auto& client : visitors_) {
+    if (!client->wants_room || client->room_in_flight) continue;
+    if (is_resting && client->room_sent == room_number_) continue;
     if (is_resting && is_recent)
-      show_room(visitor);
+      show_room(client);
     else
       is_wanted = true;
   }
   if (!is_wanted || room_is_asked_) return;
   room_is_asked_ = true;
   room_asked_at_ = now;
-  setup_.eyes.room([this, post = setup_.post](Eyes::Seen seen) {
+  setup_.providers.room([this, post = setup_.post](ImageProviders::Seen seen) {
     post([this, seen = std::move(seen)] { room_came(seen); });
   });
 }
 
-void Reception::room_came(Eyes::Seen seen) {
+void Reception::room_came(ImageProviders::Seen seen) {
   room_is_asked_ = false;
   room_came_at_ = Clock::now();
   const auto took = room_came_at_ - room_asked_at_;
   room_next_at_ = room_asked_at_ + std::max<Clock::duration>(k_between_rooms, k_room_rest * took);
   if (!room_message_ || seen.jpeg != room_.jpeg || seen.json != room_.json) {
     room_message_ = std::make_shared<const std::string>(
-        picture_message(PictureKind::room, ++room_number_, seen.json, seen.jpeg));
+        image_message(ImageKind::room, ++room_number_, seen.json, seen.jpeg));
     room_ = std::move(seen);
     room_role_ = room_asked_at_ < hidden_.second ? hidden_.first : Role::look;
   }
-  for (const auto& visitor : visitors_)
-    if (visitor->wants_room && !visitor->room_in_flight && visitor->room_sent != room_number_)
-      show_room(visitor);
+  for (const auto& client : visitors_)
+    if (client->wants_room && !client->room_in_flight && client->room_sent != room_number_)
+      show_room(client);
 }
 
-void Reception::show_room(const std::shared_ptr<Visitor>& visitor) {
-  visitor->room_in_flight = visitor->room_sent = room_number_;
-  const bool may_see = may_see_room(visitor->guest) && visitor->guest.role >= room_role_;
-  visitor->outbox.show(PictureKind::room,
+void Reception::show_room(const std::shared_ptr<WsClient>& client) {
+  client->room_in_flight = client->room_sent = room_number_;
+  const bool may_see = may_see_room(client->guest) && client->guest.role >= room_role_;
+  client->outbox.show(ImageKind::room,
                        may_see ? room_message_
-                               : std::make_shared<const std::string>(picture_message(
-                                     PictureKind::room, room_number_, dumped({{"why", k_hidden}}), {})));
-  visitor->wake();
+                               : std::make_shared<const std::string>(image_message(
+                                     ImageKind::room, room_number_, dumped({{"why", k_hidden}}), {})));
+  client->wake();
 }
 
 void Reception::take(SessionNews news) {
@@ -583,8 +583,8 @@ void Reception::publish() {
                           {"slot", edited->edit.slot},
                           {"value", edited->edit.value}};
   state["guests"] = ordered_json::array();
-  for (const auto& visitor : visitors_)
-    state["guests"].push_back({{"name", visitor->guest.name}, {"role", name_of(visitor->guest.role)}});
+  for (const auto& client : visitors_)
+    state["guests"].push_back({{"name", client->guest.name}, {"role", name_of(client->guest.role)}});
   state["comments"] = ordered_json::array();
   if (comments_ && *comments_) {
     const std::vector<scene::Comment>& all = **comments_;
@@ -608,18 +608,18 @@ void Reception::publish() {
   ordered_json message = {{"type", "state"}, {"number", number_}};
   message.update(state);
   state_ = std::make_shared<const std::string>(dumped(message));
-  for (const auto& visitor : visitors_) {
-    visitor->outbox.tell_state(state_);
-    visitor->wake();
+  for (const auto& client : visitors_) {
+    client->outbox.tell_state(state_);
+    client->wake();
   }
 }
 
 void Reception::tick(Clock::time_point now) {
   setup_.watched(guests_.count() > 0);
-  for (const auto& visitor : visitors_) {
-    if (guests_.lives(visitor->guest.number, now)) continue;
-    visitor->outbox.end("the session is over. Pair again.");
-    visitor->wake();
+  for (const auto& client : visitors_) {
+    if (guests_.lives(client->guest.number, now)) continue;
+    client->outbox.end("the session is over. Pair again.");
+    client->wake();
   }
   std::vector<Done> late;
   std::erase_if(wishes_, [&](auto& entry) {
@@ -632,9 +632,9 @@ void Reception::tick(Clock::time_point now) {
 }
 
 void Reception::close(const std::string& why) {
-  for (const auto& visitor : visitors_) {
-    visitor->outbox.end(why);
-    visitor->wake();
+  for (const auto& client : visitors_) {
+    client->outbox.end(why);
+    client->wake();
   }
 }
 

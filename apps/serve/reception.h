@@ -11,15 +11,15 @@
 #include <variant>
 #include <vector>
 
-#include "apps/serve/backroom.h"
-#include "apps/serve/eyes.h"
-#include "apps/serve/guests.h"
+#include "apps/serve/worker_thread.h"
+#include "apps/serve/image_provider.h"
+#include "apps/serve/auth_sessions.h"
 #include "apps/serve/http.h"
 #include "apps/serve/messages.h"
-#include "apps/serve/part_pictures.h"
+#include "apps/serve/thumbnails.h"
 #include "apps/serve/state.h"
 #include "apps/serve/static_files.h"
-#include "apps/serve/visitor.h"
+#include "apps/serve/ws_client.h"
 #include "scene/comments.h"
 
 namespace limn::apps {
@@ -28,10 +28,10 @@ namespace limn::apps {
 constexpr std::size_t k_most_wishes = 256;
 /// How long the session may take over an edit before HTTP answers that it did not come.
 constexpr std::chrono::seconds k_longest_wish{10};
-/// Between two room pictures, and how long a frame of the window may take before the next one is looked at.
+/// Between two room images, and how long a frame of the window may take before the next one is looked at.
 constexpr std::chrono::milliseconds k_between_rooms{66}, k_longest_look{10000};
 
-/// A room picture that took so long to draw is followed by another after so many times as long: projectors go
+/// A room image that took so long to draw is followed by another after so many times as long: projectors go
 /// first, also where one processor draws for all.
 constexpr int k_room_rest = 8;
 /// Who does not have the last one is given it during that rest, unless it came longer ago: then another is
@@ -74,29 +74,29 @@ class Reception {
     std::string authority;    ///< certificate (DER) that devices may trust; empty: there is none
     std::string cookie;       ///< its name: another for every port, since browsers keep one for all of a host
     StaticFiles files;
-    Eyes eyes;
-    Backroom* backroom = nullptr;
+    ImageProviders providers;
+    WorkerThread* worker = nullptr;
     std::function<void(Wish)> wish;  ///< to the session
-    /// To the session: where a guest's tablet looks from, by each picture; nullopt: its window is closed.
+    /// To the session: where a guest's tablet looks from, by each image; nullopt: its window is closed.
     std::function<void(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world)> place;
     std::function<void(bool)> watched;                ///< whether anybody is paired
     std::function<void(std::function<void()>)> post;  ///< runs it on this object's thread; from any thread
   };
   explicit Reception(Setup setup);
 
-  const Guests& guests() const { return guests_; }
+  const AuthSessions& guests() const { return guests_; }
 
   /// Answers once, maybe later, from any thread.
   void answer(const HttpRequest& request, Answering answering);
   /// For a request of /api/live: who comes in, or why not.
-  std::variant<std::shared_ptr<Visitor>, HttpAnswer> admit(const HttpRequest& request);
+  std::variant<std::shared_ptr<WsClient>, HttpAnswer> admit(const HttpRequest& request);
   /// Once the visitor's `wake` is there.
-  void greet(const std::shared_ptr<Visitor>& visitor);
-  void hear_text(const std::shared_ptr<Visitor>& visitor, std::string_view text);
-  void hear_bytes(const std::shared_ptr<Visitor>& visitor, std::span<const std::uint8_t> bytes);
-  void gone(const std::shared_ptr<Visitor>& visitor);
+  void greet(const std::shared_ptr<WsClient>& client);
+  void hear_text(const std::shared_ptr<WsClient>& client, std::string_view text);
+  void hear_bytes(const std::shared_ptr<WsClient>& client, std::span<const std::uint8_t> bytes);
+  void gone(const std::shared_ptr<WsClient>& client);
 
-  /// Guests of lesser roles see no picture of the room until then.
+  /// Guests of lesser roles see no image of the room until then.
   void hide_room(Role role, Clock::time_point until);
 
   void take(SessionNews news);
@@ -105,13 +105,13 @@ class Reception {
   /// Says goodbye to all.
   void close(const std::string& why);
   /// When that thread is no more: lets go of the eyes, which answer for the last time.
-  void blind() { setup_.eyes = {}; }
+  void blind() { setup_.providers = {}; }
 
-  std::size_t visitor_count() const { return visitors_.size(); }
+  std::size_t client_count() const { return visitors_.size(); }
 
  private:
   struct Asked {
-    Guests::Guest guest;
+    AuthSessions::Guest guest;
     std::string path;
     std::string body;
     std::string etag;
@@ -119,7 +119,7 @@ class Reception {
   struct Route;
   static const std::vector<Route>& routes();
   std::optional<HttpAnswer> refuse(const HttpRequest& request) const;
-  std::optional<Guests::Guest> guest_of(const HttpRequest& request) const;
+  std::optional<AuthSessions::Guest> guest_of(const HttpRequest& request) const;
   HttpAnswer file(const HttpRequest& request, const std::string& path) const;
   HttpAnswer pair(const HttpRequest& request);
 
@@ -127,9 +127,9 @@ class Reception {
   void get_actions(const Asked& asked, Answering answering);
   void get_room(const Asked& asked, Answering answering);
   void get_projector(const Asked& asked, Answering answering);
-  void get_look_picture(const Asked& asked, Answering answering);
+  void get_look_image(const Asked& asked, Answering answering);
   void get_look_assembly(const Asked& asked, Answering answering);
-  void get_variant_picture(const Asked& asked, Answering answering);
+  void get_variant_image(const Asked& asked, Answering answering);
   void do_in_backroom(std::function<HttpAnswer()> job, Answering answering);
   void post_comment(const Asked& asked, Answering answering);
   void post_edit(const Asked& asked, Answering answering);
@@ -137,28 +137,28 @@ class Reception {
 
   using Done = std::function<void(const std::string& why, std::uint64_t number)>;
   /// `done` is called when the state has it; why it cannot be tried at all.
-  std::optional<HttpAnswer> wish(const Guests::Guest& guest, const scene::Edit& edit, Done done);
+  std::optional<HttpAnswer> wish(const AuthSessions::Guest& guest, const scene::Edit& edit, Done done);
   /// The same for a comment: `done` is called when it is saved.
-  std::optional<HttpAnswer> remark(const Guests::Guest& guest, const Remark& remark, Done done);
+  std::optional<HttpAnswer> remark(const AuthSessions::Guest& guest, const Remark& remark, Done done);
   void load_comments();
-  Done answer_to(const std::shared_ptr<Visitor>& visitor, std::uint64_t id);
-  void refuse(const std::shared_ptr<Visitor>& visitor, std::uint64_t id, const HttpAnswer& refused);
-  void hear(const std::shared_ptr<Visitor>& visitor, const EditMessage& message);
-  void hear(const std::shared_ptr<Visitor>& visitor, const RemarkMessage& message);
-  void hear(const std::shared_ptr<Visitor>& visitor, const PicturesMessage& message);
-  void hear(const std::shared_ptr<Visitor>& visitor, const SeenMessage& message);
-  void hear(const std::shared_ptr<Visitor>& visitor, const WindowMessage& message);
-  void refuse(const std::shared_ptr<Visitor>& visitor,
+  Done answer_to(const std::shared_ptr<WsClient>& client, std::uint64_t id);
+  void refuse(const std::shared_ptr<WsClient>& client, std::uint64_t id, const HttpAnswer& refused);
+  void hear(const std::shared_ptr<WsClient>& client, const EditMessage& message);
+  void hear(const std::shared_ptr<WsClient>& client, const RemarkMessage& message);
+  void hear(const std::shared_ptr<WsClient>& client, const ImagesMessage& message);
+  void hear(const std::shared_ptr<WsClient>& client, const SeenMessage& message);
+  void hear(const std::shared_ptr<WsClient>& client, const WindowMessage& message);
+  void refuse(const std::shared_ptr<WsClient>& client,
               std::optional<std::uint64_t> id,
               const std::string& why);
-  void look(const std::shared_ptr<Visitor>& visitor, Visitor::Frame frame);
-  void close_window(const std::shared_ptr<Visitor>& visitor);
-  bool is_eye(const std::shared_ptr<Visitor>& visitor, Clock::time_point now) const;
-  void looked(const std::shared_ptr<Visitor>& visitor, std::uint32_t number, const Eyes::Seen& seen);
+  void look(const std::shared_ptr<WsClient>& client, WsClient::Frame frame);
+  void close_window(const std::shared_ptr<WsClient>& client);
+  bool is_eye(const std::shared_ptr<WsClient>& client, Clock::time_point now) const;
+  void looked(const std::shared_ptr<WsClient>& client, std::uint32_t number, const ImageProviders::Seen& seen);
   void ask_for_room(Clock::time_point now);
-  void room_came(Eyes::Seen seen);
-  void show_room(const std::shared_ptr<Visitor>& visitor);
-  bool may_see_room(const Guests::Guest& guest) const;
+  void room_came(ImageProviders::Seen seen);
+  void show_room(const std::shared_ptr<WsClient>& client);
+  bool may_see_room(const AuthSessions::Guest& guest) const;
   void publish();
 
   struct Waiting {
@@ -166,13 +166,13 @@ class Reception {
     Clock::time_point since;
   };
   struct Encoded {
-    cv::Mat picture;
+    cv::Mat image;
     std::shared_ptr<const std::string> jpeg;
   };
 
   Setup setup_;
-  Guests guests_;
-  std::vector<std::shared_ptr<Visitor>> visitors_;
+  AuthSessions guests_;
+  std::vector<std::shared_ptr<WsClient>> visitors_;
   std::optional<SessionNews> news_;
   std::string told_;  // the state, but for its number
   std::shared_ptr<const std::string> state_;
@@ -183,20 +183,20 @@ class Reception {
   std::optional<Result<std::vector<scene::Comment>>> comments_;  // none before the first news
   bool room_is_asked_ = false;
   Clock::time_point room_asked_at_, room_came_at_, room_next_at_;
-  Eyes::Seen room_;
+  ImageProviders::Seen room_;
   Role room_role_ = Role::look;  // the least that may see it, also when nothing is hidden any more
   std::shared_ptr<const std::string> room_message_;
   std::uint32_t room_number_ = 0;
   // Which of a guest's windows is its tablet: the one that was opened last, until it has given no place for
   // as long as one lasts; then the next that gives one.
   struct GuestEye {
-    std::weak_ptr<Visitor> visitor;
+    std::weak_ptr<WsClient> client;
     Clock::time_point at;  // when it was opened, or gave a place
   };
   std::map<std::string, GuestEye> guest_eyes_;  // by the guest's name
   std::pair<Role, Clock::time_point> hidden_{Role::look, Clock::time_point::min()};
   std::shared_ptr<std::map<std::string, Encoded>> encoded_;  // of projectors; the backroom's alone
-  std::shared_ptr<PartPictures> part_pictures_;              // likewise
+  std::shared_ptr<Thumbnails> thumbnails_;              // likewise
 };
 
 }  // namespace limn::apps

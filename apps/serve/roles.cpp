@@ -5,21 +5,21 @@
 namespace limn::apps {
 namespace {
 
-const char* name_of(scene::Takes takes) {
-  switch (takes) {
-    case scene::Takes::nothing:
+const char* name_of(scene::ArgumentKind argument_kind) {
+  switch (argument_kind) {
+    case scene::ArgumentKind::nothing:
       return "nothing";
-    case scene::Takes::text:
+    case scene::ArgumentKind::text:
       return "text";
-    case scene::Takes::maybe_text:
+    case scene::ArgumentKind::maybe_text:
       return "maybe_text";
-    case scene::Takes::number:
+    case scene::ArgumentKind::number:
       return "number";
-    case scene::Takes::millimetres:
+    case scene::ArgumentKind::millimetres:
       return "millimetres";
-    case scene::Takes::pose:
+    case scene::ArgumentKind::pose:
       return "pose";
-    case scene::Takes::on_off:
+    case scene::ArgumentKind::on_off:
       return "on_off";
   }
   LIMN_CHECK(false);
@@ -37,7 +37,7 @@ std::string actions_json() {
   for (const scene::Action& action : scene::actions())
     all.push_back({{"name", action.name},
                    {"of_slot", action.of_slot},
-                   {"takes", name_of(action.takes)},
+                   {"takes", name_of(action.argument_kind)},
                    {"value", action.value},
                    {"what", action.what},
                    {"role", name_of(action.role)}});

@@ -14,14 +14,14 @@ namespace fs = std::filesystem;
 
 constexpr std::chrono::milliseconds k_between_news{50}, k_between_unwatched{1000}, k_longest_hearing{5};
 
-constexpr std::chrono::seconds k_cameras_late{2};  // after which no picture shows a code any more
+constexpr std::chrono::seconds k_cameras_late{2};  // after which no image shows a code any more
 constexpr double k_code_share = 0.5;               // of a projector's shorter side, without a prototype
 constexpr std::chrono::milliseconds k_between_searches{300}, k_longest_search{2000};
 constexpr int k_pin_px = 360;            // a PIN's sign, as it is kept
-constexpr double k_least_pin_px = 50;    // in the projector's picture
+constexpr double k_least_pin_px = 50;    // in the projector's image
 constexpr int k_dark = 8;                // display value
 constexpr int k_module_px = 12;          // of the code, as it is kept
-constexpr double k_least_module_px = 2;  // of the projector's picture, that a phone still reads
+constexpr double k_least_module_px = 2;  // of the projector's image, that a phone still reads
 constexpr double k_code_light = 0.75;    // display value: white paper would outshine all else
 
 bool is_late(const Wish& wish, std::chrono::steady_clock::time_point now) {
@@ -63,7 +63,7 @@ Result<std::optional<Certificate>> certificate_for(const ServeOptions& options, 
 }
 
 // Where the prototype is free of markers and, if there is room, of parts.
-std::optional<SignPlace> free_place(Session* session,
+std::optional<OverlayPlace> free_place(Session* session,
                                     std::size_t projector,
                                     cv::Size shape,
                                     double least_px) {
@@ -76,7 +76,7 @@ std::optional<SignPlace> free_place(Session* session,
       (rig.cameras.empty() ? imager : rig.cameras[0]).imager_from_world.rotation.inverse() *
       Eigen::Vector3d(0, -1, 0);
   const auto place = [&](const cv::Mat& free) {
-    return sign_place(imager, world_from_prototype, free,
+    return overlay_place(imager, world_from_prototype, free,
                       world_from_prototype.rotation.inverse() * d_up_world, shape, least_px);
   };
   cv::Mat parts, free = points.clone();
@@ -88,7 +88,7 @@ std::optional<SignPlace> free_place(Session* session,
 
 }  // namespace
 
-Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, Eyes eyes) {
+Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, ImageProviders providers) {
   const auto named = [](const Error& problem) {
     return Error{fmt::format("--serve: {}", problem.message), problem.wrong_usage};
   };
@@ -102,7 +102,7 @@ Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, Eyes e
   if (!network) return named(network.error());
   std::unique_ptr<Server> out(new Server());
   out->network_ = std::move(*network);
-  out->know_ = eyes.know;
+  out->know_ = providers.know;
   out->code_lasts_ = options.code_lasts;
   Server* server = out.get();
   out->reception_ = std::make_unique<Reception>(Reception::Setup{
@@ -111,8 +111,8 @@ Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, Eyes e
       .authority = certificate->has_value() ? (*certificate)->authority : "",
       .cookie = fmt::format("limn-{}", out->network_->port()),
       .files = std::move(*files),
-      .eyes = std::move(eyes),
-      .backroom = &out->backroom_,
+      .providers = std::move(providers),
+      .worker = &out->worker_,
       .wish =
           [server](Wish wish) {
             const std::lock_guard lock(server->mutex_);
@@ -151,7 +151,7 @@ void Server::stop() {
   network_->stop();
   know_ = {};
   if (reception_) reception_->blind();
-  backroom_.close();
+  worker_.close();
 }
 
 std::optional<Wish> Server::next_wish() {
@@ -194,7 +194,7 @@ bool Server::has_code_begun(Session* session, std::size_t projector) {
   if (!code_.asked) {
     code_.asked = now;
     code_.sign =
-        k_code_light * code_sign(invitation_.url_for(code_.role), pin, name_of(code_.role), k_module_px);
+        k_code_light * pairing_code_image(invitation_.url_for(code_.role), pin, name_of(code_.role), k_module_px);
   }
   if (code_.searched && now - *code_.searched < k_between_searches) return false;
   code_.searched = now;
@@ -202,7 +202,7 @@ bool Server::has_code_begun(Session* session, std::size_t projector) {
       free_place(session, projector, code_.sign.size(), k_least_module_px * code_.sign.cols / k_module_px);
   if (!code_.place && now - *code_.asked < k_longest_search) return false;
   if (!code_.place) {
-    const cv::Mat smaller = k_code_light * pin_sign(pin, name_of(code_.role), k_pin_px);
+    const cv::Mat smaller = k_code_light * pin_image(pin, name_of(code_.role), k_pin_px);
     code_.place = free_place(session, projector, smaller.size(), k_least_pin_px);
     if (code_.place) code_.sign = smaller;
   }
@@ -214,22 +214,22 @@ bool Server::has_code_begun(Session* session, std::size_t projector) {
 }
 
 cv::Mat Server::lit(Session* session, std::size_t projector) {
-  const Painted& painted = session->painted();
-  const cv::Mat& picture = painted.projectors[projector];
+  const ComposedFrame& painted = session->painted();
+  const cv::Mat& image = painted.projectors[projector];
   const Imager& imager = session->setup().rig.projectors[projector];
-  if (imager.name != code_.projector || session->staging().blackout) return picture;
-  if (!has_code_begun(session, projector)) return picture;
+  if (imager.name != code_.projector || session->show_state().blackout) return image;
+  if (!has_code_begun(session, projector)) return image;
   if (Clock::now() >= *code_.until) code_ = {};
-  if (code_.sign.empty()) return picture;
-  cv::Mat out = picture.clone();
+  if (code_.sign.empty()) return image;
+  cv::Mat out = image.clone();
   if (code_.place) {
     if (painted.posed.world_from_prototype)
-      draw_sign(code_.sign, *code_.place, imager, *painted.posed.world_from_prototype, &out);
+      draw_pairing_overlay(code_.sign, *code_.place, imager, *painted.posed.world_from_prototype, &out);
     return out;
   }
   const int module_px =
       static_cast<int>(k_code_share * std::min(out.cols, out.rows) * k_module_px / code_.sign.cols);
-  if (module_px < 1) return picture;
+  if (module_px < 1) return image;
   cv::Mat plain;
   cv::resize(code_.sign, plain, {}, 1.0 * module_px / k_module_px, 1.0 * module_px / k_module_px,
              cv::INTER_AREA);
@@ -252,7 +252,7 @@ void Server::tell(const Session& session, const Telemetry& telemetry, const Devi
     scenes_ = session.scenes();
   }
   SessionNews news{state_of(session, telemetry, health, *begun_at_), session.painted().projectors,
-                   session.staging().looks, scene_, std::exchange(outcomes_, {})};
+                   session.show_state().looks, scene_, std::exchange(outcomes_, {})};
   {
     const std::lock_guard lock(mutex_);
     if (news_)  // not taken yet

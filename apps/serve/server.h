@@ -15,9 +15,9 @@
 #include "apps/live/device_health.h"
 #include "apps/live/session.h"
 #include "apps/live/telemetry.h"
-#include "apps/serve/backroom.h"
-#include "apps/serve/code_sign.h"
-#include "apps/serve/eyes.h"
+#include "apps/serve/worker_thread.h"
+#include "apps/serve/pairing_overlay.h"
+#include "apps/serve/image_provider.h"
 #include "apps/serve/network.h"
 #include "apps/serve/reception.h"
 #include "core/result.h"
@@ -50,7 +50,7 @@ class Server {
  public:
   /// Tells on stderr where it is and the PINs. Errors name the option. `eyes` may be
   /// empty.
-  static Result<std::unique_ptr<Server>> open(const ServeOptions& options, Eyes eyes);
+  static Result<std::unique_ptr<Server>> open(const ServeOptions& options, ImageProviders providers);
   ~Server();
 
   /// Tells the session where guests' tablets look from. Does what guests want, at most k_most_at_once edits
@@ -60,14 +60,14 @@ class Server {
   /// Lets guests know: at once after an edit, else twenty times a second, and once a second while there are
   /// none.
   void tell(const Session& session, const Telemetry& telemetry, const DeviceHealth& health, Stamp at);
-  /// From its next picture on a projector shows the code that pairs for a role, for ServeOptions::code_lasts;
-  /// no other one does then. Guests of lesser roles see no pictures of the room meanwhile, since its cameras
+  /// From its next image on a projector shows the code that pairs for a role, for ServeOptions::code_lasts;
+  /// no other one does then. Guests of lesser roles see no images of the room meanwhile, since its cameras
   /// see the code.
   void show_code(const std::string& projector, Role role);
   /// Who shows it; empty: nobody.
   const std::string& code_projector() const { return code_.projector; }
   /// What a projector of the session's rig is to give: what was painted, and the code on the largest flat and
-  /// free piece of the prototype (in the picture's middle, where there is none). Not under a blackout. What
+  /// free piece of the prototype (in the image's middle, where there is none). Not under a blackout. What
   /// guests and recordings get is what was painted.
   cv::Mat lit(Session* session, std::size_t projector);
   /// Says goodbye to all, lets go of the eyes and ends the threads.
@@ -88,13 +88,13 @@ class Server {
   struct Code {
     std::string projector;
     Role role = Role::look;
-    std::optional<Clock::time_point> asked, searched, until;  // none before the first picture
+    std::optional<Clock::time_point> asked, searched, until;  // none before the first image
     cv::Mat sign;
-    std::optional<SignPlace> place;  // on the prototype
+    std::optional<OverlayPlace> place;  // on the prototype
   };
 
   Invitation invitation_;
-  Backroom backroom_;
+  WorkerThread worker_;
   std::unique_ptr<Reception> reception_;
   std::unique_ptr<Network> network_;
   std::atomic<bool> is_watched_ = false;  // somebody is paired

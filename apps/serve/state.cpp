@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "core/config.h"
-#include "scene/in_words.h"
+#include "scene/command_text.h"
 
 namespace limn::apps {
 namespace {
@@ -16,8 +16,8 @@ constexpr std::size_t k_most_notes = 20;
 
 std::string sight_of(const std::vector<Track>& tracks, const std::string& body) {
   for (const Track& track : tracks) {
-    if (track.body != body || track.sight == Sight::lost) continue;
-    return track.sight == Sight::measured ? "seen" : "carried on";
+    if (track.body != body || track.tracking == TrackingState::lost) continue;
+    return track.tracking == TrackingState::measured ? "seen" : "carried on";
   }
   return "lost";
 }
@@ -25,19 +25,19 @@ std::string sight_of(const std::vector<Track>& tracks, const std::string& body) 
 SessionState::Slot slot_of(const Session& session, std::size_t index) {
   const scene::Scene& scene = session.setup().scene;
   const scene::Slot& slot = scene.slots[index];
-  const scene::Staging::Slot& staged = session.staging().slots[index];
+  const scene::ShowState::Slot& staged = session.show_state().slots[index];
   SessionState::Slot out;
   out.name = slot.name;
   out.variant = staged.variant;
   for (const scene::Variant& variant : slot.variants) {
     out.variants.push_back(variant.name);
-    if (variant.dropped) out.dropped.push_back(variant.name);
+    if (variant.auto_imported) out.dropped.push_back(variant.name);
   }
   out.nudge_mm = 1e3 * staged.nudge;
   out.is_held = staged.pin || !staged.nudge.isZero();
   out.sight = sight_of(session.painted().tracks, slot.name);
-  out.marker = scene::carrier(scene, session.staging(), index).text();
-  out.material = scene::words_of(staged.material);
+  out.marker = scene::slot_marker(scene, session.show_state(), index).text();
+  out.material = scene::format_material_override(staged.material);
   const scene::PosedScene& posed = session.painted().posed;
   const Pose from_world = posed.world_from_prototype ? posed.world_from_prototype->inverse() : Pose{};
   for (const scene::PosedPart& part : posed.parts)
@@ -45,9 +45,9 @@ SessionState::Slot slot_of(const Session& session, std::size_t index) {
   return out;
 }
 
-std::string light_of(const scene::Scene& scene, const scene::Staging& staging) {
-  if (!staging.light || staging.light == scene.light) return {};
-  const auto numbers = scene::numbers_of(*staging.light, staging.d_front_world);
+std::string light_of(const scene::Scene& scene, const scene::ShowState& show_state) {
+  if (!show_state.light || show_state.light == scene.light) return {};
+  const auto numbers = scene::room_light_numbers(*show_state.light, show_state.d_front_world);
   if (!numbers) return "other";
   return fmt::format("{:g} {:g} {:g} {:g} {:g}", (*numbers)[0], (*numbers)[1], (*numbers)[2], (*numbers)[3],
                      (*numbers)[4]);
@@ -78,30 +78,30 @@ SessionState state_of(const Session& session,
                       const DeviceHealth& health,
                       Stamp begun_at) {
   const scene::Scene& scene = session.setup().scene;
-  const scene::Staging& staging = session.staging();
+  const scene::ShowState& show_state = session.show_state();
   SessionState out;
   for (std::size_t i = 0; i < scene.slots.size(); ++i) out.slots.push_back(slot_of(session, i));
   if (scene.prototype) out.prototype = sight_of(session.painted().tracks, "prototype");
-  for (const scene::Look& look : staging.looks) out.looks.push_back(look.name);
-  out.look = staging.look;
-  out.other_look = staging.other_look;
-  if (staging.deleted_look) out.deleted_look = staging.deleted_look->name;
-  out.blackout = staging.blackout;
-  out.frozen = staging.frozen;
-  out.grid = staging.grid;
-  out.marker_states = staging.marker_states;
-  out.split = staging.split;
-  out.split_mm = staging.split_mm;
-  out.screen = scene::screen_names()[static_cast<std::size_t>(staging.screen)];
-  out.outputs = staging.screens;
-  out.light = light_of(scene, staging);
-  out.viewer = staging.viewer;
+  for (const scene::Look& look : show_state.looks) out.looks.push_back(look.name);
+  out.look = show_state.look;
+  out.other_look = show_state.other_look;
+  if (show_state.deleted_look) out.deleted_look = show_state.deleted_look->name;
+  out.blackout = show_state.blackout;
+  out.frozen = show_state.frozen;
+  out.grid = show_state.grid;
+  out.marker_states = show_state.marker_states;
+  out.split = show_state.split;
+  out.split_mm = show_state.split_mm;
+  out.screen = scene::screen_names()[static_cast<std::size_t>(show_state.screen)];
+  out.outputs = show_state.screens;
+  out.light = light_of(scene, show_state);
+  out.viewer = show_state.viewer;
   out.follows = session.painted().follows;
-  out.repair = session.repairing();
+  out.repair = session.recalibration_progress();
   out.windows = {session.windows().begin(), session.windows().end()};
   for (const Imager& projector : session.setup().rig.projectors) out.projectors.push_back(projector.name);
   out.devices = health.all();
-  for (const LooseMarker& loose : waiting_markers(scene, staging, session.watched()))
+  for (const LooseMarker& loose : waiting_markers(scene, show_state, session.watched()))
     out.waiting.push_back(loose.marker.text());
   const auto& notes = telemetry.notes();
   const double begun_s = seconds_between(Stamp{}, begun_at);

@@ -9,7 +9,7 @@
 #include "apps/live/session.h"
 #include "apps/live/telemetry.h"
 #include "core/pose.h"
-#include "scene/staging.h"
+#include "scene/show_state.h"
 
 namespace limn::apps {
 

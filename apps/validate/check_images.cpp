@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "core/response.h"
+#include "core/photometric_response.h"
 
 namespace limn::apps {
 namespace {
@@ -16,12 +16,12 @@ constexpr double k_over = 4;  // levels that a pixel may be off
 constexpr double k_edge = 8;  // levels between neighbours: beyond, samples of a pixel show, not its colour
 constexpr double k_difference_gain = 32;  // 4/255 becomes 128
 
-// Pixels of a picture (levels, CV_32FC3) around which it is nearly even.
-cv::Mat nearly_even(const cv::Mat& picture) {
+// Pixels of an image (levels, CV_32FC3) around which it is nearly even.
+cv::Mat nearly_even(const cv::Mat& image) {
   const cv::Mat around = square_kernel(3);
   cv::Mat highest, lowest;
-  cv::dilate(picture, highest, around);
-  cv::erode(picture, lowest, around);
+  cv::dilate(image, highest, around);
+  cv::erode(image, lowest, around);
   return ~any_channel_over(highest - lowest, k_edge);
 }
 
@@ -33,15 +33,15 @@ cv::Mat eye_image(const cv::Mat& light) {
     for (int column = 0; column < light.cols; ++column)
       for (int c = 0; c < 3; ++c)
         levels.at<cv::Vec3b>(row, column)[c] = cv::saturate_cast<std::uint8_t>(
-            255 * srgb_of_linear(std::clamp(double(light.at<cv::Vec3f>(row, column)[c]), 0.0, 1.0)));
+            255 * srgb_from_linear(std::clamp(double(light.at<cv::Vec3f>(row, column)[c]), 0.0, 1.0)));
   return levels;
 }
 
-cv::Mat linear_light(const cv::Mat& picture) {
+cv::Mat linear_light(const cv::Mat& image) {
   cv::Mat table(1, 256, CV_32F), light;
   for (int v = 0; v < 256; ++v)
     table.at<float>(v) = static_cast<float>(std::pow(v / 255.0, k_projector_gamma));
-  cv::LUT(picture, table, light);
+  cv::LUT(image, table, light);
   return light;
 }
 
@@ -59,9 +59,9 @@ cv::Mat bgr_image(const cv::Mat& grey) {
 }
 
 cv::Mat label_difference(const cv::Mat& found, const cv::Mat& truth) {
-  cv::Mat picture = bgr_image(found / 3);
-  picture.setTo(cv::Scalar(60, 80, 255), found != truth);
-  return picture;
+  cv::Mat image = bgr_image(found / 3);
+  image.setTo(cv::Scalar(60, 80, 255), found != truth);
+  return image;
 }
 
 cv::Mat owner_shades(const cv::Mat& front) {
@@ -99,10 +99,10 @@ std::string level_errors_caption(const LevelErrors& errors, const cv::Mat& shown
 }
 
 cv::Mat missing_luminance(const cv::Mat& more, const cv::Mat& less) {
-  const auto luminance = [](const cv::Mat& picture) {
+  const auto luminance = [](const cv::Mat& image) {
     cv::Mat table(1, 256, CV_32F), light;
-    for (int v = 0; v < 256; ++v) table.at<float>(v) = static_cast<float>(linear_of_srgb(v / 255.0));
-    cv::LUT(picture, table, light);
+    for (int v = 0; v < 256; ++v) table.at<float>(v) = static_cast<float>(linear_from_srgb(v / 255.0));
+    cv::LUT(image, table, light);
     cv::transform(light, light, cv::Matx13f(0.0722F, 0.7152F, 0.2126F));
     cv::GaussianBlur(light, light, {0, 0}, k_seam_blur_px);
     return light;

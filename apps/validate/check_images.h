@@ -13,7 +13,7 @@ constexpr double k_seam_blur_px = 1;  // 8-bit levels average out; an eye at the
 cv::Mat eye_image(const cv::Mat& light);
 
 /// The linear light (CV_32F) of a projector's 8-bit image.
-cv::Mat linear_light(const cv::Mat& picture);
+cv::Mat linear_light(const cv::Mat& image);
 
 /// A difference (8-bit, or linear light) made 32 times as bright for people, 8-bit: 4/255 becomes 128.
 cv::Mat amplified(const cv::Mat& difference);

@@ -18,7 +18,7 @@ struct CheckReading {
 };
 
 /// What was drawn, what it should be, and how they differ, for people to look at (8-bit BGR).
-struct CheckPicture {
+struct CheckImage {
   std::string file;  ///< without -actual.png, -expected.png, -difference.png
   std::string title;
   std::string caption;
@@ -29,7 +29,7 @@ struct CheckResult {
   std::string name;
   std::string about;
   std::vector<CheckReading> readings;  ///< in the order of check_measures()
-  std::vector<CheckPicture> pictures;
+  std::vector<CheckImage> images;
   double seconds = 0;
   std::string problem;  ///< why nothing was measured; empty: it was
   bool good() const;

@@ -37,30 +37,30 @@ Error CheckRun::nothing_to_judge(const std::string& measure, const std::string& 
 }
 
 std::vector<cv::Mat> CheckRun::drawn_by(projector::Renderer& renderer, const scene::PosedScene& posed) const {
-  std::vector<cv::Mat> pictures;
+  std::vector<cv::Mat> images;
   for (std::size_t i = 0; i < check_.told.rig.projectors.size(); ++i)
-    pictures.push_back(renderer.projector_picture(i, posed, check_.viewer));
-  return pictures;
+    images.push_back(renderer.projector_image(i, posed, check_.viewer));
+  return images;
 }
 
-const std::vector<cv::Mat>& CheckRun::projector_pictures() {
-  if (projector_pictures_.empty()) projector_pictures_ = drawn_by(*renderer_, check_.told.posed);
-  return projector_pictures_;
+const std::vector<cv::Mat>& CheckRun::projector_images() {
+  if (projector_images_.empty()) projector_images_ = drawn_by(*renderer_, check_.told.posed);
+  return projector_images_;
 }
 
-const std::vector<sim::PartPicture>& CheckRun::aims() {
+const std::vector<sim::PartImage>& CheckRun::aims() {
   if (aims_.empty())
     for (std::size_t i = 0; i < world_.rig.projectors.size(); ++i)
-      aims_.push_back(aim().projector_picture(i));
+      aims_.push_back(aim().projector_image(i));
   return aims_;
 }
 
-const TracedEye& CheckRun::eye() {
+const ReferenceView& CheckRun::eye() {
   if (!eye_) eye_.emplace(world_, check_.viewer, 1);
   return *eye_;
 }
 
-const TracedEye& CheckRun::fine_eye() {
+const ReferenceView& CheckRun::fine_eye() {
   if (!fine_eye_) {
     fine_eye_.emplace(world_, check_.viewer, k_finer);
     fine_reaches_ = fine_eye_->reaches();
@@ -106,7 +106,7 @@ Result<const Imager*> CheckRun::camera(const std::string& measure) const {
 }
 
 CheckResult CheckRun::result() && {
-  CheckResult result{check_.name, check_.about, {}, std::move(pictures_), 0, ""};
+  CheckResult result{check_.name, check_.about, {}, std::move(images_), 0, ""};
   for (const CheckLimit& limit : check_.limits)
     result.readings.push_back({limit, values_.at(limit.measure.name)});
   return result;

@@ -13,7 +13,7 @@
 #include "apps/validate/check_result.h"
 #include "core/result.h"
 #include "projector/renderer.h"
-#include "sim/aim.h"
+#include "sim/reference_renderer.h"
 
 namespace limn::apps {
 
@@ -35,7 +35,7 @@ class CheckRun {
   /// What this renderer draws for the projectors, for the check's viewer.
   std::vector<cv::Mat> drawn_by(projector::Renderer& renderer, const scene::PosedScene& posed) const;
   /// What the projectors get of the check's parts.
-  const std::vector<cv::Mat>& projector_pictures();
+  const std::vector<cv::Mat>& projector_images();
   /// The scene's prototype with one part instead of the scene's own, and where that is.
   std::pair<scene::Scene, scene::PosedScene> shown_instead(const scene::Mesh& mesh, scene::Mode mode) const;
   /// That, drawn by a renderer of its own.
@@ -44,13 +44,13 @@ class CheckRun {
   scene::Mesh coat() const;
 
   /// The ray-traced images of the parts.
-  sim::Aim aim() const { return {world_, check_.posed, check_.viewer}; }
+  sim::ReferenceRenderer aim() const { return {world_, check_.posed, check_.viewer}; }
   /// Those of the projectors.
-  const std::vector<sim::PartPicture>& aims();
+  const std::vector<sim::PartImage>& aims();
   /// The viewer's eye.
-  const TracedEye& eye();
+  const ReferenceView& eye();
   /// The viewer's eye with k_finer x k_finer rays a pixel, for light that is to be even.
-  const TracedEye& fine_eye();
+  const ReferenceView& fine_eye();
   /// What each projector reaches of it.
   const std::vector<cv::Mat>& fine_reaches();
 
@@ -61,7 +61,7 @@ class CheckRun {
 
   void set(const std::string& measure, double value) { values_[measure] = value; }
   double value(const std::string& measure) const { return values_.at(measure); }
-  void add(CheckPicture picture) { pictures_.push_back(std::move(picture)); }
+  void add(CheckImage image) { images_.push_back(std::move(image)); }
   /// All that was measured of what the check asks for.
   CheckResult result() &&;
 
@@ -70,12 +70,12 @@ class CheckRun {
   sim::World world_;
   std::set<std::string> asked_;
   std::optional<projector::Renderer> renderer_;
-  std::vector<cv::Mat> projector_pictures_;
-  std::vector<sim::PartPicture> aims_;
-  std::optional<TracedEye> eye_, fine_eye_;
+  std::vector<cv::Mat> projector_images_;
+  std::vector<sim::PartImage> aims_;
+  std::optional<ReferenceView> eye_, fine_eye_;
   std::vector<cv::Mat> fine_reaches_;
   std::map<std::string, double> values_;
-  std::vector<CheckPicture> pictures_;
+  std::vector<CheckImage> images_;
 };
 
 constexpr double k_coat = 0.5;  // light of the coat; a whole display value to 0.1 % of light

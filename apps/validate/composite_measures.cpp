@@ -48,7 +48,7 @@ Status judge_drawn(CheckRun& run) {
   const cv::Mat black(camera->height, camera->width, CV_8UC3, cv::Scalar::all(0));
   const cv::Mat actual =
       run.renderer().composite(0, black, run.check().told.posed, projector::Composite::full);
-  const sim::PartPicture seen = run.aim().seen(run.world().rig.cameras.front());
+  const sim::PartImage seen = run.aim().seen(run.world().rig.cameras.front());
   const cv::Mat expected = eye_image(seen.light);
   const cv::Mat shown = any_channel_over(actual, 0) | (seen.cover > 0);
   if (cv::countNonZero(shown) == 0) return run.nothing_to_judge("drawn_…", "a part in camera 0's picture");
@@ -113,15 +113,15 @@ Status judge_composite(CheckRun& run) {
 Status judge_edge(CheckRun& run) {
   LIMN_TRY(const Imager* camera, run.camera("edge_…"));
   const Imager& true_camera = run.world().rig.cameras.front();
-  const sim::PartPicture parts = run.aim().seen(true_camera);
+  const sim::PartImage parts = run.aim().seen(true_camera);
   const cv::Mat meets = light_meets_screen(run, true_camera, parts.cover);
   if (cv::countNonZero(meets) == 0)
     return run.nothing_to_judge("edge_…",
                                 "a part in camera 0's picture that is half on, half off the surface");
-  std::vector<cv::Mat> pictures;
+  std::vector<cv::Mat> images;
   for (std::size_t i = 0; i < run.check().told.rig.projectors.size(); ++i)
-    pictures.push_back(run.renderer().projector_picture(i, run.check().told.posed, *camera));
-  const cv::Mat by_light = eye_image(TracedEye(run.world(), true_camera, k_finer).seen(pictures));
+    images.push_back(run.renderer().projector_image(i, run.check().told.posed, *camera));
+  const cv::Mat by_light = eye_image(ReferenceView(run.world(), true_camera, k_finer).seen(images));
   const cv::Mat together =
       run.renderer().composite(0, by_light, run.check().told.posed, projector::Composite::rest);
   const cv::Mat expected = eye_image(parts.light), gap = missing_luminance(expected, together),

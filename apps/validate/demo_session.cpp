@@ -14,14 +14,14 @@
 #include "apps/virtual_capture.h"
 #include "apps/world_markers.h"
 #include "core/log.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "projector/renderer.h"
-#include "sim/photograph.h"
+#include "sim/sensor_model.h"
 #include "sim/trace.h"
 #include "sim/truth.h"
 #include "sim/virtual_rig.h"
 #include "tracker/detector.h"
-#include "tracker/observed.h"
+#include "tracker/body_estimate.h"
 
 namespace limn::apps {
 namespace {
@@ -104,7 +104,7 @@ Result<cv::Mat> photograph(sim::VirtualRig* room) {
   return frame.image;
 }
 
-// Photographs the room in its own light and finds everything in the picture.
+// Photographs the room in its own light and finds everything in the image.
 Result<Moment> looked(Session* session, sim::VirtualRig* room, const std::vector<std::string>& variants) {
   room->darken();
   Moment moment;
@@ -132,26 +132,26 @@ std::vector<cv::Mat> drawn(projector::Renderer* renderer,
                            std::size_t projector_count,
                            const scene::PosedScene& posed,
                            const Imager& viewer) {
-  std::vector<cv::Mat> pictures;
+  std::vector<cv::Mat> images;
   for (std::size_t i = 0; i < projector_count; ++i) {
-    pictures.push_back(renderer->projector_picture(i, posed, viewer));
+    images.push_back(renderer->projector_image(i, posed, viewer));
   }
-  return pictures;
+  return images;
 }
 
-// Photograph of the room with these pictures shone into it.
-Result<cv::Mat> shone(sim::VirtualRig* room, const std::vector<cv::Mat>& pictures) {
-  for (std::size_t i = 0; i < pictures.size(); ++i) {
-    if (auto shown = room->projector(static_cast<int>(i)).show(pictures[i]); !shown) return shown.error();
+// Photograph of the room with these images shone into it.
+Result<cv::Mat> shone(sim::VirtualRig* room, const std::vector<cv::Mat>& images) {
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (auto shown = room->projector(static_cast<int>(i)).show(images[i]); !shown) return shown.error();
   }
   return photograph(room);
 }
 
-// What an eye sees of the room with these pictures shone into it: a simulated photograph from there.
-cv::Mat seen_from(const sim::World& world, const Imager& eye, const std::vector<cv::Mat>& pictures) {
+// What an eye sees of the room with these images shone into it: a simulated photograph from there.
+cv::Mat seen_from(const sim::World& world, const Imager& eye, const std::vector<cv::Mat>& images) {
   sim::World seen = world;
   seen.rig.cameras = {eye};
-  return sim::photograph(seen, sim::trace(seen, 0), pictures, world.seed);
+  return sim::photograph(seen, sim::trace(seen, 0), images, world.seed);
 }
 
 // A renderer of the judge's dots instead of the scene's parts, on the same prototype.
@@ -176,12 +176,12 @@ Result<JudgedDots> judged(const Session& session, const sim::World& world, const
   LIMN_TRY(projector::Renderer renderer, dots_renderer(session, dots));
   const Pose& world_from_prototype = *moment.posed.world_from_prototype;
   const scene::PosedScene posed{world_from_prototype, {{"dots", "dots", world_from_prototype}}};
-  const auto pictures =
+  const auto images =
       drawn(&renderer, session.rig.projectors.size(), posed, designers_eye(world_from_prototype));
-  return JudgedDots{dots, judged_registration(world, dots, pictures)};
+  return JudgedDots{dots, judged_registration(world, dots, images)};
 }
 
-// Masks of all parts in one picture; where they overlap the later slot's.
+// Masks of all parts in one image; where they overlap the later slot's.
 cv::Mat merged_masks(const std::vector<projector::PartCoverage>& coverage, cv::Size size) {
   cv::Mat merged(size, CV_8U, cv::Scalar(0));
   for (const auto& part : coverage) part.mask.copyTo(merged, part.mask != 0);
@@ -197,7 +197,7 @@ cv::Mat merged_true_masks(const sim::Truth& truth, const scene::Scene& scene, co
   return merged;
 }
 
-// Outline of the first part in the camera's picture against the ray-traced truth, at twice the resolution.
+// Outline of the first part in the camera's image against the ray-traced truth, at twice the resolution.
 double composite_error_px(Session* session,
                           const sim::World& world,
                           const sim::Truth& truth,
@@ -261,7 +261,7 @@ Result<Session> calibrated(const fs::path& out, sim::VirtualRig* room, Stages* s
   fs::remove_all(captures, ignored);
   LIMN_TRY(const Plan plan, load_plan(fs::path(LIMN_SOURCE_DIR) / "config/plans/studio.json"));
   LIMN_TRY_STATUS(stages->time("capture", [&] { return capture_virtually(plan, room, captures); }));
-  SolveOptions solving;
+  SolveCommandOptions solving;
   solving.captures = captures;
   solving.out = rig_folder;
   LIMN_TRY(const calib::Report report, stages->time("solve", [&] { return solved(solving); }));
@@ -342,7 +342,7 @@ nlohmann::ordered_json json_of(const Measured& measured) {
 }
 
 // What the renderer draws and the simulator photographs, for people to look at.
-Result<std::vector<DemoPicture>> shown_session(Session* session, sim::VirtualRig* room, const Place& place) {
+Result<std::vector<DemoImage>> shown_session(Session* session, sim::VirtualRig* room, const Place& place) {
   const scene::PosedScene& posed = place.moment.posed;
   const Pose& world_from_prototype = *posed.world_from_prototype;
   const Imager eye = designers_eye(world_from_prototype);
@@ -354,16 +354,16 @@ Result<std::vector<DemoPicture>> shown_session(Session* session, sim::VirtualRig
   const std::string other_variant = session->scene.slots.at(0).variants.at(1).name;
   LIMN_TRY(const Moment swapped, looked(session, room, {other_variant}));
   LIMN_TRY_STATUS(renderer.set_contact_shadow(&session->scene));
-  room->camera_effects(0).srgb = true;  // pictures for people; those that are measured in are linear
+  room->camera_effects(0).srgb = true;  // images for people; those that are measured in are linear
   LIMN_TRY(const cv::Mat unlit, shone(room, {}));
-  const auto pictures = drawn(&renderer, projector_count, posed, eye);
-  LIMN_TRY(const cv::Mat lit, shone(room, pictures));
-  const auto pictures_swapped = drawn(&renderer, projector_count, swapped.posed, eye);
-  LIMN_TRY(const cv::Mat lit_swapped, shone(room, pictures_swapped));
-  const auto pictures_left = drawn(&renderer, projector_count, posed, eye_left);
+  const auto images = drawn(&renderer, projector_count, posed, eye);
+  LIMN_TRY(const cv::Mat lit, shone(room, images));
+  const auto images_swapped = drawn(&renderer, projector_count, swapped.posed, eye);
+  LIMN_TRY(const cv::Mat lit_swapped, shone(room, images_swapped));
+  const auto images_left = drawn(&renderer, projector_count, posed, eye_left);
 
   using projector::Composite;
-  std::vector<DemoPicture> shown = {
+  std::vector<DemoImage> shown = {
       {"unlit", "The room, unlit", "A simulated photograph: a clay door, its markers, the room's own light.",
        unlit},
       {"lit", "Lit", "The same, with the projectors' light: trim line and mirror are painted on.", lit},
@@ -374,7 +374,7 @@ Result<std::vector<DemoPicture>> shown_session(Session* session, sim::VirtualRig
        renderer.composite(0, unlit, posed, Composite::full)}};
   for (std::size_t i = 0; i < projector_count; ++i) {
     const std::string& name = session->rig.projectors[i].name;
-    shown.push_back({name, name, "What this projector gets.", pictures[i]});
+    shown.push_back({name, name, "What this projector gets.", images[i]});
   }
   shown.push_back(
       {"error-map", "Error map",
@@ -386,7 +386,7 @@ Result<std::vector<DemoPicture>> shown_session(Session* session, sim::VirtualRig
   shown.push_back(
       {"from-the-left", "From the left",
        "The designer has walked to the left: the mirror is painted for that eye and stands off the door.",
-       seen_from(room->world(), true_eye_left, pictures_left)});
+       seen_from(room->world(), true_eye_left, images_left)});
   shown.push_back({"mask", "Mask", "From the designer's eye: white is projected, grey is left to the screen.",
                    merged_masks(renderer.coverage(posed, eye), {eye.width, eye.height})});
   return shown;
@@ -404,7 +404,7 @@ double mask_iou(Session* session, const sim::World& world, const sim::Truth& tru
 
 Result<DemoResult> play_demo(const fs::path& out, bool keep_captures) {
   LIMN_TRY(sim::World world,
-           sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture));
+           sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image));
   sim::VirtualRig room(std::move(world));
   Stages stages;
   LIMN_TRY(Session session, calibrated(out, &room, &stages, keep_captures));
@@ -422,10 +422,10 @@ Result<DemoResult> play_demo(const fs::path& out, bool keep_captures) {
   measured.composite_px =
       stages.time("judge", [&] { return composite_error_px(&session, truth_world, truth, moment); });
   measured.mask_iou = stages.time("judge", [&] { return mask_iou(&session, truth_world, truth, moment); });
-  LIMN_TRY(auto pictures,
+  LIMN_TRY(auto images,
            stages.time("render", [&] { return shown_session(&session, &room, measured.places.front()); }));
   measured.seconds = stages.seconds();
-  return DemoResult{rows_of(measured), json_of(measured).dump(2) + "\n", std::move(pictures)};
+  return DemoResult{rows_of(measured), json_of(measured).dump(2) + "\n", std::move(images)};
 }
 
 }  // namespace limn::apps

@@ -13,7 +13,7 @@ namespace limn::apps {
 struct DemoResult {
   std::vector<DemoRow> rows;
   std::string json;  ///< demo.json
-  std::vector<DemoPicture> pictures;
+  std::vector<DemoImage> images;
 };
 
 /// A whole session on the virtual rig `studio`, judged against the simulator's truth: captures (in

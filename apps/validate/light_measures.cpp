@@ -32,7 +32,7 @@ std::pair<cv::Mat, cv::Mat> bounds_of_light(CheckRun& run) {
 }  // namespace
 
 Status judge_shone(CheckRun& run) {
-  const cv::Mat actual = run.eye().seen(run.projector_pictures());
+  const cv::Mat actual = run.eye().seen(run.projector_images());
   const auto [low, high] = bounds_of_light(run);
   const cv::Mat lit = any_channel_over(actual, k_dark) | any_channel_over(high, k_dark);
   if (cv::countNonZero(lit) == 0)
@@ -53,7 +53,7 @@ Status judge_shone(CheckRun& run) {
 Status judge_spill(CheckRun& run) {
   double spilt = 0, all = 0;
   for (std::size_t i = 0; i < run.aims().size(); ++i) {
-    const cv::Mat light = linear_light(run.projector_pictures()[i]);
+    const cv::Mat light = linear_light(run.projector_images()[i]);
     cv::Mat forbidden = light.clone();
     forbidden.setTo(0, run.aims()[i].cover > 0);
     const cv::Scalar sum = cv::sum(light), lost = cv::sum(forbidden);

@@ -8,7 +8,7 @@
 #include "apps/judge.h"
 #include "apps/validate/check_images.h"
 #include "apps/validate/check_measures.h"
-#include "scene/drawn.h"
+#include "scene/scan_preview.h"
 
 namespace limn::apps {
 namespace {
@@ -46,10 +46,10 @@ void add_dots(CheckRun& run,
 void add_dots(CheckRun& run,
               const std::string& file,
               const std::string& title,
-              const std::vector<cv::Mat>& pictures,
+              const std::vector<cv::Mat>& images,
               const Registration& found,
               const std::vector<Eigen::Vector3d>& places) {
-  add_dots(run, file, title, run.eye().seen(pictures), run.check().viewer, found, places, "");
+  add_dots(run, file, title, run.eye().seen(images), run.check().viewer, found, places, "");
 }
 
 }  // namespace
@@ -57,10 +57,10 @@ void add_dots(CheckRun& run,
 Status judge_texture(CheckRun& run) {
   const AimedDots dots = aimed_dots(run.world(), k_dot_count, k_dot_seed);
   if (dots.p_aimed.empty()) return run.nothing_to_judge("texture_mm", "a place that a projector reaches");
-  LIMN_TRY(const auto pictures, run.drawn_instead(dots.mesh, scene::Mode::surface));
-  const Registration found = judged_registration(run.world(), dots, pictures);
+  LIMN_TRY(const auto images, run.drawn_instead(dots.mesh, scene::Mode::surface));
+  const Registration found = judged_registration(run.world(), dots, images);
   run.set("texture_mm", found.rms_mm);
-  add_dots(run, "texture", "Surface-locked light", pictures, found, dots.p_aimed);
+  add_dots(run, "texture", "Surface-locked light", images, found, dots.p_aimed);
   return {};
 }
 
@@ -69,10 +69,10 @@ Status judge_parallax(CheckRun& run) {
       floating_dots(run.world(), run.check().viewer, k_off_surface_m, k_dot_count, k_dot_seed);
   if (dots.p_aimed.empty())
     return run.nothing_to_judge("parallax_mm", "a place before which the eye sees a disc");
-  LIMN_TRY(const auto pictures, run.drawn_instead(dots.mesh, scene::Mode::view));
-  const Registration found = judged_registration(run.world(), dots, pictures);
+  LIMN_TRY(const auto images, run.drawn_instead(dots.mesh, scene::Mode::view));
+  const Registration found = judged_registration(run.world(), dots, images);
   run.set("parallax_mm", *std::max_element(found.errors_mm.begin(), found.errors_mm.end()));
-  add_dots(run, "parallax", "Points 50 mm off the surface", pictures, found, dots.p_centres);
+  add_dots(run, "parallax", "Points 50 mm off the surface", images, found, dots.p_centres);
   return {};
 }
 
@@ -82,14 +82,14 @@ Status judge_shared(CheckRun& run) {
   AimedDots dots = floating_dots(run.world(), run.check().viewer, k_off_surface_m, k_dot_count, k_dot_seed);
   if (dots.p_aimed.empty())
     return run.nothing_to_judge("shared_mm", "a place before which the shared eye sees a disc");
-  LIMN_TRY(const auto pictures, run.drawn_instead(dots.mesh, scene::Mode::view));
+  LIMN_TRY(const auto images, run.drawn_instead(dots.mesh, scene::Mode::view));
   std::optional<Registration> first;
   std::string shares;
   double squares = 0;
   int viewers = 0;
-  for (const scene::SharedEye::Share& share : run.check().shares) {
+  for (const scene::SharedViewpoint::Share& share : run.check().shares) {
     dots.p_eye = run.world().world_from_prototype.inverse() * share.p_world;
-    const Registration found = judged_registration(run.world(), dots, pictures);
+    const Registration found = judged_registration(run.world(), dots, images);
     shares += fmt::format(" {}: {:.0f} % of the eye, RMS {:.1f} mm.", share.viewer, 100 * share.share,
                           found.rms_mm);
     if (!first) first = found;
@@ -102,9 +102,9 @@ Status judge_shared(CheckRun& run) {
   viewer.imager_from_world =
       looking_at(run.check().shares[0].p_world, *scene::middle_of(run.check().told.scene, run.check().posed),
                  Eigen::Vector3d::UnitZ());
-  const TracedEye seeing(run.world(), viewer, 1);
+  const ReferenceView seeing(run.world(), viewer, 1);
   add_dots(run, "shared", "Points 50 mm off the surface, as " + run.check().shares[0].viewer + " sees them",
-           seeing.seen(pictures), viewer, *first, dots.p_centres, shares);
+           seeing.seen(images), viewer, *first, dots.p_centres, shares);
   return {};
 }
 

@@ -8,7 +8,7 @@ namespace limn::apps {
 Status judge_rerun(CheckRun& run) {
   LIMN_TRY(projector::Renderer again,
            projector::Renderer::create(run.check().told.scene, run.check().told.rig));
-  auto first = run.projector_pictures();
+  auto first = run.projector_images();
   auto second = run.drawn_by(again, run.check().told.posed);
   if (!run.check().told.rig.cameras.empty()) {
     const Imager& camera = run.check().told.rig.cameras.front();

@@ -8,7 +8,7 @@
 #include "apps/traced_eye.h"
 #include "apps/validate/check_images.h"
 #include "apps/validate/check_measures.h"
-#include "sim/photograph.h"
+#include "sim/sensor_model.h"
 #include "sim/trace.h"
 
 namespace limn::apps {
@@ -45,8 +45,8 @@ cv::Mat mean_black(CheckRun& run, const sim::World& glowing) {
 }
 
 // As limn solve would measure it.
-Response measured_response(const sim::ProjectorEffects& effects, const std::string& projector) {
-  Response response;
+ProjectorResponse measured_response(const sim::ProjectorEffects& effects, const std::string& projector) {
+  ProjectorResponse response;
   response.projector = projector;
   for (int value = 0; value < 256; ++value)
     response.green.push_back(sim::light_share(effects, 1, value / 255.0));
@@ -121,8 +121,8 @@ cv::Mat shown_steps(const Steps& steps, double white) {
 }  // namespace
 
 Status judge_seams(CheckRun& run) {
-  LIMN_TRY(const auto pictures, run.drawn_instead(run.coat(), scene::Mode::surface));
-  const cv::Mat actual = run.fine_eye().seen(pictures);
+  LIMN_TRY(const auto images, run.drawn_instead(run.coat(), scene::Mode::surface));
+  const cv::Mat actual = run.fine_eye().seen(images);
   const cv::Mat whole = evenly_lit(run);
   const Steps steps = steps_of(run, actual, k_coat, whole);
   if (cv::countNonZero(steps.along) == 0)
@@ -157,8 +157,8 @@ Status judge_black(CheckRun& run) {
   if (!(brightest > 0)) return run.nothing_to_judge("black_step_share", "projectors whose black gives light");
   LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(run.check().told.scene, rig));
   LIMN_TRY_STATUS(renderer.set_light({.even_black = true}));
-  const auto pictures = run.drawn_by(renderer, {run.check().told.posed.world_from_prototype, {}});
-  const cv::Mat actual = run.fine_eye().seen(glowing, pictures);
+  const auto images = run.drawn_by(renderer, {run.check().told.posed.world_from_prototype, {}});
+  const cv::Mat actual = run.fine_eye().seen(glowing, images);
   const Steps steps = steps_of(run, actual / one_black, 1, whole);
   if (cv::countNonZero(steps.along) == 0)
     return run.nothing_to_judge("black_step_share", "a seam of projectors in the viewer's picture");

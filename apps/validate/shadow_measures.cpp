@@ -15,14 +15,14 @@ Status judge_refill(CheckRun& run) {
   const auto [scene, posed] = run.check().told.posed.parts.empty()
                                   ? run.shown_instead(run.coat(), scene::Mode::surface)
                                   : std::pair(run.check().told.scene, run.check().told.posed);
-  const auto reading = judged_refill(run.check().truth, scene, posed, run.check().viewer, run.check().hand,
+  const auto reading = measured_shadow_fill(run.check().truth, scene, posed, run.check().viewer, run.check().hand,
                                      run.check().truth.seed);
   if (!reading) return error("{}: {}", run.check().name, reading.message());
   run.set("refill_share", reading->share);
   run.set("refill_flash_share", reading->flash);
   run.set("refill_still_255", reading->still_levels);
   std::string shares;
-  for (const RefillFrame& frame : reading->frames)
+  for (const ShadowFillFrame& frame : reading->frames)
     shares += fmt::format("{} {} {:.0f} %", shares.empty() ? "" : ",", frame.phase, 100 * frame.share);
   run.add({"refill", "Light with a hand before a projector",
            fmt::format("Expected: without the hand. Back of what the shadow takes, frame by frame:{}. "

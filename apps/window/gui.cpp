@@ -64,7 +64,7 @@ void set_theme(float scale) {
 
 }  // namespace
 
-ImVec2 PlacedPicture::of(const Eigen::Vector2d& px) const {
+ImVec2 PlacedImage::of(const Eigen::Vector2d& px) const {
   return {corner.x + scale * static_cast<float>(px.x() + 0.5),
           corner.y + scale * static_cast<float>(px.y() + 0.5)};
 }
@@ -136,23 +136,23 @@ void Gui::frame(cv::Size pixels,
 
 bool Gui::is_typing() const { return is_typing_; }
 
-PlacedPicture Gui::picture(
-    const std::string& name, const cv::Mat& picture, ImVec2 corner, ImVec2 size, bool is_linear) {
-  if (picture.empty() || size.x < 2 || size.y < 2) return {corner, {0, 0}, 0};
+PlacedImage Gui::image(
+    const std::string& name, const cv::Mat& image, ImVec2 corner, ImVec2 size, bool is_linear) {
+  if (image.empty() || size.x < 2 || size.y < 2) return {corner, {0, 0}, 0};
   const float scale =
-      std::min(size.x / static_cast<float>(picture.cols), size.y / static_cast<float>(picture.rows));
-  PlacedPicture placed{{0, 0},
-                       {std::floor(scale * static_cast<float>(picture.cols)),
-                        std::floor(scale * static_cast<float>(picture.rows))},
+      std::min(size.x / static_cast<float>(image.cols), size.y / static_cast<float>(image.rows));
+  PlacedImage placed{{0, 0},
+                       {std::floor(scale * static_cast<float>(image.cols)),
+                        std::floor(scale * static_cast<float>(image.rows))},
                        scale};
   placed.corner = {std::floor(corner.x + (size.x - placed.size.x) / 2),
                    std::floor(corner.y + (size.y - placed.size.y) / 2)};
-  cv::Mat shown = picture;
+  cv::Mat shown = image;
   if (scale < 1)
-    cv::resize(picture, shown,
+    cv::resize(image, shown,
                {std::max(1, static_cast<int>(placed.size.x)), std::max(1, static_cast<int>(placed.size.y))},
                0, 0, cv::INTER_AREA);
-  if (is_linear) shown = srgb_picture(shown);
+  if (is_linear) shown = srgb_image(shown);
   if (!shown.isContinuous()) shown = shown.clone();
   Texture& texture = textures_[name];
   if (texture.size != shown.size()) {

@@ -22,11 +22,11 @@ constexpr ImU32 k_text = IM_COL32(232, 230, 225, 255), k_quiet = IM_COL32(169, 1
                 k_blue = IM_COL32(127, 180, 255, 255), k_violet = IM_COL32(190, 140, 255, 255);
 }  // namespace colour
 
-/// A picture as it lies in a window.
-struct PlacedPicture {
+/// An image as it lies in a window.
+struct PlacedImage {
   ImVec2 corner, size;
-  float scale = 1;  ///< window pixels a picture's pixel
-  /// Where a pixel of the picture lies in the window (pixel centres at integers).
+  float scale = 1;  ///< window pixels an image's pixel
+  /// Where a pixel of the image lies in the window (pixel centres at integers).
   ImVec2 of(const Eigen::Vector2d& px) const;
 };
 
@@ -50,10 +50,10 @@ class Gui {
   /// Whether the keys of the last frame went into a text field.
   bool is_typing() const;
 
-  /// Shows an 8-bit grey or BGR picture as large as it fits into the place, centred; `name` keeps its texture
+  /// Shows an 8-bit grey or BGR image as large as it fits into the place, centred; `name` keeps its texture
   /// from frame to frame. `is_linear`: its values are proportional to light, not yet encoded for the eye.
-  PlacedPicture picture(
-      const std::string& name, const cv::Mat& picture, ImVec2 corner, ImVec2 size, bool is_linear = false);
+  PlacedImage image(
+      const std::string& name, const cv::Mat& image, ImVec2 corner, ImVec2 size, bool is_linear = false);
 
   float em() const { return em_; }  ///< pixels of the text's height
   ImFont* heading() const { return heading_; }
@@ -81,7 +81,7 @@ void heading(const Gui& gui, const std::string& text);
 /// A button that is lit in a colour while what it switches is on.
 bool toggle(const std::string& label, bool is_on, ImU32 lit, ImVec2 size);
 
-/// Text drawn at a place over a picture, with ground behind it.
+/// Text drawn at a place over an image, with ground behind it.
 void label_at(ImVec2 corner, ImU32 colour, const std::string& text);
 
 }  // namespace limn::apps

@@ -6,8 +6,8 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_period_s = 1 / 30.0, k_touched_s = 1 / 60.0;  // between pictures
-constexpr double k_pause = 3;                                    // times what a picture cost
+constexpr double k_period_s = 1 / 30.0, k_touched_s = 1 / 60.0;  // between images
+constexpr double k_pause = 3;                                    // times what an image cost
 
 }  // namespace
 
@@ -22,7 +22,7 @@ Result<GuiWindow> GuiWindow::open(const device::Desktop& desktop,
   LIMN_TRY(device::Window window, device::Window::open(desktop, {.title = title,
                                                                  .width = within(width, most.width),
                                                                  .height = within(height, most.height),
-                                                                 .waits = false,
+                                                                 .vsync = false,
                                                                  .escape_closes = false}));
   GuiWindow out(std::move(window));
   out.window_.in_context([&] { out.gui_ = std::make_unique<Gui>(out.window_.scale()); });

@@ -29,7 +29,7 @@ class GuiWindow {
   /// Handles events. The keys that were pressed (GLFW's codes) and went into no text field.
   std::vector<int> pressed_keys();
   /// Whether to draw anew: 30 times a second, soon after a person did something, and never so often that
-  /// drawing takes more than a quarter of the time. `also_s`: what is done for each picture beside it.
+  /// drawing takes more than a quarter of the time. `also_s`: what is done for each image beside it.
   bool is_due(double also_s = 0) const;
   /// Draws; `widgets` as in Gui::frame.
   void draw(const std::function<void(Gui&)>& widgets);

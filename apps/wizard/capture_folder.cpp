@@ -51,7 +51,7 @@ nlohmann::json beginning(nlohmann::json now, const nlohmann::json& then) {
 
 std::vector<fs::path> all_of(const calib::CapturedPose& pose) {
   std::vector<fs::path> files;
-  for (const auto& of_projector : pose.pictures)
+  for (const auto& of_projector : pose.images)
     for (const auto& of_camera : of_projector) files.insert(files.end(), of_camera.begin(), of_camera.end());
   return files;
 }
@@ -70,7 +70,7 @@ Result<std::string> captured_plan(const fs::path& plan_path, const fs::path& wor
 
 std::string captured_plan(const std::string& board,
                           const std::string& code,
-                          const calib::Captures& captures) {
+                          const calib::CaptureSet& captures) {
   ordered_json all = {{"schema", "limn.captured_plan/1"}, {"plan", {{"board", board}, {"code", code}}}};
   for (const auto* devices : {&captures.cameras, &captures.projectors})
     for (const calib::CapturedDevice& device : *devices)
@@ -78,7 +78,7 @@ std::string captured_plan(const std::string& board,
   return all.dump(2) + "\n";
 }
 
-Status open_captures(const calib::Captures& captures, const std::string& plan_json) {
+Status open_captures(const calib::CaptureSet& captures, const std::string& plan_json) {
   const fs::path taken_by = captures.folder / k_taken_by, begun = captures.folder / "capture.json";
   if (fs::exists(begun)) {
     if (!fs::exists(taken_by))
@@ -98,14 +98,14 @@ Status open_captures(const calib::Captures& captures, const std::string& plan_js
   return fs::exists(begun) ? Status() : calib::begin_captures(captures);
 }
 
-calib::CapturedPose files_of(const calib::Captures& captures, int pose) {
+calib::CapturedPose files_of(const calib::CaptureSet& captures, int pose) {
   calib::CapturedPose files{fmt::format("pose{:02d}", pose), {}};
   for (std::size_t projector = 0; projector < captures.projectors.size(); ++projector) {
-    auto& of_projector = files.pictures.emplace_back(captures.cameras.size());
+    auto& of_projector = files.images.emplace_back(captures.cameras.size());
     for (std::size_t camera = 0; camera < captures.cameras.size(); ++camera) {
       for (int i = 0; i < captures.patterns[projector].count(); ++i)
         of_projector[camera].push_back(
-            calib::picture_path(captures, pose, static_cast<int>(projector), static_cast<int>(camera), i));
+            calib::image_path(captures, pose, static_cast<int>(projector), static_cast<int>(camera), i));
     }
   }
   return files;
@@ -120,7 +120,7 @@ bool is_complete(const calib::CapturedPose& pose) {
   });
 }
 
-void remove_pictures(const calib::CapturedPose& pose) {
+void remove_images(const calib::CapturedPose& pose) {
   for (const fs::path& file : all_of(pose)) {
     std::error_code absent;
     fs::remove(file, absent);

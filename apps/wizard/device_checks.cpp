@@ -9,19 +9,19 @@ namespace {
 
 class Checks {
  public:
-  Checks(const calib::Captures& captures, const Surroundings& surroundings, const WizardAudience& audience)
+  Checks(const calib::CaptureSet& captures, const Surroundings& surroundings, const WizardAudience& audience)
       : captures_(captures), around_(surroundings), audience_(audience) {}
 
   Status look_at_light() {
     step(WizardStep::outputs, WizardState::runs, "");
-    LIMN_TRY(out.light, seen_light(captures_, around_.stage));
+    LIMN_TRY(out.light, measured_exposure(captures_, around_.stage));
     if (audience_.lit) audience_.lit(out.light);
-    tell(WizardStep::outputs, unseen(out.light),
+    report_progress(WizardStep::outputs, unseen(out.light),
          fmt::format("{} of {} seen", captures_.projectors.size() - unseen(out.light).size(),
                      captures_.projectors.size()));
     std::vector<std::string> advice;
     double bright = 255, saturated = 0, blur_px = 0;
-    for (const LightSeen& seen : out.light) {
+    for (const ExposureReading& seen : out.light) {
       const auto more = seen.advice();
       advice.insert(advice.end(), more.begin(), more.end());
       if (seen.lit <= 0) continue;
@@ -29,7 +29,7 @@ class Checks {
       saturated = std::max(saturated, seen.saturated);
       blur_px = std::max(blur_px, seen.blur_px);
     }
-    tell(WizardStep::exposure, advice,
+    report_progress(WizardStep::exposure, advice,
          fmt::format("level {:.0f}, {:.1f} % saturated, edges {:.1f} px", bright, 100 * saturated, blur_px));
     return {};
   }
@@ -50,7 +50,7 @@ class Checks {
       around_.use_latency(static_cast<int>(i), measured->seconds + measured->within_s);
       words.push_back(fmt::format("{} {:.1f} ms", captures_.projectors[i].name, 1e3 * measured->seconds));
     }
-    tell(WizardStep::latency, problems, fmt::format("{}", fmt::join(words, ", ")));
+    report_progress(WizardStep::latency, problems, fmt::format("{}", fmt::join(words, ", ")));
     return {};
   }
 
@@ -74,21 +74,21 @@ class Checks {
   }
 
   // The end of a step: what is wrong, or how it is.
-  void tell(WizardStep which, const std::vector<std::string>& problems, const std::string& words) {
+  void report_progress(WizardStep which, const std::vector<std::string>& problems, const std::string& words) {
     for (const std::string& problem : problems) audience_.say("advice: " + problem);
     audience_.say(fmt::format("{}: {}", to_text(which), words));
     step(which, problems.empty() ? WizardState::done : WizardState::fails,
          problems.empty() ? words : fmt::format("{}", fmt::join(problems, "\n")));
   }
 
-  const calib::Captures& captures_;
+  const calib::CaptureSet& captures_;
   const Surroundings& around_;
   const WizardAudience& audience_;
 };
 
 }  // namespace
 
-Result<CheckedDevices> checked_devices(const calib::Captures& captures,
+Result<CheckedDevices> checked_devices(const calib::CaptureSet& captures,
                                        const Surroundings& surroundings,
                                        const WizardAudience& audience) {
   Checks checks(captures, surroundings, audience);

@@ -7,14 +7,14 @@
 #include "apps/wizard/light_check.h"
 #include "apps/wizard/surroundings.h"
 #include "apps/wizard/wizard_steps.h"
-#include "calib/captures.h"
+#include "calib/capture_set.h"
 #include "core/result.h"
 
 namespace limn::apps {
 
 /// What the wizard found out before the first pose.
 struct CheckedDevices {
-  std::vector<LightSeen> light;  ///< projector by projector, of every camera
+  std::vector<ExposureReading> light;  ///< projector by projector, of every camera
   std::vector<std::optional<DisplayLatency>>
       latency;  ///< of each projector; none: no camera sees it, or it jitters
 };
@@ -22,7 +22,7 @@ struct CheckedDevices {
 /// Outputs identify themselves, exposure and focus are judged, latencies measured and handed to the
 /// surroundings, a line each to the audience. What is wrong is told with what to do; only a device that fails
 /// is an error.
-Result<CheckedDevices> checked_devices(const calib::Captures& captures,
+Result<CheckedDevices> checked_devices(const calib::CaptureSet& captures,
                                        const Surroundings& surroundings,
                                        const WizardAudience& audience);
 

@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <thread>
 
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "device/open_camera.h"
 #include "device/open_display.h"
 
@@ -21,7 +21,7 @@ cv::Mat level(const device::Display& display, int value) {
 
 }  // namespace
 
-DeviceStage::DeviceStage(Devices devices, const calib::Board& board, std::atomic<WizardWish>* wish)
+DeviceBackend::DeviceBackend(Devices devices, const calib::Board& board, std::atomic<WizardWish>* wish)
     : devices_(std::move(devices)),
       board_(board),
       wish_(wish),
@@ -31,19 +31,19 @@ DeviceStage::DeviceStage(Devices devices, const calib::Board& board, std::atomic
       captured_at_(devices_.cameras.size()),
       period_s_(devices_.cameras.size(), 0) {}
 
-Surroundings DeviceStage::surroundings(PictureWriter* writer) {
+Surroundings DeviceBackend::surroundings(ImageWriter* writer) {
   return {.hold = [this](int, const Surroundings::Seen& seen) { return hold(seen); },
           .stage = {.show =
-                        [this](int projector, const cv::Mat& picture) {
-                          return show(static_cast<std::size_t>(projector), picture);
+                        [this](int projector, const cv::Mat& image) {
+                          return show(static_cast<std::size_t>(projector), image);
                         },
                     .grab = [this](int camera) { return grab(static_cast<std::size_t>(camera)); },
                     .store = [writer](const std::filesystem::path& path,
-                                      const cv::Mat& picture) { return writer->store(path, picture); }},
+                                      const cv::Mat& image) { return writer->store(path, image); }},
           .written = [writer] { return writer->finish(); },
           .now = devices_.now,
           .stand = [this](const Surroundings::Seen& seen) { return stand(seen); },
-          .paint = [this](const std::vector<cv::Mat>& pictures) { return paint(pictures); },
+          .paint = [this](const std::vector<cv::Mat>& images) { return paint(images); },
           .flashes =
               [this](int projector, int camera) {
                 device::Display* display = devices_.projectors.at(static_cast<std::size_t>(projector)).get();
@@ -62,7 +62,7 @@ Surroundings DeviceStage::surroundings(PictureWriter* writer) {
 }
 
 // The next frame, waited for with some patience.
-Result<Frame> DeviceStage::next(std::size_t camera) {
+Result<Frame> DeviceBackend::next(std::size_t camera) {
   const Stamp begun = devices_.now();
   for (;;) {
     Result<Frame> frame = devices_.cameras[camera]->next();
@@ -78,7 +78,7 @@ Result<Frame> DeviceStage::next(std::size_t camera) {
   }
 }
 
-Status DeviceStage::light_all(int value) {
+Status DeviceBackend::light_all(int value) {
   for (std::size_t i = 0; i < devices_.projectors.size(); ++i) {
     const auto shown_at = devices_.projectors[i]->show(level(*devices_.projectors[i], value));
     if (!shown_at) return shown_at.error();
@@ -88,7 +88,7 @@ Status DeviceStage::light_all(int value) {
   return {};
 }
 
-Status DeviceStage::show(std::size_t projector, const cv::Mat& picture) {
+Status DeviceBackend::show(std::size_t projector, const cv::Mat& image) {
   for (std::size_t i = 0; i < devices_.projectors.size(); ++i) {
     if (i == projector || is_black_[i]) continue;
     const auto black_at = devices_.projectors[i]->show(level(*devices_.projectors[i], 0));
@@ -96,7 +96,7 @@ Status DeviceStage::show(std::size_t projector, const cv::Mat& picture) {
     is_black_[i] = true;
     lit_at_ = std::max(lit_at_, shifted(*black_at, latency_s_[i]));
   }
-  const auto shown_at = devices_.projectors[projector]->show(picture);
+  const auto shown_at = devices_.projectors[projector]->show(image);
   if (!shown_at) return shown_at.error();
   is_black_[projector] = false;
   lit_at_ = std::max(lit_at_, shifted(*shown_at, latency_s_[projector]));
@@ -105,7 +105,7 @@ Status DeviceStage::show(std::size_t projector, const cv::Mat& picture) {
 
 // A frame whose whole exposure lies after what was shown last: a stamp is of the middle of an exposure, which
 // is a frame period long at most.
-Result<cv::Mat> DeviceStage::grab(std::size_t camera) {
+Result<cv::Mat> DeviceBackend::grab(std::size_t camera) {
   for (;;) {
     LIMN_TRY(const Frame frame, next(camera));
     if (frame.captured_at >= shifted(lit_at_, period_s_[camera] / 2)) return frame.image;
@@ -113,7 +113,7 @@ Result<cv::Mat> DeviceStage::grab(std::size_t camera) {
 }
 
 // All projectors light the board until it is seen still in a new place: by one camera, and moving in none.
-Status DeviceStage::hold(const Surroundings::Seen& seen) {
+Status DeviceBackend::hold(const Surroundings::Seen& seen) {
   LIMN_TRY_STATUS(light_all(255));
   for (;;) {
     bool is_still = false, is_moving = false;
@@ -134,7 +134,7 @@ Status DeviceStage::hold(const Surroundings::Seen& seen) {
 }
 
 // Until no camera sees the board and nothing moves in any, or a person says that the prototype stands.
-Result<bool> DeviceStage::stand(const Surroundings::Seen& seen) {
+Result<bool> DeviceBackend::stand(const Surroundings::Seen& seen) {
   LIMN_TRY_STATUS(light_all(255));
   std::vector<StillRoom> rooms(devices_.cameras.size());
   for (;;) {
@@ -151,9 +151,9 @@ Result<bool> DeviceStage::stand(const Surroundings::Seen& seen) {
   }
 }
 
-Status DeviceStage::paint(const std::vector<cv::Mat>& pictures) {
-  for (std::size_t i = 0; i < pictures.size(); ++i) {
-    const auto shown_at = devices_.projectors[i]->show(pictures[i]);
+Status DeviceBackend::paint(const std::vector<cv::Mat>& images) {
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const auto shown_at = devices_.projectors[i]->show(images[i]);
     if (!shown_at) return shown_at.error();
     is_black_[i] = false;
     lit_at_ = std::max(lit_at_, shifted(*shown_at, latency_s_[i]));
@@ -161,17 +161,17 @@ Status DeviceStage::paint(const std::vector<cv::Mat>& pictures) {
   return {};
 }
 
-Result<DeviceStage::Devices> opened_devices(const Devices& named, const Result<device::Desktop>& desktop) {
-  DeviceStage::Devices open{
+Result<DeviceBackend::Devices> opened_devices(const Devices& named, const Result<device::Desktop>& desktop) {
+  DeviceBackend::Devices open{
       .cameras = {},
       .projectors = {},
       .now = [] { return std::chrono::time_point_cast<Stamp::duration>(std::chrono::steady_clock::now()); },
       .wait = [](double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }};
-  for (const device::CameraWanted& wanted : named.cameras) {
+  for (const device::CameraConfig& wanted : named.cameras) {
     LIMN_TRY(auto camera, device::open_camera(wanted));
     open.cameras.push_back(std::move(camera));
   }
-  for (device::DisplayWanted wanted : named.displays) {
+  for (device::DisplayConfig wanted : named.displays) {
     if (!wanted.name.starts_with("projector")) continue;
     wanted.latency_s = 0;  // the stage adds it
     LIMN_TRY(auto display, device::open_display(wanted, desktop ? &*desktop : nullptr));

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "apps/devices.h"
-#include "apps/picture_writer.h"
+#include "apps/image_writer.h"
 #include "apps/wizard/still_board.h"
 #include "apps/wizard/still_room.h"
 #include "apps/wizard/surroundings.h"
@@ -18,7 +18,7 @@ namespace limn::apps {
 
 /// Cameras and projectors in a room as the wizard's surroundings. Displays must be opened without a latency
 /// of their own: it is measured.
-class DeviceStage {
+class DeviceBackend {
  public:
   struct Devices {
     std::vector<std::unique_ptr<device::CameraSource>> cameras;
@@ -27,16 +27,16 @@ class DeviceStage {
     std::function<void(double seconds)> wait;  ///< lets that clock go on
   };
   /// `wish`: any ends the waiting for a board; may be null.
-  DeviceStage(Devices devices, const calib::Board& board, std::atomic<WizardWish>* wish);
+  DeviceBackend(Devices devices, const calib::Board& board, std::atomic<WizardWish>* wish);
 
-  /// This must stay where it is as long as they are used; pictures go to `writer`.
-  Surroundings surroundings(PictureWriter* writer);
+  /// This must stay where it is as long as they are used; images go to `writer`.
+  Surroundings surroundings(ImageWriter* writer);
 
  private:
   Status hold(const Surroundings::Seen& seen);
   Result<bool> stand(const Surroundings::Seen& seen);
-  Status paint(const std::vector<cv::Mat>& pictures);
-  Status show(std::size_t projector, const cv::Mat& picture);
+  Status paint(const std::vector<cv::Mat>& images);
+  Status show(std::size_t projector, const cv::Mat& image);
   Status light_all(int level);
   Result<cv::Mat> grab(std::size_t camera);
   Result<Frame> next(std::size_t camera);
@@ -53,7 +53,7 @@ class DeviceStage {
 };
 
 /// Cameras and projectors of a devices file; every one must work, and there must be some of both.
-Result<DeviceStage::Devices> opened_devices(const Devices& named, const Result<device::Desktop>& desktop);
+Result<DeviceBackend::Devices> opened_devices(const Devices& named, const Result<device::Desktop>& desktop);
 
 /// As captures name them.
 template <typename AllDevices>

@@ -4,13 +4,13 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "core/picture.h"
+#include "core/image_io.h"
 
 namespace limn::apps {
 namespace {
 
 constexpr double k_least_levels = 10;   // between black and white, of pixels that count as lit
-constexpr double k_least_share = 1e-3;  // of the picture that must be lit
+constexpr double k_least_share = 1e-3;  // of the image that must be lit
 
 // What the camera shows of black and of white, and where they differ.
 struct Levels {

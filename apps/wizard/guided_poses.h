@@ -12,7 +12,7 @@ namespace limn::apps {
 Imager assumed_camera(const std::string& name, int width, int height);
 
 /// Places of a board (world_from_board) that hold a calibration well, in the order of their use: all over the
-/// camera's picture, near and far, tilted to all sides. The board fills half of the picture's width or
+/// camera's image, near and far, tilted to all sides. The board fills half of the image's width or
 /// height in the middle of them.
 std::vector<Pose> guided_poses(const Imager& camera, const calib::Board& board);
 

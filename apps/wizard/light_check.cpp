@@ -9,19 +9,19 @@
 #include <opencv2/imgproc.hpp>
 
 #include "apps/output_sign.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 
 namespace limn::apps {
 namespace {
 
 constexpr double k_lit_levels = 12;    // white over black, of a lit pixel
-constexpr double k_least_lit = 0.005;  // of the picture
+constexpr double k_least_lit = 0.005;  // of the image
 constexpr int k_full = 253;            // grey level that counts as saturated
 constexpr double k_many = 0.02;        // of the lit pixels
 constexpr double k_dark = 90;          // level that a tenth of the lit pixels should exceed
 constexpr double k_wanted = 170;       // … and where it is well placed
-constexpr double k_blurred_px = 2.5;   // half a cell of the board's markers in a small picture
-constexpr int k_squares = 16;          // across the projector's picture
+constexpr double k_blurred_px = 2.5;   // half a cell of the board's markers in a small image
+constexpr int k_squares = 16;          // across the projector's image
 
 // Sigma of the edges between dark and lit squares; 0 when there are too few.
 double blur_of(const cv::Mat& black, const cv::Mat& white, const cv::Mat& pattern, const cv::Mat& lit) {
@@ -49,7 +49,7 @@ double blur_of(const cv::Mat& black, const cv::Mat& white, const cv::Mat& patter
 
 }  // namespace
 
-std::vector<std::string> LightSeen::advice() const {
+std::vector<std::string> ExposureReading::advice() const {
   std::vector<std::string> all;
   if (lit < k_least_lit) return all;
   if (saturated > k_many)
@@ -70,12 +70,12 @@ std::vector<std::string> LightSeen::advice() const {
   return all;
 }
 
-LightSeen judged_light(const cv::Mat& black, const cv::Mat& white, const cv::Mat& squares) {
+ExposureReading judged_exposure(const cv::Mat& black, const cv::Mat& white, const cv::Mat& squares) {
   const cv::Mat dark = to_grey(black), bright = to_grey(white);
   cv::Mat difference;
   cv::subtract(bright, dark, difference);
   const cv::Mat lit = difference > k_lit_levels;
-  LightSeen seen;
+  ExposureReading seen;
   seen.histogram.resize(256);
   for (int y = 0; y < bright.rows; ++y)
     for (int x = 0; x < bright.cols; ++x)
@@ -96,22 +96,22 @@ LightSeen judged_light(const cv::Mat& black, const cv::Mat& white, const cv::Mat
 
 cv::Mat squares(int width, int height) {
   const int side = std::max(1, width / k_squares);
-  cv::Mat picture(height, width, CV_8UC1);
+  cv::Mat image(height, width, CV_8UC1);
   for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) picture.at<std::uint8_t>(y, x) = (x / side + y / side) % 2 == 0 ? 255 : 0;
-  return picture;
+    for (int x = 0; x < width; ++x) image.at<std::uint8_t>(y, x) = (x / side + y / side) % 2 == 0 ? 255 : 0;
+  return image;
 }
 
-Result<std::vector<LightSeen>> seen_light(const calib::Captures& captures, const calib::Stage& stage) {
-  std::vector<LightSeen> all;
-  const auto grabbed = [&](int projector, const cv::Mat& picture) -> Result<std::vector<cv::Mat>> {
-    LIMN_TRY_STATUS(stage.show(projector, picture));
-    std::vector<cv::Mat> pictures;
+Result<std::vector<ExposureReading>> measured_exposure(const calib::CaptureSet& captures, const calib::CaptureBackend& stage) {
+  std::vector<ExposureReading> all;
+  const auto grabbed = [&](int projector, const cv::Mat& image) -> Result<std::vector<cv::Mat>> {
+    LIMN_TRY_STATUS(stage.show(projector, image));
+    std::vector<cv::Mat> images;
     for (std::size_t i = 0; i < captures.cameras.size(); ++i) {
       LIMN_TRY(cv::Mat one, stage.grab(static_cast<int>(i)));
-      pictures.push_back(one.clone());
+      images.push_back(one.clone());
     }
-    return pictures;
+    return images;
   };
   for (std::size_t i = 0; i < captures.projectors.size(); ++i) {
     const calib::CapturedDevice& projector = captures.projectors[i];
@@ -123,7 +123,7 @@ Result<std::vector<LightSeen>> seen_light(const calib::Captures& captures, const
     LIMN_TRY(const auto white, grabbed(number, cv::Mat(size, CV_8UC1, cv::Scalar(255))));
     LIMN_TRY(const auto squared, grabbed(number, squares(size.width, size.height)));
     for (std::size_t j = 0; j < captures.cameras.size(); ++j) {
-      all.push_back(judged_light(black[j], white[j], squared[j]));
+      all.push_back(judged_exposure(black[j], white[j], squared[j]));
       all.back().camera = captures.cameras[j].name;
       all.back().projector = projector.name;
     }
@@ -131,9 +131,9 @@ Result<std::vector<LightSeen>> seen_light(const calib::Captures& captures, const
   return all;
 }
 
-std::vector<std::string> unseen(const std::vector<LightSeen>& seen) {
+std::vector<std::string> unseen(const std::vector<ExposureReading>& seen) {
   std::map<std::string, double> most;
-  for (const LightSeen& one : seen) most[one.projector] = std::max(most[one.projector], one.lit);
+  for (const ExposureReading& one : seen) most[one.projector] = std::max(most[one.projector], one.lit);
   std::vector<std::string> sentences;
   for (const auto& [projector, lit] : most)
     if (lit < k_least_lit)

@@ -9,7 +9,7 @@
 namespace limn::apps {
 
 /// What one other thread wants done in the main thread, where windows and monitors live.
-class MainErrands {
+class MainThreadExecutor {
  public:
   /// Of the other thread: returns when the main thread has done it.
   void run(const std::function<void()>& errand) {

@@ -8,7 +8,7 @@
 #include "apps/scan_files.h"
 #include "apps/wizard/worth_colour.h"
 #include "calib/capture.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "device/gl_context.h"
 #include "projector/renderer.h"
 
@@ -23,7 +23,7 @@ constexpr double k_gamma = 2.2;    // near enough for colours that are signs
 
 // The colour without its white, which room light and projectors' black give it again.
 cv::Vec3d light_bgr(double mm) {
-  const auto [red, green, blue] = worth_rgb(mm);
+  const auto [red, green, blue] = error_rgb(mm);
   const cv::Vec3d bgr(blue, green, red);
   const double most = std::max({bgr[0], bgr[1], bgr[2]}), least = std::min({bgr[0], bgr[1], bgr[2]});
   return (bgr - cv::Vec3d::all(k_white * least)) * (255 / (most - k_white * least));
@@ -61,15 +61,15 @@ class Steps {
 
   Status scan() {
     step(WizardStep::scan, WizardState::runs, "capturing");
-    calib::Captures captures = steps_.captures;
+    calib::CaptureSet captures = steps_.captures;
     captures.folder = out_ / "captures";
     std::error_code ignored;
     fs::remove_all(captures.folder, ignored);  // of a prototype that may have stood elsewhere
     LIMN_TRY_STATUS(calib::begin_captures(captures));
-    calib::Stage stage = around_.stage;
-    stage.show = [&](int projector, const cv::Mat& picture) -> Status {
+    calib::CaptureBackend stage = around_.stage;
+    stage.show = [&](int projector, const cv::Mat& image) -> Status {
       if (audience_.wish && *audience_.wish == WizardWish::leave) return error("left while it was captured.");
-      return around_.stage.show(projector, picture);
+      return around_.stage.show(projector, image);
     };
     const Status captured = calib::capture_pose(captures, 0, stage);
     LIMN_TRY_STATUS(around_.written());
@@ -102,7 +102,7 @@ class Steps {
     for (std::size_t i = 0; i < captures_.cameras.size(); ++i)
       command.frames.push_back(
           captures_.cameras[i].name + "=" +
-          calib::picture_path(captures_, 0, 0, static_cast<int>(i), captures_.patterns[0].white()).string());
+          calib::image_path(captures_, 0, 0, static_cast<int>(i), captures_.patterns[0].white()).string());
     auto aligned = written_alignment(command);
     if (!aligned) {  // no marker is seen
       command.frames.clear();
@@ -113,8 +113,8 @@ class Steps {
       end(WizardStep::align, aligned.message(), false);
       return {};
     }
-    world_from_prototype_ = aligned->alignment.world_from_prototype;
-    seen_.align_rms_mm = 1e3 * aligned->alignment.rms_m;
+    world_from_prototype_ = aligned->registration.world_from_prototype;
+    seen_.align_rms_mm = 1e3 * aligned->registration.rms_m;
     seen_.warnings.insert(seen_.warnings.end(), aligned->warnings.begin(), aligned->warnings.end());
     for (std::size_t i = 0; i < std::min(k_told, aligned->warnings.size()); ++i)
       audience_.say("advice: " + aligned->warnings[i]);
@@ -163,11 +163,11 @@ class Steps {
     LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, rig_));
     scene::PosedScene posed;
     posed.world_from_prototype = world_from_prototype_.value_or(Pose{});
-    std::vector<cv::Mat> pictures;
+    std::vector<cv::Mat> images;
     std::vector<double> all_mm;
     for (std::size_t i = 0; i < rig_.projectors.size(); ++i) {
       const cv::Mat points = renderer.surface_points(i, posed), shares = renderer.blend(i, posed);
-      cv::Mat picture(points.size(), CV_8UC3, cv::Scalar::all(0));
+      cv::Mat image(points.size(), CV_8UC3, cv::Scalar::all(0));
       for (int y = 0; y < points.rows; ++y) {
         for (int x = 0; x < points.cols; ++x) {
           const auto& p = points.at<cv::Vec3f>(y, x);
@@ -176,11 +176,11 @@ class Steps {
           if (!std::isfinite(mm)) continue;
           all_mm.push_back(mm);
           const double share = std::pow(static_cast<double>(shares.at<cv::Vec2f>(y, x)[0]), 1 / k_gamma);
-          picture.at<cv::Vec3b>(y, x) = light_bgr(mm) * share;
+          image.at<cv::Vec3b>(y, x) = light_bgr(mm) * share;
         }
       }
-      LIMN_TRY_STATUS(write_png(out_ / ("projector-" + rig_.projectors[i].name + ".png"), picture));
-      pictures.push_back(picture);
+      LIMN_TRY_STATUS(write_png(out_ / ("projector-" + rig_.projectors[i].name + ".png"), image));
+      images.push_back(image);
     }
     if (all_mm.empty())
       return error(
@@ -194,10 +194,10 @@ class Steps {
         static_cast<double>(
             std::count_if(all_mm.begin(), all_mm.end(), [](double mm) { return mm <= calib::k_good_mm; })) /
         static_cast<double>(all_mm.size());
-    LIMN_TRY_STATUS(around_.paint(pictures));
+    LIMN_TRY_STATUS(around_.paint(images));
     for (std::size_t i = 0; i < rig_.cameras.size(); ++i) {
-      LIMN_TRY(const cv::Mat picture, around_.stage.grab(static_cast<int>(i)));
-      LIMN_TRY_STATUS(write_png(out_ / ("painted-" + rig_.cameras[i].name + ".png"), picture));
+      LIMN_TRY(const cv::Mat image, around_.stage.grab(static_cast<int>(i)));
+      LIMN_TRY_STATUS(write_png(out_ / ("painted-" + rig_.cameras[i].name + ".png"), image));
     }
     end(WizardStep::paint, fmt::format("light within {:.2f} mm on 95 % of it; {:.0f} % within {:g} mm",
                                        seen_.painted_p95_mm, 100 * seen_.painted_good, calib::k_good_mm));
@@ -209,7 +209,7 @@ class Steps {
   const WizardAudience& audience_;
   fs::path out_;
   Rig rig_;
-  calib::Captures captures_;
+  calib::CaptureSet captures_;
   calib::Scan scan_;
   std::optional<Pose> world_from_prototype_;
   PrototypeSeen seen_;

@@ -8,7 +8,7 @@
 
 #include "apps/wizard/surroundings.h"
 #include "apps/wizard/wizard_steps.h"
-#include "calib/captures.h"
+#include "calib/capture_set.h"
 #include "calib/judge/error_map.h"
 #include "core/result.h"
 
@@ -18,7 +18,7 @@ namespace limn::apps {
 struct PrototypeSteps {
   std::filesystem::path rig;    ///< folder that is solved; the steps write into its folder `scan`
   std::filesystem::path scene;  ///< whose prototype is laid onto the scan; empty: the scan alone
-  calib::Captures captures;     ///< planned: devices and patterns
+  calib::CaptureSet captures;     ///< planned: devices and patterns
   std::vector<calib::ErrorMap> maps;
 };
 
@@ -34,7 +34,7 @@ struct PrototypeSeen {
 
 /// After the rig is solved: the prototype is waited for and scanned, the scene's CAD laid onto the scan (from
 /// its markers where they are seen, else from a search), and every projector paints onto it how far light may
-/// be off there (worth_rgb). Files in `scan`: those of limn scan and limn align, captures/,
+/// be off there (error_rgb). Files in `scan`: those of limn scan and limn align, captures/,
 /// painted-CAMERA.png and projector-NAME.png. nullopt: a person skipped it. An alignment that is not found is
 /// told, and the scan is painted. Needs a machine that can draw (device::GlContext).
 Result<std::optional<PrototypeSeen>> prototype_seen(const PrototypeSteps& steps,

@@ -10,7 +10,7 @@ namespace {
 constexpr std::size_t k_least_corners = 8;
 constexpr double k_still_px = 0.7;    // a hand that trembles more blurs the patterns' edges
 constexpr double k_still_s = 0.8;     // for so long
-constexpr double k_elsewhere = 0.08;  // of the board's diagonal in the picture, by the corner that moved most
+constexpr double k_elsewhere = 0.08;  // of the board's diagonal in the image, by the corner that moved most
 
 using Corners = std::map<int, Eigen::Vector2d>;
 

@@ -2,20 +2,20 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "core/picture.h"
+#include "core/image_io.h"
 
 namespace limn::apps {
 namespace {
 
-constexpr int k_width = 160;       // of the small picture: noise and flicker of single pixels are gone
+constexpr int k_width = 160;       // of the small image: noise and flicker of single pixels are gone
 constexpr double k_levels = 8;     // of 255: more than noise
-constexpr double k_share = 0.002;  // of the picture: a hand at its edge
+constexpr double k_share = 0.002;  // of the image: a hand at its edge
 
 }  // namespace
 
-bool StillRoom::take(const cv::Mat& picture, Stamp at) {
+bool StillRoom::take(const cv::Mat& image, Stamp at) {
   cv::Mat small;
-  cv::resize(to_grey(picture), small, {k_width, std::max(1, k_width * picture.rows / picture.cols)}, 0, 0,
+  cv::resize(to_grey(image), small, {k_width, std::max(1, k_width * image.rows / image.cols)}, 0, 0,
              cv::INTER_AREA);
   cv::Mat differs;
   if (small.size() == still_.size()) cv::absdiff(small, still_, differs);

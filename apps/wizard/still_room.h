@@ -13,7 +13,7 @@ class StillRoom {
   static constexpr double k_rest_s = 8;
 
   /// The next frame, 8-bit grey or BGR; stamps must not go back. True: nothing moved for k_rest_s.
-  bool take(const cv::Mat& picture, Stamp at);
+  bool take(const cv::Mat& image, Stamp at);
 
  private:
   cv::Mat still_;  // small and grey; since `since_`

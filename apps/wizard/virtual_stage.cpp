@@ -7,7 +7,7 @@
 
 #include "apps/virtual_capture.h"
 #include "calib/board/board_finder.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 
 namespace limn::apps {
 namespace {
@@ -21,11 +21,11 @@ struct VirtualStage {
   std::vector<cv::Mat> frames;    // of one exposure of all cameras, not grabbed yet
   Stamp lit_at;                   // what was shown last is on the surface
 
-  Status show(int projector, const cv::Mat& picture) {
+  Status show(int projector, const cv::Mat& image) {
     rig->darken();
     lit_at = shifted(rig->now(), latency_s.at(static_cast<std::size_t>(projector)) + k_guard_s);
     frames.assign(frames.size(), cv::Mat());
-    const auto shown = rig->projector(projector).show(picture);
+    const auto shown = rig->projector(projector).show(image);
     return shown ? Status() : Status(shown.error());
   }
 
@@ -45,8 +45,8 @@ struct VirtualStage {
   Status look(const calib::Board& board, const Surroundings::Seen& seen) {
     LIMN_TRY_STATUS(show(0, cv::Mat(rig->projector(0).size(), CV_8UC1, cv::Scalar(255))));
     for (int i = 0; i < static_cast<int>(frames.size()); ++i) {
-      const cv::Mat picture = grab(i);
-      seen(i, picture, calib::find_board(board, to_grey(picture)));
+      const cv::Mat image = grab(i);
+      seen(i, image, calib::find_board(board, to_grey(image)));
     }
     return {};
   }
@@ -54,15 +54,15 @@ struct VirtualStage {
   // The board is gone, the prototype back where the world has it.
   Result<bool> stand(const Surroundings::Seen& seen) {
     rig->remove("board");
-    rig->restore_stage();
+    rig->restore_prototype();
     LIMN_TRY_STATUS(show(0, cv::Mat(rig->projector(0).size(), CV_8UC1, cv::Scalar(255))));
     for (int i = 0; seen && i < static_cast<int>(frames.size()); ++i) seen(i, grab(i), {});
     return true;
   }
 
-  Status paint(const std::vector<cv::Mat>& pictures) {
-    for (std::size_t i = 0; i < pictures.size(); ++i) {
-      const auto shown = rig->projector(static_cast<int>(i)).show(pictures[i]);
+  Status paint(const std::vector<cv::Mat>& images) {
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      const auto shown = rig->projector(static_cast<int>(i)).show(images[i]);
       if (!shown) return shown.error();
       lit_at = std::max(lit_at, shifted(rig->now(), latency_s.at(i) + k_guard_s));
     }
@@ -74,8 +74,8 @@ struct VirtualStage {
     rig->darken();
     const auto show = [r = rig, projector](bool white) -> Result<Stamp> {
       const Stamp at = r->now();
-      const cv::Mat picture(r->projector(projector).size(), CV_8UC1, cv::Scalar(white ? 255 : 0));
-      LIMN_TRY([[maybe_unused]] const Stamp shown_at, r->projector(projector).show(picture));
+      const cv::Mat image(r->projector(projector).size(), CV_8UC1, cv::Scalar(white ? 255 : 0));
+      LIMN_TRY([[maybe_unused]] const Stamp shown_at, r->projector(projector).show(image));
       return at;
     };
     return {.show = show,
@@ -86,7 +86,7 @@ struct VirtualStage {
 
 }  // namespace
 
-Surroundings virtual_surroundings(const Plan& plan, sim::VirtualRig* rig, PictureWriter* writer) {
+Surroundings virtual_backend(const Plan& plan, sim::VirtualRig* rig, ImageWriter* writer) {
   const auto stage = std::make_shared<VirtualStage>();
   stage->rig = rig;
   stage->latency_s.resize(rig->world().rig.projectors.size(), FlashOptions().limit_s);
@@ -96,16 +96,16 @@ Surroundings virtual_surroundings(const Plan& plan, sim::VirtualRig* rig, Pictur
             stage->rig->place(board_object(plan.board, place));
             return seen ? stage->look(plan.board, seen) : Status();
           },
-          .stage = {.show = [stage](int p, const cv::Mat& picture) { return stage->show(p, picture); },
+          .stage = {.show = [stage](int p, const cv::Mat& image) { return stage->show(p, image); },
                     .grab = [stage](int camera) -> Result<cv::Mat> { return stage->grab(camera); },
                     .store = [writer](const std::filesystem::path& path,
-                                      const cv::Mat& picture) { return writer->store(path, picture); }},
+                                      const cv::Mat& image) { return writer->store(path, image); }},
           .written = [writer] { return writer->finish(); },
           .now = [rig] { return rig->now(); },
           .stand = rig->world().scene && rig->world().scene->prototype
                        ? [stage](const Surroundings::Seen& seen) { return stage->stand(seen); }
                        : std::function<Result<bool>(const Surroundings::Seen&)>(),
-          .paint = [stage](const std::vector<cv::Mat>& pictures) { return stage->paint(pictures); },
+          .paint = [stage](const std::vector<cv::Mat>& images) { return stage->paint(images); },
           .flashes = [stage](int projector, int camera) { return stage->flashes(projector, camera); },
           .use_latency =
               [stage](int projector, double seconds) {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "apps/picture_writer.h"
+#include "apps/image_writer.h"
 #include "apps/plan.h"
 #include "apps/wizard/surroundings.h"
 #include "sim/virtual_rig.h"
@@ -8,7 +8,7 @@
 namespace limn::apps {
 
 /// A virtual rig, one that does not wait for light by itself, as the wizard's surroundings: the board is
-/// where the plan wants it at once. All three must stay as long as they are used; pictures go to `writer`.
-Surroundings virtual_surroundings(const Plan& plan, sim::VirtualRig* rig, PictureWriter* writer);
+/// where the plan wants it at once. All three must stay as long as they are used; images go to `writer`.
+Surroundings virtual_backend(const Plan& plan, sim::VirtualRig* rig, ImageWriter* writer);
 
 }  // namespace limn::apps

@@ -29,7 +29,7 @@ ImU32 colour_of(calib::Verdict worth) {
 }
 
 ImU32 colour_of_mm(double mm) {
-  const auto [red, green, blue] = worth_rgb(mm);
+  const auto [red, green, blue] = error_rgb(mm);
   return IM_COL32(red, green, blue, 255);
 }
 
@@ -69,7 +69,7 @@ void draw_steps(const Gui& gui, const WizardView& view) {
 }
 
 // Seen cells as a veil: the more often, the denser.
-void draw_cells(const SeenCells& seen, const PlacedPicture& placed, ImU32 colour) {
+void draw_cells(const SeenCells& seen, const PlacedImage& placed, ImU32 colour) {
   if (seen.columns == 0 || seen.rows == 0) return;
   const float w = placed.size.x / static_cast<float>(seen.columns),
               h = placed.size.y / static_cast<float>(seen.rows);
@@ -84,7 +84,7 @@ void draw_cells(const SeenCells& seen, const PlacedPicture& placed, ImU32 colour
   }
 }
 
-void outline(const std::vector<Eigen::Vector2d>& px, const PlacedPicture& placed, ImU32 colour) {
+void outline(const std::vector<Eigen::Vector2d>& px, const PlacedImage& placed, ImU32 colour) {
   std::vector<ImVec2> corners;
   for (const Eigen::Vector2d& corner : px) corners.push_back(placed.of(corner));
   ImGui::GetWindowDrawList()->AddPolyline(corners.data(), static_cast<int>(corners.size()), colour,
@@ -102,7 +102,7 @@ void draw_camera(
   draw.AddRectFilled(inner, end, IM_COL32(12, 13, 15, 255), 3);
   ImGui::PushClipRect(inner, end, true);
   const cv::Mat empty(camera.height, camera.width, CV_8UC1, cv::Scalar(12));
-  const PlacedPicture placed = gui.picture(camera.name, camera.picture.empty() ? empty : camera.picture,
+  const PlacedImage placed = gui.image(camera.name, camera.image.empty() ? empty : camera.image,
                                            inner, {size.x, size.y - caption});
   draw_cells(camera.seen, placed, colour::k_blue);
   if (!view.is_over && !camera.target.empty()) outline(camera.target, placed, colour::k_warn);
@@ -142,7 +142,7 @@ void draw_projectors(const Gui& gui, const WizardView& view, ImVec2 size) {
                  fmt::format("{} · {:.0f} %", projector.name, 100 * projector.seen.share()).c_str());
     const float scale = std::min(width / static_cast<float>(projector.width),
                                  (size.y - caption) / static_cast<float>(projector.height));
-    const PlacedPicture placed{
+    const PlacedImage placed{
         {corner.x, corner.y + caption},
         {scale * static_cast<float>(projector.width), scale * static_cast<float>(projector.height)},
         scale};
@@ -219,7 +219,7 @@ void draw_progress(const Gui& gui, const WizardView& view) {
 void draw_light(const Gui& gui, const WizardView& view) {
   if (view.light.empty()) return;
   heading(gui, "Exposure");
-  for (const LightSeen& seen : view.light) {
+  for (const ExposureReading& seen : view.light) {
     paragraph(colour::k_quiet,
               seen.lit > 0 ? fmt::format("{}, light of {}: {:.1f} % saturated, edges {:.1f} px", seen.camera,
                                          seen.projector, 100 * seen.saturated, seen.blur_px)
@@ -260,7 +260,7 @@ void draw_faults(const Gui& gui, const WizardView& view) {
   for (const std::string& sentence : view.to_do) paragraph(colour::k_text, sentence);
 }
 
-// Light's predicted error over camera 0's picture, the middle plane of each projector's map.
+// Light's predicted error over camera 0's image, the middle plane of each projector's map.
 void draw_maps(Gui& gui, const WizardView& view, ImVec2 size) {
   const float space = 0.5F * gui.em(), caption = 1.35F * gui.em();
   const float width = (size.x + space) / static_cast<float>(view.maps.size()) - space;
@@ -289,15 +289,15 @@ void draw_maps(Gui& gui, const WizardView& view, ImVec2 size) {
   ImGui::SetCursorScreenPos({at.x, at.y + size.y});
 }
 
-void draw_pictures_taken(const Gui& gui, const WizardView& view) {
-  if (view.pictures_of == 0) return;
+void draw_images_taken(const Gui& gui, const WizardView& view) {
+  if (view.images_of == 0) return;
   ImGui::PushStyleColor(ImGuiCol_PlotHistogram, colour::k_blue);
-  ImGui::ProgressBar(static_cast<float>(view.pictures) / static_cast<float>(view.pictures_of),
+  ImGui::ProgressBar(static_cast<float>(view.images) / static_cast<float>(view.images_of),
                      {-1, 0.4F * gui.em()}, "");
   ImGui::PopStyleColor();
 }
 
-// What to do next, large, above the pictures.
+// What to do next, large, above the images.
 void draw_task(const Gui& gui, const WizardView& view) {
   if (view.is_over) {
     const bool has_rig = view.failure.empty();
@@ -321,7 +321,7 @@ void draw_task(const Gui& gui, const WizardView& view) {
       paragraph(colour::k_quiet,
                 fmt::format("Take the board away. The scan begins when nothing has moved for {:.0f} s.",
                             StillRoom::k_rest_s));
-    draw_pictures_taken(gui, view);
+    draw_images_taken(gui, view);
     return;
   }
   if (view.place.empty()) {
@@ -338,7 +338,7 @@ void draw_task(const Gui& gui, const WizardView& view) {
                            : view.is_capturing ? "hold the board still"
                                                : "looking at what was captured"));
   paragraph(colour::k_text, "Board: " + view.place);
-  if (view.is_capturing) draw_pictures_taken(gui, view);
+  if (view.is_capturing) draw_images_taken(gui, view);
 }
 
 WizardWish draw_buttons(const Gui& gui, const WizardView& view) {

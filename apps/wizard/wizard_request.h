@@ -5,8 +5,8 @@ namespace limn::apps {
 /// What a person asks of a running wizard.
 enum class WizardWish {
   none,
-  check,   ///< look at outputs, exposure and latency again, then take the pictures of this pose again
-  repeat,  ///< take the pictures of this pose again
+  check,   ///< look at outputs, exposure and latency again, then take the images of this pose again
+  repeat,  ///< take the images of this pose again
   finish,  ///< take no more poses: solve
   scan,    ///< the prototype stands there: scan it
   skip,    ///< leave out what is waited for

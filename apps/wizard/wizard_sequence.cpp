@@ -12,10 +12,10 @@
 #include "apps/solve_captures.h"
 #include "apps/wizard/capture_folder.h"
 #include "apps/wizard/device_checks.h"
-#include "calib/held_out.h"
+#include "calib/cross_validation.h"
 #include "calib/judge/board_check.h"
 #include "calib/judge/capture_faults.h"
-#include "calib/judge/picture_check.h"
+#include "calib/judge/image_check.h"
 #include "calib/observations.h"
 #include "calib/solve.h"
 #include "core/config.h"
@@ -60,18 +60,18 @@ class CaptureClock {
 };
 
 // Ends early, with an error, when a person wishes to repeat or to leave.
-Status capture(const calib::Captures& captures,
+Status capture(const calib::CaptureSet& captures,
                int pose,
                const Surroundings& around,
                const std::atomic<WizardWish>* wish,
                CaptureClock* clock) {
-  calib::Stage stage = around.stage;
-  stage.show = [&](int projector, const cv::Mat& picture) -> Status {
+  calib::CaptureBackend stage = around.stage;
+  stage.show = [&](int projector, const cv::Mat& image) -> Status {
     const WizardWish now = wish ? wish->load() : WizardWish::none;
     if (now == WizardWish::check || now == WizardWish::repeat || now == WizardWish::leave)
       return error("calibrate: stopped in pose {}.", pose);
     clock->showing(projector);
-    return around.stage.show(projector, picture);
+    return around.stage.show(projector, image);
   };
   clock->stop();
   Status done = calib::capture_pose(captures, pose, stage);
@@ -105,7 +105,7 @@ std::string line_of(const PoseJudged& judged) {
 class FaultTeller {
  public:
   explicit FaultTeller(const Say& say) : say_(say) {}
-  void tell(const std::vector<calib::Fault>& faults) {
+  void report_progress(const std::vector<calib::Fault>& faults) {
     std::set<std::string> names;
     for (const calib::Fault& fault : faults) {
       const bool is_new = names.insert(fault.name).second && !told_.contains(fault.name);
@@ -124,7 +124,7 @@ class FaultTeller {
 // A run of the wizard, from pose to pose.
 class Run {
  public:
-  Run(const calib::Captures& captures, const Surroundings& around, const WizardAudience& audience)
+  Run(const calib::CaptureSet& captures, const Surroundings& around, const WizardAudience& audience)
       : captures_(captures),
         around_(around),
         audience_(audience),
@@ -146,7 +146,7 @@ class Run {
     judge(&judged);
     audience_.say(line_of(judged));
     const auto faults = judged.assessment ? judged.assessment->faults : calib::unsolved_faults(*observed_);
-    faults_.tell(faults);
+    faults_.report_progress(faults);
     if (audience_.judged) audience_.judged(judged, observed_->observations, faults);
     return {};
   }
@@ -193,13 +193,13 @@ class Run {
     return write_file(captures_.folder / k_latency, json.dump(2) + "\n");
   }
 
-  // The pictures of a pose, from the beginning as often as that is wished for.
+  // The images of a pose, from the beginning as often as that is wished for.
   Status take(int number, const std::string& place, const calib::CapturedPose& files) {
     for (bool is_again = true; is_again;) {
       audience_.say(fmt::format("{}: hold the board {}", files.name, place));
       if (audience_.aims) audience_.aims(number);
       step(WizardStep::board, WizardState::runs, files.name);
-      remove_pictures(files);
+      remove_images(files);
       if (const Status held = around_.hold(number, nullptr); !held) {
         if (followed(WizardWish::check) || followed(WizardWish::repeat)) continue;
         return is_left() ? left_in(files) : held;
@@ -214,9 +214,9 @@ class Run {
   }
 
   Status observe(const calib::CapturedPose& files) {
-    calib::Captures alone = captures_;
+    calib::CaptureSet alone = captures_;
     alone.poses = {files};
-    LIMN_TRY_STATUS(calib::check_pictures(alone));
+    LIMN_TRY_STATUS(calib::check_images(alone));
     LIMN_TRY(calib::Observed seen, calib::observe(alone));
     LIMN_TRY_STATUS(calib::check_board(alone, seen.observations));
     observed_ = observed_ ? calib::joined(std::move(*observed_), std::move(seen)) : std::move(seen);
@@ -229,7 +229,7 @@ class Run {
     judged->more_helps = poses_.back().more_helps = apps::more_helps(poses_);
   }
 
-  const calib::Captures& captures_;
+  const calib::CaptureSet& captures_;
   const Surroundings& around_;
   const WizardAudience& audience_;
   FaultTeller faults_;
@@ -240,8 +240,8 @@ class Run {
 };
 
 // The rig as limn solve makes it of the complete poses.
-Result<calib::Report> solve_all(const WizardOptions& options, const calib::Captures& captures, int poses) {
-  SolveOptions solving{.captures = captures.folder, .out = options.out};
+Result<calib::Report> solve_all(const WizardOptions& options, const calib::CaptureSet& captures, int poses) {
+  SolveCommandOptions solving{.captures = captures.folder, .out = options.out};
   for (int pose = 0; pose < poses; ++pose) {
     const calib::CapturedPose files = files_of(captures, pose);
     if (!is_complete(files) && fs::is_directory(captures.folder / files.name))
@@ -277,7 +277,7 @@ Status add_to_rig(const std::vector<std::pair<std::string, double>>& latency_s, 
 
 Result<Calibrated> calibrated(const WizardOptions& options,
                               const std::string& plan_json,
-                              const calib::Captures& captures,
+                              const calib::CaptureSet& captures,
                               const std::vector<std::string>& places,
                               const Surroundings& surroundings,
                               const WizardAudience& audience) {

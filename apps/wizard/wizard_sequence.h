@@ -10,14 +10,14 @@
 #include "apps/wizard/prototype_steps.h"
 #include "apps/wizard/surroundings.h"
 #include "apps/wizard/wizard_steps.h"
-#include "calib/captures.h"
+#include "calib/capture_set.h"
 #include "calib/report/report.h"
 #include "core/result.h"
 
 namespace limn::apps {
 
 struct WizardOptions {
-  std::filesystem::path out;         ///< the rig folder; its captures/ keeps every picture
+  std::filesystem::path out;         ///< the rig folder; its captures/ keeps every image
   std::filesystem::path scene = {};  ///< of the prototype; empty: the scan is painted without a CAD
   bool scan = false;                 ///< scan the prototype at the end, and paint it
   bool all = false;                  ///< take every pose of the plan, although fewer are enough
@@ -42,10 +42,10 @@ struct Calibrated {
 /// before the first one that is captured the devices are checked (wizard/device_checks.h). Then the rig is
 /// solved as limn solve does it. `places`: where each pose's board is to be held, in words. Captures that
 /// another plan made are an error that says what differs; `plan_json` describes this one. Whatever fails,
-/// pictures on the disk stay there, and the next run goes on from them; leaving is an error, too.
+/// images on the disk stay there, and the next run goes on from them; leaving is an error, too.
 Result<Calibrated> calibrated(const WizardOptions& options,
                               const std::string& plan_json,
-                              const calib::Captures& captures,
+                              const calib::CaptureSet& captures,
                               const std::vector<std::string>& places,
                               const Surroundings& surroundings,
                               const WizardAudience& audience);

@@ -24,8 +24,8 @@ enum class WizardState { waits, runs, done, fails };
 struct WizardAudience {
   std::function<void(const std::string& line)> say;
   std::function<void(WizardStep step, WizardState state, const std::string& words)> step = nullptr;
-  std::function<void(const std::vector<LightSeen>&)> lit = nullptr;
-  std::function<void(int pose)> aims = nullptr;                ///< a pose's pictures are taken from now on
+  std::function<void(const std::vector<ExposureReading>&)> lit = nullptr;
+  std::function<void(int pose)> aims = nullptr;                ///< a pose's images are taken from now on
   std::function<void(const calib::Report&)> solved = nullptr;  ///< the rig is saved; the prototype may follow
   std::function<void(int pose)> judges = nullptr;              ///< it is decoded and judged from now on
   /// Observations are of all poses so far.

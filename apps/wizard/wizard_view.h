@@ -14,7 +14,7 @@
 
 namespace limn::apps {
 
-/// Where in an imager's picture boards were seen: counts in cells of a grid over the picture, row by row.
+/// Where in an imager's image boards were seen: counts in cells of a grid over the image, row by row.
 struct SeenCells {
   int columns = 0, rows = 0;
   std::vector<int> counts;
@@ -22,7 +22,7 @@ struct SeenCells {
   double share() const;
 };
 
-/// The cells of one imager: points of `px` in a picture of width x height, `columns` across.
+/// The cells of one imager: points of `px` in an image of width x height, `columns` across.
 SeenCells cells_of(const std::vector<Eigen::Vector2d>& px, int width, int height, int columns = 24);
 
 /// What the wizard's window shows at a moment.
@@ -34,10 +34,10 @@ struct WizardView {
   struct Camera {
     std::string name;
     int width = 0, height = 0;
-    cv::Mat picture = {};                       ///< newest, 8-bit grey or BGR; empty: none yet
+    cv::Mat image = {};                       ///< newest, 8-bit grey or BGR; empty: none yet
     std::vector<Eigen::Vector2d> corners = {};  ///< of the board, as last found
     std::vector<Eigen::Vector2d> target =
-        {};  ///< outline of where to hold the board; empty: not in this picture
+        {};  ///< outline of where to hold the board; empty: not in this image
     SeenCells seen = {};
   };
   struct Projector {
@@ -50,13 +50,13 @@ struct WizardView {
     std::optional<double> held_out_px, predicted_mm;  ///< none: no rig yet
   };
   std::array<Step, k_wizard_steps> steps;  ///< in the order of WizardStep
-  std::vector<LightSeen> light;            ///< as the exposure step saw it
+  std::vector<ExposureReading> light;            ///< as the exposure step saw it
   std::vector<Camera> cameras;
   std::vector<Projector> projectors;
   int pose = 0, poses = 0;  ///< number of the pose in work, of how many planned
   std::string place;        ///< where to hold the board, in words
   bool is_capturing = false;
-  int pictures = 0, pictures_of = 0;  ///< of this pose
+  int images = 0, images_of = 0;  ///< of this pose
   std::vector<Judged> judged;
   std::string advice;  ///< whether more poses help
   std::vector<calib::Fault> faults;

@@ -52,7 +52,7 @@ class Stand {
                   view_.is_capturing &= which != WizardStep::solve;
                 },
             .lit =
-                [this](const std::vector<LightSeen>& light) {
+                [this](const std::vector<ExposureReading>& light) {
                   const std::lock_guard lock(mutex_);
                   view_.light = light;
                 },
@@ -77,42 +77,42 @@ class Stand {
     step(WizardStep::solve).words = fmt::format("held-out {:.3f} px", report.assessment.held_out.rms_px);
     step(WizardStep::result).words = calib::to_text(report.assessment.verdict);
     view_.worth = report.assessment.verdict;
-    view_.verdict = report.words.verdict;
+    view_.verdict = report.explanation.verdict;
     view_.faults = report.assessment.faults;
-    view_.to_do = report.words.advice;
+    view_.to_do = report.explanation.advice;
     view_.maps = report.assessment.error_maps;
     view_.advice.clear();
   }
 
-  // The same surroundings, with the pictures passing by here.
+  // The same surroundings, with the images passing by here.
   Surroundings watched(Surroundings around) {
     const auto grab = around.stage.grab;
     around.stage.grab = [this, grab](int camera) -> Result<cv::Mat> {
-      LIMN_TRY(const cv::Mat picture, grab(camera));
+      LIMN_TRY(const cv::Mat image, grab(camera));
       const std::lock_guard lock(mutex_);
-      view_.cameras[static_cast<std::size_t>(camera)].picture = picture;
-      return picture;
+      view_.cameras[static_cast<std::size_t>(camera)].image = image;
+      return image;
     };
-    around.stage.tell = [this](int done, int total) {
+    around.stage.report_progress = [this](int done, int total) {
       const std::lock_guard lock(mutex_);
-      view_.pictures = done;
-      view_.pictures_of = total;
+      view_.images = done;
+      view_.images_of = total;
     };
     around.flashes = [this, flashes = around.flashes](int projector, int camera) {
       FlashStage flash = flashes(projector, camera);
       flash.next = [this, next = flash.next, camera]() -> Result<Frame> {
         LIMN_TRY(Frame frame, next());
         const std::lock_guard lock(mutex_);
-        view_.cameras[static_cast<std::size_t>(camera)].picture = frame.image;
+        view_.cameras[static_cast<std::size_t>(camera)].image = frame.image;
         return frame;
       };
       return flash;
     };
-    const Surroundings::Seen seen = [this](int camera, const cv::Mat& picture,
+    const Surroundings::Seen seen = [this](int camera, const cv::Mat& image,
                                            const std::vector<calib::BoardCorner>& corners) {
       const std::lock_guard lock(mutex_);
       WizardView::Camera& shown = view_.cameras.at(static_cast<std::size_t>(camera));
-      shown.picture = picture;
+      shown.image = image;
       shown.corners.clear();
       for (const calib::BoardCorner& corner : corners) shown.corners.push_back(corner.px);
     };
@@ -148,7 +148,7 @@ class Stand {
   void await_prototype(bool awaits) {
     const std::lock_guard lock(mutex_);
     view_.awaits_prototype = awaits;
-    view_.pictures = view_.pictures_of = 0;
+    view_.images = view_.images_of = 0;
     for (WizardView::Camera& camera : view_.cameras) {
       camera.target.clear();
       camera.corners.clear();
@@ -161,7 +161,7 @@ class Stand {
     view_.pose = pose;
     view_.place = plan_.places[at];
     view_.is_capturing = true;
-    view_.pictures = 0;
+    view_.images = 0;
     for (std::size_t i = 0; i < view_.cameras.size(); ++i) {
       view_.cameras[i].target = targets_[at][i];
       view_.cameras[i].corners.clear();
@@ -192,7 +192,7 @@ class Stand {
     view_.faults = faults;
     std::vector<std::vector<Eigen::Vector2d>> cameras(view_.cameras.size()),
         projectors(view_.projectors.size());
-    for (const calib::CornerSeen& corner : observations.corners)
+    for (const calib::CornerObservation& corner : observations.corners)
       cameras[static_cast<std::size_t>(corner.camera)].push_back(corner.px);
     for (const calib::Match& match : observations.matches)
       projectors[static_cast<std::size_t>(match.projector)].push_back(match.px_projector);
@@ -219,7 +219,7 @@ Result<Calibrated> calibrated_in_window(GuiWindow* window,
                                         const Surroundings& surroundings,
                                         const std::function<void(const std::string&)>& say,
                                         std::atomic<WizardWish>* wish,
-                                        MainErrands* errands,
+                                        MainThreadExecutor* executor,
                                         const WizardWork& work) {
   Stand stand(plan, wish);
   auto running = std::async(std::launch::async, [&]() -> Result<Calibrated> {
@@ -233,7 +233,7 @@ Result<Calibrated> calibrated_in_window(GuiWindow* window,
     }
   });
   for (bool is_closed = false; !is_closed;) {
-    errands->serve();
+    executor->serve();
     window->pressed_keys();
     if (!window->is_due()) {
       std::this_thread::sleep_for(k_pause);
@@ -246,7 +246,7 @@ Result<Calibrated> calibrated_in_window(GuiWindow* window,
     is_closed = asked == WizardWish::leave && (view.is_over || !window->is_wanted());
     if (asked != WizardWish::none && !view.is_over) stand.wish(asked);
   }
-  while (running.wait_for(k_pause) != std::future_status::ready) errands->serve();
+  while (running.wait_for(k_pause) != std::future_status::ready) executor->serve();
   return running.get();
 }
 

@@ -17,9 +17,9 @@ namespace limn::apps {
 
 /// What the wizard's window is told beforehand.
 struct WizardPlan {
-  calib::Captures captures;         ///< planned
+  calib::CaptureSet captures;         ///< planned
   std::vector<std::string> places;  ///< where each pose's board is to be held, in words
-  /// The same as the board's outline in each camera's picture, pixels; empty where it would not be seen.
+  /// The same as the board's outline in each camera's image, pixels; empty where it would not be seen.
   std::vector<std::vector<std::vector<Eigen::Vector2d>>> targets;  ///< [pose][camera]
   std::string devices;                                             ///< what was found, in words
   /// The targets once a rig is known; empty: they are known beforehand.
@@ -37,7 +37,7 @@ Result<Calibrated> calibrated_in_window(GuiWindow* window,
                                         const Surroundings& surroundings,
                                         const std::function<void(const std::string&)>& say,
                                         std::atomic<WizardWish>* wish,
-                                        MainErrands* errands,
+                                        MainThreadExecutor* executor,
                                         const WizardWork& work);
 
 }  // namespace limn::apps

@@ -21,7 +21,7 @@ Rgb mixed(const Rgb& a, const Rgb& b, double share) {
 
 }  // namespace
 
-Rgb worth_rgb(double mm) {
+Rgb error_rgb(double mm) {
   const double fine = calib::k_fine_mm, good = calib::k_good_mm, usable = calib::k_usable_mm;
   return mm <= good ? mixed(k_green, k_amber, (mm - fine) / (good - fine))
                     : mixed(k_amber, k_red, (mm - good) / (usable - good));

@@ -169,14 +169,14 @@ BoardSheet draw_board(const Board& board, const DrawOptions& options) {
   BoardSheet sheet;
   sheet.pixels_per_metre = grid.square / board.square_m;
   sheet.px_board_origin = Eigen::Vector2d::Constant(margin - 0.5);
-  sheet.picture = cv::Mat(2 * margin + board.rows * grid.square, 2 * margin + board.columns * grid.square,
+  sheet.image = cv::Mat(2 * margin + board.rows * grid.square, 2 * margin + board.columns * grid.square,
                           CV_8U, cv::Scalar(255));
   cv::Ptr<cv::aruco::Dictionary> dictionary;
   if (board.kind == BoardKind::charuco) dictionary = dictionary_of(board);
   int id = 0;
   for (int row = 0; row < board.rows; ++row) {
     for (int column = 0; column < board.columns; ++column) {
-      cv::Mat square = sheet.picture(
+      cv::Mat square = sheet.image(
           cv::Rect(margin + column * grid.square, margin + row * grid.square, grid.square, grid.square));
       if (board.is_black(column, row)) {
         square.setTo(0);

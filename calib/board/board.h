@@ -42,7 +42,7 @@ struct Board {
 
 /// The whole sheet as exact pixels: every square and every marker cell is a whole number of pixels.
 struct BoardSheet {
-  cv::Mat picture;              ///< 8-bit grey: 0 black ink, 255 paper
+  cv::Mat image;              ///< 8-bit grey: 0 black ink, 255 paper
   double pixels_per_metre = 0;  ///< for pHYs and for texturing a plane
   /// Pixel coordinates (pixel centres at integers) of the board frame's origin; ends in .5, for it is an
   /// edge: px = px_board_origin + pixels_per_metre * p_board.xy

@@ -205,7 +205,7 @@ std::vector<Expected> expected_on_grid(const std::vector<cv::Point2f>& grid, int
   return expected;
 }
 
-// Whether the square up-left of the first corner is black in the picture.
+// Whether the square up-left of the first corner is black in the image.
 bool first_square_is_black(const cv::Mat& grey, const std::vector<Expected>& corners) {
   const Expected& first = corners.front();
   auto level = [&](const Vector2d& px) {
@@ -251,12 +251,12 @@ std::vector<Expected> find_chessboard(const Board& board, const cv::Mat& grey) {
 }
 
 // A marker seen: its square and its corners, in units of squares and in pixels.
-struct SeenMarker {
+struct DetectedMarker {
   int column = 0, row = 0;
   std::vector<cv::Point2f> in_squares, px;
 };
 
-std::vector<SeenMarker> find_markers(const Board& board, const cv::Mat& grey) {
+std::vector<DetectedMarker> find_markers(const Board& board, const cv::Mat& grey) {
   std::vector<std::vector<cv::Point2f>> quads;
   std::vector<int> ids;
   cv::aruco::detectMarkers(grey, dictionary_of(board), quads, ids);
@@ -266,7 +266,7 @@ std::vector<SeenMarker> find_markers(const Board& board, const cv::Mat& grey) {
       if (!board.is_black(column, row)) squares.emplace_back(column, row);
     }
   }
-  std::vector<SeenMarker> seen;
+  std::vector<DetectedMarker> seen;
   const float low = static_cast<float>(1 - board.marker_share) / 2, high = 1 - low;
   for (size_t i = 0; i < ids.size(); ++i) {
     if (ids[i] >= static_cast<int>(squares.size())) continue;
@@ -281,17 +281,17 @@ std::vector<SeenMarker> find_markers(const Board& board, const cv::Mat& grey) {
 }
 
 // Without markers that a clutter's false reading has put elsewhere than the rest of the board says.
-std::vector<SeenMarker> consistent(std::vector<SeenMarker> markers) {
+std::vector<DetectedMarker> consistent(std::vector<DetectedMarker> markers) {
   constexpr double k_tolerance = 0.4;  // squares; lens distortion over the board stays below
   std::vector<cv::Point2f> px, in_squares;
-  for (const SeenMarker& marker : markers) {
+  for (const DetectedMarker& marker : markers) {
     px.insert(px.end(), marker.px.begin(), marker.px.end());
     in_squares.insert(in_squares.end(), marker.in_squares.begin(), marker.in_squares.end());
   }
   if (markers.size() < 2) return {};
   cv::Mat good;
   if (cv::findHomography(px, in_squares, cv::RANSAC, k_tolerance, good).empty()) return {};
-  std::vector<SeenMarker> kept;
+  std::vector<DetectedMarker> kept;
   for (size_t i = 0; i < markers.size(); ++i) {
     const int first = static_cast<int>(4 * i);
     if (cv::countNonZero(good.rowRange(first, first + 4)) == 4) kept.push_back(std::move(markers[i]));
@@ -301,14 +301,14 @@ std::vector<SeenMarker> consistent(std::vector<SeenMarker> markers) {
 
 // The junction's place by a homography of the nearest markers; nullopt without a marker in a square beside
 // it.
-std::optional<Expected> expected_beside(const Board& board, const std::vector<SeenMarker>& markers, int id) {
+std::optional<Expected> expected_beside(const Board& board, const std::vector<DetectedMarker>& markers, int id) {
   const int column = id % (board.columns - 1), row = id / (board.columns - 1);
-  auto distance = [&](const SeenMarker& m) {
+  auto distance = [&](const DetectedMarker& m) {
     return std::max(std::abs(2 * (m.column - column) - 1), std::abs(2 * (m.row - row) - 1));
   };
   std::vector<cv::Point2f> px, in_squares;
   bool beside = false;
-  for (const SeenMarker& marker : markers) {
+  for (const DetectedMarker& marker : markers) {
     if (distance(marker) > 3) continue;
     beside = beside || distance(marker) == 1;
     px.insert(px.end(), marker.px.begin(), marker.px.end());
@@ -327,7 +327,7 @@ std::optional<Expected> expected_beside(const Board& board, const std::vector<Se
 }
 
 std::vector<Expected> find_charuco(const Board& board, const cv::Mat& grey) {
-  const std::vector<SeenMarker> markers = consistent(find_markers(board, grey));
+  const std::vector<DetectedMarker> markers = consistent(find_markers(board, grey));
   std::vector<Expected> expected;
   for (int id = 0; id < board.corner_count() && !markers.empty(); ++id) {
     if (auto at = expected_beside(board, markers, id)) expected.push_back(*at);

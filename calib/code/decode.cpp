@@ -9,14 +9,14 @@
 
 #include "calib/code/phase.h"
 #include "calib/code/subpixel.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 
 namespace limn::calib {
 namespace {
 
 constexpr float k_nan = std::numeric_limits<float>::quiet_NaN();
 constexpr float k_infinite = std::numeric_limits<float>::infinity();
-constexpr int k_unlit = 255;          // in a picture of least steps
+constexpr int k_unlit = 255;          // in an image of least steps
 constexpr int k_settle_passes = 2;    // pixels without a label are few and small
 constexpr float k_calm_px = 12;       // range of the neighbours' labels on one surface, projector pixels
 constexpr float k_reach_px = 4;       // how far from their mean a label is looked for
@@ -37,18 +37,18 @@ struct Code {
 
   unsigned above_base() const { return base < bits ? (1U << bits) - (2U << base) : 0; }
   unsigned exchanged(unsigned code) const { return (code >> base & 1U) != 0 ? code ^ above_base() : code; }
-  unsigned shown(unsigned block) const {
+  unsigned displayed_bit(unsigned block) const {
     const unsigned gray = block ^ (block >> 1);
     return base < bits ? exchanged(gray) : gray;
   }
-  unsigned block(unsigned shown) const {
-    unsigned gray = base < bits ? exchanged(shown) : shown;
+  unsigned block(unsigned displayed_bit) const {
+    unsigned gray = base < bits ? exchanged(displayed_bit) : displayed_bit;
     for (unsigned shift = 1; shift < 16; shift *= 2) gray ^= gray >> shift;
     return gray;
   }
   // Bits that say nothing for sure about the Gray code when these of the shown one are unsure.
-  unsigned unsure(unsigned shown) const {
-    return base < bits && (shown >> base & 1U) != 0 ? shown | above_base() : shown;
+  unsigned unsure(unsigned displayed_bit) const {
+    return base < bits && (displayed_bit >> base & 1U) != 0 ? displayed_bit | above_base() : displayed_bit;
   }
 };
 
@@ -91,13 +91,13 @@ struct Label {
 };
 
 // The label that the bits give, in blocks; without one when they do not settle it to 2^max_coarse neighbours.
-Label label_of(unsigned shown, unsigned shown_unsure, const Code& code, int max_coarse) {
+Label label_of(unsigned displayed_bit, unsigned shown_unsure, const Code& code, int max_coarse) {
   const unsigned gray_unsure = code.unsure(shown_unsure);
   int coarse = 0;
   while (coarse < code.bits && (gray_unsure >> coarse) & 1U) ++coarse;
   if (coarse > max_coarse) return {};
   const unsigned open = gray_unsure >> coarse;
-  const unsigned block = code.block(shown);
+  const unsigned block = code.block(displayed_bit);
   const unsigned first = block >> coarse;
   unsigned other = first;
   if (open != 0) {
@@ -119,8 +119,8 @@ Label label_of(unsigned shown, unsigned shown_unsure, const Code& code, int max_
 void label_axis(
     const BitPlanes& planes, const Code& code, const cv::Mat& step, int max_coarse, AxisLabels* labels) {
   std::vector<ushort> block_of(size_t{1} << code.bits);
-  for (unsigned shown = 0; shown < block_of.size(); ++shown)
-    block_of[shown] = static_cast<ushort>(code.block(shown));
+  for (unsigned displayed_bit = 0; displayed_bit < block_of.size(); ++displayed_bit)
+    block_of[displayed_bit] = static_cast<ushort>(code.block(displayed_bit));
   for (int y = 0; y < step.rows; ++y) {
     const ushort *signs = planes.code.ptr<ushort>(y), *unsure = planes.unsure.ptr<ushort>(y);
     const uchar* least = step.ptr<uchar>(y);
@@ -186,11 +186,11 @@ void doubt(float limit, AxisLabels* labels, cv::Mat* doubted) {
 }
 
 // How unlikely a label is: every bit that reads the other way must have been turned by noise.
-float cost_of(const AxisReading& axis, unsigned shown, int x, int y, float variance) {
+float cost_of(const AxisReading& axis, unsigned displayed_bit, int x, int y, float variance) {
   float cost = 0;
   for (int i = 0; i < axis.bits(); ++i) {
     const float d = axis.differences[static_cast<size_t>(i)].ptr<short>(y)[x];
-    const bool set = (shown >> (axis.bits() - 1 - i) & 1U) != 0;
+    const bool set = (displayed_bit >> (axis.bits() - 1 - i) & 1U) != 0;
     if (set != (d > 0)) cost += d * d / (2 * variance);
   }
   return cost;
@@ -224,7 +224,7 @@ void settle_by_neighbours(const AxisReading& axis,
       float total = 0, sum = 0, squares = 0, best = 0;
       int likeliest = 0;
       for (int n = from; n <= to; ++n) {
-        const float cost = cost_of(axis, code.shown(static_cast<unsigned>(n)), x, y, noise.at(x, y));
+        const float cost = cost_of(axis, code.displayed_bit(static_cast<unsigned>(n)), x, y, noise.at(x, y));
         if (cost > k_max_cost) continue;
         const float at = static_cast<float>(n) - near;
         const float likely = std::exp(-cost - (exchanged ? at * at / (2 * doubt * doubt) : 0));
@@ -316,18 +316,18 @@ int count_unlabelled(const cv::Mat& marked, const cv::Mat& labels) {
 // Whether a pair's stripes are fine enough that light from elsewhere does not follow them, and wide enough
 // that the lens shows them: 4 to 32 projector pixels; all pairs of a small projector, and of xor's the ones
 // that are as fine as its base. `bit` counts from the finest of the projector.
-bool tells_direct_light(int bit, const Code& code) {
+bool measures_direct_light(int bit, const Code& code) {
   if (code.base < code.bits) return bit >= code.base;
   return code.bits <= 5 || (bit >= 1 && bit <= 4);
 }
 
-// How bright the direct light is: the mean size of picture minus inverse over the bits that tell it.
+// How bright the direct light is: the mean size of image minus inverse over the bits that tell it.
 struct DirectLight {
   cv::Mat sum;  // CV_16U
   int bits = 0;
-  void take(const cv::Mat& picture, const cv::Mat& inverse) {
+  void add_pair(const cv::Mat& image, const cv::Mat& inverse) {
     cv::Mat magnitude;
-    cv::absdiff(picture, inverse, magnitude);
+    cv::absdiff(image, inverse, magnitude);
     cv::add(sum, magnitude, sum, cv::noArray(), CV_16U);
     ++bits;
   }
@@ -338,33 +338,33 @@ struct Series {
   const Patterns& patterns;
   const std::vector<std::filesystem::path>& files;
   cv::Size size;
-  SeriesProbe probe;
+  CaptureQualityProbe probe;
   DirectLight direct;
 
   Result<cv::Mat> read(int index) {
-    LIMN_TRY(const cv::Mat picture, read_shot(files[static_cast<size_t>(index)], size.width, size.height));
-    probe.take(index, picture);
-    return picture;
+    LIMN_TRY(const cv::Mat image, read_shot(files[static_cast<size_t>(index)], size.width, size.height));
+    probe.add_image(index, image);
+    return image;
   }
 };
 
-// Picture minus inverse of an axis' bits, from picture number `first` on. `both`: white and black together,
-// which an inverse that is not shown is the picture's complement in.
+// Image minus inverse of an axis' bits, from image number `first` on. `both`: white and black together,
+// which an inverse that is not shown is the image's complement in.
 Status read_bits(int first, const Code& code, const cv::Mat& both, Series* series, AxisReading* axis) {
-  const int step = series->patterns.pictures_of_bit();
+  const int step = series->patterns.images_of_bit();
   for (int i = 0; i < code.bits; ++i) {
-    LIMN_TRY(const cv::Mat picture, series->read(first + step * i));
+    LIMN_TRY(const cv::Mat image, series->read(first + step * i));
     cv::Mat inverse;
     if (series->patterns.options.inverses) {
       LIMN_TRY(inverse, series->read(first + step * i + 1));
     } else {
-      cv::subtract(both, picture, inverse, cv::noArray(), CV_16S);
+      cv::subtract(both, image, inverse, cv::noArray(), CV_16S);
       inverse.convertTo(inverse, CV_8U);
     }
     cv::Mat difference;
-    cv::subtract(picture, inverse, difference, cv::noArray(), CV_16S);
+    cv::subtract(image, inverse, difference, cv::noArray(), CV_16S);
     axis->differences.push_back(difference);
-    if (tells_direct_light(code.lowest + code.bits - 1 - i, code)) series->direct.take(picture, inverse);
+    if (measures_direct_light(code.lowest + code.bits - 1 - i, code)) series->direct.add_pair(image, inverse);
   }
   return {};
 }
@@ -373,8 +373,8 @@ Result<PhaseReading> read_steps(int first, Series* series) {
   PhaseReading reading(series->size.height, series->size.width, series->patterns.options.period_px,
                        series->patterns.steps());
   for (int k = 0; k < series->patterns.steps(); ++k) {
-    LIMN_TRY(const cv::Mat picture, series->read(first + k));
-    reading.take(k, picture);
+    LIMN_TRY(const cv::Mat image, series->read(first + k));
+    reading.add_step(k, image);
   }
   return reading;
 }
@@ -416,7 +416,7 @@ LeastSteps least_steps(const DirectLight& direct,
   return steps;
 }
 
-// Of picture minus inverse. Without inverses it is twice the picture less white and black: three times the
+// Of image minus inverse. Without inverses it is twice the image less white and black: three times the
 // variance.
 DifferenceNoise difference_noise(const cv::Mat& white,
                                  const cv::Mat& black,
@@ -489,23 +489,23 @@ int join(const AxisLabels& u, const AxisLabels& v, Decoded* decoded) {
 }  // namespace
 
 Result<cv::Mat> read_shot(const std::filesystem::path& path, int width, int height) {
-  LIMN_TRY(cv::Mat picture, read_grey_picture(path));
-  if (picture.cols != width || picture.rows != height)
+  LIMN_TRY(cv::Mat image, read_grey_image(path));
+  if (image.cols != width || image.rows != height)
     return error("{}: expected a picture of {}x{} pixels, found {}x{}. Capture this pose again.",
-                 path.string(), width, height, picture.cols, picture.rows);
-  return picture;
+                 path.string(), width, height, image.cols, image.rows);
+  return image;
 }
 
 Result<Decoded> decode(const Patterns& patterns,
-                       const std::vector<std::filesystem::path>& pictures,
+                       const std::vector<std::filesystem::path>& images,
                        int width,
                        int height,
                        const DecodeOptions& options) {
-  LIMN_CHECK(static_cast<int>(pictures.size()) == patterns.count());
+  LIMN_CHECK(static_cast<int>(images.size()) == patterns.count());
   Series series{patterns,
-                pictures,
+                images,
                 cv::Size(width, height),
-                SeriesProbe(patterns, width, height),
+                CaptureQualityProbe(patterns, width, height),
                 {cv::Mat(height, width, CV_16U, cv::Scalar(0))}};
   LIMN_TRY(const cv::Mat white, series.read(patterns.white()));
   LIMN_TRY(const cv::Mat black, series.read(patterns.black()));
@@ -526,9 +526,9 @@ Result<Decoded> decode(const Patterns& patterns,
   }
   Decoded decoded;
   cv::subtract(white, black, decoded.contrast);
-  decoded.health = series.probe.health(pictures);
+  decoded.quality = series.probe.quality(images);
   const DifferenceNoise noise =
-      difference_noise(white, black, patterns.options.inverses, decoded.health.noise);
+      difference_noise(white, black, patterns.options.inverses, decoded.quality.noise);
   const LeastSteps steps = least_steps(series.direct, patterns.code == "xor", noise, options, &decoded);
   std::vector<AxisLabels> labels;
   cv::Mat doubted(height, width, CV_8U, cv::Scalar(0));
@@ -542,7 +542,7 @@ Result<Decoded> decode(const Patterns& patterns,
   const int removed = remove_outliers(&decoded.px_projector, options.max_from_median);
   decoded.decoded -= removed;
   decoded.outliers = contradicted + removed;
-  decoded.health.unsure_finest = unsure_finest(axes[0], axes[1], steps.fine, decoded.lit);
+  decoded.quality.unsure_finest = unsure_finest(axes[0], axes[1], steps.fine, decoded.lit);
   return decoded;
 }
 

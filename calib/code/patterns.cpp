@@ -53,12 +53,12 @@ std::vector<uchar> displayed(const std::vector<double>& light, const CodeOptions
       continue;
     }
     for (const auto* curve : {&options.response->blue, &options.response->green, &options.response->red})
-      give(inverse_looked_up(*curve, curve->front() + l * (curve->back() - curve->front())));
+      give(inverse_lookup(*curve, curve->front() + l * (curve->back() - curve->front())));
   }
   return values;
 }
 
-// A line's values, one for each position or three (BGR), side by side over the whole picture …
+// A line's values, one for each position or three (BGR), side by side over the whole image …
 cv::Mat across(std::vector<uchar> line, int width, int height) {
   const int channels = static_cast<int>(line.size()) / width;
   return cv::repeat(cv::Mat(1, width, CV_8UC(channels), line.data()), height, 1);
@@ -93,7 +93,7 @@ Status check(const std::string& code, const CodeOptions& options) {
   return {};
 }
 
-// What a code does not use stays at its default, so that equal pictures mean equal structs.
+// What a code does not use stays at its default, so that equal images mean equal structs.
 CodeOptions used(const std::string& code, const CodeOptions& options) {
   CodeOptions kept;
   if (code == "phase") {
@@ -156,15 +156,15 @@ std::vector<PatternGroup> Patterns::groups() const {
   return groups;
 }
 
-cv::Mat Patterns::picture(int index) const {
+cv::Mat Patterns::image(int index) const {
   LIMN_CHECK(index >= 0 && index < count());
   if (index >= white()) return cv::Mat(height, width, CV_8U, cv::Scalar(index == white() ? 255 : 0));
   if (index >= first_step() + steps())
     return down(displayed(wave(height, index - first_step() - steps(), options), options), width, height);
   if (index >= first_step())
     return across(displayed(wave(width, index - first_step(), options), options), width, height);
-  const bool inverse = index % pictures_of_bit() == 1;
-  const int bit = index / pictures_of_bit();
+  const bool inverse = index % images_of_bit() == 1;
+  const int bit = index / images_of_bit();
   if (bit < column_bits())
     return across(stripe(width, lowest_bit() + column_bits() - 1 - bit, base_bit(), inverse), width, height);
   const int row_bit = bit - column_bits();
@@ -172,11 +172,11 @@ cv::Mat Patterns::picture(int index) const {
 }
 
 Result<Patterns> linearised(const Patterns& patterns,
-                            const std::vector<Response>& responses,
+                            const std::vector<ProjectorResponse>& responses,
                             const std::string& projector) {
   if (patterns.code != "phase") return patterns;
   std::vector<std::string> names;
-  for (const Response& response : responses) {
+  for (const ProjectorResponse& response : responses) {
     names.push_back(response.projector);
     if (response.projector != projector) continue;
     CodeOptions options = patterns.options;
@@ -187,7 +187,7 @@ Result<Patterns> linearised(const Patterns& patterns,
                names.empty() ? "no projector" : fmt::format("{}", fmt::join(names, ", ")));
 }
 
-std::string picture_name(int index) { return fmt::format("{:03d}.png", index); }
+std::string image_name(int index) { return fmt::format("{:03d}.png", index); }
 
 Status save_patterns(const Patterns& patterns, const std::filesystem::path& path) {
   nlohmann::ordered_json json = {{"schema", "limn.patterns/1"},
@@ -231,7 +231,7 @@ Result<Patterns> load_patterns(const std::filesystem::path& path) {
   keys.merge(std::set<std::string>{"schema", "code", "size", "pictures"});
   root.only(keys);
   const std::vector<double> size = root.at("size").numbers(2);
-  const int pictures = root.at("pictures").integer();
+  const int images = root.at("pictures").integer();
   CodeOptions options = read_code_options(root);
   if (const auto response = root.find("response")) {
     response->only({"red", "green", "blue"});
@@ -241,9 +241,9 @@ Result<Patterns> load_patterns(const std::filesystem::path& path) {
   LIMN_TRY_STATUS(config.status());
   const auto patterns = Patterns::create(code, static_cast<int>(size[0]), static_cast<int>(size[1]), options);
   if (!patterns) return error("{}: {}", path.string(), patterns.message());
-  if (pictures != patterns->count())
+  if (images != patterns->count())
     return error("{}: pictures: expected {} for {}x{} {} code, found {}.", path.string(), patterns->count(),
-                 patterns->width, patterns->height, code, pictures);
+                 patterns->width, patterns->height, code, images);
   return patterns;
 }
 

@@ -19,13 +19,13 @@ PhaseReading::PhaseReading(int rows, int cols, int period_px, int steps)
       cosines_(rows, cols, CV_32F, cv::Scalar(0)),
       sines_(rows, cols, CV_32F, cv::Scalar(0)) {}
 
-void PhaseReading::take(int step, const cv::Mat& picture) {
+void PhaseReading::add_step(int step, const cv::Mat& image) {
   const double angle = 2 * std::numbers::pi * step / steps_;
   const auto cosine = static_cast<float>(std::cos(angle)), sine = static_cast<float>(std::sin(angle));
-  for (int y = 0; y < picture.rows; ++y) {
-    const uchar* light = picture.ptr<uchar>(y);
+  for (int y = 0; y < image.rows; ++y) {
+    const uchar* light = image.ptr<uchar>(y);
     float *c = cosines_.ptr<float>(y), *s = sines_.ptr<float>(y);
-    for (int x = 0; x < picture.cols; ++x) {
+    for (int x = 0; x < image.cols; ++x) {
       c[x] += cosine * light[x];
       s[x] += sine * light[x];
     }

@@ -11,7 +11,7 @@ class PhaseReading {
  public:
   PhaseReading(int rows, int cols, int period_px, int steps);
   /// Step number `step`, 8-bit grey.
-  void take(int step, const cv::Mat& picture);
+  void add_step(int step, const cv::Mat& image);
 
   int period_px() const { return period_px_; }
   int steps() const { return steps_; }

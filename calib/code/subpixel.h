@@ -14,7 +14,7 @@ struct DifferenceNoise {
 
 /// One axis of Gray code as a camera saw it.
 struct AxisReading {
-  /// CV_16S, picture minus inverse, levels; most significant bit first.
+  /// CV_16S, image minus inverse, levels; most significant bit first.
   std::vector<cv::Mat> differences;
   int bits() const { return static_cast<int>(differences.size()); }
   /// Of the bit whose reading changes between label `edge` - 1 and label `edge`.
@@ -29,7 +29,7 @@ struct AxisLabels {
   AxisLabels(int rows, int cols);
 };
 
-/// Coordinates between whole pixels: where a bit's picture and inverse cross between two camera pixels of
+/// Coordinates between whole pixels: where a bit's image and inverse cross between two camera pixels of
 /// neighbouring labels, the camera looks at the edge between those labels, whatever the blur, the global
 /// light and the surface's colour. Along rows and along columns, pixels between two such places get what
 /// lies between; the two answers are averaged by their variances. Pixels between no two edges keep what they

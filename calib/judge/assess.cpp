@@ -5,7 +5,7 @@
 #include <limits>
 #include <set>
 
-#include "calib/judge/propagate.h"
+#include "calib/judge/uncertainty.h"
 
 namespace limn::calib {
 namespace {
@@ -23,7 +23,7 @@ struct Tally {
   double squared = 0;
   std::set<int> cells;
 
-  void take(const Vector2d& px, const CapturedDevice& device, const Vector2d& residual, bool outlier) {
+  void add(const Vector2d& px, const CapturedDevice& device, const Vector2d& residual, bool outlier) {
     const int x =
         std::clamp(static_cast<int>((px.x() + 0.5) / device.width * k_coverage_grid), 0, k_coverage_grid - 1);
     const int y = std::clamp(static_cast<int>((px.y() + 0.5) / device.height * k_coverage_grid), 0,
@@ -48,15 +48,15 @@ struct Tally {
 std::vector<DeviceQuality> device_qualities(const Observations& observations, const Solution& solution) {
   std::vector<Tally> cameras(observations.cameras.size()), projectors(observations.projectors.size());
   for (size_t i = 0; i < observations.corners.size(); ++i) {
-    const CornerSeen& seen = observations.corners[i];
+    const CornerObservation& seen = observations.corners[i];
     const auto camera = static_cast<size_t>(seen.camera);
-    cameras[camera].take(seen.px, observations.cameras[camera], solution.corner_residuals[i],
+    cameras[camera].add(seen.px, observations.cameras[camera], solution.corner_residuals[i],
                          solution.corner_outlier[i]);
   }
   for (size_t i = 0; i < observations.matches.size(); ++i) {
     const Match& match = observations.matches[i];
     const auto projector = static_cast<size_t>(match.projector);
-    projectors[projector].take(match.px_projector, observations.projectors[projector],
+    projectors[projector].add(match.px_projector, observations.projectors[projector],
                                solution.match_residuals[i], solution.match_outlier[i]);
   }
   std::vector<DeviceQuality> qualities;
@@ -69,7 +69,7 @@ std::vector<DeviceQuality> device_qualities(const Observations& observations, co
 
 // 95 % of the held-out distances on the boards, mm, for each projector, less what the matches' own noise
 // makes of them: that is no error of the rig.
-std::vector<double> held_out_errors_mm(const Observations& observations, const HeldOut& score) {
+std::vector<double> held_out_errors_mm(const Observations& observations, const CrossValidation& score) {
   struct Errors {
     std::vector<double> mm;
     double squared = 0, noise = 0;  // px^2
@@ -115,14 +115,14 @@ void add_faults(const std::vector<Fault>& faults, Assessment* assessment) {
   if (severity == Severity::doubt) assessment->verdict = std::max(assessment->verdict, Verdict::usable);
 }
 
-Assessment assess(const Observed& observed, const Solution& solution, HeldOut held_out) {
+Assessment assess(const Observed& observed, const Solution& solution, CrossValidation held_out) {
   const Observations& observations = observed.observations;
   Assessment assessment;
   assessment.held_out = std::move(held_out);
   assessment.devices = device_qualities(observations, solution);
-  const Uncertainty uncertainty = believed(observations, solution, assessment.held_out.rigs);
+  const Uncertainty uncertainty = estimated_uncertainty(observations, solution, assessment.held_out.rigs);
   assessment.epipolar = epipolar_residuals(solution.rig, observed.dense);
-  assessment.pulls = pulls(observations, solution, assessment.held_out.residuals);
+  assessment.normalised_residuals = normalised_residuals(observations, solution, assessment.held_out.residuals);
   assessment.held_out_error_mm = held_out_errors_mm(observations, assessment.held_out);
   assessment.propagated_error_mm = propagated_error_mm(observations, solution, uncertainty);
   assessment.error_maps = error_maps(observations, solution, uncertainty);
@@ -155,7 +155,7 @@ Assessment assess(const Observed& observed, const Solution& solution, HeldOut he
 }
 
 Result<Assessment> assess(const Observed& observed, const SolveOptions& options, const Solution& solution) {
-  LIMN_TRY(HeldOut score, held_out(observed.observations, options, solution));
+  LIMN_TRY(CrossValidation score, cross_validate(observed.observations, options, solution));
   return assess(observed, solution, std::move(score));
 }
 

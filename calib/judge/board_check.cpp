@@ -18,7 +18,7 @@ constexpr double k_near = 0.4;       // squares; lens distortion over the board 
 constexpr double k_most_fit = 0.8;   // of the markers of the right dictionary
 constexpr double k_described = 0.5;  // of the corners: a board that is seen so well is the described one
 constexpr int k_widest = 30;         // squares
-constexpr int k_pictures = 4;        // looked at, a second each
+constexpr int k_images = 4;        // looked at, a second each
 
 struct Marker {
   int id = 0;
@@ -62,8 +62,8 @@ int explained(const std::vector<Marker>& markers, int columns, bool white_first,
   return *rows >= 3 ? cv::countNonZero(good) : 0;  // a row or two fit any width
 }
 
-std::optional<SeenBoard> look_for_charuco(const cv::Mat& grey) {
-  SeenBoard best;
+std::optional<DetectedBoard> identify_charuco(const cv::Mat& grey) {
+  DetectedBoard best;
   for (const PredefinedFamily& family : predefined_families()) {
     const std::vector<Marker> markers = markers_of(grey, family.opencv_dictionary);
     if (static_cast<int>(markers.size()) < k_least_markers) continue;
@@ -80,7 +80,7 @@ std::optional<SeenBoard> look_for_charuco(const cv::Mat& grey) {
   return best;
 }
 
-std::optional<SeenBoard> look_for_chessboard(const cv::Mat& grey) {
+std::optional<DetectedBoard> identify_chessboard(const cv::Mat& grey) {
   cv::Mat corners, found;
   try {
     if (!cv::findChessboardCornersSB(grey, {3, 3}, corners,
@@ -89,7 +89,7 @@ std::optional<SeenBoard> look_for_chessboard(const cv::Mat& grey) {
   } catch (const cv::Exception&) {
     return std::nullopt;
   }
-  return SeenBoard{BoardKind::chessboard, found.cols + 1, found.rows + 1, "", 0, false};
+  return DetectedBoard{BoardKind::chessboard, found.cols + 1, found.rows + 1, "", 0, false};
 }
 
 // aruco_5x5_50 is the beginning of aruco_5x5_100: markers of one are markers of the other.
@@ -97,7 +97,7 @@ std::string table_of(const std::string& dictionary) {
   return dictionary.starts_with("aruco_") ? dictionary.substr(0, dictionary.rfind('_')) : dictionary;
 }
 
-bool agrees(const Board& board, const SeenBoard& seen) {
+bool agrees(const Board& board, const DetectedBoard& seen) {
   if (board.kind != seen.kind) return false;
   if (board.kind == BoardKind::charuco)
     return !seen.white_first && board.columns == seen.columns &&
@@ -110,14 +110,14 @@ bool agrees(const Board& board, const SeenBoard& seen) {
 double best_view(const Board& board, const Observations& observations) {
   std::map<std::pair<int, int>, int> corners;
   int most = 0;
-  for (const CornerSeen& seen : observations.corners)
+  for (const CornerObservation& seen : observations.corners)
     most = std::max(most, ++corners[{seen.camera, seen.pose}]);
   return static_cast<double>(most) / board.corner_count();
 }
 
 }  // namespace
 
-std::string SeenBoard::in_words() const {
+std::string DetectedBoard::description() const {
   if (kind == BoardKind::chessboard)
     return fmt::format("a chessboard of {}x{} inner corners", columns - 1, rows - 1);
   return fmt::format("a charuco board {} squares across and at least {} down with markers of {}{}", columns,
@@ -125,30 +125,30 @@ std::string SeenBoard::in_words() const {
                      white_first ? ", whose top-left square is white (Limn's begin with black)" : "");
 }
 
-std::optional<SeenBoard> look_for_board(const cv::Mat& grey) {
-  if (auto charuco = look_for_charuco(grey)) return charuco;
-  return look_for_chessboard(grey);
+std::optional<DetectedBoard> identify_board(const cv::Mat& grey) {
+  if (auto charuco = identify_charuco(grey)) return charuco;
+  return identify_chessboard(grey);
 }
 
-Status check_board(const Captures& captures, const Observations& observations) {
+Status check_board(const CaptureSet& captures, const Observations& observations) {
   if (best_view(captures.board, observations) >= k_described) return {};
   log_info("the board is hardly seen; looking for another");
-  int pictures = 0;
+  int images = 0;
   for (size_t pose = 0; pose < captures.poses.size(); ++pose) {
     for (size_t camera = 0; camera < captures.cameras.size(); ++camera) {
       for (size_t projector = 0; projector < captures.projectors.size(); ++projector) {
-        if (++pictures > k_pictures) return {};
-        const auto& files = captures.poses[pose].pictures[projector][camera];
+        if (++images > k_images) return {};
+        const auto& files = captures.poses[pose].images[projector][camera];
         const auto& file = files[static_cast<size_t>(captures.patterns[projector].white())];
         const CapturedDevice& device = captures.cameras[camera];
         LIMN_TRY(const cv::Mat white, read_shot(file, device.width, device.height));
-        const auto seen = look_for_board(white);
+        const auto seen = identify_board(white);
         if (!seen || agrees(captures.board, *seen)) continue;
         return error(
             "board: expected {}, but {} shows {}. Describe the board that was captured (\"board\" in "
             "capture.json, "
             "or --board).",
-            captures.board.text(), file.string(), seen->in_words());
+            captures.board.text(), file.string(), seen->description());
       }
     }
   }

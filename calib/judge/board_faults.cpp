@@ -47,7 +47,7 @@ std::vector<CornerSums> corner_sums(const Observations& observations, const Solu
   const BoardShape shape{board.width_m(), board.height_m()};
   std::vector<CornerSums> sums(static_cast<size_t>(board.corner_count()));
   for (size_t i = 0; i < observations.corners.size(); ++i) {
-    const CornerSeen& seen = observations.corners[i];
+    const CornerObservation& seen = observations.corners[i];
     const auto& world_from_board = solution.world_from_board[static_cast<size_t>(seen.pose)];
     const Vector2d& residual = solution.corner_residuals[i];
     if (!world_from_board || !residual.allFinite() || solution.corner_outlier[i]) continue;

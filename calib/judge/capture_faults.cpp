@@ -20,7 +20,7 @@ using Eigen::Matrix2d;
 using Eigen::Vector2d;
 
 constexpr int k_least_samples = 200;       // of a series' health: medians over fewer say nothing
-constexpr double k_least_lit = 0.002;      // of the picture; the smallest board that can be found fills 2 %
+constexpr double k_least_lit = 0.002;      // of the image; the smallest board that can be found fills 2 %
 constexpr double k_same_px = 1;            // two projectors' labels of one place never agree by chance
 constexpr double k_same_share = 0.3;       // of the places that both light
 constexpr double k_level_range = 0.03;     // sums of coarse pairs; a camera that is not linear shows 0.017
@@ -30,8 +30,8 @@ constexpr double k_white_under_narrow = 0.05;  // below 1; sharp captures show 1
 constexpr double k_lost_pair = 0.5;            // of samples that are off: one frame is missing, not light
 constexpr double k_between = 0.06;        // more samples off under the finest stripes than under wide ones
 constexpr double k_between_level = 0.01;  // and less light there: interpolation before a gamma above 1
-// A shift of what is seen between the first pictures and the last, as a share of the width: sound captures
-// show up to 0.00005 (noise); and in camera pixels, for small pictures.
+// A shift of what is seen between the first images and the last, as a share of the width: sound captures
+// show up to 0.00005 (noise); and in camera pixels, for small images.
 constexpr double k_shift_share = 0.000125, k_shift_px = 0.1;
 // Of full contrast, left on stripes of 2 pixels: a blur of 1.2 pixels (standard deviation) leaves 0.15, and
 // from there on edges are found from coarser bits alone.
@@ -50,8 +50,8 @@ constexpr double k_wave_level = 0.025;
 struct Seen {
   const Observed& observed;
   int camera = 0, projector = 0;
-  std::vector<const SeriesHealth*> series;  // with enough lit samples
-  std::vector<double> lit;                  // of every series, share of the picture
+  std::vector<const CaptureQuality*> series;  // with enough lit samples
+  std::vector<double> lit;                  // of every series, share of the image
   std::vector<Matrix2d> maps;               // for each pose: d projector pixel / d camera pixel
 
   const std::string& camera_name() const {
@@ -60,14 +60,14 @@ struct Seen {
   const std::string& projector_name() const {
     return observed.observations.projectors[static_cast<size_t>(projector)].name;
   }
-  const std::string& pose_name(const SeriesHealth& health) const {
-    return observed.observations.poses[static_cast<size_t>(health.pose)];
+  const std::string& pose_name(const CaptureQuality& quality) const {
+    return observed.observations.poses[static_cast<size_t>(quality.pose)];
   }
   std::string both() const { return camera_name() + " of " + projector_name(); }
   template <typename F>
   double median_of(F&& value) const {
     std::vector<double> values;
-    for (const SeriesHealth* health : series) values.push_back(value(*health));
+    for (const CaptureQuality* quality : series) values.push_back(value(*quality));
     return median(std::move(values));
   }
 };
@@ -98,9 +98,9 @@ std::vector<Seen> seen_by_pairs(const Observed& observed) {
     for (int projector = 0; projector < static_cast<int>(observations.projectors.size()); ++projector) {
       Seen seen{observed, camera, projector, {}, {}, {}};
       const CapturedDevice& device = observations.cameras[static_cast<size_t>(camera)];
-      for (const SeriesHealth& health : observed.health) {
-        if (health.camera == camera && health.projector == projector && health.samples >= k_least_samples)
-          seen.series.push_back(&health);
+      for (const CaptureQuality& quality : observed.quality) {
+        if (quality.camera == camera && quality.projector == projector && quality.samples >= k_least_samples)
+          seen.series.push_back(&quality);
       }
       for (const DecodeShare& share : observed.decoded) {
         if (share.camera == camera && share.projector == projector)
@@ -203,12 +203,12 @@ struct Pairs {
   size_t per_axis(int axis) const { return axis == 0 ? columns : count - columns; }
 };
 
-Pairs pairs_of(const Seen& seen, const SeriesHealth& health) {
+Pairs pairs_of(const Seen& seen, const CaptureQuality& quality) {
   const CapturedDevice& device = seen.observed.observations.projectors[static_cast<size_t>(seen.projector)];
   const int columns = static_cast<int>(std::bit_width(static_cast<unsigned>(device.width - 1)));
   const int rows = static_cast<int>(std::bit_width(static_cast<unsigned>(device.height - 1)));
   int count = -1;  // without white and black
-  for (const GroupHealth& group : health.groups) count += group.count == 2 ? 1 : 0;
+  for (const GroupQuality& group : quality.groups) count += group.count == 2 ? 1 : 0;
   const int lowest = std::max(0, (columns + rows - count) / 2);
   if (count <= 0) return {1, 1, lowest};  // shown without inverses
   return {static_cast<size_t>(std::max(1, columns - lowest)), static_cast<size_t>(std::max(1, count)),
@@ -221,13 +221,13 @@ struct Between {
   double off = 0, darker = 0;
 };
 
-Between between(const Seen& seen, const SeriesHealth& health) {
-  const Pairs pairs = pairs_of(seen, health);
+Between between(const Seen& seen, const CaptureQuality& quality) {
+  const Pairs pairs = pairs_of(seen, quality);
   Between worst;
   for (const int axis : {0, 1}) {
     if (pairs.per_axis(axis) < 4 || pairs.lowest > 0) continue;
-    const GroupHealth &fine = health.groups[pairs.finest(axis)],
-                      &wide = health.groups[pairs.finest(axis) - 2];
+    const GroupQuality &fine = quality.groups[pairs.finest(axis)],
+                      &wide = quality.groups[pairs.finest(axis) - 2];
     const Between here{fine.off - wide.off, wide.level - fine.level};
     if (here.off > worst.off) worst = here;
   }
@@ -235,8 +235,8 @@ Between between(const Seen& seen, const SeriesHealth& health) {
 }
 
 void note_between(const Seen& seen, std::vector<Fault>* faults) {
-  const double off = seen.median_of([&](const SeriesHealth& h) { return between(seen, h).off; });
-  const double darker = seen.median_of([&](const SeriesHealth& h) { return between(seen, h).darker; });
+  const double off = seen.median_of([&](const CaptureQuality& h) { return between(seen, h).off; });
+  const double darker = seen.median_of([&](const CaptureQuality& h) { return between(seen, h).darker; });
   if (off < k_between || darker < k_between_level) return;
   faults->push_back(
       {"keystone_or_scaling",
@@ -249,38 +249,38 @@ void note_between(const Seen& seen, std::vector<Fault>* faults) {
 }
 
 // Range of the sums of pairs with wide stripes, which blur does not touch, and of white and black.
-double level_range(const Seen& seen, const SeriesHealth& health) {
-  const Pairs pairs = pairs_of(seen, health);
+double level_range(const Seen& seen, const CaptureQuality& quality) {
+  const Pairs pairs = pairs_of(seen, quality);
   double low = 1, high = 1;
-  const auto take = [&](const GroupHealth& group) {
+  const auto collect = [&](const GroupQuality& group) {
     if (group.off > k_lost_pair) return;
     low = std::min(low, group.level);
     high = std::max(high, group.level);
   };
   for (const int axis : {0, 1}) {
     const size_t first = pairs.finest(axis) + 1 - pairs.per_axis(axis);
-    for (size_t i = 0; i < (pairs.per_axis(axis) + 1) / 2; ++i) take(health.groups[first + i]);
+    for (size_t i = 0; i < (pairs.per_axis(axis) + 1) / 2; ++i) collect(quality.groups[first + i]);
   }
-  take(health.groups.back());
+  collect(quality.groups.back());
   return high - low;
 }
 
 // Contrast of white against black over that of the widest stripes: 1 when nothing answers to how much of the
-// picture is lit. Over narrow stripes, which blur, it is more.
-double white_contrast(const Seen& seen, const SeriesHealth& health) {
-  const Pairs pairs = pairs_of(seen, health);
+// image is lit. Over narrow stripes, which blur, it is more.
+double white_contrast(const Seen& seen, const CaptureQuality& quality) {
+  const Pairs pairs = pairs_of(seen, quality);
   double widest = 1e-9;
   for (const int axis : {0, 1}) {
     const size_t first = pairs.finest(axis) + 1 - pairs.per_axis(axis);
     for (size_t i = 0; i < std::min<size_t>(3, pairs.per_axis(axis)); ++i)
-      widest = std::max(widest, health.groups[first + i].contrast);
+      widest = std::max(widest, quality.groups[first + i].contrast);
   }
-  return health.groups.back().contrast / widest;
+  return quality.groups.back().contrast / widest;
 }
 
 bool note_exposure(const Seen& seen, std::vector<Fault>* faults) {
-  const double range = seen.median_of([&](const SeriesHealth& h) { return level_range(seen, h); });
-  const double white = seen.median_of([&](const SeriesHealth& h) { return white_contrast(seen, h); });
+  const double range = seen.median_of([&](const CaptureQuality& h) { return level_range(seen, h); });
+  const double white = seen.median_of([&](const CaptureQuality& h) { return white_contrast(seen, h); });
   const bool narrow = seen.series[0]->widest_stripe_px < k_wide_stripe_px;
   const bool white_fits = narrow ? white > 1 - k_white_under_narrow : std::abs(white - 1) < k_white_contrast;
   if (range < k_level_range && white_fits) return false;
@@ -298,16 +298,16 @@ bool note_exposure(const Seen& seen, std::vector<Fault>* faults) {
 void note_motion(const Seen& seen, std::vector<Fault>* faults) {
   const CapturedDevice& camera = seen.observed.observations.cameras[static_cast<size_t>(seen.camera)];
   const double limit = std::max(k_shift_px, k_shift_share * camera.width);
-  for (const SeriesHealth* health : seen.series) {
-    if (health->shift_patches < 4 || health->shift_px < limit) continue;
+  for (const CaptureQuality* quality : seen.series) {
+    if (quality->shift_patches < 4 || quality->shift_px < limit) continue;
     faults->push_back(
         {"moved_during_capture",
          fmt::format("{}, {}: what is seen moved by {:.2f} px (some of it {:.2f} px) between the first "
                      "pictures and the last; {:.2f} px may be noise",
-                     seen.pose_name(*health), seen.both(), health->shift_px, health->shift_worst_px, limit),
+                     seen.pose_name(*quality), seen.both(), quality->shift_px, quality->shift_worst_px, limit),
          "put board, camera and projector on firm ground and capture this pose again, or leave it out with "
          "--skip-poses " +
-             seen.pose_name(*health)});
+             seen.pose_name(*quality)});
   }
 }
 
@@ -318,8 +318,8 @@ struct Sharpness {
   int stripe_px = 2;
 };
 
-Sharpness sharpness(const Seen& seen, const SeriesHealth& health) {
-  const Pairs pairs = pairs_of(seen, health);
+Sharpness sharpness(const Seen& seen, const CaptureQuality& quality) {
+  const Pairs pairs = pairs_of(seen, quality);
   std::vector<double> scales;  // camera pixels in a projector pixel
   for (const Matrix2d& map : seen.maps) scales.push_back(1 / std::sqrt(std::abs(map.determinant())));
   const double scale = scales.empty() ? 1 : median(scales);
@@ -329,16 +329,16 @@ Sharpness sharpness(const Seen& seen, const SeriesHealth& health) {
     ++back;
     found.stripe_px *= 2;
   }
-  const bool wide = health.widest_stripe_px >= k_wide_stripe_px;
-  double full = wide ? 0 : health.groups.back().contrast;
-  for (size_t i = 0; i < pairs.count; ++i) full = std::max(full, health.groups[i].contrast);
+  const bool wide = quality.widest_stripe_px >= k_wide_stripe_px;
+  double full = wide ? 0 : quality.groups.back().contrast;
+  for (size_t i = 0; i < pairs.count; ++i) full = std::max(full, quality.groups[i].contrast);
   for (const int axis : {0, 1})
-    found.contrast = std::min(found.contrast, health.groups[pairs.finest(axis) - back].contrast / full);
+    found.contrast = std::min(found.contrast, quality.groups[pairs.finest(axis) - back].contrast / full);
   return found;
 }
 
 void note_defocus(const Seen& seen, std::vector<Fault>* faults) {
-  const double contrast = seen.median_of([&](const SeriesHealth& h) { return sharpness(seen, h).contrast; });
+  const double contrast = seen.median_of([&](const CaptureQuality& h) { return sharpness(seen, h).contrast; });
   if (contrast >= k_sharp) return;
   faults->push_back(
       {"defocus",
@@ -362,7 +362,7 @@ double power_of_waves(double mean) {
 }
 
 void note_gamma(const Seen& seen, std::vector<Fault>* faults) {
-  const double level = seen.median_of([](const SeriesHealth& h) { return h.wave_level; });
+  const double level = seen.median_of([](const CaptureQuality& h) { return h.wave_level; });
   if (std::abs(level - 0.5) < k_wave_level) return;
   const double power = power_of_waves(level);
   faults->push_back(
@@ -377,7 +377,7 @@ void note_gamma(const Seen& seen, std::vector<Fault>* faults) {
 }
 
 bool note_room_light(const Seen& seen, std::vector<Fault>* faults) {
-  const double share = seen.median_of([](const SeriesHealth& h) {
+  const double share = seen.median_of([](const CaptureQuality& h) {
     return std::max(0.0, h.black_level - k_pedestal) / std::max(k_pedestal, h.white_level - k_pedestal);
   });
   if (share < k_room_share) return false;
@@ -385,15 +385,15 @@ bool note_room_light(const Seen& seen, std::vector<Fault>* faults) {
       {"ambient_light",
        fmt::format("{}: {:.0f} levels under black, {:.0f} under white (medians): the room gives {:.0f} % of "
                    "the light",
-                   seen.both(), seen.median_of([](const SeriesHealth& h) { return h.black_level; }),
-                   seen.median_of([](const SeriesHealth& h) { return h.white_level; }), 100 * share),
+                   seen.both(), seen.median_of([](const CaptureQuality& h) { return h.black_level; }),
+                   seen.median_of([](const CaptureQuality& h) { return h.white_level; }), 100 * share),
        "darken the room, or use a brighter projector picture mode; then raise the exposure until white is "
        "just below saturation"});
   return true;
 }
 
 bool note_saturation(const Seen& seen, std::vector<Fault>* faults) {
-  const double share = seen.median_of([](const SeriesHealth& h) { return h.saturated; });
+  const double share = seen.median_of([](const CaptureQuality& h) { return h.saturated; });
   if (share < k_saturated_share) return false;
   faults->push_back(
       {"saturated",
@@ -402,23 +402,23 @@ bool note_saturation(const Seen& seen, std::vector<Fault>* faults) {
   return true;
 }
 
-void note_odd_pictures(const Seen& seen, std::vector<Fault>* faults) {
-  for (const SeriesHealth* health : seen.series) {
-    if (health->odd.empty()) continue;
-    const OddPicture& odd = health->odd.front();
+void note_odd_images(const Seen& seen, std::vector<Fault>* faults) {
+  for (const CaptureQuality* quality : seen.series) {
+    if (quality->odd.empty()) continue;
+    const OddImage& odd = quality->odd.front();
     faults->push_back(
         {"repeated_pictures",
-         fmt::format("{}, {}: {} {}{}", seen.pose_name(*health), seen.both(), odd.file.filename().string(),
+         fmt::format("{}, {}: {} {}{}", seen.pose_name(*quality), seen.both(), odd.file.filename().string(),
                      odd.finding,
-                     health->odd.size() > 1 ? fmt::format(" (and {} more)", health->odd.size() - 1) : ""),
+                     quality->odd.size() > 1 ? fmt::format(" (and {} more)", quality->odd.size() - 1) : ""),
          "wait longer between showing and grabbing (the display's delay), and capture this pose again"});
   }
 }
 
-// fy / fx of a camera from its pictures of the flat board alone, its axis taken to be in the middle.
+// fy / fx of a camera from its images of the flat board alone, its axis taken to be in the middle.
 std::optional<double> camera_aspect(const Observations& observations, int camera) {
   std::map<int, std::pair<std::vector<cv::Point3f>, std::vector<cv::Point2f>>> by_pose;
-  for (const CornerSeen& corner : observations.corners) {
+  for (const CornerObservation& corner : observations.corners) {
     if (corner.camera != camera) continue;
     const Eigen::Vector3f p = observations.board.p_corner(corner.corner).cast<float>();
     auto& [points, px] = by_pose[corner.pose];
@@ -477,7 +477,7 @@ std::vector<Fault> capture_faults(const Observed& observed) {
     // Light that moves, and white that is cut off, make waves look wrong that are not.
     if (!unsteady && !clipped) note_gamma(seen, &faults);
     // Unsteady light and noise make sums wrong, too.
-    if (!unsteady && !bright) note_odd_pictures(seen, &faults);
+    if (!unsteady && !bright) note_odd_images(seen, &faults);
   }
   return faults;
 }

@@ -34,7 +34,7 @@ std::optional<Image> seen_by(const Imager& projector, const Ray& ray, double len
 }
 
 // Until all are taken, rms_px holds the sum of squares.
-void take(const std::optional<double>& distance, EpipolarScore* score) {
+void add(const std::optional<double>& distance, EpipolarScore* score) {
   ++score->pixels;
   if (distance && std::abs(*distance) <= k_epipolar_outlier_px) {
     score->rms_px += *distance * *distance;
@@ -72,7 +72,7 @@ std::vector<EpipolarResidual> epipolar_residuals(const Rig& rig, const std::vect
   for (const DensePixel& pixel : dense) {
     const auto camera = static_cast<size_t>(pixel.camera), projector = static_cast<size_t>(pixel.projector);
     EpipolarResidual& pair = pairs[camera * projectors + projector];
-    take(epipolar_distance(rig.cameras[camera], rig.projectors[projector], pixel.px_camera.cast<double>(),
+    add(epipolar_distance(rig.cameras[camera], rig.projectors[projector], pixel.px_camera.cast<double>(),
                            pixel.px_projector.cast<double>()),
          pixel.on_board ? &pair.board : &pair.room);
   }

@@ -26,7 +26,7 @@ struct EpipolarResidual {
 /// What a decoding calls an outlier, too: a label this far from where it belongs is a wrong one.
 constexpr double k_epipolar_outlier_px = 3;
 
-/// Signed distance (projector pixels) of `px_projector` from the picture, in the projector, of the camera
+/// Signed distance (projector pixels) of `px_projector` from the image, in the projector, of the camera
 /// pixel's ray: a curve where lenses distort. The nearest point on it is found by Gauss-Newton over the ray's
 /// length. Nullopt when the ray's nearest point lies behind either device.
 std::optional<double> epipolar_distance(const Imager& camera,

@@ -35,9 +35,9 @@ std::pair<double, double> depth_range(const Observations& observations,
 }
 
 // A board-sized thing around a point, facing the camera.
-Thing facing(const Imager& camera, const Board& board, const Vector3d& p_camera) {
+RigidTarget facing(const Imager& camera, const Board& board, const Vector3d& p_camera) {
   const Pose world_from_camera = camera.imager_from_world.inverse();
-  Thing thing;
+  RigidTarget thing;
   for (int i = 0; i < k_side * k_side; ++i) {
     const Vector3d offset(board.width_m() * ((i % k_side + 0.5) / k_side - 0.5),
                           board.height_m() * ((i / k_side + 0.5) / k_side - 0.5), 0);
@@ -58,7 +58,7 @@ double p95_at(const Observations& observations,
   if (!d || d->z() <= 0) return k_nothing;
   const Vector3d p_camera = *d * (depth / d->z());
   const Pose world_from_camera = camera.imager_from_world.inverse();
-  const SurfacePlace place{world_from_camera * p_camera, world_from_camera.rotation * Vector3d::UnitZ()};
+  const SurfaceTarget place{world_from_camera * p_camera, world_from_camera.rotation * Vector3d::UnitZ()};
   const auto covariance = light_covariances(
       solution, uncertainty, facing(camera, observations.board, p_camera), projector, {&place, 1});
   if (!covariance[0]) return k_nothing;

@@ -2,14 +2,14 @@
 
 #include <vector>
 
-#include "calib/judge/propagate.h"
+#include "calib/judge/uncertainty.h"
 #include "calib/observations.h"
 #include "calib/solve.h"
 
 namespace limn::calib {
 
 /// Predicted error over the volume that camera 0 and one projector share: on planes that face camera 0, near
-/// to far, each a grid of cells over camera 0's picture. Where the centre of a cell lies:
+/// to far, each a grid of cells over camera 0's image. Where the centre of a cell lies:
 /// px = ((column + 0.5) * width / columns - 0.5, (row + 0.5) * height / rows - 0.5).
 struct ErrorMap {
   struct Plane {
@@ -22,13 +22,13 @@ struct ErrorMap {
   std::vector<Plane> planes;
   /// Largest finite value; 0 when there is none.
   double worst_mm() const;
-  /// Between the middles of cells and planes, at a place of camera 0's picture (0 to 1 across and down) and
+  /// Between the middles of cells and planes, at a place of camera 0's image (0 to 1 across and down) and
   /// its depth; beyond them as at the nearest. NaN where no neighbour is known.
   double at(const Eigen::Vector2d& place, double depth_m) const;
 };
 
 struct ErrorMapOptions {
-  int columns = 16;      ///< of cells across camera 0's picture; rows follow from its shape
+  int columns = 16;      ///< of cells across camera 0's image; rows follow from its shape
   int planes = 5;        ///< from the nearest to the farthest point of the boards
   double beyond = 0.15;  ///< m in front of and behind them, as far as the prototype may be moved
 };

@@ -27,8 +27,8 @@ constexpr int k_few_poses = 5;
 constexpr double k_overlap = 0.5, k_panel_used = 0.35;
 constexpr double k_aspect = 0.01;         // of fy / fx from 1: lenses and panels are square to 0.002
 constexpr double k_camera_centre = 0.12;  // of the width; cheap cameras are centred to 0.05
-constexpr double k_turned_deg = 135;      // a picture stands rather on its head than on its side
-constexpr double k_shifted = 0.15;        // picture heights; less is a lens without shift
+constexpr double k_turned_deg = 135;      // an image stands rather on its head than on its side
+constexpr double k_shifted = 0.15;        // image heights; less is a lens without shift
 // Against an earlier calibration. Swapped projectors stand far apart; a scale shows once directions and
 // lenses are as they were.
 constexpr double k_same_place = 0.05;      // of the distance
@@ -40,7 +40,7 @@ constexpr double k_zoom = 0.03;  // of the field of view; refocusing breathes by
 void note_board(const Observations& observations, const Solution& solution, std::vector<Fault>* faults) {
   for (int pose = 0; pose < static_cast<int>(observations.poses.size()); ++pose) {
     const bool seen = std::any_of(observations.corners.begin(), observations.corners.end(),
-                                  [&](const CornerSeen& corner) { return corner.pose == pose; });
+                                  [&](const CornerObservation& corner) { return corner.pose == pose; });
     if (!seen)
       faults->push_back(
           {"board_not_visible",
@@ -76,7 +76,7 @@ void note_geometry(const Observations& observations, const Solution& solution, s
                        "tilt the board by 20 to 45 degrees to different sides"});
 }
 
-void note_pictures(const Observed& observed,
+void note_images(const Observed& observed,
                    const std::vector<DeviceQuality>& devices,
                    std::vector<Fault>* faults) {
   const Observations& observations = observed.observations;
@@ -103,7 +103,7 @@ void note_pictures(const Observed& observed,
 // How much of the board a projector lights: its matches over those of as many whole boards as cameras see.
 double lit_share(const Observations& observations, int projector) {
   std::set<std::pair<int, int>> seen;
-  for (const CornerSeen& corner : observations.corners) seen.emplace(corner.camera, corner.pose);
+  for (const CornerObservation& corner : observations.corners) seen.emplace(corner.camera, corner.pose);
   std::map<std::tuple<int, int, int>, int> counts;
   int own = 0, whole = 0;
   for (const Match& match : observations.matches) {
@@ -127,7 +127,7 @@ void note_overlap(const Observations& observations,
   }
 }
 
-void note_odd_poses(const HeldOut& score, std::vector<Fault>* faults) {
+void note_odd_poses(const CrossValidation& score, std::vector<Fault>* faults) {
   for (const HeldOutPose& pose : score.poses) {
     std::vector<double> others;
     for (const HeldOutPose& other : score.poses) {
@@ -173,7 +173,7 @@ void note_turned(const Solution& solution, std::vector<Fault>* faults) {
   for (const Imager& projector : solution.rig.projectors) {
     const Eigen::Vector3d d = projector.imager_from_world.rotation * d_down;
     const double turned = std::abs(std::atan2(d.x(), d.y())) * 180 / std::numbers::pi;
-    // Lenses shift the picture up, away from table or ceiling: for one that hangs, that is down in its own.
+    // Lenses shift the image up, away from table or ceiling: for one that hangs, that is down in its own.
     const double shift = (projector.lens.cy() - (projector.height - 1) / 2.0) / projector.height;
     if (turned < k_turned_deg || shift > k_shifted) continue;
     faults->push_back(
@@ -193,10 +193,10 @@ void erase_implied(std::vector<Fault>* faults) {
   // Where the board is stretched, or a projector's pixels are bent to fit, the other lenses follow; a camera
   // whose pixels are not square bends whatever it looks at.
   const bool board = has("wrong_square_size"), panel = has("keystone_or_scaling");
-  const bool picture = !board && !panel && has("wrong_camera_resolution");
+  const bool image = !board && !panel && has("wrong_camera_resolution");
   std::erase_if(*faults, [&](const Fault& fault) {
     return (board && (fault.name == "wrong_camera_resolution" || fault.name == "keystone_or_scaling")) ||
-           (panel && fault.name == "wrong_camera_resolution") || (picture && fault.name == "bent_board");
+           (panel && fault.name == "wrong_camera_resolution") || (image && fault.name == "bent_board");
   });
 }
 
@@ -205,7 +205,7 @@ struct Stand {
   std::string name;
   Eigen::Vector3d p_camera0;
   Eigen::Quaterniond rotation;
-  double focal = 0;  // of the picture's width
+  double focal = 0;  // of the image's width
 };
 
 std::vector<Stand> stands(const Rig& rig, const std::vector<Imager>& imagers) {
@@ -241,7 +241,7 @@ void note_swapped(const std::vector<Stand>& before,
                      Severity::reject});
 }
 
-void note_other_pictures(const Rig& earlier, const Rig& now, std::vector<Fault>* faults) {
+void note_other_images(const Rig& earlier, const Rig& now, std::vector<Fault>* faults) {
   for (const Imager& camera : now.cameras) {
     const Imager* before = earlier.find(camera.name);
     if (!before) continue;
@@ -278,11 +278,11 @@ double common_scale(const std::vector<Stand>& before, const std::vector<Stand>& 
 std::vector<Fault> faults(const Observed& observed,
                           const Solution& solution,
                           const std::vector<DeviceQuality>& devices,
-                          const HeldOut& held_out) {
+                          const CrossValidation& held_out) {
   std::vector<Fault> found = capture_faults(observed);
   note_board(observed.observations, solution, &found);
   note_geometry(observed.observations, solution, &found);
-  note_pictures(observed, devices, &found);
+  note_images(observed, devices, &found);
   note_overlap(observed.observations, devices, &found);
   note_odd_poses(held_out, &found);
   note_lenses(solution, &found);
@@ -298,7 +298,7 @@ std::vector<Fault> faults_against(const Rig& earlier, const Rig& now) {
     return found;
   const std::vector<Stand> before = stands(earlier, earlier.projectors), after = stands(now, now.projectors);
   note_swapped(before, after, &found);
-  note_other_pictures(earlier, now, &found);
+  note_other_images(earlier, now, &found);
   const double scale = common_scale(before, after);
   if (std::abs(scale - 1) > k_scale)
     found.push_back({"wrong_square_size",

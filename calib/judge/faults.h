@@ -10,7 +10,7 @@
 namespace limn::calib {
 
 struct DeviceQuality;
-struct HeldOut;
+struct CrossValidation;
 
 /// What a fault does to the verdict.
 enum class Severity {
@@ -30,15 +30,15 @@ struct Fault {
 /// The faults that captures and their solution show: those of capture_faults (calib/judge/capture_faults.h),
 /// of poses, coverage and single poses, and of what the solved lenses and the board cannot be:
 /// - keystone_or_scaling: a projector's pixels are not square;
-/// - wrong_camera_resolution: a camera's are not, or its picture was cut;
+/// - wrong_camera_resolution: a camera's are not, or its image was cut;
 /// - little_overlap: a projector reaches little of what cameras see;
-/// - rotated_projection: the picture stands on its head and no hanging projector explains it;
+/// - rotated_projection: the image stands on its head and no hanging projector explains it;
 /// - bent_board, wrong_square_size: calib/judge/board_faults.h.
 /// `devices` and `held_out` may be empty: what they tell is left out.
 std::vector<Fault> faults(const Observed& observed,
                           const Solution& solution,
                           const std::vector<DeviceQuality>& devices,
-                          const HeldOut& held_out);
+                          const CrossValidation& held_out);
 
 /// What a solution says against an earlier one of the same devices: projectors_swapped (each stands where
 /// another one stood), wrong_square_size (every distance has grown or shrunk by the same factor),

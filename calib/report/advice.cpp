@@ -12,7 +12,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double k_edge = 0.2;           // of a picture's side: what counts as near its edge
+constexpr double k_edge = 0.2;           // of an image's side: what counts as near its edge
 constexpr double k_bare = 0.3;           // of the cells near an edge; with fewer seen the edge is bare
 constexpr int k_edge_cells = 10;         // along an edge
 constexpr double k_wide_tilt_deg = 40;   // span of tilts about an axis that holds a focal length well
@@ -21,13 +21,13 @@ constexpr double k_steep = 2;            // the error of the volume's end over t
 constexpr int k_enough_poses = 8;
 constexpr int k_few_poses = 4;           // of a projector
 constexpr double k_many_outliers = 0.1;  // of a device's points
-constexpr double k_optimistic = 1.5;     // deviation of held-out pulls
+constexpr double k_optimistic = 1.5;     // deviation of held-out normalised residuals
 constexpr double k_epipolar_px = 0.5;    // twice what a sound calibration shows (issue: 0.25)
 
 double degrees(double radians) { return radians * 180 / std::numbers::pi; }
 
-// Where in a picture: "upper left", "middle", … by shares of its width and height.
-std::string place_in_picture(double x, double y) {
+// Where in an image: "upper left", "middle", … by shares of its width and height.
+std::string place_in_image(double x, double y) {
   const std::string vertical = y < 1.0 / 3 ? "upper" : y > 2.0 / 3 ? "lower" : "";
   const std::string horizontal = x < 1.0 / 3 ? "left" : x > 2.0 / 3 ? "right" : "";
   if (vertical.empty() && horizontal.empty()) return "middle";
@@ -56,7 +56,7 @@ std::vector<SeenPixels> seen_pixels(const Observations& observations) {
     for (const CapturedDevice& device : *devices)
       all.push_back({device.name, device.width, device.height, {}});
   }
-  for (const CornerSeen& corner : observations.corners)
+  for (const CornerObservation& corner : observations.corners)
     all[static_cast<size_t>(corner.camera)].px.push_back(corner.px);
   for (const Match& match : observations.matches)
     all[observations.cameras.size() + static_cast<size_t>(match.projector)].px.push_back(match.px_projector);
@@ -99,7 +99,7 @@ void advise_edges(const Observations& observations, std::vector<std::string>* ad
 
 struct Span {
   double low = 0, high = 0;
-  void take(double v, bool first) {
+  void add(double v, bool first) {
     low = first ? v : std::min(low, v);
     high = first ? v : std::max(high, v);
   }
@@ -120,9 +120,9 @@ Stances stances(const Observations& observations, const Solution& solution) {
     const Pose camera_from_board = camera_from_world * *board;
     const Vector3d n = camera_from_board.rotation * Vector3d::UnitZ();
     const Vector3d middle(observations.board.width_m() / 2, observations.board.height_m() / 2, 0);
-    s.about_vertical.take(degrees(std::atan2(n.x(), n.z())), s.poses == 0);
-    s.about_horizontal.take(degrees(std::atan2(n.y(), n.z())), s.poses == 0);
-    s.distance.take((camera_from_board * middle).z(), s.poses == 0);
+    s.about_vertical.add(degrees(std::atan2(n.x(), n.z())), s.poses == 0);
+    s.about_horizontal.add(degrees(std::atan2(n.y(), n.z())), s.poses == 0);
+    s.distance.add((camera_from_board * middle).z(), s.poses == 0);
     ++s.poses;
   }
   return s;
@@ -199,11 +199,11 @@ void advise_devices(const Observations& observations,
 void advise_trust(const Observations& observations,
                   const Assessment& assessment,
                   std::vector<std::string>* advice) {
-  if (assessment.pulls.held_out.stddev > k_optimistic)
+  if (assessment.normalised_residuals.held_out.stddev > k_optimistic)
     advice->push_back(
         fmt::format("Go by the held-out errors: unseen poses are missed {:.1f} times as far as the noise "
                     "explains. A lens model with more values, a flatter board or more poses may help.",
-                    assessment.pulls.held_out.stddev));
+                    assessment.normalised_residuals.held_out.stddev));
   for (const EpipolarResidual& pair : assessment.epipolar) {
     if (pair.board.rms_px > k_epipolar_px)
       advice->push_back(fmt::format(
@@ -223,7 +223,7 @@ std::optional<std::string> worst_place(const Observations& observations, const E
       const int column = static_cast<int>(i) % map.columns, row = static_cast<int>(i) / map.columns;
       return fmt::format("{:.2f} mm at worst, {:.2f} m from {}, {} of its picture", worst, plane.depth_m,
                          observations.cameras[0].name,
-                         place_in_picture((column + 0.5) / map.columns, (row + 0.5) / map.rows));
+                         place_in_image((column + 0.5) / map.columns, (row + 0.5) / map.rows));
     }
   }
   return std::nullopt;
@@ -288,9 +288,9 @@ bool rests_on_enough_poses(const Assessment& assessment, int poses) {
   return is_fine || poses >= k_enough_poses;
 }
 
-Words in_words(const Observed& observed, const Solution& solution, const Assessment& assessment) {
+Explanation explain(const Observed& observed, const Solution& solution, const Assessment& assessment) {
   const Observations& observations = observed.observations;
-  Words words;
+  Explanation words;
   words.verdict = verdict_words(observations, assessment);
   advise_edges(observations, &words.advice);
   advise_stances(stances(observations, solution), assessment, &words.advice);

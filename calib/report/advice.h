@@ -10,7 +10,7 @@
 namespace limn::calib {
 
 /// A calibration's worth in plain words.
-struct Words {
+struct Explanation {
   /// "usable: predicted error 1.4 mm on projector1 (1.9 mm at worst, 1.60 m from camera0, …); …", then why it
   /// is not better, if it is not.
   std::string verdict;
@@ -24,8 +24,8 @@ struct Words {
 /// truth, 95 %, and nine within 0.01.)
 bool rests_on_enough_poses(const Assessment& assessment, int poses);
 
-/// From the data alone: where the imagers' pictures are bare, how the boards were tilted and how far away,
-/// where the predicted error grows, what the pulls and the epipolar residual say.
-Words in_words(const Observed& observed, const Solution& solution, const Assessment& assessment);
+/// From the data alone: where the imagers' images are bare, how the boards were tilted and how far away,
+/// where the predicted error grows, what the normalised residuals and the epipolar residual say.
+Explanation explain(const Observed& observed, const Solution& solution, const Assessment& assessment);
 
 }  // namespace limn::calib

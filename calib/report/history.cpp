@@ -20,8 +20,8 @@ double number_or_infinity(const Json& json) {
   return json.is_number() ? json.get<double>() : std::numeric_limits<double>::infinity();
 }
 
-std::vector<Moved> moved_of(const Json& list) {
-  std::vector<Moved> all;
+std::vector<DeviceMove> moved_of(const Json& list) {
+  std::vector<DeviceMove> all;
   for (const Json& one : list)
     all.push_back({one.at("name"), one.at("degrees"), one.at("mm"), number_or_infinity(one.at("px"))});
   return all;
@@ -68,7 +68,7 @@ std::vector<Vector3d> points_of(const Observations& observations,
       points.push_back(camera_from_world * *p);
   }
   for (size_t i = 0; !is_projector && i < observations.corners.size(); ++i) {
-    const CornerSeen& seen = observations.corners[i];
+    const CornerObservation& seen = observations.corners[i];
     const auto& board = solution.world_from_board[static_cast<size_t>(seen.pose)];
     if (seen.camera == device && board)
       points.push_back(camera_from_world * (*board * observations.board.p_corner(seen.corner)));
@@ -116,8 +116,8 @@ History read_history(const std::filesystem::path& folder) {
   return history;
 }
 
-std::vector<Moved> moved(const Rig& earlier, const Observations& observations, const Solution& solution) {
-  std::vector<Moved> all;
+std::vector<DeviceMove> device_moves(const Rig& earlier, const Observations& observations, const Solution& solution) {
+  std::vector<DeviceMove> all;
   const Imager& eye = solution.rig.cameras.front();
   const Imager* eye_before = same_device(earlier.cameras, eye);
   if (!eye_before) return all;

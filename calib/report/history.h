@@ -12,7 +12,7 @@
 namespace limn::calib {
 
 /// How far a device stands from where an earlier calibration saw it, both as seen from camera 0.
-struct Moved {
+struct DeviceMove {
   std::string name;
   double degrees = 0;
   double mm = 0;
@@ -28,7 +28,7 @@ struct PastCalibration {
   double held_out_px = 0;
   double worst_px = 0;
   double predicted_mm = 0;   ///< infinite when it was not known
-  std::vector<Moved> moved;  ///< against the one before it; empty for the first
+  std::vector<DeviceMove> moved;  ///< against the one before it; empty for the first
 };
 
 /// What a rig folder remembers.
@@ -44,6 +44,6 @@ History read_history(const std::filesystem::path& folder);
 
 /// Each device of `solution` that the earlier rig had, by name and size, too; camera 0 is where all is seen
 /// from and not listed.
-std::vector<Moved> moved(const Rig& earlier, const Observations& observations, const Solution& solution);
+std::vector<DeviceMove> device_moves(const Rig& earlier, const Observations& observations, const Solution& solution);
 
 }  // namespace limn::calib

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "calib/judge/assess.h"
-#include "calib/judge/known_length.h"
-#include "calib/lens_choice.h"
+#include "calib/judge/scale_bar.h"
+#include "calib/model_selection.h"
 #include "calib/observations.h"
 #include "calib/report/advice.h"
 #include "calib/report/history.h"
@@ -22,17 +22,17 @@ struct Report {
   Solution solution;
   Assessment assessment;
   std::vector<std::pair<std::string, double>> seconds;  ///< of each stage, in order
-  std::vector<LensTrial> lens_trials = {};              ///< empty where the models were given
-  Words words = {};                                     ///< the verdict and what to do, in sentences
+  std::vector<ModelTrial> lens_trials = {};              ///< empty where the models were given
+  Explanation explanation = {};                                     ///< the verdict and what to do, in sentences
   std::string made_at = {};                             ///< as PastCalibration::made_at
   History history = {};                                 ///< of the folder that the report is for
-  std::vector<LengthCheck> known_lengths = {};
+  std::vector<ScaleBarCheck> scale_bar_lengths = {};
 };
 
 /// report.json, as docs/formats.md describes it.
 std::string report_json(const Report& report);
 
-/// report.html: self-contained, pictures first (SVG): the verdict in words, faults and advice; the predicted
+/// report.html: self-contained, images first (SVG): the verdict in words, faults and advice; the predicted
 /// error over the volume; each unseen pose; where each imager was observed and what was left over there; the
 /// figures behind it; earlier calibrations of the rig. Only the date differs from run to run; the stages'
 /// seconds stand in report.json.

@@ -21,7 +21,7 @@ Json devices_json(const std::vector<DeviceQuality>& devices) {
   return list;
 }
 
-Json held_out_json(const HeldOut& score) {
+Json held_out_json(const CrossValidation& score) {
   Json poses = Json::array();
   for (const HeldOutPose& pose : score.poses)
     poses.push_back({{"pose", pose.pose}, {"rms_px", rounded(pose.rms_px)}, {"cells", pose.cells}});
@@ -43,15 +43,15 @@ Json epipolar_json(const Report& report) {
   return list;
 }
 
-Json pulls_json(const Pulls& pulls) {
-  const auto one = [](const PullStatistics& s) -> Json {
+Json normalised_residuals_json(const NormalisedResiduals& normalised_residuals) {
+  const auto one = [](const ResidualStatistics& s) -> Json {
     return {{"mean", rounded(s.mean)},
             {"stddev", rounded(s.stddev)},
             {"beyond_3", rounded(s.beyond_3)},
             {"count", s.count}};
   };
   return {
-      {"corners", one(pulls.corners)}, {"matches", one(pulls.matches)}, {"held_out", one(pulls.held_out)}};
+      {"corners", one(normalised_residuals.corners)}, {"matches", one(normalised_residuals.matches)}, {"held_out", one(normalised_residuals.held_out)}};
 }
 
 Json by_projector(const Report& report, const std::vector<double>& errors) {
@@ -74,7 +74,7 @@ Json error_json(const Report& report) {
 // What was tried; with the models given by hand just those.
 Json lenses_json(const Report& report) {
   Json list = Json::array();
-  for (const LensTrial& trial : report.lens_trials)
+  for (const ModelTrial& trial : report.lens_trials)
     list.push_back({{"device", trial.device},
                     {"model", trial.model},
                     {"held_out_px", rounded(trial.held_out_px)},
@@ -93,9 +93,9 @@ Json lengths_json(const Report& report) {
   const Observations& observations = report.observed.observations;
   const auto mm = [](double m) { return rounded(1e3 * m); };
   Json list = Json::array();
-  for (const LengthCheck& check : report.known_lengths) {
+  for (const ScaleBarCheck& check : report.scale_bar_lengths) {
     Json views = Json::array();
-    for (const LengthView& view : check.views)
+    for (const ScaleBarView& view : check.views)
       views.push_back({{"pose", observations.poses[static_cast<size_t>(view.pose)]},
                        {"camera", observations.cameras[static_cast<size_t>(view.camera)].name},
                        {"projector", observations.projectors[static_cast<size_t>(view.projector)].name},
@@ -114,9 +114,9 @@ Json lengths_json(const Report& report) {
   return list;
 }
 
-Json moved_json(const std::vector<Moved>& devices) {
+Json moved_json(const std::vector<DeviceMove>& devices) {
   Json list = Json::array();
-  for (const Moved& device : devices)
+  for (const DeviceMove& device : devices)
     list.push_back({{"name", device.name},
                     {"degrees", rounded(device.degrees)},
                     {"mm", rounded(device.mm)},
@@ -145,13 +145,13 @@ std::string report_json(const Report& report) {
     faults.push_back({{"name", fault.name}, {"evidence", fault.evidence}, {"advice", fault.advice}});
   for (const auto& [stage, value] : report.seconds) seconds[stage] = std::round(value * 1e3) / 1e3;
   const auto since_last = report.history.rig
-                              ? moved(*report.history.rig, report.observed.observations, report.solution)
-                              : std::vector<Moved>();
+                              ? device_moves(*report.history.rig, report.observed.observations, report.solution)
+                              : std::vector<DeviceMove>();
   const Json json = {{"schema", "limn.report/1"},
                      {"made_at", report.made_at},
                      {"verdict", to_text(a.verdict)},
-                     {"words", report.words.verdict},
-                     {"advice", report.words.advice},
+                     {"words", report.explanation.verdict},
+                     {"advice", report.explanation.advice},
                      {"devices", devices_json(a.devices)},
                      {"held_out", held_out_json(a.held_out)},
                      {"lens_models", lenses_json(report)},
@@ -161,7 +161,7 @@ std::string report_json(const Report& report) {
                        {"share_of_contrasted", rounded(a.decoded_of_contrasted)},
                        {"outliers", a.decode_outliers}}},
                      {"epipolar", epipolar_json(report)},
-                     {"pulls", pulls_json(a.pulls)},
+                     {"pulls", normalised_residuals_json(a.normalised_residuals)},
                      {"known_lengths", lengths_json(report)},
                      {"faults", faults},
                      {"moved", moved_json(since_last)},

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calib/report/drawings.h"
+#include "calib/report/svg_plots.h"
 #include "calib/report/report.h"
 
 namespace limn::calib {
@@ -10,32 +10,32 @@ namespace {
 using Eigen::Vector2d;
 
 std::string figure(const std::string& svg, const std::string& title, const std::string& text) {
-  return fmt::format("<figure>{}<figcaption><b>{}</b> {}</figcaption></figure>\n", svg, escaped(title),
-                     escaped(text));
+  return fmt::format("<figure>{}<figcaption><b>{}</b> {}</figcaption></figure>\n", svg, xml_escaped(title),
+                     xml_escaped(text));
 }
 
 std::string section(const std::string& title, const std::string& content) {
   if (content.empty()) return "";
-  return fmt::format("<section><h2>{}</h2>\n{}</section>\n", escaped(title), content);
+  return fmt::format("<section><h2>{}</h2>\n{}</section>\n", xml_escaped(title), content);
 }
 
 // A table from its head and rows; the first column is text, the others are figures.
 std::string table(const std::vector<std::string>& head, const std::vector<std::vector<std::string>>& rows) {
   if (rows.empty()) return "";
   std::string html = "<div class='wide'><table><tr>";
-  for (const std::string& cell : head) html += "<th>" + escaped(cell) + "</th>";
+  for (const std::string& cell : head) html += "<th>" + xml_escaped(cell) + "</th>";
   html += "</tr>\n";
   for (const auto& row : rows) {
     html += "<tr>";
-    for (const std::string& cell : row) html += "<td>" + escaped(cell) + "</td>";
+    for (const std::string& cell : row) html += "<td>" + xml_escaped(cell) + "</td>";
     html += "</tr>\n";
   }
   return html + "</table></div>\n";
 }
 
 std::string tile(const std::string& value, const std::string& unit, const std::string& what) {
-  return fmt::format("<div class='tile'><b>{}</b> {}<span>{}</span></div>\n", escaped(value), escaped(unit),
-                     escaped(what));
+  return fmt::format("<div class='tile'><b>{}</b> {}<span>{}</span></div>\n", xml_escaped(value), xml_escaped(unit),
+                     xml_escaped(what));
 }
 
 double worst_mm(const Assessment& a) {
@@ -52,13 +52,13 @@ double epipolar_px(const Assessment& a) {
 std::string header(const Report& report) {
   const Assessment& a = report.assessment;
   const std::string verdict = to_text(a.verdict);
-  std::string words = report.words.verdict;
+  std::string words = report.explanation.verdict;
   if (words.starts_with(verdict + ": ")) words = words.substr(verdict.size() + 2);
   if (!words.empty()) words[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(words[0])));
   std::string html =
       fmt::format("<h1>Calibration <span class='{0}'>{0}</span></h1>\n<p class='lead'>{1}</p>\n", verdict,
-                  escaped(words));
-  html += fmt::format("<p class='soft'>{}</p>\n<div class='tiles'>\n", escaped(report.made_at));
+                  xml_escaped(words));
+  html += fmt::format("<p class='soft'>{}</p>\n<div class='tiles'>\n", xml_escaped(report.made_at));
   html += tile(fmt::format("{:.2f}", worst_mm(a)), "mm", "predicted error (95 %), worst projector");
   html += tile(fmt::format("{:.2f}", a.held_out.rms_px), "px", "error on poses the solve has not seen");
   html += tile(fmt::format("{:.2f}", epipolar_px(a)), "px", "off the epipolar lines, on the board");
@@ -70,15 +70,15 @@ std::string fault_list(const std::vector<Fault>& faults) {
   if (faults.empty()) return "";
   std::string html = "<ul class='faults'>\n";
   for (const Fault& fault : faults)
-    html += fmt::format("<li><b>{}</b> {}.<br><em>What to do:</em> {}.</li>\n", escaped(fault.name),
-                        escaped(fault.evidence), escaped(fault.advice));
+    html += fmt::format("<li><b>{}</b> {}.<br><em>What to do:</em> {}.</li>\n", xml_escaped(fault.name),
+                        xml_escaped(fault.evidence), xml_escaped(fault.advice));
   return html + "</ul>\n";
 }
 
 std::string advice_list(const std::vector<std::string>& advice) {
   if (advice.empty()) return "";
   std::string html = "<ul>\n";
-  for (const std::string& sentence : advice) html += "<li>" + escaped(sentence) + "</li>\n";
+  for (const std::string& sentence : advice) html += "<li>" + xml_escaped(sentence) + "</li>\n";
   return html + "</ul>\n";
 }
 
@@ -109,7 +109,7 @@ std::string error_maps_html(const Report& report) {
   return fmt::format(
       "<p>95 % error of light meant for a thing whose place {} measures, on planes across its "
       "view; red: that much or more; grey: the projector does not reach.</p>{}\n{}",
-      escaped(camera.name), colour_key(most, "mm"), html);
+      xml_escaped(camera.name), colour_key(most, "mm"), html);
 }
 
 // Held-out errors on the boards as camera 0 saw them.
@@ -154,11 +154,11 @@ std::string imager_figure(const CapturedDevice& device,
                           const std::vector<FieldPoint>& points,
                           const DeviceQuality& quality,
                           const std::string& what) {
-  const Drawing drawing = residual_field(device.width, device.height, points);
+  const SvgPlot plot = residual_field(device.width, device.height, points);
   return figure(
-      drawing.svg, device.name,
+      plot.svg, device.name,
       fmt::format("{}: {:.3f} px RMS, {} of {} outliers, {:.0f} % covered. {}.", what, quality.rms_px,
-                  quality.outliers, quality.points, 100 * quality.coverage, drawing.key));
+                  quality.outliers, quality.points, 100 * quality.coverage, plot.key));
 }
 
 std::string imagers_html(const Report& report) {
@@ -168,7 +168,7 @@ std::string imagers_html(const Report& report) {
   for (size_t i = 0; i < observations.cameras.size(); ++i) {
     std::vector<FieldPoint> points;
     for (size_t k = 0; k < observations.corners.size(); ++k) {
-      const CornerSeen& seen = observations.corners[k];
+      const CornerObservation& seen = observations.corners[k];
       if (static_cast<size_t>(seen.camera) == i)
         points.push_back({seen.px, solution.corner_residuals[k], solution.corner_outlier[k]});
     }
@@ -186,11 +186,11 @@ std::string imagers_html(const Report& report) {
     const CapturedDevice& device = observations.projectors[i];
     html +=
         imager_figure(device, fitted, report.assessment.devices[observations.cameras.size() + i], "matches");
-    const Drawing drawing = residual_field(device.width, device.height, foretold);
+    const SvgPlot plot = residual_field(device.width, device.height, foretold);
     html +=
-        figure(drawing.svg, device.name + ", unseen poses",
+        figure(plot.svg, device.name + ", unseen poses",
                fmt::format("what a solve without the pose foretells: 95 % within {:.2f} mm on the board. {}.",
-                           report.assessment.held_out_error_mm[i], drawing.key));
+                           report.assessment.held_out_error_mm[i], plot.key));
   }
   return html + "</div>\n";
 }
@@ -215,7 +215,7 @@ std::string devices_table(const Report& report) {
 
 std::string lenses_table(const Report& report) {
   std::vector<std::vector<std::string>> rows;
-  for (const LensTrial& trial : report.lens_trials)
+  for (const ModelTrial& trial : report.lens_trials)
     rows.push_back(
         {trial.device, trial.model,
          std::isfinite(trial.held_out_px) ? fmt::format("{:.3f}", trial.held_out_px) : "no solution",
@@ -240,9 +240,9 @@ std::string trust_tables(const Report& report) {
                     score(pair.board), score(pair.room)});
   std::string html = table({"off the epipolar lines", "on the board", "in the room"}, rows);
   rows.clear();
-  const Pulls& pulls = report.assessment.pulls;
+  const NormalisedResiduals& normalised_residuals = report.assessment.normalised_residuals;
   for (const auto& [name, s] :
-       {std::pair{"corners", pulls.corners}, {"matches", pulls.matches}, {"unseen poses", pulls.held_out}})
+       {std::pair{"corners", normalised_residuals.corners}, {"matches", normalised_residuals.matches}, {"unseen poses", normalised_residuals.held_out}})
     rows.push_back({name, fmt::format("{:.2f}", s.mean), fmt::format("{:.2f}", s.stddev),
                     fmt::format("{:.1f} %", 100 * s.beyond_3), fmt::format("{}", s.count)});
   return html + table({"residual / stated deviation", "mean (0)", "deviation (1)", "beyond 3 (0.3 %)",
@@ -252,7 +252,7 @@ std::string trust_tables(const Report& report) {
 
 std::string lengths_table(const Report& report) {
   std::vector<std::vector<std::string>> rows;
-  for (const LengthCheck& check : report.known_lengths) {
+  for (const ScaleBarCheck& check : report.scale_bar_lengths) {
     const double expected = 1e3 * check.known.length_m, measured = 1e3 * check.measured_m;
     const std::string name = check.known.from + " to " + check.known.to;
     if (check.views.empty()) {
@@ -284,9 +284,9 @@ std::string decode_table(const Report& report) {
       rows);
 }
 
-std::string moved_text(const std::vector<Moved>& devices) {
+std::string moved_text(const std::vector<DeviceMove>& devices) {
   std::string text;
-  for (const Moved& device : devices)
+  for (const DeviceMove& device : devices)
     text += fmt::format(
         "{}{} {:.2f}°, {:.1f} mm{}", text.empty() ? "" : "; ", device.name, device.degrees, device.mm,
         std::isfinite(device.px) ? fmt::format(" ({:.2f} px on the same points)", device.px) : "");
@@ -305,8 +305,8 @@ std::string history_html(const Report& report) {
     held_out.push_back(past.held_out_px);
   }
   const auto now = report.history.rig
-                       ? moved(*report.history.rig, report.observed.observations, report.solution)
-                       : std::vector<Moved>();
+                       ? device_moves(*report.history.rig, report.observed.observations, report.solution)
+                       : std::vector<DeviceMove>();
   rows.push_back({report.made_at + " (this one)", to_text(a.verdict),
                   fmt::format("{:.3f}", a.held_out.rms_px), mm(worst_mm(a)), moved_text(now)});
   held_out.push_back(a.held_out.rms_px);
@@ -349,7 +349,7 @@ std::string report_html(const Report& report) {
       k_style);
   html += header(report);
   html += section("Faults", fault_list(report.assessment.faults));
-  html += section("What would help", advice_list(report.words.advice));
+  html += section("What would help", advice_list(report.explanation.advice));
   html += section("Where light may miss", error_maps_html(report));
   html += section("Where light missed on poses not seen by the solve", board_errors_html(report));
   html += section("Each pose, foretold without it", poses_html(report));

@@ -8,9 +8,9 @@
 namespace limn::calib {
 namespace {
 
-using Role = ResponsePicture::Role;
+using Role = ResponseImage::Role;
 
-constexpr size_t k_most_samples = 1500;  // of all pictures together: a power is then good to 0.001
+constexpr size_t k_most_samples = 1500;  // of all images together: a power is then good to 0.001
 constexpr double k_least_slope = 0.05;   // of the mean: an encoding that is flatter writes no level there
 // A simpler encoding may fit this much worse, relatively and in levels: a free curve always bends a little
 // with noise and rounding, and what it then explains is less than 0.1 % of full scale.
@@ -22,11 +22,11 @@ constexpr int k_rows = 10, k_unknowns = 5;
 using Light = std::array<double, 256>;
 using Values = Eigen::VectorXd;
 
-// Levels of one pixel in black, the eight share pictures and white, and which shares each shows.
+// Levels of one pixel in black, the eight share images and white, and which shares each shows.
 struct Sums {
   std::vector<std::array<double, k_rows>> levels;
   Eigen::Matrix<double, k_rows, k_unknowns> shown;  // dark and four shares
-  std::array<double, k_rows> repeats;               // pictures that a level is the mean of
+  std::array<double, k_rows> repeats;               // images that a level is the mean of
   double lowest = 0, highest = 255;                 // levels, but for the outermost pixels
 };
 
@@ -41,19 +41,19 @@ void find_range(Sums* sums) {
 }
 
 Sums sums_of(std::span<const ResponseSamples* const> samples) {
-  const auto blacks = pictures_of(Role::black), whites = pictures_of(Role::white),
-             shares = pictures_of(Role::share);
+  const auto blacks = images_of(Role::black), whites = images_of(Role::white),
+             shares = images_of(Role::share);
   Sums sums;
   std::array<std::vector<size_t>, k_rows> rows;
   rows[0] = blacks;
   for (size_t i = 0; i < shares.size(); ++i) rows[i + 1] = {shares[i]};
   rows[k_rows - 1] = whites;
   for (size_t row = 0; row < rows.size(); ++row) {
-    const ResponsePicture& picture = response_pictures()[rows[row][0]];
+    const ResponseImage& image = response_images()[rows[row][0]];
     const auto r = static_cast<Eigen::Index>(row);
     sums.shown(r, 0) = 1;
     for (int i = 0; i < 4; ++i)
-      sums.shown(r, i + 1) = picture.role != Role::black && (picture.shares >> i & 1) != 0 ? 1 : 0;
+      sums.shown(r, i + 1) = image.role != Role::black && (image.shares >> i & 1) != 0 ? 1 : 0;
     sums.repeats[row] = static_cast<double>(rows[row].size());
   }
   size_t total = 0;
@@ -64,9 +64,9 @@ Sums sums_of(std::span<const ResponseSamples* const> samples) {
       std::array<double, k_rows> levels{};
       bool clipped = false;
       for (size_t row = 0; row < rows.size(); ++row)
-        for (const size_t picture : rows[row]) {
-          levels[row] += set->at(k)[picture] / sums.repeats[row];
-          clipped = clipped || set->at(k)[picture] >= k_clipped || set->at(k)[picture] == 0;
+        for (const size_t image : rows[row]) {
+          levels[row] += set->at(k)[image] / sums.repeats[row];
+          clipped = clipped || set->at(k)[image] >= k_clipped || set->at(k)[image] == 0;
         }
       if (!clipped) sums.levels.push_back(levels);
     }
@@ -93,7 +93,7 @@ double above(double level, double pedestal) { return std::max(0.0, (level - pede
 Light srgb_light(const Values& values) {
   Light light{};
   for (size_t i = 0; i < light.size(); ++i)
-    light[i] = linear_of_srgb(above(static_cast<double>(i), values[0]));
+    light[i] = linear_from_srgb(above(static_cast<double>(i), values[0]));
   return light;
 }
 
@@ -120,7 +120,7 @@ Light free_light(const Values& values) {
   return light;
 }
 
-// The free curve's slope bends by a tenth from knot to knot unless the pictures say so, so that it goes on
+// The free curve's slope bends by a tenth from knot to knot unless the images say so, so that it goes on
 // straight where no pixel looks; its scale is a convention.
 Eigen::MatrixXd smooth_prior() {
   constexpr double k_bend = 0.1, k_scale = 1;
@@ -158,7 +158,7 @@ double slope_at(const Light& light, double level) {
   return mean_slope(light, std::max(0.0, level - 2), std::min(255.0, level + 2));
 }
 
-// One pixel's light in the rows' pictures, as the sums have it in an encoding.
+// One pixel's light in the rows' images, as the sums have it in an encoding.
 Eigen::Matrix<double, k_rows, 1> summed(const Sums& sums, size_t i, const Light& light) {
   const double least = k_least_slope * mean_slope(light, sums.lowest, sums.highest);
   Eigen::Matrix<double, k_rows, 1> y;
@@ -182,7 +182,7 @@ double level_of(const Light& light, double value) {
   return static_cast<double>(above - 1 - light.begin()) + (value - *(above - 1)) / (*above - *(above - 1));
 }
 
-// What the sums leave over, in levels' standard deviations of one picture: k_rows numbers a pixel. Compared
+// What the sums leave over, in levels' standard deviations of one image: k_rows numbers a pixel. Compared
 // as levels: compared as light over the curve's slope, a curve that bends enough would explain anything.
 Values residuals(const Sums& sums, const Light& light) {
   Values all(static_cast<Eigen::Index>(sums.levels.size()) * k_rows);
@@ -207,7 +207,7 @@ Sums without_noise(const Sums& sums, const Light& light) {
   return smooth;
 }
 
-// Standard deviation of a power on top of an encoding: how much the pictures can tell at all. Asked of sums
+// Standard deviation of a power on top of an encoding: how much the images can tell at all. Asked of sums
 // without noise, for noise alone would look as if it told something. Thousands of pixels that each tell next
 // to nothing do not add up to much: what they tell is then smaller than what is systematically wrong.
 double power_stddev(const Sums& sums, const Light& light, double rms) {
@@ -268,17 +268,17 @@ Fit fitted(const Sums& sums, const Family& family) {
   return fit;
 }
 
-// Of one pixel, over the samples; the mean is taken out of each picture, so that drift is no noise.
+// Of one pixel, over the samples; the mean is taken out of each image, so that drift is no noise.
 double scatter(std::span<const ResponseSamples* const> samples, Role role) {
-  const auto pictures = pictures_of(role);
+  const auto images = images_of(role);
   std::vector<double> squares;
   double sum = 0, count = 0;
   for (const ResponseSamples* set : samples) {
     std::vector<double> shift;
-    for (const size_t picture : pictures) {
+    for (const size_t image : images) {
       std::vector<double> differences;
       for (size_t k = 0; k < set->count; ++k)
-        differences.push_back(set->at(k)[picture] - static_cast<double>(set->at(k)[pictures[0]]));
+        differences.push_back(set->at(k)[image] - static_cast<double>(set->at(k)[images[0]]));
       double mean = 0;
       for (const double d : differences) mean += d / static_cast<double>(differences.size());
       shift.push_back(mean);
@@ -286,15 +286,15 @@ double scatter(std::span<const ResponseSamples* const> samples, Role role) {
     for (size_t k = 0; k < set->count; ++k) {
       double mean = 0, square = 0;
       bool clipped = false;
-      for (size_t i = 0; i < pictures.size(); ++i) {
-        const double level = set->at(k)[pictures[i]] - shift[i];
-        clipped = clipped || set->at(k)[pictures[i]] >= k_clipped;
-        mean += level / static_cast<double>(pictures.size());
+      for (size_t i = 0; i < images.size(); ++i) {
+        const double level = set->at(k)[images[i]] - shift[i];
+        clipped = clipped || set->at(k)[images[i]] >= k_clipped;
+        mean += level / static_cast<double>(images.size());
         square += level * level;
       }
       if (clipped) continue;
-      sum += square - static_cast<double>(pictures.size()) * mean * mean;
-      count += static_cast<double>(pictures.size()) - 1;
+      sum += square - static_cast<double>(images.size()) * mean * mean;
+      count += static_cast<double>(images.size()) - 1;
     }
   }
   return count > 0 ? std::sqrt(std::max(0.0, sum / count)) : 0;

@@ -8,12 +8,12 @@
 namespace limn::calib {
 namespace {
 
-using Role = ResponsePicture::Role;
+using Role = ResponseImage::Role;
 
 constexpr double k_least_sum =
     0.02;  // of squared light over a channel's ramp: its darkest fifth alone tells nothing
 
-// Normal equations of offset + three factors: each picture lights one channel, so they are an arrow.
+// Normal equations of offset + three factors: each image lights one channel, so they are an arrow.
 struct Arrow {
   double weight = 0, light = 0;                        // sums of w, w y
   std::array<double, 3> first{}, second{}, product{};  // of w f, w f f, w f y, per channel
@@ -47,33 +47,33 @@ struct Arrow {
   }
 };
 
-struct Shown {
-  size_t picture = 0;
+struct ShownImage {
+  size_t image = 0;
   int channel = -1;  // of a ramp
   double light = 0;
 };
 
-std::vector<Shown> shown_pictures(const Response& projector) {
-  std::vector<Shown> shown;
-  for (const size_t picture : pictures_of(Role::black)) shown.push_back({picture, -1, 0});
+std::vector<ShownImage> shown_images(const ProjectorResponse& projector) {
+  std::vector<ShownImage> shown;
+  for (const size_t image : images_of(Role::black)) shown.push_back({image, -1, 0});
   for (int c = 0; c < 3; ++c)
-    for (const size_t picture : ramp_of(c))
-      shown.push_back({picture, c, light_over_black(projector, c, response_pictures()[picture].bgr[c])});
+    for (const size_t image : ramp_of(c))
+      shown.push_back({image, c, light_over_black(projector, c, response_images()[image].bgr[c])});
   return shown;
 }
 
-// RMS of foretold minus photographed over the check colours, where the projector's light is seen unclipped.
+// RMS of predicted minus photographed over the check colours, where the projector's light is seen unclipped.
 double held_out_rms(const ResponseShots& shots,
                     const ColourMixing& mixing,
-                    const Response& projector,
+                    const ProjectorResponse& projector,
                     const CameraResponse& camera) {
-  const cv::Mat black = shots.pictures[pictures_of(Role::black)[0]].reshape(1);
-  const cv::Mat white = shots.pictures[pictures_of(Role::white)[0]].reshape(1);
+  const cv::Mat black = shots.images[images_of(Role::black)[0]].reshape(1);
+  const cv::Mat white = shots.images[images_of(Role::white)[0]].reshape(1);
   double squares = 0, count = 0;
-  for (const size_t picture : pictures_of(Role::check)) {
+  for (const size_t image : images_of(Role::check)) {
     const cv::Mat foretold =
-        foretold_photograph(mixing, projector, camera, response_pictures()[picture].bgr).reshape(1);
-    const cv::Mat taken = shots.pictures[picture].reshape(1);
+        predicted_photograph(mixing, projector, camera, response_images()[image].bgr).reshape(1);
+    const cv::Mat taken = shots.images[image].reshape(1);
     for (int r = 0; r < taken.rows; ++r)
       for (int c = 0; c < taken.cols; ++c) {
         constexpr int k_lit = 10;  // levels
@@ -91,11 +91,11 @@ double held_out_rms(const ResponseShots& shots,
 }  // namespace
 
 ColourMixing fitted_mixing(const ResponseShots& shots,
-                           const Response& projector,
+                           const ProjectorResponse& projector,
                            const CameraResponse& camera) {
   const Decoding decode = decoding(camera);
-  const std::vector<Shown> shown = shown_pictures(projector);
-  const cv::Mat& first = shots.pictures[0];
+  const std::vector<ShownImage> shown = shown_images(projector);
+  const cv::Mat& first = shots.images[0];
   ColourMixing mixing{projector.projector, camera.camera, {}, {}, {}, {}, 0};
   const std::array<cv::Mat*, 4> maps = {&mixing.offset, &mixing.blue, &mixing.green, &mixing.red};
   for (cv::Mat* map : maps) map->create(first.size(), CV_MAKETYPE(CV_32F, first.channels()));
@@ -104,8 +104,8 @@ ColourMixing fitted_mixing(const ResponseShots& shots,
     for (int r = rows.start; r < rows.end; ++r)
       for (int c = 0; c < first.cols * first.channels(); ++c) {
         Arrow arrow;
-        for (const Shown& s : shown) {
-          const uchar level = shots.pictures[s.picture].ptr(r)[c];
+        for (const ShownImage& s : shown) {
+          const uchar level = shots.images[s.image].ptr(r)[c];
           arrow.add(s.channel, s.light, decode.light[level], decode.weight[level]);
         }
         const std::array<float, 4> x = arrow.solved(least_weight);
@@ -116,15 +116,15 @@ ColourMixing fitted_mixing(const ResponseShots& shots,
   return mixing;
 }
 
-cv::Mat foretold_photograph(const ColourMixing& mixing,
-                            const Response& projector,
+cv::Mat predicted_photograph(const ColourMixing& mixing,
+                            const ProjectorResponse& projector,
                             const CameraResponse& camera,
                             const cv::Vec3b& bgr) {
   const auto share = [&](int channel) { return light_over_black(projector, channel, bgr[channel]); };
   cv::Mat light = mixing.offset + share(0) * mixing.blue + share(1) * mixing.green + share(2) * mixing.red;
   cv::Mat values = light.reshape(1);
   for (auto& value : cv::Mat_<float>(values))
-    if (!std::isnan(value)) value = static_cast<float>(255 * inverse_looked_up(camera.light, value));
+    if (!std::isnan(value)) value = static_cast<float>(255 * inverse_lookup(camera.light, value));
   return light;
 }
 

@@ -5,16 +5,16 @@
 namespace limn::calib {
 
 /// What each pixel of a camera sees of each channel of a projector, by weighted least squares over the ramps
-/// and the black pictures; levels that are cut off are left out. Also says how well photographs of the check
-/// colours, which are not used, are foretold.
+/// and the black images; levels that are cut off are left out. Also says how well photographs of the check
+/// colours, which are not used, are predicted.
 ColourMixing fitted_mixing(const ResponseShots& shots,
-                           const Response& projector,
+                           const ProjectorResponse& projector,
                            const CameraResponse& camera);
 
-/// The photograph, in levels (CV_32F or CV_32FC3), that a mixing foretells while the projector shows one
+/// The photograph, in levels (CV_32F or CV_32FC3), that a mixing predicts while the projector shows one
 /// colour (display values, BGR) everywhere.
-cv::Mat foretold_photograph(const ColourMixing& mixing,
-                            const Response& projector,
+cv::Mat predicted_photograph(const ColourMixing& mixing,
+                            const ProjectorResponse& projector,
                             const CameraResponse& camera,
                             const cv::Vec3b& bgr);
 

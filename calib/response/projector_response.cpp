@@ -11,24 +11,24 @@
 namespace limn::calib {
 namespace {
 
-using Role = ResponsePicture::Role;
+using Role = ResponseImage::Role;
 
 constexpr double k_root = 2.2;  // light^(1 / 2.2) of a display is nearly straight
 constexpr double k_worst_jump =
-    0.035;  // of light^(1 / 2.2) from what its neighbours foretell: half a step of the ramp
+    0.035;  // of light^(1 / 2.2) from what its neighbours predict: half a step of the ramp
 constexpr int k_tile_px = 16;
 constexpr size_t k_least_tiles = 20;
 constexpr double k_least_light = 0.04;  // of full scale, white in a tile: ten levels
 
 struct Ramp {
-  std::vector<size_t> pictures;
+  std::vector<size_t> images;
   std::vector<double> values;  // display values, 0 … 1
 };
 
 Ramp ramp(int channel) {
   Ramp ramp{ramp_of(channel), {}};
-  for (const size_t picture : ramp.pictures)
-    ramp.values.push_back(response_pictures()[picture].bgr[channel] / 255.0);
+  for (const size_t image : ramp.images)
+    ramp.values.push_back(response_images()[image].bgr[channel] / 255.0);
   return ramp;
 }
 
@@ -37,26 +37,26 @@ std::vector<double> shares_of(const Ramp& ramp,
                               std::span<const DecodedSamples> all,
                               size_t first = 0,
                               size_t step = 1) {
-  const auto blacks = pictures_of(Role::black);
+  const auto blacks = images_of(Role::black);
   std::vector<double> shares;
-  const size_t full = ramp.pictures.back();
-  for (const size_t picture : ramp.pictures) {
+  const size_t full = ramp.images.back();
+  for (const size_t image : ramp.images) {
     double numerator = 0, denominator = 0;
     for (const DecodedSamples& set : all) {
       const auto& light = set.decoding.light;
       for (size_t k = first; k < set.samples->count; k += step) {
         const uchar* levels = set.samples->at(k);
-        double others = 0;  // the instrument: no picture in it stands in the ratio
-        for (const size_t other : ramp.pictures)
-          if (other != picture && other != full) others += light[levels[other]] - light[levels[blacks[0]]];
+        double others = 0;  // the instrument: no image in it stands in the ratio
+        for (const size_t other : ramp.images)
+          if (other != image && other != full) others += light[levels[other]] - light[levels[blacks[0]]];
         double black = 0;
         for (size_t i = 1; i < blacks.size(); ++i)
           black += light[levels[blacks[i]]] / static_cast<double>(blacks.size() - 1);
-        numerator += others * (light[levels[picture]] - black);
+        numerator += others * (light[levels[image]] - black);
         denominator += others * (light[levels[full]] - black);
       }
     }
-    shares.push_back(picture == full ? 1 : numerator / denominator);
+    shares.push_back(image == full ? 1 : numerator / denominator);
   }
   return shares;
 }
@@ -139,7 +139,7 @@ std::vector<double> root_stddevs(const Ramp& ramp,
   return stddevs;
 }
 
-// How far each of the ramp's pictures but the darkest and the brightest is from the cubic through four
+// How far each of the ramp's images but the darkest and the brightest is from the cubic through four
 // neighbours, less what noise can do.
 double worst_jump(const Ramp& ramp,
                   const std::vector<double>& shares,
@@ -174,36 +174,36 @@ Status check_smooth(const Ramp& ramp,
     return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
   };
   if (finite(shares) && finite(stddevs) && jump < k_worst_jump) return {};
-  const size_t picture = ramp.pictures[worst];
+  const size_t image = ramp.images[worst];
   return error(
       "{}/{} or a picture near it: expected light that rises smoothly along the ramp ({}), found {:.3f} of "
       "full "
       "light between {:.3f} and {:.3f}. A picture is repeated, lost or out of order, or the camera sets its "
       "exposure by itself. Capture again with fixed exposure and white balance.",
-      where, picture_name(static_cast<int>(picture)), response_pictures()[picture].what(), shares[worst],
+      where, image_name(static_cast<int>(image)), response_images()[image].what(), shares[worst],
       shares[worst > 0 ? worst - 1 : 0], shares[std::min(worst + 1, shares.size() - 1)]);
 }
 
-// Sums over samples of light over black in some pictures.
-double summed_light(std::span<const DecodedSamples> all, size_t picture) {
-  const auto blacks = pictures_of(Role::black);
+// Sums over samples of light over black in some images.
+double summed_light(std::span<const DecodedSamples> all, size_t image) {
+  const auto blacks = images_of(Role::black);
   double sum = 0;
   for (const DecodedSamples& set : all)
     for (size_t k = 0; k < set.samples->count; ++k) {
       const uchar* levels = set.samples->at(k);
-      const auto white = pictures_of(Role::white);
+      const auto white = images_of(Role::white);
       const bool clipped =
           std::any_of(white.begin(), white.end(), [&](size_t w) { return levels[w] >= k_clipped; });
       if (clipped) continue;
-      sum += set.decoding.light[levels[picture]];
+      sum += set.decoding.light[levels[image]];
       for (const size_t black : blacks)
         sum -= set.decoding.light[levels[black]] / static_cast<double>(blacks.size());
     }
   return sum;
 }
 
-void add_checks(std::span<const DecodedSamples> all, Response* response) {
-  const auto whites = pictures_of(Role::white);
+void add_checks(std::span<const DecodedSamples> all, ProjectorResponse* response) {
+  const auto whites = images_of(Role::white);
   double full[3];
   for (int c = 0; c < 3; ++c) full[c] = summed_light(all, ramp_of(c).back());
   const double white = summed_light(all, whites.front());
@@ -211,32 +211,32 @@ void add_checks(std::span<const DecodedSamples> all, Response* response) {
   response->white_over_sum = white / (full[0] + full[1] + full[2]);
   response->drift = summed_light(all, whites.back()) / white - 1;
   double worst = 0;
-  for (const size_t picture : pictures_of(Role::grey)) {
+  for (const size_t image : images_of(Role::grey)) {
     double expected = 0;
     for (int c = 0; c < 3; ++c)
-      expected += full[c] * light_over_black(*response, c, response_pictures()[picture].bgr[c]);
+      expected += full[c] * light_over_black(*response, c, response_images()[image].bgr[c]);
     worst =
-        std::max(worst, std::abs(summed_light(all, picture) - *response->white_over_sum * expected) / white);
+        std::max(worst, std::abs(summed_light(all, image) - *response->white_over_sum * expected) / white);
   }
   response->worst_residual = worst;
 }
 
-// Decoded light, summed over channels, averaged over pictures; NaN where a level is cut off.
-cv::Mat light_picture(const ResponseShots& shots,
+// Decoded light, summed over channels, averaged over images; NaN where a level is cut off.
+cv::Mat light_image(const ResponseShots& shots,
                       const Decoding& decoding,
-                      std::span<const size_t> pictures) {
-  const cv::Mat& first = shots.pictures[0];
+                      std::span<const size_t> images) {
+  const cv::Mat& first = shots.images[0];
   cv::Mat light(first.size(), CV_32F, cv::Scalar(0));
   const int channels = first.channels();
-  for (const size_t picture : pictures)
+  for (const size_t image : images)
     for (int r = 0; r < first.rows; ++r) {
-      const uchar* levels = shots.pictures[picture].ptr(r);
+      const uchar* levels = shots.images[image].ptr(r);
       auto* out = light.ptr<float>(r);
       for (int c = 0; c < first.cols; ++c)
         for (int k = 0; k < channels; ++k) {
           const uchar level = levels[c * channels + k];
           out[c] += level >= k_clipped ? std::numeric_limits<float>::quiet_NaN()
-                                       : decoding.light[level] / static_cast<float>(pictures.size());
+                                       : decoding.light[level] / static_cast<float>(images.size());
         }
     }
   return light;
@@ -277,14 +277,14 @@ std::optional<Share> share_in(const cv::Mat& black, const cv::Mat& white, const 
 }
 
 std::vector<Share> shares_at_edges(const ResponseShots& shots, const Decoding& decoding) {
-  const auto blacks = pictures_of(Role::black), whites = pictures_of(Role::white),
-             borders = pictures_of(Role::border);
-  // No picture stands on both sides of the fit: its noise would tilt it.
+  const auto blacks = images_of(Role::black), whites = images_of(Role::white),
+             borders = images_of(Role::border);
+  // No image stands on both sides of the fit: its noise would tilt it.
   const std::span<const size_t> all(blacks);
-  const cv::Mat black = light_picture(shots, decoding, all.subspan(1)),
-                first = light_picture(shots, decoding, all.first(1)),
-                white = light_picture(shots, decoding, whites) - first,
-                border = light_picture(shots, decoding, borders) - first;
+  const cv::Mat black = light_image(shots, decoding, all.subspan(1)),
+                first = light_image(shots, decoding, all.first(1)),
+                white = light_image(shots, decoding, whites) - first,
+                border = light_image(shots, decoding, borders) - first;
   std::vector<Share> shares;
   for (int r = 0; r + k_tile_px <= black.rows; r += k_tile_px / 2)
     for (int c = 0; c + k_tile_px <= black.cols; c += k_tile_px / 2) {
@@ -296,10 +296,10 @@ std::vector<Share> shares_at_edges(const ResponseShots& shots, const Decoding& d
 
 }  // namespace
 
-Result<Response> fitted_curves(const std::string& projector,
+Result<ProjectorResponse> fitted_curves(const std::string& projector,
                                const std::string& where,
                                std::span<const DecodedSamples> samples) {
-  Response response;
+  ProjectorResponse response;
   response.projector = projector;
   std::vector<double>* curves[] = {&response.blue, &response.green, &response.red};
   for (int c = 0; c < 3; ++c) {
@@ -308,12 +308,12 @@ Result<Response> fitted_curves(const std::string& projector,
     LIMN_TRY_STATUS(check_smooth(levels, shares, root_stddevs(levels, shares, samples), where));
     *curves[c] = curve_through(points_of(levels, shares));
   }
-  response.captures = static_cast<int>(response_pictures().size());
+  response.captures = static_cast<int>(response_images().size());
   add_checks(samples, &response);
   return response;
 }
 
-std::optional<Measured> fitted_black_level(std::span<const ResponseShots* const> shots,
+std::optional<Measurement> fitted_black_level(std::span<const ResponseShots* const> shots,
                                            std::span<const Decoding> decodings) {
   std::vector<Share> shares;
   for (size_t i = 0; i < shots.size(); ++i) {
@@ -342,10 +342,10 @@ std::optional<Measured> fitted_black_level(std::span<const ResponseShots* const>
         std::sqrt(2 * spread) / weights;  // tiles overlap by half: four share each pixel, half their noise
   }
   // share = black / (white - black)
-  return Measured{std::max(0.0, centre / (1 + centre)), scatter};
+  return Measurement{std::max(0.0, centre / (1 + centre)), scatter};
 }
 
-Response with_black_level(Response response, const std::optional<Measured>& black_level) {
+ProjectorResponse with_black_level(ProjectorResponse response, const std::optional<Measurement>& black_level) {
   response.black_level = black_level;
   if (!black_level) return response;
   for (auto* curve : {&response.red, &response.green, &response.blue})
@@ -353,11 +353,11 @@ Response with_black_level(Response response, const std::optional<Measured>& blac
   return response;
 }
 
-double light_over_black(const Response& response, int channel, int value) {
+double light_over_black(const ProjectorResponse& response, int channel, int value) {
   const std::vector<double>* curves[] = {&response.blue, &response.green, &response.red};
   const std::vector<double>& curve = *curves[channel];
   const double black = response.black_level ? response.black_level->value : 0;
-  return (looked_up(curve, value / 255.0) - black) / (1 - black);
+  return (lookup(curve, value / 255.0) - black) / (1 - black);
 }
 
 }  // namespace limn::calib

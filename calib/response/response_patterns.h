@@ -9,8 +9,8 @@
 
 namespace limn::calib {
 
-/// What a projector shows in one response picture: a colour, everywhere or on a part of its pixels.
-struct ResponsePicture {
+/// What a projector shows in one response image: a colour, everywhere or on a part of its pixels.
+struct ResponseImage {
   enum class Role {
     black,  ///< several times, for drift and noise
     white,  ///< likewise
@@ -18,7 +18,7 @@ struct ResponsePicture {
     border,  ///< white along the panel's edge: says where the panel ends
     ramp,    ///< one channel at one value
     grey,    ///< all channels at one value: do the channels add?
-    check    ///< a colour that is used for nothing but to check what the others foretell
+    check    ///< a colour that is used for nothing but to check what the others predict
   };
   Role role = Role::black;
   cv::Vec3b bgr = {0, 0, 0};
@@ -32,10 +32,10 @@ constexpr int k_ramp_levels = 12;
 /// Width of the border, a share of the panel's smaller side.
 constexpr double k_border = 0.04;
 
-/// The pictures that measure a projector's response, in the order in which they are shown; at most 60.
-const std::vector<ResponsePicture>& response_pictures();
+/// The images that measure a projector's response, in the order in which they are shown; at most 60.
+const std::vector<ResponseImage>& response_images();
 
-/// Picture number `index` for a projector's size, 8-bit BGR.
+/// Image number `index` for a projector's size, 8-bit BGR.
 cv::Mat draw_response(int index, int width, int height);
 
 /// A JSON list of what is shown (limn.response_patterns/1), for people and other programs.

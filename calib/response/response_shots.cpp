@@ -5,18 +5,18 @@
 
 #include "calib/code/patterns.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 
 namespace limn::calib {
 namespace {
 
 namespace fs = std::filesystem;
-using Role = ResponsePicture::Role;
+using Role = ResponseImage::Role;
 
 constexpr double k_least_contrast = 10;  // levels, white over black: below it there is more noise than light
 constexpr size_t k_least_lit = 400;      // channels of pixels: a patch of 20 x 20
 
-fs::path folder_of(const Captures& captures, int projector, int camera) {
+fs::path folder_of(const CaptureSet& captures, int projector, int camera) {
   return captures.folder / "response" / captures.projectors[static_cast<size_t>(projector)].name /
          captures.cameras[static_cast<size_t>(camera)].name;
 }
@@ -67,11 +67,11 @@ Status check_shot(const cv::Mat& shot,
 }
 
 Status check_count(const fs::path& folder) {
-  const size_t count = response_pictures().size();
-  const fs::path beyond = folder / picture_name(static_cast<int>(count));
+  const size_t count = response_images().size();
+  const fs::path beyond = folder / image_name(static_cast<int>(count));
   if (!fs::exists(beyond)) return {};
   return error("{}: expected {} response pictures, 000.png to {}, found more. See limn patterns --response.",
-               beyond.string(), count, picture_name(static_cast<int>(count) - 1));
+               beyond.string(), count, image_name(static_cast<int>(count) - 1));
 }
 
 Error dark(const ResponseShots& shots, size_t lit) {
@@ -91,41 +91,41 @@ Error saturated(const ResponseShots& shots, size_t unclipped, size_t lit) {
 
 }  // namespace
 
-std::vector<size_t> pictures_of(Role role) {
+std::vector<size_t> images_of(Role role) {
   std::vector<size_t> indices;
-  for (size_t i = 0; i < response_pictures().size(); ++i)
-    if (response_pictures()[i].role == role) indices.push_back(i);
+  for (size_t i = 0; i < response_images().size(); ++i)
+    if (response_images()[i].role == role) indices.push_back(i);
   return indices;
 }
 
 std::vector<size_t> ramp_of(int channel) {
-  std::vector<size_t> indices = pictures_of(Role::ramp);
-  std::erase_if(indices, [&](size_t i) { return response_pictures()[i].bgr[channel] == 0; });
+  std::vector<size_t> indices = images_of(Role::ramp);
+  std::erase_if(indices, [&](size_t i) { return response_images()[i].bgr[channel] == 0; });
   return indices;
 }
 
-Status capture_response(const Captures& plan, const Stage& stage) {
+Status capture_response(const CaptureSet& plan, const CaptureBackend& backend) {
   const int projectors = static_cast<int>(plan.projectors.size()),
             cameras = static_cast<int>(plan.cameras.size());
-  const int pictures = static_cast<int>(response_pictures().size());
+  const int images = static_cast<int>(response_images().size());
   int done = 0;
   for (int projector = 0; projector < projectors; ++projector) {
     const CapturedDevice& device = plan.projectors[static_cast<size_t>(projector)];
     for (int camera = 0; camera < cameras; ++camera)
       LIMN_TRY_STATUS(make_folder(folder_of(plan, projector, camera)));
-    for (int i = 0; i < pictures; ++i) {
-      LIMN_TRY_STATUS(stage.show(projector, draw_response(i, device.width, device.height)));
+    for (int i = 0; i < images; ++i) {
+      LIMN_TRY_STATUS(backend.show(projector, draw_response(i, device.width, device.height)));
       for (int camera = 0; camera < cameras; ++camera) {
-        LIMN_TRY(const cv::Mat picture, stage.grab(camera));
-        LIMN_TRY_STATUS(stage.store(folder_of(plan, projector, camera) / picture_name(i), picture));
-        if (stage.tell) stage.tell(++done, projectors * pictures * cameras);
+        LIMN_TRY(const cv::Mat image, backend.grab(camera));
+        LIMN_TRY_STATUS(backend.store(folder_of(plan, projector, camera) / image_name(i), image));
+        if (backend.report_progress) backend.report_progress(++done, projectors * images * cameras);
       }
     }
   }
   return {};
 }
 
-Result<std::vector<ResponsePair>> response_pairs(const Captures& captures) {
+Result<std::vector<ResponsePair>> response_pairs(const CaptureSet& captures) {
   std::vector<ResponsePair> pairs;
   const fs::path folder = captures.folder / "response";
   if (std::error_code ignored; !fs::exists(folder, ignored)) return pairs;
@@ -138,25 +138,25 @@ Result<std::vector<ResponsePair>> response_pairs(const Captures& captures) {
   return pairs;
 }
 
-Result<ResponseShots> read_response_shots(const Captures& captures, const ResponsePair& pair) {
+Result<ResponseShots> read_response_shots(const CaptureSet& captures, const ResponsePair& pair) {
   const CapturedDevice& camera = captures.cameras[static_cast<size_t>(pair.camera)];
   ResponseShots shots{pair.projector, pair.camera, folder_of(captures, pair.projector, pair.camera), {}};
   LIMN_TRY_STATUS(check_count(shots.folder));
-  for (size_t i = 0; i < response_pictures().size(); ++i) {
-    const fs::path path = shots.folder / picture_name(static_cast<int>(i));
+  for (size_t i = 0; i < response_images().size(); ++i) {
+    const fs::path path = shots.folder / image_name(static_cast<int>(i));
     if (std::error_code ignored; !fs::exists(path, ignored))
       return error("{}: missing; a response needs {} pictures (this one shows {}). Capture it again.",
-                   path.string(), response_pictures().size(), response_pictures()[i].what());
-    LIMN_TRY(cv::Mat shot, read_picture(path));
-    LIMN_TRY_STATUS(check_shot(shot, path, camera, shots.pictures.empty() ? shot : shots.pictures[0]));
-    shots.pictures.push_back(std::move(shot));
+                   path.string(), response_images().size(), response_images()[i].what());
+    LIMN_TRY(cv::Mat shot, read_image(path));
+    LIMN_TRY_STATUS(check_shot(shot, path, camera, shots.images.empty() ? shot : shots.images[0]));
+    shots.images.push_back(std::move(shot));
   }
   return shots;
 }
 
 Result<ResponseSamples> sampled(const ResponseShots& shots, size_t most) {
-  const cv::Mat black = shots.pictures[pictures_of(Role::black)[0]],
-                white = shots.pictures[pictures_of(Role::white)[0]];
+  const cv::Mat black = shots.images[images_of(Role::black)[0]],
+                white = shots.images[images_of(Role::white)[0]];
   std::array<size_t, 3> brightest{ramp_of(0).back(), ramp_of(1).back(), ramp_of(2).back()};
   std::vector<size_t> lit;  // offsets of pixels' channels
   size_t lit_at_all = 0, saturated_black = 0;
@@ -164,8 +164,8 @@ Result<ResponseSamples> sampled(const ResponseShots& shots, size_t most) {
     if (black.data[i] >= k_clipped) ++saturated_black;
     if (white.data[i] - black.data[i] < k_least_contrast) continue;
     ++lit_at_all;
-    const bool clipped = std::any_of(brightest.begin(), brightest.end(), [&](size_t picture) {
-      return shots.pictures[picture].data[i] >= k_clipped;
+    const bool clipped = std::any_of(brightest.begin(), brightest.end(), [&](size_t image) {
+      return shots.images[image].data[i] >= k_clipped;
     });
     if (!clipped) lit.push_back(i);
   }
@@ -177,7 +177,7 @@ Result<ResponseSamples> sampled(const ResponseShots& shots, size_t most) {
   ResponseSamples samples{shots.camera, shots.projector, std::min(most, lit.size()), {}};
   for (size_t k = 0; k < samples.count; ++k) {
     const size_t offset = lit[k * lit.size() / samples.count];
-    for (const cv::Mat& picture : shots.pictures) samples.levels.push_back(picture.data[offset]);
+    for (const cv::Mat& image : shots.images) samples.levels.push_back(image.data[offset]);
   }
   return samples;
 }

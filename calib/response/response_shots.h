@@ -6,43 +6,43 @@
 #include <vector>
 
 #include "calib/capture.h"
-#include "calib/captures.h"
+#include "calib/capture_set.h"
 #include "calib/response/response_patterns.h"
 #include "core/result.h"
 
 namespace limn::calib {
 
-/// The photographs of one camera while one projector showed the response pictures.
+/// The photographs of one camera while one projector showed the response images.
 struct ResponseShots {
   int projector = 0;
   int camera = 0;
   std::filesystem::path folder;   ///< response/projector0/camera0 of the captures
-  std::vector<cv::Mat> pictures;  ///< 8-bit grey or BGR, all alike, in the order of response_pictures()
+  std::vector<cv::Mat> images;  ///< 8-bit grey or BGR, all alike, in the order of response_images()
 };
 
-/// Every projector shows the response pictures in turn, every camera photographs each of them, into the
+/// Every projector shows the response images in turn, every camera photographs each of them, into the
 /// captures' response/ folder. What stands before the rig is to be the prototype, and nothing may move.
-Status capture_response(const Captures& plan, const Stage& stage);
+Status capture_response(const CaptureSet& plan, const CaptureBackend& backend);
 
-/// Of which projectors and cameras the captures hold response pictures; empty when there is no response/
+/// Of which projectors and cameras the captures hold response images; empty when there is no response/
 /// folder. A folder in it that is named after no device is an error.
 struct ResponsePair {
   int projector = 0;
   int camera = 0;
 };
-Result<std::vector<ResponsePair>> response_pairs(const Captures& captures);
+Result<std::vector<ResponsePair>> response_pairs(const CaptureSet& captures);
 
-/// Reads them. A missing, damaged or additional picture, another size than the camera's, or grey beside
+/// Reads them. A missing, damaged or additional image, another size than the camera's, or grey beside
 /// colour is an error that names the file.
-Result<ResponseShots> read_response_shots(const Captures& captures, const ResponsePair& pair);
+Result<ResponseShots> read_response_shots(const CaptureSet& captures, const ResponsePair& pair);
 
-/// Levels of some pixels' channels in all pictures: what the fits work on.
+/// Levels of some pixels' channels in all images: what the fits work on.
 struct ResponseSamples {
   int camera = 0;
   int projector = 0;
   size_t count = 0;
-  std::vector<uchar> levels;  ///< [sample][picture]
-  const uchar* at(size_t sample) const { return levels.data() + sample * response_pictures().size(); }
+  std::vector<uchar> levels;  ///< [sample][image]
+  const uchar* at(size_t sample) const { return levels.data() + sample * response_images().size(); }
 };
 
 /// Levels that the sensor may have cut off.
@@ -52,8 +52,8 @@ constexpr int k_clipped = 251;
 /// cut off nearly everywhere (saturated).
 Result<ResponseSamples> sampled(const ResponseShots& shots, size_t most);
 
-/// Indices of the pictures of one role, in their order.
-std::vector<size_t> pictures_of(ResponsePicture::Role role);
+/// Indices of the images of one role, in their order.
+std::vector<size_t> images_of(ResponseImage::Role role);
 /// Of the ramp of one channel (0 blue, 1 green, 2 red), darkest first.
 std::vector<size_t> ramp_of(int channel);
 

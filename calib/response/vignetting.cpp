@@ -131,9 +131,9 @@ struct ShotPair {
   cv::Mat white, black;
 };
 
-Result<ShotPair> shots_of(const Captures& captures, const Match& match) {
+Result<ShotPair> shots_of(const CaptureSet& captures, const Match& match) {
   const auto projector = static_cast<size_t>(match.projector), camera = static_cast<size_t>(match.camera);
-  const auto& files = captures.poses[static_cast<size_t>(match.pose)].pictures[projector][camera];
+  const auto& files = captures.poses[static_cast<size_t>(match.pose)].images[projector][camera];
   const Patterns& patterns = captures.patterns[projector];
   const CapturedDevice& device = captures.cameras[camera];
   LIMN_TRY(cv::Mat white,
@@ -186,7 +186,7 @@ std::optional<PaperLight> paper_around(const ShotPair& shots,
   return mean;
 }
 
-// How large a square of the board stands in a camera's picture, pixels.
+// How large a square of the board stands in a camera's image, pixels.
 double square_px(const Imager& camera,
                  const Pose& world_from_board,
                  const Eigen::Vector3d& p,
@@ -212,7 +212,7 @@ void keep_paper(std::vector<PaperLight>* light) {
 
 }  // namespace
 
-Result<std::vector<PaperLight>> paper_light(const Captures& captures,
+Result<std::vector<PaperLight>> paper_light(const CaptureSet& captures,
                                             const Observations& observations,
                                             const Solution& solution,
                                             const std::vector<CameraResponse>& cameras) {
@@ -251,7 +251,7 @@ Result<std::vector<PaperLight>> paper_light(const Captures& captures,
 void add_vignetting(std::span<const PaperLight> light,
                     const std::vector<CapturedDevice>& cameras,
                     const std::vector<CapturedDevice>& projectors,
-                    Responses* responses) {
+                    RigResponses* responses) {
   if (light.size() < k_least_places) return;
   Problem problem(light, cameras, projectors);
   problem.solve();
@@ -259,7 +259,7 @@ void add_vignetting(std::span<const PaperLight> light,
     for (int i = 0; i < static_cast<int>(cameras.size()); ++i)
       if (cameras[static_cast<size_t>(i)].name == response.camera && problem.sees(i, -1))
         response.vignetting = problem.camera(i);
-  for (Response& response : responses->projectors)
+  for (ProjectorResponse& response : responses->projectors)
     for (int i = 0; i < static_cast<int>(projectors.size()); ++i)
       if (projectors[static_cast<size_t>(i)].name == response.projector && problem.sees(-1, i))
         response.vignetting = problem.projector(i);

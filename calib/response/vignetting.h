@@ -6,7 +6,7 @@
 
 #include "calib/observations.h"
 #include "calib/solve.h"
-#include "core/response.h"
+#include "core/photometric_response.h"
 
 namespace limn::calib {
 
@@ -21,9 +21,9 @@ struct PaperLight {
   double light = 0;
 };
 
-/// The board's paper at the matches of a solve, from the white and black pictures of its poses. Cameras
+/// The board's paper at the matches of a solve, from the white and black images of its poses. Cameras
 /// without a response are left out, and so is light that is cut off.
-Result<std::vector<PaperLight>> paper_light(const Captures& captures,
+Result<std::vector<PaperLight>> paper_light(const CaptureSet& captures,
                                             const Observations& observations,
                                             const Solution& solution,
                                             const std::vector<CameraResponse>& cameras);
@@ -36,6 +36,6 @@ Result<std::vector<PaperLight>> paper_light(const Captures& captures,
 void add_vignetting(std::span<const PaperLight> light,
                     const std::vector<CapturedDevice>& cameras,
                     const std::vector<CapturedDevice>& projectors,
-                    Responses* responses);
+                    RigResponses* responses);
 
 }  // namespace limn::calib

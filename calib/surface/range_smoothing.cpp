@@ -23,7 +23,7 @@ constexpr int k_noise_step = 16;  // pixels between the places where it is measu
 constexpr int k_lag = 7;          // pixels over which the noise may be correlated
 
 // A quadric of the inverse range around a pixel: q = c0 + c1 x + c2 y + c3 x² + c4 xy + c5 y². Inverse ranges
-// of a plane are all but linear in the picture, and a code's noise is even in them.
+// of a plane are all but linear in the image, and a code's noise is even in them.
 using Six = Eigen::Matrix<double, 6, 1>;
 using SixSix = Eigen::Matrix<double, 6, 6>;
 
@@ -52,10 +52,10 @@ class Window {
   const std::vector<Neighbour>& around(const Ranges& ranges, const cv::Mat& links, cv::Point middle) {
     found_.clear();
     std::fill(reached_.begin(), reached_.end(), false);
-    const cv::Rect picture({}, links.size());
+    const cv::Rect image({}, links.size());
     for (const cv::Point d : order_) {
       const cv::Point at = middle + d;
-      if (!picture.contains(at) || std::isnan(ranges.range.at<double>(at))) continue;
+      if (!image.contains(at) || std::isnan(ranges.range.at<double>(at))) continue;
       const cv::Point by_x(d.x - (d.x > 0) + (d.x < 0), d.y), by_y(d.x, d.y - (d.y > 0) + (d.y < 0));
       const bool reached = (d.x == 0 && d.y == 0) ||
                            (d.x != 0 && reached_[index(by_x)] && linked(links, at, middle + by_x)) ||
@@ -163,16 +163,16 @@ struct Pairs {
   }
 };
 
-// Normalised residuals around a place, as a picture; empty where there is too little of one surface.
+// Normalised residuals around a place, as an image; empty where there is too little of one surface.
 cv::Mat residuals_around(const Ranges& ranges, const cv::Mat& links, cv::Point at, Window* window) {
   const std::vector<Neighbour>& around = window->around(ranges, links, at);
   if (static_cast<int>(around.size()) < window->area() / 2) return {};
   const auto fit = fitted(around);
   if (!fit) return {};
-  cv::Mat picture(2 * k_noise_half + 1, 2 * k_noise_half + 1, CV_64F, cv::Scalar(k_nowhere));
+  cv::Mat image(2 * k_noise_half + 1, 2 * k_noise_half + 1, CV_64F, cv::Scalar(k_nowhere));
   for (const Neighbour& n : around)
-    picture.at<double>(n.dy + k_noise_half, n.dx + k_noise_half) = residual(n, *fit) / n.sigma;
-  return picture;
+    image.at<double>(n.dy + k_noise_half, n.dx + k_noise_half) = residual(n, *fit) / n.sigma;
+  return image;
 }
 
 // The size of residuals, outliers aside (1.4826 median for a normal distribution, no less than their RMS to 4

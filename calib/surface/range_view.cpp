@@ -302,7 +302,7 @@ void restrict_to(const cv::Mat& keep, RangeView* view) {
   view->counts.kept = cv::countNonZero(valid_in(view->range));
 }
 
-std::optional<Sight> sight(const RangeView& view, const Vector3d& p_world) {
+std::optional<SurfaceSample> surface_sample(const RangeView& view, const Vector3d& p_world) {
   const auto px = view.camera.project(p_world);
   if (!px) return std::nullopt;
   const int x = static_cast<int>(std::floor(px->x())), y = static_cast<int>(std::floor(px->y()));
@@ -326,11 +326,11 @@ std::optional<Sight> sight(const RangeView& view, const Vector3d& p_world) {
   const Vector3d d = (p_world - p_eye) / distance;
   normal.normalize();
   const double cosine = -normal.dot(d);
-  return Sight{-(1 / inverse - distance) * cosine, stddev * cosine, normal};
+  return SurfaceSample{-(1 / inverse - distance) * cosine, stddev * cosine, normal};
 }
 
-scene::Surface surface_of(const RangeView& view) {
-  scene::Surface surface;
+scene::ScanSurface surface_of(const RangeView& view) {
+  scene::ScanSurface surface;
   cv::Mat number(view.range.size(), CV_32S, cv::Scalar(-1));
   for (int y = 0; y < number.rows; ++y) {
     for (int x = 0; x < number.cols; ++x) {
@@ -360,7 +360,7 @@ scene::Surface surface_of(const RangeView& view) {
   return surface;
 }
 
-cv::Mat pieces_of(const RangeView& view, std::vector<double>* areas) {
+cv::Mat connected_components(const RangeView& view, std::vector<double>* areas) {
   std::vector<int> pixels;
   cv::Mat label = labelled(view.links, valid_in(view.range), &pixels);
   std::vector<double> sums(pixels.size(), 0);

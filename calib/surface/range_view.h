@@ -8,7 +8,7 @@
 
 #include "calib/code/decode.h"
 #include "core/imager.h"
-#include "scene/ply.h"
+#include "scene/scan_surface.h"
 
 namespace limn::calib {
 
@@ -74,22 +74,22 @@ struct DecodedBy {
 RangeView range_view(const Imager& camera, std::span<const DecodedBy> seen, const RangeOptions& options = {});
 
 /// How a view sees the surface at a world point.
-struct Sight {
+struct SurfaceSample {
   double offset = 0;  ///< from the point to the surface along d_normal, m
   double stddev = 0;  ///< of the offset, m
   Eigen::Vector3d d_normal = Eigen::Vector3d::UnitZ();
 };
 /// nullopt where the view has no surface in that direction (between its pixels: all four on one surface).
-std::optional<Sight> sight(const RangeView& view, const Eigen::Vector3d& p_world);
+std::optional<SurfaceSample> surface_sample(const RangeView& view, const Eigen::Vector3d& p_world);
 
 /// The view's pixels as points, neighbours on one surface joined by triangles.
-scene::Surface surface_of(const RangeView& view);
+scene::ScanSurface surface_of(const RangeView& view);
 
 /// Forgets the pixels where `keep` (CV_8U) is 0, and their links.
 void restrict_to(const cv::Mat& keep, RangeView* view);
 
 /// Connected pieces of the view by its links (CV_32S, from 1; 0: nothing), the one with the largest area
 /// first; `areas`: m².
-cv::Mat pieces_of(const RangeView& view, std::vector<double>* areas);
+cv::Mat connected_components(const RangeView& view, std::vector<double>* areas);
 
 }  // namespace limn::calib

@@ -6,9 +6,9 @@
 #include <opencv2/core.hpp>
 
 #include "calib/board/board_finder.h"
-#include "calib/surface/align.h"
+#include "calib/surface/registration.h"
 #include "core/log.h"
-#include "scene/nearest.h"
+#include "scene/mesh_bvh.h"
 
 namespace limn::calib {
 namespace {
@@ -52,17 +52,17 @@ Result<std::vector<const Imager*>> chosen(const std::vector<CapturedDevice>& dev
   return found;
 }
 
-Result<bool> shows_board(const Captures& captures, const CapturedPose& pose) {
+Result<bool> shows_board(const CaptureSet& captures, const CapturedPose& pose) {
   for (size_t camera = 0; camera < captures.cameras.size(); ++camera) {
     const CapturedDevice& device = captures.cameras[camera];
-    const auto& white = pose.pictures[0][camera][static_cast<size_t>(captures.patterns[0].white())];
-    LIMN_TRY(const cv::Mat picture, read_shot(white, device.width, device.height));
-    if (!find_board(captures.board, picture).empty()) return true;
+    const auto& white = pose.images[0][camera][static_cast<size_t>(captures.patterns[0].white())];
+    LIMN_TRY(const cv::Mat image, read_shot(white, device.width, device.height));
+    if (!find_board(captures.board, image).empty()) return true;
   }
   return false;
 }
 
-Result<std::vector<const CapturedPose*>> scene_poses(const Captures& captures, const ScanOptions& options) {
+Result<std::vector<const CapturedPose*>> scene_poses(const CaptureSet& captures, const ScanOptions& options) {
   std::vector<const CapturedPose*> poses;
   for (const std::string& name : options.poses) {
     const auto at = std::find_if(captures.poses.begin(), captures.poses.end(),
@@ -86,12 +86,12 @@ Result<std::vector<const CapturedPose*>> scene_poses(const Captures& captures, c
 
 void keep_pieces(int count, RangeView* view) {
   std::vector<double> areas;
-  const cv::Mat piece = pieces_of(*view, &areas);
+  const cv::Mat piece = connected_components(*view, &areas);
   restrict_to((piece > 0) & (piece <= count), view);
 }
 
 // What one camera saw in one pose, by all projectors.
-Result<RangeView> view_of(const Captures& captures,
+Result<RangeView> view_of(const CaptureSet& captures,
                           const CapturedPose& pose,
                           size_t camera,
                           const Imager& camera_imager,
@@ -101,7 +101,7 @@ Result<RangeView> view_of(const Captures& captures,
   const auto begun = std::chrono::steady_clock::now();
   std::vector<Decoded> decoded;
   for (size_t p = 0; p < projectors.size(); ++p) {
-    LIMN_TRY(Decoded one, decode(captures.patterns[p], pose.pictures[p][camera], camera_imager.width,
+    LIMN_TRY(Decoded one, decode(captures.patterns[p], pose.images[p][camera], camera_imager.width,
                                  camera_imager.height, options.decode));
     decoded.push_back(std::move(one));
   }
@@ -174,7 +174,7 @@ constexpr double k_laid_share =
     0.7;  // of a pose's points on the first: nearly all but what only one pose saw
 constexpr double k_least_share = 0.3;  // less: nothing says that these are one thing
 
-scene::Mesh mesh_of(const scene::Surface& surface) {
+scene::Mesh mesh_of(const scene::ScanSurface& surface) {
   scene::Mesh mesh;
   mesh.positions = surface.positions;
   mesh.normals = surface.normals;
@@ -184,10 +184,10 @@ scene::Mesh mesh_of(const scene::Surface& surface) {
 }
 
 // Views `from` to `to` as one surface.
-scene::Surface joint_surface(const std::vector<ScanView>& views, size_t from, size_t to) {
-  scene::Surface all;
+scene::ScanSurface joint_surface(const std::vector<ScanView>& views, size_t from, size_t to) {
+  scene::ScanSurface all;
   for (size_t i = from; i < to; ++i) {
-    const scene::Surface one = surface_of(views[i].view);
+    const scene::ScanSurface one = surface_of(views[i].view);
     const auto first = static_cast<std::uint32_t>(all.positions.size());
     all.positions.insert(all.positions.end(), one.positions.begin(), one.positions.end());
     all.normals.insert(all.normals.end(), one.normals.begin(), one.normals.end());
@@ -197,10 +197,10 @@ scene::Surface joint_surface(const std::vector<ScanView>& views, size_t from, si
   return all;
 }
 
-double share_laid(const scene::SurfaceIndex& index,
-                  const scene::Surface& surface,
-                  const Alignment& alignment) {
-  const std::vector<float> off = residuals(index, surface, alignment, k_same_m);
+double share_laid(const scene::MeshBvh& index,
+                  const scene::ScanSurface& surface,
+                  const Registration& registration) {
+  const std::vector<float> off = residuals(index, surface, registration, k_same_m);
   const auto on = std::count_if(off.begin(), off.end(), [](float r) { return !std::isnan(r); });
   return static_cast<double>(on) / static_cast<double>(std::max<size_t>(1, off.size()));
 }
@@ -223,24 +223,24 @@ Status lay_onto_first(Scan* scan) {
     return end;
   };
   const size_t first_end = same_pose(0);
-  const scene::Surface first = joint_surface(scan->views, 0, first_end);
+  const scene::ScanSurface first = joint_surface(scan->views, 0, first_end);
   if (first.triangles.empty())
     return error("{}: no surface was seen to lay the other poses onto.", scan->views[0].pose);
   const scene::Mesh mesh = mesh_of(first);
-  const scene::SurfaceIndex index(mesh);
+  const scene::MeshBvh index(mesh);
   for (size_t begin = first_end; begin < scan->views.size(); begin = same_pose(begin)) {
-    const scene::Surface surface = joint_surface(scan->views, begin, same_pose(begin));
+    const scene::ScanSurface surface = joint_surface(scan->views, begin, same_pose(begin));
     const std::string& name = scan->views[begin].pose;
-    Alignment best;
+    Registration best;
     double share = 0;
-    if (const auto near = aligned(mesh, index, surface, Pose())) {
+    if (const auto near = refined_registration(mesh, index, surface, Pose())) {
       best = *near;
       share = share_laid(index, surface, best);
     }
     if (share < k_laid_share) {
-      const auto anywhere = found_anywhere(mesh, index, surface);
-      if (anywhere && share_laid(index, surface, anywhere->alignment) > share) {
-        best = anywhere->alignment;
+      const auto anywhere = global_registration(mesh, index, surface);
+      if (anywhere && share_laid(index, surface, anywhere->registration) > share) {
+        best = anywhere->registration;
         share = share_laid(index, surface, best);
       }
     }
@@ -277,7 +277,7 @@ Agreement over_all(const std::vector<ScanView>& views, double reach) {
   return sum;
 }
 
-Status nothing_seen(const Captures& captures, const Scan& scan) {
+Status nothing_seen(const CaptureSet& captures, const Scan& scan) {
   int decoded = 0;
   for (const ScanView& seen : scan.views) decoded += seen.view.counts.decoded;
   if (decoded == 0)
@@ -293,7 +293,7 @@ Status nothing_seen(const Captures& captures, const Scan& scan) {
 
 }  // namespace
 
-Result<Scan> scanned(const Captures& captures, const Rig& rig, const ScanOptions& options) {
+Result<Scan> scan_captures(const CaptureSet& captures, const Rig& rig, const ScanOptions& options) {
   Scan scan;
   LIMN_TRY(const auto cameras, chosen(captures.cameras, rig.cameras, "camera"));
   LIMN_TRY(const auto projectors, chosen(captures.projectors, rig.projectors, "projector"));
@@ -316,8 +316,8 @@ Result<Scan> scanned(const Captures& captures, const Rig& rig, const ScanOptions
   if (spacing <= 0) return nothing_seen(captures, scan).error();
   scan.voxel_m = options.voxel_m > 0 ? options.voxel_m : 1.5 * spacing;
   scan.agreement = over_all(scan.views, 3 * scan.voxel_m);
-  scan.points = merged_points(views);
-  scan.mesh = merged_mesh(views, scan.voxel_m, options.least_area_m2);
+  scan.points = fused_points(views);
+  scan.mesh = fused_mesh(views, scan.voxel_m, options.least_area_m2);
   scan.seconds_merge = seconds_since(begun);
   return scan;
 }

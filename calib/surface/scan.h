@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "calib/captures.h"
+#include "calib/capture_set.h"
 #include "calib/code/decode.h"
-#include "calib/surface/merge.h"
+#include "calib/surface/tsdf_fusion.h"
 #include "calib/surface/range_view.h"
 #include "core/result.h"
 #include "core/rig.h"
@@ -38,8 +38,8 @@ struct ScanView {
 /// What the captures say of the prototype's surface, in the rig's world (of the first pose when it moved).
 struct Scan {
   std::vector<ScanView> views;
-  scene::Surface points;
-  scene::Surface mesh;
+  scene::ScanSurface points;
+  scene::ScanSurface mesh;
   double voxel_m = 0;
   Agreement agreement;  ///< over all pairs of views that see the same surface
   std::vector<std::string> warnings;
@@ -49,6 +49,6 @@ struct Scan {
 /// Measures the surface from every scene pose of the captures. Errors: a camera or projector that the rig
 /// lacks or that has another size there, no pose without a board, nothing seen, rays that pass each other
 /// (another rig's captures), a prototype that moved between poses when `moved` is not said.
-Result<Scan> scanned(const Captures& captures, const Rig& rig, const ScanOptions& options = {});
+Result<Scan> scan_captures(const CaptureSet& captures, const Rig& rig, const ScanOptions& options = {});
 
 }  // namespace limn::calib

@@ -43,7 +43,7 @@ inline std::uint32_t number_at(const std::string& bytes, std::size_t at) {
 }
 
 // What a frame is answered with: the frame itself, after a moment, on another thread.
-inline Eyes eyes_that_echo(std::chrono::milliseconds after = 0ms, std::size_t jpeg_bytes = 0) {
+inline ImageProviders eyes_that_echo(std::chrono::milliseconds after = 0ms, std::size_t jpeg_bytes = 0) {
   struct Threads {
     std::vector<std::thread> all;
     std::mutex mutex;
@@ -59,16 +59,16 @@ inline Eyes eyes_that_echo(std::chrono::milliseconds after = 0ms, std::size_t jp
       job();
     });
   };
-  Eyes eyes;
-  eyes.look = [later, jpeg_bytes](const Onlooker::Window& window, std::vector<std::uint8_t> jpeg,
-                                  Eyes::Answer answer) {
+  ImageProviders eyes;
+  eyes.look = [later, jpeg_bytes](const TabletView::Window& window, std::vector<std::uint8_t> jpeg,
+                                  ImageProviders::Answer answer) {
     if (jpeg_bytes > 0) jpeg.resize(jpeg_bytes);
     later([device = window.device, jpeg = std::move(jpeg), answer = std::move(answer)] {
       answer({json({{"sees", "nothing"}, {"why", device}}).dump(), jpeg});
     });
   };
   const auto rooms = std::make_shared<std::atomic<std::uint8_t>>(0);
-  eyes.room = [later, rooms](Eyes::Answer answer) {
+  eyes.room = [later, rooms](ImageProviders::Answer answer) {
     later([rooms, answer = std::move(answer)] {
       answer({R"({"why":""})", {0xff, 0xd8, static_cast<std::uint8_t>(++*rooms)}});
     });
@@ -86,7 +86,7 @@ class AServer : public testing::Test {
     ASSERT_TRUE(write_file(folder_ / "secret.txt", "secret"));
   }
 
-  void open(ServeOptions options = {}, Eyes eyes = {}) {
+  void open(ServeOptions options = {}, ImageProviders eyes = {}) {
     if (options.at.empty()) options.at = "0";
     options.page = folder_ / "page";
     options.keys = folder_ / "keys";

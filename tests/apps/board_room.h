@@ -24,9 +24,9 @@ struct BoardRoom {
 
   explicit BoardRoom(const apps::Plan& wanted, double display_delay_s = 0.12)
       : plan(wanted),
-        rig(sim::load_world(wanted.world, apps::marker_picture).value(),
+        rig(sim::load_world(wanted.world, apps::marker_image).value(),
             {.display_delay_s = display_delay_s, .frame_period_s = 0.1, .grab_waits_for_light = false}) {
-    rig.clear_stage();
+    rig.remove_prototype();
     from = to = plan.world_from_board[0];
     from.translation.z() += 0.5;
   }
@@ -44,7 +44,7 @@ struct BoardRoom {
     now.rotation = from.rotation.slerp(share, to.rotation);
     rig.place(apps::board_object(plan.board, now));
   }
-  apps::DeviceStage::Devices devices();
+  apps::DeviceBackend::Devices devices();
   static constexpr int k_steps = 4;
 };
 
@@ -68,12 +68,12 @@ class BoardRoomProjector : public device::Display {
   explicit BoardRoomProjector(BoardRoom* room) : room_(room) {}
   const std::string& name() const override { return room_->rig.projector(0).name(); }
   cv::Size size() const override { return room_->rig.projector(0).size(); }
-  Result<Stamp> show(const cv::Mat& picture) override {
+  Result<Stamp> show(const cv::Mat& image) override {
     const Stamp at = room_->rig.now();
     double least = 0, most = 0;
-    cv::minMaxLoc(picture.reshape(1), &least, &most);
+    cv::minMaxLoc(image.reshape(1), &least, &most);
     room_->moved += least < most && room_->steps_left > 0;  // a pattern
-    LIMN_TRY([[maybe_unused]] const Stamp lit_at, room_->rig.projector(0).show(picture));
+    LIMN_TRY([[maybe_unused]] const Stamp lit_at, room_->rig.projector(0).show(image));
     return at;
   }
 
@@ -81,8 +81,8 @@ class BoardRoomProjector : public device::Display {
   BoardRoom* room_;
 };
 
-inline apps::DeviceStage::Devices BoardRoom::devices() {
-  apps::DeviceStage::Devices all{.cameras = {},
+inline apps::DeviceBackend::Devices BoardRoom::devices() {
+  apps::DeviceBackend::Devices all{.cameras = {},
                                  .projectors = {},
                                  .now = [this] { return rig.now(); },
                                  .wait = [this](double seconds) { rig.advance(seconds); }};

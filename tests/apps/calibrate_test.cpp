@@ -9,7 +9,7 @@
 #include "apps/wizard/pose_quality.h"
 #include "apps/world_markers.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "core/rig.h"
 #include "sim/world.h"
 #include "tests/apps/small_plan.h"
@@ -33,7 +33,7 @@ json calibrated_json(const CalibrateOptions& options) {
   return status.ok() ? json::parse(printed) : json();
 }
 
-std::size_t pictures_in(const fs::path& folder) {
+std::size_t images_in(const fs::path& folder) {
   std::size_t count = 0;
   for (const auto& entry : fs::recursive_directory_iterator(folder))
     count += entry.path().extension() == ".png" ? 1 : 0;
@@ -48,14 +48,14 @@ void expect_prototype(const json& done, const fs::path& rig, const fs::path& wor
   EXPECT_LT(done["prototype"]["painted_p95_mm"].get<double>(), 1);
   EXPECT_GT(done["prototype"]["painted_good"].get<double>(), 0.95);
 
-  const sim::World world = sim::load_world(world_file, marker_picture).value();
+  const sim::World world = sim::load_world(world_file, marker_image).value();
   const Pose truth = world.rig.cameras[0].imager_from_world * world.world_from_prototype;
   const json found = read_json(rig / "scan/poses.json")["world_from_prototype"]["translation_m"];
   EXPECT_NEAR(found[0].get<double>(), truth.translation.x(), 1e-3);
   EXPECT_NEAR(found[1].get<double>(), truth.translation.y(), 1e-3);
   EXPECT_NEAR(found[2].get<double>(), truth.translation.z(), 2e-3);
 
-  const cv::Mat light = read_picture(rig / "scan/projector-projector0.png").value();
+  const cv::Mat light = read_image(rig / "scan/projector-projector0.png").value();
   std::size_t lit = 0, green = 0;
   for (const auto& bgr : cv::Mat_<cv::Vec3b>(light)) {
     lit += bgr[1] > 0;
@@ -64,7 +64,7 @@ void expect_prototype(const json& done, const fs::path& rig, const fs::path& wor
   EXPECT_GT(lit, light.total() / 10);
   EXPECT_EQ(green, lit);
   // The camera sees that light on the prototype, and black beside it.
-  const cv::Mat seen = read_grey_picture(rig / "scan/painted-camera0.png").value();
+  const cv::Mat seen = read_grey_image(rig / "scan/painted-camera0.png").value();
   EXPECT_GT(cv::countNonZero(seen > 80), static_cast<int>(seen.total() / 12));
   EXPECT_LT(cv::countNonZero(seen > 80), static_cast<int>(seen.total() / 3));
 }
@@ -98,11 +98,11 @@ TEST(Calibrate, GoesFromNothingToAGoodRigAndOnFromWhereItWasLeft) {
     EXPECT_GT(poses[i]["coverage"]["projector0"].get<double>(), 0.2);
     EXPECT_EQ(poses[i]["more_helps"].get<std::string>().empty(), i + 1 == poses.size()) << poses[i];
   }
-  // 36 pictures a pose, one every two frames of 1/30 s, and what the last one waits.
+  // 36 images a pose, one every two frames of 1/30 s, and what the last one waits.
   const double capture_s = first["capture_s"]["projector0"];
   EXPECT_NEAR(capture_s, static_cast<double>(poses.size()) * 36 * 2 / 30.0, 1);
   const fs::path captures = out / "captures";
-  ASSERT_EQ(pictures_in(captures), poses.size() * 36);
+  ASSERT_EQ(images_in(captures), poses.size() * 36);
 
   // Left within pose 2: what is complete stays as it is, pose 2 is captured again as a whole.
   const auto written_at = [&](const char* file) { return fs::last_write_time(captures / file); };
@@ -133,7 +133,7 @@ TEST(Calibrate, GoesFromNothingToAGoodRigAndOnFromWhereItWasLeft) {
   EXPECT_NE(refused.message().find("plan.board"), std::string::npos) << refused.message();
   EXPECT_NE(refused.message().find("charuco:8x6:55mm"), std::string::npos) << refused.message();
   EXPECT_NE(refused.message().find("charuco:8x6:56mm"), std::string::npos) << refused.message();
-  EXPECT_EQ(pictures_in(captures), poses.size() * 36);
+  EXPECT_EQ(images_in(captures), poses.size() * 36);
 }
 
 TEST(Calibrate, LeavesCapturesOfOthersAlone) {
@@ -184,7 +184,7 @@ TEST(Calibrate, TellsPlacesAsTheCameraSeesThem) {
     return Pose(exp_rotation(r), p) *
            Pose(Eigen::Quaterniond::Identity(), {-board.width_m() / 2, -board.height_m() / 2, 0});
   };
-  const auto words = places_in_words(
+  const auto words = pose_instructions(
       camera, board,
       {held({0, 0, 0}, {0, 0, 1}), held({0.5, 0, 0}, {-0.5, 0, 1.5}),  // its upper edge goes nearer
        held({0, 0.5, 0}, {0, 0.5, 2}),                                 // its right edge goes nearer

@@ -15,7 +15,7 @@
 #include "apps/check_judge.h"
 #include "apps/command_line.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "device/gl_context.h"
 #include "tests/support/matchers.h"
 
@@ -75,7 +75,7 @@ TEST(Check, ShippedChecksHoldAndCoverEveryMeasure) {
   EXPECT_EQ(page.find("src=\"http"), std::string::npos) << "the page needs no other file";
   EXPECT_NE(page.find("door-in-place"), std::string::npos);
   for (const char* what : {"actual", "expected", "difference"})
-    EXPECT_TRUE(read_picture(out / "door-in-place" / (std::string("shone-") + what + ".png"))) << what;
+    EXPECT_TRUE(read_image(out / "door-in-place" / (std::string("shone-") + what + ".png"))) << what;
 }
 
 TEST(Check, AFileSaysWhatStandsWhereAndWhatTheRendererIsNotTold) {
@@ -214,7 +214,7 @@ TEST_F(CheckJudge, AMapLeftOutOrAnotherLightMissesWhatTheLooksAreJudgedBy) {
   using Maps = scene::SurfaceMaps;
   for (const auto map : {&Maps::metallic_roughness, &Maps::normals, &Maps::occlusion, &Maps::emission}) {
     Check wrong = good;
-    (wrong.told.scene.slots[0].variants[0].mesh.materials[0].maps.*map).picture.release();
+    (wrong.told.scene.slots[0].variants[0].mesh.materials[0].maps.*map).image.release();
     EXPECT_FALSE(share(wrong).good());
   }
   Check wrong = good;
@@ -264,7 +264,7 @@ TEST_F(CheckJudge, AWrongResponseShowsAtTheSeams) {
                                                  k_viewer));
   Check wrong = good;
   for (const Imager& projector : wrong.told.rig.projectors) {
-    Response response;
+    ProjectorResponse response;
     response.projector = projector.name;
     for (int i = 0; i < 256; ++i) response.red.push_back(std::pow(i / 255.0, 1.8));
     response.green = response.blue = response.red;
@@ -282,7 +282,7 @@ TEST_F(CheckJudge, ABlackThatNobodyMeasuredShowsAtTheSeams) {
   const Check good = measured("halves");
   Check wrong = good;
   for (const Imager& projector : wrong.told.rig.projectors) {
-    Response response;  // without a black level
+    ProjectorResponse response;  // without a black level
     response.projector = projector.name;
     for (int i = 0; i < 256; ++i) response.red.push_back(std::pow(i / 255.0, 2.2));
     response.green = response.blue = response.red;
@@ -309,7 +309,7 @@ TEST(Check, ALimitThatCannotHoldFailsAndIsNamed) {
       nlohmann::json::parse(read_file(folder / "out" / "check.json").value()).at("passed").get<bool>());
 }
 
-TEST(Check, AnotherRunsPicturesAreComparedWith) {
+TEST(Check, AnotherRunsImagesAreComparedWith) {
   const fs::path folder = test::test_folder(), there = folder / "there", here = folder / "here";
   const std::string file =
       written(folder, "bench",
@@ -322,7 +322,7 @@ TEST(Check, AnotherRunsPicturesAreComparedWith) {
   EXPECT_NE(same.out.find("apart_share"), std::string::npos) << same.out;
 
   const fs::path theirs = there / "small" / "mask-actual.png";
-  const cv::Mat drawn = read_picture(theirs).value();
+  const cv::Mat drawn = read_image(theirs).value();
   const int side = static_cast<int>(std::sqrt(0.0015 * static_cast<double>(drawn.total()))) + 1;
   const auto other = [&](int levels) {
     cv::Mat changed = drawn.clone();

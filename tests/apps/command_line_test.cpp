@@ -11,7 +11,7 @@
 #include <sstream>
 
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "core/rig.h"
 #include "core/version.h"
 #include "tests/support/matchers.h"
@@ -133,7 +133,7 @@ TEST_F(CommandLine, UnknownFamiliesAndCodesAreWrongUsageAndListWhatExists) {
   expect({"patterns", "--projector", "1280", "--out", path("p")}, 2, {"1280"});
 }
 
-TEST_F(CommandLine, MissingAndTruncatedPicturesAreNamed) {
+TEST_F(CommandLine, MissingAndTruncatedImagesAreNamed) {
   expect({"detect", path("nowhere.png")}, 1, {"nowhere.png"});
   cv::Mat grey(480, 640, CV_8U, cv::Scalar(128));
   ASSERT_TRUE(write_png(folder_ / "a.png", grey));
@@ -142,7 +142,7 @@ TEST_F(CommandLine, MissingAndTruncatedPicturesAreNamed) {
   expect({"detect", path("a.png")}, 1, {"a.png", "truncated"});
 }
 
-TEST_F(CommandLine, APictureOfTheWrongSizeForItsCameraIsNamedWithBothSizes) {
+TEST_F(CommandLine, AnImageOfTheWrongSizeForItsCameraIsNamedWithBothSizes) {
   write_rig();
   cv::Mat grey(100, 100, CV_8U, cv::Scalar(128));
   ASSERT_TRUE(write_png(folder_ / "a.png", grey));

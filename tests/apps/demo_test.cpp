@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "tests/support/matchers.h"
 
 namespace limn::apps {
@@ -35,7 +35,7 @@ TEST(Demo, LandsTheLightWhereItIsAimedAndSaysSo) {
   EXPECT_EQ(page.find("src=\"http"), std::string::npos) << "the page needs no other file";
   for (const char* name :
        {"unlit", "lit", "projector0", "projector1", "composite", "error-map", "composite-swapped"}) {
-    EXPECT_TRUE(read_picture(folder / (std::string(name) + ".png"))) << name;
+    EXPECT_TRUE(read_image(folder / (std::string(name) + ".png"))) << name;
   }
   EXPECT_FALSE(std::filesystem::exists(folder / "demo-captures"));
   EXPECT_TRUE(std::filesystem::exists(folder / "rig" / "report.html"));

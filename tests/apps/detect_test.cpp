@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "core/rig.h"
 #include "tests/support/matchers.h"
 #include "tracker/family.h"
@@ -16,18 +16,18 @@ namespace limn::apps {
 namespace {
 
 // A marker of 80 px, upright, its top-left corner at (99.5, 79.5).
-cv::Mat picture_with_marker() {
-  cv::Mat picture(240, 320, CV_8UC1, cv::Scalar(220));
+cv::Mat image_with_marker() {
+  cv::Mat image(240, 320, CV_8UC1, cv::Scalar(220));
   const cv::Mat marker = tracker::draw_marker({"apriltag_36h11", "7"}, 10).value();
-  marker.copyTo(picture(cv::Rect(100, 80, marker.cols, marker.rows)));
-  return picture;
+  marker.copyTo(image(cv::Rect(100, 80, marker.cols, marker.rows)));
+  return image;
 }
 
 struct Detect : testing::Test {
   std::filesystem::path folder = test::test_folder();
   DetectOptions options;
   void SetUp() override {
-    ASSERT_TRUE(write_png(folder / "a.png", picture_with_marker()));
+    ASSERT_TRUE(write_png(folder / "a.png", image_with_marker()));
     options.images = {folder / "a.png"};
     options.csv = folder / "a.csv";
     options.json = folder / "a.json";
@@ -58,7 +58,7 @@ TEST_F(Detect, WritesCornersAndPoses) {
   EXPECT_NEAR(marker["corners_px"][0][1].get<double>(), 79.5, 0.02);
   EXPECT_NEAR(marker["poses"][0]["camera_from_marker"]["translation_m"][2].get<double>(), 0.4, 1e-3);
   EXPECT_EQ(marker["poses"][0]["covariance"].size(), 6u);
-  EXPECT_TRUE(read_picture(options.draw / "a.png"));
+  EXPECT_TRUE(read_image(options.draw / "a.png"));
   EXPECT_EQ(read_file(options.csv)
                 .value()
                 .rfind("file,id,x0,y0,x1,y1,x2,y2,x3,y3,score\na.png,apriltag_36h11:7,99.", 0),
@@ -89,7 +89,7 @@ TEST_F(Detect, SaysBothSizesWhenTheCameraIsAnother) {
   EXPECT_FALSE(status.error().wrong_usage);
 }
 
-TEST_F(Detect, GoesOnAfterABadPicture) {
+TEST_F(Detect, GoesOnAfterABadImage) {
   ASSERT_TRUE(write_file(folder / "bad.png", "no picture"));
   options.images = {folder / "bad.png", folder / "absent.png", folder / "a.png"};
   options.threads = 3;
@@ -99,11 +99,11 @@ TEST_F(Detect, GoesOnAfterABadPicture) {
   EXPECT_EQ(nlohmann::json::parse(read_file(options.json).value())["images"].size(), 1u);
 }
 
-TEST_F(Detect, ReadsPicturesOfAllDepthsAndChannels) {
+TEST_F(Detect, ReadsImagesOfAllDepthsAndChannels) {
   cv::Mat wide, four;
-  picture_with_marker().convertTo(wide, CV_16U, 257);
+  image_with_marker().convertTo(wide, CV_16U, 257);
   ASSERT_TRUE(write_png(folder / "wide.png", wide));
-  cv::cvtColor(picture_with_marker(), four, cv::COLOR_GRAY2BGRA);
+  cv::cvtColor(image_with_marker(), four, cv::COLOR_GRAY2BGRA);
   ASSERT_TRUE(write_png(folder / "four.png", four));
   cv::cvtColor(wide, four, cv::COLOR_GRAY2BGRA);
   ASSERT_TRUE(write_png(folder / "wide_four.png", four));
@@ -115,7 +115,7 @@ TEST_F(Detect, ReadsPicturesOfAllDepthsAndChannels) {
   for (const auto& image : images) EXPECT_EQ(image["markers"], images[0]["markers"]) << image["file"];
 }
 
-TEST_F(Detect, FindsNothingInPicturesOfNothing) {
+TEST_F(Detect, FindsNothingInImagesOfNothing) {
   options.images.clear();
   for (const auto& [width, height] : {std::pair{1, 1}, {1, 400}, {400, 1}, {2, 2}, {320, 240}})
     for (const int level : {0, 255}) {

@@ -53,16 +53,16 @@ TEST(StillBoard, IsStillWhenItRestsInANewPlace) {
 
 TEST(StillRoom, RestsWhenNothingMovesForAWhile) {
   StillRoom room;
-  cv::Mat noise(240, 320, CV_8UC1), picture(240, 320, CV_8UC1);
+  cv::Mat noise(240, 320, CV_8UC1), image(240, 320, CV_8UC1);
   cv::RNG random(3);
   double at_s = 0;
   const auto rests_after = [&](int hand_x) {
     random.fill(noise, cv::RNG::NORMAL, 6, 2);
-    picture = cv::Scalar(90);
-    cv::add(picture, noise, picture);
-    if (hand_x >= 0) picture(cv::Rect(hand_x, 60, 40, 40)) = cv::Scalar(180);
+    image = cv::Scalar(90);
+    cv::add(image, noise, image);
+    if (hand_x >= 0) image(cv::Rect(hand_x, 60, 40, 40)) = cv::Scalar(180);
     at_s += 0.1;
-    return room.take(picture, shifted(Stamp{}, at_s));
+    return room.take(image, shifted(Stamp{}, at_s));
   };
   for (int i = 0; i < 200; ++i) ASSERT_FALSE(rests_after(i)) << "a hand goes through the picture";
   int waited = 0;
@@ -71,15 +71,15 @@ TEST(StillRoom, RestsWhenNothingMovesForAWhile) {
   EXPECT_FALSE(rests_after(100));
 }
 
-TEST(DeviceStage, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
+TEST(DeviceBackend, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
   const std::filesystem::path folder = test::test_folder();
   test::BoardRoom room(load_plan(test::small_plan(folder)).value());
-  DeviceStage stage(room.devices(), room.plan.board, nullptr);
-  PictureWriter writer;
+  DeviceBackend stage(room.devices(), room.plan.board, nullptr);
+  ImageWriter writer;
   const WizardOptions options{.out = folder / "rig"};
-  const calib::Captures captures = planned(room.plan, room.rig, options.out / "captures").value();
+  const calib::CaptureSet captures = planned(room.plan, room.rig, options.out / "captures").value();
   const auto places =
-      places_in_words(room.rig.world().rig.cameras[0], room.plan.board, room.plan.world_from_board);
+      pose_instructions(room.rig.world().rig.cameras[0], room.plan.board, room.plan.world_from_board);
   std::string lines;
   std::optional<Rig> last;  // as of the poses so far
   const auto done = calibrated(
@@ -101,7 +101,7 @@ TEST(DeviceStage, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
 
   // A recheck by the same devices, of what stands there.
   const Rig rig = load_rig(options.out).value();
-  const calib::Captures again = calib::plan_captures(folder / "again", captures.cameras, captures.projectors,
+  const calib::CaptureSet again = calib::plan_captures(folder / "again", captures.cameras, captures.projectors,
                                                      captures.board, "gray", {.inverses = false});
   const Stamp before = room.rig.now();
   const Status taken = captured_once(again, rig, stage.surroundings(&writer));
@@ -109,11 +109,11 @@ TEST(DeviceStage, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
   EXPECT_LT(seconds_between(before, room.rig.now()), 15);
   const auto checked = rechecked({.rig = options.out, .captures = again.folder, .out = folder / "checked"});
   ASSERT_TRUE(checked) << checked.message();
-  EXPECT_EQ(checked->result.verdict, calib::RecheckVerdict::sound);
+  EXPECT_EQ(checked->result.verdict, calib::RigVerdict::sound);
 }
 
 // A place was planned for a guessed lens: laid onto its outline the board is elsewhere, which the rig tells,
-// and from there it is foretold where the other cameras see it.
+// and from there it is predicted where the other cameras see it.
 TEST(GuidedPoses, AreShownToAllCamerasOnceThereIsARig) {
   const calib::Board board = calib::Board::parse("charuco:11x8:25mm").value();
   const Imager assumed = assumed_camera("camera0", 1280, 1024);

@@ -10,7 +10,7 @@
 
 #include "apps/command_line.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "core/rig.h"
 #include "tests/device/loopback_server.h"
 #include "tests/support/matchers.h"
@@ -35,7 +35,7 @@ Finding found(const std::vector<Finding>& findings, const std::string& area, con
   return {};
 }
 
-// An MJPEG camera that sends a picture every 20 ms.
+// An MJPEG camera that sends an image every 20 ms.
 void stream(test::LoopbackClient& client) {
   std::vector<uchar> bytes;
   cv::imencode(".jpg", cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(90)), bytes);

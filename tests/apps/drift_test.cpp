@@ -11,10 +11,10 @@
 #include <random>
 
 #include "apps/coarser.h"
-#include "apps/live/painter.h"
+#include "apps/live/frame_composer.h"
 #include "apps/live/recording.h"
 #include "apps/live/script.h"
-#include "apps/live/watcher.h"
+#include "apps/live/perception.h"
 #include "apps/world_markers.h"
 #include "core/file.h"
 #include "device/gl_context.h"
@@ -29,39 +29,39 @@ using nlohmann::json;
 
 constexpr double k_nudged_s = 3.5, k_hands_s = 3;
 
-struct Told {
+struct RendererInput {
   double at_s = 0;
   Drift drift;
 };
 
 // What a session in the studio finds moved while all this happens.
-std::vector<Told> found(const json& events, double seconds) {
+std::vector<RendererInput> found(const json& events, double seconds) {
   const fs::path file = test::test_folder() / "script.json";
   const json script = {{"schema", "limn.script/1"}, {"seconds", seconds}, {"events", events}};
   EXPECT_TRUE(write_file(file, script.dump()));
   sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture).value();
-  EXPECT_TRUE(make_coarser(0.34, &world.rig).ok());
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+  EXPECT_TRUE(scale_resolution(0.34, &world.rig).ok());
   const SessionSetup setup{world.rig, *world.scene, {}, {}};
   sim::VirtualRig rig(std::move(world), {.frame_period_s = 0.1, .grab_waits_for_light = false});
   ScriptedRoom room = ScriptedRoom::create(load_script(file).value(), &rig).value();
   const auto context = device::GlContext::create();
   EXPECT_TRUE(context) << context.message();
-  Watcher watcher = Watcher::create(setup.scene, setup.rig).value();
-  Painter painter = Painter::create(setup.scene, setup.rig).value();
-  const scene::Staging staging = scene::first_staging(setup.scene);
-  std::vector<Told> out;
+  Perception perception = Perception::create(setup.scene, setup.rig).value();
+  FrameComposer composer = FrameComposer::create(setup.scene, setup.rig).value();
+  const scene::ShowState show_state = scene::initial_show_state(setup.scene);
+  std::vector<RendererInput> out;
   std::optional<Drift> before;
   while (rig.next_exposure() < shifted(Stamp{}, seconds)) {
     room.set(seconds_between(Stamp{}, rig.next_exposure()));
     const int camera = 0;
-    const Watched& watched = watcher.watch(rig.expose(std::span(&camera, 1)));
-    const Painted& painted = painter.paint(watched, staging, rig.now(), shifted(rig.now(), 0.033));
+    const Percepts& watched = perception.watch(rig.expose(std::span(&camera, 1)));
+    const ComposedFrame& painted = composer.paint(watched, show_state, rig.now(), shifted(rig.now(), 0.033));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i)
       EXPECT_TRUE(rig.projector(static_cast<int>(i)).show(painted.projectors[i]));
-    painter.look_for_drift(watched);
-    if (painter.drift().has_value() == before.has_value()) continue;
-    before = painter.drift();
+    composer.look_for_drift(watched);
+    if (composer.drift().has_value() == before.has_value()) continue;
+    before = composer.drift();
     out.push_back({seconds_between(Stamp{}, watched.captured_at), before.value_or(Drift{})});
     std::printf("%.1f s: %s\n", out.back().at_s, before ? sentence(*before).c_str() : "nothing");
   }
@@ -85,13 +85,13 @@ json sway(const std::string& marker, const Eigen::Vector3d& amplitude_m, double 
 }
 
 // Hands are held into the light and a part is moved to and fro, then something is nudged.
-std::vector<Told> found_after_hands(const json& nudge, double seconds) {
+std::vector<RendererInput> found_after_hands(const json& nudge, double seconds) {
   return found({hand("block", "projector0", 0.5, k_hands_s), hand("cover", "aruco_4x4_50:1", 1, k_hands_s),
                 sway("aruco_4x4_50:0", {0.02, 0, 0}, 1, 2.5), nudge},
                seconds);
 }
 
-void expect_named(const std::vector<Told>& told, const std::string& device) {
+void expect_named(const std::vector<RendererInput>& told, const std::string& device) {
   ASSERT_EQ(told.size(), 1u);
   EXPECT_GT(told[0].at_s, k_nudged_s);
   EXPECT_LE(told[0].at_s, k_nudged_s + 10);

@@ -18,11 +18,11 @@
 #include "apps/import.h"
 #include "core/config.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "core/rig.h"
 #include "device/gl_context.h"
 #include "projector/renderer.h"
-#include "scene/posed.h"
+#include "scene/posed_scene.h"
 #include "scene/scene.h"
 #include "tests/support/matchers.h"
 
@@ -102,7 +102,7 @@ TEST_F(ExportDoor, ComesBackWithItsPointsSharesAndProjectors) {
     EXPECT_TRUE(is_same_bits(region.warp, points));
     EXPECT_FALSE(region.beta) << "no black was measured";
     cv::Mat share;
-    region.alpha->picture.convertTo(share, CV_32F, 1.0 / 65535);
+    region.alpha->image.convertTo(share, CV_32F, 1.0 / 65535);
     cv::Mat wanted;
     cv::extractChannel(blend, wanted, 0);
     EXPECT_LT(cv::norm(share, wanted, cv::NORM_INF), 0.51 / 65535);
@@ -136,7 +136,7 @@ TEST_F(ExportDoor, ComesBackWithItsPointsSharesAndProjectors) {
   EXPECT_EQ(load_rig(folder / "back")->projectors.size(), 2u);
 }
 
-TEST_F(ExportDoor, GivesPlacesInTheViewersPicture) {
+TEST_F(ExportDoor, GivesPlacesInTheViewersImage) {
   options.profile = "3d";
   options.bits = 8;
   options.gamma = 2.2;
@@ -174,7 +174,7 @@ TEST_F(ExportDoor, GivesPlacesInTheViewersPicture) {
   const float share = blend.at<cv::Vec2f>(row, column)[0];
   ASSERT_GT(share, 0.1);
   EXPECT_EQ(region.alpha->gamma_embedded, 2.2);
-  EXPECT_NEAR(region.alpha->picture.at<std::uint8_t>(row, column), 255 * std::pow(share, 1 / 2.2), 0.51);
+  EXPECT_NEAR(region.alpha->image.at<std::uint8_t>(row, column), 255 * std::pow(share, 1 / 2.2), 0.51);
 }
 
 TEST_F(ExportDoor, WritesWarpsAsPfmAndExr) {
@@ -190,19 +190,19 @@ TEST_F(ExportDoor, WritesWarpsAsPfmAndExr) {
   const std::string bytes = read_file(options.warp / "warp-projector1.pfm").value();
   EXPECT_TRUE(bytes.starts_with("PF\n320 240\n-1"));
   EXPECT_TRUE(is_same_bits(read_pfm(bytes, "warp", 1 << 20).value(), points));
-  // The last row of the file is the top row of the picture.
+  // The last row of the file is the top row of the image.
   EXPECT_EQ(bytes.substr(bytes.size() - 320 * 12), std::string(points.ptr<char>(0), 320 * 12));
 
   Imf::InputFile exr((options.warp / "warp-projector1.exr").c_str());
-  cv::Mat picture(points.size(), CV_32FC3);
+  cv::Mat image(points.size(), CV_32FC3);
   Imf::FrameBuffer channels;
   for (int c = 0; c < 3; ++c) {
     channels.insert(std::string(1, "RGB"[c]),
-                    Imf::Slice(Imf::FLOAT, picture.ptr<char>() + 4 * c, 12, picture.step[0]));
+                    Imf::Slice(Imf::FLOAT, image.ptr<char>() + 4 * c, 12, image.step[0]));
   }
   exr.setFrameBuffer(channels);
   exr.readPixels(0, 239);
-  EXPECT_TRUE(is_same_bits(picture, points));
+  EXPECT_TRUE(is_same_bits(image, points));
 }
 
 TEST_F(ExportDoor, WritesEachLookAsTheViewerSeesIt) {
@@ -215,7 +215,7 @@ TEST_F(ExportDoor, WritesEachLookAsTheViewerSeesIt) {
   ASSERT_EQ(files_in(options.looks).size(), variants.size());
   std::vector<cv::Mat> looks;
   for (const scene::Variant& variant : variants) {
-    looks.push_back(read_picture(options.looks / ("look-mirror-" + variant.name + ".png")).value());
+    looks.push_back(read_image(options.looks / ("look-mirror-" + variant.name + ".png")).value());
     EXPECT_EQ(looks.back().size(), cv::Size(1280, 800));
     EXPECT_GT(cv::countNonZero(looks.back().reshape(1)), 1000) << variant.name;
     if (looks.size() > 1) {
@@ -306,14 +306,14 @@ TEST(ExportSheet, SharesSumToOneAndBetaEvensBlack) {
   const double black[2] = {0.004, 0.01};
   const Vector3d p_eye[2] = {{-0.2, 0, -1}, {0.2, 0, -1}};
   Rig rig;
-  Responses responses;
+  RigResponses responses;
   for (std::size_t i = 0; i < 2; ++i) {
     rig.projectors.push_back({fmt::format("projector{}", i), 320, 200, Lens::pinhole(400, 400, 160, 100),
                               Pose(Eigen::Quaterniond::Identity(), -p_eye[i])});
-    Response response{rig.projectors[i].name, {}, {}, {}};
+    ProjectorResponse response{rig.projectors[i].name, {}, {}, {}};
     for (auto* curve : {&response.red, &response.green, &response.blue})
       for (int k = 0; k <= 64; ++k) curve->push_back(black[i] + (1 - black[i]) * std::pow(k / 64.0, 2));
-    response.black_level = Measured{black[i], 0};
+    response.black_level = Measurement{black[i], 0};
     responses.projectors.push_back(response);
   }
   ASSERT_TRUE(save_rig(rig, folder / "rig"));
@@ -337,13 +337,13 @@ TEST(ExportSheet, SharesSumToOneAndBetaEvensBlack) {
   for (int row = 0; row < 200; ++row) {
     for (int column = 0; column < 320; ++column) {
       const auto& q = left.warp.at<cv::Vec3f>(row, column);
-      const int share = left.alpha->picture.at<cv::Vec3w>(row, column)[1];
-      const int least = left.beta->picture.at<cv::Vec3w>(row, column)[1];
+      const int share = left.alpha->image.at<cv::Vec3w>(row, column)[1];
+      const int least = left.beta->image.at<cv::Vec3w>(row, column)[1];
       if (std::isnan(q[0])) {
         EXPECT_EQ(share + least, 0);
       } else if (column >= 160) {
         ++both;
-        const int other = right.alpha->picture.at<cv::Vec3w>(row, column - 160)[1];
+        const int other = right.alpha->image.at<cv::Vec3w>(row, column - 160)[1];
         worst = std::max(worst, std::abs((share + other) / 65535.0 - 1));
         EXPECT_EQ(least, 0);
       } else {
@@ -351,7 +351,7 @@ TEST(ExportSheet, SharesSumToOneAndBetaEvensBlack) {
         worst = std::max(worst, std::abs(share / 65535.0 - 1));
         // Shown alone, the projector's light is its own black and what the other's black would give.
         const Vector3d p(q[0], q[1], q[2]);
-        const double light = looked_up(responses.projectors[0].green, least / 65535.0) - black[0];
+        const double light = lookup(responses.projectors[0].green, least / 65535.0) - black[0];
         const double missing = black[1] * irradiance(1, p) / irradiance(0, p) * (1 - black[0]);
         worst_light = std::max(worst_light, std::abs(light / missing - 1));
       }
@@ -415,14 +415,14 @@ TEST(Import, TakesProjectorsInChristiesForm) {
   EXPECT_EQ(first.name, "Projector 1");
   EXPECT_EQ(first.width, 1400);
   // Turned left by 45 degrees it looks at the origin; z is up, so what is higher is further up in its
-  // picture. Its picture reaches one half to either side at a distance of one, and down to -10 degrees.
+  // image. Its image reaches one half to either side at a distance of one, and down to -10 degrees.
   const double middle = 1050 * std::tan(30_deg) / (std::tan(30_deg) + std::tan(10_deg)) - 0.5;
   EXPECT_TRUE(near(*first.project({0, 0, 0}), Vector2d(699.5, middle), 1e-6));
   const double side = std::sqrt(0.5);
   EXPECT_TRUE(
       near(*first.project(Vector3d(side, side, 0) * std::sqrt(0.5) / 2), Vector2d(1399.5, middle), 1e-4));
   EXPECT_LT(first.project({0, 0, 0.1})->y(), middle);
-  // The other looks down at the origin with its right side turned down: +x is up in its picture.
+  // The other looks down at the origin with its right side turned down: +x is up in its image.
   const Imager& second = rig.projectors[1];
   EXPECT_TRUE(near(*second.project({0, 0, 0}), Vector2d(699.5, middle), 1e-6));
   EXPECT_LT(second.project({0.1, 0, 0})->y(), middle - 10);
@@ -488,9 +488,9 @@ struct Foreign {
     alpha = png(cv::Mat(20, 40, CV_8U, cv::Scalar(128)));
     beta = png(cv::Mat(20, 40, CV_16UC3, cv::Scalar(10, 20, 30)));
   }
-  static std::string png(const cv::Mat& picture) {
+  static std::string png(const cv::Mat& image) {
     std::vector<uchar> bytes;
-    cv::imencode(".png", picture, bytes);
+    cv::imencode(".png", image, bytes);
     return {bytes.begin(), bytes.end()};
   }
   std::vector<ZipFile> files() const {
@@ -515,17 +515,17 @@ TEST(Import, ReadsArchivesOfOtherPrograms) {
   EXPECT_TRUE(std::isnan(region.warp.at<cv::Vec3f>(1, 1)[0]));
   EXPECT_EQ(region.origin, "floorCenter");
   EXPECT_EQ(region.alpha->gamma_embedded, 2.2);
-  EXPECT_EQ(region.alpha->picture.at<std::uint8_t>(7, 7), 128);
-  EXPECT_EQ(region.beta->picture.at<cv::Vec3w>(19, 39), cv::Vec3w(10, 20, 30));
+  EXPECT_EQ(region.alpha->image.at<std::uint8_t>(7, 7), 128);
+  EXPECT_EQ(region.beta->image.at<cv::Vec3w>(19, 39), cv::Vec3w(10, 20, 30));
   EXPECT_FALSE(imager_of(region));
 }
 
 TEST(Import, ReadsPfmsWithoutAScale) {
-  const cv::Mat picture = (cv::Mat_<cv::Vec3f>(1, 2) << cv::Vec3f(1, 2, 3), cv::Vec3f(4, 5, 6));
-  std::string bytes = pfm_bytes(picture);
+  const cv::Mat image = (cv::Mat_<cv::Vec3f>(1, 2) << cv::Vec3f(1, 2, 3), cv::Vec3f(4, 5, 6));
+  std::string bytes = pfm_bytes(image);
   const std::string scale = "-1.000000\n";
   bytes.erase(bytes.find(scale), scale.size());
-  EXPECT_TRUE(is_same_bits(read_pfm(bytes, "warp", 100).value(), picture));
+  EXPECT_TRUE(is_same_bits(read_pfm(bytes, "warp", 100).value(), image));
 }
 
 TEST(Import, SaysWhatIsWrongWithAnArchive) {

@@ -16,17 +16,17 @@ namespace fs = std::filesystem;
 
 const fs::path k_described = fs::path(LIMN_SOURCE_DIR) / "config/described";
 
-Foreseen foreseen(const Described& described) {
-  const auto found = foresee(described);
+PredictedAccuracy predicted_accuracy(const DescribedRig& described) {
+  const auto found = predict_accuracy(described);
   EXPECT_TRUE(found) << found.message();
-  return found ? *found : Foreseen{};
+  return found ? *found : PredictedAccuracy{};
 }
 
 // Of foresee_truth_test, which measures what comes of the same rig: here only what can be worked out by hand.
 TEST(Foresee, TellsSizesOfTheBench) {
   const auto described = load_described(k_described / "bench.json");
   ASSERT_TRUE(described) << described.message();
-  const Foreseen found = foreseen(*described);
+  const PredictedAccuracy found = predicted_accuracy(*described);
   ASSERT_EQ(found.cameras.size(), 1u);
   ASSERT_EQ(found.projectors.size(), 1u);
   // 1.273 m along the projector's level axis over 1523 px; 1.376 m from camera to middle over 1620 px.
@@ -49,7 +49,7 @@ TEST(Foresee, TheExamplesLoadAndTheNumbersRepeat) {
     EXPECT_TRUE(described->rig.cameras[0].project(described->p_centre).has_value());
   }
   const auto described = load_described(k_described / "bench.json");
-  EXPECT_EQ(foreseen(*described).error_mm, foreseen(*described).error_mm);
+  EXPECT_EQ(predicted_accuracy(*described).error_mm, predicted_accuracy(*described).error_mm);
 }
 
 // Everything that was described stands on the page, which needs nothing else.
@@ -60,7 +60,7 @@ TEST(Foresee, APageShowsTheRig) {
   const std::string table = testing::internal::GetCapturedStdout();
   ASSERT_TRUE(done.ok()) << done.message();
   const std::string page = read_file(out / "plan.html").value();
-  const Described described = load_described(k_described / "bench.json").value();
+  const DescribedRig described = load_described(k_described / "bench.json").value();
   for (const auto* imagers : {&described.rig.cameras, &described.rig.projectors})
     for (const Imager& imager : *imagers)
       EXPECT_NE(page.find(">" + imager.name + "</text>"), std::string::npos) << imager.name;
@@ -73,20 +73,20 @@ TEST(Foresee, APageShowsTheRig) {
 TEST(Foresee, NoiseAndNarrowAnglesCostWhatTheyMust) {
   auto described = load_described(k_described / "bench.json");
   ASSERT_TRUE(described) << described.message();
-  const Foreseen before = foreseen(*described);
+  const PredictedAccuracy before = predicted_accuracy(*described);
   EXPECT_TRUE(before.advice.empty()) << before.advice.front();
-  Described noisy = *described;
+  DescribedRig noisy = *described;
   for (double* px : {&noisy.corner_px, &noisy.match_px, &noisy.marker_px}) *px *= 10;
-  const Foreseen rough = foreseen(noisy);
+  const PredictedAccuracy rough = predicted_accuracy(noisy);
   EXPECT_NEAR(rough.calibration_mm[0] / before.calibration_mm[0], 10, 3);
   // Measuring a thing is never believed to be better than 0.03 px; here it is 0.06 px.
   EXPECT_NEAR(rough.measuring_mm[0] / before.measuring_mm[0], 2, 0.3);
   EXPECT_NEAR(rough.markers[0].across_mm / before.markers[0].across_mm, 10, 0.2);
   EXPECT_GT(before.markers[0].along_mm, 3 * before.markers[0].across_mm);
-  Described small = *described;
-  small.rig.projectors[0].width = 400;  // a narrow picture: most of the volume stays dark
+  DescribedRig small = *described;
+  small.rig.projectors[0].width = 400;  // a narrow image: most of the volume stays dark
   small.rig.projectors[0].lens.values[2] = 199.5;
-  const Foreseen dark = foreseen(small);
+  const PredictedAccuracy dark = predicted_accuracy(small);
   EXPECT_LT(dark.coverage, 0.8 * before.coverage);
   ASSERT_FALSE(dark.advice.empty());
   EXPECT_NE(dark.advice[0].find("the projectors reach"), std::string::npos) << dark.advice[0];
@@ -96,35 +96,35 @@ TEST(Foresee, NoiseAndNarrowAnglesCostWhatTheyMust) {
 TEST(Foresee, NamesWhatIsTooSmallFarSteepOrDim) {
   const auto described = load_described(k_described / "bench.json");
   ASSERT_TRUE(described) << described.message();
-  const auto advice_of = [](const Described& rig) {
+  const auto advice_of = [](const DescribedRig& rig) {
     std::string all;
-    for (const std::string& sentence : foreseen(rig).advice) all += sentence + "\n";
+    for (const std::string& sentence : predicted_accuracy(rig).advice) all += sentence + "\n";
     return all;
   };
   const auto has = [](const std::string& text, const std::string& word) {
     return text.find(word) != std::string::npos;
   };
-  Described small = *described;
+  DescribedRig small = *described;
   small.marker_m = 0.02;
   EXPECT_TRUE(has(advice_of(small), "camera0: too small, a marker of 20 mm")) << advice_of(small);
   small.marker_m = 0.045;
   EXPECT_FALSE(has(advice_of(small), "too small"));
 
-  Described steep = *described;
+  DescribedRig steep = *described;
   steep.d_front = Eigen::Vector3d(-1, 0, 0);  // camera and projector stand beside this side
   EXPECT_TRUE(has(advice_of(steep), "camera0: too steep")) << advice_of(steep);
   EXPECT_TRUE(has(advice_of(steep), "projector0: too steep")) << advice_of(steep);
 
-  Described far = *described;
+  DescribedRig far = *described;
   Imager& projector = far.rig.projectors[0];
   const double away = (projector.imager_from_world * far.p_centre).z();
   projector.imager_from_world.translation.z() += away;  // twice as far
   EXPECT_TRUE(has(advice_of(far), "projector0: too far, a pixel is 1.7 mm")) << advice_of(far);
 
-  Described dim = *described;
+  DescribedRig dim = *described;
   dim.room_lux = 100;
   dim.lumens = {400};
-  const Foreseen lit = foreseen(dim);
+  const PredictedAccuracy lit = predicted_accuracy(dim);
   // 400 lm on 1.070 m x 0.669 m, 18.6 degrees off the normal.
   EXPECT_NEAR(lit.projectors[0].lux, 400 / (1.070 * 0.669) * 0.948, 3);
   EXPECT_FALSE(has(advice_of(dim), "too dim")) << advice_of(dim);

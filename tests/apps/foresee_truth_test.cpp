@@ -49,7 +49,7 @@ json read_json(const fs::path& path) { return json::parse(read_file(path).value(
 
 // Calibrates on the plan's virtual rig and compares; `described` may leave the noise to what the report
 // found.
-void check_rig(Described described,
+void check_rig(DescribedRig described,
                const fs::path& plan,
                const fs::path& world_file,
                bool own_noise,
@@ -61,16 +61,16 @@ void check_rig(Described described,
   const json report = read_json(out / "report.json");
   const auto rig = load_rig(out);
   ASSERT_TRUE(rig) << rig.message();
-  const auto world = sim::load_world(world_file, marker_picture);
+  const auto world = sim::load_world(world_file, marker_image);
   ASSERT_TRUE(world) << world.message();
   if (!own_noise) {
     described.corner_px = report["devices"][0]["rms_px"].get<double>() / std::sqrt(2.0);
     described.match_px = report["devices"][1]["rms_px"].get<double>() / std::sqrt(2.0);
   }
-  const auto foreseen = foresee(described);
-  ASSERT_TRUE(foreseen) << foreseen.message();
+  const auto predicted_accuracy = predict_accuracy(described);
+  ASSERT_TRUE(predicted_accuracy) << predicted_accuracy.message();
 
-  ASSERT_EQ(foreseen->error_mm.size(), rig->projectors.size());
+  ASSERT_EQ(predicted_accuracy->error_mm.size(), rig->projectors.size());
   for (std::size_t i = 0; i < rig->projectors.size(); ++i) {
     const test::TrueRig truth = true_pair(*world, i);
     Rig pair;
@@ -83,16 +83,16 @@ void check_rig(Described described,
                       .pooled_mm());
     const double reported_mm = report["predicted_error_mm"]["per_projector"][rig->projectors[i].name];
     std::printf("%s, %s: foreseen %.3f mm (calibration %.3f, measuring %.3f), reported %.3f, true %.3f\n",
-                plan.stem().c_str(), rig->projectors[i].name.c_str(), foreseen->error_mm[i],
-                foreseen->calibration_mm[i], foreseen->measuring_mm[i], reported_mm, true_mm);
-    expect_within_two(foreseen->error_mm[i], reported_mm,
+                plan.stem().c_str(), rig->projectors[i].name.c_str(), predicted_accuracy->error_mm[i],
+                predicted_accuracy->calibration_mm[i], predicted_accuracy->measuring_mm[i], reported_mm, true_mm);
+    expect_within_two(predicted_accuracy->error_mm[i], reported_mm,
                       rig->projectors[i].name + " as the report states it");
-    expect_within_two(foreseen->error_mm[i], true_mm, rig->projectors[i].name + " as it truly is");
+    expect_within_two(predicted_accuracy->error_mm[i], true_mm, rig->projectors[i].name + " as it truly is");
     // Sizes, from the true rig.
     const Imager& projector = world->rig.projectors[i];
     const Eigen::Vector3d p = projector.imager_from_world * described.p_centre;
-    EXPECT_NEAR(foreseen->projectors[i].pixel_mm, 1000 * p.z() / projector.lens.fx(),
-                0.02 * foreseen->projectors[i].pixel_mm);
+    EXPECT_NEAR(predicted_accuracy->projectors[i].pixel_mm, 1000 * p.z() / projector.lens.fx(),
+                0.02 * predicted_accuracy->projectors[i].pixel_mm);
   }
 }
 

@@ -10,13 +10,13 @@
 #include <string>
 
 #include "apps/window/gui.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "device/gl_context.h"
 
 namespace limn::test {
 
 /// A Gui without a window: in memory, with input as a test invents it. LIMN_TEST_KEEP: a folder where
-/// keep() leaves pictures to look at.
+/// keep() leaves images to look at.
 class GuiCanvas {
  public:
   explicit GuiCanvas(cv::Size size) : size_(size), context_(device::GlContext::create().value()) {
@@ -43,19 +43,19 @@ class GuiCanvas {
       draw(widgets, {.pointer = at, .buttons = {held, false, false}});
   }
 
-  cv::Mat picture() const {
-    cv::Mat upside_down(size_, CV_8UC3), picture;
+  cv::Mat image() const {
+    cv::Mat upside_down(size_, CV_8UC3), image;
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
     glPixelStorei(GL_PACK_ALIGNMENT, 1);
     glReadPixels(0, 0, size_.width, size_.height, GL_BGR, GL_UNSIGNED_BYTE, upside_down.data);
-    cv::flip(upside_down, picture, 0);
-    return picture;
+    cv::flip(upside_down, image, 0);
+    return image;
   }
 
   void keep(const std::string& name) const {
     const char* folder = std::getenv("LIMN_TEST_KEEP");
     if (!folder) return;
-    EXPECT_TRUE(write_png(std::filesystem::path(folder) / (name + ".png"), picture()));
+    EXPECT_TRUE(write_png(std::filesystem::path(folder) / (name + ".png"), image()));
   }
 
  private:

@@ -1,6 +1,6 @@
-// Hands over a table with control markers, as the camera side of a session sees them: pictures at 30 a
+// Hands over a table with control markers, as the camera side of a session sees them: images at 30 a
 // second, gestures that must act once and hands that pass, stop and work, which must not. LIMN_SOAK_S:
-// seconds of the pictures' clock (60); an hour gives the numbers of docs/measurements.md.
+// seconds of the images' clock (60); an hour gives the numbers of docs/measurements.md.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,9 +10,9 @@
 #include <cstdlib>
 #include <opencv2/imgproc.hpp>
 
-#include "apps/live/watcher.h"
+#include "apps/live/perception.h"
 #include "tests/support/matchers.h"
-#include "tests/tracker/marker_pictures.h"
+#include "tests/tracker/marker_images.h"
 
 namespace limn::apps {
 namespace {
@@ -20,7 +20,7 @@ namespace {
 using namespace test::literals;
 
 constexpr double k_frame_s = 1 / 30.0;
-constexpr int k_side = 320;  // of the picture; a pixel is a millimetre of the table
+constexpr int k_side = 320;  // of the image; a pixel is a millimetre of the table
 constexpr double k_table_s = 100;
 constexpr double k_arrives_mm_s = 1000;
 constexpr std::size_t k_cover = 0, k_turn = 1, k_lay = 2;  // the controls
@@ -49,7 +49,7 @@ class Table {
       scene.controls.push_back({marker(i), "next_variant", "mirror", gestures[i]});
     Rig rig;
     rig.cameras.push_back({"camera0", k_side, k_side, lens_, {}});
-    watcher_ = Watcher::create(scene, rig).value();
+    perception_ = Perception::create(scene, rig).value();
     for (int i = 0; i < 15; ++i) see();
   }
 
@@ -66,7 +66,7 @@ class Table {
     draw();
   }
 
-  // The next picture: the bare table, or with a hand and its forearm from outside over it.
+  // The next image: the bare table, or with a hand and its forearm from outside over it.
   std::vector<ControlUse> see() { return watched(light_); }
   std::vector<ControlUse> see_hand(const Eigen::Vector2d& px_hand, double arm) {
     return watched(with_hand(px_hand, arm));
@@ -110,14 +110,14 @@ class Table {
   std::vector<ControlUse> watched(const cv::Mat& light) {
     now_s_ += k_frame_s;
     const Frame frame{"camera0", test::noisy_grey(light, 2, rng_), shifted(Stamp{}, 10 + now_s_)};
-    return watcher_->watch(std::span(&frame, 1)).uses;
+    return perception_->watch(std::span(&frame, 1)).uses;
   }
 
   std::mt19937_64& rng_;
   Lens lens_ = Lens::pinhole(1000, 1000, (k_side - 1) / 2.0, (k_side - 1) / 2.0);
   std::array<Control, 3> controls_;
   cv::Mat light_;
-  std::optional<Watcher> watcher_;
+  std::optional<Perception> perception_;
   double now_s_ = 0;
 };
 

@@ -34,7 +34,7 @@ sim::World plane_world() {
   return world;
 }
 
-// The discs drawn by hand into the projector's picture (light = value), moved by `shift_px`: 8x8 sub-pixels.
+// The discs drawn by hand into the projector's image (light = value), moved by `shift_px`: 8x8 sub-pixels.
 cv::Mat drawn(const AimedDots& dots, double shift_px) {
   constexpr int k_sub = 8;
   const double radius_px = (dots.mesh.positions[1] - dots.mesh.positions[0]).norm() * k_focal_px;
@@ -52,9 +52,9 @@ cv::Mat drawn(const AimedDots& dots, double shift_px) {
       }
     }
   }
-  cv::Mat picture;
-  cv::merge(std::vector<cv::Mat>{light, light, light}, picture);
-  return picture;
+  cv::Mat image;
+  cv::merge(std::vector<cv::Mat>{light, light, light}, image);
+  return image;
 }
 
 TEST(Judge, DotsLieOnThePrototypeAndApart) {
@@ -69,8 +69,8 @@ TEST(Judge, DotsLieOnThePrototypeAndApart) {
 TEST(Judge, LightWhereItWasAimedScoresNearZero) {
   const sim::World world = plane_world();
   const AimedDots dots = aimed_dots(world, 400, 1);
-  const std::vector<cv::Mat> pictures = {drawn(dots, 0)};
-  const Registration found = judged_registration(world, dots, pictures);
+  const std::vector<cv::Mat> images = {drawn(dots, 0)};
+  const Registration found = judged_registration(world, dots, images);
   EXPECT_EQ(found.unlit, 0);
   EXPECT_LT(found.rms_mm, 0.03) << "what 8-bit levels and 8x8 sub-pixels leave";
 }
@@ -78,8 +78,8 @@ TEST(Judge, LightWhereItWasAimedScoresNearZero) {
 TEST(Judge, AShiftOfOnePixelIsMeasuredInMillimetres) {
   const sim::World world = plane_world();
   const AimedDots dots = aimed_dots(world, 400, 1);
-  const std::vector<cv::Mat> pictures = {drawn(dots, 1)};
-  const Registration found = judged_registration(world, dots, pictures);
+  const std::vector<cv::Mat> images = {drawn(dots, 1)};
+  const Registration found = judged_registration(world, dots, images);
   EXPECT_NEAR(found.rms_mm, 1, 0.02);
   EXPECT_GE(found.p95_mm, found.rms_mm);
 }
@@ -87,8 +87,8 @@ TEST(Judge, AShiftOfOnePixelIsMeasuredInMillimetres) {
 TEST(Judge, DarknessCountsAsError) {
   const sim::World world = plane_world();
   const AimedDots dots = aimed_dots(world, 50, 1);
-  const std::vector<cv::Mat> pictures = {cv::Mat(480, 640, CV_8UC3, cv::Scalar::all(0))};
-  const Registration found = judged_registration(world, dots, pictures);
+  const std::vector<cv::Mat> images = {cv::Mat(480, 640, CV_8UC3, cv::Scalar::all(0))};
+  const Registration found = judged_registration(world, dots, images);
   EXPECT_EQ(found.unlit, found.points);
   EXPECT_GT(found.rms_mm, 3);
 }

@@ -18,26 +18,26 @@ namespace {
 // The bench, its board held in the plan's first pose.
 struct Bench {
   Plan plan;
-  calib::Captures captures;
+  calib::CaptureSet captures;
   std::unique_ptr<sim::VirtualRig> rig;
 
   explicit Bench(const sim::VirtualRigOptions& options = {}) {
     const std::filesystem::path folder = test::test_folder();
     plan = load_plan(test::small_plan(folder)).value();
-    rig = std::make_unique<sim::VirtualRig>(sim::load_world(plan.world, marker_picture).value(), options);
+    rig = std::make_unique<sim::VirtualRig>(sim::load_world(plan.world, marker_image).value(), options);
     captures = planned(plan, *rig, folder / "captures").value();
-    rig->clear_stage();
+    rig->remove_prototype();
     rig->place(board_object(plan.board, plan.world_from_board[0]));
   }
 
-  LightSeen seen() {
-    const auto all = seen_light(captures, stage_of(rig.get(), nullptr, nullptr));
+  ExposureReading seen() {
+    const auto all = measured_exposure(captures, stage_of(rig.get(), nullptr, nullptr));
     EXPECT_TRUE(all.ok()) << (all ? "" : all.message());
     return all->at(0);
   }
 };
 
-std::string advice_of(const LightSeen& seen) {
+std::string advice_of(const ExposureReading& seen) {
   std::string text;
   for (const std::string& sentence : seen.advice()) text += sentence + "\n";
   return text;
@@ -45,7 +45,7 @@ std::string advice_of(const LightSeen& seen) {
 
 TEST(LightCheck, FindsNothingWrongWithASoundBench) {
   Bench bench;
-  const LightSeen seen = bench.seen();
+  const ExposureReading seen = bench.seen();
   EXPECT_EQ(seen.camera, "camera0");
   EXPECT_EQ(seen.projector, "projector0");
   EXPECT_GT(seen.lit, 0.05);
@@ -57,11 +57,11 @@ TEST(LightCheck, NamesWhatIsWrongWithExposure) {
   Bench bench;
   const double exposure = bench.rig->camera_effects(0).exposure;
   bench.rig->camera_effects(0).exposure = 4 * exposure;
-  const LightSeen bright = bench.seen();
+  const ExposureReading bright = bench.seen();
   EXPECT_GT(bright.saturated, 0.05);
   EXPECT_NE(advice_of(bright).find("Shorten the exposure"), std::string::npos) << advice_of(bright);
   bench.rig->camera_effects(0).exposure = exposure / 4;
-  const LightSeen dark = bench.seen();
+  const ExposureReading dark = bench.seen();
   EXPECT_EQ(dark.saturated, 0);
   EXPECT_NE(advice_of(dark).find("Lengthen the exposure"), std::string::npos) << advice_of(dark);
 }
@@ -70,7 +70,7 @@ TEST(LightCheck, MeasuresHowSoftEdgesAre) {
   Bench bench;
   const double sharp_px = bench.seen().blur_px;
   bench.rig->camera_effects(0).psf_px = 4;
-  const LightSeen soft = bench.seen();
+  const ExposureReading soft = bench.seen();
   EXPECT_LT(sharp_px, 2);
   EXPECT_NEAR(soft.blur_px, std::hypot(sharp_px, 4), 0.8);
   EXPECT_NE(advice_of(soft).find("Focus"), std::string::npos) << advice_of(soft);
@@ -79,7 +79,7 @@ TEST(LightCheck, MeasuresHowSoftEdgesAre) {
 TEST(LightCheck, NamesAProjectorThatNoCameraSees) {
   Bench bench;
   bench.rig->edit().projector_effects[0].illuminance_at_1m = 0;
-  const LightSeen nothing = bench.seen();
+  const ExposureReading nothing = bench.seen();
   EXPECT_LT(nothing.lit, 0.005);
   const auto sentences = unseen({nothing});
   ASSERT_EQ(sentences.size(), 1U);

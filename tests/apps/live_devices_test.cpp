@@ -13,16 +13,16 @@
 #include "apps/live/camera_threads.h"
 #include "apps/live/device_session.h"
 #include "apps/live/latest.h"
-#include "apps/live/repair.h"
+#include "apps/live/live_recalibration.h"
 #include "apps/live/replay.h"
 #include "apps/live/source_clock.h"
 #include "apps/serve/server.h"
 #include "apps/world_markers.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"
-#include "device/picture_camera.h"
+#include "device/image_sequence_camera.h"
 #include "sim/virtual_rig.h"
 #include "tests/apps/remote_client.h"
 #include "tests/support/clicker.h"
@@ -40,11 +40,11 @@ class Canvas : public device::Display {
   Canvas(std::string name, cv::Size size) : name_(std::move(name)), size_(size) {}
   const std::string& name() const override { return name_; }
   cv::Size size() const override { return size_; }
-  Result<Stamp> show(const cv::Mat& picture) override {
-    if (picture.size() != size_) return error("{}: expected its size, found another.", name_);
-    shown = picture.clone();
+  Result<Stamp> show(const cv::Mat& image) override {
+    if (image.size() != size_) return error("{}: expected its size, found another.", name_);
+    shown = image.clone();
     ++count;
-    most_lit = std::max(most_lit, cv::countNonZero(picture.reshape(1)));
+    most_lit = std::max(most_lit, cv::countNonZero(image.reshape(1)));
     return shifted(std::chrono::steady_clock::now(), 0.020);
   }
   cv::Mat shown;
@@ -58,7 +58,7 @@ class Canvas : public device::Display {
 // A camera that sends JPEG, whose cable is out for a while.
 class LooseCamera : public device::CameraSource {
  public:
-  LooseCamera(device::PictureCamera camera, int from, int until)
+  LooseCamera(device::ImageSequenceCamera camera, int from, int until)
       : camera_(std::move(camera)), from_(from), until_(until) {}
   const std::string& name() const override { return camera_.name(); }
   cv::Size size() const override { return camera_.size(); }
@@ -74,7 +74,7 @@ class LooseCamera : public device::CameraSource {
   }
 
  private:
-  device::PictureCamera camera_;
+  device::ImageSequenceCamera camera_;
   int from_, until_, asked_ = 0;
 };
 
@@ -153,7 +153,7 @@ TEST(CameraThreads, ACameraThatDoesNotComeBackIsLeft) {
 TEST(Recorder, AFrameIsReadAsItWasWatched) {
   const fs::path folder = test::test_folder();
   const sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture).value();
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
   SessionSetup setup;
   setup.rig = world.rig;
   setup.scene = *world.scene;
@@ -177,13 +177,13 @@ TEST(Recorder, AFrameIsReadAsItWasWatched) {
   EXPECT_FALSE(load_frame(folder / "recording/frames/camera0/000002.jpg"));
 }
 
-// Threads as of a real rig, on stored pictures of the studio at their pace; a recording of it replays as the
+// Threads as of a real rig, on stored images of the studio at their pace; a recording of it replays as the
 // threads ran.
 TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
   const fs::path folder = test::test_folder();
   sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture).value();
-  ASSERT_TRUE(make_coarser(0.5, &world.rig).ok());
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+  ASSERT_TRUE(scale_resolution(0.5, &world.rig).ok());
   SessionSetup setup;
   setup.rig = world.rig;
   setup.scene = *world.scene;
@@ -194,15 +194,15 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
 
   const auto context = device::GlContext::create();
   ASSERT_TRUE(context) << context.message();
-  auto books = Books::open(folder / "out", folder / "recording", &setup);
-  ASSERT_TRUE(books) << books.message();
-  auto watcher = Watcher::create(setup.scene, setup.rig, setup.watch);
-  ASSERT_TRUE(watcher) << watcher.message();
-  auto session = Session::create(setup, &books->telemetry(), books->recorder());
+  auto output = SessionOutput::open(folder / "out", folder / "recording", &setup);
+  ASSERT_TRUE(output) << output.message();
+  auto perception = Perception::create(setup.scene, setup.rig, setup.watch);
+  ASSERT_TRUE(perception) << perception.message();
+  auto session = Session::create(setup, &output->telemetry(), output->recorder());
   ASSERT_TRUE(session) << session.message();
   SessionDevices devices;
   devices.cameras.push_back(std::make_unique<LooseCamera>(
-      device::PictureCamera::open(folder / "pictures", {.frames_per_second = 20, .repeat = true}).value(), 8,
+      device::ImageSequenceCamera::open(folder / "pictures", {.frames_per_second = 20, .repeat = true}).value(), 8,
       16));
   const Imager& first = setup.rig.projectors[0];
   auto canvas = std::make_unique<Canvas>(first.name, cv::Size(first.width, first.height));
@@ -220,15 +220,15 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
   const std::atomic<bool> is_ended = false;
   const auto begun = std::chrono::steady_clock::now();
   const Status played =
-      play_on_devices(&devices, 2.5, is_ended, &*watcher, &*session, &*books, nullptr, nullptr, nullptr);
+      play_on_devices(&devices, 2.5, is_ended, &*perception, &*session, &*output, nullptr, nullptr, nullptr);
   const double took_s = seconds_between(begun, std::chrono::steady_clock::now());
   ASSERT_TRUE(played.ok()) << played.message();
-  EXPECT_LT(took_s, 2.5 + 1 + 1.5);  // its end, and a picture that was being painted on a slow machine
+  EXPECT_LT(took_s, 2.5 + 1 + 1.5);  // its end, and an image that was being painted on a slow machine
   EXPECT_GE(projector.count, 1);
   EXPECT_GT(projector.most_lit, 1000);  // on a slow machine the last may be of the time without a camera
   EXPECT_GT(screen.most_lit, 1000);
-  EXPECT_EQ(cv::countNonZero(screen.shown.row(10).reshape(1)), 0);  // bars above a wider picture
-  ASSERT_TRUE(books->close(&*session, false).ok());
+  EXPECT_EQ(cv::countNonZero(screen.shown.row(10).reshape(1)), 0);  // bars above a wider image
+  ASSERT_TRUE(output->close(&*session, false).ok());
   const std::string page = read_file(folder / "out/session.html").value();
   EXPECT_NE(page.find("camera0 is gone; the session goes on without it: camera0: the cable is out"),
             std::string::npos);
@@ -274,9 +274,9 @@ class RoomProjector : public device::Display {
   RoomProjector(SharedRoom* room, int index) : room_(room), index_(index) {}
   const std::string& name() const override { return room_->rig.projector(index_).name(); }
   cv::Size size() const override { return room_->rig.projector(index_).size(); }
-  Result<Stamp> show(const cv::Mat& picture) override {
+  Result<Stamp> show(const cv::Mat& image) override {
     const std::lock_guard lock(room_->mutex);
-    const Result<Stamp> shown_at = room_->rig.projector(index_).show(picture);
+    const Result<Stamp> shown_at = room_->rig.projector(index_).show(image);
     return shown_at ? Result<Stamp>(std::chrono::steady_clock::now()) : shown_at;
   }
 
@@ -289,8 +289,8 @@ class RoomProjector : public device::Display {
 TEST(LiveDevices, IsRepairedWhileItRuns) {
   const fs::path folder = test::test_folder();
   sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture).value();
-  ASSERT_TRUE(make_coarser(0.5, &world.rig).ok());
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+  ASSERT_TRUE(scale_resolution(0.5, &world.rig).ok());
   SessionSetup setup;
   setup.rig = world.rig;
   setup.rig.provenance_json = R"({"display_latency_ms": {"projector0": 0, "projector1": 0}})";
@@ -302,11 +302,11 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
                   {}};
   const auto context = device::GlContext::create();
   ASSERT_TRUE(context) << context.message();
-  auto books = Books::open(folder / "out", folder / "recording", &setup);
-  ASSERT_TRUE(books) << books.message();
-  auto watcher = Watcher::create(setup.scene, setup.rig, setup.watch);
-  auto session = Session::create(setup, &books->telemetry(), books->recorder());
-  ASSERT_TRUE(watcher && session);
+  auto output = SessionOutput::open(folder / "out", folder / "recording", &setup);
+  ASSERT_TRUE(output) << output.message();
+  auto perception = Perception::create(setup.scene, setup.rig, setup.watch);
+  auto session = Session::create(setup, &output->telemetry(), output->recorder());
+  ASSERT_TRUE(perception && session);
   SessionDevices devices;
   devices.cameras.push_back(std::make_unique<RoomCamera>(&room, 0));
   for (int i = 0; i < 2; ++i) devices.projectors.push_back(std::make_unique<RoomProjector>(&room, i));
@@ -337,10 +337,10 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
     is_ended = true;
   });
   const Status played =
-      play_on_devices(&devices, 60, is_ended, &*watcher, &*session, &*books, nullptr, nullptr, server.get());
+      play_on_devices(&devices, 60, is_ended, &*perception, &*session, &*output, nullptr, nullptr, server.get());
   guest.join();
   ASSERT_TRUE(played.ok()) << played.message();
-  ASSERT_TRUE(books->close(&*session, false).ok());
+  ASSERT_TRUE(output->close(&*session, false).ok());
   std::printf("during a repair of %.1f s an edit took %.2f s at most\n", repair_s, longest_s);
   EXPECT_LT(longest_s, 0.4 * repair_s) << "a picture that is painted, and a painter for the mended rig";
   EXPECT_TRUE(told.contains("computing"));
@@ -359,24 +359,24 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
   const Status replayed = run_replay(replay);
   EXPECT_TRUE(replayed.ok()) << replayed.message();
 
-  // Whatever it is at, it ends in time: with the pictures that were taken.
+  // Whatever it is at, it ends in time: with the images that were taken.
   for (const bool is_computing : {false, true}) {
     std::vector<fs::path> shown;
-    auto repair = std::make_unique<Repair>(
-        setup.rig, folder / fmt::format("ended-{}", is_computing), [&](PictureWriter* writer) {
+    auto repair = std::make_unique<LiveRecalibration>(
+        setup.rig, folder / fmt::format("ended-{}", is_computing), [&](ImageWriter* writer) {
           Surroundings around;
           around.stage.show = [&](int projector, const cv::Mat&) -> Status {
-            const fs::path pictures =
+            const fs::path images =
                 folder / fmt::format("out/repaired-1/captures/pose00/projector{}/camera0", projector);
             const auto before = std::count_if(shown.begin(), shown.end(), [&](const fs::path& path) {
-              return path.parent_path() == pictures;
+              return path.parent_path() == images;
             });
-            shown.push_back(pictures / fmt::format("{:03}.png", before));
+            shown.push_back(images / fmt::format("{:03}.png", before));
             return {};
           };
-          around.stage.grab = [&](int) { return read_picture(shown.back()); };
-          around.stage.store = [writer](const fs::path& path, const cv::Mat& picture) {
-            return writer->store(path, picture);
+          around.stage.grab = [&](int) { return read_image(shown.back()); };
+          around.stage.store = [writer](const fs::path& path, const cv::Mat& image) {
+            return writer->store(path, image);
           };
           around.written = [writer] { return writer->finish(); };
           around.use_latency = [](int, double) {};

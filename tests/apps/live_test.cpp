@@ -17,19 +17,19 @@
 #include "apps/live/device_session.h"
 #include "apps/live/osc.h"
 #include "apps/live/replay.h"
-#include "apps/live/room.h"
+#include "apps/live/virtual_room.h"
 #include "apps/live/scene_watch.h"
 #include "apps/live/script.h"
 #include "apps/live/session.h"
 #include "apps/live/swapped_cameras.h"
 #include "apps/live/telemetry.h"
 #include "apps/live/udp_socket.h"
-#include "apps/live/watcher.h"
+#include "apps/live/perception.h"
 #include "apps/world_markers.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "device/gl_context.h"
-#include "device/picture_camera.h"
+#include "device/image_sequence_camera.h"
 #include "sim/virtual_rig.h"
 #include "tests/apps/studio.h"
 #include "tests/support/matchers.h"
@@ -218,9 +218,9 @@ TEST(Live, DrawsAnewWhenTheGraphicsCardLostIt) {
   sim::VirtualRig rig(world, {.grab_waits_for_light = false});
   std::optional<device::GlContext> context = device::GlContext::create().value();
   Telemetry telemetry = Telemetry::create({}).value();
-  auto watcher = Watcher::create(setup.scene, setup.rig);
+  auto perception = Perception::create(setup.scene, setup.rig);
   auto session = Session::create(setup, &telemetry, nullptr, false);
-  ASSERT_TRUE(watcher && session);
+  ASSERT_TRUE(perception && session);
   bool is_lost = false, can_renew = false;
   session->survive_losses({[&] { return is_lost; },
                            [&]() -> Status {
@@ -231,11 +231,11 @@ TEST(Live, DrawsAnewWhenTheGraphicsCardLostIt) {
                              return {};
                            }});
   const int camera = 0;
-  session->take(watcher->watch(rig.expose(std::span(&camera, 1))), 1);
+  session->take(perception->watch(rig.expose(std::span(&camera, 1))), 1);
   const Stamp now = rig.now(), shown_at = shifted(now, 0.03);
   const cv::Mat good = session->paint(now, shown_at).projectors[0].clone();
   ASSERT_GT(cv::countNonZero(good.reshape(1)), 100);
-  const auto is_good = [&](const Painted& painted) {
+  const auto is_good = [&](const ComposedFrame& painted) {
     return cv::norm(painted.projectors[0], good, cv::NORM_INF) == 0;
   };
   is_lost = true;
@@ -244,12 +244,12 @@ TEST(Live, DrawsAnewWhenTheGraphicsCardLostIt) {
   EXPECT_TRUE(session->screen().empty());
   can_renew = true;
   rig.advance(3);
-  session->take(watcher->watch(rig.expose(std::span(&camera, 1))), 2);
+  session->take(perception->watch(rig.expose(std::span(&camera, 1))), 2);
   const cv::Mat anew = session->paint(rig.now(), shifted(rig.now(), 0.03)).projectors[0].clone();
   Telemetry unused = Telemetry::create({}).value();
   auto fresh = Session::create(setup, &unused, nullptr, false);  // that has lost nothing
   ASSERT_TRUE(fresh);
-  fresh->take(watcher->watched(), 1);
+  fresh->take(perception->watched(), 1);
   const cv::Mat expected = fresh->paint(rig.now(), shifted(rig.now(), 0.03)).projectors[0];
   EXPECT_EQ(cv::norm(anew, expected, cv::NORM_INF), 0);
   EXPECT_FALSE(is_lost);
@@ -266,8 +266,8 @@ class Canvas : public device::Display {
   Canvas(std::string name, cv::Size size) : name_(std::move(name)), size_(size) {}
   const std::string& name() const override { return name_; }
   cv::Size size() const override { return size_; }
-  Result<Stamp> show(const cv::Mat& picture) override {
-    shown = picture.clone();
+  Result<Stamp> show(const cv::Mat& image) override {
+    shown = image.clone();
     return shifted(std::chrono::steady_clock::now(), 0.02);
   }
   cv::Mat shown;
@@ -287,17 +287,17 @@ TEST(Live, EachScreenShowsWhatWasChosenForIt) {
   ASSERT_TRUE(write_png(folder / "seen.png", seen));
   const auto context = device::GlContext::create();
   ASSERT_TRUE(context) << context.message();
-  auto books = Books::open({}, folder / "recording", &setup);
-  ASSERT_TRUE(books) << books.message();
+  auto output = SessionOutput::open({}, folder / "recording", &setup);
+  ASSERT_TRUE(output) << output.message();
   EXPECT_EQ(setup.screens.size(), 3u);
-  auto watcher = Watcher::create(setup.scene, setup.rig);
-  auto session = Session::create(setup, &books->telemetry(), books->recorder(), false);
-  ASSERT_TRUE(watcher && session);
+  auto perception = Perception::create(setup.scene, setup.rig);
+  auto session = Session::create(setup, &output->telemetry(), output->recorder(), false);
+  ASSERT_TRUE(perception && session);
   for (const auto& [screen, what] : {std::pair{"", "full"}, {"wall", "camera"}, {"roof", "off"}})
     ASSERT_TRUE(session->edit({"screen", screen, what}, "test", {}));
   SessionDevices devices;
-  devices.cameras.push_back(std::make_unique<device::PictureCamera>(
-      device::PictureCamera::open(folder / "seen.png", {.repeat = true}).value()));
+  devices.cameras.push_back(std::make_unique<device::ImageSequenceCamera>(
+      device::ImageSequenceCamera::open(folder / "seen.png", {.repeat = true}).value()));
   const Imager& projector = setup.rig.projectors[0];
   devices.projectors.resize(setup.rig.projectors.size());
   devices.projectors[0] =
@@ -310,13 +310,13 @@ TEST(Live, EachScreenShowsWhatWasChosenForIt) {
   }
   const std::atomic<bool> is_ended = false;
   const Status played =
-      play_on_devices(&devices, 1.5, is_ended, &*watcher, &*session, &*books, nullptr, nullptr, nullptr);
+      play_on_devices(&devices, 1.5, is_ended, &*perception, &*session, &*output, nullptr, nullptr, nullptr);
   ASSERT_TRUE(played) << played.message();
   for (const Canvas* screen : screens) ASSERT_FALSE(screen->shown.empty()) << screen->name();
   EXPECT_EQ(cv::norm(screens[0]->shown, seen, cv::NORM_INF), 0);
   EXPECT_GT(cv::norm(screens[1]->shown, seen, cv::NORM_INF), 50) << "with parts";
   EXPECT_EQ(cv::countNonZero(screens[2]->shown.reshape(1)), 0);
-  ASSERT_TRUE(books->close(&*session, false));
+  ASSERT_TRUE(output->close(&*session, false));
   ReplayOptions replay;
   replay.session = folder / "recording";
   const Status replayed = run_replay(replay);
@@ -343,13 +343,13 @@ TEST(Live, GoesOnWithoutItsCamera) {
       dark += event["paint"]["parts"].empty();
   EXPECT_GT(dark, 15);
   // Nothing is left on where nothing is known, and in the end all is there again.
-  EXPECT_GT(cv::countNonZero(read_grey_picture(folder / "out/projector-projector0.png").value()), 1000);
+  EXPECT_GT(cv::countNonZero(read_grey_image(folder / "out/projector-projector0.png").value()), 1000);
   EXPECT_NE(read_file(folder / "out/session.html").value().find("camera0 is back"), std::string::npos);
 }
 
-// Pictures of a size that the rig was not measured in are none, and said to be; a camera whose clock steps is
+// Images of a size that the rig was not measured in are none, and said to be; a camera whose clock steps is
 // as good as before.
-TEST(Live, GoesOnWhenItsCamerasPicturesAndClockChange) {
+TEST(Live, GoesOnWhenItsCamerasImagesAndClockChange) {
   const fs::path folder = test::test_folder();
   const auto lived = [&](const std::string& name, double duration_s, const json& events) {
     LiveOptions options;
@@ -361,7 +361,7 @@ TEST(Live, GoesOnWhenItsCamerasPicturesAndClockChange) {
     return read_json(options.out / "session.json");
   };
   const auto last_light = [&](const std::string& name) {
-    return read_picture(folder / name / "projector-projector0.png").value();
+    return read_image(folder / name / "projector-projector0.png").value();
   };
   const json sway = {{"at_s", 0.2}, {"until_s", 5}, {"sway", k_mirror}, {"amplitude_m", {0.03, 0, 0}}};
   lived("calm", 0.9, json::array({sway}));
@@ -399,7 +399,7 @@ TEST(Live, RefillsASomebodysShadow) {
     options.script = written(folder / (name + ".json"), script_of(0.6, events));
     options.out = folder / name;
     EXPECT_TRUE(run_live(options).ok());
-    return read_picture(options.out / "projector-projector1.png").value();
+    return read_image(options.out / "projector-projector1.png").value();
   };
   const json hand = {{{"at_s", 0.3}, {"until_s", 2}, {"block", "projector0"}}};
   const cv::Mat calm = light("calm", true, json::array()), calm_off = light("calm-off", false, json::array());
@@ -436,9 +436,9 @@ TEST(Live, KeepsLooks) {
   const fs::path looks = folder / "door/looks";
   const json calm = read_json(looks / "calm.json"), bold = read_json(looks / "bold.json");
   EXPECT_NE(calm.at("slots").at("mirror").at("variant"), bold.at("slots").at("mirror").at("variant"));
-  const cv::Mat calm_picture = read_picture(looks / "calm.png").value(),
-                bold_picture = read_picture(looks / "bold.png").value();
-  EXPECT_GT(cv::norm(calm_picture, bold_picture, cv::NORM_INF), 50);
+  const cv::Mat calm_image = read_image(looks / "calm.png").value(),
+                bold_image = read_image(looks / "bold.png").value();
+  EXPECT_GT(cv::norm(calm_image, bold_image, cv::NORM_INF), 50);
   EXPECT_FALSE(fs::exists(looks / "third.json"));
   const std::string page = read_file(looks / "looks.html").value();
   EXPECT_NE(page.find("<b>calm</b>"), std::string::npos);
@@ -452,7 +452,7 @@ TEST(Live, KeepsLooks) {
     for (const cv::Vec3b& c : cv::Mat_<cv::Vec3b>(bgr)) count += c[1] > 1.5 * std::max(c[0], c[2]) + 20;
     return count;
   };
-  EXPECT_GT(green(bold_picture), green(calm_picture) + 500);
+  EXPECT_GT(green(bold_image), green(calm_image) + 500);
 
   // The next session knows them.
   options.script =
@@ -468,7 +468,7 @@ TEST(Live, KeepsLooks) {
           1e3 * translation[2].get<double>())),
       std::string::npos)
       << poses[poses.size() - 2];
-  EXPECT_GT(green(read_picture(options.out / "projector-projector0.png").value()), 100);
+  EXPECT_GT(green(read_image(options.out / "projector-projector0.png").value()), 100);
 }
 
 // A part is dropped into its slot's folder, then spoilt, while the session runs.
@@ -497,8 +497,8 @@ TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
   const auto broken = news();
   ASSERT_TRUE(broken.has_value());
   ASSERT_TRUE(*broken);
-  ASSERT_EQ((*broken)->left_out.size(), 1u);
-  EXPECT_NE((*broken)->left_out[0].why.find("new.glb"), std::string::npos) << (*broken)->left_out[0].why;
+  ASSERT_EQ((*broken)->skipped_variants.size(), 1u);
+  EXPECT_NE((*broken)->skipped_variants[0].why.find("new.glb"), std::string::npos) << (*broken)->skipped_variants[0].why;
   fs::remove(dropped);
 
   LiveOptions options;
@@ -508,17 +508,17 @@ TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
   options.out = folder / "out";
   options.record = folder / "recording";
   std::thread person([&] {
-    const auto wait_for_pictures = [&](std::size_t more) {
+    const auto wait_for_images = [&](std::size_t more) {
       const fs::path events = options.record / "events.jsonl";
       const std::size_t before = lines_of(events).size();
       for (int i = 0; i < 400 && lines_of(events).size() < before + more; ++i)
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
     };
-    wait_for_pictures(4);
+    wait_for_images(4);
     fs::copy_file(folder / "door/mirror-sport.glb", dropped);
-    wait_for_pictures(16);
+    wait_for_images(16);
     fs::resize_file(dropped, 1000);
-    wait_for_pictures(16);
+    wait_for_images(16);
     std::raise(SIGTERM);
   });
   const Status lived = run_live(options);
@@ -550,9 +550,9 @@ TEST(Live, KnowsCamerasThatWereExchanged) {
   const int cameras[] = {0, 1};
   std::vector<Frame> frames = rig.expose(cameras);
   const auto found = [&] {
-    auto watcher = Watcher::create(*world.scene, world.rig);
-    EXPECT_TRUE(watcher) << watcher.message();
-    const Watched& watched = watcher->watch(frames);
+    auto perception = Perception::create(*world.scene, world.rig);
+    EXPECT_TRUE(perception) << perception.message();
+    const Percepts& watched = perception->watch(frames);
     EXPECT_GT(watched.detections[0].size(), 3u);
     EXPECT_GT(watched.detections[1].size(), 3u);
     return swapped_cameras(world.rig, bodies, watched.detections, watched.captured_at);
@@ -567,11 +567,11 @@ TEST(Live, KnowsCamerasThatWereExchanged) {
   const auto context = device::GlContext::create();
   Telemetry telemetry = Telemetry::create({}).value();
   auto session = Session::create({world.rig, *world.scene, {}, {}}, &telemetry, nullptr, false);
-  auto watcher = Watcher::create(*world.scene, world.rig);
-  ASSERT_TRUE(context && session && watcher);
+  auto perception = Perception::create(*world.scene, world.rig);
+  ASSERT_TRUE(context && session && perception);
   for (const int moment : {1, 2}) {  // told once
     for (Frame& frame : frames) frame.captured_at = shifted(frame.captured_at, 5);
-    session->take(watcher->watch(frames), static_cast<std::size_t>(moment));
+    session->take(perception->watch(frames), static_cast<std::size_t>(moment));
   }
   const json notes = telemetry.summary().at("notes");
   ASSERT_EQ(notes.size(), 1u) << notes.dump();
@@ -598,7 +598,7 @@ TEST(Live, ViewersOfAllKindsShareAnEyeThatNeverJumps) {
   const Eigen::Vector3d p_camera = world.rig.cameras[0].imager_from_world.inverse().translation;
   const Pose world_from_cap = looking_at(p_cap, 2 * p_cap - p_camera, Eigen::Vector3d::UnitZ()).inverse();
   ASSERT_TRUE(
-      sim::add_marker(world, {*cap.marker, cap.marker_size_m, world_from_cap}, false, marker_picture));
+      sim::add_marker(world, {*cap.marker, cap.marker_size_m, world_from_cap}, false, marker_image));
   const fs::path folder = test::test_folder();
   const auto script = load_script(
       written(folder / "script.json", script_of(6, {{{"at_s", 2.4}, {"until_s", 4.8}, {"cover", k_cap}}})));
@@ -610,9 +610,9 @@ TEST(Live, ViewersOfAllKindsShareAnEyeThatNeverJumps) {
   sim::VirtualRig rig(std::move(world), {.frame_period_s = k_period_s, .grab_waits_for_light = false});
   auto room = ScriptedRoom::create(*script, &rig);
   ASSERT_TRUE(room) << room.message();
-  auto watcher = Watcher::create(setup.scene, setup.rig);
+  auto perception = Perception::create(setup.scene, setup.rig);
   auto session = Session::create(setup, nullptr, nullptr, false);
-  ASSERT_TRUE(watcher && session);
+  ASSERT_TRUE(perception && session);
   std::size_t moments = 0;
   std::optional<Eigen::Vector3d> p_before;
   double farthest_m = 0;
@@ -621,9 +621,9 @@ TEST(Live, ViewersOfAllKindsShareAnEyeThatNeverJumps) {
     while (seconds_between(Stamp{}, rig.next_exposure()) < end_s) {
       room->set(seconds_between(Stamp{}, rig.next_exposure()));
       const int camera = 0;
-      session->take(watcher->watch(rig.expose(std::span(&camera, 1))), ++moments);
+      session->take(perception->watch(rig.expose(std::span(&camera, 1))), ++moments);
       for (const auto& [guest, p_eye] : guests) session->see(guest, p_eye, rig.now());
-      const Painted& painted = session->paint(rig.now(), shifted(rig.now(), 0.04));
+      const ComposedFrame& painted = session->paint(rig.now(), shifted(rig.now(), 0.04));
       const Eigen::Vector3d p_eye = painted.viewer.imager_from_world.inverse().translation;
       if (p_before) farthest_m = std::max(farthest_m, (p_eye - *p_before).norm());
       p_before = p_eye;
@@ -664,10 +664,10 @@ TEST(Live, MakesARoomForARigAndAScene) {
   const auto room = room_for(studio_world.rig, *studio_world.scene);
   ASSERT_TRUE(room) << room.message();
   sim::VirtualRig rig(*room, {.grab_waits_for_light = false});
-  auto watcher = Watcher::create(*room->scene, room->rig);
-  ASSERT_TRUE(watcher);
+  auto perception = Perception::create(*room->scene, room->rig);
+  ASSERT_TRUE(perception);
   const int camera = 0;
-  const Watched& watched = watcher->watch(rig.expose(std::span(&camera, 1)));
+  const Percepts& watched = perception->watch(rig.expose(std::span(&camera, 1)));
   EXPECT_EQ(watched.motions.size(), 3u);  // the door and both slots
 }
 

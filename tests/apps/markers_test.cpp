@@ -10,9 +10,9 @@
 #include "core/cameramodel.h"
 #include "core/config.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "tests/support/matchers.h"
-#include "tests/tracker/marker_pictures.h"
+#include "tests/tracker/marker_images.h"
 #include "tracker/detector.h"
 
 namespace limn::apps {
@@ -32,7 +32,7 @@ void expect_printed(const std::string& family,
   const std::string render =
       "pdftoppm -r 127 -png '" + options.out.string() + "' '" + (folder / "page").string() + "'";
   ASSERT_EQ(std::system(render.c_str()), 0) << "pdftoppm failed or is missing (poppler-utils, packages.txt)";
-  const auto grey = read_grey_picture(folder / "page-1.png");
+  const auto grey = read_grey_image(folder / "page-1.png");
   ASSERT_TRUE(grey) << grey.message();
   std::set<std::string> found_ids;
   tracker::Detector detector(tracker::Families::load(std::vector<std::string>{family}).value());
@@ -97,8 +97,8 @@ TEST(Markers, TellWrongUsage) {
   EXPECT_TRUE(wrong(bad));
 }
 
-// Pictures of a plate with four markers, one of them bent up, turned before a distorting camera.
-TEST(Markers, LearnABodyFromItsPictures) {
+// Images of a plate with four markers, one of them bent up, turned before a distorting camera.
+TEST(Markers, LearnABodyFromItsImages) {
   using namespace test::literals;
   auto rng = test::test_rng();
   const auto folder = test::test_folder();
@@ -115,16 +115,16 @@ TEST(Markers, LearnABodyFromItsPictures) {
   options.family = "aruco_4x4_50";
   options.size_mm = 50;
   options.out = folder / "plate.json";
-  for (int picture = 0; picture < 8; ++picture) {
-    const double a = 0.25 * M_PI * picture;
-    const Pose camera_from_body(exp_rotation({0.5 * std::cos(a), 0.5 * std::sin(a), 0.1 * picture}),
+  for (int image = 0; image < 8; ++image) {
+    const double a = 0.25 * M_PI * image;
+    const Pose camera_from_body(exp_rotation({0.5 * std::cos(a), 0.5 * std::sin(a), 0.1 * image}),
                                 {0.01, 0, 0.45});
     std::vector<test::PlacedMarker> markers;
     for (std::size_t i = 0; i < 4; ++i)
       markers.push_back({{"aruco_4x4_50", std::to_string(i)}, camera_from_body * body_from_marker[i], 0.05});
-    options.images.push_back(folder / fmt::format("{}.png", picture));
+    options.images.push_back(folder / fmt::format("{}.png", image));
     ASSERT_TRUE(
-        write_png(options.images.back(), test::picture_of(camera.lens, test::plain(800, 600, 100), markers,
+        write_png(options.images.back(), test::image_of(camera.lens, test::plain(800, 600, 100), markers,
                                                           {.blur_px = 0.6, .noise_levels = 2}, rng)));
   }
   const Status status = run_learn_body(options);
@@ -155,11 +155,11 @@ TEST(Markers, LearnABodyFromItsPictures) {
 
 TEST(Markers, TrainedTemplatesAreComparedWithOthers) {
   const auto folder = test::test_folder();
-  cv::Mat picture(400, 400, CV_8UC3, cv::Scalar(230, 230, 230));
-  picture(cv::Rect(100, 100, 200, 200)).setTo(cv::Scalar(20, 20, 20));
-  picture(cv::Rect(150, 150, 100, 100)).setTo(cv::Scalar(200, 220, 240));
-  picture(cv::Rect(150, 150, 40, 70)).setTo(cv::Scalar(20, 20, 20));
-  ASSERT_TRUE(write_png(folder / "photo.png", picture));
+  cv::Mat image(400, 400, CV_8UC3, cv::Scalar(230, 230, 230));
+  image(cv::Rect(100, 100, 200, 200)).setTo(cv::Scalar(20, 20, 20));
+  image(cv::Rect(150, 150, 100, 100)).setTo(cv::Scalar(200, 220, 240));
+  image(cv::Rect(150, 150, 40, 70)).setTo(cv::Scalar(20, 20, 20));
+  ASSERT_TRUE(write_png(folder / "photo.png", image));
   MarkersOptions train;
   train.train = folder / "photo.png";
   train.out = folder / "new.patt";

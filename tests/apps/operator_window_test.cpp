@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "apps/live/live.h"
-#include "apps/live/operator_desk.h"
+#include "apps/live/operator_console.h"
 #include "apps/live/operator_panel.h"
 #include "apps/serve/qr_code.h"
 #include "apps/world_markers.h"
@@ -50,18 +50,18 @@ OperatorView a_view() {
   track.marker_count = 4;
   track.rms_px = 0.11;
   view.bodies.push_back({"prototype", "aruco_4x4_50:10, aruco_4x4_50:11", track});
-  track.sight = Sight::lost;
+  track.tracking = TrackingState::lost;
   view.bodies.push_back({"mirror", "aruco_4x4_50:0", track});
-  track.sight = Sight::extrapolated;
+  track.tracking = TrackingState::extrapolated;
   view.bodies.push_back({"grille", "aruco_4x4_50:1", track});
   view.bodies.push_back({"trim", "aruco_4x4_50:2", std::nullopt});
   view.slots = {{"mirror", {"classic", "sport", "camera pod"}, true, true},
                 {"grille", {"bars", "honeycomb"}, false, false}};
-  view.staging.slots.resize(2);
-  view.staging.slots[0].variant = "sport";
-  view.staging.slots[1].variant = "bars";
-  view.staging.looks = {{"look-01", {}}, {"sport and bars", {}}};
-  view.staging.look = "look-01";
+  view.show_state.slots.resize(2);
+  view.show_state.slots[0].variant = "sport";
+  view.show_state.slots[1].variant = "bars";
+  view.show_state.looks = {{"look-01", {}}, {"sport and bars", {}}};
+  view.show_state.look = "look-01";
   for (int i = 0; i < 400; ++i) {
     ShownFrame frame{.captured_at = shifted(Stamp{}, i / 30.0),
                      .shown_at = shifted(Stamp{}, i / 30.0 + 0.060 + 0.004 * std::sin(0.3 * i)),
@@ -82,12 +82,12 @@ OperatorView a_view() {
 
 const cv::Point2f k_material(885, 102), k_light(820, 286);  // their buttons
 
-cv::Vec3b around(const cv::Mat& picture, int x, int y) { return picture.at<cv::Vec3b>(y, x); }
+cv::Vec3b around(const cv::Mat& image, int x, int y) { return image.at<cv::Vec3b>(y, x); }
 
 // The box of pixels of a colour; empty where there are none.
-cv::Rect box_of(const cv::Mat& picture, const cv::Scalar& colour) {
+cv::Rect box_of(const cv::Mat& image, const cv::Scalar& colour) {
   cv::Mat mask;
-  cv::inRange(picture, colour - cv::Scalar::all(3), colour + cv::Scalar::all(3), mask);
+  cv::inRange(image, colour - cv::Scalar::all(3), colour + cv::Scalar::all(3), mask);
   std::vector<cv::Point> found;
   cv::findNonZero(mask, found);
   if (found.empty()) return {};
@@ -96,31 +96,31 @@ cv::Rect box_of(const cv::Mat& picture, const cv::Scalar& colour) {
   return box;
 }
 
-TEST(OperatorPanel, ShowsPicturesUndistortedWithTheirMarkers) {
+TEST(OperatorPanel, ShowsImagesUndistortedWithTheirMarkers) {
   for (const cv::Size size : {cv::Size(1600, 1000), cv::Size(1000, 640)}) {
     test::GuiCanvas canvas(size);
     OperatorPanel panel;
     const OperatorView view = a_view();
     for (int i = 0; i < 2; ++i) canvas.draw([&](Gui& gui) { panel.draw(gui, view); });
     canvas.keep(fmt::format("operator-{}", size.width));
-    const cv::Mat picture = canvas.picture();
+    const cv::Mat image = canvas.image();
     for (const cv::Scalar& colour : {k_violet, k_teal}) {
-      const cv::Rect box = box_of(picture, colour);
+      const cv::Rect box = box_of(image, colour);
       ASSERT_GT(box.width, size.width / 12) << size;
       EXPECT_NEAR(1.0 * box.width / box.height, colour == k_violet ? 1.6 : 16.0 / 9, 0.05) << size;
     }
-    // The large picture is the first camera's; the marker's outline stands where the marker is in it.
-    const cv::Rect camera = box_of(picture(cv::Rect(0, 0, size.width, size.height / 2)), k_orange);
+    // The large image is the first camera's; the marker's outline stands where the marker is in it.
+    const cv::Rect camera = box_of(image(cv::Rect(0, 0, size.width, size.height / 2)), k_orange);
     ASSERT_GT(camera.width, size.width / 2) << size;
     const double scale = camera.width / 1280.0;
     const cv::Vec3b edge =
-        around(picture, camera.x + cvRound(scale * 550), camera.y + cvRound(scale * 200.5));
+        around(image, camera.x + cvRound(scale * 550), camera.y + cvRound(scale * 200.5));
     const cv::Vec3b left =
-        around(picture, camera.x + cvRound(scale * 400.5), camera.y + cvRound(scale * 350));
+        around(image, camera.x + cvRound(scale * 400.5), camera.y + cvRound(scale * 350));
     EXPECT_GT(edge[1], edge[2]) << "green on orange";
     EXPECT_GT(left[1], left[2]) << "green on orange";
     const cv::Vec3b inside =
-        around(picture, camera.x + cvRound(scale * 550), camera.y + cvRound(scale * 300));
+        around(image, camera.x + cvRound(scale * 550), camera.y + cvRound(scale * 300));
     EXPECT_EQ(inside, cv::Vec3b(30, 120, 230));
   }
 }
@@ -144,7 +144,7 @@ std::set<std::string> reachable(const OperatorView& view, cv::Size size, const c
 
 TEST(OperatorPanel, EditsAreAClickAway) {
   OperatorView view = a_view();
-  for (auto* pictures : {&view.cameras, &view.projectors}) pictures->clear();
+  for (auto* images : {&view.cameras, &view.projectors}) images->clear();
   const std::set<std::string> bar = reachable(view, {1000, 640}, {20, 20, 420, 12}, 12);
   EXPECT_TRUE(bar.contains("blackout"));
   EXPECT_TRUE(bar.contains("freeze"));
@@ -168,15 +168,15 @@ TEST(OperatorPanel, EditsAreAClickAway) {
 TEST(OperatorPanel, PairsAndComparesByClicks) {
   OperatorView view = a_view();
   view.waiting = {"aruco_4x4_50:7"};
-  view.staging.other_look = "sport and bars";
-  view.staging.deleted_look = scene::Look{"evening", {}};
-  view.staging.slots[1].marker = MarkerName{"aruco_4x4_50", "30"};
-  view.staging.split = true;
+  view.show_state.other_look = "sport and bars";
+  view.show_state.deleted_look = scene::Look{"evening", {}};
+  view.show_state.slots[1].marker = MarkerName{"aruco_4x4_50", "30"};
+  view.show_state.split = true;
   test::GuiCanvas canvas({1600, 1000});
   OperatorPanel panel;
   for (int i = 0; i < 2; ++i) canvas.draw([&](Gui& gui) { panel.draw(gui, view); });
   canvas.keep("operator-compares");
-  for (auto* pictures : {&view.cameras, &view.projectors}) pictures->clear();
+  for (auto* images : {&view.cameras, &view.projectors}) images->clear();
   const std::set<std::string> column = reachable(view, {1600, 1000}, {1290, 60, 280, 660}, 2);
   for (const char* edit : {"pair mirror aruco_4x4_50:7", "pair grille aruco_4x4_50:7", "unpair grille",
                            "flip", "split", "undelete_look"})
@@ -184,27 +184,27 @@ TEST(OperatorPanel, PairsAndComparesByClicks) {
   EXPECT_FALSE(column.contains("unpair mirror")) << "its own marker carries it";
 }
 
-TEST(OperatorPanel, APictureGrowsWhenClicked) {
+TEST(OperatorPanel, AnImageGrowsWhenClicked) {
   test::GuiCanvas canvas({1000, 640});
   OperatorPanel panel;
   const OperatorView view = a_view();
   const auto draw = [&](Gui& gui) { panel.draw(gui, view); };
   for (int i = 0; i < 2; ++i) canvas.draw(draw);
-  const cv::Rect before = box_of(canvas.picture(), k_violet);
+  const cv::Rect before = box_of(canvas.image(), k_violet);
   canvas.click((before.tl() + before.br()) / 2, draw);
   canvas.draw(draw);
   canvas.keep("operator-large");
-  EXPECT_GT(box_of(canvas.picture(), k_violet).width, 2 * before.width);
+  EXPECT_GT(box_of(canvas.image(), k_violet).width, 2 * before.width);
 }
 
 // Whether the code of a text is the bright square in the window.
-bool shows_code(const cv::Mat& picture, const std::string& text) {
-  const cv::Rect box = box_of(picture(cv::Rect(0, 50, 720, 720)), cv::Scalar::all(255)) + cv::Point(0, 50);
+bool shows_code(const cv::Mat& image, const std::string& text) {
+  const cv::Rect box = box_of(image(cv::Rect(0, 50, 720, 720)), cv::Scalar::all(255)) + cv::Point(0, 50);
   const cv::Mat code = qr_code(text);
   if (box.width < 8 * code.cols) return false;
   for (int row = 0; row < code.rows; ++row)
     for (int column = 0; column < code.cols; ++column) {
-      const cv::Vec3b seen = around(picture, box.x + cvRound((column + 0.5) * box.width / code.cols),
+      const cv::Vec3b seen = around(image, box.x + cvRound((column + 0.5) * box.width / code.cols),
                                     box.y + cvRound((row + 0.5) * box.height / code.rows));
       if ((seen[1] > 127) != (code.at<std::uint8_t>(row, column) > 127)) return false;
     }
@@ -218,7 +218,7 @@ TEST(OperatorPanel, InvitesGuestsByACodeOrByPin) {
   const auto draw = [&](Gui& gui) { panel.draw(gui, view); };
   for (int i = 0; i < 2; ++i) canvas.draw(draw);
   const std::string page = "https://192.168.7.2:8443/#pin=";
-  EXPECT_FALSE(shows_code(canvas.picture(), page + "234567"));
+  EXPECT_FALSE(shows_code(canvas.image(), page + "234567"));
   const Invitation invitation{"https://192.168.7.2:8443/",
                               "0F:1E:2D:3C:4B:5A:69:78:87:96:A5:B4:C3:D2:E1:F0:"
                               "0F:1E:2D:3C:4B:5A:69:78:87:96:A5:B4:C3:D2:E1:F0",
@@ -229,15 +229,15 @@ TEST(OperatorPanel, InvitesGuestsByACodeOrByPin) {
   canvas.click({435, 25}, draw);  // Remote
   canvas.draw(draw);
   canvas.keep("operator-remote");
-  EXPECT_TRUE(shows_code(canvas.picture(), page + "234567"));
+  EXPECT_TRUE(shows_code(canvas.image(), page + "234567"));
   canvas.click({800, 257}, draw);  // operate
   canvas.draw(draw);
   canvas.keep("operator-remote-operate");
-  EXPECT_TRUE(shows_code(canvas.picture(), page + "345678"));
+  EXPECT_TRUE(shows_code(canvas.image(), page + "345678"));
 
   // Below: a projector that shows the code, and whose eye view parts are drawn for.
   view.windows = {"Ann", "Ben"};
-  view.staging.viewer = "Ann";
+  view.show_state.viewer = "Ann";
   view.follows = "Ann";
   view.remote->projector = view.projectors[0].name;
   for (int i = 0; i < 2; ++i) canvas.draw(draw);
@@ -259,7 +259,7 @@ TEST(OperatorPanel, InvitesGuestsByACodeOrByPin) {
 TEST(OperatorPanel, MaterialsAndLightAreSetInABox) {
   OperatorView view = a_view();
   test::GuiCanvas canvas({1000, 640});
-  const auto asked_in = [&](cv::Point2f button, const std::string& picture) {
+  const auto asked_in = [&](cv::Point2f button, const std::string& image) {
     OperatorPanel panel;
     std::set<std::string> asked;
     const auto draw = [&](Gui& gui) {
@@ -268,7 +268,7 @@ TEST(OperatorPanel, MaterialsAndLightAreSetInABox) {
     };
     canvas.click(button, draw);
     for (int i = 0; i < 2; ++i) canvas.draw(draw);
-    canvas.keep(picture);
+    canvas.keep(image);
     for (float y = button.y + 14; y < button.y + 224; y += 12) canvas.click({750, y}, draw);
     canvas.click({5, 635}, draw);  // away: it closes
     return asked;
@@ -281,7 +281,7 @@ TEST(OperatorPanel, MaterialsAndLightAreSetInABox) {
   EXPECT_TRUE(has(material, "material|mirror|- 0.")) << "metal";
   EXPECT_TRUE(has(material, "material|mirror|- - 0.")) << "rough";
   EXPECT_TRUE(material.contains("material|mirror|")) << "as its file says";
-  view.staging.slots[0].material = {Eigen::Vector3d(1, 0, 0), std::nullopt, 0.5};
+  view.show_state.slots[0].material = {Eigen::Vector3d(1, 0, 0), std::nullopt, 0.5};
   EXPECT_TRUE(has(asked_in(k_material, "operator-material-red"), "material|mirror|#ff0000 0."))
       << "the rest stays";
   const std::set<std::string> light = asked_in(k_light, "operator-light");
@@ -322,7 +322,7 @@ std::string session_with(LiveOptions options,
     for (int i = 0; i < 300 && !x.finds("Limn"); ++i) std::this_thread::sleep_for(milliseconds(100));
     std::this_thread::sleep_for(milliseconds(2000));
     acts(&x);
-    std::this_thread::sleep_for(milliseconds(3000));  // a picture at least, on a busy machine
+    std::this_thread::sleep_for(milliseconds(3000));  // an image at least, on a busy machine
     x.close();
   });
   const Status played = run_live(options);
@@ -360,7 +360,7 @@ TEST(OperatorWindow, KeysReachASessionOnDevices) {
   if (!has_display()) GTEST_SKIP() << "no display: OperatorWindow.KeysReachASessionOnDevices";
   const fs::path folder = test::test_folder();
   sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture).value();
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
   const Rig rig = world.rig;
   const fs::path scene = world.scene->folder;
   ASSERT_TRUE(save_rig(rig, folder / "rig").ok());

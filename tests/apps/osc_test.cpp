@@ -76,16 +76,16 @@ TEST(Osc, EveryActionHasAMessage) {
     std::vector<OscValue> arguments;
     std::string value;
     if (action.of_slot) arguments.emplace_back("mirror");
-    if (action.takes == scene::Takes::text) arguments.emplace_back(value = "some name");
-    if (action.takes == scene::Takes::number) {
+    if (action.argument_kind == scene::ArgumentKind::text) arguments.emplace_back(value = "some name");
+    if (action.argument_kind == scene::ArgumentKind::number) {
       arguments.emplace_back(12.5F);
       value = "12.5";
     }
-    if (action.takes == scene::Takes::millimetres) {
+    if (action.argument_kind == scene::ArgumentKind::millimetres) {
       for (const float mm : {1.5F, -2.0F, 0.25F}) arguments.emplace_back(mm);
       value = "1.5 -2 0.25";
     }
-    if (action.takes == scene::Takes::pose) {
+    if (action.argument_kind == scene::ArgumentKind::pose) {
       for (const float number : {120.5F, -2.0F, 0.25F, 0.5F, -0.5F, 0.5F, 0.5F})
         arguments.emplace_back(number);
       value = "120.5 -2 0.25 0.5 -0.5 0.5 0.5";
@@ -194,9 +194,9 @@ TEST(Osc, SurvivesSpoiltBytes) {
 class AnOscSession : public testing::Test {
  protected:
   void SetUp() override {
-    auto world = sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture);
+    auto world = sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image);
     ASSERT_TRUE(world) << world.message();
-    ASSERT_TRUE(make_coarser(0.25, &world->rig).ok());
+    ASSERT_TRUE(scale_resolution(0.25, &world->rig).ok());
     auto context = device::GlContext::create();
     ASSERT_TRUE(context) << context.message();
     context_.emplace(std::move(*context));
@@ -234,38 +234,38 @@ TEST_F(AnOscSession, HearsAnotherPrograms) {
   const lo_address to = lo_address_new("127.0.0.1", std::to_string(port->port()).c_str());
   const auto& variants = session_->setup().scene.slots[0].variants;
   ASSERT_GE(variants.size(), 2u);
-  EXPECT_EQ(session_->staging().slots[0].variant, variants[0].name);
+  EXPECT_EQ(session_->show_state().slots[0].variant, variants[0].name);
   ASSERT_GT(lo_send(to, "/limn/choose_variant", "ss", "mirror", variants[1].name.c_str()), 0);
   ASSERT_GT(lo_send(to, "/limn/blackout", "T"), 0);
   ASSERT_GT(lo_send(to, "/limn/nudge", "sfid", "mirror", 1.0, 2, -3.5), 0);
   hear();
-  EXPECT_EQ(session_->staging().slots[0].variant, variants[1].name);
-  EXPECT_TRUE(session_->staging().blackout);
-  EXPECT_TRUE(test::near(session_->staging().slots[0].nudge, Eigen::Vector3d(0.001, 0.002, -0.0035), 1e-9));
+  EXPECT_EQ(session_->show_state().slots[0].variant, variants[1].name);
+  EXPECT_TRUE(session_->show_state().blackout);
+  EXPECT_TRUE(test::near(session_->show_state().slots[0].nudge, Eigen::Vector3d(0.001, 0.002, -0.0035), 1e-9));
 
   // A pose: as it is told, and where the part then is.
   ASSERT_GT(lo_send(to, "/limn/place", "sfffffff", "mirror", 20.0, -30.0, 12.5, 1.2, 0.0, 1.2, 0.0), 0);
   hear();
-  const auto& pin = session_->staging().slots[0].pin;
+  const auto& pin = session_->show_state().slots[0].pin;
   ASSERT_TRUE(pin.has_value());
   EXPECT_TRUE(test::pose_near(
       pin->prototype_from_part,
       Pose(Eigen::Quaterniond(std::sqrt(0.5), 0, std::sqrt(0.5), 0), Eigen::Vector3d(0.02, -0.03, 0.0125)),
       1e-6, 1e-6));
-  EXPECT_TRUE(session_->staging().slots[0].nudge.isZero());
+  EXPECT_TRUE(session_->show_state().slots[0].nudge.isZero());
 
   // One screen, and all.
   ASSERT_GT(lo_send(to, "/limn/screen", "s", "camera"), 0);
   ASSERT_GT(lo_send(to, "/limn/screen", "ss", "full", "wall"), 0);
   hear();
-  EXPECT_EQ(session_->staging().screen, scene::Screen::camera);
-  EXPECT_EQ(scene::shown_on(session_->staging(), "wall"), scene::Screen::full);
-  EXPECT_EQ(scene::shown_on(session_->staging(), "desk"), scene::Screen::camera);
+  EXPECT_EQ(session_->show_state().screen, scene::Screen::camera);
+  EXPECT_EQ(scene::screen_content(session_->show_state(), "wall"), scene::Screen::full);
+  EXPECT_EQ(scene::screen_content(session_->show_state(), "desk"), scene::Screen::camera);
 
   // What the scene does not have changes nothing and is told.
   ASSERT_GT(lo_send(to, "/limn/choose_variant", "ss", "mirror", "no such"), 0);
   hear();
-  EXPECT_EQ(session_->staging().slots[0].variant, variants[1].name);
+  EXPECT_EQ(session_->show_state().slots[0].variant, variants[1].name);
   EXPECT_NE(page().find("OSC refused: choose_variant: expected a variant"), std::string::npos) << page();
   lo_address_free(to);
 }
@@ -278,9 +278,9 @@ TEST_F(AnOscSession, AFloodIsTakenInPortionsAndToldOnce) {
   int calls = 0;
   double moved_mm = -1;
   for (; calls < 1000; ++calls) {
-    const double before_mm = std::exchange(moved_mm, 1e3 * session_->staging().slots[0].nudge.x());
+    const double before_mm = std::exchange(moved_mm, 1e3 * session_->show_state().slots[0].nudge.x());
     port->hear(&*session_, &*telemetry_, Stamp{});
-    const double now_mm = 1e3 * session_->staging().slots[0].nudge.x();
+    const double now_mm = 1e3 * session_->show_state().slots[0].nudge.x();
     EXPECT_LE(now_mm - moved_mm, OscPort::k_most_at_once + 1e-6);
     if (calls > 0 && now_mm == moved_mm && moved_mm == before_mm) break;
   }
@@ -297,7 +297,7 @@ TEST_F(AnOscSession, AFloodIsTakenInPortionsAndToldOnce) {
   lo_address_free(to);
 }
 
-struct Told {
+struct RendererInput {
   std::vector<std::string> lines;
 };
 
@@ -307,14 +307,14 @@ int note_told(const char* path, const char* types, lo_arg** values, int count, l
     line += types[i] == 's'   ? fmt::format(" {}", &values[i]->s)
             : types[i] == 'i' ? fmt::format(" {}", values[i]->i)
                               : fmt::format(" {:.2f}", values[i]->f);
-  static_cast<Told*>(into)->lines.push_back(line);
+  static_cast<RendererInput*>(into)->lines.push_back(line);
   return 0;
 }
 
 TEST_F(AnOscSession, TellsWhatChanges) {
   const lo_server ear = lo_server_new(nullptr, nullptr);
   ASSERT_NE(ear, nullptr);
-  Told told;
+  RendererInput told;
   lo_server_add_method(ear, nullptr, nullptr, note_told, &told);
   auto port = OscPort::open("", fmt::format("127.0.0.1:{}", lo_server_get_port(ear)));
   ASSERT_TRUE(port) << port.message();
@@ -351,16 +351,16 @@ TEST_F(AnOscSession, TellsWhatChanges) {
   ASSERT_TRUE(session_->edit({"freeze", "", "off"}, "test", Stamp{}).ok());
   heard();
 
-  // A picture in which everything is seen, then the poses.
+  // An image in which everything is seen, then the poses.
   sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture).value();
-  ASSERT_TRUE(make_coarser(0.5, &world.rig).ok());
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+  ASSERT_TRUE(scale_resolution(0.5, &world.rig).ok());
   Rig rig = world.rig;
   sim::VirtualRig virtual_rig(std::move(world), {.grab_waits_for_light = false});
-  auto watcher = Watcher::create(session_->setup().scene, rig);
-  ASSERT_TRUE(watcher);
+  auto perception = Perception::create(session_->setup().scene, rig);
+  ASSERT_TRUE(perception);
   const int camera = 0;
-  session_->take(watcher->watch(virtual_rig.expose(std::span(&camera, 1))), 1);
+  session_->take(perception->watch(virtual_rig.expose(std::span(&camera, 1))), 1);
   session_->paint(virtual_rig.now(), virtual_rig.now());
   const auto poses = heard();
   const scene::PosedScene& posed = session_->painted().posed;

@@ -13,12 +13,12 @@
 #include "apps/live/session.h"
 #include "apps/world_markers.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "device/gl_context.h"
 #include "sim/ray_scene.h"
 #include "sim/virtual_rig.h"
 #include "tests/support/matchers.h"
-#include "tests/tracker/marker_pictures.h"
+#include "tests/tracker/marker_images.h"
 
 namespace limn::apps {
 namespace {
@@ -67,7 +67,7 @@ TEST(Pairing, AMarkerThatLiesIsOfferedUntilItIsTakenAway) {
   ASSERT_TRUE(scene) << scene.message();
   Rig rig;
   rig.cameras = {{"camera0", 640, 480, Lens::pinhole(600, 600, 319.5, 239.5), Pose{}}};
-  Watcher watcher = Watcher::create(*scene, rig).value();
+  Perception perception = Perception::create(*scene, rig).value();
   const cv::Mat ground(480, 640, CV_8UC1, cv::Scalar(90));
   const Pose laid(exp_rotation({0.3, 0.1, 0}), {0, 0, 0.6});
   double now = 0;
@@ -76,9 +76,9 @@ TEST(Pairing, AMarkerThatLiesIsOfferedUntilItIsTakenAway) {
     marker.camera_from_marker.translation += beside;
     marker.size_m = loose_size_m(*scene);
     now += 1 / 30.0;
-    const cv::Mat picture = test::picture_of(rig.cameras[0].lens, ground, std::span(&marker, 1), {}, rng);
-    const Frame frame{"camera0", picture, shifted(Stamp{}, now)};
-    const Watched& watched = watcher.watch(std::span(&frame, 1));
+    const cv::Mat image = test::image_of(rig.cameras[0].lens, ground, std::span(&marker, 1), {}, rng);
+    const Frame frame{"camera0", image, shifted(Stamp{}, now)};
+    const Percepts& watched = perception.watch(std::span(&frame, 1));
     return watched.loose.empty() ? now : seconds_between(Stamp{}, watched.loose[0].still_since);
   };
   double since = 0;
@@ -144,18 +144,18 @@ class ASession : public testing::Test {
  protected:
   void SetUp() override {
     folder_ = test::test_folder();
-    auto world = sim::load_world(studio_in(folder_), marker_picture);
+    auto world = sim::load_world(studio_in(folder_), marker_image);
     ASSERT_TRUE(world) << world.message();
-    ASSERT_TRUE(make_coarser(0.5, &world->rig).ok());
+    ASSERT_TRUE(scale_resolution(0.5, &world->rig).ok());
     setup_.rig = world->rig;
     setup_.scene = *world->scene;
     setup_.paint.refill = false;
     auto context = device::GlContext::create();
     ASSERT_TRUE(context) << context.message();
     context_.emplace(std::move(*context));
-    auto watcher = Watcher::create(setup_.scene, setup_.rig, setup_.watch);
-    ASSERT_TRUE(watcher) << watcher.message();
-    watcher_.emplace(std::move(*watcher));
+    auto perception = Perception::create(setup_.scene, setup_.rig, setup_.watch);
+    ASSERT_TRUE(perception) << perception.message();
+    perception_.emplace(std::move(*perception));
     auto telemetry = Telemetry::create({});
     ASSERT_TRUE(telemetry);
     telemetry_.emplace(std::move(*telemetry));
@@ -170,7 +170,7 @@ class ASession : public testing::Test {
   void watch(int moments) {
     for (int i = 0; i < moments; ++i) {
       const int camera = 0;
-      session_->take(watcher_->watch(rig_->expose(std::span(&camera, 1))), ++moments_);
+      session_->take(perception_->watch(rig_->expose(std::span(&camera, 1))), ++moments_);
     }
   }
 
@@ -219,22 +219,22 @@ class ASession : public testing::Test {
   SessionSetup setup_;
   sim::World world_;
   std::optional<device::GlContext> context_;
-  std::optional<Watcher> watcher_;
+  std::optional<Perception> perception_;
   std::optional<Telemetry> telemetry_;
   std::optional<Session> session_;
   std::unique_ptr<sim::VirtualRig> rig_;
-  sim::PlacedMesh placed_;
+  sim::MeshInstance placed_;
   std::unique_ptr<sim::RayScene> rays_;
   std::size_t moments_ = 0;
 };
 
 TEST_F(ASession, AMarkerGlowsOnceItLiesStillForASecond) {
   watch(30);
-  EXPECT_TRUE(waiting_markers(setup_.scene, session_->staging(), session_->watched()).empty());
+  EXPECT_TRUE(waiting_markers(setup_.scene, session_->show_state(), session_->watched()).empty());
   const cv::Mat before[2] = {painted(0), painted(1)};
   EXPECT_FALSE(session_->edit({"pair", "mirror", ""}, "test", rig_->now()).ok());
   watch(8);
-  const auto waiting = waiting_markers(setup_.scene, session_->staging(), session_->watched());
+  const auto waiting = waiting_markers(setup_.scene, session_->show_state(), session_->watched());
   ASSERT_EQ(waiting.size(), 1u);
   EXPECT_EQ(waiting[0].marker, k_nine);
   const Eigen::Vector3d p_true = world_.world_from_prototype * k_laid;
@@ -262,7 +262,7 @@ TEST_F(ASession, AMarkerGlowsOnceItLiesStillForASecond) {
   }
   EXPECT_EQ(lit, 1);
   edit("pair", "mirror", "");
-  EXPECT_TRUE(waiting_markers(setup_.scene, session_->staging(), session_->watched()).empty());
+  EXPECT_TRUE(waiting_markers(setup_.scene, session_->show_state(), session_->watched()).empty());
 }
 
 TEST_F(ASession, AGridOfMillimetresLiesOnThePrototype) {
@@ -333,8 +333,8 @@ TEST_F(ASession, TwoLooksStandOnTheTwoSidesOfALine) {
   edit("split", "", "on");
   edit("split_at", "", "-40");
   const cv::Mat split = calm();
-  for (const auto& [name, picture] : {std::pair{"a", a}, {"b", b}, {"split", split}})
-    EXPECT_TRUE(write_png(folder_ / fmt::format("{}.png", name), picture).ok());
+  for (const auto& [name, image] : {std::pair{"a", a}, {"b", b}, {"split", split}})
+    EXPECT_TRUE(write_png(folder_ / fmt::format("{}.png", name), image).ok());
   Eigen::AlignedBox3f box;
   for (const Eigen::Vector3f& p : setup_.scene.prototype->mesh.positions) box.extend(p);
   const double line_m = static_cast<double>(box.center().x()) - 0.040;
@@ -360,9 +360,9 @@ TEST_F(ASession, SplitsTheScreenAsTheSurface) {
   const auto screen = [&](const char* name) {
     watch(3);
     painted();
-    const cv::Mat picture = session_->screen();
-    EXPECT_TRUE(write_png(folder_ / fmt::format("screen-{}.png", name), picture).ok());
-    return picture.clone();
+    const cv::Mat image = session_->screen();
+    EXPECT_TRUE(write_png(folder_ / fmt::format("screen-{}.png", name), image).ok());
+    return image.clone();
   };
   watch(3);
   painted();

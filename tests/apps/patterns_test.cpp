@@ -8,39 +8,39 @@
 #include "calib/code/patterns.h"
 #include "calib/response/response_patterns.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "tests/support/matchers.h"
 
 namespace limn::apps {
 namespace {
 
-TEST(PatternsCommand, WritesNumberedPicturesAndTheirDescription) {
+TEST(PatternsCommand, WritesNumberedImagesAndTheirDescription) {
   const auto out = test::test_folder() / "patterns";
   const Status status = run_patterns({.projector = "40x24", .out = out});
   ASSERT_TRUE(status.ok()) << status.message();
   const auto patterns = calib::load_patterns(out / "patterns.json");
   ASSERT_TRUE(patterns.ok()) << patterns.message();
   EXPECT_EQ(patterns->count(), 24);
-  const auto last = read_picture(out / "023.png");
+  const auto last = read_image(out / "023.png");
   ASSERT_TRUE(last.ok()) << last.message();
   EXPECT_TRUE(test::image_near(*last, cv::Mat(24, 40, CV_8U, cv::Scalar(0)), 0, 0, "black"));
-  EXPECT_TRUE(test::image_near(read_picture(out / "022.png").value(), cv::Mat(24, 40, CV_8U, cv::Scalar(255)),
+  EXPECT_TRUE(test::image_near(read_image(out / "022.png").value(), cv::Mat(24, 40, CV_8U, cv::Scalar(255)),
                                0, 0, "white"));
   EXPECT_FALSE(std::filesystem::exists(out / "024.png"));
 }
 
-TEST(PatternsCommand, WritesTheResponsePictures) {
+TEST(PatternsCommand, WritesTheResponseImages) {
   const auto out = test::test_folder() / "response";
   const Status status = run_patterns({.projector = "40x24", .response = true, .out = out});
   ASSERT_TRUE(status.ok()) << status.message();
-  const int count = static_cast<int>(calib::response_pictures().size());
+  const int count = static_cast<int>(calib::response_images().size());
   EXPECT_LE(count, 60);
   for (const int i : {0, 1, 5, 20, count - 1}) {
-    const auto picture = read_picture(out / calib::picture_name(i));
-    ASSERT_TRUE(picture.ok()) << picture.message();
-    EXPECT_TRUE(test::image_near(*picture, calib::draw_response(i, 40, 24), 0, 0, "response"));
+    const auto image = read_image(out / calib::image_name(i));
+    ASSERT_TRUE(image.ok()) << image.message();
+    EXPECT_TRUE(test::image_near(*image, calib::draw_response(i, 40, 24), 0, 0, "response"));
   }
-  EXPECT_FALSE(std::filesystem::exists(out / calib::picture_name(count)));
+  EXPECT_FALSE(std::filesystem::exists(out / calib::image_name(count)));
   const auto list = nlohmann::json::parse(read_file(out / "patterns.json").value());
   EXPECT_EQ(list["pictures"].size(), static_cast<std::size_t>(count));
   EXPECT_EQ(list["pictures"][0]["shows"], "black");
@@ -65,7 +65,7 @@ TEST(PatternsCommand, DrawsWavesByAMeasuredResponse) {
   const Status status = run_patterns(options);
   ASSERT_TRUE(status.ok()) << status.message();
   const auto patterns = calib::load_patterns(options.out / "patterns.json").value();
-  const cv::Mat wave = read_picture(options.out / calib::picture_name(patterns.first_step())).value();
+  const cv::Mat wave = read_image(options.out / calib::image_name(patterns.first_step())).value();
   EXPECT_EQ(wave.at<cv::Vec3b>(0, 4), cv::Vec3b(128, 128, 128)) << "half the light, a quarter of a wave away";
 
   options.linearise = file(left + ", " + right);

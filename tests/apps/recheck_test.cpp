@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace test;
-using calib::RecheckVerdict;
+using calib::RigVerdict;
 using Json = nlohmann::json;
 
 Json json_at(const fs::path& path) {
@@ -66,8 +66,8 @@ TEST(RecheckCommand, FindsAndRepairsANudgeOnTheVirtualRig) {
   const fs::path folder = test_folder();
   const fs::path sound_world = bench_world(folder / "sound.json", 0),
                  nudged_world = bench_world(folder / "nudged.json", 0.00444);
-  const Rig rig = sim::load_world(sound_world, marker_picture).value().rig;
-  const Rig truth = sim::load_world(nudged_world, marker_picture).value().rig;
+  const Rig rig = sim::load_world(sound_world, marker_image).value().rig;
+  const Rig truth = sim::load_world(nudged_world, marker_image).value().rig;
   const double turned = angle_between(rig.projectors[0].imager_from_world.rotation,
                                       truth.projectors[0].imager_from_world.rotation);
   ASSERT_NEAR(turned * 180 / std::numbers::pi, 0.2, 0.001);
@@ -76,16 +76,16 @@ TEST(RecheckCommand, FindsAndRepairsANudgeOnTheVirtualRig) {
   RecheckCommand sound{.rig = folder / "rig", .plan = plan_of(sound_world), .out = folder / "before"};
   const auto before = rechecked(sound);
   ASSERT_TRUE(before) << before.message();
-  EXPECT_EQ(before->result.verdict, RecheckVerdict::sound);
-  // 15 s hold 150 pictures at ten a second: six projectors of this size.
-  EXPECT_EQ(before->pictures, 11 + 10 + 2);
+  EXPECT_EQ(before->result.verdict, RigVerdict::sound);
+  // 15 s hold 150 images at ten a second: six projectors of this size.
+  EXPECT_EQ(before->images, 11 + 10 + 2);
   EXPECT_EQ(load_rig(sound.out).value().projectors[0].imager_from_world.matrix(),
             load_rig(sound.rig).value().projectors[0].imager_from_world.matrix());
 
   RecheckCommand nudged{.rig = folder / "rig", .plan = plan_of(nudged_world), .out = folder / "after"};
   const auto undecided = rechecked(nudged);
   ASSERT_TRUE(undecided) << undecided.message();
-  EXPECT_EQ(undecided->result.verdict, RecheckVerdict::undecided);
+  EXPECT_EQ(undecided->result.verdict, RigVerdict::undecided);
 
   // The same captures, with the board where it stood before.
   RecheckCommand again{
@@ -93,7 +93,7 @@ TEST(RecheckCommand, FindsAndRepairsANudgeOnTheVirtualRig) {
   again.still = sound.out / "recheck.json";
   const auto after = rechecked(again);
   ASSERT_TRUE(after) << after.message();
-  ASSERT_EQ(after->result.verdict, RecheckVerdict::nudged);
+  ASSERT_EQ(after->result.verdict, RigVerdict::moved);
   EXPECT_EQ(after->result.candidates[0].device, "projector0");
   EXPECT_NEAR(after->result.candidates[0].degrees, 0.2, 0.02);
   const auto repaired = load_rig(again.out);
@@ -135,15 +135,15 @@ TEST(RecheckCommand, ThePrototypeAloneTellsWhatMoved) {
   const fs::path folder = test_folder();
   studio_plan(folder / "sound", 0);
   const fs::path nudged_plan = studio_plan(folder / "nudged", 0.006);
-  const Rig rig = sim::load_world(folder / "sound/world.json", marker_picture).value().rig;
-  const Rig truth = sim::load_world(folder / "nudged/world.json", marker_picture).value().rig;
+  const Rig rig = sim::load_world(folder / "sound/world.json", marker_image).value().rig;
+  const Rig truth = sim::load_world(folder / "nudged/world.json", marker_image).value().rig;
   ASSERT_TRUE(save_rig(rig, folder / "rig").ok());
   const auto after = rechecked(
       {.rig = folder / "rig", .plan = nudged_plan, .prototype = true, .out = folder / "nudged/out"});
   ASSERT_TRUE(after) << after.message();
-  ASSERT_EQ(after->result.verdict, RecheckVerdict::nudged);
+  ASSERT_EQ(after->result.verdict, RigVerdict::moved);
   EXPECT_EQ(after->result.candidates[0].device, "projector1");
-  EXPECT_EQ(after->pictures, 2 * (11 + 10 + 2));
+  EXPECT_EQ(after->images, 2 * (11 + 10 + 2));
   const auto repaired = load_rig(folder / "nudged/out");
   ASSERT_TRUE(repaired) << repaired.message();
   const double apart_before_mm = light_apart_mm(rig.projectors[1], truth.projectors[1]),
@@ -155,7 +155,7 @@ TEST(RecheckCommand, ThePrototypeAloneTellsWhatMoved) {
 
 TEST(RecheckCommand, WantsCapturesOrAPlan) {
   const fs::path folder = test_folder();
-  const Rig rig = sim::load_world(bench_world(folder / "world.json", 0), marker_picture).value().rig;
+  const Rig rig = sim::load_world(bench_world(folder / "world.json", 0), marker_image).value().rig;
   ASSERT_TRUE(save_rig(rig, folder / "rig").ok());
   const auto neither = rechecked({.rig = folder / "rig", .out = folder / "out"});
   ASSERT_FALSE(neither);

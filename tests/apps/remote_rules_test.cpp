@@ -7,13 +7,13 @@
 #include <regex>
 #include <set>
 
-#include "apps/serve/guests.h"
+#include "apps/serve/auth_sessions.h"
 #include "apps/serve/http.h"
 #include "apps/serve/messages.h"
 #include "apps/serve/own_addresses.h"
 #include "apps/serve/qr_code.h"
 #include "apps/serve/static_files.h"
-#include "apps/serve/visitor.h"
+#include "apps/serve/ws_client.h"
 #include "core/file.h"
 #include "tests/support/matchers.h"
 
@@ -165,9 +165,9 @@ TEST(RemoteMessages, FramesHaveANumberAndAJpeg) {
   EXPECT_FALSE(frame_of(huge));
 }
 
-TEST(RemoteMessages, PicturesAreWrittenAsTheDocumentationSays) {
+TEST(RemoteMessages, ImagesAreWrittenAsTheDocumentationSays) {
   const std::vector<std::uint8_t> jpeg = {0xff, 0xd8};
-  const std::string bytes = picture_message(PictureKind::window, 258, "{}", jpeg);
+  const std::string bytes = image_message(ImageKind::window, 258, "{}", jpeg);
   using namespace std::string_literals;
   EXPECT_EQ(bytes, "\2\0\0\0\2\1\0\0\2\0\0\0{}\xff\xd8"s);
 }
@@ -195,20 +195,20 @@ TEST(RemoteMessages, AGuestHasNoNameOfLimnsOwn) {
   EXPECT_EQ(named("my operator")->name, "my operator");
 }
 
-std::string wrong_pin(const Guests& guests) {
+std::string wrong_pin(const AuthSessions& guests) {
   for (int i = 0;; ++i) {
     std::string pin = fmt::format("{:06}", i);
     if (std::find(guests.pins().begin(), guests.pins().end(), pin) == guests.pins().end()) return pin;
   }
 }
 
-TEST(Guests, OfOneNameAreToldApart) {
-  Guests guests;
-  const Guests::Time now{};
-  const auto paired = [&](const std::string& name, const std::optional<Guests::Guest>& replaced = {}) {
-    return std::get<Guests::Paired>(guests.pair(guests.pin(Role::look), name, "10.0.0.1", now, replaced));
+TEST(AuthSessions, OfOneNameAreToldApart) {
+  AuthSessions guests;
+  const AuthSessions::Time now{};
+  const auto paired = [&](const std::string& name, const std::optional<AuthSessions::Guest>& replaced = {}) {
+    return std::get<AuthSessions::Paired>(guests.pair(guests.pin(Role::look), name, "10.0.0.1", now, replaced));
   };
-  const Guests::Paired first = paired("Ann"), second = paired("ann");
+  const AuthSessions::Paired first = paired("Ann"), second = paired("ann");
   EXPECT_EQ(first.guest.name, "Ann");
   EXPECT_EQ(second.guest.name, "ann (2)");
   EXPECT_EQ(paired("Ann").guest.name, "Ann (3)");
@@ -216,20 +216,20 @@ TEST(Guests, OfOneNameAreToldApart) {
   // Who pairs again is the same, and one session ends.
   EXPECT_EQ(paired("Ann", first.guest).guest.name, "Ann");
   EXPECT_FALSE(guests.find(first.token, now));
-  EXPECT_TRUE(std::holds_alternative<Guests::WrongPin>(
+  EXPECT_TRUE(std::holds_alternative<AuthSessions::WrongPin>(
       guests.pair(wrong_pin(guests), "Ann", "10.0.0.1", now, second.guest)));
   EXPECT_TRUE(guests.find(second.token, now));
 }
 
-TEST(Guests, APinGivesItsRoleAndATokenThatEnds) {
-  Guests guests;
-  const Guests::Time now{};
+TEST(AuthSessions, APinGivesItsRoleAndATokenThatEnds) {
+  AuthSessions guests;
+  const AuthSessions::Time now{};
   std::set<std::string> tokens;
   for (const Role role : {Role::look, Role::work, Role::operate}) {
     EXPECT_TRUE(std::regex_match(guests.pin(role), std::regex("[0-9]{6}")));
     const auto paired = guests.pair(guests.pin(role), "Ann", "10.0.0.1", now);
-    ASSERT_TRUE(std::holds_alternative<Guests::Paired>(paired));
-    const std::string token = std::get<Guests::Paired>(paired).token;
+    ASSERT_TRUE(std::holds_alternative<AuthSessions::Paired>(paired));
+    const std::string token = std::get<AuthSessions::Paired>(paired).token;
     EXPECT_EQ(token.size(), 64u);
     tokens.insert(token);
     const auto found = guests.find(token, now + k_session_life - 1s);
@@ -246,54 +246,54 @@ TEST(Guests, APinGivesItsRoleAndATokenThatEnds) {
   }
   EXPECT_EQ(tokens.size(), 3u);
   EXPECT_FALSE(guests.find("", now));
-  EXPECT_NE(Guests().pins(), guests.pins());
+  EXPECT_NE(AuthSessions().pins(), guests.pins());
 }
 
-TEST(Guests, AfterTenWrongPinsAnAddressWaits) {
-  Guests guests;
-  Guests::Time now{};
+TEST(AuthSessions, AfterTenWrongPinsAnAddressWaits) {
+  AuthSessions guests;
+  AuthSessions::Time now{};
   const std::string wrong = wrong_pin(guests), right = guests.pin(Role::look);
   auto wait = k_first_wait;
   for (int round = 0; round < 6; ++round) {
     for (int i = 0; i < k_most_wrong; ++i)
-      EXPECT_TRUE(std::holds_alternative<Guests::WrongPin>(guests.pair(wrong, "", "10.0.0.1", now)));
+      EXPECT_TRUE(std::holds_alternative<AuthSessions::WrongPin>(guests.pair(wrong, "", "10.0.0.1", now)));
     const auto held = guests.pair(right, "", "10.0.0.1", now + 1s);
-    ASSERT_TRUE(std::holds_alternative<Guests::Wait>(held));
-    EXPECT_EQ(std::get<Guests::Wait>(held).left, wait - 1s);
-    EXPECT_TRUE(std::holds_alternative<Guests::Paired>(guests.pair(right, "", "10.0.0.2", now)))
+    ASSERT_TRUE(std::holds_alternative<AuthSessions::Wait>(held));
+    EXPECT_EQ(std::get<AuthSessions::Wait>(held).left, wait - 1s);
+    EXPECT_TRUE(std::holds_alternative<AuthSessions::Paired>(guests.pair(right, "", "10.0.0.2", now)))
         << "somebody else";
     now += wait;
-    EXPECT_TRUE(std::holds_alternative<Guests::Paired>(guests.pair(right, "", "10.0.0.1", now)));
+    EXPECT_TRUE(std::holds_alternative<AuthSessions::Paired>(guests.pair(right, "", "10.0.0.1", now)));
     wait = std::min(2 * wait, k_longest_wait);
   }
 }
 
-TEST(Guests, AfterAHundredWrongPinsEverybodyWaits) {
-  Guests guests;
-  const Guests::Time now{};
+TEST(AuthSessions, AfterAHundredWrongPinsEverybodyWaits) {
+  AuthSessions guests;
+  const AuthSessions::Time now{};
   const std::string wrong = wrong_pin(guests);
   for (int i = 0; i < k_most_wrong_of_all; ++i)
     EXPECT_TRUE(
-        std::holds_alternative<Guests::WrongPin>(guests.pair(wrong, "", fmt::format("10.0.{}.1", i), now)));
-  EXPECT_TRUE(std::holds_alternative<Guests::Wait>(guests.pair(guests.pin(Role::look), "", "10.1.0.1", now)));
+        std::holds_alternative<AuthSessions::WrongPin>(guests.pair(wrong, "", fmt::format("10.0.{}.1", i), now)));
+  EXPECT_TRUE(std::holds_alternative<AuthSessions::Wait>(guests.pair(guests.pin(Role::look), "", "10.1.0.1", now)));
 }
 
-TEST(Guests, ANetworkOfIPv6IsOnePlace) {
-  Guests guests;
-  const Guests::Time now{};
+TEST(AuthSessions, ANetworkOfIPv6IsOnePlace) {
+  AuthSessions guests;
+  const AuthSessions::Time now{};
   const std::string wrong = wrong_pin(guests);
   for (int i = 0; i < k_most_wrong; ++i) guests.pair(wrong, "", fmt::format("2001:db8::{}", i + 1), now);
-  EXPECT_TRUE(std::holds_alternative<Guests::Wait>(guests.pair(wrong, "", "2001:db8::ffff", now)));
-  EXPECT_TRUE(std::holds_alternative<Guests::WrongPin>(guests.pair(wrong, "", "2001:db8:0:1::1", now)));
+  EXPECT_TRUE(std::holds_alternative<AuthSessions::Wait>(guests.pair(wrong, "", "2001:db8::ffff", now)));
+  EXPECT_TRUE(std::holds_alternative<AuthSessions::WrongPin>(guests.pair(wrong, "", "2001:db8:0:1::1", now)));
 }
 
-TEST(Guests, SessionsAreBounded) {
-  Guests guests;
-  const Guests::Time now{};
+TEST(AuthSessions, SessionsAreBounded) {
+  AuthSessions guests;
+  const AuthSessions::Time now{};
   std::string first;
   for (std::size_t i = 0; i < k_most_sessions + 10; ++i) {
     const auto paired = guests.pair(guests.pin(Role::look), "", "10.0.0.1", now);
-    if (i == 0) first = std::get<Guests::Paired>(paired).token;
+    if (i == 0) first = std::get<AuthSessions::Paired>(paired).token;
   }
   EXPECT_EQ(guests.count(), k_most_sessions);
   EXPECT_FALSE(guests.find(first, now));
@@ -304,8 +304,8 @@ TEST(Outbox, KeepsTheNewestAlone) {
   const auto text = [](const char* words) { return std::make_shared<const std::string>(words); };
   outbox.tell_state(text("old"));
   outbox.tell_state(text("new"));
-  outbox.show(PictureKind::room, text("old room"));
-  outbox.show(PictureKind::room, text("new room"));
+  outbox.show(ImageKind::room, text("old room"));
+  outbox.show(ImageKind::room, text("new room"));
   outbox.answer("done");
   std::vector<std::string> all;
   while (const auto next = outbox.next()) all.push_back(*next->bytes);

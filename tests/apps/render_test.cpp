@@ -9,9 +9,9 @@
 
 #include "core/config.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "core/rig.h"
-#include "scene/posed.h"
+#include "scene/posed_scene.h"
 #include "scene/scene.h"
 #include "sim/car_door.h"
 #include "tests/support/matchers.h"
@@ -61,9 +61,9 @@ Imager test_camera() {
 cv::Mat photographed(const MarkerName& name, const Imager& camera, const Pose& camera_from_marker) {
   const cv::Mat marker = tracker::draw_marker(name, 40).value();
   const Pose marker_from_camera = camera_from_marker.inverse();
-  cv::Mat picture(camera.height, camera.width, CV_8U);
-  for (int row = 0; row < picture.rows; ++row) {
-    for (int column = 0; column < picture.cols; ++column) {
+  cv::Mat image(camera.height, camera.width, CV_8U);
+  for (int row = 0; row < image.rows; ++row) {
+    for (int column = 0; column < image.cols; ++column) {
       int sum = 0;
       for (int k = 0; k < 16; ++k) {
         const Vector2d px(column + (k % 4 + 0.5) / 4 - 0.5, row + (k / 4 + 0.5) / 4 - 0.5);
@@ -74,13 +74,13 @@ cv::Mat photographed(const MarkerName& name, const Imager& camera, const Pose& c
         const bool inside = x >= 0 && y >= 0 && x < marker.cols && y < marker.rows;
         sum += inside ? marker.at<std::uint8_t>(y, x) : 220;
       }
-      picture.at<std::uint8_t>(row, column) = static_cast<std::uint8_t>(sum / 16);
+      image.at<std::uint8_t>(row, column) = static_cast<std::uint8_t>(sum / 16);
     }
   }
-  return picture;
+  return image;
 }
 
-TEST(Render, StandsAPartOnAMarkerOfAPicture) {
+TEST(Render, StandsAPartOnAMarkerOfAnImage) {
   const fs::path folder = test::test_folder();
   Rig rig;
   rig.cameras = {test_camera()};
@@ -97,7 +97,7 @@ TEST(Render, StandsAPartOnAMarkerOfAPicture) {
   const Status status = run_render(options);
   ASSERT_TRUE(status) << status.message();
 
-  const cv::Mat out = read_picture(folder / "out" / "composite-camera0.png").value();
+  const cv::Mat out = read_image(folder / "out" / "composite-camera0.png").value();
   ASSERT_EQ(out.size(), cv::Size(800, 600));
   // The flag's tip in the truth: light on one side of it, paper on the other.
   const auto at = [&](const Vector3d& p_marker) {
@@ -113,7 +113,7 @@ TEST(Render, StandsAPartOnAMarkerOfAPicture) {
   EXPECT_EQ(coverage["parts"][0]["part"], "flag");
   EXPECT_EQ(coverage["parts"][0]["off_surface"], 1);
   EXPECT_GT(coverage["parts"][0]["viewer_pixels"], 5000);
-  const cv::Mat mask = read_picture(folder / "out" / "mask-flag.png").value();
+  const cv::Mat mask = read_image(folder / "out" / "mask-flag.png").value();
   EXPECT_EQ(cv::countNonZero(mask == 128), coverage["parts"][0]["viewer_pixels"].get<int>());
 }
 
@@ -151,13 +151,13 @@ class RenderDoor : public testing::Test {
   RenderOptions options;
 };
 
-TEST_F(RenderDoor, PosesPlaceEverythingAndEveryPictureIsWritten) {
+TEST_F(RenderDoor, PosesPlaceEverythingAndEveryImageIsWritten) {
   const Status status = run_render(options);
   ASSERT_TRUE(status) << status.message();
-  const cv::Mat light = read_picture(folder / "out/projector-projector0.png").value();
+  const cv::Mat light = read_image(folder / "out/projector-projector0.png").value();
   EXPECT_EQ(light.size(), cv::Size(800, 600));
   EXPECT_GT(cv::countNonZero(light.reshape(1)), 1000);
-  EXPECT_GT(cv::countNonZero(read_picture(folder / "out/composite-camera0.png").value().reshape(1)), 1000);
+  EXPECT_GT(cv::countNonZero(read_image(folder / "out/composite-camera0.png").value().reshape(1)), 1000);
   const json coverage = json::parse(read_file(folder / "out/coverage.json").value());
   ASSERT_EQ(coverage["parts"].size(), 2u);
   for (const auto& part : coverage["parts"]) {
@@ -165,7 +165,7 @@ TEST_F(RenderDoor, PosesPlaceEverythingAndEveryPictureIsWritten) {
     if (part["viewer_pixels"] > 0) {
       EXPECT_NEAR(on + off, 1, 1e-9);
     }
-    const cv::Mat mask = read_picture(folder / "out" / part["mask"].get<std::string>()).value();
+    const cv::Mat mask = read_image(folder / "out" / part["mask"].get<std::string>()).value();
     EXPECT_EQ(mask.size(), cv::Size(1280, 800));  // the scene's own viewer
   }
   const json viewer = {
@@ -175,7 +175,7 @@ TEST_F(RenderDoor, PosesPlaceEverythingAndEveryPictureIsWritten) {
   ASSERT_TRUE(write_file(folder / "viewer.json", viewer.dump()));
   options.viewers = {folder / "viewer.json"};
   ASSERT_TRUE(run_render(options));
-  EXPECT_EQ(read_picture(folder / "out/mask-mirror.png").value().size(), cv::Size(320, 200));
+  EXPECT_EQ(read_image(folder / "out/mask-mirror.png").value().size(), cv::Size(320, 200));
 }
 
 TEST_F(RenderDoor, SeveralViewersShareTheEyeOfThoseOnTheNearestOnesSide) {
@@ -189,7 +189,7 @@ TEST_F(RenderDoor, SeveralViewersShareTheEyeOfThoseOnTheNearestOnesSide) {
     options.viewers = viewers;
     const Status status = run_render(options);
     EXPECT_TRUE(status) << status.message();
-    return read_picture(folder / "out/projector-projector0.png").value();
+    return read_image(folder / "out/projector-projector0.png").value();
   };
   const Vector3d p_near(0.2, 0, 1), p_beside(-0.1, 0, 1.4), p_aside(-3, 0, 0.2);
   std::vector<fs::path> files;
@@ -217,7 +217,7 @@ TEST_F(RenderDoor, SparesOrLightsTheMarkers) {
   const auto light_on_marker = [&](const std::string& how) {
     options.marker_light = how;
     EXPECT_TRUE(run_render(options));
-    const cv::Mat light = read_picture(folder / "out/projector-projector0.png").value();
+    const cv::Mat light = read_image(folder / "out/projector-projector0.png").value();
     const Rig rig = load_rig(options.rig).value();
     const Pose world_from_marker = sim::car_door_slot_places().at("mirror");
     const Vector2d px = *rig.projectors[0].project(world_from_marker.translation);
@@ -234,19 +234,19 @@ TEST_F(RenderDoor, SparesOrLightsTheMarkers) {
 
 TEST_F(RenderDoor, BalancesLightAndSaysWhatItCannotGive) {
   ASSERT_TRUE(run_render(options));
-  const cv::Mat as_it_is = read_picture(folder / "out/projector-projector0.png").value();
+  const cv::Mat as_it_is = read_image(folder / "out/projector-projector0.png").value();
   EXPECT_FALSE(fs::exists(folder / "out/clipped-projector0.png"));
   options.light.compensation = "geometry";
   options.light.level = 1e6;
   ASSERT_TRUE(run_render(options));
-  const cv::Mat clipped = read_picture(folder / "out/clipped-projector0.png").value();
+  const cv::Mat clipped = read_image(folder / "out/clipped-projector0.png").value();
   EXPECT_GT(cv::countNonZero(clipped == 255), 1000) << "nothing is a million times as bright";
   const json light = json::parse(read_file(folder / "out/coverage.json").value())["light"];
   EXPECT_EQ(light["compensation"], "geometry");
   EXPECT_GT(light["projectors"][0]["too_bright_wanted"], 0.001);
   options.light.level = {};
   ASSERT_TRUE(run_render(options));
-  const cv::Mat balanced = read_picture(folder / "out/projector-projector0.png").value();
+  const cv::Mat balanced = read_image(folder / "out/projector-projector0.png").value();
   EXPECT_GT(cv::norm(as_it_is, balanced, cv::NORM_INF), 5);
 
   options.light.compensation = "measured";
@@ -260,10 +260,10 @@ TEST_F(RenderDoor, BalancesLightAndSaysWhatItCannotGive) {
 
 TEST_F(RenderDoor, CompositesMayBeUndistorted) {
   ASSERT_TRUE(run_render(options));
-  const cv::Mat raw = read_picture(folder / "out/composite-camera0.png").value();
+  const cv::Mat raw = read_image(folder / "out/composite-camera0.png").value();
   options.undistorted = true;
   ASSERT_TRUE(run_render(options));
-  const cv::Mat straight = read_picture(folder / "out/composite-camera0.png").value();
+  const cv::Mat straight = read_image(folder / "out/composite-camera0.png").value();
   const Imager camera = load_rig(options.rig).value().cameras[0];
   const Lens pinhole =
       Lens::pinhole(camera.lens.fx(), camera.lens.fy(), (camera.width - 1) / 2.0, (camera.height - 1) / 2.0);
@@ -292,15 +292,15 @@ TEST_F(RenderDoor, AVirtualCameraSeesPrototypeAndPartsWithOneEyeOrTwo) {
   ASSERT_TRUE(write_file(folder / "view.json", viewer.dump()));
   options.view = folder / "view.json";
   ASSERT_TRUE(run_render(options));
-  const cv::Mat one = read_picture(folder / "out/view.png").value();
+  const cv::Mat one = read_image(folder / "out/view.png").value();
   ASSERT_EQ(one.size(), cv::Size(400, 300));
   EXPECT_GT(cv::norm(one.at<cv::Vec3b>(150, 200), one.at<cv::Vec3b>(2, 2), cv::NORM_INF),
             20);  // the door, the room
   options.stereo_mm = 60;
   ASSERT_TRUE(run_render(options));
-  const cv::Mat two = read_picture(folder / "out/view.png").value();
+  const cv::Mat two = read_image(folder / "out/view.png").value();
   ASSERT_EQ(two.size(), cv::Size(800, 300));
-  // 1.2 m away the door stands further right in the left eye's picture: focal length x base line / distance.
+  // 1.2 m away the door stands further right in the left eye's image: focal length x base line / distance.
   const double expected_px = 200 / std::tan(20 * std::numbers::pi / 180) * 0.06 / 1.17;
   cv::Mat grey;
   cv::cvtColor(two, grey, cv::COLOR_BGR2GRAY);
@@ -405,7 +405,7 @@ TEST(RenderPhotograph, StandsAMirrorOnAMarker) {
   options.out = folder / "out";
   const Status status = run_render(options);
   ASSERT_TRUE(status) << status.message();
-  const cv::Mat mask = read_picture(folder / "out/mask-mirror40.png").value();
+  const cv::Mat mask = read_image(folder / "out/mask-mirror40.png").value();
   // Corners of marker 40 by opencv_singlemarkers_6x6_250.csv.
   const std::vector<cv::Point> marker = {{359, 310}, {404, 310}, {410, 350}, {362, 350}};
   cv::Mat inside = cv::Mat::zeros(mask.size(), CV_8U);

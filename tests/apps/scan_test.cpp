@@ -14,9 +14,9 @@
 #include "core/file.h"
 #include "core/rig.h"
 #include "scene/marker_file.h"
-#include "scene/nearest.h"
-#include "scene/ply.h"
-#include "scene/posed.h"
+#include "scene/mesh_bvh.h"
+#include "scene/scan_surface.h"
+#include "scene/posed_scene.h"
 #include "sim/truth.h"
 #include "sim/world.h"
 #include "tests/support/matchers.h"
@@ -31,7 +31,7 @@ using namespace test::literals;
 const fs::path k_plan = fs::path(LIMN_SOURCE_DIR) / "config/plans/bench.json";
 
 sim::World bench() {
-  return sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/bench.json", marker_picture).value();
+  return sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/bench.json", marker_image).value();
 }
 
 struct Errors {
@@ -40,7 +40,7 @@ struct Errors {
 };
 
 // Of the points that the camera sees on the clay itself: their distances from it along its normal.
-Errors errors_on_clay(const scene::Surface& surface, const sim::World& world, std::size_t every) {
+Errors errors_on_clay(const scene::ScanSurface& surface, const sim::World& world, std::size_t every) {
   const sim::Truth truth(world);
   const Imager& camera = world.rig.cameras[0];
   Errors e;
@@ -136,10 +136,10 @@ TEST(Scan, MeasuresTheVirtualDoorToATenthOfAMillimetreAndTheCadIsLaidOntoIt) {
          {"size_mm", 1e3 * marker.size_m},
          {"body_from_marker", to_json(on_door[2].body_from_marker.inverse() * marker.body_from_marker)}});
   ASSERT_TRUE(write_file(out / "body.json", body.dump()).ok());
-  const calib::Captures captures = calib::load_captures(out / "scan/captures").value();
+  const calib::CaptureSet captures = calib::load_captures(out / "scan/captures").value();
   align.body = out / "body.json";
   align.rig = out / "rig";
-  align.frames = {"camera0=" + captures.poses[0].pictures[0][0][captures.patterns[0].white()].string()};
+  align.frames = {"camera0=" + captures.poses[0].images[0][0][captures.patterns[0].white()].string()};
   const Status with_body = run_align(align);
   ASSERT_TRUE(with_body.ok()) << with_body.message();
   const auto found = scene::load_marker_file(align.out / "markers.json");

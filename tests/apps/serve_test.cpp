@@ -279,10 +279,10 @@ TEST_F(AServer, OpensNoMoreWindowsThanItCanLookThrough) {
 // Two windows of one guest, as of two tabs of a browser: light follows the one that was opened last, and the
 // other one only when that has been still for a second.
 TEST_F(AServer, OneWindowOfAGuestIsItsTablet) {
-  Eyes eyes;
+  ImageProviders eyes;
   std::mutex mutex;
   std::map<std::string, std::string> named;  // by device
-  eyes.look = [&](const Onlooker::Window& window, std::vector<std::uint8_t>, Eyes::Answer answer) {
+  eyes.look = [&](const TabletView::Window& window, std::vector<std::uint8_t>, ImageProviders::Answer answer) {
     {
       const std::lock_guard lock(mutex);
       named[window.device] = window.guest;
@@ -319,15 +319,15 @@ TEST_F(AServer, OneWindowOfAGuestIsItsTablet) {
   while (!is_tablet(second.get(), "tablet-0002")) ASSERT_LT(number, 50u);
 }
 
-TEST_F(AServer, SaysWhyThereIsNoRoomPicture) {
-  Eyes eyes;
-  eyes.room = [](Eyes::Answer answer) { answer({R"({"why":"no camera"})", {}}); };
+TEST_F(AServer, SaysWhyThereIsNoRoomImage) {
+  ImageProviders eyes;
+  eyes.room = [](ImageProviders::Answer answer) { answer({R"({"why":"no camera"})", {}}); };
   open({}, eyes);
   const auto one = guest(Role::look);
   one->send_text(R"({"type": "pictures", "room": true})");
-  const auto picture = one->message();
-  ASSERT_TRUE(picture && !picture->is_text);
-  EXPECT_EQ(picture->bytes.substr(12), R"({"why":"no camera"})");
+  const auto image = one->message();
+  ASSERT_TRUE(image && !image->is_text);
+  EXPECT_EQ(image->bytes.substr(12), R"({"why":"no camera"})");
   EXPECT_EQ(client()->get("/picture/room.jpg", token_of(Role::look)).status, 404);
 }
 
@@ -363,17 +363,17 @@ TEST_F(AServer, RefusesLargeFramesAndForgetsHalfOnes) {
   EXPECT_EQ(number_at(answer->bytes, 4), 3u);
 }
 
-TEST_F(AServer, SendsRoomPicturesOneInFlight) {
+TEST_F(AServer, SendsRoomImagesOneInFlight) {
   open({}, eyes_that_echo());
   const auto one = guest(Role::look), other = guest(Role::look);
   for (const auto* each : {&one, &other}) (*each)->send_text(R"({"type": "pictures", "room": true})");
   std::uint32_t last = 0;
   for (int i = 0; i < 3; ++i) {
-    const auto picture = one->message();
-    ASSERT_TRUE(picture && !picture->is_text);
-    EXPECT_EQ(number_at(picture->bytes, 0), 1u);
-    EXPECT_GT(number_at(picture->bytes, 4), last);
-    last = number_at(picture->bytes, 4);
+    const auto image = one->message();
+    ASSERT_TRUE(image && !image->is_text);
+    EXPECT_EQ(number_at(image->bytes, 0), 1u);
+    EXPECT_GT(number_at(image->bytes, 4), last);
+    last = number_at(image->bytes, 4);
     EXPECT_FALSE(one->message(0.3)) << "one was not seen yet";
     one->send_text(json({{"type", "seen"}, {"picture", last}}).dump());
   }

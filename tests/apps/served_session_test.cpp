@@ -1,4 +1,4 @@
-// The remote of a session: guests' edits, what they are told, pictures, their tablets, the code in the light.
+// The remote of a session: guests' edits, what they are told, images, their tablets, the code in the light.
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
@@ -13,8 +13,8 @@
 #include "apps/coarser.h"
 #include "apps/live/live.h"
 #include "apps/live/replay.h"
-#include "apps/live/watcher.h"
-#include "apps/serve/code_sign.h"
+#include "apps/live/perception.h"
+#include "apps/serve/pairing_overlay.h"
 #include "apps/world_markers.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"
@@ -27,14 +27,14 @@ namespace limn::apps {
 namespace {
 
 // A session with a virtual rig's scene, served, and played by hand: one turn is what the loop does between
-// two pictures.
+// two images.
 class AServedSession : public AServer {
  protected:
   void SetUp() override {
     AServer::SetUp();
-    auto world = sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture);
+    auto world = sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image);
     ASSERT_TRUE(world) << world.message();
-    ASSERT_TRUE(make_coarser(0.25, &world->rig).ok());
+    ASSERT_TRUE(scale_resolution(0.25, &world->rig).ok());
     auto context = device::GlContext::create();
     ASSERT_TRUE(context) << context.message();
     context_.emplace(std::move(*context));
@@ -122,7 +122,7 @@ TEST_F(AServedSession, AnEditReachesItAndEverybodySeesIt) {
     EXPECT_EQ(json::parse(*refused)["id"], 8);
     EXPECT_NE(refused->find("choose_variant: expected a variant"), std::string::npos) << *refused;
   });
-  EXPECT_EQ(session_->staging().slots[0].variant, variants[1].name);
+  EXPECT_EQ(session_->show_state().slots[0].variant, variants[1].name);
 }
 
 TEST_F(AServedSession, ProgramsEditOverHttp) {
@@ -138,33 +138,33 @@ TEST_F(AServedSession, ProgramsEditOverHttp) {
     EXPECT_EQ(wrong.status, 400);
     EXPECT_NE(wrong.body.find("expected on, off or toggle"), std::string::npos);
   });
-  EXPECT_TRUE(session_->staging().blackout);
+  EXPECT_TRUE(session_->show_state().blackout);
 }
 
 // In the words of the actions, so that everybody's sliders stand there; also those of a look.
 TEST_F(AServedSession, TellsMaterialsAndLight) {
-  using Told = std::pair<std::string, std::string>;  // the mirror's material, the light
+  using RendererInput = std::pair<std::string, std::string>;  // the mirror's material, the light
   std::string token;
   const auto done = [&](const char* action, const char* slot, const std::string& value) {
     const auto answer = client()->post(
         "/api/edit", json({{"action", action}, {"slot", slot}, {"value", value}}).dump(), token);
     EXPECT_EQ(answer.status, 200) << answer.body;
     const json state = json::parse(client()->get("/api/state", token).body);
-    return Told(state["slots"][0]["material"], state["light"]);
+    return RendererInput(state["slots"][0]["material"], state["light"]);
   };
   play_while([&] {
     token = token_of(Role::work, "Ann");
-    EXPECT_EQ(done("grid", "", "on"), Told("", ""));
-    EXPECT_EQ(done("material", "mirror", "#c02818 - 0.45"), Told("#c02818 - 0.45", ""));
-    EXPECT_EQ(done("material", "mirror", ""), Told("", ""));
+    EXPECT_EQ(done("grid", "", "on"), RendererInput("", ""));
+    EXPECT_EQ(done("material", "mirror", "#c02818 - 0.45"), RendererInput("#c02818 - 0.45", ""));
+    EXPECT_EQ(done("material", "mirror", ""), RendererInput("", ""));
     for (const char* light : {"-135 -20.5 0.65 0.35 0.15", "30 45 0.6 0.3 0.1", "170 5 2 0 0"})
-      EXPECT_EQ(done("light", "", light), Told("", light));
+      EXPECT_EQ(done("light", "", light), RendererInput("", light));
   });
   session_->paint(at_, at_);  // which looks are saved of
   ASSERT_TRUE(session_->edit({"save_look", "", "dark"}, "test", at_));
   play_while([&] {
-    EXPECT_EQ(done("light", "", ""), Told("", ""));
-    EXPECT_EQ(done("restore_look", "", "dark"), Told("", "170 5 2 0 0"));
+    EXPECT_EQ(done("light", "", ""), RendererInput("", ""));
+    EXPECT_EQ(done("restore_look", "", "dark"), RendererInput("", "170 5 2 0 0"));
   });
 }
 
@@ -185,7 +185,7 @@ TEST_F(AServedSession, TellsWhatEachScreenShows) {
   });
 }
 
-// The session gives guests no more of its time than it can between two pictures.
+// The session gives guests no more of its time than it can between two images.
 TEST_F(AServedSession, AFloodOfEditsIsTakenInPortions) {
   const auto ann = guest(Role::work);
   for (int i = 0; i < 100; ++i)
@@ -193,11 +193,11 @@ TEST_F(AServedSession, AFloodOfEditsIsTakenInPortions) {
         R"({{"type": "edit", "id": {}, "action": "nudge", "slot": "mirror", "value": "1 0 0"}})", i));
   std::this_thread::sleep_for(200ms);
   turn();
-  const double first_mm = 1e3 * session_->staging().slots[0].nudge.x();
+  const double first_mm = 1e3 * session_->show_state().slots[0].nudge.x();
   EXPECT_GT(first_mm, 0);
   EXPECT_LE(first_mm, Server::k_most_at_once + 1e-6);
   for (int i = 0; i < 100; ++i) turn();
-  EXPECT_NEAR(1e3 * session_->staging().slots[0].nudge.x(), 100, 1e-6);
+  EXPECT_NEAR(1e3 * session_->show_state().slots[0].nudge.x(), 100, 1e-6);
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(ann->message_of("done")) << i;
 }
 
@@ -282,7 +282,7 @@ TEST_F(AServedSession, KeepsCommentsWithTheProject) {
   EXPECT_EQ((*kept)[0].text, "2 mm up");
 }
 
-TEST_F(AServedSession, GivesPicturesAndAssemblies) {
+TEST_F(AServedSession, GivesImagesAndAssemblies) {
   ASSERT_TRUE(session_->edit({"save_look", "", "calm one"}, "test", at_));
   session_->paint(at_, at_);
   const std::string slot = session_->setup().scene.slots[0].name,
@@ -293,10 +293,10 @@ TEST_F(AServedSession, GivesPicturesAndAssemblies) {
     const auto projector = client()->get("/picture/projector/projector0.jpg", token);
     ASSERT_EQ(projector.status, 200) << projector.body;
     EXPECT_EQ(projector.headers.at("cache-control"), "no-store");
-    const auto picture = device::decode_jpeg(
+    const auto image = device::decode_jpeg(
         {reinterpret_cast<const std::uint8_t*>(projector.body.data()), projector.body.size()});
-    ASSERT_TRUE(picture) << picture.message();
-    EXPECT_EQ(picture->size(), session_->painted().projectors[0].size());
+    ASSERT_TRUE(image) << image.message();
+    EXPECT_EQ(image->size(), session_->painted().projectors[0].size());
     const auto part = client()->get("/picture/variant/" + slot + "/" + variant + ".png", token);
     EXPECT_EQ(part.status, 200) << part.body;
     EXPECT_EQ(part.body.substr(1, 3), "PNG");
@@ -324,7 +324,7 @@ TEST_F(AServedSession, ProjectsACodeForAWhile) {
   ASSERT_TRUE(session_->edit({"blackout", "", "on"}, "test", at_));
   EXPECT_TRUE(is_painted(server_->lit(&*session_, 0))) << "under a blackout";
   ASSERT_TRUE(session_->edit({"blackout", "", "off"}, "test", at_));
-  // No prototype is seen: after a while it is in the picture's middle.
+  // No prototype is seen: after a while it is in the image's middle.
   cv::Mat lit = server_->lit(&*session_, 0);
   EXPECT_TRUE(is_painted(lit));
   for (const auto asked = Clock::now(); is_painted(lit) && seconds_since(asked) < 5;) {
@@ -333,7 +333,7 @@ TEST_F(AServedSession, ProjectsACodeForAWhile) {
   }
   const auto begun = Clock::now();
   cv::Mat sign;
-  cv::resize(0.75 * code_sign(server_->invitation().url_for(Role::work), pin(Role::work), "work", 12), sign,
+  cv::resize(0.75 * pairing_code_image(server_->invitation().url_for(Role::work), pin(Role::work), "work", 12), sign,
              {}, 1.0 / 6, 1.0 / 6, cv::INTER_AREA);
   const cv::Rect middle({(lit.cols - sign.cols) / 2, (lit.rows - sign.rows) / 2}, sign.size());
   EXPECT_LE(cv::norm(lit(middle), sign, cv::NORM_INF), 1);
@@ -369,7 +369,7 @@ TEST_F(AServedSession, ProjectsACodeForAWhile) {
   EXPECT_EQ(server_->code_projector(), "");
 }
 
-// What the loop pays for guests, of its time between two pictures.
+// What the loop pays for guests, of its time between two images.
 TEST_F(AServedSession, CostsTheSessionLittle) {
   const auto cost_us = [&] {
     double spent_s = 0;
@@ -457,7 +457,7 @@ class Attack {
         large.back()->send_half_a_frame(size, std::string_view(noise_).substr(0, size - 1));
       }
     });
-    again([this] {  // pictures of 65500 pixels a side, of 500 scans, and large ones
+    again([this] {  // images of 65500 pixels a side, of 500 scans, and large ones
       const auto one = window("bomb-tablet");
       for (std::uint32_t i = 0; i < 30 && !is_over_; ++i) {
         one->send_binary(number_bytes(i) + bombs_[i % bombs_.size()]);
@@ -499,7 +499,7 @@ class Attack {
 };
 
 // Whatever guests do, the session paints on, who came before is served, and memory stays within bounds.
-TEST_F(AServedSession, UnderAttackMemoryIsBoundedAndItsPicturesGoOn) {
+TEST_F(AServedSession, UnderAttackMemoryIsBoundedAndItsImagesGoOn) {
   constexpr double k_attack_s = 3;
   // Eight windows: a frame that comes, one that waits, one that is looked at.
   constexpr double k_most_mib = 128;
@@ -508,14 +508,14 @@ TEST_F(AServedSession, UnderAttackMemoryIsBoundedAndItsPicturesGoOn) {
   files.rlim_cur = std::min<rlim_t>(files.rlim_max, 8192);
   ::setrlimit(RLIMIT_NOFILE, &files);
   sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture).value();
-  ASSERT_TRUE(make_coarser(0.25, &world.rig).ok());
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+  ASSERT_TRUE(scale_resolution(0.25, &world.rig).ok());
   sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
   const SessionSetup& setup = session_->setup();
-  Watcher watcher = Watcher::create(setup.scene, setup.rig, setup.watch).value();
-  auto onlooker = Onlooker::create(setup, folder_ / "lenses");
-  ASSERT_TRUE(onlooker) << onlooker.message();
-  open({}, eyes_of(std::move(*onlooker)));
+  Perception perception = Perception::create(setup.scene, setup.rig, setup.watch).value();
+  auto tablet_view = TabletView::create(setup, folder_ / "lenses");
+  ASSERT_TRUE(tablet_view) << tablet_view.message();
+  open({}, eyes_of(std::move(*tablet_view)));
   const auto ben = guest(Role::work, "Ben");
   Attack attack(server_->port(), token_of(Role::look, "Eve"));
   struct Frames {
@@ -529,14 +529,14 @@ TEST_F(AServedSession, UnderAttackMemoryIsBoundedAndItsPicturesGoOn) {
     while (seconds_since(begun) < seconds) {
       const auto frame = Clock::now();
       const int camera = 0;
-      session_->take(watcher.watch(rig.expose(std::span(&camera, 1))), ++count);
+      session_->take(perception.watch(rig.expose(std::span(&camera, 1))), ++count);
       at_ = rig.now();
       EXPECT_TRUE(session_->edit({"nudge", "mirror", count % 2 ? "0.2 0 0" : "-0.2 0 0"}, "test", at_));
       double guests_ms = -thread_ms();
       server_->hear(&*session_, at_);
       server_->tell(*session_, *telemetry_, health_, at_);
       guests_ms += thread_ms();
-      const Painted& painted = session_->paint(at_, shifted(at_, 0.04));
+      const ComposedFrame& painted = session_->paint(at_, shifted(at_, 0.04));
       EXPECT_EQ(painted.painted_at, at_);
       for (std::size_t i = 0; i < painted.projectors.size(); ++i)
         EXPECT_TRUE(rig.projector(static_cast<int>(i)).show(server_->lit(&*session_, i)));
@@ -613,15 +613,15 @@ TEST(LiveServe, GuestsReachARunningSessionThatIsReplayed) {
   options.serve = "0";
   options.record = folder / "recording";
   // What a tablet sees of the room.
-  sim::World seen = sim::load_world(folder / "world.json", marker_picture).value();
+  sim::World seen = sim::load_world(folder / "world.json", marker_image).value();
   std::vector<cv::Mat> dark;
   for (const Imager& p : seen.rig.projectors) dark.push_back(cv::Mat::zeros(p.height, p.width, CV_8UC3));
   const Eigen::Vector3d p_middle = seen.world_from_prototype.translation;
-  const std::vector<std::uint8_t> picture =
+  const std::vector<std::uint8_t> image =
       test::VirtualTablet(seen, dark, 640, 400, 2)
           .shoot_from(looking_at(p_middle + Eigen::Vector3d(-0.4, -0.6, 0.1), p_middle, {0, 0, 1}))
           .jpeg;
-  const std::string jpeg(picture.begin(), picture.end());
+  const std::string jpeg(image.begin(), image.end());
   bool is_followed = false, is_left = false;
   int status = 0, room_status = 0;
   json state;

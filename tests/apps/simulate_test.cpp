@@ -7,7 +7,7 @@
 
 #include "apps/world_markers.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "core/rig.h"
 #include "sim/world.h"
 #include "tests/support/matchers.h"
@@ -20,9 +20,9 @@ namespace fs = std::filesystem;
 
 const fs::path k_bench = fs::path(LIMN_SOURCE_DIR) / "config" / "worlds" / "bench.json";
 
-double mean(const fs::path& path) { return cv::mean(read_picture(path).value())[0]; }
+double mean(const fs::path& path) { return cv::mean(read_image(path).value())[0]; }
 
-TEST(Simulate, WritesPicturesTheTruthAndTheRig) {
+TEST(Simulate, WritesImagesTheTruthAndTheRig) {
   const fs::path out = test_folder() / "out";
   const fs::path shown = test_folder() / "half.png";
   cv::Mat half = cv::Mat::zeros(800, 1280, CV_8U);
@@ -35,13 +35,13 @@ TEST(Simulate, WritesPicturesTheTruthAndTheRig) {
   const double white = mean(out / "camera0-white.png");
   EXPECT_LT(ambient + 5, half_lit);
   EXPECT_LT(half_lit + 5, white);
-  EXPECT_GT(cv::norm(read_picture(out / "camera0-still-life.png").value(),
-                     read_picture(out / "camera0-white.png").value(), cv::NORM_INF),
+  EXPECT_GT(cv::norm(read_image(out / "camera0-still-life.png").value(),
+                     read_image(out / "camera0-white.png").value(), cv::NORM_INF),
             50);
 
   const auto json = nlohmann::json::parse(read_file(out / "truth.json").value());
   EXPECT_EQ(json["slots"]["mirror"]["variant"], "sport");
-  const sim::World world = sim::load_world(k_bench, apps::marker_picture).value();
+  const sim::World world = sim::load_world(k_bench, apps::marker_image).value();
   const Rig rig = load_rig(out / "rig").value();
   ASSERT_EQ(json["markers"].size(), 10U);
   const auto& marker = json["markers"][0];

@@ -1,4 +1,4 @@
-// A long session in which things go wrong again and again: cameras and projectors come and go, pictures come
+// A long session in which things go wrong again and again: cameras and projectors come and go, images come
 // in another size, a camera's clock steps, hands cover markers and hide the light, files break and are
 // mended, the disk is full for a while. LIMN_SOAK_S: seconds of the session's clock (20).
 #include <gtest/gtest.h>

@@ -29,8 +29,8 @@ constexpr double k_max_cells_px = 0.165, k_max_worst_cells_px = 0.228;
 constexpr double k_max_corners_px = 0.262, k_max_worst_corners_px = 0.385;
 constexpr double k_max_held_out_px = 0.20;
 
-SolveOptions five_poses(const fs::path& data, const fs::path& out) {
-  SolveOptions options{.captures = data, .out = out};
+SolveCommandOptions five_poses(const fs::path& data, const fs::path& out) {
+  SolveCommandOptions options{.captures = data, .out = out};
   options.import_format = "opencv-gray";
   options.projector = "1024x768";
   options.board = "chessboard:9x7:75mm";
@@ -39,7 +39,7 @@ SolveOptions five_poses(const fs::path& data, const fs::path& out) {
   return options;
 }
 
-// The board's corners by OpenCV alone, in the white picture; by our ids.
+// The board's corners by OpenCV alone, in the white image; by our ids.
 std::map<int, Vector2d> opencv_corners(const fs::path& folder, const calib::Board& board) {
   const cv::Mat white = cv::imread(folder / "graycode_40.png", 0);
   std::vector<cv::Point2f> found;
@@ -54,7 +54,7 @@ std::map<int, Vector2d> opencv_corners(const fs::path& folder, const calib::Boar
 
 // Pose of a flat board by OpenCV's PnP on undistorted corners, all of them; none of the solver's code. (In
 // captures 1 and 2 the sheet's corner stands off the plane: the camera sees three corners up to 3 px from
-// where a flat board has them. Without them the plane fits the rest better and foretells these worse.)
+// where a flat board has them. Without them the plane fits the rest better and predicts these worse.)
 Pose pnp(const std::vector<std::pair<int, Vector2d>>& corners,
          const Imager& camera,
          const calib::Board& board) {
@@ -71,7 +71,7 @@ Pose pnp(const std::vector<std::pair<int, Vector2d>>& corners,
           Vector3d(tvec.at<double>(0), tvec.at<double>(1), tvec.at<double>(2))};
 }
 
-// A plain decoding, none of ours: signs of picture minus inverse, and a pixel counts when every bit is clear.
+// A plain decoding, none of ours: signs of image minus inverse, and a pixel counts when every bit is clear.
 cv::Mat plain_labels(const fs::path& folder) {
   constexpr int k_bits = 10, k_clear = 3, k_lit = 10;
   const auto shot = [&](int i) { return cv::imread(folder / fmt::format("graycode_{:02d}.png", i), 0); };
@@ -237,7 +237,7 @@ TEST(SolvePhotographs, FiveRealPosesHoldOutByTheReportAndByAnIndependentJudge) {
   double worst_cells = 0, worst_corners = 0;
   for (int pose = 0; pose < 5; ++pose) {
     const std::string name = "capture_" + std::to_string(pose);
-    SolveOptions options = five_poses(*data, folder / "without");
+    SolveCommandOptions options = five_poses(*data, folder / "without");
     options.skip_poses = {name};
     ASSERT_TRUE(run_solve(options).ok());
     const auto camera = load_cameramodel(folder / "without" / "camera0.cameramodel");

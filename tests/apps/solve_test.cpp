@@ -19,7 +19,7 @@
 #include "calib/code/patterns.h"
 #include "calib/response/response_patterns.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "core/rig.h"
 #include "tests/calib/true_rig.h"
 #include "tests/support/matchers.h"
@@ -68,9 +68,9 @@ struct Stage {
         const Vector3d p = board_from_camera.translation - board_from_camera.translation.z() / d.z() * d;
         const Vector2d at = shown.px_board_origin + shown.pixels_per_metre * p.head<2>();
         const int u = static_cast<int>(std::lround(at.x())), v = static_cast<int>(std::lround(at.y()));
-        const bool inside = u >= 0 && v >= 0 && u < shown.picture.cols && v < shown.picture.rows;
+        const bool inside = u >= 0 && v >= 0 && u < shown.image.cols && v < shown.image.rows;
         Sample sample;
-        sample.albedo = inside && with_board && shown.picture.at<uchar>(v, u) == 0 ? 0.05F : 0.8F;
+        sample.albedo = inside && with_board && shown.image.at<uchar>(v, u) == 0 ? 0.05F : 0.8F;
         if (const auto light = projector.project(world_from_board(pose) * p);
             light && projector.contains(*light)) {
           sample.column = static_cast<int>(std::lround(light->x()));
@@ -101,15 +101,15 @@ struct Stage {
   calib::BoardSheet bar() const {
     calib::BoardSheet made{cv::Mat(160, 420, CV_8U, cv::Scalar(255)), 1000, {49.5, -40.5}};
     for (const int id : {3, 7}) {
-      const cv::Mat marker = marker_picture({"apriltag_36h11", std::to_string(id)}).value();
+      const cv::Mat marker = marker_image({"apriltag_36h11", std::to_string(id)}).value();
       cv::Mat grey;
       cv::resize(to_grey(marker), grey, {64, 64}, 0, 0, cv::INTER_NEAREST);
-      grey.copyTo(made.picture(cv::Rect(id == 3 ? 53 : 303, 48, 64, 64)));
+      grey.copyTo(made.image(cv::Rect(id == 3 ? 53 : 303, 48, 64, 64)));
     }
     return made;
   }
 
-  void capture_seen(const calib::Captures& plan, int pose, const std::vector<Sample>& seen) const {
+  void capture_seen(const calib::CaptureSet& plan, int pose, const std::vector<Sample>& seen) const {
     cv::Mat photo;
     const Status status = calib::capture_pose(
         plan, pose,
@@ -118,12 +118,12 @@ struct Stage {
     ASSERT_TRUE(status.ok()) << status.message();
   }
 
-  void capture_bar(const calib::Captures& plan, int pose) const {
+  void capture_bar(const calib::CaptureSet& plan, int pose) const {
     capture_seen(plan, pose, samples(pose, true, bar()));
   }
 
   void capture(const fs::path& folder, int poses, bool with_board = true) const {
-    const calib::Captures plan =
+    const calib::CaptureSet plan =
         calib::plan_captures(folder, {{camera.name, camera.width, camera.height}},
                              {{projector.name, projector.width, projector.height}}, board);
     ASSERT_TRUE(calib::begin_captures(plan).ok());
@@ -183,7 +183,7 @@ TEST(SolveCommand, FindsTheRigThatTookTheCaptures) {
   EXPECT_EQ(chosen, 2);
   EXPECT_GT(report["lens_models"].size(), 4U);
 
-  // Where light lands on a thing that was not captured is what the report foretells.
+  // Where light lands on a thing that was not captured is what the report predicts.
   TrueRig known;
   known.rig.cameras = {truth.camera};
   known.rig.projectors = {truth.projector};
@@ -262,10 +262,10 @@ TEST(SolveCommand, UsesASceneWithoutABoard) {
   ASSERT_TRUE(report.ok()) << report.message();
   const calib::Observations& seen = report->observed.observations;
   ASSERT_GT(seen.points.size(), 50U);
-  EXPECT_EQ(seen.points.size(), seen.sightings.size()) << "one camera, one projector";
+  EXPECT_EQ(seen.points.size(), seen.tie_observations.size()) << "one camera, one projector";
   // What of the residual depth cannot take up: across the epipolar lines.
   std::vector<double> lengths;
-  for (const Vector2d& r : report->solution.sighting_residuals) lengths.push_back(r.norm());
+  for (const Vector2d& r : report->solution.tie_point_residuals) lengths.push_back(r.norm());
   std::nth_element(lengths.begin(), lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2),
                    lengths.end());
   EXPECT_LT(lengths[lengths.size() / 2], 0.2);
@@ -317,14 +317,14 @@ cv::Mat photograph_of_response(const cv::Mat& shown, int width, int height) {
   return photo;
 }
 
-TEST(SolveCommand, MeasuresTheResponseFromPicturesBesideThePoses) {
+TEST(SolveCommand, MeasuresTheResponseFromImagesBesideThePoses) {
   const fs::path captures = own_captures(), out = captures.parent_path() / "rig with response";
   const Stage stage;
   const fs::path folder = captures / "response" / "projector0" / "camera0";
   ASSERT_TRUE(make_folder(folder).ok());
-  for (int i = 0; i < static_cast<int>(calib::response_pictures().size()); ++i) {
+  for (int i = 0; i < static_cast<int>(calib::response_images().size()); ++i) {
     const cv::Mat shown = calib::draw_response(i, stage.projector.width, stage.projector.height);
-    ASSERT_TRUE(write_png(folder / calib::picture_name(i),
+    ASSERT_TRUE(write_png(folder / calib::image_name(i),
                           photograph_of_response(shown, stage.camera.width, stage.camera.height))
                     .ok());
   }
@@ -353,7 +353,7 @@ TEST(SolveCommand, MeasuresTheResponseFromPicturesBesideThePoses) {
   EXPECT_EQ(read_file(out / "rig.json").value(), old_rig);
 }
 
-TEST(SolveCommand, NamesCopiedPicturesAndTheBoardThatWasReallyThere) {
+TEST(SolveCommand, NamesCopiedImagesAndTheBoardThatWasReallyThere) {
   const fs::path captures = own_captures(), out = captures.parent_path() / "new rig";
   const auto failure = [&] {
     const Status status = run_solve({.captures = captures, .out = out});
@@ -381,16 +381,16 @@ TEST(SolveCommand, NamesCopiedPicturesAndTheBoardThatWasReallyThere) {
 TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
   const fs::path captures = own_captures(), out = captures.parent_path() / "rig with bar";
   const Stage stage;
-  const calib::Captures plan = calib::plan_captures(
+  const calib::CaptureSet plan = calib::plan_captures(
       captures, {{stage.camera.name, stage.camera.width, stage.camera.height}},
       {{stage.projector.name, stage.projector.width, stage.projector.height}}, stage.board);
   for (const int pose : {6, 7}) stage.capture_bar(plan, pose);
-  SolveOptions options{.captures = captures, .out = out};
-  options.known_lengths = {"apriltag_36h11:3 apriltag_36h11:7 250mm"};
+  SolveCommandOptions options{.captures = captures, .out = out};
+  options.scale_bar_lengths = {"apriltag_36h11:3 apriltag_36h11:7 250mm"};
   const auto right = solved(options);
   ASSERT_TRUE(right.ok()) << right.message();
-  ASSERT_EQ(right->known_lengths.size(), 1U);
-  const calib::LengthCheck& check = right->known_lengths[0];
+  ASSERT_EQ(right->scale_bar_lengths.size(), 1U);
+  const calib::ScaleBarCheck& check = right->scale_bar_lengths[0];
   EXPECT_EQ(check.views.size(), 2U);
   EXPECT_NEAR(check.measured_m, 0.250, 0.0015);
   EXPECT_LT(std::abs(check.measured_m - 0.250), 3.5 * check.stddev_m);
@@ -402,23 +402,23 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
   described.replace(described.find("charuco:8x6:40mm\""), 17,
                     "charuco:8x6:39mm\", \"known_lengths\": [\"apriltag_36h11:3 apriltag_36h11:7 25cm\"]");
   ASSERT_TRUE(write_file(captures / "capture.json", described).ok());
-  options.known_lengths.clear();
+  options.scale_bar_lengths.clear();
   const auto wrong = solved(options);
   ASSERT_TRUE(wrong.ok()) << wrong.message();
-  ASSERT_EQ(wrong->known_lengths.size(), 1U);
-  EXPECT_NEAR(wrong->known_lengths[0].measured_m, 0.250 * 39 / 40, 0.0015);
+  ASSERT_EQ(wrong->scale_bar_lengths.size(), 1U);
+  EXPECT_NEAR(wrong->scale_bar_lengths[0].measured_m, 0.250 * 39 / 40, 0.0015);
   const auto fault = std::find_if(wrong->assessment.faults.begin(), wrong->assessment.faults.end(),
                                   [](const calib::Fault& f) { return f.name == "wrong_scale"; });
   ASSERT_NE(fault, wrong->assessment.faults.end());
   EXPECT_NE(fault->advice.find("instead of 39 mm"), std::string::npos) << fault->advice;
   EXPECT_NE(wrong->assessment.verdict, calib::Verdict::good);
 
-  options.known_lengths = {"apriltag_36h11:3 apriltag_36h11:8 250mm"};
+  options.scale_bar_lengths = {"apriltag_36h11:3 apriltag_36h11:8 250mm"};
   const auto unseen = solved(options);
   ASSERT_TRUE(unseen.ok()) << unseen.message();
   EXPECT_EQ(unseen->assessment.faults.back().name, "known_length_not_seen");
   for (const char* nonsense : {"", "apriltag_36h11:3 250mm", "a:1 b:2 250", "a:1 a:1 250mm", "a:1 b:2 -3mm"})
-    EXPECT_FALSE(calib::parse_known_length(nonsense).ok()) << nonsense;
+    EXPECT_FALSE(calib::parse_scale_bar(nonsense).ok()) << nonsense;
 }
 
 // Each pose's stripes are those of another pose: nothing fits anything.
@@ -427,7 +427,7 @@ TEST(SolveCommand, ContradictionsAreRejectedWithFiniteNumbers) {
   const auto stripes = [&](int pose) { return captures / fmt::format("pose{:02d}", pose) / "camera0"; };
   const calib::Patterns patterns = calib::load_patterns(captures / "patterns.json").value();
   for (int i = 0; i < patterns.white(); ++i) {
-    const std::string name = calib::picture_name(i);
+    const std::string name = calib::image_name(i);
     fs::rename(stripes(0) / name, captures / "first.png");
     for (int pose = 0; pose + 1 < 6; ++pose) fs::rename(stripes(pose + 1) / name, stripes(pose) / name);
     fs::rename(captures / "first.png", stripes(5) / name);
@@ -459,11 +459,11 @@ TEST(SolveCommand, SaysThatNoBoardIsVisible) {
 
 TEST(SolveCommand, CallsWrongOptionsWrongUsage) {
   const fs::path folder = test_folder();
-  const auto usage = [](const SolveOptions& options) {
+  const auto usage = [](const SolveCommandOptions& options) {
     const Status status = run_solve(options);
     return !status.ok() && status.error().wrong_usage;
   };
-  SolveOptions foreign{.captures = folder, .out = folder / "rig"};
+  SolveCommandOptions foreign{.captures = folder, .out = folder / "rig"};
   foreign.import_format = "opencv-gray";
   EXPECT_TRUE(usage(foreign));
   foreign.projector = "1024x768";

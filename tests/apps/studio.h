@@ -19,9 +19,9 @@ inline constexpr const char* k_mirror = "aruco_4x4_50:0";  // the marker of the 
 
 inline sim::World studio(double resolution) {
   sim::World world =
-      sim::load_world(std::filesystem::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture)
+      sim::load_world(std::filesystem::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image)
           .value();
-  EXPECT_TRUE(make_coarser(resolution, &world.rig).ok());
+  EXPECT_TRUE(scale_resolution(resolution, &world.rig).ok());
   return world;
 }
 

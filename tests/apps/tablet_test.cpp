@@ -11,14 +11,14 @@
 
 #include "apps/coarser.h"
 #include "apps/live/session.h"
-#include "apps/live/watcher.h"
-#include "apps/tablet/guest_eye.h"
-#include "apps/tablet/guest_picture.h"
-#include "apps/tablet/lens_book.h"
-#include "apps/tablet/onlooker.h"
+#include "apps/live/perception.h"
+#include "apps/tablet/tablet_localizer.h"
+#include "apps/tablet/tablet_image.h"
+#include "apps/tablet/intrinsics_store.h"
+#include "apps/tablet/tablet_view.h"
 #include "apps/world_markers.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"
 #include "sim/truth.h"
@@ -48,43 +48,43 @@ class Room {
   explicit Room(const fs::path& lens_folder, double resolution = 0.5, double frame_period_s = 1 / 30.0)
       : context_(device::GlContext::create().value()) {
     sim::World world =
-        sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture).value();
-    EXPECT_TRUE(make_coarser(resolution, &world.rig).ok());
+        sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+    EXPECT_TRUE(scale_resolution(resolution, &world.rig).ok());
     setup_.rig = world.rig;
     setup_.scene = *world.scene;
     rig_.emplace(std::move(world),
                  sim::VirtualRigOptions{.frame_period_s = frame_period_s, .grab_waits_for_light = false});
-    watcher_ = Watcher::create(setup_.scene, setup_.rig).value();
+    perception_ = Perception::create(setup_.scene, setup_.rig).value();
     session_ = Session::create(setup_, nullptr, nullptr, false).value();
-    onlooker_ = Onlooker::create(setup_, lens_folder).value();
+    tablet_view_ = TabletView::create(setup_, lens_folder).value();
     for (int i = 0; i < 8; ++i) step();
   }
 
   // One more of the room's frames.
   void step() {
     const int camera = 0;
-    session_->take(watcher_->watch(rig_->expose(std::span(&camera, 1))), ++moments_);
-    const Painted& painted = session_->paint(rig_->now(), shifted(rig_->now(), 0.04));
+    session_->take(perception_->watch(rig_->expose(std::span(&camera, 1))), ++moments_);
+    const ComposedFrame& painted = session_->paint(rig_->now(), shifted(rig_->now(), 0.04));
     for (std::size_t k = 0; k < painted.projectors.size(); ++k)
       (void)rig_->projector(static_cast<int>(k)).show(painted.projectors[k]).value();
-    onlooker_->know(*session_);
+    tablet_view_->know(*session_);
   }
 
   struct Window {
     json said;
-    cv::Mat picture;
+    cv::Mat image;
     std::vector<std::uint8_t> jpeg;
     std::optional<Eigen::Vector3d> p_eye_world;
   };
   Window look(const std::string& device,
               std::vector<std::uint8_t> jpeg,
-              WindowParts parts = WindowParts::as_screen) {
-    std::promise<Onlooker::Seen> answered;
-    onlooker_->look({device, "", parts}, std::move(jpeg),
-                    [&](Onlooker::Seen seen) { answered.set_value(std::move(seen)); });
-    Onlooker::Seen seen = answered.get_future().get();
+              TabletViewMode parts = TabletViewMode::as_screen) {
+    std::promise<TabletView::Seen> answered;
+    tablet_view_->look({device, "", parts}, std::move(jpeg),
+                    [&](TabletView::Seen seen) { answered.set_value(std::move(seen)); });
+    TabletView::Seen seen = answered.get_future().get();
     Window window{json::parse(seen.json), {}, seen.jpeg, seen.p_eye_world};
-    if (!seen.jpeg.empty()) window.picture = device::decode_jpeg(seen.jpeg).value();
+    if (!seen.jpeg.empty()) window.image = device::decode_jpeg(seen.jpeg).value();
     return window;
   }
 
@@ -92,8 +92,8 @@ class Room {
     return {rig_->world(), session_->painted().projectors, width, height, seed};
   }
 
-  Onlooker& onlooker() { return *onlooker_; }
-  void end_onlooker() { onlooker_.reset(); }
+  TabletView& tablet_view() { return *tablet_view_; }
+  void end_onlooker() { tablet_view_.reset(); }
   Session& session() { return *session_; }
   sim::VirtualRig& rig() { return *rig_; }
 
@@ -101,9 +101,9 @@ class Room {
   device::GlContext context_;
   SessionSetup setup_;
   std::optional<sim::VirtualRig> rig_;
-  std::optional<Watcher> watcher_;
+  std::optional<Perception> perception_;
   std::optional<Session> session_;
-  std::unique_ptr<Onlooker> onlooker_;
+  std::unique_ptr<TabletView> tablet_view_;
   std::size_t moments_ = 0;
 };
 
@@ -114,7 +114,7 @@ std::vector<Eigen::Vector3d> part_points(const sim::World& world, const scene::P
     const scene::Slot* slot = world.scene->find_slot(part.slot);
     for (const scene::Variant& variant : slot->variants)
       if (variant.name == part.variant)
-        for (const sim::SurfacePoint& point : sim::surface_points(variant.mesh, 60, 1))
+        for (const sim::SampledPoint& point : sim::surface_points(variant.mesh, 60, 1))
           points.push_back(part.world_from_part * point.p);
   }
   return points;
@@ -127,7 +127,7 @@ Imager view_of(const json& said, const Imager& truth) {
   return view;
 }
 
-// Where the picture that came back differs from the one that was sent.
+// Where the image that came back differs from the one that was sent.
 cv::Mat drawn_mask(const cv::Mat& sent, const cv::Mat& back) {
   constexpr int k_drawn = 40;  // levels, more than JPEG makes of edges
   cv::Mat difference, channels[3], most;
@@ -138,8 +138,8 @@ cv::Mat drawn_mask(const cv::Mat& sent, const cv::Mat& back) {
   return most > k_drawn;
 }
 
-// Somebody looks round for 10 s: what is drawn lies where it belongs, in exactly the picture that was sent.
-TEST(Tablet, PartAndPictureLieOnEachOtherAfterTenSecondsOfLookingRound) {
+// Somebody looks round for 10 s: what is drawn lies where it belongs, in exactly the image that was sent.
+TEST(Tablet, PartAndImageLieOnEachOtherAfterTenSecondsOfLookingRound) {
   const fs::path folder = test::test_folder();
   Room room(folder / "lenses");
   test::VirtualTablet tablet = room.tablet(8);
@@ -170,15 +170,15 @@ TEST(Tablet, PartAndPictureLieOnEachOtherAfterTenSecondsOfLookingRound) {
     std::printf("%5.1f s: %4.2f px, %d markers, rms %.2f px, focal length %.1f +- %.1f (true %.1f)\n",
                 0.1 * i, part_px, window.said["markers"].get<int>(), window.said["rms_px"].get<double>(),
                 view.lens.fx(), window.said["lens"]["focal_stddev_px"].get<double>(), shot.camera.lens.fx());
-    ASSERT_TRUE(write_png(folder / fmt::format("sent-{}.png", i), shot.picture));
-    ASSERT_TRUE(write_png(folder / fmt::format("seen-{}.png", i), window.picture));
+    ASSERT_TRUE(write_png(folder / fmt::format("sent-{}.png", i), shot.image));
+    ASSERT_TRUE(write_png(folder / fmt::format("seen-{}.png", i), window.image));
     // The mirror that was drawn, and the one that belongs there.
-    const sim::ObjectPicture objects = judge.object_picture(shot.camera);
+    const sim::ObjectImage objects = judge.object_image(shot.camera);
     const auto name = std::find(objects.names.begin(), objects.names.end(), "part-mirror");
     ASSERT_NE(name, objects.names.end());
-    cv::Mat expected = objects.picture == static_cast<int>(name - objects.names.begin());
+    cv::Mat expected = objects.image == static_cast<int>(name - objects.names.begin());
     if (cv::countNonZero(expected) < 300) continue;
-    const cv::Mat found = drawn_mask(device::decode_jpeg(shot.jpeg).value(), window.picture);
+    const cv::Mat found = drawn_mask(device::decode_jpeg(shot.jpeg).value(), window.image);
     ASSERT_TRUE(write_png(folder / fmt::format("drawn-{}.png", i), found));
     cv::Mat around;
     cv::dilate(expected, around, cv::Mat::ones(9, 9, CV_8U));
@@ -195,7 +195,7 @@ TEST(Tablet, PartAndPictureLieOnEachOtherAfterTenSecondsOfLookingRound) {
   EXPECT_GT(judged, 0);
 }
 
-// Where light of the mirror falls in a tablet's picture, and where it should for that tablet's eye.
+// Where light of the mirror falls in a tablet's image, and where it should for that tablet's eye.
 struct LitMirror {
   double off_mm = 0;   // between the middles, at the prototype's distance
   double overlap = 0;  // what is in both, of what is in either
@@ -219,21 +219,21 @@ LitMirror lit_mirror(const sim::World& world,
   constexpr int k_lit = 6;  // levels
   const scene::PosedScene parts = sim::true_poses(world);
   std::vector<cv::Mat> dark;
-  for (const cv::Mat& picture : shown) dark.push_back(cv::Mat::zeros(picture.size(), picture.type()));
+  for (const cv::Mat& image : shown) dark.push_back(cv::Mat::zeros(image.size(), image.type()));
   test::VirtualTablet with(world, std::move(shown), k_width, k_height, 21),
       without(world, std::move(dark), k_width, k_height, 21);
   const test::TabletShot lit = with.shoot_from(camera_from_world);
   const sim::Truth judge(world, parts);
   const cv::Mat wanted = filled(judge.part_mask(lit.camera, "mirror") == 255);
   cv::Mat lights, either;
-  cv::absdiff(lit.picture, without.shoot_from(camera_from_world).picture, lights);
+  cv::absdiff(lit.image, without.shoot_from(camera_from_world).image, lights);
   cv::blur(lights, lights, {3, 3});  // the noise
   cv::cvtColor(lights, lights, cv::COLOR_BGR2GRAY);
   lights = lights > k_lit;
   lights.setTo(0, judge.part_mask(lit.camera, "trim"));
   cv::morphologyEx(lights, lights, cv::MORPH_OPEN, cv::Mat::ones(5, 5, CV_8U));
   lights = filled(lights);
-  EXPECT_TRUE(write_png(kept.string() + ".png", lit.picture));
+  EXPECT_TRUE(write_png(kept.string() + ".png", lit.image));
   EXPECT_TRUE(write_png(kept.string() + "-light.png", lights));
   cv::bitwise_or(lights, wanted, either);
   const cv::Moments a = cv::moments(lights, true), b = cv::moments(wanted, true);
@@ -326,7 +326,7 @@ TEST(Tablet, AWindowShowsWhatItsGuestChoseAndTheSessionsSplit) {
   const auto edit = [&](const char* action, const char* slot, const char* value) {
     const Status done = session.edit({action, slot, value}, "Ben", room.rig().now());
     EXPECT_TRUE(done.ok()) << done.message();
-    room.onlooker().know(session);
+    room.tablet_view().know(session);
   };
   test::VirtualTablet tablet = room.tablet(7);
   for (int i = 0; i < 4; ++i) room.look(k_tablet, tablet.shoot(1.2 * i).jpeg);  // the lens
@@ -334,58 +334,58 @@ TEST(Tablet, AWindowShowsWhatItsGuestChoseAndTheSessionsSplit) {
   const test::TabletShot shot = tablet.shoot_from(
       looking_at(p_middle + Eigen::Vector3d(-0.1, -0.7, 0.1), p_middle, Eigen::Vector3d::UnitZ()));
   const cv::Mat sent = device::decode_jpeg(shot.jpeg).value();
-  const auto shown = [&](const char* name, WindowParts parts) {
-    cv::Mat picture = room.look(k_tablet, shot.jpeg, parts).picture;
-    EXPECT_TRUE(write_png(folder / (std::string(name) + ".png"), picture));
-    return picture;
+  const auto shown = [&](const char* name, TabletViewMode parts) {
+    cv::Mat image = room.look(k_tablet, shot.jpeg, parts).image;
+    EXPECT_TRUE(write_png(folder / (std::string(name) + ".png"), image));
+    return image;
   };
   const cv::Rect mirror = cv::boundingRect(
       sim::Truth(room.rig().world(), sim::true_poses(room.rig().world())).part_mask(shot.camera, "mirror"));
-  const auto pixels = [&](const cv::Mat& picture) {
-    return cv::countNonZero(drawn_mask(sent(mirror), picture(mirror)));
+  const auto pixels = [&](const cv::Mat& image) {
+    return cv::countNonZero(drawn_mask(sent(mirror), image(mirror)));
   };
 
   // The mirror's light is for another eye: as the screen, whole.
-  const cv::Mat classic = shown("full", WindowParts::full);
-  EXPECT_NEAR(pixels(shown("as-screen", WindowParts::as_screen)), pixels(classic), 0.05 * pixels(classic));
-  const int rest = pixels(shown("rest", WindowParts::rest));
+  const cv::Mat classic = shown("full", TabletViewMode::full);
+  EXPECT_NEAR(pixels(shown("as-screen", TabletViewMode::as_screen)), pixels(classic), 0.05 * pixels(classic));
+  const int rest = pixels(shown("rest", TabletViewMode::rest));
   EXPECT_LT(rest, 0.7 * pixels(classic));
   EXPECT_GT(rest, 100);
 
   edit("save_look", "", "classic");
   edit("choose_variant", "mirror", "sport");
   edit("save_look", "", "sport");
-  const cv::Mat sport = shown("sport", WindowParts::full);
+  const cv::Mat sport = shown("sport", TabletViewMode::full);
   EXPECT_GT(cv::countNonZero(drawn_mask(classic, sport)), 300);
   edit("split", "", "on");
-  const cv::Mat left = shown("left-of-the-split", WindowParts::full);  // as the mirror is
+  const cv::Mat left = shown("left-of-the-split", TabletViewMode::full);  // as the mirror is
   edit("split_at", "", "-440");
-  const cv::Mat right = shown("right-of-the-split", WindowParts::full);
+  const cv::Mat right = shown("right-of-the-split", TabletViewMode::full);
   // But for the line and what JPEG makes of it.
   const auto apart = [](const cv::Mat& a, const cv::Mat& b) { return cv::countNonZero(drawn_mask(a, b)); };
   EXPECT_LT(10 * apart(left, classic), apart(left, sport));
   EXPECT_LT(10 * apart(right, sport), apart(right, classic));
 }
 
-// What is no picture, or too much of one, is refused, and everybody gets an answer.
-// After a repair the room's picture is drawn by the camera's new place.
+// What is no image, or too much of one, is refused, and everybody gets an answer.
+// After a repair the room's image is drawn by the camera's new place.
 TEST(Tablet, AMendedRigIsDrawnWith) {
   const fs::path folder = test::test_folder();
   Room room(folder / "lenses", 0.25);
-  const auto picture = [&](Onlooker* onlooker) {
-    onlooker->know(room.session());
-    std::promise<Onlooker::Seen> answered;
-    onlooker->room([&](Onlooker::Seen seen) { answered.set_value(std::move(seen)); });
+  const auto image = [&](TabletView* tablet_view) {
+    tablet_view->know(room.session());
+    std::promise<TabletView::Seen> answered;
+    tablet_view->room([&](TabletView::Seen seen) { answered.set_value(std::move(seen)); });
     return device::decode_jpeg(answered.get_future().get().jpeg).value();
   };
-  const cv::Mat before = picture(&room.onlooker());
+  const cv::Mat before = image(&room.tablet_view());
   Rig mended = room.session().setup().rig;
   mended.cameras[0].imager_from_world.translation.x() += 0.05;
   ASSERT_TRUE(room.session().mend(mended, room.rig().now()));
-  const cv::Mat after = picture(&room.onlooker());
+  const cv::Mat after = image(&room.tablet_view());
   EXPECT_GT(cv::countNonZero(drawn_mask(before, after)), 50);
-  const auto fresh = Onlooker::create(room.session().setup(), folder / "lenses").value();
-  EXPECT_EQ(cv::countNonZero(drawn_mask(picture(fresh.get()), after)), 0);
+  const auto fresh = TabletView::create(room.session().setup(), folder / "lenses").value();
+  EXPECT_EQ(cv::countNonZero(drawn_mask(image(fresh.get()), after)), 0);
 }
 
 TEST(Tablet, WhatCannotBeLookedAtIsAnsweredWithWhy) {
@@ -415,41 +415,41 @@ TEST(Tablet, WhatCannotBeLookedAtIsAnsweredWithWhy) {
   EXPECT_NE(said("../../etc", shot.jpeg).find("device"), std::string::npos);
   EXPECT_NE(said(k_tablet, device::encode_jpeg(cv::Mat(1, 1, CV_8U, cv::Scalar(9)), 50)).find("No markers"),
             std::string::npos);
-  // A wall: no markers. The room's picture stands in.
+  // A wall: no markers. The room's image stands in.
   const Pose aside = looking_at({0, -1, 0.5}, {0, -3, 0.5}, Eigen::Vector3d::UnitZ());
   EXPECT_NE(said(k_tablet, tablet.shoot_from(aside).jpeg).find("No markers"), std::string::npos);
-  std::promise<Onlooker::Seen> answered;
-  room.onlooker().room([&](Onlooker::Seen seen) { answered.set_value(std::move(seen)); });
-  const Onlooker::Seen seen = answered.get_future().get();
+  std::promise<TabletView::Seen> answered;
+  room.tablet_view().room([&](TabletView::Seen seen) { answered.set_value(std::move(seen)); });
+  const TabletView::Seen seen = answered.get_future().get();
   EXPECT_EQ(json::parse(seen.json)["why"], "");
-  const auto picture = device::decode_jpeg(seen.jpeg);
-  ASSERT_TRUE(picture);
-  EXPECT_EQ(picture->size(), cv::Size(960, 540));
-  ASSERT_TRUE(write_png(test::test_folder() / "room.png", *picture));
-  // After all that a picture is a picture; a large one comes back smaller.
-  EXPECT_EQ(room.look(k_tablet, shot.jpeg).picture.size(), cv::Size(k_width, k_height));
+  const auto image = device::decode_jpeg(seen.jpeg);
+  ASSERT_TRUE(image);
+  EXPECT_EQ(image->size(), cv::Size(960, 540));
+  ASSERT_TRUE(write_png(test::test_folder() / "room.png", *image));
+  // After all that an image is an image; a large one comes back smaller.
+  EXPECT_EQ(room.look(k_tablet, shot.jpeg).image.size(), cv::Size(k_width, k_height));
   test::VirtualTablet large = room.tablet(3, 2560, 1600);
   const Room::Window window = room.look(k_tablet, large.shoot(0).jpeg);
   EXPECT_EQ(window.said["sees"], "prototype") << window.said.dump();
-  EXPECT_EQ(window.picture.size(), cv::Size(1280, 800));
+  EXPECT_EQ(window.image.size(), cv::Size(1280, 800));
 }
 
-// Pictures that come faster than they can be drawn: the newest wins, and everybody is answered once.
-TEST(Tablet, TheNewestPictureOfADeviceWinsAndAllAreAnswered) {
+// Images that come faster than they can be drawn: the newest wins, and everybody is answered once.
+TEST(Tablet, TheNewestImageOfADeviceWinsAndAllAreAnswered) {
   const fs::path lenses = test::test_folder() / "lenses";
   Room room(lenses);
   test::VirtualTablet tablet = room.tablet(5);
   const test::TabletShot one = tablet.shoot(0), other = tablet.shoot(1.7);
-  constexpr int k_pictures = 12;
+  constexpr int k_images = 12;
   struct Answers {
     std::mutex mutex;
-    std::vector<std::vector<json>> said = std::vector<std::vector<json>>(2 * k_pictures);
+    std::vector<std::vector<json>> said = std::vector<std::vector<json>>(2 * k_images);
     int count = 0;
   } answers;
-  for (int i = 0; i < 2 * k_pictures; ++i) {
+  for (int i = 0; i < 2 * k_images; ++i) {
     const bool is_one = i % 2 == 0;
-    room.onlooker().look({is_one ? "tablet-one" : "tablet-other"}, is_one ? one.jpeg : other.jpeg,
-                         [&answers, i](Onlooker::Seen seen) {
+    room.tablet_view().look({is_one ? "tablet-one" : "tablet-other"}, is_one ? one.jpeg : other.jpeg,
+                         [&answers, i](TabletView::Seen seen) {
                            const std::lock_guard lock(answers.mutex);
                            answers.said[static_cast<std::size_t>(i)].push_back(json::parse(seen.json));
                            ++answers.count;
@@ -458,26 +458,26 @@ TEST(Tablet, TheNewestPictureOfADeviceWinsAndAllAreAnswered) {
   for (int i = 0; i < 600; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     const std::lock_guard lock(answers.mutex);
-    if (answers.count == 2 * k_pictures) break;
+    if (answers.count == 2 * k_images) break;
   }
   int drawn = 0;
-  for (int i = 0; i < 2 * k_pictures; ++i) {
+  for (int i = 0; i < 2 * k_images; ++i) {
     const auto& said = answers.said[static_cast<std::size_t>(i)];
     ASSERT_EQ(said.size(), 1u) << i;
     if (said[0]["sees"] == "nothing") {
-      EXPECT_LT(i, 2 * k_pictures - 2) << "the newest";
+      EXPECT_LT(i, 2 * k_images - 2) << "the newest";
       continue;
     }
     ++drawn;
     const Imager& truth = (i % 2 == 0 ? one : other).camera;
     EXPECT_TRUE(test::pose_near(pose_of(said[0]["view_from_world"]), truth.imager_from_world, 0.05, 0.1));
   }
-  EXPECT_LT(drawn, 2 * k_pictures);
+  EXPECT_LT(drawn, 2 * k_images);
   // What still waits at the end is told so.
-  std::promise<Onlooker::Seen> late;
-  room.onlooker().look({k_tablet}, one.jpeg, [](const Onlooker::Seen&) {});
-  room.onlooker().look({"tablet-late"}, one.jpeg,
-                       [&](Onlooker::Seen seen) { late.set_value(std::move(seen)); });
+  std::promise<TabletView::Seen> late;
+  room.tablet_view().look({k_tablet}, one.jpeg, [](const TabletView::Seen&) {});
+  room.tablet_view().look({"tablet-late"}, one.jpeg,
+                       [&](TabletView::Seen seen) { late.set_value(std::move(seen)); });
   room.end_onlooker();
   EXPECT_EQ(late.get_future().wait_for(std::chrono::seconds(0)), std::future_status::ready);
   // What was found of the lenses is kept.
@@ -485,9 +485,9 @@ TEST(Tablet, TheNewestPictureOfADeviceWinsAndAllAreAnswered) {
   EXPECT_EQ(load_lenses(lenses, "tablet-nobody").size(), 0u);
 }
 
-TEST(Tablet, AMarkerThatIsBeingMovedIsPlacedByTheGuestsOwnPicture) {
+TEST(Tablet, AMarkerThatIsBeingMovedIsPlacedByTheGuestsOwnImage) {
   sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_picture).value();
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
   const scene::Scene scene = *world.scene;
   const std::vector<Body> bodies = scene::bodies(scene);
   // What the session takes to be true.
@@ -508,11 +508,11 @@ TEST(Tablet, AMarkerThatIsBeingMovedIsPlacedByTheGuestsOwnPicture) {
   for (const Imager& p : world.rig.projectors)
     white.emplace_back(p.height, p.width, CV_8UC3, cv::Scalar::all(150));
   test::VirtualTablet tablet(world, white, k_width, k_height, 4);
-  GuestEye eye(tracker::Families::load(tracker::families_of(bodies), scene.folder).value());
+  TabletLocalizer eye(tracker::Families::load(tracker::families_of(bodies), scene.folder).value());
   int found = 0;
   for (int i = 0; i < 12; ++i) {
     const test::TabletShot shot = tablet.shoot(0.4 * i);
-    const GuestSight sight = eye.look(shot.picture, bodies, tracks);
+    const TabletPose sight = eye.look(shot.image, bodies, tracks);
     eye.learn();
     ASSERT_TRUE(sight.view.has_value()) << sight.why;
     if (i < 4) continue;  // the lens is new
@@ -530,7 +530,7 @@ TEST(Tablet, AMarkerThatIsBeingMovedIsPlacedByTheGuestsOwnPicture) {
 
 TEST(Tablet, LensesThatAreKeptAreThereAgainAndDamagedOnesAreNot) {
   const fs::path folder = test::test_folder();
-  calib::LensBelief lens = calib::expected_lens(1280, 800);
+  calib::IntrinsicsEstimate lens = calib::prior_intrinsics(1280, 800);
   lens.views = 17;
   lens.covariance(0, 3) = lens.covariance(3, 0) = 0.1;
   ASSERT_TRUE(save_lenses(folder, "tablet-one", {lens}));

@@ -26,7 +26,7 @@ struct ShownVariant {
   std::string variant;
 };
 
-// Of a slot's part, picture by picture.
+// Of a slot's part, image by image.
 std::vector<ShownVariant> shown_variants(const fs::path& poses_csv, const std::string& slot) {
   std::ifstream file(poses_csv);
   std::vector<ShownVariant> shown;
@@ -45,7 +45,7 @@ TEST(Trigger, IsSeenWithinATenthOfASecond) {
   std::vector<double> triggers_s;
   json events = json::array();
   for (int i = 0; i < k_triggers; ++i) {
-    triggers_s.push_back(0.4 + 0.1013 * i);  // at any moment of a picture
+    triggers_s.push_back(0.4 + 0.1013 * i);  // at any moment of an image
     events.push_back(
         {{"at_s", triggers_s.back()}, {"edit", {{"action", "next_variant"}, {"slot", "mirror"}}}});
   }

@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "device/jpeg.h"
-#include "sim/photograph.h"
+#include "sim/sensor_model.h"
 #include "sim/trace.h"
 
 namespace limn::test {
@@ -59,8 +59,8 @@ TabletShot VirtualTablet::shoot(double at_s) {
 TabletShot VirtualTablet::shoot_from(const Pose& camera_from_world) {
   world_.rig.cameras[0].imager_from_world = camera_from_world;
   TabletShot shot{{}, {}, world_.rig.cameras[0]};
-  shot.picture = sim::photograph(world_, sim::trace(world_, 0), shown_, seed_ + ++shots_);
-  shot.jpeg = device::encode_jpeg(shot.picture, k_quality);
+  shot.image = sim::photograph(world_, sim::trace(world_, 0), shown_, seed_ + ++shots_);
+  shot.jpeg = device::encode_jpeg(shot.image, k_quality);
   return shot;
 }
 

@@ -14,7 +14,7 @@ namespace limn::test {
 /// What a tablet took, and with which camera from where in truth.
 struct TabletShot {
   std::vector<std::uint8_t> jpeg;
-  cv::Mat picture;  ///< before it was compressed
+  cv::Mat image;  ///< before it was compressed
   Imager camera;
 };
 

@@ -56,8 +56,8 @@ WizardView a_view() {
   view.poses = 9;
   view.place = "left, low, near (1.12 m), tilted 25 degrees up, turned 40 degrees clockwise";
   view.is_capturing = true;
-  view.pictures = 31;
-  view.pictures_of = 144;
+  view.images = 31;
+  view.images_of = 144;
   view.judged = {{"pose00", {}, {}}, {"pose01", {}, {}}, {"pose02", 0.9, 4.2}, {"pose03", 0.31, 0.8}};
   view.advice = "More poses help: the predicted error still falls.";
   view.faults = {{"little_tilt", "boards were tilted by 11 degrees at most", "tilt the board more"}};
@@ -75,7 +75,7 @@ TEST(WizardPanel, ShowsWhereTheBoardIsAndWhereItIsToGo) {
     canvas.keep(fmt::format("wizard-{}", size.width));
     const auto count = [&](const cv::Scalar& low, const cv::Scalar& high) {
       cv::Mat mask;
-      cv::inRange(canvas.picture()(cv::Rect(size.width / 4, 0, size.width / 2, size.height)), low, high,
+      cv::inRange(canvas.image()(cv::Rect(size.width / 4, 0, size.width / 2, size.height)), low, high,
                   mask);
       return cv::countNonZero(mask);
     };

@@ -20,7 +20,7 @@
 #include "calib/capture.h"
 #include "calib/judge/assess.h"
 #include "calib/solve.h"
-#include "sim/photograph.h"
+#include "sim/sensor_model.h"
 #include "sim/trace.h"
 #include "tests/calib/true_rig.h"
 
@@ -92,12 +92,12 @@ sim::World world_of(const TrueRig& truth) {
   return world;
 }
 
-Result<calib::Captures> captured(const TrueRig& truth, const fs::path& folder) {
+Result<calib::CaptureSet> captured(const TrueRig& truth, const fs::path& folder) {
   if (fs::exists(folder / "complete")) return calib::load_captures(folder);
   fs::remove_all(folder);
   sim::World world = world_of(truth);
   const Imager &camera = truth.rig.cameras[0], &projector = truth.rig.projectors[0];
-  const calib::Captures plan =
+  const calib::CaptureSet plan =
       calib::plan_captures(folder, {{camera.name, camera.width, camera.height}},
                            {{projector.name, projector.width, projector.height}}, truth.board);
   LIMN_TRY_STATUS(calib::begin_captures(plan));
@@ -106,8 +106,8 @@ Result<calib::Captures> captured(const TrueRig& truth, const fs::path& folder) {
     world.objects = {bowed_board(truth, truth.world_from_board[pose])};
     const sim::Samples samples = sim::trace(world, 0);
     cv::Mat shown;
-    const calib::Stage stage{.show = [&](int, const cv::Mat& picture) -> Status {
-                               shown = picture.clone();
+    const calib::CaptureBackend stage{.show = [&](int, const cv::Mat& image) -> Status {
+                               shown = image.clone();
                                return {};
                              },
                              .grab = [&](int) -> Result<cv::Mat> {
@@ -127,7 +127,7 @@ struct View {
   std::vector<cv::Point2f> camera, projector;
 };
 
-// ChArUco corners as OpenCV finds them, refined in the picture: its interpolation is half a pixel off.
+// ChArUco corners as OpenCV finds them, refined in the image: its interpolation is half a pixel off.
 std::map<int, cv::Point2f> opencv_corners(const calib::Board& board, const cv::Mat& white) {
   const cv::Ptr<cv::aruco::CharucoBoard> charuco = cv::aruco::CharucoBoard::create(
       board.columns, board.rows, static_cast<float>(board.square_m),
@@ -145,11 +145,11 @@ std::map<int, cv::Point2f> opencv_corners(const calib::Board& board, const cv::M
   return found;
 }
 
-// Whole-pixel labels as cv::structured_light::GrayCodePattern decodes them: a bit is the sign of picture
+// Whole-pixel labels as cv::structured_light::GrayCodePattern decodes them: a bit is the sign of image
 // minus inverse, a pixel with a bit that differs by 5 levels or less is dropped, and so is one without light.
-cv::Mat opencv_labels(const calib::Patterns& patterns, const std::vector<fs::path>& pictures) {
+cv::Mat opencv_labels(const calib::Patterns& patterns, const std::vector<fs::path>& images) {
   const auto read = [&](int i) {
-    return cv::imread(pictures[static_cast<size_t>(i)].string(), cv::IMREAD_GRAYSCALE);
+    return cv::imread(images[static_cast<size_t>(i)].string(), cv::IMREAD_GRAYSCALE);
   };
   cv::Mat direct, sure, labels[2];
   cv::subtract(read(patterns.white()), read(patterns.black()), direct);
@@ -158,11 +158,11 @@ cv::Mat opencv_labels(const calib::Patterns& patterns, const std::vector<fs::pat
   for (int axis = 0; axis < 2; ++axis) {
     cv::Mat label = cv::Mat::zeros(direct.size(), CV_32S), gray = cv::Mat::zeros(direct.size(), CV_8U);
     for (int bit = axis == 0 ? patterns.column_bits() : patterns.row_bits(); bit > 0; --bit, at += 2) {
-      const cv::Mat picture = read(at), inverse = read(at + 1);
+      const cv::Mat image = read(at), inverse = read(at + 1);
       cv::Mat difference;
-      cv::absdiff(picture, inverse, difference);
+      cv::absdiff(image, inverse, difference);
       sure &= difference > 5;
-      gray ^= (picture > inverse) / 255;  // Gray to binary: each bit is the XOR of those above
+      gray ^= (image > inverse) / 255;  // Gray to binary: each bit is the XOR of those above
       cv::Mat wide;
       gray.convertTo(wide, CV_32S);
       label = label * 2 + wide;
@@ -195,12 +195,12 @@ std::optional<cv::Point2f> local_corner(const cv::Mat& labels, const cv::Point2f
                      static_cast<float>(h.at<double>(1, 2) / h.at<double>(2, 2)));
 }
 
-std::vector<View> opencv_views(const calib::Captures& captures) {
+std::vector<View> opencv_views(const calib::CaptureSet& captures) {
   std::vector<View> views;
   for (const calib::CapturedPose& pose : captures.poses) {
-    const auto& pictures = pose.pictures[0][0];
-    const cv::Mat labels = opencv_labels(captures.patterns[0], pictures);
-    const cv::Mat white = cv::imread(pictures[static_cast<size_t>(captures.patterns[0].white())].string(),
+    const auto& images = pose.images[0][0];
+    const cv::Mat labels = opencv_labels(captures.patterns[0], images);
+    const cv::Mat white = cv::imread(images[static_cast<size_t>(captures.patterns[0].white())].string(),
                                      cv::IMREAD_GRAYSCALE);
     View view;
     for (const auto& [id, px] : opencv_corners(captures.board, white)) {
@@ -224,7 +224,7 @@ Imager imager_of(const std::string& name, const cv::Size& size, const cv::Mat& k
 }
 
 // Each device alone, then cv::stereoCalibrate over all views with every value free (k1 k2 p1 p2).
-Rig opencv_rig(const calib::Captures& captures, const std::vector<View>& views) {
+Rig opencv_rig(const calib::CaptureSet& captures, const std::vector<View>& views) {
   std::vector<std::vector<cv::Point3f>> points;
   std::vector<std::vector<cv::Point2f>> camera, projector;
   for (const View& view : views) {
@@ -285,7 +285,7 @@ void print_limn_offsets(const TrueRig& truth, const calib::Observations& observa
   const Imager &camera = truth.rig.cameras[0], &projector = truth.rig.projectors[0];
   Offsets corners, matches;
   Vector2d px;
-  for (const calib::CornerSeen& seen : observations.corners) {
+  for (const calib::CornerObservation& seen : observations.corners) {
     if (calib::predict_corner(view_of(camera), truth.world_from_board[static_cast<size_t>(seen.pose)], shape,
                               truth.bow_m, truth.board.p_corner(seen.corner).head<2>(), &px))
       corners.take(seen.px - px);
@@ -333,7 +333,7 @@ Status run_case(const Case& test_case, const fs::path& folder) {
   const auto seconds = [&] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   };
-  LIMN_TRY(const calib::Captures captures, captured(truth, folder / test_case.name));
+  LIMN_TRY(const calib::CaptureSet captures, captured(truth, folder / test_case.name));
   fmt::print("{}: captured {:.0f} s\n", test_case.name, seconds());
   const double begun_solving = seconds();
   LIMN_TRY(const calib::Observed observed, calib::observe(captures));

@@ -1,10 +1,10 @@
-// How often the stated 95 % error holds: rigs with known truth, observations made with noise (no pictures, so
+// How often the stated 95 % error holds: rigs with known truth, observations made with noise (no images, so
 // that there can be many), each solved, judged, and lit: the share of unseen points within the stated error.
 // Usage: calib_stated [CASES [FIRST]]
 #include <fmt/core.h>
 
 #include "calib/judge/assess.h"
-#include "calib/judge/propagate.h"
+#include "calib/judge/uncertainty.h"
 #include "calib/solve.h"
 #include "tests/calib/true_rig.h"
 

@@ -124,19 +124,19 @@ std::vector<Kind> all_kinds(const std::vector<std::string>& templates) {
   return kinds;
 }
 
-// Families share markers (aruco_4x4_50 is the beginning of aruco_4x4_1000): what counts is the picture.
-bool is_same_picture(const MarkerName& found, const MarkerName& truth) {
+// Families share markers (aruco_4x4_50 is the beginning of aruco_4x4_1000): what counts is the image.
+bool is_same_image(const MarkerName& found, const MarkerName& truth) {
   if (found.family == "artoolkit" || truth.family == "artoolkit")
     return found.family == truth.family &&
            std::filesystem::path(found.id).filename() == std::filesystem::path(truth.id).filename();
   static std::map<std::string, cv::Mat> drawn;
-  const auto picture = [](const MarkerName& name) -> const cv::Mat& {
+  const auto image = [](const MarkerName& name) -> const cv::Mat& {
     cv::Mat& known = drawn[name.text()];
     if (known.empty()) known = tracker::draw_marker(name, 1).value();
     return known;
   };
-  const cv::Mat& a = picture(found);
-  cv::Mat b = picture(truth).clone();
+  const cv::Mat& a = image(found);
+  cv::Mat b = image(truth).clone();
   for (int turn = 0; turn < 4; ++turn) {  // aruco_4x4_250:227 is apriltag_16h5:16 turned
     if (a.size() == b.size() && cv::norm(a, b, cv::NORM_INF) == 0) return true;
     cv::rotate(b, b, cv::ROTATE_90_CLOCKWISE);
@@ -198,7 +198,7 @@ Tally judged(const std::vector<Detection>& detections, const TrackerFrame& frame
       ++tally.beside;
       continue;
     }
-    const bool right = is_same_picture(detection.marker, truth->marker);
+    const bool right = is_same_image(detection.marker, truth->marker);
     tally.right += right;
     tally.wrong += !right;
     const double off = (detection.corners_px[0] - truth->corners_px[0]).norm();

@@ -22,9 +22,9 @@
 #include "apps/live/recording.h"
 #include "apps/live/script.h"
 #include "apps/live/session.h"
-#include "apps/live/watcher.h"
+#include "apps/live/perception.h"
 #include "apps/world_markers.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"
 #include "sim/virtual_rig.h"
@@ -37,8 +37,8 @@ namespace {
 namespace fs = std::filesystem;
 using apps::Session;
 using apps::SessionSetup;
-using apps::Watched;
-using apps::Watcher;
+using apps::Percepts;
+using apps::Perception;
 
 constexpr double k_lag_s = 0.06;
 
@@ -73,7 +73,7 @@ double median(std::vector<double> values) {
 // The studio, seen by a camera of 1280x1024.
 sim::World studio() {
   sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_picture).value();
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
   Imager& camera = world.rig.cameras[0];
   constexpr int k_width = 1280, k_height = 1024;
   camera.lens = Lens::pinhole(1467, 1467, 0.5 * (k_width - 1), 0.5 * (k_height - 1));
@@ -87,7 +87,7 @@ struct Shot {
   Stamp captured_at;
 };
 
-// A session's frames as a camera would send them: lit by the session's own pictures, a marker in a hand.
+// A session's frames as a camera would send them: lit by the session's own images, a marker in a hand.
 std::vector<Shot> shots(int count, SessionSetup* setup) {
   sim::World world = studio();
   setup->rig = world.rig;
@@ -96,7 +96,7 @@ std::vector<Shot> shots(int count, SessionSetup* setup) {
   apps::Script script;
   script.sways.push_back({"aruco_4x4_50:0", 0, 1e9, {0.05, 0, 0}, 0.5});
   auto room = apps::ScriptedRoom::create(script, &rig).value();
-  auto watcher = Watcher::create(setup->scene, setup->rig).value();
+  auto perception = Perception::create(setup->scene, setup->rig).value();
   auto session = Session::create(*setup, nullptr, nullptr, false).value();
   std::vector<Shot> out;
   for (int i = 0; i < count; ++i) {
@@ -106,7 +106,7 @@ std::vector<Shot> shots(int count, SessionSetup* setup) {
     std::vector<std::uint8_t> jpeg;
     cv::imencode(".jpg", frames[0].image, jpeg, {cv::IMWRITE_JPEG_QUALITY, 90});
     out.push_back({std::string(jpeg.begin(), jpeg.end()), frames[0].captured_at});
-    session.take(watcher.watch(frames), static_cast<std::size_t>(i) + 1);
+    session.take(perception.watch(frames), static_cast<std::size_t>(i) + 1);
     const auto& painted = session.paint(rig.now(), shifted(rig.now(), 0.04));
     for (std::size_t k = 0; k < painted.projectors.size(); ++k)
       (void)rig.projector(static_cast<int>(k)).show(painted.projectors[k]).value();
@@ -148,9 +148,9 @@ std::vector<Wire> wires() {
 void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup, const Wire& wire) {
   const std::string family = "apriltag_36h11";
   const Peer apriltag = apriltag_peer(std::span(&family, 1), 2, 1);
-  auto watcher = Watcher::create(setup.scene, setup.rig, setup.watch).value();
+  auto perception = Perception::create(setup.scene, setup.rig, setup.watch).value();
   apps::Latest<std::vector<Frame>> frames;
-  apps::Latest<Watched> seen;
+  apps::Latest<Percepts> seen;
   std::vector<double> decode, watch, filter, hand, theirs;
   std::size_t markers = 0;
   std::vector<std::function<Frame()>> decoders;
@@ -165,7 +165,7 @@ void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup, const
     frames.put({std::move(frame)});
     const auto taken = frames.take({});
     const double was_taken = processor_ms();
-    const Watched& watched = watcher.watch(*taken);
+    const Percepts& watched = perception.watch(*taken);
     const double was_watched = processor_ms();
     seen.put(watched);
     const auto known = seen.take({});
@@ -216,7 +216,7 @@ struct FrameCost {
 FrameCost session_cost(const std::vector<Shot>& shots, SessionSetup setup, const fs::path& record) {
   std::unique_ptr<apps::Recorder> recorder;
   if (!record.empty()) recorder = apps::Recorder::create(record, setup).value();
-  auto watcher = Watcher::create(setup.scene, setup.rig, setup.watch).value();
+  auto perception = Perception::create(setup.scene, setup.rig, setup.watch).value();
   auto session = Session::create(setup, nullptr, recorder.get(), false).value();
   std::vector<double> times;
   std::size_t moments = 0;
@@ -225,7 +225,7 @@ FrameCost session_cost(const std::vector<Shot>& shots, SessionSetup setup, const
     const double begun = wall_ms();
     const std::vector<Frame> frames = {decoded(shot, setup)};
     if (recorder) recorder->watched(frames);
-    session.take(watcher.watch(frames), ++moments);
+    session.take(perception.watch(frames), ++moments);
     session.paint(shifted(shot.captured_at, 0.02), shifted(shot.captured_at, k_lag_s));
     session.look_for_drift(shifted(shot.captured_at, 0.02));
     times.push_back(wall_ms() - begun);
@@ -245,10 +245,10 @@ double percentile(std::vector<double> values, double share) {
   return *at;
 }
 
-// From a person's edit to the first pictures that show it, by the wall, without the display: what is left of
+// From a person's edit to the first images that show it, by the wall, without the display: what is left of
 // the frame in which it comes, at any moment of it alike, and the whole frame after it.
 void print_edits(const std::vector<Shot>& shots, const SessionSetup& setup) {
-  auto watcher = Watcher::create(setup.scene, setup.rig, setup.watch).value();
+  auto perception = Perception::create(setup.scene, setup.rig, setup.watch).value();
   auto session = Session::create(setup, nullptr, nullptr, false).value();
   std::vector<double> waits;
   double before_ms = 0;
@@ -257,7 +257,7 @@ void print_edits(const std::vector<Shot>& shots, const SessionSetup& setup) {
     const bool is_edited = i % 3 == 2;
     if (is_edited) LIMN_CHECK(session.edit({"next_variant", "mirror", ""}, "bench", shots[i].captured_at));
     const std::vector<Frame> frames = {decoded(shots[i], setup)};
-    session.take(watcher.watch(frames), i + 1);
+    session.take(perception.watch(frames), i + 1);
     session.paint(shifted(shots[i].captured_at, 0.02), shifted(shots[i].captured_at, k_lag_s));
     const double painted_ms = wall_ms() - begun;
     session.look_for_drift(shifted(shots[i].captured_at, 0.02));
@@ -289,7 +289,7 @@ void print_recording(const std::vector<Shot>& shots, const SessionSetup& setup) 
 }
 
 void print_memory(const std::vector<Shot>& shots, const SessionSetup& setup) {
-  auto watcher = Watcher::create(setup.scene, setup.rig, setup.watch).value();
+  auto perception = Perception::create(setup.scene, setup.rig, setup.watch).value();
   double first_mib = 0;
   double at_s = 0;
   for (std::size_t round = 0; round < k_rounds; ++round) {
@@ -297,7 +297,7 @@ void print_memory(const std::vector<Shot>& shots, const SessionSetup& setup) {
       at_s += 1 / 30.0;
       Frame frame = decoded(shot, setup);
       frame.captured_at = shifted(shot.captured_at, at_s);
-      (void)watcher.watch(std::span(&frame, 1));
+      (void)perception.watch(std::span(&frame, 1));
     }
     if (round == 0) first_mib = resident_mib();
   }

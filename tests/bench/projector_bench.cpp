@@ -1,4 +1,4 @@
-// What the projectors' pictures cost: milliseconds a pass by GPU timer queries, whole frames of a moving and
+// What the projectors' images cost: milliseconds a pass by GPU timer queries, whole frames of a moving and
 // of a still scene beside yardsticks of the same run, and what compensation gives. Usage: limn bench
 // projector
 // [--frames N (5)]
@@ -83,7 +83,7 @@ std::vector<Eigen::Vector3f> all_corners(const scene::Scene& scene, const scene:
   return corners;
 }
 
-// The simplest passes of their kinds, into a picture of the projector's size.
+// The simplest passes of their kinds, into an image of the projector's size.
 class Yardsticks {
  public:
   explicit Yardsticks(const std::vector<Eigen::Vector3f>& corners)
@@ -130,7 +130,7 @@ class Yardsticks {
     glClearDepth(1);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   }
-  void copy() const { picture_ = projector::read_back(framebuffer_, k_width, k_height, CV_8UC4, GL_BGRA); }
+  void copy() const { image_ = projector::read_back(framebuffer_, k_width, k_height, CV_8UC4, GL_BGRA); }
   void draw_triangles() const {
     clear();
     glClipControl(GL_LOWER_LEFT, GL_NEGATIVE_ONE_TO_ONE);
@@ -153,15 +153,15 @@ class Yardsticks {
     glDrawArrays(GL_TRIANGLES, 0, 3);
   }
   void remap() const {
-    static const cv::Mat picture(k_height, k_width, CV_8UC4, cv::Scalar(10, 80, 200, 255));
-    cv::remap(picture, picture_, map_, cv::noArray(), cv::INTER_LINEAR);
+    static const cv::Mat image(k_height, k_width, CV_8UC4, cv::Scalar(10, 80, 200, 255));
+    cv::remap(image, image_, map_, cv::noArray(), cv::INTER_LINEAR);
   }
 
  private:
   int triangle_count_;
   GlName corners_, vertices_, triangles_, warp_, from_, into_, gpu_map_, framebuffer_, depth_;
   cv::Mat map_;
-  mutable cv::Mat picture_;
+  mutable cv::Mat image_;
 };
 
 int run(int frames) {
@@ -170,7 +170,7 @@ int run(int frames) {
     fmt::print(stderr, "{}\n", context.message());
     return 1;
   }
-  auto loaded = sim::load_world(LIMN_SOURCE_DIR "/config/worlds/studio.json", apps::marker_picture);
+  auto loaded = sim::load_world(LIMN_SOURCE_DIR "/config/worlds/studio.json", apps::marker_image);
   if (!loaded) {
     fmt::print(stderr, "{}\n", loaded.message());
     return 1;
@@ -240,7 +240,7 @@ int run(int frames) {
   const auto frame = [&](const char* name, const std::function<scene::PosedScene()>& place) {
     const double ms = median_ms(frames, [&] {
       const scene::PosedScene placed = place();
-      for (std::size_t i = 0; i < projectors; ++i) (void)renderer->projector_picture(i, placed, viewer);
+      for (std::size_t i = 0; i < projectors; ++i) (void)renderer->projector_image(i, placed, viewer);
     });
     fmt::print("  {:<38}  {:6.2f}  {:5.2f}\n", name, ms, ms / sum);
     return ms;
@@ -251,15 +251,15 @@ int run(int frames) {
   fmt::print("  nothing moves, of clear and copy                {:5.2f}\n",
              still / (static_cast<double>(projectors) * copy));
 
-  // Composites: the picture is new each time. Their yardstick has the camera's size.
+  // Composites: the image is new each time. Their yardstick has the camera's size.
   const Imager& camera = world.rig.cameras[0];
-  const cv::Mat picture(camera.height, camera.width, CV_8UC3, cv::Scalar(60, 70, 80));
+  const cv::Mat image(camera.height, camera.width, CV_8UC3, cv::Scalar(60, 70, 80));
   const double scale = 1.0 * camera.width * camera.height / (k_width * k_height);
   fmt::print("\n  composites, {}x{}                        ms   of copies of this size\n", camera.width,
              camera.height);
   const auto composite = [&](const char* name, const std::function<scene::PosedScene()>& place) {
     const double ms = median_ms(
-        frames, [&] { (void)renderer->composite(0, picture, place(), projector::Composite::full); });
+        frames, [&] { (void)renderer->composite(0, image, place(), projector::Composite::full); });
     fmt::print("  {:<38}  {:6.2f}  {:5.2f}\n", name, ms, ms / (copy * scale));
   };
   composite("a part moves", moved);

@@ -19,7 +19,7 @@
 
 #include "apps/coarser.h"
 #include "apps/live/session.h"
-#include "apps/live/watcher.h"
+#include "apps/live/perception.h"
 #include "apps/serve/server.h"
 #include "apps/world_markers.h"
 #include "core/log.h"
@@ -54,16 +54,16 @@ class Stage {
  public:
   Stage() : context_(device::GlContext::create().value()) {
     sim::World world =
-        sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_picture)
+        sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image)
             .value();
-    static_cast<void>(apps::make_coarser(k_resolution, &world.rig).ok());
+    static_cast<void>(apps::scale_resolution(k_resolution, &world.rig).ok());
     setup_.rig = world.rig;
     setup_.scene = *world.scene;
     rig_ = std::make_unique<sim::VirtualRig>(
         std::move(world),
         sim::VirtualRigOptions{.frame_period_s = k_period_s, .grab_waits_for_light = false});
     telemetry_.emplace(apps::Telemetry::create({}).value());
-    watcher_.emplace(apps::Watcher::create(setup_.scene, setup_.rig).value());
+    perception_.emplace(apps::Perception::create(setup_.scene, setup_.rig).value());
     session_.emplace(apps::Session::create(setup_, &*telemetry_, nullptr, false).value());
     health_.add({.name = "camera0", .kind = "camera"});
   }
@@ -75,7 +75,7 @@ class Stage {
     constexpr int k_cameras[] = {0};
     const std::vector<Frame> frames = rig_->expose(k_cameras);
     const auto begun = Clock::now();
-    if (!frames.empty()) session_->take(watcher_->watch(frames), ++moments_);
+    if (!frames.empty()) session_->take(perception_->watch(frames), ++moments_);
     server->hear(&*session_, rig_->now());
     server->tell(*session_, *telemetry_, health_, rig_->now());
     session_->paint(rig_->now(), shifted(rig_->now(), k_lag_s));
@@ -90,7 +90,7 @@ class Stage {
   apps::SessionSetup setup_;
   std::unique_ptr<sim::VirtualRig> rig_;
   std::optional<apps::Telemetry> telemetry_;
-  std::optional<apps::Watcher> watcher_;
+  std::optional<apps::Perception> perception_;
   std::optional<apps::Session> session_;
   apps::DeviceHealth health_;
   std::size_t moments_ = 0;
@@ -98,9 +98,9 @@ class Stage {
 
 // Four guests who look at the state; one of them edits, and with `rooms` all have the live composite. Their
 // own work is little and goes after everybody's.
-class Guests {
+class AuthSessions {
  public:
-  Guests(const apps::Server& server, bool rooms, std::vector<double>* late_ms) : late_ms_(late_ms) {
+  AuthSessions(const apps::Server& server, bool rooms, std::vector<double>* late_ms) : late_ms_(late_ms) {
     const std::string pin = server.invitation().pins[1];
     for (int i = 0; i < k_guests; ++i) {
       const auto paired =
@@ -112,7 +112,7 @@ class Guests {
     }
     for (int i = 0; i < k_guests; ++i) threads_.emplace_back([this, i] { attend(i); });
   }
-  ~Guests() {
+  ~AuthSessions() {
     is_over_ = true;
     for (std::thread& thread : threads_) thread.join();
   }
@@ -180,13 +180,13 @@ int run(int argc, char** argv) {
   set_log_level(LogLevel::warning);
   Stage stage;
   const fs::path keys = fs::temp_directory_path() / fmt::format("limn-remote-bench-{}", ::getpid());
-  auto onlooker = apps::Onlooker::create(stage.setup(), keys);
-  if (!onlooker) {
-    fmt::print(stderr, "{}\n", onlooker.message());
+  auto tablet_view = apps::TabletView::create(stage.setup(), keys);
+  if (!tablet_view) {
+    fmt::print(stderr, "{}\n", tablet_view.message());
     return 1;
   }
   const apps::ServeOptions options{.at = "0", .page = {}, .keys = {}};
-  const auto server = apps::Server::open(options, apps::eyes_of(std::move(*onlooker)));
+  const auto server = apps::Server::open(options, apps::eyes_of(std::move(*tablet_view)));
   if (!server) {
     fmt::print(stderr, "{}\n", server.message());
     return 1;
@@ -200,13 +200,13 @@ int run(int argc, char** argv) {
     return at_share(times, 0.5);
   };
   turn();
-  std::vector<double> alone, states, pictures, late_ms, late_with_pictures_ms;
+  std::vector<double> alone, states, images, late_ms, late_with_images_ms;
   alone.push_back(turn());
   // Each turn with guests stands between two without: other work on the machine comes and goes.
   const auto beside = [&](bool rooms, std::vector<double>* late, std::vector<double>* shares) {
     double with = 0;
     {
-      const Guests guests(**server, rooms, late);
+      const AuthSessions guests(**server, rooms, late);
       with = turn();
     }
     const double before = alone.back();
@@ -215,7 +215,7 @@ int run(int argc, char** argv) {
   };
   for (int round = 0; round < rounds_of(argc, argv); ++round) {
     beside(false, &late_ms, &states);
-    beside(true, &late_with_pictures_ms, &pictures);
+    beside(true, &late_with_images_ms, &images);
   }
   fmt::print("a frame's time (found, told, painted), of turns of {} frames\n", k_frames - 1);
   fmt::print("  without guests               {:.2f} ms (median; {:.2f} to {:.2f})\n", at_share(alone, 0.5),
@@ -223,11 +223,11 @@ int run(int argc, char** argv) {
   fmt::print("  four who see the state       {:.3f} of it (median; {:.3f} to {:.3f})\n",
              at_share(states, 0.5), at_share(states, 0.1), at_share(states, 0.9));
   fmt::print("  four with the live composite {:.3f} of it (median; {:.3f} to {:.3f})\n",
-             at_share(pictures, 0.5), at_share(pictures, 0.1), at_share(pictures, 0.9));
+             at_share(images, 0.5), at_share(images, 0.1), at_share(images, 0.9));
   fmt::print(
       "an edit is seen by four after {:.0f} ms (median), {:.0f} ms (95 %); with composites {:.0f}, {:.0f}\n",
-      at_share(late_ms, 0.5), at_share(late_ms, 0.95), at_share(late_with_pictures_ms, 0.5),
-      at_share(late_with_pictures_ms, 0.95));
+      at_share(late_ms, 0.5), at_share(late_ms, 0.95), at_share(late_with_images_ms, 0.5),
+      at_share(late_with_images_ms, 0.95));
   return 0;
 }
 

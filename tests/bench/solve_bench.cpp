@@ -1,5 +1,5 @@
 #include "apps/solve_captures.h"
-// The whole `limn solve` over the real captures beside cv::imread alone over the same pictures on one thread.
+// The whole `limn solve` over the real captures beside cv::imread alone over the same images on one thread.
 // Usage: solve_bench FOLDER_OF_GRAYCODE OUT [REPEATS]
 #include <fmt/core.h>
 
@@ -21,7 +21,7 @@ double seconds_of(const std::function<void()>& work) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
 }
 
-std::vector<fs::path> pictures_in(const fs::path& folder) {
+std::vector<fs::path> images_in(const fs::path& folder) {
   std::vector<fs::path> files;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
     if (entry.path().extension() == ".png") files.push_back(entry.path());
@@ -37,13 +37,13 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "usage: solve_bench FOLDER_OF_GRAYCODE OUT [REPEATS]\n");
     return 2;
   }
-  limn::apps::SolveOptions options{.captures = argv[1], .out = argv[2]};
+  limn::apps::SolveCommandOptions options{.captures = argv[1], .out = argv[2]};
   options.import_format = "opencv-gray";
   options.projector = "1024x768";
   options.board = "chessboard:9x7:75mm";
   options.poses = "capture_*";
   options.shots = "graycode_*.png";
-  const std::vector<fs::path> files = pictures_in(options.captures);
+  const std::vector<fs::path> files = images_in(options.captures);
   // The two take turns, so that whatever else runs here slows both; the quickest of each counts.
   double reading = 1e9, solving = 1e9, held_out = 0, worst = 0;
   const int repeats = argc > 3 ? std::stoi(argv[3]) : 3;

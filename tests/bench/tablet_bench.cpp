@@ -1,5 +1,5 @@
 // What a guest's window costs the server: decode, track, composite and encode of one client's 640x400
-// pictures beside a JPEG decode, a detection and a JPEG encode alone in the same run; how exact it is; and
+// images beside a JPEG decode, a detection and a JPEG encode alone in the same run; how exact it is; and
 // what the projector loop feels of it. Usage: limn bench tablet [--frames N (60)] [--seed S (2026)]
 #include <fmt/core.h>
 #include <sys/resource.h>
@@ -20,8 +20,8 @@
 #include <thread>
 
 #include "apps/live/session.h"
-#include "apps/live/watcher.h"
-#include "apps/tablet/onlooker.h"
+#include "apps/live/perception.h"
+#include "apps/tablet/tablet_view.h"
 #include "apps/world_markers.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"
@@ -62,35 +62,35 @@ struct Room {
   device::GlContext context = device::GlContext::create().value();
   apps::SessionSetup setup;
   sim::VirtualRig rig;
-  apps::Watcher watcher;
+  apps::Perception perception;
   apps::Session session;
   std::size_t moments = 0;
 
   explicit Room(const sim::World& world)
       : setup{.rig = world.rig, .scene = *world.scene, .watch = {}, .paint = {}},
         rig(world, {.grab_waits_for_light = false}),
-        watcher(apps::Watcher::create(setup.scene, setup.rig).value()),
+        perception(apps::Perception::create(setup.scene, setup.rig).value()),
         session(apps::Session::create(setup, nullptr, nullptr, false).value()) {
     for (int i = 0; i < 6; ++i) step();
   }
 
-  const apps::Watched& see() {
+  const apps::Percepts& see() {
     const int camera = 0;
     ++moments;
-    return watcher.watch(rig.expose(std::span(&camera, 1)));
+    return perception.watch(rig.expose(std::span(&camera, 1)));
   }
 
   void step() {
     session.take(see(), moments);
-    const apps::Painted& painted = session.paint(rig.now(), shifted(rig.now(), 0.04));
+    const apps::ComposedFrame& painted = session.paint(rig.now(), shifted(rig.now(), 0.04));
     for (std::size_t k = 0; k < painted.projectors.size(); ++k)
       (void)rig.projector(static_cast<int>(k)).show(painted.projectors[k]).value();
   }
 };
 
-apps::Onlooker::Seen look(apps::Onlooker* onlooker, const std::vector<std::uint8_t>& jpeg) {
-  std::promise<apps::Onlooker::Seen> answered;
-  onlooker->look({k_device}, jpeg, [&](apps::Onlooker::Seen seen) { answered.set_value(std::move(seen)); });
+apps::TabletView::Seen look(apps::TabletView* tablet_view, const std::vector<std::uint8_t>& jpeg) {
+  std::promise<apps::TabletView::Seen> answered;
+  tablet_view->look({k_device}, jpeg, [&](apps::TabletView::Seen seen) { answered.set_value(std::move(seen)); });
   return answered.get_future().get();
 }
 
@@ -124,12 +124,12 @@ std::vector<Eigen::Vector3d> part_points(const sim::World& world) {
   for (const scene::PosedPart& part : posed.parts)
     for (const scene::Variant& variant : world.scene->find_slot(part.slot)->variants)
       if (variant.name == part.variant)
-        for (const sim::SurfacePoint& point : sim::surface_points(variant.mesh, 100, 1))
+        for (const sim::SampledPoint& point : sim::surface_points(variant.mesh, 100, 1))
           points.push_back(part.world_from_part * point.p);
   return points;
 }
 
-void print_window(const std::vector<TabletShot>& shots, Room* room, apps::Onlooker* onlooker) {
+void print_window(const std::vector<TabletShot>& shots, Room* room, apps::TabletView* tablet_view) {
   const std::vector<Eigen::Vector3d> points = part_points(room->rig.world());
   tracker::Detector detector(tracker::Families::load(tracker::families_of(scene::bodies(room->setup.scene)),
                                                      room->setup.scene.folder)
@@ -141,26 +141,26 @@ void print_window(const std::vector<TabletShot>& shots, Room* room, apps::Onlook
   Off off;
   json last;
   constexpr const char* k_parts[] = {"decode", "track", "composite", "encode"};
-  // As in a session, each picture meets other tracks.
-  std::vector<apps::Watched> moments;
+  // As in a session, each image meets other tracks.
+  std::vector<apps::Percepts> moments;
   for (std::size_t i = 0; i < shots.size(); ++i) moments.push_back(room->see());
   for (int round = 0; round < 3; ++round) {
     for (std::size_t i = 0; i < shots.size(); ++i) {
       const TabletShot& shot = shots[i];
       room->session.take(moments[i], room->moments);
-      onlooker->know(room->session);
+      tablet_view->know(room->session);
       const double begun_processor = processor_ms(), begun = now_ms();
-      const cv::Mat picture = device::decode_jpeg(shot.jpeg).value();
+      const cv::Mat image = device::decode_jpeg(shot.jpeg).value();
       const double decoded = now_ms();
       cv::Mat grey;
-      cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
+      cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
       const double turned_grey = now_ms();
       (void)detector.detect(grey);
       const double detected = now_ms();
-      (void)device::encode_jpeg(picture, k_quality);
+      (void)device::encode_jpeg(image, k_quality);
       const double encoded = now_ms();
       const double asked_processor = processor_ms(), asked = now_ms();
-      const apps::Onlooker::Seen seen = look(onlooker, shot.jpeg);
+      const apps::TabletView::Seen seen = look(tablet_view, shot.jpeg);
       const double answered_processor = processor_ms(), answered = now_ms();
       const json said = json::parse(seen.json);
       LIMN_CHECK(said["sees"] != "nothing");
@@ -199,27 +199,27 @@ void print_window(const std::vector<TabletShot>& shots, Room* room, apps::Onlook
       shots[0].camera.lens.fx());
 }
 
-// Pictures painted one after the other, a part nudged in each, with and without somebody who looks on ten
+// Images painted one after the other, a part nudged in each, with and without somebody who looks on ten
 // times a second; in turn, so that a busy machine disturbs both.
-void print_projector_loop(const std::vector<TabletShot>& shots, Room* room, apps::Onlooker* onlooker) {
-  constexpr int k_turns = 6, k_pictures = 14;
+void print_projector_loop(const std::vector<TabletShot>& shots, Room* room, apps::TabletView* tablet_view) {
+  constexpr int k_turns = 6, k_images = 14;
   std::vector<double> with, without, know;
   for (int turn = 0; turn < 2 * k_turns; ++turn) {
     std::atomic<bool> is_over = false;
     std::thread guest([&, is_looking = turn % 2 == 1] {
       for (std::size_t i = 0; is_looking && !is_over; ++i) {
         const auto next = std::chrono::steady_clock::now() + std::chrono::milliseconds(100);
-        (void)look(onlooker, shots[i % shots.size()].jpeg);
+        (void)look(tablet_view, shots[i % shots.size()].jpeg);
         std::this_thread::sleep_until(next);
       }
     });
-    for (int i = 0; i < k_pictures; ++i) {
+    for (int i = 0; i < k_images; ++i) {
       const char* way = i % 2 == 0 ? "0.2 0 0" : "-0.2 0 0";
       LIMN_CHECK(room->session.edit({"nudge", "mirror", way}, "bench", room->rig.now()).ok());
       const double begun = now_ms();
       room->session.paint(room->rig.now(), shifted(room->rig.now(), 0.04));
       const double painted = now_ms();
-      onlooker->know(room->session);
+      tablet_view->know(room->session);
       know.push_back(now_ms() - painted);
       if (i > 1) (turn % 2 == 1 ? with : without).push_back(now_ms() - begun);
     }
@@ -252,7 +252,7 @@ int main(int argc, char** argv) {
       return 2;
     }
   const sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_picture).value();
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
   Room room(world);
   VirtualTablet tablet(world, room.session.painted().projectors, k_width, k_height, seed);
   std::vector<TabletShot> shots;
@@ -260,12 +260,12 @@ int main(int argc, char** argv) {
     shots.push_back(tablet.shoot(10.0 * static_cast<double>(i) / static_cast<double>(frames)));
   const fs::path folder = fs::temp_directory_path() / fmt::format("limn-bench-lenses-{}", getpid());
   {
-    const auto onlooker = apps::Onlooker::create(room.setup, folder).value();
+    const auto tablet_view = apps::TabletView::create(room.setup, folder).value();
     fmt::print("{} pictures of {}x{}, seed {}; {}\n", shots.size(), k_width, k_height, seed,
                room.context.description());
-    onlooker->know(room.session);
-    std::thread([&] { print_window(shots, &room, onlooker.get()); }).join();
-    print_projector_loop(shots, &room, onlooker.get());
+    tablet_view->know(room.session);
+    std::thread([&] { print_window(shots, &room, tablet_view.get()); }).join();
+    print_projector_loop(shots, &room, tablet_view.get());
   }
   fs::remove_all(folder);
 }

@@ -23,7 +23,7 @@
 #include <vector>
 
 #include "core/imager_file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "tests/bench/tracker_frames.h"
 #include "tests/bench/tracker_peers.h"
 #include "tracker/detector.h"
@@ -312,29 +312,29 @@ void bench_time(const Options& options) {
   cv::setNumThreads(1);
 }
 
-// Pictures made against detectors, beside an ordinary one of the same size, for every kind of code.
+// Images made against detectors, beside an ordinary one of the same size, for every kind of code.
 void bench_hostile(const Options& options) {
   constexpr int k_width = 1280;
   constexpr int k_height = 720;
   std::mt19937_64 rng(options.seed);
   const Peer limn =
       test::limn_peer(std::vector<std::string>{"apriltag_36h11", "aruco_4x4_50", "artoolkit_3x3"}, 1);
-  std::vector<std::pair<std::string, cv::Mat>> pictures = {
+  std::vector<std::pair<std::string, cv::Mat>> images = {
       {"noise", test::noise(k_width, k_height, rng)},
       {"nested squares", test::nested_squares(k_width, k_height)}};
   for (const int square : {1, 2, 3, 5, 8, 12, 20, 40})
-    pictures.emplace_back(fmt::format("checkerboard of {} px", square),
+    images.emplace_back(fmt::format("checkerboard of {} px", square),
                           test::checkerboard(k_width, k_height, square));
   const double ordinary =
       least_ms(limn, test::cluttered_frame(k_width, k_height, 1000 * options.seed).grey, 1);
   fmt::print("\n  {:<40}{:>18}{:>10.2f}\n", "hostile, 1280x720", "ms; ordinary:", ordinary);
-  for (const auto& [name, grey] : pictures) {
+  for (const auto& [name, grey] : images) {
     const double ms = least_ms(limn, grey, 1);
     fmt::print("  {:<40}{:>18.2f}{:>9.1f}x\n", name, ms, ms / ordinary);
   }
 }
 
-// The 12 markers of a 1920x1080 clutter frame, found again in the next picture of a still scene.
+// The 12 markers of a 1920x1080 clutter frame, found again in the next image of a still scene.
 void bench_regions(const Options& options) {
   std::vector<double> ms;
   std::size_t markers = 0;
@@ -375,7 +375,7 @@ void add_distances(const std::filesystem::path& csv, const std::string& family, 
     std::getline(cells, id, ',');
     if (found.empty())
       found = tracker::Detector(tracker::Families::load(std::vector{family}).value())
-                  .detect(read_grey_picture(csv.parent_path() / file).value());
+                  .detect(read_grey_image(csv.parent_path() / file).value());
     const auto hit =
         std::find_if(found.begin(), found.end(), [&](const auto& d) { return d.marker.id == id; });
     for (std::size_t k = 0; k < 4 && std::getline(cells, x, ',') && std::getline(cells, y, ','); ++k)
@@ -401,7 +401,7 @@ void bench_photographs(const std::filesystem::path& folder) {
 
 // A flat board of OpenCV's photographs: where each marker's top left corner lies on it, in marker sides.
 struct Board {
-  const char* picture;
+  const char* image;
   const char* family;
   const char* camera;
   Eigen::Vector2d (*place)(int id);
@@ -416,7 +416,7 @@ Eigen::Vector2d place_on_charuco(int id) {
       return 2 * Eigen::Vector2d(square % 5, square / 5) + Eigen::Vector2d(0.5, 0.5);
 }
 
-// What is left of `apart` when paper may bend and the lens file may err smoothly: a cubic in the picture for
+// What is left of `apart` when paper may bend and the lens file may err smoothly: a cubic in the image for
 // each coordinate, with the share of freedom that it takes up given back.
 std::vector<double> beside_smooth(const std::vector<cv::Point2d>& seen,
                                   const std::vector<cv::Point2d>& fitted) {
@@ -461,7 +461,7 @@ BesidePlane bench_board(const std::filesystem::path& folder, const Board& board)
   const std::string family =
       board.family[0] == '/' ? "aruco:" + (folder / (board.family + 1)).string() : board.family;
   const auto found = tracker::Detector(tracker::Families::load(std::vector{family}).value())
-                         .detect(read_grey_picture(folder / board.picture).value());
+                         .detect(read_grey_image(folder / board.image).value());
   const Imager camera = load_imager(folder / board.camera).value();
   std::vector<cv::Point2d> seen, on_board;
   for (const auto& d : found)
@@ -479,7 +479,7 @@ BesidePlane bench_board(const std::filesystem::path& folder, const Board& board)
   cv::perspectiveTransform(on_board, fitted, plane);
   BesidePlane beside{found.size(), {}, beside_smooth(seen, fitted)};
   for (std::size_t i = 0; i < seen.size(); ++i) beside.px.push_back(cv::norm(seen[i] - fitted[i]));
-  beside.print(board.picture);
+  beside.print(board.image);
   return beside;
 }
 

@@ -87,10 +87,10 @@ cv::Point fixed(const Eigen::Vector2d& px) {  // 4 fractional bits
   return {static_cast<int>(std::lround(16 * px.x())), static_cast<int>(std::lround(16 * px.y()))};
 }
 
-void fill(cv::Mat& picture, std::span<const Eigen::Vector2d> polygon, double level) {
+void fill(cv::Mat& image, std::span<const Eigen::Vector2d> polygon, double level) {
   std::vector<cv::Point> points;
   for (const Eigen::Vector2d& px : polygon) points.push_back(fixed(px));
-  cv::fillConvexPoly(picture, points, cv::Scalar(level), cv::LINE_AA, 4);
+  cv::fillConvexPoly(image, points, cv::Scalar(level), cv::LINE_AA, 4);
 }
 
 cv::Mat background(const Condition& condition,
@@ -99,16 +99,16 @@ cv::Mat background(const Condition& condition,
                    bool cluttered,
                    Rng& rng) {
   const double level = condition.black + uniform(rng, {0.1, 0.7}) * (condition.white - condition.black);
-  cv::Mat picture =
+  cv::Mat image =
       cluttered ? clutter(k_width, k_height, rng) : plain(k_width, k_height, static_cast<int>(level));
   if (cluttered) {  // in the condition's own levels
     const double gain = (condition.white - condition.black) / 235;
-    picture.convertTo(picture, CV_8U, gain, condition.black - 10 * gain);
+    image.convertTo(image, CV_8U, gain, condition.black - 10 * gain);
   }
   if (condition.dark_card)
     for (const PlacedMarker& marker : markers)
-      fill(picture, outline(lens, marker, condition.margin + 0.12), k_black_of_dark_card);
-  return picture;
+      fill(image, outline(lens, marker, condition.margin + 0.12), k_black_of_dark_card);
+  return image;
 }
 
 // Something between dark and light that lies over a marker's corner or edge, or paper that eats into the
@@ -171,7 +171,7 @@ cv::Mat shade(const Condition& condition, Rng& rng) {
   return factor;
 }
 
-// A projector's picture over everything: light that adds to the room's, reflected as the paper and ink do.
+// A projector's image over everything: light that adds to the room's, reflected as the paper and ink do.
 cv::Mat with_projected_content(const cv::Mat& light, Rng& rng) {
   cv::Mat content;
   clutter(k_width, k_height, rng).convertTo(content, CV_32F, 1.0 / 255);
@@ -230,7 +230,7 @@ TrackerFrame frame_of(const Condition& condition, std::uint64_t seed, int number
   TrackerFrame frame;
   frame.lens = frame_lens(condition);
   const std::vector<PlacedMarker> markers = drawn_markers(condition, frame.lens, name_of, rng);
-  PictureOptions options;
+  ImageOptions options;
   options.black = condition.black;
   options.white = condition.white;
   cv::Mat light = light_of(frame.lens, background(condition, frame.lens, markers, number % 2 == 1, rng),
@@ -282,10 +282,10 @@ TrackerFrame cluttered_frame(int width, int height, std::uint64_t seed) {
                              markers.back().camera_from_marker});
     frame.marker_size_m = markers.back().size_m;
   }
-  PictureOptions options;
+  ImageOptions options;
   options.blur_px = 0.5;
   options.noise_levels = ordinary.noise_levels;
-  frame.grey = picture_of(frame.lens, clutter(width, height, rng), markers, options, rng);
+  frame.grey = image_of(frame.lens, clutter(width, height, rng), markers, options, rng);
   return frame;
 }
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/lens.h"
-#include "tests/tracker/marker_pictures.h"
+#include "tests/tracker/marker_images.h"
 
 namespace limn::test {
 
@@ -49,7 +49,7 @@ struct TrueMarker {
   Pose camera_from_marker;
 };
 
-/// A picture and what is in it.
+/// An image and what is in it.
 struct TrackerFrame {
   cv::Mat grey;
   Lens lens;

@@ -34,8 +34,8 @@ class Apriltag {
   }
 
   std::vector<Found> detect(const cv::Mat& grey) const {
-    image_u8_t picture = {grey.cols, grey.rows, static_cast<int>(grey.step[0]), grey.data};
-    zarray_t* list = apriltag_detector_detect(detector_.get(), &picture);
+    image_u8_t image = {grey.cols, grey.rows, static_cast<int>(grey.step[0]), grey.data};
+    zarray_t* list = apriltag_detector_detect(detector_.get(), &image);
     std::vector<Found> found;
     for (int i = 0; i < zarray_size(list); ++i) {
       apriltag_detection_t* d = nullptr;

@@ -27,15 +27,15 @@ struct Judged {
     assessment.predicted_error_mm = assessment.held_out_error_mm =
         assessment.propagated_error_mm = {0.8, 1.4};
   }
-  Words words() const {
+  Explanation words() const {
     Solution solution;
     solution.rig = world.rig;
     for (const Pose& pose : world.world_from_board) solution.world_from_board.emplace_back(pose);
-    return in_words({world.observations, {}, {}}, solution, assessment);
+    return explain({world.observations, {}, {}}, solution, assessment);
   }
 };
 
-bool says(const Words& words, const std::string& text) {
+bool says(const Explanation& words, const std::string& text) {
   return std::any_of(words.advice.begin(), words.advice.end(),
                      [&](const std::string& sentence) { return sentence.find(text) != std::string::npos; });
 }
@@ -122,7 +122,7 @@ TEST(Advice, TheVerdictNamesProjectorPoseAndReason) {
 TEST(Advice, WarnsWhereStatedDeviationsAreTooSmall) {
   Judged judged;
   EXPECT_FALSE(says(judged.words(), "Go by the held-out errors"));
-  judged.assessment.pulls.held_out.stddev = 2.0;
+  judged.assessment.normalised_residuals.held_out.stddev = 2.0;
   EXPECT_TRUE(says(judged.words(), "2.0 times as far as the noise explains"));
 }
 

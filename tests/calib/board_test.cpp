@@ -17,13 +17,13 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 
-// A photograph of the sheet: `picture_from_sheet` takes sheet pixels to picture pixels (pixel centres at
+// A photograph of the sheet: `image_from_sheet` takes sheet pixels to image pixels (pixel centres at
 // integers). Exact area sampling by 8 x 8 points a pixel, then optional blur; paper 200, ink 20,
 // background 90.
-cv::Mat photograph(const cv::Mat& sheet, const Matrix3d& picture_from_sheet, cv::Size size, double blur = 0) {
+cv::Mat photograph(const cv::Mat& sheet, const Matrix3d& image_from_sheet, cv::Size size, double blur = 0) {
   constexpr int k_samples = 8;
-  const Matrix3d back = picture_from_sheet.inverse();
-  cv::Mat picture(size, CV_32F);
+  const Matrix3d back = image_from_sheet.inverse();
+  cv::Mat image(size, CV_32F);
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       double sum = 0;
@@ -35,25 +35,25 @@ cv::Mat photograph(const cv::Mat& sheet, const Matrix3d& picture_from_sheet, cv:
         const bool inside = u >= 0 && v >= 0 && u < sheet.cols && v < sheet.rows;
         sum += inside ? (sheet.at<uchar>(v, u) != 0 ? 200 : 20) : 90;
       }
-      picture.at<float>(y, x) = static_cast<float>(sum / (k_samples * k_samples));
+      image.at<float>(y, x) = static_cast<float>(sum / (k_samples * k_samples));
     }
   }
-  if (blur > 0) cv::GaussianBlur(picture, picture, {}, blur);
+  if (blur > 0) cv::GaussianBlur(image, image, {}, blur);
   cv::Mat grey;
-  picture.convertTo(grey, CV_8U);
+  image.convertTo(grey, CV_8U);
   return grey;
 }
 
-// A tilted view of the whole sheet, `width` picture pixels wide, its middle at `px_middle`.
+// A tilted view of the whole sheet, `width` image pixels wide, its middle at `px_middle`.
 Matrix3d tilted_view(
     const BoardSheet& sheet, double width, double angle, Vector2d px_middle, double perspective) {
   Matrix3d centre = Matrix3d::Identity(), view = Matrix3d::Identity(), place = Matrix3d::Identity();
-  centre(0, 2) = -sheet.picture.cols / 2.0;
-  centre(1, 2) = -sheet.picture.rows / 2.0;
-  const double s = width / sheet.picture.cols;
+  centre(0, 2) = -sheet.image.cols / 2.0;
+  centre(1, 2) = -sheet.image.rows / 2.0;
+  const double s = width / sheet.image.cols;
   view.topLeftCorner<2, 2>() << s * std::cos(angle), -0.9 * s * std::sin(angle), s * std::sin(angle),
       0.9 * s * std::cos(angle);
-  view(2, 0) = perspective / sheet.picture.cols;
+  view(2, 0) = perspective / sheet.image.cols;
   place.topRightCorner<2, 1>() = px_middle;
   return place * view * centre;
 }
@@ -132,9 +132,9 @@ TEST(Board, DrawsItsGridOnWholePixels) {
       const Vector2d px = sheet.px_board_origin + sheet.pixels_per_metre * board.p_corner(id).head<2>();
       const int x = static_cast<int>(std::lround(px.x() + 0.5)),
                 y = static_cast<int>(std::lround(px.y() + 0.5));
-      const int a = sheet.picture.at<uchar>(y - 1, x - 1), b = sheet.picture.at<uchar>(y - 1, x);
-      ASSERT_EQ(a, sheet.picture.at<uchar>(y, x)) << text << " corner " << id;
-      ASSERT_EQ(b, sheet.picture.at<uchar>(y, x - 1)) << text << " corner " << id;
+      const int a = sheet.image.at<uchar>(y - 1, x - 1), b = sheet.image.at<uchar>(y - 1, x);
+      ASSERT_EQ(a, sheet.image.at<uchar>(y, x)) << text << " corner " << id;
+      ASSERT_EQ(b, sheet.image.at<uchar>(y, x - 1)) << text << " corner " << id;
       ASSERT_EQ(a + b, 255);
       const bool black = board.is_black(id % (board.columns - 1), id / (board.columns - 1));
       ASSERT_EQ(a == 0, black);
@@ -147,7 +147,7 @@ TEST(BoardFinder, FindsCharucoCornersWithoutBias) {
   const BoardSheet sheet = draw_board(board, {.square_px = 160});
   for (const double width : {420.0, 700.0}) {
     const Matrix3d view = tilted_view(sheet, width, 0.35, {401.3, 297.8}, 0.15);
-    const auto found = find_board(board, photograph(sheet.picture, view, {800, 600}, 0.7));
+    const auto found = find_board(board, photograph(sheet.image, view, {800, 600}, 0.7));
     const Errors errors = errors_of(board, sheet, view, found);
     EXPECT_EQ(errors.count, board.corner_count());
     EXPECT_LT(errors.mean.norm(), 0.02) << "width " << width;
@@ -161,7 +161,7 @@ TEST(BoardFinder, FindsChessboardCornersWithoutBiasWhicheverWayItIsTurned) {
   const BoardSheet sheet = draw_board(board, {.square_px = 160});
   for (const double angle : {-0.2, 1.2, 2.9, 4.4}) {
     const Matrix3d view = tilted_view(sheet, 380, angle, {300.3, 250.8}, 0.1);
-    const auto found = find_board(board, photograph(sheet.picture, view, {600, 500}, 0.7));
+    const auto found = find_board(board, photograph(sheet.image, view, {600, 500}, 0.7));
     const Errors errors = errors_of(board, sheet, view, found);
     EXPECT_EQ(errors.count, board.corner_count()) << "angle " << angle;
     EXPECT_LT(errors.mean.norm(), 0.02) << "angle " << angle;
@@ -173,9 +173,9 @@ TEST(BoardFinder, SeesACharucoBoardInPart) {
   const Board board = Board::parse("charuco:11x8:25mm").value();
   const BoardSheet sheet = draw_board(board, {.square_px = 160});
   const Matrix3d view = tilted_view(sheet, 700, 0.2, {600, 350}, 0.1);
-  cv::Mat picture = photograph(sheet.picture, view, {640, 480}, 0.6);
-  cv::rectangle(picture, {350, 200, 90, 60}, cv::Scalar(128), cv::FILLED);  // a hand
-  const auto found = find_board(board, picture);
+  cv::Mat image = photograph(sheet.image, view, {640, 480}, 0.6);
+  cv::rectangle(image, {350, 200, 90, 60}, cv::Scalar(128), cv::FILLED);  // a hand
+  const auto found = find_board(board, image);
   const Errors errors = errors_of(board, sheet, view, found);
   EXPECT_GT(errors.count, 12);
   EXPECT_LT(errors.count, board.corner_count());
@@ -186,7 +186,7 @@ TEST(BoardFinder, TellsTheTruthAboutItsNoise) {
   const Board board = Board::parse("charuco:11x8:25mm").value();
   const BoardSheet sheet = draw_board(board, {.square_px = 160});
   const Matrix3d view = tilted_view(sheet, 500, 0.35, {401.3, 297.8}, 0.15);
-  const cv::Mat clean = photograph(sheet.picture, view, {800, 600}, 0.7);
+  const cv::Mat clean = photograph(sheet.image, view, {800, 600}, 0.7);
   auto rng = test::test_rng();
   std::normal_distribution<double> noise(0, 12);
   double squared_pull = 0, squared_error = 0;
@@ -212,7 +212,7 @@ TEST(BoardFinder, FindsNothingWhereThereIsNoBoard) {
   const Board chessboard = Board::parse("chessboard:9x7:75mm").value();
   const Board other = Board::parse("chessboard:8x6:30mm").value();
   const BoardSheet sheet = draw_board(other, {.square_px = 50});
-  EXPECT_TRUE(find_board(charuco, sheet.picture).empty());
+  EXPECT_TRUE(find_board(charuco, sheet.image).empty());
   EXPECT_TRUE(find_board(chessboard, cv::Mat(480, 640, CV_8U, cv::Scalar(80))).empty());
 }
 

@@ -12,12 +12,12 @@
 
 #include "calib/code/patterns.h"
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "tests/support/matchers.h"
 
 namespace limn::test {
 
-/// A camera before a projector, whose pixels fall on straight lines of the projector's picture: exact light,
+/// A camera before a projector, whose pixels fall on straight lines of the projector's image: exact light,
 /// then blur, gain and noise.
 struct CodeBench {
   calib::Patterns patterns = calib::Patterns::create("gray", 64, 64).value();
@@ -27,33 +27,33 @@ struct CodeBench {
   double noise = 0;                                 // levels
   double gamma = 1;                                 // of the projector: light = value ^ gamma
   std::array<double, 3> channel_gamma = {1, 1, 1};  // multiplies it in blue, green, red; the camera is grey
-  /// Light in the picture number `index` as the camera sees it, 0 to 1, may be changed before it is taken.
+  /// Light in the image number `index` as the camera sees it, 0 to 1, may be changed before it is taken.
   std::function<void(int index, cv::Mat* light)> changed;
   std::mt19937_64 rng = test_rng();
 
-  // Where in the projector's picture the middle of a camera pixel falls.
+  // Where in the projector's image the middle of a camera pixel falls.
   double column_at(int x) const { return 5.3 + 0.35 * x; }
   double row_at(int y) const { return 3.1 + 0.4 * y; }
 
-  /// Light at the camera pixels: the picture's pixels are squares, blurred. CV_64F.
-  cv::Mat light(const cv::Mat& picture) const {
-    cv::Mat linear(picture.size(), CV_64F);
-    for (int y = 0; y < picture.rows; ++y) {
-      for (int x = 0; x < picture.cols; ++x)
+  /// Light at the camera pixels: the image's pixels are squares, blurred. CV_64F.
+  cv::Mat light(const cv::Mat& image) const {
+    cv::Mat linear(image.size(), CV_64F);
+    for (int y = 0; y < image.rows; ++y) {
+      for (int x = 0; x < image.cols; ++x)
         linear.at<double>(y, x) =
-            (light_of(picture, y, x, 0) + light_of(picture, y, x, 1) + light_of(picture, y, x, 2)) / 3;
+            (light_of(image, y, x, 0) + light_of(image, y, x, 1) + light_of(image, y, x, 2)) / 3;
     }
-    const auto columns = weights(width, picture.cols, [&](int x) { return column_at(x); });
-    const auto rows = weights(height, picture.rows, [&](int y) { return row_at(y); });
+    const auto columns = weights(width, image.cols, [&](int x) { return column_at(x); });
+    const auto rows = weights(height, image.rows, [&](int y) { return row_at(y); });
     return rows * linear * columns.t();
   }
 
-  /// All pictures of the code, 8 bits.
+  /// All images of the code, 8 bits.
   std::vector<cv::Mat> photographs() {
     std::normal_distribution<double> scatter(0, 1);
     std::vector<cv::Mat> photos;
     for (int i = 0; i < patterns.count(); ++i) {
-      cv::Mat seen = light(patterns.picture(i));
+      cv::Mat seen = light(patterns.image(i));
       if (changed) changed(i, &seen);
       cv::Mat photo(height, width, CV_8U);
       for (int y = 0; y < height; ++y) {
@@ -70,16 +70,16 @@ struct CodeBench {
     EXPECT_TRUE(make_folder(folder).ok());
     std::vector<std::filesystem::path> files;
     for (const cv::Mat& photo : photographs()) {
-      files.push_back(folder / calib::picture_name(static_cast<int>(files.size())));
+      files.push_back(folder / calib::image_name(static_cast<int>(files.size())));
       EXPECT_TRUE(write_png(files.back(), photo, {.compression = 1}).ok());
     }
     return files;
   }
 
  private:
-  double light_of(const cv::Mat& picture, int y, int x, int channel) const {
-    const uchar* pixel = picture.ptr(y, x);
-    const double value = pixel[picture.channels() == 1 ? 0 : channel] / 255.0;
+  double light_of(const cv::Mat& image, int y, int x, int channel) const {
+    const uchar* pixel = image.ptr(y, x);
+    const double value = pixel[image.channels() == 1 ? 0 : channel] / 255.0;
     return std::pow(value, gamma * channel_gamma[static_cast<size_t>(channel)]);
   }
 

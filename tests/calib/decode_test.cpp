@@ -8,7 +8,7 @@
 #include <random>
 
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "tests/calib/code_bench.h"
 
 namespace limn::calib {
@@ -72,11 +72,11 @@ TEST(Decode, DropsUnresolvedFineBitsInsteadOfThePixel) {
   EXPECT_LT(std::abs(e.mean), 0.05);
   EXPECT_LT(e.worst, 4.0);
   EXPECT_LT(e.squared_pull, 1.3);  // the variance says how coarse the labels are
-  EXPECT_GT(decoded->health.unsure_finest, 0.5) << "most pixels have lost their finest bit";
+  EXPECT_GT(decoded->quality.unsure_finest, 0.5) << "most pixels have lost their finest bit";
 }
 
 // Noise alone, so that nothing but it makes the scatter: the variances must be neither hopeful nor cautious,
-// and the noise is what the pictures show.
+// and the noise is what the images show.
 TEST(Decode, FindsPlacesBetweenWholePixelsWithTheScatterThatItStates) {
   struct Case {
     const char* code;
@@ -98,7 +98,7 @@ TEST(Decode, FindsPlacesBetweenWholePixelsWithTheScatterThatItStates) {
         "[ sub-pixel] %-5s %d: rms %.4f px, worst %.3f px, squared pull %.2f, %.1f %% within 1.96, noise "
         "%.2f\n",
         c.code, c.options.base_stripe_px, e.rms, e.worst, e.squared_pull, 100 * e.within_95,
-        std::sqrt(decoded->health.noise.read + 100 * decoded->health.noise.per_level));
+        std::sqrt(decoded->quality.noise.read + 100 * decoded->quality.noise.per_level));
     EXPECT_GT(decoded->share(), 0.98) << c.code;
     EXPECT_LT(e.rms, c.worst_rms) << c.code << ": whole pixels scatter by 0.29";
     EXPECT_LT(std::abs(e.mean), 0.01) << c.code;
@@ -106,7 +106,7 @@ TEST(Decode, FindsPlacesBetweenWholePixelsWithTheScatterThatItStates) {
     EXPECT_LT(e.squared_pull, 1.3) << c.code;
     EXPECT_GT(e.within_95, 0.92) << c.code;
     EXPECT_LT(e.within_95, 0.98) << c.code;
-    EXPECT_NEAR(std::sqrt(decoded->health.noise.read + 100 * decoded->health.noise.per_level), 3, 0.2)
+    EXPECT_NEAR(std::sqrt(decoded->quality.noise.read + 100 * decoded->quality.noise.per_level), 3, 0.2)
         << c.code;
   }
 }
@@ -126,7 +126,7 @@ TEST(Decode, WhiteAndBlackStandForInversesThatAreNotShown) {
     EXPECT_LT(std::abs(e.mean), 0.01) << code;
     EXPECT_GT(e.squared_pull, 0.6) << code;
     EXPECT_LT(e.squared_pull, 1.4) << code;
-    EXPECT_TRUE(decoded->health.odd.empty()) << code;
+    EXPECT_TRUE(decoded->quality.odd.empty()) << code;
   }
 }
 
@@ -144,7 +144,7 @@ TEST(Decode, PhaseNeverTakesTheNextWave) {
     EXPECT_GT(decoded->share(), 0.97) << blur;
     EXPECT_LT(e.worst, 1) << blur;
     EXPECT_LT(e.rms, 0.15) << blur;
-    EXPECT_NEAR(decoded->health.wave_level, 0.5, 0.02);
+    EXPECT_NEAR(decoded->quality.wave_level, 0.5, 0.02);
   }
 }
 
@@ -155,7 +155,7 @@ TEST(Decode, PhaseSaysThatTheProjectorsResponseIsNotWhatItWasDrawnFor) {
   bench.gamma = 1;
   const auto decoded = decode(bench.patterns, bench.photograph(test::test_folder()), k_width, k_height);
   ASSERT_TRUE(decoded.ok()) << decoded.message();
-  EXPECT_GT(decoded->health.wave_level, 0.6);
+  EXPECT_GT(decoded->quality.wave_level, 0.6);
 }
 
 // 3 steps, because every step more hides another harmonic of a wrong response.
@@ -164,7 +164,7 @@ TEST(Decode, PhaseErrsATenthAsMuchWhenItsWavesAreDrawnByTheProjectorsResponse) {
   bench.blur = 0.6;
   bench.gamma = 1.5;
   bench.channel_gamma = {0.85, 1, 1.25};
-  Response measured{"projector0", {}, {}, {}};
+  ProjectorResponse measured{"projector0", {}, {}, {}};
   for (int v = 0; v < 256; ++v) {
     const auto light = [&](size_t c) { return std::pow(v / 255.0, bench.gamma * bench.channel_gamma[c]); };
     measured.blue.push_back(light(0));
@@ -181,13 +181,13 @@ TEST(Decode, PhaseErrsATenthAsMuchWhenItsWavesAreDrawnByTheProjectorsResponse) {
   const Errors e_without = errors_of(without, bench), e = errors_of(with, bench);
   printf("[ response ] phase of 3 steps: rms %.3f px with gamma 2.2, %.3f px with the response\n",
          e_without.rms, e.rms);
-  EXPECT_NEAR(with.health.wave_level, 0.5, 0.01);
-  EXPECT_GT(without.health.wave_level, 0.55);
+  EXPECT_NEAR(with.quality.wave_level, 0.5, 0.01);
+  EXPECT_GT(without.quality.wave_level, 0.55);
   EXPECT_LT(e.rms, 0.1 * e_without.rms);
   EXPECT_LT(e.rms, 0.02);
 }
 
-// A white V-groove of 60 degrees whose crease runs down the middle of the picture; light falls flatly onto
+// A white V-groove of 60 degrees whose crease runs down the middle of the image; light falls flatly onto
 // its left wall. Each wall lights the other: diffuse, three bounces, strips along the crease (the form factor
 // between strips at distances s and t from the crease is s t sin^2 / (2 r^3)), spread along them.
 class Groove {
@@ -260,7 +260,7 @@ TEST(Decode, XorHoldsInAGrooveWhoseWallsLightEachOtherAndGrayDoesNot) {
   for (const WallScore& score : {xor4, xor2}) EXPECT_GT(score.right, 0.98 * score.labelled);
 }
 
-// Light from elsewhere lifts every picture by half of what white gains: bits must not look unsure for it.
+// Light from elsewhere lifts every image by half of what white gains: bits must not look unsure for it.
 TEST(Decode, DoesNotMindGlobalLight) {
   Bench bench;
   bench.blur = 0.6;
@@ -269,7 +269,7 @@ TEST(Decode, DoesNotMindGlobalLight) {
   const double global = 60;
   for (int i = 0; i < bench.patterns.count(); ++i) {
     const double share = i == bench.patterns.white() ? 1 : i == bench.patterns.black() ? 0 : 0.5;
-    cv::Mat photo = read_picture(files[static_cast<size_t>(i)]).value();
+    cv::Mat photo = read_image(files[static_cast<size_t>(i)]).value();
     photo.convertTo(photo, CV_8U, 0.2, share * global);  // 32 levels of direct light remain
     ASSERT_TRUE(write_png(files[static_cast<size_t>(i)], photo).ok());
   }
@@ -289,13 +289,13 @@ TEST(Decode, CallsPixelsUnlitThatReflectionsAloneReach) {
   std::normal_distribution<double> scatter(0, 1);
   std::vector<fs::path> files;
   for (int i = 0; i < bench.patterns.count(); ++i) {
-    const double mean = cv::mean(bench.patterns.picture(i))[0] / 255;
+    const double mean = cv::mean(bench.patterns.image(i))[0] / 255;
     cv::Mat photo(k_height, k_width, CV_8U);
     for (int y = 0; y < k_height; ++y) {
       for (int x = 0; x < k_width; ++x)
         photo.at<uchar>(y, x) = cv::saturate_cast<uchar>(20 + 60 * mean + scatter(rng));
     }
-    files.push_back(folder / picture_name(i));
+    files.push_back(folder / image_name(i));
     ASSERT_TRUE(write_png(files.back(), photo).ok());
   }
   const auto decoded = decode(bench.patterns, files, k_width, k_height);
@@ -330,7 +330,7 @@ TEST(Decode, RemovesALabelThatItsNeighboursContradict) {
   Bench bench;
   const auto files = bench.photograph(test::test_folder());
   for (const size_t pair : {0U, 1U}) {  // one pixel reads the coarsest column bit the wrong way
-    cv::Mat photo = read_picture(files[pair]).value();
+    cv::Mat photo = read_image(files[pair]).value();
     photo.at<uchar>(60, 30) = pair == 0 ? 180 : 20;
     ASSERT_TRUE(write_png(files[pair], photo).ok());
   }

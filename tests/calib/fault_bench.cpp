@@ -8,7 +8,7 @@
 #include "calib/capture.h"
 #include "calib/code/patterns.h"
 #include "core/file.h"
-#include "sim/photograph.h"
+#include "sim/sensor_model.h"
 #include "sim/trace.h"
 
 namespace limn::test {
@@ -35,11 +35,11 @@ Pose pose_of(const nlohmann::json& json) {
 sim::Object board_sheet(const FaultBench& bench, const Pose& world_from_board) {
   const calib::BoardSheet drawn = calib::draw_board(bench.board, {.square_px = 64});
   const double metres_per_px = 1 / drawn.pixels_per_metre;
-  const double width = drawn.picture.cols * metres_per_px, height = drawn.picture.rows * metres_per_px;
-  const Eigen::Vector2d px_centre((drawn.picture.cols - 1) / 2.0, (drawn.picture.rows - 1) / 2.0);
+  const double width = drawn.image.cols * metres_per_px, height = drawn.image.rows * metres_per_px;
+  const Eigen::Vector2d px_centre((drawn.image.cols - 1) / 2.0, (drawn.image.rows - 1) / 2.0);
   const Eigen::Vector2d p_centre = (px_centre - drawn.px_board_origin) * metres_per_px;
   const Pose board_from_sheet(Eigen::Quaterniond::Identity(), {p_centre.x(), p_centre.y(), 0});
-  sim::Object object = sim::sheet("board", width, height, drawn.picture, world_from_board * board_from_sheet);
+  sim::Object object = sim::sheet("board", width, height, drawn.image, world_from_board * board_from_sheet);
   if (!bench.sheet) return object;
   constexpr int k_steps = 40;
   auto mesh = std::make_shared<scene::Mesh>();
@@ -98,13 +98,13 @@ Traced trace_pose(const FaultBench& bench, int pose) {
   return result;
 }
 
-// What every projector's panel gets while `projector` is meant to show `picture`.
-std::vector<cv::Mat> panels(const FaultBench& bench, int projector, const cv::Mat& picture) {
+// What every projector's panel gets while `projector` is meant to show `image`.
+std::vector<cv::Mat> panels(const FaultBench& bench, int projector, const cv::Mat& image) {
   std::vector<cv::Mat> shown(bench.world.rig.projectors.size());
   const int display = bench.display_of ? bench.display_of(projector) : projector;
   if (display < 0) return shown;
   cv::Mat& panel = shown[static_cast<size_t>(display)];
-  panel = bench.on_panel ? bench.on_panel(picture) : picture;
+  panel = bench.on_panel ? bench.on_panel(image) : image;
   const Imager& imager = bench.world.rig.projectors[static_cast<size_t>(display)];
   if (panel.cols != imager.width || panel.rows != imager.height)
     cv::resize(panel, panel, {imager.width, imager.height}, 0, 0, cv::INTER_LINEAR);
@@ -142,12 +142,12 @@ FaultBench FaultBench::create(const std::string& name, int poses) {
   return bench;
 }
 
-Result<calib::Captures> FaultBench::capture(const std::filesystem::path& folder) const {
+Result<calib::CaptureSet> FaultBench::capture(const std::filesystem::path& folder) const {
   std::vector<calib::CapturedDevice> cameras, projectors;
   for (const Imager& i : world.rig.cameras) cameras.push_back({i.name, i.width, i.height});
   for (const Imager& i : world.rig.projectors)
     projectors.push_back({i.name, mode ? mode->width : i.width, mode ? mode->height : i.height});
-  const calib::Captures plan = calib::plan_captures(folder, cameras, projectors, board, code, code_options);
+  const calib::CaptureSet plan = calib::plan_captures(folder, cameras, projectors, board, code, code_options);
   LIMN_TRY_STATUS(calib::begin_captures(plan));
   std::uint64_t frame = seed * 1000003;
   for (int pose = 0; pose < static_cast<int>(world_from_board.size()); ++pose) {
@@ -155,11 +155,11 @@ Result<calib::Captures> FaultBench::capture(const std::filesystem::path& folder)
     std::vector<cv::Mat> shown;
     int shot = -1, of_projector = -1;
     sim::World now = world;
-    const calib::Stage stage{
-        .show = [&](int projector, const cv::Mat& picture) -> Status {
+    const calib::CaptureBackend backend{
+        .show = [&](int projector, const cv::Mat& image) -> Status {
           shot = projector == of_projector ? shot + 1 : 0;
           of_projector = projector;
-          shown = panels(*this, projector, picture);
+          shown = panels(*this, projector, image);
           if (before_shot) before_shot(pose, shot, &now);
           return {};
         },
@@ -170,7 +170,7 @@ Result<calib::Captures> FaultBench::capture(const std::filesystem::path& folder)
           return on_photo ? on_photo(photo) : photo;
         },
     };
-    LIMN_TRY_STATUS(calib::capture_pose(plan, pose, stage));
+    LIMN_TRY_STATUS(calib::capture_pose(plan, pose, backend));
   }
   return calib::load_captures(folder);
 }

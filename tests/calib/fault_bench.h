@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "calib/board/board.h"
-#include "calib/captures.h"
+#include "calib/capture_set.h"
 #include "core/result.h"
 #include "sim/world.h"
 
@@ -18,14 +18,14 @@ namespace limn::test {
 /// Something moved while a pose was captured.
 struct Nudge {
   int pose = 0;
-  int shot = 0;  ///< index of the first picture after it, in the series of every projector
+  int shot = 0;  ///< index of the first image after it, in the series of every projector
   bool camera = false;
   Pose world_moved;  ///< world_from_world: of the board, or of the camera
 };
 
 /// A calibration captured on a world of config/ whose devices have 3/8 of their pixels, with a coarser board
 /// of the same size, held as that world's plan says. Everything is as it should be until something is set;
-/// what calib sees of it are capture.json and pictures.
+/// what calib sees of it are capture.json and images.
 struct FaultBench {
   sim::World world;
   calib::Board board;  ///< as capture.json says
@@ -36,13 +36,13 @@ struct FaultBench {
 
   /// What the display pretends to be, if not the projector's own size.
   std::optional<cv::Size> mode;
-  /// What the projector's panel shows of a picture (of the mode's size).
-  std::function<cv::Mat(const cv::Mat& picture)> on_panel;
-  /// Which projector a picture for `projector` comes out of; -1: none in the room.
+  /// What the projector's panel shows of an image (of the mode's size).
+  std::function<cv::Mat(const cv::Mat& image)> on_panel;
+  /// Which projector an image for `projector` comes out of; -1: none in the room.
   std::function<int(int projector)> display_of;
-  /// Changes light or sensor before a picture is taken; geometry stays.
+  /// Changes light or sensor before an image is taken; geometry stays.
   std::function<void(int pose, int shot, sim::World* world)> before_shot;
-  /// Of the camera's picture, before it is kept.
+  /// Of the camera's image, before it is kept.
   std::function<cv::Mat(const cv::Mat& photo)> on_photo;
   /// Of the sheet: where its point (x, y), metres from its middle, truly is.
   std::function<Eigen::Vector3d(const Eigen::Vector2d& p)> sheet;
@@ -50,7 +50,7 @@ struct FaultBench {
 
   /// `name`: "bench" or "studio".
   static FaultBench create(const std::string& name, int poses);
-  Result<calib::Captures> capture(const std::filesystem::path& folder) const;
+  Result<calib::CaptureSet> capture(const std::filesystem::path& folder) const;
 };
 
 }  // namespace limn::test

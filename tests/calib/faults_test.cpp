@@ -35,7 +35,7 @@ struct Told {
   std::vector<Fault> faults;
 };
 
-Told told_of(const Captures& captures, const std::string& injected, const Rig* earlier) {
+Told told_of(const CaptureSet& captures, const std::string& injected, const Rig* earlier) {
   Told told{{}, "failed", {}, {}};
   const auto observed = observe(captures);
   EXPECT_TRUE(observed.ok()) << observed.message();
@@ -82,22 +82,22 @@ void expect_sound(const Told& told) {
 
 FaultBench bench(int poses = k_poses) { return FaultBench::create("bench", poses); }
 
-// The display makes one picture of another by a homography, with bilinear interpolation.
-cv::Mat warped(const cv::Mat& picture, const std::array<cv::Point2f, 4>& corners) {
-  const auto w = static_cast<float>(picture.cols), h = static_cast<float>(picture.rows);
+// The display makes one image of another by a homography, with bilinear interpolation.
+cv::Mat warped(const cv::Mat& image, const std::array<cv::Point2f, 4>& corners) {
+  const auto w = static_cast<float>(image.cols), h = static_cast<float>(image.rows);
   const std::array<cv::Point2f, 4> from = {{{0, 0}, {w, 0}, {w, h}, {0, h}}};
   std::array<cv::Point2f, 4> to = corners;
   for (cv::Point2f& corner : to) corner = {corner.x * w, corner.y * h};
   cv::Mat panel;
-  cv::warpPerspective(picture, panel, cv::getPerspectiveTransform(from.data(), to.data()), picture.size(),
+  cv::warpPerspective(image, panel, cv::getPerspectiveTransform(from.data(), to.data()), image.size(),
                       cv::INTER_LINEAR);
   return panel;
 }
 
 std::function<cv::Mat(const cv::Mat&)> flipped(int how) {
-  return [how](const cv::Mat& picture) {
+  return [how](const cv::Mat& image) {
     cv::Mat panel;
-    cv::flip(picture, panel, how);
+    cv::flip(image, panel, how);
     return panel;
   };
 }
@@ -164,8 +164,8 @@ TEST(Faults, ProjectorsSwappedSinceTheLastCalibration) {
 
 TEST(Faults, KeystoneLeftOn) {
   FaultBench keystone = bench();
-  keystone.on_panel = [](const cv::Mat& picture) {
-    return warped(picture, {{{0.08F, 0}, {0.92F, 0}, {1, 1}, {0, 1}}});
+  keystone.on_panel = [](const cv::Mat& image) {
+    return warped(image, {{{0.08F, 0}, {0.92F, 0}, {1, 1}, {0, 1}}});
   };
   // Its projector is none with a straight axis: poses disagree and the board seems bent.
   expect_named(told_of(keystone, "keystone"), "keystone_or_scaling", {"odd_pose", "bent_board"});
@@ -185,7 +185,7 @@ TEST(Faults, BoardsAllButParallel) {
     flat.world_from_board[i] = Pose(Eigen::Quaterniond::Identity(), {0.05 * n - 0.1, 0, 0.02 * n}) * first *
                                Pose(exp_rotation({0.02 * n, 0.05 - 0.02 * n, 0}), Vector3d::Zero());
   }
-  // Boards side by side leave most of the picture empty, too.
+  // Boards side by side leave most of the image empty, too.
   expect_named(told_of(flat, "boards all but parallel"), "little_tilt", {"low_coverage"});
 }
 
@@ -237,7 +237,7 @@ TEST(Faults, WhiteDrivesTheCameraToFullScale) {
 }
 
 // The display was late: the camera saw what had been shown before.
-TEST(Faults, OnePictureIsTheOneBefore) {
+TEST(Faults, OneImageIsTheOneBefore) {
   FaultBench late = bench();
   cv::Mat last;
   int pose_now = -1, shot_now = -1;
@@ -299,7 +299,7 @@ TEST(Faults, ProjectionTurnedUpsideDown) {
   expect_named(told_of(rotated, "turned by 180 degrees"), "rotated_projection");
 }
 
-TEST(Faults, CameraPictureStretched) {
+TEST(Faults, CameraImageStretched) {
   FaultBench stretched = bench();
   stretched.on_photo = [](const cv::Mat& photo) {
     cv::Mat whole;
@@ -309,12 +309,12 @@ TEST(Faults, CameraPictureStretched) {
   expect_named(told_of(stretched, "camera's picture stretched"), "wrong_camera_resolution", {"odd_pose"});
 }
 
-TEST(Faults, CameraPictureOfAnotherSizeNamesTheFile) {
+TEST(Faults, CameraImageOfAnotherSizeNamesTheFile) {
   FaultBench other = bench(3);
   const auto folder = test_folder() / "captures";
   const auto captures = other.capture(folder);
   ASSERT_TRUE(captures.ok()) << captures.message();
-  Captures smaller = *captures;
+  CaptureSet smaller = *captures;
   smaller.cameras[0].width = 640;
   smaller.cameras[0].height = 480;
   const auto observed = observe(smaller);

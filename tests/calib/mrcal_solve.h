@@ -42,7 +42,7 @@ inline MrcalSolution mrcal_solve(const Observations& observations,
     frames.push_back({{{r.x(), r.y(), r.z()}}, {{t.x(), t.y(), t.z()}}});
     const size_t first = pool.size();
     pool.resize(first + static_cast<size_t>(corners), {{0, 0, -1}});  // weight -1: not seen
-    for (const CornerSeen& corner : observations.corners) {
+    for (const CornerObservation& corner : observations.corners) {
       if (corner.camera == camera && corner.pose == pose)
         pool[first + static_cast<size_t>(corner.corner)] = {{corner.px.x(), corner.px.y(), 1}};
     }

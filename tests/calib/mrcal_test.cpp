@@ -35,7 +35,7 @@ TEST_P(Mrcal, AgreesOnTheCameraAndTheBoardPoses) {
     shape.camera_distortion = {-0.12, 0.08, 0.0006, -0.0004, 0.05};
   World world = make_world(shape);
   std::erase_if(world.observations.corners,
-                [](const CornerSeen& c) { return (c.corner + c.pose) % 13 == 0; });  // partly covered
+                [](const CornerObservation& c) { return (c.corner + c.pose) % 13 == 0; });  // partly covered
   add_noise(&world, 0.1, 0, test_rng());
   SolveOptions options = plain_least_squares();
   options.camera_model = GetParam();
@@ -50,7 +50,7 @@ TEST_P(Mrcal, AgreesOnTheCameraAndTheBoardPoses) {
   const MrcalSolution theirs = mrcal_solve(world.observations, 0, first, start, false);
 
   double worst = 0, squared = 0;
-  for (const CornerSeen& seen : world.observations.corners) {
+  for (const CornerObservation& seen : world.observations.corners) {
     const Eigen::Vector3d p = world.observations.board.p_corner(seen.corner);
     const auto a = ours->rig.cameras[0].project(*ours->world_from_board[static_cast<size_t>(seen.pose)] * p);
     const auto b = theirs.camera.lens.project(theirs.camera_from_board.at(seen.pose) * p);

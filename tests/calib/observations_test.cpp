@@ -21,16 +21,16 @@ struct Sheet {
   std::vector<BoardCorner> corners;
 
   Sheet() {
-    const cv::Mat& picture = drawn.picture;
+    const cv::Mat& image = drawn.image;
     cv::Mat least;
-    cv::erode(picture, least, cv::Mat());
-    decoded.contrast = 8 + picture * (180 / 255.0);
-    decoded.px_projector.create(picture.size(), CV_32FC2);
-    decoded.variance = cv::Mat(picture.size(), CV_32FC2, cv::Scalar::all(0.01));
-    for (int y = 0; y < picture.rows; ++y) {
-      for (int x = 0; x < picture.cols; ++x) {
+    cv::erode(image, least, cv::Mat());
+    decoded.contrast = 8 + image * (180 / 255.0);
+    decoded.px_projector.create(image.size(), CV_32FC2);
+    decoded.variance = cv::Mat(image.size(), CV_32FC2, cv::Scalar::all(0.01));
+    for (int y = 0; y < image.rows; ++y) {
+      for (int x = 0; x < image.cols; ++x) {
         const float wrong = least.at<uchar>(y, x) > 0 ? 0.0F : 0.5F;
-        const float ink = picture.at<uchar>(y, x) > 0 ? 0.0F : std::numeric_limits<float>::quiet_NaN();
+        const float ink = image.at<uchar>(y, x) > 0 ? 0.0F : std::numeric_limits<float>::quiet_NaN();
         decoded.px_projector.at<cv::Vec2f>(y, x) = {0.5F * static_cast<float>(x) + wrong + ink,
                                                     0.5F * static_cast<float>(y) + wrong + ink};
       }

@@ -1,7 +1,7 @@
 #pragma once
 
 // A rig with known truth, a board shown to it in some poses, and what it would observe: coordinates, not
-// pictures.
+// images.
 
 #include <Eigen/Core>
 #include <cmath>
@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "calib/observations.h"
-#include "calib/predict.h"
+#include "calib/measurement_model.h"
 #include "core/rig.h"
 #include "tests/support/matchers.h"
 
@@ -100,7 +100,7 @@ inline void add_devices(World* world, const WorldOptions& options) {
     world->rig.cameras.push_back(imager("camera1", 1280, 1024, {1500, 1499, 630, 520},
                                         {-0.05, 0.02, -0.0003, 0.0005},
                                         looking_at({0.5, 0.05, 0.05}, target, up)));
-  // A lens shift moves the picture off the axis: the projector is turned so that it still meets the board.
+  // A lens shift moves the image off the axis: the projector is turned so that it still meets the board.
   const double shift_px = 800 * options.shift;
   for (int i = 0; i < options.projectors; ++i) {
     const Pose towards = looking_at({i == 0 ? -0.35 : 0.3, 0.1, 0.0}, target, up);
@@ -161,7 +161,7 @@ inline void observe_scene(World* world, int columns, int rows, double distance_m
     const auto look = [&](const Imager& imager, bool by_projector, int which) {
       const auto there = imager.project(p);
       if (!there || !imager.contains(*there)) return;
-      world->observations.sightings.push_back({point, by_projector, which, *there, 0.02});
+      world->observations.tie_observations.push_back({point, by_projector, which, *there, 0.02});
       seen = true;
     };
     for (size_t k = 0; k < world->rig.projectors.size(); ++k)
@@ -179,7 +179,7 @@ inline void add_noise(World* world, double corner_px, double match_px, std::mt19
     const double x = scatter(rng);
     return Eigen::Vector2d(px * x, px * scatter(rng));
   };
-  for (CornerSeen& seen : world->observations.corners) {
+  for (CornerObservation& seen : world->observations.corners) {
     seen.px += noise(corner_px);
     seen.stddev_px = 1e-3;
   }
@@ -187,9 +187,9 @@ inline void add_noise(World* world, double corner_px, double match_px, std::mt19
     match.px_projector += noise(match_px);
     match.stddev_px = 1e-3;
   }
-  for (Sighting& sighting : world->observations.sightings) {
-    sighting.px += noise(match_px);
-    sighting.stddev_px = 1e-3;
+  for (TiePointObservation& tie_observation : world->observations.tie_observations) {
+    tie_observation.px += noise(match_px);
+    tie_observation.stddev_px = 1e-3;
   }
 }
 

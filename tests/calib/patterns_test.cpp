@@ -26,8 +26,8 @@ TEST(Patterns, GiveEveryPixelItsOwnCodeInTheStatedOrder) {
   auto value = [&](int first, int bits, int x, int y) {  // Gray to binary, most significant first
     int binary = 0, previous = 0;
     for (int i = 0; i < bits; ++i) {
-      const int lit = patterns.picture(first + 2 * i).at<uchar>(y, x);
-      EXPECT_EQ(lit + patterns.picture(first + 2 * i + 1).at<uchar>(y, x), 255);
+      const int lit = patterns.image(first + 2 * i).at<uchar>(y, x);
+      EXPECT_EQ(lit + patterns.image(first + 2 * i + 1).at<uchar>(y, x), 255);
       previous ^= lit == 255 ? 1 : 0;
       binary = 2 * binary + previous;
     }
@@ -39,8 +39,8 @@ TEST(Patterns, GiveEveryPixelItsOwnCodeInTheStatedOrder) {
       EXPECT_EQ(value(2 * column_bits, row_bits, x, y), y);
     }
   }
-  EXPECT_EQ(patterns.picture(patterns.white()).at<uchar>(5, 12), 255);
-  EXPECT_EQ(patterns.picture(patterns.black()).at<uchar>(5, 12), 0);
+  EXPECT_EQ(patterns.image(patterns.white()).at<uchar>(5, 12), 255);
+  EXPECT_EQ(patterns.image(patterns.black()).at<uchar>(5, 12), 0);
   EXPECT_EQ(patterns.white(), 14);
 }
 
@@ -51,13 +51,13 @@ TEST(Patterns, ExchangedBitsAreGrayCodeWithNarrowStripes) {
     ASSERT_EQ(exchanged.count(), gray.count());
     const int base = exchanged.column_bits() - 1 - exchanged.base_bit();  // pair of the base
     cv::Mat differing;
-    cv::compare(exchanged.picture(2 * base), gray.picture(2 * base), differing, cv::CMP_NE);
+    cv::compare(exchanged.image(2 * base), gray.image(2 * base), differing, cv::CMP_NE);
     EXPECT_EQ(cv::countNonZero(differing), 0);
     for (int pair = 0; pair < exchanged.column_bits(); ++pair) {
-      const cv::Mat shown = exchanged.picture(2 * pair);
+      const cv::Mat shown = exchanged.image(2 * pair);
       for (int x = 0; x < 64; ++x) {
-        const int bit = (gray.picture(2 * pair).at<uchar>(0, x) ^
-                         (pair < base ? gray.picture(2 * base).at<uchar>(0, x) : 0)) != 0;
+        const int bit = (gray.image(2 * pair).at<uchar>(0, x) ^
+                         (pair < base ? gray.image(2 * base).at<uchar>(0, x) : 0)) != 0;
         ASSERT_EQ(shown.at<uchar>(0, x) != 0, bit) << pair << " " << x;
       }
       int run = 1, longest = 1;
@@ -78,8 +78,8 @@ TEST(Patterns, WavesAreSinusoidalInLightAndTheirPairsTellThemApart) {
   EXPECT_EQ(patterns.count(), 2 * (4 + 3) + 2 * 5 + 2);
   EXPECT_EQ(patterns.groups().size(), 7U + 2U + 1U);
   for (int k = 0; k < 5; ++k) {
-    const cv::Mat columns = patterns.picture(patterns.first_step() + k);
-    const cv::Mat rows = patterns.picture(patterns.first_step() + 5 + k);
+    const cv::Mat columns = patterns.image(patterns.first_step() + k);
+    const cv::Mat rows = patterns.image(patterns.first_step() + 5 + k);
     for (int i = 0; i < 60; ++i) {
       const double light = 0.5 + 0.5 * std::cos(2 * std::numbers::pi * (i / 20.0 - k / 5.0));
       EXPECT_NEAR(std::pow(columns.at<uchar>(7, i) / 255.0, 1.8), light, 0.005);
@@ -88,14 +88,14 @@ TEST(Patterns, WavesAreSinusoidalInLightAndTheirPairsTellThemApart) {
   }
 }
 
-TEST(Patterns, WithoutInversesAreEverySecondPictureOfThoseWith) {
+TEST(Patterns, WithoutInversesAreEverySecondImageOfThoseWith) {
   for (const char* code : {"gray", "xor"}) {
     const Patterns all = Patterns::create(code, 60, 40).value();
     const Patterns sparse = Patterns::create(code, 60, 40, {.inverses = false}).value();
     ASSERT_EQ(2 * sparse.first_step(), all.first_step());
     for (int i = 0; i < sparse.first_step(); ++i)
-      EXPECT_EQ(cv::norm(sparse.picture(i), all.picture(2 * i), cv::NORM_INF), 0) << code << i;
-    EXPECT_EQ(cv::countNonZero(sparse.picture(sparse.black())), 0);
+      EXPECT_EQ(cv::norm(sparse.image(i), all.image(2 * i), cv::NORM_INF), 0) << code << i;
+    EXPECT_EQ(cv::countNonZero(sparse.image(sparse.black())), 0);
     EXPECT_EQ(sparse.groups().size(), 1U);
     const auto path = test::test_folder() / "patterns.json";
     ASSERT_TRUE(save_patterns(sparse, path).ok());
@@ -104,7 +104,7 @@ TEST(Patterns, WithoutInversesAreEverySecondPictureOfThoseWith) {
 }
 
 TEST(Patterns, WavesOfAMeasuredResponseAreSinusoidalInEveryChannel) {
-  Response response{"left", {}, {}, {}};
+  ProjectorResponse response{"left", {}, {}, {}};
   for (int v = 0; v < 200; ++v) {
     response.red.push_back(0.01 + 0.99 * std::pow(v / 199.0, 2.6));
     response.green.push_back(0.01 + 0.99 * std::pow(v / 199.0, 1.4));
@@ -112,16 +112,16 @@ TEST(Patterns, WavesOfAMeasuredResponseAreSinusoidalInEveryChannel) {
   }
   const Patterns plain = Patterns::create("phase", 64, 32).value();
   const Patterns patterns = linearised(plain, {response}, "left").value();
-  ASSERT_EQ(patterns.picture(patterns.first_step()).type(), CV_8UC3);
+  ASSERT_EQ(patterns.image(patterns.first_step()).type(), CV_8UC3);
   for (int k = 0; k < 6; ++k) {
-    const cv::Mat columns = patterns.picture(patterns.first_step() + k);
-    const cv::Mat rows = patterns.picture(patterns.first_step() + 6 + k);
+    const cv::Mat columns = patterns.image(patterns.first_step() + k);
+    const cv::Mat rows = patterns.image(patterns.first_step() + 6 + k);
     for (int i = 0; i < 32; ++i) {
       const double light = 0.5 + 0.5 * std::cos(2 * std::numbers::pi * (i / 16.0 - k / 6.0));
       const auto& bgr = columns.at<cv::Vec3b>(7, i);
-      EXPECT_NEAR(looked_up(response.blue, bgr[0] / 255.0), 0.01 + 0.8 * light, 0.005);
-      EXPECT_NEAR(looked_up(response.green, bgr[1] / 255.0), 0.01 + 0.99 * light, 0.005);
-      EXPECT_NEAR(looked_up(response.red, bgr[2] / 255.0), 0.01 + 0.99 * light, 0.006);
+      EXPECT_NEAR(lookup(response.blue, bgr[0] / 255.0), 0.01 + 0.8 * light, 0.005);
+      EXPECT_NEAR(lookup(response.green, bgr[1] / 255.0), 0.01 + 0.99 * light, 0.005);
+      EXPECT_NEAR(lookup(response.red, bgr[2] / 255.0), 0.01 + 0.99 * light, 0.006);
       EXPECT_EQ(rows.at<cv::Vec3b>(i, 3), bgr);
     }
   }

@@ -28,7 +28,7 @@ Report reported(const World& world, const fs::path& folder, const std::string& m
   report.observed.decoded = {{0, 0, 0, 1000, 950, 3, 1900}};
   report.solution = solve(world.observations).value();
   report.assessment = assess(report.observed, {}, report.solution).value();
-  report.words = in_words(report.observed, report.solution, report.assessment);
+  report.explanation = explain(report.observed, report.solution, report.assessment);
   report.seconds = {{"solve", 0.5}, {"total", 1.25}};
   report.made_at = made_at;
   report.history = read_history(folder);
@@ -52,7 +52,7 @@ TEST(Report, ThePageIsSelfContainedAndSaysTheVerdictInWords) {
     EXPECT_EQ(html.find(outside), std::string::npos) << outside;
   EXPECT_NE(html.find("Predicted error"), std::string::npos)
       << "the verdict's words, without the verdict itself";
-  for (const std::string& sentence : report.words.advice) EXPECT_NE(html.find(sentence), std::string::npos);
+  for (const std::string& sentence : report.explanation.advice) EXPECT_NE(html.find(sentence), std::string::npos);
   EXPECT_NE(html.find("odd &lt;fault&gt;"), std::string::npos);
   EXPECT_EQ(html.find("nan"), std::string::npos);
   EXPECT_EQ(html.find("inf"), std::string::npos);

@@ -3,12 +3,12 @@
 #include <gtest/gtest.h>
 
 #include "calib/response/response_shots.h"
-#include "sim/photograph.h"
+#include "sim/sensor_model.h"
 #include "tests/support/matchers.h"
 
 namespace limn::calib {
 
-inline Captures plan_of(const sim::World& world, const std::filesystem::path& folder) {
+inline CaptureSet plan_of(const sim::World& world, const std::filesystem::path& folder) {
   std::vector<CapturedDevice> cameras, projectors;
   for (const Imager& imager : world.rig.cameras)
     cameras.push_back({imager.name, imager.width, imager.height});
@@ -17,9 +17,9 @@ inline Captures plan_of(const sim::World& world, const std::filesystem::path& fo
   return plan_captures(folder, cameras, projectors, Board::parse("charuco:5x4:25mm").value());
 }
 
-/// Photographs of the response pictures, as the world's cameras take them.
-inline Captures captured(const sim::World& world) {
-  const Captures plan = plan_of(world, test::test_folder() / "captures");
+/// Photographs of the response images, as the world's cameras take them.
+inline CaptureSet captured(const sim::World& world) {
+  const CaptureSet plan = plan_of(world, test::test_folder() / "captures");
   std::vector<sim::Samples> samples;
   for (size_t i = 0; i < world.rig.cameras.size(); ++i)
     samples.push_back(sim::trace(world, static_cast<int>(i)));
@@ -27,9 +27,9 @@ inline Captures captured(const sim::World& world) {
   std::uint64_t shots = 0;
   const Status status =
       capture_response(plan, {.show =
-                                  [&](int projector, const cv::Mat& picture) {
+                                  [&](int projector, const cv::Mat& image) {
                                     for (cv::Mat& other : shown) other = cv::Mat();
-                                    shown[static_cast<size_t>(projector)] = picture;
+                                    shown[static_cast<size_t>(projector)] = image;
                                     return Status();
                                   },
                               .grab = [&](int camera) -> Result<cv::Mat> {

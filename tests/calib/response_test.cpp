@@ -1,4 +1,4 @@
-#include "calib/response/response.h"
+#include "calib/response/measure_response.h"
 
 #include <gtest/gtest.h>
 
@@ -12,8 +12,8 @@
 #include "calib/response/response_patterns.h"
 #include "calib/response/response_shots.h"
 #include "core/file.h"
-#include "core/picture.h"
-#include "sim/photograph.h"
+#include "core/image_io.h"
+#include "sim/sensor_model.h"
 #include "tests/calib/response_captures.h"
 #include "tests/sim/small_world.h"
 #include "tests/support/matchers.h"
@@ -58,7 +58,7 @@ sim::World lit_world(int height = 240) {
 }
 
 // The largest difference of a measured curve from the true one, share of full light.
-double worst_error(const Response& response, const sim::ProjectorEffects& truth) {
+double worst_error(const ProjectorResponse& response, const sim::ProjectorEffects& truth) {
   double worst = 0;
   const std::vector<double>* curves[] = {&response.blue, &response.green, &response.red};
   for (int c = 0; c < 3; ++c)
@@ -69,11 +69,11 @@ double worst_error(const Response& response, const sim::ProjectorEffects& truth)
 }
 
 // The camera's true light of a level, and the largest difference of the measured one from it, both with the
-// levels that the pictures hold at their ends made the same (light has no zero or unit of its own).
+// levels that the images hold at their ends made the same (light has no zero or unit of its own).
 double worst_error(const CameraResponse& response, const sim::CameraEffects& truth) {
   const auto true_light = [&](double level) {
     const double share = std::max(0.0, (level - truth.black_level) / (255 - truth.black_level));
-    return truth.srgb ? linear_of_srgb(share) : share;
+    return truth.srgb ? linear_from_srgb(share) : share;
   };
   constexpr int k_low = 10, k_high = 245;
   const auto share = [&](auto light, int level) {
@@ -86,7 +86,7 @@ double worst_error(const CameraResponse& response, const sim::CameraEffects& tru
   return worst;
 }
 
-// RMS, levels, of the foretold photograph of a colour from the photograph without noise, where light falls.
+// RMS, levels, of the predicted photograph of a colour from the photograph without noise, where light falls.
 double foretold_error(const MeasuredResponse& measured, sim::World world, const cv::Vec3b& bgr) {
   sim::CameraEffects& effects = world.camera_effects[0];
   effects.full_well_e = effects.read_noise = 0;
@@ -98,7 +98,7 @@ double foretold_error(const MeasuredResponse& measured, sim::World world, const 
   };
   const cv::Mat black = taken({0, 0, 0}), white = taken({255, 255, 255}),
                 photo = taken({bgr[0] * 1.0, bgr[1] * 1.0, bgr[2] * 1.0});
-  const cv::Mat foretold = foretold_photograph(measured.mixings.at(0), measured.responses.projectors.at(0),
+  const cv::Mat foretold = predicted_photograph(measured.mixings.at(0), measured.responses.projectors.at(0),
                                                measured.responses.cameras.at(0), bgr)
                                .reshape(1);
   double squares = 0;
@@ -132,16 +132,16 @@ TEST_P(ResponseOf, ProjectorAndCameraIsFoundAndForetellsOtherColours) {
   projector.channel_gamma = {1.05, 1, 0.95};
   projector.s_curve = a.s_curve;
   projector.black_level = a.black_level;
-  ASSERT_LE(response_pictures().size(), 60U);
-  const auto measured = measured_response(captured(world));
+  ASSERT_LE(response_images().size(), 60U);
+  const auto measured = measure_response(captured(world));
   ASSERT_TRUE(measured.ok()) << measured.message();
   EXPECT_TRUE(measured->warnings.empty()) << measured->warnings[0];
-  const Response& found = measured->responses.projectors.at(0);
+  const ProjectorResponse& found = measured->responses.projectors.at(0);
   EXPECT_LT(worst_error(found, projector), 0.01);
   ASSERT_TRUE(found.black_level.has_value());
   EXPECT_NEAR(found.black_level->value, a.black_level, 4 * found.black_level->stddev);
   EXPECT_LT(found.black_level->stddev, 5e-4);
-  EXPECT_EQ(found.captures, static_cast<int>(response_pictures().size()));
+  EXPECT_EQ(found.captures, static_cast<int>(response_images().size()));
   const CameraResponse& seen = measured->responses.cameras.at(0);
   EXPECT_EQ(seen.encoding, a.srgb ? "srgb" : "linear");
   EXPECT_LT(worst_error(seen, camera), 0.01);
@@ -181,10 +181,10 @@ ResponseSamples made_samples(const std::function<double(double)>& level_of, doub
     for (double& s : share) sum += s = uniform(rng);
     for (double& s : share) s *= (1 - resolved) / sum;
     share[rng() % 4] += resolved;
-    for (const ResponsePicture& picture : response_pictures()) {
+    for (const ResponseImage& image : response_images()) {
       double light = 0;
       for (size_t i = 0; i < 4; ++i)
-        if (picture.shares >> i & 1) light += share[i] * std::pow(picture.bgr[1] / 255.0, 2.2);
+        if (image.shares >> i & 1) light += share[i] * std::pow(image.bgr[1] / 255.0, 2.2);
       const double level = level_of(0.02 + brightness * light) + noise(rng);
       samples.levels.push_back(cv::saturate_cast<uchar>(level));
     }
@@ -200,7 +200,7 @@ CameraResponse encoding_of(const ResponseSamples& samples) {
 TEST(CameraResponse, PowersAndUnknownCurvesAreFound) {
   const auto worst = [](const CameraResponse& response, const std::function<double(double)>& level_of) {
     double low = 0, high = 0, worst = 0;  // the same scale at both ends of what was seen
-    const auto found = [&](double light) { return looked_up(response.light, level_of(light) / 255); };
+    const auto found = [&](double light) { return lookup(response.light, level_of(light) / 255); };
     low = found(0.05), high = found(0.9);
     for (double light = 0.05; light < 0.9; light += 0.01)
       worst = std::max(worst, std::abs((found(light) - low) / (high - low) - (light - 0.05) / 0.85));
@@ -222,15 +222,15 @@ TEST(CameraResponse, PowersAndUnknownCurvesAreFound) {
       << "what a linear camera would be off by";
 }
 
-TEST(CameraResponse, WhatThePicturesDoNotTellIsCalledUnknown) {
+TEST(CameraResponse, WhatTheImagesDoNotTellIsCalledUnknown) {
   const auto linear = [](double light) { return 4 + 240 * light; };
   EXPECT_EQ(encoding_of(made_samples(linear)).encoding, "linear");
   EXPECT_EQ(encoding_of(made_samples(linear, 1)).encoding, "unknown") << "each pixel sees one share alone";
   ResponseSamples unsound = made_samples(linear);
-  const size_t count = response_pictures().size();
+  const size_t count = response_images().size();
   for (size_t k = 0; k < unsound.count; ++k)  // sharpened: single shares are too bright
     for (size_t i = 0; i < count; ++i)
-      if (response_pictures()[i].role == ResponsePicture::Role::share && (k + i) % 3 == 0)
+      if (response_images()[i].role == ResponseImage::Role::share && (k + i) % 3 == 0)
         unsound.levels[k * count + i] = static_cast<uchar>(std::min(250, unsound.levels[k * count + i] + 30));
   EXPECT_EQ(encoding_of(unsound).encoding, "unknown");
 }
@@ -246,23 +246,23 @@ class DamagedResponse : public testing::Test {
     world.camera_effects.push_back(world.camera_effects[0]);
     return world;
   }
-  Captures plan_ = captured(small());
+  CaptureSet plan_ = captured(small());
   fs::path folder_ = plan_.folder / "response" / "projector0" / "camera0";
 
   std::string failure() const {
-    const auto measured = measured_response(plan_);
+    const auto measured = measure_response(plan_);
     EXPECT_FALSE(measured.ok());
     return measured.ok() ? "" : measured.message();
   }
-  void change(const char* picture, const std::function<void(cv::Mat&)>& how) const {
-    cv::Mat shot = read_picture(folder_ / picture).value();
+  void change(const char* image, const std::function<void(cv::Mat&)>& how) const {
+    cv::Mat shot = read_image(folder_ / image).value();
     how(shot);
-    ASSERT_TRUE(write_png(folder_ / picture, shot).ok());
+    ASSERT_TRUE(write_png(folder_ / image, shot).ok());
   }
 };
 
-TEST_F(DamagedResponse, IsNamedWithItsPicture) {
-  const auto whole = measured_response(plan_);
+TEST_F(DamagedResponse, IsNamedWithItsImage) {
+  const auto whole = measure_response(plan_);
   ASSERT_TRUE(whole.ok()) << whole.message();
   ASSERT_EQ(whole->warnings.size(), 1U) << "camera1 sees nothing, and that is said";
   EXPECT_NE(whole->warnings[0].find("camera1"), std::string::npos);
@@ -288,13 +288,13 @@ TEST_F(DamagedResponse, IsNamedWithItsPicture) {
   fs::create_directories(plan_.folder / "response" / "projektor0");
   EXPECT_NE(failure().find("projektor0"), std::string::npos);
   fs::remove(plan_.folder / "response" / "projektor0");
-  EXPECT_TRUE(measured_response(plan_).ok()) << "all is as it was";
+  EXPECT_TRUE(measure_response(plan_).ok()) << "all is as it was";
 }
 
 TEST_F(DamagedResponse, DarkAndSaturatedAreToldApart) {
   fs::remove_all(plan_.folder / "response" / "projector0" / "camera1");
   const auto all = [&](const std::function<void(cv::Mat&)>& how) {
-    for (size_t i = 0; i < response_pictures().size(); ++i) change(fmt::format("{:03d}.png", i).c_str(), how);
+    for (size_t i = 0; i < response_images().size(); ++i) change(fmt::format("{:03d}.png", i).c_str(), how);
   };
   all([](cv::Mat& shot) { shot = shot * 0.02; });
   EXPECT_NE(failure().find("dark"), std::string::npos);
@@ -308,7 +308,7 @@ TEST_F(DamagedResponse, UnusualLightIsSaid) {
   for (const char* share :
        {"002.png", "003.png", "004.png", "005.png", "006.png", "007.png", "008.png", "009.png"})
     change(share, [](cv::Mat& shot) { shot = shot * 1.1; });
-  const auto measured = measured_response(plan_);
+  const auto measured = measure_response(plan_);
   ASSERT_TRUE(measured.ok()) << measured.message();
   ASSERT_EQ(measured->warnings.size(), 2U);
   EXPECT_NE(measured->warnings[0].find("white boost"), std::string::npos) << measured->warnings[0];

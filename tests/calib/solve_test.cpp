@@ -149,7 +149,7 @@ TEST(Solve, IsTheSameEveryTime) {
 TEST(Solve, UsesAPoseOfWhichFewCornersAreSeen) {
   World world = make_world(1, 1, 6, 0.5);
   std::erase_if(world.observations.corners,
-                [](const CornerSeen& c) { return c.pose == 4 && c.corner % 17 != 0; });
+                [](const CornerObservation& c) { return c.pose == 4 && c.corner % 17 != 0; });
   const auto solution = solve(world.observations, without_priors());
   ASSERT_TRUE(solution.ok()) << solution.message();
   ASSERT_TRUE(solution->world_from_board[4].has_value());
@@ -173,7 +173,7 @@ TEST(Solve, SaysWhatIsMissing) {
 
   World apart = make_world(2, 1, 6, 0.5);
   std::erase_if(apart.observations.corners,
-                [](const CornerSeen& c) { return (c.camera == 0) == (c.pose < 3); });
+                [](const CornerObservation& c) { return (c.camera == 0) == (c.pose < 3); });
   std::erase_if(apart.observations.matches, [](const Match& m) { return (m.camera == 0) == (m.pose < 3); });
   EXPECT_NE(solve(apart.observations).message().find("camera1"), std::string::npos);
 }
@@ -189,7 +189,7 @@ TEST(Assess, HeldOutErrorIsTheNoiseOfTheCells) {
   add_noise(&world, 0.05, 0.1, test_rng());
   const auto solution = solve(world.observations);
   ASSERT_TRUE(solution.ok()) << solution.message();
-  const auto score = held_out(world.observations, {}, *solution);
+  const auto score = cross_validate(world.observations, {}, *solution);
   ASSERT_TRUE(score.ok()) << score.message();
   EXPECT_EQ(score->poses.size(), 8U);
   EXPECT_GT(score->rms_px, 0.1 * std::sqrt(2.0) * 0.97);  // the 2-vector
@@ -295,7 +295,7 @@ TEST(Assess, NoticesABoardThatMovedWhileItWasCaptured) {
 TEST(Assess, LeavesOutABoardWhoseCornersAreOnALine) {
   World world = make_world(1, 1, 6, 0.5);
   add_noise(&world, 0.05, 0.05, test_rng());
-  std::erase_if(world.observations.corners, [](const CornerSeen& c) { return c.pose == 4 && c.corner >= 5; });
+  std::erase_if(world.observations.corners, [](const CornerObservation& c) { return c.pose == 4 && c.corner >= 5; });
   const auto solution = solve(world.observations);
   ASSERT_TRUE(solution.ok()) << solution.message();
   const auto assessment = assess({world.observations, {}, {}, 0, 0}, {}, *solution);

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "calib/held_out.h"
+#include "calib/cross_validation.h"
 #include "calib/solve.h"
 #include "tests/calib/observed_world.h"
 #include "tests/support/matchers.h"
@@ -55,7 +55,7 @@ double rms(const std::vector<Vector2d>& errors) {
   return std::sqrt(squared / static_cast<double>(errors.size()));
 }
 
-// RMS over draws of noise; with the free points or without.
+// RMS over draws of noise; with the tie points or without.
 double error_over_draws(const World& world, const World& unseen, bool with_points, int draws) {
   std::mt19937_64 rng = test_rng();
   double squared = 0;
@@ -64,7 +64,7 @@ double error_over_draws(const World& world, const World& unseen, bool with_point
     add_noise(&noisy, 0.1, 0.1, std::mt19937_64(rng()));
     if (!with_points) {
       noisy.observations.points.clear();
-      noisy.observations.sightings.clear();
+      noisy.observations.tie_observations.clear();
     }
     const auto solution = solve(noisy.observations);
     EXPECT_TRUE(solution.ok()) << solution.message();
@@ -101,7 +101,7 @@ TEST(FreePoints, PerfectOnesAreFoundWhereTheyAreAndWrongOnesDoNotMatter) {
   World world = make_world(2, 2, 4, 0.5);
   observe_scene(&world, 12, 10);
   Observations& o = world.observations;
-  for (size_t i = 0; i < o.sightings.size(); i += 17) o.sightings[i].px += Vector2d(6, 9);
+  for (size_t i = 0; i < o.tie_observations.size(); i += 17) o.tie_observations[i].px += Vector2d(6, 9);
   const auto solution = solve(o);
   ASSERT_TRUE(solution.ok()) << solution.message();
   EXPECT_TRUE(pose_near(solution->rig.projectors[1].imager_from_world,
@@ -111,8 +111,8 @@ TEST(FreePoints, PerfectOnesAreFoundWhereTheyAreAndWrongOnesDoNotMatter) {
   size_t placed = 0;
   for (const auto& p : solution->points) placed += p ? 1 : 0;
   EXPECT_EQ(placed, o.points.size());
-  EXPECT_GT(solution->sighting_residuals[0].norm(), 1);
-  EXPECT_LT(solution->sighting_residuals[5].norm(), 0.02);
+  EXPECT_GT(solution->tie_point_residuals[0].norm(), 1);
+  EXPECT_LT(solution->tie_point_residuals[5].norm(), 0.02);
 }
 
 TEST(Bend, ABowIsFoundAndCostsNothing) {
@@ -187,7 +187,7 @@ TEST(Solve, ContradictionsEndInAMessageOrInFiniteNumbers) {
       if (kind == 1 && match.pose % 2 == 1) match.px_projector.x() = 1279 - match.px_projector.x();
       if (kind == 2) match.px_projector = Vector2d(640, 400);
     }
-    for (CornerSeen& seen : wrong.corners) {
+    for (CornerObservation& seen : wrong.corners) {
       if (kind == 3) seen.px = Vector2d(anywhere(rng), anywhere(rng));
     }
     const auto solution = solve(wrong);
@@ -201,7 +201,7 @@ TEST(Solve, ContradictionsEndInAMessageOrInFiniteNumbers) {
       EXPECT_TRUE(imager->imager_from_world.is_finite()) << kind;
     }
     EXPECT_TRUE(solution->covariance.allFinite()) << kind;
-    const auto score = held_out(wrong, {}, *solution);
+    const auto score = cross_validate(wrong, {}, *solution);
     EXPECT_TRUE(!score || score->rms_px > 10) << kind;
   }
   printf("[ wrong    ] %d of 4 contradictions end in a message\n", failed);

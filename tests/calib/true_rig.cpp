@@ -6,7 +6,7 @@
 #include <numbers>
 #include <opencv2/calib3d.hpp>
 
-#include "calib/predict.h"
+#include "calib/measurement_model.h"
 #include "sim/car_door.h"
 #include "sim/ray_scene.h"
 #include "sim/truth.h"
@@ -118,7 +118,7 @@ scene::Mesh panel_mesh() {
 
 // ---- judging ----
 
-struct Aim {
+struct ReferenceRenderer {
   Vector3d p, n;  // on the prototype, its frame
 };
 
@@ -129,7 +129,7 @@ bool faces(const Imager& imager, const Vector3d& p_world, const Vector3d& n_worl
 
 bool seen(const sim::RayScene& scene, const Imager& imager, const Vector3d& p_world) {
   const auto px = imager.project(p_world);
-  return px && imager.contains(*px) && scene.lit(imager.imager_from_world.inverse().translation, p_world);
+  return px && imager.contains(*px) && scene.reached(imager.imager_from_world.inverse().translation, p_world);
 }
 
 // Spread as far as they go: each the farthest from those before.
@@ -192,12 +192,12 @@ std::vector<double> errors_at(const TrueRig& truth,
                               double pnp_px,
                               int count,
                               std::mt19937_64* rng) {
-  const sim::PlacedMesh there{&mesh, world_from_prototype};
+  const sim::MeshInstance there{&mesh, world_from_prototype};
   const sim::RayScene scene({&there, 1});
   const Imager &camera = truth.rig.cameras[0], &projector = truth.rig.projectors[0];
   std::vector<Vector3d> visible;
-  std::vector<Aim> aims;
-  for (const sim::SurfacePoint& point : sim::surface_points(mesh, 8 * count, (*rng)())) {
+  std::vector<ReferenceRenderer> aims;
+  for (const sim::SampledPoint& point : sim::surface_points(mesh, 8 * count, (*rng)())) {
     const Vector3d p_world = world_from_prototype * point.p,
                    n_world = world_from_prototype.rotation * point.n;
     if (seen(scene, camera, p_world) && faces(camera, p_world, n_world)) visible.push_back(point.p);
@@ -213,11 +213,11 @@ std::vector<double> errors_at(const TrueRig& truth,
     pixels.push_back(*camera.project(world_from_prototype * p) + Vector2d(noise(*rng), noise(*rng)));
   const Pose measured = measured_pose(calibrated.cameras[0], known, pixels);
   std::vector<double> errors;
-  for (const Aim& aim : aims) {
-    const auto px = calibrated.projectors[0].project(measured * aim.p);
+  for (const ReferenceRenderer& reference : aims) {
+    const auto px = calibrated.projectors[0].project(measured * reference.p);
     if (!px) continue;
     const auto error =
-        error_mm(scene, projector, *px, world_from_prototype * aim.p, world_from_prototype.rotation * aim.n);
+        error_mm(scene, projector, *px, world_from_prototype * reference.p, world_from_prototype.rotation * reference.n);
     if (error) errors.push_back(*error);
   }
   return errors;
@@ -293,7 +293,7 @@ calib::Observations observed_perfectly(const TrueRig& truth, int each) {
 
 void add_noise(double corner_px, double match_px, std::mt19937_64* rng, calib::Observations* observations) {
   std::normal_distribution<double> scatter(0, 1);
-  for (calib::CornerSeen& seen : observations->corners)
+  for (calib::CornerObservation& seen : observations->corners)
     seen.px += corner_px * Vector2d(scatter(*rng), scatter(*rng));
   for (calib::Match& match : observations->matches)
     match.px_projector += match_px * Vector2d(scatter(*rng), scatter(*rng));

@@ -35,7 +35,7 @@ struct RigOptions {
 /// Camera 1280 x 960, projector 800 x 600 with pixels of about 1 mm at the board, 1.3 m away.
 TrueRig make_true_rig(const RigOptions& options);
 
-/// What the rig would observe, without pictures: corners and matches with normal noise (px, one coordinate).
+/// What the rig would observe, without images: corners and matches with normal noise (px, one coordinate).
 /// `each`: of how many cells one is taken.
 calib::Observations observed_perfectly(const TrueRig& rig, int each = 1);
 void add_noise(double corner_px, double match_px, std::mt19937_64* rng, calib::Observations* observations);

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "sim/photograph.h"
+#include "sim/sensor_model.h"
 #include "tests/sim/small_world.h"
 #include "tests/support/matchers.h"
 
@@ -46,8 +46,8 @@ std::vector<PaperLight> photographed_walls(std::span<const double> distances_m) 
   return light;
 }
 
-Responses found_in(const std::vector<PaperLight>& light) {
-  Responses responses;
+RigResponses found_in(const std::vector<PaperLight>& light) {
+  RigResponses responses;
   responses.cameras.resize(1);
   responses.cameras[0].camera = "camera0";
   responses.projectors.resize(1);
@@ -56,7 +56,7 @@ Responses found_in(const std::vector<PaperLight>& light) {
   return responses;
 }
 
-// The largest difference over a picture, where both are 1 in the middle.
+// The largest difference over an image, where both are 1 in the middle.
 double worst_error(const Vignetting& found, double loss, int width, int height) {
   double worst = 0;
   const Eigen::Vector2d middle((width - 1) / 2.0, (height - 1) / 2.0);
@@ -71,7 +71,7 @@ double worst_error(const Vignetting& found, double loss, int width, int height) 
 
 TEST(Vignetting, OfCameraAndProjectorAreToldApartByManyPlaces) {
   const double distances[] = {0.7, 0.85, 1.0, 1.2, 1.45, 1.7};
-  const Responses found = found_in(photographed_walls(distances));
+  const RigResponses found = found_in(photographed_walls(distances));
   ASSERT_TRUE(found.cameras[0].vignetting && found.projectors[0].vignetting);
   const double camera = worst_error(*found.cameras[0].vignetting, k_camera_loss, 320, 240),
                projector = worst_error(*found.projectors[0].vignetting, k_projector_loss, 200, 150);
@@ -87,7 +87,7 @@ TEST(Vignetting, ASmudgeOnTheBoardIsLeftOut) {
   const double distances[] = {0.7, 0.85, 1.0, 1.2, 1.45, 1.7};
   std::vector<PaperLight> light = photographed_walls(distances);
   for (size_t i = 0; i < light.size(); i += 12) light[i].light *= 0.6;
-  const Responses found = found_in(light);
+  const RigResponses found = found_in(light);
   EXPECT_LT(worst_error(*found.projectors[0].vignetting, k_projector_loss, 200, 150), 0.02);
 }
 

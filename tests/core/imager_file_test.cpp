@@ -41,7 +41,7 @@ TEST(Imager, HalfTheResolutionSeesTheSameRays) {
       "c", 640, 480, Lens::create("LENSMODEL_OPENCV4", {700, 710, 320, 240, -0.1, 0, 0, 0}).value(), {}};
   const auto half = resized(whole, 320, 240);
   ASSERT_TRUE(half);
-  const Eigen::Vector3d p(0.2, -0.1, 1);  // a pixel's left edge at -0.5 stays the picture's left edge
+  const Eigen::Vector3d p(0.2, -0.1, 1);  // a pixel's left edge at -0.5 stays the image's left edge
   EXPECT_TRUE(test::near(half->project(p)->array() + 0.5, (whole.project(p)->array() + 0.5) / 2, 1e-9));
   EXPECT_FALSE(resized(whole, 320, 320));
 }

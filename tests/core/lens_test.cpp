@@ -36,7 +36,7 @@ std::vector<LensCase> lens_cases() {
 class LensModels : public testing::TestWithParam<LensCase> {
  protected:
   Lens lens() const { return Lens::create(GetParam().model, GetParam().values).value(); }
-  // Directions over a picture of about 1280x800.
+  // Directions over an image of about 1280x800.
   std::vector<Eigen::Vector3d> directions() const {
     std::vector<Eigen::Vector3d> directions;
     for (double x = -0.5; x <= 0.5; x += 0.125) {

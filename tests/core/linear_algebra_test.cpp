@@ -29,7 +29,7 @@ TEST(LinearAlgebra, SolvesSymmetricEquations) {
   const Matrix6d definite = root * root.transpose() + Matrix6d::Identity(),
                  indefinite = root + root.transpose();
   for (const Matrix6d& symmetric : {definite, indefinite})
-    EXPECT_LT((symmetric * solved(symmetric, b) - b).norm(), 1e-11);
+    EXPECT_LT((symmetric * solve_ldlt(symmetric, b) - b).norm(), 1e-11);
 }
 
 TEST(LinearAlgebra, NearestRotationIsOneAndIsFoundInNoise) {
@@ -45,7 +45,7 @@ TEST(LinearAlgebra, NearestRotationIsOneAndIsFoundInNoise) {
 
 TEST(LinearAlgebra, TurnsOneDirectionIntoAnother) {
   const Eigen::Vector3d from(0.2, -3, 1), to(-4, 0.1, 0.3);
-  const Eigen::Quaterniond turn = turn_between(from, to);
+  const Eigen::Quaterniond turn = rotation_between(from, to);
   EXPECT_LT((turn * from.normalized() - to.normalized()).norm(), 1e-14);
   EXPECT_NEAR(turn.vec().dot(from), 0, 1e-12);  // the shortest: about an axis across both
   EXPECT_NEAR(turn.vec().dot(to), 0, 1e-12);

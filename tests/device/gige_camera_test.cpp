@@ -99,7 +99,7 @@ TEST(GigeCamera, DeliversFramesLockedAndStamped) {
 TEST(GigeCamera, ARegionAndBrightnessAloneThroughOpenCamera) {
   const FakeCamera fake;
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
-  const CameraWanted wanted = {.source = fmt::format("gige:{}", k_id), .size = {320, 240}, .grey = true};
+  const CameraConfig wanted = {.source = fmt::format("gige:{}", k_id), .size = {320, 240}, .grey = true};
   auto camera = open_camera(wanted);
   ASSERT_TRUE(camera) << camera.message();
   EXPECT_EQ((*camera)->size(), cv::Size(320, 240));

@@ -12,25 +12,25 @@ namespace limn::device {
 namespace {
 
 cv::Mat ramp() {
-  cv::Mat picture(48, 64, CV_8UC3);
-  for (int y = 0; y < picture.rows; ++y)
-    for (int x = 0; x < picture.cols; ++x)
-      picture.at<cv::Vec3b>(y, x) = {static_cast<uchar>(3 * x), static_cast<uchar>(5 * y), 60};
-  return picture;
+  cv::Mat image(48, 64, CV_8UC3);
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols; ++x)
+      image.at<cv::Vec3b>(y, x) = {static_cast<uchar>(3 * x), static_cast<uchar>(5 * y), 60};
+  return image;
 }
 
-std::vector<uchar> encoded(const cv::Mat& picture) {
+std::vector<uchar> encoded(const cv::Mat& image) {
   std::vector<uchar> bytes;
-  cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, 98});
+  cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, 98});
   return bytes;
 }
 
 // Its colours at a lower resolution (TJSAMP_…).
-std::vector<uchar> sampled(const cv::Mat& picture, int sampling) {
+std::vector<uchar> sampled(const cv::Mat& image, int sampling) {
   const tjhandle encoder = tjInitCompress();
   unsigned char* data = nullptr;
   unsigned long size = 0;
-  EXPECT_EQ(tjCompress2(encoder, picture.data, picture.cols, static_cast<int>(picture.step), picture.rows,
+  EXPECT_EQ(tjCompress2(encoder, image.data, image.cols, static_cast<int>(image.step), image.rows,
                         TJPF_BGR, &data, &size, sampling, 95, 0),
             0);
   const std::vector<uchar> bytes(data, data + size);
@@ -64,7 +64,7 @@ TEST(Jpeg, DecodesColourAndBrightnessAlone) {
   EXPECT_NEAR(grey->at<uchar>(40, 60), 0.114 * 180 + 0.587 * 200 + 0.299 * 60, 4);
 }
 
-TEST(Jpeg, APictureOfOneChannelStaysGrey) {
+TEST(Jpeg, AnImageOfOneChannelStaysGrey) {
   const auto grey = decode_jpeg(encoded(cv::Mat(16, 16, CV_8U, cv::Scalar(90))));
   ASSERT_TRUE(grey);
   EXPECT_EQ(grey->type(), CV_8UC1);
@@ -74,12 +74,12 @@ TEST(Jpeg, TablesThatWebcamsLeaveOutAreTheStandards) {
   const auto bytes = encoded(ramp());
   const auto bare = without_segments(bytes, 0xc4);
   ASSERT_LT(bare.size() + 400, bytes.size());
-  const auto picture = decode_jpeg(bare);
-  ASSERT_TRUE(picture) << picture.message();
-  EXPECT_TRUE(test::image_near(*picture, ramp(), 2, 16, "bare"));
+  const auto image = decode_jpeg(bare);
+  ASSERT_TRUE(image) << image.message();
+  EXPECT_TRUE(test::image_near(*image, ramp(), 2, 16, "bare"));
 }
 
-TEST(Jpeg, NoHalfPictures) {
+TEST(Jpeg, NoHalfImages) {
   const auto bytes = encoded(ramp());
   for (const std::size_t size :
        {std::size_t{0}, std::size_t{3}, std::size_t{200}, bytes.size() / 2, bytes.size() - 20}) {
@@ -104,7 +104,7 @@ TEST(Jpeg, SizeIsKnownBeforeAnythingIsDecoded) {
   EXPECT_FALSE(jpeg_size(bytes));
 }
 
-TEST(Jpeg, LargePicturesComeOutSmaller) {
+TEST(Jpeg, LargeImagesComeOutSmaller) {
   const auto bytes = encoded(ramp());
   const auto same = decode_jpeg(bytes, {.longest_side = 64});
   ASSERT_TRUE(same);

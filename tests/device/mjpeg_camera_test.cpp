@@ -44,7 +44,7 @@ std::string url(const LoopbackServer& server, const std::string& login = "") {
 
 constexpr double k_clocks_apart_s = 1e-3;  // the kernel stamps by the wall clock, which is regulated
 
-// Sends pictures of growing brightness every 5 ms until the client goes.
+// Sends images of growing brightness every 5 ms until the client goes.
 void stream_well(LoopbackClient& client) {
   client.receive_until("\r\n\r\n");
   bool there = client.send(k_answer);
@@ -54,7 +54,7 @@ void stream_well(LoopbackClient& client) {
   }
 }
 
-TEST(MjpegCamera, DeliversPicturesInOrderStampedOnArrival) {
+TEST(MjpegCamera, DeliversImagesInOrderStampedOnArrival) {
   std::string asked;
   std::mutex mutex;
   std::vector<Stamp> sent(200);
@@ -97,8 +97,8 @@ TEST(MjpegCamera, GreyWhenAskedTo) {
   EXPECT_EQ(camera->next()->image.type(), CV_8UC1);
 }
 
-// A reader that was away finds the newest picture, with the moment at which it came, not that of reading it.
-TEST(MjpegCamera, OldPicturesThatWaitAreDropped) {
+// A reader that was away finds the newest image, with the moment at which it came, not that of reading it.
+TEST(MjpegCamera, OldImagesThatWaitAreDropped) {
   std::atomic<bool> is_away = false, are_sent = false, is_over = false;
   Stamp last_sent;
   LoopbackServer server([&](LoopbackClient& client) {
@@ -177,7 +177,7 @@ TEST(MjpegCamera, ReconnectsWhenTheServerComesBack) {
 }
 
 TEST(MjpegCamera, ALostConnectionIsMendedInsideOneCall) {
-  LoopbackServer server([](LoopbackClient& client) {  // one picture, then the end
+  LoopbackServer server([](LoopbackClient& client) {  // one image, then the end
     client.receive_until("\r\n\r\n");
     client.send(std::string(k_answer) + part(jpeg(50)) + "--frame--\r\n");
   });
@@ -190,8 +190,8 @@ TEST(MjpegCamera, ALostConnectionIsMendedInsideOneCall) {
   EXPECT_GE(server.clients(), 4);
 }
 
-// The camera's error when after one good picture the server sends `rest` again and again.
-std::string problem_after_one_picture(const std::string& rest) {
+// The camera's error when after one good image the server sends `rest` again and again.
+std::string problem_after_one_image(const std::string& rest) {
   constexpr double k_limit_s = 1;
   LoopbackServer server([&, first = true](LoopbackClient& client) mutable {
     client.receive_until("\r\n\r\n");
@@ -217,20 +217,20 @@ TEST(MjpegCamera, FaultsAreNamed) {
     EXPECT_NE(message.find("camera0 (http://127.0.0.1:"), std::string::npos) << message;
   };
   const std::string half = jpeg(50).substr(0, jpeg(50).size() / 2);
-  contains(problem_after_one_picture(part(half)), "truncated or damaged");
-  contains(problem_after_one_picture(part(jpeg(50, 80))), "64x48, found 80x48");
-  contains(problem_after_one_picture("--other\r\n"), "expected the boundary \"--frame\"");
-  contains(problem_after_one_picture(part(std::string(30000, 'x'))), "at most 20000 bytes");
-  contains(problem_after_one_picture(""), "silent");
+  contains(problem_after_one_image(part(half)), "truncated or damaged");
+  contains(problem_after_one_image(part(jpeg(50, 80))), "64x48, found 80x48");
+  contains(problem_after_one_image("--other\r\n"), "expected the boundary \"--frame\"");
+  contains(problem_after_one_image(part(std::string(30000, 'x'))), "at most 20000 bytes");
+  contains(problem_after_one_image(""), "silent");
 }
 
-TEST(MjpegCamera, ADamagedPictureAmongGoodOnesIsPassedOver) {
+TEST(MjpegCamera, ADamagedImageAmongGoodOnesIsPassedOver) {
   LoopbackServer server([](LoopbackClient& client) {
     client.receive_until("\r\n\r\n");
     bool there = client.send(k_answer);
     for (int i = 0; there; ++i) {
-      const std::string picture = jpeg(60);
-      there = client.send(part(i % 2 ? picture.substr(0, picture.size() / 2) : picture));
+      const std::string image = jpeg(60);
+      there = client.send(part(i % 2 ? image.substr(0, image.size() / 2) : image));
       pause(5);
     }
   });

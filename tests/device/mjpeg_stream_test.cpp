@@ -30,8 +30,8 @@ std::string chunked(const std::string& text, std::size_t size) {
 
 Stamp at(int ms) { return Stamp(std::chrono::milliseconds(ms)); }
 
-// Every picture of the bytes when they come in pieces of `step`.
-std::vector<std::string> pictures(const std::string& bytes, std::size_t step, Status* end = nullptr) {
+// Every image of the bytes when they come in pieces of `step`.
+std::vector<std::string> images(const std::string& bytes, std::size_t step, Status* end = nullptr) {
   MjpegStream stream(k_limit);
   std::vector<std::string> found;
   for (std::size_t i = 0; i < bytes.size(); i += step) {
@@ -45,11 +45,11 @@ std::vector<std::string> pictures(const std::string& bytes, std::size_t step, St
 
 std::string problem_of(const std::string& bytes) {
   Status end;
-  pictures(bytes, bytes.size(), &end);
+  images(bytes, bytes.size(), &end);
   return end ? "" : end.message();
 }
 
-TEST(MjpegStream, PicturesComeOutHoweverTheBytesAreCut) {
+TEST(MjpegStream, ImagesComeOutHoweverTheBytesAreCut) {
   const std::string binary("\xff\xd8\r\n--fram\r\n\r\n\0\xff\xd9", 17);
   const std::vector<std::string> expected = {"first", binary, "third"};
   const std::string lengths = k_answer + part("first") + part(binary) + part("third");
@@ -60,7 +60,7 @@ TEST(MjpegStream, PicturesComeOutHoweverTheBytesAreCut) {
   const std::string chunks = "HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n" + k_answer.substr(17) +
                              chunked(lengths.substr(k_answer.size()), 7);
   for (const std::string& bytes : {lengths, open, bare, chunks})
-    for (const std::size_t step : {1, 2, 3, 5}) EXPECT_EQ(pictures(bytes, step), expected) << step << bytes;
+    for (const std::size_t step : {1, 2, 3, 5}) EXPECT_EQ(images(bytes, step), expected) << step << bytes;
 }
 
 TEST(MjpegStream, OnlyTheNewestIsKeptAndItsFirstByteIsItsStamp) {
@@ -83,7 +83,7 @@ TEST(MjpegStream, BoundariesAsServersWriteThem) {
   for (const char* written : {"\"frame\"", "--frame", "frame; charset=x", " frame "}) {
     const std::string answer = fmt::format(
         "HTTP/1.0 200 OK\r\nContent-type: Multipart/x-mixed-replace;boundary={}\r\n\r\n", written);
-    EXPECT_EQ(pictures(answer + part("one"), 4), std::vector<std::string>{"one"}) << written;
+    EXPECT_EQ(images(answer + part("one"), 4), std::vector<std::string>{"one"}) << written;
   }
 }
 
@@ -116,13 +116,13 @@ TEST(MjpegStream, MemoryStaysBoundedWhateverIsSent) {
   EXPECT_NE(problem_of(k_answer + "--frame\r\nX: " + many).find("header"), std::string::npos);
 }
 
-TEST(MjpegStream, PicturesBeforeAFaultAreGood) {
+TEST(MjpegStream, ImagesBeforeAFaultAreGood) {
   Status end;
-  EXPECT_EQ(pictures(k_answer + part("good") + "--wrong\r\n", 500, &end), std::vector<std::string>{"good"});
+  EXPECT_EQ(images(k_answer + part("good") + "--wrong\r\n", 500, &end), std::vector<std::string>{"good"});
   EXPECT_FALSE(end);
 }
 
-// Bytes of the right kind in wrong places: every answer is a picture or an error.
+// Bytes of the right kind in wrong places: every answer is an image or an error.
 TEST(MjpegStream, DamagedStreamsNeverBreakIt) {
   auto rng = test::test_rng();
   const std::string lengths = k_answer + part("first") + open_part("second") + part("third");
@@ -139,8 +139,8 @@ TEST(MjpegStream, DamagedStreamsNeverBreakIt) {
         bytes[where] = "\r\n-:0f;=\xff"[rng() % 9];
     }
     Status end;
-    for (const std::string& picture : pictures(bytes, 1 + rng() % 64, &end))
-      EXPECT_LE(picture.size(), bytes.size());
+    for (const std::string& image : images(bytes, 1 + rng() % 64, &end))
+      EXPECT_LE(image.size(), bytes.size());
     refused += end ? 0 : 1;
   }
   EXPECT_GT(refused, 5000);

@@ -33,45 +33,45 @@ void contains(const std::string& message, const std::string& part) {
 
 // Red, green, blue, grey quarters, a white pixel in the top left corner and one in the bottom right.
 cv::Mat quarters(cv::Size size, int grey) {
-  cv::Mat picture(size, CV_8UC3, cv::Scalar::all(grey));
+  cv::Mat image(size, CV_8UC3, cv::Scalar::all(grey));
   const int w = size.width / 2, h = size.height / 2;
-  picture(cv::Rect(0, 0, w, h)).setTo(cv::Scalar(0, 0, 255));
-  picture(cv::Rect(w, 0, w, h)).setTo(cv::Scalar(0, 255, 0));
-  picture(cv::Rect(0, h, w, h)).setTo(cv::Scalar(255, 0, 0));
-  picture.at<cv::Vec3b>(0, 0) = {255, 255, 255};
-  picture.at<cv::Vec3b>(size.height - 1, size.width - 1) = {255, 255, 255};
-  return picture;
+  image(cv::Rect(0, 0, w, h)).setTo(cv::Scalar(0, 0, 255));
+  image(cv::Rect(w, 0, w, h)).setTo(cv::Scalar(0, 255, 0));
+  image(cv::Rect(0, h, w, h)).setTo(cv::Scalar(255, 0, 0));
+  image.at<cv::Vec3b>(0, 0) = {255, 255, 255};
+  image.at<cv::Vec3b>(size.height - 1, size.width - 1) = {255, 255, 255};
+  return image;
 }
 
 // What the X server shows there.
 cv::Mat lit(cv::Point position, cv::Size size) {
   ::Display* server = XOpenDisplay(nullptr);
-  XImage* image =
+  XImage* x_image =
       XGetImage(server, DefaultRootWindow(server), position.x, position.y, static_cast<unsigned>(size.width),
                 static_cast<unsigned>(size.height), AllPlanes, ZPixmap);
-  cv::Mat picture(size, CV_8UC3);
-  for (int y = 0; image && y < size.height; ++y)
+  cv::Mat image(size, CV_8UC3);
+  for (int y = 0; x_image && y < size.height; ++y)
     for (int x = 0; x < size.width; ++x) {
-      const unsigned long pixel = XGetPixel(image, x, y);
-      picture.at<cv::Vec3b>(y, x) = {static_cast<uchar>(pixel), static_cast<uchar>(pixel >> 8),
+      const unsigned long pixel = XGetPixel(x_image, x, y);
+      image.at<cv::Vec3b>(y, x) = {static_cast<uchar>(pixel), static_cast<uchar>(pixel >> 8),
                                      static_cast<uchar>(pixel >> 16)};
     }
-  if (image) XDestroyImage(image);
+  if (x_image) XDestroyImage(x_image);
   XCloseDisplay(server);
-  return picture;
+  return image;
 }
 
 // Shows it until the server has it: a swap reaches an X server a moment later.
-testing::AssertionResult shows(MonitorDisplay* display, const cv::Mat& picture, cv::Point position) {
+testing::AssertionResult shows(MonitorDisplay* display, const cv::Mat& image, cv::Point position) {
   cv::Mat found;
   for (int i = 0; i < 50; ++i) {
-    const auto shown = display->show(picture);
+    const auto shown = display->show(image);
     if (!shown) return testing::AssertionFailure() << shown.message();
-    found = lit(position, picture.size());
-    if (cv::norm(found, picture, cv::NORM_INF) == 0) return testing::AssertionSuccess();
+    found = lit(position, image.size());
+    if (cv::norm(found, image, cv::NORM_INF) == 0) return testing::AssertionSuccess();
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
-  return test::image_near(found, picture, 0, 0, display->name());
+  return test::image_near(found, image, 0, 0, display->name());
 }
 
 class OnADesktop : public testing::Test {
@@ -189,7 +189,7 @@ class SeveralMonitors : public OnADesktop {
   }
 };
 
-TEST_F(SeveralMonitors, EachShowsItsOwnPicture) {
+TEST_F(SeveralMonitors, EachShowsItsOwnImage) {
   const auto monitors = desktop_->monitors();
   ASSERT_EQ(monitors.size(), 3u);
   EXPECT_EQ(monitors[1].name, "DUMMY1");

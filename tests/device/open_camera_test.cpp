@@ -3,7 +3,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/videoio.hpp>
 
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "tests/support/matchers.h"
 
 namespace limn::device {
@@ -15,7 +15,7 @@ void contains(const std::string& message, const std::string& part) {
   EXPECT_NE(message.find(part), std::string::npos) << part << " in: " << message;
 }
 
-TEST(OpenCamera, PicturesFoldersAndVideosByTheirPath) {
+TEST(OpenCamera, ImagesFoldersAndVideosByTheirPath) {
   const fs::path folder = test::test_folder();
   fs::create_directory(folder / "pictures.d");
   ASSERT_TRUE(write_png(folder / "pictures.d/000.png", cv::Mat(6, 8, CV_8U, cv::Scalar(9))));
@@ -58,12 +58,12 @@ TEST(OpenCamera, NetworkSourcesGoToTheirOwnReaders) {
 }
 
 TEST(OpenCamera, SettingsThatASourceHasNotAndOtherSizesAreRefused) {
-  const fs::path picture = test::test_folder() / "one.png";
-  ASSERT_TRUE(write_png(picture, cv::Mat(6, 8, CV_8U, cv::Scalar(9))));
-  const auto set = open_camera({.source = picture.string(), .sensor = {.exposure_ms = 8}});
+  const fs::path image = test::test_folder() / "one.png";
+  ASSERT_TRUE(write_png(image, cv::Mat(6, 8, CV_8U, cv::Scalar(9))));
+  const auto set = open_camera({.source = image.string(), .sensor = {.exposure_ms = 8}});
   ASSERT_FALSE(set);
   contains(set.message(), "exposure_ms cannot be set");
-  const auto other = open_camera({.source = picture.string(), .size = {640, 480}});
+  const auto other = open_camera({.source = image.string(), .size = {640, 480}});
   ASSERT_FALSE(other);
   contains(other.message(), "expected 640x480, found 8x6");
 }

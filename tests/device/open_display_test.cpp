@@ -11,19 +11,19 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-TEST(OpenDisplay, OffscreenKeepsThePictureShown) {
+TEST(OpenDisplay, OffscreenKeepsTheImageShown) {
   const auto display =
       open_display({.name = "left", .monitor = "offscreen", .size = {8, 6}, .latency_s = 0.5}, nullptr);
   ASSERT_TRUE(display) << display.message();
   EXPECT_EQ((*display)->name(), "left");
   EXPECT_EQ((*display)->size(), cv::Size(8, 6));
-  cv::Mat picture(6, 8, CV_8UC1, cv::Scalar(9));
+  cv::Mat image(6, 8, CV_8UC1, cv::Scalar(9));
   const Stamp begun = Clock::now();
-  const auto shown_at = (*display)->show(picture);
+  const auto shown_at = (*display)->show(image);
   ASSERT_TRUE(shown_at);
   EXPECT_GE(seconds_between(begun, *shown_at), 0.5);
-  picture.setTo(1);
-  EXPECT_EQ(dynamic_cast<OffscreenDisplay&>(**display).picture().at<std::uint8_t>(3, 3), 9);
+  image.setTo(1);
+  EXPECT_EQ(dynamic_cast<OffscreenDisplay&>(**display).image().at<std::uint8_t>(3, 3), 9);
   const auto wide = (*display)->show(cv::Mat(6, 9, CV_8UC1, cv::Scalar()));
   ASSERT_FALSE(wide);
   EXPECT_NE(wide.message().find("of 8x6, found 9x6"), std::string::npos) << wide.message();

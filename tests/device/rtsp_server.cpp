@@ -31,9 +31,9 @@ struct Jpeg {
 };
 
 // The pieces of a baseline JPEG that RFC 2435 sends; its Huffman tables are the standard's.
-Jpeg taken_apart(const cv::Mat& picture) {
+Jpeg taken_apart(const cv::Mat& image) {
   std::vector<uchar> bytes;
-  cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, 90});
+  cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, 90});
   Jpeg jpeg;
   for (std::size_t at = 2; at + 4 < bytes.size();) {
     const std::size_t size = 256u * bytes[at + 2] + bytes[at + 3];
@@ -71,9 +71,9 @@ bool RtspClient::begin(LoopbackClient& client) {
   }
 }
 
-bool RtspClient::send(const cv::Mat& picture, double seconds) {
+bool RtspClient::send(const cv::Mat& image, double seconds) {
   constexpr std::size_t k_packet = 1400;
-  const Jpeg jpeg = taken_apart(picture);
+  const Jpeg jpeg = taken_apart(image);
   const auto ticks = static_cast<std::uint32_t>(90000 * seconds);  // RTP's clock for video
   for (std::size_t at = 0; at < jpeg.scan.size(); at += k_packet) {
     const bool last = at + k_packet >= jpeg.scan.size();
@@ -81,8 +81,8 @@ bool RtspClient::send(const cv::Mat& picture, double seconds) {
                          big_endian(ticks, 4) + big_endian(1, 4);
     // Type 1 is 4:2:0; Q 255 sends its own tables, with the first fragment.
     packet += big_endian(0, 1) + big_endian(at, 3) + big_endian(1, 1) + big_endian(255, 1) +
-              big_endian(static_cast<std::uint64_t>(picture.cols / 8), 1) +
-              big_endian(static_cast<std::uint64_t>(picture.rows / 8), 1);
+              big_endian(static_cast<std::uint64_t>(image.cols / 8), 1) +
+              big_endian(static_cast<std::uint64_t>(image.rows / 8), 1);
     if (at == 0) packet += big_endian(0, 2) + big_endian(128, 2) + jpeg.tables;
     packet += jpeg.scan.substr(at, k_packet);
     if (!client_.send(big_endian('$', 1) + big_endian(0, 1) + big_endian(packet.size(), 2) + packet))

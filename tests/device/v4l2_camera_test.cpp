@@ -252,7 +252,7 @@ TEST(V4l2Camera, DecodesMjpgYuyvAndGrey) {
   EXPECT_EQ(driver.opened, driver.closed + 1);  // `camera` still lives
 }
 
-TEST(V4l2Camera, RowsMayBeLongerThanThePicture) {
+TEST(V4l2Camera, RowsMayBeLongerThanTheImage) {
   Driver driver;
   driver.formats = {V4L2_PIX_FMT_GREY};
   driver.on_get = [](v4l2_pix_format* format) { format->bytesperline = 80; };

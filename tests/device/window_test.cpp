@@ -13,18 +13,18 @@ namespace {
 
 bool has_display() { return std::getenv("DISPLAY") || std::getenv("WAYLAND_DISPLAY"); }
 
-TEST(Window, ShowsAPictureAndGivesTheContextBack) {
+TEST(Window, ShowsAnImageAndGivesTheContextBack) {
   if (!has_display()) GTEST_SKIP() << "no display: Window.ShowsAPictureAndGivesTheContextBack";
   const auto context = GlContext::create();
   ASSERT_TRUE(context) << context.message();
   auto window = Window::open("Limn", 320, 240);
   ASSERT_TRUE(window) << window.message();
-  cv::Mat picture(120, 160, CV_8UC3, cv::Scalar(200, 50, 20));
-  picture(cv::Rect(0, 0, 80, 60)).setTo(cv::Scalar(0, 0, 255));  // top left: red
-  window->show(picture);
-  window->show(picture);
+  cv::Mat image(120, 160, CV_8UC3, cv::Scalar(200, 50, 20));
+  image(cv::Rect(0, 0, 80, 60)).setTo(cv::Scalar(0, 0, 255));  // top left: red
+  window->show(image);
+  window->show(image);
   EXPECT_TRUE(window->is_open());
-  EXPECT_EQ(window->pressed_key(), 0);
+  EXPECT_EQ(window->poll_pressed_key(), 0);
   // The headless context is current again.
   EXPECT_NE(context->description().find(reinterpret_cast<const char*>(glGetString(GL_RENDERER))),
             std::string::npos);

@@ -23,7 +23,7 @@ void check(const std::string& bytes) {
     LIMN_CHECK(region.warp.empty() || (region.warp.type() == CV_32FC3 && region.warp.cols <= region.width &&
                                        region.warp.rows <= region.height));
     for (const auto* map : {&region.alpha, &region.beta})
-      LIMN_CHECK(!*map || ((*map)->picture.size() == size && (*map)->gamma_embedded > 0));
+      LIMN_CHECK(!*map || ((*map)->image.size() == size && (*map)->gamma_embedded > 0));
     if (const auto imager = apps::imager_of(region)) test::check_imager(*imager);
   }
 }

@@ -1,4 +1,4 @@
-// Small grey pictures: three bytes, then the levels row by row. The first byte is the width; of the second
+// Small grey images: three bytes, then the levels row by row. The first byte is the width; of the second
 // the lower three bits say how many pixels wide a level is drawn, the others choose the lens; the third's
 // lower bits: blurred, srgb, followed, trained from; its upper four all set: larger than most.
 #include <opencv2/imgproc.hpp>
@@ -15,8 +15,8 @@ using namespace limn;
 constexpr int k_max_pixels = 80 * 80;
 constexpr int k_max_large_pixels = 160 * 120;
 
-// Pictures of one level a byte, each drawn `scale` x `scale` pixels; blurred so that edges have a slope.
-cv::Mat picture_of(const std::uint8_t* levels, std::size_t count, int width, int scale, bool blurred) {
+// Images of one level a byte, each drawn `scale` x `scale` pixels; blurred so that edges have a slope.
+cv::Mat image_of(const std::uint8_t* levels, std::size_t count, int width, int scale, bool blurred) {
   const int height = static_cast<int>(count) / width;
   if (height == 0) return {};
   const cv::Mat small(height, width, CV_8UC1, const_cast<std::uint8_t*>(levels));
@@ -42,7 +42,7 @@ Lens lens_for(const cv::Mat& grey, bool bent) {
   return Lens::create("LENSMODEL_OPENCV8", {f, f, cx, cy, -0.35, 0.1, 1e-2, -1e-2, 0.02, 0, 0, 0}).value();
 }
 
-// No picture may make anything but sound detections and poses.
+// No image may make anything but sound detections and poses.
 void check(const tracker::Detection& detection, const Lens* lens) {
   LIMN_CHECK(detection.score >= 0 && detection.score <= 1 && !detection.marker.id.empty());
   for (std::size_t i = 0; i < 4; ++i) {
@@ -55,7 +55,7 @@ void check(const tracker::Detection& detection, const Lens* lens) {
     LIMN_CHECK(pose.camera_from_marker.is_finite() && pose.covariance.allFinite());
 }
 
-// Also where the picture has moved on, and once more from there.
+// Also where the image has moved on, and once more from there.
 void check_followed(tracker::Detector& detector,
                     const cv::Mat& grey,
                     const Lens* lens,
@@ -86,7 +86,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
   const int scale = 1 + bytes[1] % 8;
   const int max_pixels = bytes[2] >> 4 == 15 ? k_max_large_pixels : k_max_pixels;
   const auto most = static_cast<std::size_t>(max_pixels / (scale * scale));
-  const cv::Mat grey = picture_of(bytes + k_head, std::min(size - k_head, most), width, scale, bytes[2] & 1);
+  const cv::Mat grey = image_of(bytes + k_head, std::min(size - k_head, most), width, scale, bytes[2] & 1);
   if (grey.empty()) return 0;
   const std::optional<Lens> own_lens =
       bytes[1] & 8 ? std::optional(lens_for(grey, bytes[1] & 16)) : std::nullopt;

@@ -13,7 +13,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
   }
   const auto& templates = families->templates();
   LIMN_CHECK(templates.size() == 1 && templates[0].size >= 8);
-  for (const tracker::TemplateLikeness& pair : tracker::compared(templates))
+  for (const tracker::TemplateSimilarity& pair : tracker::compared(templates))
     LIMN_CHECK(std::abs(pair.correlation) < 1.001);
   return 0;
 }

@@ -1,4 +1,4 @@
-// What drawing a projector's picture asks of the heap once the renderer's buffers have grown to it, and what
+// What drawing a projector's image asks of the heap once the renderer's buffers have grown to it, and what
 // a large mesh asks while it goes to the GPU.
 #include <gtest/gtest.h>
 #include <malloc.h>
@@ -86,7 +86,7 @@ class Allocation : public testing::Test {
   device::GlContext context_ = device::GlContext::create().value();
 };
 
-TEST_F(Allocation, StopsAfterTheFirstPictures) {
+TEST_F(Allocation, StopsAfterTheFirstImages) {
   auto drawing = Renderer::create(scene_of(8), two_projectors());
   ASSERT_TRUE(drawing) << drawing.message();
   const Imager viewer =

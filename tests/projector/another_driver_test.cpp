@@ -10,8 +10,8 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "core/picture.h"
-#include "projector/treatment.h"
+#include "core/image_io.h"
+#include "projector/composite_policy.h"
 #include "scene/scene.h"
 #include "tests/projector/sheet_room.h"
 #include "tests/support/matchers.h"
@@ -45,7 +45,7 @@ Imager half_as_large(Imager imager) {
   return imager;
 }
 
-std::map<std::string, cv::Mat> pictures() {
+std::map<std::string, cv::Mat> images() {
   const Scene scene = finishes();
   Rig rig;
   rig.cameras = {half_as_large(camera())};
@@ -58,11 +58,11 @@ std::map<std::string, cv::Mat> pictures() {
   const Imager viewer = half_as_large(viewer_from({0.2, -0.3, -1.2}));
   Renderer drawing = Renderer::create(scene, rig).value();
   std::map<std::string, cv::Mat> out;
-  out["light0"] = drawing.projector_picture(0, posed, viewer);
-  out["light1"] = drawing.projector_picture(1, posed, viewer);
+  out["light0"] = drawing.projector_image(0, posed, viewer);
+  out["light1"] = drawing.projector_image(1, posed, viewer);
   EXPECT_TRUE(drawing.set_light({.compensation = Compensation::geometry, .even_black = true}));
-  out["balanced0"] = drawing.projector_picture(0, posed, viewer);
-  out["balanced1"] = drawing.projector_picture(1, posed, viewer);
+  out["balanced0"] = drawing.projector_image(0, posed, viewer);
+  out["balanced1"] = drawing.projector_image(1, posed, viewer);
   const cv::Mat grey(240, 320, CV_8UC3, cv::Scalar(90, 100, 110));
   out["full"] = drawing.composite(0, grey, posed, Composite::full);
   out["rest"] = drawing.composite(0, grey, posed, Composite::rest);
@@ -84,8 +84,8 @@ bool draw_with(const std::string& driver, const Settings& settings, const fs::pa
     const auto context = device::GlContext::create();
     const auto name = [] { return std::string(reinterpret_cast<const char*>(glGetString(GL_RENDERER))); };
     if (!context || name().find(driver) == std::string::npos) _exit(1);
-    for (const auto& [of, picture] : pictures())
-      if (!write_png(folder / (of + ".png"), picture)) _exit(2);
+    for (const auto& [of, image] : images())
+      if (!write_png(folder / (of + ".png"), image)) _exit(2);
     _exit(testing::Test::HasFailure() ? 2 : 0);
   }
   int status = 0;
@@ -94,8 +94,8 @@ bool draw_with(const std::string& driver, const Settings& settings, const fs::pa
   return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
-// "On another machine at most 2 levels on 0.1 % of pixels": those of the part, as most of a picture is black.
-void expect_same_pictures(const std::string& driver, const Settings& settings) {
+// "On another machine at most 2 levels on 0.1 % of pixels": those of the part, as most of an image is black.
+void expect_same_images(const std::string& driver, const Settings& settings) {
   const fs::path folder = test::test_folder();
   for (const std::string& drawn_by : {std::string("llvmpipe"), driver}) {
     fs::create_directories(folder / drawn_by);
@@ -104,8 +104,8 @@ void expect_same_pictures(const std::string& driver, const Settings& settings) {
   }
   int compared = 0;
   for (const auto& file : fs::directory_iterator(folder / "llvmpipe")) {
-    const cv::Mat expected = read_picture(file.path()).value();
-    const cv::Mat actual = read_picture(folder / driver / file.path().filename()).value();
+    const cv::Mat expected = read_image(file.path()).value();
+    const cv::Mat actual = read_image(folder / driver / file.path().filename()).value();
     ASSERT_EQ(actual.size(), expected.size());
     ASSERT_EQ(actual.type(), expected.type());
     cv::Mat apart;
@@ -126,14 +126,14 @@ void expect_same_pictures(const std::string& driver, const Settings& settings) {
 
 TEST(AnotherDriver, OfScalarShadersDrawsTheSame) {
   // It says 3.3, and does what is asked of it here.
-  expect_same_pictures("softpipe",
+  expect_same_images("softpipe",
                        {{"MESA_GL_VERSION_OVERRIDE", "4.5"}, {"MESA_GLSL_VERSION_OVERRIDE", "450"}});
 }
 
 TEST(AnotherDriver, OfVulkanDrawsTheSame) {
   // With a variant of each program by its uniforms' values, as it has for software (Mesa 22.3 to 25.0), it
   // now and then takes one of other values.
-  expect_same_pictures("zink", {{"MESA_LOADER_DRIVER_OVERRIDE", "zink"}, {"ZINK_INLINE_UNIFORMS", "0"}});
+  expect_same_images("zink", {{"MESA_LOADER_DRIVER_OVERRIDE", "zink"}, {"ZINK_INLINE_UNIFORMS", "0"}});
 }
 
 }  // namespace

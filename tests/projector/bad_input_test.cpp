@@ -61,9 +61,9 @@ Rig one_projector() {
   return rig;
 }
 
-int brightest(const cv::Mat& picture) {
+int brightest(const cv::Mat& image) {
   double most = 0;
-  cv::minMaxLoc(picture.reshape(1), nullptr, &most);
+  cv::minMaxLoc(image.reshape(1), nullptr, &most);
   return static_cast<int>(most);
 }
 
@@ -121,7 +121,7 @@ TEST_F(BadInput, MapsBeyondTheLimitAreNamedAndReduced) {
 
 TEST_F(BadInput, AnAlbedoBeyondTheLimitIsNamedAndReduced) {
   scene::Scene scene = wall_and_part();
-  scene.prototype->albedo_picture = cv::Mat(8, 5000, CV_8UC3, cv::Scalar(200, 200, 200));
+  scene.prototype->albedo_image = cv::Mat(8, 5000, CV_8UC3, cv::Scalar(200, 200, 200));
   testing::internal::CaptureStderr();
   Renderer drawing = renderer(scene, one_projector());
   const std::string told = testing::internal::GetCapturedStderr();
@@ -150,15 +150,15 @@ TEST_F(BadInput, MoreTrianglesThanTheDriverHoldsAreRefused) {
 TEST_F(BadInput, AProjectorThatSeesNothingIsBlackAndTakesNoShare) {
   const scene::Scene scene = wall_and_part();
   const Imager viewer = viewer_from({0.1, -0.2, -1}, {0, 0, 0});
-  const cv::Mat alone = renderer(scene, one_projector()).projector_picture(0, posed_at_origin(), viewer);
+  const cv::Mat alone = renderer(scene, one_projector()).projector_image(0, posed_at_origin(), viewer);
   Rig rig = one_projector();
   rig.projectors.push_back(projector_from("away", {0, 0, -1}, {0, 0, -2}));
   rig.projectors.push_back(projector_from("behind", {0, 0, 1}, {0, 0, 0}));
   Renderer drawing = renderer(scene, rig);
   EXPECT_GT(brightest(alone), 150);
-  EXPECT_EQ(cv::norm(drawing.projector_picture(0, posed_at_origin(), viewer), alone, cv::NORM_INF), 0);
-  EXPECT_EQ(brightest(drawing.projector_picture(1, posed_at_origin(), viewer)), 0);
-  EXPECT_EQ(brightest(drawing.projector_picture(2, posed_at_origin(), viewer)), 0);
+  EXPECT_EQ(cv::norm(drawing.projector_image(0, posed_at_origin(), viewer), alone, cv::NORM_INF), 0);
+  EXPECT_EQ(brightest(drawing.projector_image(1, posed_at_origin(), viewer)), 0);
+  EXPECT_EQ(brightest(drawing.projector_image(2, posed_at_origin(), viewer)), 0);
 }
 
 TEST_F(BadInput, NoPlaceOfTheViewersEyeMakesMoreLightThanThePartHas) {
@@ -170,10 +170,10 @@ TEST_F(BadInput, NoPlaceOfTheViewersEyeMakesMoreLightThanThePartHas) {
        {behind, Vector3d(0.01, 0, 0), Vector3d(0, 0, -0.03), Vector3d(0.02, 0.01, -0.0301),
         Vector3d(0, 0, -0.01), Vector3d(0.2, 0.1, -1e-4), Vector3d(0, 0, -100)}) {
     const Imager viewer = viewer_from(p_eye, p_eye.z() < -0.03 ? Vector3d(0, 0, 0) : Vector3d(0.001, 0, 0.3));
-    const cv::Mat picture = drawing.projector_picture(0, posed_at_origin(), viewer);
-    EXPECT_LE(brightest(picture), own) << p_eye.transpose();
+    const cv::Mat image = drawing.projector_image(0, posed_at_origin(), viewer);
+    EXPECT_LE(brightest(image), own) << p_eye.transpose();
     if (p_eye == behind) {
-      EXPECT_EQ(brightest(picture), 0);
+      EXPECT_EQ(brightest(image), 0);
     }
     for (const PartCoverage& part : drawing.coverage(posed_at_origin(), viewer)) {
       EXPECT_GE(part.on_surface_share, 0);
@@ -188,12 +188,12 @@ TEST(LostContext, ARendererIsMadeAnewFromSceneAndRig) {
   const Imager viewer = viewer_from({0.1, -0.2, -1}, {0, 0, 0});
   std::optional<device::GlContext> context;
   std::optional<Renderer> drawing;
-  std::vector<cv::Mat> pictures;
+  std::vector<cv::Mat> images;
   for (int life = 0; life < 3; ++life) {
     drawing.reset();  // in this order, as for a context that is lost
     context.reset();
     if (life > 0) {
-      EXPECT_GT(brightest(pictures.back()), 150);  // the last good picture is nobody's but ours
+      EXPECT_GT(brightest(images.back()), 150);  // the last good image is nobody's but ours
     }
     auto made = device::GlContext::create();
     ASSERT_TRUE(made) << made.message();
@@ -201,8 +201,8 @@ TEST(LostContext, ARendererIsMadeAnewFromSceneAndRig) {
     auto renderer = Renderer::create(scene, rig);
     ASSERT_TRUE(renderer) << renderer.message();
     drawing.emplace(std::move(renderer).value());
-    pictures.push_back(drawing->projector_picture(0, posed_at_origin(), viewer));
-    EXPECT_EQ(cv::norm(pictures.back(), pictures.front(), cv::NORM_INF), 0);
+    images.push_back(drawing->projector_image(0, posed_at_origin(), viewer));
+    EXPECT_EQ(cv::norm(images.back(), images.front(), cv::NORM_INF), 0);
     EXPECT_FALSE(context->is_lost());
   }
 }

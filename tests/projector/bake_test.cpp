@@ -46,7 +46,7 @@ TEST(Bake, PixelMapIsTheLens) {
 }
 
 TEST(Bake, ResponseTableInvertsTheMeasuredLight) {
-  Response response{"projector0", {}, {}, {}};
+  ProjectorResponse response{"projector0", {}, {}, {}};
   for (int i = 0; i <= 16; ++i) {
     const double v = i / 16.0;
     response.red.push_back(v * v);

@@ -8,10 +8,10 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
-#include "calib/response/response.h"
-#include "core/picture.h"
+#include "calib/response/measure_response.h"
+#include "core/image_io.h"
 #include "projector/renderer.h"
-#include "sim/photograph.h"
+#include "sim/sensor_model.h"
 #include "tests/calib/response_captures.h"
 #include "tests/projector/gl_test.h"
 #include "tests/sim/small_world.h"
@@ -53,26 +53,26 @@ std::shared_ptr<scene::Mesh> bulged(double towards_m = 0) {
 
 // Coloured stripes, discs and a light ground, as printed.
 cv::Mat print() {
-  cv::Mat picture(360, 500, CV_8UC3, cv::Scalar(215, 222, 226));
+  cv::Mat image(360, 500, CV_8UC3, cv::Scalar(215, 222, 226));
   for (int i = 0; i < 5; ++i)
-    cv::rectangle(picture, cv::Rect(20 + 100 * i, 30, 60, 300),
+    cv::rectangle(image, cv::Rect(20 + 100 * i, 30, 60, 300),
                   cv::Scalar(170 + 12 * (i % 3), 200 - 14 * i, 150 + 17 * i), cv::FILLED, cv::LINE_AA);
-  cv::circle(picture, {150, 180}, 70, cv::Scalar(205, 170, 160), cv::FILLED, cv::LINE_AA);
-  cv::circle(picture, {350, 180}, 70, cv::Scalar(150, 190, 215), cv::FILLED, cv::LINE_AA);
-  return picture;
+  cv::circle(image, {150, 180}, 70, cv::Scalar(205, 170, 160), cv::FILLED, cv::LINE_AA);
+  cv::circle(image, {350, 180}, 70, cv::Scalar(150, 190, 215), cv::FILLED, cv::LINE_AA);
+  return image;
 }
 
 // What designers want to see there: soft colours, and letters.
 cv::Mat paint() {
-  cv::Mat picture(360, 500, CV_8UC3);
-  for (int y = 0; y < picture.rows; ++y)
-    for (int x = 0; x < picture.cols; ++x)
-      picture.at<cv::Vec3b>(y, x) = cv::Vec3b(static_cast<uchar>(190 + 45 * std::sin(x / 80.0)),
+  cv::Mat image(360, 500, CV_8UC3);
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols; ++x)
+      image.at<cv::Vec3b>(y, x) = cv::Vec3b(static_cast<uchar>(190 + 45 * std::sin(x / 80.0)),
                                               static_cast<uchar>(190 + 45 * std::sin(y / 60.0 + 1)),
                                               static_cast<uchar>(190 + 45 * std::cos((x + y) / 90.0)));
-  cv::putText(picture, "LIMN", {60, 230}, cv::FONT_HERSHEY_DUPLEX, 4, cv::Scalar(235, 190, 170), 14,
+  cv::putText(image, "LIMN", {60, 230}, cv::FONT_HERSHEY_DUPLEX, 4, cv::Scalar(235, 190, 170), 14,
               cv::LINE_AA);
-  return picture;
+  return image;
 }
 
 sim::World printed_world() {
@@ -131,7 +131,7 @@ cv::Mat encoded(const cv::Mat& light, const cv::Scalar& white) {
   cv::Mat out = light.clone();
   for (auto& pixel : cv::Mat_<cv::Vec3f>(out))
     for (int c = 0; c < 3; ++c)
-      pixel[c] = static_cast<float>(srgb_of_linear(std::clamp(pixel[c] / white[c], 0.0, 1.0)));
+      pixel[c] = static_cast<float>(srgb_from_linear(std::clamp(pixel[c] / white[c], 0.0, 1.0)));
   return out;
 }
 
@@ -164,11 +164,11 @@ Rig true_rig(const sim::World& world) {
   Rig rig = world.rig;
   for (std::size_t i = 0; i < rig.projectors.size(); ++i) {
     const sim::ProjectorEffects& effects = world.projector_effects[i];
-    Response response{rig.projectors[i].name, {}, {}, {}};
+    ProjectorResponse response{rig.projectors[i].name, {}, {}, {}};
     std::vector<double>* curves[] = {&response.blue, &response.green, &response.red};
     for (int c = 0; c < 3; ++c)
       for (int v = 0; v < 256; ++v) curves[c]->push_back(sim::light_share(effects, c, v / 255.0));
-    response.black_level = Measured{effects.black_level, 0};
+    response.black_level = Measurement{effects.black_level, 0};
     response.vignetting = Vignetting{Eigen::Vector2d::Zero(), -effects.vignetting, 0, 0};
     rig.responses.push_back(response);
   }
@@ -176,7 +176,7 @@ Rig true_rig(const sim::World& world) {
 }
 
 // Light of the prototype in the camera without noise; NaN beside it and at its edges. `shown` are the
-// projectors' pictures.
+// projectors' images.
 cv::Mat light_on_prototype(const sim::World& world, const std::vector<cv::Mat>& shown) {
   const sim::Samples samples = sim::trace(world, 0);
   const cv::Mat light = sim::ideal_light(world, samples, shown);
@@ -191,10 +191,10 @@ cv::Mat light_on_prototype(const sim::World& world, const std::vector<cv::Mat>& 
   return green;
 }
 
-// The value that a share of a picture's numbers lie below.
-double at_share(const cv::Mat& picture, double share) {
+// The value that a share of an image's numbers lie below.
+double at_share(const cv::Mat& image, double share) {
   std::vector<float> values;
-  for (const float value : cv::Mat_<float>(picture))
+  for (const float value : cv::Mat_<float>(image))
     if (!std::isnan(value)) values.push_back(value);
   std::sort(values.begin(), values.end());
   return values.at(static_cast<std::size_t>(share * static_cast<double>(values.size() - 1)));
@@ -202,9 +202,9 @@ double at_share(const cv::Mat& picture, double share) {
 
 // The largest change of light within 4 pixels along rows or columns, but for the worst in 1000; as an eye
 // sees it that does not resolve the projectors' pixels.
-double largest_step(const cv::Mat& picture) {
+double largest_step(const cv::Mat& image) {
   cv::Mat light;
-  cv::GaussianBlur(picture, light, {7, 7}, 1);
+  cv::GaussianBlur(image, light, {7, 7}, 1);
   constexpr int k_apart = 4;
   cv::Mat steps(light.size(), CV_32F, cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
   for (int row = k_apart; row < light.rows; ++row)
@@ -215,7 +215,7 @@ double largest_step(const cv::Mat& picture) {
   return at_share(steps, 0.999);
 }
 
-// A bare prototype of one albedo, two equal projectors whose pictures end on it.
+// A bare prototype of one albedo, two equal projectors whose images end on it.
 sim::World bare_world() {
   sim::World world = printed_world();
   world.objects[0].texture = cv::Mat();
@@ -233,7 +233,7 @@ TEST_F(CompensationTest, OneColourIsEvenAcrossTwoProjectors) {
   const Rig rig = true_rig(world);
   const cv::Mat white(16, 16, CV_8UC3, cv::Scalar::all(255));
   scene::Scene scene = painted_scene(white);
-  scene.prototype->albedo_picture = cv::Mat();
+  scene.prototype->albedo_image = cv::Mat();
   scene::PosedScene posed;
   posed.world_from_prototype = world.world_from_prototype;
   posed.parts.push_back({"paint", "a", world.world_from_prototype});
@@ -241,9 +241,9 @@ TEST_F(CompensationTest, OneColourIsEvenAcrossTwoProjectors) {
   ASSERT_TRUE(made.ok()) << made.message();
   const auto shone = [&](const LightOptions& options) {
     EXPECT_TRUE(made->set_light(options).ok());
-    std::vector<cv::Mat> pictures;
-    for (std::size_t i = 0; i < 2; ++i) pictures.push_back(made->projector_picture(i, posed, rig.cameras[0]));
-    const cv::Mat light = light_on_prototype(world, pictures);
+    std::vector<cv::Mat> images;
+    for (std::size_t i = 0; i < 2; ++i) images.push_back(made->projector_image(i, posed, rig.cameras[0]));
+    const cv::Mat light = light_on_prototype(world, images);
     return (at_share(light, 0.995) - at_share(light, 0.005)) / at_share(light, 0.5);
   };
   // Bright enough to leave no step of 8 bits over half a percent, dim enough to be reached everywhere.
@@ -265,9 +265,9 @@ TEST_F(CompensationTest, BlackIsEvenAcrossTwoProjectors) {
   ASSERT_TRUE(made.ok()) << made.message();
   const auto shone = [&](bool even) {
     EXPECT_TRUE(made->set_light({.even_black = even}).ok());
-    std::vector<cv::Mat> pictures;
-    for (std::size_t i = 0; i < 2; ++i) pictures.push_back(made->projector_picture(i, posed, rig.cameras[0]));
-    return light_on_prototype(world, pictures);
+    std::vector<cv::Mat> images;
+    for (std::size_t i = 0; i < 2; ++i) images.push_back(made->projector_image(i, posed, rig.cameras[0]));
+    return light_on_prototype(world, images);
   };
   const cv::Mat uneven = shone(false), even = shone(true);
   const double one = at_share(uneven, 0.02);  // where only one projector's black is
@@ -287,7 +287,7 @@ struct Judged {
 Judged painted_over_print(const Pose& new_from_old) {
   sim::World world = printed_world();
   const scene::Scene scene = painted_scene(paint());
-  const auto measured = calib::measured_response(calib::captured(world));
+  const auto measured = calib::measure_response(calib::captured(world));
   if (!measured) throw std::runtime_error(measured.message());
   Rig rig = world.rig;
   rig.responses = measured->responses.projectors;
@@ -318,10 +318,10 @@ Judged painted_over_print(const Pose& new_from_old) {
   const auto shone = [&](const LightOptions& options, cv::Mat* in_gamut) {
     const Status status = renderer.set_light(options, &surface);
     EXPECT_TRUE(status.ok()) << status.message();
-    std::vector<cv::Mat> pictures;
+    std::vector<cv::Mat> images;
     *in_gamut = on_prototype.clone();
     for (std::size_t i = 0; i < rig.projectors.size(); ++i) {
-      pictures.push_back(renderer.projector_picture(i, posed, rig.cameras[0]));
+      images.push_back(renderer.projector_image(i, posed, rig.cameras[0]));
       cv::Mat clipped;
       cv::dilate(renderer.clipped(i), clipped, cv::Mat(), {-1, -1}, 2);
       for (std::size_t k = 0; k < samples.size(); ++k) {
@@ -331,7 +331,7 @@ Judged painted_over_print(const Pose& new_from_old) {
           in_gamut->at<uchar>(samples.pixel[k] / size.width, samples.pixel[k] % size.width) = 0;
       }
     }
-    return cv::Mat(sim::ideal_light(world, samples, pictures));
+    return cv::Mat(sim::ideal_light(world, samples, images));
   };
   // As bright as it comes out best, channel by channel: the camera's white is not ours to judge.
   const auto judged = [&](const cv::Mat& light, const cv::Mat& where, double* similarity) {

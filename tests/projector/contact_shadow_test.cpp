@@ -4,7 +4,7 @@
 #include <iostream>
 #include <opencv2/core.hpp>
 
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "projector/renderer.h"
 #include "sim/ray_scene.h"
 #include "tests/projector/gl_test.h"
@@ -66,9 +66,9 @@ Rig one_camera() {
   return rig;
 }
 
-const cv::Mat& grey_picture() {
-  static const cv::Mat picture(480, 640, CV_8UC3, cv::Scalar::all(200));
-  return picture;
+const cv::Mat& grey_image() {
+  static const cv::Mat image(480, 640, CV_8UC3, cv::Scalar::all(200));
+  return image;
 }
 
 class ContactShadowTest : public test::GlTest {
@@ -124,9 +124,9 @@ TEST_F(ContactShadowTest, IsNearTheOneThatRaysFind) {
     const scene::Scene scene = block_before_a_board(gap, scene::Mode::view);
     const Pose world_from_block(exp_rotation({0, 0, 0.5}), {0.03, -0.02, 0});
     Renderer drawing = renderer(scene, rig, true);
-    const cv::Mat out = drawing.composite(0, grey_picture(), posed_with(world_from_block), Composite::full);
-    const sim::PlacedMesh board{&scene.prototype->mesh, Pose()};
-    const sim::PlacedMesh placed{&scene.slots[0].variants[0].mesh, world_from_block};
+    const cv::Mat out = drawing.composite(0, grey_image(), posed_with(world_from_block), Composite::full);
+    const sim::MeshInstance board{&scene.prototype->mesh, Pose()};
+    const sim::MeshInstance placed{&scene.slots[0].variants[0].mesh, world_from_block};
     const sim::RayScene block(std::span(&placed, 1)), prototype(std::span(&board, 1));
     const auto sees_block = [&](int column, int row) {  // within a pixel
       for (const Vector2d& d : {Vector2d(-1, -1), {1, -1}, {-1, 1}, {1, 1}})
@@ -144,7 +144,7 @@ TEST_F(ContactShadowTest, IsNearTheOneThatRaysFind) {
         if (std::abs(p.z()) > 1e-6) continue;  // the board's rim
         const double truth = traced_shadow(block, p);
         const double found =
-            1 - linear_of_srgb(out.at<cv::Vec3b>(row, column)[1] / 255.0) / linear_of_srgb(200 / 255.0);
+            1 - linear_from_srgb(out.at<cv::Vec3b>(row, column)[1] / 255.0) / linear_from_srgb(200 / 255.0);
         darkest = std::max(darkest, found);
         darkest_truth = std::max(darkest_truth, truth);
         worst = std::max(worst, std::abs(found - truth));
@@ -161,23 +161,23 @@ TEST_F(ContactShadowTest, IsNearTheOneThatRaysFind) {
   }
 }
 
-TEST_F(ContactShadowTest, LeavesProjectorPicturesAndSurfacePartsAndWhatIsFarAlone) {
+TEST_F(ContactShadowTest, LeavesProjectorImagesAndSurfacePartsAndWhatIsFarAlone) {
   const Rig rig = one_camera();
   for (const auto& [mode, gap] :
        {std::pair(scene::Mode::view, 0.0), {scene::Mode::view, 0.08}, {scene::Mode::surface, 0.0}}) {
     const scene::Scene scene = block_before_a_board(gap, mode);
     Renderer with = renderer(scene, rig, true), without = renderer(scene, rig, false);
     const scene::PosedScene posed = posed_with(Pose());
-    EXPECT_EQ(cv::norm(with.projector_picture(0, posed, rig.cameras[0]),
-                       without.projector_picture(0, posed, rig.cameras[0]), cv::NORM_INF),
+    EXPECT_EQ(cv::norm(with.projector_image(0, posed, rig.cameras[0]),
+                       without.projector_image(0, posed, rig.cameras[0]), cv::NORM_INF),
               0);
     for (const Composite what : {Composite::full, Composite::rest}) {
-      const cv::Mat dark = with.composite(0, grey_picture(), posed, what);
-      const cv::Mat plain = without.composite(0, grey_picture(), posed, what);
+      const cv::Mat dark = with.composite(0, grey_image(), posed, what);
+      const cv::Mat plain = without.composite(0, grey_image(), posed, what);
       const bool expected = mode == scene::Mode::view && gap == 0;
       EXPECT_EQ(cv::norm(dark, plain, cv::NORM_INF) > 30, expected);
       EXPECT_TRUE(with.set_contact_shadow(nullptr));
-      EXPECT_EQ(cv::norm(with.composite(0, grey_picture(), posed, what), plain, cv::NORM_INF), 0);
+      EXPECT_EQ(cv::norm(with.composite(0, grey_image(), posed, what), plain, cv::NORM_INF), 0);
       EXPECT_TRUE(with.set_contact_shadow(&scene));
     }
   }

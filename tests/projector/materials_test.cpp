@@ -3,9 +3,9 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "core/picture.h"
-#include "core/response.h"
-#include "projector/treatment.h"
+#include "core/image_io.h"
+#include "core/photometric_response.h"
+#include "projector/composite_policy.h"
 #include "scene/tangents.h"
 #include "sim/ray_scene.h"
 #include "tests/projector/sheet_room.h"
@@ -88,7 +88,7 @@ TEST_F(MaterialsTest, MetalAndGlossAreAsInGltf) {
         const Vector3d wanted = lit({0.7, 0.45, 0.2}, metallic, roughness, {0, 0, -1}, -ray.d, *scene.light);
         const auto& bgr = seen.at<cv::Vec3b>(row, column);
         for (int c = 0; c < 3; ++c)
-          worst = std::max(worst, std::abs(bgr[2 - c] - 255 * srgb_of_linear(std::min(1.0, wanted[c]))));
+          worst = std::max(worst, std::abs(bgr[2 - c] - 255 * srgb_from_linear(std::min(1.0, wanted[c]))));
       }
     EXPECT_LT(worst, 1) << "of 255, metallic " << metallic << ", roughness " << roughness;
   }
@@ -113,7 +113,7 @@ Mesh fields(double z) {
   Mesh part = coloured(sheet(0.2, 0.2, z), k_field_colour.cast<float>(), false);
   for (const auto& p : part.positions) part.uvs.push_back({p.x() / 0.2f + 0.5f, 0.5f - p.y() / 0.2f});
   constexpr int k_side = 64;
-  const auto picture = [&](const cv::Scalar& colour) {
+  const auto image = [&](const cv::Scalar& colour) {
     return cv::Mat(2 * k_side, 2 * k_side, CV_8UC3, colour);
   };
   const auto field = [&](cv::Mat& whole, int k) {
@@ -121,18 +121,18 @@ Mesh fields(double z) {
   };
   scene::Material& material = part.materials[0];
   scene::SurfaceMaps& maps = material.maps;
-  cv::Mat rough = picture({0, 153, 0}), normals = picture({255, 128, 128}), open = picture({0, 0, 255}),
-          glow = picture({});
+  cv::Mat rough = image({0, 153, 0}), normals = image({255, 128, 128}), open = image({0, 0, 255}),
+          glow = image({});
   field(rough, 0).setTo(cv::Scalar(255, 102, 0));
   field(normals, 1).setTo(cv::Scalar(220, 60, 200));
   field(open, 2).setTo(cv::Scalar(255, 255, 51));  // of which the strength takes 5 / 8
   field(glow, 3).setTo(cv::Scalar(188, 188, 188));
   material.metallic = material.roughness = 1;
   material.emitted = Eigen::Vector3f::Constant(static_cast<float>(k_field_glow));
-  maps.metallic_roughness.picture = rough;
-  maps.normals.picture = normals;
-  maps.occlusion.picture = open;
-  maps.emission.picture = glow;
+  maps.metallic_roughness.image = rough;
+  maps.normals.image = normals;
+  maps.occlusion.image = open;
+  maps.emission.image = glow;
   maps.normal_scale = static_cast<float>(k_normal_scale);
   maps.occlusion_strength = 0.625f;
   scene::add_tangents(&part);
@@ -146,10 +146,10 @@ Vector3d wanted_of_field(int k, const Vector3d& d_eye, const scene::RoomLight& r
   const Field& field = k_fields[k];
   const Vector3d n = Vector3d(field.along.x(), -field.along.y(), -field.along.z()).normalized();
   return lit(k_field_colour, field.metallic, field.roughness, n, d_eye, room, field.open) +
-         Vector3d::Constant(field.glow * k_field_glow * linear_of_srgb(188 / 255.0));
+         Vector3d::Constant(field.glow * k_field_glow * linear_from_srgb(188 / 255.0));
 }
 
-// Levels between a picture's colour where p is and a wanted colour, by the encoding of what shows it.
+// Levels between an image's colour where p is and a wanted colour, by the encoding of what shows it.
 double levels_off(const cv::Mat& bgr,
                   const Imager& imager,
                   const Vector3d& p,
@@ -172,7 +172,7 @@ TEST_F(MaterialsTest, MapsOfASurfaceAreReadInLightCompositesAndViews) {
   const Imager viewer = viewer_from({-0.3, -0.3, -1.2});
   const Vector3d p_eye = eye.imager_from_world.inverse().translation;
   const Vector3d p_viewer = viewer.imager_from_world.inverse().translation;
-  const auto srgb = [](double light) { return srgb_of_linear(light); };
+  const auto srgb = [](double light) { return srgb_from_linear(light); };
   const auto gamma = [](double light) { return std::pow(light, 1 / 2.2); };
   for (const scene::Mode mode : {scene::Mode::view, scene::Mode::surface}) {
     const double z = mode == scene::Mode::view ? -0.05 : -0.0005;
@@ -182,7 +182,7 @@ TEST_F(MaterialsTest, MapsOfASurfaceAreReadInLightCompositesAndViews) {
     Renderer drawing = renderer(scene, rig);
     const cv::Mat composite = drawing.composite(0, cv::Mat::zeros(480, 640, CV_8UC1), posed, Composite::full);
     const cv::Mat view = drawing.view(eye, posed, cv::Scalar());
-    const cv::Mat light = drawing.projector_picture(0, posed, viewer);
+    const cv::Mat light = drawing.projector_image(0, posed, viewer);
     for (int k = 0; k < 4; ++k) {
       const Vector3d p = middle_of_field(k, z), d_eye = (p_eye - p).normalized(),
                      d_viewer = (p_viewer - p).normalized();
@@ -225,7 +225,7 @@ TEST_F(MaterialsTest, MapsOfOnePartLeaveOthersAsTheyAre) {
 }
 
 // What people chose instead is drawn as if the files had said it, and what they chose not as the files say.
-TEST_F(MaterialsTest, DrawsOtherMaterialsAndLightFromPictureToPicture) {
+TEST_F(MaterialsTest, DrawsOtherMaterialsAndLightFromImageToImage) {
   const scene::RoomLight evening{
       k_up, {0.05, 0.08, 0.1}, {0.3, 0.28, 0.25}, {{Vector3d(0.2, -0.5, -1).normalized(), {0.5, 0.45, 0.4}}}};
   Mesh own = coloured(sheet(0.5, 0.4), {0.2f, 0.4f, 0.6f}, true), other = own;
@@ -263,7 +263,7 @@ TEST_F(MaterialsTest, DrawsOtherMaterialsAndLightFromPictureToPicture) {
 }
 
 TEST_F(MaterialsTest, TextureStandsTheRightWayUp) {
-  // Left half red, top half bright, as seen by a viewer whose picture's down is +y.
+  // Left half red, top half bright, as seen by a viewer whose image's down is +y.
   Mesh part = coloured(sheet(0.2, 0.2, -0.001), {1, 1, 1});
   for (const auto& p : part.positions) part.uvs.push_back({p.x() / 0.2f + 0.5f, 0.5f - p.y() / 0.2f});
   cv::Mat texture(64, 64, CV_8UC3, cv::Scalar(0, 0, 255));
@@ -303,15 +303,15 @@ Mesh ring(double z, const cv::Scalar& colour_bgr) {
 }
 
 TEST_F(MaterialsTest, WhatAMaterialCutsOutIsNotThere) {
-  // Through the hole in the ring another part is seen, and the camera's picture around it.
+  // Through the hole in the ring another part is seen, and the camera's image around it.
   const cv::Scalar red(0, 0, 255), grey(90, 90, 90);
   const Scene scene = scene_of(
       sheet(0.5, 0.4), {slot("ring", scene::Mode::view, ring(-0.05, red)),
                         slot("plate", scene::Mode::view, coloured(sheet(0.1, 0.1, -0.02), {0, 1, 0}))});
   const Rig rig = two_projectors();
   const Imager& camera = rig.cameras[0];
-  const cv::Mat picture(480, 640, CV_8UC3, grey);
-  const cv::Mat found = renderer(scene, rig).composite(0, picture, posed_at_origin(scene), Composite::full);
+  const cv::Mat image(480, 640, CV_8UC3, grey);
+  const cv::Mat found = renderer(scene, rig).composite(0, image, posed_at_origin(scene), Composite::full);
   int green = 0, wrong = 0;
   double ring_found = 0, ring_expected = 0;
   for (int row = 0; row < found.rows; ++row)
@@ -349,7 +349,7 @@ TEST_F(MaterialsTest, WhatAMaterialCutsOutGivesNoLight) {
     Renderer drawing = renderer(scene, rig);
     const Vector3d p_eye(-0.3, -0.3, -1.2);
     const PosedScene posed = posed_at_origin(scene);
-    const cv::Mat light = drawing.projector_picture(0, posed, viewer_from(p_eye));
+    const cv::Mat light = drawing.projector_image(0, posed, viewer_from(p_eye));
     int same = 0, either = 0, beside = 0;
     for (int row = 0; row < light.rows; ++row)
       for (int column = 0; column < light.cols; ++column) {
@@ -384,7 +384,7 @@ TEST_F(MaterialsTest, CutOutPartsAgreeWithARayTracer) {
   posed.parts[0].world_from_part = Pose(exp_rotation({0.4, -0.5, 0.3}), {0.02, 0.01, -0.1});
   const cv::Mat found =
       renderer(scene, rig).composite(0, cv::Mat::zeros(480, 640, CV_8UC3), posed, Composite::full);
-  const sim::PlacedMesh placed{&part, posed.parts[0].world_from_part};
+  const sim::MeshInstance placed{&part, posed.parts[0].world_from_part};
   const sim::RayScene rays(std::span(&placed, 1));
   int same = 0, either = 0;
   for (int row = 0; row < found.rows; ++row)

@@ -5,9 +5,9 @@
 #include <functional>
 #include <opencv2/imgproc.hpp>
 
-#include "core/picture.h"
-#include "core/response.h"
-#include "projector/treatment.h"
+#include "core/image_io.h"
+#include "core/photometric_response.h"
+#include "projector/composite_policy.h"
 #include "sim/ray_scene.h"
 #include "tests/projector/sheet_room.h"
 #include "tests/support/matchers.h"
@@ -93,7 +93,7 @@ TEST_F(RendererTest, ViewPartStandsWhereTheViewersEyeSeesIt) {
   Rig rig = two_projectors();
   rig.projectors.pop_back();
   for (const Vector3d& p_eye : {Vector3d(-0.3, -0.3, -1.2), Vector3d(0.4, 0.1, -1.0)}) {
-    const cv::Mat found = renderer(scene, rig).projector_picture(0, posed, viewer_from(p_eye));
+    const cv::Mat found = renderer(scene, rig).projector_image(0, posed, viewer_from(p_eye));
     cv::Mat expected(found.size(), CV_64FC3), light(found.size(), CV_64FC3);
     for (int row = 0; row < found.rows; ++row) {
       for (int column = 0; column < found.cols; ++column) {
@@ -124,8 +124,8 @@ TEST_F(RendererTest, SurfacePartIsTheSameForEveryViewerAndOnlyWithinTwoMillimetr
     const Scene scene = scene_of(sheet(0.5, 0.4), {part(z)});
     Renderer drawing = renderer(scene, rig);
     const PosedScene posed = posed_at_origin(scene);
-    const cv::Mat a = drawing.projector_picture(0, posed, viewer_from({-0.3, -0.3, -1.2}));
-    const cv::Mat b = drawing.projector_picture(0, posed, viewer_from({0.5, 0.1, -1.0}));
+    const cv::Mat a = drawing.projector_image(0, posed, viewer_from({-0.3, -0.3, -1.2}));
+    const cv::Mat b = drawing.projector_image(0, posed, viewer_from({0.5, 0.1, -1.0}));
     EXPECT_EQ(cv::norm(a, b, cv::NORM_INF), 0);
     const cv::Mat points = drawing.surface_points(0, posed);
     int lit = 0, wrong = 0;
@@ -155,9 +155,9 @@ TEST_F(RendererTest, PartBehindThePrototypeGetsNoLightAndIsCutInTheComposite) {
   posed.parts[0].world_from_part.translation = {0.15, 0, 0};
   const Rig rig = two_projectors();
   Renderer drawing = renderer(scene, rig);
-  EXPECT_EQ(cv::countNonZero(drawing.projector_picture(0, posed, rig.cameras[0]).reshape(1)), 0);
-  const cv::Mat picture(480, 640, CV_8UC3, cv::Scalar(10, 20, 30));
-  const cv::Mat full = drawing.composite(0, picture, posed, Composite::full);
+  EXPECT_EQ(cv::countNonZero(drawing.projector_image(0, posed, rig.cameras[0]).reshape(1)), 0);
+  const cv::Mat image(480, 640, CV_8UC3, cv::Scalar(10, 20, 30));
+  const cv::Mat full = drawing.composite(0, image, posed, Composite::full);
   int drawn = 0, wrong = 0;
   for (int row = 0; row < full.rows; ++row) {
     for (int column = 0; column < full.cols; ++column) {
@@ -217,9 +217,9 @@ TEST_F(RendererTest, CompositeDrawsPartsThroughTheCamerasLens) {
   posed.parts[0].world_from_part = Pose(exp_rotation({0.3, 0.4, 0.5}), {0.15, 0.05, 0});
   const Rig rig = two_projectors();
   Renderer drawing = renderer(scene, rig);
-  const cv::Mat picture = cv::Mat::zeros(480, 640, CV_8UC1);
-  const cv::Mat full = drawing.composite(0, picture, posed, Composite::full);
-  const cv::Mat rest = drawing.composite(0, picture, posed, Composite::rest);
+  const cv::Mat image = cv::Mat::zeros(480, 640, CV_8UC1);
+  const cv::Mat full = drawing.composite(0, image, posed, Composite::full);
+  const cv::Mat rest = drawing.composite(0, image, posed, Composite::rest);
   const Pose part_from_world = posed.parts[0].world_from_part.inverse();
   cv::Mat expected(480, 640, CV_64F), found(480, 640, CV_64F);
   int wrong_rest = 0, rest_pixels = 0;
@@ -262,16 +262,16 @@ TEST_F(RendererTest, EachPartOfACompositeIsTreatedInItsOwnWay) {
   posed.parts[0].world_from_part.translation.x() = -0.1;
   posed.parts[1].world_from_part.translation.x() = 0.1;
   Renderer drawing = renderer(scene, two_projectors());
-  const cv::Mat picture(480, 640, CV_8UC3, cv::Scalar::all(90));
-  const cv::Mat full = drawing.composite(0, picture, posed, Composite::full);
-  const cv::Mat rest = drawing.composite(0, picture, posed, Composite::rest);
+  const cv::Mat image(480, 640, CV_8UC3, cv::Scalar::all(90));
+  const cv::Mat full = drawing.composite(0, image, posed, Composite::full);
+  const cv::Mat rest = drawing.composite(0, image, posed, Composite::rest);
   const cv::Rect left(0, 0, 320, 480), right(320, 0, 320, 480);
   ASSERT_GT(cv::norm(full(left), rest(left), cv::NORM_INF), 30);
   ASSERT_GT(cv::norm(full(right), rest(right), cv::NORM_INF), 30);
   for (const bool left_whole : {true, false, true}) {
-    const std::vector<Treatment> treatments = {{"left", left_whole ? Composite::full : Composite::rest, 0},
+    const std::vector<CompositePolicy> policies = {{"left", left_whole ? Composite::full : Composite::rest, 0},
                                                {"right", left_whole ? Composite::rest : Composite::full, 0}};
-    const cv::Mat out = drawing.composite(0, picture, posed, treatments);
+    const cv::Mat out = drawing.composite(0, image, posed, policies);
     EXPECT_EQ(cv::norm(out(left), (left_whole ? full : rest)(left), cv::NORM_INF), 0);
     EXPECT_EQ(cv::norm(out(right), (left_whole ? rest : full)(right), cv::NORM_INF), 0);
   }
@@ -283,37 +283,37 @@ TEST_F(RendererTest, BetweenRestAndFullACompositeIsTheirMixInLinearLight) {
                {slot("mirror", scene::Mode::view, coloured(sheet(0.1, 0.1, -0.01), {0.2F, 0.9F, 0.6F}))});
   const PosedScene posed = posed_at_origin(scene);
   Renderer drawing = renderer(scene, two_projectors());
-  const cv::Mat picture(480, 640, CV_8UC3, cv::Scalar(200, 90, 30));
+  const cv::Mat image(480, 640, CV_8UC3, cv::Scalar(200, 90, 30));
   const auto drawn = [&](double passing) {
-    return drawing.composite(0, picture, posed,
-                             std::vector<Treatment>{{"mirror", Composite::full, 0, passing}});
+    return drawing.composite(0, image, posed,
+                             std::vector<CompositePolicy>{{"mirror", Composite::full, 0, passing}});
   };
   const cv::Mat full = drawn(0), rest = drawn(1);
-  EXPECT_EQ(cv::norm(rest, drawing.composite(0, picture, posed, Composite::rest), cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(rest, drawing.composite(0, image, posed, Composite::rest), cv::NORM_INF), 0);
   ASSERT_GT(cv::norm(full, rest, cv::NORM_INF), 100);
   for (const double passing : {0.25, 0.6}) {
-    cv::Mat expected(picture.size(), CV_8UC3);
-    for (int i = 0; i < static_cast<int>(picture.total()) * 3; ++i) {
-      const double light = (1 - passing) * linear_of_srgb(full.data[i] / 255.0) +
-                           passing * linear_of_srgb(rest.data[i] / 255.0);
-      expected.data[i] = cv::saturate_cast<std::uint8_t>(255 * srgb_of_linear(light));
+    cv::Mat expected(image.size(), CV_8UC3);
+    for (int i = 0; i < static_cast<int>(image.total()) * 3; ++i) {
+      const double light = (1 - passing) * linear_from_srgb(full.data[i] / 255.0) +
+                           passing * linear_from_srgb(rest.data[i] / 255.0);
+      expected.data[i] = cv::saturate_cast<std::uint8_t>(255 * srgb_from_linear(light));
     }
     EXPECT_LE(cv::norm(drawn(passing), expected, cv::NORM_INF), 3) << passing;
   }
 }
 
-TEST_F(RendererTest, WhereNoPartIsTheCompositeIsTheCamerasPicture) {
+TEST_F(RendererTest, WhereNoPartIsTheCompositeIsTheCamerasImage) {
   const Scene scene = scene_of(sheet(0.3, 0.3), {});
   auto rng = test::test_rng();
-  cv::Mat picture(480, 640, CV_8UC3);
-  std::generate(picture.begin<cv::Vec3b>(), picture.end<cv::Vec3b>(), [&] {
+  cv::Mat image(480, 640, CV_8UC3);
+  std::generate(image.begin<cv::Vec3b>(), image.end<cv::Vec3b>(), [&] {
     const auto v = rng();
     return cv::Vec3b(static_cast<std::uint8_t>(v), static_cast<std::uint8_t>(v >> 8),
                      static_cast<std::uint8_t>(v >> 16));
   });
   const cv::Mat out =
-      renderer(scene, two_projectors()).composite(0, picture, posed_at_origin(scene), Composite::full);
-  EXPECT_EQ(cv::norm(out, picture, cv::NORM_INF), 0);
+      renderer(scene, two_projectors()).composite(0, image, posed_at_origin(scene), Composite::full);
+  EXPECT_EQ(cv::norm(out, image, cv::NORM_INF), 0);
 }
 
 TEST_F(RendererTest, LightOfTwoProjectorsSumsToThePartsColour) {
@@ -326,11 +326,11 @@ TEST_F(RendererTest, LightOfTwoProjectorsSumsToThePartsColour) {
   const Imager viewer = viewer_from({0, 0, -1.3});
   cv::Mat light[2];
   for (std::size_t i = 0; i < 2; ++i) {
-    const cv::Mat picture = drawing.projector_picture(i, posed, viewer);
-    light[i] = cv::Mat(picture.size(), CV_32F);
-    for (int row = 0; row < picture.rows; ++row) {
-      for (int column = 0; column < picture.cols; ++column) {
-        light[i].at<float>(row, column) = static_cast<float>(light_of(picture.at<cv::Vec3b>(row, column)[1]));
+    const cv::Mat image = drawing.projector_image(i, posed, viewer);
+    light[i] = cv::Mat(image.size(), CV_32F);
+    for (int row = 0; row < image.rows; ++row) {
+      for (int column = 0; column < image.cols; ++column) {
+        light[i].at<float>(row, column) = static_cast<float>(light_of(image.at<cv::Vec3b>(row, column)[1]));
       }
     }
   }
@@ -381,7 +381,7 @@ TEST_F(RendererTest, BlendSharesTheLightAndMakesUpForMissingBlack) {
     rig.projectors.push_back({i == 0 ? "projector0" : "projector1", 640, 400,
                               Lens::pinhole(800, 800, 320, 200), projector_from_world});
     rig.responses.push_back({rig.projectors[i].name, {0, 1}, {0, 1}, {0, 1}});
-    rig.responses.back().black_level = Measured{black[i], 0};
+    rig.responses.back().black_level = Measurement{black[i], 0};
   }
   Renderer drawing = renderer(scene, rig);
   const cv::Mat blend[2] = {drawing.blend(0, posed), drawing.blend(1, posed)};
@@ -476,7 +476,7 @@ TEST_F(RendererTest, ProjectorInTheOthersShadowGivesAllTheLight) {
   const PosedScene posed = posed_at_origin(scene);
   const Rig rig = two_projectors();
   Renderer drawing = renderer(scene, rig);
-  const cv::Mat left = drawing.projector_picture(0, posed, viewer_from({0, 0, -1.3}));
+  const cv::Mat left = drawing.projector_image(0, posed, viewer_from({0, 0, -1.3}));
   const cv::Mat points = drawing.surface_points(0, posed);
   const Vector3d p_right = rig.projectors[1].imager_from_world.inverse().translation;
   int shadowed = 0, dim = 0;
@@ -524,9 +524,9 @@ TEST_F(RendererTest, ABallsShadowReachesAsFarAsItsOutline) {
   const Scene scene = scene_of(mesh, {});
   Rig rig = two_projectors();
   for (const Imager& projector : rig.projectors) {
-    Response response;
+    ProjectorResponse response;
     response.projector = projector.name;
-    response.black_level = Measured{0.004, 0};
+    response.black_level = Measurement{0.004, 0};
     for (int value = 0; value < 256; ++value)
       response.green.push_back(0.004 + 0.996 * std::pow(value / 255.0, 2.2));
     response.red = response.blue = response.green;
@@ -535,7 +535,7 @@ TEST_F(RendererTest, ABallsShadowReachesAsFarAsItsOutline) {
   Renderer drawing = renderer(scene, rig);
   const cv::Mat blend = drawing.blend(0, posed_at_origin(scene));
   const cv::Mat points = drawing.surface_points(0, posed_at_origin(scene));
-  const sim::PlacedMesh placed{&mesh, Pose()};
+  const sim::MeshInstance placed{&mesh, Pose()};
   const sim::RayScene truth(std::span(&placed, 1));
   const Vector3d p_right = rig.projectors[1].imager_from_world.inverse().translation;
   int shadowed = 0, lit_in_shadow = 0, dark_in_light = 0;
@@ -545,7 +545,7 @@ TEST_F(RendererTest, ABallsShadowReachesAsFarAsItsOutline) {
       if (std::isnan(p[0]) || p[2] < -0.001F) continue;
       const auto px = rig.projectors[1].project(Vector3d(p[0], p[1], p[2]));
       if (!px || !rig.projectors[1].contains(*px)) continue;
-      const bool in_shadow = !truth.lit(p_right, Vector3d(p[0], p[1], p[2]));
+      const bool in_shadow = !truth.reached(p_right, Vector3d(p[0], p[1], p[2]));
       const bool made_up = blend.at<cv::Vec2f>(row, column)[1] > 0;  // for the right one's black
       shadowed += in_shadow;
       lit_in_shadow += in_shadow && !made_up;
@@ -566,15 +566,15 @@ TEST_F(RendererTest, UnlitColourIsExactAndTheResponseIsApplied) {
   const Imager viewer = viewer_from({0, 0, -1.3});
   const Vector2d middle = *rig.projectors[0].project({0, 0, 0});
   const auto at_middle = [&](const Rig& used) {
-    const cv::Mat picture = renderer(scene, used).projector_picture(0, posed_at_origin(scene), viewer);
-    EXPECT_EQ(picture.at<cv::Vec3b>(2, 2), cv::Vec3b(0, 0, 0));
-    return picture.at<cv::Vec3b>(static_cast<int>(middle.y()), static_cast<int>(middle.x()));
+    const cv::Mat image = renderer(scene, used).projector_image(0, posed_at_origin(scene), viewer);
+    EXPECT_EQ(image.at<cv::Vec3b>(2, 2), cv::Vec3b(0, 0, 0));
+    return image.at<cv::Vec3b>(static_cast<int>(middle.y()), static_cast<int>(middle.x()));
   };
   const cv::Vec3b gamma = at_middle(rig);
   for (int c = 0; c < 3; ++c) {
     EXPECT_EQ(gamma[2 - c], std::lround(255 * std::pow(static_cast<double>(colour[c]), 1 / 2.2)));
   }
-  Response response{"projector0", {}, {}, {}};
+  ProjectorResponse response{"projector0", {}, {}, {}};
   for (int i = 0; i <= 255; ++i) {
     response.red.push_back(std::pow(i / 255.0, 1.8));
     response.green.push_back(i / 255.0);
@@ -595,18 +595,18 @@ TEST_F(RendererTest, NothingIsDrawnAgainUntilSomethingChanges) {
   drawn.time_passes(true);
   PosedScene posed = posed_at_origin(scene);
   const Imager viewer = viewer_from({0.1, -0.2, -1.4});
-  const cv::Mat first = drawn.projector_picture(0, posed, viewer);
+  const cv::Mat first = drawn.projector_image(0, posed, viewer);
   EXPECT_GT(cv::countNonZero(first.reshape(1)), 1000);
   EXPECT_FALSE(drawn.pass_times().empty());
-  const cv::Mat again = drawn.projector_picture(0, posed, viewer);
+  const cv::Mat again = drawn.projector_image(0, posed, viewer);
   EXPECT_TRUE(drawn.pass_times().empty());
   EXPECT_EQ(cv::norm(first, again, cv::NORM_INF), 0);
   posed.parts[0].world_from_part.translation.x() += 0.01;
-  EXPECT_GT(cv::norm(first, drawn.projector_picture(0, posed, viewer), cv::NORM_INF), 10);
+  EXPECT_GT(cv::norm(first, drawn.projector_image(0, posed, viewer), cv::NORM_INF), 10);
   EXPECT_FALSE(drawn.pass_times().empty());
-  const cv::Mat from_there = drawn.projector_picture(0, posed, viewer_from({-0.1, -0.2, -1.4}));
-  EXPECT_GT(cv::norm(from_there, drawn.projector_picture(0, posed, viewer), cv::NORM_INF), 10);
-  // Parts over another picture: only laid over it.
+  const cv::Mat from_there = drawn.projector_image(0, posed, viewer_from({-0.1, -0.2, -1.4}));
+  EXPECT_GT(cv::norm(from_there, drawn.projector_image(0, posed, viewer), cv::NORM_INF), 10);
+  // Parts over another image: only laid over it.
   const cv::Mat dark = cv::Mat::zeros(480, 640, CV_8UC1), bright(480, 640, CV_8UC1, cv::Scalar(200));
   const cv::Mat over_dark = drawn.composite(0, dark, posed, Composite::full);
   (void)drawn.pass_times();
@@ -619,13 +619,13 @@ TEST_F(RendererTest, NothingIsDrawnAgainUntilSomethingChanges) {
   EXPECT_GT(cv::norm(over_dark, drawn.composite(0, dark, posed, Composite::full), cv::NORM_INF), 10);
   EXPECT_GT(cv::norm(over_dark, drawn.composite(0, dark, posed, Composite::rest), cv::NORM_INF), 10);
 
-  const cv::Mat plain = drawn.projector_picture(0, posed, viewer);
+  const cv::Mat plain = drawn.projector_image(0, posed, viewer);
   ASSERT_TRUE(drawn.set_light({.compensation = Compensation::geometry}));
-  EXPECT_GT(cv::norm(plain, drawn.projector_picture(0, posed, viewer), cv::NORM_INF), 5);
+  EXPECT_GT(cv::norm(plain, drawn.projector_image(0, posed, viewer), cv::NORM_INF), 5);
 }
 
-// Whatever is kept from picture to picture.
-TEST_F(RendererTest, APictureAfterOthersIsTheSameAsTheFirstOfItsKind) {
+// Whatever is kept from image to image.
+TEST_F(RendererTest, AnImageAfterOthersIsTheSameAsTheFirstOfItsKind) {
   const Scene scene =
       scene_of(sheet(0.5, 0.4),
                {slot("mirror", scene::Mode::view, coloured(sheet(0.16, 0.1, -0.05), {0.25f, 0.5f, 0.75f})),
@@ -642,19 +642,19 @@ TEST_F(RendererTest, APictureAfterOthersIsTheSameAsTheFirstOfItsKind) {
   const Imager viewer = viewer_from({0.1, -0.1, -1.3});
   Renderer drawing = renderer(scene, two_projectors()), anew = renderer(scene, two_projectors()),
            anew_in_shadow = renderer(scene, two_projectors());
-  anew_in_shadow.set_arriving(1, shadow);
-  (void)drawing.projector_picture(0, still, viewer);
+  anew_in_shadow.set_occlusion(1, shadow);
+  (void)drawing.projector_image(0, still, viewer);
   EXPECT_EQ(
-      cv::norm(drawing.projector_picture(0, part_moved, viewer),
-               renderer(scene, two_projectors()).projector_picture(0, part_moved, viewer), cv::NORM_INF),
+      cv::norm(drawing.projector_image(0, part_moved, viewer),
+               renderer(scene, two_projectors()).projector_image(0, part_moved, viewer), cv::NORM_INF),
       0);
-  EXPECT_EQ(cv::norm(drawing.projector_picture(0, all_moved, viewer),
-                     anew.projector_picture(0, all_moved, viewer), cv::NORM_INF),
+  EXPECT_EQ(cv::norm(drawing.projector_image(0, all_moved, viewer),
+                     anew.projector_image(0, all_moved, viewer), cv::NORM_INF),
             0);
-  drawing.set_arriving(1, shadow);
-  const cv::Mat refilled = drawing.projector_picture(0, all_moved, viewer);
-  EXPECT_EQ(cv::norm(refilled, anew_in_shadow.projector_picture(0, all_moved, viewer), cv::NORM_INF), 0);
-  EXPECT_GT(cv::norm(refilled, anew.projector_picture(0, all_moved, viewer), cv::NORM_INF), 20);
+  drawing.set_occlusion(1, shadow);
+  const cv::Mat refilled = drawing.projector_image(0, all_moved, viewer);
+  EXPECT_EQ(cv::norm(refilled, anew_in_shadow.projector_image(0, all_moved, viewer), cv::NORM_INF), 0);
+  EXPECT_GT(cv::norm(refilled, anew.projector_image(0, all_moved, viewer), cv::NORM_INF), 20);
 }
 
 TEST_F(RendererTest, WhatMovesIsDrawnQuicklyAndWholeOnceItStandsStill) {
@@ -665,18 +665,18 @@ TEST_F(RendererTest, WhatMovesIsDrawnQuicklyAndWholeOnceItStandsStill) {
   PosedScene moved = posed;
   moved.parts[0].world_from_part = Pose(exp_rotation({0, 0, 0.1}), {0.011, 0.007, 0});
   const Imager viewer = viewer_from({0.1, -0.2, -1.4});
-  const cv::Mat whole = renderer(scene, two_projectors()).projector_picture(0, moved, viewer);
+  const cv::Mat whole = renderer(scene, two_projectors()).projector_image(0, moved, viewer);
 
   Renderer drawn = renderer(scene, two_projectors());
   drawn.set_quick_motion(true);
-  (void)drawn.projector_picture(0, posed, viewer);
-  const cv::Mat quick = drawn.projector_picture(0, moved, viewer);
+  (void)drawn.projector_image(0, posed, viewer);
+  const cv::Mat quick = drawn.projector_image(0, moved, viewer);
   EXPECT_GT(cv::norm(quick, whole, cv::NORM_INF), 0) << "edges by half the samples";
   cv::Mat apart;
   cv::extractChannel(cv::abs(quick - whole), apart, 1);
   EXPECT_LT(cv::countNonZero(apart), 0.03 * static_cast<double>(quick.total())) << "and edges alone";
-  EXPECT_EQ(cv::norm(drawn.projector_picture(0, moved, viewer), whole, cv::NORM_INF), 0);
-  EXPECT_EQ(cv::norm(drawn.projector_picture(0, moved, viewer), whole, cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(drawn.projector_image(0, moved, viewer), whole, cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(drawn.projector_image(0, moved, viewer), whole, cv::NORM_INF), 0);
 }
 
 TEST_F(RendererTest, SceneWithoutPrototypeOrProjectorsIsClassicAugmentedReality) {
@@ -686,9 +686,9 @@ TEST_F(RendererTest, SceneWithoutPrototypeOrProjectorsIsClassicAugmentedReality)
   rig.cameras = {camera()};
   Renderer drawing = renderer(scene, rig);
   const PosedScene posed = posed_at_origin(scene);
-  const cv::Mat picture(480, 640, CV_8UC3, cv::Scalar(9, 9, 9));
+  const cv::Mat image(480, 640, CV_8UC3, cv::Scalar(9, 9, 9));
   for (const Composite what : {Composite::rest, Composite::full}) {
-    const cv::Mat out = drawing.composite(0, picture, posed, what);
+    const cv::Mat out = drawing.composite(0, image, posed, what);
     const Vector2d middle = *rig.cameras[0].project({0, 0, 0});
     EXPECT_EQ(out.at<cv::Vec3b>(static_cast<int>(middle.y()), static_cast<int>(middle.x())),
               cv::Vec3b(0, 255, 0));
@@ -715,13 +715,13 @@ TEST_F(RendererTest, DoorsCoverageAgreesWithARayTracer) {
   Renderer drawing = renderer(scene, rig);
   const auto coverage = drawing.coverage(posed, viewer);
   const scene::Variant& variant = scene.find_slot("mirror")->variants[0];
-  const sim::PlacedMesh prototype{&scene.prototype->mesh, *posed.world_from_prototype};
-  const sim::PlacedMesh part{&variant.mesh, posed.parts[0].world_from_part};
+  const sim::MeshInstance prototype{&scene.prototype->mesh, *posed.world_from_prototype};
+  const sim::MeshInstance part{&variant.mesh, posed.parts[0].world_from_part};
   const sim::RayScene prototype_rays(std::span(&prototype, 1)), part_rays(std::span(&part, 1));
   const auto reaches = [&](const Imager& projector, const Vector3d& p, const Vector3d& n) {
     const auto px = projector.project(p);
     const Vector3d p_light = projector.imager_from_world.inverse().translation;
-    return px && projector.contains(*px) && n.dot(p_light - p) > 0 && prototype_rays.lit(p_light, p);
+    return px && projector.contains(*px) && n.dot(p_light - p) > 0 && prototype_rays.reached(p_light, p);
   };
   double same = 0, either = 0, on_same = 0, on_either = 0;
   for (int row = 0; row < viewer.height; ++row) {

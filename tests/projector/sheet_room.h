@@ -11,7 +11,7 @@
 
 #include "core/rig.h"
 #include "projector/renderer.h"
-#include "scene/posed.h"
+#include "scene/posed_scene.h"
 #include "tests/projector/gl_test.h"
 
 namespace limn::projector {

@@ -5,7 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "projector/renderer.h"
 #include "tests/projector/gl_test.h"
 #include "tests/support/matchers.h"
@@ -39,16 +39,16 @@ scene::Mesh sheet(const double (&sides)[2], double z) {
   return mesh;
 }
 
-// As a picture, linear light, CV_32FC3 BGR.
-cv::Mat pattern_picture() {
-  cv::Mat picture(k_texture[1], k_texture[0], CV_32FC3);
-  for (int row = 0; row < picture.rows; ++row)
-    for (int column = 0; column < picture.cols; ++column) {
-      const Vector3d rgb = pattern_rgb(((column + 0.5) / picture.cols - 0.5) * k_part[0],
-                                       ((row + 0.5) / picture.rows - 0.5) * k_part[1]);
-      picture.at<cv::Vec3f>(row, column) = cv::Vec3d(rgb[2], rgb[1], rgb[0]);
+// As an image, linear light, CV_32FC3 BGR.
+cv::Mat pattern_image() {
+  cv::Mat image(k_texture[1], k_texture[0], CV_32FC3);
+  for (int row = 0; row < image.rows; ++row)
+    for (int column = 0; column < image.cols; ++column) {
+      const Vector3d rgb = pattern_rgb(((column + 0.5) / image.cols - 0.5) * k_part[0],
+                                       ((row + 0.5) / image.rows - 0.5) * k_part[1]);
+      image.at<cv::Vec3f>(row, column) = cv::Vec3d(rgb[2], rgb[1], rgb[0]);
     }
-  return picture;
+  return image;
 }
 
 scene::Scene wall_with(scene::Mode mode) {
@@ -61,13 +61,13 @@ scene::Scene wall_with(scene::Mode mode) {
   scene::Material& material = slot.variants[0].mesh.materials[0];
   material.base_colour = {1, 1, 1};
   material.unlit = true;
-  const cv::Mat light = pattern_picture();
+  const cv::Mat light = pattern_image();
   material.texture.create(light.size(), CV_8UC3);
   for (int row = 0; row < light.rows; ++row)
     for (int column = 0; column < light.cols; ++column)
       for (int c = 0; c < 3; ++c)
         material.texture.at<cv::Vec3b>(row, column)[c] = cv::saturate_cast<std::uint8_t>(
-            255 * srgb_of_linear(static_cast<double>(light.at<cv::Vec3f>(row, column)[c])));
+            255 * srgb_from_linear(static_cast<double>(light.at<cv::Vec3f>(row, column)[c])));
   scene.slots.push_back(slot);
   return scene;
 }
@@ -75,17 +75,17 @@ scene::Scene wall_with(scene::Mode mode) {
 // Where the ray meets the plane of this z.
 Vector3d on_plane(const Vector3d& p, const Vector3d& d, double z) { return p + (z - p.z()) / d.z() * d; }
 
-// First pass of a view part: its picture from the viewer's eye.
-cv::Mat eye_picture(const Imager& viewer) {
+// First pass of a view part: its image from the viewer's eye.
+cv::Mat eye_image(const Imager& viewer) {
   const Vector3d p_eye = viewer.imager_from_world.inverse().translation;
-  cv::Mat picture(viewer.height, viewer.width, CV_32FC3);
-  for (int row = 0; row < picture.rows; ++row)
-    for (int column = 0; column < picture.cols; ++column) {
+  cv::Mat image(viewer.height, viewer.width, CV_32FC3);
+  for (int row = 0; row < image.rows; ++row)
+    for (int column = 0; column < image.cols; ++column) {
       const Vector3d p = on_plane(p_eye, viewer.ray(Vector2d(column, row))->d, -k_stand_off);
       const Vector3d rgb = pattern_rgb(p.x(), p.y());
-      picture.at<cv::Vec3f>(row, column) = cv::Vec3d(rgb[2], rgb[1], rgb[0]);
+      image.at<cv::Vec3f>(row, column) = cv::Vec3d(rgb[2], rgb[1], rgb[0]);
     }
-  return picture;
+  return image;
 }
 
 // Second pass: which pixel of `source` each pixel of the projector shows; `inside` is 255 where the part is.
@@ -116,7 +116,7 @@ Warp warp_of(const Imager& projector, const Imager& viewer, scene::Mode mode, co
   return warp;
 }
 
-// The projector's picture by cv::remap, display values of gamma 2.2 before rounding.
+// The projector's image by cv::remap, display values of gamma 2.2 before rounding.
 cv::Mat remapped(const cv::Mat& source, const Warp& warp) {
   cv::Mat light, levels;
   cv::remap(source, light, warp.map, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_CONSTANT);
@@ -175,7 +175,7 @@ TEST_F(WarpTest, IsWhatRemapMakesOfTheLens) {
   const Imager viewer =
       viewer_imager(looking_at({0.2, -0.3, -1.2}, {0, 0, 0}, {0, -1, 0}).inverse(), 2400, 1800, 25);
   for (const scene::Mode mode : {scene::Mode::view, scene::Mode::surface}) {
-    const cv::Mat source = mode == scene::Mode::view ? eye_picture(viewer) : pattern_picture();
+    const cv::Mat source = mode == scene::Mode::view ? eye_image(viewer) : pattern_image();
     const scene::Scene scene = wall_with(mode);
     const scene::PosedScene posed{Pose(), {{"part", "a", Pose()}}};
     for (const Imager& projector : projectors) {
@@ -184,7 +184,7 @@ TEST_F(WarpTest, IsWhatRemapMakesOfTheLens) {
       auto made = Renderer::create(scene, rig);
       ASSERT_TRUE(made) << made.message();
       cv::Mat found;
-      made->projector_picture(0, posed, viewer).convertTo(found, CV_32F);
+      made->projector_image(0, posed, viewer).convertTo(found, CV_32F);
       const Warp warp = warp_of(projector, viewer, mode, {0, 0});
       const cv::Mat expected = remapped(source, warp);
       cv::Mat inside;
@@ -204,7 +204,7 @@ TEST_F(WarpTest, IsWhatRemapMakesOfTheLens) {
                 << " lens values"
                 << ": mean " << mean[1] << " levels, " << 100 * over << " % over 2; worst shift of "
                 << shifts.size() << " squares " << worst_of(shifts) << " px\n";
-      EXPECT_LT(mean[1], 0.6);  // rounding texture, picture and places (to 1/32 by cv::remap)
+      EXPECT_LT(mean[1], 0.6);  // rounding texture, image and places (to 1/32 by cv::remap)
       EXPECT_LT(over, 1e-3);
       EXPECT_GT(shifts.size(), 15u);
       EXPECT_LT(worst_of(shifts), 0.05);

@@ -23,7 +23,7 @@ Scene a_scene() {
     for (const char* variant : {"a", "b", "c"}) slot.variants.push_back({variant, {}});
     scene.slots.push_back(slot);
   }
-  scene.slots[0].variants.push_back({"new one", {}, Variant::Dropped{"m"}});
+  scene.slots[0].variants.push_back({"new one", {}, Variant::AutoImported{"m"}});
   return scene;
 }
 
@@ -34,15 +34,15 @@ Look look_of(const std::string& name, const std::string& variant) {
 }
 
 // Looks A, B and C, of which B was shown last and A before it, and one that was deleted.
-Staging a_staging(const Scene& scene) {
-  Staging staging = first_staging(scene);
-  staging.looks = {look_of("A", "a"), look_of("B", "b"), look_of("C", "c")};
-  staging.look = "B";
-  staging.other_look = "A";
-  staging.deleted_look = look_of("gone", "a");
-  staging.slots[0].variant = "b";
-  staging.screens = {{"wall"}, {"desk"}};
-  return staging;
+ShowState a_staging(const Scene& scene) {
+  ShowState show_state = initial_show_state(scene);
+  show_state.looks = {look_of("A", "a"), look_of("B", "b"), look_of("C", "c")};
+  show_state.look = "B";
+  show_state.other_look = "A";
+  show_state.deleted_look = look_of("gone", "a");
+  show_state.slots[0].variant = "b";
+  show_state.screens = {{"wall"}, {"desk"}};
+  return show_state;
 }
 
 std::string text_of(const Pose& pose) {
@@ -51,10 +51,10 @@ std::string text_of(const Pose& pose) {
   return fmt::format("{} {} {} {} {} {} {}", t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z());
 }
 
-// All of a staging, by member, as text. A member that is added does not compile until it is here, too.
-std::map<std::string, std::string> members_of(const Staging& staging) {
+// All of a show state, by member, as text. A member that is added does not compile until it is here, too.
+std::map<std::string, std::string> members_of(const ShowState& show_state) {
   const auto& [slots, looks, look, other_look, deleted_look, blackout, frozen, marker_states, grid, split,
-               split_mm, screen, screens, light, d_up_world, d_front_world, viewer] = staging;
+               split_mm, screen, screens, light, d_up_world, d_front_world, viewer] = show_state;
   std::map<std::string, std::string> all = {
       {"look", look},
       {"other_look", other_look},
@@ -87,7 +87,7 @@ std::map<std::string, std::string> members_of(const Staging& staging) {
 
 using Members = std::set<std::string>;
 
-Members changed(const Staging& before, const Staging& after) {
+Members changed(const ShowState& before, const ShowState& after) {
   Members out;
   const std::map<std::string, std::string> was = members_of(before);
   for (const auto& [member, text] : members_of(after))
@@ -97,66 +97,66 @@ Members changed(const Staging& before, const Staging& after) {
   return out;
 }
 
-// What an action is asked, of which staging, and what it is to change: these members, so that `is_done`
+// What an action is asked, of which show state, and what it is to change: these members, so that `is_done`
 // holds.
 struct Case {
-  Staging before;
+  ShowState before;
   std::string value;
   Members members;
-  bool (*is_done)(const Staging& after);
+  bool (*is_done)(const ShowState& after);
   std::string slot = "mirror";  // of actions on a slot
 };
 
 // No default: an action without its case is a warning here and a failure below.
 std::optional<Case> case_of(ActionId id, const Scene& scene) {
-  const Staging usual = a_staging(scene);
-  Staging held = usual;
+  const ShowState usual = a_staging(scene);
+  ShowState held = usual;
   held.slots[0].nudge = {0.1, 0.2, 0.3};
   held.slots[0].pin = Pin{Pose{}, std::nullopt};
   held.slots[0].marker = MarkerName{"aruco_4x4_50", "9"};
   switch (id) {
     case ActionId::next_variant:
       return Case{
-          usual, "", {"slots[0].variant"}, [](const Staging& s) { return s.slots[0].variant == "c"; }};
+          usual, "", {"slots[0].variant"}, [](const ShowState& s) { return s.slots[0].variant == "c"; }};
     case ActionId::previous_variant:
       return Case{
-          usual, "", {"slots[0].variant"}, [](const Staging& s) { return s.slots[0].variant == "a"; }};
+          usual, "", {"slots[0].variant"}, [](const ShowState& s) { return s.slots[0].variant == "a"; }};
     case ActionId::choose_variant:
-      return Case{usual, "new one", {"slots[0].variant"}, [](const Staging& s) {
+      return Case{usual, "new one", {"slots[0].variant"}, [](const ShowState& s) {
                     return s.slots[0].variant == "new one";
                   }};
     case ActionId::nudge:
-      return Case{held, "1 -2 0.5", {"slots[0].nudge", "slots[0].pin"}, [](const Staging& s) {
+      return Case{held, "1 -2 0.5", {"slots[0].nudge", "slots[0].pin"}, [](const ShowState& s) {
                     return s.slots[0].nudge.isApprox(Eigen::Vector3d(0.101, 0.198, 0.3005), k_exact) &&
                            s.slots[0].pin->prototype_from_part.translation.isApprox(
                                Eigen::Vector3d(0.001, -0.002, 0.0005), k_exact);
                   }};
     case ActionId::place:
-      return Case{held, "120 0 -35.5 1 0 0 0", {"slots[0].nudge", "slots[0].pin"}, [](const Staging& s) {
+      return Case{held, "120 0 -35.5 1 0 0 0", {"slots[0].nudge", "slots[0].pin"}, [](const ShowState& s) {
                     return s.slots[0].nudge.isZero() &&
                            s.slots[0].pin->prototype_from_part.translation.isApprox(
                                Eigen::Vector3d(0.12, 0, -0.0355), k_exact);
                   }};
     case ActionId::release:
-      return Case{held, "", {"slots[0].nudge", "slots[0].pin"}, [](const Staging& s) {
+      return Case{held, "", {"slots[0].nudge", "slots[0].pin"}, [](const ShowState& s) {
                     return s.slots[0].nudge.isZero() && !s.slots[0].pin;
                   }};
     case ActionId::pair:
-      return Case{held, "aruco_4x4_50:7", {"slots[0].marker", "slots[0].pin"}, [](const Staging& s) {
+      return Case{held, "aruco_4x4_50:7", {"slots[0].marker", "slots[0].pin"}, [](const ShowState& s) {
                     return s.slots[0].marker == MarkerName{"aruco_4x4_50", "7"} && !s.slots[0].pin;
                   }};
     case ActionId::unpair:
-      return Case{held, "", {"slots[0].marker", "slots[0].pin"}, [](const Staging& s) {
+      return Case{held, "", {"slots[0].marker", "slots[0].pin"}, [](const ShowState& s) {
                     return !s.slots[0].marker && !s.slots[0].pin;
                   }};
     case ActionId::units:  // by the session: beside the part's file (pairing_test)
-      return Case{usual, "new one mm", {}, [](const Staging&) { return true; }};
+      return Case{usual, "new one mm", {}, [](const ShowState&) { return true; }};
     case ActionId::material:
-      return Case{usual, "#ffffff 0 0.4", {"slots[0].material"}, [](const Staging& s) {
-                    return s.slots[0].material == MaterialChange{Eigen::Vector3d(1, 1, 1), 0, 0.4};
+      return Case{usual, "#ffffff 0 0.4", {"slots[0].material"}, [](const ShowState& s) {
+                    return s.slots[0].material == MaterialOverride{Eigen::Vector3d(1, 1, 1), 0, 0.4};
                   }};
     case ActionId::save_look:
-      return Case{usual, "new", {"looks", "look", "other_look"}, [](const Staging& s) {
+      return Case{usual, "new", {"looks", "look", "other_look"}, [](const ShowState& s) {
                     return s.looks.size() == 4 && s.looks[3].name == "new" && s.look == "new" &&
                            s.other_look == "B";
                   }};
@@ -164,60 +164,60 @@ std::optional<Case> case_of(ActionId id, const Scene& scene) {
       return Case{usual,
                   "C",
                   {"look", "other_look", "slots[0].variant", "slots[0].pin", "light"},
-                  [](const Staging& s) {
+                  [](const ShowState& s) {
                     return s.look == "C" && s.other_look == "B" && s.slots[0].variant == "c" && s.light;
                   }};
     case ActionId::next_look:
       return Case{usual,
                   "",
                   {"look", "other_look", "slots[0].variant", "slots[0].pin", "light"},
-                  [](const Staging& s) { return s.look == "C" && s.slots[0].variant == "c"; }};
+                  [](const ShowState& s) { return s.look == "C" && s.slots[0].variant == "c"; }};
     case ActionId::previous_look:
       return Case{usual,
                   "",
                   {"look", "other_look", "slots[0].variant", "slots[0].pin", "light"},
-                  [](const Staging& s) { return s.look == "A" && s.slots[0].variant == "a"; }};
+                  [](const ShowState& s) { return s.look == "A" && s.slots[0].variant == "a"; }};
     case ActionId::flip:
       return Case{usual,
                   "",
                   {"look", "other_look", "slots[0].variant", "slots[0].pin", "light"},
-                  [](const Staging& s) { return s.look == "A" && s.other_look == "B"; }};
+                  [](const ShowState& s) { return s.look == "A" && s.other_look == "B"; }};
     case ActionId::split:
-      return Case{usual, "on", {"split"}, [](const Staging& s) { return s.split; }};
+      return Case{usual, "on", {"split"}, [](const ShowState& s) { return s.split; }};
     case ActionId::split_at:
-      return Case{usual, "-12.5", {"split_mm"}, [](const Staging& s) { return s.split_mm == -12.5; }};
+      return Case{usual, "-12.5", {"split_mm"}, [](const ShowState& s) { return s.split_mm == -12.5; }};
     case ActionId::delete_look:
-      return Case{usual, "A", {"looks", "deleted_look", "other_look"}, [](const Staging& s) {
+      return Case{usual, "A", {"looks", "deleted_look", "other_look"}, [](const ShowState& s) {
                     return s.looks.size() == 2 && s.deleted_look->name == "A" && s.other_look.empty();
                   }};
     case ActionId::undelete_look:
-      return Case{usual, "", {"looks", "deleted_look"}, [](const Staging& s) {
+      return Case{usual, "", {"looks", "deleted_look"}, [](const ShowState& s) {
                     return s.looks.size() == 4 && s.looks[3].name == "gone" && !s.deleted_look;
                   }};
     case ActionId::repair:  // by the session's devices (live_test, live_devices_test)
-      return Case{usual, "", {}, [](const Staging&) { return true; }};
+      return Case{usual, "", {}, [](const ShowState&) { return true; }};
     case ActionId::light:
-      return Case{usual, "30 45 0.6 0.3 0.1", {"light"}, [](const Staging& s) {
+      return Case{usual, "30 45 0.6 0.3 0.1", {"light"}, [](const ShowState& s) {
                     return s.light->above_rgb == Eigen::Vector3d::Constant(0.3);
                   }};
     case ActionId::blackout:
-      return Case{usual, "on", {"blackout"}, [](const Staging& s) { return s.blackout; }};
+      return Case{usual, "on", {"blackout"}, [](const ShowState& s) { return s.blackout; }};
     case ActionId::freeze:
-      return Case{usual, "on", {"frozen"}, [](const Staging& s) { return s.frozen; }};
+      return Case{usual, "on", {"frozen"}, [](const ShowState& s) { return s.frozen; }};
     case ActionId::grid:
-      return Case{usual, "on", {"grid"}, [](const Staging& s) { return s.grid; }};
+      return Case{usual, "on", {"grid"}, [](const ShowState& s) { return s.grid; }};
     case ActionId::marker_states:
-      return Case{usual, "on", {"marker_states"}, [](const Staging& s) { return s.marker_states; }};
+      return Case{usual, "on", {"marker_states"}, [](const ShowState& s) { return s.marker_states; }};
     case ActionId::screen:
       return Case{usual,
                   "stereo",
                   {"screens"},
-                  [](const Staging& s) {
+                  [](const ShowState& s) {
                     return s.screens[1].shows == Screen::stereo && s.screens[0].shows == Screen::rest;
                   },
                   "desk"};
     case ActionId::viewer:
-      return Case{usual, "Ann", {"viewer"}, [](const Staging& s) { return s.viewer == "Ann"; }};
+      return Case{usual, "Ann", {"viewer"}, [](const ShowState& s) { return s.viewer == "Ann"; }};
     case ActionId::count:
       return std::nullopt;
   }
@@ -229,14 +229,14 @@ TEST(Actions, EachChangesWhatItIsToChangeAndNothingElse) {
   for (const Action& action : actions()) {
     const auto wanted = case_of(action.id, scene);
     ASSERT_TRUE(wanted) << action.name << ": expected a case in this test, found none.";
-    const auto after = edited(scene, wanted->before, {}, make_edit(action.id, wanted->slot, wanted->value));
+    const auto after = apply_edit(scene, wanted->before, {}, make_edit(action.id, wanted->slot, wanted->value));
     ASSERT_TRUE(after) << action.name << ": " << after.message();
     EXPECT_EQ(changed(wanted->before, *after), wanted->members) << action.name;
     EXPECT_TRUE(wanted->is_done(*after)) << action.name;
-    if (action.takes != Takes::on_off) continue;
+    if (action.takes != ArgumentKind::on_off) continue;
     // A switch goes off again, and to the other side.
     const auto value = [&](const std::string& word) {
-      return changed(wanted->before, *edited(scene, *after, {}, make_edit(action.id, wanted->slot, word)));
+      return changed(wanted->before, *apply_edit(scene, *after, {}, make_edit(action.id, wanted->slot, word)));
     };
     EXPECT_EQ(value("off"), Members()) << action.name;
     EXPECT_EQ(value("toggle"), Members()) << action.name;
@@ -251,9 +251,9 @@ TEST(Actions, WhatTheSessionDoesIsReadAndRefusedInTime) {
   ASSERT_TRUE(unit) << unit.message();
   EXPECT_EQ(std::get<PartUnit>(unit->value).part, "new one");
   EXPECT_EQ(std::get<PartUnit>(unit->value).unit, "mm");
-  Staging dark = a_staging(scene);
+  ShowState dark = a_staging(scene);
   dark.blackout = true;
-  EXPECT_FALSE(edited(scene, dark, {}, make_edit(ActionId::repair)));
+  EXPECT_FALSE(apply_edit(scene, dark, {}, make_edit(ActionId::repair)));
 }
 
 TEST(Actions, AreFoundByTheirNames) {
@@ -264,7 +264,7 @@ TEST(Actions, AreFoundByTheirNames) {
     EXPECT_EQ(&action_of(action.id), &action);
     EXPECT_EQ(make_edit(action.id, "mirror", "x").action, action.name);
     EXPECT_FALSE(action.what.empty()) << action.name;
-    EXPECT_EQ(action.value.empty(), action.takes == Takes::nothing) << action.name;
+    EXPECT_EQ(action.value.empty(), action.takes == ArgumentKind::nothing) << action.name;
   }
   for (const char* unknown : {"", "dance", "next_variant ", "NEXT_VARIANT", "count"})
     EXPECT_EQ(find_action(unknown), nullptr) << unknown;
@@ -276,11 +276,11 @@ TEST(Actions, WhatIsOppositeGoesThereAndBack) {
   for (const Action& action : actions()) {
     if (!action.opposite) continue;
     EXPECT_EQ(action_of(*action.opposite).opposite, action.id) << action.name;
-    EXPECT_EQ(action.takes, Takes::nothing) << action.name;
-    const auto start = edited(scene, a_staging(scene), {}, make_edit(action.id, "mirror"));
+    EXPECT_EQ(action.takes, ArgumentKind::nothing) << action.name;
+    const auto start = apply_edit(scene, a_staging(scene), {}, make_edit(action.id, "mirror"));
     ASSERT_TRUE(start) << start.message();
-    const auto there = edited(scene, *start, {}, make_edit(*action.opposite, "mirror"));
-    const auto back = edited(scene, *there, {}, make_edit(action.id, "mirror"));
+    const auto there = apply_edit(scene, *start, {}, make_edit(*action.opposite, "mirror"));
+    const auto back = apply_edit(scene, *there, {}, make_edit(action.id, "mirror"));
     EXPECT_FALSE(changed(*start, *there).empty()) << action.name;
     EXPECT_EQ(changed(*start, *back), Members()) << action.name;
     ++pairs;

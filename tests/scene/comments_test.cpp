@@ -11,8 +11,8 @@ namespace {
 TEST(Comments, AreKeptWithTheProject) {
   const std::filesystem::path file = test::test_folder() / "comments.json";
   EXPECT_TRUE(load_comments(file).value().empty());
-  const auto first = comment_of("Ann", "evening", "mirror", "\u00fcber <b>\"all\"</b>\nhigher"),
-             second = comment_of("", "", "", "!");
+  const auto first = make_comment("Ann", "evening", "mirror", "\u00fcber <b>\"all\"</b>\nhigher"),
+             second = make_comment("", "", "", "!");
   ASSERT_TRUE(first && second) << first.message() << second.message();
   EXPECT_EQ(first->at.size(), std::string("2026-01-31T12:00:00Z").size());
   ASSERT_TRUE(save_comments(file, {*first, *second}));
@@ -29,12 +29,12 @@ TEST(Comments, AreKeptWithTheProject) {
 
 TEST(Comments, AreBoundedText) {
   const std::string longest(k_longest_comment, 'x');
-  EXPECT_TRUE(comment_of("Ann", "", "", longest));
+  EXPECT_TRUE(make_comment("Ann", "", "", longest));
   for (const std::string& bad :
        {std::string(), longest + "x", std::string("\x07"), std::string("\xff\xfe"), std::string(1, '\0')})
-    EXPECT_FALSE(comment_of("Ann", "", "", bad)) << bad.size();
-  EXPECT_FALSE(comment_of(std::string(k_longest_name + 1, 'x'), "", "", "text"));
-  EXPECT_FALSE(comment_of("Ann", "\xff", "", "text"));
+    EXPECT_FALSE(make_comment("Ann", "", "", bad)) << bad.size();
+  EXPECT_FALSE(make_comment(std::string(k_longest_name + 1, 'x'), "", "", "text"));
+  EXPECT_FALSE(make_comment("Ann", "\xff", "", "text"));
   EXPECT_FALSE(save_comments(test::test_folder() / "many.json",
                              std::vector<Comment>(k_most_comments + 1, Comment{"", "", "", "", "x"})));
 }

@@ -7,9 +7,9 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "scene/glb.h"
-#include "scene/nearest.h"
+#include "scene/mesh_bvh.h"
 #include "scene/tangents.h"
 #include "tests/support/matchers.h"
 
@@ -99,10 +99,10 @@ std::string textured_gltf(const std::string& image) {
 }
 
 std::string small_png() {
-  cv::Mat picture(2, 2, CV_8UC3, cv::Scalar(10, 20, 30));
-  picture.at<cv::Vec3b>(0, 1) = {200, 100, 50};
+  cv::Mat image(2, 2, CV_8UC3, cv::Scalar(10, 20, 30));
+  image.at<cv::Vec3b>(0, 1) = {200, 100, 50};
   std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", picture, bytes);
+  cv::imencode(".png", image, bytes);
   return {bytes.begin(), bytes.end()};
 }
 
@@ -189,11 +189,11 @@ std::string gltf_with(const std::string& alpha, const std::string& image) {
 
 TEST(Mesh, AlphaOfATextureCutsOut) {
   // Clear at the left, in black; the right is half clear, then whole.
-  cv::Mat picture(1, 3, CV_8UC4, cv::Scalar(10, 200, 30, 255));
-  picture.at<cv::Vec4b>(0, 0) = {0, 0, 0, 0};
-  picture.at<cv::Vec4b>(0, 1) = {10, 200, 30, 100};
+  cv::Mat image(1, 3, CV_8UC4, cv::Scalar(10, 200, 30, 255));
+  image.at<cv::Vec4b>(0, 0) = {0, 0, 0, 0};
+  image.at<cv::Vec4b>(0, 1) = {10, 200, 30, 100};
   std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", picture, bytes);
+  cv::imencode(".png", image, bytes);
   written("decal/paint.png", std::string(bytes.begin(), bytes.end()));
   const auto loaded = [&](const std::string& alpha) {
     const auto mesh = load_mesh(written("decal/part.gltf", gltf_with(alpha, R"("uri":"paint.png")")), "m");
@@ -210,8 +210,8 @@ TEST(Mesh, AlphaOfATextureCutsOut) {
   EXPECT_EQ(masked.texture.at<cv::Vec4b>(0, 0), cv::Vec4b(10, 200, 30, 0));  // no black to bleed in
   EXPECT_EQ(masked.texture.at<cv::Vec4b>(0, 1), cv::Vec4b(10, 200, 30, 100));
   // Thin everywhere: shown rather than lost.
-  picture.setTo(cv::Scalar(10, 200, 30, 100));
-  cv::imencode(".png", picture, bytes);
+  image.setTo(cv::Scalar(10, 200, 30, 100));
+  cv::imencode(".png", image, bytes);
   written("decal/paint.png", std::string(bytes.begin(), bytes.end()));
   const Material thin = loaded(R"("alphaMode":"BLEND",)");
   EXPECT_EQ(thin.cut_below, 0);
@@ -221,10 +221,10 @@ TEST(Mesh, AlphaOfATextureCutsOut) {
 }
 
 TEST(Mesh, TheBaseColoursAlphaMultipliesTheTextures) {
-  cv::Mat picture(1, 2, CV_8UC4, cv::Scalar(10, 200, 30, 255));
-  picture.at<cv::Vec4b>(0, 1)[3] = 100;
+  cv::Mat image(1, 2, CV_8UC4, cv::Scalar(10, 200, 30, 255));
+  image.at<cv::Vec4b>(0, 1)[3] = 100;
   std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", picture, bytes);
+  cv::imencode(".png", image, bytes);
   written("faint/paint.png", std::string(bytes.begin(), bytes.end()));
   const auto loaded = [&](const std::string& factor) {
     std::string text = gltf_with(R"("alphaMode":"MASK",)", R"("uri":"paint.png")");
@@ -244,7 +244,7 @@ TEST(Mesh, TheBaseColoursAlphaMultipliesTheTextures) {
     EXPECT_NE(told.find(word), std::string::npos) << told;
 }
 
-// textured_gltf with more in its material, whose textures 1 to 4 are these pictures, and a normal at each
+// textured_gltf with more in its material, whose textures 1 to 4 are these images, and a normal at each
 // corner.
 std::string gltf_with_maps(const std::string& more, const std::vector<std::string>& files) {
   std::string images = R"("uri":"paint.png")", textures = R"("textures":[{"source":0})";
@@ -257,9 +257,9 @@ std::string gltf_with_maps(const std::string& more, const std::vector<std::strin
   return text.replace(text.find(before), before.size(), textures);
 }
 
-std::string png_of(const cv::Mat& picture) {
+std::string png_of(const cv::Mat& image) {
   std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", picture, bytes);
+  cv::imencode(".png", image, bytes);
   return {bytes.begin(), bytes.end()};
 }
 
@@ -277,11 +277,11 @@ TEST(Mesh, SurfaceMapsOfGltfAreRead) {
   const auto mesh = load_mesh(written("maps/part.gltf", text), "m");
   ASSERT_TRUE(mesh) << mesh.message();
   const Material& material = mesh->materials[mesh->triangle_materials[0]];
-  EXPECT_EQ(material.maps.normals.picture.at<cv::Vec3b>(0, 0), cv::Vec3b(255, 128, 128));
-  EXPECT_EQ(material.maps.metallic_roughness.picture.at<cv::Vec3b>(1, 1), cv::Vec3b(51, 102, 153));
-  EXPECT_EQ(material.maps.occlusion.picture.data,
-            material.maps.metallic_roughness.picture.data);  // read once
-  EXPECT_EQ(material.maps.emission.picture.at<cv::Vec3b>(0, 1), cv::Vec3b(77, 77, 77));
+  EXPECT_EQ(material.maps.normals.image.at<cv::Vec3b>(0, 0), cv::Vec3b(255, 128, 128));
+  EXPECT_EQ(material.maps.metallic_roughness.image.at<cv::Vec3b>(1, 1), cv::Vec3b(51, 102, 153));
+  EXPECT_EQ(material.maps.occlusion.image.data,
+            material.maps.metallic_roughness.image.data);  // read once
+  EXPECT_EQ(material.maps.emission.image.at<cv::Vec3b>(0, 1), cv::Vec3b(77, 77, 77));
   EXPECT_NE(material.maps.normals.file.find("normals.png"), std::string::npos);
   EXPECT_EQ(material.maps.normal_scale, 0.5f);
   EXPECT_EQ(material.maps.occlusion_strength, 0.75f);
@@ -371,7 +371,7 @@ TEST(Mesh, ATextureTransformMovesTheUvs) {
   expect_uvs("", {0, 0}, {1, 0}, {0, 1});
   expect_uvs(R"("offset":[0.25,0.5])", {0.25, 0.5}, {1.25, 0.5}, {0.25, 1.5});
   expect_uvs(R"("scale":[2,3])", {0, 0}, {2, 0}, {0, 3});
-  // A quarter of a turn, counter-clockwise as the picture is seen.
+  // A quarter of a turn, counter-clockwise as the image is seen.
   expect_uvs(R"("rotation":1.5707963)", {0, 0}, {0, -1}, {1, 0});
   expect_uvs(R"("offset":[0.25,0.5],"rotation":1.5707963,"scale":[2,3])", {0.25, 0.5}, {0.25, -1.5},
              {3.25, 0.5});
@@ -430,7 +430,7 @@ std::string gltf_with_tangents(const std::string& place, const Vector3f& tangent
   return text;
 }
 
-// The normals of a picture follow it where a transform turns it.
+// The normals of an image follow it where a transform turns it.
 TEST(Mesh, TangentsOfTheFileGoWhereATransformTurnsTheTexture) {
   written("turned/paint.png", small_png());
   const auto tangent = [&](const std::string& how) {
@@ -576,7 +576,7 @@ TEST(Nearest, AgreesWithASearchOverSamplesOfACube) {
   std::uniform_real_distribution<double> u(-3, 3);
   for (int i = 0; i < 500; ++i) {
     const Vector3d p(u(rng), u(rng), u(rng));
-    const SurfacePoint found = nearest_on(*mesh, p);
+    const MeshPoint found = nearest_on(*mesh, p);
     Vector3d expected = p.cwiseMax(-1).cwiseMin(1);
     if (expected == p) {  // inside: onto the nearest side
       int axis = 0;
@@ -608,11 +608,11 @@ TEST(Glb, PutsMeshesInTheirPlaces) {
   textured.triangles.push_back({0, 2, 1});
   textured.triangle_materials = {0, 1};
   const Pose lifted(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized())), {1, -2, 0.5});
-  const std::vector<PlacedMesh> placed = {
+  const std::vector<GlbNode> placed = {
       {"plain", &plain, {}}, {"lifted", &textured, lifted}, {"again", &plain, lifted}};
-  const std::string bytes = glb(placed);
-  EXPECT_EQ(bytes, glb(placed));
-  EXPECT_LT(bytes.size(), glb(std::vector{placed[0], placed[1]}).size() + 300);  // a mesh is in it once
+  const std::string bytes = encode_glb(placed);
+  EXPECT_EQ(bytes, encode_glb(placed));
+  EXPECT_LT(bytes.size(), encode_glb(std::vector{placed[0], placed[1]}).size() + 300);  // a mesh is in it once
 
   const auto loaded = load_mesh(written("placed.glb", bytes), "m");
   ASSERT_TRUE(loaded) << loaded.message();
@@ -651,14 +651,14 @@ TEST(Glb, MapsOfASurfaceComeBack) {
                                 .normal_scale = 0.5f,
                                 .occlusion_strength = 0.75f}};
   const Pose lifted(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized())), {1, -2, 0.5});
-  const std::vector<PlacedMesh> placed = {{"part", &mesh, lifted}};
-  const auto loaded = load_mesh(written("maps.glb", glb(placed)), "m");
+  const std::vector<GlbNode> placed = {{"part", &mesh, lifted}};
+  const auto loaded = load_mesh(written("maps.glb", encode_glb(placed)), "m");
   ASSERT_TRUE(loaded) << loaded.message();
   const Material& material = loaded->materials[loaded->triangle_materials[0]];
-  EXPECT_EQ(material.maps.metallic_roughness.picture.at<cv::Vec3b>(3, 3), cv::Vec3b(51, 102, 153));
-  EXPECT_EQ(material.maps.occlusion.picture.data, material.maps.metallic_roughness.picture.data);
-  EXPECT_EQ(material.maps.normals.picture.at<cv::Vec3b>(3, 3), cv::Vec3b(200, 140, 90));
-  EXPECT_EQ(material.maps.emission.picture.at<cv::Vec3b>(3, 3), cv::Vec3b(1, 2, 3));
+  EXPECT_EQ(material.maps.metallic_roughness.image.at<cv::Vec3b>(3, 3), cv::Vec3b(51, 102, 153));
+  EXPECT_EQ(material.maps.occlusion.image.data, material.maps.metallic_roughness.image.data);
+  EXPECT_EQ(material.maps.normals.image.at<cv::Vec3b>(3, 3), cv::Vec3b(200, 140, 90));
+  EXPECT_EQ(material.maps.emission.image.at<cv::Vec3b>(3, 3), cv::Vec3b(1, 2, 3));
   EXPECT_EQ(material.maps.normal_scale, 0.5f);
   EXPECT_EQ(material.maps.occlusion_strength, 0.75f);
   EXPECT_TRUE(test::near(material.emitted.cast<double>(), Vector3d(0.5, 1, 0.25), 1e-6));

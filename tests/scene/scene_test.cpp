@@ -6,8 +6,8 @@
 #include <opencv2/core.hpp>
 
 #include "core/file.h"
-#include "core/picture.h"
-#include "scene/posed.h"
+#include "core/image_io.h"
+#include "scene/posed_scene.h"
 #include "tests/support/matchers.h"
 
 namespace limn::scene {
@@ -85,7 +85,7 @@ TEST(Scene, EveryKeyIsRead) {
   EXPECT_EQ(found[2].markers[0].marker.id, "5");
 }
 
-TEST(Scene, PrototypeIsOptionalAndAlbedoMayBeAPicture) {
+TEST(Scene, PrototypeIsOptionalAndAlbedoMayBeAnImage) {
   json without = whole_scene();
   without.erase("prototype");
   const auto scene = load_scene(folder_with(without) / "scene.json");
@@ -100,9 +100,9 @@ TEST(Scene, PrototypeIsOptionalAndAlbedoMayBeAPicture) {
   ASSERT_TRUE(
       write_file(folder / "uv.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"));
   ASSERT_TRUE(write_png(folder / "paint.png", cv::Mat(4, 4, CV_8UC3, cv::Scalar(1, 2, 3))));
-  const auto with_picture = load_scene(folder);
-  ASSERT_TRUE(with_picture) << with_picture.message();
-  EXPECT_EQ(with_picture->prototype->albedo_picture.at<cv::Vec3b>(3, 3), cv::Vec3b(1, 2, 3));
+  const auto with_image = load_scene(folder);
+  ASSERT_TRUE(with_image) << with_image.message();
+  EXPECT_EQ(with_image->prototype->albedo_image.at<cv::Vec3b>(3, 3), cv::Vec3b(1, 2, 3));
 }
 
 TEST(Scene, AMarkerMayCarryTheViewersEye) {
@@ -122,7 +122,7 @@ TEST(Scene, AMarkerMayCarryTheViewersEye) {
       Pose(Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitY())), {0.3, -0.2, 0.1});
   const std::vector<Track> tracks = {prototype, cap};
   const PosedScene there = posed(*scene, tracks);
-  ASSERT_EQ(there.eyes.size(), 1u);
+  ASSERT_EQ(there.viewpoints.size(), 1u);
   const auto viewer = viewer_of(*scene, there, -Eigen::Vector3d::UnitY());
   ASSERT_TRUE(viewer);
   EXPECT_TRUE(test::near(viewer->imager_from_world.inverse().translation,
@@ -268,21 +268,21 @@ TEST(Scene, PartsThatCannotBeLoadedAreLeftOutWhenThatIsAskedFor) {
   ASSERT_TRUE(write_file(folder / "slots/mirror/half.glb", "glTF"));
   fs::remove(folder / "mirror-sport.glb");
   EXPECT_FALSE(load_scene(folder));
-  std::vector<LeftOut> left_out;
-  const auto scene = load_scene(folder, &left_out);
+  std::vector<SkippedVariant> skipped_variants;
+  const auto scene = load_scene(folder, &skipped_variants);
   ASSERT_TRUE(scene) << scene.message();
   EXPECT_EQ(scene->find_slot("mirror")->variants.size(), 2u);
-  ASSERT_EQ(left_out.size(), 2u);
-  EXPECT_EQ(left_out[0].slot, "mirror");
-  EXPECT_NE(left_out[0].why.find("mirror-sport.glb"), std::string::npos) << left_out[0].why;
-  EXPECT_EQ(left_out[1].variant, "half");
+  ASSERT_EQ(skipped_variants.size(), 2u);
+  EXPECT_EQ(skipped_variants[0].slot, "mirror");
+  EXPECT_NE(skipped_variants[0].why.find("mirror-sport.glb"), std::string::npos) << skipped_variants[0].why;
+  EXPECT_EQ(skipped_variants[1].variant, "half");
 
   fs::remove(folder / "trim-line.glb");
-  left_out.clear();
-  const auto without_trim = load_scene(folder, &left_out);
+  skipped_variants.clear();
+  const auto without_trim = load_scene(folder, &skipped_variants);
   ASSERT_TRUE(without_trim) << without_trim.message();
   EXPECT_EQ(without_trim->find_slot("trim"), nullptr);
-  EXPECT_EQ(left_out.size(), 3u);
+  EXPECT_EQ(skipped_variants.size(), 3u);
 }
 
 TEST(Scene, TheDoorOfTheConfigFolderLoads) {

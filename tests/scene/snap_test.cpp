@@ -2,8 +2,8 @@
 
 #include <cstdio>
 
-#include "scene/nearest.h"
-#include "scene/posed.h"
+#include "scene/mesh_bvh.h"
+#include "scene/posed_scene.h"
 #include "tests/support/matchers.h"
 #include "tests/tracker/seen_body.h"
 #include "tracker/body_pose.h"
@@ -55,7 +55,7 @@ struct Sideways {
   double turn_deg = 0;  // of the part, worst
 };
 
-// RMS over many pictures of a lone 40 mm marker, on a surface that is turned by `off_axis` from the line of
+// RMS over many images of a lone 40 mm marker, on a surface that is turned by `off_axis` from the line of
 // sight.
 Sideways measured(const Mesh& mesh, double off_axis, std::mt19937_64& rng) {
   const Imager camera = test::camera_1080p();
@@ -65,21 +65,21 @@ Sideways measured(const Mesh& mesh, double off_axis, std::mt19937_64& rng) {
   Track prototype;
   prototype.body = "prototype";
   prototype.world_from_body = world_from_prototype;
-  constexpr int k_pictures = 300;
+  constexpr int k_images = 300;
   Sideways out;
-  for (int i = 0; i < k_pictures; ++i) {
+  for (int i = 0; i < k_images; ++i) {
     const auto detections =
         test::detections_of({"mirror", body.markers}, camera, world_from_prototype, k_noise_px, rng);
     const tracker::View view{&camera, detections};
     const auto track = tracker::world_from_body(body, std::span(&view, 1), Stamp{});
     if (!track) continue;
     const Vector3d error = track->world_from_body.translation - world_from_prototype.translation;
-    out.depth_mm += std::pow(1e3 * error.dot(world_from_prototype.translation.normalized()), 2) / k_pictures;
+    out.depth_mm += std::pow(1e3 * error.dot(world_from_prototype.translation.normalized()), 2) / k_images;
     const Vector3d p_prototype = world_from_prototype.inverse() * track->world_from_body.translation;
-    out.nearest_mm += 1e6 * nearest_on(mesh, p_prototype).p.squaredNorm() / k_pictures;
+    out.nearest_mm += 1e6 * nearest_on(mesh, p_prototype).p.squaredNorm() / k_images;
     const Track tracks[] = {prototype, *track};
     const Pose found = world_from_prototype.inverse() * posed(scene, tracks).parts.at(0).world_from_part;
-    out.likeliest_mm += 1e6 * found.translation.squaredNorm() / k_pictures;
+    out.likeliest_mm += 1e6 * found.translation.squaredNorm() / k_images;
     out.turn_deg =
         std::max(out.turn_deg, angle_between(found.rotation, Eigen::Quaterniond::Identity()) / 1_deg);
   }

@@ -6,7 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/file.h"
-#include "scene/nearest.h"
+#include "scene/mesh_bvh.h"
 #include "sim/truth.h"
 #include "tests/support/matchers.h"
 
@@ -109,8 +109,8 @@ TEST(CarDoor, TheTrimLiesOnTheSurfaceWithinAFifthOfAMillimetre) {
   tracks[1].body = "trim";
   tracks[1].world_from_body = sim::car_door_slot_places().at("trim");
   const Pose prototype_from_part = scene::posed(scene, tracks).parts.at(0).world_from_part;
-  for (const sim::SurfacePoint& point : sim::surface_points(trim.variants[0].mesh, 500, 5)) {
-    const scene::SurfacePoint nearest =
+  for (const sim::SampledPoint& point : sim::surface_points(trim.variants[0].mesh, 500, 5)) {
+    const scene::MeshPoint nearest =
         scene::nearest_on(scene.prototype->mesh, prototype_from_part * point.p);
     ASSERT_LT(nearest.distance, 0.2_mm);
     ASSERT_GT((prototype_from_part * point.p - nearest.p).dot(nearest.d_normal), 0.0) << "under the clay";
@@ -128,7 +128,7 @@ TEST(CarDoor, PlatesTouchTheClayAndAreClearOfIt) {
     for (int r = -5; r <= 5; ++r)
       for (int c = -5; c <= 5; ++c) {
         const Eigen::Vector3d p = plate * Eigen::Vector3d(c * 0.0052, r * 0.0052, 0);
-        const scene::SurfacePoint nearest = scene::nearest_on(scene.prototype->mesh, p);
+        const scene::MeshPoint nearest = scene::nearest_on(scene.prototype->mesh, p);
         const double height = (p - nearest.p).dot(nearest.d_normal);
         least = std::min(least, height), most = std::max(most, height);
       }
@@ -175,7 +175,7 @@ TEST(CarDoor, TheStudioSeesTheDoorInItsWholeWorkingVolume) {
     }
     EXPECT_GE(seen, 8);
     int reached = 0, count = 0;
-    for (const sim::SurfacePoint& point : sim::surface_points(world.scene->prototype->mesh, 400, 1)) {
+    for (const sim::SampledPoint& point : sim::surface_points(world.scene->prototype->mesh, 400, 1)) {
       if (point.n.z() < 0.7) continue;  // sides and back
       ++count;
       for (const Imager& projector : world.rig.projectors)

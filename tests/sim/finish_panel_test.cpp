@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/file.h"
-#include "scene/nearest.h"
+#include "scene/mesh_bvh.h"
 #include "scene/scene.h"
 #include "tests/support/matchers.h"
 
@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 const fs::path k_finishes = fs::path(LIMN_SOURCE_DIR) / "config/scenes/finishes";
 
-// Compared as shapes and pictures, not as bytes: another processor's sine differs in its last bit.
+// Compared as shapes and images, not as bytes: another processor's sine differs in its last bit.
 TEST(FinishPanel, TheCommittedFilesAreWhatTheGeneratorMakes) {
   const fs::path made = test::test_folder();
   for (const auto& [name, content] : sim::finish_panel_files()) {
@@ -31,8 +31,8 @@ TEST(FinishPanel, TheCommittedFilesAreWhatTheGeneratorMakes) {
       ASSERT_LT((found->positions[i] - expected->positions[i]).norm(), 2e-6F);
     for (const auto map : {&scene::SurfaceMaps::metallic_roughness, &scene::SurfaceMaps::normals,
                            &scene::SurfaceMaps::occlusion, &scene::SurfaceMaps::emission}) {
-      const cv::Mat &a = (found->materials[0].maps.*map).picture,
-                    &b = (expected->materials[0].maps.*map).picture;
+      const cv::Mat &a = (found->materials[0].maps.*map).image,
+                    &b = (expected->materials[0].maps.*map).image;
       ASSERT_EQ(a.size(), b.size());
       if (a.empty()) continue;
       EXPECT_LE(cv::norm(a, b, cv::NORM_INF), 1);
@@ -46,11 +46,11 @@ TEST(FinishPanel, TheSceneHasAllMapsAndItsPlateLiesOnThePanel) {
   ASSERT_TRUE(scene->light.has_value());
   const scene::SurfaceMaps& maps = scene->find_slot("emblem")->variants[0].mesh.materials[0].maps;
   for (const scene::Texture& map : {maps.metallic_roughness, maps.normals, maps.occlusion, maps.emission})
-    EXPECT_FALSE(map.picture.empty());
+    EXPECT_FALSE(map.image.empty());
   const scene::Mesh& plate = scene->find_slot("plate")->variants[0].mesh;
   EXPECT_EQ(scene->find_slot("plate")->mode, scene::Mode::surface);
   for (const Eigen::Vector3f& p : plate.positions) {
-    const scene::SurfacePoint nearest = scene::nearest_on(scene->prototype->mesh, p.cast<double>());
+    const scene::MeshPoint nearest = scene::nearest_on(scene->prototype->mesh, p.cast<double>());
     EXPECT_LT(nearest.distance, 1e-3);
     EXPECT_GT((p.cast<double>() - nearest.p).dot(nearest.d_normal), 0);
   }

@@ -4,7 +4,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "sim/photograph.h"
+#include "sim/sensor_model.h"
 #include "tests/sim/small_world.h"
 #include "tests/support/matchers.h"
 
@@ -147,10 +147,10 @@ TEST(Trace, AnotherPatternIsALookup) {
   for (int r = 0; r < 150; ++r)
     for (int c = 0; c < 200; ++c) b.at<std::uint8_t>(r, c) = c / 3 % 2 == 0 ? 255 : 0;
   (void)sim::photograph(world, samples, std::vector<cv::Mat>{a}, 1);
-  const cv::Mat looked_up = sim::photograph(world, samples, std::vector<cv::Mat>{b}, 2);
+  const cv::Mat lookup = sim::photograph(world, samples, std::vector<cv::Mat>{b}, 2);
   const cv::Mat traced = sim::photograph(world, sim::trace(world, 0), std::vector<cv::Mat>{b}, 2);
-  EXPECT_TRUE(image_near(looked_up, traced, 0, 0, "lookup"));
-  EXPECT_GT(cv::norm(looked_up, sim::photograph(world, samples, std::vector<cv::Mat>{a}, 2)), 100);
+  EXPECT_TRUE(image_near(lookup, traced, 0, 0, "lookup"));
+  EXPECT_GT(cv::norm(lookup, sim::photograph(world, samples, std::vector<cv::Mat>{a}, 2)), 100);
 }
 
 }  // namespace

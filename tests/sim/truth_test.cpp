@@ -65,7 +65,7 @@ TEST(Truth, APointBehindSomethingIsNotVisible) {
   EXPECT_FALSE(truth.visible(camera, {0.09, 1, 0}));
   EXPECT_TRUE(truth.visible(camera, {0.11, 1, 0}));
   EXPECT_TRUE(truth.visible(camera, {0, 0.5, 0}));   // the occluder's own surface
-  EXPECT_FALSE(truth.visible(camera, {0.9, 1, 0}));  // beside the picture
+  EXPECT_FALSE(truth.visible(camera, {0.9, 1, 0}));  // beside the image
 }
 
 TEST(Truth, APartIsOnSurfaceBeforeThePrototypeAndOffBeyondItsEdge) {
@@ -109,12 +109,12 @@ TEST(Truth, ASurfacePartMayLieUpToTwoMillimetresDeep) {
   }
 }
 
-TEST(Truth, ObjectPictureNamesTheNearestThing) {
+TEST(Truth, ObjectImageNamesTheNearestThing) {
   const Stage stage(0.1);
-  const sim::ObjectPicture seen =
-      sim::Truth(stage.world, stage.parts).object_picture(stage.world.rig.cameras[0]);
+  const sim::ObjectImage seen =
+      sim::Truth(stage.world, stage.parts).object_image(stage.world.rig.cameras[0]);
   const auto name = [&](int c, int r) {
-    return seen.names.at(static_cast<std::size_t>(seen.picture.at<std::int16_t>(r, c)));
+    return seen.names.at(static_cast<std::size_t>(seen.image.at<std::int16_t>(r, c)));
   };
   EXPECT_EQ(name(160, 120), "prototype");
   EXPECT_EQ(name(230, 120), "part-part");
@@ -131,7 +131,7 @@ TEST(Truth, SurfacePointsAreUniformByAreaAndOnTheMesh) {
   ASSERT_EQ(points.size(), 20000U);
   int beside = 0;
   double x = 0;
-  for (const sim::SurfacePoint& point : points) {
+  for (const sim::SampledPoint& point : points) {
     EXPECT_EQ(point.p.z(), 0);
     EXPECT_TRUE(near(point.n, Eigen::Vector3d(0, 0, -1), 1e-6));
     if (point.p.x() >= 1) ++beside, x += point.p.x();

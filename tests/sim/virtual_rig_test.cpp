@@ -56,7 +56,7 @@ TEST(VirtualRig, StampsRiseAndTheClockIsVirtual) {
   EXPECT_EQ(a.camera, "camera0");
 }
 
-TEST(VirtualRig, MovingAnObjectChangesThePicture) {
+TEST(VirtualRig, MovingAnObjectChangesTheImage) {
   sim::World world = small_world();
   world.objects.push_back(sim::sheet("board", 0.1, 0.1, {}, facing_minus_y(0, 0.9, 0)));
   world.room.ambient = 0.5;
@@ -80,15 +80,15 @@ TEST(VirtualRig, AClearStageComesBack) {
   world.room.ambient = 0.5;
   sim::VirtualRig rig(std::move(world));
   const cv::Mat before = rig.camera(0).next().value().image;
-  rig.clear_stage();
+  rig.remove_prototype();
   const cv::Mat clear = rig.camera(0).next().value().image;
   EXPECT_EQ(clear.channels(), 1);
   for (const auto object : rig.samples(0).object) ASSERT_EQ(object, 0);  // the wall alone
-  rig.restore_stage();
+  rig.restore_prototype();
   EXPECT_TRUE(image_near(rig.camera(0).next().value().image, before, 0, 0, "restored"));
 }
 
-TEST(VirtualRig, APictureOfTheWrongSizeIsRefusedWithBothSizes) {
+TEST(VirtualRig, AnImageOfTheWrongSizeIsRefusedWithBothSizes) {
   sim::VirtualRig rig(small_world());
   const auto shown = rig.projector(0).show(cv::Mat::zeros(10, 20, CV_8U));
   ASSERT_FALSE(shown);

@@ -17,9 +17,9 @@ const fs::path k_worlds = fs::path(LIMN_SOURCE_DIR) / "config" / "worlds";
 
 // Stands in for the tracker's families: black with a white middle.
 Result<cv::Mat> plain_marker(const MarkerName&) {
-  cv::Mat picture = cv::Mat::zeros(6, 6, CV_8U);
-  picture(cv::Rect(2, 2, 2, 2)) = 255;
-  return picture;
+  cv::Mat image = cv::Mat::zeros(6, 6, CV_8U);
+  image(cv::Rect(2, 2, 2, 2)) = 255;
+  return image;
 }
 
 Result<sim::World> loaded(std::string text) {

@@ -6,7 +6,7 @@
 #include <functional>
 #include <opencv2/core.hpp>
 
-#include "core/picture.h"
+#include "core/image_io.h"
 
 namespace limn::test {
 namespace {
@@ -62,9 +62,9 @@ testing::AssertionResult image_near(
                 << " (limit " << worst << ")" << (finite ? "" : ", NaN or infinite values");
   const auto folder = test_folder();
   const double scale = actual.depth() == CV_8U ? 1 : 255;
-  auto write = [&](const char* kind, const cv::Mat& picture, double factor) {
+  auto write = [&](const char* kind, const cv::Mat& image, double factor) {
     cv::Mat bytes;
-    picture.reshape(actual.channels(), actual.rows).convertTo(bytes, CV_8U, factor);
+    image.reshape(actual.channels(), actual.rows).convertTo(bytes, CV_8U, factor);
     const auto path = folder / (name + "-" + kind + ".png");
     if (write_png(path, bytes)) result << "\n  " << path.string();
   };

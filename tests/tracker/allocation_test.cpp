@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "tests/support/matchers.h"
-#include "tests/tracker/marker_pictures.h"
+#include "tests/tracker/marker_images.h"
 #include "tracker/detector.h"
 
 namespace {
@@ -32,7 +32,7 @@ TEST(Allocation, StopsAfterTheFirstFrame) {
   for (int i = 0; i < 4; ++i)
     markers.push_back(test::placed(lens, {"apriltag_36h11", std::to_string(i)}, {100.0 + 140 * i, 240}, 80,
                                    0.3 * i, 0.4, 0.7 * i));
-  const cv::Mat grey = test::picture_of(lens, test::clutter(640, 480, rng), markers, {}, rng);
+  const cv::Mat grey = test::image_of(lens, test::clutter(640, 480, rng), markers, {}, rng);
   Detector detector(Families::load(std::vector<std::string>{"apriltag_36h11", "aruco_5x5_50"}).value());
   std::vector<Detection> found, again;
   detector.detect(grey, nullptr, &found);
@@ -49,7 +49,7 @@ TEST(Allocation, StopsAfterTheFirstFrame) {
 }
 
 // Fitted patterns, motion among them, lines between shadows, covered codes.
-TEST(Allocation, StopsInHardPicturesToo) {
+TEST(Allocation, StopsInHardImagesToo) {
   auto rng = test::test_rng();
   const Lens lens =
       Lens::create("LENSMODEL_OPENCV8", {600, 600, 319.5, 239.5, -0.2, 0.05, 0, 0, 0, 0, 0, 0}).value();
@@ -69,7 +69,7 @@ TEST(Allocation, StopsInHardPicturesToo) {
   const cv::Mat clutter = test::clutter(640, 480, rng);
   {
     SCOPED_TRACE("blurred");
-    expect_none(test::picture_of(lens, clutter, markers, {.blur_px = 2.5, .noise_levels = 2}, rng), 3);
+    expect_none(test::image_of(lens, clutter, markers, {.blur_px = 2.5, .noise_levels = 2}, rng), 3);
   }
   cv::Mat light = test::light_of(lens, clutter, markers, {}, rng);
   {

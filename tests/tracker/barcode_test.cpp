@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "tests/support/matchers.h"
-#include "tests/tracker/marker_pictures.h"
+#include "tests/tracker/marker_images.h"
 #include "tracker/detector.h"
 
 namespace limn::tracker {
@@ -87,12 +87,12 @@ struct Count {
   double worst_px = 0;
 };
 
-// One marker a picture, its id by its number.
+// One marker an image, its id by its number.
 Count seen(const std::string& family,
            double low_px,
            double high_px,
            const cv::Mat& background,
-           const test::PictureOptions& options,
+           const test::ImageOptions& options,
            int count) {
   auto rng = test::test_rng();
   const Lens lens = pinhole_vga();
@@ -107,7 +107,7 @@ Count seen(const std::string& family,
     const auto truth = test::true_corners(lens, marker);
     ++result.shown;
     for (const Detection& found :
-         detector.detect(test::picture_of(lens, background, std::vector{marker}, options, rng))) {
+         detector.detect(test::image_of(lens, background, std::vector{marker}, options, rng))) {
       const double off = (found.corners_px[0] - truth[0]).norm();
       const bool right = found.marker == name && off < 3;
       right ? ++result.found : ++result.wrong;
@@ -157,7 +157,7 @@ TEST(Barcode, MarkersOfOtherFamiliesAreNone) {
         markers.push_back(test::placed(
             lens, {family, std::to_string(i + k)}, {120 + 200 * (k % 3), 140 + 200 * (k / 3)},
             uniform(rng, 24, 110), uniform(rng, 0, 6.28), uniform(rng, 0, 50_deg), uniform(rng, 0, 6.28)));
-      const cv::Mat grey = test::picture_of(lens, test::plain(640, 480, 100), markers,
+      const cv::Mat grey = test::image_of(lens, test::plain(640, 480, 100), markers,
                                             {.blur_px = 0.6, .noise_levels = 2}, rng);
       shown += 6;
       taken += static_cast<int>(detector.detect(grey).size());
@@ -166,7 +166,7 @@ TEST(Barcode, MarkersOfOtherFamiliesAreNone) {
   EXPECT_EQ(taken, 0);
 }
 
-TEST(Barcode, MixWithOtherFamiliesInOnePicture) {
+TEST(Barcode, MixWithOtherFamiliesInOneImage) {
   auto rng = test::test_rng();
   const Lens lens = pinhole_vga();
   const std::vector<std::string> names = {"apriltag_36h11", "artoolkit_3x3", "aruco_4x4_50", "artoolkit_4x4"};
@@ -179,7 +179,7 @@ TEST(Barcode, MixWithOtherFamiliesInOnePicture) {
                                    uniform(rng, 0, 6.28), uniform(rng, 0, 40_deg), uniform(rng, 0, 6.28)));
   }
   const cv::Mat grey =
-      test::picture_of(lens, test::plain(640, 480, 100), markers, {.blur_px = 0.6, .noise_levels = 2}, rng);
+      test::image_of(lens, test::plain(640, 480, 100), markers, {.blur_px = 0.6, .noise_levels = 2}, rng);
   for (const Detection& detection : Detector(families(names)).detect(grey))
     found.insert(detection.marker.text());
   EXPECT_EQ(found, shown);
@@ -195,7 +195,7 @@ TEST(Barcode, IsToldFromALargerOneWhicheverWayItIsTurned) {
     for (int turn = 0; turn < 4; ++turn) {
       const std::vector<PlacedMarker> placed = {
           test::placed(lens, name, {320, 240}, 70, turn * 90_deg, 0, 0)};
-      const cv::Mat grey = test::picture_of(lens, test::plain(640, 480, 100), placed,
+      const cv::Mat grey = test::image_of(lens, test::plain(640, 480, 100), placed,
                                             {.blur_px = 0.6, .noise_levels = 2}, rng);
       const auto found = Detector(families(names)).detect(grey);
       ASSERT_EQ(found.size(), 1U) << name.text() << " turned " << turn << " times";
@@ -208,19 +208,19 @@ TEST(Barcode, PhotographsWithoutThemShowNone) {
   const auto folder = test::real_data("");
   if (!folder) GTEST_SKIP() << "no photographs";
   Detector detector(families({"artoolkit_3x3"}));
-  int pictures = 0;
+  int images = 0;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(*folder)) {
     const std::string extension = entry.path().extension().string();
     if (extension != ".png" && extension != ".jpg") continue;
-    // Every sixth pair of a Gray code's pictures, by its place in the sequence.
+    // Every sixth pair of a Gray code's images, by its place in the sequence.
     const std::string stem = entry.path().stem().string();
     if (stem.rfind("graycode_", 0) == 0 && std::stoi(stem.substr(9)) % 12 > 1) continue;
-    ++pictures;
-    for (const Detection& found : detector.detect(read_grey_picture(entry.path()).value()))
+    ++images;
+    for (const Detection& found : detector.detect(read_grey_image(entry.path()).value()))
       ADD_FAILURE() << entry.path() << ": " << found.marker.text() << " at "
                     << found.corners_px[0].transpose();
   }
-  EXPECT_GE(pictures, 40);
+  EXPECT_GE(images, 40);
 }
 
 // Their cells are wider or narrower than those of other families, whose codes they may show by chance: three
@@ -237,7 +237,7 @@ TEST(Barcode, AreNotTakenForCodesOfOtherFamilies) {
     const PlacedMarker marker = test::placed(pinhole_vga(), name, {320, 240}, uniform(rng, 20, 70),
                                              uniform(rng, 0, 6.28), uniform(rng, 0, 70_deg), i);
     const auto found = detector.detect(
-        test::picture_of(pinhole_vga(), test::plain(640, 480, 100), std::vector{marker},
+        test::image_of(pinhole_vga(), test::plain(640, 480, 100), std::vector{marker},
                          {.blur_px = uniform(rng, 0.4, 2.5), .noise_levels = uniform(rng, 2, 12)}, rng));
     for (const Detection& detection : found) {
       ++read;

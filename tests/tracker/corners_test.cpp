@@ -15,11 +15,11 @@ namespace {
 
 struct Sweep {
   double low_px, high_px, max_tilt;
-  test::PictureOptions picture;
+  test::ImageOptions image;
   bool spin = true;
   Lens lens = pinhole_vga();
   bool give_lens = false;
-  bool srgb_picture = false;
+  bool srgb_image = false;
   Encoding encoding = Encoding::linear;
   double bow = 0;        ///< of the upper and lower sides, as share of a side
   double motion_px = 0;  ///< even, in any direction
@@ -41,7 +41,7 @@ cv::Mat in_motion(const cv::Mat& light, const Eigen::Vector2d& motion) {
   return sum;
 }
 
-// Light that differs from place to place, as that of a projector's picture does.
+// Light that differs from place to place, as that of a projector's image does.
 cv::Mat stained(const cv::Mat& light, double deviation, std::mt19937_64& rng) {
   constexpr double k_spot_px = 2;
   cv::Mat spots(light.size(), CV_32F);
@@ -60,21 +60,21 @@ cv::Mat after_jpeg(const cv::Mat& grey, int quality) {
   return cv::imdecode(bytes, cv::IMREAD_GRAYSCALE);
 }
 
-cv::Mat picture_of(const Sweep& sweep, const PlacedMarker& marker, std::mt19937_64& rng) {
+cv::Mat image_of(const Sweep& sweep, const PlacedMarker& marker, std::mt19937_64& rng) {
   const cv::Mat ground = test::plain(640, 480, 100);
   if (sweep.stains > 0) {
-    cv::Mat light = test::light_of(sweep.lens, ground, std::vector{marker}, sweep.picture, rng);
+    cv::Mat light = test::light_of(sweep.lens, ground, std::vector{marker}, sweep.image, rng);
     light = stained(light, sweep.stains, rng);
-    cv::GaussianBlur(light, light, {0, 0}, sweep.picture.blur_px);
-    return test::noisy_grey(light, sweep.picture.noise_levels, rng);
+    cv::GaussianBlur(light, light, {0, 0}, sweep.image.blur_px);
+    return test::noisy_grey(light, sweep.image.noise_levels, rng);
   }
   if (sweep.motion_px == 0)
-    return test::picture_of(sweep.lens, ground, std::vector{marker}, sweep.picture, rng);
+    return test::image_of(sweep.lens, ground, std::vector{marker}, sweep.image, rng);
   const double angle = uniform(rng, 0, 6.28);
-  const cv::Mat light = test::light_of(sweep.lens, ground, std::vector{marker}, sweep.picture, rng);
+  const cv::Mat light = test::light_of(sweep.lens, ground, std::vector{marker}, sweep.image, rng);
   return test::noisy_grey(
       in_motion(light, sweep.motion_px * Eigen::Vector2d(std::cos(angle), std::sin(angle))),
-      sweep.picture.noise_levels, rng);
+      sweep.image.noise_levels, rng);
 }
 
 // Of linear levels (0 ... 255).
@@ -110,8 +110,8 @@ SweepResult swept(const Sweep& sweep, int count) {
                      uniform(rng, sweep.low_px, sweep.high_px), sweep.spin ? uniform(rng, 0, 6.28) : 0,
                      uniform(rng, 0, sweep.max_tilt), uniform(rng, 0, 6.28));
     marker.bow = sweep.bow;
-    cv::Mat grey = picture_of(sweep, marker, rng);
-    if (sweep.srgb_picture) grey = srgb_encoded(grey);
+    cv::Mat grey = image_of(sweep, marker, rng);
+    if (sweep.srgb_image) grey = srgb_encoded(grey);
     if (sweep.jpeg_quality > 0) grey = after_jpeg(grey, sweep.jpeg_quality);
     const auto truth = test::true_corners(sweep.lens, marker);
     ++result.markers;
@@ -141,7 +141,7 @@ SweepResult swept(const Sweep& sweep, int count) {
 
 TEST(Detector, FindsSharpMarkersToATwentiethOfAPixelWithoutBias) {
   Sweep sweep{48, 120, 70_deg, {}};
-  sweep.picture.noise_levels = 2;
+  sweep.image.noise_levels = 2;
   const SweepResult r = swept(sweep, 60);
   EXPECT_EQ(r.found, r.markers);
   EXPECT_EQ(r.wrong, 0);
@@ -153,7 +153,7 @@ TEST(Detector, FindsSharpMarkersToATwentiethOfAPixelWithoutBias) {
 TEST(Detector, HasNoBiasWhereSidesRunAlongThePixels) {
   Sweep sweep{48, 120, 0, {}};
   sweep.spin = false;
-  sweep.picture.noise_levels = 2;
+  sweep.image.noise_levels = 2;
   const SweepResult r = swept(sweep, 40);
   EXPECT_EQ(r.found, r.markers);
   EXPECT_LT(r.rms_px, 0.08);
@@ -166,24 +166,24 @@ TEST(Detector, FindsMarkersWhoseSidesRunThroughPixelCentres) {
   std::mt19937_64 rng = test::test_rng();
   const Lens lens = pinhole_vga();
   Detector detector(families({"aruco_4x4_50"}), {.broken_markers = false});
-  constexpr int k_pictures = 20;
+  constexpr int k_images = 20;
   int found = 0;
-  for (int i = 0; i < k_pictures; ++i) {
+  for (int i = 0; i < k_images; ++i) {
     const std::vector<PlacedMarker> markers = {
         test::placed(lens, {"aruco_4x4_50", "7"}, {150, 240}, 120, 0, 0, 0),
         test::placed(lens, {"aruco_4x4_50", "9"}, {450, 240}, 60, 0, 0, 0)};
     const cv::Mat grey =
-        test::picture_of(lens, test::plain(640, 480, 100), markers, {.blur_px = 0.7, .noise_levels = 2}, rng);
+        test::image_of(lens, test::plain(640, 480, 100), markers, {.blur_px = 0.7, .noise_levels = 2}, rng);
     found += static_cast<int>(detector.detect(grey).size());
   }
-  EXPECT_EQ(found, 2 * k_pictures);
+  EXPECT_EQ(found, 2 * k_images);
 }
 
-TEST(Detector, HasNoBiasInPicturesOfAnSrgbCameraWhenToldSo) {
+TEST(Detector, HasNoBiasInImagesOfAnSrgbCameraWhenToldSo) {
   Sweep sweep{48, 120, 45_deg, {}};
-  sweep.picture.blur_px = 0.7;
-  sweep.picture.noise_levels = 1;
-  sweep.srgb_picture = true;
+  sweep.image.blur_px = 0.7;
+  sweep.image.noise_levels = 1;
+  sweep.srgb_image = true;
   const SweepResult untold = swept(sweep, 40);
   sweep.encoding = Encoding::srgb;
   const SweepResult told = swept(sweep, 40);
@@ -195,19 +195,19 @@ TEST(Detector, HasNoBiasInPicturesOfAnSrgbCameraWhenToldSo) {
 
 TEST(Detector, FindsSmallMarkers) {
   Sweep sweep{16, 32, 45_deg, {}};
-  sweep.picture.noise_levels = 2;
-  sweep.picture.blur_px = 0.4;
+  sweep.image.noise_levels = 2;
+  sweep.image.blur_px = 0.4;
   const SweepResult r = swept(sweep, 60);
   EXPECT_GE(r.found, 58);
   EXPECT_EQ(r.wrong, 0);
   EXPECT_LT(r.rms_px, 0.15);
 }
 
-TEST(Detector, StraightensTheSidesOfADistortedPictureThroughItsLens) {
+TEST(Detector, StraightensTheSidesOfADistortedImageThroughItsLens) {
   Sweep sweep{120, 200, 45_deg, {}};
   sweep.lens = bent_vga();
-  sweep.picture.blur_px = 0.5;
-  sweep.picture.noise_levels = 1;
+  sweep.image.blur_px = 0.5;
+  sweep.image.noise_levels = 1;
   const SweepResult without = swept(sweep, 30);
   sweep.give_lens = true;
   const SweepResult with = swept(sweep, 30);
@@ -228,29 +228,29 @@ TEST(Detector, SaysHowSureItsCornersAre) {
   for (const double noise : {2.0, 8.0}) {
     SCOPED_TRACE(noise);
     Sweep sweep{60, 120, 50_deg, {}};
-    sweep.picture.blur_px = 0.7;
-    sweep.picture.noise_levels = noise;
+    sweep.image.blur_px = 0.7;
+    sweep.image.noise_levels = noise;
     expect_true_covariance(swept(sweep, 60));
   }
 }
 
 TEST(Detector, SaysHowSureItsCornersAreWithoutAnyBlur) {
   Sweep sweep{48, 120, 60_deg, {}};
-  sweep.picture.noise_levels = 2;
+  sweep.image.noise_levels = 2;
   const SweepResult r = swept(sweep, 60);
   expect_true_covariance(r);
   EXPECT_LT(r.rms_px, 0.02);
 }
 
 // Of sides that end where pixels do, no crossing errs: what is computed from residuals is 0 of 0.
-TEST(Detector, SaysHowSureItsCornersAreInAPerfectPicture) {
+TEST(Detector, SaysHowSureItsCornersAreInAPerfectImage) {
   auto rng = test::test_rng();
   const cv::Mat white(480, 640, CV_8UC1, cv::Scalar(210));
   for (const double side : {24, 60, 200}) {
     const PlacedMarker marker =
         test::placed(pinhole_vga(), {"aruco_4x4_50", "7"}, {319.5, 239.5}, side, 0, 0, 0);
     const auto found = Detector(families({"aruco_4x4_50"}))
-                           .detect(test::picture_of(pinhole_vga(), white, std::span(&marker, 1), {}, rng));
+                           .detect(test::image_of(pinhole_vga(), white, std::span(&marker, 1), {}, rng));
     ASSERT_EQ(found.size(), 1u) << side;
     for (const Eigen::Matrix2d& covariance : found[0].corner_covariance) {
       EXPECT_TRUE(covariance.allFinite()) << side;
@@ -261,16 +261,16 @@ TEST(Detector, SaysHowSureItsCornersAreInAPerfectPicture) {
 
 TEST(Detector, SaysHowSureItsCornersAreInUnevenLight) {
   Sweep sweep{60, 120, 50_deg, {}};
-  sweep.picture.blur_px = 0.7;
-  sweep.picture.noise_levels = 2;
+  sweep.image.blur_px = 0.7;
+  sweep.image.noise_levels = 2;
   sweep.stains = 0.05;
   expect_true_covariance(swept(sweep, 60));
 }
 
-TEST(Detector, SaysHowSureItsCornersAreInAJpegPicture) {
+TEST(Detector, SaysHowSureItsCornersAreInAJpegImage) {
   Sweep sweep{60, 120, 50_deg, {}};
-  sweep.picture.blur_px = 0.4;
-  sweep.picture.noise_levels = 2;
+  sweep.image.blur_px = 0.4;
+  sweep.image.noise_levels = 2;
   sweep.jpeg_quality = 75;
   expect_true_covariance(swept(sweep, 60));
 }
@@ -278,7 +278,7 @@ TEST(Detector, SaysHowSureItsCornersAreInAJpegPicture) {
 TEST(Detector, FindsMovingCornersAndSaysHowSureTheyAre) {
   for (const double motion : {12.0, 16.0}) {
     Sweep sweep{60, 120, 45_deg, {}};
-    sweep.picture.noise_levels = 2;
+    sweep.image.noise_levels = 2;
     sweep.motion_px = motion;
     const SweepResult r = swept(sweep, 30);
     EXPECT_GE(r.found, 20) << motion;  // reading the cells is another matter
@@ -292,8 +292,8 @@ TEST(Detector, FindsMovingCornersAndSaysHowSureTheyAre) {
 
 TEST(Detector, SaysHowSureTheCornersOfSmallMarkersAre) {
   Sweep sweep{16, 32, 40_deg, {}};
-  sweep.picture.blur_px = 0.4;
-  sweep.picture.noise_levels = 2;
+  sweep.image.blur_px = 0.4;
+  sweep.image.noise_levels = 2;
   const SweepResult r = swept(sweep, 80);
   EXPECT_GE(r.found, 78);
   EXPECT_LT(r.rms_px, 0.035);
@@ -304,8 +304,8 @@ TEST(Detector, SaysHowSureTheCornersOfSmallMarkersAre) {
 TEST(Detector, SaysHowSureTheCornersOfBlurredMarkersAre) {
   for (const double blur : {2.5, 3.5}) {
     Sweep sweep{60, 120, 45_deg, {}};
-    sweep.picture.blur_px = blur;
-    sweep.picture.noise_levels = 2;
+    sweep.image.blur_px = blur;
+    sweep.image.noise_levels = 2;
     const SweepResult r = swept(sweep, 40);
     EXPECT_EQ(r.found, r.markers);
     EXPECT_LT(r.rms_px, 0.08) << blur;
@@ -316,8 +316,8 @@ TEST(Detector, SaysHowSureTheCornersOfBlurredMarkersAre) {
 
 TEST(Detector, SaysHowSureCornersAreByTheirSidesAlone) {
   Sweep sweep{16, 40, 40_deg, {}};
-  sweep.picture.blur_px = 1;
-  sweep.picture.noise_levels = 2;
+  sweep.image.blur_px = 1;
+  sweep.image.noise_levels = 2;
   const SweepResult fitted = swept(sweep, 80);
   sweep.pattern_fits = false;
   const SweepResult r = swept(sweep, 80);
@@ -331,8 +331,8 @@ TEST(Detector, FindsTheCornersOfBlurredMarkersThroughTheLens) {
   Sweep sweep{120, 180, 45_deg, {}};
   sweep.lens = bent_vga();
   sweep.give_lens = true;
-  sweep.picture.blur_px = 3;
-  sweep.picture.noise_levels = 2;
+  sweep.image.blur_px = 3;
+  sweep.image.noise_levels = 2;
   const SweepResult r = swept(sweep, 40);
   EXPECT_EQ(r.found, r.markers);
   EXPECT_LT(r.rms_px, 0.08);  // twice as much where patterns are fitted without the lens
@@ -343,8 +343,8 @@ TEST(Detector, FindsTheCornersOfBentPaper) {
   for (const double bow : {0.003, 0.006, 0.012}) {  // 0.2 to 1 px
     SCOPED_TRACE(bow);
     Sweep sweep{60, 80, 30_deg, {}};
-    sweep.picture.blur_px = 0.5;
-    sweep.picture.noise_levels = 2;
+    sweep.image.blur_px = 0.5;
+    sweep.image.noise_levels = 2;
     sweep.bow = bow;
     const SweepResult r = swept(sweep, 25);
     EXPECT_EQ(r.found, r.markers);
@@ -356,16 +356,16 @@ TEST(Detector, FindsTheCornersOfBentPaper) {
 TEST(Detector, MovesACornerSteadilyAsItsPaperBends) {
   Detector detector(families({"aruco_4x4_50"}));
   PlacedMarker marker = test::placed(pinhole_vga(), {"aruco_4x4_50", "3"}, {320.3, 240.1}, 60, 0.3, 0.2, 1);
-  test::PictureOptions options;
+  test::ImageOptions options;
   options.blur_px = 1;
   options.noise_levels = 4;
   constexpr double k_step_px = 0.05;
   std::array<Eigen::Vector2d, 4> before;
   for (int step = 0; step <= 50; ++step) {  // to 2.5 px: past the largest bow that is believed
     marker.bow = k_step_px * step / 60;
-    std::mt19937_64 rng(7);  // the same noise in all pictures
+    std::mt19937_64 rng(7);  // the same noise in all images
     const auto found = detector.detect(
-        test::picture_of(pinhole_vga(), test::plain(640, 480, 100), std::vector{marker}, options, rng));
+        test::image_of(pinhole_vga(), test::plain(640, 480, 100), std::vector{marker}, options, rng));
     ASSERT_EQ(found.size(), 1u);
     for (std::size_t k = 0; k < 4 && step > 0; ++k)
       EXPECT_LT((found[0].corners_px[k] - before[k]).norm(), 5 * k_step_px) << step << " corner " << k;
@@ -384,7 +384,7 @@ TEST(Detector, HasNoBiasWhereTheWhiteMarginIsAPixelWide) {
     marker.margin = 0.015;
     const auto truth = test::true_corners(pinhole_vga(), marker);
     const auto found =
-        detector.detect(test::picture_of(pinhole_vga(), test::plain(640, 480, 90), std::vector{marker},
+        detector.detect(test::image_of(pinhole_vga(), test::plain(640, 480, 90), std::vector{marker},
                                          {.blur_px = 0.5, .noise_levels = 2}, rng));
     ASSERT_EQ(found.size(), 1u) << i;
     const Eigen::Vector2d centre = 0.25 * (truth[0] + truth[1] + truth[2] + truth[3]);

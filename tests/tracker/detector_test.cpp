@@ -29,7 +29,7 @@ void expect_whole_family(const std::string& family, int count) {
                                    0.5 * std::numbers::pi * (id % 4) + 0.1, 0.1, 1));
     }
     const cv::Mat grey =
-        test::picture_of(lens, test::plain(1600, 1200, 160), sheet, {.noise_levels = 2}, rng);
+        test::image_of(lens, test::plain(1600, 1200, 160), sheet, {.noise_levels = 2}, rng);
     const auto found = detector.detect(grey);
     EXPECT_EQ(found.size(), sheet.size());
     for (const PlacedMarker& marker : sheet) {
@@ -52,7 +52,7 @@ TEST(Detector, FindsAllOfAruco4x4InAllTurns) { expect_whole_family("aruco_4x4_50
 TEST(Detector, FindsAllOfAruco7x7InAllTurns) { expect_whole_family("aruco_7x7_100", 100); }
 TEST(Detector, FindsTheOriginalArucoInAllTurns) { expect_whole_family("aruco_original", 180); }
 
-TEST(Detector, FindsSeveralFamiliesInOnePicture) {
+TEST(Detector, FindsSeveralFamiliesInOneImage) {
   auto rng = test::test_rng();
   const Lens lens = pinhole_vga();
   const std::vector<std::string> names = {"apriltag_36h11", "aruco_4x4_50", "aruco_6x6_250", "apriltag_25h9"};
@@ -61,7 +61,7 @@ TEST(Detector, FindsSeveralFamiliesInOnePicture) {
     markers.push_back(
         test::placed(lens, {names[i], "7"}, {100 + 140.0 * static_cast<double>(i), 240}, 70, 0.4, 0.3, 2));
   const auto found =
-      Detector(families(names)).detect(test::picture_of(lens, test::plain(640, 480, 40), markers, {}, rng));
+      Detector(families(names)).detect(test::image_of(lens, test::plain(640, 480, 40), markers, {}, rng));
   ASSERT_EQ(found.size(), names.size());
   for (const PlacedMarker& marker : markers)
     EXPECT_EQ(
@@ -85,7 +85,7 @@ TEST(Detector, SeesNoMarkersInNoise) {
   EXPECT_TRUE(detector.detect(test::noise(640, 480, rng)).empty());
 }
 
-TEST(Detector, SurvivesOddPictures) {
+TEST(Detector, SurvivesOddImages) {
   Detector detector(families({"aruco_4x4_50"}));
   EXPECT_TRUE(detector.detect(cv::Mat()).empty());
   for (const auto& [width, height] : {std::pair{1, 1}, {2, 3}, {3, 2}, {5, 7}, {1, 400}, {400, 1}, {13, 13}})
@@ -122,7 +122,7 @@ TEST(Detector, FindsMarkersUnderFingersAndSaysWhichCornersAreCovered) {
 }
 
 // How long they take: tests/bench/tracker_bench.
-TEST(Detector, FindsNothingInHostilePictures) {
+TEST(Detector, FindsNothingInHostileImages) {
   auto rng = test::test_rng();
   constexpr int k_width = 1280;
   constexpr int k_height = 720;
@@ -135,7 +135,7 @@ TEST(Detector, FindsNothingInHostilePictures) {
 
 TEST(Detector, FindsAMarkerInTheLastCornerOfFortyEightMegapixels) {
   auto rng = test::test_rng();
-  const cv::Mat part = test::picture_of(
+  const cv::Mat part = test::image_of(
       pinhole_vga(), test::plain(640, 480, 128),
       std::vector{test::placed(pinhole_vga(), {"apriltag_36h11", "3"}, {560, 400}, 90, 0.3, 0.2, 1)},
       {.blur_px = 0.5, .noise_levels = 2}, rng);
@@ -151,11 +151,11 @@ TEST(Detector, FindsAMarkerInTheLastCornerOfFortyEightMegapixels) {
                            in_part[0].corners_px[k], 0.05));
 }
 
-TEST(Detector, FindsAMarkerInAPartOfALargerPicture) {
+TEST(Detector, FindsAMarkerInAPartOfALargerImage) {
   auto rng = test::test_rng();
   const PlacedMarker marker = test::placed(pinhole_vga(), {"aruco_4x4_50", "3"}, {320, 240}, 80, 0.3, 0.2, 1);
   const cv::Mat whole =
-      test::picture_of(pinhole_vga(), test::plain(640, 480, 60), std::vector{marker}, {}, rng);
+      test::image_of(pinhole_vga(), test::plain(640, 480, 60), std::vector{marker}, {}, rng);
   const cv::Mat part = whole(cv::Rect(201, 101, 237, 281));  // its rows do not follow each other in memory
   Detector detector(families({"aruco_4x4_50"}));
   const auto in_whole = detector.detect(whole);
@@ -176,10 +176,10 @@ TEST(Detector, FindsATemplateInAllTurns) {
   for (int turn = 0; turn < 8; ++turn) {
     const PlacedMarker marker =
         test::placed(pinhole_vga(), name, {320, 240}, 110, turn * 45_deg, 35_deg, turn);
-    test::PictureOptions options;
+    test::ImageOptions options;
     options.noise_levels = 2;
     const auto found = detector.detect(
-        test::picture_of(pinhole_vga(), test::plain(640, 480, 90), std::vector{marker}, options, rng));
+        test::image_of(pinhole_vga(), test::plain(640, 480, 90), std::vector{marker}, options, rng));
     ASSERT_EQ(found.size(), 1u);
     EXPECT_EQ(found[0].marker.text(), "artoolkit:letter.patt");
     EXPECT_GT(found[0].score, 0.9);

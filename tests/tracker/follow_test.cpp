@@ -34,7 +34,7 @@ TEST(Detector, FollowsMarkersThatMoveByHalfTheirSide) {
   }
 }
 
-TEST(Detector, FollowsMarkersUnderFingersToThePicturesEnd) {
+TEST(Detector, FollowsMarkersUnderFingersToTheImagesEnd) {
   auto rng = test::test_rng();
   Detector detector(families({"apriltag_36h11"}));
   const cv::Mat first = scattered_markers(0, rng);
@@ -73,7 +73,7 @@ TEST(Detector, FollowsABlurredMarkerByItsPattern) {
     const std::vector<PlacedMarker> marker = {test::placed(
         pinhole_vga(), {"apriltag_36h11", "3"}, {300 + 0.37 * i, 240}, 40, 0.2 + 0.01 * i, 20_deg, 0)};
     const int level = 170 + static_cast<int>(40 * std::sin(0.1 * i));
-    const cv::Mat grey = test::picture_of(pinhole_vga(), test::plain(640, 480, level), marker,
+    const cv::Mat grey = test::image_of(pinhole_vga(), test::plain(640, 480, level), marker,
                                           {.blur_px = 1.2, .noise_levels = 2}, rng);
     const auto truth = test::true_corners(pinhole_vga(), marker[0]);
     if (i == 0)
@@ -114,7 +114,7 @@ TEST(Detector, FollowsNoPatternThatIsNoLongerThere) {
   const auto seen = [&](const std::string& id, int moved_px, bool finger) {
     const std::vector<PlacedMarker> marker = {
         test::placed(pinhole_vga(), {"apriltag_36h11", id}, {320.0 + moved_px, 240}, 40, 0.2, 20_deg, 0)};
-    cv::Mat grey = test::picture_of(pinhole_vga(), test::plain(640, 480, 200), marker,
+    cv::Mat grey = test::image_of(pinhole_vga(), test::plain(640, 480, 200), marker,
                                     {.blur_px = 1.2, .noise_levels = 1}, rng);
     const Eigen::Vector2d at = test::true_corners(pinhole_vga(), marker[0])[0];
     if (finger)
@@ -124,7 +124,7 @@ TEST(Detector, FollowsNoPatternThatIsNoLongerThere) {
   const auto first = detector.detect(seen("3", 0, false));
   ASSERT_EQ(first.size(), 1u);
   ASSERT_TRUE(first[0].by_pattern);
-  const SeenPattern& pattern = *first[0].by_pattern;
+  const PatternAppearance& pattern = *first[0].by_pattern;
   std::array<Eigen::Vector2d, 4> corners_px;
   for (std::size_t i = 0; i < 4; ++i) corners_px[(i + pattern.first_corner) % 4] = first[0].corners_px[i];
   PatternFitBuffers buffers;
@@ -155,7 +155,7 @@ cv::Mat stacked_markers(int count, double moved_px, std::mt19937_64& rng) {
   for (int i = 0; i < count; ++i)
     markers.push_back(test::placed(pinhole_vga(), {"aruco_4x4_50", "7"}, {320, 200 + 36.0 * i + moved_px}, 70,
                                    0, 68_deg, 0));
-  return test::picture_of(pinhole_vga(), test::plain(640, 480, 100), markers, {.noise_levels = 1}, rng);
+  return test::image_of(pinhole_vga(), test::plain(640, 480, 100), markers, {.noise_levels = 1}, rng);
 }
 
 TEST(Detector, FollowsNoSquareTwice) {

@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include "tests/support/matchers.h"
-#include "tests/tracker/marker_pictures.h"
+#include "tests/tracker/marker_images.h"
 #include "tracker/detector.h"
 
 namespace limn::tracker {
@@ -14,7 +14,7 @@ namespace {
 using namespace test::literals;
 
 constexpr double k_frame_s = 1 / 30.0;
-constexpr int k_side = 240;  // of the picture; a pixel is a millimetre of the table
+constexpr int k_side = 240;  // of the image; a pixel is a millimetre of the table
 const Eigen::Vector2d k_px_control(120, 120);
 const MarkerName k_control{"aruco_4x4_50", "7"}, k_other{"aruco_4x4_50", "3"}, k_another{"aruco_4x4_50", "5"};
 

@@ -61,22 +61,22 @@ TEST(MarkerMask, WidensByTheTracksUncertaintyAndLeavesOutWhatIsLostOrTurnedAway)
   const int sure = lit();
   track.covariance.bottomRightCorner<3, 3>() = 1e-4 * Eigen::Matrix3d::Identity();  // 10 mm
   EXPECT_NEAR(static_cast<double>(lit()) / sure, std::pow((50 + 2 * 30) / 50.0, 2), 0.1);
-  track.sight = Sight::lost;
+  track.tracking = TrackingState::lost;
   EXPECT_EQ(lit(), 0);
-  track.sight = Sight::measured;
+  track.tracking = TrackingState::measured;
   track.world_from_body.rotation = exp_rotation({0, 180_deg, 0});
   EXPECT_EQ(lit(), 0);
 }
 
-TEST(MarkerMask, LightsSparesOrLeavesThePicture) {
-  const cv::Mat picture(4, 4, CV_8UC3, cv::Scalar(10, 20, 30));
+TEST(MarkerMask, LightsSparesOrLeavesTheImage) {
+  const cv::Mat image(4, 4, CV_8UC3, cv::Scalar(10, 20, 30));
   cv::Mat mask = cv::Mat::zeros(4, 4, CV_8UC1);
   mask.at<std::uint8_t>(1, 2) = 255;
-  EXPECT_EQ(with_marker_light(picture, mask, MarkerLight::keep_out).at<cv::Vec3b>(1, 2), cv::Vec3b(0, 0, 0));
-  EXPECT_EQ(with_marker_light(picture, mask, MarkerLight::spotlight).at<cv::Vec3b>(1, 2),
+  EXPECT_EQ(with_marker_light(image, mask, MarkerLight::keep_out).at<cv::Vec3b>(1, 2), cv::Vec3b(0, 0, 0));
+  EXPECT_EQ(with_marker_light(image, mask, MarkerLight::spotlight).at<cv::Vec3b>(1, 2),
             cv::Vec3b(255, 255, 255));
-  EXPECT_EQ(with_marker_light(picture, mask, MarkerLight::as_is).at<cv::Vec3b>(1, 2), cv::Vec3b(10, 20, 30));
-  EXPECT_EQ(with_marker_light(picture, mask, MarkerLight::keep_out).at<cv::Vec3b>(1, 1),
+  EXPECT_EQ(with_marker_light(image, mask, MarkerLight::as_is).at<cv::Vec3b>(1, 2), cv::Vec3b(10, 20, 30));
+  EXPECT_EQ(with_marker_light(image, mask, MarkerLight::keep_out).at<cv::Vec3b>(1, 1),
             cv::Vec3b(10, 20, 30));
 }
 

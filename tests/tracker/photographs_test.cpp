@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "core/rig.h"
 #include "tests/support/matchers.h"
 #include "tracker/detector.h"
@@ -39,10 +39,10 @@ std::vector<Listed> read_list(const std::filesystem::path& path) {
   return list;
 }
 
-std::vector<Detection> detections_in(const std::filesystem::path& picture,
+std::vector<Detection> detections_in(const std::filesystem::path& image,
                                      const std::vector<std::string>& names) {
   Detector detector(Families::load(names).value());
-  return detector.detect(read_grey_picture(picture).value());
+  return detector.detect(read_grey_image(image).value());
 }
 
 #define DATA_OR_SKIP(folder)                                      \
@@ -62,7 +62,7 @@ Eigen::Vector2d corner_of_pixel(const Listed& row, std::size_t corner) {
 }
 
 // One listed corner of 284 lies 1.9 px beside the plane through the corners of the board's other markers
-// (lens undistorted by the file beside the pictures), and as far from where cv::cornerSubPix ends that starts
+// (lens undistorted by the file beside the images), and as far from where cv::cornerSubPix ends that starts
 // there. This is the plane's pixel. The board is not quite flat: its corners scatter by 0.5 px about the
 // plane.
 std::optional<Eigen::Vector2d> by_plane(const Listed& row, std::size_t corner) {
@@ -137,10 +137,10 @@ TEST(Photographs, ShowAllDistantTagsAnd46Of47WhereTheyAreListed) {
   for (const Listed& row : read_list(*apriltag_data / "apriltag_swarmathon.csv")) {
     if (!found.count(row.file))
       found[row.file] = detections_in(*apriltag_data / row.file, {"apriltag_36h11"});
-    const auto& in_picture = found[row.file];
+    const auto& in_image = found[row.file];
     ++listed;
     const auto is_found = [&](double within_px) {
-      return std::any_of(in_picture.begin(), in_picture.end(),
+      return std::any_of(in_image.begin(), in_image.end(),
                          [&](const auto& d) { return is_listed_tag(row, d, within_px); });
     };
     read += is_found(4);
@@ -161,14 +161,14 @@ TEST(Photographs, ShowHiroAtItsDistance) {
   ASSERT_EQ(camera->width, 640);  // twice the frame's size
   for (const std::size_t i : {0u, 1u}) camera->lens.values[i] *= 0.5;
   for (const std::size_t i : {2u, 3u}) camera->lens.values[i] = 0.5 * (camera->lens.values[i] + 0.5) - 0.5;
-  const auto grey = read_grey_picture(*artoolkit_data / "hiro_frame_320x240.png").value();
+  const auto grey = read_grey_image(*artoolkit_data / "hiro_frame_320x240.png").value();
   const std::vector<std::string> names = {"artoolkit:" + (*artoolkit_data / "kanji.patt").string(),
                                           "artoolkit:" + (*artoolkit_data / "sample1.patt").string(),
                                           "artoolkit:" + (*artoolkit_data / "hiro.patt").string()};
   const auto found = Detector(Families::load(names).value()).detect(grey, &camera->lens);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].marker.text(), "artoolkit:hiro.patt");
-  // The writing runs from the upper left to the lower right of the picture.
+  // The writing runs from the upper left to the lower right of the image.
   EXPECT_TRUE(test::near(found[0].corners_px[0], Eigen::Vector2d(177, 21), 1.5));
   const auto poses = marker_poses(camera->lens, 0.08, found[0].corners_px, found[0].corner_covariance);
   ASSERT_FALSE(poses.empty());

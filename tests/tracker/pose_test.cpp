@@ -5,10 +5,10 @@
 #include <random>
 
 #include "tests/support/matchers.h"
-#include "tests/tracker/marker_pictures.h"
+#include "tests/tracker/marker_images.h"
 #include "tracker/body_pose.h"
 #include "tracker/marker_pose.h"
-#include "tracker/observed.h"
+#include "tracker/body_estimate.h"
 #include "tracker/pose_fit.h"
 #include "tracker/triangle_pose.h"
 
@@ -125,18 +125,18 @@ TEST(PoseFit, HasTheDerivativeOfItsResidual) {
   const Lens lens = bent_lens();
   for (int i = 0; i < 30; ++i) {
     const Pose world_from_body = random_pose(rng, 30_deg, 0.8);
-    const PointSight sight{&lens,
+    const PointObservation observation{&lens,
                            Pose(exp_rotation({0.1, -0.2, 0.05}), Eigen::Vector3d(0.02, 0.01, 0.1)),
                            {0.03, -0.02, 0.01},
                            {300, 200},
                            Eigen::Matrix2d::Identity()};
     Eigen::Vector2d r, high, low;
     Eigen::Matrix<double, 2, 6> j;
-    ASSERT_TRUE(residual(sight, world_from_body, &r, &j));
+    ASSERT_TRUE(residual(observation, world_from_body, &r, &j));
     for (int k = 0; k < 6; ++k) {
       const Vector6d step = 1e-6 * Vector6d::Unit(k);
-      ASSERT_TRUE(residual(sight, boxplus(world_from_body, step), &high));
-      ASSERT_TRUE(residual(sight, boxplus(world_from_body, -step), &low));
+      ASSERT_TRUE(residual(observation, boxplus(world_from_body, step), &high));
+      ASSERT_TRUE(residual(observation, boxplus(world_from_body, -step), &low));
       EXPECT_TRUE(test::near(j.col(k), (high - low) / 2e-6, 1e-3 * std::max(1.0, j.col(k).norm())));
     }
   }

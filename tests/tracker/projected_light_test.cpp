@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
-#include "sim/photograph.h"
+#include "sim/sensor_model.h"
 #include "sim/trace.h"
 #include "tests/sim/small_world.h"
 #include "tests/support/matchers.h"
@@ -36,12 +36,12 @@ sim::World lit_wall(double ambient) {
   sensor.full_well_e = 10000;
   sensor.read_noise = 1;
   world.projector_effects[0].gamma = k_gamma;
-  const sim::MarkerPicture picture = [](const MarkerName& name) { return draw_marker(name, 16); };
+  const sim::MarkerImage image = [](const MarkerName& name) { return draw_marker(name, 16); };
   for (int i = 0; i < k_columns * k_rows; ++i) {
     const Pose on_wall = test::facing_minus_y(0.13 * (i % k_columns - 2), 0.999, 0.14 * (i / k_columns - 1));
     const Pose turned = on_wall * Pose(exp_rotation({0, 0, 0.3 * i}), {0, 0, 0});
     const BodyMarker marker = {{"aruco_4x4_50", std::to_string(i)}, k_size_m, turned};
-    EXPECT_TRUE(sim::add_marker(world, marker, false, picture));
+    EXPECT_TRUE(sim::add_marker(world, marker, false, image));
   }
   return world;
 }
@@ -174,7 +174,7 @@ TEST(ProjectedLight, IsForetoldAsTheVirtualRigSeesIt) {
   EXPECT_LT(worst, 0.1);
 }
 
-TEST(ProjectedLight, LeavesAPictureAloneThatItDoesNotExplain) {
+TEST(ProjectedLight, LeavesAnImageAloneThatItDoesNotExplain) {
   cv::Mat grey(120, 160, CV_8UC1), light(120, 160, CV_32FC1);
   for (int y = 0; y < grey.rows; ++y)
     for (int x = 0; x < grey.cols; ++x) {

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "core/file.h"
-#include "core/picture.h"
+#include "core/image_io.h"
 #include "tests/support/matchers.h"
-#include "tests/tracker/marker_pictures.h"
+#include "tests/tracker/marker_images.h"
 #include "tracker/detector.h"
 #include "tracker/template_comparison.h"
 #include "tracker/template_training.h"
@@ -34,8 +34,8 @@ std::filesystem::path bars(const std::filesystem::path& folder, const std::strin
   return path;
 }
 
-cv::Mat picture_with(const std::vector<PlacedMarker>& markers, std::mt19937_64& rng) {
-  return test::picture_of(pinhole_vga(), test::plain(640, 480, 110), markers,
+cv::Mat image_with(const std::vector<PlacedMarker>& markers, std::mt19937_64& rng) {
+  return test::image_of(pinhole_vga(), test::plain(640, 480, 110), markers,
                           {.blur_px = 0.7, .noise_levels = 2}, rng);
 }
 
@@ -43,18 +43,18 @@ PlacedMarker placed(const std::filesystem::path& file, double x, double side_px,
   return test::placed(pinhole_vga(), {"artoolkit", file.string()}, {x, 240}, side_px, spin, tilt, 0.7);
 }
 
-TEST(Templates, TrainedFromAPictureAreFoundAgain) {
+TEST(Templates, TrainedFromAnImageAreFoundAgain) {
   auto rng = test::test_rng();
   const auto folder = test::test_folder();
   const auto original = bars(folder, "bars.patt", 4);
-  const auto trained = train_template(picture_with({placed(original, 300, 160, 0.3, 30_deg)}, rng));
+  const auto trained = train_template(image_with({placed(original, 300, 160, 0.3, 30_deg)}, rng));
   ASSERT_TRUE(trained) << trained.message();
   const auto learned = folder / "learned.patt";
   ASSERT_TRUE(write_file(learned, template_text(*trained)));
   Detector detector(Families::load(std::vector{detected_text(learned)}).value());
   for (int turn = 0; turn < 4; ++turn) {
     const PlacedMarker marker = placed(original, 330, 110, 0.2 + turn * 90_deg, 35_deg);
-    const auto found = detector.detect(picture_with({marker}, rng));
+    const auto found = detector.detect(image_with({marker}, rng));
     ASSERT_EQ(found.size(), 1u) << turn;
     EXPECT_EQ(found[0].marker.text(), "artoolkit:learned.patt");
     EXPECT_GT(found[0].score, 0.9);
@@ -86,7 +86,7 @@ TEST(Templates, AreWrittenInARToolKitsFormat) {
 TEST(Templates, TheHiroFrameTrainsHiro) {
   const auto data = test::real_data("markers/artoolkit");
   if (!data) GTEST_SKIP() << "no photographs: markers/artoolkit";
-  const auto trained = train_template(read_picture(*data / "hiro_frame_320x240.png").value());
+  const auto trained = train_template(read_image(*data / "hiro_frame_320x240.png").value());
   ASSERT_TRUE(trained) << trained.message();
   const auto learned = test::test_folder() / "learned.patt";
   ASSERT_TRUE(write_file(learned, template_text(*trained)));
@@ -98,23 +98,23 @@ TEST(Templates, TheHiroFrameTrainsHiro) {
   EXPECT_GT(pairs[0].correlation, k_min_correlation);
 }
 
-TEST(Templates, TrainingSaysWhatIsWrongWithThePicture) {
+TEST(Templates, TrainingSaysWhatIsWrongWithTheImage) {
   auto rng = test::test_rng();
   const auto folder = test::test_folder();
   const auto file = bars(folder, "bars.patt", 4);
-  const auto message = [](const cv::Mat& picture) {
-    const auto trained = train_template(picture);
+  const auto message = [](const cv::Mat& image) {
+    const auto trained = train_template(image);
     return trained ? std::string("trained") : trained.message();
   };
-  const auto says = [&](const cv::Mat& picture, const std::string& part) {
-    EXPECT_NE(message(picture).find(part), std::string::npos) << part << ": " << message(picture);
+  const auto says = [&](const cv::Mat& image, const std::string& part) {
+    EXPECT_NE(message(image).find(part), std::string::npos) << part << ": " << message(image);
   };
   says(test::plain(640, 480, 128), "found none");
-  says(picture_with({test::placed(pinhole_vga(), {"aruco_4x4_50", "3"}, {300, 200}, 120, 0.1, 0, 0)}, rng),
+  says(image_with({test::placed(pinhole_vga(), {"aruco_4x4_50", "3"}, {300, 200}, 120, 0.1, 0, 0)}, rng),
        "found none");
-  says(picture_with({placed(file, 150, 120, 0.1, 0), placed(file, 450, 90, 0.2, 0)}, rng),
+  says(image_with({placed(file, 150, 120, 0.1, 0), placed(file, 450, 90, 0.2, 0)}, rng),
        "found 2: at (150, 240) 120 px");
-  says(picture_with({placed(file, 300, 40, 0.1, 0)}, rng), "40 px wide, expected at least 64");
+  says(image_with({placed(file, 300, 40, 0.1, 0)}, rng), "40 px wide, expected at least 64");
 }
 
 TEST(Templates, AreToldApartByTheDetectorsOwnLimits) {
@@ -133,21 +133,21 @@ TEST(Templates, AreToldApartByTheDetectorsOwnLimits) {
   const auto pairs = compared(families.templates());
   ASSERT_EQ(pairs.size(), 6u);
   const auto of = [&](const std::string& x, const std::string& y) {
-    for (const TemplateLikeness& pair : pairs)
+    for (const TemplateSimilarity& pair : pairs)
       if (pair.a == x && pair.b == y) return pair;
-    return TemplateLikeness{};
+    return TemplateSimilarity{};
   };
   EXPECT_NEAR(of("even.patt", "even.patt").correlation, 1, 1e-6);
-  EXPECT_EQ(of("even.patt", "even.patt").telling, Telling::confused);
+  EXPECT_EQ(of("even.patt", "even.patt").telling, Discriminability::confused);
   EXPECT_EQ(of("a.patt", "b.patt").quarter_turns, 0);
   EXPECT_EQ(of("a.patt", "b.patt").telling,
-            of("a.patt", "b.patt").correlation > 0.9 ? Telling::confused : Telling::alike);
+            of("a.patt", "b.patt").correlation > 0.9 ? Discriminability::confused : Discriminability::alike);
   EXPECT_GT(of("a.patt", "b.patt").correlation, 0.8);
-  EXPECT_EQ(of("a.patt", "a.patt").telling, Telling::apart);
+  EXPECT_EQ(of("a.patt", "a.patt").telling, Discriminability::apart);
   // What the report calls confused, the detector does not read.
   auto rng = test::test_rng();
   Detector detector(Families::load(std::vector{detected_text(folder / "even.patt")}).value());
-  EXPECT_TRUE(detector.detect(picture_with({placed(folder / "even.patt", 300, 120, 0, 0)}, rng)).empty());
+  EXPECT_TRUE(detector.detect(image_with({placed(folder / "even.patt", 300, 120, 0, 0)}, rng)).empty());
 }
 
 // Two that differ by the width of a bar: sharp they are told apart, blurred they are doubted.
@@ -163,10 +163,10 @@ TEST(Templates, NearlyAlikeAreDoubtedWhereTheyAreBlurred) {
     const auto& file = i % 2 ? a : b;
     const bool is_sharp = i < 20;
     const PlacedMarker marker = placed(file, 320, is_sharp ? 140 : 32, 0.3 * i, is_sharp ? 20_deg : 60_deg);
-    const cv::Mat picture =
-        test::picture_of(pinhole_vga(), test::plain(640, 480, 110), std::vector{marker},
+    const cv::Mat image =
+        test::image_of(pinhole_vga(), test::plain(640, 480, 110), std::vector{marker},
                          {.blur_px = is_sharp ? 0.7 : 2.5, .noise_levels = is_sharp ? 6.0 : 15.0}, rng);
-    for (const Detection& detection : detector.detect(picture)) {
+    for (const Detection& detection : detector.detect(image)) {
       const bool right = detection.marker.id == file.filename();
       sharp += right && is_sharp;
       wrong += !right;

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "tests/support/matchers.h"
-#include "tests/tracker/marker_pictures.h"
+#include "tests/tracker/marker_images.h"
 #include "tracker/detector.h"
 
 /// Markers before cameras of 640x480, for the detector's tests.
@@ -33,7 +33,7 @@ inline cv::Mat scattered_markers(int moved_px, std::mt19937_64& rng) {
     markers.push_back(test::placed(pinhole_vga(), {"apriltag_36h11", std::to_string(i)},
                                    {120.0 + 190 * (i % 3) + moved_px, 130.0 + 210 * (i / 3)}, 60 + 8 * i,
                                    0.4 * i, 0.1 * i, i));
-  return test::picture_of(pinhole_vga(), test::clutter(640, 480, rng), markers, {.noise_levels = 2}, rng);
+  return test::image_of(pinhole_vga(), test::clutter(640, 480, rng), markers, {.noise_levels = 2}, rng);
 }
 
 inline void expect_same(const std::vector<Detection>& a, const std::vector<Detection>& b, double within_px) {

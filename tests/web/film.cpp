@@ -13,8 +13,8 @@
 
 #include "apps/world_markers.h"
 #include "device/jpeg.h"
-#include "sim/aim.h"
-#include "sim/photograph.h"
+#include "sim/reference_renderer.h"
+#include "sim/sensor_model.h"
 #include "sim/trace.h"
 #include "sim/world.h"
 
@@ -23,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace limn;
 
-constexpr int k_views = 8, k_pictures_a_view = 6, k_width = 640, k_height = 480;
+constexpr int k_views = 8, k_images_a_view = 6, k_width = 640, k_height = 480;
 constexpr double k_fov_deg = 65;
 
 // Round the prototype, 0.65 to 0.8 m away, up to 35 degrees to the side.
@@ -60,7 +60,7 @@ int main(int argc, char** argv) {
   fs::remove_all(folder);
   fs::create_directories(folder);
   auto loaded =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_picture);
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image);
   if (!loaded) {
     fmt::print(stderr, "{}\n", loaded.message());
     return 1;
@@ -74,15 +74,15 @@ int main(int argc, char** argv) {
   world.camera_effects = {{.colour = true, .exposure = 0.57, .psf_px = 0.6, .read_noise = 1, .srgb = true}};
   for (int view = 0; view < k_views; ++view) {
     world.rig.cameras = {tablet(world, view)};
-    const cv::Mat picture =
+    const cv::Mat image =
         sim::photograph(world, sim::trace(world, 0), {}, static_cast<std::uint64_t>(view));
-    const std::vector<std::uint8_t> jpeg = device::encode_jpeg(picture, 85);
+    const std::vector<std::uint8_t> jpeg = device::encode_jpeg(image, 85);
     cv::Mat where;
-    sim::Aim(world, parts, world.rig.cameras[0])
-        .seen(world.rig.cameras[0])
+    sim::ReferenceRenderer(world, parts, world.rig.cameras[0])
+        .parts_image(world.rig.cameras[0])
         .cover.convertTo(where, CV_8U, 255);
     cv::resize(where, where, {}, 0.5, 0.5, cv::INTER_AREA);
-    const bool is_written = write(folder / "tablet.mjpeg", jpeg, k_pictures_a_view) &&
+    const bool is_written = write(folder / "tablet.mjpeg", jpeg, k_images_a_view) &&
                             write(folder / fmt::format("{:02}.jpg", view), jpeg) &&
                             cv::imwrite((folder / fmt::format("{:02}-parts.png", view)).string(), where);
     if (!is_written) {

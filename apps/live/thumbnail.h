@@ -1,0 +1,20 @@
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+#include "projector/renderer.h"
+#include "scene/scene.h"
+
+namespace limn::apps {
+
+/// A variant by itself, as one sees it in front of its marker from a little above and to the right, filling
+/// `side_px` x `side_px` pixels, sRGB BGR over a dark ground. `renderer` was made of `scene`; its GL context
+/// must be current. Empty: the scene has no such variant.
+cv::Mat draw_thumbnail(projector::Renderer* renderer,
+                     const scene::Scene& scene,
+                     const std::string& slot,
+                     const std::string& variant,
+                     int side_px);
+
+}  // namespace limn::apps

@@ -1,0 +1,508 @@
+#include "calib/bundle_adjustment.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <tuple>
+
+#include "calib/solve.h"
+#include "core/linear_algebra.h"
+
+namespace limn::calib {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr double k_unseen = 1e4;  // standard deviations that an observation without a prediction counts as
+constexpr int k_most_steps = 200;
+constexpr double k_settled = 1e-10;  // of the cost: a step that promises less is the last
+constexpr double k_first_damping = 1e-6, k_least_damping = 1e-12, k_most_damping = 1e10;
+
+ImagerView view(const Imager& imager) {
+  return {imager.lens.model, imager.lens.values, imager.imager_from_world};
+}
+
+int value_count(const Imager& imager) { return imager.lens.model.value_count(); }
+
+// OPENCVn's order: fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4
+bool is_tangential(int value) { return value == 6 || value == 7 || value >= 12; }
+
+bool is_finite(const Parameters& parameters) {
+  for (const auto* imagers : {&parameters.cameras, &parameters.projectors}) {
+    for (const Imager& imager : *imagers) {
+      for (const double v : imager.lens.values) {
+        if (!std::isfinite(v)) return false;
+      }
+      if (!imager.imager_from_world.is_finite()) return false;
+    }
+  }
+  for (const auto& board : parameters.world_from_board) {
+    if (board && !board->is_finite()) return false;
+  }
+  return parameters.bend_m.allFinite();
+}
+
+}  // namespace
+
+BundleAdjuster::BundleAdjuster(const Observations& observations, const SolveOptions& options, int left_out)
+    : observations_(observations),
+      options_(options),
+      left_out_(left_out),
+      shape_{observations.board.width_m(), observations.board.height_m()},
+      match_rays_(observations.matches.size()),
+      point_rays_(observations.points.size()) {
+  index_parameters();
+}
+
+void BundleAdjuster::index_parameters() {
+  std::map<std::tuple<int, int, int>, Group> groups;  // pose, projector, camera
+  const auto assign = [&](int pose, int projector, int camera, size_t member) {
+    if (pose == left_out_) return;
+    Group& group = groups[{pose, projector, camera}];
+    group.camera = camera;
+    group.projector = projector;
+    group.pose = pose;
+    group.members.push_back(member);
+  };
+  for (size_t i = 0; i < observations_.corners.size(); ++i)
+    assign(observations_.corners[i].pose, -1, observations_.corners[i].camera, i);
+  for (size_t i = 0; i < observations_.matches.size(); ++i) {
+    const Match& match = observations_.matches[i];
+    assign(match.pose, match.projector, match.camera, i);
+  }
+  for (auto& [key, group] : groups) groups_.push_back(std::move(group));
+}
+
+// Cauchy's loss rho(s) = a^2 log(1 + s / a^2) of the squared length s of a residual.
+double BundleAdjuster::robust_weight(double squared, NormalEquations* normal) const {
+  const double a2 = options_.robust_at * options_.robust_at, weight = 1 / (1 + squared / a2);
+  normal->cost += a2 * std::log1p(squared / a2) / 2;
+  normal->weight += weight;
+  normal->curvature += weight - squared * weight * weight / a2;
+  normal->slope += weight * weight * squared / 2;
+  normal->count += 1;
+  return weight;
+}
+
+void BundleAdjuster::add_group(const Group& group, const Parameters& at, const Noise& noise, NormalEquations* normal) {
+  const auto& board = at.world_from_board[static_cast<size_t>(group.pose)];
+  if (!board) return;
+  const Imager& camera = at.cameras[static_cast<size_t>(group.camera)];
+  const bool is_match = group.projector >= 0;
+  const Imager* projector = is_match ? &at.projectors[static_cast<size_t>(group.projector)] : nullptr;
+  const ImagerView camera_view = view(camera);
+  // Columns: camera values, camera pose, bend, projector values, projector pose; the board's pose last.
+  const int n = value_count(camera), m = is_match ? value_count(*projector) : 0;
+  const int board_at = n + 8 + (is_match ? m + 6 : 0), columns = board_at + 6;
+  MatrixXd rows = MatrixXd::Zero(static_cast<Eigen::Index>(2 * group.members.size()), columns);
+  VectorXd residuals = VectorXd::Zero(rows.rows());
+  Derivatives d;
+  for (size_t i = 0; i < group.members.size(); ++i) {
+    Vector2d px, measured;
+    double stddev = 0;
+    bool seen = false;
+    if (is_match) {
+      const Match& match = observations_.matches[group.members[i]];
+      LensRay& ray = match_rays_[group.members[i]];
+      measured = match.px_projector;
+      stddev = std::hypot(match.stddev_px, noise.match_px);
+      seen = find_ray(camera.lens.model, camera.lens.values, match.px_camera, true, &ray) &&
+             predict_match(camera_view, view(*projector), *board, shape_, at.bend_m, ray, &px, &d);
+    } else {
+      const CornerObservation& corner = observations_.corners[group.members[i]];
+      const Vector2d p_board = observations_.board.p_corner(corner.corner).head<2>();
+      measured = corner.px;
+      stddev = std::hypot(corner.stddev_px, noise.corner_px);
+      seen = predict_corner(camera_view, *board, shape_, at.bend_m, p_board, &px, &d);
+    }
+    if (!seen) {
+      robust_weight(k_unseen * k_unseen, normal);
+      continue;
+    }
+    const Vector2d residual = (px - measured) / stddev;
+    const double scale = std::sqrt(robust_weight(residual.squaredNorm(), normal));
+    const auto row = static_cast<Eigen::Index>(2 * i);
+    residuals.segment<2>(row) = scale * residual;
+    const double factor = scale / stddev;
+    rows.block(row, 0, 2, n) = factor * d.camera_values;
+    rows.block<2, 6>(row, n) = factor * d.camera_pose;
+    rows.block<2, 2>(row, n + 6) = factor * d.bend;
+    if (is_match) {
+      rows.block(row, n + 8, 2, m) = factor * d.projector_values;
+      rows.block<2, 6>(row, n + 8 + m) = factor * d.projector_pose;
+    }
+    rows.block<2, 6>(row, board_at) = factor * d.board_pose;
+  }
+  MatrixXd local = MatrixXd::Zero(columns, columns);
+  local.selfadjointView<Eigen::Lower>().rankUpdate(rows.transpose());
+  const VectorXd gradient = rows.transpose() * residuals;
+
+  // To the places of the unknowns.
+  struct Part {
+    int from, to, size;
+  };
+  std::vector<Part> parts = {{0, camera_at_[static_cast<size_t>(group.camera)], n + 6}, {n + 6, bend_at_, 2}};
+  if (is_match) parts.push_back({n + 8, projector_at_[static_cast<size_t>(group.projector)], m + 6});
+  Eliminated& own = normal->boards[static_cast<size_t>(group.pose)];
+  for (const Part& a : parts) {
+    for (const Part& b : parts) {
+      if (a.from == b.from) {
+        normal->devices.block(a.to, a.to, a.size, a.size) += local.block(a.from, a.from, a.size, a.size);
+      } else if (a.to > b.to) {  // the lower half; local's lies below its own diagonal
+        if (a.from > b.from)
+          normal->devices.block(a.to, b.to, a.size, b.size) += local.block(a.from, b.from, a.size, b.size);
+        else
+          normal->devices.block(a.to, b.to, a.size, b.size) +=
+              local.block(b.from, a.from, b.size, a.size).transpose();
+      }
+    }
+    own.cross.middleCols(a.to, a.size) += local.block(board_at, a.from, 6, a.size);
+    normal->gradient.segment(a.to, a.size) += gradient.segment(a.from, a.size);
+  }
+  own.own += local.bottomRightCorner<6, 6>();
+  own.gradient += gradient.tail<6>();
+}
+
+void BundleAdjuster::add_points(const Parameters& at, const Noise& noise, NormalEquations* normal) {
+  TiePointDerivatives d;
+  MatrixXd rows;
+  for (size_t i = 0; i < observations_.tie_observations.size();) {
+    const auto index = static_cast<size_t>(observations_.tie_observations[i].point);
+    size_t end = i;
+    while (end < observations_.tie_observations.size() &&
+           static_cast<size_t>(observations_.tie_observations[end].point) == index)
+      ++end;
+    const size_t begin = i;
+    i = end;
+    const double inverse_depth = at.inverse_depths[index];
+    const TiePoint& point = observations_.points[index];
+    if (inverse_depth == 0 || point.pose == left_out_) continue;
+    const Imager& camera = at.cameras[static_cast<size_t>(point.camera)];
+    LensRay& ray = point_rays_[index];
+    const bool has_ray = find_ray(camera.lens.model, camera.lens.values, point.px_camera, true, &ray);
+    const int n = value_count(camera), camera_at = camera_at_[static_cast<size_t>(point.camera)];
+    rows.setZero(static_cast<Eigen::Index>(2 * (end - begin)), normal->gradient.size() + 1);
+    VectorXd residuals = VectorXd::Zero(rows.rows());
+    for (size_t k = begin; k < end; ++k) {
+      const TiePointObservation& tie_observation = observations_.tie_observations[k];
+      const auto which = static_cast<size_t>(tie_observation.imager);
+      const Imager& seeing = tie_observation.by_projector ? at.projectors[which] : at.cameras[which];
+      const int seeing_at = tie_observation.by_projector ? projector_at_[which] : camera_at_[which];
+      Vector2d px;
+      if (!has_ray || !predict_tie_point(view(camera), view(seeing), ray, inverse_depth, &px, &d)) {
+        robust_weight(k_unseen * k_unseen, normal);
+        continue;
+      }
+      const double stddev = std::hypot(tie_observation.stddev_px, noise.tie_point_px);
+      const Vector2d residual = (px - tie_observation.px) / stddev;
+      const double scale = std::sqrt(robust_weight(residual.squaredNorm(), normal)), factor = scale / stddev;
+      const auto row = static_cast<Eigen::Index>(2 * (k - begin));
+      residuals.segment<2>(row) = scale * residual;
+      rows.block(row, camera_at, 2, n) = factor * d.camera_values;
+      rows.block<2, 6>(row, camera_at + n) = factor * d.camera_pose;
+      rows.block(row, seeing_at, 2, value_count(seeing)) = factor * d.values;
+      rows.block<2, 6>(row, seeing_at + value_count(seeing)) = factor * d.pose;
+      rows.block<2, 1>(row, rows.cols() - 1) = factor * d.inverse_depth;
+    }
+    const auto devices = rows.leftCols(rows.cols() - 1);
+    const VectorXd depth = rows.rightCols<1>();
+    normal->devices.selfadjointView<Eigen::Lower>().rankUpdate(devices.transpose());
+    normal->gradient += devices.transpose() * residuals;
+    normal->points[index] = {MatrixXd::Constant(1, 1, depth.squaredNorm()), depth.transpose() * devices,
+                             VectorXd::Constant(1, depth.dot(residuals))};
+  }
+}
+
+void BundleAdjuster::add_lens_prior(const Imager& imager, bool is_projector, int at, NormalEquations* normal) const {
+  const auto add = [&](int value, double expected, double stddev) {
+    const double residual = (imager.lens.values[static_cast<size_t>(value)] - expected) / stddev;
+    normal->cost += residual * residual / 2;
+    normal->devices(at + value, at + value) += 1 / (stddev * stddev);
+    normal->gradient(at + value) += residual / stddev;
+  };
+  add(2, (imager.width - 1) / 2.0,
+      (is_projector ? options_.projector_centre : options_.camera_centre) * imager.width);
+  if (!is_projector) add(3, (imager.height - 1) / 2.0, options_.camera_centre * imager.width);
+  for (int i = 4; i < value_count(imager); ++i)
+    add(i, 0, is_tangential(i) ? options_.tangential : options_.radial);
+  const double fx = imager.lens.fx(), fy = imager.lens.fy();
+  const double residual = std::log(std::abs(fy / fx)) / options_.aspect;
+  const Vector2d slope(-1 / (fx * options_.aspect), 1 / (fy * options_.aspect));
+  normal->cost += residual * residual / 2;
+  normal->devices.block<2, 2>(at, at) += slope * slope.transpose();
+  normal->gradient.segment<2>(at) += residual * slope;
+}
+
+void BundleAdjuster::add_priors(const Parameters& at, NormalEquations* normal) const {
+  for (size_t i = 0; i < at.cameras.size(); ++i) add_lens_prior(at.cameras[i], false, camera_at_[i], normal);
+  for (size_t i = 0; i < at.projectors.size(); ++i)
+    add_lens_prior(at.projectors[i], true, projector_at_[i], normal);
+  const double weight = 1 / (options_.bend_share * shape_.width_m);
+  normal->cost += at.bend_m.squaredNorm() * weight * weight / 2;
+  normal->devices.block<2, 2>(bend_at_, bend_at_).diagonal().array() += weight * weight;
+  normal->gradient.segment<2>(bend_at_) += weight * weight * at.bend_m;
+}
+
+BundleAdjuster::NormalEquations BundleAdjuster::evaluate(const Parameters& at, const Noise& noise) {
+  NormalEquations normal;
+  const int size = bend_at_ + 2;
+  normal.cost = 0;
+  normal.devices = MatrixXd::Zero(size, size);
+  normal.gradient = VectorXd::Zero(size);
+  normal.boards.assign(at.world_from_board.size(),
+                       {MatrixXd::Zero(6, 6), MatrixXd::Zero(6, size), VectorXd::Zero(6)});
+  normal.points.assign(observations_.points.size(), {});
+  if (!is_finite(at)) {
+    normal.cost = std::numeric_limits<double>::infinity();
+    return normal;
+  }
+  for (const Group& group : groups_) add_group(group, at, noise, &normal);
+  add_points(at, noise, &normal);
+  add_priors(at, &normal);
+  for (int i = 0; i < size; ++i) {  // what is fixed: no movement, no influence
+    if (free_[static_cast<size_t>(i)]) continue;
+    normal.devices.row(i).setZero();
+    normal.devices.col(i).setZero();
+    normal.devices(i, i) = 1;
+    normal.gradient(i) = 0;
+    for (auto* list : {&normal.boards, &normal.points}) {
+      for (Eliminated& own : *list) {
+        if (own.cross.cols() > 0) own.cross.col(i).setZero();
+      }
+    }
+  }
+  return normal;
+}
+
+MatrixXd BundleAdjuster::reduced(const NormalEquations& normal, double damping, VectorXd* gradient) const {
+  MatrixXd schur = normal.devices;
+  schur.diagonal() *= 1 + damping;
+  *gradient = normal.gradient;
+  for (const auto* list : {&normal.boards, &normal.points}) {
+    for (const Eliminated& own : *list) {
+      if (own.own.rows() == 0 || !(own.own.diagonal().minCoeff() > 0)) continue;
+      MatrixXd damped = own.own;
+      damped.diagonal() *= 1 + damping;
+      const auto factor = damped.llt();
+      if (factor.info() != Eigen::Success) continue;
+      const MatrixXd half = factor.matrixL().solve(own.cross);
+      schur.selfadjointView<Eigen::Lower>().rankUpdate(half.transpose(), -1);
+      *gradient -= half.transpose() * factor.matrixL().solve(own.gradient);
+    }
+  }
+  return schur;
+}
+
+std::optional<BundleAdjuster::Step> BundleAdjuster::step(const NormalEquations& normal, double damping) const {
+  Step step;
+  VectorXd gradient;
+  const MatrixXd schur = reduced(normal, damping, &gradient);
+  // Unknowns of very different sizes: scaled to a unit diagonal.
+  if (!(schur.diagonal().minCoeff() > 0)) return std::nullopt;
+  const VectorXd scale = schur.diagonal().cwiseSqrt().cwiseInverse();
+  const MatrixXd scaled = scale.asDiagonal() * schur * scale.asDiagonal();
+  const Eigen::LLT<MatrixXd, Eigen::Lower> factor(scaled);
+  if (factor.info() != Eigen::Success) return std::nullopt;
+  step.devices = -(scale.asDiagonal() * factor.solve(scale.cwiseProduct(gradient)));
+  const auto promise = [&](const VectorXd& delta, const VectorXd& slope, const VectorXd& diagonal) {
+    step.promised += (damping * delta.cwiseAbs2().dot(diagonal) - delta.dot(slope)) / 2;
+  };
+  promise(step.devices, normal.gradient, normal.devices.diagonal());
+  const auto back = [&](const std::vector<Eliminated>& list, std::vector<VectorXd>* deltas) {
+    for (const Eliminated& own : list) {
+      deltas->push_back(VectorXd::Zero(own.own.rows()));
+      if (own.own.rows() == 0 || !(own.own.diagonal().minCoeff() > 0)) continue;
+      MatrixXd damped = own.own;
+      damped.diagonal() *= 1 + damping;
+      const auto block = damped.llt();
+      if (block.info() != Eigen::Success) continue;
+      deltas->back() = -block.solve(own.gradient + own.cross * step.devices);
+      promise(deltas->back(), own.gradient, own.own.diagonal());
+    }
+  };
+  back(normal.boards, &step.boards);
+  back(normal.points, &step.points);
+  if (!step.devices.allFinite() || !std::isfinite(step.promised)) return std::nullopt;
+  return step;
+}
+
+Parameters BundleAdjuster::moved(const Parameters& from, const Step& step) const {
+  Parameters to = from;
+  const auto move = [&](Imager* imager, int at) {
+    const int n = value_count(*imager);
+    for (int i = 0; i < n; ++i) imager->lens.values[static_cast<size_t>(i)] += step.devices(at + i);
+    imager->imager_from_world = boxplus(imager->imager_from_world, step.devices.segment<6>(at + n));
+  };
+  for (size_t i = 0; i < to.cameras.size(); ++i) {
+    const Pose pose = to.cameras[i].imager_from_world;
+    move(&to.cameras[i], camera_at_[i]);
+    if (i == 0) to.cameras[i].imager_from_world = pose;  // it is the world: not even rounded
+  }
+  for (size_t i = 0; i < to.projectors.size(); ++i) move(&to.projectors[i], projector_at_[i]);
+  to.bend_m += step.devices.segment<2>(bend_at_);
+  for (size_t i = 0; i < to.world_from_board.size(); ++i) {
+    if (to.world_from_board[i])
+      to.world_from_board[i] = boxplus(*to.world_from_board[i], Vector6d(step.boards[i]));
+  }
+  for (size_t i = 0; i < to.inverse_depths.size(); ++i) {
+    if (step.points[i].size() > 0) to.inverse_depths[i] += step.points[i](0);
+  }
+  return to;
+}
+
+// First depths: the mean of what the tie-point observations say.
+void BundleAdjuster::place_points(Parameters* parameters) const {
+  parameters->inverse_depths.assign(observations_.points.size(), 0.0);
+  std::vector<double> sums(observations_.points.size(), 0.0);
+  std::vector<int> counts(observations_.points.size(), 0);
+  for (const TiePointObservation& tie_observation : observations_.tie_observations) {
+    const auto index = static_cast<size_t>(tie_observation.point), which = static_cast<size_t>(tie_observation.imager);
+    const TiePoint& point = observations_.points[index];
+    const Imager& camera = parameters->cameras[static_cast<size_t>(point.camera)];
+    const Imager& seeing = tie_observation.by_projector ? parameters->projectors[which] : parameters->cameras[which];
+    LensRay ray;
+    if (!find_ray(camera.lens.model, camera.lens.values, point.px_camera, false, &ray)) continue;
+    const double depth = triangulated_depth(view(camera), ray, view(seeing), tie_observation.px);
+    if (!(depth > 0)) continue;
+    sums[index] += 1 / depth;
+    ++counts[index];
+  }
+  for (size_t i = 0; i < sums.size(); ++i) {
+    if (counts[i] > 0) parameters->inverse_depths[i] = sums[i] / counts[i];
+  }
+}
+
+Result<BundleAdjuster::Summary> BundleAdjuster::minimise(Parameters start, const Noise& noise, double enough) {
+  camera_at_.clear();
+  projector_at_.clear();
+  int size = 0;
+  for (const Imager& camera : start.cameras) {
+    camera_at_.push_back(size);
+    size += value_count(camera) + 6;
+  }
+  for (const Imager& projector : start.projectors) {
+    projector_at_.push_back(size);
+    size += value_count(projector) + 6;
+  }
+  bend_at_ = size;
+  free_.assign(static_cast<size_t>(size) + 2, true);
+  for (int i = 0; i < 6; ++i) free_[static_cast<size_t>(value_count(start.cameras[0]) + i)] = false;
+  if (!options_.bend) free_[static_cast<size_t>(size)] = free_[static_cast<size_t>(size) + 1] = false;
+  if (start.inverse_depths.size() != observations_.points.size()) place_points(&start);
+
+  Summary descent{std::move(start)};
+  NormalEquations here = evaluate(descent.parameters, noise);
+  if (!std::isfinite(here.cost))
+    return error(
+        "the joint solve has no finite start: the observations do not determine the devices. Capture more "
+        "poses, tilted by 20 to 45 degrees to different sides.");
+  double damping = k_first_damping, last_gain = 1;
+  while (descent.steps < k_most_steps && damping < k_most_damping) {
+    ++descent.steps;
+    const std::optional<Step> tried = step(here, damping);
+    if (!tried) {
+      damping = std::max(10 * damping, k_first_damping);
+      continue;
+    }
+    const bool last = tried->promised < k_settled * here.cost + enough;
+    const Parameters there = moved(descent.parameters, *tried);
+    NormalEquations normal = evaluate(there, noise);
+    if (normal.cost <= here.cost) {
+      last_gain = (here.cost - normal.cost) / std::max(here.cost, k_to_rounding);
+      descent.parameters = there;
+      here = std::move(normal);
+      damping = std::max(damping / 10, k_least_damping);
+    } else {
+      damping *= 10;
+    }
+    descent.converged = last;
+    if (last) break;
+  }
+  descent.cost = here.cost;
+  // A valley: steps that no observation feels. The covariance says how long it is.
+  constexpr double k_flat = 1e-4;  // of the cost, in the last step
+  if (descent.converged || (last_gain < k_flat && std::isfinite(here.cost))) return descent;
+  return error(
+      "the joint solve did not converge in {} steps. Check the board's description, leave out doubtful poses "
+      "(--skip-poses), capture more poses.",
+      descent.steps);
+}
+
+MatrixXd BundleAdjuster::covariance(const Parameters& at, const Noise& noise) {
+  const NormalEquations normal = evaluate(at, noise);
+  VectorXd gradient;
+  MatrixXd schur = reduced(normal, 0, &gradient);
+  schur = schur.selfadjointView<Eigen::Lower>();
+  const VectorXd scale =
+      schur.diagonal().cwiseMax(std::numeric_limits<double>::min()).cwiseSqrt().cwiseInverse();
+  const MatrixXd scaled = scale.asDiagonal() * schur * scale.asDiagonal();
+  MatrixXd inverse = scale.asDiagonal() *
+                     scaled.ldlt().solve(MatrixXd::Identity(schur.rows(), schur.cols())) * scale.asDiagonal();
+  const double robust = normal.weight * normal.slope / std::max(normal.curvature * normal.curvature, 1e-300);
+  for (int i = 0; i < bend_at_; ++i) {
+    if (free_[static_cast<size_t>(i)]) continue;
+    inverse.row(i).setZero();
+    inverse.col(i).setZero();
+  }
+  return robust * inverse.topLeftCorner(bend_at_, bend_at_);
+}
+
+Result<Pose> BundleAdjuster::board_pose(const Parameters& at, int pose, const Noise& noise, Pose start) const {
+  using Matrix6 = Eigen::Matrix<double, 6, 6>;
+  const auto normal_at = [&](const Pose& world_from_board, Matrix6* matrix, Vector6d* gradient) {
+    NormalEquations sums;
+    sums.cost = 0;
+    matrix->setZero();
+    gradient->setZero();
+    Derivatives d;
+    for (const CornerObservation& corner : observations_.corners) {
+      if (corner.pose != pose) continue;
+      const Imager& camera = at.cameras[static_cast<size_t>(corner.camera)];
+      const double stddev = std::hypot(corner.stddev_px, noise.corner_px);
+      Vector2d px;
+      if (!predict_corner(view(camera), world_from_board, shape_, at.bend_m,
+                          observations_.board.p_corner(corner.corner).head<2>(), &px, &d)) {
+        robust_weight(k_unseen * k_unseen, &sums);
+        continue;
+      }
+      const Vector2d residual = (px - corner.px) / stddev;
+      const double weight = robust_weight(residual.squaredNorm(), &sums);
+      *matrix += weight / (stddev * stddev) * d.board_pose.transpose() * d.board_pose;
+      *gradient += weight / stddev * d.board_pose.transpose() * residual;
+    }
+    return sums.cost;
+  };
+  Matrix6 matrix;
+  Vector6d gradient;
+  double cost = normal_at(start, &matrix, &gradient), damping = k_first_damping;
+  for (int step = 0; step < k_most_steps && damping < k_most_damping; ++step) {
+    Matrix6 damped = matrix;
+    damped.diagonal() *= 1 + damping;
+    const Vector6d delta = -solve_ldlt(damped, gradient);
+    if (!delta.allFinite()) break;
+    const bool last = -delta.dot(gradient) / 2 < k_settled * cost + k_to_rounding;
+    const Pose tried = boxplus(start, delta);
+    Matrix6 next;
+    Vector6d slope;
+    const double there = normal_at(tried, &next, &slope);
+    if (there <= cost) {
+      start = tried;
+      cost = there;
+      matrix = next;
+      gradient = slope;
+      damping = std::max(damping / 10, k_least_damping);
+    } else {
+      damping *= 10;
+    }
+    if (last) return start;
+  }
+  return error("{}: the board's pose does not follow from its corners.",
+               observations_.poses[static_cast<size_t>(pose)]);
+}
+
+}  // namespace limn::calib

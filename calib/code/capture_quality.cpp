@@ -1,0 +1,367 @@
+#include "calib/code/capture_quality.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "core/median.h"
+
+namespace limn::calib {
+namespace {
+
+using Eigen::Matrix4f;
+using Eigen::Vector2f;
+using Eigen::Vector4f;
+
+constexpr int k_samples = 20000;      // at most about; medians over them are good to a fraction of a level
+constexpr int k_reduced_width = 320;  // of the images that motion is measured in
+constexpr int k_patch = 32;           // their patches' side
+constexpr int k_steps = 5;            // of Gauss-Newton; each halves what is left, or better
+constexpr float k_least_texture = 4;  // levels a pixel, root mean square of a patch's weaker gradient
+constexpr float k_max_patch_shift = 6;      // reduced pixels; further steps are lost
+constexpr int k_saturated = 254;
+constexpr double k_lit = 10;           // levels between bright and dark
+constexpr double k_lit_noise = 5;      // and times a sum's noise: one dark sample in thousands gets there
+constexpr double k_off = 0.25;         // of the contrast
+constexpr double k_off_noise = 4.5;    // and times a sum's noise
+constexpr double k_same = 0.08;        // mean difference of two images of one pattern, of the contrast
+constexpr double k_odd_group = 0.05;   // of samples that are off; motion at edges stays below
+constexpr double k_wrong_group = 0.5;  // likewise: no motion does that
+
+// The lit samples of a series: what their images add up to, and how far apart they get.
+struct Samples {
+  std::vector<cv::Mat> images;  // CV_32F, one row each
+  std::vector<float> sum, range;
+  float noise = 0;  // of a pair's sum, standard deviation, levels
+  size_t size() const { return sum.size(); }
+  const float* of(int image) const { return images[static_cast<size_t>(image)].ptr<float>(); }
+};
+
+bool is_pair(const PatternGroup& group) { return group.count == 2; }
+
+// What the pairs of each sample add up to, and how far apart a pair gets.
+struct PairSums {
+  std::vector<float> sum, range;
+  float noise = 0;  // standard deviation of one pair's sum, by the median over everything, lit or not
+};
+
+PairSums pair_sums(const std::vector<PatternGroup>& groups, const std::vector<cv::Mat>& all) {
+  PairSums pairs;
+  std::vector<float> sums, deviations;
+  for (int at = 0; at < all[0].cols; ++at) {
+    sums.clear();
+    float range = 0;
+    for (const PatternGroup& group : groups) {
+      if (!is_pair(group)) continue;
+      const int a = all[static_cast<size_t>(group.first)].at<uchar>(at);
+      const int b = all[static_cast<size_t>(group.first) + 1].at<uchar>(at);
+      sums.push_back(static_cast<float>(a + b));
+      range = std::max(range, static_cast<float>(std::abs(a - b)));
+    }
+    const auto middle = static_cast<float>(median(sums));
+    for (const float sum : sums) deviations.push_back(std::abs(sum - middle));
+    pairs.sum.push_back(middle);
+    pairs.range.push_back(range);
+  }
+  pairs.noise = static_cast<float>(1.4826 * median(std::move(deviations)));
+  return pairs;
+}
+
+Samples lit_samples(const std::vector<PatternGroup>& groups, const std::vector<cv::Mat>& all) {
+  const PairSums pairs = pair_sums(groups, all);
+  const double least = std::max(k_lit, k_lit_noise * pairs.noise);
+  Samples lit;
+  lit.noise = pairs.noise;
+  std::vector<int> places;
+  for (size_t at = 0; at < pairs.sum.size(); ++at) {
+    if (pairs.range[at] < least) continue;
+    lit.sum.push_back(std::max(1.0F, pairs.sum[at]));
+    lit.range.push_back(pairs.range[at]);
+    places.push_back(static_cast<int>(at));
+  }
+  for (const cv::Mat& image : all) {
+    cv::Mat row(1, static_cast<int>(places.size()), CV_32F);
+    for (size_t i = 0; i < places.size(); ++i)
+      row.at<float>(static_cast<int>(i)) = image.at<uchar>(places[i]);
+    lit.images.push_back(row);
+  }
+  return lit;
+}
+
+GroupQuality quality_of(const Samples& lit, const PatternGroup& group) {
+  GroupQuality quality{group.first, group.count};
+  std::vector<float> levels;
+  double contrast = 0, range = 0, off = 0;
+  for (size_t i = 0; i < lit.size(); ++i) {
+    float sum = 0, high = 0, low = 255;
+    for (int k = 0; k < group.count; ++k) {
+      const float value = lit.of(group.first + k)[i];
+      sum += value;
+      high = std::max(high, value);
+      low = std::min(low, value);
+    }
+    sum *= 2 / static_cast<float>(group.count);
+    levels.push_back(sum / lit.sum[i]);
+    contrast += high - low;
+    range += lit.range[i];
+    off += std::abs(sum - lit.sum[i]) > std::max(k_off * lit.range[i], k_off_noise * lit.noise) ? 1 : 0;
+  }
+  quality.level = median(levels);
+  quality.contrast = contrast / range;
+  quality.off = off / static_cast<double>(lit.size());
+  return quality;
+}
+
+// Mean difference of two images over the samples, as a share of their range; `inverse`: of the second one's
+// complement.
+double difference(const Samples& lit, int a, int b, bool inverse) {
+  double sum = 0, range = 0;
+  for (size_t i = 0; i < lit.size(); ++i) {
+    const float second = inverse ? lit.sum[i] - lit.of(b)[i] : lit.of(b)[i];
+    sum += std::abs(lit.of(a)[i] - second);
+    range += lit.range[i];
+  }
+  return sum / range;
+}
+
+// Why a pair does not add up, as far as the series itself tells; nullopt when nothing in it is alike.
+std::optional<OddImage> finding(const Samples& lit,
+                                  const std::vector<PatternGroup>& groups,
+                                  const std::vector<std::filesystem::path>& files,
+                                  int first) {
+  const auto name = [&](int i) { return files[static_cast<size_t>(i)].filename().string(); };
+  for (const int image : {first, first + 1}) {
+    const auto& file = files[static_cast<size_t>(image)];
+    if (image > 0 && difference(lit, image, image - 1, false) < k_same)
+      return OddImage{file, "shows the same as " + name(image - 1)};
+    for (const PatternGroup& group : groups) {
+      if (!is_pair(group) || group.first == first) continue;
+      for (const int other : {group.first, group.first + 1}) {
+        if (difference(lit, image, other, false) < k_same)
+          return OddImage{file, "shows the same as " + name(other)};
+      }
+      // Images of two pairs have changed places; which two of the four, the sums do not tell.
+      const bool crossed = difference(lit, first, group.first, true) < k_same ||
+                           difference(lit, first, group.first + 1, true) < k_same;
+      if (crossed)
+        return OddImage{files[static_cast<size_t>(first)],
+                          fmt::format("or {} has changed places with {} or {}", name(first + 1),
+                                      name(group.first), name(group.first + 1))};
+    }
+  }
+  return std::nullopt;
+}
+
+void find_odd(const Samples& lit,
+              const std::vector<PatternGroup>& groups,
+              const std::vector<std::filesystem::path>& files,
+              CaptureQuality* quality) {
+  for (const GroupQuality& group : quality->groups) {
+    if (group.count != 2) continue;
+    if (group.off < k_odd_group) continue;
+    if (auto odd = finding(lit, groups, files, group.first)) {
+      quality->odd.push_back(std::move(*odd));
+    } else if (group.off > k_wrong_group) {
+      const auto name = files[static_cast<size_t>(group.first) + 1].filename().string();
+      quality->odd.push_back({files[static_cast<size_t>(group.first)],
+                             "and " + name + " do not add up to what the other pairs do"});
+    }
+  }
+}
+
+// How a patch of `b` lies against `a`: Gauss-Newton over shift, gain and offset.
+struct PatchShift {
+  bool textured = false;
+  Vector2f shift = Vector2f::Zero();
+};
+
+PatchShift shift_of(const cv::Mat& a, const cv::Mat& b, const cv::Rect& patch) {
+  PatchShift found;
+  Vector2f at = Vector2f::Zero();
+  float gain = 1, offset = 0;
+  for (int step = 0; step < k_steps; ++step) {
+    Matrix4f normal = Matrix4f::Zero();
+    Vector4f right = Vector4f::Zero();
+    int count = 0;
+    for (int y = patch.y; y < patch.y + patch.height; ++y) {
+      for (int x = patch.x; x < patch.x + patch.width; ++x) {
+        const float u = static_cast<float>(x) + at.x(), v = static_cast<float>(y) + at.y();
+        const int iu = static_cast<int>(std::floor(u)), iv = static_cast<int>(std::floor(v));
+        if (iu < 0 || iv < 0 || iu + 1 >= b.cols || iv + 1 >= b.rows) continue;
+        const float s = u - static_cast<float>(iu), t = v - static_cast<float>(iv);
+        const float *p = b.ptr<float>(iv) + iu, *q = b.ptr<float>(iv + 1) + iu;
+        const float top = p[0] + s * (p[1] - p[0]), low = q[0] + s * (q[1] - q[0]);
+        const float value = top + t * (low - top);
+        const Vector4f row(gain * ((1 - t) * (p[1] - p[0]) + t * (q[1] - q[0])), gain * (low - top), value,
+                           1);
+        normal.selfadjointView<Eigen::Lower>().rankUpdate(row);
+        right += (a.ptr<float>(y)[x] - gain * value - offset) * row;
+        ++count;
+      }
+    }
+    if (count < patch.area() / 2) return {};
+    normal = normal.selfadjointView<Eigen::Lower>();
+    const Eigen::Matrix2f gradients = normal.topLeftCorner<2, 2>() / static_cast<float>(count);
+    const float weaker = gradients.selfadjointView<Eigen::Lower>().eigenvalues()[0];
+    if (step == 0 && !(weaker > k_least_texture * k_least_texture)) return {};
+    const Vector4f delta = normal.ldlt().solve(right);
+    if (!delta.allFinite()) return {};
+    at += delta.head<2>();
+    gain += delta[2];
+    offset += delta[3];
+    if (at.norm() > k_max_patch_shift) break;
+  }
+  return {true, at};
+}
+
+void measure_motion(const cv::Mat& first, const cv::Mat& last, double scale, CaptureQuality* quality) {
+  std::vector<float> lengths;
+  for (int y = 0; y + k_patch <= first.rows; y += k_patch) {
+    for (int x = 0; x + k_patch <= first.cols; x += k_patch) {
+      const PatchShift patch = shift_of(last, first, {x, y, k_patch, k_patch});
+      if (patch.textured) lengths.push_back(patch.shift.norm() * static_cast<float>(scale));
+    }
+  }
+  quality->shift_patches = static_cast<int>(lengths.size());
+  if (lengths.empty()) return;
+  quality->shift_px = median(lengths);
+  std::sort(lengths.begin(), lengths.end());
+  quality->shift_worst_px = lengths[lengths.size() * 9 / 10];
+}
+
+// Mean of squares without the few that motion or a flash have spoilt.
+double trimmed_square(std::vector<float> residuals) {
+  constexpr double k_trim = 4;  // standard deviations
+  std::vector<float> sizes;
+  for (const float r : residuals) sizes.push_back(std::abs(r));
+  const double limit = k_trim * std::max(1.0, 1.4826 * median(sizes));
+  double sum = 0;
+  size_t count = 0;
+  for (const float r : sizes) {
+    if (r > limit) continue;
+    sum += static_cast<double>(r) * r;
+    ++count;
+  }
+  return sum / static_cast<double>(std::max<size_t>(1, count));
+}
+
+// An image and its inverse always add up to the same: what they do not is the noise of two intensities. It
+// is a straight line over the light; both its ends come from halves of the samples, dim and bright.
+void measure_noise(const Samples& lit, CaptureQuality* quality) {
+  constexpr size_t k_least_sums = 2000;
+  std::vector<float> sums = lit.sum;
+  const auto middle = static_cast<float>(median(sums));
+  std::array<std::vector<float>, 2> residuals;
+  std::array<double, 2> light{}, count{};
+  int pairs = 0;
+  for (const GroupQuality& group : quality->groups) pairs += group.count == 2 && group.off < k_odd_group;
+  if (pairs < 2) return;  // without inverses nothing adds up to the same
+  for (const GroupQuality& group : quality->groups) {
+    if (group.count != 2 || group.off >= k_odd_group) continue;
+    const float *a = lit.of(group.first), *b = lit.of(group.first + 1);
+    for (size_t i = 0; i < lit.size(); ++i) {
+      if (std::max(a[i], b[i]) >= k_saturated || std::min(a[i], b[i]) < 1) continue;
+      const size_t half = lit.sum[i] > middle ? 1 : 0;
+      residuals[half].push_back((a[i] + b[i]) / static_cast<float>(group.level) - lit.sum[i]);
+      light[half] += lit.sum[i];
+      ++count[half];
+    }
+  }
+  if (residuals[0].size() < k_least_sums || residuals[1].size() < k_least_sums) return;
+  // The sum that they are compared with is the median of all: pi / 2 times the variance of a mean.
+  const double own = 1 + std::numbers::pi / 2 / pairs - 2.0 / pairs;
+  const double dim = trimmed_square(residuals[0]) / own, bright = trimmed_square(residuals[1]) / own;
+  const double from = light[0] / count[0], to = light[1] / count[1];
+  constexpr double k_rounding = 1.0 / 6;  // of two intensities to whole levels
+  constexpr double k_least_range = 1.3;   // of the light in the halves; below, their difference is chance
+  const double slope = to > k_least_range * from ? std::max(0.0, (bright - dim) / (to - from)) : 0;
+  quality->noise.per_level = slope;
+  quality->noise.read = std::max(k_rounding, slope > 0 ? dim - slope * from : (dim + bright) / 2) / 2;
+}
+
+void measure_waves(const Samples& lit, const Patterns& patterns, CaptureQuality* quality) {
+  if (patterns.steps() == 0) return;
+  const float *white = lit.of(patterns.white()), *black = lit.of(patterns.black());
+  std::vector<float> light;
+  for (size_t i = 0; i < lit.size(); ++i) {
+    float sum = 0;
+    for (int k = 0; k < 2 * patterns.steps(); ++k) sum += lit.of(patterns.first_step() + k)[i];
+    const float mean = sum / static_cast<float>(2 * patterns.steps());
+    if (white[i] - black[i] >= k_lit) light.push_back((mean - black[i]) / (white[i] - black[i]));
+  }
+  if (!light.empty()) quality->wave_level = median(light);
+}
+
+void measure_light(const Samples& lit, const Patterns& patterns, CaptureQuality* quality) {
+  const float *white = lit.of(patterns.white()), *black = lit.of(patterns.black());
+  quality->white_level = median(std::vector<float>(white, white + lit.size()));
+  quality->black_level = median(std::vector<float>(black, black + lit.size()));
+  const auto full = std::count_if(white, white + lit.size(), [](float v) { return v >= k_saturated; });
+  quality->saturated = static_cast<double>(full) / static_cast<double>(lit.size());
+}
+
+bool holds(const GroupQuality& group,
+           const std::vector<OddImage>& odd,
+           const std::vector<std::filesystem::path>& files) {
+  return std::any_of(odd.begin(), odd.end(), [&](const OddImage& image) {
+    for (int k = 0; k < group.count; ++k) {
+      if (files[static_cast<size_t>(group.first + k)] == image.file) return true;
+    }
+    return false;
+  });
+}
+
+}  // namespace
+
+CaptureQualityProbe::CaptureQualityProbe(const Patterns& patterns, int width, int height)
+    : patterns_(patterns),
+      width_(width),
+      height_(height),
+      stride_(std::max(1, static_cast<int>(std::sqrt(static_cast<double>(width) * height / k_samples)))),
+      samples_(static_cast<size_t>(patterns.count())) {}
+
+void CaptureQualityProbe::add_image(int index, const cv::Mat& image) {
+  cv::Mat row(1, ((width_ + stride_ - 1) / stride_) * ((height_ + stride_ - 1) / stride_), CV_8U,
+              cv::Scalar(0));
+  int at = 0;
+  for (int y = 0; y < height_; y += stride_) {
+    // every row begins elsewhere, so that upright stripes do not beat with the grid
+    for (int x = (y / stride_ * 3) % stride_; x < width_; x += stride_)
+      row.ptr<uchar>()[at++] = image.ptr<uchar>(y)[x];
+  }
+  samples_[static_cast<size_t>(index)] = row.colRange(0, at);
+  cv::Mat* sum = index <= 1 ? &first_ : index >= patterns_.white() ? &last_ : nullptr;
+  if (!sum) return;
+  const double scale = std::min(1.0, static_cast<double>(k_reduced_width) / width_);
+  cv::Mat reduced;
+  cv::resize(image, reduced, {}, scale, scale, cv::INTER_AREA);
+  if (sum->empty()) *sum = cv::Mat(reduced.size(), CV_32F, cv::Scalar(0));
+  cv::add(*sum, reduced, *sum, cv::noArray(), CV_32F);
+}
+
+CaptureQuality CaptureQualityProbe::quality(const std::vector<std::filesystem::path>& files) const {
+  CaptureQuality quality;
+  const std::vector<PatternGroup> groups = patterns_.groups();
+  const Samples lit = lit_samples(groups, samples_);
+  quality.samples = static_cast<int>(lit.size());
+  if (lit.size() == 0) return quality;
+  measure_light(lit, patterns_, &quality);
+  quality.widest_stripe_px = patterns_.widest_stripe_px();
+  for (const PatternGroup& group : groups) quality.groups.push_back(quality_of(lit, group));
+  find_odd(lit, groups, files, &quality);
+  for (const GroupQuality& group : quality.groups) {
+    if (group.count != 2 || holds(group, quality.odd, files)) continue;
+    quality.level_low = std::min(quality.level_low, group.level);
+    quality.level_high = std::max(quality.level_high, group.level);
+  }
+  measure_noise(lit, &quality);
+  measure_waves(lit, patterns_, &quality);
+  measure_motion(first_, last_, static_cast<double>(width_) / first_.cols, &quality);
+  return quality;
+}
+
+}  // namespace limn::calib

@@ -1,0 +1,137 @@
+#include "calib/cross_validation.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <thread>
+
+namespace limn::calib {
+namespace {
+
+using Eigen::Vector2d;
+
+std::vector<int> scored_poses(const Observations& observations, const Solution& solution) {
+  std::set<int> poses;
+  for (const Match& match : observations.matches) {
+    if (solution.world_from_board[static_cast<size_t>(match.pose)]) poses.insert(match.pose);
+  }
+  return {poses.begin(), poses.end()};
+}
+
+// Distance on the board between the match's point and where the projector's light of that pixel lands: the
+// pixel error times the local scale of the mapping from the board's plane to projector pixels.
+double error_on_board(const Observations& observations,
+                      const Solution& solution,
+                      const Pose& world_from_board,
+                      const Match& match,
+                      const Vector2d& residual) {
+  const auto p = surface_point(observations, solution, world_from_board, match);
+  if (!p) return std::numeric_limits<double>::quiet_NaN();
+  const Imager& projector = solution.rig.projectors[static_cast<size_t>(match.projector)];
+  constexpr double k_step = 1e-4;  // m
+  Eigen::Matrix2d px_by_m;
+  const auto at = projector.project(*p);
+  for (int axis = 0; axis < 2; ++axis) {
+    const auto moved =
+        projector.project(*p + k_step * (world_from_board.rotation * Eigen::Vector3d::Unit(axis)));
+    if (!at || !moved) return std::numeric_limits<double>::quiet_NaN();
+    px_by_m.col(axis) = (*moved - *at) / k_step;
+  }
+  return (px_by_m.inverse() * residual).norm();
+}
+
+// What one pose came to; written by one thread each.
+struct PoseScore {
+  Status status;
+  Rig rig;
+  double squared = 0;
+  int cells = 0;
+};
+
+PoseScore score_pose(const Observations& observations,
+                     const SolveOptions& options,
+                     const Solution& solution,
+                     int pose,
+                     bool with_errors,
+                     CrossValidation* into) {
+  const std::string& name = observations.poses[static_cast<size_t>(pose)];
+  const auto left = solve_again(observations, options, solution, pose, with_errors);
+  PoseScore score;
+  if (!left) {
+    score.status = error("held-out solve without {}: {}", name, left.message());
+    return score;
+  }
+  const auto world_from_board = board_pose_from_cameras(observations, *left, pose);
+  if (!world_from_board) {
+    score.status = error("held-out pose {}: {}", name, world_from_board.message());
+    return score;
+  }
+  score.rig = left->rig;
+  for (size_t i = 0; i < observations.matches.size(); ++i) {
+    const Match& match = observations.matches[i];
+    if (match.pose != pose) continue;
+    const auto px = predicted(observations, *left, *world_from_board, match);
+    if (!px) continue;
+    into->residuals[i] = *px - match.px_projector;
+    if (with_errors)
+      into->errors_m[i] = error_on_board(observations, *left, *world_from_board, match, into->residuals[i]);
+    score.squared += into->residuals[i].squaredNorm();
+    ++score.cells;
+  }
+  return score;
+}
+
+// Every pose on its own, on as many threads as there are cores: each writes its own places.
+std::vector<PoseScore> score_poses(const Observations& observations,
+                                   const SolveOptions& options,
+                                   const Solution& solution,
+                                   const std::vector<int>& poses,
+                                   bool with_errors,
+                                   CrossValidation* into) {
+  std::vector<PoseScore> scores(poses.size());
+  std::atomic<size_t> next = 0;
+  const auto work = [&] {
+    for (size_t i = next++; i < poses.size(); i = next++)
+      scores[i] = score_pose(observations, options, solution, poses[i], with_errors, into);
+  };
+  std::vector<std::jthread> threads;
+  for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i) threads.emplace_back(work);
+  work();
+  threads.clear();
+  return scores;
+}
+
+}  // namespace
+
+Result<CrossValidation> cross_validate(const Observations& observations,
+                         const SolveOptions& options,
+                         const Solution& solution,
+                         bool with_errors) {
+  const Vector2d none = Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  CrossValidation score;
+  score.residuals.assign(observations.matches.size(), none);
+  score.errors_m.assign(observations.matches.size(), none.x());
+  const std::vector<int> poses = scored_poses(observations, solution);
+  const auto scores = score_poses(observations, options, solution, poses, with_errors, &score);
+  double squared = 0;
+  int cells = 0;
+  for (size_t i = 0; i < poses.size(); ++i) {
+    LIMN_TRY_STATUS(scores[i].status);
+    if (scores[i].cells == 0) continue;
+    const double rms = std::sqrt(scores[i].squared / scores[i].cells);
+    score.poses.push_back({observations.poses[static_cast<size_t>(poses[i])], rms, scores[i].cells});
+    score.rigs.push_back(scores[i].rig);
+    score.worst_px = std::max(score.worst_px, rms);
+    squared += scores[i].squared;
+    cells += scores[i].cells;
+  }
+  if (cells == 0)
+    return error("held-out: no match of any pose could be predicted. Capture more board poses.");
+  score.rms_px = std::sqrt(squared / cells);
+  return score;
+}
+
+}  // namespace limn::calib

@@ -1,0 +1,322 @@
+#include "calib/judge/scale_bar.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <sstream>
+
+#include "calib/code/decode.h"
+#include "calib/surface/triangulate.h"
+
+namespace limn::calib {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double k_around = 1.35;      // of the mark's size: with the white margin that every marker has
+constexpr double k_paper = 0.6;        // of the bright pixels' contrast; ink and its edges are darker
+constexpr size_t k_most_pixels = 400;  // of a mark; more only cost time
+constexpr size_t k_least_pixels = 30;  // ten times a plane's unknowns
+constexpr double k_far_sigmas = 3;
+
+// A decoded pixel on a mark's paper.
+struct Spot {
+  Vector2d px_camera, px_projector;
+};
+
+Vector2d crossing_of_diagonals(const std::array<Vector2d, 4>& q) {
+  Eigen::Matrix2d m;
+  m << q[2] - q[0], q[1] - q[3];
+  const Vector2d shares = m.inverse() * (q[1] - q[0]);  // q0 + s (q2 - q0) = q1 - t (q1 - q3)
+  return q[0] + shares.x() * (q[2] - q[0]);
+}
+
+std::vector<Spot> paper_spots(const Decoded& decoded, const std::array<Vector2d, 4>& corners) {
+  const Vector2d centre = crossing_of_diagonals(corners);
+  std::vector<cv::Point2f> hull;
+  Vector2d low = centre, high = centre;
+  for (const Vector2d& corner : corners) {
+    const Vector2d p = centre + k_around * (corner - centre);
+    hull.emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()));
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  struct Candidate {
+    Spot spot;
+    int contrast = 0;
+  };
+  std::vector<Candidate> all;
+  std::vector<int> contrasts;
+  const cv::Mat& labels = decoded.px_projector;
+  for (int y = std::max(0, static_cast<int>(low.y()));
+       y <= std::min(labels.rows - 1, static_cast<int>(high.y())); ++y) {
+    for (int x = std::max(0, static_cast<int>(low.x()));
+         x <= std::min(labels.cols - 1, static_cast<int>(high.x())); ++x) {
+      const auto& label = labels.at<cv::Vec2f>(y, x);
+      const cv::Point2f at(static_cast<float>(x), static_cast<float>(y));
+      if (std::isnan(label[0]) || cv::pointPolygonTest(hull, at, false) < 0) continue;
+      all.push_back({{Vector2d(x, y), Vector2d(label[0], label[1])}, decoded.contrast.at<uchar>(y, x)});
+      contrasts.push_back(all.back().contrast);
+    }
+  }
+  if (all.size() < k_least_pixels) return {};
+  const auto bright = contrasts.begin() + static_cast<std::ptrdiff_t>(contrasts.size() * 9 / 10);
+  std::nth_element(contrasts.begin(), bright, contrasts.end());
+  std::erase_if(all, [&](const Candidate& c) { return c.contrast < k_paper * *bright; });
+  std::vector<Spot> spots;
+  const size_t step = all.size() / k_most_pixels + 1;
+  for (size_t i = 0; i < all.size(); i += step) spots.push_back(all[i].spot);
+  return spots;
+}
+
+// The mark's centre in the world and its deviation along and across the camera's ray.
+struct Centre {
+  Vector3d p_world;
+  double along_m = 0, across_m = 0;
+  Vector3d d_ray;
+};
+
+// How many independent labels there are: neighbours within one projector pixel share their error.
+double independent(const std::vector<Spot>& spots, double pixels) {
+  Eigen::Matrix2d normal = 1e-9 * Eigen::Matrix2d::Identity(), product = Eigen::Matrix2d::Zero();
+  Vector2d mean = Vector2d::Zero(), mean_label = Vector2d::Zero();
+  for (const Spot& s : spots) {
+    mean += s.px_camera / static_cast<double>(spots.size());
+    mean_label += s.px_projector / static_cast<double>(spots.size());
+  }
+  for (const Spot& s : spots) {
+    normal += (s.px_camera - mean) * (s.px_camera - mean).transpose();
+    product += (s.px_camera - mean) * (s.px_projector - mean_label).transpose();
+  }
+  const double area = std::abs((normal.inverse() * product).determinant());  // projector pixels of one
+  return std::clamp(area * pixels, 4.0, pixels);
+}
+
+// Inverse depth along the camera's axis is an affine function of direction on a plane.
+std::optional<Centre> centre_of(const Imager& camera,
+                                const Imager& projector,
+                                const DetectedMark& mark,
+                                const std::vector<Spot>& spots) {
+  const auto middle = camera.lens.unproject(crossing_of_diagonals(mark.corners_px));
+  if (!middle) return std::nullopt;
+  const Vector2d m = middle->head<2>() / middle->z();
+  std::vector<Vector3d> rows;
+  std::vector<double> inverse_depths;
+  for (const Spot& spot : spots) {
+    const auto eye = camera.ray(spot.px_camera), light = projector.ray(spot.px_projector);
+    const auto p = eye && light ? midpoint(*eye, *light) : std::nullopt;
+    if (!p) continue;
+    const Vector3d p_camera = camera.imager_from_world * *p;
+    if (!(p_camera.z() > 0)) continue;
+    rows.emplace_back(1, p_camera.x() / p_camera.z() - m.x(), p_camera.y() / p_camera.z() - m.y());
+    inverse_depths.push_back(1 / p_camera.z());
+  }
+  for (int pass = 0;; ++pass) {
+    if (rows.size() < k_least_pixels) return std::nullopt;
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+    Vector3d product = Vector3d::Zero();
+    for (size_t i = 0; i < rows.size(); ++i) {
+      normal += rows[i] * rows[i].transpose();
+      product += rows[i] * inverse_depths[i];
+    }
+    const Vector3d plane = normal.ldlt().solve(product);
+    double squared = 0;
+    for (size_t i = 0; i < rows.size(); ++i) squared += std::pow(rows[i].dot(plane) - inverse_depths[i], 2);
+    const double sigma = std::sqrt(squared / static_cast<double>(rows.size() - 3));
+    if (pass < 2) {  // what is far from the plane is no paper
+      std::vector<Vector3d> kept_rows;
+      std::vector<double> kept;
+      for (size_t i = 0; i < rows.size(); ++i) {
+        if (std::abs(rows[i].dot(plane) - inverse_depths[i]) > k_far_sigmas * sigma) continue;
+        kept_rows.push_back(rows[i]);
+        kept.push_back(inverse_depths[i]);
+      }
+      rows = std::move(kept_rows);
+      inverse_depths = std::move(kept);
+      continue;
+    }
+    if (!(plane[0] > 0)) return std::nullopt;
+    Centre centre;
+    const double depth = 1 / plane[0];
+    centre.p_world = camera.imager_from_world.inverse() * Vector3d(depth * m.x(), depth * m.y(), depth);
+    centre.d_ray = camera.imager_from_world.rotation.conjugate() * *middle;
+    const auto count = static_cast<double>(rows.size());
+    const double leverage = normal.inverse()(0, 0) * count / independent(spots, count);
+    centre.along_m = sigma * std::sqrt(leverage) * depth * depth / middle->z();
+    centre.across_m = mark.stddev_px / 2 * depth / camera.lens.fx();  // the mean of four corners
+    return centre;
+  }
+}
+
+struct Pair {
+  const DetectedMark *a = nullptr, *b = nullptr;
+  std::vector<Spot> spots_a, spots_b;
+};
+
+std::optional<double> length_of(const Imager& camera, const Imager& projector, const Pair& pair) {
+  const auto a = centre_of(camera, projector, *pair.a, pair.spots_a),
+             b = centre_of(camera, projector, *pair.b, pair.spots_b);
+  if (!a || !b) return std::nullopt;
+  return (a->p_world - b->p_world).norm();
+}
+
+double noise_of(const Centre& a, const Centre& b) {
+  const Vector3d along = (b.p_world - a.p_world).normalized();
+  double variance = 0;
+  for (const Centre* c : {&a, &b}) {
+    const double share = std::pow(along.dot(c->d_ray), 2);
+    variance += share * c->along_m * c->along_m + (1 - share) * c->across_m * c->across_m;
+  }
+  return std::sqrt(variance);
+}
+
+// Standard deviation of the length by the devices' covariance: central differences of a standard deviation
+// each.
+double calibration_of(const Solution& solution, int camera, int projector, const Pair& pair) {
+  if (solution.covariance.size() == 0) return 0;
+  int camera_at = 0;
+  for (int i = 0; i < camera; ++i)
+    camera_at += solution.rig.cameras[static_cast<size_t>(i)].lens.model.value_count() + 6;
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(solution.covariance.cols());
+  const auto vary = [&](int at, bool is_camera) {
+    const Imager& original = is_camera ? solution.rig.cameras[static_cast<size_t>(camera)]
+                                       : solution.rig.projectors[static_cast<size_t>(projector)];
+    const int values = original.lens.model.value_count();
+    for (int i = 0; i < values + 6; ++i) {
+      const double step = std::sqrt(std::max(0.0, solution.covariance(at + i, at + i)));
+      if (!(step > 0)) continue;
+      double difference = 0;
+      for (const double sign : {1.0, -1.0}) {
+        Imager moved = original;
+        if (i < values) {
+          moved.lens.values[static_cast<size_t>(i)] += sign * step;
+        } else {
+          moved.imager_from_world =
+              boxplus(moved.imager_from_world, sign * step * Vector6d::Unit(i - values));
+        }
+        const Imager& eye = is_camera ? moved : solution.rig.cameras[static_cast<size_t>(camera)];
+        const Imager& light = is_camera ? solution.rig.projectors[static_cast<size_t>(projector)] : moved;
+        difference += sign * length_of(eye, light, pair).value_or(0);
+      }
+      gradient[at + i] = difference / (2 * step);
+    }
+  };
+  vary(camera_at, true);
+  vary(solution.projector_at(static_cast<size_t>(projector)), false);
+  return std::sqrt(std::max(0.0, gradient.dot(solution.covariance * gradient)));
+}
+
+const DetectedMark* find(const std::vector<DetectedMark>& marks, int camera, int pose, const std::string& name) {
+  const auto found = std::find_if(marks.begin(), marks.end(), [&](const DetectedMark& mark) {
+    return mark.camera == camera && mark.pose == pose && mark.name == name;
+  });
+  return found == marks.end() ? nullptr : &*found;
+}
+
+void measure_view(const Solution& solution,
+               const Decoded& decoded,
+               const DetectedMark& a,
+               const DetectedMark& b,
+               int projector,
+               ScaleBarCheck* check) {
+  const Imager& eye = solution.rig.cameras[static_cast<size_t>(a.camera)];
+  const Imager& light = solution.rig.projectors[static_cast<size_t>(projector)];
+  const Pair pair{&a, &b, paper_spots(decoded, a.corners_px), paper_spots(decoded, b.corners_px)};
+  const auto from = centre_of(eye, light, a, pair.spots_a), to = centre_of(eye, light, b, pair.spots_b);
+  if (!from || !to) return;
+  check->views.push_back({a.camera, projector, a.pose, (from->p_world - to->p_world).norm(),
+                          noise_of(*from, *to), calibration_of(solution, a.camera, projector, pair)});
+}
+
+void conclude(double widened, ScaleBarCheck* check) {
+  double weights = 0, sum = 0, calibration = 0, squared = 0;
+  for (const ScaleBarView& view : check->views) {
+    const double weight = 1 / std::pow(std::max(view.noise_m, 1e-9), 2);
+    weights += weight;
+    sum += weight * view.measured_m;
+    calibration += weight * view.calibration_m;
+  }
+  if (weights == 0) return;
+  check->measured_m = sum / weights;
+  for (const ScaleBarView& view : check->views)
+    squared += std::pow((view.measured_m - check->measured_m) / std::max(view.noise_m, 1e-9), 2);
+  const double freedom = static_cast<double>(check->views.size()) - 1;
+  const double scatter = freedom > 0 ? std::max(1.0, std::sqrt(squared / freedom)) : 1;
+  check->stddev_m = std::hypot(scatter / std::sqrt(weights), widened * calibration / weights);
+}
+
+}  // namespace
+
+Result<ScaleBar> parse_scale_bar(const std::string& text) {
+  std::istringstream words(text);
+  ScaleBar known;
+  std::string length, surplus;
+  words >> known.from >> known.to >> length;
+  double value = 0;
+  const auto [rest, problem] = std::from_chars(length.data(), length.data() + length.size(), value);
+  const std::string unit = rest;  // the text ends in a zero
+  const double factor = unit == "mm" ? 1e-3 : unit == "cm" ? 1e-2 : unit == "m" ? 1 : 0;
+  known.length_m = value * factor;
+  if (words.fail() || words >> surplus || problem != std::errc() || !(known.length_m > 0) ||
+      !std::isfinite(known.length_m) || known.from == known.to)
+    return error(
+        "known length '{}': expected two markers and their distance, such as 'apriltag_36h11:3 "
+        "apriltag_36h11:7 250mm'.",
+        text);
+  return known;
+}
+
+Result<std::vector<ScaleBarCheck>> measure_scale_bars(const CaptureSet& captures,
+                                                  const Solution& solution,
+                                                  const std::vector<DetectedMark>& marks,
+                                                  const std::vector<ScaleBar>& lengths,
+                                                  double widened) {
+  std::vector<ScaleBarCheck> checks;
+  for (const ScaleBar& known : lengths) checks.push_back({known, {}, 0, 0});
+  for (size_t pose = 0; pose < captures.poses.size(); ++pose) {
+    for (size_t camera = 0; camera < captures.cameras.size(); ++camera) {
+      const auto mark = [&](const std::string& name) {
+        return find(marks, static_cast<int>(camera), static_cast<int>(pose), name);
+      };
+      const bool needed = std::any_of(lengths.begin(), lengths.end(), [&](const ScaleBar& known) {
+        return mark(known.from) && mark(known.to);
+      });
+      for (size_t projector = 0; needed && projector < captures.projectors.size(); ++projector) {
+        const CapturedDevice& device = captures.cameras[camera];
+        LIMN_TRY(const Decoded decoded,
+                 decode(captures.patterns[projector], captures.poses[pose].images[projector][camera],
+                        device.width, device.height));
+        for (ScaleBarCheck& check : checks) {
+          const DetectedMark *a = mark(check.known.from), *b = mark(check.known.to);
+          if (a && b) measure_view(solution, decoded, *a, *b, static_cast<int>(projector), &check);
+        }
+      }
+    }
+  }
+  for (ScaleBarCheck& check : checks) conclude(widened, &check);
+  return checks;
+}
+
+std::optional<Fault> scale_fault(const ScaleBarCheck& check, const Board& board) {
+  const ScaleBar& known = check.known;
+  const std::string name = fmt::format("{} to {}", known.from, known.to);
+  if (check.views.empty())
+    return Fault{"known_length_not_seen", fmt::format("no pose shows both ends of {} lit", name),
+                 "hold the bar where a camera sees both markers and a projector lights them", Severity::note};
+  const double difference = check.measured_m - known.length_m, share = difference / known.length_m;
+  if (std::abs(difference) <= 3 * check.stddev_m || std::abs(share) <= k_scale_tolerance) return std::nullopt;
+  return Fault{
+      "wrong_scale",
+      fmt::format(
+          "{} is {:.2f} mm long and measures {:.2f} mm with a deviation of {:.2f} mm in {} views ({:+.2f} %)",
+          name, 1e3 * known.length_m, 1e3 * check.measured_m, 1e3 * check.stddev_m, check.views.size(),
+          100 * share),
+      fmt::format(
+          "measure the board: its squares seem to be {:.3f} mm instead of {:g} mm; or measure the bar again",
+          1e3 * board.square_m / (1 + share), 1e3 * board.square_m)};
+}
+
+}  // namespace limn::calib

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/capture_set.h"
+#include "calib/judge/faults.h"
+#include "calib/solve.h"
+#include "core/result.h"
+
+namespace limn::calib {
+
+/// A length that somebody has measured: between the centres of two markers on one stiff thing, such as a
+/// printed bar. It is independent of the board, so it tells what a board of a wrong size hides.
+struct ScaleBar {
+  std::string from, to;  ///< `family:id`
+  double length_m = 0;
+};
+
+/// "apriltag_36h11:3 apriltag_36h11:7 250mm" (mm, cm or m).
+Result<ScaleBar> parse_scale_bar(const std::string& text);
+
+/// A square mark in a camera's image of one pose.
+struct DetectedMark {
+  int camera = 0;
+  int pose = 0;
+  std::string name;
+  std::array<Eigen::Vector2d, 4> corners_px;  ///< around
+  double stddev_px = 0.05;                    ///< of one coordinate of a corner
+};
+
+/// What one camera and one projector made of it in one pose.
+struct ScaleBarView {
+  int camera = 0;
+  int projector = 0;
+  int pose = 0;
+  double measured_m = 0;
+  double noise_m = 0;        ///< standard deviation by what this view decoded
+  double calibration_m = 0;  ///< by the devices' covariance: the views share it
+};
+
+struct ScaleBarCheck {
+  ScaleBar known;
+  std::vector<ScaleBarView> views;  ///< empty: nowhere were both marks seen and lit
+  double measured_m = 0;          ///< their mean, weighted by noise
+  double stddev_m = 0;            ///< stated: of the mean, calibration included
+};
+
+/// Each length, measured by light: the paper in and around each mark is decoded, its points are where the
+/// camera's and the projector's rays meet, a plane through them meets the camera's ray of the mark's centre.
+/// Poses with or without a board. `widened`: factor on the devices' standard deviations, such as the held-out
+/// normalised residuals' deviation where that is beyond 1.
+Result<std::vector<ScaleBarCheck>> measure_scale_bars(const CaptureSet& captures,
+                                                  const Solution& solution,
+                                                  const std::vector<DetectedMark>& marks,
+                                                  const std::vector<ScaleBar>& lengths,
+                                                  double widened = 1);
+
+/// `wrong_scale` beyond 3 stated deviations and k_scale_tolerance; `known_length_not_seen` without a view.
+std::optional<Fault> scale_fault(const ScaleBarCheck& check, const Board& board);
+constexpr double k_scale_tolerance =
+    0.002;  // a printer's own error is half of that; below it nothing is wrong
+
+}  // namespace limn::calib

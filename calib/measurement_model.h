@@ -1,0 +1,115 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+
+#include "core/lens.h"
+#include "core/pose.h"
+
+namespace limn::calib {
+
+/// How a nearly flat board is bent: two parabolas, as mrcal has them. Height (m, along the board's z) of the
+/// sheet at (x, y): bend.x (1 - xr^2) + bend.y (1 - yr^2), where xr and yr run from -1 to 1 over the squares.
+struct BoardShape {
+  double width_m = 1;
+  double height_m = 1;
+  double z(const Eigen::Vector2d& bend, double x, double y) const;
+  /// (dz/dx, dz/dy)
+  Eigen::Vector2d slope(const Eigen::Vector2d& bend, double x, double y) const;
+  /// (dz/dbend.x, dz/dbend.y)
+  Eigen::Vector2d per_bend(double x, double y) const;
+};
+
+/// Borrowed places of an imager's unknowns.
+struct ImagerView {
+  const LensModel& model;
+  std::span<const double> values;
+  const Pose& imager_from_world;
+};
+
+/// Of the lens models that can be solved: LENSMODEL_OPENCV12's.
+constexpr int k_most_values = 16;
+
+/// Where an imager's pixel looks: the point (x, y, 1) on its ray, imager frame, and how that moves with the
+/// lens' values while the pixel stays (implicit function theorem: project(values, d) = px stays true, so
+/// J_d dd = -J_values dvalues).
+struct LensRay {
+  Eigen::Vector3d d = Eigen::Vector3d::Zero();
+  Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor, 2, k_most_values> xy_by_values;
+};
+
+/// LensRay of a pixel. Starts from what `ray` holds, if it holds anything: two steps when the values have
+/// hardly moved since. False when the pixel has none (`ray` is empty then).
+bool find_ray(const LensModel& model,
+              std::span<const double> values,
+              const Eigen::Vector2d& px,
+              bool with_derivatives,
+              LensRay* ray);
+
+/// Derivatives of a predicted pixel. Poses: by boxplus's delta [rotation; translation]; values: 2 x
+/// value_count.
+struct Derivatives {
+  using Pose6 = Eigen::Matrix<double, 2, 6>;
+  using Values = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor, 2, k_most_values>;
+  Values camera_values, projector_values;
+  Pose6 camera_pose, projector_pose, board_pose;
+  Eigen::Matrix2d bend;
+};
+
+/// Camera pixel of the board's point (x, y). False when it has none (behind the camera).
+bool predict_corner(const ImagerView& camera,
+                    const Pose& world_from_board,
+                    const BoardShape& shape,
+                    const Eigen::Vector2d& bend,
+                    const Eigen::Vector2d& p_board_xy,
+                    Eigen::Vector2d* px,
+                    Derivatives* derivatives = nullptr);
+
+/// World point where the ray of a camera pixel meets the board. False when it does not.
+bool intersect_board(const ImagerView& camera,
+                const Pose& world_from_board,
+                const BoardShape& shape,
+                const Eigen::Vector2d& bend,
+                const Eigen::Vector2d& px_camera,
+                Eigen::Vector3d* p_world);
+
+/// Projector pixel of that point.
+bool predict_match(const ImagerView& camera,
+                   const ImagerView& projector,
+                   const Pose& world_from_board,
+                   const BoardShape& shape,
+                   const Eigen::Vector2d& bend,
+                   const Eigen::Vector2d& px_camera,
+                   Eigen::Vector2d* px_projector,
+                   Derivatives* derivatives = nullptr);
+/// Likewise with the ray of the camera's pixel at hand (with its derivatives when those are wanted).
+bool predict_match(const ImagerView& camera,
+                   const ImagerView& projector,
+                   const Pose& world_from_board,
+                   const BoardShape& shape,
+                   const Eigen::Vector2d& bend,
+                   const LensRay& ray,
+                   Eigen::Vector2d* px_projector,
+                   Derivatives* derivatives = nullptr);
+
+/// How another imager (`seeing`) sees the point at 1 / `inverse_depth` along z of a camera's ray.
+struct TiePointDerivatives {
+  Derivatives::Values camera_values, values;
+  Derivatives::Pose6 camera_pose, pose;
+  Eigen::Vector2d inverse_depth;
+};
+bool predict_tie_point(const ImagerView& camera,
+                      const ImagerView& seeing,
+                      const LensRay& ray,
+                      double inverse_depth,
+                      Eigen::Vector2d* px,
+                      TiePointDerivatives* derivatives = nullptr);
+
+/// Distance along `ray` (units of its d) of a camera to the point nearest to the ray of another imager's
+/// pixel; 0 when the rays are all but parallel or meet behind.
+double triangulated_depth(const ImagerView& camera,
+                const LensRay& ray,
+                const ImagerView& seeing,
+                const Eigen::Vector2d& px);
+
+}  // namespace limn::calib

@@ -1,0 +1,152 @@
+#include "calib/model_selection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <optional>
+
+namespace limn::calib {
+
+const char* const k_auto_lens = "auto";
+
+namespace {
+
+constexpr auto k_pinhole = "LENSMODEL_PINHOLE", k_plain = "LENSMODEL_OPENCV4";
+constexpr const char* k_richer[] = {"LENSMODEL_OPENCV5", "LENSMODEL_OPENCV8"};
+
+constexpr double k_least_gain = 0.03;  // of the error; by chance lenses that need nothing gain 1 or 2 %
+
+struct Candidate {
+  std::vector<std::string> models;
+  Solution solution;
+  CrossValidation held_out;
+};
+
+struct Gain {
+  double share = 0, uncertainty = 0;
+  bool is_certain() const { return share > uncertainty; }
+};
+
+// Student's t, 95 % on one side, by degrees of freedom from 1; few poses tell little.
+double student_95(size_t freedom) {
+  constexpr double k_t[] = {6.31, 2.92, 2.35, 2.13, 2.02, 1.94, 1.89, 1.86, 1.83, 1.81, 1.80, 1.78};
+  return k_t[std::min(freedom, std::size(k_t)) - 1];
+}
+
+// Poses are what scatters independently. Ratios, because one steep or distant pose has more of every error:
+// by how much the richer model's is lower on the (geometric) average, and how far chance takes that.
+Gain gain_of(const CrossValidation& simple, const CrossValidation& rich) {
+  std::vector<double> ratios;
+  double sum = 0;
+  for (const HeldOutPose& a : simple.poses) {
+    for (const HeldOutPose& b : rich.poses) {
+      if (a.pose != b.pose || !(a.rms_px > 0) || !(b.rms_px > 0)) continue;
+      ratios.push_back(std::log(a.rms_px / b.rms_px));
+      sum += ratios.back();
+    }
+  }
+  const auto n = static_cast<double>(ratios.size());
+  if (n < 2) return {0, std::numeric_limits<double>::infinity()};
+  double squared = 0;
+  for (const double ratio : ratios) squared += (ratio - sum / n) * (ratio - sum / n);
+  const double chance = student_95(ratios.size() - 1) * std::sqrt(squared / (n - 1) / n);
+  return {sum / n, std::max(chance, k_least_gain)};
+}
+
+class ModelSelector {
+ public:
+  ModelSelector(const Observations& observations, const SolveOptions& options, Candidate first)
+      : observations_(observations), options_(options), best_(std::move(first)) {}
+
+  void choose(size_t device) {
+    const bool is_projector = device >= observations_.cameras.size();
+    const size_t first = trials_.size();
+    note(device, best_.models[device], best_.held_out.rms_px, {});
+    if (is_projector && try_simpler(device)) return mark_chosen(device, first);
+    for (const char* model : k_richer) try_richer(device, model);
+    mark_chosen(device, first);
+  }
+  const Candidate& best() const { return best_; }
+  std::vector<ModelTrial> trials() { return std::move(trials_); }
+
+ private:
+  std::optional<Candidate> candidate(size_t device, const std::string& model) {
+    Candidate tried;
+    tried.models = best_.models;
+    tried.models[device] = model;
+    SolveOptions options = options_;
+    options.lens_models = tried.models;
+    auto solution = solve_again(observations_, options, best_.solution);
+    if (!solution) return std::nullopt;
+    auto score = cross_validate(observations_, options, *solution, false);
+    if (!score) return std::nullopt;
+    tried.solution = *std::move(solution);
+    tried.held_out = *std::move(score);
+    return tried;
+  }
+
+  bool try_simpler(size_t device) {
+    auto tried = candidate(device, k_pinhole);
+    const Gain gain = tried ? gain_of(tried->held_out, best_.held_out) : Gain();
+    note(device, k_pinhole, tried ? tried->held_out.rms_px : std::nan(""), gain);
+    if (!tried || gain.is_certain()) return false;
+    best_ = *std::move(tried);
+    return true;
+  }
+
+  void try_richer(size_t device, const std::string& model) {
+    auto tried = candidate(device, model);
+    const Gain gain = tried ? gain_of(best_.held_out, tried->held_out) : Gain();
+    note(device, model, tried ? tried->held_out.rms_px : std::nan(""), gain);
+    if (tried && gain.is_certain()) best_ = *std::move(tried);
+  }
+
+  void note(size_t device, const std::string& model, double px, const Gain& gain) {
+    const size_t cameras = observations_.cameras.size();
+    const std::string& name = device < cameras ? observations_.cameras[device].name
+                                               : observations_.projectors[device - cameras].name;
+    trials_.push_back({name, model, px, gain.share, gain.uncertainty, false});
+  }
+  void mark_chosen(size_t device, size_t first) {
+    for (size_t i = first; i < trials_.size(); ++i)
+      trials_[i].chosen = trials_[i].model == best_.models[device];
+  }
+
+  const Observations& observations_;
+  const SolveOptions& options_;
+  Candidate best_;
+  std::vector<ModelTrial> trials_;
+};
+
+}  // namespace
+
+Result<ModelSelection> solve_selecting_models(const Observations& observations, const SolveOptions& options) {
+  ModelSelection choice;
+  choice.options = options;
+  const std::vector<std::string> asked = lens_models(observations, options);
+  choice.options.lens_models = asked;
+  for (std::string& name : choice.options.lens_models) {
+    if (name == k_auto_lens) name = k_plain;
+  }
+  LIMN_TRY(choice.solution, solve(observations, choice.options));
+  LIMN_TRY(choice.held_out, cross_validate(observations, choice.options, choice.solution));
+  if (choice.options.lens_models == asked) return choice;
+
+  // Projectors first: nearly all of what is left over is theirs.
+  ModelSelector choosing(observations, choice.options,
+                    {choice.options.lens_models, choice.solution, choice.held_out});
+  const size_t cameras = observations.cameras.size();
+  for (size_t i = 0; i < asked.size(); ++i) {
+    const size_t device = (i + cameras) % asked.size();
+    if (asked[device] == k_auto_lens) choosing.choose(device);
+  }
+  choice.trials = choosing.trials();
+  if (choosing.best().models == choice.options.lens_models) return choice;
+  choice.options.lens_models = choosing.best().models;
+  LIMN_TRY(choice.solution, solve_from(observations, choice.options, choosing.best().solution));
+  LIMN_TRY(choice.held_out, cross_validate(observations, choice.options, choice.solution));
+  return choice;
+}
+
+}  // namespace limn::calib

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+namespace limn::calib {
+
+/// Images as SVG texts for pages on white: no script, no style sheet, no address. Deterministic.
+
+/// An observation in an imager's image and what was left over there.
+struct FieldPoint {
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  Eigen::Vector2d residual = Eigen::Vector2d::Zero();  ///< px; not finite: drawn as a point
+  bool outlier = false;
+};
+
+/// A drawing and what to read it by.
+struct SvgPlot {
+  std::string svg;
+  std::string key;  ///< "arrows x200; blue 0 to red 0.15 px; black rings: outliers"; plain text
+};
+
+/// Residuals as magnified arrows, coloured by their length, on a grid whose bare cells (nothing observed) are
+/// grey. The magnification is the largest round one at which nine of ten inliers stay short.
+SvgPlot residual_field(int width, int height, const std::vector<FieldPoint>& points);
+
+/// A measured value at a place.
+struct Dot {
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  double value = 0;
+};
+/// Values as coloured dots in an image; colours run to `most`.
+std::string dot_map(int width, int height, const std::vector<Dot>& dots, double most);
+
+/// Cells, row by row, in an image's shape; NaN is grey. Colours run to `most`.
+std::string heat_map(int width, int height, int columns, const std::vector<double>& values, double most);
+
+/// From 0 to `most` in colours, with `unit`.
+std::string colour_key(double most, const std::string& unit);
+
+struct Bar {
+  std::string label;
+  double value = 0;
+  std::string note;  ///< behind the bar
+};
+/// Horizontal bars from 0 with a dashed line at `limit`.
+std::string bar_chart(const std::vector<Bar>& bars, double limit, const std::string& limit_note);
+
+/// Values over time, oldest first, from 0 to their largest.
+std::string sparkline(const std::vector<double>& values);
+
+/// `text` with <, >, & and quotes made harmless.
+std::string xml_escaped(const std::string& text);
+
+}  // namespace limn::calib

@@ -1,0 +1,67 @@
+#include "device/image_sequence_camera.h"
+
+#include <algorithm>
+
+#include "core/image_io.h"
+
+namespace limn::device {
+namespace {
+
+bool is_image(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+}
+
+Result<std::vector<std::filesystem::path>> images_of(const std::filesystem::path& path) {
+  namespace fs = std::filesystem;
+  std::error_code problem;
+  if (fs::is_regular_file(path, problem)) return std::vector<fs::path>{path};
+  if (!fs::is_directory(path, problem))
+    return error("{}: expected a picture or a folder of pictures, found nothing there. Check the path.",
+                 path.string());
+  std::vector<fs::path> images;
+  for (const auto& entry : fs::directory_iterator(path, problem))
+    if (is_image(entry.path())) images.push_back(entry.path());
+  if (problem)
+    return error("{}: cannot be listed: {}. Check its permissions.", path.string(), problem.message());
+  if (images.empty())
+    return error("{}: expected .png or .jpg pictures, found none. Name the folder that holds the frames.",
+                 path.string());
+  std::sort(images.begin(), images.end());
+  return images;
+}
+
+}  // namespace
+
+Result<ImageSequenceCamera> ImageSequenceCamera::open(const std::filesystem::path& path,
+                                          const ImageSequenceCameraOptions& options) {
+  ImageSequenceCamera camera;
+  camera.options_ = options;
+  LIMN_TRY(camera.images_, images_of(path));
+  LIMN_TRY(const cv::Mat first, read_image(camera.images_.front()));
+  camera.size_ = first.size();
+  return camera;
+}
+
+Result<Frame> ImageSequenceCamera::next() {
+  if (!options_.repeat && shown_ >= images_.size())
+    return error("{}: all {} pictures have been played.", options_.name, images_.size());
+  const std::filesystem::path& path = images_[shown_ % images_.size()];
+  LIMN_TRY(cv::Mat image, read_image(path));
+  if (image.size() != size_)
+    return error(
+        "{}: expected {}x{} like the first picture of the folder, found {}x{}. Keep other pictures "
+        "elsewhere.",
+        path.string(), size_.width, size_.height, image.cols, image.rows);
+  const double seconds = static_cast<double>(shown_++) / options_.frames_per_second;
+  return Frame{options_.name, image, shifted(Stamp{}, seconds)};
+}
+
+std::string ImageSequenceCamera::description() const {
+  return fmt::format("{} stored pictures, {}x{}, {:g} a second", images_.size(), size_.width, size_.height,
+                     options_.frames_per_second);
+}
+
+}  // namespace limn::device

@@ -1,0 +1,103 @@
+#include "projector/brdf_lut.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace limn::projector {
+namespace {
+
+constexpr int k_nodes = 32;        // as in shaders/look.glsl
+constexpr int k_samples = 512;     // of a node; 16 times as many change no level in renderer_test
+constexpr double k_horizon = 0.3;  // height where all light is that from above
+constexpr double k_least_roughness = 0.03, k_least_cosine = 1e-3, k_most_cosine = 0.999;
+
+// Of light from a direction of height -1 … 1 (its sine): share that is that from above.
+double share_from_above(double height) {
+  const double t = std::clamp((height / k_horizon + 1) / 2, 0.0, 1.0);
+  return t * t * (3 - 2 * t);
+}
+
+// Of 0 … count - 1: spread evenly over 0 … 1 whatever their number (van der Corput).
+double spread(unsigned i) {
+  double sum = 0;
+  for (double digit = 0.5; i > 0; i >>= 1, digit /= 2) sum += (i & 1) * digit;
+  return sum;
+}
+
+// Half vectors around z as GGX has them.
+template <class Use>
+void for_each_half_vector(double roughness, const Use& use) {
+  const double a2 = std::pow(roughness, 4);
+  for (int i = 0; i < k_samples; ++i) {
+    const double share = spread(static_cast<unsigned>(i));
+    const double angle = 2 * std::numbers::pi * (i + 0.5) / k_samples;
+    const double z = std::sqrt((1 - share) / (1 + (a2 - 1) * share)), ring = std::sqrt(1 - z * z);
+    use(Eigen::Vector3d(ring * std::cos(angle), ring * std::sin(angle), z));
+  }
+}
+
+// In even light from everywhere.
+struct Mirrored {
+  double head_on = 0, white = 0;  // factors
+  double aside = 0;               // of the mean direction, from the normal (0) to the mirrored one (1)
+};
+
+Mirrored mirrored(double cosine, double roughness) {
+  const Eigen::Vector3d d_eye(std::sqrt(1 - cosine * cosine), 0, cosine);
+  const double a2 = std::pow(roughness, 4);
+  Mirrored sum;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for_each_half_vector(roughness, [&](const Eigen::Vector3d& h) {
+    const double vh = d_eye.dot(h);
+    const Eigen::Vector3d l = 2 * vh * h - d_eye;
+    if (l.z() <= 0 || vh <= 0) return;
+    const double visible = l.z() * std::sqrt(cosine * cosine * (1 - a2) + a2) +
+                           cosine * std::sqrt(l.z() * l.z() * (1 - a2) + a2);
+    const double light = 2 * l.z() * vh / (visible * h.z() * k_samples), white = std::pow(1 - vh, 5);
+    sum.head_on += light * (1 - white);
+    sum.white += light * white;
+    mean += light * l;
+  });
+  const double tangent = -mean.x() / mean.z();
+  sum.aside = std::clamp(tangent / (d_eye.x() + tangent * (1 - cosine)), 0.0, 1.0);
+  return sum;
+}
+
+// Of the lobe around a direction of that height, as if it were seen head on.
+double mirrored_from_above(double height, double roughness) {
+  const double level = std::sqrt(std::max(0.0, 1 - height * height)), a2 = std::pow(roughness, 4);
+  double above = 0, all = 0;
+  for_each_half_vector(roughness, [&](const Eigen::Vector3d& h) {
+    const Eigen::Vector3d l = 2 * h.z() * h - Eigen::Vector3d::UnitZ();
+    if (l.z() <= 0) return;
+    const double light = l.z() / (l.z() + std::sqrt(l.z() * l.z() * (1 - a2) + a2));
+    above += light * share_from_above(l.z() * height + l.x() * level);
+    all += light;
+  });
+  return above / all;
+}
+
+cv::Mat made() {
+  cv::Mat table(k_nodes, k_nodes, CV_32FC4);
+  for (int row = 0; row < k_nodes; ++row) {
+    const double roughness = std::max(k_least_roughness, 1.0 * row / (k_nodes - 1));
+    for (int column = 0; column < k_nodes; ++column) {
+      const double x = 1.0 * column / (k_nodes - 1);
+      const Mirrored share = mirrored(std::clamp(x, k_least_cosine, k_most_cosine), roughness);
+      table.at<cv::Vec4f>(row, column) =
+          cv::Vec4d(share.head_on, share.white, mirrored_from_above(2 * x - 1, roughness), share.aside);
+    }
+  }
+  return table;
+}
+
+}  // namespace
+
+const cv::Mat& brdf_lut() {
+  static const cv::Mat table = made();
+  return table;
+}
+
+}  // namespace limn::projector

@@ -1,0 +1,534 @@
+#include "projector/shadow_detector.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "projector/light_levels.h"
+
+namespace limn::projector {
+namespace {
+
+// Beliefs before anything was seen, for light that is 1 at full scale and irradiance that is 1 at a typical
+// patch: nothing is known of the room and the albedo, projectors are alike.
+constexpr float k_offset = 0.03F, k_offset_stddev = 0.15F;
+constexpr float k_gain = 0.5F, k_albedo_stddev = 0.5F, k_projector_stddev = 0.04F;
+constexpr float k_noise = 0.0012F;  // of a patch's light: shot noise of 64 pixels, and rounding
+constexpr float k_drift = 0.002F;   // share by which what a patch looks like may change from frame to frame
+constexpr float k_offset_unmodelled = 0.01F;  // of the room's light: people walk in it
+constexpr std::uint8_t k_too_bright = 250;    // level
+constexpr float k_least_weight = 0.02F;       // of an unlit patch among lit ones
+constexpr float k_most_cost = 25;   // of a patch, so that none decides alone: five standard deviations
+constexpr float k_unlike_cost = 9;  // nothing explains what costs more
+constexpr float k_like_cost = 4;    // what costs less has not changed
+constexpr float k_change_cost = 3;  // of another state of a projector than the last
+constexpr float k_least_vote = 1;   // by which a cell's votes must differ to change it
+constexpr float k_most_vote = 10;
+constexpr float k_most_others = 5, k_few_others = 2;  // blocked cells among the eight around one
+constexpr float k_stale_votes = 0.5F;    // what is left of a camera's votes when the next frame is another's
+constexpr std::uint8_t k_patience = 60;  // frames that nothing explains a patch; then it is learned afresh
+constexpr std::uint8_t k_no_label = 255, k_unlike = 254, k_dark = 253;  // beside sets of projectors
+constexpr float k_infinity = 1e30F;
+constexpr std::size_t k_all_sets = 4;         // projectors; of more no three are blocked in one place
+constexpr std::size_t k_most_projectors = 7;  // whose sets are labels
+
+double median(std::vector<double> values, double otherwise) {
+  if (values.empty()) return otherwise;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Of neighbours in a row that both have one.
+double typical_distance(const cv::Mat& places, int dimensions) {
+  std::vector<double> distances;
+  for (int row = 0; row < places.rows; ++row)
+    for (int column = 1; column < places.cols; ++column) {
+      const auto& a = places.at<cv::Vec4f>(row, column - 1);
+      const auto& b = places.at<cv::Vec4f>(row, column);
+      const int given = dimensions == 3 ? 3 : 2;  // irradiance of a projector, w of points
+      if (!(a[given] > 0 && b[given] > 0)) continue;
+      double sum = 0;
+      for (int k = 0; k < dimensions; ++k) sum += std::pow(static_cast<double>(a[k] - b[k]), 2);
+      distances.push_back(std::sqrt(sum));
+    }
+  return median(std::move(distances), 1);
+}
+
+// Mean light of the patches.
+cv::Mat in_patches(const cv::Mat& levels, const cv::Mat& light_of_level, const cv::Size& patches) {
+  cv::Mat light, out;
+  cv::LUT(levels, light_of_level, light);
+  cv::resize(light, out, patches, 0, 0, cv::INTER_AREA);
+  return out;
+}
+
+cv::Mat too_bright(const cv::Mat& levels, const cv::Size& patches) {
+  cv::Mat bright = levels >= k_too_bright, channels[3];
+  cv::resize(bright, bright, patches, 0, 0, cv::INTER_AREA);
+  if (bright.channels() == 1) return bright;
+  cv::split(bright, channels);
+  return channels[0] | channels[1] | channels[2];
+}
+
+// Blocked cells and those around them get 0, two cells further all is 1.
+cv::Mat softened(const cv::Mat& blocked) {
+  cv::Mat grown, soft;
+  cv::dilate(blocked, grown, cv::getStructuringElement(cv::MORPH_RECT, {5, 5}));
+  cv::Mat(1 - grown).convertTo(soft, CV_32F);
+  cv::blur(soft, soft, {3, 3}, {-1, -1}, cv::BORDER_REPLICATE);
+  return soft;
+}
+
+int cells(int pixels, int cell_px) { return (pixels + cell_px - 1) / cell_px; }
+
+float square(float value) { return value * value; }
+
+// What a belief makes of the light that arrives, `x` (1 for the offset, then each projector's).
+struct Foretold {
+  float mean = 0, variance = 0;
+};
+
+Foretold foretold(const float* belief, const float* x, std::size_t d) {
+  Foretold out;
+  const float* covariance = belief + d;
+  for (std::size_t i = 0; i < d; ++i) {
+    if (x[i] == 0) continue;
+    out.mean += belief[i] * x[i];
+    for (std::size_t j = 0; j < d; ++j) out.variance += x[i] * covariance[i * d + j] * x[j];
+  }
+  return out;
+}
+
+// Takes in that the light was `light`, of so much variance (Kalman's update).
+void take_in(float light, const float* x, float variance, std::size_t d, float* belief) {
+  float* covariance = belief + d;
+  const Foretold f = foretold(belief, x, d);
+  float gain[k_most_projectors + 1], length_2 = 0;
+  for (std::size_t i = 0; i < d; ++i) {
+    gain[i] = 0;
+    for (std::size_t j = 0; j < d; ++j) gain[i] += covariance[i * d + j] * x[j];
+    length_2 += x[i] * x[i];
+  }
+  const float whole = f.variance + variance;
+  const float drift = square(k_drift * light / length_2);
+  for (std::size_t i = 0; i < d; ++i) {
+    belief[i] += gain[i] / whole * (light - f.mean);
+    for (std::size_t j = 0; j < d; ++j)
+      covariance[i * d + j] += drift * x[i] * x[j] - gain[i] * gain[j] / whole;
+  }
+}
+
+// A projector and the cells of its image.
+struct Source {
+  int width = 0, height = 0;
+  cv::Mat light;    // CV_32FC3, 1 x 256: of display values (BGR), black's included
+  cv::Mat blocked;  // CV_8U, a pixel a cell: 1 where no light arrives
+  cv::Mat map;
+};
+
+struct Watch {
+  Imager imager;
+  cv::Mat light;  // CV_32F, 1 x 256: of levels
+  IlluminatedPatches patches;
+  double spacing_m = 0;  // of patches on the prototype
+  double typical_irradiance = 1;
+  std::vector<int> footprints;  // of a patch in each projector's image, its pixels a side
+  int channels = 0;
+  // A patch and channel: mean (offset, then gains), covariance, the light that it was last learned in.
+  std::vector<float> beliefs;
+  std::vector<std::uint8_t> unlike;  // frames in a row that nothing explained, a patch
+  std::vector<cv::Mat> votes;        // a projector: CV_32FC2, a pixel a cell, for free and for blocked
+};
+
+// One frame, patch by patch.
+struct Sight {
+  cv::Mat light;                 // CV_32F, channels of the camera
+  std::vector<cv::Mat> given;    // by each projector, if all arrives: irradiance x light, likewise
+  cv::Mat usable;                // CV_8U
+  std::vector<cv::Mat> costs;    // CV_32F, an explanation: around each patch
+  std::vector<cv::Mat> misfits;  // the same but for what one that predicts less pays
+  cv::Mat labels;                // CV_8U: the set of projectors that are blocked, k_unlike or k_no_label
+  std::vector<cv::Mat> gaps;     // a projector: CV_32F, by how much that explains better than otherwise
+};
+
+// Where the patch of a point was before the prototype moved.
+std::optional<std::size_t> patch_of(const Watch& watch, const cv::Vec4f& point) {
+  if (!(point[3] > 0)) return std::nullopt;
+  const IlluminatedPatches& patches = watch.patches;
+  const Eigen::Vector3d p = Eigen::Vector3f(point[0], point[1], point[2]).cast<double>();
+  const auto px = watch.imager.project(patches.prototype_from_world.inverse() * p);
+  if (!px || !watch.imager.contains(*px)) return std::nullopt;
+  const int column = static_cast<int>((px->x() + 0.5) / patches.side_px);
+  const int row = static_cast<int>((px->y() + 0.5) / patches.side_px);
+  if (column >= patches.points.cols || row >= patches.points.rows) return std::nullopt;
+  const auto& q = patches.points.at<cv::Vec4f>(row, column);
+  const bool is_same =
+      q[3] > 0 && (Eigen::Vector3f(q[0], q[1], q[2]).cast<double>() - p).norm() < watch.spacing_m;
+  if (!is_same) return std::nullopt;  // another side of the prototype hid it
+  return static_cast<std::size_t>(row * patches.points.cols + column);
+}
+
+}  // namespace
+
+struct ShadowDetector::Impl {
+  ShadowDetectorOptions options;
+  std::vector<Source> sources;
+  std::vector<Watch> watches;
+  std::vector<unsigned> explanations;  // sets of projectors that are blocked, as bits
+
+  Impl(const Rig& rig, const ShadowDetectorOptions& options_in) : options(options_in) {
+    LIMN_CHECK(options.cell_px > 0 && rig.projectors.size() <= k_most_projectors);
+    for (const Imager& imager : rig.projectors) {
+      const cv::Size size(cells(imager.width, options.cell_px), cells(imager.height, options.cell_px));
+      sources.push_back({imager.width, imager.height, light_of_display(rig, imager.name),
+                         cv::Mat(size, CV_8U, cv::Scalar(0)), cv::Mat(size, CV_32F, cv::Scalar(1))});
+    }
+    for (const Imager& imager : rig.cameras) {
+      Watch watch;
+      watch.imager = imager;
+      watch.light = light_of_levels(rig, imager.name);
+      for (const Source& source : sources)
+        watch.votes.emplace_back(source.blocked.size(), CV_32FC2, cv::Scalar::all(0));
+      watches.push_back(std::move(watch));
+    }
+    for (unsigned set = 0; set < 1U << sources.size(); ++set)
+      if (sources.size() <= k_all_sets || std::popcount(set) <= 2) explanations.push_back(set);
+  }
+
+  std::size_t dimensions() const { return sources.size() + 1; }
+  std::size_t belief_size() const { return dimensions() * (dimensions() + 1) + sources.size(); }
+  cv::Point cell_of(const cv::Vec4f& lit) const {
+    return {static_cast<int>((lit[0] + 0.5F) / static_cast<float>(options.cell_px)),
+            static_cast<int>((lit[1] + 0.5F) / static_cast<float>(options.cell_px))};
+  }
+
+  void forget(Watch* watch, std::size_t patch) const;
+  void forget_all(Watch* watch) const;
+  Sight sight_of(const Watch& watch, const cv::Mat& frame, std::span<const cv::Mat> shown) const;
+  float variance_of(const float* belief, const float* x) const;
+  void explain(const Watch& watch, Sight* viewpoint) const;
+  std::pair<unsigned, unsigned> reached_and_blocked(const Watch& watch, int row, int column) const;
+  void choose(const Watch& watch, Sight* viewpoint) const;
+  void vote(const Sight& viewpoint, Watch* watch) const;
+  bool count_votes();
+  void learn(const Sight& viewpoint, Watch* watch) const;
+};
+
+void ShadowDetector::Impl::forget(Watch* watch, std::size_t patch) const {
+  const std::size_t d = dimensions();
+  const auto channels = static_cast<std::size_t>(watch->channels);
+  for (std::size_t c = 0; c < channels; ++c) {
+    float* mean = &watch->beliefs[(patch * channels + c) * belief_size()];
+    float* covariance = mean + d;
+    for (std::size_t i = 0; i < d; ++i) {
+      mean[i] = i == 0 ? k_offset : k_gain;
+      for (std::size_t j = 0; j < d; ++j) {
+        float value = i == 0 || j == 0 ? 0 : square(k_albedo_stddev);
+        if (i == j) value += square(i == 0 ? k_offset_stddev : k_projector_stddev);
+        covariance[i * d + j] = value;
+      }
+    }
+    std::fill_n(covariance + d * d, sources.size(), 0.0F);
+  }
+  watch->unlike[patch] = 0;
+}
+
+void ShadowDetector::Impl::forget_all(Watch* watch) const {
+  const std::size_t patches = watch->patches.points.total();
+  watch->beliefs.resize(patches * static_cast<std::size_t>(watch->channels) * belief_size());
+  watch->unlike.assign(patches, 0);
+  for (std::size_t patch = 0; patch < patches; ++patch) forget(watch, patch);
+}
+
+Sight ShadowDetector::Impl::sight_of(const Watch& watch,
+                                    const cv::Mat& frame,
+                                    std::span<const cv::Mat> shown) const {
+  Sight viewpoint;
+  const IlluminatedPatches& patches = watch.patches;
+  const cv::Size size = patches.points.size();
+  const cv::Rect seen(0, 0, size.width * patches.side_px, size.height * patches.side_px);
+  viewpoint.light = in_patches(frame(seen), watch.light, size);
+  viewpoint.usable = cv::Mat(size, CV_8U, cv::Scalar(0));
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    const Source& source = sources[i];
+    cv::Mat image = shown[i], light, place[4], irradiance;
+    if (image.empty()) image = cv::Mat(source.height, source.width, CV_8UC3, cv::Scalar::all(0));
+    LIMN_CHECK(image.type() == CV_8UC3 && image.cols == source.width && image.rows == source.height);
+    cv::LUT(image, source.light, light);
+    if (watch.channels == 1) light = luminance(light);
+    const int side = watch.footprints[i];
+    cv::blur(light, light, {side, side}, {-1, -1}, cv::BORDER_REPLICATE);
+    cv::split(patches.by_projector[i], place);
+    cv::remap(light, light, place[0], place[1], cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+    viewpoint.usable |= place[2] > 0;
+    irradiance = place[2] / watch.typical_irradiance;
+    cv::merge(std::vector<cv::Mat>(static_cast<std::size_t>(watch.channels), irradiance), irradiance);
+    viewpoint.given.push_back(light.mul(irradiance));
+  }
+  viewpoint.usable.setTo(0, too_bright(frame(seen), size));
+  return viewpoint;
+}
+
+// The variance of a patch's light beside that of its belief.
+float ShadowDetector::Impl::variance_of(const float* belief, const float* x) const {
+  const std::size_t d = dimensions();
+  const float* last = belief + d + d * d;
+  float change = 0;
+  for (std::size_t i = 0; i < sources.size(); ++i) change += belief[i + 1] * (x[i + 1] - last[i]);
+  return square(k_noise) + square(k_offset_unmodelled * belief[0]) +
+         square(static_cast<float>(options.unmodelled) * change);
+}
+
+// What each explanation costs: minus twice the logarithm of its likelihood, mean of the channels and of the
+// patches around, those that are lit before all.
+void ShadowDetector::Impl::explain(const Watch& watch, Sight* viewpoint) const {
+  const std::size_t n = sources.size(), d = dimensions();
+  const auto channels = static_cast<std::size_t>(watch.channels);
+  const cv::Size size = viewpoint->light.size();
+  for (std::size_t k = 0; k < explanations.size(); ++k) {
+    viewpoint->costs.emplace_back(size, CV_32F, cv::Scalar(0));
+    viewpoint->misfits.emplace_back(size, CV_32F, cv::Scalar(0));
+  }
+  cv::Mat weight(size, CV_32F, cv::Scalar(0));
+  cv::parallel_for_({0, size.height}, [&](const cv::Range& rows) {
+    float x[k_most_projectors + 1] = {1};
+    for (int row = rows.start; row < rows.end; ++row)
+      for (int column = 0; column < size.width; ++column) {
+        if (!viewpoint->usable.at<std::uint8_t>(row, column)) continue;
+        const auto patch = static_cast<std::size_t>(row * size.width + column);
+        for (std::size_t c = 0; c < channels; ++c) {
+          const float* belief = &watch.beliefs[(patch * channels + c) * belief_size()];
+          const auto value = [&](const cv::Mat& m) {
+            return m.ptr<float>(row)[static_cast<std::size_t>(column) * channels + c];
+          };
+          const float light = value(viewpoint->light);
+          float brightest = 0;
+          for (std::size_t i = 0; i < n; ++i)
+            brightest = std::max(brightest, belief[i + 1] * value(viewpoint->given[i]));
+          const float tells = std::max(k_least_weight, brightest / (brightest + 2 * k_noise));
+          weight.at<float>(row, column) += tells;
+          for (std::size_t k = 0; k < explanations.size(); ++k) {
+            for (std::size_t i = 0; i < n; ++i)
+              x[i + 1] = (explanations[k] >> i & 1U) != 0 ? 0 : value(viewpoint->given[i]);
+            const Foretold f = foretold(belief, x, d);
+            const float variance = f.variance + variance_of(belief, x);
+            const float misfit = std::min(k_most_cost, square(f.mean - light) / variance);
+            viewpoint->misfits[k].at<float>(row, column) += tells * misfit;
+            viewpoint->costs[k].at<float>(row, column) += tells * (misfit + std::log(variance / square(k_noise)));
+          }
+        }
+      }
+  });
+  const auto around = [](cv::Mat& m) {
+    cv::boxFilter(m, m, CV_32F, {3, 3}, {-1, -1}, false, cv::BORDER_CONSTANT);
+  };
+  around(weight);
+  weight = cv::max(weight, k_least_weight);
+  for (std::vector<cv::Mat>* sums : {&viewpoint->costs, &viewpoint->misfits})
+    for (cv::Mat& sum : *sums) {
+      around(sum);
+      sum /= weight;
+    }
+}
+
+// Sets of projectors that reach a patch, and those of them whose light did not arrive at the last frame.
+std::pair<unsigned, unsigned> ShadowDetector::Impl::reached_and_blocked(const Watch& watch,
+                                                                       int row,
+                                                                       int column) const {
+  unsigned reached = 0, blocked = 0;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    const auto& lit = watch.patches.by_projector[i].at<cv::Vec4f>(row, column);
+    if (!(lit[2] > 0)) continue;
+    reached |= 1U << i;
+    if (sources[i].blocked.at<std::uint8_t>(cell_of(lit)) != 0) blocked |= 1U << i;
+  }
+  return {reached, blocked};
+}
+
+// The explanation that costs least around each patch, a change included. Where no light arrives at all nobody
+// can help, and it may be a dark thing before the camera: the state stays.
+void ShadowDetector::Impl::choose(const Watch& watch, Sight* viewpoint) const {
+  const cv::Size size = viewpoint->light.size();
+  viewpoint->labels = cv::Mat(size, CV_8U, cv::Scalar(k_no_label));
+  for (std::size_t i = 0; i < sources.size(); ++i) viewpoint->gaps.emplace_back(size, CV_32F, cv::Scalar(0));
+  for (int row = 0; row < size.height; ++row)
+    for (int column = 0; column < size.width; ++column) {
+      if (!viewpoint->usable.at<std::uint8_t>(row, column)) continue;
+      const auto [reached, before] = reached_and_blocked(watch, row, column);
+      const auto cost = [&](std::size_t k) { return viewpoint->costs[k].at<float>(row, column); };
+      std::size_t best = 0, unchanged = 0;
+      float least = k_infinity;
+      for (std::size_t k = 0; k < explanations.size(); ++k) {
+        if ((explanations[k] & ~reached) != 0) continue;
+        const auto changes = static_cast<float>(std::popcount(explanations[k] ^ before));
+        if (changes == 0) unchanged = k;
+        if (cost(k) + k_change_cost * changes >= least) continue;
+        least = cost(k) + k_change_cost * changes;
+        best = k;
+      }
+      const auto misfit = [&](std::size_t k) { return viewpoint->misfits[k].at<float>(row, column); };
+      if (misfit(unchanged) < k_like_cost) best = unchanged;
+      if (explanations[best] == reached) {
+        viewpoint->labels.at<std::uint8_t>(row, column) = k_dark;
+        continue;
+      }
+      if (misfit(best) > k_unlike_cost) {
+        viewpoint->labels.at<std::uint8_t>(row, column) = k_unlike;
+        continue;
+      }
+      viewpoint->labels.at<std::uint8_t>(row, column) = static_cast<std::uint8_t>(explanations[best]);
+      for (std::size_t i = 0; i < sources.size(); ++i) {
+        const unsigned bit = 1U << i;
+        if ((reached & bit) == 0) continue;
+        float otherwise = cost(unchanged);
+        if (((explanations[best] ^ before) & bit) == 0) {
+          otherwise = k_infinity;
+          for (std::size_t k = 0; k < explanations.size(); ++k)
+            if ((explanations[k] & ~reached) == 0 && ((explanations[k] ^ explanations[best]) & bit) != 0)
+              otherwise = std::min(otherwise, cost(k));
+        }
+        viewpoint->gaps[i].at<float>(row, column) = std::clamp(otherwise - cost(best), 0.0F, k_most_vote);
+      }
+    }
+}
+
+void ShadowDetector::Impl::vote(const Sight& viewpoint, Watch* watch) const {
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    watch->votes[i].setTo(0);
+    for (int row = 0; row < viewpoint.labels.rows; ++row)
+      for (int column = 0; column < viewpoint.labels.cols; ++column) {
+        const std::uint8_t label = viewpoint.labels.at<std::uint8_t>(row, column);
+        const auto& lit = watch->patches.by_projector[i].at<cv::Vec4f>(row, column);
+        if (label >= k_dark || !(lit[2] > 0)) continue;
+        watch->votes[i].at<cv::Vec2f>(cell_of(lit))[label >> i & 1] += viewpoint.gaps[i].at<float>(row, column);
+      }
+  }
+}
+
+bool ShadowDetector::Impl::count_votes() {
+  bool changed = false;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    Source& source = sources[i];
+    cv::Mat votes = watches.front().votes[i].clone(), counted = source.blocked.clone();
+    for (std::size_t k = 1; k < watches.size(); ++k) votes += watches[k].votes[i];
+    for (int row = 0; row < votes.rows; ++row)
+      for (int column = 0; column < votes.cols; ++column) {
+        const cv::Vec2f& vote = votes.at<cv::Vec2f>(row, column);
+        std::uint8_t& blocked = counted.at<std::uint8_t>(row, column);
+        if (vote[1 - blocked] > vote[blocked] + k_least_vote) blocked = 1 - blocked;
+      }
+    // Cells that nobody sees follow most of those around them; one alone is no shadow.
+    cv::Mat neighbours;
+    counted.convertTo(neighbours, CV_32F);
+    cv::boxFilter(neighbours, neighbours, CV_32F, {3, 3}, {-1, -1}, false, cv::BORDER_REPLICATE);
+    for (int row = 0; row < votes.rows; ++row)
+      for (int column = 0; column < votes.cols; ++column) {
+        const cv::Vec2f& vote = votes.at<cv::Vec2f>(row, column);
+        std::uint8_t& blocked = counted.at<std::uint8_t>(row, column);
+        const float others = neighbours.at<float>(row, column) - static_cast<float>(blocked);
+        if (vote[0] + vote[1] == 0 && others >= k_most_others) blocked = 1;
+        if (others < (vote[0] + vote[1] == 0 ? k_most_others - 1 : k_few_others)) blocked = 0;
+      }
+    if (cv::norm(counted, source.blocked, cv::NORM_INF) == 0) continue;
+    changed = true;
+    source.blocked = counted;
+    source.map = softened(counted);
+  }
+  return changed;
+}
+
+// Patches that are explained, as all around them, and as at the last frame.
+void ShadowDetector::Impl::learn(const Sight& viewpoint, Watch* watch) const {
+  const std::size_t n = sources.size(), d = dimensions();
+  const auto channels = static_cast<std::size_t>(watch->channels);
+  const cv::Size size = viewpoint.labels.size();
+  cv::Mat lowest, highest = viewpoint.labels.clone();
+  const cv::Mat around = cv::getStructuringElement(cv::MORPH_RECT, {5, 5});
+  cv::erode(viewpoint.labels, lowest, around);
+  highest.setTo(0, viewpoint.labels == k_no_label);
+  cv::dilate(highest, highest, around);
+  float x[k_most_projectors + 1] = {1};
+  for (int row = 0; row < size.height; ++row)
+    for (int column = 0; column < size.width; ++column) {
+      const std::uint8_t label = viewpoint.labels.at<std::uint8_t>(row, column);
+      const auto patch = static_cast<std::size_t>(row * size.width + column);
+      if (label == k_no_label) continue;
+      if (label == k_unlike) {
+        if (++watch->unlike[patch] >= k_patience) forget(watch, patch);
+        continue;
+      }
+      watch->unlike[patch] = 0;
+      if (label == k_dark) continue;
+      if (lowest.at<std::uint8_t>(row, column) != label || highest.at<std::uint8_t>(row, column) != label)
+        continue;
+      for (std::size_t c = 0; c < channels; ++c) {
+        float* belief = &watch->beliefs[(patch * channels + c) * belief_size()];
+        const auto value = [&](const cv::Mat& m) {
+          return m.ptr<float>(row)[static_cast<std::size_t>(column) * channels + c];
+        };
+        for (std::size_t i = 0; i < n; ++i) x[i + 1] = (label >> i & 1) != 0 ? 0 : value(viewpoint.given[i]);
+        take_in(value(viewpoint.light), x, variance_of(belief, x), d, belief);
+        std::copy_n(x + 1, n, belief + d + d * d);
+      }
+    }
+}
+
+ShadowDetector::ShadowDetector(const Rig& rig, const ShadowDetectorOptions& options)
+    : impl_(std::make_unique<Impl>(rig, options)) {}
+ShadowDetector::ShadowDetector(ShadowDetector&&) noexcept = default;
+ShadowDetector& ShadowDetector::operator=(ShadowDetector&&) noexcept = default;
+ShadowDetector::~ShadowDetector() = default;
+
+void ShadowDetector::place(std::size_t index, IlluminatedPatches patches) {
+  Watch& watch = impl_->watches.at(index);
+  LIMN_CHECK(patches.side_px > 0 && patches.by_projector.size() == impl_->sources.size());
+  const Watch before = watch;
+  const bool is_first = before.patches.points.empty();
+  watch.patches = std::move(patches);
+  const cv::Mat& points = watch.patches.points;
+  watch.spacing_m = typical_distance(points, 3);
+  watch.footprints.clear();
+  std::vector<double> irradiances;
+  for (const cv::Mat& lit : watch.patches.by_projector) {
+    watch.footprints.push_back(std::max(1, cvRound(typical_distance(lit, 2))));
+    for (const auto& pixel : cv::Mat_<cv::Vec4f>(lit))
+      if (pixel[2] > 0) irradiances.push_back(static_cast<double>(pixel[2]));
+  }
+  if (is_first) watch.typical_irradiance = median(std::move(irradiances), 1);
+  impl_->forget_all(&watch);
+  if (is_first || watch.channels == 0) return;
+  const std::size_t size = static_cast<std::size_t>(watch.channels) * impl_->belief_size();
+  for (int row = 0; row < points.rows; ++row)
+    for (int column = 0; column < points.cols; ++column)
+      if (const auto from = patch_of(before, points.at<cv::Vec4f>(row, column))) {
+        const auto to = static_cast<std::size_t>(row * points.cols + column);
+        std::copy_n(&before.beliefs[*from * size], size, &watch.beliefs[to * size]);
+      }
+}
+
+bool ShadowDetector::see(std::size_t index, const cv::Mat& frame, std::span<const cv::Mat> shown) {
+  Watch& watch = impl_->watches.at(index);
+  LIMN_CHECK(frame.type() == CV_8UC1 || frame.type() == CV_8UC3);
+  LIMN_CHECK(frame.cols == watch.imager.width && frame.rows == watch.imager.height);
+  LIMN_CHECK(shown.size() == impl_->sources.size());
+  if (watch.patches.points.empty()) return false;
+  if (watch.channels != frame.channels()) {
+    watch.channels = frame.channels();
+    impl_->forget_all(&watch);
+  }
+  Sight viewpoint = impl_->sight_of(watch, frame, shown);
+  impl_->explain(watch, &viewpoint);
+  impl_->choose(watch, &viewpoint);
+  for (Watch& other : impl_->watches)
+    for (cv::Mat& votes : other.votes) votes *= k_stale_votes;
+  impl_->vote(viewpoint, &watch);
+  impl_->learn(viewpoint, &watch);
+  return impl_->count_votes();
+}
+
+const cv::Mat& ShadowDetector::map(std::size_t projector) const { return impl_->sources.at(projector).map; }
+
+}  // namespace limn::projector

@@ -1,0 +1,403 @@
+#include "projector/visibility_buffers.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace limn::projector {
+namespace {
+
+// Texels of ids a pixel; more of them find thinner triangles.
+constexpr double k_oversampling = 1.5;
+// Most texels of a side of the eye's ids.
+constexpr int k_eye_side = 2560;
+// Nodes of the pixel maps: 4-5 px a cell, within 0.01 px of the lens between them.
+constexpr int k_map_columns = 321, k_map_rows = 241;
+constexpr GLuint k_sight_texels_unit = 17;  // as in shaders/scene.glsl
+constexpr double k_on_surface = 0.002;      // m, as in shaders/on_surface.glsl
+// Share of the image's smaller side over which a projector fades towards its border.
+constexpr double k_soft_border = 0.1;
+
+Pose sight_pose(const Imager& imager, const Pose& scene_from_world) {
+  return imager.imager_from_world * scene_from_world.inverse();
+}
+
+bool is_prototype(const PlacedRun& placed) { return placed.owner == 0; }
+bool is_any(const PlacedRun&) { return true; }
+bool is_part(const PlacedRun& placed) { return placed.owner != 0; }
+bool is_view_part(const PlacedRun& placed) { return placed.owner != 0 && !placed.on_surface; }
+bool is_surface_part(const PlacedRun& placed) { return placed.owner != 0 && placed.on_surface; }
+
+// The tangents that the wanted runs span; empty when there are none.
+TangentRect spanned_by(const Pose& pinhole_from_scene,
+                       const std::vector<PlacedRun>& runs,
+                       bool (*wanted)(const PlacedRun&)) {
+  TangentRect rect = tangents_spanned(pinhole_from_scene, {});
+  for (const PlacedRun& run : runs)
+    if (wanted(run)) rect = united(rect, tangents_spanned(pinhole_from_scene, bounds_of(run)));
+  return rect;
+}
+
+Eigen::AlignedBox3d box_of(const std::vector<PlacedRun>& runs, bool (*wanted)(const PlacedRun&)) {
+  Eigen::AlignedBox3d box;
+  for (const PlacedRun& run : runs)
+    if (wanted(run))
+      for (const Eigen::Vector3d& p : bounds_of(run)) box.extend(p);
+  return box;
+}
+
+// The tangents of a frustum that holds all that an eye sees through a part's box, from the prototype's
+// nearest depth to its farthest. The prototype's when the box reaches behind the eye.
+TangentRect spanned_behind(const Pose& pinhole_from_scene,
+                           const PlacedRun& part,
+                           const std::vector<PlacedRun>& runs,
+                           const Eigen::Vector3d& p_eye) {
+  const std::array<Eigen::Vector3d, 8> corners = bounds_of(part);
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& p : corners) middle += p / static_cast<double>(corners.size());
+  const Eigen::Vector3d d = (middle - p_eye).normalized();
+  double nearest = 1e9, farthest = 0;
+  for (const PlacedRun& run : runs) {
+    if (!is_prototype(run)) continue;
+    for (const Eigen::Vector3d& p : bounds_of(run)) {
+      nearest = std::min(nearest, d.dot(p - p_eye));
+      farthest = std::max(farthest, d.dot(p - p_eye));
+    }
+  }
+  std::array<Eigen::Vector3d, 16> out;
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    const double depth = d.dot(corners[k] - p_eye);
+    if (depth < 0.01 || nearest < 0.01) return spanned_by(pinhole_from_scene, runs, is_prototype);
+    out[2 * k] = p_eye + nearest / depth * (corners[k] - p_eye);
+    out[2 * k + 1] = p_eye + farthest / depth * (corners[k] - p_eye);
+  }
+  return tangents_spanned(pinhole_from_scene, out);
+}
+
+// The tangents that a twin's image covers.
+TangentRect covered(const PinholeView& pinhole) {
+  return {
+      (Eigen::Vector2d::Constant(-0.5) - pinhole.centre) / pinhole.focal,
+      (Eigen::Vector2d(pinhole.width, pinhole.height).array() - 0.5 - pinhole.centre.array()).matrix() / pinhole.focal};
+}
+
+std::array<Eigen::Vector3d, 8> corners_of(const Eigen::AlignedBox3d& box) {
+  std::array<Eigen::Vector3d, 8> corners;
+  for (int k = 0; k < 8; ++k)
+    corners[static_cast<std::size_t>(k)] = box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(k));
+  return corners;
+}
+
+cv::Rect whole_of(const PinholeView& pinhole) { return {0, 0, pinhole.width, pinhole.height}; }
+
+// The texels of a twin's image around tangents.
+cv::Rect texels_of(const PinholeView& pinhole, const TangentRect& rect) {
+  if (rect.is_empty()) return {};
+  const auto texel = [&](const Eigen::Vector2d& tangent) {
+    const Eigen::Vector2d at = pinhole.focal * tangent + pinhole.centre;
+    return cv::Point(static_cast<int>(std::floor(at.x())), static_cast<int>(std::floor(at.y())));
+  };
+  return cv::Rect(texel(rect.lower) - cv::Point(1, 1), texel(rect.upper) + cv::Point(3, 3)) & whole_of(pinhole);
+}
+
+}  // namespace
+
+struct VisibilityBuffers::GpuViewpoint {
+  Eigen::Matrix4f sight_from_scene;
+  Eigen::Vector4f focal_centre, p_eye, size, map, quality, vignetting, focus;
+
+  GpuViewpoint(const PinholeView& pinhole, int first_layer) {
+    sight_from_scene = pinhole.pinhole_from_scene.matrix().cast<float>();
+    const auto focal = static_cast<float>(pinhole.focal);
+    focal_centre << focal, focal, pinhole.centre.cast<float>();
+    p_eye << pinhole.pinhole_from_scene.inverse().translation.cast<float>(), static_cast<float>(first_layer);
+    size << static_cast<float>(pinhole.width), static_cast<float>(pinhole.height), 0, 0;
+    map.setZero();
+    quality << focal, 0, 0, 0;
+    vignetting.setZero();
+    focus.setZero();
+  }
+  void of_imager(const Imager& imager) {
+    size.tail<2>() << static_cast<float>(imager.width), static_cast<float>(imager.height);
+    quality.x() = static_cast<float>(imager.lens.fx());
+    quality.y() = static_cast<float>(k_soft_border * std::min(imager.width, imager.height));
+  }
+  void with_map(const TangentRect& whole, int layer) {
+    const Eigen::Vector2d nodes(k_map_columns - 1, k_map_rows - 1);
+    map << whole.lower.cast<float>(), nodes.cwiseQuotient(whole.upper - whole.lower).cast<float>();
+    quality.z() = static_cast<float>(layer);
+  }
+  void with_focus(const Focus& known, const Imager& imager) {
+    const double disc = known.aperture_m * imager.lens.fx();  // px, a metre before a lens focused at infinity
+    focus.head<2>() << static_cast<float>(disc / known.distance_m), static_cast<float>(disc);
+  }
+  void with_response(const ProjectorResponse& response) {
+    if (response.black_level) quality.w() = static_cast<float>(response.black_level->value);
+    if (!response.vignetting) return;
+    const Vignetting& v = *response.vignetting;
+    vignetting << v.tilt.cast<float>(), static_cast<float>(v.r2), static_cast<float>(v.r4);
+  }
+};
+
+Result<VisibilityBuffers> VisibilityBuffers::create(const Rig& rig) {
+  VisibilityBuffers visibility;
+  const std::vector<Imager>& projectors = rig.projectors;
+  LIMN_TRY(visibility.program_, Program::link("ids.vert", "ids.frag"));
+  LIMN_TRY(visibility.cut_program_, Program::link("ids_cut.vert", "ids_cut.frag"));
+  visibility.projectors_ = projectors;
+  visibility.responses_ = rig.responses;
+  visibility.focuses_ = rig.focuses;
+  const int count = static_cast<int>(projectors.size()) + 1;  // with the witness
+  visibility.pixel_maps_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_RG32F, k_map_columns, k_map_rows, count);
+  for (std::size_t i = 0; i < projectors.size(); ++i) {
+    GpuLens lens{baked(projectors[i]), {}};
+    lens.tangents = make_texture(GL_TEXTURE_2D, GL_RG32F, lens.baked.tangents.cols, lens.baked.tangents.rows);
+    upload(lens.tangents, lens.baked.tangents);
+    visibility.upload_pixel_map(static_cast<int>(i), projectors[i], lens.baked.rect);
+    const Eigen::Vector2d extent =
+        k_oversampling * projectors[i].lens.fx() * (lens.baked.rect.upper - lens.baked.rect.lower);
+    visibility.ids_width_ = std::clamp(static_cast<int>(extent.x()) + 8, visibility.ids_width_, 2 * k_eye_side);
+    visibility.ids_height_ = std::clamp(static_cast<int>(extent.y()) + 8, visibility.ids_height_, 2 * k_eye_side);
+    visibility.lenses_.push_back(std::move(lens));
+  }
+  visibility.projector_ids_ =
+      make_texture(GL_TEXTURE_2D_ARRAY, GL_R32UI, visibility.ids_width_, visibility.ids_height_, 2 * count);
+  glClearTexImage(*visibility.projector_ids_, 0, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
+  visibility.surface_places_.resize(projectors.size());
+  visibility.eye_ids_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_R32UI, k_eye_side, k_eye_side, 2);
+  visibility.depth_ = make_texture(GL_TEXTURE_2D, GL_DEPTH_COMPONENT32F, std::max(k_eye_side, visibility.ids_width_),
+                               std::max(k_eye_side, visibility.ids_height_));
+  if (projectors.size() > 1) {
+    LIMN_TRY(visibility.edge_feathering_,
+             EdgeFeathering::create(static_cast<int>(projectors.size()), visibility.ids_width_, visibility.ids_height_));
+  }
+  visibility.framebuffer_ = make_framebuffer();
+  glNamedFramebufferTexture(*visibility.framebuffer_, GL_DEPTH_ATTACHMENT, *visibility.depth_, 0);
+  const std::vector<std::byte> empty((projectors.size() + 2) * sizeof(GpuViewpoint));
+  visibility.visibility_ = make_buffer(empty.data(), empty.size());
+  visibility.sight_texels_ = make_texels(visibility.visibility_, GL_RGBA32F);
+  return visibility;
+}
+
+void VisibilityBuffers::draw(const GpuScene& scene,
+                  const std::vector<PlacedRun>& runs,
+                  bool (*wanted)(const PlacedRun&),
+                  const PinholeView& pinhole,
+                  const cv::Rect& within,
+                  const GlName& ids,
+                  int layer) {
+  glNamedFramebufferTextureLayer(*framebuffer_, GL_COLOR_ATTACHMENT0, *ids, 0, layer);
+  glBindFramebuffer(GL_FRAMEBUFFER, *framebuffer_);
+  glViewport(0, 0, pinhole.width, pinhole.height);
+  glEnable(GL_SCISSOR_TEST);  // clears what is read, no more
+  glScissor(within.x, within.y, within.width, within.height);
+  const GLuint nothing[4] = {};
+  const float farthest = 0;
+  glClearNamedFramebufferuiv(*framebuffer_, GL_COLOR, 0, nothing);
+  glClearNamedFramebufferfv(*framebuffer_, GL_DEPTH, 0, &farthest);
+  glDisable(GL_SCISSOR_TEST);
+  glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+  glEnable(GL_DEPTH_TEST);
+  glDepthMask(GL_TRUE);
+  glDepthFunc(GL_GREATER);
+  glDisable(GL_CULL_FACE);
+  glDisable(GL_BLEND);
+  glBindVertexArray(scene.vertex_array());
+  scene.bind();
+  const TangentRect rect = covered(pinhole);
+  const auto draw_triangles = [](int first, int count) {
+    if (count > 0) glDrawArrays(GL_TRIANGLES, 3 * first, 3 * count);
+  };
+  for (const PlacedRun& placed : runs) {
+    if (!wanted(placed)) continue;
+    const Pose twin_from_owner = pinhole.pinhole_from_scene * placed.scene_from_owner;
+    const Eigen::Matrix4d clip_from_owner = clip_from_pinhole(pinhole) * twin_from_owner.matrix();
+    const Program& program = placed.run->has_cut_outs ? cut_program_ : program_;
+    program.use();
+    program.set("u_has_cut_outs", placed.run->has_cut_outs);
+    program.set("u_focal", static_cast<float>(pinhole.focal));
+    program.set("u_clip_from_owner", Eigen::Matrix4f(clip_from_owner.cast<float>()));
+    // Those in sight that stand together, at once.
+    int first = placed.run->first, count = 0;
+    for (const TriangleRun::Cluster& cluster : placed.run->clusters) {
+      if (intersected(rect, tangents_spanned(twin_from_owner, corners_of(cluster.box))).is_empty()) continue;
+      if (cluster.first != first + count) {
+        draw_triangles(first, count);
+        first = cluster.first;
+        count = 0;
+      }
+      count += cluster.count;
+    }
+    draw_triangles(first, count);
+  }
+  glDisable(GL_DEPTH_TEST);
+  glFlush();  // softpipe hands what was drawn to compute programs no sooner
+}
+
+void VisibilityBuffers::send(int index, const GpuViewpoint& viewpoint) {
+  glNamedBufferSubData(*visibility_, static_cast<GLintptr>(sizeof(GpuViewpoint)) * index, sizeof(GpuViewpoint), &viewpoint);
+}
+
+void VisibilityBuffers::upload_pixel_map(int layer, const Imager& imager, const TangentRect& rect) {
+  const cv::Mat map = pixel_map(imager, rect, k_map_columns, k_map_rows);
+  glTextureSubImage3D(*pixel_maps_, 0, 0, 0, layer, map.cols, map.rows, 1, GL_RG, GL_FLOAT, map.data);
+}
+
+// Over the prototype: nothing else is lit.
+PinholeView VisibilityBuffers::projector_pinhole_view(std::size_t projector,
+                            const std::vector<PlacedRun>& runs,
+                            const Pose& scene_from_world) const {
+  const Pose pose = sight_pose(projectors_[projector], scene_from_world);
+  return pinhole_view_over(pose, intersected(lenses_[projector].baked.rect, spanned_by(pose, runs, is_prototype)),
+                   k_oversampling * projectors_[projector].lens.fx(), ids_width_, ids_height_);
+}
+
+void VisibilityBuffers::draw_prototype_from_projectors(const GpuScene& scene,
+                                           const std::vector<PlacedRun>& runs,
+                                           const Pose& scene_from_world,
+                                           bool with_soft_edges) {
+  for (std::size_t i = 0; i < projectors_.size(); ++i) {
+    const PinholeView pinhole = projector_pinhole_view(i, runs, scene_from_world);
+    const int layer = 2 * static_cast<int>(i);
+    draw(scene, runs, is_prototype, pinhole, whole_of(pinhole), projector_ids_, layer);
+    if (with_soft_edges && edge_feathering_) edge_feathering_->find(static_cast<int>(i), depth_, pinhole);
+    GpuViewpoint viewpoint(pinhole, layer);
+    viewpoint.of_imager(projectors_[i]);
+    viewpoint.with_map(lenses_[i].baked.rect, static_cast<int>(i));
+    for (const ProjectorResponse& response : responses_)
+      if (response.projector == projectors_[i].name) viewpoint.with_response(response);
+    for (const Focus& focus : focuses_)
+      if (focus.projector == projectors_[i].name) viewpoint.with_focus(focus, projectors_[i]);
+    send(static_cast<int>(i), viewpoint);
+  }
+  if (!with_soft_edges || !edge_feathering_) return;
+  scene.bind();
+  edge_feathering_->feather([this](const Program& program) { bind(program, 0); });
+}
+
+void VisibilityBuffers::draw_surface_parts_from_projectors(const GpuScene& scene,
+                                               const std::vector<PlacedRun>& runs,
+                                               const Pose& scene_from_world) {
+  for (std::size_t i = 0; i < projectors_.size(); ++i) {
+    const PinholeView pinhole = projector_pinhole_view(i, runs, scene_from_world);
+    const int layer = 2 * static_cast<int>(i) + 1;
+    cv::Rect& place = surface_places_[i];
+    if (!place.empty())
+      glClearTexSubImage(*projector_ids_, 0, place.x, place.y, layer, place.width, place.height, 1,
+                         GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
+    place = texels_of(pinhole, spanned_by(pinhole.pinhole_from_scene, runs, is_surface_part));
+    if (!place.empty()) draw(scene, runs, is_surface_part, pinhole, place, projector_ids_, layer);
+  }
+}
+
+void VisibilityBuffers::draw_from_imager(const GpuScene& scene,
+                             const std::vector<PlacedRun>& runs,
+                             const Pose& scene_from_world,
+                             const Imager& imager,
+                             const BakedLens& lens,
+                             bool parts_alone) {
+  const Pose pose = sight_pose(imager, scene_from_world);
+  const TangentRect rect = intersected(lens.rect, spanned_by(pose, runs, parts_alone ? is_part : is_any));
+  const PinholeView pinhole = pinhole_view_over(pose, rect, k_oversampling * imager.lens.fx(), k_eye_side, k_eye_side);
+  draw(scene, runs, is_prototype, pinhole, whole_of(pinhole), eye_ids_, 0);
+  draw(scene, runs, is_part, pinhole, whole_of(pinhole), eye_ids_, 1);
+  GpuViewpoint viewpoint(pinhole, 0);
+  viewpoint.of_imager(imager);
+  send(eye(), viewpoint);
+}
+
+void VisibilityBuffers::draw_from_reference_camera(const GpuScene& scene,
+                              const std::vector<PlacedRun>& runs,
+                              const Pose& scene_from_world,
+                              const Imager& camera,
+                              const BakedLens& lens) {
+  const Pose pose = sight_pose(camera, scene_from_world);
+  const PinholeView pinhole = pinhole_view_over(pose, intersected(lens.rect, spanned_by(pose, runs, is_prototype)),
+                              k_oversampling * camera.lens.fx(), ids_width_, ids_height_);
+  const int layer = 2 * eye();
+  draw(scene, runs, is_prototype, pinhole, whole_of(pinhole), projector_ids_, layer);
+  upload_pixel_map(eye(), camera, lens.rect);
+  GpuViewpoint viewpoint(pinhole, layer);
+  viewpoint.of_imager(camera);
+  viewpoint.with_map(lens.rect, eye());
+  send(reference_camera(), viewpoint);
+}
+
+void VisibilityBuffers::draw_from_eye(const GpuScene& scene,
+                          const std::vector<PlacedRun>& runs,
+                          const Pose& scene_from_world,
+                          const Eigen::Vector3d& p_eye_scene,
+                          const Eigen::Vector3d& d_up_scene) {
+  const Eigen::AlignedBox3d box = box_of(runs, is_view_part);
+  const Pose pose = box.isEmpty() ? Pose() : looking_at(p_eye_scene, box.center(), d_up_scene);
+  const Eigen::AlignedBox3d prototype = box_of(runs, is_prototype);
+  double focal = 1;
+  for (const Imager& projector : projectors_) {
+    const Eigen::Vector3d p_projector = (sight_pose(projector, scene_from_world).inverse()).translation;
+    const double distance = prototype.isEmpty() ? 1 : std::max(0.05, prototype.exteriorDistance(p_projector));
+    const double farthest =
+        prototype.isEmpty() ? 1
+                            : (prototype.center() - p_eye_scene).norm() + 0.5 * prototype.diagonal().norm();
+    focal = std::max(focal, k_oversampling * projector.lens.fx() * farthest / distance);
+  }
+  const PinholeView pinhole = pinhole_view_over(pose, spanned_by(pose, runs, is_view_part), focal, k_eye_side, k_eye_side);
+  draw(scene, runs, is_prototype, pinhole, whole_of(pinhole), eye_ids_, 0);
+  draw(scene, runs, is_part, pinhole, whole_of(pinhole), eye_ids_, 1);
+  send(eye(), GpuViewpoint(pinhole, 0));
+}
+
+cv::Rect VisibilityBuffers::prototype_rect(std::size_t projector,
+                                 const std::vector<PlacedRun>& runs,
+                                 const Pose& scene_from_world) const {
+  const Pose pose = sight_pose(projectors_[projector], scene_from_world);
+  return pixels_of(projectors_[projector], lenses_[projector].baked, spanned_by(pose, runs, is_prototype));
+}
+
+std::vector<cv::Rect> VisibilityBuffers::visible_rects(const Imager& imager,
+                                          const BakedLens& lens,
+                                          const std::vector<PlacedRun>& runs,
+                                          const Pose& scene_from_world,
+                                          bool prototype_too,
+                                          double around_m) const {
+  const Pose pose = sight_pose(imager, scene_from_world);
+  std::vector<cv::Rect> places;
+  for (const PlacedRun& run : runs) {
+    if (!prototype_too && is_prototype(run)) continue;
+    const cv::Rect place = pixels_of(imager, lens, tangents_spanned(pose, bounds_of(run, around_m)));
+    if (!place.empty()) places.push_back(place);
+  }
+  return places;
+}
+
+void VisibilityBuffers::lit_rects(std::size_t projector,
+                          const std::vector<PlacedRun>& runs,
+                          const Pose& scene_from_world,
+                          const Eigen::Vector3d& p_eye_scene,
+                          std::vector<cv::Rect>* of_view,
+                          std::vector<cv::Rect>* of_surface) const {
+  const Pose pose = sight_pose(projectors_[projector], scene_from_world);
+  const cv::Rect whole = prototype_rect(projector, runs, scene_from_world);
+  of_view->clear();
+  of_surface->clear();
+  for (const PlacedRun& part : runs) {
+    if (!is_part(part)) continue;
+    const TangentRect rect = part.on_surface ? tangents_spanned(pose, bounds_of(part, k_on_surface))
+                                             : spanned_behind(pose, part, runs, p_eye_scene);
+    const cv::Rect place = whole & pixels_of(projectors_[projector], lenses_[projector].baked, rect);
+    if (!place.empty()) (part.on_surface ? of_surface : of_view)->push_back(place);
+  }
+}
+
+void VisibilityBuffers::bind(const Program& program, int first_unit) const {
+  glBindTextureUnit(k_sight_texels_unit, *sight_texels_);
+  program.bind("s_projector_ids", first_unit, projector_ids_);
+  program.bind("s_eye_ids", first_unit + 1, eye_ids_);
+  program.bind("s_pixel_maps", first_unit + 2, pixel_maps_);
+  program.set("s_kept",
+              first_unit + 3);  // samplers of other kinds may not share a unit, though it is not read
+  if (edge_feathering_) edge_feathering_->bind(program, first_unit + 3);
+  program.set("u_projector_count", static_cast<int>(projectors_.size()));
+  program.set("u_eye", eye());
+}
+
+}  // namespace limn::projector

@@ -1,0 +1,171 @@
+#include "scene/posed_scene.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+#include "core/config.h"
+#include "core/linear_algebra.h"
+#include "scene/mesh_bvh.h"
+
+namespace limn::scene {
+namespace {
+
+// A lost body is not where its track says: it is as if it were not seen.
+const Track* find_track(std::span<const Track> tracks, const std::string& body) {
+  const auto found = std::find_if(tracks.begin(), tracks.end(),
+                                  [&](const Track& t) { return t.body == body && t.tracking != TrackingState::lost; });
+  return found == tracks.end() ? nullptr : &*found;
+}
+
+// What no covariance of corners knows of: how far the mesh, the calibration and a marker's paper are from the
+// true surface. It also keeps a covariance that is exact along some line invertible.
+constexpr double k_unknown_place = 0.2e-3;  // m
+
+// Of the marker's centre in the prototype's frame, from the covariances of both poses.
+Eigen::Matrix3d place_covariance(const Track& prototype, const Track& marker) {
+  const Eigen::Vector3d d = marker.world_from_body.translation - prototype.world_from_body.translation;
+  Eigen::Matrix<double, 3, 6> by_prototype;    // d_world of R^T (p - t), by the delta of the prototype's pose
+  by_prototype << 0, -d.z(), d.y(), -1, 0, 0,  //
+      d.z(), 0, -d.x(), 0, -1, 0,              //
+      -d.y(), d.x(), 0, 0, 0, -1;
+  const Eigen::Matrix3d world = marker.covariance.bottomRightCorner<3, 3>() +
+                                by_prototype * prototype.covariance * by_prototype.transpose() +
+                                k_unknown_place * k_unknown_place * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d world_from_prototype = prototype.world_from_body.rotation_matrix();
+  return world_from_prototype.transpose() * world * world_from_prototype;
+}
+
+// The marker laid onto the prototype's surface, three degrees of freedom instead of six: centre on the
+// likeliest point (a lone marker's depth is uncertain, so it slides along the line of sight), z into the
+// surface by the shortest turn, so that its turn about z stays; the two planar branches differ by just such a
+// turn. The side of the surface is the one the marker faces, so that a mesh with its normals inside out
+// serves, too.
+Pose laid_on(const Mesh& mesh, const Track& prototype, const Track& marker) {
+  const Pose prototype_from_marker = prototype.world_from_body.inverse() * marker.world_from_body;
+  const MeshPoint point =
+      most_likely_on(mesh, prototype_from_marker.translation, place_covariance(prototype, marker));
+  const Eigen::Vector3d d_marker_z = prototype_from_marker.rotation * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d d_inward = d_marker_z.dot(point.d_normal) > 0 ? point.d_normal : -point.d_normal;
+  const Eigen::Quaterniond turn = rotation_between(d_marker_z, d_inward);
+  return prototype.world_from_body * Pose(turn * prototype_from_marker.rotation, point.p);
+}
+
+std::string chosen_variant(const Slot& slot, std::size_t index, std::span<const std::string> variants) {
+  return index < variants.size() && !variants[index].empty() ? variants[index] : slot.variants.front().name;
+}
+
+bool has_variant(const Slot& slot, const std::string& name) {
+  return std::any_of(slot.variants.begin(), slot.variants.end(),
+                     [&](const Variant& v) { return v.name == name; });
+}
+
+PosedPart read_part(const ConfigNode& node, const Slot& slot) {
+  node.only({"world_from_part", "variant"});
+  PosedPart part{slot.name, slot.variants.front().name, node.at("world_from_part").pose()};
+  if (const auto variant = node.find("variant")) {
+    part.variant = variant->text();
+    if (!has_variant(slot, part.variant)) {
+      std::string names;
+      for (const Variant& known : slot.variants) names += (names.empty() ? "" : ", ") + known.name;
+      variant->problem(fmt::format("expected a variant of the slot ({}), found '{}'.", names, part.variant));
+    }
+  }
+  return part;
+}
+
+std::vector<Viewpoint> fixed_viewpoints(const Scene& scene) {
+  std::vector<Viewpoint> viewpoints;
+  for (std::size_t i = 0; i < scene.viewers.size(); ++i) {
+    const Viewer& viewer = scene.viewers[i];
+    if (viewer.fixed)
+      viewpoints.push_back({viewer_body(i), viewer.fixed->imager_from_world.inverse().translation, viewer.weight});
+  }
+  return viewpoints;
+}
+
+std::optional<Imager> viewer_towards(const Eigen::Vector3d& p_eye,
+                                     const Eigen::Vector3d& p_middle,
+                                     const Eigen::Vector3d& d_up_world) {
+  const Eigen::Vector3d d = (p_middle - p_eye).normalized();
+  if (!d.allFinite()) return std::nullopt;
+  const Eigen::Vector3d d_up = std::abs(d.dot(d_up_world)) < 0.99 ? d_up_world : d.unitOrthogonal();
+  return viewer_imager(looking_at(p_eye, p_middle, d_up).inverse(), 1280, 800, 40);
+}
+
+}  // namespace
+
+PosedScene posed(const Scene& scene, std::span<const Track> tracks, std::span<const std::string> variants) {
+  PosedScene out;
+  const Track* prototype = scene.prototype ? find_track(tracks, "prototype") : nullptr;
+  if (prototype) out.world_from_prototype = prototype->world_from_body;
+  for (std::size_t i = 0; i < scene.slots.size(); ++i) {
+    const Slot& slot = scene.slots[i];
+    const Track* track = find_track(tracks, slot.name);
+    if (!track) continue;
+    const Pose world_from_marker = slot.stick_to_surface && prototype
+                                       ? laid_on(scene.prototype->mesh, *prototype, *track)
+                                       : track->world_from_body;
+    out.parts.push_back(
+        {slot.name, chosen_variant(slot, i, variants), world_from_marker * slot.marker_from_part});
+  }
+  out.viewpoints = fixed_viewpoints(scene);
+  for (std::size_t i = 0; i < scene.viewers.size(); ++i)
+    if (const Track* track = scene.viewers[i].marker ? find_track(tracks, viewer_body(i)) : nullptr)
+      out.viewpoints.push_back(
+          {track->body, track->world_from_body * scene.viewers[i].p_eye_marker, scene.viewers[i].weight});
+  return out;
+}
+
+std::optional<Eigen::Vector3d> middle_of(const Scene& scene, const PosedScene& posed) {
+  Eigen::AlignedBox3d box;
+  if (scene.prototype && posed.world_from_prototype)
+    for (const Eigen::Vector3f& p : scene.prototype->mesh.positions)
+      box.extend(*posed.world_from_prototype * p.cast<double>());
+  else
+    for (const PosedPart& part : posed.parts) box.extend(part.world_from_part.translation);
+  if (box.isEmpty()) return std::nullopt;
+  return box.center();
+}
+
+std::optional<Imager> viewer_at(const Eigen::Vector3d& p_eye_world,
+                                const Scene& scene,
+                                const PosedScene& posed,
+                                const Eigen::Vector3d& d_up_world) {
+  const auto p_middle = middle_of(scene, posed);
+  return p_middle ? viewer_towards(p_eye_world, *p_middle, d_up_world) : std::nullopt;
+}
+
+std::optional<Imager> viewer_of(const Scene& scene,
+                                const PosedScene& posed,
+                                const Eigen::Vector3d& d_up_world) {
+  if (scene.viewers.size() == 1 && scene.viewers[0].fixed) return scene.viewers[0].fixed;
+  const auto p_middle = middle_of(scene, posed);
+  if (!p_middle) return std::nullopt;
+  const auto p_eye = updated_viewpoint({}, posed.viewpoints, *p_middle, 0).p_world();
+  return p_eye ? viewer_towards(*p_eye, *p_middle, d_up_world) : std::nullopt;
+}
+
+Result<PosedScene> load_poses(const std::filesystem::path& path, const Scene& scene) {
+  LIMN_TRY(const Config config, Config::load(path, ""));
+  const ConfigNode root = config.root();
+  root.only({"schema", "world_from_prototype", "slots"});
+  PosedScene out;
+  out.viewpoints = fixed_viewpoints(scene);
+  if (const auto pose = root.find("world_from_prototype")) out.world_from_prototype = pose->pose();
+  if (const auto slots = root.find("slots")) {
+    for (const std::string& name : slots->keys()) {
+      if (!scene.find_slot(name)) {
+        std::string names;
+        for (const Slot& known : scene.slots) names += (names.empty() ? "" : ", ") + known.name;
+        slots->at(name).problem(fmt::format("expected a slot of the scene ({}), found '{}'.", names, name));
+      }
+    }
+    for (const Slot& slot : scene.slots) {
+      if (const auto node = slots->find(slot.name)) out.parts.push_back(read_part(*node, slot));
+    }
+  }
+  LIMN_TRY_STATUS(config.status());
+  return out;
+}
+
+}  // namespace limn::scene

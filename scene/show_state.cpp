@@ -1,0 +1,267 @@
+#include "scene/show_state.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <set>
+
+#include "core/config.h"
+#include "scene/command_text.h"
+
+namespace limn::scene {
+namespace {
+
+constexpr double k_moved_m = 0.010, k_moved_rad = 5 * std::numbers::pi / 180;
+std::vector<std::string> variant_names(const Slot& slot) {
+  std::vector<std::string> names;
+  for (const Variant& variant : slot.variants) names.push_back(variant.name);
+  return names;
+}
+
+const Track* find_shown(std::span<const Track> tracks, const std::string& body) {
+  const auto found = std::find_if(tracks.begin(), tracks.end(), [&](const Track& track) {
+    return track.body == body && track.tracking != TrackingState::lost;
+  });
+  return found == tracks.end() ? nullptr : &*found;
+}
+
+std::set<std::string> families_of(const Scene& scene) {
+  std::set<std::string> families;
+  for (const Body& body : bodies(scene))
+    for (const BodyMarker& marker : body.markers) families.insert(marker.marker.family);
+  return families;
+}
+
+// What else uses a marker, in words.
+std::optional<std::string> user_of(const Scene& scene,
+                                   const ShowState& show_state,
+                                   const MarkerName& marker,
+                                   std::size_t but_slot) {
+  for (std::size_t i = 0; i < scene.slots.size(); ++i)
+    if (i != but_slot && slot_marker(scene, show_state, i) == marker) return "slot '" + scene.slots[i].name + "'";
+  for (const Body& body : bodies(scene)) {
+    if (scene.find_slot(body.name)) continue;
+    for (const BodyMarker& known : body.markers)
+      if (known.marker == marker) return body.name == "prototype" ? "the prototype" : "a viewer";
+  }
+  for (const Control& control : scene.controls)
+    if (control.marker == marker) return "the control of " + control.action;
+  return std::nullopt;
+}
+
+}  // namespace
+
+const std::vector<std::string>& screen_names() {
+  static const std::vector<std::string> names = {"rest", "full", "camera", "view", "stereo", "off"};
+  return names;
+}
+
+ShowState initial_show_state(const Scene& scene) {
+  ShowState show_state;
+  for (const Slot& slot : scene.slots) show_state.slots.push_back({slot.variants.front().name, {}, {}, {}});
+  for (ShowState::Slot& slot : show_state.slots) slot.nudge.setZero();
+  return show_state;
+}
+
+std::vector<std::string> look_names(const ShowState& show_state) {
+  std::vector<std::string> names;
+  for (const Look& look : show_state.looks) names.push_back(look.name);
+  return names;
+}
+
+bool is_look_name(const std::string& name) {
+  return !name.empty() && name.size() <= 64 && name.front() != '.' &&
+         std::all_of(name.begin(), name.end(), [](char c) {
+           return std::isalnum(static_cast<unsigned char>(c)) || c == '-' || c == '_' || c == ' ' || c == '.';
+         });
+}
+
+const Look* find_look(const ShowState& show_state, const std::string& name) {
+  const auto look = std::find_if(show_state.looks.begin(), show_state.looks.end(),
+                                 [&](const Look& known) { return known.name == name; });
+  return look == show_state.looks.end() ? nullptr : &*look;
+}
+
+void remember_look(const std::string& name, ShowState* show_state) {
+  if (show_state->look == name) return;
+  show_state->other_look = show_state->look;
+  show_state->look = name;
+}
+
+ShowState with_look(const Scene& scene, ShowState show_state, const Look& look) {
+  for (const Look::Part& part : look.parts) {
+    for (std::size_t i = 0; i < scene.slots.size(); ++i) {
+      if (scene.slots[i].name != part.slot) continue;
+      show_state.slots[i].variant = part.variant;
+      show_state.slots[i].pin = Pin{part.prototype_from_part, std::nullopt};
+      show_state.slots[i].material = part.material;
+    }
+  }
+  show_state.light = look.light;
+  remember_look(look.name, &show_state);
+  return show_state;
+}
+
+Screen screen_content(const ShowState& show_state, const std::string& screen) {
+  for (const Output& output : show_state.screens)
+    if (output.name == screen) return output.shows;
+  return show_state.screen;
+}
+
+const MarkerName& slot_marker(const Scene& scene, const ShowState& show_state, std::size_t slot) {
+  return show_state.slots[slot].marker ? *show_state.slots[slot].marker : scene.slots[slot].marker;
+}
+
+Status check_carrier(const Scene& scene, const ShowState& show_state, const MarkerName& marker, std::size_t slot) {
+  const std::set<std::string> families = families_of(scene);
+  if (!families.count(marker.family))
+    return error("expected a marker of the scene's families ({}), found {}.",
+                 listed({families.begin(), families.end()}), marker.text());
+  if (const auto user = user_of(scene, show_state, marker, slot))
+    return error("expected a marker that carries nothing, found {}, which {} uses.", marker.text(), *user);
+  return {};
+}
+
+std::vector<Track> assign_tracks(const Scene& scene, const ShowState& show_state, std::span<const Track> tracks) {
+  std::vector<Track> out;
+  for (const Track& track : tracks) {
+    const Slot* own = scene.find_slot(track.body);
+    bool is_taken = false;
+    for (std::size_t i = 0; i < scene.slots.size(); ++i) {
+      const MarkerName& marker = slot_marker(scene, show_state, i);
+      if (own ? own->marker != marker : track.body != loose_body(marker)) continue;
+      out.push_back(track);
+      out.back().body = scene.slots[i].name;
+      is_taken = true;
+    }
+    if (!own && !is_taken) out.push_back(track);
+  }
+  return out;
+}
+
+std::optional<ShowState> left_of_split(const Scene& scene, const ShowState& show_state) {
+  if (!show_state.split) return std::nullopt;
+  const Look* other = find_look(show_state, show_state.other_look);
+  if (!other) return std::nullopt;
+  return with_look(scene, show_state, *other);
+}
+
+std::string pairings_json(const Scene& scene, const ShowState& show_state) {
+  nlohmann::ordered_json slots = nlohmann::ordered_json::object();
+  for (std::size_t i = 0; i < scene.slots.size(); ++i)
+    if (show_state.slots[i].marker) slots[scene.slots[i].name] = show_state.slots[i].marker->text();
+  if (slots.empty()) return {};
+  return nlohmann::ordered_json({{"schema", "limn.pairings/1"}, {"slots", slots}}).dump(2) + "\n";
+}
+
+Result<ShowState> with_pairings(const std::filesystem::path& path, const Scene& scene, ShowState show_state) {
+  LIMN_TRY(const Config config, Config::load(path, "limn.pairings/1"));
+  const ConfigNode root = config.root();
+  root.only({"schema", "slots"});
+  const ConfigNode slots = root.at("slots");
+  for (const std::string& name : slots.keys()) {
+    const Slot* slot = scene.find_slot(name);
+    const auto marker = MarkerName::parse(slots.at(name).text());
+    if (!slot) slots.at(name).problem("expected a slot of the scene, found another name.");
+    if (!marker) slots.at(name).problem(marker.message());
+    if (slot && marker) show_state.slots[static_cast<std::size_t>(slot - scene.slots.data())].marker = *marker;
+  }
+  for (std::size_t i = 0; i < scene.slots.size(); ++i)  // all together: they may have changed places
+    if (const auto& marker = show_state.slots[i].marker)
+      if (const Status can = check_carrier(scene, show_state, *marker, i); !can)
+        slots.at(scene.slots[i].name).problem(can.message());
+  LIMN_TRY_STATUS(config.status());
+  return show_state;
+}
+
+ShowState without_moved_pins(const Scene& scene, const ShowState& show_state, std::span<const Track> tracks) {
+  ShowState out = show_state;
+  const Track* prototype = find_shown(tracks, "prototype");
+  if (scene.prototype && !prototype) return out;
+  for (std::size_t i = 0; i < scene.slots.size(); ++i) {
+    std::optional<Pin>& pin = out.slots[i].pin;
+    const Track* track = pin ? find_shown(tracks, scene.slots[i].name) : nullptr;
+    if (!track) continue;
+    const Pose from_world = prototype ? prototype->world_from_body.inverse() : Pose{};
+    const Pose now = from_world * track->world_from_body;
+    if (!pin->prototype_from_marker) {
+      pin->prototype_from_marker = now;
+      continue;
+    }
+    const Pose& then = *pin->prototype_from_marker;
+    if ((now.translation - then.translation).norm() > k_moved_m ||
+        angle_between(now.rotation, then.rotation) > k_moved_rad)
+      pin.reset();
+  }
+  return out;
+}
+
+PosedScene compose_scene(const Scene& scene, const ShowState& show_state, std::span<const Track> tracks) {
+  std::vector<std::string> variants;
+  for (const ShowState::Slot& slot : show_state.slots) variants.push_back(slot.variant);
+  PosedScene out = posed(scene, tracks, variants);
+  const bool has_base = out.world_from_prototype.has_value() || !scene.prototype;
+  const Pose world_from_base = out.world_from_prototype.value_or(Pose{});
+  for (std::size_t i = 0; i < scene.slots.size(); ++i) {
+    const ShowState::Slot& slot = show_state.slots[i];
+    const auto part = std::find_if(out.parts.begin(), out.parts.end(),
+                                   [&](const PosedPart& p) { return p.slot == scene.slots[i].name; });
+    if (slot.pin && has_base) {
+      const PosedPart pinned{scene.slots[i].name, slot.variant,
+                             world_from_base * slot.pin->prototype_from_part};
+      if (part == out.parts.end())
+        out.parts.push_back(pinned);
+      else
+        *part = pinned;
+    } else if (part != out.parts.end()) {
+      part->world_from_part = part->world_from_part * Pose(Eigen::Quaterniond::Identity(), slot.nudge);
+    }
+  }
+  for (PosedPart& part : out.parts)
+    part.material =
+        show_state.slots[static_cast<std::size_t>(scene.find_slot(part.slot) - scene.slots.data())].material;
+  out.light = show_state.light;
+  return out;
+}
+
+std::string look_json(const Look& look) {
+  nlohmann::ordered_json json = {{"schema", "limn.look/1"}, {"name", look.name}};
+  json["slots"] = nlohmann::ordered_json::object();
+  for (const Look::Part& part : look.parts) {
+    nlohmann::ordered_json& slot = json["slots"][part.slot];
+    slot = {{"variant", part.variant}, {"prototype_from_part", to_json(part.prototype_from_part)}};
+    if (!part.material.is_none()) slot["material"] = to_json(part.material);
+  }
+  if (look.light) json["light"] = to_json(*look.light);
+  return json.dump(2) + "\n";
+}
+
+Result<Look> load_look(const std::filesystem::path& path, const Scene& scene) {
+  LIMN_TRY(const Config config, Config::load(path, "limn.look/1"));
+  const ConfigNode root = config.root();
+  root.only({"schema", "name", "slots", "light"});
+  Look look;
+  look.name = root.at("name").text();
+  if (!is_look_name(look.name))
+    root.at("name").problem(fmt::format("expected a name, found '{}'.", look.name));
+  const ConfigNode slots = root.at("slots");
+  for (const std::string& name : slots.keys()) {
+    const ConfigNode node = slots.at(name);
+    node.only({"variant", "prototype_from_part", "material"});
+    const Slot* slot = scene.find_slot(name);
+    if (!slot) {
+      node.problem("expected a slot of the scene, found another name.");
+      break;
+    }
+    look.parts.push_back(
+        {name, node.at("variant").choice(variant_names(*slot)), node.at("prototype_from_part").pose()});
+    if (const auto material = node.find("material"))
+      look.parts.back().material = read_material_override(*material);
+  }
+  if (const auto light = root.find("light")) look.light = read_room_light(*light);
+  LIMN_TRY_STATUS(config.status());
+  return look;
+}
+
+}  // namespace limn::scene

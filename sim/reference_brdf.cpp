@@ -1,0 +1,169 @@
+#include "sim/reference_brdf.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace limn::sim {
+namespace {
+
+using Eigen::Vector3d;
+
+// Where no room is known: soft light around the viewer's up direction and a lamp above the left shoulder.
+constexpr double k_soft_below = 0.15, k_soft_above = 0.35, k_lamp = 0.65;
+const Vector3d k_d_lamp_viewer = Vector3d(-0.36, -0.64, -0.68).normalized();
+
+constexpr double k_dielectric = 0.04;       // mirrored head on, glTF 2.0
+constexpr double k_lamp_roughness = 0.2;    // lamps have a size: no surface mirrors one more sharply
+constexpr double k_least_roughness = 0.03;  // what is smoother mirrors soft light alike
+constexpr double k_horizon_height = 0.3;    // the soft light's horizon is wide: all is `above` from there on
+constexpr int k_directions = 256;           // of mirrored soft light: right to 0.4 %, see part_look_test
+constexpr int k_fresnel_directions = 1024, k_fresnel_nodes = 65;
+
+Vector3d bgr(const Vector3d& rgb) { return rgb.reverse(); }
+
+// Points of the unit square, the more the evener (the additive sequence of the plastic number).
+Eigen::Vector2d even_point(int i) {
+  constexpr double k_x = 0.7548776662466927, k_y = 0.5698402909980532;
+  const double x = 0.5 + k_x * i, y = 0.5 + k_y * i;
+  return {x - std::floor(x), y - std::floor(y)};
+}
+
+// Soft light from a direction; of a white diffuse surface that faces it, if it came from everywhere.
+Vector3d soft_from(const scene::RoomLight& room, const Vector3d& d) {
+  const double height = std::clamp(d.dot(room.d_up_world) / k_horizon_height, -1.0, 1.0);
+  const double above = 0.5 + 0.75 * height - 0.25 * height * height * height;
+  return bgr(room.below_rgb + above * (room.above_rgb - room.below_rgb));
+}
+
+// All of it on a white diffuse surface.
+Vector3d soft_on(const scene::RoomLight& room, const Vector3d& n) {
+  const double above = (1 + n.dot(room.d_up_world)) / 2;
+  return bgr((1 - above) * room.below_rgb + above * room.above_rgb);
+}
+
+double schlick(double cosine) {
+  const double x = 1 - std::clamp(cosine, 0.0, 1.0);
+  return x * x * x * x * x;
+}
+
+Vector3d fresnel(const Vector3d& head_on, double cosine) {
+  return head_on + (Vector3d::Ones() - head_on) * schlick(cosine);
+}
+
+// Smith's height-correlated visibility over GGX's slopes: G / (4 NL NV).
+double visibility(double nl, double nv, double alpha) {
+  const auto root = [&](double c) { return std::sqrt(alpha * alpha + (1 - alpha * alpha) * c * c); };
+  return 0.5 / (nl * root(nv) + nv * root(nl));
+}
+
+double ggx(double nh, double alpha) {
+  const double f = (nh * nh) * (alpha * alpha - 1) + 1;
+  return alpha * alpha / (std::numbers::pi * f * f);
+}
+
+// Mean of Schlick's term over all light that a diffuse surface gets, by the cosine to the eye.
+double mean_schlick(double cosine) {
+  static const std::array<double, k_fresnel_nodes> table = [] {
+    std::array<double, k_fresnel_nodes> means{};
+    for (int node = 0; node < k_fresnel_nodes; ++node) {
+      const double z = static_cast<double>(node) / (k_fresnel_nodes - 1);
+      const Vector3d d_eye(std::sqrt(1 - z * z), 0, z);
+      for (int i = 0; i < k_fresnel_directions; ++i) {
+        const Eigen::Vector2d at = even_point(i);
+        const double ring = std::sqrt(at.x()), angle = 2 * std::numbers::pi * at.y();
+        const Vector3d d(ring * std::cos(angle), ring * std::sin(angle), std::sqrt(1 - at.x()));
+        means[static_cast<std::size_t>(node)] +=
+            schlick(d_eye.dot((d_eye + d).normalized())) / k_fresnel_directions;
+      }
+    }
+    return means;
+  }();
+  const double at = std::clamp(cosine, 0.0, 1.0) * (k_fresnel_nodes - 1);
+  const auto node = std::min<std::size_t>(static_cast<std::size_t>(at), k_fresnel_nodes - 2);
+  const double share = at - static_cast<double>(node);
+  return (1 - share) * table[node] + share * table[node + 1];
+}
+
+// Slopes of half vectors along u and v as GGX of alpha 1 has them.
+const std::array<Eigen::Vector2d, k_directions>& slopes() {
+  static const std::array<Eigen::Vector2d, k_directions> all = [] {
+    std::array<Eigen::Vector2d, k_directions> made;
+    for (int i = 0; i < k_directions; ++i) {
+      const Eigen::Vector2d at = even_point(i);
+      const double angle = 2 * std::numbers::pi * at.y();
+      made[static_cast<std::size_t>(i)] =
+          std::sqrt(at.x() / (1 - at.x())) * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    }
+    return made;
+  }();
+  return all;
+}
+
+// Over half vectors as GGX has them: the brighter the lobe, the more directions.
+Vector3d mirrored_soft(const SurfaceMaterial& substance,
+                       const Vector3d& head_on,
+                       const Vector3d& n,
+                       const Vector3d& d_eye,
+                       const scene::RoomLight& room) {
+  const double alpha = std::pow(std::max(substance.roughness, k_least_roughness), 2);
+  const double nv = std::max(1e-4, n.dot(d_eye));
+  const Vector3d d_u = n.unitOrthogonal(), d_v = n.cross(d_u);
+  Vector3d sum = Vector3d::Zero();
+  for (const Eigen::Vector2d& slope : slopes()) {
+    const Vector3d h = (alpha * (slope.x() * d_u + slope.y() * d_v) + n).normalized();
+    const double vh = d_eye.dot(h), nh = n.dot(h);
+    const Vector3d d = 2 * vh * h - d_eye;
+    const double nl = n.dot(d);
+    if (nl <= 0 || vh <= 0) continue;
+    // Half vectors are as dense as D nh; directions are 4 vh as thin.
+    sum += soft_from(room, d).cwiseProduct(fresnel(head_on, vh)) *
+           (visibility(nl, nv, alpha) * nl * 4 * vh / nh);
+  }
+  return sum / k_directions;
+}
+
+}  // namespace
+
+PartsLight PartsLight::beside(const Imager& eye) {
+  const Eigen::Quaterniond world_from_eye = eye.imager_from_world.inverse().rotation;
+  PartsLight light;
+  light.room.d_up_world = world_from_eye * -Vector3d::UnitY();
+  light.room.below_rgb.setConstant(k_soft_below);
+  light.room.above_rgb.setConstant(k_soft_above);
+  light.room.lamps = {{world_from_eye * k_d_lamp_viewer, Vector3d::Constant(k_lamp)}};
+  return light;
+}
+
+Vector3d shaded(const SurfaceMaterial& substance,
+                const Vector3d& n,
+                const Vector3d& d_eye,
+                const scene::RoomLight& room) {
+  const Vector3d diffuse = (1 - substance.metallic) * substance.base;
+  const Vector3d head_on =
+      (1 - substance.metallic) * Vector3d::Constant(k_dielectric) + substance.metallic * substance.base;
+  const double nv = std::max(1e-4, n.dot(d_eye));
+  const double alpha = std::pow(std::max(substance.roughness, k_lamp_roughness), 2);
+  Vector3d soft = diffuse.cwiseProduct(soft_on(room, n)), by_lamps = Vector3d::Zero();
+  if (!substance.is_plain) {
+    const Vector3d mean = head_on + (Vector3d::Ones() - head_on) * mean_schlick(nv);
+    soft = soft.cwiseProduct(Vector3d::Ones() - mean) + mirrored_soft(substance, head_on, n, d_eye, room);
+  }
+  for (const scene::RoomLight::Lamp& lamp : room.lamps) {
+    const double nl = n.dot(lamp.d_world);
+    if (nl <= 0) continue;
+    Vector3d reflected = diffuse;  // times pi, for so is a lamp's strength
+    if (!substance.is_plain) {
+      const Vector3d h = (d_eye + lamp.d_world).normalized();
+      const Vector3d mirrored = fresnel(head_on, d_eye.dot(h));
+      reflected = (Vector3d::Ones() - mirrored).cwiseProduct(diffuse) +
+                  mirrored * (std::numbers::pi * ggx(n.dot(h), alpha) * visibility(nl, nv, alpha));
+    }
+    by_lamps += nl * reflected.cwiseProduct(bgr(lamp.strength_rgb));
+  }
+  return substance.open * soft + by_lamps + substance.emitted;
+}
+
+}  // namespace limn::sim

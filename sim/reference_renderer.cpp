@@ -1,0 +1,242 @@
+#include "sim/reference_renderer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/core.hpp>
+
+#include "core/result.h"
+#include "sim/directions.h"
+#include "sim/texture.h"
+
+namespace limn::sim {
+namespace {
+
+constexpr double k_on_surface = 2e-3;   // m; a surface part this near is on the prototype (docs/formats.md)
+constexpr int k_sub_samples = 8;        // a side of a pixel on an edge: its cover is then right to 1/128
+constexpr float k_same_light = 0.004F;  // of full light, 1/255: samples that differ by less are one colour
+
+std::vector<MeshInstance> prototype_of(const World& world) {
+  const Object* prototype = world.find("prototype");
+  if (prototype == nullptr) return {};
+  return {{prototype->mesh.get(), prototype->world_from_object}};
+}
+
+RayScene rays_of(const MeshInstance& mesh) { return RayScene(std::span(&mesh, 1)); }
+
+Eigen::Vector3d turned_against(const Eigen::Vector3d& n, const Eigen::Vector3d& d) {
+  return n.dot(d) > 0 ? Eigen::Vector3d(-n) : n;
+}
+
+// A normal that looks away along d looks aside instead: at a silhouette.
+Eigen::Vector3d aside(const Eigen::Vector3d& n, const Eigen::Vector3d& d) {
+  return n.dot(d) > 0 ? Eigen::Vector3d((n - n.dot(d) * d).normalized()) : n;
+}
+
+}  // namespace
+
+ReferenceRenderer::ReferenceRenderer(const World& world, const scene::PosedScene& parts, const Imager& viewer)
+    : world_(world),
+      prototype_(prototype_of(world)),
+      p_eye_(viewer.imager_from_world.inverse().translation),
+      light_(PartsLight::beside(viewer)) {
+  LIMN_CHECK(world.scene.has_value());
+  if (const auto& room = parts.light ? parts.light : world.scene->light) light_ = {*room, true};
+  for (const scene::PosedPart& posed : parts.parts) {
+    const scene::Slot* slot = world.scene->find_slot(posed.slot);
+    LIMN_CHECK(slot != nullptr);
+    const auto variant = std::find_if(slot->variants.begin(), slot->variants.end(),
+                                      [&](const scene::Variant& v) { return v.name == posed.variant; });
+    LIMN_CHECK(variant != slot->variants.end());
+    parts_.push_back({rays_of({&variant->mesh, posed.world_from_part}), &variant->mesh,
+                      slot->mode == scene::Mode::surface});
+  }
+}
+
+// A pixel whose corners agree with its centre is one sample; others are averaged over a grid.
+template <class SampleAt>
+PartImage ReferenceRenderer::averaged(const Imager& imager, const SampleAt& sample_at) {
+  const Directions directions(imager);
+  const Eigen::Vector3d p_eye = imager.imager_from_world.inverse().translation;
+  const auto along = [&](const Eigen::Vector3f& d) {
+    return d.allFinite() ? sample_at(Ray{p_eye, d.cast<double>().normalized()}) : Sample{};
+  };
+  const auto width = static_cast<std::size_t>(imager.width);
+  const auto corner_row = [&](int row) {
+    std::vector<Eigen::Vector3f> d(width + 1);
+    directions.row(-0.5, row - 0.5, d);
+    std::vector<Sample> samples(d.size());
+    std::transform(d.begin(), d.end(), samples.begin(), along);
+    return samples;
+  };
+  const auto agree = [](const Sample& a, const Sample& b) {
+    return a.part == b.part && (a.light - b.light).cwiseAbs().maxCoeff() < k_same_light;
+  };
+  PartImage out{cv::Mat(imager.height, imager.width, CV_32FC3, cv::Scalar::all(0)),
+                  cv::Mat(imager.height, imager.width, CV_32F, cv::Scalar(0))};
+  const auto average = [&](int column, int row) {
+    Eigen::Vector3f light = Eigen::Vector3f::Zero();
+    float cover = 0;
+    for (int k = 0; k < k_sub_samples * k_sub_samples; ++k) {
+      const double x = column + (k % k_sub_samples + 0.5) / k_sub_samples - 0.5;
+      const double y = row + (k / k_sub_samples + 0.5) / k_sub_samples - 0.5;
+      const Sample sample = along(directions.at(x, y));
+      light += sample.light;
+      cover += sample.part >= 0 ? 1.0F : 0.0F;
+    }
+    constexpr float k_share = 1.0F / (k_sub_samples * k_sub_samples);
+    return std::pair<Eigen::Vector3f, float>(light * k_share, cover * k_share);
+  };
+  constexpr int k_strip = 16;  // rows; the corner row between strips is traced twice
+  cv::parallel_for_({0, (imager.height + k_strip - 1) / k_strip}, [&](const cv::Range& strips) {
+    for (int row = strips.start * k_strip; row < std::min(imager.height, strips.end * k_strip); ++row) {
+      const std::vector<Sample> above = corner_row(row), below = corner_row(row + 1);
+      std::vector<Eigen::Vector3f> d(width);
+      directions.row(0, row, d);
+      for (std::size_t i = 0; i < width; ++i) {
+        const Sample centre = along(d[i]);
+        const bool plain = agree(centre, above[i]) && agree(centre, above[i + 1]) &&
+                           agree(centre, below[i]) && agree(centre, below[i + 1]);
+        const auto column = static_cast<int>(i);
+        const auto [light, cover] =
+            plain ? std::pair<Eigen::Vector3f, float>(centre.light, centre.part >= 0 ? 1.0F : 0.0F)
+                  : average(column, row);
+        out.light.at<cv::Vec3f>(row, column) = {light.x(), light.y(), light.z()};
+        out.cover.at<float>(row, column) = cover;
+      }
+    }
+  });
+  return out;
+}
+
+ReferenceRenderer::Nearest ReferenceRenderer::nearest_part(const Ray& ray) const {
+  Nearest nearest;
+  nearest.hit.distance = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    const Hit hit = parts_[i].rays.first_hit(ray);
+    if (hit.object < 0 || hit.distance >= nearest.hit.distance) continue;
+    nearest = {static_cast<int>(i), hit};
+  }
+  return nearest;
+}
+
+// Whether the prototype hides the part that a ray meets first; a surface part may lie 2 mm within it.
+bool ReferenceRenderer::is_hidden(const Nearest& nearest, const Ray& ray, const Hit& behind) const {
+  if (behind.object < 0) return false;
+  const double cosine = std::abs(prototype_.face_normal(behind).dot(ray.d));
+  const bool on_surface = parts_[static_cast<std::size_t>(nearest.part)].on_surface;
+  return (nearest.hit.distance - behind.distance) * cosine > (on_surface ? k_on_surface : 0);
+}
+
+Eigen::Vector3f ReferenceRenderer::radiance_along(const Eigen::Vector3d& d,
+                                const Nearest& nearest,
+                                const PartsLight& light) const {
+  const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
+  const SurfaceMaterial substance = surface_material(*part.mesh, nearest.hit.triangle, part.rays.uv(nearest.hit));
+  if (substance.is_unlit) return substance.base.cast<float>();
+  const Eigen::Vector3d face = turned_against(part.rays.face_normal(nearest.hit), d);
+  const double side = part.rays.shading_normal(nearest.hit).dot(face) < 0 ? -1 : 1;
+  const Eigen::Vector3d n = aside(side * part.rays.mapped_normal(nearest.hit, substance.along), d);
+  return shaded(substance, n, -d, light.room).cast<float>();
+}
+
+// Where no room is known light comes from along the normal of the prototype, and nothing is mirrored.
+Eigen::Vector3f ReferenceRenderer::radiance_on_surface(const Nearest& nearest, const Eigen::Vector3d& d_normal) const {
+  const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
+  const SurfaceMaterial substance = surface_material(*part.mesh, nearest.hit.triangle, part.rays.uv(nearest.hit));
+  if (substance.is_unlit) return substance.base.cast<float>();
+  const double side = part.rays.shading_normal(nearest.hit).dot(d_normal) < 0 ? -1 : 1;
+  const Eigen::Vector3d n = aside(side * part.rays.mapped_normal(nearest.hit, substance.along), -d_normal);
+  if (light_.is_known) return shaded(substance, n, d_normal, light_.room).cast<float>();
+  const Eigen::Vector3d light = substance.open * light_.room.above_rgb.reverse() +
+                                n.dot(d_normal) * light_.room.lamps[0].strength_rgb.reverse();
+  return (substance.base.cwiseProduct(light) + substance.emitted).cast<float>();
+}
+
+// The view part that the viewer sees before p, a point of the prototype.
+ReferenceRenderer::Sample ReferenceRenderer::view_sample(const Eigen::Vector3d& p, const Eigen::Vector3d& n_face) const {
+  const double distance = (p - p_eye_).norm();
+  const Ray ray{p_eye_, (p - p_eye_) / distance};
+  if (n_face.dot(ray.d) >= 0) return {};  // the viewer looks at the other side
+  const Nearest nearest = nearest_part(ray);
+  if (nearest.part < 0 || nearest.hit.distance > distance) return {};
+  if (parts_[static_cast<std::size_t>(nearest.part)].on_surface) return {};
+  if (!prototype_.reached(p_eye_, p)) return {};
+  return {nearest.part, radiance_along(ray.d, nearest, light_)};
+}
+
+// The surface part nearest to p along the normal, within 2 mm on either side.
+ReferenceRenderer::Sample ReferenceRenderer::surface_sample(const Eigen::Vector3d& p, const Eigen::Vector3d& n) const {
+  Nearest best;
+  double best_height = k_on_surface;
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    if (!parts_[i].on_surface) continue;
+    for (const double side : {-1.0, 1.0}) {
+      const Hit hit = parts_[i].rays.first_hit({p + side * k_on_surface * n, -side * n});
+      const double height = std::abs(k_on_surface - hit.distance);
+      if (hit.object < 0 || height > best_height) continue;
+      best = {static_cast<int>(i), hit};
+      best_height = height;
+    }
+  }
+  if (best.part < 0) return {};
+  return {best.part, radiance_on_surface(best, n)};
+}
+
+ReferenceRenderer::Sample ReferenceRenderer::light_along(const Ray& ray) const {
+  const Hit hit = prototype_.first_hit(ray);
+  if (hit.object < 0) return {};
+  const Eigen::Vector3d p = ray.p_origin + hit.distance * ray.d;
+  const Eigen::Vector3d n_face = turned_against(prototype_.face_normal(hit), ray.d);
+  const Sample view = view_sample(p, n_face);
+  if (view.part >= 0) return view;
+  return surface_sample(p, turned_against(prototype_.shading_normal(hit), -n_face));
+}
+
+ReferenceRenderer::Sample ReferenceRenderer::parts_along(const Ray& ray, const PartsLight& light) const {
+  const Nearest nearest = nearest_part(ray);
+  if (nearest.part < 0 || is_hidden(nearest, ray, prototype_.first_hit(ray))) return {};
+  const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
+  if (part.on_surface) return {nearest.part, radiance_on_surface(nearest, part.rays.shading_normal(nearest.hit))};
+  return {nearest.part, radiance_along(ray.d, nearest, light)};
+}
+
+PartImage ReferenceRenderer::projector_image(std::size_t index) const {
+  return averaged(world_.rig.projectors.at(index), [&](const Ray& ray) { return light_along(ray); });
+}
+
+PartImage ReferenceRenderer::parts_image(const Imager& imager) const {
+  const PartsLight light = light_.is_known ? light_ : PartsLight::beside(imager);
+  return averaged(imager, [&](const Ray& ray) { return parts_along(ray, light); });
+}
+
+DepthOrder ReferenceRenderer::depth_order(const Imager& imager) const {
+  const Directions directions(imager);
+  const Eigen::Vector3d p_eye = imager.imager_from_world.inverse().translation;
+  DepthOrder out{cv::Mat(imager.height, imager.width, CV_16S, cv::Scalar(-1)),
+                 cv::Mat(imager.height, imager.width, CV_8U, cv::Scalar(0))};
+  cv::parallel_for_({0, imager.height}, [&](const cv::Range& rows) {
+    std::vector<Eigen::Vector3f> d(static_cast<std::size_t>(imager.width));
+    for (int row = rows.start; row < rows.end; ++row) {
+      directions.row(0, row, d);
+      for (int column = 0; column < imager.width; ++column) {
+        const Eigen::Vector3f& direction = d[static_cast<std::size_t>(column)];
+        if (!direction.allFinite()) continue;
+        const Ray ray{p_eye, direction.cast<double>().normalized()};
+        const Nearest nearest = nearest_part(ray);
+        if (nearest.part < 0) continue;
+        const Hit behind = prototype_.first_hit(ray);
+        const bool crossed = std::any_of(parts_.begin(), parts_.end(), [&](const Part& part) {
+          return &part != &parts_[static_cast<std::size_t>(nearest.part)] &&
+                 part.rays.first_hit(ray).object >= 0;
+        });
+        if (behind.object >= 0 || crossed) out.contested.at<std::uint8_t>(row, column) = 255;
+        if (!is_hidden(nearest, ray, behind))
+          out.front.at<std::int16_t>(row, column) = static_cast<std::int16_t>(nearest.part);
+      }
+    }
+  });
+  return out;
+}
+
+}  // namespace limn::sim

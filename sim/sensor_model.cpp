@@ -1,0 +1,342 @@
+#include "sim/sensor_model.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace limn::sim {
+namespace {
+
+constexpr int k_grey = -1;               // channel of a grey camera
+constexpr double k_blur_step_px = 0.25;  // defocus is rounded to this stdev: its edge spreads differ by < 1 %
+constexpr int k_blur_levels = 40;        // up to 10 px, far beyond any use
+
+// The light of one projector in one colour channel, ready for lookups.
+class Beam {
+ public:
+  Beam(const Imager& projector, const ProjectorEffects& effects, const cv::Mat& shown, int channel)
+      : width_(static_cast<float>(projector.width)),
+        height_(static_cast<float>(projector.height)),
+        effects_(effects),
+        dark_(shown.empty()) {
+    black_ = static_cast<float>(effects.illuminance_at_1m * effects.black_level);
+    vignetting_ = static_cast<float>(effects.vignetting) * 4 / (width_ * width_ + height_ * height_);
+    blur_levels_m_ = static_cast<float>(projector.lens.fx() * effects.aperture_m / 4 / k_blur_step_px);
+    blur_at_focus_ = blur_levels_m_ / static_cast<float>(effects.focus_m);
+    if (!dark_) sharp_ = light_of(shown, channel);
+  }
+
+  /// Makes the blurred images that these samples need; before at().
+  void prepare(std::span<const ProjectorView> views) {
+    if (dark_) return;
+    std::array<bool, k_blur_levels> used{};
+    for (const ProjectorView& view : views)
+      if (view.gain > 0) used[level_of(view.depth)] = true;
+    cv::parallel_for_({0, k_blur_levels}, [&](const cv::Range& range) {
+      for (auto level = static_cast<std::size_t>(range.start); level < static_cast<std::size_t>(range.end);
+           ++level)
+        if (used[level]) levels_[level] = blurred(level);
+    });
+  }
+
+  float at(const ProjectorView& view) const {
+    return view.gain * vignette(view) * (dark_ ? black_ * coverage(view) : lookup(view));
+  }
+
+ private:
+  static constexpr int k_pad = 24;  // px of darkness around the panel, for the blur to spill into
+
+  // Light of all display values, CV_32F or CV_32FC3 (BGR), as many channels as the image has.
+  cv::Mat light_of_values(int channels) const {
+    cv::Mat light(1, 256, CV_32FC(channels));
+    for (int v = 0; v < 256; ++v)
+      for (int c = 0; c < channels; ++c)
+        light.ptr<float>()[v * channels + c] =
+            static_cast<float>(effects_.illuminance_at_1m * light_share(effects_, c, v / 255.0));
+    return light;
+  }
+
+  cv::Mat light_of(const cv::Mat& shown, int channel) const {
+    cv::Mat linear = shown;
+    if (shown.depth() == CV_32F) return padded(channel_of(shown * effects_.illuminance_at_1m, channel));
+    if (shown.channels() == 1 && effects_.channel_gamma != Eigen::Vector3d::Ones())
+      cv::cvtColor(shown, linear, cv::COLOR_GRAY2BGR);
+    cv::LUT(linear, light_of_values(linear.channels()), linear);
+    return padded(channel_of(linear, channel));
+  }
+
+  static cv::Mat channel_of(cv::Mat light, int channel) {
+    if (light.channels() == 3 && channel == k_grey)
+      cv::transform(light, light, cv::Matx13f(0.0722F, 0.7152F, 0.2126F));  // BT.709 luminance of BGR
+    else if (light.channels() == 3)
+      cv::extractChannel(light, light, channel);
+    return light;
+  }
+
+  static cv::Mat padded(cv::Mat light) {
+    cv::copyMakeBorder(light, light, k_pad, k_pad, k_pad, k_pad, cv::BORDER_CONSTANT, cv::Scalar(0));
+    return light;
+  }
+
+  cv::Mat blurred(std::size_t level) const {
+    if (level == 0) return sharp_;
+    const double sigma = static_cast<double>(level) * k_blur_step_px;
+    const int side = 2 * static_cast<int>(std::ceil(3.5 * sigma)) + 1;
+    cv::Mat result;
+    cv::GaussianBlur(sharp_, result, {side, side}, sigma, sigma, cv::BORDER_REPLICATE);
+    return result;
+  }
+
+  // A disc of diameter D has a stdev of D / 4; D = aperture |depth - focus| / focus on the surface.
+  std::size_t level_of(float depth) const {
+    const float level = std::abs(blur_at_focus_ - blur_levels_m_ / depth) + 0.5F;
+    return std::min<std::size_t>(static_cast<std::size_t>(level), k_blur_levels - 1);
+  }
+
+  // Bilinear: the projector's square pixel averaged over a camera pixel of like size.
+  float lookup(const ProjectorView& view) const {
+    const cv::Mat& light = levels_[level_of(view.depth)];
+    const float x = view.u + k_pad, y = view.v + k_pad;
+    const int c = static_cast<int>(x), r = static_cast<int>(y);
+    const float fx = x - static_cast<float>(c), fy = y - static_cast<float>(r);
+    const float* upper = light.ptr<float>(r) + c;
+    const float* lower = light.ptr<float>(r + 1) + c;
+    return (1 - fy) * (upper[0] + fx * (upper[1] - upper[0])) + fy * (lower[0] + fx * (lower[1] - lower[0]));
+  }
+
+  float coverage(const ProjectorView& view) const {
+    return std::clamp(std::min(view.u + 1, width_ - view.u), 0.0F, 1.0F) *
+           std::clamp(std::min(view.v + 1, height_ - view.v), 0.0F, 1.0F);
+  }
+
+  float vignette(const ProjectorView& view) const {
+    const float dx = view.u - (width_ - 1) / 2, dy = view.v - (height_ - 1) / 2;
+    return 1 - vignetting_ * (dx * dx + dy * dy);
+  }
+
+  float width_, height_;
+  ProjectorEffects effects_;
+  bool dark_;
+  float black_ = 0;
+  float vignetting_ = 0;                         // per squared pixel from the panel's middle
+  float blur_levels_m_ = 0, blur_at_focus_ = 0;  // blur level = |blur_at_focus - blur_levels_m / depth|
+  cv::Mat sharp_;
+  std::array<cv::Mat, k_blur_levels> levels_;
+};
+
+std::vector<Beam> beams_of(const World& world,
+                           const Samples& samples,
+                           std::span<const cv::Mat> shown,
+                           int channel) {
+  std::vector<Beam> beams;
+  for (std::size_t k = 0; k < samples.projectors.size(); ++k) {
+    const Imager& projector = world.rig.projectors.at(k);
+    const cv::Mat image = shown.empty() ? cv::Mat() : shown[k];
+    if (!image.empty()) {
+      LIMN_CHECK(image.cols == projector.width && image.rows == projector.height);
+      LIMN_CHECK(image.type() == CV_8UC1 || image.type() == CV_8UC3 || image.type() == CV_32FC3);
+    }
+    beams.emplace_back(projector, world.projector_effects.at(k), image, channel);
+    beams.back().prepare(samples.projectors[k]);
+  }
+  return beams;
+}
+
+// What the gain of a view is to be multiplied by where falloff or incidence is switched off.
+float unphysical_gain(const World& world, const Samples& samples, std::size_t projector, std::size_t i) {
+  const ProjectorEffects& effects = world.projector_effects[projector];
+  if (effects.falloff && effects.incidence) return 1;
+  const Eigen::Vector3d p = world.rig.projectors[projector].imager_from_world.inverse().translation;
+  const Eigen::Vector3f towards = p.cast<float>() - samples.p_world[i];
+  const float cosine = samples.n_world[i].dot(towards.normalized());
+  return (effects.falloff ? 1 : towards.squaredNorm()) / (effects.incidence ? 1 : std::max(cosine, 1e-3F));
+}
+
+float reflected(const Samples& samples, int channel, std::size_t i) {
+  return channel == k_grey ? samples.grey[i] : samples.weight[i] * samples.albedo[i][channel];
+}
+
+cv::Mat channel_light(const World& world,
+                      const Samples& samples,
+                      std::span<const cv::Mat> shown,
+                      int channel) {
+  const std::vector<Beam> beams = beams_of(world, samples, shown, channel);
+  cv::Mat light(samples.height, samples.width, CV_32F);
+  auto* out = light.ptr<float>();
+  const std::size_t pixels = light.total(), extra = samples.size() - pixels;
+  std::vector<float> more(extra);
+  const bool physical = std::all_of(world.projector_effects.begin(), world.projector_effects.end(),
+                                    [](const ProjectorEffects& e) { return e.falloff && e.incidence; });
+  constexpr std::size_t k_chunk = 16384;
+  const auto chunks = static_cast<int>((samples.size() + k_chunk - 1) / k_chunk);
+  cv::parallel_for_({0, chunks}, [&](const cv::Range& range) {
+    const std::size_t end = std::min(samples.size(), static_cast<std::size_t>(range.end) * k_chunk);
+    for (std::size_t i = static_cast<std::size_t>(range.start) * k_chunk; i < end; ++i) {
+      float illuminance = samples.room_light[i];
+      for (std::size_t k = 0; k < beams.size(); ++k) {
+        const ProjectorView& view = samples.projectors[k][i];
+        if (view.gain <= 0) continue;
+        illuminance += beams[k].at(view) * (physical ? 1 : unphysical_gain(world, samples, k, i));
+      }
+      (i < pixels ? out[i] : more[i - pixels]) = reflected(samples, channel, i) * illuminance;
+    }
+  });
+  for (std::size_t i = 0; i < extra; ++i) out[samples.pixel[pixels + i]] += more[i];
+  return light;
+}
+
+// Exposure and vignetting: quadratic in the distance from the image's middle.
+void expose_row(const CameraEffects& effects, cv::Mat& signal, int r) {
+  const auto width = static_cast<float>(signal.cols), height = static_cast<float>(signal.rows);
+  const auto exposure = static_cast<float>(effects.exposure);
+  const float loss = static_cast<float>(effects.vignetting) * 4 / (width * width + height * height);
+  const float dy = static_cast<float>(r) - (height - 1) / 2;
+  auto* value = signal.ptr<float>(r);
+  for (int c = 0; c < signal.cols; ++c) {
+    const float dx = static_cast<float>(c) - (width - 1) / 2;
+    const float gain = exposure * (1 - loss * (dx * dx + dy * dy));
+    for (int k = 0; k < signal.channels(); ++k) *value++ *= gain;
+  }
+}
+
+void in_row_strips(int rows, const std::function<void(const cv::Range&)>& work) {
+  constexpr int k_strips = 8;
+  cv::parallel_for_({0, k_strips}, [&](const cv::Range& range) {
+    work({rows * range.start / k_strips, rows * range.end / k_strips});
+  });
+}
+
+// 65536 quantiles of the normal distribution: a 16-bit random number picks one. Found by Newton's method.
+const std::vector<float>& normal_quantiles() {
+  static const std::vector<float> table = [] {
+    std::vector<float> t(65536);
+    double x = -4.3;
+    for (std::size_t i = 0; i < t.size() / 2; ++i) {
+      const double p = (static_cast<double>(i) + 0.5) / static_cast<double>(t.size());
+      for (int step = 0; step < 8; ++step)
+        x -= (0.5 * std::erfc(-x / std::sqrt(2.0)) - p) /
+             (std::exp(-x * x / 2) / std::sqrt(2 * std::numbers::pi));
+      t[i] = static_cast<float>(x);
+      t[t.size() - 1 - i] = static_cast<float>(-x);
+    }
+    return t;
+  }();
+  return table;
+}
+
+// Sebastiano Vigna's splitmix64: a different, well mixed number for every state.
+std::uint64_t mixed(std::uint64_t z) {
+  z += 0x9e3779b97f4a7c15U;
+  z = (z ^ (z >> 30U)) * 0xbf58476d1ce4e5b9U;
+  z = (z ^ (z >> 27U)) * 0x94d049bb133111ebU;
+  return z ^ (z >> 31U);
+}
+
+// 8-bit level (before rounding) of linear signal 0..1 in 65536 steps, for the sRGB curve.
+const std::vector<float>& srgb_from_linear() {
+  static const std::vector<float> table = [] {
+    std::vector<float> t(65536);
+    for (std::size_t i = 0; i < t.size(); ++i) {
+      const double v = static_cast<double>(i) / static_cast<double>(t.size() - 1);
+      t[i] = static_cast<float>(v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055);
+    }
+    return t;
+  }();
+  return table;
+}
+
+float encoded(const CameraEffects& effects, float signal) {
+  if (!effects.srgb) return signal;
+  if (signal <= 0) return 12.92F * signal;
+  return srgb_from_linear()[static_cast<std::size_t>(std::min(signal, 1.0F) * 65535.0F + 0.5F)];
+}
+
+void digitise_row(
+    const CameraEffects& effects, const float* signal, std::uint8_t* levels, int count, std::uint64_t seed) {
+  const std::vector<float>& normal = normal_quantiles();
+  const bool noisy = effects.full_well_e > 0 || effects.read_noise > 0;
+  const float shot = effects.full_well_e > 0 ? static_cast<float>(1 / effects.full_well_e) : 0;
+  const auto read = static_cast<float>(effects.read_noise / 255);
+  const auto black = static_cast<float>(effects.black_level);
+  std::uint64_t bits = 0;
+  for (int i = 0; i < count; ++i) {
+    float value = signal[i];
+    if (noisy) {
+      bits = (i & 3) == 0 ? mixed(seed + static_cast<std::uint64_t>(i)) : bits >> 16U;
+      value += std::sqrt(read * read + shot * std::max(value, 0.0F)) * normal[bits & 0xffffU];
+    }
+    levels[i] = cv::saturate_cast<std::uint8_t>(black + (255 - black) * encoded(effects, value));
+  }
+}
+
+// Colour filters that overlap.
+void mix(const CameraEffects& effects, cv::Mat* light) {
+  if (effects.sensitivity == Eigen::Matrix3d::Identity()) return;
+  cv::Matx33f matrix;
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) matrix(r, c) = static_cast<float>(effects.sensitivity(r, c));
+  cv::transform(*light, *light, matrix);
+}
+
+}  // namespace
+
+double light_share(const ProjectorEffects& effects, int channel, double value) {
+  const double power = std::pow(value, effects.gamma * effects.channel_gamma[channel]);
+  const double smoothstep = value * value * (3 - 2 * value);
+  const double share = (1 - effects.s_curve) * power + effects.s_curve * smoothstep;
+  return effects.black_level + (1 - effects.black_level) * share;
+}
+
+cv::Mat ideal_light(const World& world, const Samples& samples, std::span<const cv::Mat> shown) {
+  LIMN_CHECK(shown.empty() || shown.size() == samples.projectors.size());
+  if (!world.camera_effects.at(static_cast<std::size_t>(samples.camera)).colour)
+    return channel_light(world, samples, shown, k_grey);
+  std::vector<cv::Mat> channels;
+  for (int c = 0; c < 3; ++c) channels.push_back(channel_light(world, samples, shown, c));
+  cv::Mat light;
+  cv::merge(channels, light);
+  mix(world.camera_effects[static_cast<std::size_t>(samples.camera)], &light);
+  return light;
+}
+
+cv::Mat exposed(const World& world, int camera, const cv::Mat& light) {
+  const CameraEffects& effects = world.camera_effects.at(static_cast<std::size_t>(camera));
+  cv::Mat signal(light.size(), light.type());
+  const int side = 2 * static_cast<int>(std::ceil(4 * effects.psf_px)) + 1;
+  in_row_strips(light.rows, [&](const cv::Range& rows) {
+    cv::Mat strip = signal.rowRange(rows);  // the filter sees the rows beyond its strip
+    if (effects.psf_px > 0)
+      cv::GaussianBlur(light.rowRange(rows), strip, {side, side}, effects.psf_px, effects.psf_px,
+                       cv::BORDER_REPLICATE);
+    else
+      light.rowRange(rows).copyTo(strip);
+    for (int r = rows.start; r < rows.end; ++r) expose_row(effects, signal, r);
+  });
+  return signal;
+}
+
+cv::Mat digitised(const World& world, int camera, const cv::Mat& signal, std::uint64_t seed) {
+  const CameraEffects& effects = world.camera_effects.at(static_cast<std::size_t>(camera));
+  cv::Mat levels(signal.size(), CV_MAKETYPE(CV_8U, signal.channels()));
+  const std::uint64_t stream = mixed(seed ^ mixed(static_cast<std::uint64_t>(camera) + 1));
+  in_row_strips(signal.rows, [&](const cv::Range& rows) {
+    for (int r = rows.start; r < rows.end; ++r)
+      digitise_row(effects, signal.ptr<float>(r), levels.ptr(r), signal.cols * signal.channels(),
+                   mixed(stream + static_cast<std::uint64_t>(r)));
+  });
+  return levels;
+}
+
+cv::Mat photograph(const World& world,
+                   const Samples& samples,
+                   std::span<const cv::Mat> shown,
+                   std::uint64_t seed) {
+  const cv::Mat light = ideal_light(world, samples, shown);
+  return digitised(world, samples.camera, exposed(world, samples.camera, light), seed);
+}
+
+}  // namespace limn::sim

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+#include <span>
+
+#include "sim/trace.h"
+#include "sim/world.h"
+
+namespace limn::sim {
+
+/// Light of a display value (0 … 1) as a share of full white, black level included; channel 0 is blue, 1
+/// green, 2 red.
+double light_share(const ProjectorEffects& effects, int channel, double value);
+
+/// Linear light in every pixel (CV_32FC1, or C3 for a colour camera): no blur, no noise, no exposure. `shown`
+/// holds one 8-bit grey or BGR image per projector; an empty image is black, an empty span is all black.
+/// A CV_32FC3 image is linear light as it leaves the projector, a share of full white: no gamma, no black.
+/// A projector's pixels are little squares, blurred by defocus where the surface is out of focus.
+cv::Mat ideal_light(const World& world, const Samples& samples, std::span<const cv::Mat> shown);
+
+/// After the lens: PSF, vignetting, exposure. Linear, 1 is full scale; may exceed it.
+cv::Mat exposed(const World& world, int camera, const cv::Mat& light);
+
+/// After the sensor: shot and read noise, encoding, black level, 8 bits. The same seed gives the same bytes.
+cv::Mat digitised(const World& world, int camera, const cv::Mat& signal, std::uint64_t seed);
+
+/// All three steps. Throws std::logic_error when `shown` does not fit the projectors.
+cv::Mat photograph(const World& world,
+                   const Samples& samples,
+                   std::span<const cv::Mat> shown,
+                   std::uint64_t seed);
+
+}  // namespace limn::sim

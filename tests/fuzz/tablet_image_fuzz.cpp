@@ -1,0 +1,58 @@
+// What a guest's tablet sends as its image: decoded or refused, and looked at like any other.
+#include "apps/tablet/tablet_localizer.h"
+#include "apps/tablet/tablet_image.h"
+#include "tests/fuzz/fuzz_file.h"
+#include "tracker/family.h"
+
+namespace {
+
+using namespace limn;
+
+// A body of four markers about the origin, and one of a single marker beside it.
+std::vector<Body> bodies() {
+  std::vector<Body> out = {{"prototype", {}}, {"mirror", {}}};
+  for (int i = 0; i < 4; ++i) {
+    Pose place;
+    place.translation = {0.1 * (i % 2) - 0.05, 0.1 * (i / 2) - 0.05, 0.01 * i};
+    out[0].markers.push_back({{"apriltag_36h11", std::to_string(i)}, 0.04, place});
+  }
+  out[1].markers.push_back({{"aruco_4x4_50", "0"}, 0.04, Pose()});
+  return out;
+}
+
+std::vector<Track> tracks() {
+  Track prototype, mirror;
+  prototype.body = "prototype";
+  mirror.body = "mirror";
+  mirror.world_from_body.translation = {0.1, 0.1, 0};
+  return {prototype, mirror};
+}
+
+}  // namespace
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
+  static const std::vector<Body> known = bodies();
+  static const std::vector<Track> where = tracks();
+  static const tracker::Families families = tracker::Families::load(tracker::families_of(known)).value();
+  const auto image = apps::decode_tablet_image({bytes, size});
+  if (!image) {
+    LIMN_CHECK(image.message().find("expected") != std::string::npos);
+    return 0;
+  }
+  LIMN_CHECK(image->type() == CV_8UC3 && std::max(image->cols, image->rows) <= apps::k_drawn_side);
+  apps::TabletLocalizer eye(families);
+  for (int i = 0; i < 2; ++i) {  // the second time with what it learnt
+    const apps::TabletPose sight = eye.look(*image, known, where);
+    eye.learn();
+    LIMN_CHECK(sight.view.has_value() == sight.why.empty());
+    LIMN_CHECK(std::isfinite(sight.focal_stddev_px) && sight.focal_stddev_px > 0);
+    if (!sight.view) continue;
+    LIMN_CHECK(sight.markers > 0 && std::isfinite(sight.rms_px));
+    LIMN_CHECK(sight.view->imager_from_world.is_finite());
+    LIMN_CHECK(Lens::create(sight.view->lens.model.name(), sight.view->lens.values).ok());
+    for (const Track& moved : sight.moved)
+      LIMN_CHECK(moved.world_from_body.is_finite() && moved.covariance.allFinite());
+  }
+  for (const calib::IntrinsicsEstimate& lens : eye.lenses()) LIMN_CHECK(lens.is_sound());
+  return 0;
+}

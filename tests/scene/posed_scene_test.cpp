@@ -1,0 +1,141 @@
+#include "scene/posed_scene.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/config.h"
+#include "core/file.h"
+#include "tests/support/matchers.h"
+
+namespace limn::scene {
+namespace {
+
+using Eigen::Vector3d;
+using namespace test::literals;
+
+// A half cylinder of radius 0.5 along y, its outside towards -z.
+Mesh half_cylinder() {
+  Mesh mesh;
+  constexpr int k_steps = 180;
+  for (int i = 0; i <= k_steps; ++i) {
+    const double a = M_PI * (1.0 * i / k_steps - 0.5);
+    for (const double y : {-0.5, 0.5}) {
+      mesh.positions.push_back(Vector3d(0.5 * std::sin(a), y, -0.5 * std::cos(a)).cast<float>());
+      mesh.normals.push_back(Vector3d(std::sin(a), 0, -std::cos(a)).cast<float>());
+    }
+  }
+  for (std::uint32_t i = 0; i < k_steps; ++i) {
+    mesh.triangles.push_back({2 * i, 2 * i + 1, 2 * i + 2});
+    mesh.triangles.push_back({2 * i + 2, 2 * i + 1, 2 * i + 3});
+  }
+  mesh.triangle_materials.assign(mesh.triangles.size(), 0);
+  return mesh;
+}
+
+Scene two_slots(bool stick) {
+  Scene scene;
+  scene.prototype = Prototype{half_cylinder(), {}, 0.8, {}};
+  for (const char* name : {"mirror", "trim"}) {
+    Slot slot;
+    slot.name = name;
+    slot.marker_from_part = Pose(exp_rotation({0.1, 0.2, 0.3}), {0.01, 0.02, -0.03});
+    slot.stick_to_surface = stick;
+    slot.variants = {{"a", {}}, {"b", {}}};
+    scene.slots.push_back(slot);
+  }
+  return scene;
+}
+
+Track track_of(const std::string& body, const Pose& world_from_body) {
+  Track track;
+  track.body = body;
+  track.world_from_body = world_from_body;
+  return track;
+}
+
+TEST(Posed, PartsRideOnTheirMarkersAndUnseenOnesAreAbsent) {
+  const Scene scene = two_slots(false);
+  const Pose world_from_marker(exp_rotation({0.4, -0.2, 0.1}), {1, 2, 3});
+  const Track tracks[] = {track_of("trim", world_from_marker)};
+  const std::string variants[] = {"", "b"};
+  const PosedScene out = posed(scene, tracks, variants);
+  EXPECT_FALSE(out.world_from_prototype);
+  ASSERT_EQ(out.parts.size(), 1u);
+  EXPECT_EQ(out.parts[0].slot, "trim");
+  EXPECT_EQ(out.parts[0].variant, "b");
+  EXPECT_TRUE(test::pose_near(out.parts[0].world_from_part,
+                              world_from_marker * scene.slots[1].marker_from_part, 1e-9, 1e-9));
+  EXPECT_EQ(posed(scene, tracks).parts[0].variant, "a");
+}
+
+TEST(Posed, LostPartIsAbsentAndAnExtrapolatedOneIsNot) {
+  const Scene scene = two_slots(false);
+  std::array<Track, 2> tracks = {track_of("mirror", Pose{}), track_of("trim", Pose{})};
+  tracks[0].tracking = TrackingState::lost;
+  tracks[1].tracking = TrackingState::extrapolated;
+  const PosedScene out = posed(scene, tracks);
+  ASSERT_EQ(out.parts.size(), 1u);
+  EXPECT_EQ(out.parts[0].slot, "trim");
+}
+
+TEST(Posed, StickingPartIsLaidOntoTheSurfaceAndKeepsItsTurn) {
+  Scene scene = two_slots(true);
+  const Pose world_from_prototype(exp_rotation({0.3, 1.2, -0.4}), {0.5, -0.2, 2});
+  for (const double side : {1.0, -1.0}) {  // the mesh's normals outward, then inward
+    if (side < 0) {
+      for (auto& n : scene.prototype->mesh.normals) n = -n;
+    }
+    // On the cylinder 30 degrees round, turned by 0.7 about its normal.
+    const double a = M_PI / 6;
+    const Eigen::AngleAxisd round(-a, Vector3d::UnitY()), turn(0.7, Vector3d::UnitZ());
+    const Pose on_surface(Eigen::Quaterniond(round * turn), {0.5 * std::sin(a), 0.1, -0.5 * std::cos(a)});
+    // Measured: 8 mm off along the normal, tilted by 5 degrees about an axis in the surface.
+    const Vector3d d_out = on_surface.rotation * -Vector3d::UnitZ();
+    const Eigen::Quaterniond tilt = exp_rotation(on_surface.rotation * Vector3d(5.0_deg, 0, 0));
+    const Pose measured(tilt * on_surface.rotation, on_surface.translation + 0.008 * d_out);
+    const Track tracks[] = {track_of("prototype", world_from_prototype),
+                            track_of("mirror", world_from_prototype * measured)};
+    const PosedScene out = posed(scene, tracks);
+    ASSERT_EQ(out.parts.size(), 1u);
+    const Pose expected = world_from_prototype * on_surface * scene.slots[0].marker_from_part;
+    EXPECT_TRUE(test::pose_near(out.parts[0].world_from_part, expected, 0.6_deg, 0.2_mm));
+  }
+}
+
+TEST(Posed, WithoutThePrototypeThereIsNothingToStickTo) {
+  const Scene scene = two_slots(true);
+  const Track tracks[] = {track_of("mirror", Pose(exp_rotation({0, 0, 1}), {1, 0, 0}))};
+  EXPECT_TRUE(test::pose_near(posed(scene, tracks).parts[0].world_from_part,
+                              tracks[0].world_from_body * scene.slots[0].marker_from_part, 1e-9, 1e-9));
+}
+
+TEST(Poses, FileIsReadAndUnknownNamesAreErrors) {
+  const Scene scene = two_slots(false);
+  const auto file = test::test_folder() / "poses.json";
+  const Pose pose(exp_rotation({0.1, 0.2, 0.3}), {1, 2, 3});
+  nlohmann::json json = {{"world_from_prototype", to_json(pose)},
+                         {"slots", {{"mirror", {{"world_from_part", to_json(pose)}, {"variant", "b"}}}}}};
+  const auto load = [&] {
+    EXPECT_TRUE(write_file(file, json.dump()));
+    return load_poses(file, scene);
+  };
+  const auto whole = load();
+  ASSERT_TRUE(whole) << whole.message();
+  EXPECT_TRUE(test::pose_near(*whole->world_from_prototype, pose, 1e-7, 1e-9));
+  EXPECT_EQ(whole->parts[0].variant, "b");
+
+  json["slots"]["mirror"].erase("variant");
+  EXPECT_EQ(load()->parts[0].variant, "a");
+  json["slots"]["mirror"]["variant"] = "z";
+  ASSERT_FALSE(load());
+  EXPECT_NE(load().message().find("slots.mirror.variant"), std::string::npos) << load().message();
+  json["slots"]["mirror"]["variant"] = "a";
+  json["slots"]["grille"] = json["slots"]["mirror"];
+  ASSERT_FALSE(load());
+  EXPECT_NE(load().message().find("grille"), std::string::npos);
+  json["slots"].erase("grille");
+  json["time"] = 3;
+  EXPECT_FALSE(load());
+}
+
+}  // namespace
+}  // namespace limn::scene

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <opencv2/core/mat.hpp>
+#include <random>
+#include <span>
+#include <vector>
+
+#include "core/lens.h"
+#include "core/marker.h"
+#include "core/pose.h"
+
+namespace limn::test {
+
+/// A marker to be drawn into an image.
+struct PlacedMarker {
+  MarkerName marker;
+  Pose camera_from_marker;
+  double size_m = 0.08;
+  double margin = 0.125;  ///< of white paper around it, as share of its side
+  /// How far its upper and lower sides' middles lie below their chords, as share of its side: paper around a
+  /// cylinder, seen along the cylinder's axis from above. The corners stay where they are.
+  double bow = 0;
+  /// Rolling shutter: px by which the image moves from one row to the next, still at the centre's row.
+  Eigen::Vector2d row_motion = Eigen::Vector2d::Zero();
+};
+
+struct ImageOptions {
+  double black = 30;        ///< grey level of ink
+  double white = 210;       ///< grey level of paper
+  double blur_px = 0;       ///< sigma of a Gaussian after the pixels' own area
+  double noise_levels = 0;  ///< standard deviation per pixel
+};
+
+/// The light of markers with exact truth, in grey levels, before blur and noise (CV_32FC1): every pixel is
+/// the mean over its area (coverage by a lattice of samples where an edge runs through), through the true
+/// lens; pixel centres at integers. `background` (8-bit grey) is what is seen beside the papers; later
+/// markers cover earlier ones.
+cv::Mat light_of(const Lens& lens,
+                 const cv::Mat& background,
+                 std::span<const PlacedMarker> markers,
+                 const ImageOptions& options,
+                 std::mt19937_64& rng);
+
+/// Adds the noise, rounds and saturates.
+cv::Mat noisy_grey(const cv::Mat& light, double noise_levels, std::mt19937_64& rng);
+
+/// The camera's image of it all: light, blur, noise.
+cv::Mat image_of(const Lens& lens,
+                   const cv::Mat& background,
+                   std::span<const PlacedMarker> markers,
+                   const ImageOptions& options,
+                   std::mt19937_64& rng);
+
+/// The corners' true pixels in the order of Detection::corners_px.
+std::array<Eigen::Vector2d, 4> true_corners(const Lens& lens, const PlacedMarker& marker);
+
+/// A marker whose centre is seen at `px`, `side_px` wide when seen from straight ahead, turned by `spin`
+/// about its own axis and tilted by `tilt` towards `tilt_direction` (radians).
+PlacedMarker placed(const Lens& lens,
+                    const MarkerName& marker,
+                    const Eigen::Vector2d& px,
+                    double side_px,
+                    double spin,
+                    double tilt,
+                    double tilt_direction);
+
+/// Shapes, stripes, dots, writing and gradients of all sizes: everything but markers.
+cv::Mat clutter(int width, int height, std::mt19937_64& rng);
+
+/// Hostile to detectors: thousands of squares in each other, all that a marker could be at first.
+cv::Mat nested_squares(int width, int height);
+/// Hostile, too: as many small squares that touch at their corners.
+cv::Mat checkerboard(int width, int height, int square);
+/// Every pixel any level.
+cv::Mat noise(int width, int height, std::mt19937_64& rng);
+
+/// Even grey.
+cv::Mat plain(int width, int height, int grey);
+
+}  // namespace limn::test

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "core/imager.h"
+#include "core/marker.h"
+#include "tracker/detection.h"
+#include "tracker/pose_fit.h"
+
+namespace limn::tracker {
+
+/// Residuals beyond this many standard deviations count linearly: a corner under a finger.
+constexpr double k_huber = 3;
+
+/// What one camera saw at a moment.
+struct View {
+  const Imager* camera = nullptr;
+  std::span<const Detection> detections;
+};
+
+/// One marker of a body in one view, with all detections there that carry its name.
+struct MarkerCorrespondences {
+  const BodyMarker* marker = nullptr;
+  const Imager* camera = nullptr;
+  std::vector<const Detection*> detections;
+  std::vector<std::array<PointObservation, 4>> corners;  ///< of each of them
+};
+
+/// A body's markers in the images of one moment. Borrows bodies, cameras and detections.
+using BodyCorrespondences = std::vector<MarkerCorrespondences>;
+
+BodyCorrespondences correspondences(const Body& body, std::span<const View> views);
+
+/// The corners that a pose of the body speaks for: of a marker found twice in an image, the detection that
+/// agrees best.
+struct ChosenCorners {
+  std::vector<PointObservation> observations;
+  int marker_count = 0;
+};
+ChosenCorners corners_at(const BodyCorrespondences& correspondences, const Pose& world_from_body);
+
+enum class Minima { all, foretold };
+
+/// The local minima of the body's robust reprojection error, likeliest first, at most two: the second is the
+/// other branch of the planar ambiguity, where there is one. Every marker proposes both of its branches;
+/// where the body was predicted to stand by one of the `predicted` poses and does, the largest marker alone,
+/// and none where only the predicted minima are wanted.
+std::vector<PoseFit> minima(const BodyCorrespondences& correspondences,
+                            std::span<const Pose> foretold = {},
+                            Minima wanted = Minima::all);
+
+/// Whether a detection is this marker. Names of files compare without their folders.
+bool is_marker(const MarkerName& found, const MarkerName& wanted);
+
+}  // namespace limn::tracker

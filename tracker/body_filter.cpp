@@ -1,0 +1,286 @@
+#include "tracker/body_filter.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+namespace limn::tracker {
+namespace {
+
+// The branch that is not reported keeps at least this weight, so that evidence can bring it back: corner
+// errors that last (a bent sheet, a lens that does not fit) make the other branch surer than it is.
+constexpr double k_least_weight = 1e-6;
+// The reported branch changes when the other is this likely: odds that waver about even ones would flicker.
+constexpr double k_change_at = 0.9;
+// Odds between the branches change by at most e to this in one image. Corner errors of an image go
+// together (a patch of light, a covered side, a small marker's pattern) and are then rarer by the model than
+// in truth: one image must not outweigh all before it.
+constexpr double k_most_evidence = 2;
+// Branches nearer than this are one: beyond, the planar ambiguity has two minima of their own.
+constexpr double k_same_branch = 0.02;
+// chi² by which an image may miss the motion: the prior's six degrees of freedom exceed it never by noise
+// (1e-10).
+constexpr double k_max_excess = 60;
+constexpr int k_misfits_believed = 2;
+// While there is one branch, a second is looked for in one of so many images.
+constexpr int k_second_every = 3;
+// Standard deviations of velocity and acceleration of a body that has just come into view, and of one that
+// was still.
+constexpr double k_seen_turn = 2, k_seen_speed = 0.5;                     // rad/s, m/s
+constexpr double k_seen_turn_acceleration = 15, k_seen_acceleration = 3;  // rad/s², m/s²
+constexpr double k_start_turn = 0.5, k_start_speed = 0.1;
+constexpr double k_start_turn_acceleration = 10, k_start_acceleration = 2;
+
+struct Rates {
+  double turn, speed, turn_acceleration, acceleration;
+};
+constexpr Rates k_seen = {k_seen_turn, k_seen_speed, k_seen_turn_acceleration, k_seen_acceleration};
+constexpr Rates k_start = {k_start_turn, k_start_speed, k_start_turn_acceleration, k_start_acceleration};
+
+Motion at_rest(const Pose& world_from_body, const Matrix6d& covariance) {
+  Motion motion;
+  motion.world_from_body = world_from_body;
+  motion.covariance.topLeftCorner<6, 6>() = covariance;
+  return motion;
+}
+
+// Velocity and acceleration may be anything within these deviations of nothing.
+Motion roused(const Motion& still, const Rates& rates) {
+  Motion motion = at_rest(still.world_from_body, still.pose_covariance());
+  Eigen::Matrix<double, 12, 1> deviations;
+  deviations << Eigen::Vector3d::Constant(rates.turn), Eigen::Vector3d::Constant(rates.speed),
+      Eigen::Vector3d::Constant(rates.turn_acceleration), Eigen::Vector3d::Constant(rates.acceleration);
+  motion.covariance.bottomRightCorner<12, 12>() = deviations.cwiseAbs2().asDiagonal();
+  return motion;
+}
+
+Motion halted(const Motion& moving) { return at_rest(moving.world_from_body, moving.pose_covariance()); }
+
+Branch started(const PoseFit& fit) {
+  const Motion still = at_rest(fit.world_from_body, fit.covariance);
+  return {still, roused(still, k_seen), 0.5, 1};
+}
+
+std::optional<PoseFit> posterior(const BodyCorrespondences& seen, const Motion& prior, const Pose& start) {
+  const PosePrior known = prior_of(prior);
+  return fit_pose(corners_at(seen, start).observations, start, k_huber, &known);
+}
+
+// The branch of a moment, before and after its images.
+struct Forecast {
+  Motion still, moving;
+  double still_share;  // probability that it is still
+  double weight;       // the branch's
+};
+
+Forecast forecast(const Branch& branch, double seconds, const MotionModel& model) {
+  const double stays_still = branch.still_weight * std::exp(-model.starts_per_s * seconds);
+  const double starts = branch.still_weight - stays_still;
+  const double stays_moving = (1 - branch.still_weight) * std::exp(-model.stops_per_s * seconds);
+  const double stops = 1 - branch.still_weight - stays_moving;
+  const double still = stays_still + stops, moving = starts + stays_moving;
+  return {
+      propagated(mixed(branch.still, stays_still / still, halted(branch.moving), stops / still), seconds,
+                 still_noise(model)),
+      propagated(mixed(roused(branch.still, k_start), starts / moving, branch.moving, stays_moving / moving),
+                 seconds, moving_noise(model)),
+      still, branch.weight};
+}
+
+struct Update {
+  Branch branch;
+  double log_weight;  // of the branch, not normalised
+  PoseFit moving;     // its posterior as a moving body
+};
+
+// nullopt when no pose near the forecast suits the corners.
+std::optional<Update> updated(const Forecast& at, const BodyCorrespondences& seen) {
+  const auto still = posterior(seen, at.still, at.still.world_from_body);
+  const auto moving = posterior(seen, at.moving, at.moving.world_from_body);
+  if (!moving) return std::nullopt;
+  const double log_moving = std::log(1 - at.still_share) + log_evidence(at.moving, *moving);
+  const double log_still =
+      still ? std::log(at.still_share) + log_evidence(at.still, *still) : log_moving - 100;
+  const double highest = std::max(log_moving, log_still);
+  const double sum = std::exp(log_moving - highest) + std::exp(log_still - highest);
+  Branch branch;
+  branch.moving = corrected(at.moving, *moving);
+  branch.still = still ? corrected(at.still, *still) : halted(branch.moving);
+  branch.still_weight = std::clamp(std::exp(log_still - highest) / sum, 1e-9, 1 - 1e-9);
+  return Update{branch, std::log(at.weight) + highest + std::log(sum), *moving};
+}
+
+// The second mode of the posterior, when it has one near another minimum of the corners' own error: how a
+// branch is born again after the frontal view, where both are one.
+std::optional<Update> second_mode(const Forecast& at,
+                                  const Update& first,
+                                  const BodyCorrespondences& seen,
+                                  std::span<const PoseFit> fits) {
+  for (const PoseFit& fit : fits) {
+    const auto mode = posterior(seen, at.moving, fit.world_from_body);
+    if (!mode ||
+        angle_between(mode->world_from_body.rotation, first.moving.world_from_body.rotation) < k_same_branch)
+      continue;
+    const double log_weight = std::log(at.weight * (1 - at.still_share)) + log_evidence(at.moving, *mode);
+    return Update{started(fit), log_weight, *mode};
+  }
+  return std::nullopt;
+}
+
+bool are_one(const Update& a, const Update& b) {
+  return angle_between(a.branch.moving.world_from_body.rotation, b.branch.moving.world_from_body.rotation) <
+         k_same_branch;
+}
+
+// Weights add up to 1; the reported branch stays first until another is much likelier.
+std::vector<Branch> weighed(const std::vector<Update>& updates) {
+  double highest = updates.front().log_weight;
+  for (const Update& update : updates) highest = std::max(highest, update.log_weight);
+  std::vector<Branch> branches;
+  double sum = 0;
+  for (const Update& update : updates) {
+    branches.push_back(update.branch);
+    sum += branches.back().weight = std::max(k_least_weight, std::exp(update.log_weight - highest));
+  }
+  for (Branch& branch : branches) branch.weight /= sum;
+  if (branches.size() == 2 && branches[1].weight > k_change_at) std::swap(branches[0], branches[1]);
+  return branches;
+}
+
+const PoseFit& nearest_fit(std::span<const PoseFit> fits, const Pose& world_from_body) {
+  return *std::min_element(fits.begin(), fits.end(), [&](const PoseFit& a, const PoseFit& b) {
+    return angle_between(a.world_from_body.rotation, world_from_body.rotation) <
+           angle_between(b.world_from_body.rotation, world_from_body.rotation);
+  });
+}
+
+void note_measured(const BodyCorrespondences& seen,
+                   std::span<const PoseFit> fits,
+                   Stamp captured_at,
+                   BodyFilter* motion) {
+  const PoseFit& fit = nearest_fit(fits, motion->branches.front().moving.world_from_body);
+  motion->fixes.push_back({fit.world_from_body, fit.covariance, captured_at});
+  if (motion->fixes.size() > 2) motion->fixes.erase(motion->fixes.begin());
+  motion->marker_count = corners_at(seen, fit.world_from_body).marker_count;
+  motion->rms_px = fit.rms_px;
+  motion->misfits = 0;
+  motion->measured_at = motion->looked_at = captured_at;
+}
+
+// A flat prior: the likelihood's integral over each minimum.
+double log_weight_alone(const PoseFit& fit) {
+  return 0.5 * (std::log(fit.covariance.determinant()) - fit.chi_square);
+}
+
+BodyFilter started(const Body& body, const BodyCorrespondences& seen, std::span<const PoseFit> fits, Stamp captured_at) {
+  BodyFilter motion;
+  motion.body = body.name;
+  std::vector<Update> updates;
+  for (const PoseFit& fit : fits) updates.push_back({started(fit), log_weight_alone(fit), fit});
+  if (updates.size() == 2 && updates[1].log_weight > updates[0].log_weight) std::swap(updates[0], updates[1]);
+  motion.branches = weighed(updates);
+  note_measured(seen, fits, captured_at, &motion);
+  return motion;
+}
+
+// nullopt when the image contradicts the motion.
+std::optional<std::vector<Branch>> advanced(const BodyFilter& known,
+                                            const BodyCorrespondences& seen,
+                                            std::span<const PoseFit> fits,
+                                            double seconds,
+                                            const MotionModel& model) {
+  std::vector<Update> updates;
+  std::vector<Forecast> forecasts;
+  for (const Branch& branch : known.branches) {
+    const Forecast at = forecast(branch, seconds, model);
+    auto update = updated(at, seen);
+    if (!update || (!updates.empty() && are_one(*update, updates.front()))) continue;
+    updates.push_back(std::move(*update));
+    forecasts.push_back(at);
+  }
+  if (updates.size() == 2) {
+    const double before = std::log(forecasts[1].weight / forecasts[0].weight);
+    const double evidence = updates[1].log_weight - updates[0].log_weight - before;
+    updates[1].log_weight =
+        updates[0].log_weight + before + std::clamp(evidence, -k_most_evidence, k_most_evidence);
+  }
+  const bool suits = std::any_of(updates.begin(), updates.end(), [&](const Update& update) {
+    return update.moving.chi_square < fits.front().chi_square + k_max_excess;
+  });
+  if (!suits) return std::nullopt;
+  if (updates.size() == 1 && fits.size() == 2)
+    if (auto second = second_mode(forecasts[0], updates[0], seen, fits))
+      updates.push_back(std::move(*second));
+  return weighed(updates);
+}
+
+BodyFilter seen_again(const BodyFilter& known,
+                      const Body& body,
+                      const BodyCorrespondences& seen,
+                      Stamp captured_at,
+                      const MotionModel& model) {
+  BodyFilter after = known;
+  after.looked_at = captured_at;
+  const double unseen = seconds_between(known.measured_at, captured_at);
+  const bool was_lost = unseen > lost_after_s(known, model);
+  std::vector<Pose> foretold;
+  if (!was_lost)
+    for (const Branch& branch : known.branches)
+      foretold.push_back(pose_after(branch.moving, std::min(unseen, model.extrapolation_limit_s)));
+  after.of_one = known.branches.size() == 1 ? known.of_one + 1 : 0;
+  const std::vector<PoseFit> fits =
+      minima(seen, foretold, after.of_one % k_second_every == 0 ? Minima::all : Minima::foretold);
+  if (fits.empty()) return after;
+  if (was_lost) return started(body, seen, fits, captured_at);
+  if (auto branches = advanced(known, seen, fits, unseen, model)) {
+    after.branches = std::move(*branches);
+    note_measured(seen, fits, captured_at, &after);
+    return after;
+  }
+  if (++after.misfits >= k_misfits_believed) return started(body, seen, fits, captured_at);
+  return after;
+}
+
+}  // namespace
+
+double lost_after_s(const BodyFilter& motion, const MotionModel& model) {
+  constexpr double k_gaps = 1.5;
+  return std::max(model.extrapolation_limit_s, k_gaps * std::min(motion.gaps_s[0], motion.gaps_s[1]));
+}
+
+MotionNoise still_noise(const MotionModel& model) {
+  return {.turn_drift = model.turn_drift * model.turn_drift, .drift = model.drift * model.drift};
+}
+
+MotionNoise moving_noise(const MotionModel& model) {
+  return {.turn_jerk = model.turn_jerk, .jerk = model.jerk};
+}
+
+std::vector<BodyFilter> observed(std::span<const BodyFilter> known,
+                                 std::span<const Body> bodies,
+                                 std::span<const View> views,
+                                 Stamp captured_at,
+                                 const MotionModel& model) {
+  std::vector<BodyFilter> motions;
+  for (const Body& body : bodies) {
+    const auto before =
+        std::find_if(known.begin(), known.end(), [&](const BodyFilter& m) { return m.body == body.name; });
+    const BodyCorrespondences seen = correspondences(body, views);
+    if (before == known.end()) {
+      const std::vector<PoseFit> fits = minima(seen);
+      if (!fits.empty()) motions.push_back(started(body, seen, fits, captured_at));
+    } else if (captured_at <= before->looked_at) {
+      motions.push_back(*before);
+    } else {
+      BodyFilter last = *before;
+      last.gaps_s = {before->gaps_s[1], seconds_between(before->looked_at, captured_at)};
+      motions.push_back(seen_again(last, body, seen, captured_at, model));
+      motions.back().gaps_s = last.gaps_s;
+    }
+  }
+  return motions;
+}
+
+}  // namespace limn::tracker

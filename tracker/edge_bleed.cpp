@@ -1,0 +1,150 @@
+#include "tracker/edge_bleed.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "tracker/quad_sampler.h"
+
+namespace limn::tracker {
+namespace {
+
+constexpr std::size_t k_steps = 8;                    // from a cell's middle to the next
+constexpr std::array<float, 2> k_lines{-0.2F, 0.2F};  // of a cell beside its middle
+constexpr int k_min_edges = 12;
+constexpr double k_min_contrast = 8;           // of light, between two cells
+constexpr double k_clear_deviations = 3;       // below them a retreat is noise, as a bow is (refine.cpp)
+constexpr double k_unsure_share = 0.2;         // of the retreat: photographs of boards agree to so much
+constexpr double k_between_markers_px = 0.02;  // that markers of one image differ by at least
+
+// Edges between cells one after the other along x, or y if `down`: where each lies and its lines' places.
+struct Edges {
+  static constexpr std::size_t k_most = 2 * SeenCells::k_max * (SeenCells::k_max - 1);
+  static constexpr std::size_t k_places = k_lines.size() * (k_steps + 1);
+  std::size_t count = 0;
+  std::array<double, k_most> leverage;  // of the retreat on the way that is measured
+  std::array<bool, k_most> rising, down;
+  std::array<float, k_most * k_places> x, y;
+};
+
+void add_edges(const SeenCells& cells, bool down, Edges* edges) {
+  const auto number = static_cast<float>(cells.count);
+  for (int line = 0; line < cells.count; ++line)
+    for (int i = 0; i + 1 < cells.count; ++i) {
+      const bool first = down ? cells.is_white(i, line) : cells.is_white(line, i);
+      const bool second = down ? cells.is_white(i + 1, line) : cells.is_white(line, i + 1);
+      if (first == second) continue;
+      // The corners have drawn back, too, so that the edge seems nearer to the border than it is: white on
+      // its inner side seems wider for both reasons, on its outer side for one less the other.
+      const double from_middle = 2 * (i + 1.0) / cells.count - 1;
+      edges->leverage[edges->count] = 1 + (first ? from_middle : -from_middle);
+      edges->rising[edges->count] = second;
+      edges->down[edges->count] = down;
+      std::size_t at = edges->count++ * Edges::k_places;
+      for (const float beside : k_lines)
+        for (std::size_t step = 0; step <= k_steps; ++step, ++at) {
+          const float along =
+              (static_cast<float>(i) + 0.5F + static_cast<float>(step) / static_cast<float>(k_steps)) /
+              number;
+          const float across = (static_cast<float>(line) + 0.5F + beside) / number;
+          edges->x[at] = down ? across : along;
+          edges->y[at] = down ? along : across;
+        }
+    }
+}
+
+}  // namespace
+
+std::optional<EdgeBleed> find_edge_bleed(const cv::Mat& grey,
+                                           const std::array<double, 256>& light,
+                                           const std::array<Eigen::Vector2d, 4>& corners_px,
+                                           const SeenCells& cells) {
+  Edges edges;
+  add_edges(cells, false, &edges);
+  add_edges(cells, true, &edges);
+  if (edges.count < static_cast<std::size_t>(k_min_edges)) return std::nullopt;
+  std::array<float, Edges::k_most * Edges::k_places> levels;
+  const QuadSampler quad(grey, corners_px);
+  const std::size_t places = edges.count * Edges::k_places;
+  for (std::size_t from = 0; from < places; from += QuadSampler::k_most) {
+    const std::size_t number = std::min(QuadSampler::k_most, places - from);
+    quad.between({&edges.x[from], number}, {&edges.y[from], number}, &levels[from]);
+  }
+  const auto& c = corners_px;
+  const auto cross = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+    return std::abs(a.x() * b.y() - a.y() * b.x());
+  };
+  const double area = 0.5 * cross(c[2] - c[0], c[3] - c[1]);
+  const double width = area / (0.5 * ((c[3] - c[0]).norm() + (c[2] - c[1]).norm()));
+  const double height = area / (0.5 * ((c[1] - c[0]).norm() + (c[2] - c[3]).norm()));
+  const auto light_at = [&](std::size_t place) {
+    return light[static_cast<std::size_t>(std::clamp(levels[place] + 0.5F, 0.0F, 255.0F))];
+  };
+  // a: leverage, b: how much wider than half the way white is, px
+  double aa = 0, ab = 0, bb = 0;
+  int number = 0;
+  for (std::size_t i = 0; i < edges.count; ++i) {
+    const double cell_px = (edges.down[i] ? height : width) / cells.count;
+    double white = 0;  // share of the way, of all lines
+    bool shows = true;
+    for (std::size_t line = 0; line < k_lines.size(); ++line) {
+      const std::size_t at = i * Edges::k_places + line * (k_steps + 1);
+      const double begins = light_at(at), ends = light_at(at + k_steps);
+      const double rise = edges.rising[i] ? ends - begins : begins - ends;
+      shows &= rise > k_min_contrast;
+      double sum = 0.5 * (begins + ends);
+      for (std::size_t step = 1; step < k_steps; ++step) sum += light_at(at + step);
+      white += (sum / k_steps - std::min(begins, ends)) / rise / k_lines.size();
+    }
+    if (!shows) continue;
+    const double a = edges.leverage[i], b = (white - 0.5) * cell_px;
+    aa += a * a, ab += a * b, bb += b * b;
+    ++number;
+  }
+  if (number < k_min_edges) return std::nullopt;
+  EdgeBleed bleed;
+  bleed.px = ab / aa;
+  bleed.variance = std::max(0.0, bb - ab * ab / aa) / (number - 1) / aa;
+  return bleed;
+}
+
+std::optional<EdgeBleed> common_edge_bleed(std::span<const EdgeBleed> of_markers) {
+  if (of_markers.empty()) return std::nullopt;
+  double weights = 0, sum = 0, squares = 0;
+  for (const EdgeBleed& one : of_markers) {
+    const double weight = 1 / (one.variance + k_between_markers_px * k_between_markers_px);
+    weights += weight, sum += weight * one.px, squares += weight * one.px * one.px;
+  }
+  const double mean = sum / weights;
+  const auto others = static_cast<double>(of_markers.size() - 1);
+  const double scatter = others > 0 ? std::max(1.0, (squares - mean * sum) / others) : 1;
+  return EdgeBleed{mean, scatter / weights};
+}
+
+void undo_edge_bleed(const EdgeBleed& bleed,
+                      std::array<Eigen::Vector2d, 4>* corners_px,
+                      std::array<Eigen::Matrix2d, 4>* covariance) {
+  const double square = bleed.px * bleed.px;
+  constexpr double k_limit = k_clear_deviations * k_clear_deviations;
+  const double evidence = square / bleed.variance;
+  if (!(evidence > 0)) return;
+  // The non-negative garrote, and how far off it is if there is a retreat or none: as for bows (refine.cpp).
+  const double share = std::max(0.0, 1 - k_limit / evidence);
+  const double probability = 1 / (1 + std::exp(0.5 * (k_limit - evidence)));
+  const double off = probability * (1 - share) * (1 - share) + (1 - probability) * share * share;
+  const double unsure =
+      share * bleed.variance + (off + share * share * k_unsure_share * k_unsure_share) * square;
+  const std::array<Eigen::Vector2d, 4> before = *corners_px;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Eigen::Vector2d to_here = (before[i] - before[(i + 3) % 4]).normalized();
+    const Eigen::Vector2d from_here = (before[(i + 1) % 4] - before[i]).normalized();
+    const Eigen::Vector2d outward[2] = {{to_here.y(), -to_here.x()}, {from_here.y(), -from_here.x()}};
+    // The corner of both sides, each a pixel farther out.
+    const Eigen::Vector2d out = (outward[0] + outward[1]) / (1 + outward[0].dot(outward[1]));
+    if (!out.allFinite()) continue;
+    (*corners_px)[i] += share * bleed.px * out;
+    (*covariance)[i] += unsure * out * out.transpose();
+  }
+}
+
+}  // namespace limn::tracker
