@@ -1,6 +1,6 @@
 #pragma once
 
-#include "apps/scan_alignment.h"
+#include "wizard/measure/scan_alignment.h"
 #include "core/result.h"
 
 namespace limn::apps {

@@ -9,16 +9,16 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "apps/board_place.h"
-#include "apps/devices.h"
-#include "apps/plan.h"
-#include "apps/virtual_capture.h"
-#include "apps/wizard/capture_folder.h"
-#include "apps/wizard/guided_poses.h"
-#include "apps/wizard/virtual_stage.h"
-#include "apps/wizard/wizard_sequence.h"
-#include "apps/wizard/wizard_window.h"
-#include "apps/world_markers.h"
+#include "wizard/pose_instructions.h"
+#include "device/devices_file.h"
+#include "wizard/capture/capture_plan.h"
+#include "wizard/capture/virtual_capture.h"
+#include "wizard/capture/capture_folder.h"
+#include "wizard/guided_poses.h"
+#include "wizard/capture/virtual_backend.h"
+#include "wizard/sequence.h"
+#include "wizard/window/wizard_window.h"
+#include "tracker/marker_image.h"
 #include "core/log.h"
 
 namespace limn::apps {

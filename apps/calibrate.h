@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-#include "apps/wizard/device_stage.h"
+#include "wizard/capture/device_backend.h"
 #include "core/result.h"
 #include "device/desktop.h"
 

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include "apps/plan.h"
-#include "apps/virtual_capture.h"
-#include "apps/world_markers.h"
+#include "wizard/capture/capture_plan.h"
+#include "wizard/capture/virtual_capture.h"
+#include "tracker/marker_image.h"
 #include "sim/virtual_rig.h"
 
 namespace limn::apps {

@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
-#include "apps/check_file.h"
-#include "apps/check_judge.h"
-#include "apps/check_page.h"
+#include "validate/check_file.h"
+#include "validate/check_judge.h"
+#include "validate/check_page.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "core/image_io.h"

@@ -7,8 +7,8 @@
 #include <thread>
 #include <vector>
 
-#include "apps/demo_page.h"
-#include "apps/validate/demo_session.h"
+#include "validate/demo_page.h"
+#include "validate/demo_session.h"
 #include "core/file.h"
 #include "core/frame.h"
 #include "core/image_io.h"

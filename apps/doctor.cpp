@@ -12,8 +12,8 @@
 #include <sstream>
 #include <thread>
 
-#include "apps/devices.h"
-#include "apps/output_sign.h"
+#include "device/devices_file.h"
+#include "device/test_card.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "device/gige_camera.h"

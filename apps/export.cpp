@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "apps/exchange/projector_maps.h"
+#include "exchange/projector_maps.h"
 #include "core/log.h"
 #include "device/gl_context.h"
 #include "projector/renderer.h"

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "apps/exchange/exporter.h"
+#include "exchange/exporter.h"
 #include "core/result.h"
 
 namespace limn::apps {

@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "apps/exchange/mpcdi_reader.h"
-#include "apps/exchange/mpcdi_report.h"
-#include "apps/exchange/mpcdi_rig.h"
+#include "exchange/mpcdi_reader.h"
+#include "exchange/mpcdi_report.h"
+#include "exchange/mpcdi_rig.h"
 #include "core/log.h"
 #include "core/rig.h"
 

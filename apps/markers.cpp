@@ -4,9 +4,9 @@
 
 #include <string>
 
-#include "apps/marker_mount.h"
-#include "apps/markers_templates.h"
-#include "apps/printing/marker_sheet.h"
+#include "exchange/printing/marker_mount.h"
+#include "exchange/printing/marker_templates.h"
+#include "exchange/printing/marker_sheet.h"
 
 namespace limn::apps {
 

@@ -3,7 +3,7 @@
 #include <functional>
 #include <opencv2/core/mat.hpp>
 
-#include "apps/pixel_size.h"
+#include "wizard/measure/pixel_size.h"
 #include "calib/code/patterns.h"
 #include "calib/response/response_patterns.h"
 #include "core/file.h"

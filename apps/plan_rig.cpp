@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include "apps/design/design_report.h"
-#include "apps/design/rig_design.h"
-#include "apps/plan_page.h"
+#include "design/design_report.h"
+#include "design/rig_design.h"
+#include "design/plan_page.h"
 #include "core/file.h"
 
 namespace limn::apps {

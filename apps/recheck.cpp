@@ -6,12 +6,12 @@
 #include <string>
 #include <system_error>
 
-#include "apps/devices.h"
-#include "apps/image_writer.h"
-#include "apps/plan.h"
-#include "apps/virtual_capture.h"
-#include "apps/wizard/device_stage.h"
-#include "apps/world_markers.h"
+#include "device/devices_file.h"
+#include "core/image_writer.h"
+#include "wizard/capture/capture_plan.h"
+#include "wizard/capture/virtual_capture.h"
+#include "wizard/capture/device_backend.h"
+#include "tracker/marker_image.h"
 #include "calib/capture_set.h"
 #include "core/file.h"
 #include "core/rig.h"

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "apps/rig_recheck.h"
+#include "wizard/capture/rig_recheck.h"
 #include "core/result.h"
 
 namespace limn::apps {

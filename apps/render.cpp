@@ -9,7 +9,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
-#include "apps/camera_encoding.h"
+#include "tracker/camera_encoding.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/log.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/light.h"
+#include "apps/compensation_options.h"
 #include "core/result.h"
 
 namespace limn::apps {

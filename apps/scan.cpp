@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include "apps/plan.h"
-#include "apps/scan_files.h"
-#include "apps/virtual_capture.h"
-#include "apps/world_markers.h"
+#include "wizard/capture/capture_plan.h"
+#include "wizard/measure/scan_files.h"
+#include "wizard/capture/virtual_capture.h"
+#include "tracker/marker_image.h"
 #include "calib/capture_set.h"
 #include "core/file.h"
 #include "core/log.h"

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "apps/solve_captures.h"
+#include "wizard/measure/solve_captures.h"
 #include "core/result.h"
 
 namespace limn::apps {

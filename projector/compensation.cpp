@@ -10,7 +10,7 @@ namespace limn::projector {
 namespace {
 
 constexpr double k_too_dim = 0.2;        // share of the surface that need not reach white
-constexpr std::size_t k_samples = 4000;  // triangles that are asked for the level
+constexpr std::size_t k_most_triangles = 4000;  // triangles that are asked for the level
 constexpr float k_least_light = 0.004F;  // of the camera's full scale, that a projector's white must give
 constexpr int k_edge_px = 2;             // beside shadows and silhouettes pixels see two things
 
@@ -170,7 +170,7 @@ Result<SurfaceMixing> surface_mixing(const MeasuredSurface& surface, std::span<c
 double geometric_level(const scene::Prototype& prototype, const Rig& rig, const Pose& world_from_prototype) {
   const scene::Mesh& mesh = prototype.mesh;
   const cv::Mat albedo = relative_albedo(prototype);
-  const std::size_t stride = std::max<std::size_t>(1, mesh.triangles.size() / k_samples);
+  const std::size_t stride = std::max<std::size_t>(1, mesh.triangles.size() / k_most_triangles);
   std::vector<double> levels;
   for (std::size_t t = 0; t < mesh.triangles.size(); t += stride) {
     std::array<Eigen::Vector3d, 3> p;

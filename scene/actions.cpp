@@ -96,7 +96,7 @@ Status unpair(Change* change, std::monostate) { return pair(change, change->slot
 Status set_unit(Change* change, const PartUnit& wanted) {
   std::vector<std::string> dropped;
   for (const Variant& variant : change->slot().variants)
-    if (variant.dropped) dropped.push_back(variant.name);
+    if (variant.auto_imported) dropped.push_back(variant.name);
   if (std::find(dropped.begin(), dropped.end(), wanted.part) == dropped.end())
     return error("{}: expected a part that was dropped into slot '{}' ({}) and its unit, found '{}'.",
                  change->name, change->slot().name, listed(dropped), wanted.words);

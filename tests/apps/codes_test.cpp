@@ -5,10 +5,10 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "apps/plan.h"
+#include "wizard/capture/capture_plan.h"
 #include "apps/solve.h"
-#include "apps/virtual_capture.h"
-#include "apps/world_markers.h"
+#include "wizard/capture/virtual_capture.h"
+#include "tracker/marker_image.h"
 #include "core/file.h"
 #include "core/rig.h"
 #include "sim/world.h"

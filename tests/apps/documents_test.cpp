@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "apps/command_line.h"
-#include "apps/design/rig_description.h"
+#include "design/rig_description.h"
 #include "core/file.h"
 
 namespace limn::apps {

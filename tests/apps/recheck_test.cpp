@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "apps/world_markers.h"
+#include "tracker/marker_image.h"
 #include "core/file.h"
 #include "core/rig.h"
 #include "sim/world.h"

@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/align.h"
-#include "apps/plan.h"
-#include "apps/virtual_capture.h"
-#include "apps/world_markers.h"
+#include "wizard/capture/capture_plan.h"
+#include "wizard/capture/virtual_capture.h"
+#include "tracker/marker_image.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/rig.h"

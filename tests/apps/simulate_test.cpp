@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
-#include "apps/world_markers.h"
+#include "tracker/marker_image.h"
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/rig.h"

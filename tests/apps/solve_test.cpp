@@ -13,7 +13,7 @@
 #include <opencv2/imgproc.hpp>
 #include <regex>
 
-#include "apps/world_markers.h"
+#include "tracker/marker_image.h"
 #include "calib/board/board.h"
 #include "calib/capture.h"
 #include "calib/code/patterns.h"

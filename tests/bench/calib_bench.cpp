@@ -14,8 +14,8 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
-#include "apps/plan.h"
-#include "apps/virtual_capture.h"
+#include "wizard/capture/capture_plan.h"
+#include "wizard/capture/virtual_capture.h"
 #include "calib/board/board_dictionary.h"
 #include "calib/capture.h"
 #include "calib/judge/assess.h"

@@ -18,12 +18,12 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "apps/live/latest.h"
-#include "apps/live/recording.h"
-#include "apps/live/script.h"
-#include "apps/live/session.h"
-#include "apps/live/perception.h"
-#include "apps/world_markers.h"
+#include "session/latest.h"
+#include "session/recording.h"
+#include "session/script.h"
+#include "session/session.h"
+#include "session/perception.h"
+#include "tracker/marker_image.h"
 #include "core/image_io.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"

@@ -14,7 +14,7 @@
 #include <map>
 #include <opencv2/imgproc.hpp>
 
-#include "apps/world_markers.h"
+#include "tracker/marker_image.h"
 #include "device/gl_context.h"
 #include "projector/gl.h"
 #include "projector/renderer.h"

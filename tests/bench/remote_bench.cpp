@@ -17,15 +17,15 @@
 #include <thread>
 #include <vector>
 
-#include "apps/coarser.h"
-#include "apps/live/session.h"
-#include "apps/live/perception.h"
-#include "apps/serve/server.h"
-#include "apps/world_markers.h"
+#include "core/scale_resolution.h"
+#include "session/session.h"
+#include "session/perception.h"
+#include "remote/server.h"
+#include "tracker/marker_image.h"
 #include "core/log.h"
 #include "device/gl_context.h"
 #include "sim/virtual_rig.h"
-#include "tests/apps/remote_client.h"
+#include "tests/remote/remote_client.h"
 
 namespace limn::test {
 namespace {
@@ -76,8 +76,8 @@ class Stage {
     const std::vector<Frame> frames = rig_->expose(k_cameras);
     const auto begun = Clock::now();
     if (!frames.empty()) session_->take(perception_->watch(frames), ++moments_);
-    server->hear(&*session_, rig_->now());
-    server->tell(*session_, *telemetry_, health_, rig_->now());
+    server->apply_requests(&*session_, rig_->now());
+    server->publish_state(*session_, *telemetry_, health_, rig_->now());
     session_->paint(rig_->now(), shifted(rig_->now(), k_lag_s));
     const double took_ms = ms_since(begun);
     for (std::size_t i = 0; i < setup_.rig.projectors.size(); ++i)

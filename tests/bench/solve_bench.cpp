@@ -1,4 +1,4 @@
-#include "apps/solve_captures.h"
+#include "wizard/measure/solve_captures.h"
 // The whole `limn solve` over the real captures beside cv::imread alone over the same images on one thread.
 // Usage: solve_bench FOLDER_OF_GRAYCODE OUT [REPEATS]
 #include <fmt/core.h>

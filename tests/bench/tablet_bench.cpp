@@ -19,15 +19,15 @@
 #include <opencv2/imgproc.hpp>
 #include <thread>
 
-#include "apps/live/session.h"
-#include "apps/live/perception.h"
-#include "apps/tablet/tablet_view.h"
-#include "apps/world_markers.h"
+#include "session/session.h"
+#include "session/perception.h"
+#include "remote/tablet/tablet_view.h"
+#include "tracker/marker_image.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"
 #include "sim/truth.h"
 #include "sim/virtual_rig.h"
-#include "tests/apps/virtual_tablet.h"
+#include "tests/remote/virtual_tablet.h"
 #include "tracker/detector.h"
 #include "tracker/family.h"
 

@@ -9,7 +9,7 @@
 #include <optional>
 #include <random>
 
-#include "apps/world_markers.h"
+#include "tracker/marker_image.h"
 #include "sim/car_door.h"
 #include "sim/truth.h"
 #include "sim/world.h"

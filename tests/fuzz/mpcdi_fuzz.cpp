@@ -1,7 +1,7 @@
 // MPCDI, as an archive or its XML alone. An archive's checksums would refuse every change inside it, so lines
 // of %% part the bytes into files, too, which are packed: mpcdi.xml, then 1, 2, … for maps.
-#include "apps/exchange/mpcdi_reader.h"
-#include "apps/exchange/zip.h"
+#include "exchange/mpcdi_reader.h"
+#include "exchange/zip.h"
 #include "tests/fuzz/fuzz_file.h"
 
 namespace {

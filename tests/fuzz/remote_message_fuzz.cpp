@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "apps/serve/http.h"
-#include "apps/serve/messages.h"
+#include "remote/http.h"
+#include "remote/messages.h"
 #include "tests/fuzz/fuzz_file.h"
 
 namespace limn::apps {

@@ -1,6 +1,6 @@
 // What a guest's tablet sends as its image: decoded or refused, and looked at like any other.
-#include "apps/tablet/tablet_localizer.h"
-#include "apps/tablet/tablet_image.h"
+#include "remote/tablet/tablet_localizer.h"
+#include "remote/tablet/tablet_image.h"
 #include "tests/fuzz/fuzz_file.h"
 #include "tracker/family.h"
 

@@ -1,23 +1,35 @@
-// The order of the layers (docs/architecture.md): which room may include which.
+// The house's arrows (docs/architecture.md): which room may include which, and that no folder includes
+// another in a circle.
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <regex>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace limn {
 namespace {
 
 namespace fs = std::filesystem;
-using Rooms = std::set<std::string>;
+using Names = std::set<std::string>;
 
-const std::map<std::string, Rooms>& allowed() {
-  static const std::map<std::string, Rooms> arrows = {
+// Each room, and the rooms that it may include. exchange/printing is a room of its own.
+const std::map<std::string, Names>& allowed() {
+  static const Names k_libraries = {"core", "scene", "device", "calib", "tracker", "projector", "sim"};
+  static const auto with = [](const Names& more) {
+    Names all = k_libraries;
+    all.insert(more.begin(), more.end());
+    return all;
+  };
+  static const std::map<std::string, Names> arrows = {
       {"core", {}},
       {"scene", {"core"}},
       {"device", {"core"}},
@@ -25,32 +37,60 @@ const std::map<std::string, Rooms>& allowed() {
       {"tracker", {"core"}},
       {"projector", {"core", "scene"}},
       {"sim", {"core", "scene", "device"}},
-      {"apps", {"core", "scene", "device", "calib", "tracker", "projector", "sim"}},
+      {"gui", {"core", "device"}},
+      {"exchange", {"core", "scene", "projector"}},
+      {"exchange/printing", {"core", "calib", "tracker"}},
+      {"design", {"core", "calib", "tracker"}},
+      {"wizard", with({"gui"})},
+      {"session", with({"gui", "wizard"})},
+      {"remote", with({"gui", "session"})},
+      {"validate", with({"wizard", "session"})},
+      {"apps",
+       with({"gui", "exchange", "exchange/printing", "design", "wizard", "session", "remote", "validate"})},
   };
   return arrows;
 }
 
+// The folders inside a room, in the order in which they stand on each other; equals may not include each
+// other.
+const std::map<std::string, std::map<std::string, int>>& inner_order() {
+  static const std::map<std::string, std::map<std::string, int>> order = {
+      {"calib",
+       {{"calib/board", 0},
+        {"calib/code", 0},
+        {"calib", 1},
+        {"calib/surface", 2},
+        {"calib/response", 2},
+        {"calib/judge", 3},
+        {"calib/report", 4}}},
+      {"wizard", {{"wizard/capture", 0}, {"wizard/measure", 0}, {"wizard", 1}, {"wizard/window", 2}}},
+      {"remote", {{"remote/tablet", 0}, {"remote", 1}}},
+  };
+  return order;
+}
+
 // Third parties that stay private to some rooms: include prefix -> rooms.
-const std::map<std::string, Rooms>& guests() {
-  static const std::map<std::string, Rooms> homes = {
+const std::map<std::string, Names>& guests() {
+  static const std::map<std::string, Names> homes = {
       {"mrcal/", {"core", "calib"}},
       {"ceres/", {"calib"}},
       {"assimp/", {"scene"}},
       {"meshoptimizer", {"scene"}},
       {"embree3/", {"sim"}},
-      {"GLFW/", {"device", "apps"}},
-      {"epoxy/", {"device", "projector", "apps"}},
+      {"GLFW/", {"device", "gui", "session"}},
+      {"epoxy/", {"device", "projector", "gui", "session"}},
       {"EGL/", {"device"}},
       {"CLI/", {"apps"}},
-      {"imgui", {"apps"}},
-      {"boost/", {"apps"}},
-      {"openssl/", {"apps"}},
-      {"qrencode", {"apps"}},
+      {"imgui", {"gui", "wizard", "session"}},
+      {"boost/", {"remote"}},
+      {"openssl/", {"remote"}},
+      {"qrencode", {"gui"}},
       {"turbojpeg", {"device"}},
-      {"zip.h", {"apps"}},
-      {"lo/", {"apps"}},
-      {"pugixml", {"apps"}},
-      {"OpenEXR/", {"apps"}},
+      {"zip.h", {"exchange"}},
+      {"lo/", {"session"}},
+      {"pugixml", {"exchange"}},
+      {"OpenEXR/", {"exchange"}},
+      {"cairo", {"exchange/printing"}},
       {"opencv2/calib3d", {"calib"}},
       {"opencv2/aruco", {"core", "calib", "tracker"}},
       {"opencv2/videoio", {"device"}},
@@ -58,89 +98,322 @@ const std::map<std::string, Rooms>& guests() {
   return homes;
 }
 
+// A file's include.
 struct Include {
   fs::path file;
+  std::string folder;  // of the file, from the root
   std::string what;
 };
 
-std::vector<Include> includes_of(const fs::path& folder) {
+const fs::path& root() {
+  static const fs::path path = LIMN_SOURCE_DIR;
+  return path;
+}
+
+std::string folder_of(const std::string& path) {
+  const std::size_t slash = path.rfind('/');
+  return slash == std::string::npos ? "" : path.substr(0, slash);
+}
+
+// The room that a folder belongs to; empty: none.
+std::string room_of(std::string folder) {
+  while (!folder.empty() && !allowed().contains(folder)) folder = folder_of(folder);
+  return folder;
+}
+
+bool is_code(const fs::path& path) { return path.extension() == ".h" || path.extension() == ".cpp"; }
+
+std::vector<fs::path> code_in(const fs::path& folder) {
+  std::vector<fs::path> files;
+  if (!fs::exists(folder)) return files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder))
+    if (entry.is_regular_file() && is_code(entry.path())) files.push_back(entry.path());
+  return files;
+}
+
+std::vector<Include> includes_in(const fs::path& folder) {
   static const std::regex pattern(R"(^\s*#\s*include\s*[<"]([^>"]+)[>"])");
   std::vector<Include> found;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    const auto extension = entry.path().extension();
-    if (extension != ".h" && extension != ".cpp") continue;
-    std::ifstream in(entry.path());
+  for (const fs::path& file : code_in(folder)) {
+    const std::string from = fs::relative(file, root()).parent_path().generic_string();
+    std::ifstream in(file);
     for (std::string line; std::getline(in, line);) {
       std::smatch match;
-      if (std::regex_search(line, match, pattern)) found.push_back({entry.path(), match[1]});
+      if (std::regex_search(line, match, pattern)) found.push_back({file, from, match[1]});
     }
   }
   return found;
 }
 
-std::string room_of(const std::string& include) { return include.substr(0, include.find('/')); }
+// The includes of all rooms.
+const std::vector<Include>& includes() {
+  static const std::vector<Include> all = [] {
+    std::vector<Include> found;
+    for (const auto& [room, may] : allowed()) {
+      if (room.find('/') != std::string::npos) continue;  // its files are found in the room around it
+      const auto more = includes_in(root() / room);
+      found.insert(found.end(), more.begin(), more.end());
+    }
+    return found;
+  }();
+  return all;
+}
 
 TEST(House, RoomsIncludeOnlyWhatTheArrowsAllow) {
   int seen = 0;
-  for (const auto& [room, may] : allowed()) {
-    for (const Include& include : includes_of(fs::path(LIMN_SOURCE_DIR) / room)) {
-      const std::string other = room_of(include.what);
-      if (other == room || !allowed().contains(other) || include.what.find('/') == std::string::npos)
-        continue;
-      ++seen;
-      EXPECT_TRUE(may.contains(other)) << include.file << " includes " << include.what;
-    }
+  for (const Include& include : includes()) {
+    const std::string from = room_of(include.folder), to = room_of(folder_of(include.what));
+    if (to.empty() || from == to) continue;
+    ++seen;
+    EXPECT_TRUE(allowed().at(from).contains(to)) << include.file << " includes " << include.what;
   }
-  EXPECT_GT(seen, 50) << "the sources were not found";
+  EXPECT_GT(seen, 500) << "the sources were not found";
 }
 
-// A calib file's folder: "calib/judge", or "calib" itself.
-std::string calib_folder(const std::string& path) {
-  const size_t slash = path.find('/', std::string("calib/").size());
-  return slash == std::string::npos ? "calib" : path.substr(0, slash);
+TEST(House, EveryRoomIsThere) {
+  for (const auto& [room, may] : allowed()) EXPECT_FALSE(code_in(root() / room).empty()) << room;
 }
 
-TEST(House, CalibsFoldersIncludeOnlyThoseBefore) {
-  const std::map<std::string, int> order = {{"calib/board", 0},   {"calib/code", 0},     {"calib", 1},
-                                            {"calib/surface", 2}, {"calib/response", 2}, {"calib/judge", 3},
-                                            {"calib/report", 4}};
+TEST(House, FoldersOfARoomIncludeOnlyThoseBefore) {
   int seen = 0;
-  for (const Include& include : includes_of(fs::path(LIMN_SOURCE_DIR) / "calib")) {
-    if (!include.what.starts_with("calib/")) continue;
-    const std::string from = calib_folder(fs::relative(include.file, LIMN_SOURCE_DIR).generic_string());
-    const std::string to = calib_folder(include.what);
-    ASSERT_TRUE(order.contains(from)) << from << ": give this folder its place";
+  for (const Include& include : includes()) {
+    const std::string room = room_of(include.folder), to = folder_of(include.what);
+    if (!inner_order().contains(room) || room_of(to) != room) continue;
+    const auto& order = inner_order().at(room);
+    ASSERT_TRUE(order.contains(include.folder)) << include.folder << ": give this folder its place";
     ASSERT_TRUE(order.contains(to)) << include.file << " includes " << include.what;
     ++seen;
-    EXPECT_TRUE(from == to || order.at(to) < order.at(from)) << include.file << " includes " << include.what;
+    EXPECT_TRUE(include.folder == to || order.at(to) < order.at(include.folder))
+        << include.file << " includes " << include.what;
   }
-  EXPECT_GT(seen, 50) << "the sources were not found";
+  EXPECT_GT(seen, 100) << "the sources were not found";
+}
+
+// folder -> the folders that it includes, each with one include that shows it.
+using Graph = std::map<std::string, std::map<std::string, std::string>>;
+
+// The first circle that a walk from `folder` meets, as lines for people; empty: none.
+std::string circle_from(const std::string& folder,
+                        const Graph& graph,
+                        std::vector<std::string>* way,
+                        Names* done) {
+  const auto met = std::find(way->begin(), way->end(), folder);
+  if (met != way->end()) {
+    std::string circle;
+    for (auto at = met; at != way->end(); ++at) {
+      const std::string& to = at + 1 == way->end() ? folder : *(at + 1);
+      circle += "\n  " + *at + " -> " + to + ": " + graph.at(*at).at(to);
+    }
+    return circle;
+  }
+  if (done->contains(folder) || !graph.contains(folder)) return "";
+  way->push_back(folder);
+  for (const auto& [to, example] : graph.at(folder)) {
+    const std::string circle = circle_from(to, graph, way, done);
+    if (!circle.empty()) return circle;
+  }
+  way->pop_back();
+  done->insert(folder);
+  return "";
+}
+
+std::string circle_in(const Graph& graph) {
+  Names done;
+  for (const auto& [folder, others] : graph) {
+    std::vector<std::string> way;
+    const std::string circle = circle_from(folder, graph, &way, &done);
+    if (!circle.empty()) return circle;
+  }
+  return "";
+}
+
+Graph graph_of(const std::vector<Include>& all) {
+  Graph graph;
+  for (const Include& include : all) {
+    const std::string to = folder_of(include.what);
+    if (to.empty() || to == include.folder || !fs::exists(root() / include.what)) continue;
+    graph[include.folder].emplace(
+        to, fs::relative(include.file, root()).generic_string() + " includes " + include.what);
+  }
+  return graph;
+}
+
+TEST(House, ACircleIsFound) {
+  const Graph circle = {{"a", {{"b", ""}}}, {"b", {{"c", ""}}}, {"c", {{"b", ""}}}};
+  EXPECT_EQ(circle_in(circle), "\n  b -> c: \n  c -> b: ");
+  EXPECT_EQ(circle_in({{"a", {{"b", ""}, {"c", ""}}}, {"b", {{"c", ""}}}}), "");
+}
+
+// Tests as well: a folder of tests may use another one's worlds.
+TEST(House, NoFolderIncludesAnotherInACircle) {
+  std::vector<Include> all = includes();
+  const auto tests = includes_in(root() / "tests");
+  all.insert(all.end(), tests.begin(), tests.end());
+  const Graph graph = graph_of(all);
+  EXPECT_GT(graph.size(), 20u) << "the sources were not found";
+  EXPECT_EQ(circle_in(graph), "");
+}
+
+int lines_in(const fs::path& folder) {
+  int lines = 0;
+  for (const fs::path& file : code_in(folder)) {
+    std::ifstream in(file);
+    for (std::string line; std::getline(in, line);) ++lines;
+  }
+  return lines;
+}
+
+TEST(House, NoRoomIsTooLargeToKnow) {
+  constexpr int k_most = 9000, k_most_commands = 6000;
+  const Names larger = {"calib", "tracker"};  // calib by its folders, tracker by its one task
+  for (const auto& [room, may] : allowed()) {
+    if (larger.contains(room)) continue;
+    EXPECT_LE(lines_in(root() / room), room == "apps" ? k_most_commands : k_most) << room;
+  }
+}
+
+TEST(House, TheRootIsReadable) {
+  constexpr int k_most = 20;
+  int folders = 0;
+  std::string names;
+  for (const auto& entry : fs::directory_iterator(root())) {
+    const std::string name = entry.path().filename().string();
+    if (!entry.is_directory() || name.starts_with('.') || name == "build" || name == "out") continue;
+    ++folders;
+    names += " " + name;
+  }
+  EXPECT_LE(folders, k_most) << names;
 }
 
 TEST(House, ThirdPartiesStayInTheirRooms) {
   int seen = 0;
-  for (const auto& [room, may] : allowed()) {
-    for (const Include& include : includes_of(fs::path(LIMN_SOURCE_DIR) / room)) {
-      for (const auto& [prefix, homes] : guests()) {
-        if (!include.what.starts_with(prefix)) continue;
-        ++seen;
-        EXPECT_TRUE(homes.contains(room)) << include.file << " includes " << include.what;
-      }
+  for (const Include& include : includes()) {
+    for (const auto& [prefix, homes] : guests()) {
+      if (!include.what.starts_with(prefix)) continue;
+      ++seen;
+      EXPECT_TRUE(homes.contains(room_of(include.folder))) << include.file << " includes " << include.what;
     }
   }
-  EXPECT_GT(seen, 5) << "the sources were not found";
+  EXPECT_GT(seen, 20) << "the sources were not found";
 }
 
 TEST(House, HeadersKeepSlowThirdPartiesOut) {
+  for (const Include& include : includes()) {
+    if (include.file.extension() != ".h") continue;
+    for (const char* slow : {"nlohmann/json.hpp", "opencv2/opencv.hpp", "CLI/", "boost/", "ceres/", "assimp/",
+                             "embree3/", "mrcal/"}) {
+      EXPECT_FALSE(include.what.starts_with(slow)) << include.file << " includes " << include.what;
+    }
+  }
+}
+
+// ---- words ----
+
+// The glossary's list: lines "- `word`: why" after the heading "Do not use".
+Names words_not_to_use() {
+  std::ifstream in(root() / "docs/glossary.md");
+  static const std::regex heading(R"(^#+\s.*[Dd]o not use.*)"), item(R"(^\s*[-|*]\s*`([A-Za-z_]+)`.*)");
+  Names words;
+  bool is_inside = false;
+  for (std::string line; std::getline(in, line);) {
+    std::smatch match;
+    if (line.starts_with("#"))
+      is_inside = std::regex_match(line, heading);
+    else if (is_inside && std::regex_match(line, match, item))
+      words.insert(match[1]);
+  }
+  return words;
+}
+
+// C++ without its strings, characters and comments.
+std::string code_alone(const std::string& text) {
+  static const std::string k_raw = "R\"";
+  std::string code;
+  for (std::size_t i = 0; i < text.size();) {
+    const auto skip_to = [&](const std::string& end, std::size_t from) {
+      const std::size_t at = text.find(end, from);
+      i = at == std::string::npos ? text.size() : at + end.size();
+      code += ' ';
+    };
+    if (text.compare(i, 2, "//") == 0) {
+      skip_to("\n", i);
+      code += '\n';
+    } else if (text.compare(i, 2, "/*") == 0) {
+      skip_to("*/", i + 2);
+    } else if (text.compare(i, 2, k_raw) == 0) {
+      const std::size_t open = text.find('(', i);
+      skip_to(")" + text.substr(i + 2, open - i - 2) + "\"", open);
+    } else if (text[i] == '"' ||
+               (text[i] == '\'' && (i == 0 || !std::isalnum(static_cast<unsigned char>(text[i - 1]))))) {
+      const char quote = text[i];
+      for (++i; i < text.size() && text[i] != quote && text[i] != '\n'; ++i)
+        if (text[i] == '\\') ++i;
+      ++i;
+      code += ' ';
+    } else {
+      code += text[i++];
+    }
+  }
+  return code;
+}
+
+TEST(House, StringsAndCommentsAreNoCode) {
+  EXPECT_EQ(code_alone("a = \"b\"; // c\nd = 1'000 + 'e'; /* f */ g"), "a =  ;  \nd = 1'000 +  ;   g");
+  EXPECT_EQ(code_alone("R\"x(one \" two)x\" three"), "  three");
+}
+
+// An identifier's words, in lower case: "PictureWriter" and "picture_writer" are picture and writer.
+Names words_of(const std::string& identifier) {
+  Names words;
+  std::string word;
+  const auto end = [&] {
+    if (!word.empty()) words.insert(word);
+    word.clear();
+  };
+  for (std::size_t i = 0; i < identifier.size(); ++i) {
+    const auto c = static_cast<unsigned char>(identifier[i]);
+    if (c == '_' || std::isdigit(c)) {
+      end();
+      continue;
+    }
+    const bool begins =
+        std::isupper(c) && i > 0 && std::islower(static_cast<unsigned char>(identifier[i - 1]));
+    if (begins) end();
+    word += static_cast<char>(std::tolower(c));
+  }
+  end();
+  return words;
+}
+
+TEST(House, IdentifiersKeepToTheGlossary) {
+  const Names forbidden = words_not_to_use();
+  ASSERT_FALSE(forbidden.empty()) << "docs/glossary.md: expected a list under a heading \"Do not use\"";
+  static const std::regex identifier(R"([A-Za-z_]\w*)"),
+      preprocessor(R"(^\s*#[^\n]*)", std::regex::multiline);
+  int seen = 0;
   for (const auto& [room, may] : allowed()) {
-    for (const Include& include : includes_of(fs::path(LIMN_SOURCE_DIR) / room)) {
-      if (include.file.extension() != ".h") continue;
-      for (const char* slow : {"nlohmann/json.hpp", "opencv2/opencv.hpp", "CLI/", "boost/", "ceres/",
-                               "assimp/", "embree3/", "mrcal/"}) {
-        EXPECT_FALSE(include.what.starts_with(slow)) << include.file << " includes " << include.what;
+    for (const fs::path& file : code_in(root() / room)) {
+      std::ifstream in(file);
+      std::string code = code_alone({std::istreambuf_iterator<char>(in), {}});
+      code = std::regex_replace(code, preprocessor, "");
+      Names told;
+      for (std::sregex_iterator at(code.begin(), code.end(), identifier), end; at != end; ++at) {
+        ++seen;
+        const std::string name = at->str();
+        if (told.contains(name)) continue;
+        const Names words = words_of(name);
+        for (const std::string& word : forbidden) {
+          // A whole identifier ("at_once", "Eye"), or one of the words of another ("picture").
+          const bool is_word = word == name || words.contains(word);
+          if (!is_word) continue;
+          told.insert(name);
+          ADD_FAILURE() << fs::relative(file, root()) << ": " << name << " (docs/glossary.md: do not use "
+                        << word << ")";
+        }
       }
     }
   }
+  EXPECT_GT(seen, 10000) << "the sources were not found";
 }
 
 }  // namespace

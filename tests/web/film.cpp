@@ -11,7 +11,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "apps/world_markers.h"
+#include "tracker/marker_image.h"
 #include "device/jpeg.h"
 #include "sim/reference_renderer.h"
 #include "sim/sensor_model.h"

@@ -1,0 +1,295 @@
+#include "apps/live.h"
+
+#include <algorithm>
+#include <atomic>
+#include <csignal>
+#include <limits>
+#include <optional>
+
+#include "core/scale_resolution.h"
+#include "device/devices_file.h"
+#include "session/session_output.h"
+#include "session/device_session.h"
+#include "session/operator_console.h"
+#include "session/osc_port.h"
+#include "session/virtual_room.h"
+#include "session/script.h"
+#include "session/session.h"
+#include "session/virtual_session.h"
+#include "session/perception.h"
+#include "core/screen_encoding.h"
+#include "core/user_folder.h"
+#include "remote/server.h"
+#include "remote/tablet/tablet_view.h"
+#include "tracker/marker_image.h"
+#include "core/log.h"
+#include "device/desktop.h"
+#include "device/gl_context.h"
+#include "device/open_camera.h"
+#include "device/open_display.h"
+#include "sim/virtual_rig.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double k_camera_limit_s = 0.5;  // so that the session ends in under a second
+
+// Set by SIGINT and SIGTERM.
+std::atomic<bool> g_is_ended = false;
+void end_session(int) { g_is_ended = true; }
+
+Status check_options(const LiveOptions& options) {
+  if (!(options.seconds >= 0) || options.seconds > 1e6)
+    return usage_error("--seconds: expected seconds, 0 for no end, found {}.", options.seconds);
+  if (!(options.extrapolate_s > 0 && options.extrapolate_s <= 5))
+    return usage_error("--extrapolate: expected seconds over 0 and at most 5, found {}.",
+                       options.extrapolate_s);
+  if (!options.devices.empty() && options.rig.empty())
+    return usage_error("--devices: expected --rig and --scene with it, found neither.");
+  if (!options.devices.empty() && (!options.world.empty() || !options.script.empty()))
+    return usage_error("--devices: expected no --world and --script with it, which are of the virtual rig.");
+  if (!options.serve_show.empty() && options.serve.empty())
+    return usage_error("--serve-show: expected --serve with it, found none.");
+  if (options.rig.empty() != options.scene.empty())
+    return usage_error(
+        "expected --rig and --scene together, found one of them. Without both the session is in a "
+        "virtual world.");
+  return {};
+}
+
+// What stands in the virtual room, and what the session is told of it.
+struct Stage {
+  sim::World world;
+  SessionSetup setup;
+  std::vector<scene::SkippedVariant> skipped_variants;
+};
+
+Result<Stage> virtual_stage(const LiveOptions& options) {
+  Stage stage;
+  if (!options.rig.empty()) {
+    LIMN_TRY(stage.setup.rig, load_rig(options.rig));
+    LIMN_TRY(stage.setup.scene, scene::load_scene(options.scene, &stage.skipped_variants));
+  }
+  if (options.rig.empty() || !options.world.empty()) {
+    const fs::path world =
+        options.world.empty() ? fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json" : options.world;
+    LIMN_TRY(stage.world, sim::load_world(world, marker_image, &stage.skipped_variants));
+    if (!stage.world.scene)
+      return error("{}: scene: expected a scene for a session, found none.", world.string());
+  } else {
+    LIMN_TRY(stage.world, room_for(stage.setup.rig, stage.setup.scene));
+  }
+  if (const Status coarser = scale_resolution(options.resolution, &stage.world.rig); !coarser)
+    return usage_error("--resolution: {}", coarser.message());
+  if (options.rig.empty()) {
+    stage.setup.rig = stage.world.rig;
+    stage.setup.scene = *stage.world.scene;
+  } else {
+    LIMN_TRY_STATUS(scale_resolution(options.resolution, &stage.setup.rig));
+  }
+  return stage;
+}
+
+// A rig is for the devices that it was measured on.
+Status check_fits(const Rig& rig, const Rig& devices) {
+  for (const auto& [wanted, there] :
+       {std::pair{&rig.cameras, &devices.cameras}, {&rig.projectors, &devices.projectors}}) {
+    for (const Imager& imager : *wanted) {
+      const auto found =
+          std::find_if(there->begin(), there->end(), [&](const Imager& d) { return d.name == imager.name; });
+      std::string names;
+      for (const Imager& d : *there) names += (names.empty() ? "" : ", ") + d.name;
+      if (found == there->end())
+        return error(
+            "rig: {}: expected one of the devices ({}), found none of that name. This rig belongs to other "
+            "devices; name the right one, or run limn calibrate.",
+            imager.name, names.empty() ? "none" : names);
+      if (found->width != imager.width || found->height != imager.height)
+        return error(
+            "rig: {}: expected the device's size {}x{}, found {}x{}. This rig belongs to another device or "
+            "mode; set the mode, or run limn calibrate.",
+            imager.name, found->width, found->height, imager.width, imager.height);
+    }
+  }
+  return {};
+}
+
+// What options say of a session, beside where it takes place.
+Status set_up(const LiveOptions& options, SessionSetup* setup) {
+  const auto prediction = tracker::prediction_of(options.prediction);
+  if (!prediction)
+    return usage_error("--prediction: expected hold, linear or filtered, found '{}'.", options.prediction);
+  setup->paint.prediction = *prediction;
+  const auto marker_light = tracker::marker_light_of(options.marker_light);
+  if (!marker_light)
+    return usage_error("--marker-light: expected as-is, keep-out or spotlight, found '{}'.",
+                       options.marker_light);
+  setup->paint.marker_light = *marker_light;
+  setup->paint.refill = options.refill;
+  setup->watch.motion.extrapolation_limit_s = options.extrapolate_s;
+  setup->paint.motion = setup->watch.motion;
+  return {};
+}
+
+// The remote; null without one.
+Result<std::unique_ptr<Server>> served(const LiveOptions& options, const SessionSetup& setup) {
+  if (options.serve.empty()) return std::unique_ptr<Server>();
+  const auto is_named = [&](const Imager& projector) { return projector.name == options.serve_show; };
+  if (!options.serve_show.empty() &&
+      std::none_of(setup.rig.projectors.begin(), setup.rig.projectors.end(), is_named)) {
+    std::string names;
+    for (const Imager& projector : setup.rig.projectors)
+      names += (names.empty() ? "" : ", ") + projector.name;
+    return usage_error("--serve-show: expected a projector of the rig ({}), found '{}'.", names,
+                       options.serve_show);
+  }
+  ServeOptions serve;
+  serve.at = options.serve;
+  LIMN_TRY(const fs::path own, user_folder());
+  auto tablet_view = TabletView::create(setup, own / "lenses");
+  if (!tablet_view) log_warning("live: the remote shows no live pictures: {}", tablet_view.message());
+  LIMN_TRY(std::unique_ptr<Server> server,
+           Server::open(serve, tablet_view ? image_providers(std::move(*tablet_view)) : ImageProviders{}));
+  if (!options.serve_show.empty()) server->show_code(options.serve_show, Role::work);
+  return server;
+}
+
+Session::Drawing drawing_in(std::optional<device::GlContext>* context) {
+  return {[context] { return !*context || (*context)->is_lost(); },
+          [context]() -> Status {
+            context->reset();
+            LIMN_TRY(*context, device::GlContext::create());
+            return {};
+          }};
+}
+
+Status play_in_virtual_room(const LiveOptions& options) {
+  LIMN_TRY(Script script, options.script.empty() ? Result<Script>(Script{}) : load_script(options.script));
+  LIMN_TRY(Stage stage, virtual_stage(options));
+  SessionSetup& setup = stage.setup;
+  LIMN_TRY_STATUS(check_fits(setup.rig, stage.world.rig));
+  LIMN_TRY_STATUS(set_up(options, &setup));
+  setup.paint.is_linear_camera = !stage.world.camera_effects.front().srgb;
+  log_info("live: no devices are named; the session runs on a virtual rig, on its own clock");
+  const double end_s = options.seconds > 0  ? options.seconds
+                       : script.seconds > 0 ? script.seconds
+                                            : std::numeric_limits<double>::infinity();
+  sim::VirtualRig rig(std::move(stage.world), {.display_delay_s = k_virtual_display_s,
+                                               .camera_delay_s = k_virtual_camera_s,
+                                               .frame_period_s = options.frame_period_s,
+                                               .grab_waits_for_light = false});
+  LIMN_TRY(ScriptedRoom room, ScriptedRoom::create(std::move(script), &rig));
+  std::optional<device::GlContext> context;
+  LIMN_TRY(context, device::GlContext::create());
+  log_info("live: {}", context->description());
+  LIMN_TRY(OscPort osc, OscPort::open(options.osc, options.osc_to));
+  LIMN_TRY(const std::unique_ptr<Server> server, served(options, setup));
+  LIMN_TRY(SessionOutput output, SessionOutput::open(options.out, options.record, &setup));
+  tell(stage.skipped_variants, {}, &output.telemetry());
+  LIMN_TRY(Perception perception, Perception::create(setup.scene, setup.rig, setup.watch));
+  LIMN_TRY(Session session, Session::create(setup, &output.telemetry(), output.recorder()));
+  session.survive_losses(drawing_in(&context));
+  std::optional<OperatorConsole> console;
+  if (options.window) {
+    LIMN_TRY(const device::Desktop desktop, device::Desktop::open());
+    LIMN_TRY(console, OperatorConsole::open(desktop, setup.scene));
+    if (server) console->invite(server.get());
+  }
+  LIMN_TRY_STATUS(play_virtually(end_s, g_is_ended, &rig, &room, &perception, &session, &output,
+                                 console ? &*console : nullptr, &osc, server.get()));
+  console.reset();
+  if (server) server->stop();
+  return output.close(&session, options.json);
+}
+
+bool is_projector(const Rig& rig, const std::string& display) {
+  return std::any_of(rig.projectors.begin(), rig.projectors.end(),
+                     [&](const Imager& projector) { return projector.name == display; });
+}
+
+// Opens what can be opened; what cannot is told of and left out.
+SessionDevices opened(const Devices& devices, const Rig& rig, const device::Desktop* desktop) {
+  SessionDevices out;
+  const auto miss = [&out](const std::string& name, const char* kind, const std::string& why) {
+    log_warning("live: {}: {} The session goes on without it.", name, why);
+    out.missing.push_back({.name = name, .kind = kind, .works = false, .why = why});
+  };
+  for (device::CameraConfig wanted : devices.cameras) {
+    wanted.limit_s = k_camera_limit_s;
+    auto camera = device::open_camera(wanted);
+    if (!camera) miss(wanted.name, "camera", camera.message());
+    out.cameras.push_back(camera ? std::move(*camera) : nullptr);
+  }
+  out.projectors.resize(rig.projectors.size());
+  for (const device::DisplayConfig& wanted : devices.displays) {
+    auto display = device::open_display(wanted, desktop);
+    const auto projector = std::find_if(rig.projectors.begin(), rig.projectors.end(),
+                                        [&](const Imager& p) { return p.name == wanted.name; });
+    if (!display)
+      miss(wanted.name, projector != rig.projectors.end() ? "projector" : "screen", display.message());
+    auto opened = display ? std::move(*display) : nullptr;
+    if (projector != rig.projectors.end())
+      out.projectors[static_cast<std::size_t>(projector - rig.projectors.begin())] = std::move(opened);
+    else
+      out.screens.push_back(std::move(opened));
+  }
+  for (const device::KeysConfig& wanted : devices.keys) {
+    auto keys = device::KeySource::open(wanted);
+    keys ? out.keys.push_back(std::move(*keys)) : miss(wanted.name, "keys", keys.message());
+  }
+  return out;
+}
+
+Status play_with_devices(const LiveOptions& options) {
+  LIMN_TRY(const Devices named, load_devices(options.devices));
+  SessionSetup setup;
+  LIMN_TRY(setup.rig, load_rig(options.rig));
+  std::vector<scene::SkippedVariant> skipped_variants;
+  LIMN_TRY(setup.scene, scene::load_scene(options.scene, &skipped_variants));
+  LIMN_TRY(const Devices devices, matched(named, setup.rig));
+  for (const device::DisplayConfig& display : devices.displays)
+    if (!is_projector(setup.rig, display.name)) setup.screens.push_back(display.name);
+  LIMN_TRY_STATUS(set_up(options, &setup));
+  setup.paint.is_linear_camera =
+      !setup.rig.cameras.empty() && is_measured_linear(setup.rig, setup.rig.cameras.front());
+  std::optional<device::Desktop> desktop;
+  if (options.window ||
+      std::any_of(devices.displays.begin(), devices.displays.end(), device::needs_desktop)) {
+    LIMN_TRY(desktop, device::Desktop::open());
+  }
+  SessionDevices open = opened(devices, setup.rig, desktop ? &*desktop : nullptr);
+  std::optional<device::GlContext> context;
+  LIMN_TRY(context, device::GlContext::create());
+  log_info("live: {}", context->description());
+  LIMN_TRY(OscPort osc, OscPort::open(options.osc, options.osc_to));
+  LIMN_TRY(const std::unique_ptr<Server> server, served(options, setup));
+  LIMN_TRY(SessionOutput output, SessionOutput::open(options.out, options.record, &setup));
+  tell(skipped_variants, {}, &output.telemetry());
+  LIMN_TRY(Perception perception, Perception::create(setup.scene, setup.rig, setup.watch));
+  LIMN_TRY(Session session, Session::create(setup, &output.telemetry(), output.recorder()));
+  session.survive_losses(drawing_in(&context));
+  std::optional<OperatorConsole> console;
+  if (options.window) {
+    LIMN_TRY(console, OperatorConsole::open(*desktop, setup.scene));
+    if (server) console->invite(server.get());
+  }
+  LIMN_TRY_STATUS(play_on_devices(&open, options.seconds, g_is_ended, &perception, &session, &output,
+                                  console ? &*console : nullptr, &osc, server.get()));
+  console.reset();
+  if (server) server->stop();
+  return output.close(&session, options.json);
+}
+
+}  // namespace
+
+Status run_live(const LiveOptions& options) {
+  LIMN_TRY_STATUS(check_options(options));
+  g_is_ended = false;
+  std::signal(SIGINT, end_session);
+  std::signal(SIGTERM, end_session);
+  return options.devices.empty() ? play_in_virtual_room(options) : play_with_devices(options);
+}
+
+}  // namespace limn::apps

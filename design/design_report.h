@@ -1,0 +1,15 @@
+#pragma once
+
+#include <string>
+
+#include "design/rig_design.h"
+
+namespace limn::apps {
+
+/// What `limn plan` prints: the table.
+std::string design_table(const PredictedAccuracy& predicted_accuracy, const DescribedRig& described);
+
+/// The same as JSON (plan.json), without a newline at its end.
+std::string design_json(const PredictedAccuracy& predicted_accuracy);
+
+}  // namespace limn::apps

@@ -1,0 +1,166 @@
+#include "device/devices_file.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "core/config.h"
+
+namespace limn::apps {
+namespace {
+
+std::optional<double> positive_of(const ConfigNode& node, const std::string& key) {
+  const auto found = node.find(key);
+  if (!found) return std::nullopt;
+  return found->positive();
+}
+
+cv::Size size_of(const ConfigNode& node) {
+  const auto found = node.find("size");
+  if (!found) return {};
+  const auto values = found->numbers(2);
+  const cv::Size size(static_cast<int>(values[0]), static_cast<int>(values[1]));
+  if (size.width < 1 || size.height < 1 || size.width != values[0] || size.height != values[1])
+    found->problem("expected [width, height] in pixels.");
+  return size;
+}
+
+// Files are named from the devices file; addresses stay as they are.
+std::string source_of(const ConfigNode& node, const std::filesystem::path& folder) {
+  const std::string source = node.text();
+  const std::size_t colon = source.find(':');
+  if (source.empty()) node.problem("expected a camera's source, found an empty text.");
+  if (colon != std::string::npos && source.find('/') > colon) return source;
+  return (folder / source).lexically_normal().string();
+}
+
+device::CameraConfig read_camera(const ConfigNode& node, const std::filesystem::path& folder) {
+  node.only({"name", "source", "size", "exposure_ms", "gain", "white_balance_k"});
+  device::CameraConfig camera;
+  camera.name = node.at("name").text();
+  camera.source = source_of(node.at("source"), folder);
+  camera.size = size_of(node);
+  camera.sensor.exposure_ms = positive_of(node, "exposure_ms");
+  if (const auto gain = node.find("gain")) camera.sensor.gain = gain->number();
+  camera.sensor.white_balance_k = positive_of(node, "white_balance_k");
+  return camera;
+}
+
+device::DisplayConfig read_display(const ConfigNode& node) {
+  node.only({"name", "monitor", "size", "latency_ms"});
+  device::DisplayConfig display;
+  display.name = node.at("name").text();
+  display.monitor = node.at("monitor").text();
+  display.size = size_of(node);
+  if (const auto latency = node.find("latency_ms")) {
+    display.latency_s = latency->number() / 1000;
+    if (display.latency_s < 0) latency->problem("expected a number >= 0.");
+  }
+  return display;
+}
+
+// A problem at the second of two whose `key` is the same.
+template <class Item, class Key>
+void refuse_twins(const std::vector<Item>& items,
+                  const std::vector<ConfigNode>& nodes,
+                  const Key& key,
+                  const char* what) {
+  for (std::size_t i = 0; i < items.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (key(items[i]) == key(items[j]))
+        nodes[i].problem(
+            fmt::format("expected a {} of its own, found {}, which {} has already. Change one of them.", what,
+                        key(items[i]), items[j].name));
+}
+
+Error size_differs(const Devices& devices, const std::string& name, cv::Size found, const Imager& imager) {
+  return error(
+      "{}: {}: expected the rig's size {}x{}, found {}x{}. Calibrate it at this size, or take the rig's.",
+      devices.file.string(), name, imager.width, imager.height, found.width, found.height);
+}
+
+std::string names_of(const std::vector<Imager>& imagers) {
+  std::string list;
+  for (const Imager& imager : imagers) list += fmt::format("{}{}", list.empty() ? "" : ", ", imager.name);
+  return list.empty() ? "none" : list;
+}
+
+const Imager* find_in(const std::vector<Imager>& imagers, const std::string& name) {
+  const auto found =
+      std::find_if(imagers.begin(), imagers.end(), [&](const Imager& i) { return i.name == name; });
+  return found == imagers.end() ? nullptr : &*found;
+}
+
+// Each of the rig's imagers must be among the devices.
+template <class Item>
+Status all_there(const Devices& devices,
+                 const std::vector<Item>& items,
+                 const std::vector<Imager>& imagers,
+                 const char* key) {
+  for (const Imager& imager : imagers)
+    if (std::none_of(items.begin(), items.end(), [&](const Item& item) { return item.name == imager.name; }))
+      return error(
+          "{}: {}: expected the rig's {} among them, found it nowhere. Add it, or take the rig of these "
+          "devices.",
+          devices.file.string(), key, imager.name);
+  return {};
+}
+
+}  // namespace
+
+Result<Devices> load_devices(const std::filesystem::path& path) {
+  LIMN_TRY(const Config config, Config::load(path, "limn.devices/1"));
+  const ConfigNode root = config.root();
+  root.only({"schema", "cameras", "displays", "keys"});
+  Devices devices{.file = path, .cameras = {}, .displays = {}};
+  const auto cameras = root.at("cameras").items(), displays = root.at("displays").items();
+  for (const ConfigNode& node : cameras) devices.cameras.push_back(read_camera(node, config.folder()));
+  for (const ConfigNode& node : displays) devices.displays.push_back(read_display(node));
+  if (const auto keys = root.find("keys"))
+    for (const ConfigNode& node : keys->items()) {
+      node.only({"name", "path"});
+      devices.keys.push_back({node.at("name").text(), config.folder() / node.at("path").text()});
+    }
+  const auto name = [](const auto& item) { return item.name; };
+  refuse_twins(devices.cameras, cameras, name, "name");
+  refuse_twins(devices.displays, displays, name, "name");
+  refuse_twins(
+      devices.cameras, cameras, [](const auto& camera) { return camera.source; }, "source");
+  for (std::size_t i = 0; i < displays.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const std::string& monitor = devices.displays[i].monitor;
+      if (monitor == devices.displays[j].monitor && monitor != "offscreen" && monitor != "window")
+        displays[i].problem(fmt::format("expected a monitor of its own, found {}, which {} has already.",
+                                        monitor, devices.displays[j].name));
+    }
+  LIMN_TRY_STATUS(config.status());
+  return devices;
+}
+
+Result<Devices> matched(const Devices& devices, const Rig& rig) {
+  LIMN_TRY_STATUS(all_there(devices, devices.cameras, rig.cameras, "cameras"));
+  LIMN_TRY_STATUS(all_there(devices, devices.displays, rig.projectors, "displays"));
+  Devices fitted = devices;
+  for (device::CameraConfig& camera : fitted.cameras) {
+    const Imager* imager = find_in(rig.cameras, camera.name);
+    if (!imager)
+      return error(
+          "{}: cameras: expected those of the rig ({}), found {}. Rename it, or calibrate it with the "
+          "others.",
+          devices.file.string(), names_of(rig.cameras), camera.name);
+    const cv::Size size(imager->width, imager->height);
+    if (!camera.size.empty() && camera.size != size)
+      return size_differs(devices, camera.name, camera.size, *imager);
+    camera.size = size;
+  }
+  for (device::DisplayConfig& display : fitted.displays) {
+    const Imager* imager = find_in(rig.projectors, display.name);
+    if (!imager) continue;
+    const cv::Size size(imager->width, imager->height);
+    if (!display.size.empty() && display.size != size)
+      return size_differs(devices, display.name, display.size, *imager);
+    display.size = size;
+  }
+  return fitted;
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,10 @@
+#pragma once
+
+#include "exchange/exporter.h"
+
+namespace limn::apps {
+
+/// An image for each variant of each placed slot, as the viewer sees it over black.
+Exporter look_exporter();
+
+}  // namespace limn::apps

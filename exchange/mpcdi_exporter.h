@@ -1,0 +1,10 @@
+#pragma once
+
+#include "exchange/exporter.h"
+
+namespace limn::apps {
+
+/// An archive of MPCDI 2.0 with every projector's points, shares and pose.
+Exporter mpcdi_exporter();
+
+}  // namespace limn::apps

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <filesystem>
+
+#include "exchange/mpcdi.h"
+#include "core/result.h"
+
+namespace limn::apps {
+
+/// Reads an MPCDI archive of version 1 or 2, or its XML alone (as Christie's Mystique writes it:
+/// `*.mpcdi.xml`, poses without maps). Lengths become metres. Nothing is unpacked to disk. Error, with its
+/// place in the file: what is damaged, missing, contradicts itself, or is larger than any projector's maps.
+Result<Mpcdi> read_mpcdi(const std::filesystem::path& path);
+
+}  // namespace limn::apps

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "exchange/mpcdi.h"
+
+namespace limn::apps {
+
+/// What an MPCDI file holds (limn.import/1).
+nlohmann::ordered_json mpcdi_report(const Mpcdi& mpcdi);
+
+}  // namespace limn::apps

@@ -1,0 +1,266 @@
+#include "exchange/printing/marker_sheet.h"
+
+#include <cairo-pdf.h>
+#include <cairo-svg.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "calib/board/board.h"
+#include "core/file.h"
+#include "core/image_io.h"
+#include "tracker/family.h"
+
+namespace limn::apps {
+namespace {
+
+constexpr double k_points_per_mm = 72 / 25.4;
+constexpr double k_page_width = 210, k_page_height = 297;  // mm, A4
+constexpr double k_edge = 10;                              // mm that printers leave white
+constexpr double k_foot = 16;                              // mm at the bottom for the bar
+constexpr double k_label = 6;                              // mm below a marker for its name
+constexpr double k_bar = 100;                              // mm
+
+struct Sheet {
+  std::string bytes;
+  std::shared_ptr<cairo_surface_t> surface;
+  std::shared_ptr<cairo_t> cairo;
+};
+
+cairo_status_t append(void* bytes, const unsigned char* data, unsigned int length) {
+  static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), length);
+  return CAIRO_STATUS_SUCCESS;
+}
+
+// A page in millimetres, origin at the top left.
+std::unique_ptr<Sheet> new_sheet(bool svg, double width_mm, double height_mm) {
+  auto sheet = std::make_unique<Sheet>();
+  const double width = width_mm * k_points_per_mm;
+  const double height = height_mm * k_points_per_mm;
+  cairo_surface_t* surface = svg ? cairo_svg_surface_create_for_stream(append, &sheet->bytes, width, height)
+                                 : cairo_pdf_surface_create_for_stream(append, &sheet->bytes, width, height);
+  sheet->surface.reset(surface, cairo_surface_destroy);
+  sheet->cairo.reset(cairo_create(surface), cairo_destroy);
+  cairo_scale(sheet->cairo.get(), k_points_per_mm, k_points_per_mm);
+  return sheet;
+}
+
+Status write_sheet(Sheet& sheet, const std::filesystem::path& path) {
+  cairo_show_page(sheet.cairo.get());
+  cairo_surface_finish(sheet.surface.get());
+  const cairo_status_t status = cairo_surface_status(sheet.surface.get());
+  if (status != CAIRO_STATUS_SUCCESS)
+    return error("{}: cannot draw the sheet: {}", path.string(), cairo_status_to_string(status));
+  return write_file(path, sheet.bytes);
+}
+
+void set_grey(cairo_t* cairo, double level) { cairo_set_source_rgb(cairo, level, level, level); }
+
+// An image as vectors: all pixels of a grey level are rectangles of one path, so that neighbours leave no
+// seam.
+void draw_cells(cairo_t* cairo, const cv::Mat& image, double x_mm, double y_mm, double mm_per_pixel) {
+  std::map<std::uint8_t, std::vector<cv::Rect>> levels;
+  for (int y = 0; y < image.rows;) {
+    int below = y + 1;
+    while (below < image.rows &&
+           std::equal(image.ptr(y), image.ptr(y) + image.cols, image.ptr(below)))
+      ++below;
+    for (int x = 0; x < image.cols;) {
+      const std::uint8_t level = image.at<std::uint8_t>(y, x);
+      int right = x + 1;
+      while (right < image.cols && image.at<std::uint8_t>(y, right) == level) ++right;
+      if (level != 255) levels[level].emplace_back(x, y, right - x, below - y);
+      x = right;
+    }
+    y = below;
+  }
+  for (const auto& [level, rectangles] : levels) {
+    for (const cv::Rect& r : rectangles)
+      cairo_rectangle(cairo, x_mm + r.x * mm_per_pixel, y_mm + r.y * mm_per_pixel, r.width * mm_per_pixel,
+                      r.height * mm_per_pixel);
+    set_grey(cairo, level / 255.0);
+    cairo_fill(cairo);
+  }
+}
+
+void draw_text(
+    cairo_t* cairo, const std::string& text, double x_mm, double y_mm, double height_mm, double room_mm) {
+  cairo_select_font_face(cairo, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
+  cairo_set_font_size(cairo, height_mm);
+  cairo_text_extents_t extents;
+  cairo_text_extents(cairo, text.c_str(), &extents);
+  if (extents.x_advance > room_mm) cairo_set_font_size(cairo, height_mm * room_mm / extents.x_advance);
+  set_grey(cairo, 0);
+  cairo_move_to(cairo, x_mm, y_mm);
+  cairo_show_text(cairo, text.c_str());
+}
+
+void draw_bar(cairo_t* cairo, double x_mm, double y_mm) {
+  set_grey(cairo, 0);
+  cairo_set_line_width(cairo, 0.25);
+  cairo_move_to(cairo, x_mm, y_mm);
+  cairo_line_to(cairo, x_mm + k_bar, y_mm);
+  for (int i = 0; i <= 10; ++i) {
+    const double tick = i % 5 == 0 ? 3 : 1.5;
+    cairo_move_to(cairo, x_mm + i * k_bar / 10, y_mm - tick);
+    cairo_line_to(cairo, x_mm + i * k_bar / 10, y_mm);
+  }
+  cairo_stroke(cairo);
+  draw_text(cairo, "100 mm: measure it; print at 100 %, not \"fit to page\"", x_mm, y_mm + 4, 3, 150);
+}
+
+struct Grid {
+  double margin, pitch_x, pitch_y;
+  int columns, rows;
+};
+
+Result<Grid> grid_for(double size_mm) {
+  Grid grid{};
+  grid.margin = margin_mm(size_mm);
+  grid.pitch_x = size_mm + 2 * grid.margin;
+  grid.pitch_y = grid.pitch_x + k_label;
+  grid.columns = static_cast<int>((k_page_width - 2 * k_edge) / grid.pitch_x);
+  grid.rows = static_cast<int>((k_page_height - 2 * k_edge - k_foot) / grid.pitch_y);
+  if (grid.columns < 1 || grid.rows < 1)
+    return error("--size-mm: expected at most 152 mm, the largest marker on A4, found {}.", size_mm);
+  return grid;
+}
+
+// Frame to cut along, the top-left mark in it, the marker, its name.
+void draw_marker_cell(cairo_t* cairo,
+                      const cv::Mat& cells,
+                      const std::string& label,
+                      double x,
+                      double y,
+                      double size,
+                      double margin) {
+  const double side = size + 2 * margin;
+  set_grey(cairo, 0.75);
+  cairo_set_line_width(cairo, 0.1);
+  cairo_rectangle(cairo, x, y, side, side);
+  cairo_stroke(cairo);
+  const double mark = std::min(2.0, 0.5 * margin);  // a triangle in the frame's top-left corner
+  set_grey(cairo, 0.35);
+  cairo_move_to(cairo, x, y);
+  cairo_line_to(cairo, x + mark, y);
+  cairo_line_to(cairo, x, y + mark);
+  cairo_close_path(cairo);
+  cairo_fill(cairo);
+  draw_cells(cairo, cells, x + margin, y + margin, size / cells.cols);
+  draw_text(cairo, label, x, y + side + 3.6, 3, side);
+}
+
+Result<std::vector<std::string>> parse_ids(const std::string& text) {
+  std::vector<std::string> ids;
+  const char* at = text.data();
+  const char* end = at + text.size();
+  while (at < end) {
+    int from = 0;
+    auto read = std::from_chars(at, end, from);
+    int to = from;
+    if (read.ec == std::errc{} && read.ptr < end && *read.ptr == '-') {
+      read = std::from_chars(read.ptr + 1, end, to);
+    }
+    const bool ends = read.ptr == end || *read.ptr == ',';
+    if (read.ec != std::errc{} || !ends || from < 0 || to < from || to - from > 10000)
+      return usage_error("--ids: expected numbers and ranges such as 0-11,15, found '{}'.", text);
+    for (int id = from; id <= to; ++id) ids.push_back(std::to_string(id));
+    at = read.ptr == end ? end : read.ptr + 1;
+  }
+  if (ids.empty()) return usage_error("--ids: expected numbers and ranges such as 0-11,15, found none.");
+  return ids;
+}
+
+struct Drawing {
+  std::string label;
+  cv::Mat cells;
+};
+
+Result<std::vector<Drawing>> drawings_of(const MarkerSheetOptions& options) {
+  constexpr const char* k_template = "artoolkit:";
+  std::vector<MarkerName> names;
+  if (options.family.rfind(k_template, 0) == 0) {
+    names.push_back({"artoolkit", options.family.substr(std::string(k_template).size())});
+  } else {
+    LIMN_TRY(const std::vector<std::string> ids, parse_ids(options.ids));
+    for (const std::string& id : ids) names.push_back({options.family, id});
+  }
+  std::vector<Drawing> drawings;
+  for (const MarkerName& name : names) {
+    auto cells = tracker::draw_marker(name, 1);
+    if (!cells) return usage_error("limn markers: {}", cells.message());
+    const std::string label = fmt::format("{}   {:g} mm", name.text(), options.size_mm);
+    drawings.push_back({label, std::move(*cells)});
+  }
+  return drawings;
+}
+
+std::filesystem::path page_path(const std::filesystem::path& out, int page) {
+  if (page == 0) return out;
+  return out.parent_path() / fmt::format("{}-{}{}", out.stem().string(), page + 1, out.extension().string());
+}
+
+}  // namespace
+
+// An eighth of the side: a cell or more of every family.
+double margin_mm(double size_mm) { return std::max(3.0, size_mm / 8); }
+
+Result<MarkerSheet> write_marker_sheet(const MarkerSheetOptions& options) {
+  const bool svg = options.out.extension() == ".svg";
+  if (!std::isfinite(options.size_mm) || options.size_mm < 3)
+    return usage_error("--size-mm: expected at least 3, found {}.", options.size_mm);
+  LIMN_TRY(const std::vector<Drawing> drawings, drawings_of(options));
+  const auto fitted = grid_for(options.size_mm);
+  if (!fitted) return usage_error("{}", fitted.message());
+  const Grid& grid = *fitted;
+  const int per_page = grid.columns * grid.rows;
+  const int count = static_cast<int>(drawings.size());
+  const int pages = (count + per_page - 1) / per_page;
+  std::unique_ptr<Sheet> sheet = new_sheet(svg, k_page_width, k_page_height);
+  for (int page = 0; page < pages; ++page) {
+    draw_bar(sheet->cairo.get(), k_edge, k_page_height - k_edge - 5);
+    for (int i = page * per_page; i < std::min(count, (page + 1) * per_page); ++i) {
+      const int place = i - page * per_page;
+      const Drawing& drawing = drawings[static_cast<std::size_t>(i)];
+      draw_marker_cell(sheet->cairo.get(), drawing.cells, drawing.label,
+                       k_edge + place % grid.columns * grid.pitch_x,
+                       k_edge + place / grid.columns * grid.pitch_y, options.size_mm, grid.margin);
+    }
+    if (page + 1 == pages) break;
+    if (svg) {
+      LIMN_TRY_STATUS(write_sheet(*sheet, page_path(options.out, page)));
+      sheet = new_sheet(svg, k_page_width, k_page_height);
+    } else {
+      cairo_show_page(sheet->cairo.get());
+    }
+  }
+  LIMN_TRY_STATUS(write_sheet(*sheet, svg ? page_path(options.out, pages - 1) : options.out));
+  return MarkerSheet{count, pages};
+}
+
+Result<std::string> write_board_sheet(const std::string& text, const std::filesystem::path& out) {
+  const std::string extension = out.extension().string();
+  const auto board = calib::Board::parse(text);
+  if (!board) return usage_error("--board: {}", board.message());
+  const calib::BoardSheet drawing = calib::draw_board(*board);
+  if (extension == ".png") LIMN_TRY_STATUS(write_png(out, drawing.image, {9, drawing.pixels_per_metre}));
+  if (extension != ".png") {
+    const double mm_per_pixel = 1000 / drawing.pixels_per_metre;
+    const double width = drawing.image.cols * mm_per_pixel;
+    const double height = drawing.image.rows * mm_per_pixel;
+    const double page_width = std::max(width, k_bar + 2 * k_edge);
+    auto sheet = new_sheet(extension == ".svg", page_width, height + k_foot);
+    draw_cells(sheet->cairo.get(), drawing.image, 0.5 * (page_width - width), 0, mm_per_pixel);
+    draw_bar(sheet->cairo.get(), k_edge, height + 5);
+    draw_text(sheet->cairo.get(), board->text(), k_edge, height + 13, 3, page_width - 2 * k_edge);
+    LIMN_TRY_STATUS(write_sheet(*sheet, out));
+  }
+  return board->text();
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,100 @@
+#include "exchange/printing/marker_templates.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <string_view>
+
+#include "core/file.h"
+#include "core/image_io.h"
+#include "tracker/identify.h"
+#include "tracker/template_comparison.h"
+#include "tracker/template_training.h"
+
+namespace limn::apps {
+namespace {
+
+using tracker::Discriminability;
+using tracker::TemplateSimilarity;
+
+std::string_view name_of(Discriminability telling) {
+  switch (telling) {
+    case Discriminability::confused:
+      return "confused";
+    case Discriminability::alike:
+      return "alike";
+    case Discriminability::apart:
+      return "apart";
+  }
+  return "";
+}
+
+void print_table(const std::vector<TemplateSimilarity>& pairs) {
+  fmt::print("{:<24} {:<24} {:>6} {:>12}  verdict\n", "template", "and", "turned", "correlation");
+  for (const TemplateSimilarity& pair : pairs)
+    fmt::print("{:<24} {:<24} {:>5}° {:>12.3f}  {}\n", pair.a, pair.a == pair.b ? "itself" : pair.b,
+               90 * pair.quarter_turns, pair.correlation, name_of(pair.telling));
+}
+
+void print_verdict(const TemplateSimilarity& worst) {
+  const std::string who = worst.a == worst.b ? worst.a + " and itself turned" : worst.a + " and " + worst.b;
+  switch (worst.telling) {
+    case Discriminability::confused:
+      fmt::print("Worst: {}: confused, correlation above {:g}: change one.\n", who,
+                 1 - tracker::k_min_rotation_lead);
+      return;
+    case Discriminability::alike:
+      fmt::print("Worst: {}: alike, correlation of {:g} or more: the detector may take one for the other.\n",
+                 who, tracker::k_min_correlation);
+      return;
+    case Discriminability::apart:
+      fmt::print("Worst: {}: apart; all are told apart.\n", who);
+  }
+}
+
+std::string json_text(const std::vector<TemplateSimilarity>& pairs) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const TemplateSimilarity& pair : pairs)
+    list.push_back({{"a", pair.a},
+                    {"b", pair.b},
+                    {"quarter_turns", pair.quarter_turns},
+                    {"correlation", pair.correlation},
+                    {"verdict", name_of(pair.telling)}});
+  return nlohmann::json{{"min_correlation", tracker::k_min_correlation},
+                        {"min_rotation_lead", tracker::k_min_rotation_lead},
+                        {"pairs", list}}
+             .dump(1) +
+         "\n";
+}
+
+}  // namespace
+
+Status train_template(const std::filesystem::path& image, const std::filesystem::path& out) {
+  if (out.extension() != ".patt")
+    return usage_error("--out: expected a file that ends in .patt for a template, found '{}'.", out.string());
+  LIMN_TRY(const cv::Mat pixels, read_image(image));
+  const auto trained = tracker::train_template(pixels);
+  if (!trained) return error("{}: {}", image.string(), trained.message());
+  LIMN_TRY_STATUS(write_file(out, tracker::template_text(*trained)));
+  fmt::print("{}: the frame at ({:.0f}, {:.0f}), {:.0f} px wide\n", out.string(), trained->corners_px[0].x(),
+             trained->corners_px[0].y(), trained->side_px);
+  return {};
+}
+
+Status compare_templates(const std::vector<std::filesystem::path>& files, const std::filesystem::path& json) {
+  std::vector<std::string> names;
+  for (const auto& file : files) names.push_back("artoolkit:" + file.string());
+  LIMN_TRY(const tracker::Families families, tracker::Families::load(names));
+  const auto& templates = families.templates();
+  for (const auto& pattern : templates)
+    if (pattern.size != templates.front().size)
+      return error("{}: expected {} values a side as in {}, found {}. Train both alike.", pattern.id,
+                   templates.front().size, templates.front().id, pattern.size);
+  const auto pairs = tracker::compared(templates);
+  print_table(pairs);
+  print_verdict(pairs.front());
+  if (!json.empty()) LIMN_TRY_STATUS(write_file(json, json_text(pairs)));
+  return {};
+}
+
+}  // namespace limn::apps

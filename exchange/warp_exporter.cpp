@@ -1,0 +1,46 @@
+#include "exchange/warp_exporter.h"
+
+#include <fmt/format.h>
+
+#include <cstddef>
+#include <string>
+
+#include "exchange/exr.h"
+#include "exchange/pfm.h"
+#include "core/file.h"
+
+namespace limn::apps {
+namespace {
+
+Status write_warps(const ExportJob& job, const ExportOptions& options) {
+  LIMN_TRY_STATUS(make_folder(options.warp));
+  for (std::size_t i = 0; i < job.maps.size(); ++i) {
+    const std::string name = fmt::format("warp-{}.{}", job.rig.projectors[i].name, options.format);
+    const std::string bytes =
+        options.format == "pfm"
+            ? pfm_bytes(job.maps[i].points)
+            : exr_bytes(job.maps[i].points,
+                        "R, G, B: x, y, z (m) of the prototype's point that the pixel lights; NaN: none");
+    LIMN_TRY_STATUS(write_file(options.warp / name, bytes));
+  }
+  return {};
+}
+
+Status check(const ExportOptions& options) {
+  if (options.format != "pfm" && options.format != "exr")
+    return usage_error("--format: expected pfm or exr, found '{}'.", options.format);
+  return {};
+}
+
+}  // namespace
+
+Exporter warp_exporter() {
+  return {.name = "warp",
+          .argument = "DIR",
+          .path = &ExportOptions::warp,
+          .check = check,
+          .needs_viewer = [](const ExportOptions&) { return false; },
+          .write = write_warps};
+}
+
+}  // namespace limn::apps

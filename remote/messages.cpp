@@ -1,0 +1,270 @@
+#include "remote/messages.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+namespace limn::apps {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t k_shortest_device = 8, k_longest_device = 64, k_pin_digits = 6;
+constexpr std::uint64_t k_most_id = (std::uint64_t{1} << 53) - 1;  // that a page's numbers hold
+constexpr std::size_t k_quoted = 40;                               // bytes of what was found, in errors
+
+// For errors: short, without control characters, never half a letter.
+std::string in_quotes(const std::string& text) {
+  std::string out;
+  for (const char c : text.substr(0, k_quoted)) {
+    const auto byte = static_cast<unsigned char>(c);
+    out += byte < 0x20 || byte >= 0x7f ? '?' : c;
+  }
+  return "'" + out + (text.size() > k_quoted ? "…'" : "'");
+}
+
+std::string found_in(const json& value) {
+  return value.is_string()       ? in_quotes(value.get_ref<const std::string&>())
+         : value.is_structured() ? std::string(value.type_name())
+                                 : in_quotes(value.dump(-1, ' ', false, json::error_handler_t::replace));
+}
+
+bool has_controls(const std::string& text, bool may_have_lines) {
+  return std::any_of(text.begin(), text.end(), [&](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return (byte < 0x20 && !(may_have_lines && c == '\n')) || byte == 0x7f;
+  });
+}
+
+// An object's members, read one by one; the first problem stays.
+class Reader {
+ public:
+  static Result<Reader> of(std::string_view text) {
+    if (text.size() > k_longest_message)
+      return error("expected a message of at most {} bytes, found {}.", k_longest_message, text.size());
+    json all = json::parse(text, nullptr, false);
+    if (all.is_discarded()) return error("expected a JSON object, found other text.");
+    if (!all.is_object()) return error("expected a JSON object, found {}.", found_in(all));
+    return Reader(std::move(all));
+  }
+
+  // Left out: empty, when it may be.
+  std::string text(const char* key, std::size_t longest, bool may_be_absent, bool may_have_lines = false) {
+    const json* value = taken(key, may_be_absent);
+    if (!value) return "";
+    if (!value->is_string()) return problem(key, "text", found_in(*value)), "";
+    const auto& found = value->get_ref<const std::string&>();
+    if (found.size() > longest)
+      return problem(key, fmt::format("at most {} bytes", longest), fmt::format("{}", found.size())), "";
+    if (has_controls(found, may_have_lines))
+      return problem(key, "text without control characters", in_quotes(found)), "";
+    return found;
+  }
+
+  std::uint64_t number(const char* key, std::uint64_t most) {
+    const json* value = taken(key, false);
+    if (!value) return 0;
+    if (!value->is_number_unsigned() || value->get<std::uint64_t>() > most)
+      return problem(key, fmt::format("a whole number from 0 to {}", most), found_in(*value)), 0;
+    return value->get<std::uint64_t>();
+  }
+
+  bool boolean(const char* key) {
+    const json* value = taken(key, false);
+    if (!value) return false;
+    if (!value->is_boolean()) return problem(key, "true or false", found_in(*value)), false;
+    return value->get<bool>();
+  }
+
+  void problem(const std::string& key, const std::string& expected, const std::string& found) {
+    if (!problem_) problem_ = error("{}: expected {}, found {}.", key, expected, found);
+  }
+
+  // After everything was read: all of it is known.
+  Status status() const {
+    if (problem_) return *problem_;
+    for (const auto& [key, value] : all_.items())
+      if (std::find(taken_.begin(), taken_.end(), key) == taken_.end())
+        return error("expected no other keys, found {}.", in_quotes(key));
+    return {};
+  }
+
+ private:
+  explicit Reader(json all) : all_(std::move(all)) {}
+  const json* taken(const char* key, bool may_be_absent) {
+    taken_.push_back(key);
+    const auto found = all_.find(key);
+    if (found != all_.end()) return &*found;
+    if (!may_be_absent) problem(key, "it", "no such key");
+    return nullptr;
+  }
+
+  json all_;
+  std::vector<std::string> taken_;
+  std::optional<Error> problem_;
+};
+
+scene::Edit read_edit(Reader* reader) {
+  scene::Edit edit;
+  edit.action = reader->text("action", k_longest_word, false);
+  edit.slot = reader->text("slot", k_longest_word, true);
+  edit.value = reader->text("value", k_longest_word, true);
+  if (!scene::find_action(edit.action))
+    reader->problem("action",
+                    fmt::format("one of GET /api/actions ({} and so on)", scene::actions().front().name),
+                    in_quotes(edit.action));
+  return edit;
+}
+
+Remark read_remark(Reader* reader) {
+  Remark remark;
+  remark.look = reader->text("look", k_longest_word, true);
+  remark.slot = reader->text("slot", k_longest_word, true);
+  remark.text = reader->text("text", scene::k_longest_comment, false, true);
+  if (remark.text.find_first_not_of(" \n") == std::string::npos)
+    reader->problem("text", "a remark", "nothing");
+  return remark;
+}
+
+bool is_device_name(const std::string& name) {
+  return name.size() >= k_shortest_device && name.size() <= k_longest_device &&
+         std::all_of(name.begin(), name.end(), [](char c) {
+           return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-';
+         });
+}
+
+Message read_message(const std::string& type, Reader* reader) {
+  if (type == "edit") {
+    const std::uint64_t id = reader->number("id", k_most_id);
+    return EditMessage{id, read_edit(reader)};
+  }
+  if (type == "comment") {
+    const std::uint64_t id = reader->number("id", k_most_id);
+    return RemarkMessage{id, read_remark(reader)};
+  }
+  if (type == "pictures") return ImagesMessage{reader->boolean("room")};
+  if (type == "seen") return SeenMessage{static_cast<std::uint32_t>(reader->number("picture", 0xffffffffu))};
+  if (type == "window") {
+    WindowMessage window{reader->text("device", k_longest_word, false), reader->boolean("on")};
+    const std::string parts = reader->text("parts", k_longest_word, true);
+    if (parts == "rest")
+      window.parts = TabletViewMode::rest;
+    else if (parts == "full")
+      window.parts = TabletViewMode::full;
+    else if (!parts.empty() && parts != "screen")
+      reader->problem("parts", "screen, rest or full", in_quotes(parts));
+    if (!is_device_name(window.device))
+      reader->problem("device",
+                      fmt::format("{} to {} letters, digits and '-'", k_shortest_device, k_longest_device),
+                      in_quotes(window.device));
+    return window;
+  }
+  reader->problem("type", "edit, comment, pictures, seen or window", in_quotes(type));
+  return {};
+}
+
+std::string list_of(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+  return list;
+}
+
+bool is_reserved(std::string name) {
+  for (char& c : name)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  const auto& all = reserved_names();
+  return name.find(':') != std::string::npos || std::find(all.begin(), all.end(), name) != all.end();
+}
+
+void put_number(std::uint32_t number, std::string* out) {
+  for (int shift = 0; shift < 32; shift += 8) out->push_back(static_cast<char>(number >> shift & 0xffu));
+}
+
+}  // namespace
+
+Result<Message> message_of(std::string_view text) {
+  LIMN_TRY(Reader reader, Reader::of(text));
+  const std::string type = reader.text("type", k_longest_word, false);
+  Message message = read_message(type, &reader);
+  LIMN_TRY_STATUS(reader.status());
+  return message;
+}
+
+std::optional<std::uint64_t> id_of(std::string_view text) {
+  if (text.size() > k_longest_message) return std::nullopt;
+  const json all = json::parse(text, nullptr, false);
+  if (!all.is_object()) return std::nullopt;
+  const auto id = all.find("id");
+  if (id == all.end() || !id->is_number_unsigned() || id->get<std::uint64_t>() > k_most_id)
+    return std::nullopt;
+  return id->get<std::uint64_t>();
+}
+
+const std::vector<std::string>& reserved_names() {
+  static const std::vector<std::string> all = {"operator", "key", "script", "osc", "limn"};
+  return all;
+}
+
+Result<PairWish> pair_of_body(std::string_view text) {
+  LIMN_TRY(Reader reader, Reader::of(text));
+  PairWish wish{reader.text("pin", k_longest_word, false), reader.text("name", k_longest_guest_name, true)};
+  if (wish.pin.size() != k_pin_digits ||
+      !std::all_of(wish.pin.begin(), wish.pin.end(), [](char c) { return c >= '0' && c <= '9'; }))
+    reader.problem("pin", fmt::format("{} digits", k_pin_digits), "other text");
+  const auto first = wish.name.find_first_not_of(' ');
+  wish.name = first == std::string::npos
+                  ? "guest"
+                  : wish.name.substr(first, wish.name.find_last_not_of(' ') + 1 - first);
+  if (is_reserved(wish.name))
+    reader.problem(
+        "name", fmt::format("a name without ':' that is none of Limn's own ({})", list_of(reserved_names())),
+        in_quotes(wish.name));
+  LIMN_TRY_STATUS(reader.status());
+  return wish;
+}
+
+Result<scene::Edit> edit_of_body(std::string_view text) {
+  LIMN_TRY(Reader reader, Reader::of(text));
+  scene::Edit edit = read_edit(&reader);
+  LIMN_TRY_STATUS(reader.status());
+  return edit;
+}
+
+Result<Remark> remark_of_body(std::string_view text) {
+  LIMN_TRY(Reader reader, Reader::of(text));
+  Remark remark = read_remark(&reader);
+  LIMN_TRY_STATUS(reader.status());
+  return remark;
+}
+
+Status empty_body(std::string_view text) {
+  LIMN_TRY(const Reader reader, Reader::of(text));
+  return reader.status();
+}
+
+Result<FrameMessage> frame_of(std::span<const std::uint8_t> bytes) {
+  if (bytes.size() > k_longest_frame)
+    return error("expected a picture of at most {} bytes, found {}.", k_longest_jpeg, bytes.size() - 4);
+  if (bytes.size() < 8 || bytes[4] != 0xff || bytes[5] != 0xd8)
+    return error("expected a frame's number and a JPEG, found {} other bytes.", bytes.size());
+  FrameMessage frame;
+  for (std::size_t i = 0; i < 4; ++i)
+    frame.number |= static_cast<std::uint32_t>(bytes[i]) << static_cast<unsigned>(8 * i);
+  frame.jpeg = bytes.subspan(4);
+  return frame;
+}
+
+std::string image_message(ImageKind kind,
+                            std::uint32_t number,
+                            const std::string& json,
+                            std::span<const std::uint8_t> jpeg) {
+  std::string out;
+  out.reserve(12 + json.size() + jpeg.size());
+  put_number(static_cast<std::uint32_t>(kind), &out);
+  put_number(number, &out);
+  put_number(static_cast<std::uint32_t>(json.size()), &out);
+  out += json;
+  out.append(jpeg.begin(), jpeg.end());
+  return out;
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,146 @@
+#include "remote/pairing_overlay.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "gui/qr_code.h"
+
+namespace limn::apps {
+namespace {
+
+constexpr auto k_font = cv::FONT_HERSHEY_SIMPLEX;
+constexpr double k_capital_px = 22;      // of the font at scale 1
+constexpr double k_fill = 0.8;           // of the width, by text
+constexpr int k_grid = 40;               // places looked at along the image's shorter side
+constexpr int k_nodes = 8;               // looked at along each side of a place
+constexpr double k_flat = 0.03;          // of a sign's width, from a plane
+constexpr double k_smaller = 0.93;       // from one size to the next
+constexpr double k_least_upright = 0.2;  // sine of the angle between the surface's normal and up
+constexpr int k_finer = 3;
+
+std::optional<Eigen::Vector3d> point_at(const cv::Mat& points, int x, int y) {
+  const auto& p = points.at<cv::Vec3f>(y, x);
+  if (!std::isfinite(p[0])) return std::nullopt;
+  return Eigen::Vector3d(p[0], p[1], p[2]);
+}
+
+// A line of text in the middle of a row; returns where the next row begins.
+int write(const std::string& text, double share, int top, cv::Mat* sign) {
+  constexpr int k_measured = 1;
+  const cv::Size unit = cv::getTextSize(text, k_font, 1, k_measured, nullptr);
+  const double scale = share * sign->cols / unit.width;
+  const int height = static_cast<int>(std::ceil(k_capital_px * scale));
+  const int left = static_cast<int>(0.5 * (1 - share) * sign->cols);
+  cv::putText(*sign, text, {left, top + height}, k_font, scale, cv::Scalar(),
+              std::max(1, static_cast<int>(2.5 * scale)), cv::LINE_AA);
+  return top + height + height / 2;
+}
+
+}  // namespace
+
+cv::Mat pairing_code_image(const std::string& text, const std::string& pin, const std::string& role, int module_px) {
+  const cv::Mat code = qr_code(text);
+  if (code.empty()) return {};
+  cv::Mat large;
+  cv::resize(code, large, {}, module_px, module_px, cv::INTER_NEAREST);
+  cv::Mat sign(large.rows * 3 / 2, large.cols, CV_8UC3, cv::Scalar::all(255));
+  cv::cvtColor(large, sign(cv::Rect({}, large.size())), cv::COLOR_GRAY2BGR);
+  const int next = write(pin, k_fill, large.rows - module_px, &sign);
+  const int end = write("Limn: " + role, k_fill / 2, next, &sign);
+  return sign.rowRange(0, std::min(sign.rows, end + 2 * module_px)).clone();
+}
+
+cv::Mat pin_image(const std::string& pin, const std::string& role, int width) {
+  cv::Mat sign(width, width, CV_8UC3, cv::Scalar::all(255));
+  const int margin = width / 12;
+  const int next = write(pin, k_fill, margin, &sign);
+  return sign.rowRange(0, write("Limn: " + role, k_fill / 2, next, &sign) + margin / 2).clone();
+}
+
+std::optional<OverlayPlace> overlay_place(const Imager& projector,
+                                    const Pose& world_from_prototype,
+                                    const cv::Mat& points,
+                                    const Eigen::Vector3d& d_up,
+                                    cv::Size shape,
+                                    double least_px) {
+  const double aspect = 1.0 * shape.height / shape.width;
+  const int step = std::max(1, std::min(points.cols, points.rows) / k_grid);
+  struct Seat {
+    Eigen::Vector3d p;
+    Eigen::Vector3d d_right, d_down;  // unit
+    double m_per_px;                  // along the direction in which it is foreshortened most
+  };
+  std::vector<Seat> seats;
+  for (int y = step; y < points.rows - step; y += step)
+    for (int x = step; x < points.cols - step; x += step) {
+      const auto p = point_at(points, x, y);
+      const auto right = point_at(points, x + step / 2, y), left = point_at(points, x - step / 2, y),
+                 down = point_at(points, x, y + step / 2), up = point_at(points, x, y - step / 2);
+      if (!p || !right || !left || !down || !up) continue;
+      const Eigen::Vector3d n = (*right - *left).cross(*down - *up).normalized();  // into the surface
+      const Eigen::Vector3d d_right = n.cross(d_up);
+      if (d_right.norm() < k_least_upright) continue;
+      seats.push_back({*p, d_right.normalized(), n.cross(d_right).normalized(),
+                       std::max((*right - *left).norm(), (*down - *up).norm()) / (2 * (step / 2))});
+    }
+  const auto place_at = [&](const Seat& seat, double width) {
+    const Eigen::Vector3d d_right = width * seat.d_right, d_down = aspect * width * seat.d_down;
+    return OverlayPlace{seat.p - 0.5 * (d_right + d_down), d_right, d_down};
+  };
+  // Whether the surface is there everywhere and flat, to a share of the width.
+  const auto is_free = [&](const OverlayPlace& place) {
+    const double most = k_flat * place.d_right.norm();
+    for (int i = 0; i <= k_nodes; ++i)
+      for (int j = 0; j <= k_nodes; ++j) {
+        const Eigen::Vector3d p =
+            place.p_corner + 1.0 * i / k_nodes * place.d_right + 1.0 * j / k_nodes * place.d_down;
+        const auto px = projector.project(world_from_prototype * p);
+        if (!px || !projector.contains(*px)) return false;
+        const auto there = point_at(points, cvRound(px->x()), cvRound(px->y()));
+        if (!there || (*there - p).norm() > most) return false;
+      }
+    return true;
+  };
+  for (double px = points.cols; px >= least_px; px *= k_smaller)
+    for (const Seat& seat : seats)
+      if (const OverlayPlace place = place_at(seat, px * seat.m_per_px); is_free(place)) return place;
+  return std::nullopt;
+}
+
+void draw_pairing_overlay(const cv::Mat& sign,
+               const OverlayPlace& place,
+               const Imager& projector,
+               const Pose& world_from_prototype,
+               cv::Mat* image) {
+  std::array<cv::Point2f, 4> corners;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double right = i == 1 || i == 2, down = i >= 2;
+    const auto px = projector.project(world_from_prototype *
+                                      (place.p_corner + right * place.d_right + down * place.d_down));
+    if (!px) return;
+    corners[i] = cv::Point2f(static_cast<float>(px->x()), static_cast<float>(px->y()));
+  }
+  const cv::Rect box = cv::boundingRect(corners) & cv::Rect({}, image->size());
+  if (box.empty()) return;
+  for (cv::Point2f& corner : corners) corner -= cv::Point2f(cv::Point(box.tl()));
+  const float width = static_cast<float>(sign.cols) - 0.5F, height = static_cast<float>(sign.rows) - 0.5F;
+  const std::array<cv::Point2f, 4> from = {
+      {{-0.5F, -0.5F}, {width, -0.5F}, {width, height}, {-0.5F, height}}};
+  const cv::Mat turn = cv::getPerspectiveTransform(from.data(), corners.data());
+  // Many of the sign's pixels to one of the image's: drawn larger and made smaller, so that edges are even.
+  const cv::Mat larger = (cv::Mat_<double>(3, 3) << k_finer, 0, 0.5 * (k_finer - 1),  //
+                          0, k_finer, 0.5 * (k_finer - 1),                            //
+                          0, 0, 1);
+  cv::Mat cover(sign.size(), CV_8U, cv::Scalar(255)), drawn, share;
+  cv::warpPerspective(sign, drawn, larger * turn, box.size() * k_finer, cv::INTER_LINEAR);
+  cv::warpPerspective(cover, share, larger * turn, box.size() * k_finer, cv::INTER_NEAREST);
+  cv::resize(drawn, drawn, box.size(), 0, 0, cv::INTER_AREA);
+  cv::resize(share, share, box.size(), 0, 0, cv::INTER_AREA);
+  drawn.copyTo((*image)(box), share > 127);
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,112 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <deque>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "session/device_health.h"
+#include "session/remote_link.h"
+#include "session/session.h"
+#include "session/telemetry.h"
+#include "core/worker_thread.h"
+#include "remote/pairing_overlay.h"
+#include "remote/image_provider.h"
+#include "remote/network.h"
+#include "remote/reception.h"
+#include "core/result.h"
+
+namespace limn::apps {
+
+struct ServeOptions {
+  std::string at;                 ///< PORT (of this machine alone) or ADDRESS:PORT; port 0: any free one
+  std::filesystem::path page;     ///< the page's files; empty: Limn's own
+  std::filesystem::path keys;     ///< of the certificate; empty: Limn's own folder
+  bool always_encrypted = false;  ///< TLS on the loopback, too
+  NetworkLimits limits = {};
+  std::chrono::milliseconds code_lasts{60000};  ///< in a projector's light
+};
+
+/// The remote of a session (docs/remote.md): guests on its network. What RemoteLink has belongs to the session's
+/// thread and never waits; everything else happens on threads of the server's own.
+class Server : public RemoteLink {
+ public:
+  /// Tells on stderr where it is and the PINs. Errors name the option. `eyes` may be
+  /// empty.
+  static Result<std::unique_ptr<Server>> open(const ServeOptions& options, ImageProviders providers);
+  ~Server() override;
+
+  /// Tells the session where guests' tablets look from. Does what guests want, at most k_most_at_once edits
+  /// and for at most 5 ms; the others wait for the next call. What cannot be done is answered to who wanted
+  /// it.
+  void apply_requests(Session* session, Stamp at) override;
+  /// Lets guests know: at once after an edit, else twenty times a second, and once a second while there are
+  /// none.
+  void publish_state(const Session& session,
+                     const Telemetry& telemetry,
+                     const DeviceHealth& health,
+                     Stamp at) override;
+  /// From its next image on a projector shows the code that pairs for a role, for ServeOptions::code_lasts;
+  /// no other one does then. Guests of lesser roles see no images of the room meanwhile, since its cameras
+  /// see the code.
+  void show_code(const std::string& projector, Role role) override;
+  /// Who shows it; empty: nobody.
+  const std::string& code_projector() const override { return code_.projector; }
+  /// What a projector of the session's rig is to give: what was painted, and the code on the largest flat and
+  /// free piece of the prototype (in the image's middle, where there is none). Not under a blackout. What
+  /// guests and recordings get is what was painted.
+  cv::Mat projector_image(Session* session, std::size_t projector) override;
+  /// Says goodbye to all, lets go of the eyes and ends the threads.
+  void stop();
+
+  const Invitation& invitation() const override { return invitation_; }
+  int port() const { return network_->port(); }
+
+  static constexpr std::size_t k_most_at_once = 64;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Server() = default;
+  std::optional<Wish> next_wish();
+  bool has_code_begun(Session* session, std::size_t projector);
+
+  // In a projector's light.
+  struct Code {
+    std::string projector;
+    Role role = Role::look;
+    std::optional<Clock::time_point> asked, searched, until;  // none before the first image
+    cv::Mat sign;
+    std::optional<OverlayPlace> place;  // on the prototype
+  };
+
+  Invitation invitation_;
+  WorkerThread worker_;
+  std::unique_ptr<Reception> reception_;
+  std::unique_ptr<Network> network_;
+  std::atomic<bool> is_watched_ = false;  // somebody is paired
+
+  std::mutex mutex_;
+  std::deque<Wish> wishes_;                                       // for the session
+  std::map<std::string, std::optional<Eigen::Vector3d>> places_;  // likewise: the newest of each guest
+  std::optional<SessionNews> news_;                               // for the network
+  bool is_news_posted_ = false;
+
+  std::vector<Outcome> outcomes_;  // the session's alone, as the rest
+  std::function<void(const Session&)> know_;
+  std::shared_ptr<const scene::Scene> scene_;
+  int scenes_ = 0;
+  Code code_;
+  std::chrono::milliseconds code_lasts_{};
+  std::optional<Clock::time_point> told_at_;
+  std::optional<Stamp> begun_at_;
+  std::size_t told_edits_ = 0;
+};
+
+}  // namespace limn::apps

@@ -1,0 +1,279 @@
+#include "remote/tablet/tablet_localizer.h"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+
+#include "tracker/marker_pose.h"
+
+namespace limn::apps {
+namespace {
+
+constexpr int k_lens_side = 1280;                      // px, the longer side that lenses are kept at
+constexpr std::size_t k_most_aspects = 4;              // of one device
+constexpr double k_gate_px = 2, k_gate_of_median = 4;  // markers further off than both were moved
+constexpr double k_sure = 9;  // by so much (chi square) is a lone marker's place likelier than its mirror's
+constexpr double k_most_unsure_px = 8;  // of the place, as it shows at the markers' distance
+constexpr double k_noticed_px = 0.15;   // of a change of the lens, anywhere in the image
+constexpr double k_known_share = 0.03;  // of the focal length: a lens good enough to straighten sides with
+constexpr double k_learnt = 0.8;        // of a deviation: less of it is worth keeping
+
+using tracker::PoseFit;
+using tracker::BodyCorrespondences;
+
+// The markers of bodies whose place is known, as one body in the world.
+Body room_of(std::span<const Body> bodies, std::span<const Track> tracks, std::size_t least_markers) {
+  Body room{"room", {}};
+  for (const Body& body : bodies)
+    for (const Track& track : tracks) {
+      if (track.body != body.name || track.tracking == TrackingState::lost || body.markers.size() < least_markers)
+        continue;
+      for (const BodyMarker& marker : body.markers)
+        room.markers.push_back(
+            {marker.marker, marker.size_m, track.world_from_body * marker.body_from_marker});
+    }
+  return room;
+}
+
+// How far off a marker's corners are, RMS px.
+double misfit(const tracker::MarkerCorrespondences& marker, const Pose& pose) {
+  const auto chosen = tracker::corners_at({marker}, pose);
+  double squares = 0;
+  for (const tracker::PointObservation& observation : chosen.observations) {
+    Eigen::Vector2d r;
+    if (!tracker::residual(observation, pose, &r)) return 1e6;
+    squares += r.squaredNorm();
+  }
+  return chosen.observations.empty() ? 1e6 : std::sqrt(squares / static_cast<double>(chosen.observations.size()));
+}
+
+double gate_of(const BodyCorrespondences& seen, const Pose& pose) {
+  std::vector<double> off;
+  for (const tracker::MarkerCorrespondences& marker : seen) off.push_back(misfit(marker, pose));
+  const auto middle = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2);
+  std::nth_element(off.begin(), middle, off.end());
+  return std::max(k_gate_px, k_gate_of_median * *middle);
+}
+
+BodyCorrespondences without_moved(const BodyCorrespondences& seen, const Pose& pose) {
+  const double gate = gate_of(seen, pose);
+  BodyCorrespondences kept;
+  for (const tracker::MarkerCorrespondences& marker : seen)
+    if (misfit(marker, pose) <= gate) kept.push_back(marker);
+  return kept;
+}
+
+// The pose that fits all markers and is not far from the one before, where there are enough of them to leave
+// no doubt: found sooner than from nothing.
+std::optional<PoseFit> fitted_near(const BodyCorrespondences& seen, const std::optional<Pose>& last) {
+  constexpr std::size_t k_enough = 4;
+  constexpr double k_fits_px = 1;
+  if (!last || seen.size() < k_enough) return std::nullopt;
+  const auto fit = tracker::fit_pose(tracker::corners_at(seen, *last).observations, *last, tracker::k_huber);
+  return fit && fit->rms_px < k_fits_px ? fit : std::nullopt;
+}
+
+// One standard deviation of where a fit puts the middle of what it sees, px.
+double unsure_px(const Imager& camera, const PoseFit& fit, const BodyCorrespondences& seen) {
+  Eigen::Vector3d p_middle = Eigen::Vector3d::Zero();
+  for (const tracker::MarkerCorrespondences& marker : seen) p_middle += marker.marker->body_from_marker.translation;
+  p_middle /= static_cast<double>(seen.size());
+  const tracker::PointObservation observation{&camera.lens, Pose(), p_middle, Eigen::Vector2d::Zero()};
+  Eigen::Vector2d r;
+  Eigen::Matrix<double, 2, 6> d_r;
+  if (!tracker::residual(observation, fit.world_from_body, &r, &d_r)) return 1e6;
+  return std::sqrt((d_r * fit.covariance * d_r.transpose()).trace());
+}
+
+// How far apart two lenses of one size show things at most, px of an image `width` wide.
+double difference_px(const calib::IntrinsicsEstimate& a, const calib::IntrinsicsEstimate& b, int width) {
+  constexpr int k_nodes = 7;
+  const Lens lens_a = a.lens(), lens_b = b.lens();
+  double most = 0;
+  for (int i = 0; i < k_nodes * k_nodes; ++i) {
+    const Eigen::Vector2d px(static_cast<double>(i % k_nodes) * (a.width - 1) / (k_nodes - 1),
+                             static_cast<double>(i / k_nodes) * (a.height - 1) / (k_nodes - 1));
+    const auto d = lens_a.unproject(px);
+    const auto there = d ? lens_b.project(*d) : std::nullopt;
+    most = std::max(most, there ? (*there - px).norm() : 1e6);
+  }
+  return most * width / a.width;
+}
+
+// The single markers that stand elsewhere than was said, by the guest's own image.
+std::vector<Track> moved_markers(const Imager& view,
+                                 double gate_px,
+                                 std::span<const tracker::Detection> detections,
+                                 std::span<const Body> bodies,
+                                 std::span<const Track> tracks) {
+  std::vector<Track> moved;
+  Imager camera = view;
+  camera.imager_from_world = Pose();
+  const tracker::View here{&camera, detections};
+  for (const Track& track : tracks) {
+    const auto body =
+        std::find_if(bodies.begin(), bodies.end(), [&](const Body& b) { return b.name == track.body; });
+    if (body == bodies.end() || body->markers.size() != 1 || track.tracking == TrackingState::lost) continue;
+    const BodyCorrespondences seen = tracker::correspondences(*body, std::span(&here, 1));
+    const Pose said = view.imager_from_world * track.world_from_body;
+    if (seen.empty() || misfit(seen[0], said) <= gate_px) continue;
+    // The branch that leans as the marker did.
+    std::optional<PoseFit> best;
+    for (const PoseFit& fit : tracker::minima(seen))
+      if (!best || angle_between(fit.world_from_body.rotation, said.rotation) <
+                       angle_between(best->world_from_body.rotation, said.rotation))
+        best = fit;
+    if (!best) continue;
+    const Pose world_from_camera = view.imager_from_world.inverse();
+    Track there = track;
+    there.world_from_body = world_from_camera * best->world_from_body;
+    Matrix6d turn = Matrix6d::Zero();
+    turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = world_from_camera.rotation_matrix();
+    there.covariance = turn * best->covariance * turn.transpose();
+    there.tracking = TrackingState::measured;
+    moved.push_back(there);
+  }
+  return moved;
+}
+
+}  // namespace
+
+TabletLocalizer::TabletLocalizer(tracker::Families families, std::span<const calib::IntrinsicsEstimate> lenses)
+    : detector_(std::move(families),
+                {.encoding = tracker::Encoding::srgb, .broken_markers = false, .pattern_fits = false}) {
+  for (const calib::IntrinsicsEstimate& lens : lenses)
+    aspects_.push_back({calib::OnlineIntrinsics(lens), lens, lens.focal_stddev_px()});
+}
+
+TabletLocalizer::Aspect& TabletLocalizer::aspect_of(int width, int height) {
+  const auto found = std::find_if(aspects_.begin(), aspects_.end(), [&](const Aspect& aspect) {
+    return aspect.used.resized(width, height).has_value();
+  });
+  if (found != aspects_.end()) {
+    std::rotate(found, found + 1, aspects_.end());
+    return aspects_.back();
+  }
+  if (aspects_.size() >= k_most_aspects) aspects_.erase(aspects_.begin());
+  const double scale = static_cast<double>(k_lens_side) / std::max(width, height);
+  const calib::IntrinsicsEstimate lens =
+      calib::prior_intrinsics(std::max(1, static_cast<int>(std::lround(scale * width))),
+                           std::max(1, static_cast<int>(std::lround(scale * height))));
+  aspects_.push_back({calib::OnlineIntrinsics(lens), lens, lens.focal_stddev_px()});
+  return aspects_.back();
+}
+
+// What the image shows of each body with several markers, for learning of the lens: of bodies alone, so
+// that it matters little where the session takes them to be.
+void TabletLocalizer::note_views(const Imager& camera,
+                          std::span<const tracker::Detection> detections,
+                          std::span<const Body> bodies,
+                          std::span<const Track> tracks) {
+  Imager here = camera;
+  here.imager_from_world = Pose();
+  const tracker::View view{&here, detections};
+  const calib::IntrinsicsEstimate& kept = aspects_.back().used;
+  const Eigen::Vector2d scale(static_cast<double>(kept.width) / camera.width,
+                              static_cast<double>(kept.height) / camera.height);
+  for (const Body& body : bodies)
+    for (const Track& track : tracks) {
+      if (body.markers.size() < 2 || track.body != body.name) continue;
+      const BodyCorrespondences seen = tracker::correspondences(body, std::span(&view, 1));
+      if (seen.size() < 2) continue;
+      calib::BodyView noted{camera.imager_from_world * track.world_from_body, {}};
+      for (const tracker::PointObservation& observation : tracker::corners_at(seen, noted.camera_from_body).observations)
+        noted.points.push_back(
+            {observation.p_body, (scale.array() * (observation.px.array() + 0.5) - 0.5).matrix(),
+             scale.asDiagonal() * Eigen::Matrix2d(observation.information.inverse()) * scale.asDiagonal()});
+      views_.push_back(std::move(noted));
+    }
+}
+
+TabletPose TabletLocalizer::look(const cv::Mat& bgr, std::span<const Body> bodies, std::span<const Track> tracks) {
+  cv::Mat grey;
+  cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
+  views_.clear();
+  width_ = grey.cols;
+  const Aspect& aspect = aspect_of(grey.cols, grey.rows);
+  const auto lens = aspect.used.resized(grey.cols, grey.rows);
+  LIMN_CHECK(lens.has_value());
+  Imager camera{"guest", grey.cols, grey.rows, lens->lens(), Pose()};
+  const double focal_stddev_px =
+      aspect.lens.estimate().focal_stddev_px() * grey.cols / static_cast<double>(aspect.used.width);
+  const bool is_known = focal_stddev_px < k_known_share * lens->values[0];
+  const std::vector<tracker::Detection> detections =
+      detector_.detect(grey, is_known ? &camera.lens : nullptr);
+
+  TabletPose out;
+  out.focal_stddev_px = focal_stddev_px;
+  out.lens_frames = aspect.lens.estimate().views;
+  const auto nothing = [&](const char* why) {
+    out.why = why;
+    return out;
+  };
+  if (detections.empty()) return nothing("No markers in view: point the camera at the prototype.");
+  const tracker::View view{&camera, detections};
+  // Bodies of several markers stand more firmly than those of one.
+  Body room = room_of(bodies, tracks, 2);
+  BodyCorrespondences seen = tracker::correspondences(room, std::span(&view, 1));
+  if (seen.size() < 2) {
+    room = room_of(bodies, tracks, 1);
+    seen = tracker::correspondences(room, std::span(&view, 1));
+  }
+  if (seen.empty())
+    return nothing("The markers in view have no known place: the room's camera must see them, too.");
+  std::vector<PoseFit> fits;
+  if (const auto near = fitted_near(seen, last_)) fits = {*near};
+  last_.reset();
+  if (fits.empty()) fits = tracker::minima(seen);
+  constexpr const char* k_go_nearer = "The markers in view are too small or too steep: go nearer.";
+  if (fits.empty()) return nothing(k_go_nearer);
+  PoseFit fit = fits.front();
+  const BodyCorrespondences kept = without_moved(seen, fit.world_from_body);
+  if (kept.size() < seen.size() && !kept.empty())
+    if (const auto again = tracker::fit_pose(tracker::corners_at(kept, fit.world_from_body).observations,
+                                             fit.world_from_body, tracker::k_huber))
+      fit = *again;
+  if (kept.size() < 2 && fits.size() > 1 && fits[1].chi_square - fits[0].chi_square < k_sure)
+    return nothing("One marker alone does not tell the place for sure: bring a second one into view.");
+  if (!(unsure_px(camera, fit, kept.empty() ? seen : kept) < k_most_unsure_px)) return nothing(k_go_nearer);
+  out.markers = static_cast<int>(kept.size());
+  out.rms_px = fit.rms_px;
+  const double gate_px = gate_of(seen, fit.world_from_body);
+  camera.imager_from_world = fit.world_from_body;  // what was seen so far had it at the origin
+  out.moved = moved_markers(camera, gate_px, detections, bodies, tracks);
+  note_views(camera, detections, bodies, tracks);
+  last_ = camera.imager_from_world;
+  out.view = std::move(camera);
+  return out;
+}
+
+void TabletLocalizer::learn() {
+  if (aspects_.empty()) return;
+  Aspect& aspect = aspects_.back();
+  bool is_news = false;
+  for (const calib::BodyView& view : views_) is_news |= aspect.lens.add(view);
+  views_.clear();
+  if (is_news) aspect.lens.improve();
+  if (is_news && difference_px(aspect.lens.estimate(), aspect.used, width_) > k_noticed_px)
+    aspect.used = aspect.lens.estimate();
+}
+
+std::vector<calib::IntrinsicsEstimate> TabletLocalizer::lenses() const {
+  std::vector<calib::IntrinsicsEstimate> out;
+  for (const Aspect& aspect : aspects_)
+    if (aspect.lens.estimate().views > 0) out.push_back(aspect.lens.estimate());
+  return out;
+}
+
+bool TabletLocalizer::has_learnt() const {
+  return std::any_of(aspects_.begin(), aspects_.end(), [](const Aspect& aspect) {
+    const double now = aspect.lens.estimate().focal_stddev_px();
+    return aspect.lens.estimate().views > 0 &&
+           (now < k_learnt * aspect.kept_stddev_px || now > aspect.kept_stddev_px / k_learnt);
+  });
+}
+
+void TabletLocalizer::note_kept() {
+  for (Aspect& aspect : aspects_) aspect.kept_stddev_px = aspect.lens.estimate().focal_stddev_px();
+}
+
+}  // namespace limn::apps

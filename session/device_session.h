@@ -1,0 +1,47 @@
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <vector>
+
+#include "session/session_output.h"
+#include "session/device_health.h"
+#include "session/operator_console.h"
+#include "session/osc_port.h"
+#include "session/session.h"
+#include "session/perception.h"
+#include "session/remote_link.h"
+#include "core/result.h"
+#include "device/camera_source.h"
+#include "device/display.h"
+#include "device/key_source.h"
+
+namespace limn::apps {
+
+/// Opened devices of a session, which takes the cameras with it. A camera that is missing at first, or a
+/// display, is null: the session goes on without it.
+struct SessionDevices {
+  std::vector<std::unique_ptr<device::CameraSource>> cameras;  ///< of the rig's names
+  std::vector<std::unique_ptr<device::Display>> projectors;    ///< in the rig's order
+  std::vector<std::unique_ptr<device::Display>> screens;       ///< show what ShowState::screen says
+  std::vector<device::KeySource> keys = {};
+  std::vector<DeviceState> missing = {};  ///< what could not be opened, and why
+};
+
+/// Plays a session on devices, in real time, until `seconds` are over (0: no end), `is_ended`, or the window
+/// the operator ends it (`desk`, `osc` and `remote` may be null); at least a camera and a projector must be
+/// there. A thread for each camera takes its newest frame, one thread watches, this one (its GL context
+/// current) paints and shows. Newest wins, nothing queues: what was not taken in time is dropped and counted.
+/// Devices that fail are told of, once, and tried again. Sources with stamps of their own (images, videos)
+/// are played at their pace.
+Status play_on_devices(SessionDevices* devices,
+                       double seconds,
+                       const std::atomic<bool>& is_ended,
+                       Perception* perception,
+                       Session* session,
+                       SessionOutput* output,
+                       OperatorConsole* console,
+                       OscPort* osc,
+                       RemoteLink* remote);
+
+}  // namespace limn::apps

@@ -1,0 +1,122 @@
+#include "session/live_recalibration.h"
+
+#include "core/worker_thread.h"
+#include "core/user_folder.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int k_niceness = 10;  // while it computes: light goes first
+constexpr auto k_look_again = std::chrono::milliseconds(5);
+constexpr const char* k_ended = "the session was ended.";
+
+// The rig with what has moved, in words.
+std::string words_of(const calib::RigCheck& result, const fs::path& folder) {
+  if (result.verdict == calib::RigVerdict::sound)
+    return "repair: nothing has moved; the session goes on with its rig";
+  const calib::Move& move = result.candidates.front();
+  std::string others;
+  for (std::size_t i = 1; i < result.candidates.size(); ++i) others += " or " + result.candidates[i].device;
+  return fmt::format(
+      "repair: {}{} was turned by {:.2f} degrees and moved by {:.1f} mm; the session goes on with the mended "
+      "rig. It is in {} for the next one.",
+      move.device, others, move.degrees, move.mm, folder.string());
+}
+
+Status mend(
+    const Result<Rechecked>& checked, const fs::path& folder, Stamp at, Perception* perception, Session* session) {
+  if (!checked) return checked.error();
+  if (checked->result.verdict != calib::RigVerdict::sound) {
+    LIMN_TRY_STATUS(session->mend(checked->result.rig, at));
+    const SessionSetup& setup = session->setup();
+    LIMN_TRY(*perception, Perception::create(setup.scene, setup.rig, setup.watch));
+  }
+  session->warn(at, words_of(checked->result, folder));
+  return {};
+}
+
+}  // namespace
+
+Result<fs::path> recalibration_folder(const fs::path& out) {
+  fs::path base = out;
+  if (base.empty()) {
+    LIMN_TRY(base, user_folder());
+  }
+  std::error_code none;
+  for (int i = 1;; ++i) {
+    const fs::path folder = base / fmt::format("repaired-{}", i);
+    if (!fs::exists(folder, none)) return folder;
+  }
+}
+
+LiveRecalibration::LiveRecalibration(const Rig& rig, fs::path folder, const std::function<Surroundings(ImageWriter*)>& around)
+    : folder_(std::move(folder)), images_(recheck_images(rig)) {
+  result_ = std::async(std::launch::async,
+                       [this, rig, around = through_errands(around(&writer_))]() -> Result<Rechecked> {
+                         try {
+                           return rechecked_in_place(rig, around, folder_, [this] { return !is_over_; });
+                         } catch (const std::exception& bug) {
+                           return error("this is a bug in Limn, please report it: {}", bug.what());
+                         }
+                       });
+}
+
+LiveRecalibration::~LiveRecalibration() {
+  is_over_ = true;
+  while (result_.valid() && result_.wait_for(k_look_again) != std::future_status::ready) executor_.serve();
+}
+
+// The same, done in serve(); errors from the moment at which it is over.
+Surroundings LiveRecalibration::through_errands(Surroundings around) {
+  Surroundings out;
+  out.stage.show = [this, show = around.stage.show](int projector, const cv::Mat& image) {
+    Status status = error("{}", k_ended);
+    executor_.run([&] {
+      if (is_over_) return;
+      status = show(projector, image);
+      ++shown_;
+    });
+    return status;
+  };
+  out.stage.grab = [this, grab = around.stage.grab](int camera) {
+    Result<cv::Mat> image = error("{}", k_ended);
+    executor_.run([&] {
+      if (!is_over_) image = grab(camera);
+    });
+    return image;
+  };
+  out.stage.store = around.stage.store;
+  out.use_latency = [this, use = around.use_latency](int projector, double seconds) {
+    executor_.run([&] { use(projector, seconds); });
+  };
+  out.written = [this, written = around.written] {
+    Status status = written();
+    step_back(k_niceness);
+    is_capturing_ = false;
+    return status;
+  };
+  return out;
+}
+
+std::string LiveRecalibration::words() const {
+  return is_capturing_ ? fmt::format("{} of {} patterns", shown_.load(), images_) : "computing";
+}
+
+std::optional<Result<Rechecked>> LiveRecalibration::take() {
+  if (!result_.valid() || result_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+    return std::nullopt;
+  is_capturing_ = false;
+  return result_.get();
+}
+
+void apply_recalibration(
+    const Result<Rechecked>& checked, const fs::path& folder, Stamp at, Perception* perception, Session* session) {
+  session->set_recalibration_progress("");
+  static_cast<void>(session->take_recalibration_request());  // who asked meanwhile has it
+  const Status mended = mend(checked, folder, at, perception, session);
+  if (!mended) session->warn(at, "repair: " + mended.message() + " The session goes on with its rig.");
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <deque>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "session/device_health.h"
+#include "session/keys.h"
+#include "session/operator_panel.h"
+#include "session/session.h"
+#include "session/telemetry.h"
+#include "session/remote_link.h"
+#include "gui/gui_window.h"
+#include "core/result.h"
+#include "device/desktop.h"
+
+namespace limn::apps {
+
+/// What the window shows of an invitation, with the codes that phones read.
+OperatorView::Remote shown(const Invitation& invitation);
+
+/// Where the operator of a session sits: its window and keys. Belongs to the session's thread; the session's
+/// GL context stays current.
+class OperatorConsole {
+ public:
+  static Result<OperatorConsole> open(const device::Desktop& desktop, const scene::Scene& scene);
+
+  /// From now on the window says how guests come in. The remote outlives this.
+  void invite(RemoteLink* remote);
+
+  /// What keys do; one slot is chosen for all of them.
+  Keys& keys() { return keys_; }
+
+  /// An image was shown.
+  void shown(const ShownFrame& frame);
+  /// Whether the window is to be drawn anew at the next serve(), with a screen's image.
+  bool is_due() const { return window_.is_due(screen_s_); }
+  /// Edits of keys and of the window go to the session; what cannot be done becomes a note. Draws the window
+  /// when it is due. `screen`: its newest image; empty: as before. False: the operator ends the session.
+  bool serve(
+      Session* session, Telemetry* telemetry, const DeviceHealth& health, const cv::Mat& screen, Stamp now);
+
+ private:
+  OperatorConsole(GuiWindow window, const scene::Scene& scene) : window_(std::move(window)), keys_(scene) {}
+  OperatorView view_of(const Session& session,
+                       const Telemetry& telemetry,
+                       const DeviceHealth& health,
+                       Stamp now);
+  std::vector<OperatorView::Device> devices_of(const DeviceHealth& health, Stamp now);
+
+  GuiWindow window_;
+  OperatorPanel panel_;
+  Keys keys_;
+  RemoteLink* remote_link_ = nullptr;
+  std::optional<OperatorView::Remote> remote_;
+  std::deque<ShownFrame> recent_;
+  cv::Mat screen_;
+  double screen_s_ = 0;  // what it cost
+  std::optional<Stamp> begun_at_;
+  struct Pace {
+    std::size_t images = 0;
+    std::optional<double> per_second;
+  };
+  std::map<std::string, Pace> paces_;  // by device
+  Stamp paced_at_;
+};
+
+}  // namespace limn::apps

@@ -1,0 +1,135 @@
+#include "session/osc_port.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+
+#include "core/log.h"
+
+namespace limn::apps {
+namespace {
+
+constexpr auto k_longest_hearing = std::chrono::milliseconds(5);
+constexpr auto k_between_refusals = std::chrono::seconds(1);
+constexpr auto k_between_all = std::chrono::seconds(1);
+constexpr float k_same_mm = 0.05F, k_same_turn = 0.0003F;  // a quaternion's, 0.03 degrees
+
+std::vector<OscValue> values_of(const Pose& pose) {
+  const Eigen::Vector3f mm = (1e3 * pose.translation).cast<float>();
+  Eigen::Quaternionf q = pose.rotation.cast<float>();
+  if (q.w() < 0) q.coeffs() *= -1;
+  return {mm.x(), mm.y(), mm.z(), q.w(), q.x(), q.y(), q.z()};
+}
+
+// Poses that differ by what a tracker trembles are the same.
+bool is_same(const std::vector<OscValue>& a, const std::vector<OscValue>& b) {
+  if (a.size() != b.size()) return false;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const float *x = std::get_if<float>(&a[i]), *y = std::get_if<float>(&b[i]);
+    const float limit = i + 4 < a.size() ? k_same_mm : k_same_turn;
+    if (x && y ? !(std::abs(*x - *y) <= limit) : a[i] != b[i]) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+Result<OscPort> OscPort::open(const std::string& hear, const std::string& tell) {
+  OscPort out;
+  const auto named = [](const char* option, const Error& problem) {
+    return Error{fmt::format("{}: {}", option, problem.message), problem.wrong_usage};
+  };
+  if (!hear.empty()) {
+    const auto place = net_place(hear, "127.0.0.1", true);
+    if (!place) return named("--osc", place.error());
+    auto socket = UdpSocket::hearing(*place);
+    if (!socket) return named("--osc", socket.error());
+    out.ear_ = std::move(*socket);
+    log_info("live: hears OSC at {}, UDP port {}", place->host, out.port());
+  }
+  if (!tell.empty()) {
+    const auto place = net_place(tell, "127.0.0.1");
+    if (!place) return named("--osc-to", place.error());
+    auto socket = UdpSocket::sending(*place);
+    if (!socket) return named("--osc-to", socket.error());
+    out.mouth_ = std::move(*socket);
+  }
+  return out;
+}
+
+void OscPort::hear(Session* session, Telemetry* telemetry, Stamp at) {
+  if (!ear_) return;
+  std::array<std::uint8_t, k_longest_osc + 1> bytes;
+  const Stamp begun = now();
+  for (int i = 0; i < k_most_at_once && now() - begun < k_longest_hearing; ++i) {
+    const auto length = ear_->next(bytes);
+    if (!length) break;
+    const auto edit = edit_of_osc({bytes.data(), std::min(*length, bytes.size())});
+    const Status done = edit ? session->edit(*edit, "osc", at) : Status(edit.error());
+    if (!done) refuse(done.message(), telemetry, at);
+  }
+  if (untold_ > 0 && at - *refused_at_ >= k_between_refusals) refuse("as before", telemetry, at);
+}
+
+void OscPort::refuse(const std::string& why, Telemetry* telemetry, Stamp at) {
+  if (refused_at_ && at - *refused_at_ < k_between_refusals) {
+    ++untold_;
+    return;
+  }
+  const std::string more = untold_ > 0 ? fmt::format(" ({} more refused meanwhile)", untold_) : "";
+  telemetry->note(at, fmt::format("OSC refused: {}{}", why, more));
+  log_warning("live: OSC: {}{}", why, more);
+  refused_at_ = at;
+  untold_ = 0;
+}
+
+void OscPort::tell(const Session& session, Stamp at) {
+  if (!mouth_) return;
+  if (!told_all_at_ || at - *told_all_at_ >= k_between_all) {
+    told_all_at_ = at;
+    told_.clear();
+  }
+  const scene::ShowState& show_state = session.show_state();
+  const scene::PosedScene& posed = session.painted().posed;
+  const auto put_all = [&](const std::string& name, std::vector<OscValue> values) {
+    put(name, "/limn/state/" + name, std::move(values));
+  };
+  const Pose from_world = posed.world_from_prototype ? posed.world_from_prototype->inverse() : Pose{};
+  if (posed.world_from_prototype) put_all("prototype", values_of(*posed.world_from_prototype));
+  const std::vector<scene::Slot>& slots = session.setup().scene.slots;
+  for (std::size_t i = 0; i < slots.size(); ++i) {
+    const std::string& slot = slots[i].name;
+    put("variant " + slot, "/limn/state/variant", {slot, show_state.slots[i].variant});
+    const scene::PosedPart* shown = nullptr;
+    for (const scene::PosedPart& part : posed.parts)
+      if (part.slot == slot) shown = &part;
+    std::vector<OscValue> values = {slot};
+    if (shown)
+      for (OscValue& value : values_of(from_world * shown->world_from_part))
+        values.push_back(std::move(value));
+    put("pose " + slot, shown ? "/limn/state/pose" : "/limn/state/lost", std::move(values));
+  }
+  const int looks = static_cast<int>(show_state.looks.size());
+  for (int i = 0; i < std::max(1, looks); ++i)
+    put(fmt::format("looks {}", i), "/limn/state/looks",
+        {i, looks, looks > 0 ? show_state.looks[static_cast<std::size_t>(i)].name : std::string()});
+  put_all("look", {show_state.look});
+  put_all("blackout", {static_cast<int>(show_state.blackout)});
+  put_all("freeze", {static_cast<int>(show_state.frozen)});
+  put_all("marker_states", {static_cast<int>(show_state.marker_states)});
+  put_all("screen", {scene::screen_names()[static_cast<std::size_t>(show_state.screen)]});
+  for (const scene::Output& output : show_state.screens)
+    put("output " + output.name, "/limn/state/output",
+        {output.name, scene::screen_names()[static_cast<std::size_t>(output.shows)]});
+  put_all("viewer", {show_state.viewer});
+}
+
+void OscPort::put(const std::string& key, const std::string& path, std::vector<OscValue> arguments) {
+  const auto known = told_.find(key);
+  if (known != told_.end() && is_same(known->second, arguments)) return;
+  mouth_->send(osc_message(path, arguments));
+  told_[key] = std::move(arguments);
+}
+
+}  // namespace limn::apps

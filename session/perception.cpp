@@ -1,0 +1,257 @@
+#include "session/perception.h"
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+#include <numbers>
+
+#include "tracker/camera_encoding.h"
+#include "core/stopwatch.h"
+#include "core/image_io.h"
+#include "tracker/family.h"
+#include "tracker/predict.h"
+#include "tracker/body_correspondences.h"
+
+namespace limn::apps {
+namespace {
+
+// Loose markers: a body from the fifth image on, forgotten after two seconds.
+constexpr int k_known_after = 5;
+constexpr double k_forgotten_s = 2;
+constexpr double k_still_m = 0.005, k_still_rad = 5 * std::numbers::pi / 180;
+constexpr double k_lying_m = 0.01, k_lying_rad = 45 * std::numbers::pi / 180;
+constexpr double k_once_s = 0.4;  // two cameras that see one gesture within it
+// While all of the scene's markers are seen, searches are so many times rarer, and every second one alone
+// looks for markers that are partly covered.
+constexpr int k_rarer = 3;
+constexpr int k_covered_every = 2;
+// Between images, as shares of the one before: a longer one says nothing of the next.
+constexpr double k_like_moments = 3;
+constexpr double k_trembles_m = 0.5e-3, k_trembles_rad = 1e-3;
+
+Result<tracker::Gesture> gesture_of(const scene::Control& control) {
+  static const std::map<std::string, tracker::Gesture> gestures = {{"", tracker::Gesture::cover},
+                                                                   {"cover", tracker::Gesture::cover},
+                                                                   {"turn", tracker::Gesture::turn},
+                                                                   {"lay", tracker::Gesture::lay}};
+  const auto found = gestures.find(control.gesture);
+  if (found != gestures.end()) return found->second;
+  return error("scene.json: controls: {}: expected the gesture cover, turn or lay, found '{}'.",
+               control.marker.text(), control.gesture);
+}
+
+// By more than its corners' noise.
+bool has_moved(const tracker::Detection& now, const tracker::Detection& before) {
+  constexpr double k_deviations = 3;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double variance = (now.corner_covariance[i] + before.corner_covariance[i]).trace();
+    if ((now.corners_px[i] - before.corners_px[i]).squaredNorm() > k_deviations * k_deviations * variance)
+      return true;
+  }
+  return false;
+}
+
+// Where markers should be after another `seconds`, as they moved in the `seconds_before`.
+std::vector<tracker::Detection> foretold(const std::vector<tracker::Detection>& last,
+                                         const std::vector<tracker::Detection>& before,
+                                         double seconds,
+                                         double seconds_before) {
+  std::vector<tracker::Detection> next = last;
+  if (!(seconds_before > 0 && seconds > 0 && seconds < k_like_moments * seconds_before)) return next;
+  for (tracker::Detection& marker : next) {
+    const tracker::Detection* was = nullptr;  // the nearest of that name
+    const auto moved = [&](const tracker::Detection& other) {
+      return (marker.corners_px[0] - other.corners_px[0]).norm();
+    };
+    for (const tracker::Detection& other : before)
+      if (other.marker == marker.marker && (!was || moved(other) < moved(*was))) was = &other;
+    if (!was || !has_moved(marker, *was)) continue;
+    for (std::size_t i = 0; i < 4; ++i)
+      marker.corners_px[i] += seconds / seconds_before * (marker.corners_px[i] - was->corners_px[i]);
+  }
+  return next;
+}
+
+// What to look for: bodies and controls.
+std::vector<std::string> families_of(const scene::Scene& scene, std::vector<Body> bodies) {
+  for (const scene::Control& control : scene.controls)
+    bodies.push_back({"(control)", {{control.marker, 0, Pose{}}}});
+  return tracker::families_of(bodies);
+}
+
+}  // namespace
+
+bool is_elsewhere(const Pose& before, const Pose& now) {
+  return (before.translation - now.translation).norm() > k_trembles_m ||
+         angle_between(before.rotation, now.rotation) > k_trembles_rad;
+}
+
+double loose_size_m(const scene::Scene& scene) { return scene.slots.empty() ? 0 : scene.slots[0].size_m; }
+
+Result<Perception> Perception::create(const scene::Scene& scene, const Rig& rig, const PerceptionOptions& options) {
+  LIMN_CHECK(options.full_scan_every > 0);
+  Perception out;
+  out.rig_ = rig;
+  out.options_ = options;
+  out.bodies_ = scene::bodies(scene);
+  out.loose_size_m_ = loose_size_m(scene);
+  for (const Body& body : out.bodies_)
+    for (const BodyMarker& marker : body.markers) out.used_.push_back(marker.marker);
+  for (const scene::Control& control : scene.controls) out.used_.push_back(control.marker);
+  LIMN_TRY(const tracker::Families families,
+           tracker::Families::load(families_of(scene, out.bodies_), scene.folder));
+  std::vector<tracker::GestureReader> gestures;
+  for (const scene::Control& control : scene.controls) {
+    LIMN_TRY(const tracker::Gesture gesture, gesture_of(control));
+    gestures.emplace_back(control.marker, gesture);
+  }
+  for (const Imager& camera : rig.cameras)
+    out.eyes_.push_back({tracker::Detector(families, {.encoding = encoding_of(rig, camera)}), gestures});
+  out.used_at_.resize(scene.controls.size());
+  out.watched_.frames.resize(rig.cameras.size());
+  out.watched_.detections.resize(rig.cameras.size());
+  return out;
+}
+
+const Percepts& Perception::watch(std::span<const Frame> frames) {
+  const auto begun = std::chrono::steady_clock::now();
+  watched_.uses.clear();
+  std::vector<std::size_t> cameras;
+  for (const Frame& frame : frames) {
+    const auto camera = std::find_if(rig_.cameras.begin(), rig_.cameras.end(),
+                                     [&](const Imager& c) { return c.name == frame.camera; });
+    LIMN_CHECK(camera != rig_.cameras.end());
+    cameras.push_back(static_cast<std::size_t>(camera - rig_.cameras.begin()));
+    look(cameras.back(), frame);
+    watched_.captured_at = std::max(watched_.captured_at, frame.captured_at);
+  }
+  read_gestures(cameras);
+  watched_.detect_ms = milliseconds_since(begun);
+
+  note_loose(cameras);
+  const auto filtering = std::chrono::steady_clock::now();
+  std::vector<tracker::View> views;
+  for (const std::size_t i : cameras) views.push_back({&rig_.cameras[i], watched_.detections[i]});
+  if (!views.empty()) {
+    std::vector<Body> bodies = bodies_;
+    for (const Loose& loose : loose_)
+      if (loose.moments >= k_known_after)
+        bodies.push_back({scene::loose_body(loose.marker), {{loose.marker, loose_size_m_, Pose()}}});
+    watched_.motions =
+        tracker::observed(watched_.motions, bodies, views, watched_.captured_at, options_.motion);
+    follow_loose();
+  }
+  watched_.filter_ms = milliseconds_since(filtering);
+  return watched_;
+}
+
+// Markers are followed where they should be by now; all of the image is searched for others now and then,
+// and when one is gone.
+void Perception::look(std::size_t camera, const Frame& frame) {
+  Eye& eye = eyes_[camera];
+  const Lens* lens = &rig_.cameras[camera].lens;
+  std::vector<tracker::Detection>& detections = watched_.detections[camera];
+  watched_.frames[camera] = frame;
+  eye.grey = frame.grey.empty() ? to_grey(frame.image) : frame.grey;
+  const double seconds = seconds_between(eye.seen_at, frame.captured_at);
+  const std::vector<tracker::Detection> next =
+      foretold(detections, eye.before, seconds, std::exchange(eye.seconds, seconds));
+  eye.seen_at = frame.captured_at;
+  std::swap(eye.before, detections);
+  eye.detector.follow(eye.grey, lens, next, &detections);
+  const bool is_one_gone = detections.size() < next.size();
+  if (--eye.until_search > 0 && !is_one_gone) return;
+  const bool covered = eye.searches++ % k_covered_every == 0 || !all_are_seen();
+  eye.detector.detect_more(eye.grey, lens, &detections,
+                           covered ? tracker::Reading::covered : tracker::Reading::open);
+  eye.until_search = (all_are_seen() ? k_rarer : 1) * options_.full_scan_every;
+}
+
+// Whether some camera sees each of the markers that bodies and controls use.
+bool Perception::all_are_seen() const {
+  return std::all_of(used_.begin(), used_.end(), [&](const MarkerName& used) {
+    return std::any_of(watched_.detections.begin(), watched_.detections.end(), [&](const auto& of_camera) {
+      return std::any_of(of_camera.begin(), of_camera.end(), [&](const tracker::Detection& detection) {
+        return tracker::is_marker(detection.marker, used);
+      });
+    });
+  });
+}
+
+// Markers of the scene's families that nothing in it uses.
+void Perception::note_loose(std::span<const std::size_t> cameras) {
+  const Stamp at = watched_.captured_at;
+  std::vector<MarkerName> seen;
+  for (const std::size_t camera : cameras)
+    for (const tracker::Detection& detection : watched_.detections[camera])
+      if (std::none_of(used_.begin(), used_.end(),
+                       [&](const MarkerName& used) { return tracker::is_marker(detection.marker, used); }))
+        seen.push_back(detection.marker);
+  std::sort(seen.begin(), seen.end());
+  seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+  std::erase_if(loose_,
+                [&](const Loose& loose) { return seconds_between(loose.seen_at, at) > k_forgotten_s; });
+  for (const MarkerName& marker : seen) {
+    auto known = std::find_if(loose_.begin(), loose_.end(),
+                              [&](const Loose& loose) { return loose.marker == marker; });
+    if (known == loose_.end()) {
+      if (loose_size_m_ <= 0 || static_cast<int>(loose_.size()) >= options_.most_loose) continue;
+      loose_.push_back({marker, 0, at, std::nullopt, at});
+      known = std::prev(loose_.end());
+    }
+    ++known->moments;
+    known->seen_at = at;
+  }
+}
+
+// Which of them lie still.
+void Perception::follow_loose() {
+  watched_.loose.clear();
+  if (loose_.empty()) return;
+  for (const Track& track : tracker::predicted(watched_.motions, watched_.captured_at,
+                                               tracker::Prediction::filtered, options_.motion)) {
+    const auto loose = std::find_if(loose_.begin(), loose_.end(), [&](const Loose& l) {
+      return scene::loose_body(l.marker) == track.body;
+    });
+    if (loose == loose_.end() || track.tracking == TrackingState::lost) continue;
+    const Pose& now = track.world_from_body;
+    const bool lies = seconds_between(loose->still_since, watched_.captured_at) >= k_lies_after_s;
+    if (!loose->anchor ||
+        (now.translation - loose->anchor->translation).norm() > (lies ? k_lying_m : k_still_m) ||
+        angle_between(now.rotation, loose->anchor->rotation) > (lies ? k_lying_rad : k_still_rad)) {
+      loose->anchor = now;
+      loose->still_since = watched_.captured_at;
+    }
+    watched_.loose.push_back({loose->marker, now, loose->still_since});
+  }
+  std::stable_sort(watched_.loose.begin(), watched_.loose.end(),
+                   [](const LooseMarker& a, const LooseMarker& b) { return a.still_since < b.still_since; });
+}
+
+// A control is used when one camera sees the gesture and none of the others sees the marker uncovered. Of
+// controls that are hidden together the last one is meant: an arm hides the others on the hand's way there.
+void Perception::read_gestures(std::span<const std::size_t> cameras) {
+  for (const std::size_t camera : cameras) {
+    std::vector<tracker::GestureReader>& gestures = eyes_[camera].gestures;
+    const Stamp at = watched_.frames[camera].captured_at;
+    std::vector<int> steps;
+    for (tracker::GestureReader& gesture : gestures)
+      steps.push_back(gesture.read(eyes_[camera].grey, watched_.detections[camera], at));
+    for (std::size_t i = 0; i < gestures.size(); ++i) {
+      if (steps[i] == 0) continue;
+      const bool is_seen_elsewhere =
+          !gestures[i].is_seen() && std::any_of(eyes_.begin(), eyes_.end(), [&](const Eye& other) {
+            return &other.gestures != &gestures && other.gestures[i].is_seen();
+          });
+      const bool is_arms = std::any_of(gestures.begin(), gestures.end(), [&](const auto& other) {
+        return gestures[i].hidden_since() && other.hidden_since() > gestures[i].hidden_since();
+      });
+      const bool is_known = used_at_[i] != Stamp{} && seconds_between(used_at_[i], at) < k_once_s;
+      if (is_seen_elsewhere || is_arms || is_known) continue;
+      used_at_[i] = at;
+      watched_.uses.push_back({i, steps[i]});
+    }
+  }
+}
+
+}  // namespace limn::apps

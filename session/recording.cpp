@@ -1,0 +1,253 @@
+#include "session/recording.h"
+
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "core/config.h"
+#include "core/file.h"
+#include "core/image_io.h"
+#include "device/jpeg.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t k_most_queued = 40;  // frames; 240 MB of colour 1920x1080
+
+std::int64_t nanoseconds(Stamp at) { return at.time_since_epoch().count(); }
+
+Status copy_folder(const fs::path& from, const fs::path& to) {
+  std::error_code problem;
+  fs::create_directories(to, problem);
+  if (!problem)
+    fs::copy(from, to, fs::copy_options::recursive | fs::copy_options::overwrite_existing, problem);
+  if (!problem) return {};
+  return error("{}: expected a folder that can be copied to {}, found: {}.", from.string(), to.string(),
+               problem.message());
+}
+
+Status save_whole_rig(const Rig& rig, const fs::path& folder) {
+  LIMN_TRY_STATUS(save_rig(rig, folder));
+  if (rig.responses.empty() && rig.camera_responses.empty()) return {};
+  return save_responses({rig.responses, rig.camera_responses}, {}, folder);
+}
+
+nlohmann::ordered_json setup_json(const SessionSetup& setup) {
+  const tracker::MotionModel& motion = setup.watch.motion;
+  const ComposeOptions& paint = setup.paint;
+  return {{"schema", "limn.session/1"},
+          {"rig", "rig"},
+          {"scene", "scene"},
+          {"full_scan_every", setup.watch.full_scan_every},
+          {"motion",
+           {{"jerk", motion.jerk},
+            {"turn_jerk", motion.turn_jerk},
+            {"drift", motion.drift},
+            {"turn_drift", motion.turn_drift},
+            {"starts_per_s", motion.starts_per_s},
+            {"stops_per_s", motion.stops_per_s},
+            {"extrapolation_limit_s", motion.extrapolation_limit_s}}},
+          {"prediction", tracker::prediction_names()[static_cast<std::size_t>(paint.prediction)]},
+          {"marker_light", tracker::marker_light_names()[static_cast<std::size_t>(paint.marker_light)]},
+          {"fade_s", paint.fade_s},
+          {"label_s", paint.label_s},
+          {"lost_s", paint.lost_s},
+          {"stereo_mm", paint.stereo_mm},
+          {"refill", paint.refill},
+          {"screens", setup.screens}};
+}
+
+template <class T>
+T read_choice(const ConfigNode& node, const std::vector<std::string>& names) {
+  const std::string name = node.choice(names);
+  const auto found = std::find(names.begin(), names.end(), name);
+  return static_cast<T>(found == names.end() ? 0 : found - names.begin());
+}
+
+}  // namespace
+
+Recorder::Recorder(const fs::path& folder) : folder_(folder), images_(k_most_queued) {}
+
+Result<std::unique_ptr<Recorder>> Recorder::create(const fs::path& folder, const SessionSetup& setup) {
+  if (fs::exists(folder / "session.json"))
+    return error(
+        "{}: expected a folder without a session, found one. Name another folder; nothing was changed.",
+        folder.string());
+  LIMN_TRY_STATUS(make_folder(folder));
+  LIMN_TRY_STATUS(save_whole_rig(setup.rig, folder / "rig"));
+  LIMN_TRY_STATUS(copy_folder(setup.scene.folder, folder / "scene"));
+  for (const Imager& camera : setup.rig.cameras)
+    LIMN_TRY_STATUS(make_folder(folder / "frames" / camera.name));
+  std::unique_ptr<Recorder> out(new Recorder(folder));
+  out->events_.open(folder / "events.jsonl");
+  if (!out->events_)
+    return error("{}: expected a file that can be written, found none. Look at rights and space.",
+                 (folder / "events.jsonl").string());
+  LIMN_TRY_STATUS(write_file(folder / "session.json", setup_json(setup).dump(2) + "\n"));
+  return out;
+}
+
+void Recorder::watched(std::span<const Frame> frames) {
+  const std::lock_guard lock(mutex_);
+  if (ended_) return;
+  nlohmann::ordered_json event = {{"watch", nlohmann::ordered_json::array()}};
+  for (const Frame& frame : frames) {
+    const std::string file =
+        fmt::format("frames/{}/{:06}.{}", frame.camera, frames_++, frame.jpeg ? "jpg" : "png");
+    if (!(frame.jpeg ? images_.offer(folder_ / file, frame.jpeg)
+                     : images_.offer(folder_ / file, frame.image)))
+      return end("the disk is full or too slow for the cameras' pictures");
+    event["watch"].push_back(
+        {{"camera", frame.camera}, {"file", file}, {"captured_at_ns", nanoseconds(frame.captured_at)}});
+  }
+  write(event);
+}
+
+void Recorder::shown(const scene::Scene& scene) {
+  const std::lock_guard lock(mutex_);
+  if (ended_) return;
+  const std::string copy = fmt::format("scene-{}", ++scenes_);
+  if (!copy_folder(scene.folder, folder_ / copy)) return end("the scene's files could not be copied");
+  write({{"scene", copy}});
+}
+
+Rig Recorder::mended(Rig rig, std::size_t moments) {
+  const std::lock_guard lock(mutex_);
+  if (ended_) return rig;
+  const std::string copy = fmt::format("rig-{}", ++rigs_);
+  const Status saved = save_whole_rig(rig, folder_ / copy);
+  Result<Rig> read = saved ? load_rig(folder_ / copy) : Result<Rig>(saved.error());
+  if (!read) {
+    end("the mended rig could not be written");
+    return rig;
+  }
+  write({{"rig", copy}, {"moments", moments}});
+  return std::move(*read);
+}
+
+void Recorder::edited(const scene::Edit& edit, const std::string& source, std::size_t moments) {
+  const std::lock_guard lock(mutex_);
+  if (ended_) return;
+  write({{"edit", {{"action", edit.action}, {"slot", edit.slot}, {"value", edit.value}}},
+         {"source", source},
+         {"moments", moments}});
+}
+
+void Recorder::saw(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at) {
+  const std::lock_guard lock(mutex_);
+  if (ended_) return;
+  nlohmann::ordered_json eye = {{"guest", guest}, {"at_ns", nanoseconds(at)}};
+  if (p_eye_world) eye["p_world"] = {p_eye_world->x(), p_eye_world->y(), p_eye_world->z()};
+  write({{"eye", eye}});
+}
+
+void Recorder::painted(const ComposedFrame& painted, std::size_t moments) {
+  const std::lock_guard lock(mutex_);
+  if (ended_) return;
+  write({{"paint", pose_log(painted)},
+         {"moments", moments},
+         {"pictures", fmt::format("{:016x}", fingerprint(painted.projectors))}});
+}
+
+void Recorder::write(const nlohmann::ordered_json& event) {
+  events_ << event.dump() << '\n';
+  if (!events_.flush()) end("the disk is full");
+}
+
+void Recorder::end(const std::string& why) { ended_ = why; }
+
+std::optional<std::string> Recorder::ended() const {
+  const std::lock_guard lock(mutex_);
+  return ended_;
+}
+
+Status Recorder::finish() { return images_.finish(); }
+
+std::uint64_t fingerprint(std::span<const cv::Mat> images) {
+  std::uint64_t hash = 0xcbf29ce484222325;  // FNV-1a's, over words of eight bytes
+  const auto add = [&](std::uint64_t word) {
+    hash = (hash ^ word) * 0x100000001b3;
+    hash ^= hash >> 29;
+  };
+  for (const cv::Mat& image : images) {
+    const std::size_t length = static_cast<std::size_t>(image.cols) * image.elemSize();
+    for (int row = 0; row < image.rows; ++row) {
+      const std::uint8_t* bytes = image.ptr(row);
+      for (std::size_t i = 0; i < length; i += 8) {
+        std::uint64_t word = 0;
+        std::memcpy(&word, bytes + i, std::min<std::size_t>(8, length - i));
+        add(word);
+      }
+    }
+    add(length);
+  }
+  return hash;
+}
+
+nlohmann::ordered_json pose_log(const ComposedFrame& painted) {
+  nlohmann::ordered_json json = {{"painted_at_ns", nanoseconds(painted.painted_at)},
+                                 {"shown_at_ns", nanoseconds(painted.shown_at)}};
+  json["tracks"] = nlohmann::ordered_json::array();
+  for (const Track& track : painted.tracks)
+    json["tracks"].push_back({{"body", track.body},
+                              {"sight", static_cast<int>(track.tracking)},
+                              {"world_from_body", to_json(track.world_from_body)}});
+  json["parts"] = nlohmann::ordered_json::array();
+  for (const scene::PosedPart& part : painted.posed.parts)
+    json["parts"].push_back(
+        {{"slot", part.slot}, {"variant", part.variant}, {"world_from_part", to_json(part.world_from_part)}});
+  if (const auto& p = painted.p_guest_eye_world) json["guest_eye"] = {p->x(), p->y(), p->z()};
+  return json;
+}
+
+Result<Frame> load_frame(const fs::path& file) {
+  Frame frame;
+  if (file.extension() != ".jpg") {
+    LIMN_TRY(frame.image, read_image(file));
+    return frame;
+  }
+  LIMN_TRY(std::string bytes, read_file(file));
+  Result<Frame> decoded = device::decode_frame(std::move(bytes));
+  if (!decoded) return error("{}: {}", file.string(), decoded.message());
+  return decoded;
+}
+
+Result<SessionSetup> load_setup(const fs::path& folder) {
+  LIMN_TRY(const Config config, Config::load(folder / "session.json", "limn.session/1"));
+  const ConfigNode root = config.root();
+  root.only({"schema", "rig", "scene", "full_scan_every", "motion", "prediction", "marker_light", "fade_s",
+             "label_s", "lost_s", "stereo_mm", "refill", "screens"});
+  SessionSetup setup;
+  setup.watch.full_scan_every = root.at("full_scan_every").integer();
+  if (setup.watch.full_scan_every < 1) root.at("full_scan_every").problem("expected 1 or more, found less.");
+  const ConfigNode motion = root.at("motion");
+  tracker::MotionModel& model = setup.watch.motion;
+  model.jerk = motion.at("jerk").positive();
+  model.turn_jerk = motion.at("turn_jerk").positive();
+  model.drift = motion.at("drift").positive();
+  model.turn_drift = motion.at("turn_drift").positive();
+  model.starts_per_s = motion.at("starts_per_s").positive();
+  model.stops_per_s = motion.at("stops_per_s").positive();
+  model.extrapolation_limit_s = motion.at("extrapolation_limit_s").positive();
+  setup.paint.motion = model;
+  setup.paint.prediction =
+      read_choice<tracker::Prediction>(root.at("prediction"), tracker::prediction_names());
+  setup.paint.marker_light =
+      read_choice<tracker::MarkerLight>(root.at("marker_light"), tracker::marker_light_names());
+  setup.paint.fade_s = root.at("fade_s").positive();
+  setup.paint.label_s = root.at("label_s").positive();
+  setup.paint.lost_s = root.at("lost_s").positive();
+  setup.paint.stereo_mm = root.at("stereo_mm").number();
+  setup.paint.refill = root.at("refill").boolean();
+  if (const auto screens = root.find("screens"))
+    for (const ConfigNode& name : screens->items()) setup.screens.push_back(name.text());
+  const fs::path rig = root.at("rig").path_inside(), scene = root.at("scene").path_inside();
+  LIMN_TRY_STATUS(config.status());
+  LIMN_TRY(setup.rig, load_rig(rig));
+  std::vector<scene::SkippedVariant> skipped_variants;  // as the session left it out
+  LIMN_TRY(setup.scene, scene::load_scene(scene, &skipped_variants));
+  return setup;
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,99 @@
+#include "session/session_output.h"
+
+#include <nlohmann/json.hpp>
+
+#include "core/file.h"
+#include "core/log.h"
+#include "core/image_io.h"
+
+namespace limn::apps {
+namespace {
+
+double seconds_of(Stamp at) { return seconds_between(Stamp{}, at); }
+
+void print_summary(const nlohmann::ordered_json& json) {
+  for (const auto& [key, value] : json.items()) {
+    if (value.is_object())
+      fmt::print("{}: median {:.3f}, 95 % {:.3f}, 99 % {:.3f}\n", key, value["median"].get<double>(),
+                 value["p95"].get<double>(), value["p99"].get<double>());
+    else if (value.is_number())
+      fmt::print("{}: {}\n", key, value.dump());
+  }
+}
+
+}  // namespace
+
+Result<SessionOutput> SessionOutput::open(const std::filesystem::path& out,
+                          const std::filesystem::path& record,
+                          SessionSetup* setup) {
+  LIMN_TRY(Telemetry telemetry, Telemetry::create(out));
+  SessionOutput output(std::move(telemetry));
+  output.out_ = out;
+  if (!out.empty()) {
+    LIMN_TRY(output.poses_,
+             AppendLog::create(out / "poses.csv", "shown_at_s,slot,variant,x_mm,y_mm,z_mm,qw,qx,qy,qz\n"));
+  }
+  if (!record.empty()) {
+    LIMN_TRY(output.recorder_, Recorder::create(record, *setup));
+    const std::filesystem::path project = setup->scene.folder;  // its looks are the project's
+    LIMN_TRY(*setup, load_setup(record));
+    setup->scene.folder = project;
+  }
+  return output;
+}
+
+void SessionOutput::shown(const ShownFrame& frame, const ComposedFrame& painted) {
+  telemetry_.add(frame);
+  if (poses_.is_open()) add_poses(painted);
+  if (const auto news = poses_.news()) telemetry_.note(painted.shown_at, *news);
+  if (!recorder_ || told_of_recording_) return;
+  const auto ended = recorder_->ended();
+  if (!ended) return;
+  told_of_recording_ = true;
+  telemetry_.note(painted.shown_at, "the recording ended: " + *ended);
+  log_warning("live: the recording ended at {:.2f} s: {}. The session goes on.", seconds_of(painted.shown_at),
+              *ended);
+}
+
+// In the prototype's frame where there is one, else in the world's.
+void SessionOutput::add_poses(const ComposedFrame& painted) {
+  const Pose from_world =
+      painted.posed.world_from_prototype ? painted.posed.world_from_prototype->inverse() : Pose{};
+  for (const scene::PosedPart& part : painted.posed.parts) {
+    const Pose pose = from_world * part.world_from_part;
+    const Eigen::Vector3d mm = 1e3 * pose.translation;
+    const Eigen::Quaterniond& q = pose.rotation;
+    poses_.add(fmt::format("{:.6f},{},{},{:.4f},{:.4f},{:.4f},{:.8f},{:.8f},{:.8f},{:.8f}\n",
+                           seconds_of(painted.shown_at), part.slot, part.variant, mm.x(), mm.y(), mm.z(),
+                           q.w(), q.x(), q.y(), q.z()),
+               painted.shown_at);
+  }
+}
+
+Status SessionOutput::close(Session* session, bool as_json) {
+  poses_.flush();
+  const Status recorded = recorder_ ? recorder_->finish() : Status();
+  nlohmann::ordered_json json = {{"schema", "limn.live/1"}};
+  json.update(telemetry_.summary());
+  const Status written = write_end(session, json);
+  if (as_json)
+    fmt::print("{}\n", json.dump(2));
+  else
+    print_summary(json);
+  return written ? recorded : written;
+}
+
+// What a session leaves in its folder.
+Status SessionOutput::write_end(Session* session, const nlohmann::ordered_json& json) const {
+  if (out_.empty()) return {};
+  const std::vector<cv::Mat>& images = session->painted().projectors;
+  for (std::size_t i = 0; i < images.size(); ++i)
+    LIMN_TRY_STATUS(
+        write_png(out_ / ("projector-" + session->setup().rig.projectors[i].name + ".png"), images[i]));
+  if (const cv::Mat screen = session->screen(); !screen.empty())
+    LIMN_TRY_STATUS(write_png(out_ / "screen.png", screen));
+  LIMN_TRY_STATUS(write_file(out_ / "session.json", json.dump(2) + "\n"));
+  return telemetry_.write_page(out_ / "session.html", "A session of Limn");
+}
+
+}  // namespace limn::apps

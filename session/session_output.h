@@ -1,0 +1,47 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+
+#include "session/append_log.h"
+#include "session/recording.h"
+#include "session/session.h"
+#include "session/telemetry.h"
+#include "core/result.h"
+
+namespace limn::apps {
+
+/// Everything that a session writes while it runs.
+class SessionOutput {
+ public:
+  /// `out`: folder for telemetry.csv and poses.csv; `record`: for the recording; empty: none. With a
+  /// recording `setup` becomes what replay will read of it, to the last bit.
+  static Result<SessionOutput> open(const std::filesystem::path& out,
+                            const std::filesystem::path& record,
+                            SessionSetup* setup);
+
+  Telemetry& telemetry() { return telemetry_; }
+  Recorder* recorder() { return recorder_.get(); }  ///< null without one
+
+  const std::filesystem::path& out() const { return out_; }  ///< empty: none
+
+  /// One image shown. Says once that the recording ended.
+  void shown(const ShownFrame& frame, const ComposedFrame& painted);
+
+  /// Waits for the recording; writes session.json, session.html, the last images; prints the summary.
+  Status close(Session* session, bool as_json);
+
+ private:
+  explicit SessionOutput(Telemetry telemetry) : telemetry_(std::move(telemetry)) {}
+  void add_poses(const ComposedFrame& painted);
+  Status write_end(Session* session, const nlohmann::ordered_json& json) const;
+
+  std::filesystem::path out_;
+  Telemetry telemetry_;
+  AppendLog poses_;
+  std::unique_ptr<Recorder> recorder_;
+  bool told_of_recording_ = false;
+};
+
+}  // namespace limn::apps

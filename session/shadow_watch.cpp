@@ -1,0 +1,36 @@
+#include "session/shadow_watch.h"
+
+#include <algorithm>
+
+namespace limn::apps {
+namespace {
+
+constexpr int k_patch_px = 8;
+
+}  // namespace
+
+ShadowWatch::ShadowWatch(const Rig& rig) : rig_(rig), arriving_(rig), seen_at_(rig.cameras.size()) {}
+
+void ShadowWatch::look(const Percepts& watched,
+                       const scene::PosedScene& posed,
+                       const ProjectionHistory& shown,
+                       projector::Renderer* renderer) {
+  if (!posed.world_from_prototype) return;
+  if (!placed_ || is_elsewhere(*placed_, *posed.world_from_prototype)) {
+    placed_ = posed.world_from_prototype;
+    for (std::size_t i = 0; i < rig_.cameras.size(); ++i)
+      arriving_.place(i, renderer->illuminated_patches(i, posed, k_patch_px));
+  }
+  bool has_changed = false;
+  for (std::size_t i = 0; i < watched.frames.size(); ++i) {
+    const Frame& frame = watched.frames[i];
+    if (frame.image.empty() || frame.captured_at <= seen_at_[i]) continue;
+    seen_at_[i] = frame.captured_at;
+    if (const auto* images = shown.at(frame.captured_at))
+      has_changed |= arriving_.see(i, frame.image, *images);
+  }
+  if (!has_changed) return;
+  for (std::size_t i = 0; i < rig_.projectors.size(); ++i) renderer->set_occlusion(i, arriving_.map(i));
+}
+
+}  // namespace limn::apps

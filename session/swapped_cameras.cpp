@@ -1,0 +1,57 @@
+#include "session/swapped_cameras.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "tracker/body_pose.h"
+#include "tracker/body_correspondences.h"
+
+namespace limn::apps {
+namespace {
+
+// Residuals of what all cameras see of one body: those of cameras in their places, and of others.
+constexpr double k_right_px = 3, k_wrong_px = 12;
+
+// How badly the bodies that several cameras see fit; 0 when there are none.
+double misfit_px(std::span<const Body> bodies,
+                 std::span<const Imager* const> cameras,
+                 std::span<const std::vector<tracker::Detection>> detections,
+                 Stamp captured_at) {
+  std::vector<tracker::View> views;
+  for (std::size_t i = 0; i < cameras.size(); ++i) views.push_back({cameras[i], detections[i]});
+  double worst = 0;
+  for (const Body& body : bodies) {
+    int seen_by = 0;
+    for (const tracker::View& view : views) seen_by += !tracker::correspondences(body, {&view, 1}).empty();
+    if (seen_by < 2) continue;
+    const auto track = tracker::world_from_body(body, views, captured_at);
+    worst = std::max(worst, track ? track->rms_px : std::numeric_limits<double>::infinity());
+  }
+  return worst;
+}
+
+}  // namespace
+
+std::optional<std::pair<std::string, std::string>> swapped_cameras(
+    const Rig& rig,
+    std::span<const Body> bodies,
+    std::span<const std::vector<tracker::Detection>> detections,
+    Stamp captured_at) {
+  LIMN_CHECK(detections.size() == rig.cameras.size());
+  std::vector<const Imager*> cameras;
+  for (const Imager& camera : rig.cameras) cameras.push_back(&camera);
+  const double as_named = misfit_px(bodies, cameras, detections, captured_at);
+  if (as_named < k_wrong_px) return std::nullopt;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    for (std::size_t k = i + 1; k < cameras.size(); ++k) {
+      if (cameras[i]->width != cameras[k]->width || cameras[i]->height != cameras[k]->height) continue;
+      std::swap(cameras[i], cameras[k]);
+      const double exchanged = misfit_px(bodies, cameras, detections, captured_at);
+      std::swap(cameras[i], cameras[k]);
+      if (exchanged < k_right_px) return std::pair(cameras[i]->name, cameras[k]->name);
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace limn::apps

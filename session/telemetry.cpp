@@ -1,0 +1,188 @@
+#include "session/telemetry.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/html.h"
+#include "core/file.h"
+
+namespace limn::apps {
+namespace {
+
+constexpr double k_least = 1e-4, k_growth = 1.02;
+constexpr std::size_t k_most_notes = 500, k_most_slices = 240;
+
+constexpr const char* k_telemetry_style = R"(
+:root { color-scheme: dark; }
+body { margin: 0 auto; max-width: 1000px; padding: 2rem 1.5rem 4rem; background: #14161a; color: #e8e6e1;
+       font: 16px/1.5 system-ui, sans-serif; }
+h1 { font-weight: 600; margin: 0 0 .3rem; } h2 { font-weight: 500; margin: 2rem 0 .5rem; font-size: 1.1rem; }
+.lead { color: #a9a69f; margin: 0 0 2rem; }
+table { border-collapse: collapse; } th { text-align: left; color: #a9a69f; font-weight: 500; }
+td, th { padding: .3rem 1.6rem .3rem 0; border-bottom: 1px solid #2b2f36; }
+td.n { font-variant-numeric: tabular-nums; text-align: right; white-space: nowrap; }
+svg { width: 100%; height: 140px; background: #1b1e24; border-radius: 4px; }
+polyline { fill: none; stroke: #7fb4ff; stroke-width: 1.5; } text { fill: #a9a69f; font-size: 12px; }
+)";
+
+// A line over the session, in a box of 1000 x 140.
+std::string chart(const std::string& title,
+                  const std::vector<std::pair<double, double>>& points,
+                  const std::string& unit) {
+  if (points.size() < 2) return "";
+  double high = 0;
+  for (const auto& [x, y] : points) high = std::max(high, y);
+  if (!(high > 0)) return "";
+  const double begin = points.front().first, span = std::max(1e-9, points.back().first - begin);
+  std::string line;
+  for (const auto& [x, y] : points)
+    line += fmt::format("{:.1f},{:.1f} ", 10 + 980 * (x - begin) / span, 120 - 95 * y / high);
+  return fmt::format(
+      "<h2>{}</h2><svg viewBox=\"0 0 1000 140\" preserveAspectRatio=\"none\" role=\"img\" aria-label=\"{}\">"
+      "<polyline points=\"{}\"/><text x=\"10\" y=\"16\">{:.{}f} {}</text>"
+      "<text x=\"990\" y=\"136\" text-anchor=\"end\">{:.0f} s</text></svg>\n",
+      escaped(title), escaped(title), line, high, high < 10 ? 2 : 0, unit, begin + span);
+}
+
+}  // namespace
+
+void Quantiles::add(double value) {
+  if (!(value >= 0)) return;
+  const double bin = value <= k_least ? 0 : std::log(value / k_least) / std::log(k_growth) + 1;
+  ++bins_[static_cast<std::size_t>(std::clamp(bin, 0.0, static_cast<double>(bins_.size() - 1)))];
+  least_ = count_ == 0 ? value : std::min(least_, value);
+  most_ = count_ == 0 ? value : std::max(most_, value);
+  ++count_;
+  sum_ += value;
+}
+
+double Quantiles::at(double share) const {
+  if (count_ == 0) return NAN;
+  const auto wanted = static_cast<std::size_t>(std::ceil(share * static_cast<double>(count_)));
+  std::size_t seen = 0;
+  for (std::size_t i = 0; i < bins_.size(); ++i) {
+    seen += bins_[i];
+    if (seen >= std::max<std::size_t>(1, wanted))
+      return std::clamp(i == 0 ? 0 : k_least * std::pow(k_growth, static_cast<double>(i) - 0.5), least_,
+                        most_);
+  }
+  return NAN;
+}
+
+Telemetry::Telemetry()
+    : measures_{{"detect", "ms", "finding markers", {}},
+                {"filter", "ms", "poses and motions", {}},
+                {"paint", "ms", "projector pictures", {}},
+                {"screen", "ms", "the screen's picture", {}},
+                {"record", "ms", "handing over to the recording", {}},
+                {"latency", "ms", "from the camera's exposure to light on the surface", {}},
+                {"placement", "mm", "of the parts from their true places, RMS (virtual rig)", {}}} {}
+
+Result<Telemetry> Telemetry::create(const std::filesystem::path& folder) {
+  Telemetry out;
+  if (folder.empty()) return out;
+  LIMN_TRY_STATUS(make_folder(folder));
+  LIMN_TRY(out.csv_,
+           AppendLog::create(folder / "telemetry.csv",
+                               "captured_at_s,shown_at_s,latency_ms,detect_ms,filter_ms,paint_ms,screen_ms,"
+                               "record_ms,markers,lost,missed,placement_mm\n"));
+  return out;
+}
+
+void Telemetry::add(const ShownFrame& frame) {
+  const double latency_ms = 1e3 * seconds_between(frame.captured_at, frame.shown_at);
+  if (frames_++ == 0) begun_at_ = frame.shown_at;
+  last_at_ = frame.shown_at;
+  missed_ += static_cast<std::size_t>(frame.missed);
+  with_lost_ += frame.lost > 0;
+  const double values[] = {frame.detect_ms, frame.filter_ms, frame.paint_ms,    frame.screen_ms,
+                           frame.record_ms, latency_ms,      frame.placement_mm};
+  for (std::size_t i = 0; i < measures_.size(); ++i) measures_[i].all.add(values[i]);
+  add_to_slice(frame, latency_ms);
+  if (!csv_.is_open()) return;
+  csv_.add(fmt::format("{:.6f},{:.6f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{},{},{},{:.4f}\n",
+                       seconds_between(Stamp{}, frame.captured_at), seconds_between(Stamp{}, frame.shown_at),
+                       latency_ms, frame.detect_ms, frame.filter_ms, frame.paint_ms, frame.screen_ms,
+                       frame.record_ms, frame.markers, frame.lost, frame.missed, frame.placement_mm),
+           frame.shown_at);
+  if (const auto news = csv_.news()) note(frame.shown_at, *news);
+}
+
+// When there are too many slices, two become one.
+void Telemetry::add_to_slice(const ShownFrame& frame, double latency_ms) {
+  const double at_s = seconds_between(begun_at_, frame.shown_at);
+  if (slices_.empty() || at_s >= slices_.back().begins_s + slice_s_) slices_.push_back({at_s, 0, 0, 0, 0});
+  Slice& slice = slices_.back();
+  slice.latency_ms = std::max(slice.latency_ms, latency_ms);
+  slice.paint_ms = std::max(slice.paint_ms, frame.paint_ms);
+  slice.placement_mm = std::max(slice.placement_mm, frame.placement_mm);
+  ++slice.count;
+  if (slices_.size() < k_most_slices) return;
+  for (std::size_t i = 0; 2 * i + 1 < slices_.size(); ++i) {
+    const Slice &a = slices_[2 * i], &b = slices_[2 * i + 1];
+    slices_[i] = {a.begins_s, std::max(a.latency_ms, b.latency_ms), std::max(a.paint_ms, b.paint_ms),
+                  std::max(a.placement_mm, b.placement_mm), a.count + b.count};
+  }
+  slices_.resize(slices_.size() / 2);
+  slice_s_ *= 2;
+}
+
+void Telemetry::note(Stamp at, const std::string& what) {
+  notes_.emplace_back(seconds_between(Stamp{}, at), what);
+  if (notes_.size() > k_most_notes) notes_.erase(notes_.begin());
+}
+
+nlohmann::ordered_json Telemetry::summary() const {
+  nlohmann::ordered_json json;
+  const double seconds = frames_ > 0 ? seconds_between(begun_at_, last_at_) : 0;
+  json["seconds"] = seconds;
+  json["pictures"] = frames_;
+  json["missed_frames"] = missed_;
+  json["pictures_with_lost_bodies"] = with_lost_;
+  for (const Measure& measure : measures_) {
+    if (measure.all.count() == 0) continue;
+    json[measure.name + "_" + measure.unit] = {{"median", measure.all.at(0.5)},
+                                               {"p95", measure.all.at(0.95)},
+                                               {"p99", measure.all.at(0.99)},
+                                               {"mean", measure.all.mean()}};
+  }
+  json["notes"] = nlohmann::ordered_json::array();
+  for (const auto& [at_s, what] : notes_) json["notes"].push_back({{"at_s", at_s}, {"what", what}});
+  return json;
+}
+
+Status Telemetry::write_page(const std::filesystem::path& path, const std::string& title) const {
+  const nlohmann::ordered_json json = summary();
+  std::string html = fmt::format(
+      "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>{0}</title><style>{1}</style>"
+      "<h1>{0}</h1><p class=\"lead\">{2:.1f} s, {3} pictures shown, {4} camera frames missed, {5} pictures "
+      "with a lost body.</p>\n<table><tr><th>what</th><th>median</th><th>95 %</th><th>99 %</th></tr>\n",
+      escaped(title), k_telemetry_style, json["seconds"].get<double>(), frames_, missed_, with_lost_);
+  for (const Measure& measure : measures_) {
+    if (measure.all.count() == 0) continue;
+    html += fmt::format(
+        "<tr><td>{} ({})</td><td class=\"n\">{:.2f} {}</td><td class=\"n\">{:.2f}</td><td "
+        "class=\"n\">{:.2f}</td></tr>\n",
+        measure.name, escaped(measure.what), measure.all.at(0.5), measure.unit, measure.all.at(0.95),
+        measure.all.at(0.99));
+  }
+  html += "</table>\n";
+  std::vector<std::pair<double, double>> latency, paint, placement;
+  for (const Slice& slice : slices_) {
+    latency.emplace_back(slice.begins_s, slice.latency_ms);
+    paint.emplace_back(slice.begins_s, slice.paint_ms);
+    placement.emplace_back(slice.begins_s, slice.placement_mm);
+  }
+  html += chart("Camera to light, the worst in each slice", latency, "ms");
+  html += chart("Painting, the worst in each slice", paint, "ms");
+  html += chart("Parts from their true places, the worst in each slice", placement, "mm");
+  html += "<h2>What happened</h2><table>\n";
+  for (const auto& [at_s, what] : notes_)
+    html += fmt::format("<tr><td class=\"n\">{:.2f} s</td><td>{}</td></tr>\n", at_s, escaped(what));
+  return write_file(path, html + "</table></html>\n");
+}
+
+}  // namespace limn::apps

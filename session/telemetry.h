@@ -1,0 +1,78 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "session/append_log.h"
+#include "core/frame.h"
+#include "core/result.h"
+
+namespace limn::apps {
+
+/// Quantiles of many values >= 0 in fixed memory, within 1 %: a histogram whose bins grow by 2 %.
+class Quantiles {
+ public:
+  void add(double value);
+  /// NaN while there are none.
+  double at(double share) const;
+  double mean() const { return count_ > 0 ? sum_ / static_cast<double>(count_) : 0; }
+  std::size_t count() const { return count_; }
+
+ private:
+  std::array<std::size_t, 1000> bins_{};
+  std::size_t count_ = 0;
+  double sum_ = 0, least_ = 0, most_ = 0;
+};
+
+/// One image's way from the camera to the light.
+struct ShownFrame {
+  Stamp captured_at;  ///< of the newest camera image in it
+  Stamp shown_at;
+  double detect_ms = 0, filter_ms = 0, paint_ms = 0, screen_ms = 0, record_ms = 0;
+  int markers = 0;           ///< in the newest images
+  int lost = 0;              ///< bodies
+  int missed = 0;            ///< camera images that never came or were not looked at
+  double placement_mm = -1;  ///< RMS over the parts, from their true places; -1: not known
+};
+
+/// What a session measured of itself, in memory that does not grow with time.
+class Telemetry {
+ public:
+  /// Begins telemetry.csv in the folder, one row an image shown; an empty path writes nothing.
+  static Result<Telemetry> create(const std::filesystem::path& folder);
+
+  void add(const ShownFrame& frame);
+  /// Something worth telling: a device gone, a look saved. The last 500 are kept.
+  void note(Stamp at, const std::string& what);
+  /// The notes kept, with the seconds of the session's clock.
+  const std::vector<std::pair<double, std::string>>& notes() const { return notes_; }
+
+  nlohmann::ordered_json summary() const;
+  /// A page for people: the summary, how times went over the session, what happened.
+  Status write_page(const std::filesystem::path& path, const std::string& title) const;
+
+ private:
+  struct Measure {
+    std::string name, unit, what;
+    Quantiles all;
+  };
+  struct Slice {  // of the session, some seconds
+    double begins_s = 0, latency_ms = 0, paint_ms = 0, placement_mm = 0;
+    int count = 0;
+  };
+  Telemetry();
+  void add_to_slice(const ShownFrame& frame, double latency_ms);
+
+  std::vector<Measure> measures_;
+  std::vector<Slice> slices_;
+  double slice_s_ = 0.5;
+  std::vector<std::pair<double, std::string>> notes_;
+  AppendLog csv_;
+  Stamp begun_at_, last_at_;
+  std::size_t frames_ = 0, missed_ = 0, with_lost_ = 0;
+};
+
+}  // namespace limn::apps

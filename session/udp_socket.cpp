@@ -1,0 +1,109 @@
+#include "session/udp_socket.h"
+
+#include <fcntl.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <memory>
+#include <utility>
+
+namespace limn::apps {
+namespace {
+
+struct FreeAddresses {
+  void operator()(addrinfo* all) const { freeaddrinfo(all); }
+};
+using Addresses = std::unique_ptr<addrinfo, FreeAddresses>;
+
+Result<Addresses> addresses_of(const NetPlace& place, int flags) {
+  addrinfo wanted = {};
+  wanted.ai_family = AF_UNSPEC;
+  wanted.ai_socktype = SOCK_DGRAM;
+  wanted.ai_flags = flags | AI_NUMERICSERV;
+  addrinfo* found = nullptr;
+  if (const int problem = getaddrinfo(place.host.c_str(), place.port.c_str(), &wanted, &found); problem != 0)
+    return error("{}: expected {}, found: {}.", place.host,
+                 flags & AI_NUMERICHOST ? "a numeric address" : "a host with an address",
+                 gai_strerror(problem));
+  return Addresses(found);
+}
+
+int open_for(const addrinfo& address) {
+  const int handle = socket(address.ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  const int yes = 1;
+  if (handle >= 0) setsockopt(handle, SOL_SOCKET, SO_BROADCAST, &yes, sizeof yes);
+  return handle;
+}
+
+}  // namespace
+
+Result<NetPlace> net_place(const std::string& text, const std::string& default_host, bool or_any) {
+  NetPlace place{default_host, text};
+  if (const auto colon = text.rfind(':'); colon != std::string::npos) {
+    place = {text.substr(0, colon), text.substr(colon + 1)};
+    if (place.host.size() > 2 && place.host.front() == '[' && place.host.back() == ']')
+      place.host = place.host.substr(1, place.host.size() - 2);
+  }
+  int port = -1;
+  const char* end = place.port.data() + place.port.size();
+  const auto [at, problem] = std::from_chars(place.port.data(), end, port);
+  if (problem != std::errc() || at != end || port < (or_any ? 0 : 1) || port > 65535)
+    return usage_error("expected a port from 1 to 65535, found '{}' in '{}'.", place.port, text);
+  if (place.host.empty())
+    return usage_error("expected an address before the port, found none in '{}'.", text);
+  return place;
+}
+
+Result<UdpSocket> UdpSocket::hearing(const NetPlace& place) {
+  LIMN_TRY(const Addresses addresses, addresses_of(place, AI_NUMERICHOST | AI_PASSIVE));
+  UdpSocket out(open_for(*addresses));
+  if (out.handle_ < 0 || bind(out.handle_, addresses->ai_addr, addresses->ai_addrlen) != 0)
+    return error("{}:{}: expected a free port at an address of this machine, found: {}. Take another port.",
+                 place.host, place.port, std::strerror(errno));
+  return out;
+}
+
+Result<UdpSocket> UdpSocket::sending(const NetPlace& place) {
+  LIMN_TRY(const Addresses addresses, addresses_of(place, 0));
+  UdpSocket out(open_for(*addresses));
+  if (out.handle_ < 0 || connect(out.handle_, addresses->ai_addr, addresses->ai_addrlen) != 0)
+    return error("{}:{}: expected a host that can be reached, found: {}.", place.host, place.port,
+                 std::strerror(errno));
+  return out;
+}
+
+UdpSocket::UdpSocket(UdpSocket&& other) noexcept : handle_(std::exchange(other.handle_, -1)) {}
+UdpSocket& UdpSocket::operator=(UdpSocket&& other) noexcept {
+  std::swap(handle_, other.handle_);
+  return *this;
+}
+UdpSocket::~UdpSocket() {
+  if (handle_ >= 0) close(handle_);
+}
+
+std::optional<std::size_t> UdpSocket::next(std::span<std::uint8_t> bytes) {
+  const ssize_t length = recv(handle_, bytes.data(), bytes.size(), MSG_TRUNC);
+  if (length < 0) return std::nullopt;
+  return static_cast<std::size_t>(length);
+}
+
+void UdpSocket::send(std::span<const std::uint8_t> bytes) {
+  // An error here is the last datagram's (nobody hears): this one is sent again.
+  if (::send(handle_, bytes.data(), bytes.size(), MSG_NOSIGNAL) < 0 && errno == ECONNREFUSED)
+    static_cast<void>(::send(handle_, bytes.data(), bytes.size(), MSG_NOSIGNAL));
+}
+
+int UdpSocket::port() const {
+  sockaddr_storage address = {};
+  socklen_t length = sizeof address;
+  if (getsockname(handle_, reinterpret_cast<sockaddr*>(&address), &length) != 0) return 0;
+  return ntohs(address.ss_family == AF_INET6 ? reinterpret_cast<const sockaddr_in6&>(address).sin6_port
+                                             : reinterpret_cast<const sockaddr_in&>(address).sin_port);
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,406 @@
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <set>
+#include <thread>
+
+#include "core/scale_resolution.h"
+#include "session/camera_threads.h"
+#include "session/device_session.h"
+#include "session/latest.h"
+#include "session/live_recalibration.h"
+#include "apps/replay.h"
+#include "session/source_clock.h"
+#include "remote/server.h"
+#include "tracker/marker_image.h"
+#include "core/file.h"
+#include "core/image_io.h"
+#include "device/gl_context.h"
+#include "device/jpeg.h"
+#include "device/image_sequence_camera.h"
+#include "sim/virtual_rig.h"
+#include "tests/remote/remote_client.h"
+#include "tests/support/clicker.h"
+#include "tests/support/matchers.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace test::literals;
+
+// Remembers what it was shown; its light leaves 20 ms later.
+class Canvas : public device::Display {
+ public:
+  Canvas(std::string name, cv::Size size) : name_(std::move(name)), size_(size) {}
+  const std::string& name() const override { return name_; }
+  cv::Size size() const override { return size_; }
+  Result<Stamp> show(const cv::Mat& image) override {
+    if (image.size() != size_) return error("{}: expected its size, found another.", name_);
+    shown = image.clone();
+    ++count;
+    most_lit = std::max(most_lit, cv::countNonZero(image.reshape(1)));
+    return shifted(std::chrono::steady_clock::now(), 0.020);
+  }
+  cv::Mat shown;
+  int count = 0, most_lit = 0;
+
+ private:
+  std::string name_;
+  cv::Size size_;
+};
+
+// A camera that sends JPEG, whose cable is out for a while.
+class LooseCamera : public device::CameraSource {
+ public:
+  LooseCamera(device::ImageSequenceCamera camera, int from, int until)
+      : camera_(std::move(camera)), from_(from), until_(until) {}
+  const std::string& name() const override { return camera_.name(); }
+  cv::Size size() const override { return camera_.size(); }
+  Result<Frame> next() override {
+    ++asked_;
+    if (asked_ >= from_ && asked_ < until_) return error("camera0: the cable is out.");
+    LIMN_TRY(const Frame taken, camera_.next());
+    const std::vector<std::uint8_t> jpeg = device::encode_jpeg(taken.image, 85);
+    LIMN_TRY(Frame frame, device::decode_frame({jpeg.begin(), jpeg.end()}));
+    frame.camera = taken.camera;
+    frame.captured_at = taken.captured_at;
+    return frame;
+  }
+
+ private:
+  device::ImageSequenceCamera camera_;
+  int from_, until_, asked_ = 0;
+};
+
+TEST(Latest, TheNewestWinsAndNothingQueues) {
+  Latest<int> box;
+  EXPECT_FALSE(box.take(std::chrono::milliseconds(1)));
+  std::thread writer([&] {
+    for (int i = 1; i <= 1000; ++i) box.put(i);
+  });
+  writer.join();
+  EXPECT_EQ(box.take(std::chrono::milliseconds(1)), 1000);
+  EXPECT_FALSE(box.take(std::chrono::milliseconds(1)));
+  box.put(3);
+  box.put(4, [](const int& old, int& next) { next += old; });
+  EXPECT_EQ(box.take(std::chrono::milliseconds(1)), 7);
+}
+
+TEST(SourceClock, StampsComeOntoTheSessionsClockAlsoWhenTheirClockSteps) {
+  const Stamp begun = shifted(Stamp{}, 5000);
+  SourceClock own;  // the session's clock, 30 ms on the way
+  for (int i = 0; i < 5; ++i) {
+    const Stamp now = shifted(begun, 0.1 * i);
+    const auto time = own.on_session_clock(shifted(now, -0.03), now);
+    EXPECT_NEAR(seconds_between(time.captured_at, now), 0.03, 1e-9);
+    EXPECT_FALSE(time.has_stepped);
+  }
+  EXPECT_FALSE(own.is_other());
+  for (const double step_s : {3600.0, -7200.0, 20.0}) {
+    const auto time = own.on_session_clock(shifted(begun, 1 + step_s), shifted(begun, 1));
+    EXPECT_TRUE(time.has_stepped);
+    EXPECT_NEAR(seconds_between(time.captured_at, shifted(begun, 1)), 0.03, 1e-6) << "as late as before";
+    const auto next = own.on_session_clock(shifted(begun, 1.1 + step_s), shifted(begun, 1.1));
+    EXPECT_FALSE(next.has_stepped);
+    EXPECT_NEAR(seconds_between(next.captured_at, shifted(begun, 1.1)), 0.03, 1e-6);
+  }
+  SourceClock video;
+  EXPECT_EQ(video.on_session_clock(Stamp{}, begun).captured_at, begun);
+  EXPECT_TRUE(video.is_other());
+}
+
+// A camera whose driver searches for it and does not come back.
+class StuckCamera : public device::CameraSource {
+ public:
+  explicit StuckCamera(std::shared_future<void> freed) : freed_(std::move(freed)) {}
+  const std::string& name() const override { return name_; }
+  cv::Size size() const override { return {64, 48}; }
+  Result<Frame> next() override {
+    freed_.wait();
+    return error("camera0: it is gone.");
+  }
+
+ private:
+  std::string name_ = "camera0";
+  std::shared_future<void> freed_;
+};
+
+TEST(CameraThreads, ACameraThatDoesNotComeBackIsLeft) {
+  std::promise<void> freed;
+  auto health = std::make_shared<DeviceHealth>();
+  const std::size_t number = health->add({"camera0", "camera"});
+  auto threads = std::make_unique<CameraThreads>(health);
+  threads->add(std::make_unique<StuckCamera>(freed.get_future().share()), number);
+  EXPECT_FALSE(threads->take(std::chrono::milliseconds(10)).has_value());
+  const auto begun = std::chrono::steady_clock::now();
+  testing::internal::CaptureStderr();
+  threads.reset();
+  EXPECT_NE(testing::internal::GetCapturedStderr().find("camera0 did not come back"), std::string::npos);
+  EXPECT_LT(seconds_between(begun, std::chrono::steady_clock::now()), 1.5);
+  freed.set_value();
+  for (int i = 0; i < 500 && health.use_count() > 1; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_EQ(health.use_count(), 1) << "its thread has ended and taken everything with it";
+}
+
+// Brightness by JPEG itself is not what its colours make of it.
+TEST(Recorder, AFrameIsReadAsItWasWatched) {
+  const fs::path folder = test::test_folder();
+  const sim::World world =
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+  SessionSetup setup;
+  setup.rig = world.rig;
+  setup.scene = *world.scene;
+  cv::Mat colours(48, 64, CV_8UC3);
+  cv::randu(colours, 0, 256);
+  const std::vector<std::uint8_t> jpeg = device::encode_jpeg(colours, 90);
+  Frame sent = device::decode_frame({jpeg.begin(), jpeg.end()}).value();
+  sent.camera = "camera0";
+  const Frame taken{"camera0", colours, {}};
+  auto recorder = Recorder::create(folder / "recording", setup).value();
+  recorder->watched(std::vector{sent, taken});
+  ASSERT_TRUE(recorder->finish().ok());
+  const auto first = load_frame(folder / "recording/frames/camera0/000000.jpg");
+  ASSERT_TRUE(first) << first.message();
+  EXPECT_TRUE(test::image_near(first->image, sent.image, 0, 0, "image"));
+  EXPECT_TRUE(test::image_near(first->grey, sent.grey, 0, 0, "brightness"));
+  EXPECT_GT(cv::norm(first->grey, to_grey(sent.image), cv::NORM_INF), 0);
+  const auto second = load_frame(folder / "recording/frames/camera0/000001.png");
+  ASSERT_TRUE(second) << second.message();
+  EXPECT_TRUE(test::image_near(second->image, colours, 0, 0, "picture"));
+  EXPECT_FALSE(load_frame(folder / "recording/frames/camera0/000002.jpg"));
+}
+
+// Threads as of a real rig, on stored images of the studio at their pace; a recording of it replays as the
+// threads ran.
+TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
+  const fs::path folder = test::test_folder();
+  sim::World world =
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+  ASSERT_TRUE(scale_resolution(0.5, &world.rig).ok());
+  SessionSetup setup;
+  setup.rig = world.rig;
+  setup.scene = *world.scene;
+  sim::VirtualRig room(std::move(world), {.grab_waits_for_light = false});
+  ASSERT_TRUE(make_folder(folder / "pictures").ok());
+  for (int i = 0; i < 3; ++i)
+    ASSERT_TRUE(write_png(folder / "pictures" / fmt::format("{}.png", i), room.camera(0).next()->image).ok());
+
+  const auto context = device::GlContext::create();
+  ASSERT_TRUE(context) << context.message();
+  auto output = SessionOutput::open(folder / "out", folder / "recording", &setup);
+  ASSERT_TRUE(output) << output.message();
+  auto perception = Perception::create(setup.scene, setup.rig, setup.watch);
+  ASSERT_TRUE(perception) << perception.message();
+  auto session = Session::create(setup, &output->telemetry(), output->recorder());
+  ASSERT_TRUE(session) << session.message();
+  SessionDevices devices;
+  devices.cameras.push_back(std::make_unique<LooseCamera>(
+      device::ImageSequenceCamera::open(folder / "pictures", {.frames_per_second = 20, .repeat = true}).value(), 8,
+      16));
+  const Imager& first = setup.rig.projectors[0];
+  auto canvas = std::make_unique<Canvas>(first.name, cv::Size(first.width, first.height));
+  const Canvas& projector = *canvas;
+  devices.projectors.push_back(std::move(canvas));
+  devices.projectors.push_back(nullptr);  // the second was not found
+  auto wide = std::make_unique<Canvas>("screen", cv::Size(640, 480));
+  const Canvas& screen = *wide;
+  devices.screens.push_back(std::move(wide));
+
+  const test::Clicker clicker(folder / "clicker");
+  devices.keys.push_back(device::KeySource::open({"clicker", folder / "clicker"}).value());
+  clicker.send(EV_KEY, KEY_PAGEDOWN, 1);
+
+  const std::atomic<bool> is_ended = false;
+  const auto begun = std::chrono::steady_clock::now();
+  const Status played =
+      play_on_devices(&devices, 2.5, is_ended, &*perception, &*session, &*output, nullptr, nullptr, nullptr);
+  const double took_s = seconds_between(begun, std::chrono::steady_clock::now());
+  ASSERT_TRUE(played.ok()) << played.message();
+  EXPECT_LT(took_s, 2.5 + 1 + 1.5);  // its end, and an image that was being painted on a slow machine
+  EXPECT_GE(projector.count, 1);
+  EXPECT_GT(projector.most_lit, 1000);  // on a slow machine the last may be of the time without a camera
+  EXPECT_GT(screen.most_lit, 1000);
+  EXPECT_EQ(cv::countNonZero(screen.shown.row(10).reshape(1)), 0);  // bars above a wider image
+  ASSERT_TRUE(output->close(&*session, false).ok());
+  const std::string page = read_file(folder / "out/session.html").value();
+  EXPECT_NE(page.find("camera0 is gone; the session goes on without it: camera0: the cable is out"),
+            std::string::npos);
+  EXPECT_NE(page.find("camera0 is back"), std::string::npos);
+  EXPECT_NE(page.find("next_variant mirror (clicker)"), std::string::npos);
+
+  const std::string events = read_file(folder / "recording/events.jsonl").value();
+  EXPECT_NE(events.find("frames/camera0/000000.jpg"), std::string::npos);
+  EXPECT_EQ(events.find(".png"), std::string::npos);
+  ReplayOptions replay;
+  replay.session = folder / "recording";
+  const Status replayed = run_replay(replay);
+  EXPECT_TRUE(replayed.ok()) << replayed.message();
+}
+
+// A room of which threads have their turns; its cameras' stamps are of the session's clock.
+struct SharedRoom {
+  sim::VirtualRig rig;
+  std::mutex mutex;
+};
+
+class RoomCamera : public device::CameraSource {
+ public:
+  RoomCamera(SharedRoom* room, int index) : room_(room), index_(index) {}
+  const std::string& name() const override { return room_->rig.camera(index_).name(); }
+  cv::Size size() const override { return room_->rig.camera(index_).size(); }
+  Result<Frame> next() override {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    const std::lock_guard lock(room_->mutex);
+    const Stamp exposed_at = std::chrono::steady_clock::now();
+    LIMN_TRY(Frame frame, room_->rig.camera(index_).next());
+    frame.captured_at = exposed_at;
+    return frame;
+  }
+
+ private:
+  SharedRoom* room_;
+  int index_;
+};
+
+class RoomProjector : public device::Display {
+ public:
+  RoomProjector(SharedRoom* room, int index) : room_(room), index_(index) {}
+  const std::string& name() const override { return room_->rig.projector(index_).name(); }
+  cv::Size size() const override { return room_->rig.projector(index_).size(); }
+  Result<Stamp> show(const cv::Mat& image) override {
+    const std::lock_guard lock(room_->mutex);
+    const Result<Stamp> shown_at = room_->rig.projector(index_).show(image);
+    return shown_at ? Result<Stamp>(std::chrono::steady_clock::now()) : shown_at;
+  }
+
+ private:
+  SharedRoom* room_;
+  int index_;
+};
+
+// A camera that was nudged is found by the session's own devices, whose threads go on with the mended rig.
+TEST(LiveDevices, IsRepairedWhileItRuns) {
+  const fs::path folder = test::test_folder();
+  sim::World world =
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+  ASSERT_TRUE(scale_resolution(0.5, &world.rig).ok());
+  SessionSetup setup;
+  setup.rig = world.rig;
+  setup.rig.provenance_json = R"({"display_latency_ms": {"projector0": 0, "projector1": 0}})";
+  setup.scene = *world.scene;
+  Pose& moved = world.rig.cameras[0].imager_from_world;
+  moved = Pose(exp_rotation(Eigen::Vector3d(0, 0.25, 0) * M_PI / 180), Eigen::Vector3d::Zero()) * moved;
+  const Pose truth = moved, world_from_prototype = world.world_from_prototype;
+  SharedRoom room{sim::VirtualRig(std::move(world), {.display_delay_s = 0, .grab_waits_for_light = false}),
+                  {}};
+  const auto context = device::GlContext::create();
+  ASSERT_TRUE(context) << context.message();
+  auto output = SessionOutput::open(folder / "out", folder / "recording", &setup);
+  ASSERT_TRUE(output) << output.message();
+  auto perception = Perception::create(setup.scene, setup.rig, setup.watch);
+  auto session = Session::create(setup, &output->telemetry(), output->recorder());
+  ASSERT_TRUE(perception && session);
+  SessionDevices devices;
+  devices.cameras.push_back(std::make_unique<RoomCamera>(&room, 0));
+  for (int i = 0; i < 2; ++i) devices.projectors.push_back(std::make_unique<RoomProjector>(&room, i));
+  // Meanwhile guests are answered, and told how far it is.
+  ASSERT_TRUE(make_folder(folder / "page").ok());
+  ASSERT_TRUE(write_file(folder / "page/index.html", "<title>Limn</title>").ok());
+  const auto server = Server::open({.at = "0", .page = folder / "page", .keys = {}}, {}).value();
+  ASSERT_TRUE(session->edit({"repair", "", ""}, "test", {}));
+  std::atomic<bool> is_ended = false;
+  double longest_s = 0, repair_s = 0;
+  std::set<std::string> told;
+  std::thread guest([&] {
+    const auto ask = [&](const std::string& path, const nlohmann::json& body, const std::string& token) {
+      return nlohmann::json::parse(test::RemoteClient(server->port()).post(path, body.dump(), token).body);
+    };
+    const std::string token = ask("/api/pair", {{"pin", server->invitation().pins[2]}}, "")["token"];
+    const auto begun = std::chrono::steady_clock::now();
+    for (int i = 0; i < 600 && !fs::exists(folder / "recording/rig-2"); ++i) {
+      const auto asked = std::chrono::steady_clock::now();
+      (void)ask("/api/edit", {{"action", "grid"}, {"value", i % 2 ? "on" : "off"}}, token);
+      longest_s = std::max(longest_s, seconds_between(asked, std::chrono::steady_clock::now()));
+      const std::string state = test::RemoteClient(server->port()).get("/api/state", token).body;
+      told.insert(nlohmann::json::parse(state)["repair"]);
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
+    repair_s = seconds_between(begun, std::chrono::steady_clock::now());
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    is_ended = true;
+  });
+  const Status played =
+      play_on_devices(&devices, 60, is_ended, &*perception, &*session, &*output, nullptr, nullptr, server.get());
+  guest.join();
+  ASSERT_TRUE(played.ok()) << played.message();
+  ASSERT_TRUE(output->close(&*session, false).ok());
+  std::printf("during a repair of %.1f s an edit took %.2f s at most\n", repair_s, longest_s);
+  EXPECT_LT(longest_s, 0.4 * repair_s) << "a picture that is painted, and a painter for the mended rig";
+  EXPECT_TRUE(told.contains("computing"));
+  EXPECT_GT(std::count_if(told.begin(), told.end(),
+                          [](const std::string& words) { return words.ends_with(" patterns"); }),
+            3);
+  EXPECT_EQ(session->repairing(), "");
+  EXPECT_TRUE(
+      test::pose_near(session->setup().rig.cameras[0].imager_from_world, truth, 0.02 * M_PI / 180, 0.0015));
+  ASSERT_TRUE(session->painted().posed.world_from_prototype);
+  EXPECT_TRUE(
+      test::pose_near(*session->painted().posed.world_from_prototype, world_from_prototype, 0.2_deg, 1.5_mm));
+  EXPECT_GT(cv::countNonZero(session->painted().projectors[1].reshape(1)), 1000);
+  ReplayOptions replay;
+  replay.session = folder / "recording";
+  const Status replayed = run_replay(replay);
+  EXPECT_TRUE(replayed.ok()) << replayed.message();
+
+  // Whatever it is at, it ends in time: with the images that were taken.
+  for (const bool is_computing : {false, true}) {
+    std::vector<fs::path> shown;
+    auto repair = std::make_unique<LiveRecalibration>(
+        setup.rig, folder / fmt::format("ended-{}", is_computing), [&](ImageWriter* writer) {
+          Surroundings around;
+          around.stage.show = [&](int projector, const cv::Mat&) -> Status {
+            const fs::path images =
+                folder / fmt::format("out/repaired-1/captures/pose00/projector{}/camera0", projector);
+            const auto before = std::count_if(shown.begin(), shown.end(), [&](const fs::path& path) {
+              return path.parent_path() == images;
+            });
+            shown.push_back(images / fmt::format("{:03}.png", before));
+            return {};
+          };
+          around.stage.grab = [&](int) { return read_image(shown.back()); };
+          around.stage.store = [writer](const fs::path& path, const cv::Mat& image) {
+            return writer->store(path, image);
+          };
+          around.written = [writer] { return writer->finish(); };
+          around.use_latency = [](int, double) {};
+          return around;
+        });
+    while (is_computing ? repair->is_capturing() : shown.size() < 10)
+      repair->serve(std::chrono::milliseconds(10));
+    EXPECT_FALSE(repair->take());
+    const auto begun = std::chrono::steady_clock::now();
+    repair.reset();
+    const double took_s = seconds_between(begun, std::chrono::steady_clock::now());
+    std::printf("a repair that was %s ended in %.2f s\n", is_computing ? "computing" : "capturing", took_s);
+    EXPECT_LT(took_s, 0.5);
+  }
+}
+
+TEST(LiveDevices, SaysWhatIsMissing) {
+  SessionDevices devices;
+  const std::atomic<bool> is_ended = false;
+  const Status played =
+      play_on_devices(&devices, 1, is_ended, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr);
+  ASSERT_FALSE(played.ok());
+  EXPECT_NE(played.message().find("a camera that works"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace limn::apps

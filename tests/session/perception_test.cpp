@@ -1,0 +1,178 @@
+#include "session/perception.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "session/script.h"
+#include "sim/virtual_rig.h"
+#include "tests/session/studio.h"
+#include "tests/support/matchers.h"
+#include "tracker/predict.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Light on a marker in a hand arrives where the marker then is: 0.5 Hz, 0.25 m/s at most, 60 ms late.
+TEST(Perception, PredictionMakesUpForTheLag) {
+  constexpr double k_lag_s = 0.060, k_begins_s = 0.5, k_ends_s = 2.0, k_runs_s = 2.4;
+  constexpr double k_amplitude_m = 0.25 / (2 * M_PI * 0.5);
+  const fs::path folder = test::test_folder();
+  const auto script = load_script(
+      written(folder / "script.json", script_of(k_runs_s, {{{"at_s", k_begins_s},
+                                                            {"until_s", k_ends_s},
+                                                            {"sway", k_mirror},
+                                                            {"amplitude_m", {k_amplitude_m, 0, 0}},
+                                                            {"hz", 0.5}}})));
+  ASSERT_TRUE(script) << script.message();
+  const MarkerName marker = MarkerName::parse(k_mirror).value();
+  sim::World world = studio(1);
+  const Pose world_from_marker = *sim::world_from_marker(world, marker);
+  const Eigen::Vector3d p_eye = world.rig.cameras[0].imager_from_world.inverse().translation;
+  const Pose camera_from_world = looking_at(p_eye, world_from_marker.translation, Eigen::Vector3d::UnitZ());
+  world.rig.cameras[0] = viewer_imager(camera_from_world.inverse(), 640, 320, 11);  // the marker: 62 px
+  world.rig.cameras[0].name = "camera0";
+  sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
+  auto room = ScriptedRoom::create(*script, &rig);
+  ASSERT_TRUE(room) << room.message();
+  auto perception = Perception::create(*rig.world().scene, rig.world().rig);
+  ASSERT_TRUE(perception) << perception.message();
+  double filtered = 0, held = 0, still = 0, overshoot_m = 0;
+  int moving = 0, resting = 0;
+  while (rig.next_exposure() < shifted(Stamp{}, k_runs_s)) {
+    const double captured_s = seconds_between(Stamp{}, rig.next_exposure());
+    room->set(captured_s);
+    const int camera = 0;
+    const Percepts& watched = perception->watch(rig.expose(std::span(&camera, 1)));
+    const double shown_s = captured_s + k_lag_s;
+    const Eigen::Vector3d p_true = room->world_from_marker(marker, shown_s).translation;
+    const auto off = [&](tracker::Prediction how) {
+      for (const Track& track : tracker::predicted(watched.motions, shifted(Stamp{}, shown_s), how))
+        if (track.body == "mirror") return (track.world_from_body.translation - p_true).norm();
+      return 1.0;
+    };
+    const double now = off(tracker::Prediction::filtered);
+    if (shown_s > 0.3 && shown_s < k_begins_s) {
+      still += now * now;
+      ++resting;
+    }
+    if (shown_s > k_begins_s + 0.3 && shown_s < k_ends_s) {
+      filtered += now * now;
+      held += std::pow(off(tracker::Prediction::hold), 2);
+      ++moving;
+    }
+    if (shown_s >= k_ends_s) overshoot_m = std::max(overshoot_m, now);  // at the turn, where it stops
+  }
+  const double filtered_mm = 1e3 * std::sqrt(filtered / moving), held_mm = 1e3 * std::sqrt(held / moving);
+  std::printf("in motion %.2f mm RMS, without prediction %.2f; after the stop at most %.2f; still %.3f\n",
+              filtered_mm, held_mm, 1e3 * overshoot_m, 1e3 * std::sqrt(still / resting));
+  EXPECT_LE(filtered_mm, 1.5);
+  EXPECT_LE(filtered_mm, 0.15 * held_mm);
+  EXPECT_LE(1e3 * overshoot_m, 3);
+  EXPECT_LE(1e3 * std::sqrt(still / resting), 0.1);
+}
+
+TEST(Perception, LooksForCoveredMarkersWhileOneIsMissing) {
+  sim::World world = studio(1);
+  const MarkerName control = MarkerName::parse("apriltag_36h11:9").value();
+  world.scene->controls = {{control, "next_variant", "mirror", "cover"}};
+  const Pose lying(Eigen::Quaterniond(0.707106781, -0.707106781, 0, 0), {-0.35, -0.15, 0.45});
+  ASSERT_TRUE(sim::add_marker(world, {control, 0.05, lying}, false, marker_image));
+  sim::VirtualRig rig(world, {.grab_waits_for_light = false});
+  const int camera = 0;
+  Frame whole = rig.expose(std::span(&camera, 1))[0];
+  auto perception = Perception::create(*world.scene, world.rig);
+  ASSERT_TRUE(perception) << perception.message();
+  const auto found_in = [&](const Frame& frame) -> std::optional<tracker::Detection> {
+    whole.captured_at = shifted(whole.captured_at, 1 / 30.0);
+    for (const tracker::Detection& found :
+         perception->watch(std::vector<Frame>{{frame.camera, frame.image, whole.captured_at}}).detections[0])
+      if (found.marker == control) return found;
+    return std::nullopt;
+  };
+  const auto marker = found_in(whole);
+  ASSERT_TRUE(marker);
+  std::vector<cv::Point> outline;
+  for (const Eigen::Vector2d& corner : marker->corners_px)
+    outline.emplace_back(static_cast<int>(corner.x()), static_cast<int>(corner.y()));
+  const int side = static_cast<int>(cv::norm(outline[1] - outline[0]));
+  Frame gone{whole.camera, whole.image.clone(), {}}, covered{whole.camera, whole.image.clone(), {}};
+  cv::fillConvexPoly(gone.image, outline, cv::Scalar::all(40));
+  cv::circle(covered.image, 0.5 * (outline[0] + outline[1]), side / 7, cv::Scalar::all(40), cv::FILLED);
+  EXPECT_FALSE(found_in(gone));
+  std::optional<tracker::Detection> found;
+  int images = 0;
+  for (; images < 3 && !found; ++images) found = found_in(covered);
+  ASSERT_TRUE(found) << "in " << images << " pictures";
+}
+
+// A camera that is swung round: markers are found where they should be by now, not searched for.
+TEST(Perception, FollowsMarkersThatMoveByMoreThanHalfTheirSideAnImage) {
+  sim::World world = studio(1);
+  sim::VirtualRig rig(world, {.grab_waits_for_light = false});
+  const int camera = 0;
+  const Frame still = rig.expose(std::span(&camera, 1))[0];
+  auto perception = Perception::create(*world.scene, world.rig);
+  ASSERT_TRUE(perception) << perception.message();
+  const std::size_t all = perception->watch(std::span(&still, 1)).detections[0].size();
+  ASSERT_GE(all, 5u);
+  const auto& c = perception->watched().detections[0][0].corners_px;
+  const double side = (c[1] - c[0]).norm();
+  double moved = 0;
+  int image = 0;
+  for (const double sides : {0.3, 0.6, 0.8, 0.8, 0.8}) {
+    moved += std::round(sides * side);
+    Frame frame{still.camera, {}, shifted(still.captured_at, ++image / 30.0)};
+    const cv::Matx23d away(1, 0, -moved, 0, 1, 0);
+    cv::warpAffine(still.image, frame.image, away, still.image.size(), cv::INTER_NEAREST);
+    std::size_t followed = 0;
+    for (const tracker::Detection& found : perception->watch(std::span(&frame, 1)).detections[0])
+      followed +=
+          (found.unshadowed && found.unshadowed->age > 0) || (found.by_pattern && found.by_pattern->age > 0);
+    EXPECT_EQ(followed, all) << image;
+  }
+}
+
+TEST(Perception, ReadsWhatControlMarkersSay) {
+  sim::World world = studio(0.5);
+  world.scene->controls = {{MarkerName::parse("aruco_4x4_50:9").value(), "next_variant", "mirror", "cover"}};
+  ASSERT_TRUE(
+      sim::add_marker(world,
+                      {world.scene->controls[0].marker, 0.05,
+                       Pose(Eigen::Quaterniond(0.707106781, -0.707106781, 0, 0), {-0.35, -0.15, 0.45})},
+                      false, marker_image));
+  const fs::path folder = test::test_folder();
+  const auto script =
+      load_script(written(folder / "script.json",
+                          script_of(2, {{{"at_s", 0.4}, {"until_s", 1.5}, {"cover", "aruco_4x4_50:9"}}})));
+  ASSERT_TRUE(script) << script.message();
+  const scene::Scene scene = *world.scene;
+  sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
+  auto room = ScriptedRoom::create(*script, &rig);
+  auto perception = Perception::create(scene, rig.world().rig);
+  ASSERT_TRUE(room);
+  ASSERT_TRUE(perception);
+  std::vector<double> used_s;
+  for (int i = 0; i < 55; ++i) {
+    const double at_s = seconds_between(Stamp{}, rig.next_exposure());
+    room->set(at_s);
+    const int camera = 0;
+    for (const ControlUse& use : perception->watch(rig.expose(std::span(&camera, 1))).uses) {
+      EXPECT_EQ(use.control, 0u);
+      EXPECT_EQ(use.steps, 1);
+      used_s.push_back(at_s);
+    }
+  }
+  ASSERT_EQ(used_s.size(), 1u);
+  EXPECT_GT(used_s[0], 0.85);
+  EXPECT_LT(used_s[0], 1.05);
+}
+
+}  // namespace
+}  // namespace limn::apps

@@ -1,0 +1,12 @@
+#include "tracker/marker_image.h"
+
+#include "tracker/family.h"
+
+namespace limn::apps {
+
+Result<cv::Mat> marker_image(const MarkerName& marker) {
+  constexpr int k_pixels_per_cell = 8;  // cells are plain: any number draws the same edges
+  return tracker::draw_marker(marker, k_pixels_per_cell);
+}
+
+}  // namespace limn::apps

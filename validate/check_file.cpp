@@ -1,0 +1,336 @@
+#include "validate/check_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "core/scale_resolution.h"
+#include "tracker/marker_image.h"
+#include "core/config.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+int side_px(const ConfigNode& node, double value) {
+  if (value >= 1 && value <= 16384 && value == std::floor(value)) return static_cast<int>(value);
+  node.problem(fmt::format("expected a whole number of pixels from 1 to 16384, found {}.", value));
+  return 1;
+}
+
+// As a viewer file, or with eye_m and target_m instead of the pose.
+Imager read_imager(const ConfigNode& node) {
+  std::vector<double> size = node.at("size").numbers(2);
+  size.resize(2, 1);
+  const int width = side_px(node.at("size"), size[0]), height = side_px(node.at("size"), size[1]);
+  double fov_deg = node.at("fov_deg").positive();
+  if (fov_deg >= 180) {
+    node.at("fov_deg").problem(fmt::format("expected an angle below 180 degrees, found {}.", fov_deg));
+    fov_deg = 40;
+  }
+  if (const auto pose = node.find("world_from_viewer"))
+    return viewer_imager(pose->pose(), width, height, fov_deg);
+  const Eigen::Vector3d p_eye = node.at("eye_m").vector3(), p_target = node.at("target_m").vector3();
+  const Eigen::Vector3d d = p_target - p_eye;
+  if (d.head<2>().norm() < 1e-6 * std::max(1.0, d.norm())) {
+    node.at("target_m")
+        .problem(
+            "expected a target apart from the eye and not straight above or below it. Give "
+            "world_from_viewer instead.");
+    return viewer_imager({}, width, height, fov_deg);
+  }
+  return viewer_imager(looking_at(p_eye, p_target, Eigen::Vector3d::UnitZ()).inverse(), width, height,
+                       fov_deg);
+}
+
+struct Viewer {
+  Imager imager;
+  double weight = 1;
+};
+
+Viewer read_viewer(const ConfigNode& node, bool is_one_of_several) {
+  if (!is_one_of_several) {
+    node.only({"world_from_viewer", "eye_m", "target_m", "size", "fov_deg"});
+    return {read_imager(node)};
+  }
+  node.only({"world_from_viewer", "eye_m", "target_m", "size", "fov_deg", "weight"});
+  Viewer viewer{read_imager(node)};
+  if (const auto weight = node.find("weight")) viewer.weight = weight->positive();
+  return viewer;
+}
+
+// One, or a list of several.
+std::vector<Viewer> read_viewers(const ConfigNode& node) {
+  if (!node.is_array()) return {read_viewer(node, false)};
+  std::vector<Viewer> viewers;
+  for (const ConfigNode& item : node.items()) viewers.push_back(read_viewer(item, true));
+  if (viewers.empty()) node.problem("expected at least one viewer, found none.");
+  return viewers;
+}
+
+std::vector<CheckLimit> read_limits(const ConfigNode& node) {
+  std::set<std::string> known;
+  for (const CheckMeasure& measure : check_measures()) known.insert(measure.name);
+  node.only(known);
+  std::vector<CheckLimit> limits;
+  for (const CheckMeasure& measure : check_measures()) {
+    const auto limit = node.find(measure.name);
+    if (!limit) continue;
+    limits.push_back({measure, limit->number()});
+    if (limits.back().value < 0)
+      limit->problem(fmt::format("expected a limit that is not negative, found {}.", limits.back().value));
+  }
+  if (limits.empty()) {
+    std::string names;
+    for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
+    node.problem(fmt::format("expected at least one limit of: {}; found none.", names));
+  }
+  return limits;
+}
+
+// The world with another scene's prototype in it instead of its own.
+void put_on_stage(scene::Scene scene, sim::World* world) {
+  world->scene = std::move(scene);
+  std::erase_if(world->objects, [](const sim::Object& object) { return object.name == "prototype"; });
+  if (!world->scene->prototype) return;
+  sim::Object object;
+  object.name = "prototype";
+  object.mesh = std::make_shared<scene::Mesh>(world->scene->prototype->mesh);
+  object.world_from_object = world->world_from_prototype;
+  object.prototype_from_object = Pose();
+  world->objects.push_back(std::move(object));
+}
+
+const scene::Slot* known_slot(const scene::Scene& scene, const std::string& name, const ConfigNode& node) {
+  const scene::Slot* slot = scene.find_slot(name);
+  if (slot) return slot;
+  std::string names;
+  for (const scene::Slot& known : scene.slots) names += (names.empty() ? "" : ", ") + known.name;
+  node.problem(fmt::format("expected a slot of the scene ({}), found '{}'.", names, name));
+  return nullptr;
+}
+
+struct SlotPlace {
+  std::optional<Pose> world_from_part;
+  std::string variant;
+};
+
+SlotPlace read_slot(const ConfigNode& node, const scene::Slot& slot, const Pose& world_from_prototype) {
+  node.only({"world_from_part", "prototype_from_part", "variant"});
+  SlotPlace place;
+  if (const auto pose = node.find("prototype_from_part"))
+    place.world_from_part = world_from_prototype * pose->pose();
+  if (const auto pose = node.find("world_from_part")) place.world_from_part = pose->pose();
+  if (const auto variant = node.find("variant")) {
+    std::vector<std::string> names;
+    for (const scene::Variant& known : slot.variants) names.push_back(known.name);
+    place.variant = variant->choice(names);
+  }
+  return place;
+}
+
+// Everything where the world has it, but for what the file says.
+scene::PosedScene read_poses(const ConfigNode& node, sim::World* world) {
+  node.only({"world_from_prototype", "slots", "shown"});
+  const scene::Scene& scene = *world->scene;
+  if (const auto pose = node.find("world_from_prototype")) sim::move_prototype(*world, pose->pose());
+  std::vector<std::string> variants(scene.slots.size());
+  std::vector<SlotPlace> places(scene.slots.size());
+  if (const auto slots = node.find("slots")) {
+    for (const std::string& name : slots->keys()) {
+      const scene::Slot* slot = known_slot(scene, name, slots->at(name));
+      if (!slot) continue;
+      const auto i = static_cast<std::size_t>(slot - scene.slots.data());
+      places[i] = read_slot(slots->at(name), *slot, world->world_from_prototype);
+      variants[i] = places[i].variant;
+    }
+  }
+  std::set<std::string> shown;
+  for (const scene::Slot& slot : scene.slots) shown.insert(slot.name);
+  if (const auto names = node.find("shown")) {
+    shown.clear();
+    for (const ConfigNode& name : names->items())
+      if (known_slot(scene, name.text(), name)) shown.insert(name.text());
+  }
+  const scene::PosedScene standing = sim::true_poses(*world, variants);
+  scene::PosedScene posed{world->world_from_prototype, {}, standing.viewpoints};
+  for (std::size_t i = 0; i < scene.slots.size(); ++i) {
+    const scene::Slot& slot = scene.slots[i];
+    if (!shown.contains(slot.name)) continue;
+    const auto found = std::find_if(standing.parts.begin(), standing.parts.end(),
+                                    [&](const scene::PosedPart& part) { return part.slot == slot.name; });
+    if (places[i].world_from_part) {
+      const std::string& variant = places[i].variant;
+      posed.parts.push_back(
+          {slot.name, variant.empty() ? slot.variants.front().name : variant, *places[i].world_from_part});
+    } else if (found != standing.parts.end()) {
+      posed.parts.push_back(*found);
+    } else {
+      node.problem(fmt::format(
+          "expected slots.{}.world_from_part, for no marker of it stands in the world, found none.",
+          slot.name));
+    }
+  }
+  return posed;
+}
+
+Result<scene::PosedScene> poses_of(const std::optional<ConfigNode>& node,
+                                   const fs::path& folder,
+                                   sim::World* world) {
+  if (!node || !node->is_string()) return read_poses(node.value_or(ConfigNode()), world);
+  LIMN_TRY(scene::PosedScene posed, scene::load_poses(folder / node->text(), *world->scene));
+  if (posed.world_from_prototype) sim::move_prototype(*world, *posed.world_from_prototype);
+  posed.world_from_prototype = world->world_from_prototype;
+  posed.viewpoints = sim::true_poses(*world).viewpoints;
+  return posed;
+}
+
+void coarsen(const ConfigNode& node, Rig* rig) {
+  const Status done = scale_resolution(node.positive(), rig);
+  if (!done) node.problem(done.message());
+}
+
+// Those of the file, else of the scene. Of several the eye that they share, in an image like the first
+// one's.
+Status choose_viewer(const std::vector<Viewer>& told, Check* check) {
+  const scene::Scene& scene = check->told.scene;
+  std::vector<scene::Viewpoint> eyes = check->posed.viewpoints;
+  std::optional<Imager> like;
+  if (!told.empty()) {
+    eyes.clear();
+    like = told[0].imager;
+    for (const Viewer& viewer : told)
+      eyes.push_back({fmt::format("viewer{}", eyes.size()),
+                      viewer.imager.imager_from_world.inverse().translation, viewer.weight});
+  } else if (!scene.viewers.empty()) {
+    like = scene.viewers[0].fixed;
+  }
+  const bool is_alone = told.empty() ? scene.viewers.size() == 1 : told.size() == 1;
+  if (is_alone && like) {
+    check->viewer = *like;
+    return {};
+  }
+  const Eigen::Vector3d d_up_world = Eigen::Vector3d::UnitZ();
+  if (eyes.empty()) return error("viewer: expected one, for the scene has none in the world, found nothing.");
+  const scene::SharedViewpoint shared = scene::updated_viewpoint({}, eyes, *scene::middle_of(scene, check->posed), 0);
+  const auto viewer = scene::viewer_at(*shared.p_world(), scene, check->posed, d_up_world);
+  if (!viewer)
+    return error("viewer: expected viewers apart from the prototype, found their eye in its middle.");
+  check->viewer = *viewer;
+  if (like) {
+    const double half = 0.5 * like->width / like->lens.fx();
+    check->viewer = viewer_imager(viewer->imager_from_world.inverse(), like->width, like->height,
+                                  360 / std::numbers::pi * std::atan(half));
+  }
+  if (eyes.size() > 1) check->shares = shared.shares;
+  return {};
+}
+
+// Moves the light of a projector by so many of its pixels: what a push against it does.
+void nudge(const ConfigNode& node, Rig* rig) {
+  for (const std::string& name : node.keys()) {
+    const auto projector = std::find_if(rig->projectors.begin(), rig->projectors.end(),
+                                        [&](const Imager& p) { return p.name == name; });
+    if (projector == rig->projectors.end()) {
+      std::string names;
+      for (const Imager& known : rig->projectors) names += (names.empty() ? "" : ", ") + known.name;
+      node.at(name).problem(fmt::format("expected a projector of the world ({}), found '{}'.", names, name));
+      continue;
+    }
+    std::vector<double> px = node.at(name).numbers(2);
+    px.resize(2, 0);
+    projector->lens.values[2] += px[0];  // the principal point
+    projector->lens.values[3] += px[1];
+  }
+}
+
+Hand read_hand(const ConfigNode& node, const Rig& rig) {
+  node.only({"before", "at", "aim_m"});
+  std::vector<std::string> names;
+  for (const Imager& projector : rig.projectors) names.push_back(projector.name);
+  Hand hand;
+  const auto found = std::find(names.begin(), names.end(), node.at("before").choice(names));
+  if (found != names.end()) hand.projector = static_cast<std::size_t>(found - names.begin());
+  hand.p_aim = node.at("aim_m").vector3();
+  hand.at = node.at("at").positive();
+  if (hand.at >= 1)
+    node.at("at").problem(fmt::format("expected a share of the way below 1, found {}.", hand.at));
+  return hand;
+}
+
+}  // namespace
+
+const std::vector<CheckMeasure>& check_measures() {
+  static const std::vector<CheckMeasure> measures = {
+      {"texture_mm", "surface light from where it was aimed, RMS", "mm"},
+      {"parallax_mm", "points 50 mm off the surface, seen from the eye, worst", "mm"},
+      {"shared_mm", "the same, seen by the viewers who share the eye, RMS", "mm"},
+      {"shone_mean_255", "light on the prototype against the ray tracer, mean of lit pixels", "/255"},
+      {"shone_over4_share", "light on the prototype, pixels more than 4/255 off", ""},
+      {"shone_inner_over4_share", "light on the prototype off edges, pixels more than 4/255 off", ""},
+      {"drawn_mean_255", "parts over a camera picture against the ray tracer, mean of their pixels", "/255"},
+      {"drawn_over4_share", "parts over a camera picture, pixels more than 4/255 off", ""},
+      {"drawn_inner_over4_share", "parts over a camera picture off edges, pixels more than 4/255 off", ""},
+      {"mask_iou", "on/off-surface masks, overlap with the ray tracer's (IoU)", "", true},
+      {"spill_share", "light on what no part asks for, of all light", ""},
+      {"composite_px", "outlines over a camera picture, RMS of the worst part", "px"},
+      {"edge_gap_share", "part's light missing where light meets screen, 95 %", ""},
+      {"edge_double_share", "part's light shown twice where light meets screen, 95 %", ""},
+      {"depth_order_share", "pixels with parts and prototype in the right order", "", true},
+      {"seam_step_p95", "luminance step along projectors' seams, 95 %", ""},
+      {"seam_step_max", "luminance step anywhere, largest", ""},
+      {"black_step_share", "step of the light of black, share of one projector's, worst", ""},
+      {"refill_share", "light lost to a hand's shadow that is back within 3 frames", "", true},
+      {"refill_flash_share", "light over what was there without the hand, worst", ""},
+      {"refill_still_255", "change of the projectors' pictures over 30 frames without a hand", "/255"},
+      {"rerun_worst_255", "difference of two runs, worst", "/255"},
+  };
+  return measures;
+}
+
+Result<Check> load_check(const fs::path& path) {
+  LIMN_TRY(const Config config, Config::load(path, "limn.check/1"));
+  const ConfigNode root = config.root();
+  root.only({"schema", "about", "world", "scene", "poses", "viewer", "resolution", "nudge", "hand", "clay",
+             "limits"});
+  Check check;
+  check.name = path.stem().string();
+  check.about = root.at("about").text();
+  const fs::path world_file = (config.folder() / root.at("world").text()).lexically_normal();
+  check.limits = read_limits(root.at("limits"));
+  std::vector<Viewer> viewers;
+  if (const auto node = root.find("viewer")) viewers = read_viewers(*node);
+  const auto scene = root.find("scene");
+  const std::string scene_folder = scene ? scene->text() : "";
+  LIMN_TRY_STATUS(config.status());
+
+  LIMN_TRY(check.truth, sim::load_world(world_file, marker_image));
+  if (!scene_folder.empty()) {
+    LIMN_TRY(scene::Scene other, scene::load_scene((config.folder() / scene_folder).lexically_normal()));
+    put_on_stage(std::move(other), &check.truth);
+  }
+  if (!check.truth.scene || !check.truth.scene->prototype) {
+    return error(
+        "{}: world: expected a world or a scene with a prototype to shine on, found none. Add scene.",
+        path.string());
+  }
+  LIMN_TRY(check.posed, poses_of(root.find("poses"), config.folder(), &check.truth));
+  if (const auto node = root.find("resolution")) coarsen(*node, &check.truth.rig);
+  if (const auto node = root.find("hand")) check.hand = read_hand(*node, check.truth.rig);
+  if (const auto node = root.find("clay")) {
+    const Eigen::Vector3d rgb = node->vector3();
+    if (sim::Object* prototype = check.truth.find("prototype")) prototype->albedo = rgb.reverse();
+  }
+  check.told = {check.truth.rig, *check.truth.scene, check.posed};
+  if (const Status chosen = choose_viewer(viewers, &check); !chosen)
+    return error("{}: {}", path.string(), chosen.message());
+  if (const auto node = root.find("nudge")) nudge(*node, &check.truth.rig);
+  LIMN_TRY_STATUS(config.status());
+  return check;
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,431 @@
+#include "validate/demo_session.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+#include "validate/metrics.h"
+#include "wizard/capture/capture_plan.h"
+#include "wizard/measure/solve_captures.h"
+#include "wizard/capture/virtual_capture.h"
+#include "tracker/marker_image.h"
+#include "core/log.h"
+#include "core/image_io.h"
+#include "projector/renderer.h"
+#include "sim/sensor_model.h"
+#include "sim/trace.h"
+#include "sim/truth.h"
+#include "sim/virtual_rig.h"
+#include "tracker/detector.h"
+#include "tracker/body_estimate.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int k_judged_points = 2500;
+constexpr std::uint64_t k_judged_seed = 20261121;
+constexpr int k_viewer_width = 1280, k_viewer_height = 960;
+constexpr double k_viewer_fov_deg = 40;
+
+constexpr double k_turn_deg = 40;
+const Eigen::Vector3d k_move_m = Eigen::Vector3d(0.12, 0.08, 0.04).normalized() * 0.15;
+
+// What is asked of a first light (the numbers).
+constexpr double k_max_registration_mm = 0.5;
+constexpr double k_max_composite_px = 1.0;
+constexpr double k_min_mask_iou = 0.97;
+constexpr double k_max_held_out_px = 0.40;
+
+// Where the designer stands, in the door's frame (x right, y up, z towards the onlooker): first behind the
+// camera, then two steps to the left.
+const Eigen::Vector3d k_p_eye(0.03, 0.32, 1.62);
+const Eigen::Vector3d k_p_eye_left(-0.75, 0.35, 1.15);
+const Eigen::Vector3d k_p_gaze(-0.04, 0.02, 0.0);
+
+// Seconds of each stage, in order.
+class Stages {
+ public:
+  template <class Work>
+  auto time(const std::string& name, Work work) {
+    const auto begun = std::chrono::steady_clock::now();
+    log_info("{} ...", name);
+    auto result = work();
+    add(name, seconds_between(begun, std::chrono::steady_clock::now()));
+    return result;
+  }
+  void add(const std::string& name, double seconds) {
+    for (auto& [known, sum] : seconds_) {
+      if (known == name) {
+        sum += seconds;
+        return;
+      }
+    }
+    seconds_.emplace_back(name, seconds);
+  }
+  const std::vector<std::pair<std::string, double>>& seconds() const { return seconds_; }
+
+ private:
+  std::vector<std::pair<std::string, double>> seconds_;
+};
+
+// What the session knows (never the truth), and the GL that it draws with.
+struct Session {
+  Rig rig;
+  double held_out_px;  // of its calibration
+  scene::Scene scene;
+  std::vector<Body> bodies;
+  tracker::Detector detector;
+  projector::Renderer renderer;
+};
+
+// Where everything is at a moment, as the tracker sees it, and what is shown on it.
+struct Moment {
+  cv::Mat photograph;  // of the room without projected light
+  int markers = 0;
+  int false_markers = 0;  // of them, not in the room
+  std::vector<Track> tracks;
+  scene::PosedScene posed;
+};
+
+Imager designers_eye(const Pose& world_from_prototype, const Eigen::Vector3d& p_eye = k_p_eye) {
+  const Pose viewer_from_prototype = looking_at(p_eye, k_p_gaze, Eigen::Vector3d::UnitY());
+  return viewer_imager(world_from_prototype * viewer_from_prototype.inverse(), k_viewer_width,
+                       k_viewer_height, k_viewer_fov_deg);
+}
+
+Result<cv::Mat> photograph(sim::VirtualRig* room) {
+  LIMN_TRY(const Frame frame, room->camera(0).next());
+  return frame.image;
+}
+
+// Photographs the room in its own light and finds everything in the image.
+Result<Moment> looked(Session* session, sim::VirtualRig* room, const std::vector<std::string>& variants) {
+  room->darken();
+  Moment moment;
+  LIMN_TRY(const Frame frame, room->camera(0).next());
+  moment.photograph = frame.image;
+  const Imager& camera = session->rig.cameras.at(0);
+  const auto detections = session->detector.detect(to_grey(frame.image), &camera.lens);
+  moment.markers = static_cast<int>(detections.size());
+  moment.false_markers =
+      static_cast<int>(std::count_if(detections.begin(), detections.end(), [&](const auto& detection) {
+        return !sim::world_from_marker(room->world(), detection.marker);
+      }));
+  const tracker::View view{&camera, detections};
+  moment.tracks = tracker::observed(session->bodies, std::span(&view, 1), frame.captured_at);
+  moment.posed = scene::posed(session->scene, moment.tracks, variants);
+  if (!moment.posed.world_from_prototype || moment.posed.parts.size() != session->scene.slots.size()) {
+    return error(
+        "the simulated photograph: expected the prototype and {} slots, found {} markers that place {}.",
+        session->scene.slots.size(), detections.size(), moment.posed.parts.size());
+  }
+  return moment;
+}
+
+std::vector<cv::Mat> drawn(projector::Renderer* renderer,
+                           std::size_t projector_count,
+                           const scene::PosedScene& posed,
+                           const Imager& viewer) {
+  std::vector<cv::Mat> images;
+  for (std::size_t i = 0; i < projector_count; ++i) {
+    images.push_back(renderer->projector_image(i, posed, viewer));
+  }
+  return images;
+}
+
+// Photograph of the room with these images shone into it.
+Result<cv::Mat> shone(sim::VirtualRig* room, const std::vector<cv::Mat>& images) {
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    if (auto shown = room->projector(static_cast<int>(i)).show(images[i]); !shown) return shown.error();
+  }
+  return photograph(room);
+}
+
+// What an eye sees of the room with these images shone into it: a simulated photograph from there.
+cv::Mat seen_from(const sim::World& world, const Imager& eye, const std::vector<cv::Mat>& images) {
+  sim::World seen = world;
+  seen.rig.cameras = {eye};
+  return sim::photograph(seen, sim::trace(seen, 0), images, world.seed);
+}
+
+// A renderer of the judge's dots instead of the scene's parts, on the same prototype.
+Result<projector::Renderer> dots_renderer(const Session& session, const AimedDots& dots) {
+  scene::Scene scene = session.scene;
+  scene::Slot slot;
+  slot.name = "dots";
+  slot.mode = scene::Mode::surface;
+  slot.variants = {{"dots", dots.mesh}};
+  scene.slots = {slot};
+  return projector::Renderer::create(scene, session.rig);
+}
+
+struct JudgedDots {
+  AimedDots dots;
+  Registration registration;
+};
+
+// The calibrated rig's light against the truth, with the door where the tracker says it is.
+Result<JudgedDots> judged(const Session& session, const sim::World& world, const Moment& moment) {
+  const AimedDots dots = aimed_dots(world, k_judged_points, k_judged_seed);
+  LIMN_TRY(projector::Renderer renderer, dots_renderer(session, dots));
+  const Pose& world_from_prototype = *moment.posed.world_from_prototype;
+  const scene::PosedScene posed{world_from_prototype, {{"dots", "dots", world_from_prototype}}};
+  const auto images =
+      drawn(&renderer, session.rig.projectors.size(), posed, designers_eye(world_from_prototype));
+  return JudgedDots{dots, judged_registration(world, dots, images)};
+}
+
+// Masks of all parts in one image; where they overlap the later slot's.
+cv::Mat merged_masks(const std::vector<projector::PartCoverage>& coverage, cv::Size size) {
+  cv::Mat merged(size, CV_8U, cv::Scalar(0));
+  for (const auto& part : coverage) part.mask.copyTo(merged, part.mask != 0);
+  return merged;
+}
+
+cv::Mat merged_true_masks(const sim::Truth& truth, const scene::Scene& scene, const Imager& viewer) {
+  cv::Mat merged(viewer.height, viewer.width, CV_8U, cv::Scalar(0));
+  for (const scene::Slot& slot : scene.slots) {
+    const cv::Mat mask = truth.part_mask(viewer, slot.name);
+    mask.copyTo(merged, mask != 0);
+  }
+  return merged;
+}
+
+// Outline of the first part in the camera's image against the ray-traced truth, at twice the resolution.
+double composite_error_px(Session* session,
+                          const sim::World& world,
+                          const sim::Truth& truth,
+                          const Moment& moment) {
+  const auto doubled = [](const Imager& camera) {
+    return resized(camera, 2 * camera.width, 2 * camera.height).value();
+  };
+  const auto coverage = session->renderer.coverage(moment.posed, doubled(session->rig.cameras[0]));
+  const cv::Mat true_mask = truth.part_mask(doubled(world.rig.cameras[0]), coverage.at(0).slot);
+  return outline_distance_px(coverage.at(0).mask, true_mask) / 2;
+}
+
+// The door with every judged dot in the colour of its error, over a photograph.
+cv::Mat error_map(const cv::Mat& photograph, const sim::World& world, const JudgedDots& judged) {
+  const auto& [dots, found] = judged;
+  cv::Mat map = photograph / 3;
+  for (std::size_t i = 0; i < dots.p_aimed.size(); ++i) {
+    const auto px = world.rig.cameras[0].project(world.world_from_prototype * dots.p_aimed[i]);
+    if (!px) continue;
+    const double share =
+        std::min(1.0, found.errors_mm[i] / k_max_registration_mm);  // green to red at the limit
+    const cv::Scalar colour(40, 230 * std::min(1.0, 2 - 2 * share), 230 * std::min(1.0, 2 * share));
+    cv::circle(map, cv::Point(cvRound(px->x()), cvRound(px->y())), 3, colour, cv::FILLED, cv::LINE_AA);
+  }
+  return map;
+}
+
+// One place of the door: where it truly is, what the tracker finds, how well the light then fits.
+struct Place {
+  std::string name;  // in demo.json
+  Moment moment;
+  JudgedDots judged;
+};
+
+Result<Place> judged_place(const std::string& name,
+                           const Pose& world_from_prototype,
+                           Session* session,
+                           sim::VirtualRig* room,
+                           Stages* stages) {
+  room->move("prototype", world_from_prototype);
+  LIMN_TRY(Moment moment, stages->time("track", [&] { return looked(session, room, {}); }));
+  LIMN_TRY(JudgedDots judged_dots,
+           stages->time("judge", [&] { return judged(*session, room->world(), moment); }));
+  return Place{name, std::move(moment), std::move(judged_dots)};
+}
+
+// The door in place, moved by 150 mm and turned by 40°.
+std::vector<std::pair<std::string, Pose>> places_of(const Pose& world_from_prototype) {
+  const Eigen::Vector3d d_up = Eigen::Vector3d::UnitZ();
+  const Pose turn(exp_rotation(k_turn_deg * std::numbers::pi / 180 * d_up), Eigen::Vector3d::Zero());
+  Pose moved = world_from_prototype, turned = world_from_prototype;
+  moved.translation += k_move_m;
+  turned.rotation = turn.rotation * turned.rotation;
+  return {{"in_place", world_from_prototype}, {"moved", moved}, {"turned", turned}};
+}
+
+// Captures, calibration and the session that they make possible.
+Result<Session> calibrated(const fs::path& out, sim::VirtualRig* room, Stages* stages, bool keep_captures) {
+  const fs::path captures = out / "demo-captures", rig_folder = out / "rig";
+  std::error_code ignored;
+  fs::remove_all(captures, ignored);
+  LIMN_TRY(const Plan plan, load_plan(fs::path(LIMN_SOURCE_DIR) / "config/plans/studio.json"));
+  LIMN_TRY_STATUS(stages->time("capture", [&] { return capture_virtually(plan, room, captures); }));
+  SolveCommandOptions solving;
+  solving.captures = captures;
+  solving.out = rig_folder;
+  LIMN_TRY(const calib::Report report, stages->time("solve", [&] { return solved(solving); }));
+  if (!keep_captures) fs::remove_all(captures, ignored);
+  const Rig& rig = report.solution.rig;
+  scene::Scene scene = room->world().scene.value();
+  auto bodies = scene::bodies(scene);
+  const auto names = tracker::families_of(bodies);
+  LIMN_TRY(tracker::Families families, tracker::Families::load(names));
+  LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, rig));
+  return Session{rig,
+                 report.assessment.held_out.rms_px,
+                 std::move(scene),
+                 std::move(bodies),
+                 tracker::Detector(std::move(families)),
+                 std::move(renderer)};
+}
+
+// What the demo measured.
+struct Measurement {
+  double held_out_px = 0;
+  std::vector<Place> places;
+  double composite_px = 0;
+  double mask_iou = 0;
+  std::vector<std::pair<std::string, double>> seconds;
+};
+
+std::string readable(std::string name) {
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
+}
+
+std::vector<DemoRow> rows_of(const Measurement& measured) {
+  std::vector<DemoRow> rows;
+  const auto at_most = [&](const std::string& what, double value, const char* unit, double limit) {
+    rows.push_back({what, fmt::format("{:.3f} {}", value, unit), fmt::format("at most {:g} {}", limit, unit),
+                    value <= limit});
+  };
+  at_most("calibration, held-out pose", measured.held_out_px, "px", k_max_held_out_px);
+  for (const Place& place : measured.places) {
+    const Registration& found = place.judged.registration;
+    at_most(fmt::format("registration {}, RMS of {} points", readable(place.name), found.points),
+            found.rms_mm, "mm", k_max_registration_mm);
+    rows.push_back({fmt::format("registration {}, 95 %", readable(place.name)),
+                    fmt::format("{:.3f} mm", found.p95_mm), "", true});
+  }
+  int markers = 0, false_markers = 0;
+  for (const Place& place : measured.places) {
+    markers += place.moment.markers;
+    false_markers += place.moment.false_markers;
+  }
+  rows.push_back({fmt::format("false markers among {}", markers), fmt::format("{}", false_markers), "none",
+                  false_markers == 0});
+  at_most("composite, outline of the mirror, RMS", measured.composite_px, "px", k_max_composite_px);
+  rows.push_back({"on/off-surface mask, IoU", fmt::format("{:.4f}", measured.mask_iou),
+                  fmt::format("at least {}", k_min_mask_iou), measured.mask_iou >= k_min_mask_iou});
+  double total = 0;
+  for (const auto& [name, seconds] : measured.seconds) {
+    rows.push_back({"time: " + name, fmt::format("{:.1f} s", seconds), "", true});
+    total += seconds;
+  }
+  rows.push_back({"time: all", fmt::format("{:.1f} s", total), "", true});
+  return rows;
+}
+
+nlohmann::ordered_json json_of(const Measurement& measured) {
+  nlohmann::ordered_json json = {{"held_out_px", measured.held_out_px}};
+  for (const Place& place : measured.places) {
+    const Registration& found = place.judged.registration;
+    json["registration_mm"][place.name] = {
+        {"rms", found.rms_mm}, {"p95", found.p95_mm}, {"points", found.points}, {"unlit", found.unlit}};
+    json["markers"][place.name] = {{"found", place.moment.markers}, {"false", place.moment.false_markers}};
+  }
+  json["composite_px"] = measured.composite_px;
+  json["mask_iou"] = measured.mask_iou;
+  for (const auto& [name, seconds] : measured.seconds) json["seconds"][name] = seconds;
+  return json;
+}
+
+// What the renderer draws and the simulator photographs, for people to look at.
+Result<std::vector<DemoImage>> shown_session(Session* session, sim::VirtualRig* room, const Place& place) {
+  const scene::PosedScene& posed = place.moment.posed;
+  const Pose& world_from_prototype = *posed.world_from_prototype;
+  const Imager eye = designers_eye(world_from_prototype);
+  const Imager eye_left = designers_eye(world_from_prototype, k_p_eye_left);
+  const Imager true_eye_left = designers_eye(room->world().world_from_prototype, k_p_eye_left);
+  const std::size_t projector_count = session->rig.projectors.size();
+  projector::Renderer& renderer = session->renderer;
+
+  const std::string other_variant = session->scene.slots.at(0).variants.at(1).name;
+  LIMN_TRY(const Moment swapped, looked(session, room, {other_variant}));
+  LIMN_TRY_STATUS(renderer.set_contact_shadow(&session->scene));
+  room->camera_effects(0).srgb = true;  // images for people; those that are measured in are linear
+  LIMN_TRY(const cv::Mat unlit, shone(room, {}));
+  const auto images = drawn(&renderer, projector_count, posed, eye);
+  LIMN_TRY(const cv::Mat lit, shone(room, images));
+  const auto images_swapped = drawn(&renderer, projector_count, swapped.posed, eye);
+  LIMN_TRY(const cv::Mat lit_swapped, shone(room, images_swapped));
+  const auto images_left = drawn(&renderer, projector_count, posed, eye_left);
+
+  using projector::Composite;
+  std::vector<DemoImage> shown = {
+      {"unlit", "The room, unlit", "A simulated photograph: a clay door, its markers, the room's own light.",
+       unlit},
+      {"lit", "Lit", "The same, with the projectors' light: trim line and mirror are painted on.", lit},
+      {"composite", "On the screen",
+       "Camera picture plus what light cannot show: the mirror's part beyond the door.",
+       renderer.composite(0, lit, posed, Composite::rest)},
+      {"composite-full", "The whole parts on the screen", "Drawn over the unlit photograph.",
+       renderer.composite(0, unlit, posed, Composite::full)}};
+  for (std::size_t i = 0; i < projector_count; ++i) {
+    const std::string& name = session->rig.projectors[i].name;
+    shown.push_back({name, name, "What this projector gets.", images[i]});
+  }
+  shown.push_back(
+      {"error-map", "Error map",
+       fmt::format("Each dot is aimed light, judged by the ray tracer: green 0, red {} mm or more.",
+                   k_max_registration_mm),
+       error_map(unlit, room->world(), place.judged)});
+  shown.push_back({"composite-swapped", "Another mirror", "After a variant swap: light and screen follow.",
+                   renderer.composite(0, lit_swapped, swapped.posed, Composite::rest)});
+  shown.push_back(
+      {"from-the-left", "From the left",
+       "The designer has walked to the left: the mirror is painted for that eye and stands off the door.",
+       seen_from(room->world(), true_eye_left, images_left)});
+  shown.push_back({"mask", "Mask", "From the designer's eye: white is projected, grey is left to the screen.",
+                   merged_masks(renderer.coverage(posed, eye), {eye.width, eye.height})});
+  return shown;
+}
+
+// Overlap of the designer's masks with the ray-traced ones.
+double mask_iou(Session* session, const sim::World& world, const sim::Truth& truth, const Moment& moment) {
+  const Imager eye = designers_eye(*moment.posed.world_from_prototype);
+  const cv::Mat found = merged_masks(session->renderer.coverage(moment.posed, eye), {eye.width, eye.height});
+  const Imager true_eye = designers_eye(world.world_from_prototype);
+  return label_iou(found, merged_true_masks(truth, session->scene, true_eye));
+}
+
+}  // namespace
+
+Result<DemoResult> play_demo(const fs::path& out, bool keep_captures) {
+  LIMN_TRY(sim::World world,
+           sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image));
+  sim::VirtualRig room(std::move(world));
+  Stages stages;
+  LIMN_TRY(Session session, calibrated(out, &room, &stages, keep_captures));
+  Measurement measured;
+  measured.held_out_px = session.held_out_px;
+  const Pose in_place = room.world().world_from_prototype;
+  for (const auto& [name, world_from_prototype] : places_of(in_place)) {
+    LIMN_TRY(Place place, judged_place(name, world_from_prototype, &session, &room, &stages));
+    measured.places.push_back(std::move(place));
+  }
+  room.move("prototype", in_place);
+  const Moment& moment = measured.places.front().moment;
+  const sim::World& truth_world = room.world();
+  const sim::Truth truth(truth_world, sim::true_poses(truth_world));
+  measured.composite_px =
+      stages.time("judge", [&] { return composite_error_px(&session, truth_world, truth, moment); });
+  measured.mask_iou = stages.time("judge", [&] { return mask_iou(&session, truth_world, truth, moment); });
+  LIMN_TRY(auto images,
+           stages.time("render", [&] { return shown_session(&session, &room, measured.places.front()); }));
+  measured.seconds = stages.seconds();
+  return DemoResult{rows_of(measured), json_of(measured).dump(2) + "\n", std::move(images)};
+}
+
+}  // namespace limn::apps

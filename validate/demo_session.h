@@ -1,0 +1,24 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "validate/demo_page.h"
+#include "core/result.h"
+
+namespace limn::apps {
+
+/// What a demo measured, as people and as programs read it, and what it drew.
+struct DemoResult {
+  std::vector<DemoRow> rows;
+  std::string json;  ///< demo.json
+  std::vector<DemoImage> images;
+};
+
+/// A whole session on the virtual rig `studio`, judged against the simulator's truth: captures (in
+/// `out`/demo-captures, removed afterwards unless `keep_captures`), calibration (in `out`/rig), tracking,
+/// projection and composites. A GL context must be current.
+Result<DemoResult> play_demo(const std::filesystem::path& out, bool keep_captures);
+
+}  // namespace limn::apps

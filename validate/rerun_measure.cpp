@@ -1,0 +1,23 @@
+#include <opencv2/core.hpp>
+
+#include "validate/metrics.h"
+#include "validate/check_measures.h"
+
+namespace limn::apps {
+
+Status judge_rerun(CheckRun& run) {
+  LIMN_TRY(projector::Renderer again,
+           projector::Renderer::create(run.check().told.scene, run.check().told.rig));
+  auto first = run.projector_images();
+  auto second = run.drawn_by(again, run.check().told.posed);
+  if (!run.check().told.rig.cameras.empty()) {
+    const Imager& camera = run.check().told.rig.cameras.front();
+    const cv::Mat black(camera.height, camera.width, CV_8UC3, cv::Scalar::all(0));
+    first.push_back(run.renderer().composite(0, black, run.check().told.posed, projector::Composite::full));
+    second.push_back(again.composite(0, black, run.check().told.posed, projector::Composite::full));
+  }
+  run.set("rerun_worst_255", worst_difference(first, second));
+  return {};
+}
+
+}  // namespace limn::apps

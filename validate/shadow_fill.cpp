@@ -1,0 +1,283 @@
+#include "validate/shadow_fill.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "validate/metrics.h"
+#include "projector/shadow_detector.h"
+#include "projector/renderer.h"
+#include "sim/sensor_model.h"
+#include "sim/trace.h"
+
+namespace limn::apps {
+namespace {
+
+constexpr int k_side_px = 8;      // of the patches
+constexpr int k_dark_frames = 2;  // at first: a session begins without parts
+constexpr int k_still_frames = 30;
+constexpr int k_stay_frames = 6, k_move_frames = 5, k_gone_frames = 6;
+constexpr int k_allowed_frames = 3;    // from a shadow to light
+constexpr float k_least_loss = 0.05F;  // of a pixel's light: below, it is not in the shadow
+constexpr int k_least_pixels = 100;    // of a shadow
+constexpr int k_blur_px = 5;           // of the viewer's image, over which light is the same
+constexpr int k_light_end = 9;         // pixels: nearer to its end light fades over a projector's last pixel
+constexpr float k_least_light = 0.1F;  // of the brightest: below, nobody sees a flash
+constexpr float k_edge = 0.1F;  // of the light between neighbours: beyond, another projector's pixels show
+constexpr double k_skin_bgr[] = {0.28, 0.40, 0.62};
+
+// As limn solve would measure them.
+void add_responses(const sim::World& world, Rig* rig) {
+  for (std::size_t i = 0; i < rig->projectors.size(); ++i) {
+    const sim::ProjectorEffects& effects = world.projector_effects[i];
+    ProjectorResponse response{rig->projectors[i].name, {}, {}, {}};
+    std::vector<double>* curves[] = {&response.blue, &response.green, &response.red};
+    for (int c = 0; c < 3; ++c)
+      for (int v = 0; v < 256; ++v) curves[c]->push_back(sim::light_share(effects, c, v / 255.0));
+    response.black_level = Measurement{effects.black_level, 0};
+    response.vignetting = Vignetting{Eigen::Vector2d::Zero(), -effects.vignetting, 0, 0};
+    rig->responses.push_back(response);
+  }
+  for (std::size_t i = 0; i < rig->cameras.size(); ++i) {
+    const sim::CameraEffects& effects = world.camera_effects[i];
+    CameraResponse response;
+    response.camera = rig->cameras[i].name;
+    for (int v = 0; v < 256; ++v) {
+      const double level = std::max(0.0, (v - effects.black_level) / (255 - effects.black_level));
+      response.light.push_back(effects.srgb ? linear_from_srgb(level) : level);
+    }
+    rig->camera_responses.push_back(response);
+  }
+}
+
+sim::Object hand_object(const Pose& world_from_hand, double width_m, double height_m) {
+  sim::Object object = sim::sheet("hand", width_m, height_m, {}, world_from_hand);
+  object.albedo = {k_skin_bgr[0], k_skin_bgr[1], k_skin_bgr[2]};
+  return object;
+}
+
+// What a camera or the viewer's eye sees of the world with the hand somewhere, or without.
+struct Traced {
+  std::vector<sim::Samples> cameras;
+  sim::Samples eye;
+};
+
+class Session {
+ public:
+  Session(const sim::World& world,
+          const scene::PosedScene& posed,
+          const Imager& viewer,
+          const Hand& hand,
+          std::uint64_t seed)
+      : world_(world), posed_(posed), viewer_(viewer), hand_(hand), seed_(seed) {}
+
+  Result<ShadowFillReading> run(const scene::Scene& scene) {
+    Rig rig = world_.rig;
+    rig.responses.clear();
+    rig.camera_responses.clear();
+    add_responses(world_, &rig);
+    LIMN_TRY(renderer_, projector::Renderer::create(scene, rig));
+    LIMN_TRY_STATUS(renderer_->set_light({.compensation = projector::Compensation::geometry}));
+    arriving_.emplace(rig);
+    for (std::size_t i = 0; i < rig.cameras.size(); ++i)
+      arriving_->place(i, renderer_->illuminated_patches(i, posed_, k_side_px));
+    const Traced free = traced(std::nullopt);
+    const std::vector<cv::Mat> black(rig.projectors.size());
+    for (int k = 0; k < k_dark_frames; ++k) watch(free, black);
+    draw();
+    first_ = shown_;
+    before_ = light(free, shown_);
+    ShadowFillReading reading;
+    for (int k = 0; k < k_still_frames; ++k) {
+      watch(free, shown_);
+      draw();
+      reading.still_levels = std::max(reading.still_levels, worst_difference(shown_, first_));
+    }
+    const Traced there = traced(0.0);
+    LIMN_TRY_STATUS(find_lost(there));
+    since_ = cv::Mat(before_.size(), CV_32S, cv::Scalar(0));
+    for (int k = 0; k < k_stay_frames; ++k) step(there, "stays", &reading);
+    reading.before = before_;
+    reading.lost = light(there, first_);
+    reading.refilled = light(there, shown_);
+    for (int k = 1; k <= k_move_frames; ++k) step(traced(k * hand_.step_m), "moves", &reading);
+    for (int k = 0; k < k_gone_frames; ++k) {
+      step(free, "gone", &reading);
+      if (k > k_allowed_frames)
+        reading.back_levels = std::max(reading.back_levels, worst_difference(shown_, first_));
+    }
+    return reading;
+  }
+
+ private:
+  // The hand so far along its way, across the light and upwards.
+  Pose world_from_hand(double moved_m) const {
+    const Imager& projector = world_.rig.projectors[hand_.projector];
+    const Eigen::Vector3d p_light = projector.imager_from_world.inverse().translation;
+    const Eigen::Vector3d p_aim = world_.world_from_prototype * hand_.p_aim;
+    Pose pose = looking_at(p_light, p_aim, Eigen::Vector3d::UnitZ()).inverse();
+    pose.translation =
+        p_light + hand_.at * (p_aim - p_light) + pose.rotation * Eigen::Vector3d(moved_m, -0.3 * moved_m, 0);
+    return pose;
+  }
+
+  Traced traced(std::optional<double> moved_m) const {
+    sim::World world = world_;
+    if (moved_m)
+      world.objects.push_back(hand_object(world_from_hand(*moved_m), hand_.width_m, hand_.height_m));
+    Traced out;
+    for (std::size_t i = 0; i < world.rig.cameras.size(); ++i)
+      out.cameras.push_back(sim::trace(world, static_cast<int>(i)));
+    world.rig.cameras = {viewer_};
+    world.camera_effects = {sim::CameraEffects{.colour = true}};
+    out.eye = sim::trace(world, 0);
+    std::fill(out.eye.room_light.begin(), out.eye.room_light.end(), 0.0F);
+    return out;
+  }
+
+  void watch(const Traced& traced, const std::vector<cv::Mat>& shown) {
+    for (std::size_t i = 0; i < traced.cameras.size(); ++i)
+      arriving_->see(i, sim::photograph(world_, traced.cameras[i], shown, seed_ + frames_), shown);
+    ++frames_;
+  }
+
+  void draw() {
+    shown_.clear();
+    for (std::size_t i = 0; i < world_.rig.projectors.size(); ++i)
+      renderer_->set_occlusion(i, arriving_->map(i));
+    for (std::size_t i = 0; i < world_.rig.projectors.size(); ++i)
+      shown_.push_back(renderer_->projector_image(i, posed_, viewer_));
+  }
+
+  // The projectors' light on the prototype as the eye sees it; 0 elsewhere.
+  cv::Mat light(const Traced& traced, const std::vector<cv::Mat>& shown) const {
+    sim::World eye = world_;
+    eye.rig.cameras = {viewer_};
+    eye.camera_effects = {sim::CameraEffects{.colour = true}};
+    cv::Mat out = sim::ideal_light(eye, traced.eye, shown);
+    out.setTo(0, ~whole(traced.eye));
+    return out;
+  }
+
+  // Pixels that see the prototype and nothing else.
+  cv::Mat whole(const sim::Samples& samples) const {
+    cv::Mat out(samples.height, samples.width, CV_8U, cv::Scalar(255));
+    for (std::size_t k = 0; k < samples.size(); ++k) {
+      const std::int16_t object = samples.object[k];
+      const bool is_prototype = object >= 0 && static_cast<std::size_t>(object) < world_.objects.size() &&
+                                world_.objects[static_cast<std::size_t>(object)].name == "prototype";
+      if (!is_prototype) out.data[samples.pixel[k]] = 0;
+    }
+    return out;
+  }
+
+  // Light of the pixels, and where it is lost though others can give it.
+  struct Loss {
+    cv::Mat wanted, without;  // CV_32F: without a hand; with it and nobody to help
+    cv::Mat where;
+  };
+  Loss loss(const Traced& traced) const {
+    Loss out{grey(before_), grey(light(traced, first_)), {}};
+    std::vector<cv::Mat> others;
+    for (std::size_t i = 0; i < world_.rig.projectors.size(); ++i) {
+      const Imager& projector = world_.rig.projectors[i];
+      others.emplace_back();
+      if (i != hand_.projector)
+        others.back() = cv::Mat(projector.height, projector.width, CV_8UC3, cv::Scalar::all(255));
+    }
+    out.where = (out.wanted - out.without > k_least_loss * out.wanted) & is_light(out.wanted) &
+                whole(traced.eye) & (grey(light(traced, others)) > out.wanted);
+    return out;
+  }
+
+  static cv::Mat grey(const cv::Mat& light) {
+    cv::Mat out;
+    cv::transform(light, out, cv::Matx13f::all(1.0F / 3));
+    return out;
+  }
+
+  // Over some pixels: another projector's have other places and are more or less sharp.
+  static cv::Mat blurred(const cv::Mat& grey) {
+    cv::Mat out;
+    cv::blur(grey, out, {k_blur_px, k_blur_px});
+    return out;
+  }
+
+  Status find_lost(const Traced& traced) const {
+    const int lost = cv::countNonZero(loss(traced).where);
+    if (lost >= k_least_pixels) return {};
+    return error(
+        "refill: expected a hand whose shadow others can light from the viewer's eye, found {} such pixels. "
+        "Move the hand.",
+        lost);
+  }
+
+  // A frame with these things in their places: judged as it is, then seen by the cameras.
+  void step(const Traced& traced, const std::string& phase, ShadowFillReading* reading) {
+    const cv::Mat actual = light(traced, shown_);
+    const Loss lost = loss(traced);
+    cv::Mat since(since_.size(), CV_32S, cv::Scalar(0));
+    cv::Mat(since_ + 1).copyTo(since, lost.where);
+    since_ = since;
+    const cv::Mat old = since_ > k_allowed_frames;
+    ShadowFillFrame frame{phase, back_share(lost, actual, lost.where), flash(traced, actual),
+                      worst_difference(shown_, first_)};
+    if (cv::countNonZero(old) >= k_least_pixels)
+      reading->share = std::min(reading->share, back_share(lost, actual, old));
+    reading->flash = std::max(reading->flash, frame.flash);
+    reading->frames.push_back(frame);
+    watch(traced, shown_);
+    draw();
+  }
+
+  static double back_share(const Loss& lost, const cv::Mat& actual, const cv::Mat& where) {
+    const cv::Mat wanted = blurred(lost.wanted), without = blurred(lost.without);
+    const cv::Mat back = cv::max(0.0, cv::min(blurred(grey(actual)), wanted) - without);
+    const double all = cv::mean(cv::Mat(wanted - without), where)[0];
+    return all > 0 ? cv::mean(back, where)[0] / all : 1;
+  }
+
+  // Over what was there without the hand, away from edges, and from where all light ends.
+  double flash(const Traced& traced, const cv::Mat& actual) const {
+    cv::Mat wanted = blurred(grey(before_)), found = blurred(grey(actual)), highest, lowest, where;
+    const cv::Mat around = cv::getStructuringElement(cv::MORPH_RECT, {k_light_end, k_light_end});
+    cv::dilate(wanted, highest, around);
+    cv::erode(wanted, lowest, around);
+    cv::erode(whole(traced.eye) & is_light(wanted), where, around);
+    where &= highest - lowest < k_edge * wanted;
+    double worst = 0;
+    cv::minMaxLoc(found / wanted - 1, nullptr, &worst, nullptr, nullptr, where);
+    return std::max(0.0, worst);
+  }
+
+  static cv::Mat is_light(const cv::Mat& wanted) {
+    double brightest = 0;
+    cv::minMaxLoc(wanted, nullptr, &brightest);
+    return wanted > k_least_light * brightest;
+  }
+
+  const sim::World& world_;
+  const scene::PosedScene& posed_;
+  const Imager& viewer_;
+  const Hand& hand_;
+  std::uint64_t seed_;
+  std::uint64_t frames_ = 0;
+  std::optional<projector::Renderer> renderer_;
+  std::optional<projector::ShadowDetector> arriving_;
+  std::vector<cv::Mat> shown_, first_;
+  cv::Mat before_;
+  cv::Mat since_;  // CV_32S: frames that a pixel has been in the shadow
+};
+
+}  // namespace
+
+Result<ShadowFillReading> measured_shadow_fill(const sim::World& world,
+                                    const scene::Scene& scene,
+                                    const scene::PosedScene& posed,
+                                    const Imager& viewer,
+                                    const Hand& hand,
+                                    std::uint64_t seed) {
+  return Session(world, posed, viewer, hand, seed).run(scene);
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,36 @@
+#include <fmt/format.h>
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <utility>
+
+#include "validate/shadow_fill.h"
+#include "validate/check_images.h"
+#include "validate/check_measures.h"
+
+namespace limn::apps {
+
+// In the world as it is, room, noise and all.
+Status judge_refill(CheckRun& run) {
+  const auto [scene, posed] = run.check().told.posed.parts.empty()
+                                  ? run.shown_instead(run.coat(), scene::Mode::surface)
+                                  : std::pair(run.check().told.scene, run.check().told.posed);
+  const auto reading = measured_shadow_fill(run.check().truth, scene, posed, run.check().viewer, run.check().hand,
+                                     run.check().truth.seed);
+  if (!reading) return error("{}: {}", run.check().name, reading.message());
+  run.set("refill_share", reading->share);
+  run.set("refill_flash_share", reading->flash);
+  run.set("refill_still_255", reading->still_levels);
+  std::string shares;
+  for (const ShadowFillFrame& frame : reading->frames)
+    shares += fmt::format("{} {} {:.0f} %", shares.empty() ? "" : ",", frame.phase, 100 * frame.share);
+  run.add({"refill", "Light with a hand before a projector",
+           fmt::format("Expected: without the hand. Back of what the shadow takes, frame by frame:{}. "
+                       "Brighter by {:.1f} % at most. Difference: 32 times.",
+                       shares, 100 * reading->flash),
+           eye_image(reading->refilled), eye_image(reading->before),
+           amplified(cv::abs(reading->refilled - reading->before))});
+  return {};
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,210 @@
+#include "wizard/capture/rig_recheck.h"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
+
+#include "calib/observations.h"
+#include "core/config.h"
+#include "core/file.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+// A rig that predicts pixels better than this has not been asked outside its poses.
+constexpr double k_least_rig_px = 0.05;
+constexpr double k_guard_s = 0.001;  // beyond a measured latency
+constexpr const char* k_code_in_place = "gray";
+const calib::CodeOptions k_sparse{.inverses = false};
+constexpr const char* k_any_board = "charuco:11x8:25mm";  // of a rig that does not tell its own
+
+double rounded(double v) { return std::round(v * 1e4) / 1e4; }
+
+Json provenance_of(const Rig& rig) {
+  const Json provenance = Json::parse(rig.provenance_json, nullptr, false);
+  return provenance.is_object() ? provenance : Json::object();
+}
+
+// How well the rig predicts, and how its board is bent, as its solve noted them.
+calib::RigCheckOptions options_for(const Rig& rig, const calib::Board& board) {
+  calib::RigCheckOptions options;
+  const Json provenance = provenance_of(rig);
+  if (const auto held_out = provenance.find("held_out_px");
+      held_out != provenance.end() && held_out->is_number())
+    options.rig_px = std::max(k_least_rig_px, held_out->get<double>() / std::sqrt(2.0));
+  const auto bend = provenance.find("board_bend_mm");
+  if (bend != provenance.end() && provenance.value("board", Json()) == board.text() && bend->is_array() &&
+      bend->size() == 2 && bend->at(0).is_number() && bend->at(1).is_number())
+    options.bend_m = 1e-3 * Eigen::Vector2d(bend->at(0).get<double>(), bend->at(1).get<double>());
+  return options;
+}
+
+Result<std::vector<std::optional<Pose>>> still_boards(const fs::path& path,
+                                                      const std::vector<std::string>& poses) {
+  std::vector<std::optional<Pose>> boards(poses.size());
+  LIMN_TRY(const Config config, Config::load(path, "limn.recheck/1"));
+  const ConfigNode places = config.root().at("boards");
+  bool any = false;
+  for (size_t i = 0; i < poses.size(); ++i) {
+    const auto place = places.find(poses[i]);
+    if (!place) continue;
+    boards[i] = place->at("world_from_board").pose();
+    any = true;
+  }
+  LIMN_TRY_STATUS(config.status());
+  if (!any)
+    return error("{}: boards: expected one of the captures' poses ({}), found none.", path.string(),
+                 fmt::join(poses, ", "));
+  return boards;
+}
+
+Json json_of(const calib::Move& move) {
+  return {{"device", move.device},
+          {"degrees", rounded(move.degrees)},
+          {"degrees_stddev", rounded(move.degrees_stddev)},
+          {"mm", rounded(move.mm)},
+          {"mm_stddev", rounded(move.mm_stddev)},
+          {"px", rounded(move.px)},
+          {"mm_on_board", rounded(move.mm_on_board)},
+          {"imager_from_world", to_json(move.imager_from_world)}};
+}
+
+Json json_of(const Rechecked& checked, const std::vector<std::string>& poses) {
+  const calib::RigCheck& result = checked.result;
+  Json devices = Json::array(), candidates = Json::array(), boards = Json::object();
+  for (const calib::CheckedDevice& device : result.devices)
+    devices.push_back({{"name", device.name},
+                       {"observations", device.observations},
+                       {"before_px", rounded(device.before_px)},
+                       {"after_px", rounded(device.after_px)}});
+  for (const calib::Move& move : result.candidates) candidates.push_back(json_of(move));
+  for (size_t i = 0; i < poses.size(); ++i) {
+    if (const auto& pose = result.world_from_board[i])
+      boards[poses[i]] = {{"world_from_board", to_json(*pose)}};
+  }
+  return {{"schema", "limn.recheck/1"},        {"verdict", calib::to_text(result.verdict)},
+          {"candidates", candidates},          {"devices", devices},
+          {"board_moved", result.board_moved}, {"boards", boards},
+          {"pictures", checked.images}};
+}
+
+// The rig with its first candidate's pose re-solved. What was known about errors is no longer so.
+Rig repaired(const calib::RigCheck& result) {
+  Rig rig = result.rig;
+  if (result.candidates.empty()) return rig;
+  Json provenance = provenance_of(rig);
+  const calib::Move& move = result.candidates.front();
+  provenance["re_solved"] = {{"made_by", "limn recheck"},
+                             {"device", move.device},
+                             {"degrees", rounded(move.degrees)},
+                             {"mm", rounded(move.mm)}};
+  rig.provenance_json = provenance.dump();
+  rig.covariance_json.clear();
+  return rig;
+}
+
+int shown_images(const calib::CaptureSet& captures) {
+  int images = 0;
+  for (const calib::Patterns& patterns : captures.patterns) images += patterns.count();
+  return images * static_cast<int>(captures.poses.size());
+}
+
+}  // namespace
+
+Result<calib::Board> calibration_board(const Rig& rig) {
+  const Json provenance = provenance_of(rig);
+  const auto text = provenance.find("board");
+  const bool is_told = text != provenance.end() && text->is_string();
+  return calib::Board::parse(is_told ? text->get<std::string>() : k_any_board);
+}
+
+std::string recheck_sentence(const calib::RigCheck& result) {
+  using calib::RigVerdict;
+  if (result.verdict == RigVerdict::sound) return "sound: nothing has moved";
+  if (result.verdict == RigVerdict::unexplained)
+    return "no move of one device explains what is seen: several have moved, or a lens was turned";
+  std::string names;
+  for (const calib::Move& move : result.candidates) names += (names.empty() ? "" : " or ") + move.device;
+  if (result.verdict == RigVerdict::moved) return names + " has moved";
+  return names + " has moved relative to the other; a board that stands still (--still) tells which";
+}
+
+Status check_explained(const calib::RigCheck& result) {
+  if (result.verdict != calib::RigVerdict::unexplained) return {};
+  return error("{}. Calibrate again (limn solve).", recheck_sentence(result));
+}
+
+Result<CheckedRig> recheck_rig(const Rig& rig,
+                               const fs::path& folder,
+                               const fs::path& still,
+                               const fs::path& out,
+                               const std::function<bool()>& should_continue) {
+  LIMN_TRY(const calib::CaptureSet captures, calib::load_captures(folder));
+  LIMN_TRY(const calib::Observed observed, calib::observe(captures, {}, should_continue));
+  const std::vector<std::string>& poses = observed.observations.poses;
+  calib::RigCheckOptions options = options_for(rig, captures.board);
+  options.should_continue = should_continue;
+  if (!still.empty()) {
+    LIMN_TRY(options.still_boards, still_boards(still, poses));
+  }
+  CheckedRig checked;
+  LIMN_TRY(checked.rechecked.result, calib::check_rig(rig, observed.observations, options));
+  checked.rechecked.images = shown_images(captures);
+  checked.json = json_of(checked.rechecked, poses).dump(2) + "\n";
+  checked.rechecked.result.rig = repaired(checked.rechecked.result);
+  LIMN_TRY_STATUS(make_folder(out));
+  LIMN_TRY_STATUS(write_file(out / "recheck.json", checked.json));
+  return checked;
+}
+
+Status captured_once(const calib::CaptureSet& captures, const Rig& rig, const Surroundings& around) {
+  LIMN_TRY_STATUS(calib::begin_captures(captures));
+  const Json latencies_ms = provenance_of(rig).value("display_latency_ms", Json::object());
+  for (std::size_t i = 0; i < captures.projectors.size(); ++i)
+    if (const auto ms = latencies_ms.find(captures.projectors[i].name);
+        ms != latencies_ms.end() && ms->is_number())
+      around.use_latency(static_cast<int>(i), 1e-3 * ms->get<double>() + k_guard_s);
+  const Status taken = calib::capture_pose(captures, 0, around.stage);
+  const Status written = around.written();
+  return taken ? written : taken;
+}
+
+int recheck_images(const Rig& rig) {
+  int images = 0;
+  for (const Imager& projector : rig.projectors)
+    if (const auto patterns =
+            calib::Patterns::create(k_code_in_place, projector.width, projector.height, k_sparse))
+      images += patterns->count();
+  return images;
+}
+
+Result<Rechecked> rechecked_in_place(const Rig& rig,
+                                     const Surroundings& around,
+                                     const fs::path& folder,
+                                     const std::function<bool()>& should_continue) {
+  LIMN_TRY(const calib::Board board, calibration_board(rig));
+  const auto devices = [](const std::vector<Imager>& imagers) {
+    std::vector<calib::CapturedDevice> list;
+    for (const Imager& imager : imagers) list.push_back({imager.name, imager.width, imager.height});
+    return list;
+  };
+  const fs::path captures = folder / "captures";
+  LIMN_TRY_STATUS(captured_once(calib::plan_captures(captures, devices(rig.cameras), devices(rig.projectors),
+                                                     board, k_code_in_place, k_sparse),
+                                rig, around));
+  LIMN_TRY(CheckedRig checked, recheck_rig(rig, captures, {}, folder, should_continue));
+  LIMN_TRY_STATUS(check_explained(checked.rechecked.result));
+  LIMN_TRY_STATUS(save_rig(checked.rechecked.result.rig, folder));
+  if (!rig.responses.empty() || !rig.camera_responses.empty())
+    LIMN_TRY_STATUS(save_responses({rig.responses, rig.camera_responses}, {}, folder));
+  return std::move(checked.rechecked);
+}
+
+}  // namespace limn::apps

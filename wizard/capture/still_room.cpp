@@ -1,0 +1,31 @@
+#include "wizard/capture/still_room.h"
+
+#include <opencv2/imgproc.hpp>
+
+#include "core/image_io.h"
+
+namespace limn::apps {
+namespace {
+
+constexpr int k_width = 160;       // of the small image: noise and flicker of single pixels are gone
+constexpr double k_levels = 8;     // of 255: more than noise
+constexpr double k_share = 0.002;  // of the image: a hand at its edge
+
+}  // namespace
+
+bool StillRoom::take(const cv::Mat& image, Stamp at) {
+  cv::Mat small;
+  cv::resize(to_grey(image), small, {k_width, std::max(1, k_width * image.rows / image.cols)}, 0, 0,
+             cv::INTER_AREA);
+  cv::Mat differs;
+  if (small.size() == still_.size()) cv::absdiff(small, still_, differs);
+  const bool is_moving =
+      differs.empty() || cv::countNonZero(differs > k_levels) > k_share * static_cast<double>(small.total());
+  if (is_moving) {
+    still_ = small;
+    since_ = at;
+  }
+  return seconds_between(since_, at) >= k_rest_s;
+}
+
+}  // namespace limn::apps

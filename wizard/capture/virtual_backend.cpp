@@ -1,0 +1,116 @@
+#include "wizard/capture/virtual_backend.h"
+
+#include <algorithm>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <utility>
+
+#include "wizard/capture/virtual_capture.h"
+#include "calib/board/board_finder.h"
+#include "core/image_io.h"
+
+namespace limn::apps {
+namespace {
+
+constexpr double k_guard_s = 0.001;  // beyond a measured latency
+
+// A virtual rig's devices with what is known of their latencies.
+struct VirtualStage {
+  sim::VirtualRig* rig = nullptr;
+  std::vector<double> latency_s;  // of the projectors
+  std::vector<cv::Mat> frames;    // of one exposure of all cameras, not grabbed yet
+  Stamp lit_at;                   // what was shown last is on the surface
+
+  Status show(int projector, const cv::Mat& image) {
+    rig->darken();
+    lit_at = shifted(rig->now(), latency_s.at(static_cast<std::size_t>(projector)) + k_guard_s);
+    frames.assign(frames.size(), cv::Mat());
+    const auto shown = rig->projector(projector).show(image);
+    return shown ? Status() : Status(shown.error());
+  }
+
+  cv::Mat grab(int camera) {
+    cv::Mat& wanted = frames.at(static_cast<std::size_t>(camera));
+    if (wanted.empty()) {
+      rig->advance(std::max(0.0, seconds_between(rig->now(), lit_at)));
+      std::vector<int> all;
+      for (int i = 0; i < static_cast<int>(frames.size()); ++i) all.push_back(i);
+      std::size_t i = 0;
+      for (Frame& frame : rig->expose(all)) frames[i++] = std::move(frame.image);
+    }
+    return std::exchange(wanted, cv::Mat());
+  }
+
+  // The board as it is held, in white light.
+  Status look(const calib::Board& board, const Surroundings::Seen& seen) {
+    LIMN_TRY_STATUS(show(0, cv::Mat(rig->projector(0).size(), CV_8UC1, cv::Scalar(255))));
+    for (int i = 0; i < static_cast<int>(frames.size()); ++i) {
+      const cv::Mat image = grab(i);
+      seen(i, image, calib::find_board(board, to_grey(image)));
+    }
+    return {};
+  }
+
+  // The board is gone, the prototype back where the world has it.
+  Result<bool> stand(const Surroundings::Seen& seen) {
+    rig->remove("board");
+    rig->restore_prototype();
+    LIMN_TRY_STATUS(show(0, cv::Mat(rig->projector(0).size(), CV_8UC1, cv::Scalar(255))));
+    for (int i = 0; seen && i < static_cast<int>(frames.size()); ++i) seen(i, grab(i), {});
+    return true;
+  }
+
+  Status paint(const std::vector<cv::Mat>& images) {
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      const auto shown = rig->projector(static_cast<int>(i)).show(images[i]);
+      if (!shown) return shown.error();
+      lit_at = std::max(lit_at, shifted(rig->now(), latency_s.at(i) + k_guard_s));
+    }
+    frames.assign(frames.size(), cv::Mat());
+    return {};
+  }
+
+  FlashStage flashes(int projector, int camera) {
+    rig->darken();
+    const auto show = [r = rig, projector](bool white) -> Result<Stamp> {
+      const Stamp at = r->now();
+      const cv::Mat image(r->projector(projector).size(), CV_8UC1, cv::Scalar(white ? 255 : 0));
+      LIMN_TRY([[maybe_unused]] const Stamp shown_at, r->projector(projector).show(image));
+      return at;
+    };
+    return {.show = show,
+            .next = [r = rig, camera] { return r->camera(camera).next(); },
+            .wait = [r = rig](double seconds) { r->advance(seconds); }};
+  }
+};
+
+}  // namespace
+
+Surroundings virtual_backend(const Plan& plan, sim::VirtualRig* rig, ImageWriter* writer) {
+  const auto stage = std::make_shared<VirtualStage>();
+  stage->rig = rig;
+  stage->latency_s.resize(rig->world().rig.projectors.size(), FlashOptions().limit_s);
+  stage->frames.resize(rig->world().rig.cameras.size());
+  return {.hold = [&plan, stage](int pose, const Surroundings::Seen& seen) -> Status {
+            const Pose& place = plan.world_from_board[static_cast<std::size_t>(pose)];
+            stage->rig->place(board_object(plan.board, place));
+            return seen ? stage->look(plan.board, seen) : Status();
+          },
+          .stage = {.show = [stage](int p, const cv::Mat& image) { return stage->show(p, image); },
+                    .grab = [stage](int camera) -> Result<cv::Mat> { return stage->grab(camera); },
+                    .store = [writer](const std::filesystem::path& path,
+                                      const cv::Mat& image) { return writer->store(path, image); }},
+          .written = [writer] { return writer->finish(); },
+          .now = [rig] { return rig->now(); },
+          .stand = rig->world().scene && rig->world().scene->prototype
+                       ? [stage](const Surroundings::Seen& seen) { return stage->stand(seen); }
+                       : std::function<Result<bool>(const Surroundings::Seen&)>(),
+          .paint = [stage](const std::vector<cv::Mat>& images) { return stage->paint(images); },
+          .flashes = [stage](int projector, int camera) { return stage->flashes(projector, camera); },
+          .use_latency =
+              [stage](int projector, double seconds) {
+                stage->latency_s.at(static_cast<std::size_t>(projector)) = seconds;
+              }};
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,100 @@
+#include "wizard/device_checks.h"
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+namespace limn::apps {
+namespace {
+
+class Checks {
+ public:
+  Checks(const calib::CaptureSet& captures, const Surroundings& surroundings, const WizardAudience& audience)
+      : captures_(captures), around_(surroundings), audience_(audience) {}
+
+  Status look_at_light() {
+    step(WizardStep::outputs, WizardState::runs, "");
+    LIMN_TRY(out.light, measured_exposure(captures_, around_.stage));
+    if (audience_.lit) audience_.lit(out.light);
+    report_progress(WizardStep::outputs, unseen(out.light),
+         fmt::format("{} of {} seen", captures_.projectors.size() - unseen(out.light).size(),
+                     captures_.projectors.size()));
+    std::vector<std::string> advice;
+    double bright = 255, saturated = 0, blur_px = 0;
+    for (const ExposureReading& seen : out.light) {
+      const auto more = seen.advice();
+      advice.insert(advice.end(), more.begin(), more.end());
+      if (seen.lit <= 0) continue;
+      bright = std::min(bright, seen.bright);
+      saturated = std::max(saturated, seen.saturated);
+      blur_px = std::max(blur_px, seen.blur_px);
+    }
+    report_progress(WizardStep::exposure, advice,
+         fmt::format("level {:.0f}, {:.1f} % saturated, edges {:.1f} px", bright, 100 * saturated, blur_px));
+    return {};
+  }
+
+  Status measure_latency() {
+    step(WizardStep::latency, WizardState::runs, "");
+    std::vector<std::string> words, problems;
+    for (std::size_t i = 0; i < captures_.projectors.size(); ++i) {
+      out.latency.emplace_back();
+      const auto camera = best_camera(captures_.projectors[i].name);
+      if (!camera) continue;
+      const auto measured = measured_latency(around_.flashes(static_cast<int>(i), *camera));
+      if (!measured) {
+        problems.push_back(fmt::format("{}: {}", captures_.projectors[i].name, measured.message()));
+        continue;
+      }
+      out.latency.back() = *measured;
+      around_.use_latency(static_cast<int>(i), measured->seconds + measured->within_s);
+      words.push_back(fmt::format("{} {:.1f} ms", captures_.projectors[i].name, 1e3 * measured->seconds));
+    }
+    report_progress(WizardStep::latency, problems, fmt::format("{}", fmt::join(words, ", ")));
+    return {};
+  }
+
+  CheckedDevices out;
+
+ private:
+  // The one that sees most of a projector's light; none when none does.
+  std::optional<int> best_camera(const std::string& projector) const {
+    double most = 0;
+    std::optional<int> best;
+    for (std::size_t i = 0; i < out.light.size(); ++i) {
+      if (out.light[i].projector != projector || out.light[i].lit <= most) continue;
+      most = out.light[i].lit;
+      best = static_cast<int>(i % captures_.cameras.size());
+    }
+    return best;
+  }
+
+  void step(WizardStep which, WizardState state, const std::string& words) {
+    if (audience_.step) audience_.step(which, state, words);
+  }
+
+  // The end of a step: what is wrong, or how it is.
+  void report_progress(WizardStep which, const std::vector<std::string>& problems, const std::string& words) {
+    for (const std::string& problem : problems) audience_.say("advice: " + problem);
+    audience_.say(fmt::format("{}: {}", to_text(which), words));
+    step(which, problems.empty() ? WizardState::done : WizardState::fails,
+         problems.empty() ? words : fmt::format("{}", fmt::join(problems, "\n")));
+  }
+
+  const calib::CaptureSet& captures_;
+  const Surroundings& around_;
+  const WizardAudience& audience_;
+};
+
+}  // namespace
+
+Result<CheckedDevices> checked_devices(const calib::CaptureSet& captures,
+                                       const Surroundings& surroundings,
+                                       const WizardAudience& audience) {
+  Checks checks(captures, surroundings, audience);
+  LIMN_TRY_STATUS(checks.look_at_light());
+  LIMN_TRY_STATUS(checks.measure_latency());
+  return std::move(checks.out);
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,19 @@
+#include "wizard/measure/pixel_size.h"
+
+#include <charconv>
+#include <system_error>
+
+namespace limn::apps {
+
+Result<PixelSize> parse_pixel_size(const std::string& text) {
+  PixelSize size;
+  const char* end = text.data() + text.size();
+  const auto width = std::from_chars(text.data(), end, size.width);
+  if (width.ec == std::errc() && width.ptr != end && *width.ptr == 'x') {
+    const auto height = std::from_chars(width.ptr + 1, end, size.height);
+    if (height.ec == std::errc() && height.ptr == end && size.width > 0 && size.height > 0) return size;
+  }
+  return usage_error("--projector: expected a size such as 1280x800, found '{}'.", text);
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,331 @@
+#include "wizard/measure/scan_alignment.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "core/stopwatch.h"
+#include "core/config.h"
+#include "core/file.h"
+#include "core/log.h"
+#include "core/image_io.h"
+#include "core/rig.h"
+#include "scene/scan_preview.h"
+#include "scene/marker_file.h"
+#include "scene/scene.h"
+#include "tracker/body_pose.h"
+#include "tracker/detector.h"
+#include "tracker/family.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using Eigen::Vector3d;
+
+constexpr int k_image_width = 1200, k_image_height = 800;
+constexpr double k_residual_reach_m = 0.02;  // further from the mesh is another thing
+constexpr double k_colour_limit_mm = 2;      // end of the residual map's colours
+constexpr double k_symmetric = 0.9;          // a rival that explains this share of the best pose's points
+constexpr std::size_t k_told = 12;           // differences printed; all are in align.json
+
+// A pose and how it was found.
+struct Start {
+  Pose world_from_prototype;
+  std::optional<Matrix6d> covariance;  // of markers
+  std::string how;
+};
+
+Result<Start> start_from_file(const fs::path& path) {
+  LIMN_TRY(const Config config, Config::load(path, ""));
+  const Pose pose = config.root().at("world_from_prototype").pose();
+  LIMN_TRY_STATUS(config.status());
+  return Start{pose, std::nullopt, "start"};
+}
+
+Result<Start> start_from_picks(const fs::path& path, double metres_per_unit) {
+  LIMN_TRY(const Config config, Config::load(path, "limn.picks/1"));
+  const ConfigNode root = config.root();
+  root.only({"schema", "pairs"});
+  std::vector<calib::Pick> picks;
+  for (const ConfigNode& pair : root.at("pairs").items()) {
+    pair.only({"cad", "scan_m"});
+    picks.push_back({pair.at("cad").vector3() * metres_per_unit, pair.at("scan_m").vector3()});
+  }
+  LIMN_TRY_STATUS(config.status());
+  const auto pose = calib::pose_from_picks(picks);
+  if (!pose) return error("{}: {}", path.string(), pose.message());
+  return Start{*pose, std::nullopt, "points"};
+}
+
+// CAMERA=PICTURE, read and of the camera's size.
+struct Shot {
+  const Imager* camera = nullptr;
+  cv::Mat image;
+};
+Result<Shot> read_shot(const std::string& argument, const Rig& rig) {
+  const auto equals = argument.find('=');
+  const std::string name = argument.substr(0, equals);
+  const auto camera =
+      std::find_if(rig.cameras.begin(), rig.cameras.end(), [&](const Imager& c) { return c.name == name; });
+  if (equals == std::string::npos || camera == rig.cameras.end())
+    return usage_error("--frame {}: expected CAMERA=PICTURE with a camera of the rig.", argument);
+  LIMN_TRY(cv::Mat image, read_grey_image(argument.substr(equals + 1)));
+  if (image.cols != camera->width || image.rows != camera->height)
+    return error("{}: expected a picture of {}'s size {}x{}, found {}x{}.", argument.substr(equals + 1), name,
+                 camera->width, camera->height, image.cols, image.rows);
+  return Shot{&*camera, std::move(image)};
+}
+
+// Where a body stands in the frames, by all cameras' markers at once.
+Result<Track> track_in_frames(const AlignOptions& command, const Body& body, const fs::path& family_folder) {
+  LIMN_TRY(const Rig rig, load_rig(command.rig));
+  LIMN_TRY(tracker::Families families,
+           tracker::Families::load(tracker::families_of({&body, 1}), family_folder));
+  tracker::Detector detector(std::move(families));
+  std::vector<Shot> shots;
+  std::vector<std::vector<tracker::Detection>> detections;
+  for (const std::string& frame : command.frames) {
+    LIMN_TRY(Shot shot, read_shot(frame, rig));
+    detections.push_back(detector.detect(shot.image, &shot.camera->lens));
+    shots.push_back(std::move(shot));
+  }
+  std::vector<tracker::View> views;
+  for (std::size_t i = 0; i < shots.size(); ++i) views.push_back({shots[i].camera, detections[i]});
+  const auto track = tracker::world_from_body(body, views, Stamp{});
+  if (!track)
+    return error(
+        "--frame: expected markers of the prototype in the picture, found none of its {}. Look at light and "
+        "focus.",
+        body.markers.size());
+  return *track;
+}
+
+Result<Start> start_from_markers(const AlignOptions& command) {
+  if (command.rig.empty() || command.frames.empty())
+    return usage_error("--scene: the markers of its prototype need --rig RIG and --frame CAMERA=PICTURE.");
+  LIMN_TRY(const scene::Scene scene, scene::load_scene(command.scene));
+  const std::vector<Body> bodies = scene::bodies(scene);
+  const auto body =
+      std::find_if(bodies.begin(), bodies.end(), [](const Body& b) { return b.name == "prototype"; });
+  if (body == bodies.end() || body->markers.empty())
+    return error("{}: expected markers on the prototype (prototype.markers), found none.",
+                 command.scene.string());
+  LIMN_TRY(const Track track, track_in_frames(command, *body, scene.folder));
+  log_info("align: start from {} markers, {:.2f} px", track.marker_count, track.rms_px);
+  return Start{track.world_from_body, track.covariance, fmt::format("{} markers", track.marker_count)};
+}
+
+// The body's markers on the CAD, once that was found to stand there.
+Status write_markers(const AlignOptions& command, const Pose& world_from_prototype) {
+  LIMN_TRY(std::vector<BodyMarker> markers, scene::load_marker_file(command.body));
+  LIMN_TRY(const Track track, track_in_frames(command, {"body", markers}, command.body.parent_path()));
+  const Pose prototype_from_body = world_from_prototype.inverse() * track.world_from_body;
+  for (BodyMarker& marker : markers) marker.body_from_marker = prototype_from_body * marker.body_from_marker;
+  return write_file(command.out / "markers.json", scene::marker_file_json(markers));
+}
+
+// A scene gives its mesh alone without frames, and where the frames are for another body.
+bool starts_from_markers(const AlignOptions& command) {
+  const bool is_mesh_alone = command.mesh.empty() && (command.frames.empty() || !command.body.empty());
+  return !command.scene.empty() && !is_mesh_alone;
+}
+
+Status checked(const AlignOptions& command) {
+  if (command.mesh.empty() && command.scene.empty())
+    return usage_error(
+        "expected a CAD file (--mesh and --units) or a --scene with a prototype, found neither.");
+  if (!command.body.empty() && (command.rig.empty() || command.frames.empty() || command.scan.empty()))
+    return usage_error("--body: expected --scan, --rig and --frame CAMERA=PICTURE with it.");
+  if (!command.mesh.empty() && command.units.empty())
+    return usage_error("--units: expected m, cm, mm, in or ft of the CAD, found none.");
+  const int starts = !command.start.empty() + !command.points.empty() + starts_from_markers(command);
+  if (starts > 1) return usage_error("expected one of --start, --points, --scene, found {}.", starts);
+  if (command.scan.empty() && command.scene.empty())
+    return usage_error(
+        "expected --scan SCAN.ply, or --scene, --rig and --frame to take the markers' answer alone.");
+  return {};
+}
+
+Result<std::optional<Start>> start_of(const AlignOptions& command, double metres_per_unit) {
+  using Maybe = std::optional<Start>;
+  Result<Start> start = Start{};
+  if (!command.start.empty())
+    start = start_from_file(command.start);
+  else if (!command.points.empty())
+    start = start_from_picks(command.points, metres_per_unit);
+  else if (starts_from_markers(command))
+    start = start_from_markers(command);
+  else
+    return Maybe();
+  if (!start) return start.error();
+  return Maybe(*start);
+}
+
+Result<MeshAligned> align(const AlignOptions& command,
+                          const scene::Mesh& mesh,
+                          const scene::MeshBvh& index,
+                          const scene::ScanSurface& scan,
+                          const std::optional<Start>& start) {
+  MeshAligned result;
+  if (start) {
+    LIMN_TRY(result.registration, calib::refined_registration(mesh, index, scan, start->world_from_prototype));
+    result.how = start->how;
+  } else {
+    log_info("align: no start given, looking everywhere");
+    const auto found = calib::global_registration(mesh, index, scan);
+    if (!found) return error("{}: {}", command.scan.string(), found.message());
+    result.registration = found->registration;
+    result.how = "search";
+    if (found->rival_share > k_symmetric) {
+      const double turn =
+          angle_between(found->rival->rotation, found->registration.world_from_prototype.rotation);
+      result.warnings.push_back(fmt::format(
+          "another pose, turned by {:.0f} degrees, explains {:.0f} % as many points: the shape is "
+          "symmetric or too little of it was scanned. Check the picture, or give --start.",
+          turn * 180 / M_PI, 100 * found->rival_share));
+    }
+  }
+  for (const std::string& free : result.registration.free_directions)
+    result.warnings.push_back(fmt::format(
+        "the scanned shape does not hold the fit against a {} (prototype's axes): that part of the "
+        "pose comes from the start alone. Scan more of it, or use markers.",
+        free));
+  return result;
+}
+
+std::string text_of(const calib::Difference& d) {
+  return fmt::format(
+      "{:.1f} cm2 around ({:.0f}, {:.0f}, {:.0f}) mm of the prototype: the scan stands {:.1f} mm {} the CAD "
+      "(up to {:.1f} mm)",
+      1e4 * d.area_m2, 1e3 * d.p_prototype.x(), 1e3 * d.p_prototype.y(), 1e3 * d.p_prototype.z(),
+      1e3 * std::abs(d.mean_m), d.mean_m > 0 ? "outside" : "inside", 1e3 * std::abs(d.worst_m));
+}
+
+nlohmann::ordered_json json_of(const MeshAligned& aligned,
+                               const std::vector<calib::Difference>& differences,
+                               double seconds) {
+  const calib::Registration& a = aligned.registration;
+  nlohmann::ordered_json json;
+  json["schema"] = "limn.align/1";
+  json["start"] = aligned.how;
+  json["world_from_prototype"] = to_json(a.world_from_prototype);
+  json["covariance"] = nlohmann::ordered_json::array();
+  for (int r = 0; r < 6; ++r) {
+    std::vector<double> row;
+    for (int c = 0; c < 6; ++c) row.push_back(a.covariance(r, c));
+    json["covariance"].push_back(row);
+  }
+  json["rms_mm"] = 1e3 * a.rms_m;
+  json["points"] = {{"near", a.near}, {"used", a.used}};
+  json["free_directions"] = a.free_directions;
+  json["differences"] = nlohmann::ordered_json::array();
+  for (const calib::Difference& d : differences)
+    json["differences"].push_back({{"prototype_m", {d.p_prototype.x(), d.p_prototype.y(), d.p_prototype.z()}},
+                                   {"area_mm2", 1e6 * d.area_m2},
+                                   {"mean_mm", 1e3 * d.mean_m},
+                                   {"worst_mm", 1e3 * d.worst_m}});
+  json["warnings"] = aligned.warnings;
+  json["seconds"] = seconds;
+  return json;
+}
+
+// The scan's points near the mesh in the colours of their residuals, in the prototype's frame.
+scene::ScanSurface coloured(const scene::ScanSurface& scan,
+                        const std::vector<float>& residuals,
+                        const Pose& world_from_prototype) {
+  std::vector<bool> keep;
+  for (const float residual : residuals) keep.push_back(!std::isnan(residual));
+  scene::ScanSurface part = scan;
+  const Pose inverse = world_from_prototype.inverse();
+  for (auto& p : part.positions) p = (inverse * p.cast<double>()).cast<float>();
+  for (auto& n : part.normals) n = (inverse.rotation * n.cast<double>()).cast<float>();
+  part.colours_rgb.clear();
+  for (const float residual : residuals)
+    part.colours_rgb.push_back(scene::signed_colour_rgb(
+        std::isnan(residual) ? 0 : 1e3 * static_cast<double>(residual) / k_colour_limit_mm));
+  return scene::with_vertices_kept(part, keep);
+}
+
+Status write_images(const scene::ScanSurface& map, const fs::path& out) {
+  Vector3d d_seen = Vector3d::Zero();
+  for (const auto& n : map.normals) d_seen += n.cast<double>();
+  d_seen.normalize();
+  const Vector3d up = std::abs(d_seen.y()) < 0.9 ? Vector3d::UnitY() : Vector3d::UnitZ();
+  const std::string caption = "scan over the CAD: red stands outside, blue inside";
+  for (const auto& [name, turn] : {std::pair{"residual.png", 0.0}, std::pair{"residual-side.png", 0.9}}) {
+    const Vector3d d_from = Eigen::AngleAxisd(turn, up) * d_seen;
+    const auto viewer = scene::preview_viewer(map, d_from, up, k_image_width, k_image_height);
+    LIMN_TRY_STATUS(write_png(out / name, scene::with_scale(scene::draw_scan_preview(map, viewer), -k_colour_limit_mm,
+                                                            k_colour_limit_mm, caption)));
+  }
+  return {};
+}
+
+Status write_pose(const Pose& world_from_prototype, const fs::path& out) {
+  const nlohmann::ordered_json poses = {{"world_from_prototype", to_json(world_from_prototype)}};
+  return write_file(out / "poses.json", poses.dump(2) + "\n");
+}
+
+// The markers' answer alone.
+Result<MeshAligned> written_markers_pose(const Start& start, const AlignOptions& command, double seconds) {
+  MeshAligned aligned;
+  aligned.registration.world_from_prototype = start.world_from_prototype;
+  if (start.covariance) aligned.registration.covariance = *start.covariance;
+  aligned.how = start.how;
+  LIMN_TRY_STATUS(make_folder(command.out));
+  LIMN_TRY_STATUS(write_file(command.out / "align.json", json_of(aligned, {}, seconds).dump(2) + "\n"));
+  LIMN_TRY_STATUS(write_pose(start.world_from_prototype, command.out));
+  return aligned;
+}
+
+// The mesh that is laid onto the scan: the CAD file, or the scene's prototype.
+Result<scene::Mesh> mesh_of(const AlignOptions& command) {
+  if (!command.mesh.empty()) return scene::load_mesh(command.mesh, command.units);
+  LIMN_TRY(scene::Scene scene, scene::load_scene(command.scene));
+  if (!scene.prototype) return error("{}: expected a prototype, found none.", command.scene.string());
+  return std::move(scene.prototype->mesh);
+}
+
+}  // namespace
+
+Result<MeshAligned> written_alignment(const AlignOptions& command) {
+  const auto begun = std::chrono::steady_clock::now();
+  LIMN_TRY_STATUS(checked(command));
+  const auto metres = scene::metres_per_unit(command.mesh.empty() ? "m" : command.units);
+  if (!metres) return usage_error("--units: {}", metres.message());
+  const auto scan_metres = scene::metres_per_unit(command.scan_units);
+  if (!scan_metres) return usage_error("--scan-units: {}", scan_metres.message());
+  LIMN_TRY(const scene::Mesh mesh, mesh_of(command));
+  LIMN_TRY(const auto start, start_of(command, *metres));
+  if (command.scan.empty()) return written_markers_pose(*start, command, 1e-3 * milliseconds_since(begun));
+  const fs::path file = fs::is_directory(command.scan) ? command.scan / "mesh.ply" : command.scan;
+  LIMN_TRY(const scene::ScanSurface scan, scene::load_ply(file, *scan_metres));
+  if (const Status sizes = calib::comparable_sizes(mesh, scan); !sizes)
+    return error("{}: {}", (command.mesh.empty() ? command.scene : command.mesh).string(), sizes.message());
+  const scene::MeshBvh index(mesh);
+  LIMN_TRY(MeshAligned aligned, align(command, mesh, index, scan, start));
+  const auto residuals = calib::residuals(index, scan, aligned.registration, k_residual_reach_m);
+  const auto differences =
+      calib::differences(scan, residuals, aligned.registration, {.least_m = 1e-3 * command.least_mm});
+  for (std::size_t i = 0; i < std::min(k_told, differences.size()); ++i)
+    aligned.warnings.push_back(text_of(differences[i]));
+  if (differences.size() > k_told)
+    aligned.warnings.push_back(
+        fmt::format("{} smaller regions differ, too: see align.json", differences.size() - k_told));
+
+  LIMN_TRY_STATUS(make_folder(command.out));
+  const scene::ScanSurface map = coloured(scan, residuals, aligned.registration.world_from_prototype);
+  LIMN_TRY_STATUS(scene::save_ply(map, command.out / "residual.ply"));
+  LIMN_TRY_STATUS(write_images(map, command.out));
+  LIMN_TRY_STATUS(write_file(command.out / "align.json",
+                             json_of(aligned, differences, 1e-3 * milliseconds_since(begun)).dump(2) + "\n"));
+  LIMN_TRY_STATUS(write_pose(aligned.registration.world_from_prototype, command.out));
+  if (!command.body.empty()) LIMN_TRY_STATUS(write_markers(command, aligned.registration.world_from_prototype));
+  return aligned;
+}
+
+}  // namespace limn::apps

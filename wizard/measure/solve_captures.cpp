@@ -1,0 +1,158 @@
+#include "wizard/measure/solve_captures.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "wizard/measure/scale_bars.h"
+#include "wizard/measure/pixel_size.h"
+#include "calib/capture_set.h"
+#include "calib/judge/assess.h"
+#include "calib/judge/board_check.h"
+#include "calib/judge/capture_faults.h"
+#include "calib/judge/image_check.h"
+#include "calib/model_selection.h"
+#include "calib/observations.h"
+#include "calib/report/failed_report.h"
+#include "calib/report/report.h"
+#include "calib/response/measure_response.h"
+#include "calib/response/vignetting.h"
+#include "calib/solve.h"
+#include "core/file.h"
+#include "core/lens.h"
+#include "core/log.h"
+#include "core/rig.h"
+#include "core/time_now.h"
+
+namespace limn::apps {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begun) {
+  return std::chrono::duration<double>(Clock::now() - begun).count();
+}
+
+Result<calib::CaptureSet> foreign_captures(const SolveCommandOptions& options) {
+  if (options.import_format != "opencv-gray")
+    return usage_error("--import: expected opencv-gray, found '{}'.", options.import_format);
+  if (options.projector.empty() || options.board.empty())
+    return usage_error("--import {}: needs --projector 1024x768 and --board chessboard:9x7:75mm.",
+                       options.import_format);
+  LIMN_TRY(const PixelSize size, parse_pixel_size(options.projector));
+  const auto board = calib::Board::parse(options.board);
+  if (!board) return usage_error("--board: {}", board.message());
+  return calib::import_opencv_gray(
+      {options.captures, size.width, size.height, *board, options.poses, options.shots, options.skip_poses});
+}
+
+Result<calib::CaptureSet> captures_of(const SolveCommandOptions& options) {
+  if (!options.import_format.empty()) return foreign_captures(options);
+  if (!options.projector.empty() || !options.board.empty())
+    return usage_error("--projector and --board describe foreign captures: they need --import opencv-gray.");
+  return calib::load_captures(options.captures, options.skip_poses);
+}
+
+Status check_models(const SolveCommandOptions& options) {
+  for (const std::string& name : {options.camera_model, options.projector_model}) {
+    if (name == calib::k_auto_lens) continue;
+    if (const auto model = LensModel::parse(name); !model) return usage_error("{}", model.message());
+  }
+  return {};
+}
+
+// The known lengths as light measures them; what is wrong with them is a fault, and nothing with a fault of
+// scale is good.
+Status check_lengths(const calib::CaptureSet& captures,
+                     const std::vector<calib::ScaleBar>& lengths,
+                     calib::Report* report) {
+  if (lengths.empty()) return {};
+  LIMN_TRY(const auto marks, scale_bar_marks(captures, report->solution.rig, lengths));
+  const double widened = std::max(1.0, report->assessment.normalised_residuals.held_out.stddev);
+  LIMN_TRY(report->scale_bar_lengths,
+           calib::measure_scale_bars(captures, report->solution, marks, lengths, widened));
+  for (const calib::ScaleBarCheck& check : report->scale_bar_lengths) {
+    if (const auto fault = calib::scale_fault(check, captures.board))
+      calib::add_faults({*fault}, &report->assessment);
+  }
+  return {};
+}
+
+// What kept a rig from being made, with the faults that explain it; they also stand in report.json.
+Error explained(const Error& failure, const std::vector<calib::Fault>& faults, const SolveCommandOptions& options) {
+  if (faults.empty()) return failure;
+  if (const auto written = calib::write_failed_report(failure.message, faults, options.out); !written)
+    log_warning("{}", written.message());
+  return error("{}\n{}", failure.message, calib::to_text(faults));
+}
+
+// What the rig says against the one that it replaces.
+void compare_with_earlier(const SolveCommandOptions& options,
+                          const calib::Solution& solution,
+                          calib::Assessment* assessment) {
+  if (!std::filesystem::exists(options.out / "rig.json")) return;
+  const auto earlier = load_rig(options.out);
+  if (earlier) calib::add_faults(calib::faults_against(*earlier, solution.rig), assessment);
+}
+
+// What the lit boards say of how light falls off towards corners; only cameras whose encoding is known can
+// tell.
+Status measure_vignetting(const calib::CaptureSet& captures,
+                          const calib::Report& report,
+                          RigResponses* responses) {
+  if (responses->cameras.empty()) return {};
+  LIMN_TRY(const auto light,
+           calib::paper_light(captures, report.observed.observations, report.solution, responses->cameras));
+  calib::add_vignetting(light, captures.cameras, captures.projectors, responses);
+  return {};
+}
+
+}  // namespace
+
+Result<calib::Report> solved(const SolveCommandOptions& options) {
+  const auto begun = Clock::now();
+  LIMN_TRY_STATUS(check_models(options));
+  LIMN_TRY(const calib::CaptureSet captures, captures_of(options));
+  LIMN_TRY(const auto lengths, scale_bar_lengths(captures, options.scale_bar_lengths));
+  LIMN_TRY_STATUS(calib::check_images(captures));
+  LIMN_TRY(calib::MeasuredResponse response, calib::measure_response(captures));
+  for (const std::string& warning : response.warnings) log_warning("response: {}", warning);
+  const double response_seconds = seconds_since(begun);
+  LIMN_TRY(calib::Observed observed, calib::observe(captures));
+  LIMN_TRY_STATUS(calib::check_board(captures, observed.observations));
+  const double board_seconds = observed.seconds_board, decode_seconds = observed.seconds_decode;
+  calib::SolveOptions solving;
+  solving.camera_model = options.camera_model;
+  solving.projector_model = options.projector_model;
+  const auto solving_begun = Clock::now();
+  auto choice = calib::solve_selecting_models(observed.observations, solving);
+  if (!choice) return explained(choice.error(), calib::unsolved_faults(observed), options);
+  solving = choice->options;
+  calib::Solution* const solution = &choice->solution;
+  const double solve_seconds = seconds_since(solving_begun);
+  log_info("solved in {} steps, judging by held-out poses", solution->iterations);
+  const auto judging_begun = Clock::now();
+  calib::Assessment assessment = calib::assess(observed, *solution, std::move(choice->held_out));
+  compare_with_earlier(options, *solution, &assessment);
+  calib::Report report{std::move(observed),
+                       std::move(*solution),
+                       std::move(assessment),
+                       {{"response", response_seconds},
+                        {"board", board_seconds},
+                        {"decode", decode_seconds},
+                        {"solve", solve_seconds},
+                        {"assess", seconds_since(judging_begun)},
+                        {"total", seconds_since(begun)}},
+                       std::move(choice->trials)};
+  LIMN_TRY_STATUS(measure_vignetting(captures, report, &response.responses));
+  LIMN_TRY_STATUS(check_lengths(captures, lengths, &report));
+  report.explanation = calib::explain(report.observed, report.solution, report.assessment);
+  report.made_at = time_now();
+  report.history = calib::read_history(options.out);
+  LIMN_TRY_STATUS(calib::write_rig_folder(report, solving, options.out));
+  if (!response.responses.projectors.empty())
+    LIMN_TRY_STATUS(save_responses(response.responses, response.mixings, options.out));
+  return report;
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,39 @@
+#include "wizard/pose_quality.h"
+
+#include <algorithm>
+
+#include "calib/report/advice.h"
+
+namespace limn::apps {
+namespace {
+
+constexpr double k_settled = 0.05;  // of the predicted error, over two poses
+
+// Faults that another pose may cure; the others are cured by hands.
+bool wants_poses(const calib::Fault& fault) {
+  return fault.name == "few_poses" || fault.name == "little_tilt" || fault.name == "low_coverage";
+}
+
+}  // namespace
+
+double predicted_mm(const calib::Assessment& assessment) {
+  return *std::max_element(assessment.predicted_error_mm.begin(), assessment.predicted_error_mm.end());
+}
+
+std::string more_helps(const std::vector<PoseJudged>& poses) {
+  if (poses.empty() || !poses.back().assessment) return "too few for a rig";
+  const calib::Assessment& last = *poses.back().assessment;
+  for (const calib::Fault& fault : last.faults)
+    if (wants_poses(fault)) return fault.name;
+  if (last.verdict != calib::Verdict::good) return "the rig is " + calib::to_text(last.verdict);
+  const double mm = predicted_mm(last);
+  if (mm <= calib::k_fine_mm) return "";
+  if (!calib::rests_on_enough_poses(last, static_cast<int>(poses.size())))
+    return "few leave little to judge by";
+  const auto earlier = poses.size() < 3 ? nullptr : &poses[poses.size() - 3].assessment;
+  if (earlier == nullptr || !*earlier) return "the predicted error may still fall";
+  const bool has_settled = mm > (1 - k_settled) * predicted_mm(**earlier);
+  return has_settled ? "" : "the predicted error still falls";
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "wizard/capture/exposure_check.h"
+#include "wizard/pose_quality.h"
+#include "wizard/capture/request.h"
+#include "calib/observations.h"
+#include "calib/report/report.h"
+
+namespace limn::apps {
+
+/// The wizard's steps, in their order.
+enum class WizardStep { devices, outputs, exposure, latency, board, solve, result, scan, align, paint };
+constexpr std::size_t k_wizard_steps = 10;
+std::string to_text(WizardStep step);
+enum class WizardState { waits, runs, done, fails };
+
+/// Who watches the wizard; functions may be empty, but for `say`.
+struct WizardAudience {
+  std::function<void(const std::string& line)> say;
+  std::function<void(WizardStep step, WizardState state, const std::string& words)> step = nullptr;
+  std::function<void(const std::vector<ExposureReading>&)> lit = nullptr;
+  std::function<void(int pose)> aims = nullptr;                ///< a pose's images are taken from now on
+  std::function<void(const calib::Report&)> solved = nullptr;  ///< the rig is saved; the prototype may follow
+  std::function<void(int pose)> judges = nullptr;              ///< it is decoded and judged from now on
+  /// Observations are of all poses so far.
+  std::function<void(const PoseJudged&, const calib::Observations&, const std::vector<calib::Fault>&)>
+      judged = nullptr;
+  std::atomic<WizardWish>* wish = nullptr;  ///< none again once it is followed
+};
+
+}  // namespace limn::apps

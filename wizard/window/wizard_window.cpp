@@ -1,0 +1,253 @@
+#include "wizard/window/wizard_window.h"
+
+#include <chrono>
+#include <future>
+#include <mutex>
+#include <thread>
+
+#include "wizard/window/wizard_panel.h"
+#include "wizard/window/wizard_view.h"
+#include "calib/board/board_finder.h"
+
+namespace limn::apps {
+namespace {
+
+using State = WizardState;
+
+constexpr auto k_pause = std::chrono::milliseconds(2);  // errands wait no longer
+
+// What worker and window share.
+class Stand {
+ public:
+  Stand(const WizardPlan& plan, std::atomic<WizardWish>* wish)
+      : plan_(plan), targets_(plan.targets), wish_(wish) {
+    step(WizardStep::devices) = {State::done, plan.devices};
+    for (const calib::CapturedDevice& camera : plan.captures.cameras)
+      view_.cameras.push_back({.name = camera.name, .width = camera.width, .height = camera.height});
+    for (const calib::CapturedDevice& projector : plan.captures.projectors)
+      view_.projectors.push_back({projector.name, projector.width, projector.height, {}});
+    view_.poses = static_cast<int>(plan.places.size());
+  }
+
+  WizardView view() const {
+    const std::lock_guard lock(mutex_);
+    return view_;
+  }
+
+  void wish(WizardWish wish) {
+    *wish_ = wish;
+    if (wish != WizardWish::leave) return;
+    const std::lock_guard lock(mutex_);
+    view_.is_leaving = true;
+  }
+
+  WizardAudience audience(const std::function<void(const std::string&)>& say) {
+    return {.say = say,
+            .step =
+                [this](WizardStep which, State state, const std::string& words) {
+                  const std::lock_guard lock(mutex_);
+                  const bool is_pose = which == WizardStep::board;
+                  step(which) = {state,
+                                 is_pose ? fmt::format("pose {} of {}", view_.pose + 1, view_.poses) : words};
+                  view_.is_capturing &= which != WizardStep::solve;
+                },
+            .lit =
+                [this](const std::vector<ExposureReading>& light) {
+                  const std::lock_guard lock(mutex_);
+                  view_.light = light;
+                },
+            .aims = [this](int pose) { aims(pose); },
+            .solved = [this](const calib::Report& report) { solved(report, view_.judged.size()); },
+            .judges = [this](int pose) { judges(pose); },
+            .judged = [this](const PoseJudged& judged, const calib::Observations& observations,
+                             const std::vector<calib::Fault>& faults) { take(judged, observations, faults); },
+            .wish = wish_};
+  }
+
+  // There is a rig.
+  void solved(const calib::Report& report, std::size_t poses) {
+    const std::lock_guard lock(mutex_);
+    view_.is_capturing = false;
+    view_.has_rig = true;
+    for (std::size_t i = 0; i <= static_cast<std::size_t>(WizardStep::result); ++i) {
+      if (view_.steps[i].state == State::waits) view_.steps[i].words = "by an earlier run";
+      if (view_.steps[i].state != State::fails) view_.steps[i].state = State::done;
+    }
+    step(WizardStep::board).words = fmt::format("{} poses", poses);
+    step(WizardStep::solve).words = fmt::format("held-out {:.3f} px", report.assessment.held_out.rms_px);
+    step(WizardStep::result).words = calib::to_text(report.assessment.verdict);
+    view_.worth = report.assessment.verdict;
+    view_.verdict = report.explanation.verdict;
+    view_.faults = report.assessment.faults;
+    view_.to_do = report.explanation.advice;
+    view_.maps = report.assessment.error_maps;
+    view_.advice.clear();
+  }
+
+  // The same surroundings, with the images passing by here.
+  Surroundings watched(Surroundings around) {
+    const auto grab = around.stage.grab;
+    around.stage.grab = [this, grab](int camera) -> Result<cv::Mat> {
+      LIMN_TRY(const cv::Mat image, grab(camera));
+      const std::lock_guard lock(mutex_);
+      view_.cameras[static_cast<std::size_t>(camera)].image = image;
+      return image;
+    };
+    around.stage.report_progress = [this](int done, int total) {
+      const std::lock_guard lock(mutex_);
+      view_.images = done;
+      view_.images_of = total;
+    };
+    around.flashes = [this, flashes = around.flashes](int projector, int camera) {
+      FlashStage flash = flashes(projector, camera);
+      flash.next = [this, next = flash.next, camera]() -> Result<Frame> {
+        LIMN_TRY(Frame frame, next());
+        const std::lock_guard lock(mutex_);
+        view_.cameras[static_cast<std::size_t>(camera)].image = frame.image;
+        return frame;
+      };
+      return flash;
+    };
+    const Surroundings::Seen seen = [this](int camera, const cv::Mat& image,
+                                           const std::vector<calib::BoardCorner>& corners) {
+      const std::lock_guard lock(mutex_);
+      WizardView::Camera& shown = view_.cameras.at(static_cast<std::size_t>(camera));
+      shown.image = image;
+      shown.corners.clear();
+      for (const calib::BoardCorner& corner : corners) shown.corners.push_back(corner.px);
+    };
+    around.hold = [hold = around.hold, seen](int pose, const Surroundings::Seen&) {
+      return hold(pose, seen);
+    };
+    if (around.stand)
+      around.stand = [this, stand = around.stand, seen](const Surroundings::Seen&) {
+        await_prototype(true);
+        auto stands = stand(seen);
+        await_prototype(false);
+        return stands;
+      };
+    return around;
+  }
+
+  void end(const Result<Calibrated>& done) {
+    const std::lock_guard lock(mutex_);
+    view_.is_over = true;
+    view_.is_capturing = false;
+    if (!done) {
+      for (WizardView::Step& step : view_.steps)
+        if (step.state == State::runs) step.state = State::fails;
+      view_.failure = done.message();
+      return;
+    }
+    if (!done->no_prototype.empty())
+      for (WizardView::Step& step : view_.steps)
+        if (step.state == State::runs) step = {State::fails, done->no_prototype};
+  }
+
+ private:
+  void await_prototype(bool awaits) {
+    const std::lock_guard lock(mutex_);
+    view_.awaits_prototype = awaits;
+    view_.images = view_.images_of = 0;
+    for (WizardView::Camera& camera : view_.cameras) {
+      camera.target.clear();
+      camera.corners.clear();
+    }
+  }
+
+  void aims(int pose) {
+    const std::lock_guard lock(mutex_);
+    const auto at = static_cast<std::size_t>(pose);
+    view_.pose = pose;
+    view_.place = plan_.places[at];
+    view_.is_capturing = true;
+    view_.images = 0;
+    for (std::size_t i = 0; i < view_.cameras.size(); ++i) {
+      view_.cameras[i].target = targets_[at][i];
+      view_.cameras[i].corners.clear();
+    }
+  }
+
+  void judges(int pose) {
+    const std::lock_guard lock(mutex_);
+    view_.pose = pose;
+    view_.place = plan_.places[static_cast<std::size_t>(pose)];
+    view_.is_capturing = false;
+  }
+
+  void take(const PoseJudged& judged,
+            const calib::Observations& observations,
+            const std::vector<calib::Fault>& faults) {
+    const std::lock_guard lock(mutex_);
+    WizardView::Judged row{judged.pose, std::nullopt, std::nullopt};
+    if (judged.assessment) {
+      row.held_out_px = judged.assessment->held_out.rms_px;
+      row.predicted_mm = predicted_mm(*judged.assessment);
+    }
+    view_.judged.push_back(row);
+    if (judged.rig && plan_.targets_by) targets_ = plan_.targets_by(*judged.rig);
+    view_.advice = !judged.assessment          ? "No rig yet: " + judged.unsolved
+                   : judged.more_helps.empty() ? "These poses are enough."
+                                               : "More poses help: " + judged.more_helps + ".";
+    view_.faults = faults;
+    std::vector<std::vector<Eigen::Vector2d>> cameras(view_.cameras.size()),
+        projectors(view_.projectors.size());
+    for (const calib::CornerObservation& corner : observations.corners)
+      cameras[static_cast<std::size_t>(corner.camera)].push_back(corner.px);
+    for (const calib::Match& match : observations.matches)
+      projectors[static_cast<std::size_t>(match.projector)].push_back(match.px_projector);
+    for (std::size_t i = 0; i < cameras.size(); ++i)
+      view_.cameras[i].seen = cells_of(cameras[i], view_.cameras[i].width, view_.cameras[i].height);
+    for (std::size_t i = 0; i < projectors.size(); ++i)
+      view_.projectors[i].seen =
+          cells_of(projectors[i], view_.projectors[i].width, view_.projectors[i].height);
+  }
+
+  WizardView::Step& step(WizardStep which) { return view_.steps.at(static_cast<std::size_t>(which)); }
+
+  const WizardPlan& plan_;
+  std::vector<std::vector<std::vector<Eigen::Vector2d>>> targets_;  // as far as they are known
+  mutable std::mutex mutex_;
+  WizardView view_;
+  std::atomic<WizardWish>* wish_;
+};
+
+}  // namespace
+
+Result<Calibrated> calibrated_in_window(GuiWindow* window,
+                                        const WizardPlan& plan,
+                                        const Surroundings& surroundings,
+                                        const std::function<void(const std::string&)>& say,
+                                        std::atomic<WizardWish>* wish,
+                                        MainThreadExecutor* executor,
+                                        const WizardWork& work) {
+  Stand stand(plan, wish);
+  auto running = std::async(std::launch::async, [&]() -> Result<Calibrated> {
+    try {
+      Result<Calibrated> done = work(stand.watched(surroundings), stand.audience(say));
+      stand.end(done);
+      return done;
+    } catch (const std::exception& bug) {
+      stand.end(error("this is a bug in Limn, please report it: {}", bug.what()));
+      throw;
+    }
+  });
+  for (bool is_closed = false; !is_closed;) {
+    executor->serve();
+    window->pressed_keys();
+    if (!window->is_due()) {
+      std::this_thread::sleep_for(k_pause);
+      continue;
+    }
+    const WizardView view = stand.view();
+    WizardWish asked = WizardWish::none;
+    window->draw([&](Gui& gui) { asked = draw_wizard(gui, view); });
+    if (!window->is_wanted()) asked = WizardWish::leave;
+    is_closed = asked == WizardWish::leave && (view.is_over || !window->is_wanted());
+    if (asked != WizardWish::none && !view.is_over) stand.wish(asked);
+  }
+  while (running.wait_for(k_pause) != std::future_status::ready) executor->serve();
+  return running.get();
+}
+
+}  // namespace limn::apps
