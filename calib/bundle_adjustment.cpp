@@ -18,9 +18,10 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double k_unseen = 1e4;  // standard deviations that an observation without a prediction counts as
+// An observation without a prediction counts as this many standard deviations.
+constexpr double k_unseen = 1e4;
 constexpr int k_most_steps = 200;
-constexpr double k_settled = 1e-10;  // of the cost: a step that promises less is the last
+constexpr double k_settled = 1e-10;  // share of the cost: a step that promises less is the last
 constexpr double k_first_damping = 1e-6, k_least_damping = 1e-12, k_most_damping = 1e10;
 
 ImagerView view(const Imager& imager) {
@@ -29,7 +30,7 @@ ImagerView view(const Imager& imager) {
 
 int value_count(const Imager& imager) { return imager.lens.model.value_count(); }
 
-// OPENCVn's order: fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4
+// Order of values in OPENCVn: fx fy cx cy k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4.
 bool is_tangential(int value) { return value == 6 || value == 7 || value >= 12; }
 
 bool is_finite(const Parameters& parameters) {
@@ -142,7 +143,7 @@ void BundleAdjuster::add_group(const Group& group, const Parameters& at, const N
   local.selfadjointView<Eigen::Lower>().rankUpdate(rows.transpose());
   const VectorXd gradient = rows.transpose() * residuals;
 
-  // To the places of the unknowns.
+  // Maps local columns to the parameters' indices.
   struct Part {
     int from, to, size;
   };
@@ -264,7 +265,7 @@ BundleAdjuster::NormalEquations BundleAdjuster::evaluate(const Parameters& at, c
   for (const Group& group : groups_) add_group(group, at, noise, &normal);
   add_points(at, noise, &normal);
   add_priors(at, &normal);
-  for (int i = 0; i < size; ++i) {  // what is fixed: no movement, no influence
+  for (int i = 0; i < size; ++i) {  // fixed parameters: no movement, no influence
     if (free_[static_cast<size_t>(i)]) continue;
     normal.devices.row(i).setZero();
     normal.devices.col(i).setZero();
@@ -302,7 +303,7 @@ std::optional<BundleAdjuster::Step> BundleAdjuster::step(const NormalEquations& 
   Step step;
   VectorXd gradient;
   const MatrixXd schur = reduced(normal, damping, &gradient);
-  // Unknowns of very different sizes: scaled to a unit diagonal.
+  // The parameters have very different sizes, so the matrix is scaled to a unit diagonal.
   if (!(schur.diagonal().minCoeff() > 0)) return std::nullopt;
   const VectorXd scale = schur.diagonal().cwiseSqrt().cwiseInverse();
   const MatrixXd scaled = scale.asDiagonal() * schur * scale.asDiagonal();
@@ -341,7 +342,7 @@ Parameters BundleAdjuster::moved(const Parameters& from, const Step& step) const
   for (size_t i = 0; i < to.cameras.size(); ++i) {
     const Pose pose = to.cameras[i].imager_from_world;
     move(&to.cameras[i], camera_at_[i]);
-    if (i == 0) to.cameras[i].imager_from_world = pose;  // it is the world: not even rounded
+    if (i == 0) to.cameras[i].imager_from_world = pose;  // it defines the world and is not even rounded
   }
   for (size_t i = 0; i < to.projectors.size(); ++i) move(&to.projectors[i], projector_at_[i]);
   to.bend_m += step.devices.segment<2>(bend_at_);
@@ -355,7 +356,7 @@ Parameters BundleAdjuster::moved(const Parameters& from, const Step& step) const
   return to;
 }
 
-// First depths: the mean of what the tie-point observations say.
+// Initial depths: the mean of what the observations give.
 void BundleAdjuster::place_points(Parameters* parameters) const {
   parameters->inverse_depths.assign(observations_.points.size(), 0.0);
   std::vector<double> sums(observations_.points.size(), 0.0);
@@ -425,7 +426,7 @@ Result<BundleAdjuster::Summary> BundleAdjuster::minimise(Parameters start, const
   }
   descent.cost = here.cost;
   // A valley: steps that no observation feels. The covariance says how long it is.
-  constexpr double k_flat = 1e-4;  // of the cost, in the last step
+  constexpr double k_flat = 1e-4;  // share of the cost, in the last step
   if (descent.converged || (last_gain < k_flat && std::isfinite(here.cost))) return descent;
   return error(
       "the joint solve did not converge in {} steps. Check the board's description, leave out doubtful poses "

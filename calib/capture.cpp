@@ -26,8 +26,8 @@ Status capture_image(const CaptureSet& plan, int pose, int projector, int patter
     const CapturedDevice& device = plan.cameras[static_cast<size_t>(camera)];
     LIMN_TRY(const cv::Mat image, backend.grab(camera));
     if (image.cols != device.width || image.rows != device.height)
-      return error("{}: expected pictures of {}x{}, the camera gave {}x{}. Has its mode changed?",
-                   device.name, device.width, device.height, image.cols, image.rows);
+      return error("{}: expected images of {}x{}, the camera gave {}x{}. Has its mode changed?", device.name,
+                   device.width, device.height, image.cols, image.rows);
     LIMN_TRY_STATUS(backend.store(image_path(plan, pose, projector, camera, pattern), image));
   }
   return {};
@@ -42,7 +42,7 @@ Status store_image_now(const std::filesystem::path& path, const cv::Mat& image) 
 Status begin_captures(const CaptureSet& plan) {
   const auto path = plan.folder / "capture.json";
   if (std::filesystem::exists(path))
-    return error("{}: there are captures here already. Choose another folder, or remove this one.",
+    return error("{}: this folder already holds captures. Choose another folder, or remove this one.",
                  path.string());
   LIMN_TRY_STATUS(make_folder(plan.folder));
   nlohmann::ordered_json projectors = devices_json(plan.projectors);

@@ -9,20 +9,21 @@
 
 namespace limn::calib {
 
-/// Shows an image (8-bit grey or BGR, the projector's size) on one projector while every other one is black;
-/// returns when it is visible to the next grab.
+/// Shows an image (8-bit grey or BGR, the projector's size) on one projector while all others are black.
+/// Returns when the image is visible to the next grab.
 using ShowImage = std::function<Status(int projector, const cv::Mat& image)>;
-/// An image (8-bit grey or BGR) of one camera, taken after the last show.
+/// Takes an image (8-bit grey or BGR) with one camera, after the last image was shown.
 using GrabImage = std::function<Result<cv::Mat>(int camera)>;
-/// Keeps an image on disk. A caller with threads may queue it; then it reports late failures itself.
+/// Stores an image on disk. A caller with threads may queue it; it then reports late failures itself.
 using StoreImage = std::function<Status(const std::filesystem::path& path, const cv::Mat& image)>;
-/// Told after every grab: images done, of how many.
+/// Reports progress after every grab: the number of images done, and of all images.
 using ReportProgress = std::function<void(int done, int total)>;
 
-/// Writes at once, atomically, as lightly compressed PNG: the Store of callers without threads.
+/// Writes the image at once, atomically, as lightly compressed PNG: the StoreImage of callers without
+/// threads.
 Status store_image_now(const std::filesystem::path& path, const cv::Mat& image);
 
-/// Everything that capturing needs from outside: two functions, never a device.
+/// The functions that a capture needs from its caller. They hide the devices.
 struct CaptureBackend {
   ShowImage show;
   GrabImage grab;
@@ -31,13 +32,13 @@ struct CaptureBackend {
 };
 
 /// Makes the captures folder: capture.json and patterns.json (one for each size of projector). A folder that
-/// holds a capture.json already is an error: captures are never mixed. `plan` comes from plan_captures
-/// (calib/capture_set.h).
+/// already holds a capture.json is an error, because captures are never mixed. `plan` comes from
+/// plan_captures (calib/capture_set.h).
 Status begin_captures(const CaptureSet& plan);
 
-/// Captures pose number `pose` (0, 1, …): every projector shows its patterns in turn, every camera
-/// photographs each of them. An image of another size than the camera's is an error. Images already taken
-/// stay on disk.
+/// Captures pose number `pose` (0, 1, …): every projector shows its patterns in turn, and every camera
+/// photographs each of them. An image whose size differs from its camera's is an error. Images that were
+/// already taken stay on disk.
 Status capture_pose(const CaptureSet& plan, int pose, const CaptureBackend& backend);
 
 }  // namespace limn::calib

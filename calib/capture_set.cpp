@@ -17,7 +17,7 @@ bool matches(const char* pattern, const char* text) {
   return (*pattern == '?' || *pattern == *text) && matches(pattern + 1, text + 1);
 }
 
-// Names in `folder` that match, sorted; directories or files.
+// Names of directories or files in `folder` that match the pattern, sorted.
 std::vector<std::string> names_in(const fs::path& folder, const std::string& pattern, bool directories) {
   std::vector<std::string> names;
   std::error_code problem;
@@ -26,7 +26,7 @@ std::vector<std::string> names_in(const fs::path& folder, const std::string& pat
     if (entry.is_directory() == directories && matches(pattern.c_str(), name.c_str()))
       names.push_back(std::move(name));
   }
-  // 2 before 10 when names count without leading zeros: shorter digits first within the same stem
+  // 2 comes before 10 when numbers have no leading zeros: fewer digits first within the same stem.
   std::sort(names.begin(), names.end(), [](const std::string& a, const std::string& b) {
     const auto stem = [](const std::string& s) { return s.substr(0, s.find_last_not_of("0123456789") + 1); };
     if (stem(a) == stem(b) && a.size() != b.size()) return a.size() < b.size();
@@ -35,7 +35,7 @@ std::vector<std::string> names_in(const fs::path& folder, const std::string& pat
   return names;
 }
 
-// Pose directories that match, without those to be skipped.
+// Pose directories that match, without those in `skip`.
 Result<std::vector<std::string>> pose_names(const fs::path& folder,
                                             const std::string& pattern,
                                             const std::vector<std::string>& skip) {
@@ -47,20 +47,20 @@ Result<std::vector<std::string>> pose_names(const fs::path& folder,
   for (const std::string& name : skip) {
     const auto found = std::find(names.begin(), names.end(), name);
     if (found == names.end())
-      return error("--skip-poses: there is no pose '{}' in {}. There are left: {}.", name, folder.string(),
+      return error("--skip-poses: there is no pose '{}' in {}. Poses: {}.", name, folder.string(),
                    fmt::join(names, ", "));
     names.erase(found);
   }
   return names;
 }
 
-// pose00 or pose00/projector0: the directory below which the cameras stand.
+// pose00 or pose00/projector0: the directory that contains the cameras' directories.
 fs::path level_of(const CaptureSet& captures, const std::string& pose, size_t projector) {
   const fs::path folder = captures.folder / pose;
   return captures.projectors.size() > 1 ? folder / captures.projectors[projector].name : folder;
 }
 
-// Folders in `folder` that belong to no device of these captures.
+// Checks for folders in `folder` that belong to no device of these captures.
 Status check_strangers(const fs::path& folder,
                        const std::vector<CapturedDevice>& devices,
                        const std::string& pose) {
@@ -70,21 +70,19 @@ Status check_strangers(const fs::path& folder,
     if (name.starts_with(".") || std::find(known.begin(), known.end(), name) != known.end()) continue;
     return error(
         "{}: expected folders of the devices in capture.json ({}), found '{}'. Captures of different rigs "
-        "are "
-        "mixed: move {} to its own captures folder, or leave it out with --skip-poses {}.",
+        "are mixed: move {} to its own captures folder, or leave it out with --skip-poses {}.",
         folder.string(), fmt::join(known, ", "), name, pose, pose);
   }
   return {};
 }
 
-// Numbered images beyond the patterns' count.
+// Checks for numbered images beyond the patterns' count.
 Status check_surplus(const fs::path& folder, const Patterns& patterns, const std::string& pose) {
   const fs::path next = folder / image_name(patterns.count());
   if (!fs::exists(next)) return {};
   return error(
-      "{}: expected {} pictures, {} to {}, as patterns.json says, found more. Other patterns were shown: "
-      "capture "
-      "{} again, or leave it out with --skip-poses {}.",
+      "{}: expected {} images, {} to {}, as patterns.json says, found more. Other patterns were shown: "
+      "capture {} again, or leave it out with --skip-poses {}.",
       next.string(), patterns.count(), image_name(0), image_name(patterns.count() - 1), pose, pose);
 }
 
@@ -103,7 +101,7 @@ Result<CapturedPose> read_pose(const CaptureSet& captures, const std::string& na
         files.push_back(folder / image_name(k));
         if (!fs::exists(files.back()))
           return error(
-              "{}: missing; pose {} needs {} pictures of {} by {}. Capture the pose again, or leave it out "
+              "{}: missing; pose {} needs {} images of {} by {}. Capture the pose again, or leave it out "
               "with --skip-poses {}.",
               files.back().string(), name, captures.patterns[i].count(), captures.projectors[i].name,
               camera.name, name);
@@ -132,7 +130,7 @@ std::vector<CapturedDevice> read_devices(const ConfigNode& list, const std::set<
   return devices;
 }
 
-// A patterns file that is named but not there is capture.json's mistake.
+// A patterns file that is named but missing is an error in capture.json.
 fs::path patterns_path(const ConfigNode& node) {
   fs::path path = node.path_inside();
   std::error_code ignored;
@@ -220,7 +218,7 @@ Result<CaptureSet> import_opencv_gray(const ForeignCaptureSet& foreign) {
       files.push_back(foreign.folder / name / file);
     if (static_cast<int>(files.size()) != patterns.count())
       return error(
-          "{}: expected {} pictures '{}' ({}x{} Gray code with inverses, white and black), found {}. Leave "
+          "{}: expected {} images '{}' ({}x{} Gray code with inverses, white and black), found {}. Leave "
           "the pose out with --skip-poses, or check --projector and --shots.",
           (foreign.folder / name).string(), patterns.count(), foreign.shots, patterns.width, patterns.height,
           files.size());

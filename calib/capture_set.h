@@ -10,7 +10,7 @@
 
 namespace limn::calib {
 
-/// A camera or projector that took part.
+/// A camera or projector of the capture.
 struct CapturedDevice {
   std::string name;
   int width = 0;
@@ -24,20 +24,20 @@ struct CapturedPose {
   std::vector<std::vector<std::vector<std::filesystem::path>>> images;
 };
 
-/// A captures folder (docs/formats.md): what was shown, what was photographed, where the images are.
+/// A captures folder (docs/formats.md): what was shown and photographed, and where the images are.
 struct CaptureSet {
   std::filesystem::path folder;
   std::vector<CapturedDevice> cameras;
   std::vector<CapturedDevice> projectors;
   std::vector<Patterns> patterns;  ///< one for each projector
   Board board;
-  std::vector<CapturedPose> poses;  ///< by name
+  std::vector<CapturedPose> poses;  ///< sorted by name
   /// Lengths measured by hand, as calib/judge/scale_bar.h reads them; "scale_bar_lengths" in capture.json.
   std::vector<std::string> scale_bar_lengths = {};
 };
 
 /// A captures folder that is about to be filled: patterns of a code for every projector, no poses yet. An
-/// unknown code, or options out of their range, throw (our bug: whoever reads them from people checks them).
+/// unknown code, or options out of their range, throw: the caller must have checked what people entered.
 CaptureSet plan_captures(const std::filesystem::path& folder,
                        std::vector<CapturedDevice> cameras,
                        std::vector<CapturedDevice> projectors,
@@ -45,25 +45,25 @@ CaptureSet plan_captures(const std::filesystem::path& folder,
                        const std::string& code = "gray",
                        const CodeOptions& options = {});
 
-/// The file of one image: pose00/camera0/000.png, or pose00/projector0/camera0/000.png with several
-/// projectors.
+/// The file of one image: pose00/camera0/000.png, or pose00/projector0/camera0/000.png where there are
+/// several projectors.
 std::filesystem::path image_path(
     const CaptureSet& captures, int pose, int projector, int camera, int pattern);
 
-/// Reads capture.json and patterns.json and lists the poses (`pose*` directories). A pose without all of its
-/// images is an error that names the first missing file. Poses named in `skip` are left out unread; a name
-/// in it that no pose has is an error.
+/// Reads capture.json and patterns.json and lists the poses (`pose*` directories). A pose with a missing
+/// image is an error that names the first missing file. Poses named in `skip` are not read; a name in it that
+/// no pose has is an error.
 Result<CaptureSet> load_captures(const std::filesystem::path& folder,
                                const std::vector<std::string>& skip = {});
 
-/// Images that somebody else took: one camera, one projector, OpenCV's Gray code.
+/// Images that another program captured: one camera, one projector, OpenCV's Gray code.
 struct ForeignCaptureSet {
   std::filesystem::path folder;
   int projector_width = 0;
   int projector_height = 0;
   Board board;
-  std::string poses = "pose*";  ///< names of the pose directories: * and ? stand for any text, any character
-  std::string shots = "*.png";  ///< names of the images in each, in the order of their names
+  std::string poses = "pose*";    ///< names of the pose directories; * matches any text, ? any character
+  std::string shots = "*.png";    ///< names of the images in each, in the order of their names
   std::vector<std::string> skip;  ///< as in load_captures
 };
 Result<CaptureSet> import_opencv_gray(const ForeignCaptureSet& foreign);

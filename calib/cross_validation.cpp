@@ -43,7 +43,7 @@ double error_on_board(const Observations& observations,
   return (px_by_m.inverse() * residual).norm();
 }
 
-// What one pose came to; written by one thread each.
+// The result for one pose; each is written by one thread.
 struct PoseScore {
   Status status;
   Rig rig;
@@ -84,7 +84,7 @@ PoseScore score_pose(const Observations& observations,
   return score;
 }
 
-// Every pose on its own, on as many threads as there are cores: each writes its own places.
+// Scores every pose independently, on as many threads as there are cores; each thread writes its own results.
 std::vector<PoseScore> score_poses(const Observations& observations,
                                    const SolveOptions& options,
                                    const Solution& solution,

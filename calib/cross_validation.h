@@ -10,7 +10,7 @@
 
 namespace limn::calib {
 
-/// How well one board pose is predicted by a solve that has not seen it.
+/// How well one board pose is predicted by a solve without it.
 struct HeldOutPose {
   std::string pose;
   double rms_px = 0;
@@ -18,8 +18,8 @@ struct HeldOutPose {
 };
 
 struct CrossValidation {
-  double rms_px = 0;    ///< over all cells of all poses; RMS of the 2-vector
-  double worst_px = 0;  ///< of the poses' RMS
+  double rms_px = 0;    ///< over all cells of all poses; RMS of the 2-vector's length
+  double worst_px = 0;  ///< largest RMS of a pose
   std::vector<HeldOutPose> poses;
   std::vector<Rig> rigs;  ///< parallel to poses: the devices as solved without that pose
   /// Parallel to Observations::matches: predicted minus measured projector pixel (NaN where not scored), and
@@ -28,11 +28,11 @@ struct CrossValidation {
   std::vector<double> errors_m;
 };
 
-/// Leaves out each board pose in turn: solves without it, takes its pose from the camera's corners alone and
-/// predicts the projector pixels of its matches (each the average over a cell of the board). The solves start
-/// from `solution` and take its noise as weights (solve_again): a start anywhere else ends in the same place
-/// (tests/calib/cross_validation_test.cpp). `with_errors`: errors_m, too. Uses all cores; the result does not depend
-/// on their number.
+/// Cross-validation over board poses. Leaves out each board pose in turn: solves without it, estimates its
+/// pose from the camera's corners alone and predicts the projector pixels of its matches (each is the average
+/// over a cell of the board). The solves start from `solution` and take their weights from its noise
+/// (solve_again); another start ends in the same minimum (tests/calib/cross_validation_test.cpp).
+/// `with_errors`: also compute errors_m. Uses all cores; the result does not depend on their number.
 Result<CrossValidation> cross_validate(const Observations& observations,
                          const SolveOptions& options,
                          const Solution& solution,

@@ -6,7 +6,7 @@
 namespace limn::calib {
 namespace {
 
-constexpr double k_least_parallax = 0.01;  // rad between two rays; below, the depth is anybody's guess
+constexpr double k_least_parallax = 0.01;  // rad between two rays; below, the depth is too uncertain
 
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
@@ -19,14 +19,14 @@ Matrix3d cross_matrix(const Vector3d& v) {
   return m;
 }
 
-// How a point R p + t moves with boxplus's delta: w x (R p) + v, as a 3x6 matrix. `arm` is R p.
+// Derivative of a point R p + t by boxplus's perturbation: w x (R p) + v, as a 3x6 matrix. `arm` is R p.
 Eigen::Matrix<double, 3, 6> moved_by_pose(const Vector3d& arm) {
   Eigen::Matrix<double, 3, 6> m;
   m << -cross_matrix(arm), Matrix3d::Identity();
   return m;
 }
 
-// A camera ray on the board.
+// Intersection of a camera ray with the board.
 struct Hit {
   Vector3d p_camera, p_world, p_board;
   double distance = 0;  // in units of the ray's d
@@ -60,7 +60,7 @@ bool cast(const ImagerView& camera,
   return true;
 }
 
-// Newton from the ray's d; false when it does not arrive in some steps.
+// Newton's method from the ray's d; false when it does not converge in some steps.
 bool refine_ray(const LensModel& model,
                 std::span<const double> values,
                 const Vector2d& px,

@@ -8,7 +8,7 @@
 
 namespace limn::calib {
 
-/// How a nearly flat board is bent: two parabolas, as mrcal has them. Height (m, along the board's z) of the
+/// The shape of a nearly flat board: two parabolas, as in mrcal. Height (m, along the board's z) of the
 /// sheet at (x, y): bend.x (1 - xr^2) + bend.y (1 - yr^2), where xr and yr run from -1 to 1 over the squares.
 struct BoardShape {
   double width_m = 1;
@@ -20,34 +20,34 @@ struct BoardShape {
   Eigen::Vector2d per_bend(double x, double y) const;
 };
 
-/// Borrowed places of an imager's unknowns.
+/// An imager's parameters, borrowed from the caller.
 struct ImagerView {
   const LensModel& model;
   std::span<const double> values;
   const Pose& imager_from_world;
 };
 
-/// Of the lens models that can be solved: LENSMODEL_OPENCV12's.
+/// Largest number of values of a lens model that can be solved (LENSMODEL_OPENCV12).
 constexpr int k_most_values = 16;
 
-/// Where an imager's pixel looks: the point (x, y, 1) on its ray, imager frame, and how that moves with the
-/// lens' values while the pixel stays (implicit function theorem: project(values, d) = px stays true, so
+/// The ray of an imager's pixel: the point (x, y, 1) on it, imager frame, and the derivatives of x and y by
+/// the lens values at a fixed pixel (implicit function theorem: project(values, d) = px stays true, so
 /// J_d dd = -J_values dvalues).
 struct LensRay {
   Eigen::Vector3d d = Eigen::Vector3d::Zero();
   Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor, 2, k_most_values> xy_by_values;
 };
 
-/// LensRay of a pixel. Starts from what `ray` holds, if it holds anything: two steps when the values have
-/// hardly moved since. False when the pixel has none (`ray` is empty then).
+/// Computes the LensRay of a pixel. The search starts from `ray` if that is not empty, and then takes two
+/// steps when the values have hardly changed. False when the pixel has no ray (`ray` is then empty).
 bool find_ray(const LensModel& model,
               std::span<const double> values,
               const Eigen::Vector2d& px,
               bool with_derivatives,
               LensRay* ray);
 
-/// Derivatives of a predicted pixel. Poses: by boxplus's delta [rotation; translation]; values: 2 x
-/// value_count.
+/// Derivatives of a predicted pixel. Poses: by the perturbation of boxplus, [rotation; translation]. Values:
+/// 2 x value_count.
 struct Derivatives {
   using Pose6 = Eigen::Matrix<double, 2, 6>;
   using Values = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor, 2, k_most_values>;
@@ -56,7 +56,7 @@ struct Derivatives {
   Eigen::Matrix2d bend;
 };
 
-/// Camera pixel of the board's point (x, y). False when it has none (behind the camera).
+/// Predicts the camera pixel of the board's point (x, y). False when it has none (behind the camera).
 bool predict_corner(const ImagerView& camera,
                     const Pose& world_from_board,
                     const BoardShape& shape,
@@ -65,7 +65,7 @@ bool predict_corner(const ImagerView& camera,
                     Eigen::Vector2d* px,
                     Derivatives* derivatives = nullptr);
 
-/// World point where the ray of a camera pixel meets the board. False when it does not.
+/// Intersects the ray of a camera pixel with the board; gives the world point. False when they do not meet.
 bool intersect_board(const ImagerView& camera,
                 const Pose& world_from_board,
                 const BoardShape& shape,
@@ -73,7 +73,7 @@ bool intersect_board(const ImagerView& camera,
                 const Eigen::Vector2d& px_camera,
                 Eigen::Vector3d* p_world);
 
-/// Projector pixel of that point.
+/// Predicts the projector pixel of that point.
 bool predict_match(const ImagerView& camera,
                    const ImagerView& projector,
                    const Pose& world_from_board,
@@ -82,7 +82,7 @@ bool predict_match(const ImagerView& camera,
                    const Eigen::Vector2d& px_camera,
                    Eigen::Vector2d* px_projector,
                    Derivatives* derivatives = nullptr);
-/// Likewise with the ray of the camera's pixel at hand (with its derivatives when those are wanted).
+/// The same with the ray of the camera pixel given (with its derivatives if `derivatives` is given).
 bool predict_match(const ImagerView& camera,
                    const ImagerView& projector,
                    const Pose& world_from_board,
@@ -92,7 +92,8 @@ bool predict_match(const ImagerView& camera,
                    Eigen::Vector2d* px_projector,
                    Derivatives* derivatives = nullptr);
 
-/// How another imager (`seeing`) sees the point at 1 / `inverse_depth` along z of a camera's ray.
+/// Predicts where another imager (`seeing`) observes the tie point at depth 1 / `inverse_depth` along z of a
+/// camera's ray.
 struct TiePointDerivatives {
   Derivatives::Values camera_values, values;
   Derivatives::Pose6 camera_pose, pose;
@@ -105,8 +106,8 @@ bool predict_tie_point(const ImagerView& camera,
                       Eigen::Vector2d* px,
                       TiePointDerivatives* derivatives = nullptr);
 
-/// Distance along `ray` (units of its d) of a camera to the point nearest to the ray of another imager's
-/// pixel; 0 when the rays are all but parallel or meet behind.
+/// Depth along a camera's `ray` (in units of its d) of the point nearest to the ray of another imager's
+/// pixel; 0 when the rays are almost parallel or meet behind an imager.
 double triangulated_depth(const ImagerView& camera,
                 const LensRay& ray,
                 const ImagerView& seeing,

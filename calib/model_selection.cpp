@@ -15,7 +15,8 @@ namespace {
 constexpr auto k_pinhole = "LENSMODEL_PINHOLE", k_plain = "LENSMODEL_OPENCV4";
 constexpr const char* k_richer[] = {"LENSMODEL_OPENCV5", "LENSMODEL_OPENCV8"};
 
-constexpr double k_least_gain = 0.03;  // of the error; by chance lenses that need nothing gain 1 or 2 %
+// Share of the error; by chance, lenses that need no more values gain 1 or 2 %.
+constexpr double k_least_gain = 0.03;
 
 struct Candidate {
   std::vector<std::string> models;
@@ -28,14 +29,15 @@ struct Gain {
   bool is_certain() const { return share > uncertainty; }
 };
 
-// Student's t, 95 % on one side, by degrees of freedom from 1; few poses tell little.
+// Student's t, 95 % one-sided, for degrees of freedom from 1; large for few poses.
 double student_95(size_t freedom) {
   constexpr double k_t[] = {6.31, 2.92, 2.35, 2.13, 2.02, 1.94, 1.89, 1.86, 1.83, 1.81, 1.80, 1.78};
   return k_t[std::min(freedom, std::size(k_t)) - 1];
 }
 
-// Poses are what scatters independently. Ratios, because one steep or distant pose has more of every error:
-// by how much the richer model's is lower on the (geometric) average, and how far chance takes that.
+// Statistics over poses, because poses scatter independently. Ratios are used, because a steep or distant
+// pose has more of every error: by what share the richer model's error is lower in the (geometric) mean, and
+// what chance could make of that.
 Gain gain_of(const CrossValidation& simple, const CrossValidation& rich) {
   std::vector<double> ratios;
   double sum = 0;
@@ -133,7 +135,7 @@ Result<ModelSelection> solve_selecting_models(const Observations& observations, 
   LIMN_TRY(choice.held_out, cross_validate(observations, choice.options, choice.solution));
   if (choice.options.lens_models == asked) return choice;
 
-  // Projectors first: nearly all of what is left over is theirs.
+  // Projectors first: nearly all of the remaining error is theirs.
   ModelSelector choosing(observations, choice.options,
                     {choice.options.lens_models, choice.solution, choice.held_out});
   const size_t cameras = observations.cameras.size();

@@ -10,34 +10,35 @@
 
 namespace limn::calib {
 
-/// A lens model that was tried for a device, everything else as chosen so far.
+/// A lens model that was tried for one device, with the models of the others as chosen so far.
 struct ModelTrial {
   std::string device;
   std::string model;
   double held_out_px = 0;  ///< NaN where the solve failed
-  /// By what share the richer of this model and the one it was compared with has the lower held-out error
-  /// (geometric mean over poses), and what chance could make of that (95 %, from how poses differ; at least
-  /// 3 %). Both 0 for the model to start with.
+  /// The gain of the richer of this model and the one it was compared with: by what share its held-out error
+  /// is lower (geometric mean over poses). `uncertainty`: what chance could make of that (95 %, from how
+  /// poses differ; at least 3 %). Both are 0 for the first model.
   double gain = 0;
   double uncertainty = 0;
-  bool chosen = false;  ///< the device's model in the end
+  bool chosen = false;  ///< whether the device ended with this model
 };
 
 struct ModelSelection {
-  SolveOptions options;  ///< with a model for every device
+  SolveOptions options;  ///< with one model for every device
   Solution solution;
   CrossValidation held_out;
-  std::vector<ModelTrial> trials;  ///< empty where no model was left open
+  std::vector<ModelTrial> trials;  ///< empty where all models were given
 };
 
-/// `auto`, as a lens model's name.
+/// The name `auto`, given instead of a lens model's.
 extern const char* const k_auto_lens;
 
-/// Solves; devices whose model is `auto` get LENSMODEL_PINHOLE (projectors alone), OPENCV4, OPENCV5 or
-/// OPENCV8, by held-out error: greedily, one device after another, from OPENCV4 on. A richer model is taken
-/// only when its held-out error is lower by more than chance could make it (Student's t over the poses'
-/// differences); ties go to the simpler. The score is of the poses that chose: flattered, but by less than
-/// the uncertainties told.
+/// Solves, and selects the lens model of each device whose model is `auto`: LENSMODEL_PINHOLE (projectors
+/// only), OPENCV4, OPENCV5 or OPENCV8, by held-out error. The search is greedy, one device after another,
+/// starting from OPENCV4. A richer model is chosen only when its held-out error is lower by more than chance
+/// explains (Student's t over the poses' differences); otherwise the simpler one is. The returned held-out
+/// error is that of the poses that were used for the selection, so it is slightly too low, but by less than
+/// the stated uncertainties.
 Result<ModelSelection> solve_selecting_models(const Observations& observations, const SolveOptions& options = {});
 
 }  // namespace limn::calib

@@ -24,18 +24,22 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr const char* k_ended = "captures: it was ended while they were looked at.";
-constexpr int k_cells = 2;          // to a side of a square; the held-out score averages over the same cells
-constexpr double k_inset_px = 2;    // from a square's edge: pixels across it see the light of one side only
-constexpr double k_inset = 0.06;    // of a square, likewise
-constexpr int k_least_pixels = 12;  // in a cell: three times a plane's unknowns and some
-constexpr double k_least_of_cell =
-    0.5;  // of a cell's bright pixels with a label; fewer are a chance selection, and biased
-constexpr double k_outlier_px = 3;  // from the cell's plane
-constexpr double k_bright = 0.75;   // of the cell's bright pixels; halfway between ink and paper is 0.5
+constexpr const char* k_ended = "captures: stopped before all images were decoded.";
+// Cells along a side of a square; the held-out error averages over the same cells.
+constexpr int k_cells = 2;
+// Distance from a square's edge: pixels on the edge receive light of one side only.
+constexpr double k_inset_px = 2;
+constexpr double k_inset = 0.06;    // share of a square, the same
+constexpr int k_least_pixels = 12;  // in a cell: more than three times the number of a plane's parameters
+// Share of a cell's bright pixels with a label; fewer are a chance selection, and biased.
+constexpr double k_least_of_cell = 0.5;
+constexpr double k_outlier_px = 3;  // distance from the cell's plane
+// Share of the cell's bright pixels' level; halfway between ink and paper is 0.5.
+constexpr double k_bright = 0.75;
 constexpr double k_least_stddev_px = 0.02;
 
-// Pixel of every grid point (column, row of squares' corners, rim included) that corners nearby tell.
+// Pixel of every grid point (column, row of squares' corners, rim included) that can be computed from nearby
+// corners.
 class Grid {
  public:
   Grid(const Board& board, const std::vector<BoardCorner>& corners) : board_(board), corners_(corners) {
@@ -83,7 +87,7 @@ class Grid {
     const Vector2d nearest = near.front().second->px;
     const double side = (near[0].second->px - near[1].second->px).norm();
     if (!found.allFinite() || (found - nearest).norm() > 4 * side)
-      return std::nullopt;  // corners on one line
+      return std::nullopt;  // the corners lie on one line
     return found;
   }
 
@@ -97,15 +101,15 @@ struct Labelled {
   double weight = 0;
 };
 
-// The labelled pixels of a cell that see paper and nothing but paper around them.
+// The labelled pixels of a cell that see paper, with nothing but paper around them.
 struct Cell {
   std::vector<Labelled> pixels;
-  std::vector<int> levels;        // white minus black, of all its pixels
-  std::vector<int> least_levels;  // the least of the 3 x 3 around, likewise
-  std::vector<int> labelled_at;   // index of each labelled pixel in the two
+  std::vector<int> levels;        // white minus black of all its pixels
+  std::vector<int> least_levels;  // minimum of the 3 x 3 around each pixel, of the same
+  std::vector<int> labelled_at;   // index of each labelled pixel in the two arrays above
 
-  // Ink in the cell (a marker's) is left out with its fringe: a pixel across its edge gets its light from one
-  // side, and its label with it. False when too few of the rest have labels.
+  // Removes ink in the cell (a marker's) with its fringe: a pixel on the edge of ink receives its light from
+  // one side, and so its label is wrong. False when too few of the remaining pixels have labels.
   bool keep_bright() {
     if (pixels.empty()) return false;
     std::vector<int> sorted = levels;
@@ -123,7 +127,7 @@ struct Cell {
   }
 };
 
-// A robust plane through a cell's labels; the means of what fits.
+// Fits a robust plane to a cell's labels; returns the means of the inliers.
 std::optional<Match> fitted(std::vector<Labelled> pixels) {
   for (int pass = 0; pass < 3; ++pass) {
     if (static_cast<int>(pixels.size()) < k_least_pixels) return std::nullopt;
@@ -159,7 +163,7 @@ std::optional<Match> fitted(std::vector<Labelled> pixels) {
   return std::nullopt;
 }
 
-// The pixels of one square, by cell. `least_contrast`: of the 3 x 3 around each pixel.
+// The pixels of one square, by cell. `least_contrast`: minimum contrast of the 3 x 3 around each pixel.
 using Cells = std::array<Cell, k_cells * k_cells>;
 void collect(const std::array<Vector2d, 4>& quad,
              const Decoded& decoded,
@@ -198,7 +202,7 @@ void collect(const std::array<Vector2d, 4>& quad,
   }
 }
 
-// The mean of the projectors' white images: wherever any of them lights the board it is visible.
+// The mean of the projectors' white images: the board is visible where any of them illuminates it.
 Result<cv::Mat> bright_image(const CaptureSet& captures, size_t pose, size_t camera) {
   const CapturedDevice& device = captures.cameras[camera];
   cv::Mat sum(device.height, device.width, CV_32F, cv::Scalar(0));
@@ -213,10 +217,10 @@ Result<cv::Mat> bright_image(const CaptureSet& captures, size_t pose, size_t cam
   return mean;
 }
 
-// Whether a pixel and its neighbours see one surface of one colour: a pixel across the edge of ink or of a
-// thing gets its light from two sides, and its label with it.
+// Whether a pixel and its neighbours see one surface of one colour. A pixel on the edge of ink or of an
+// object receives light from two sides, and so its label is wrong.
 bool on_one_surface(const Decoded& decoded, int x, int y) {
-  constexpr int k_near = 2;  // px: as far as a lens blurs
+  constexpr int k_near = 2;  // px: radius of a lens's blur
   if (x < k_near || y < k_near || x + k_near >= decoded.contrast.cols || y + k_near >= decoded.contrast.rows)
     return false;
   int least = 255, most = 0;
@@ -238,7 +242,7 @@ std::vector<DensePixel> thinned(const Decoded& decoded, const std::vector<BoardC
     px_corners.emplace_back(static_cast<float>(corner.px.x()), static_cast<float>(corner.px.y()));
   cv::convexHull(px_corners, hull);
   std::vector<DensePixel> dense;
-  constexpr double k_most = 5000;  // of an image: an RMS to a percent, at some 10 us each
+  constexpr double k_most = 5000;  // for each image: an RMS accurate to a percent, at about 10 us each
   const cv::Mat& labels = decoded.px_projector;
   const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(labels.cols * labels.rows / k_most))));
   for (int y = step / 2; y < labels.rows; y += step) {
@@ -259,10 +263,10 @@ double now() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-// A hundred fields: the lenses' edges want a few points each, and each point costs the solve time.
+// About a hundred fields: the lenses' edges need a few points each, and each point costs time in the solve.
 constexpr TiePointOptions k_room_points{.columns = 12, .rows = 9};
 
-// What one camera saw of one pose.
+// What one camera observed in one pose.
 Result<Observed> observe_pose(const CaptureSet& captures, int pose, int camera, const DecodeOptions& options) {
   const auto at_pose = static_cast<size_t>(pose), at_camera = static_cast<size_t>(camera);
   Observed seen;
@@ -323,7 +327,7 @@ void append(const Observed& seen, Observed* all) {
   all->seconds_decode += seen.seconds_decode;
 }
 
-// A pose in which no camera sees the board shows the scene alone.
+// A pose in which no camera sees the board is a scene capture.
 Status observe_scenes(const CaptureSet& captures,
                       const DecodeOptions& options,
                       const std::function<bool()>& should_continue,
@@ -362,7 +366,8 @@ Result<Observed> observe(const CaptureSet& captures,
   for (const CapturedPose& pose : captures.poses) observed.observations.poses.push_back(pose.name);
   const int cameras = static_cast<int>(captures.cameras.size());
   const int count = static_cast<int>(captures.poses.size()) * cameras;
-  // Each camera and pose on its own, on as many threads as there are cores; put together in their order.
+  // Cameras and poses are processed independently, on as many threads as there are cores, and joined in
+  // order.
   std::vector<std::optional<Result<Observed>>> parts(static_cast<size_t>(count));
   Progress progress("decode", count);
   std::atomic<int> next = 0;

@@ -13,15 +13,17 @@ namespace limn::calib {
 namespace {
 
 constexpr int k_most_view_steps = 30, k_most_rounds = 4;
-constexpr double k_enough = 1e-3;  // of the cost (squares of standard deviations): nothing feels less
+// Minimum gain in the cost (squares of standard deviations); smaller gains are not significant.
+constexpr double k_enough = 1e-3;
 constexpr double k_most_view_damping = 1e8;
-constexpr double k_fits_share = 0.6;     // of a view's points, to be believed
-constexpr double k_unsure_share = 0.03;  // of the focal length: until then others are tried, too
-constexpr double k_more_told = 0.02;     // natural log of the determinant's growth that is worth an exchange
-constexpr double k_contradiction = 30;   // squared Mahalanobis distance, 5 degrees of freedom: 1 in 70 000
-constexpr double k_median_square = 2 * std::numbers::ln2;  // of a squared 2-vector of standard normals
-constexpr std::size_t k_least_points = 6;                  // that leave something for the lens beside a place
-constexpr double k_most_sound = 1e5;                       // px, of a focal length
+constexpr double k_fits_share = 0.6;     // share of a view's points that must fit for the view to be trusted
+constexpr double k_unsure_share = 0.03;  // share of the focal length; above it others are tried
+// Growth of the determinant's natural log that is worth an exchange of views.
+constexpr double k_more_told = 0.02;
+constexpr double k_contradiction = 30;  // squared Mahalanobis distance, 5 degrees of freedom: 1 in 70 000
+constexpr double k_median_square = 2 * std::numbers::ln2;  // median of a squared 2-vector of standard normals
+constexpr std::size_t k_least_points = 6;                  // minimum that determines more than the pose
+constexpr double k_most_sound = 1e5;                       // px, largest plausible focal length
 
 const LensModel& model() {
   static const LensModel opencv4 = LensModel::parse("LENSMODEL_OPENCV4").value();
@@ -58,7 +60,7 @@ double middle(std::vector<double> values) {
   return *at;
 }
 
-// Squared distance of a point's pixel from the predicted one in its standard deviations.
+// Squared distance of a point's pixel from the predicted one, in standard deviations.
 double square_of(const std::array<double, 8>& values, const Pose& pose, const BodyPoint& point) {
   Eigen::Vector2d px;
   if (!project(values, pose * point.p_body, &px)) return std::numeric_limits<double>::infinity();
@@ -72,7 +74,7 @@ double log_determinant(const Matrix5d& m) {
   return 2 * root.matrixLLT().diagonal().array().log().sum();
 }
 
-// By its scaled form: a focal length and k2 are orders of magnitude apart.
+// Inverse by a scaled form, because a focal length and k2 differ by orders of magnitude.
 Matrix5d inverse_of(const Matrix5d& m) {
   const Vector5d scale = m.diagonal().cwiseSqrt().cwiseInverse();
   const Matrix5d scaled = scale.asDiagonal() * m * scale.asDiagonal();
@@ -137,7 +139,7 @@ IntrinsicsEstimate prior_intrinsics(int width, int height, const IntrinsicsPrior
   return out;
 }
 
-// Normal equations of one view: l the lens, p the camera's place (boxplus's delta).
+// Normal equations of one view: l the lens, p the camera's pose (boxplus's perturbation).
 struct OnlineIntrinsics::Blocks {
   bool is_whole = true;
   double cost = 0;
@@ -147,7 +149,7 @@ struct OnlineIntrinsics::Blocks {
   Vector5d l = Vector5d::Zero();
   Vector6d p = Vector6d::Zero();
 
-  // What the view says of the lens, its place eliminated.
+  // Information of the view about the lens, with its pose eliminated.
   Matrix5d information() const { return ll - lp * pp.ldlt().solve(lp.transpose()); }
 };
 
@@ -190,7 +192,7 @@ OnlineIntrinsics::Blocks OnlineIntrinsics::blocks(const Vector5d& values,
   return out;
 }
 
-// By the median, so that points that were moved do not count.
+// Estimated by the median, so that points that were moved do not count.
 double OnlineIntrinsics::noise_of(const Vector5d& values,
                              std::span<const View> views,
                              std::span<const Pose> poses) const {
@@ -204,7 +206,7 @@ double OnlineIntrinsics::noise_of(const Vector5d& values,
   return std::max(1.0, std::sqrt(middle(std::move(squares)) / k_median_square / freedom));
 }
 
-// Where the camera was, the lens being as it is; nullopt when the view does not fit it.
+// The camera's pose for the given lens values; nullopt when the view does not fit them.
 std::optional<Pose> OnlineIntrinsics::find_pose(const Vector5d& values, const View& view, double* noise) const {
   Pose pose = view.camera_from_body;
   for (int round = 0; round < k_most_rounds; ++round) {
@@ -240,7 +242,7 @@ bool OnlineIntrinsics::add(const BodyView& seen) {
   const auto pose = find_pose(estimate_.values, view, &noise);
   const auto lens = model_values(estimate_.values);
   const double limit = std::pow(options_.robust_at * std::max(noise_, 1.0), 2);
-  // While the lens is unsure, what a view is off by may be the lens's.
+  // While the lens is uncertain, a view's misfit may be an error of the lens.
   const bool is_unsure = estimate_.focal_stddev_px() > k_unsure_share * estimate_.values[0];
   const auto fitting =
       !pose ? 0 : std::count_if(view.points.begin(), view.points.end(), [&](const BodyPoint& p) {
@@ -337,7 +339,7 @@ std::optional<OnlineIntrinsics::Solved> OnlineIntrinsics::solve_views(Solved at)
   return at;
 }
 
-// The focal length trades with distance: far from the truth there are other minima.
+// Focal length and distance are correlated, so that far from the truth there are other minima.
 std::optional<OnlineIntrinsics::Solved> OnlineIntrinsics::solve_from_other_focal_lengths() const {
   std::optional<Solved> best;
   double least = std::numeric_limits<double>::infinity();
@@ -352,7 +354,7 @@ std::optional<OnlineIntrinsics::Solved> OnlineIntrinsics::solve_from_other_focal
     }
     const auto found = solve_views(std::move(start));
     if (!found) continue;
-    // Costs compare at one noise.
+    // Costs are compared at the same noise.
     double cost = 0;
     for (std::size_t i = 0; i < views_.size(); ++i)
       cost += blocks(found->values, views_[i], found->poses[i], 1).cost;

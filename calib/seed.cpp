@@ -16,15 +16,16 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr int k_least_corners = 8;   // of a view that helps to calibrate a camera
-constexpr size_t k_least_poses = 3;  // two leave a lens open, and one is left out to judge
+constexpr int k_least_corners = 8;  // in a view that is used to calibrate a camera
+// Two do not determine a lens, and one is left out for the held-out error.
+constexpr size_t k_least_poses = 3;
 
 Pose to_pose(const cv::Mat& rvec, const cv::Mat& tvec) {
   const Vector3d w(rvec.at<double>(0), rvec.at<double>(1), rvec.at<double>(2));
   return {exp_rotation(w), Vector3d(tvec.at<double>(0), tvec.at<double>(1), tvec.at<double>(2))};
 }
 
-// One camera's lens and its poses of the boards it saw.
+// One camera's lens and the poses of the boards that it saw.
 struct CameraSeed {
   Lens lens;
   std::map<int, Pose> camera_from_board;
@@ -61,8 +62,7 @@ Result<CameraSeed> seed_camera(const Observations& observations, int camera, con
   if (views.poses.size() < k_least_poses)
     return error(
         "{}: expected the board in at least {} poses, found it in {}. Capture more poses, with the whole "
-        "board "
-        "in the picture and lit.",
+        "board in view and lit.",
         device.name, k_least_poses, views.poses.size());
   cv::Mat matrix = cv::Mat::eye(3, 3, CV_64F), distortion = cv::Mat::zeros(1, 5, CV_64F);
   std::vector<cv::Mat> rotations, translations;
@@ -104,7 +104,8 @@ double disagreement(const Pose& a, const Pose& b) {
   return angle_between(a.rotation, b.rotation) + (a.translation - b.translation).norm();
 }
 
-// The candidate with the smallest sum of distances to the others: one board misread does not matter.
+// The candidate with the smallest sum of distances to the others, so that one wrong board pose does not
+// matter.
 Pose medoid(const std::vector<Pose>& candidates) {
   size_t best = 0;
   double best_sum = std::numeric_limits<double>::max();
@@ -119,7 +120,7 @@ Pose medoid(const std::vector<Pose>& candidates) {
   return candidates[best];
 }
 
-// camera_from_world for every camera, board poses in the world, from camera 0 outwards.
+// Computes camera_from_world for every camera and the boards' poses in the world, starting from camera 0.
 Status link(const Observations& observations, const std::vector<CameraSeed>& seeds, Seed* into) {
   std::vector<bool> linked(seeds.size(), false);
   auto place = [&](size_t camera, const Pose& camera_from_world) {
@@ -151,7 +152,7 @@ Status link(const Observations& observations, const std::vector<CameraSeed>& see
   return {};
 }
 
-// Poses with too few corners to calibrate with still have a place.
+// Places the boards of poses with too few corners to calibrate with.
 void place_remaining(const Observations& observations, Seed* into) {
   const Rig rig{into->cameras, {}, {}, {}, {}};
   for (int pose = 0; pose < static_cast<int>(into->world_from_board.size()); ++pose) {
@@ -199,8 +200,7 @@ Result<Imager> seed_projector(const Observations& observations,
   if (poses.size() < 2 || points.px.size() < 20)
     return error(
         "{}: expected its light on the board in at least 3 poses, found {} poses with {} patches. Point it "
-        "at "
-        "the board, darken the room, check the exposure.",
+        "at the board, darken the room, check the exposure.",
         device.name, poses.size(), points.px.size());
   const auto linear = linear_camera(points.p_world, points.px);
   if (!linear)
@@ -299,10 +299,14 @@ Result<Pose> board_pose_seed(const Observations& observations, const Rig& rig) {
   cv::Mat rvec, tvec;
   if (p_board.size() < 4 || !cv::solvePnP(p_board, flat, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rvec,
                                           tvec, false, cv::SOLVEPNP_IPPE))
-    return error("{}: no pose of the board from {} corners.", camera.name, p_board.size());
+    return error("{}: cannot estimate the board's pose from {} corners. Keep more of the board in view.",
+                 camera.name, p_board.size());
   const Pose camera_from_board = to_pose(rvec, tvec);
   if (!camera_from_board.is_finite() || !(camera_from_board.translation.z() > 0))
-    return error("{}: {} corners of the board, all on a line, give no pose.", camera.name, p_board.size());
+    return error(
+        "{}: {} corners of the board all lie on a line; a pose needs corners in two directions. Keep more of "
+        "the board in view.",
+        camera.name, p_board.size());
   return camera.imager_from_world.inverse() * camera_from_board;
 }
 

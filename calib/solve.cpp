@@ -13,10 +13,9 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double k_outlier_at = 4;  // standard deviations: one in 3000 of sound observations
+constexpr double k_outlier_at = 4;  // standard deviations: one in 3000 of correct observations
 constexpr double k_least_noise_px = 0.01;
-constexpr int k_rounds =
-    3;  // how much everything scatters is known only after a fit; then it sets the weights
+constexpr int k_rounds = 3;  // the noise is known only after a fit; it sets the next fit's weights
 
 ImagerView view(const Imager& imager) {
   return {imager.lens.model, imager.lens.values, imager.imager_from_world};
@@ -38,8 +37,8 @@ double noise_of(const std::vector<Vector2d>& residuals) {
   return median_noise(std::move(deviations), Noise().corner_px);
 }
 
-// A point's own distance takes one of its tie-point observations' degrees of freedom; of the others' sum of squares the
-// median is Wilson's and Hilferty's.
+// The tie point's own depth uses one degree of freedom of its observations; the median of the remaining sum
+// of squares is Wilson's and Hilferty's.
 double sighting_noise(const Observations& observations, const std::vector<Vector2d>& residuals) {
   std::vector<double> deviations;
   for (size_t i = 0; i < residuals.size();) {
@@ -127,7 +126,8 @@ void add_residuals(const Observations& observations, const Parameters& at, const
   }
 }
 
-// What the places of one device weigh: each round with the noise that the last one left.
+// Iteratively reweighted bundle adjustment: refits k_rounds times, each time with the noise estimated from
+// the last residuals.
 Result<Solution> rounds(const Observations& observations,
                         const SolveOptions& options,
                         Parameters start,
@@ -154,8 +154,8 @@ Result<Solution> rounds(const Observations& observations,
   }
   if (!solution.covariance.allFinite())
     return error(
-        "the joint solve leaves devices undetermined: their covariance is not finite. Capture more poses, "
-        "tilted by 20 to 45 degrees to different sides.");
+        "the bundle adjustment does not determine all devices: their covariance is not finite. Capture more "
+        "poses, tilted by 20 to 45 degrees to different sides.");
   return solution;
 }
 
@@ -217,7 +217,7 @@ Status check_finite(const Observations& observations) {
   return {};
 }
 
-// Another lens with the values that both have; the rest 0.
+// Another lens model with the values that both have; the rest 0.
 Lens with_model(const Lens& lens, const LensModel& model) {
   Lens changed{model, lens.values};
   changed.values.resize(static_cast<size_t>(model.value_count()), 0.0);

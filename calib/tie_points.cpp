@@ -11,11 +11,11 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double k_least_share = 0.6;  // of a window's pixels with a label
+constexpr double k_least_share = 0.6;  // share of a window's pixels with a label
 constexpr double k_stddev_floor_px = 0.02;
-constexpr int k_bin_px = 4;  // of a projector's image, for finding who else sees its pixel
+constexpr int k_bin_px = 4;  // bin size in a projector's image, for finding which cameras see its pixel
 
-// What one projector's pixel is in the middle of a window of a camera's image.
+// The projector pixel at the centre of a window of a camera's image, and its derivative.
 struct Patch {
   Vector2d label;
   Eigen::Matrix2d slope;  // d label / d camera pixel
@@ -55,7 +55,7 @@ std::optional<Patch> patch_at(const cv::Mat& labels, int x, int y, const TiePoin
   return patch;
 }
 
-// For each bin of a projector's image a camera pixel that it lights; -1: none.
+// For each bin of a projector's image, a camera pixel that it illuminates; -1: none.
 class Reverse {
  public:
   Reverse(const cv::Mat& labels, const CapturedDevice& projector)
@@ -84,7 +84,8 @@ class Reverse {
   std::vector<int> bins_;
 };
 
-// The pixel of another camera that a projector's pixel lights: from a pixel near it along the plane there.
+// The pixel of another camera that a projector's pixel illuminates: from a pixel near it along the plane
+// there.
 std::optional<TiePointObservation> tie_observation_by(const cv::Mat& labels,
                                     const Reverse& reverse,
                                     const Vector2d& label,
@@ -111,21 +112,21 @@ std::optional<TiePointObservation> tie_observation_by(const cv::Mat& labels,
   return std::nullopt;
 }
 
-// The pixel of a field that most projectors reach, nearest to the field's middle.
+// The pixel of a field that most projectors reach, nearest to the field's centre.
 struct Choice {
   int x = 0, y = 0, seen = 0;
   std::vector<std::optional<Patch>> patches;
 };
 
-// `hull`: of what is left out, camera pixels; may be empty.
+// `hull`: a region to leave out, camera pixels; may be empty.
 Choice best_in(const std::vector<Decoded>& decoded,
                const std::vector<cv::Point2f>& hull,
                const cv::Rect& field,
                const TiePointOptions& options) {
   Choice best;
-  constexpr int k_tries = 3;  // by each axis
+  constexpr int k_tries = 3;  // along each axis
   for (int i = 0; i < k_tries * k_tries; ++i) {
-    const int order[] = {4, 1, 3, 5, 7, 0, 2, 6, 8};  // the middle first
+    const int order[] = {4, 1, 3, 5, 7, 0, 2, 6, 8};  // the centre first
     Choice tried;
     tried.x = field.x + field.width * (2 * (order[i] % k_tries) + 1) / (2 * k_tries);
     tried.y = field.y + field.height * (2 * (order[i] / k_tries) + 1) / (2 * k_tries);
@@ -147,7 +148,7 @@ cv::Rect field_of(const CapturedDevice& camera, int field, const TiePointOptions
           camera.width / options.columns, camera.height / options.rows};
 }
 
-// A new point with what the projectors see of it; its index.
+// Adds a tie point with its observations by the projectors; returns its index.
 int add_point(const Choice& choice, int camera, int pose, Observations* into) {
   const int point = static_cast<int>(into->points.size());
   into->points.push_back({pose, camera, Vector2d(choice.x, choice.y)});
@@ -165,7 +166,7 @@ void add_tie_points(const std::vector<std::vector<Decoded>>& decoded,
                      int pose,
                      const TiePointOptions& options,
                      Observations* into) {
-  std::vector<std::vector<Reverse>> reverse;  // only cameras that share the view need it
+  std::vector<std::vector<Reverse>> reverse;  // only needed where cameras share the view
   for (size_t camera = 0; decoded.size() > 1 && camera < decoded.size(); ++camera) {
     reverse.emplace_back();
     for (size_t p = 0; p < decoded[camera].size(); ++p)
@@ -187,7 +188,7 @@ void add_tie_points(const std::vector<std::vector<Decoded>>& decoded,
           seen->point = point;
           seen->imager = static_cast<int>(other);
           into->tie_observations.push_back(*seen);
-          break;  // one projector's light is enough to find it
+          break;  // one projector is enough to find it
         }
       }
     }

@@ -8,26 +8,28 @@
 namespace limn::calib {
 
 struct TiePointOptions {
-  /// The image is divided into so many fields across and down; each gives at most one point of a camera.
+  /// The image is divided into this many fields across and down; each gives at most one tie point of a
+  /// camera.
   int columns = 20;
   int rows = 15;
-  /// Half the side of the window that a plane is fitted to, pixels: a label's noise averages out over it.
+  /// Half the side of the window that a plane is fitted to, pixels. Noise of the labels averages out over it.
   int half_window = 4;
-  /// Of the plane's residuals, standard deviation, projector pixels: more is an edge or a coarse label.
+  /// Maximum standard deviation of the plane's residuals, projector pixels. More means an edge or a coarse
+  /// label.
   double max_residual_px = 0.5;
 };
 
-/// The well-placed points of a scene capture: for every camera, in each field of its image the pixel that
-/// most imagers see well, on a smooth piece of surface; with the projectors' pixels there, and the pixels of
-/// other cameras that one of these projectors' pixels lights. `decoded[camera][projector]`; appended to
-/// `into`.
+/// Selects the tie points of a scene capture: for every camera, in each field of its image, the pixel on a
+/// smooth piece of surface that most imagers measure well. Adds the projector pixels observed there, and the
+/// pixels of other cameras that one of these projector pixels illuminates. The result is appended to `into`.
+/// Input: `decoded[camera][projector]`.
 void add_tie_points(const std::vector<std::vector<Decoded>>& decoded,
                      int pose,
                      const TiePointOptions& options,
                      Observations* into);
 
-/// Likewise what one camera sees around the board: the room reaches the edges of the images, where boards
-/// seldom do, and tells the lenses apart there. `decoded`: one for each projector.
+/// Does the same with what one camera sees around the board. The room reaches the edges of the images, where
+/// boards seldom do, and so determines the lens distortion there. `decoded`: one for each projector.
 void add_room_points(const std::vector<Decoded>& decoded,
                      const std::vector<BoardCorner>& board,
                      int camera,

@@ -22,7 +22,7 @@ std::vector<std::string> split(const std::string& text, char at) {
   return parts;
 }
 
-// The whole of `text` as a number.
+// Parses the whole of `text` as a number.
 template <class T>
 bool read_number(const std::string& text, T* value) {
   const char* end = text.data() + text.size();
@@ -41,7 +41,7 @@ bool read_length(const std::string& text, double* metres) {
     if (!text.ends_with(name)) continue;
     if (!read_number(text.substr(0, text.size() - name.size()), metres)) return false;
     *metres *= factor;
-    return *metres >= 1e-4 && *metres <= 10;  // nothing smaller prints, nothing larger is a board
+    return *metres >= 1e-4 && *metres <= 10;  // smaller boards cannot be printed, larger ones do not exist
   }
   return false;
 }
@@ -60,13 +60,13 @@ Status read_charuco_fields(const std::string& text, const std::vector<std::strin
   board->dictionary = parts.size() > 3 ? parts[3] : default_dictionary(markers);
   if (board->dictionary.empty())
     return error(
-        "board '{}': expected at most 1000 markers, the largest dictionary, found {}. Take fewer squares.",
+        "board '{}': expected at most 1000 markers, the largest dictionary, found {}. Use fewer squares.",
         text, markers);
   if (!find_predefined_family(board->dictionary))
     return error("board '{}': expected a dictionary such as aruco_4x4_50 or aruco_5x5_250, found '{}'.", text,
                  board->dictionary);
   if (const int has = dictionary_of(*board)->bytesList.rows; has < markers)
-    return error("board '{}': needs {} markers, but {} has {}. Take a larger dictionary.", text, markers,
+    return error("board '{}': needs {} markers, but {} has {}. Use a larger dictionary.", text, markers,
                  board->dictionary, has);
   board->marker_share = 0.75;
   if (parts.size() > 4 && (!read_number(parts[4], &board->marker_share) || !(board->marker_share >= 0.4) ||
@@ -78,8 +78,8 @@ Status read_charuco_fields(const std::string& text, const std::vector<std::strin
 
 bool near_whole(double v) { return std::abs(v - std::round(v)) < 1e-6; }
 
-// Pixels of a square and of a marker's cell: whole cells, equal margins, and a whole number of pixels per
-// metre where one is near, because a PNG's pHYs is a whole number.
+// Pixels of a square and of a marker's cell: whole cells, equal margins, and if possible a whole number of
+// pixels per metre, because a PNG's pHYs is a whole number.
 struct PixelGrid {
   int square = 0;
   int cell = 0;
@@ -103,7 +103,7 @@ PixelGrid pixel_grid(const Board& board, int least) {
     if (found.square == 0) found = grid;
   }
   if (found.square > 0) return found;
-  // No whole cells for this share: the nearest ones. The corners stay where they are.
+  // No whole cells for this share: the nearest ones are used. The corners keep their positions.
   int square = least + least % 2;
   int cell = std::max(1, static_cast<int>(std::lround(square * board.marker_share / cells)));
   if ((square - cells * cell) % 2 != 0) ++square;

@@ -18,7 +18,8 @@ enum class BoardKind { charuco, chessboard };
 /// Text form, as in docs/formats.md:
 ///   `charuco:11x8:25mm`                        11 x 8 squares of 25 mm
 ///   `charuco:11x8:25mm:aruco_5x5_100:0.7`      with its dictionary and the marker's side as a share of the
-///   square `chessboard:9x7:75mm`                      9 x 7 INNER corners, that is 10 x 8 squares
+///                                              square's
+///   `chessboard:9x7:75mm`                      9 x 7 INNER corners, that is 10 x 8 squares
 /// Defaults: the smallest aruco_4x4 dictionary that has enough markers; 0.75 (whole cells: 8 to a square).
 struct Board {
   BoardKind kind = BoardKind::charuco;
@@ -33,24 +34,24 @@ struct Board {
 
   /// Inner corners, where four squares meet: id = row * (columns - 1) + column, from the top left.
   int corner_count() const { return (columns - 1) * (rows - 1); }
-  /// Place of a corner on the flat board (z = 0).
+  /// Position of a corner on the flat board (z = 0).
   Eigen::Vector3d p_corner(int id) const;
   double width_m() const { return columns * square_m; }
   double height_m() const { return rows * square_m; }
   bool is_black(int column, int row) const { return (column + row) % 2 == 0; }
 };
 
-/// The whole sheet as exact pixels: every square and every marker cell is a whole number of pixels.
+/// The whole sheet as an exact image: every square and every marker cell is a whole number of pixels.
 struct BoardSheet {
   cv::Mat image;              ///< 8-bit grey: 0 black ink, 255 paper
-  double pixels_per_metre = 0;  ///< for pHYs and for texturing a plane
-  /// Pixel coordinates (pixel centres at integers) of the board frame's origin; ends in .5, for it is an
-  /// edge: px = px_board_origin + pixels_per_metre * p_board.xy
+  double pixels_per_metre = 0;  ///< for pHYs (the resolution in a PNG) and for texturing a plane
+  /// Pixel coordinates (pixel centres at integers) of the board frame's origin. They end in .5, because the
+  /// origin lies on a pixel's edge: px = px_board_origin + pixels_per_metre * p_board.xy
   Eigen::Vector2d px_board_origin = Eigen::Vector2d::Zero();
 };
 
 struct DrawOptions {
-  int square_px = 80;  ///< at least; the next size with whole marker cells is taken
+  int square_px = 80;  ///< minimum; the next size with whole marker cells is used
   int margin_px = -1;  ///< white border around the grid; -1: as wide as a square
 };
 BoardSheet draw_board(const Board& board, const DrawOptions& options = {});

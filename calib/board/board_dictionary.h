@@ -6,7 +6,8 @@
 
 namespace limn::calib {
 
-/// OpenCV's table of a ChArUco board's markers; within this room only, for it drags OpenCV's headers along.
+/// OpenCV's table of a ChArUco board's markers. For use in this folder only, because it needs OpenCV's
+/// headers.
 cv::Ptr<cv::aruco::Dictionary> dictionary_of(const Board& board);
 
 }  // namespace limn::calib

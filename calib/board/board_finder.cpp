@@ -15,19 +15,21 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double k_reach = 0.42;  // of a square along its edges; half would meet the next junction's blur
+// Share of a square along its edges; half would reach the next corner's blur.
+constexpr double k_reach = 0.42;
 constexpr double k_max_reach_px = 40;      // more pixels only cost time
-constexpr double k_band = 0.2;             // of a square across an edge, on boards without markers
+constexpr double k_band = 0.2;             // share of a square across an edge, on boards without markers
 constexpr double k_min_half_contrast = 3;  // levels; below, noise moves the fit by whole pixels
-constexpr double k_max_residual = 0.35;    // of the half contrast: a covered or glaring junction
-constexpr double k_max_shift = 0.3;        // of a square: the fit has run to another corner
-constexpr double k_min_square_px = 8;      // smaller squares leave too few pixels clear of the blur
+// Share of the half contrast: above it the corner is covered or has glare.
+constexpr double k_max_residual = 0.35;
+constexpr double k_max_shift = 0.3;    // share of a square: above it the fit has moved to another corner
+constexpr double k_min_square_px = 8;  // smaller squares have too few pixels clear of the blur
 
-// Where a junction is expected: its place and the vectors to the next junctions right and down.
+// Where a corner is expected: its position and the vectors to the next corners right and down.
 struct Expected {
   int id = 0;
   Vector2d px, right, down;
-  bool black_up_left = true;  // the square between -right and -down
+  bool black_up_left = true;  // whether the square between -right and -down is black
 };
 
 double erf_slope(double x) { return 2 / std::sqrt(std::numbers::pi) * std::exp(-x * x); }
@@ -36,7 +38,7 @@ struct Sample {
   double x = 0, y = 0, value = 0;
 };
 
-// Pixels along the junction's two edges, relative to `px`.
+// Pixels along the corner's two edges, relative to `px`.
 std::vector<Sample> samples_near(const cv::Mat& grey, const Expected& at, double band) {
   const double reach_right = std::min(k_reach, k_max_reach_px / at.right.norm());
   const double reach_down = std::min(k_reach, k_max_reach_px / at.down.norm());
@@ -160,7 +162,7 @@ std::optional<JunctionFit> fit_junction(const std::vector<Sample>& samples, cons
   return fit;
 }
 
-// Share of a square that is clear of markers on both sides of an edge.
+// Share of a square beside an edge that is clear of markers on both sides.
 double clear_band(const Board& board) {
   return board.kind == BoardKind::charuco ? 0.65 * (1 - board.marker_share) / 2 : k_band;
 }
@@ -170,7 +172,7 @@ std::optional<BoardCorner> refined(const Board& board, const cv::Mat& grey, Expe
   if (!(side >= k_min_square_px)) return std::nullopt;
   const Vector2d px_start = at.px;
   std::optional<JunctionFit> fit;
-  for (int pass = 0; pass < 2; ++pass) {  // the second with its pixels chosen around the place found
+  for (int pass = 0; pass < 2; ++pass) {  // the second pass uses pixels around the position found
     const std::vector<Sample> samples = samples_near(grey, at, std::max(clear_band(board), 2.5 / side));
     if (samples.empty()) return std::nullopt;
     fit = fit_junction(samples, first_guess(samples, at));
@@ -190,7 +192,7 @@ std::optional<BoardCorner> refined(const Board& board, const cv::Mat& grey, Expe
 
 Vector2d to_vector(const cv::Point2f& p) { return {p.x, p.y}; }
 
-// Vectors to the neighbours from differences on the grid.
+// Vectors to the neighbours, from differences on the grid.
 std::vector<Expected> expected_on_grid(const std::vector<cv::Point2f>& grid, int across, int down) {
   auto at = [&](int column, int row) { return to_vector(grid[static_cast<size_t>(row * across + column)]); };
   std::vector<Expected> expected;
@@ -218,7 +220,7 @@ bool first_square_is_black(const cv::Mat& grey, const std::vector<Expected>& cor
          level(first.px + a - b) + level(first.px - a + b);
 }
 
-// The detector may start at any end of the board: bring the grid into the board's frame.
+// Brings the grid into the board's frame, because the detector may start at any corner of the board.
 std::vector<cv::Point2f> uprighted(const cv::Mat& grey, std::vector<cv::Point2f> grid, int across, int down) {
   const std::vector<Expected> corners = expected_on_grid(grid, across, down);
   const Expected& middle = corners[corners.size() / 2];
@@ -250,7 +252,7 @@ std::vector<Expected> find_chessboard(const Board& board, const cv::Mat& grey) {
   return expected;
 }
 
-// A marker seen: its square and its corners, in units of squares and in pixels.
+// A detected marker: its square and its corners, in units of squares and in pixels.
 struct DetectedMarker {
   int column = 0, row = 0;
   std::vector<cv::Point2f> in_squares, px;
@@ -280,7 +282,7 @@ std::vector<DetectedMarker> find_markers(const Board& board, const cv::Mat& grey
   return seen;
 }
 
-// Without markers that a clutter's false reading has put elsewhere than the rest of the board says.
+// Removes markers whose position contradicts the rest of the board (false detections in clutter).
 std::vector<DetectedMarker> consistent(std::vector<DetectedMarker> markers) {
   constexpr double k_tolerance = 0.4;  // squares; lens distortion over the board stays below
   std::vector<cv::Point2f> px, in_squares;
@@ -299,7 +301,7 @@ std::vector<DetectedMarker> consistent(std::vector<DetectedMarker> markers) {
   return kept;
 }
 
-// The junction's place by a homography of the nearest markers; nullopt without a marker in a square beside
+// The corner's position by a homography of the nearest markers; nullopt without a marker in a square beside
 // it.
 std::optional<Expected> expected_beside(const Board& board, const std::vector<DetectedMarker>& markers, int id) {
   const int column = id % (board.columns - 1), row = id / (board.columns - 1);
@@ -339,7 +341,7 @@ std::vector<Expected> find_charuco(const Board& board, const cv::Mat& grey) {
 
 std::vector<BoardCorner> find_board(const Board& board, const cv::Mat& grey) {
   LIMN_CHECK(grey.type() == CV_8U);
-  constexpr size_t k_least = 4;  // fewer do not give a pose
+  constexpr size_t k_least = 4;  // fewer do not determine a pose
   std::vector<BoardCorner> corners;
   for (const Expected& at :
        board.kind == BoardKind::charuco ? find_charuco(board, grey) : find_chessboard(board, grey)) {

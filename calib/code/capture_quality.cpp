@@ -17,36 +17,40 @@ using Eigen::Matrix4f;
 using Eigen::Vector2f;
 using Eigen::Vector4f;
 
-constexpr int k_samples = 20000;      // at most about; medians over them are good to a fraction of a level
-constexpr int k_reduced_width = 320;  // of the images that motion is measured in
-constexpr int k_patch = 32;           // their patches' side
-constexpr int k_steps = 5;            // of Gauss-Newton; each halves what is left, or better
-constexpr float k_least_texture = 4;  // levels a pixel, root mean square of a patch's weaker gradient
-constexpr float k_max_patch_shift = 6;      // reduced pixels; further steps are lost
+// About the maximum; medians over them are accurate to a fraction of a level.
+constexpr int k_samples = 20000;
+constexpr int k_reduced_width = 320;  // width of the images that motion is measured in
+constexpr int k_patch = 32;           // side of their patches
+constexpr int k_steps = 5;            // Gauss-Newton steps; each halves the remaining error, or better
+constexpr float k_least_texture = 4;  // levels per pixel, root mean square of a patch's weaker gradient
+constexpr float k_max_patch_shift = 6;      // reduced pixels; larger steps have diverged
 constexpr int k_saturated = 254;
-constexpr double k_lit = 10;           // levels between bright and dark
-constexpr double k_lit_noise = 5;      // and times a sum's noise: one dark sample in thousands gets there
-constexpr double k_off = 0.25;         // of the contrast
-constexpr double k_off_noise = 4.5;    // and times a sum's noise
-constexpr double k_same = 0.08;        // mean difference of two images of one pattern, of the contrast
-constexpr double k_odd_group = 0.05;   // of samples that are off; motion at edges stays below
-constexpr double k_wrong_group = 0.5;  // likewise: no motion does that
+constexpr double k_lit = 10;  // levels between bright and dark
+// Times a sum's noise, the second limit: one dark sample in thousands exceeds it.
+constexpr double k_lit_noise = 5;
+constexpr double k_off = 0.25;       // share of the contrast
+constexpr double k_off_noise = 4.5;  // times a sum's noise, the second limit
+// Mean difference of two images of one pattern, as a share of the contrast.
+constexpr double k_same = 0.08;
+constexpr double k_odd_group = 0.05;   // share of samples that are off; motion at edges stays below
+constexpr double k_wrong_group = 0.5;  // the same; motion never causes that much
 
-// The lit samples of a series: what their images add up to, and how far apart they get.
+// The illuminated samples of a series: the sums of their images, and their largest difference.
 struct Samples {
   std::vector<cv::Mat> images;  // CV_32F, one row each
   std::vector<float> sum, range;
-  float noise = 0;  // of a pair's sum, standard deviation, levels
+  float noise = 0;  // standard deviation of a pair's sum, levels
   size_t size() const { return sum.size(); }
   const float* of(int image) const { return images[static_cast<size_t>(image)].ptr<float>(); }
 };
 
 bool is_pair(const PatternGroup& group) { return group.count == 2; }
 
-// What the pairs of each sample add up to, and how far apart a pair gets.
+// The sum of each sample's pairs, and the largest difference within a pair.
 struct PairSums {
   std::vector<float> sum, range;
-  float noise = 0;  // standard deviation of one pair's sum, by the median over everything, lit or not
+  // Standard deviation of one pair's sum, by the median over all samples, illuminated or not.
+  float noise = 0;
 };
 
 PairSums pair_sums(const std::vector<PatternGroup>& groups, const std::vector<cv::Mat>& all) {
@@ -116,8 +120,8 @@ GroupQuality quality_of(const Samples& lit, const PatternGroup& group) {
   return quality;
 }
 
-// Mean difference of two images over the samples, as a share of their range; `inverse`: of the second one's
-// complement.
+// Mean difference of two images over the samples, as a share of their range; `inverse`: uses the complement
+// of the second image.
 double difference(const Samples& lit, int a, int b, bool inverse) {
   double sum = 0, range = 0;
   for (size_t i = 0; i < lit.size(); ++i) {
@@ -128,7 +132,7 @@ double difference(const Samples& lit, int a, int b, bool inverse) {
   return sum / range;
 }
 
-// Why a pair does not add up, as far as the series itself tells; nullopt when nothing in it is alike.
+// Explains why a pair does not add up, as far as the series shows; nullopt when no other image is like it.
 std::optional<OddImage> finding(const Samples& lit,
                                   const std::vector<PatternGroup>& groups,
                                   const std::vector<std::filesystem::path>& files,
@@ -144,7 +148,7 @@ std::optional<OddImage> finding(const Samples& lit,
         if (difference(lit, image, other, false) < k_same)
           return OddImage{file, "shows the same as " + name(other)};
       }
-      // Images of two pairs have changed places; which two of the four, the sums do not tell.
+      // Images of two pairs have changed places; the sums do not show which two of the four.
       const bool crossed = difference(lit, first, group.first, true) < k_same ||
                            difference(lit, first, group.first + 1, true) < k_same;
       if (crossed)
@@ -173,7 +177,7 @@ void find_odd(const Samples& lit,
   }
 }
 
-// How a patch of `b` lies against `a`: Gauss-Newton over shift, gain and offset.
+// Shift of a patch in `b` relative to `a`: Gauss-Newton over shift, gain and offset.
 struct PatchShift {
   bool textured = false;
   Vector2f shift = Vector2f::Zero();
@@ -233,7 +237,7 @@ void measure_motion(const cv::Mat& first, const cv::Mat& last, double scale, Cap
   quality->shift_worst_px = lengths[lengths.size() * 9 / 10];
 }
 
-// Mean of squares without the few that motion or a flash have spoilt.
+// Mean of squares without the few residuals that motion or a flash has spoilt.
 double trimmed_square(std::vector<float> residuals) {
   constexpr double k_trim = 4;  // standard deviations
   std::vector<float> sizes;
@@ -249,8 +253,9 @@ double trimmed_square(std::vector<float> residuals) {
   return sum / static_cast<double>(std::max<size_t>(1, count));
 }
 
-// An image and its inverse always add up to the same: what they do not is the noise of two intensities. It
-// is a straight line over the light; both its ends come from halves of the samples, dim and bright.
+// Measures noise: an image and its inverse always have the same sum, so its scatter is the noise of two
+// intensities. Noise variance is a straight line over the light, fitted to two halves of the samples, dim and
+// bright.
 void measure_noise(const Samples& lit, CaptureQuality* quality) {
   constexpr size_t k_least_sums = 2000;
   std::vector<float> sums = lit.sum;
@@ -259,7 +264,7 @@ void measure_noise(const Samples& lit, CaptureQuality* quality) {
   std::array<double, 2> light{}, count{};
   int pairs = 0;
   for (const GroupQuality& group : quality->groups) pairs += group.count == 2 && group.off < k_odd_group;
-  if (pairs < 2) return;  // without inverses nothing adds up to the same
+  if (pairs < 2) return;  // without inverses there are no equal sums
   for (const GroupQuality& group : quality->groups) {
     if (group.count != 2 || group.off >= k_odd_group) continue;
     const float *a = lit.of(group.first), *b = lit.of(group.first + 1);
@@ -272,12 +277,12 @@ void measure_noise(const Samples& lit, CaptureQuality* quality) {
     }
   }
   if (residuals[0].size() < k_least_sums || residuals[1].size() < k_least_sums) return;
-  // The sum that they are compared with is the median of all: pi / 2 times the variance of a mean.
+  // The reference is the median of all sums; its variance is pi / 2 times that of a mean.
   const double own = 1 + std::numbers::pi / 2 / pairs - 2.0 / pairs;
   const double dim = trimmed_square(residuals[0]) / own, bright = trimmed_square(residuals[1]) / own;
   const double from = light[0] / count[0], to = light[1] / count[1];
-  constexpr double k_rounding = 1.0 / 6;  // of two intensities to whole levels
-  constexpr double k_least_range = 1.3;   // of the light in the halves; below, their difference is chance
+  constexpr double k_rounding = 1.0 / 6;  // rounding of two intensities to whole levels
+  constexpr double k_least_range = 1.3;   // ratio of the light in the halves; below, it is chance
   const double slope = to > k_least_range * from ? std::max(0.0, (bright - dim) / (to - from)) : 0;
   quality->noise.per_level = slope;
   quality->noise.read = std::max(k_rounding, slope > 0 ? dim - slope * from : (dim + bright) / 2) / 2;
@@ -329,7 +334,7 @@ void CaptureQualityProbe::add_image(int index, const cv::Mat& image) {
               cv::Scalar(0));
   int at = 0;
   for (int y = 0; y < height_; y += stride_) {
-    // every row begins elsewhere, so that upright stripes do not beat with the grid
+    // Every row begins at another column, so that upright stripes do not alias with the grid.
     for (int x = (y / stride_ * 3) % stride_; x < width_; x += stride_)
       row.ptr<uchar>()[at++] = image.ptr<uchar>(y)[x];
   }

@@ -16,24 +16,25 @@ namespace {
 
 constexpr float k_nan = std::numeric_limits<float>::quiet_NaN();
 constexpr float k_infinite = std::numeric_limits<float>::infinity();
-constexpr int k_unlit = 255;          // in an image of least steps
-constexpr int k_settle_passes = 2;    // pixels without a label are few and small
+constexpr int k_unlit = 255;          // a value in an image of least steps: not illuminated
+constexpr int k_settle_passes = 2;    // pixels without a label are few, their regions small
 constexpr float k_calm_px = 12;       // range of the neighbours' labels on one surface, projector pixels
-constexpr float k_reach_px = 4;       // how far from their mean a label is looked for
-constexpr int k_wide_stripe_px = 16;  // stripes that blur does not weaken but at their edges
-constexpr float k_neighbours_px =
-    0.5F;  // what a label may differ from its neighbours' mean, besides their slope
-constexpr float k_coarse_var =
-    1;  // px^2: labels of 4 and more, whose middle may be further off than their neighbours
-constexpr float k_neighbours_var = 0.26F;  // px^2: of one of two neighbouring labels
-constexpr float k_max_cost = 8;            // of a label, half squared standard deviations of noise: 4 of them
+constexpr float k_reach_px = 4;       // labels within this distance of the neighbours' mean are candidates
+constexpr int k_wide_stripe_px = 16;  // stripes that blur weakens at their edges only
+// Difference of a label from its neighbours' mean that is allowed in addition to their slope.
+constexpr float k_neighbours_px = 0.5F;
+// px^2: variance of labels 4 or more pixels wide, whose centre may be further off than their neighbours.
+constexpr float k_coarse_var = 1;
+constexpr float k_neighbours_var = 0.26F;  // px^2: variance of one of two neighbouring labels
+// Half squared standard deviations of noise for a label: 4 standard deviations.
+constexpr float k_max_cost = 8;
 
-// An axis' code as it is shown: Gray code, of which bits above `base` may be exchanged with that one.
+// The code of an axis as it is shown: Gray code, whose bits above `base` may be combined with that bit.
 struct Code {
-  int bits = 0;    // shown
+  int bits = 0;    // number of bits shown
   int lowest = 0;  // finest bit shown: labels are blocks of 2^lowest projector pixels
   int base = 32;
-  int blocks = 0;  // labels on the axis
+  int blocks = 0;  // number of labels on the axis
 
   unsigned above_base() const { return base < bits ? (1U << bits) - (2U << base) : 0; }
   unsigned exchanged(unsigned code) const { return (code >> base & 1U) != 0 ? code ^ above_base() : code; }
@@ -46,7 +47,7 @@ struct Code {
     for (unsigned shift = 1; shift < 16; shift *= 2) gray ^= gray >> shift;
     return gray;
   }
-  // Bits that say nothing for sure about the Gray code when these of the shown one are unsure.
+  // Bits of the Gray code that are unsure when these bits of the shown code are.
   unsigned unsure(unsigned displayed_bit) const {
     return base < bits && (displayed_bit >> base & 1U) != 0 ? displayed_bit | above_base() : displayed_bit;
   }
@@ -57,10 +58,10 @@ struct BitPlanes {
   cv::Mat code, unsure;
 };
 
-// Levels by which a pair must differ to be sure; k_unlit where the projector's own light does not reach.
+// Levels by which a pair must differ to be sure; k_unlit where the projector's direct light does not reach.
 struct LeastSteps {
-  cv::Mat fine;  // CV_8U: of bits that blur takes
-  cv::Mat wide;  // CV_8U: of wide stripes, and of the bits of xor's base
+  cv::Mat fine;  // CV_8U: for bits that blur weakens
+  cv::Mat wide;  // CV_8U: for wide stripes, and for the bits of xor's base
 };
 
 BitPlanes bit_planes(const AxisReading& axis, const Code& code, const LeastSteps& steps) {
@@ -86,11 +87,11 @@ BitPlanes bit_planes(const AxisReading& axis, const Code& code, const LeastSteps
 }
 
 struct Label {
-  int low = 0, end = 0;  // by the signs; low = end: none
+  int low = 0, end = 0;  // by the signs; low = end: no label
   float centre = k_nan, variance = k_nan;
 };
 
-// The label that the bits give, in blocks; without one when they do not settle it to 2^max_coarse neighbours.
+// The label that the bits give, in blocks; none when they do not determine it to 2^max_coarse neighbours.
 Label label_of(unsigned displayed_bit, unsigned shown_unsure, const Code& code, int max_coarse) {
   const unsigned gray_unsure = code.unsure(shown_unsure);
   int coarse = 0;
@@ -102,7 +103,7 @@ Label label_of(unsigned displayed_bit, unsigned shown_unsure, const Code& code, 
   unsigned other = first;
   if (open != 0) {
     if ((open & (open - 1)) != 0) return {};  // two unsure bits above sure ones
-    // flipping a bit of Gray code flips that bit of the number and all finer ones
+    // Flipping a bit of Gray code flips that bit of the number and all finer ones.
     other = first ^ ((open << 1) - 1);
     if (std::max(first, other) - std::min(first, other) != 1) return {};
   }
@@ -144,8 +145,8 @@ void label_axis(
   }
 }
 
-// The known coordinates around (x, y), without its own: their mean (NaN when there are few, or they do not
-// belong together) and their range.
+// The known coordinates around (x, y), without the pixel's own: their mean (NaN when there are too few, or
+// they do not belong to one surface) and their range.
 struct Neighbours {
   float mean = k_nan, range = 0;
 };
@@ -167,8 +168,8 @@ Neighbours around(const cv::Mat& px, int x, int y) {
   return {sum / static_cast<float>(count), high - low};
 }
 
-// Takes away labels that stand alone against calm neighbours, perhaps because noise has turned a bit of a
-// dark pixel, and marks them.
+// Removes labels that differ from uniform neighbours, perhaps because noise has flipped a bit of a dark
+// pixel, and marks them.
 void doubt(float limit, AxisLabels* labels, cv::Mat* doubted) {
   const cv::Mat before = labels->px.clone();
   for (int y = 1; y + 1 < before.rows; ++y) {
@@ -185,7 +186,7 @@ void doubt(float limit, AxisLabels* labels, cv::Mat* doubted) {
   }
 }
 
-// How unlikely a label is: every bit that reads the other way must have been turned by noise.
+// How unlikely a label is: noise must have flipped every bit that reads differently.
 float cost_of(const AxisReading& axis, unsigned displayed_bit, int x, int y, float variance) {
   float cost = 0;
   for (int i = 0; i < axis.bits(); ++i) {
@@ -196,16 +197,16 @@ float cost_of(const AxisReading& axis, unsigned displayed_bit, int x, int y, flo
   return cost;
 }
 
-// Lit pixels whose bits do not settle their label: those near the neighbours' are weighed by their
-// likelihood.
+// Decides illuminated pixels whose bits do not determine their label: candidates near the neighbours' labels
+// are compared by their likelihood.
 void settle_by_neighbours(const AxisReading& axis,
                           const Code& code,
                           const DifferenceNoise& noise,
                           const cv::Mat& step,
                           AxisLabels* labels) {
-  // Exchanged bits are all unsure at the base's edges and leave labels open that lie a stripe apart: there
-  // the neighbours decide. Gray code leaves neighbouring labels open; what the neighbours say would only bias
-  // it.
+  // Combined bits (xor) are all unsure at the base's edges, and the possible labels are then a stripe apart:
+  // the neighbours decide. In Gray code the possible labels are adjacent; the neighbours would only bias the
+  // choice.
   const bool exchanged = code.base < code.bits;
   const cv::Mat before = labels->px.clone();
   const float scale = 1.0F / static_cast<float>(1 << code.lowest);
@@ -213,7 +214,7 @@ void settle_by_neighbours(const AxisReading& axis,
     const uchar* least = step.ptr<uchar>(y);
     float *px = labels->px.ptr<float>(y), *variance = labels->variance.ptr<float>(y);
     for (int x = 0; x < step.cols; ++x) {
-      if (least[x] == k_unlit || variance[x] <= k_coarse_var) continue;  // NaN: none
+      if (least[x] == k_unlit || variance[x] <= k_coarse_var) continue;  // NaN: no label
       const auto [near, range] = around(before, x, y);
       if (std::isnan(near)) continue;
       const float doubt =
@@ -240,13 +241,13 @@ void settle_by_neighbours(const AxisReading& axis,
       const float spread = squares / total - mean * mean;
       variance[x] = spread + 1.0F / 12;
       if (!exchanged || spread > k_neighbours_var) continue;
-      labels->low.ptr<short>(y)[x] = static_cast<short>(likeliest);  // its edges count, too
+      labels->low.ptr<short>(y)[x] = static_cast<short>(likeliest);  // labels at its edges count, too
       labels->end.ptr<short>(y)[x] = static_cast<short>(likeliest + 1);
     }
   }
 }
 
-// Median of the labels around (x, y), per axis.
+// Median of the labels around (x, y), for each axis.
 cv::Vec2f local_median(const cv::Mat& labels, int x, int y) {
   constexpr int k_half = 2;
   std::array<float, 25> columns{}, rows{};
@@ -269,7 +270,7 @@ bool apart(const cv::Vec2f& a, const cv::Vec2f& b, double limit) {
   return std::abs(a[0] - b[0]) > limit || std::abs(a[1] - b[1]) > limit;
 }
 
-// Whether every labelled pixel of the 3x3 neighbourhood is close: then the median is not needed.
+// Whether every labelled pixel of the 3x3 neighbourhood is close, so that the median is not needed.
 bool calm(const cv::Mat& labels, int x, int y, double limit) {
   const auto& own = labels.at<cv::Vec2f>(y, x);
   int neighbours = 0;
@@ -303,7 +304,7 @@ int remove_outliers(cv::Mat* labels, double limit) {
   return removed;
 }
 
-// Marked pixels whose label went for good.
+// Number of marked pixels that have no label in the end.
 int count_unlabelled(const cv::Mat& marked, const cv::Mat& labels) {
   int count = 0;
   for (int y = 0; y < marked.rows; ++y) {
@@ -313,15 +314,15 @@ int count_unlabelled(const cv::Mat& marked, const cv::Mat& labels) {
   return count;
 }
 
-// Whether a pair's stripes are fine enough that light from elsewhere does not follow them, and wide enough
-// that the lens shows them: 4 to 32 projector pixels; all pairs of a small projector, and of xor's the ones
-// that are as fine as its base. `bit` counts from the finest of the projector.
+// Whether a pair's stripes are fine enough that indirect light does not follow them, and wide enough that the
+// lens resolves them: 4 to 32 projector pixels; for a small projector all pairs, for xor those that are as
+// fine as its base. `bit` counts from the projector's finest.
 bool measures_direct_light(int bit, const Code& code) {
   if (code.base < code.bits) return bit >= code.base;
   return code.bits <= 5 || (bit >= 1 && bit <= 4);
 }
 
-// How bright the direct light is: the mean size of image minus inverse over the bits that tell it.
+// Direct light: the mean size of image minus inverse over the bits that measure it.
 struct DirectLight {
   cv::Mat sum;  // CV_16U
   int bits = 0;
@@ -333,7 +334,7 @@ struct DirectLight {
   }
 };
 
-// One series as it is read.
+// One series while it is read.
 struct Series {
   const Patterns& patterns;
   const std::vector<std::filesystem::path>& files;
@@ -348,8 +349,8 @@ struct Series {
   }
 };
 
-// Image minus inverse of an axis' bits, from image number `first` on. `both`: white and black together,
-// which an inverse that is not shown is the image's complement in.
+// Reads image minus inverse of an axis's bits, from image number `first` on. `both`: white plus black; where
+// inverses are not shown, they are computed as `both` minus the image.
 Status read_bits(int first, const Code& code, const cv::Mat& both, Series* series, AxisReading* axis) {
   const int step = series->patterns.images_of_bit();
   for (int i = 0; i < code.bits; ++i) {
@@ -379,10 +380,10 @@ Result<PhaseReading> read_steps(int first, Series* series) {
   return reading;
 }
 
-// The steps that bits need, from the direct light. A pixel is lit when the projector's own light reaches it:
-// white minus black also holds what the room reflects.
-// Exchanged bits all cross zero at the base's edges, so that there but noise turns what they say together;
-// their stripes lose more than half of their light to blur, and none of it comes from elsewhere.
+// The minimum steps of the bits, from the direct light. A pixel is illuminated when the projector's direct
+// light reaches it; white minus black also contains what the room reflects. Combined bits (xor) all cross
+// zero at the base's edges, so that only noise decides between them there; their stripes lose more than half
+// of their light to blur, and none of it is indirect.
 LeastSteps least_steps(const DirectLight& direct,
                        bool exchanged,
                        const DifferenceNoise& noise,
@@ -391,7 +392,8 @@ LeastSteps least_steps(const DirectLight& direct,
   constexpr double k_exchanged_noise = 2;     // standard deviations of a difference
   constexpr double k_exchanged_direct = 0.4;  // contrast of stripes of 2 pixels blurred by 0.6
   const double min_direct = exchanged ? k_exchanged_direct * options.min_direct : options.min_direct;
-  constexpr double k_lit_noise = 1.4;  // standard deviations of a difference: a mean of several is sure then
+  // Standard deviations of a difference: the mean of several is then sure.
+  constexpr double k_lit_noise = 1.4;
   const cv::Size size = decoded->contrast.size();
   LeastSteps steps{cv::Mat(size, CV_8U, cv::Scalar(k_unlit)), cv::Mat(size, CV_8U, cv::Scalar(k_unlit))};
   for (int y = 0; y < size.height; ++y) {
@@ -416,8 +418,8 @@ LeastSteps least_steps(const DirectLight& direct,
   return steps;
 }
 
-// Of image minus inverse. Without inverses it is twice the image less white and black: three times the
-// variance.
+// Noise of image minus inverse. Without inverses the difference is twice the image minus white and black:
+// three times the variance.
 DifferenceNoise difference_noise(const cv::Mat& white,
                                  const cv::Mat& black,
                                  bool inverses,
@@ -446,7 +448,7 @@ AxisLabels labels_of(const AxisReading& axis,
   return labels;
 }
 
-// From blocks of 2^lowest projector pixels to those pixels.
+// Converts blocks of 2^lowest projector pixels to pixels.
 void to_pixels(int lowest, AxisLabels* labels) {
   if (lowest == 0) return;
   const double block = 1 << lowest;
@@ -454,7 +456,7 @@ void to_pixels(int lowest, AxisLabels* labels) {
   labels->variance *= block * block;
 }
 
-// Share of the lit pixels whose finest bit is unsure, on the axis where they are more.
+// Share of the illuminated pixels whose finest bit is unsure, on the axis with more of them.
 double unsure_finest(const AxisReading& columns, const AxisReading& rows, const cv::Mat& step, int lit) {
   double worst = 0;
   for (const AxisReading* axis : {&columns, &rows}) {
@@ -469,7 +471,7 @@ double unsure_finest(const AxisReading& columns, const AxisReading& rows, const 
   return worst;
 }
 
-// Puts the axes together where both are known; how many pixels that are.
+// Combines the axes where both have labels; returns the number of these pixels.
 int join(const AxisLabels& u, const AxisLabels& v, Decoded* decoded) {
   decoded->px_projector = cv::Mat(u.px.size(), CV_32FC2, cv::Scalar(k_nan, k_nan));
   decoded->variance = decoded->px_projector.clone();
@@ -491,7 +493,7 @@ int join(const AxisLabels& u, const AxisLabels& v, Decoded* decoded) {
 Result<cv::Mat> read_shot(const std::filesystem::path& path, int width, int height) {
   LIMN_TRY(cv::Mat image, read_grey_image(path));
   if (image.cols != width || image.rows != height)
-    return error("{}: expected a picture of {}x{} pixels, found {}x{}. Capture this pose again.",
+    return error("{}: expected an image of {}x{} pixels, found {}x{}. Capture this pose again.",
                  path.string(), width, height, image.cols, image.rows);
   return image;
 }

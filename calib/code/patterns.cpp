@@ -22,7 +22,7 @@ int bits_for(int size) { return static_cast<int>(std::bit_width(static_cast<unsi
 
 int gray_bit(int i, int bit) { return ((i ^ (i >> 1)) >> bit) & 1; }
 
-// Light of each position along an axis: that bit of its Gray code, above `base` exchanged with that one.
+// Light of each position along an axis: that bit of its Gray code, combined with bit `base` if above it.
 std::vector<uchar> stripe(int size, int bit, int base, bool inverse) {
   std::vector<uchar> line(static_cast<size_t>(size));
   for (int i = 0; i < size; ++i) {
@@ -32,7 +32,7 @@ std::vector<uchar> stripe(int size, int bit, int base, bool inverse) {
   return line;
 }
 
-// Light of each position in a step of the sinusoid, 0 … 1.
+// Light of each position in one step of the sinusoid, 0 … 1.
 std::vector<double> wave(int size, int step, const CodeOptions& options) {
   std::vector<double> line(static_cast<size_t>(size));
   for (int i = 0; i < size; ++i) {
@@ -43,7 +43,7 @@ std::vector<double> wave(int size, int step, const CodeOptions& options) {
   return line;
 }
 
-// What a display is given for such light between black's and white's; one channel, or BGR.
+// Display values for light between black's and white's; one channel, or BGR.
 std::vector<uchar> displayed(const std::vector<double>& light, const CodeOptions& options) {
   std::vector<uchar> values;
   const auto give = [&](double value) { values.push_back(static_cast<uchar>(std::lround(255 * value))); };
@@ -58,13 +58,13 @@ std::vector<uchar> displayed(const std::vector<double>& light, const CodeOptions
   return values;
 }
 
-// A line's values, one for each position or three (BGR), side by side over the whole image …
+// Repeats a line (one value for each position, or three for BGR) side by side over the whole image.
 cv::Mat across(std::vector<uchar> line, int width, int height) {
   const int channels = static_cast<int>(line.size()) / width;
   return cv::repeat(cv::Mat(1, width, CV_8UC(channels), line.data()), height, 1);
 }
 
-// … or one below the other.
+// Repeats it from top to bottom.
 cv::Mat down(std::vector<uchar> line, int width, int height) {
   const int channels = static_cast<int>(line.size()) / height;
   return cv::repeat(cv::Mat(height, 1, CV_8UC(channels), line.data()), 1, width);
@@ -93,7 +93,7 @@ Status check(const std::string& code, const CodeOptions& options) {
   return {};
 }
 
-// What a code does not use stays at its default, so that equal images mean equal structs.
+// Options that a code does not use keep their defaults, so that equal images mean equal structs.
 CodeOptions used(const std::string& code, const CodeOptions& options) {
   CodeOptions kept;
   if (code == "phase") {
@@ -128,7 +128,7 @@ Result<Patterns> Patterns::create(const std::string& code,
 
 int Patterns::lowest_bit() const {
   if (code != "phase") return 0;
-  // Labels of at most half a wave: their centres tell the wave with a quarter of it to spare.
+  // Labels of at most half a wave: their centres identify the wave with a margin of a quarter.
   const int half = std::bit_width(static_cast<unsigned>(options.period_px / 2)) - 1;
   return std::min(half, bits_for(std::min(width, height)) - 1);
 }

@@ -8,8 +8,8 @@
 namespace limn::calib {
 namespace {
 
-constexpr float k_max_turn = 0.1F;   // of a wave: what noise may do to a phase that is used
-constexpr float k_max_apart = 0.4F;  // of a wave, label from phase; half is where the next one begins
+constexpr float k_max_turn = 0.1F;   // share of a wave: maximum noise of a phase that is used
+constexpr float k_max_apart = 0.4F;  // share of a wave between label and phase; the next wave begins at half
 
 }  // namespace
 
@@ -44,7 +44,7 @@ void refine_by_phase(const PhaseReading& reading,
     float *px = labels->px.ptr<float>(y), *variance = labels->variance.ptr<float>(y);
     for (int x = 0; x < labels->px.cols; ++x) {
       if (std::isnan(px[x])) continue;
-      // amplitude = 2 / N |(c, s)|; a difference of two intensities holds twice the variance of one
+      // Amplitude = 2 / N |(c, s)|; a difference of two intensities has twice the variance of one.
       const float squared = c[x] * c[x] + s[x] * s[x];
       const float radians2 =
           noise.at(x, y) * static_cast<float>(reading.steps()) / std::max(4 * squared, 1e-6F);

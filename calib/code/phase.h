@@ -6,16 +6,16 @@
 
 namespace limn::calib {
 
-/// The steps of a sinusoid along one axis as a camera saw them, added up.
+/// Accumulates the steps of a sinusoid along one axis as a camera saw them.
 class PhaseReading {
  public:
   PhaseReading(int rows, int cols, int period_px, int steps);
-  /// Step number `step`, 8-bit grey.
+  /// Adds step number `step`, 8-bit grey.
   void add_step(int step, const cv::Mat& image);
 
   int period_px() const { return period_px_; }
   int steps() const { return steps_; }
-  /// Sums of intensity times cosine and times sine of the step's angle, CV_32F.
+  /// Sums of intensity times cosine (and times sine) of the step's angle, CV_32F.
   const cv::Mat& cosines() const { return cosines_; }
   const cv::Mat& sines() const { return sines_; }
 
@@ -24,11 +24,11 @@ class PhaseReading {
   cv::Mat cosines_, sines_;
 };
 
-/// Puts the phase's coordinate in the place of the labels': the wave is the one whose coordinate is nearest
-/// to the label, so that a label may be wrong by almost half a wave without harm. Where the noise alone turns
-/// the phase by more than a tenth of a wave, and where label and phase are so far apart that the next wave is
-/// about as near, the label stays with its variance: the fine part is dropped, not the pixel. Variance: of
-/// the phase by the intensities' noise, 2 var / (steps * amplitude^2) * (period / 2 pi)^2, and floor_px^2.
+/// Replaces the labels' coordinates by the phase's. The wave is the one whose coordinate is nearest to the
+/// label, so that a label may be wrong by almost half a wave. The label and its variance stay where the noise
+/// alone changes the phase by more than a tenth of a wave, and where label and phase are so far apart that
+/// the next wave is about as near: the pixel is kept without the fine part. Variance: the phase's by the
+/// noise of the intensities, 2 var / (steps * amplitude^2) * (period / 2 pi)^2, plus floor_px^2.
 void refine_by_phase(const PhaseReading& reading,
                      const DifferenceNoise& noise,
                      double floor_px,

@@ -9,13 +9,14 @@ namespace limn::calib {
 namespace {
 
 constexpr float k_nan = std::numeric_limits<float>::quiet_NaN();
-constexpr int k_longest = 64;  // camera pixels between two edges: a line is no longer the surface beyond
+// Camera pixels between two edges; over more, a line does not describe the surface.
+constexpr int k_longest = 64;
 
-// A place on a line of camera pixels where the light of a label's edge falls.
+// A position on a line of camera pixels where a label's edge appears.
 struct Crossing {
   int edge = -1;       // between labels edge - 1 and edge; -1: none
   float at = 0;        // camera pixels along the line
-  float variance = 0;  // of it, camera pixels^2
+  float variance = 0;  // variance of `at`, camera pixels^2
 };
 
 // The edge between two neighbouring pixels' labels; -1 when they are the same or do not touch.
@@ -31,12 +32,13 @@ bool nested(int low_a, int end_a, int low_b, int end_b) {
   return (low_a <= low_b && end_b <= end_a) || (low_b <= low_a && end_a <= end_b);
 }
 
-// Estimates on one axis, so far: weighted sum and weight of each pixel.
+// Estimates on one axis so far: weighted sum and weight of each pixel.
 struct Sums {
   cv::Mat value, weight;
 };
 
-// Fills the pixels behind `first` up to `second` of a line; `step`: elements from one pixel to the next.
+// Interpolates the pixels after `first` up to `second` of a line; `step`: elements from one pixel to the
+// next.
 void fill_between(
     const Crossing& first, const Crossing& second, float floor, float* value, float* weight, size_t step) {
   const int from = static_cast<int>(std::floor(first.at)) + 1, to = static_cast<int>(std::floor(second.at));
@@ -53,13 +55,13 @@ void fill_between(
   }
 }
 
-// The labels of neighbouring lines or pixels, and where to add what lies between their edges.
+// The labels of neighbouring lines or pixels, and the sums that interpolated values are added to.
 struct Place {
   const short *low_a, *end_a, *low_b, *end_b;
 };
 
-// Where the difference of the bit that changes at `edge` crosses zero between pixels a and b, `at` along the
-// line.
+// Finds where the difference of the bit that changes at `edge` crosses zero between pixels a and b; `at` is
+// the position along the line.
 Crossing crossing(const AxisReading& reading, int edge, cv::Point a, cv::Point b, int at, float variance) {
   const cv::Mat& difference = reading.at_edge(edge);
   const float first = difference.ptr<short>(a.y)[a.x], second = difference.ptr<short>(b.y)[b.x];
@@ -69,7 +71,7 @@ Crossing crossing(const AxisReading& reading, int edge, cv::Point a, cv::Point b
           variance * ((1 - share) * (1 - share) + share * share) / (step * step)};
 }
 
-// Goes from pixel a to pixel b of a line: `last` is the edge passed before.
+// Moves from pixel a to pixel b of a line; `last` is the previous edge.
 void pass(const AxisReading& reading,
           const DifferenceNoise& noise,
           const Place& labels,
@@ -84,7 +86,7 @@ void pass(const AxisReading& reading,
   const int low_a = labels.low_a[a.x], end_a = labels.end_a[a.x];
   const int low_b = labels.low_b[b.x], end_b = labels.end_b[b.x];
   if (low_a == low_b && end_a == end_b && low_a != end_a) return;
-  if (nested(low_a, end_a, low_b, end_b)) return;  // the same label goes on, perhaps a coarser one
+  if (nested(low_a, end_a, low_b, end_b)) return;  // the same label, perhaps a coarser one
   const int edge = edge_between(low_a, end_a, low_b, end_b);
   const Crossing next = edge > 0 ? crossing(reading, edge, a, b, at, noise.at(a.x, a.y)) : Crossing{};
   if (last->edge >= 0 && next.edge >= 0 && next.edge != last->edge && next.at - last->at < k_longest)
@@ -126,7 +128,7 @@ void along_columns(const AxisReading& reading,
 }  // namespace
 
 const cv::Mat& AxisReading::at_edge(int edge) const {
-  const int bit = std::countr_zero(static_cast<unsigned>(edge));  // the one that Gray code changes there
+  const int bit = std::countr_zero(static_cast<unsigned>(edge));  // the bit that Gray code changes there
   return differences[static_cast<size_t>(bits() - 1 - bit)];
 }
 
@@ -149,7 +151,7 @@ void refine_between_edges(const AxisReading& reading,
     const float *value = sums.value.ptr<float>(y), *weight = sums.weight.ptr<float>(y);
     float *px = labels->px.ptr<float>(y), *variance = labels->variance.ptr<float>(y);
     for (int x = 0; x < sums.value.cols; ++x) {
-      // The two directions share their noise and their floor: the better of them at best, for the variance.
+      // The two directions share noise and floor, so the variance is that of the better one.
       if (weight[x] * variance[x] <= 1 || std::isnan(px[x])) continue;
       px[x] = value[x] / weight[x];
       variance[x] = std::max(1 / weight[x], floor);

@@ -12,8 +12,8 @@ namespace {
 
 using Eigen::Vector2d;
 
-// A left-out board errs by what the rig errs and by its own sag and place, about alike: sqrt(1/2) is the
-// rig's.
+// A left-out board errs by the rig's error and by its own bend and pose error, in about equal parts: the
+// rig's share is sqrt(1/2).
 constexpr double k_rig_of_held_out = 0.71;
 constexpr int k_coverage_grid = 10;
 
@@ -67,8 +67,8 @@ std::vector<DeviceQuality> device_qualities(const Observations& observations, co
   return qualities;
 }
 
-// 95 % of the held-out distances on the boards, mm, for each projector, less what the matches' own noise
-// makes of them: that is no error of the rig.
+// For each projector: the distance on the boards, mm, that 95 % of the held-out errors stay within, with the
+// matches' own noise subtracted, because it is no error of the rig.
 std::vector<double> held_out_errors_mm(const Observations& observations, const CrossValidation& score) {
   struct Errors {
     std::vector<double> mm;

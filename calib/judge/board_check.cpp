@@ -13,12 +13,13 @@
 namespace limn::calib {
 namespace {
 
-constexpr int k_least_markers = 6;   // fewer fit many a board
-constexpr double k_near = 0.4;       // squares; lens distortion over the board stays below
-constexpr double k_most_fit = 0.8;   // of the markers of the right dictionary
-constexpr double k_described = 0.5;  // of the corners: a board that is seen so well is the described one
-constexpr int k_widest = 30;         // squares
-constexpr int k_images = 4;        // looked at, a second each
+constexpr int k_least_markers = 6;  // fewer markers fit many boards
+constexpr double k_near = 0.4;      // in squares; lens distortion over the board stays below
+constexpr double k_most_fit = 0.8;  // share of the markers that the right dictionary explains
+// Share of the corners; a board with so many detected is the described one.
+constexpr double k_described = 0.5;
+constexpr int k_widest = 30;   // in squares
+constexpr int k_images = 4;  // number of images to search, a second each
 
 struct Marker {
   int id = 0;
@@ -39,14 +40,14 @@ std::vector<Marker> markers_of(const cv::Mat& grey, int dictionary) {
 cv::Point2f square_of(int id, int columns, bool white_first) {
   int row = 0;
   for (int left = id;; ++row) {
-    const int skipped = (row % 2 == 0) == white_first ? 0 : 1;  // the row's first white square
+    const int skipped = (row % 2 == 0) == white_first ? 0 : 1;  // skip to the row's first white square
     const int in_row = (columns - skipped + 1) / 2;
     if (left < in_row) return {static_cast<float>(skipped + 2 * left), static_cast<float>(row)};
     left -= in_row;
   }
 }
 
-// How many markers a flat board of that layout explains.
+// Number of markers that a flat board of that layout explains.
 int explained(const std::vector<Marker>& markers, int columns, bool white_first, int* rows) {
   std::vector<cv::Point2f> px, squares;
   for (const Marker& marker : markers) {
@@ -92,7 +93,7 @@ std::optional<DetectedBoard> identify_chessboard(const cv::Mat& grey) {
   return DetectedBoard{BoardKind::chessboard, found.cols + 1, found.rows + 1, "", 0, false};
 }
 
-// aruco_5x5_50 is the beginning of aruco_5x5_100: markers of one are markers of the other.
+// aruco_5x5_50 is the beginning of aruco_5x5_100: a marker of the first is a marker of the second.
 std::string table_of(const std::string& dictionary) {
   return dictionary.starts_with("aruco_") ? dictionary.substr(0, dictionary.rfind('_')) : dictionary;
 }
@@ -106,7 +107,7 @@ bool agrees(const Board& board, const DetectedBoard& seen) {
   return as_is || (board.columns == seen.rows && board.rows == seen.columns);  // it may lie on its side
 }
 
-// The best view of the board, as a share of its corners.
+// The largest share of the board's corners in one image.
 double best_view(const Board& board, const Observations& observations) {
   std::map<std::pair<int, int>, int> corners;
   int most = 0;
@@ -122,7 +123,7 @@ std::string DetectedBoard::description() const {
     return fmt::format("a chessboard of {}x{} inner corners", columns - 1, rows - 1);
   return fmt::format("a charuco board {} squares across and at least {} down with markers of {}{}", columns,
                      rows, dictionary,
-                     white_first ? ", whose top-left square is white (Limn's begin with black)" : "");
+                     white_first ? ", whose top-left square is white (Limn prints it black)" : "");
 }
 
 std::optional<DetectedBoard> identify_board(const cv::Mat& grey) {
@@ -132,7 +133,7 @@ std::optional<DetectedBoard> identify_board(const cv::Mat& grey) {
 
 Status check_board(const CaptureSet& captures, const Observations& observations) {
   if (best_view(captures.board, observations) >= k_described) return {};
-  log_info("the board is hardly seen; looking for another");
+  log_info("the described board is hardly visible; searching for another board (takes seconds)");
   int images = 0;
   for (size_t pose = 0; pose < captures.poses.size(); ++pose) {
     for (size_t camera = 0; camera < captures.cameras.size(); ++camera) {
@@ -146,8 +147,7 @@ Status check_board(const CaptureSet& captures, const Observations& observations)
         if (!seen || agrees(captures.board, *seen)) continue;
         return error(
             "board: expected {}, but {} shows {}. Describe the board that was captured (\"board\" in "
-            "capture.json, "
-            "or --board).",
+            "capture.json, or --board).",
             captures.board.text(), file.string(), seen->description());
       }
     }

@@ -14,14 +14,14 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr int k_least_views = 3;    // of a corner
-constexpr double k_weak_m = 0.01;   // offsets beyond are not expected, standard deviation
-constexpr double k_bend_m = 0.001;  // two parabolas follow a bend of less; beyond, sheets bend in other ways
-constexpr double k_bend_share = 0.003;    // of the board's width, likewise
-constexpr double k_offset_m = 0.0003;     // RMS; light lands off by as much where the board was trusted
-constexpr double k_offset_share = 0.001;  // of the board's width: office printers are true to 0.1 %
+constexpr int k_least_views = 3;    // poses of a corner
+constexpr double k_weak_m = 0.01;   // standard deviation of a weak prior on the offsets
+constexpr double k_bend_m = 0.001;  // two parabolas describe bends below this; larger bends have other shapes
+constexpr double k_bend_share = 0.003;    // share of the board's width; the same limit
+constexpr double k_offset_m = 0.0003;     // RMS; where the board was used, light lands off by as much
+constexpr double k_offset_share = 0.001;  // share of the board's width: office printers are accurate to 0.1 %
 
-// d pixel / d point in the board's frame.
+// Derivative of the pixel by the point in the board's frame.
 std::optional<Eigen::Matrix<double, 2, 3>> by_point(const Imager& camera,
                                                     const Pose& world_from_board,
                                                     const Vector3d& p_board) {
@@ -64,7 +64,7 @@ std::vector<CornerSums> corner_sums(const Observations& observations, const Solu
   return sums;
 }
 
-// fy / fx - 1 of all imagers, the smallest by size; 0 when they do not agree in sign and size.
+// fy / fx - 1 that all imagers have in common: the smallest by size; 0 when signs or sizes differ.
 double common_stretch(const Rig& rig) {
   double low = 1e9, high = -1e9;
   for (const auto* imagers : {&rig.cameras, &rig.projectors}) {
@@ -111,8 +111,8 @@ std::vector<Fault> board_faults(const Observations& observations, const Solution
     faults.push_back(
         {"bent_board",
          fmt::format(
-             "the board is {:.1f} mm from flat over its width and height (a bend of {:.1f} and {:.1f} "
-             "mm); its corners stand out of that by {:.2f} mm RMS",
+             "the board differs from flat by {:.1f} mm over its width and height (bends of {:.1f} and {:.1f} "
+             "mm); its corners differ from that shape by {:.2f} mm RMS",
              1e3 * bend, 1e3 * solution.bend_m.x(), 1e3 * solution.bend_m.y(), 1e3 * offsets.out_m),
          "glue the board onto glass, aluminium or honeycomb and hold it without pressing it"});
   const double stretch = common_stretch(solution.rig);
@@ -120,9 +120,9 @@ std::vector<Fault> board_faults(const Observations& observations, const Solution
   if (is_stretched || (faults.empty() && offsets.across_m > allowed))
     faults.push_back(
         {"wrong_square_size",
-         fmt::format("{}corners lie off their places by {:.2f} mm RMS",
+         fmt::format("{}corners differ from their nominal positions by {:.2f} mm RMS",
                      is_stretched
-                         ? fmt::format("every lens wants fy / fx = {:.3f}: squares are not as wide as "
+                         ? fmt::format("all lenses have fy / fx = {:.3f}: squares are not as wide as "
                                        "high, or ",
                                        1 + stretch)
                          : "",

@@ -19,39 +19,44 @@ namespace {
 using Eigen::Matrix2d;
 using Eigen::Vector2d;
 
-constexpr int k_least_samples = 200;       // of a series' health: medians over fewer say nothing
-constexpr double k_least_lit = 0.002;      // of the image; the smallest board that can be found fills 2 %
-constexpr double k_same_px = 1;            // two projectors' labels of one place never agree by chance
-constexpr double k_same_share = 0.3;       // of the places that both light
-constexpr double k_level_range = 0.03;     // sums of coarse pairs; a camera that is not linear shows 0.017
-constexpr int k_wide_stripe_px = 16;       // blur leaves such stripes all of their contrast
-constexpr double k_white_contrast = 0.15;  // off 1; light from elsewhere adds 0.04 to white
-constexpr double k_white_under_narrow = 0.05;  // below 1; sharp captures show 1.36 over stripes of 4 pixels
-constexpr double k_lost_pair = 0.5;            // of samples that are off: one frame is missing, not light
-constexpr double k_between = 0.06;        // more samples off under the finest stripes than under wide ones
-constexpr double k_between_level = 0.01;  // and less light there: interpolation before a gamma above 1
-// A shift of what is seen between the first images and the last, as a share of the width: sound captures
-// show up to 0.00005 (noise); and in camera pixels, for small images.
+constexpr int k_least_samples = 200;  // in a series; medians over fewer samples are too uncertain
+// Share of the image; the smallest board that can be found fills 2 %.
+constexpr double k_least_lit = 0.002;
+constexpr double k_same_px = 1;       // two projectors' labels at one camera pixel never agree by chance
+constexpr double k_same_share = 0.3;  // share of the pixels that both projectors illuminate
+// Range of coarse pairs' sums; a camera that is not linear shows 0.017.
+constexpr double k_level_range = 0.03;
+constexpr int k_wide_stripe_px = 16;       // stripes of this width keep all of their contrast under blur
+constexpr double k_white_contrast = 0.15;  // deviation from 1; indirect light adds 0.04 to white
+// Amount below 1; sharp captures show 1.36 over stripes of 4 pixels.
+constexpr double k_white_under_narrow = 0.05;
+// Share of samples that are off; above it an image is missing, light is no cause.
+constexpr double k_lost_pair = 0.5;
+// Difference of the shares that are off under the finest stripes and under wide ones.
+constexpr double k_between = 0.06;
+constexpr double k_between_level = 0.01;  // decrease of the light there: interpolation before a gamma above 1
+// Image shift between the first images of a series and the last, as a share of the width: sound captures show
+// up to 0.00005 (noise). The second limit, in camera pixels, is for small images.
 constexpr double k_shift_share = 0.000125, k_shift_px = 0.1;
-// Of full contrast, left on stripes of 2 pixels: a blur of 1.2 pixels (standard deviation) leaves 0.15, and
-// from there on edges are found from coarser bits alone.
+// Share of full contrast that is left on stripes of 2 pixels: a blur of 1.2 pixels (standard deviation)
+// leaves 0.15; with less, edges are found from coarser bits alone.
 constexpr double k_sharp = 0.15;
-constexpr double k_seen_stripe_px = 1.4;  // camera pixels; narrower stripes blur in the sharpest camera
-constexpr double k_pedestal = 16;         // levels that sensors add to black, at most
-constexpr double k_room_share = 0.6;      // of white's light that is the room's
-constexpr double k_rough_aspect = 0.05;   // of fy / fx from 1, from homographies alone
-constexpr size_t k_least_corners = 8;     // for a homography that noise does not turn
+constexpr double k_seen_stripe_px = 1.4;  // in camera pixels; narrower stripes blur in the sharpest camera
+constexpr double k_pedestal = 16;         // maximum number of levels that sensors add to black
+constexpr double k_room_share = 0.6;      // the room's share of white's light
+constexpr double k_rough_aspect = 0.05;   // deviation of fy / fx from 1, from homographies alone
+constexpr size_t k_least_corners = 8;     // minimum for a homography that noise does not distort
 constexpr double k_saturated_share = 0.2;
-// Of the waves' mean light from one half: a gamma that is 12 % off. Beyond it the phase of 3 steps errs by
-// 0.1 pixel in waves of 16; 6 steps stand more.
+// Deviation of the waves' mean light from one half: as for a gamma that is 12 % off. Beyond it the phase of 3
+// steps errs by 0.1 pixel in waves of 16; 6 steps tolerate more.
 constexpr double k_wave_level = 0.025;
 
-// All that one camera saw of one projector.
+// All series of one camera and one projector.
 struct Seen {
   const Observed& observed;
   int camera = 0, projector = 0;
-  std::vector<const CaptureQuality*> series;  // with enough lit samples
-  std::vector<double> lit;                  // of every series, share of the image
+  std::vector<const CaptureQuality*> series;  // with enough illuminated samples
+  std::vector<double> lit;                  // for every series, share of the image
   std::vector<Matrix2d> maps;               // for each pose: d projector pixel / d camera pixel
 
   const std::string& camera_name() const {
@@ -72,7 +77,7 @@ struct Seen {
   }
 };
 
-// The affine map that fits a pose's matches; nullopt when they are few or on a line.
+// The affine map that fits a pose's matches; nullopt when there are too few or they lie on a line.
 std::optional<Matrix2d> affine(const std::vector<const Match*>& matches) {
   if (matches.size() < 6) return std::nullopt;
   Vector2d from = Vector2d::Zero(), to = Vector2d::Zero();
@@ -132,14 +137,16 @@ void note_dark(const Observed& observed, const std::vector<Seen>& pairs, std::ve
     if (poses == 0 || best >= k_least_lit || 2 * with_labels > poses) continue;
     faults->push_back(
         {"wrong_display",
-         fmt::format("the patterns of {} light {:.2f} % of the picture, though the board is seen in {} poses",
-                     observed.observations.projectors[projector].name, 100 * best, poses),
-         "let its patterns go to its own display, switch it on, open its lens, darken the room",
+         fmt::format(
+             "the patterns of {} illuminate {:.2f} % of the image, though the board is seen in {} poses",
+             observed.observations.projectors[projector].name, 100 * best, poses),
+         "check that it is switched on, its lens cap is off and its patterns are shown on its own display; "
+         "darken the room",
          Severity::reject});
   }
 }
 
-// Places that both projectors light, and how many of them have the same label.
+// Number of pixels that both projectors illuminate, and how many of these have the same label.
 struct Agreement {
   int places = 0, same = 0;
 };
@@ -172,10 +179,11 @@ void note_same_light(const Observations& observations, std::vector<Fault>* fault
       if (found.places < k_least_samples / 10 || found.same < k_same_share * found.places) continue;
       faults->push_back(
           {"wrong_display",
-           fmt::format("the patterns of {} light what those of {} do: {} of {} places have the same pixel",
-                       observations.projectors[static_cast<size_t>(b)].name,
-                       observations.projectors[static_cast<size_t>(a)].name, found.same, found.places),
-           "give each projector its own display; displays must not be clones of each other",
+           fmt::format(
+               "the patterns of {} illuminate what those of {} do: {} of {} pixels have the same label",
+               observations.projectors[static_cast<size_t>(b)].name,
+               observations.projectors[static_cast<size_t>(a)].name, found.same, found.places),
+           "give each projector its own display; the displays must not mirror (clone) each other",
            Severity::reject});
     }
   }
@@ -187,15 +195,15 @@ void note_mirrored(const Seen& seen, std::vector<Fault>* faults) {
   if (2 * static_cast<size_t>(against) <= seen.maps.size()) return;
   faults->push_back(
       {"mirrored_projection",
-       fmt::format("the pixels of {} run against those of {} in {} of {} poses", seen.projector_name(),
-                   seen.camera_name(), against, seen.maps.size()),
+       fmt::format("the pixels of {} are mirrored against those of {} in {} of {} poses",
+                   seen.projector_name(), seen.camera_name(), against, seen.maps.size()),
        "switch off rear projection (mirroring) in the projector's menu or the display's settings; likewise "
        "a camera's mirror mode",
        Severity::reject});
 }
 
-// Where in a series' groups an axis' finest pair stands. Pairs come first: columns, rows, each from the
-// widest stripes to the finest; phase leaves out as many of the finest for both.
+// Index of an axis's finest pair in a series' groups. Pairs come first: columns, rows, each from the widest
+// stripes to the finest; phase leaves out the same number of finest bits for both.
 struct Pairs {
   size_t columns = 0, count = 0;
   int lowest = 0;  // finest bit that has a pair
@@ -215,7 +223,7 @@ Pairs pairs_of(const Seen& seen, const CaptureQuality& quality) {
           lowest};
 }
 
-// How much more the finest stripes' samples are off than those of stripes four times as wide, and how much
+// How many more samples are off under the finest stripes than under stripes four times as wide, and how much
 // darker they are; on the worse axis.
 struct Between {
   double off = 0, darker = 0;
@@ -240,15 +248,16 @@ void note_between(const Seen& seen, std::vector<Fault>* faults) {
   if (off < k_between || darker < k_between_level) return;
   faults->push_back(
       {"keystone_or_scaling",
-       fmt::format("{}: under the finest stripes {:.0f} % more pixels than under wide ones miss the light of "
-                   "white and black together (median {:.1f} % of it): the picture is interpolated on its way "
-                   "to the panel",
-                   seen.both(), 100 * off, 100 * darker),
+       fmt::format(
+           "{}: under the finest stripes, {:.0f} % more pixels than under wide stripes differ from the "
+           "sum of white and black (median {:.1f} % of it): the image is interpolated between the "
+           "computer and the panel",
+           seen.both(), 100 * off, 100 * darker),
        "send the projector its native resolution; switch off keystone, zoom, overscan and sharpening in the "
        "projector and the display's settings"});
 }
 
-// Range of the sums of pairs with wide stripes, which blur does not touch, and of white and black.
+// Range of the sums of pairs with wide stripes, which blur does not affect, and of white and black.
 double level_range(const Seen& seen, const CaptureQuality& quality) {
   const Pairs pairs = pairs_of(seen, quality);
   double low = 1, high = 1;
@@ -265,8 +274,8 @@ double level_range(const Seen& seen, const CaptureQuality& quality) {
   return high - low;
 }
 
-// Contrast of white against black over that of the widest stripes: 1 when nothing answers to how much of the
-// image is lit. Over narrow stripes, which blur, it is more.
+// Contrast of white against black divided by that of the widest stripes: 1 when nothing reacts to how much of
+// the image is bright. Over narrow stripes, which blur, it is larger.
 double white_contrast(const Seen& seen, const CaptureQuality& quality) {
   const Pairs pairs = pairs_of(seen, quality);
   double widest = 1e-9;
@@ -286,10 +295,9 @@ bool note_exposure(const Seen& seen, std::vector<Fault>* faults) {
   if (range < k_level_range && white_fits) return false;
   faults->push_back(
       {"exposure_drift",
-       fmt::format(
-           "{}: pictures and their inverses together change by {:.1f} % within a series; white differs "
-           "from black by {:.2f} of what {} stripes do",
-           seen.both(), 100 * range, white, narrow ? "narrow" : "wide"),
+       fmt::format("{}: the sum of an image and its inverse changes by {:.1f} % within a series; the "
+                   "contrast of white against black is {:.2f} of that of {} stripes",
+                   seen.both(), 100 * range, white, narrow ? "narrow" : "wide"),
        "switch off automatic exposure, gain and white balance; let camera and projector warm up; keep the "
        "room's light steady"});
   return true;
@@ -302,8 +310,8 @@ void note_motion(const Seen& seen, std::vector<Fault>* faults) {
     if (quality->shift_patches < 4 || quality->shift_px < limit) continue;
     faults->push_back(
         {"moved_during_capture",
-         fmt::format("{}, {}: what is seen moved by {:.2f} px (some of it {:.2f} px) between the first "
-                     "pictures and the last; {:.2f} px may be noise",
+         fmt::format("{}, {}: the image moved by {:.2f} px (parts of it by {:.2f} px) between the first "
+                     "images and the last; {:.2f} px may be noise",
                      seen.pose_name(*quality), seen.both(), quality->shift_px, quality->shift_worst_px, limit),
          "put board, camera and projector on firm ground and capture this pose again, or leave it out with "
          "--skip-poses " +
@@ -311,8 +319,8 @@ void note_motion(const Seen& seen, std::vector<Fault>* faults) {
   }
 }
 
-// Contrast that stripes which the camera can tell apart have left, on the worse axis, and their width in
-// projector pixels.
+// Remaining contrast of stripes that the camera can resolve, on the worse axis, and their width in projector
+// pixels.
 struct Sharpness {
   double contrast = 1;
   int stripe_px = 2;
@@ -320,7 +328,7 @@ struct Sharpness {
 
 Sharpness sharpness(const Seen& seen, const CaptureQuality& quality) {
   const Pairs pairs = pairs_of(seen, quality);
-  std::vector<double> scales;  // camera pixels in a projector pixel
+  std::vector<double> scales;  // camera pixels per projector pixel
   for (const Matrix2d& map : seen.maps) scales.push_back(1 / std::sqrt(std::abs(map.determinant())));
   const double scale = scales.empty() ? 1 : median(scales);
   size_t back = 0;
@@ -342,15 +350,16 @@ void note_defocus(const Seen& seen, std::vector<Fault>* faults) {
   if (contrast >= k_sharp) return;
   faults->push_back(
       {"defocus",
-       fmt::format("{}: stripes of {} projector pixels keep {:.0f} % of their contrast, sharp ones over "
-                   "{:.0f} %",
-                   seen.both(), sharpness(seen, *seen.series[0]).stripe_px, 100 * contrast, 100 * k_sharp),
+       fmt::format(
+           "{}: stripes of {} projector pixels keep {:.0f} % of their contrast; in focus they keep over "
+           "{:.0f} %",
+           seen.both(), sharpness(seen, *seen.series[0]).stripe_px, 100 * contrast, 100 * k_sharp),
        "focus the projector at the prototype's distance, then the camera; close the camera's aperture a "
        "little"});
 }
 
-// The power p for which light of mean 1/2, 0.5 + 0.5 cos, has this mean once it is raised to it: the mean is
-// G(p + 1/2) / (sqrt(pi) G(p + 1)), which falls with p.
+// The exponent p for which light 0.5 + 0.5 cos (mean 1/2), raised to p, has this mean: the mean is
+// G(p + 1/2) / (sqrt(pi) G(p + 1)), which decreases with p.
 double power_of_waves(double mean) {
   double low = 0.05, high = 20;
   for (int i = 0; i < 40; ++i) {
@@ -367,13 +376,15 @@ void note_gamma(const Seen& seen, std::vector<Fault>* faults) {
   const double power = power_of_waves(level);
   faults->push_back(
       {"projector_gamma",
-       fmt::format("{}: the waves' mean light is {:.1f} % of white's, sinusoids have 50 %: as if their light "
-                   "were raised to the power {:.2f}",
-                   seen.both(), 100 * level, power),
-       fmt::format("let limn solve measure the projector's response and draw the waves by it (code_options' "
-                   "response), or multiply their gamma by {:.2f}; set the projector to a fixed picture mode "
-                   "and the camera to linear pictures",
-                   power)});
+       fmt::format(
+           "{}: the waves' mean light is {:.1f} % of white's; sinusoids have 50 %. It looks as if their "
+           "light was raised to the power {:.2f}",
+           seen.both(), 100 * level, power),
+       fmt::format(
+           "let limn solve measure the projector's response and draw the waves with it (code_options' "
+           "response), or multiply their gamma by {:.2f}; set the projector to a fixed picture mode "
+           "and the camera to linear images",
+           power)});
 }
 
 bool note_room_light(const Seen& seen, std::vector<Fault>* faults) {
@@ -383,7 +394,7 @@ bool note_room_light(const Seen& seen, std::vector<Fault>* faults) {
   if (share < k_room_share) return false;
   faults->push_back(
       {"ambient_light",
-       fmt::format("{}: {:.0f} levels under black, {:.0f} under white (medians): the room gives {:.0f} % of "
+       fmt::format("{}: {:.0f} levels under black, {:.0f} under white (medians): room light is {:.0f} % of "
                    "the light",
                    seen.both(), seen.median_of([](const CaptureQuality& h) { return h.black_level; }),
                    seen.median_of([](const CaptureQuality& h) { return h.white_level; }), 100 * share),
@@ -397,7 +408,7 @@ bool note_saturation(const Seen& seen, std::vector<Fault>* faults) {
   if (share < k_saturated_share) return false;
   faults->push_back(
       {"saturated",
-       fmt::format("{}: white drives {:.0f} % of the lit pixels to full scale", seen.both(), 100 * share),
+       fmt::format("{}: white saturates {:.0f} % of the illuminated pixels", seen.both(), 100 * share),
        "shorten the exposure or close the aperture until white is just below saturation"});
   return true;
 }
@@ -411,11 +422,12 @@ void note_odd_images(const Seen& seen, std::vector<Fault>* faults) {
          fmt::format("{}, {}: {} {}{}", seen.pose_name(*quality), seen.both(), odd.file.filename().string(),
                      odd.finding,
                      quality->odd.size() > 1 ? fmt::format(" (and {} more)", quality->odd.size() - 1) : ""),
-         "wait longer between showing and grabbing (the display's delay), and capture this pose again"});
+         "increase the delay between showing and grabbing (the display's latency), and capture this pose "
+         "again"});
   }
 }
 
-// fy / fx of a camera from its images of the flat board alone, its axis taken to be in the middle.
+// fy / fx of a camera from its images of the flat board alone, with its axis assumed in the middle.
 std::optional<double> camera_aspect(const Observations& observations, int camera) {
   std::map<int, std::pair<std::vector<cv::Point3f>, std::vector<cv::Point2f>>> by_pose;
   for (const CornerObservation& corner : observations.corners) {
@@ -446,7 +458,7 @@ void note_camera_shapes(const Observations& observations, std::vector<Fault>* fa
     if (!aspect || std::abs(*aspect - 1) < k_rough_aspect) continue;
     faults->push_back(
         {"wrong_camera_resolution",
-         fmt::format("{}: its pixels come out about {:.2f} times as wide as high",
+         fmt::format("{}: its pixels are about {:.2f} times as wide as high",
                      observations.cameras[static_cast<size_t>(camera)].name, *aspect),
          "use a resolution with the sensor's own shape, without stretching, digital zoom or cropping"});
   }
@@ -474,7 +486,7 @@ std::vector<Fault> capture_faults(const Observed& observed) {
     note_defocus(seen, &faults);
     const bool bright = !unsteady && note_room_light(seen, &faults);
     const bool clipped = note_saturation(seen, &faults);
-    // Light that moves, and white that is cut off, make waves look wrong that are not.
+    // Light that changes, and white that is clipped, make correct waves look wrong.
     if (!unsteady && !clipped) note_gamma(seen, &faults);
     // Unsteady light and noise make sums wrong, too.
     if (!unsteady && !bright) note_odd_images(seen, &faults);

@@ -7,18 +7,18 @@
 
 namespace limn::calib {
 
-/// Faults that the images and their labels show without any solution, so that a solve that fails can say
-/// why:
-/// - wrong_display: a projector's patterns light nothing, or what another projector's patterns light;
-/// - mirrored_projection: labels run against the camera's pixels, which no mirror-free optics do;
+/// Faults that the images and their labels show without a solution, so that a solve that fails can say why:
+/// - wrong_display: a projector's patterns illuminate nothing, or what another projector's patterns
+/// illuminate;
+/// - mirrored_projection: labels run against the camera's pixels, which needs a mirror in the light's path;
 /// - keystone_or_scaling: fine stripes and their inverses do not add up to white and black, because
 ///   something between the pattern and the panel interpolates grey values at their edges;
 /// - exposure_drift, projector_gamma, moved_during_capture, defocus, ambient_light, saturated,
-///   repeated_pictures: from the series' health (calib/code/capture_quality.h).
+///   repeated_pictures: from the capture quality of the series (calib/code/capture_quality.h).
 std::vector<Fault> capture_faults(const Observed& observed);
 
-/// Where no solution comes of the captures: these and, roughly from the corners alone,
-/// wrong_camera_resolution.
+/// For captures without a solution: the faults above and wrong_camera_resolution, estimated roughly from the
+/// corners alone.
 std::vector<Fault> unsolved_faults(const Observed& observed);
 
 }  // namespace limn::calib

@@ -9,8 +9,8 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr int k_steps = 8;             // lenses bend the curve little: three are usual
-constexpr double k_settled_px = 1e-4;  // of a step, along the curve
+constexpr int k_steps = 8;             // lenses bend the curve little: three steps are usual
+constexpr double k_settled_px = 1e-4;  // length of a step along the curve
 
 // Length along `ray` of its point nearest to `other`.
 double nearest_length(const Ray& ray, const Ray& other) {
@@ -21,7 +21,7 @@ double nearest_length(const Ray& ray, const Ray& other) {
 
 struct Image {
   Vector2d px;
-  Vector2d per_metre;  // of the ray's length
+  Vector2d per_metre;  // derivative by the ray's length
 };
 
 std::optional<Image> seen_by(const Imager& projector, const Ray& ray, double length) {
@@ -33,7 +33,7 @@ std::optional<Image> seen_by(const Imager& projector, const Ray& ray, double len
   return seen;
 }
 
-// Until all are taken, rms_px holds the sum of squares.
+// Adds a distance; until all are added, rms_px holds the sum of squares.
 void add(const std::optional<double>& distance, EpipolarScore* score) {
   ++score->pixels;
   if (distance && std::abs(*distance) <= k_epipolar_outlier_px) {
@@ -57,7 +57,7 @@ std::optional<double> epipolar_distance(const Imager& camera,
     const auto seen = seen_by(projector, *ray, length);
     if (!seen) return std::nullopt;
     const double speed = seen->per_metre.norm();
-    if (!(speed > 0)) return (px_projector - seen->px).norm();  // along the baseline: the line is a point
+    if (!(speed > 0)) return (px_projector - seen->px).norm();  // along the baseline the line is a point
     const Vector2d along = seen->per_metre / speed, miss = px_projector - seen->px;
     const double step = along.dot(miss);
     if (std::abs(step) < k_settled_px) return along.x() * miss.y() - along.y() * miss.x();

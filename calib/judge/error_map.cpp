@@ -11,9 +11,9 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr int k_side = 5;  // points along each side of the thing
+constexpr int k_side = 5;  // points along each side of the target
 
-// Depths along camera 0's axis that the boards span, with a margin.
+// Range of depths along camera 0's axis that the boards cover, with a margin.
 std::pair<double, double> depth_range(const Observations& observations,
                                       const Solution& solution,
                                       double beyond) {
@@ -34,7 +34,7 @@ std::pair<double, double> depth_range(const Observations& observations,
   return {std::max(near - beyond, near / 2), far + beyond};
 }
 
-// A board-sized thing around a point, facing the camera.
+// A board-sized target around a point, facing the camera.
 RigidTarget facing(const Imager& camera, const Board& board, const Vector3d& p_camera) {
   const Pose world_from_camera = camera.imager_from_world.inverse();
   RigidTarget thing;

@@ -18,24 +18,27 @@
 namespace limn::calib {
 namespace {
 
-constexpr double k_little_tilt_deg = 10;  // boards closer than this to one plane do not fix the focal length
-constexpr double k_low_share = 0.5;       // of lit pixels decoded
+// Boards closer than this to one plane do not determine the focal length.
+constexpr double k_little_tilt_deg = 10;
+constexpr double k_low_share = 0.5;  // share of illuminated pixels decoded
 constexpr double k_low_coverage = 0.25;
-constexpr double k_odd_pose = 2.5;  // held-out RMS of a pose over the median of the others
+constexpr double k_odd_pose = 2.5;  // held-out RMS of a pose divided by the median of the others
 constexpr int k_few_poses = 5;
-// Less of the boards lit, with less of the panel: light lands mostly where nothing was measured.
+// A smaller share of the boards illuminated, by a smaller share of the panel: most light lands where nothing
+// was measured.
 constexpr double k_overlap = 0.5, k_panel_used = 0.35;
-constexpr double k_aspect = 0.01;         // of fy / fx from 1: lenses and panels are square to 0.002
-constexpr double k_camera_centre = 0.12;  // of the width; cheap cameras are centred to 0.05
-constexpr double k_turned_deg = 135;      // an image stands rather on its head than on its side
-constexpr double k_shifted = 0.15;        // image heights; less is a lens without shift
-// Against an earlier calibration. Swapped projectors stand far apart; a scale shows once directions and
-// lenses are as they were.
-constexpr double k_same_place = 0.05;      // of the distance
+// Deviation of fy / fx from 1: lenses and panels are square to 0.002.
+constexpr double k_aspect = 0.01;
+constexpr double k_camera_centre = 0.12;  // share of the width; cheap cameras are centred to 0.05
+constexpr double k_turned_deg = 135;      // from here on an image is upside down rather than on its side
+constexpr double k_shifted = 0.15;        // in image heights; less is a lens without shift
+// Limits against an earlier calibration. Swapped projectors are far apart; a change of scale shows only if
+// directions and lenses stayed the same.
+constexpr double k_same_place = 0.05;      // share of the distance
 constexpr double k_same_axes = 0.1;        // rad
-constexpr double k_same_direction = 0.01;  // rad, and of the focal lengths: between two calibrations
+constexpr double k_same_direction = 0.01;  // rad, and share of the focal lengths: between two calibrations
 constexpr double k_scale = 0.005;
-constexpr double k_zoom = 0.03;  // of the field of view; refocusing breathes by 0.02
+constexpr double k_zoom = 0.03;  // share of the field of view; refocusing changes it by 0.02
 
 void note_board(const Observations& observations, const Solution& solution, std::vector<Fault>* faults) {
   for (int pose = 0; pose < static_cast<int>(observations.poses.size()); ++pose) {
@@ -45,12 +48,12 @@ void note_board(const Observations& observations, const Solution& solution, std:
       faults->push_back(
           {"board_not_visible",
            fmt::format("no camera sees the board in {}", observations.poses[static_cast<size_t>(pose)]),
-           "a scene capture is fine; otherwise light the board and keep it in the picture", Severity::note});
+           "a scene capture is fine; otherwise light the board and keep it in view", Severity::note});
     if (seen && !solution.world_from_board[static_cast<size_t>(pose)])
       faults->push_back({"board_not_placed",
-                         fmt::format("too few corners, or all on a line, in {}; it was left out",
+                         fmt::format("too few corners, or all on a line, in {}; the pose is not used",
                                      observations.poses[static_cast<size_t>(pose)]),
-                         "keep more of the board in the picture and lit", Severity::note});
+                         "keep more of the board in view and lit", Severity::note});
   }
 }
 
@@ -68,7 +71,8 @@ void note_geometry(const Observations& observations, const Solution& solution, s
     }
   }
   if (poses < k_few_poses)
-    faults->push_back({"few_poses", fmt::format("{} board poses of {}", poses, observations.poses.size()),
+    faults->push_back({"few_poses",
+                       fmt::format("{} of {} poses show the board", poses, observations.poses.size()),
                        "capture at least 8, tilted to different sides, at the working distance"});
   if (largest < k_little_tilt_deg)
     faults->push_back({"little_tilt",
@@ -85,7 +89,7 @@ void note_images(const Observed& observed,
     if (part < k_low_share)
       faults->push_back(
           {"low_decode",
-           fmt::format("{} of {} in {}: {:.0f} % of {} lit pixels decoded",
+           fmt::format("{} of {} in {}: {:.0f} % of {} illuminated pixels decoded",
                        observations.cameras[static_cast<size_t>(share.camera)].name,
                        observations.projectors[static_cast<size_t>(share.projector)].name,
                        observations.poses[static_cast<size_t>(share.pose)], 100 * part, share.lit),
@@ -95,12 +99,13 @@ void note_images(const Observed& observed,
     if (device.coverage < k_low_coverage)
       faults->push_back(
           {"low_coverage",
-           fmt::format("{}: observations in {:.0f} % of the picture", device.name, 100 * device.coverage),
-           "bring the board to the corners of the picture, too", Severity::note});
+           fmt::format("{}: observations in {:.0f} % of the image", device.name, 100 * device.coverage),
+           "add poses with the board in the corners of the image", Severity::note});
   }
 }
 
-// How much of the board a projector lights: its matches over those of as many whole boards as cameras see.
+// The share of the board that a projector illuminates: its matches divided by those of as many whole boards
+// as the cameras see.
 double lit_share(const Observations& observations, int projector) {
   std::set<std::pair<int, int>> seen;
   for (const CornerObservation& corner : observations.corners) seen.emplace(corner.camera, corner.pose);
@@ -121,8 +126,9 @@ void note_overlap(const Observations& observations,
     if (lit > k_overlap || devices[i].coverage > k_panel_used) continue;
     faults->push_back(
         {"little_overlap",
-         fmt::format("{} lights {:.0f} % of what cameras see of the boards, with {:.0f} % of its picture",
-                     devices[i].name, 100 * lit, 100 * devices[i].coverage),
+         fmt::format(
+             "{} illuminates {:.0f} % of the boards' area that cameras see, with {:.0f} % of its pixels",
+             devices[i].name, 100 * lit, 100 * devices[i].coverage),
          "turn projector and camera towards the same place, or hold the board where both reach it"});
   }
 }
@@ -136,8 +142,8 @@ void note_odd_poses(const CrossValidation& score, std::vector<Fault>* faults) {
     if (others.size() < 3 || pose.rms_px < k_odd_pose * median(others) || pose.rms_px < k_good_px) continue;
     faults->push_back(
         {"odd_pose",
-         fmt::format("{}: held-out {:.2f} px, the others' median {:.2f} px", pose.pose, pose.rms_px,
-                     median(others)),
+         fmt::format("{}: held-out error {:.2f} px, median of the other poses {:.2f} px", pose.pose,
+                     pose.rms_px, median(others)),
          "the board or a device may have moved while it was captured; try --skip-poses " + pose.pose});
   }
 }
@@ -148,7 +154,7 @@ void note_lenses(const Solution& solution, std::vector<Fault>* faults) {
   for (const Imager& projector : solution.rig.projectors) {
     if (std::abs(aspect(projector)) < k_aspect) continue;
     faults->push_back({"keystone_or_scaling",
-                       fmt::format("{}: its pixels come out {:.3f} times as wide as high", projector.name,
+                       fmt::format("{}: its pixels are {:.3f} times as wide as high", projector.name,
                                    1 + aspect(projector)),
                        "send the projector its native resolution; switch off keystone, zoom and aspect "
                        "corrections in the projector and the display's settings"});
@@ -160,7 +166,7 @@ void note_lenses(const Solution& solution, std::vector<Fault>* faults) {
     if (std::abs(aspect(camera)) < k_aspect && off < k_camera_centre) continue;
     faults->push_back(
         {"wrong_camera_resolution",
-         fmt::format("{}: its pixels come out {:.3f} times as wide as high, its optical axis {:.0f} % of the "
+         fmt::format("{}: its pixels are {:.3f} times as wide as high, its optical axis is {:.0f} % of the "
                      "width from the middle",
                      camera.name, 1 + aspect(camera), 100 * off),
          "use a resolution with the sensor's own shape, without stretching, digital zoom or cropping"});
@@ -173,25 +179,25 @@ void note_turned(const Solution& solution, std::vector<Fault>* faults) {
   for (const Imager& projector : solution.rig.projectors) {
     const Eigen::Vector3d d = projector.imager_from_world.rotation * d_down;
     const double turned = std::abs(std::atan2(d.x(), d.y())) * 180 / std::numbers::pi;
-    // Lenses shift the image up, away from table or ceiling: for one that hangs, that is down in its own.
+    // Lenses shift the image up, away from the table; if the projector hangs, that is down in its own image.
     const double shift = (projector.lens.cy() - (projector.height - 1) / 2.0) / projector.height;
     if (turned < k_turned_deg || shift > k_shifted) continue;
     faults->push_back(
         {"rotated_projection",
-         fmt::format("{}: its picture stands turned by {:.0f} degrees against {}; its lens shift ({:.2f} "
-                     "picture heights) is not that of a projector that hangs",
+         fmt::format("{}: its image is turned by {:.0f} degrees against {}; its lens shift ({:.2f} image "
+                     "heights) is not that of a ceiling-mounted projector",
                      projector.name, turned, camera.name, shift),
          "switch off ceiling mounting (flip, rotation) in the projector's menu or the display's settings"});
   }
 }
 
-// What a fault implies is not named again.
+// Removes faults that follow from others.
 void erase_implied(std::vector<Fault>* faults) {
   const auto has = [&](const char* name) {
     return std::any_of(faults->begin(), faults->end(), [&](const Fault& f) { return f.name == name; });
   };
-  // Where the board is stretched, or a projector's pixels are bent to fit, the other lenses follow; a camera
-  // whose pixels are not square bends whatever it looks at.
+  // Where the board is stretched, or a projector's pixels are distorted to fit, the other lenses follow; a
+  // camera whose pixels are not square makes the board look bent.
   const bool board = has("wrong_square_size"), panel = has("keystone_or_scaling");
   const bool image = !board && !panel && has("wrong_camera_resolution");
   std::erase_if(*faults, [&](const Fault& fault) {
@@ -200,12 +206,12 @@ void erase_implied(std::vector<Fault>* faults) {
   });
 }
 
-// Of a device against camera 0: its place and its axes.
+// The pose of a device relative to camera 0: its position and its axes.
 struct Stand {
   std::string name;
   Eigen::Vector3d p_camera0;
   Eigen::Quaterniond rotation;
-  double focal = 0;  // of the image's width
+  double focal = 0;  // as a share of the image's width
 };
 
 std::vector<Stand> stands(const Rig& rig, const std::vector<Imager>& imagers) {
@@ -218,7 +224,7 @@ std::vector<Stand> stands(const Rig& rig, const std::vector<Imager>& imagers) {
   return all;
 }
 
-// Whether a stands where b stood.
+// Whether device a stands where device b stood.
 bool same_stand(const Stand& a, const Stand& b) {
   return (a.p_camera0 - b.p_camera0).norm() < k_same_place * b.p_camera0.norm() &&
          a.rotation.angularDistance(b.rotation) < k_same_axes;
@@ -232,13 +238,14 @@ void note_swapped(const std::vector<Stand>& before,
     const auto there = std::find_if(before.begin(), before.end(),
                                     [&](const Stand& stand) { return same_stand(projector, stand); });
     if (there != before.end() && there->name != projector.name)
-      swaps.push_back(fmt::format("{} stands where {} stood", projector.name, there->name));
+      swaps.push_back(fmt::format("{} is where {} was", projector.name, there->name));
   }
   if (swaps.empty()) return;
-  faults->push_back({"projectors_swapped", fmt::format("{}", fmt::join(swaps, ", ")),
-                     "give each projector its own display again (cables, display order); if they have really "
-                     "changed places, solve once more",
-                     Severity::reject});
+  faults->push_back(
+      {"projectors_swapped", fmt::format("{}", fmt::join(swaps, ", ")),
+       "connect each projector to its own display again (cables, display order); if the projectors "
+       "have really changed places, run limn solve once more",
+       Severity::reject});
 }
 
 void note_other_images(const Rig& earlier, const Rig& now, std::vector<Fault>* faults) {
@@ -249,10 +256,11 @@ void note_other_images(const Rig& earlier, const Rig& now, std::vector<Fault>* f
     if (std::abs(zoom - 1) < k_zoom) continue;
     faults->push_back(
         {"wrong_camera_resolution",
-         fmt::format("{}: its picture ({}x{}) shows {:.3f} times the earlier calibration's field ({}x{})",
-                     camera.name, camera.width, camera.height, 1 / zoom, before->width, before->height),
+         fmt::format(
+             "{}: its image ({}x{}) has {:.3f} times the field of view of the earlier calibration ({}x{})",
+             camera.name, camera.width, camera.height, 1 / zoom, before->width, before->height),
          "use the same camera mode as before, without digital zoom or cropping; if zoom or lens were changed "
-         "on purpose, solve once more"});
+         "on purpose, run limn solve once more"});
   }
 }
 
@@ -306,7 +314,7 @@ std::vector<Fault> faults_against(const Rig& earlier, const Rig& now) {
                                  "directions and lenses are the same",
                                  scale),
                      "measure the printed squares and give --board or the plan their size; if the earlier "
-                     "board was the wrong one, solve once more",
+                     "board size was the wrong one, run limn solve once more",
                      Severity::reject});
   return found;
 }

@@ -12,11 +12,11 @@ namespace limn::calib {
 struct DeviceQuality;
 struct CrossValidation;
 
-/// What a fault does to the verdict.
+/// Effect of a fault on the verdict.
 enum class Severity {
-  note,   ///< nothing: what remains is sound
-  doubt,  ///< never good: the numbers may hide what it does
-  reject  ///< never usable: the rig is not what its names say
+  note,   ///< no effect: what remains is sound
+  doubt,  ///< at most usable: the numbers may hide the fault's effect
+  reject  ///< always reject: the rig is not what its names say
 };
 
 /// Something wrong with a capture that a person can put right.
@@ -28,24 +28,25 @@ struct Fault {
 };
 
 /// The faults that captures and their solution show: those of capture_faults (calib/judge/capture_faults.h),
-/// of poses, coverage and single poses, and of what the solved lenses and the board cannot be:
+/// faults of poses and coverage, and implausible values of the solved lenses and the board:
 /// - keystone_or_scaling: a projector's pixels are not square;
-/// - wrong_camera_resolution: a camera's are not, or its image was cut;
+/// - wrong_camera_resolution: a camera's pixels are not square, or its image was cropped;
 /// - little_overlap: a projector reaches little of what cameras see;
-/// - rotated_projection: the image stands on its head and no hanging projector explains it;
+/// - rotated_projection: the image is upside down and no ceiling-mounted projector explains it;
 /// - bent_board, wrong_square_size: calib/judge/board_faults.h.
-/// `devices` and `held_out` may be empty: what they tell is left out.
+/// `devices` and `held_out` may be empty; the faults that need them are then not checked.
 std::vector<Fault> faults(const Observed& observed,
                           const Solution& solution,
                           const std::vector<DeviceQuality>& devices,
                           const CrossValidation& held_out);
 
-/// What a solution says against an earlier one of the same devices: projectors_swapped (each stands where
-/// another one stood), wrong_square_size (every distance has grown or shrunk by the same factor),
-/// wrong_camera_resolution (a camera sees another field). Nothing where devices have come, gone or moved.
+/// Faults from comparing a solution with an earlier one of the same devices: projectors_swapped (each stands
+/// where another one stood), wrong_square_size (every distance has grown or shrunk by the same factor),
+/// wrong_camera_resolution (a camera has another field of view). Empty where devices were added, removed or
+/// moved.
 std::vector<Fault> faults_against(const Rig& earlier, const Rig& now);
 
-/// The heaviest severity among them; note when there are none.
+/// The highest severity among them; note when there are none.
 Severity heaviest(const std::vector<Fault>& faults);
 
 /// One line for each: "NAME: EVIDENCE; ADVICE."

@@ -17,12 +17,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int k_lit = 20;       // levels of white above black: sums of darker pixels say little in 8 bits
-constexpr double k_off = 0.35;  // of a sum, in units of white minus black: noise and gamma stay below
-constexpr double k_many = 0.1;  // of the lit pixels; blurred edges are fewer
-constexpr int k_step = 3;       // every n-th pixel both ways
+// Levels of white above black; sums of darker pixels are too uncertain in 8 bits.
+constexpr int k_lit = 20;
+constexpr double k_off = 0.35;  // error of a sum, in units of white minus black: noise and gamma stay below
+constexpr double k_many = 0.1;  // share of the illuminated pixels; blurred edges are fewer
+constexpr int k_step = 3;       // every n-th pixel both ways is checked
 
-// Where a series or one of its images stands.
+// Identifies a series or one of its images.
 struct Place {
   size_t pose = 0, projector = 0, camera = 0;
 };
@@ -48,7 +49,7 @@ struct Header {
   int width = 0, height = 0;
 };
 
-// A PNG's size stands in bytes 16 to 23, its last chunk is IEND.
+// A PNG's size is in bytes 16 to 23, its last chunk is IEND.
 Header header_of(const fs::path& path) {
   Header header;
   std::error_code problem;
@@ -78,7 +79,7 @@ Header header_of(const fs::path& path) {
 Status check_header(const CaptureSet& captures, const Place& at, const fs::path& path, const Header& header) {
   const CapturedDevice& camera = captures.cameras[at.camera];
   const std::string& pose = captures.poses[at.pose].name;
-  if (!header.is_png) return {};  // JPEG or damaged: told where it is read
+  if (!header.is_png) return {};  // JPEG or damaged: reported where it is read
   if (header.width != camera.width || header.height != camera.height) {
     const auto& files = series_of(captures, at);
     const bool all = std::all_of(files.begin(), files.end(), [&](const fs::path& file) {
@@ -89,22 +90,23 @@ Status check_header(const CaptureSet& captures, const Place& at, const fs::path&
         "{}: expected {}x{} pixels, the size of {}, found {}x{}. {} Capture the pose again, or leave it "
         "out with --skip-poses {}.",
         path.string(), camera.width, camera.height, camera.name, header.width, header.height,
-        all ? "All pictures beside it are like that: they come from another rig, or from another mode of "
-              "the camera."
-            : "Others beside it are not.",
+        all ? "All other images of this series are like that: they come from another rig, or from another "
+              "mode "
+              "of the camera."
+            : "Not all images of this series are like that.",
         pose);
   }
-  // Bytes behind the end do no harm: only now is the whole file looked at.
+  // Bytes after the end do no harm: so the whole file is read only now.
   if (header.is_whole) return {};
   const auto content = read_file(path);
   if (content && content->rfind("IEND") != std::string::npos) return {};
   return error(
-      "{}: expected a whole PNG picture, found a truncated one ({} bytes). Copy or capture it again, or "
+      "{}: expected a whole PNG image, found a truncated one ({} bytes). Copy or capture it again, or "
       "leave the pose out with --skip-poses {}.",
       path.string(), header.bytes, pose);
 }
 
-// One number for each image: equal numbers, equal bytes. Files of a length of their own are not read.
+// Gives each image a number: equal numbers, equal bytes. A file whose length no other file has is not read.
 class Contents {
  public:
   void add_file(const fs::path& path, std::uintmax_t bytes) { by_length_[bytes].push_back(path); }
@@ -148,11 +150,11 @@ Status check_copied_series(const CaptureSet& captures, const Contents& contents)
   std::map<std::vector<int>, Place> known;
   for (const Place& at : all_series(captures)) {
     const std::vector<int> ids = contents.ids(series_of(captures, at));
-    if (all_alike(ids)) continue;  // nothing of the projector is seen, without noise
+    if (all_alike(ids)) continue;  // no light of the projector is visible, and there is no noise
     const auto [first, is_new] = known.try_emplace(ids, at);
     if (is_new) continue;
     return error(
-        "{}: holds the same pictures as {}, byte for byte; one is a copy of the other. Capture {} again, or "
+        "{}: contains the same images as {}, byte for byte; one is a copy of the other. Capture {} again, or "
         "leave it out with --skip-poses {}.",
         folder_of(captures, at), folder_of(captures, first->second), captures.poses[at.pose].name,
         captures.poses[at.pose].name);
@@ -178,7 +180,7 @@ Result<bool> adds_up(const CaptureSet& captures, const Place& at, int index) {
   const auto group = std::find_if(groups.begin(), groups.end(), [&](const PatternGroup& g) {
     return index >= g.first && index < g.first + g.count;
   });
-  if (group == groups.end()) return true;  // without an inverse nothing tells
+  if (group == groups.end()) return true;  // without an inverse this cannot be checked
   std::vector<cv::Mat> members;
   for (int i = group->first; i < group->first + group->count; ++i) {
     LIMN_TRY(const cv::Mat member, image(i));
@@ -205,7 +207,7 @@ struct CheckedImage {
   int index = 0;
 };
 
-// The same bytes in two places: in one series, or at the same pattern of two.
+// Finds the same bytes in two places: within one series, or at the same pattern of two series.
 Status check_copied_images(const CaptureSet& captures, const Contents& contents) {
   std::map<int, std::vector<CheckedImage>> by_content;
   for (const Place& at : all_series(captures)) {
@@ -222,7 +224,7 @@ Status check_copied_images(const CaptureSet& captures, const Contents& contents)
       };
       const std::string& pose = captures.poses[images[i].at.pose].name;
       return error(
-          "{}: holds the same picture as {}, byte for byte, where the patterns differ. Capture {} again, or "
+          "{}: contains the same image as {}, byte for byte, where the patterns differ. Capture {} again, or "
           "leave it out with --skip-poses {}.",
           path(images[i]), path(images[i == 0 ? 1 : 0]), pose, pose);
     }

@@ -12,11 +12,12 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double k_huber = 3;  // in rig_px: chance pixels, reflections
-// Without a board a device is undetermined when its place along the light is: two devices alone tell no
-// scale.
-constexpr double k_loose_rad = 5 * std::numbers::pi / 180, k_loose_m = 0.2;  // that it may well have moved
-constexpr double k_undetermined_m = 0.02;                                    // standard deviation
+constexpr double k_huber = 3;  // in rig_px; against wrong pixels and reflections
+// A weak prior: as far as a device may have moved.
+constexpr double k_loose_rad = 5 * std::numbers::pi / 180, k_loose_m = 0.2;
+// Without a board, a device is undetermined when its position along the light's direction has a larger
+// standard deviation: two devices alone do not give the scale.
+constexpr double k_undetermined_m = 0.02;
 
 // Levenberg-Marquardt on a handful of poses.
 class Fit {
@@ -75,7 +76,7 @@ class Fit {
     int count = 0;    ///< observations with a prediction
   };
 
-  // A residual with its derivatives by the unknowns.
+  // A residual with its derivatives by the parameters.
   struct Row {
     Vector2d residual;
     Eigen::Matrix<double, 2, Eigen::Dynamic> by;
@@ -89,14 +90,14 @@ class Fit {
     ++normal->count;
   }
 
-  // One sight of a board: camera, projector (-1: the camera's corners), pose. Of a scene: camera, device that
-  // sees its points (-2 and below: cameras), pose.
+  // Identifies a sample group. For a board: camera, projector (-1: the camera's corners), pose. For a scene:
+  // camera, device that observes its points (-2 and below: cameras), pose.
   using CoarseSample = std::array<int, 3>;
   CoarseSample coarse_sample_of(const TiePointObservation& tie_observation) const {
     const TiePoint& point = observations_.points[static_cast<size_t>(tie_observation.point)];
     return {point.camera, tie_observation.by_projector ? tie_observation.imager : -2 - tie_observation.imager, point.pose};
   }
-  // How much of one observation of a sight is independent of the others.
+  // The share of one observation of a sample group that is independent of the others.
   double share_of(const CoarseSample& coarse_sample) const {
     return std::min(1.0, static_cast<double>(options_.independent) / counts_.at(coarse_sample));
   }
@@ -108,7 +109,7 @@ class Fit {
   }
   int device_at(size_t device) const { return device == free_.device ? 0 : -1; }
 
-  // What other devices see of a tie point at an inverse depth: rows with their weights.
+  // Observations of a tie point by other devices, at an inverse depth: residual rows with their weights.
   struct PointRow {
     Row row;
     Vector2d by_inverse_depth;
@@ -143,8 +144,8 @@ class Fit {
     return rows;
   }
 
-  // Tie points lie where their tie-point observations put them best, whatever the devices' places (variable projection,
-  // Golub and Pereyra 1973).
+  // Tie points are eliminated: whatever the devices' poses, each lies where its observations fit best
+  // (variable projection, Golub and Pereyra 1973).
   void add_points(RigCheckPlaces* places, NormalEquations* normal) const {
     constexpr int k_rounds = 3;
     each_point(observations_, [&](size_t index, std::span<const TiePointObservation> tie_observations) {
@@ -239,13 +240,13 @@ class Fit {
     return places;
   }
 
-  // The free device's covariance; whether it is determined at all.
+  // Computes the free device's covariance, and whether the pose is determined at all.
   void judge(const NormalEquations& normal, MovedDeviceFit* fitted) const {
     const Eigen::VectorXd scale =
         normal.matrix.diagonal().cwiseMax(std::numeric_limits<double>::min()).cwiseSqrt().cwiseInverse();
     const Eigen::LDLT<Eigen::MatrixXd> scaled(
         Eigen::MatrixXd(scale.asDiagonal() * normal.matrix * scale.asDiagonal()));
-    constexpr double k_undetermined = 1e-10;  // of a unit diagonal
+    constexpr double k_undetermined = 1e-10;  // relative to a unit diagonal
     fitted->determined = scaled.vectorD().minCoeff() > k_undetermined;
     if (!fitted->determined || free_.device == MoveHypothesis::k_nobody) return;
     const Eigen::MatrixXd inverse = scale.asDiagonal() *
@@ -262,7 +263,7 @@ class Fit {
   BoardShape shape_;
   std::vector<int> board_at_;  // first column of each board's pose; -1: fixed
   int bend_at_ = 0, unknowns_ = 0;
-  std::map<CoarseSample, int> counts_;  // observations of each sight
+  std::map<CoarseSample, int> counts_;  // number of observations in each group
 };
 
 }  // namespace

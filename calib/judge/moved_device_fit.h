@@ -12,19 +12,21 @@
 #include "core/imager.h"
 #include "core/pose.h"
 
-/// What recheck() asks again and again: where would everything be, had this device moved?
+/// The fit that check_rig() runs for each hypothesis: where are all devices and boards if this device has
+/// moved?
 namespace limn::calib {
 
 inline ImagerView view_of(const Imager& imager) {
   return {imager.lens.model, imager.lens.values, imager.imager_from_world};
 }
 
-/// Devices in the observations' order; a device is named by its place: cameras first, then projectors.
+/// Devices in the observations' order; a device is identified by its index: cameras first, then projectors.
 struct RigCheckPlaces {
   std::vector<Imager> devices;
   size_t cameras = 0;
   std::vector<std::optional<Pose>> world_from_board;
-  std::vector<double> inverse_depths;  ///< of the tie points, 1/m along z of their cameras; 0: none follows
+  /// Inverse depths of the tie points, 1/m along z of their cameras; 0: not used.
+  std::vector<double> inverse_depths;
   Eigen::Vector2d bend = Eigen::Vector2d::Zero();
 
   const Imager& camera(int i) const { return devices[static_cast<size_t>(i)]; }
@@ -34,7 +36,7 @@ struct RigCheckPlaces {
   }
 };
 
-/// Calls visit(point's number, its tie-point observations) with every tie point that is sighted.
+/// Calls visit(index of the point, its observations) for every tie point that is observed.
 template <typename Visit>
 void each_point(const Observations& observations, const Visit& visit) {
   const std::vector<TiePointObservation>& all = observations.tie_observations;
@@ -44,7 +46,7 @@ void each_point(const Observations& observations, const Visit& visit) {
   }
 }
 
-/// What a hypothesis leaves free: one device or nobody, and the boards that are not known to stand still.
+/// The free parameters of a hypothesis: one device or none, and the boards that may have moved.
 struct MoveHypothesis {
   static constexpr size_t k_nobody = static_cast<size_t>(-1);
   size_t device = k_nobody;
@@ -54,11 +56,11 @@ struct MoveHypothesis {
 struct MovedDeviceFit {
   RigCheckPlaces places;
   double misfit = std::numeric_limits<double>::infinity();  ///< chi squared of the independent samples
-  Matrix6d covariance = Matrix6d::Zero();                   ///< of the free device's pose
+  Matrix6d covariance = Matrix6d::Zero();                   ///< covariance of the free device's pose
   bool determined = false;
 };
 
-/// Fits what the hypothesis leaves free, from `places` on, to all that is seen; lenses are kept.
+/// Fits the free parameters of the hypothesis to all observations, starting from `places`; lenses are kept.
 MovedDeviceFit fit_moved_device(const Observations& observations,
                 const RigCheckOptions& options,
                 const MoveHypothesis& free,

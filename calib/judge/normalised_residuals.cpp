@@ -18,7 +18,7 @@ ImagerView view(const Imager& imager) {
   return {imager.lens.model, imager.lens.values, imager.imager_from_world};
 }
 
-// First index of a camera's values in the solution's covariance; its pose's six follow them.
+// First index of a camera's values in the solution's covariance; the six of its pose follow them.
 int camera_at(const Solution& solution, int camera) {
   int at = 0;
   for (int i = 0; i < camera; ++i)
@@ -34,8 +34,8 @@ double match_variance(const Solution& solution, const Match& match) {
   return std::pow(std::hypot(match.stddev_px, solution.match_noise_px), 2);
 }
 
-// A board pose that is taken from corners alone: its covariance by their noise, and how it follows the
-// devices' unknowns (6 x unknowns).
+// A board pose estimated from corners alone: its covariance by their noise, and its derivatives by the
+// devices' parameters (6 x parameters).
 struct PoseByCorners {
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   MatrixXd by_devices;
@@ -100,7 +100,7 @@ Matrix2d predicted_covariance(const Observations& observations,
          match_variance(solution, match) * Matrix2d::Identity();
 }
 
-// Sums up normalised residuals as they come.
+// Accumulates normalised residuals.
 struct Tally {
   int all = 0, kept = 0, beyond = 0;
   double sum = 0, squared = 0;

@@ -8,24 +8,24 @@
 
 namespace limn::calib {
 
-/// Residuals over their stated deviations, each coordinate for itself. Where the statement is true they are
-/// N(0, 1): mean 0, deviation 1, 0.3 % beyond 3.
+/// Statistics of normalised residuals: each coordinate's residual divided by its stated standard deviation.
+/// Where the statement is true they are N(0, 1): mean 0, deviation 1, 0.3 % beyond 3.
 struct ResidualStatistics {
-  int count = 0;        ///< coordinates
+  int count = 0;        ///< over coordinates that the solve did not mark as outliers
   double mean = 0;      ///< over those that the solve did not call outliers
-  double stddev = 0;    ///< likewise
+  double stddev = 0;    ///< the same
   double beyond_3 = 0;  ///< share, outliers included
 };
 
 struct NormalisedResiduals {
-  ResidualStatistics corners;   ///< by the corner's own deviation and the noise that the solve found
-  ResidualStatistics matches;   ///< likewise
-  ResidualStatistics held_out;  ///< predicted minus measured, by held_out_covariances
+  ResidualStatistics corners;   ///< stated: the corner's own deviation and the noise that the solve found
+  ResidualStatistics matches;   ///< the same
+  ResidualStatistics held_out;  ///< predicted minus measured, stated by held_out_covariances
 };
 
-/// What a held-out prediction of each match is expected to scatter by, projector px^2: the match's own noise,
-/// the pose's (taken from noisy corners), and the devices' covariance, whose effect on the pose is counted
-/// (what camera and pose share cancels). The covariance is that of the solve with all poses, widened by
+/// The expected covariance of each match's held-out prediction, projector px^2: the match's own noise, the
+/// pose's (estimated from noisy corners), and the devices' covariance including its effect on the pose (what
+/// camera and pose share cancels). The devices' covariance is that of the solve with all poses, widened by
 /// n / (n - 1) poses. Not finite where a match has no prediction.
 std::vector<Eigen::Matrix2d> held_out_covariances(const Observations& observations, const Solution& solution);
 

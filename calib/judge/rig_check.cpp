@@ -17,8 +17,8 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double k_degrees = 180 / std::numbers::pi;
-// Of the squares' sums, in independent samples of rig_px^2. A move has six degrees of freedom: chi squared
-// exceeds 30 once in 25000, 15 once in 50.
+// Significance of a sum of squares, in independent samples of rig_px^2. A move has six degrees of freedom:
+// chi squared exceeds 30 once in 25000 cases, 15 once in 50.
 constexpr double k_moved = 30;
 constexpr double k_apart = 15;
 constexpr double k_sound_rig_px = 4;  // RMS misfit that a sound rig may show beyond min_deg
@@ -50,7 +50,7 @@ Result<RigCheckPlaces> places_of(const Rig& rig, const Observations& observation
   return places;
 }
 
-// Whether a tie point lies in the view of three devices: two of them tell its distance, whichever moved.
+// Whether a tie point is observed by three devices: two of them give its depth, whichever has moved.
 bool has_scale(const Observations& observations, const RigCheckPlaces& places) {
   constexpr int k_least_shared = 20;
   int shared = 0;
@@ -60,7 +60,7 @@ bool has_scale(const Observations& observations, const RigCheckPlaces& places) {
   return shared >= k_least_shared;
 }
 
-// The mean of what the tie-point observations say.
+// Sets each tie point to the mean of what its observations give.
 void place_points(const Observations& observations, RigCheckPlaces* places) {
   places->inverse_depths.assign(observations.points.size(), 0.0);
   each_point(observations, [&](size_t index, std::span<const TiePointObservation> tie_observations) {
@@ -79,7 +79,7 @@ void place_points(const Observations& observations, RigCheckPlaces* places) {
   });
 }
 
-// Boards from what cameras see of their corners, where nothing else is known.
+// Estimates board poses from the corners that cameras see, where nothing else is known.
 Status place_boards(const Observations& observations, const RigCheckOptions& options, RigCheckPlaces* places) {
   Rig seen_by;
   seen_by.cameras.assign(places->devices.begin(),
@@ -100,7 +100,7 @@ Status place_boards(const Observations& observations, const RigCheckOptions& opt
   any = any || has_scale(observations, *places);
   if (!any)
     return error(
-        "captures: expected the board ({}) in a camera's picture, or a scene that three of the rig's devices "
+        "captures: expected the board ({}) in a camera's image, or a scene that three of the rig's devices "
         "share, found neither. Put the board into view.",
         observations.board.text());
   return {};
@@ -146,7 +146,7 @@ class RigChecker {
 
   struct Hypotheses {
     MovedDeviceFit nobody;
-    std::vector<MovedDeviceFit> devices;  ///< each device moved alone
+    std::vector<MovedDeviceFit> devices;  ///< the fit with each device moved alone
   };
 
   Hypotheses hypotheses(bool trust_boards) const {
@@ -165,7 +165,7 @@ class RigChecker {
     return misfit;
   }
 
-  // With the boards that stood still where they stood, unless they are not to be trusted.
+  // Boards that have not been touched are kept fixed, unless they are not to be trusted.
   MovedDeviceFit fitted(size_t device, bool trust_boards) const {
     MoveHypothesis free{device, std::vector<bool>(nominal_.world_from_board.size())};
     for (size_t pose = 0; pose < free.boards.size(); ++pose) {
@@ -182,7 +182,7 @@ class RigChecker {
     return true;
   }
 
-  // Projectors first: where several fit as well, the rig's world goes with its cameras.
+  // Projectors first: where several fit equally well, the rig's world stays with its cameras.
   std::vector<size_t> by_preference() const {
     std::vector<size_t> order;
     for (size_t i = nominal_.cameras; i < nominal_.devices.size(); ++i) order.push_back(i);
@@ -190,14 +190,14 @@ class RigChecker {
     return order;
   }
 
-  // Of a device's misfit that is still sound.
+  // Largest misfit of a device that still counts as sound.
   double limit_px(size_t device) const {
     return std::max(options_.min_deg / k_degrees * nominal_.devices[device].lens.fx(),
                     k_sound_rig_px * options_.rig_px);
   }
 
-  // visit(pixel predicted, pixel measured, point) of all observations of a device. A camera's tie points lie
-  // on its own rays: they are told by what the others see of them.
+  // Calls visit(pixel predicted, pixel measured, point) for all observations of a device. A camera's tie
+  // points lie on its own rays: their residuals are in the imagers that observe them.
   template <typename Visit>
   void each(const RigCheckPlaces& places, size_t device, Visit visit) const {
     const BoardShape shape{observations_.board.width_m(), observations_.board.height_m()};
@@ -230,7 +230,7 @@ class RigChecker {
     const TiePoint& point = observations_.points[index];
     const auto ray = places.camera(point.camera).ray(point.px_camera);
     if (!ray || places.inverse_depths[index] == 0) return std::nullopt;
-    // Depth is along z of the camera; a ray's d is of unit length there.
+    // Depth is along z of the camera; a ray's d has unit length, so it is scaled.
     const double z = (places.camera(point.camera).imager_from_world.rotation * ray->d).z();
     return Eigen::Vector3d(ray->p_origin + ray->d / (z * places.inverse_depths[index]));
   }
@@ -277,7 +277,7 @@ class RigChecker {
     const Eigen::Vector3d way = world_from_now.translation - before.imager_from_world.inverse().translation;
     move.degrees = turn.norm() * k_degrees;
     move.mm = 1e3 * way.norm();
-    // Of the turn, and of the centre -R^T t, whose change is -R^T (v + t x w).
+    // Derivatives of the rotation and of the centre -R^T t, whose change is -R^T (v + t x w).
     Eigen::Matrix<double, 3, 6> centre;
     const Eigen::Vector3d t = now.imager_from_world.translation;
     Eigen::Matrix3d cross;
@@ -352,7 +352,7 @@ Result<RigCheck> check_rig(const Rig& rig, const Observations& observations, con
   place_points(observations, &places);
   LIMN_TRY_STATUS(place_boards(observations, options, &places));
   RigCheck result = RigChecker(observations, options, std::move(places)).run(rig);
-  if (options.should_continue && !options.should_continue()) return error("recheck: it was ended.");
+  if (options.should_continue && !options.should_continue()) return error("recheck: stopped before the end.");
   return result;
 }
 

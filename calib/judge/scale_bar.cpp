@@ -16,10 +16,10 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double k_around = 1.35;      // of the mark's size: with the white margin that every marker has
-constexpr double k_paper = 0.6;        // of the bright pixels' contrast; ink and its edges are darker
-constexpr size_t k_most_pixels = 400;  // of a mark; more only cost time
-constexpr size_t k_least_pixels = 30;  // ten times a plane's unknowns
+constexpr double k_around = 1.35;      // share of the mark's size: includes the white margin of every marker
+constexpr double k_paper = 0.6;        // share of the bright pixels' contrast; ink and its edges are darker
+constexpr size_t k_most_pixels = 400;  // for each mark; more only cost time
+constexpr size_t k_least_pixels = 30;  // ten times the number of a plane's parameters
 constexpr double k_far_sigmas = 3;
 
 // A decoded pixel on a mark's paper.
@@ -72,14 +72,14 @@ std::vector<Spot> paper_spots(const Decoded& decoded, const std::array<Vector2d,
   return spots;
 }
 
-// The mark's centre in the world and its deviation along and across the camera's ray.
+// The mark's centre in the world and its standard deviations along and across the camera's ray.
 struct Centre {
   Vector3d p_world;
   double along_m = 0, across_m = 0;
   Vector3d d_ray;
 };
 
-// How many independent labels there are: neighbours within one projector pixel share their error.
+// Number of independent labels: neighbours within one projector pixel share their error.
 double independent(const std::vector<Spot>& spots, double pixels) {
   Eigen::Matrix2d normal = 1e-9 * Eigen::Matrix2d::Identity(), product = Eigen::Matrix2d::Zero();
   Vector2d mean = Vector2d::Zero(), mean_label = Vector2d::Zero();
@@ -91,11 +91,12 @@ double independent(const std::vector<Spot>& spots, double pixels) {
     normal += (s.px_camera - mean) * (s.px_camera - mean).transpose();
     product += (s.px_camera - mean) * (s.px_projector - mean_label).transpose();
   }
-  const double area = std::abs((normal.inverse() * product).determinant());  // projector pixels of one
+  // Area of one camera pixel in projector pixels.
+  const double area = std::abs((normal.inverse() * product).determinant());
   return std::clamp(area * pixels, 4.0, pixels);
 }
 
-// Inverse depth along the camera's axis is an affine function of direction on a plane.
+// On a plane, the inverse depth along the camera's axis is an affine function of direction.
 std::optional<Centre> centre_of(const Imager& camera,
                                 const Imager& projector,
                                 const DetectedMark& mark,
@@ -126,7 +127,7 @@ std::optional<Centre> centre_of(const Imager& camera,
     double squared = 0;
     for (size_t i = 0; i < rows.size(); ++i) squared += std::pow(rows[i].dot(plane) - inverse_depths[i], 2);
     const double sigma = std::sqrt(squared / static_cast<double>(rows.size() - 3));
-    if (pass < 2) {  // what is far from the plane is no paper
+    if (pass < 2) {  // pixels far from the plane are no paper
       std::vector<Vector3d> kept_rows;
       std::vector<double> kept;
       for (size_t i = 0; i < rows.size(); ++i) {
@@ -146,7 +147,7 @@ std::optional<Centre> centre_of(const Imager& camera,
     const auto count = static_cast<double>(rows.size());
     const double leverage = normal.inverse()(0, 0) * count / independent(spots, count);
     centre.along_m = sigma * std::sqrt(leverage) * depth * depth / middle->z();
-    centre.across_m = mark.stddev_px / 2 * depth / camera.lens.fx();  // the mean of four corners
+    centre.across_m = mark.stddev_px / 2 * depth / camera.lens.fx();  // mean of four corners
     return centre;
   }
 }
@@ -173,8 +174,8 @@ double noise_of(const Centre& a, const Centre& b) {
   return std::sqrt(variance);
 }
 
-// Standard deviation of the length by the devices' covariance: central differences of a standard deviation
-// each.
+// Standard deviation of the length by the devices' covariance: central differences with steps of one standard
+// deviation.
 double calibration_of(const Solution& solution, int camera, int projector, const Pair& pair) {
   if (solution.covariance.size() == 0) return 0;
   int camera_at = 0;
@@ -257,7 +258,7 @@ Result<ScaleBar> parse_scale_bar(const std::string& text) {
   words >> known.from >> known.to >> length;
   double value = 0;
   const auto [rest, problem] = std::from_chars(length.data(), length.data() + length.size(), value);
-  const std::string unit = rest;  // the text ends in a zero
+  const std::string unit = rest;  // the text is zero-terminated
   const double factor = unit == "mm" ? 1e-3 : unit == "cm" ? 1e-2 : unit == "m" ? 1 : 0;
   known.length_m = value * factor;
   if (words.fail() || words >> surplus || problem != std::errc() || !(known.length_m > 0) ||
@@ -304,16 +305,18 @@ std::optional<Fault> scale_fault(const ScaleBarCheck& check, const Board& board)
   const ScaleBar& known = check.known;
   const std::string name = fmt::format("{} to {}", known.from, known.to);
   if (check.views.empty())
-    return Fault{"known_length_not_seen", fmt::format("no pose shows both ends of {} lit", name),
-                 "hold the bar where a camera sees both markers and a projector lights them", Severity::note};
+    return Fault{"known_length_not_seen",
+                 fmt::format("in no pose are both ends of {} seen by a camera and lit by a projector", name),
+                 "place the bar where a camera sees both markers and a projector lights them",
+                 Severity::note};
   const double difference = check.measured_m - known.length_m, share = difference / known.length_m;
   if (std::abs(difference) <= 3 * check.stddev_m || std::abs(share) <= k_scale_tolerance) return std::nullopt;
   return Fault{
       "wrong_scale",
-      fmt::format(
-          "{} is {:.2f} mm long and measures {:.2f} mm with a deviation of {:.2f} mm in {} views ({:+.2f} %)",
-          name, 1e3 * known.length_m, 1e3 * check.measured_m, 1e3 * check.stddev_m, check.views.size(),
-          100 * share),
+      fmt::format("{} is {:.2f} mm long, but {:.2f} mm (standard deviation {:.2f} mm) were measured in {} "
+                  "views ({:+.2f} %)",
+                  name, 1e3 * known.length_m, 1e3 * check.measured_m, 1e3 * check.stddev_m,
+                  check.views.size(), 100 * share),
       fmt::format(
           "measure the board: its squares seem to be {:.3f} mm instead of {:g} mm; or measure the bar again",
           1e3 * board.square_m / (1 + share), 1e3 * board.square_m)};

@@ -13,8 +13,8 @@
 
 namespace limn::calib {
 
-/// A length that somebody has measured: between the centres of two markers on one stiff thing, such as a
-/// printed bar. It is independent of the board, so it tells what a board of a wrong size hides.
+/// A scale bar: a measured distance between the centres of two markers on one stiff object, such as a printed
+/// bar. It is independent of the board, so it detects a board of a wrong size.
 struct ScaleBar {
   std::string from, to;  ///< `family:id`
   double length_m = 0;
@@ -28,31 +28,32 @@ struct DetectedMark {
   int camera = 0;
   int pose = 0;
   std::string name;
-  std::array<Eigen::Vector2d, 4> corners_px;  ///< around
-  double stddev_px = 0.05;                    ///< of one coordinate of a corner
+  std::array<Eigen::Vector2d, 4> corners_px;  ///< in order around the mark
+  double stddev_px = 0.05;                    ///< standard deviation of one coordinate of a corner
 };
 
-/// What one camera and one projector made of it in one pose.
+/// The measurement by one camera and one projector in one pose.
 struct ScaleBarView {
   int camera = 0;
   int projector = 0;
   int pose = 0;
   double measured_m = 0;
-  double noise_m = 0;        ///< standard deviation by what this view decoded
-  double calibration_m = 0;  ///< by the devices' covariance: the views share it
+  double noise_m = 0;        ///< standard deviation by the decoding noise of this view
+  double calibration_m = 0;  ///< standard deviation by the devices' covariance, common to all views
 };
 
 struct ScaleBarCheck {
   ScaleBar known;
-  std::vector<ScaleBarView> views;  ///< empty: nowhere were both marks seen and lit
-  double measured_m = 0;          ///< their mean, weighted by noise
-  double stddev_m = 0;            ///< stated: of the mean, calibration included
+  std::vector<ScaleBarView> views;  ///< empty: in no pose were both marks seen and illuminated
+  double measured_m = 0;          ///< mean of the views, weighted by noise
+  double stddev_m = 0;            ///< stated standard deviation of the mean, calibration included
 };
 
-/// Each length, measured by light: the paper in and around each mark is decoded, its points are where the
-/// camera's and the projector's rays meet, a plane through them meets the camera's ray of the mark's centre.
-/// Poses with or without a board. `widened`: factor on the devices' standard deviations, such as the held-out
-/// normalised residuals' deviation where that is beyond 1.
+/// Measures each scale bar with structured light: the paper in and around each mark is decoded and
+/// triangulated from the camera's and the projector's rays, and a plane through these points is intersected
+/// with the camera's ray of the mark's centre. Poses with or without a board are used. `widened`: factor on
+/// the devices' standard deviations, such as the standard deviation of the held-out normalised residuals
+/// where that is above 1.
 Result<std::vector<ScaleBarCheck>> measure_scale_bars(const CaptureSet& captures,
                                                   const Solution& solution,
                                                   const std::vector<DetectedMark>& marks,
@@ -61,7 +62,6 @@ Result<std::vector<ScaleBarCheck>> measure_scale_bars(const CaptureSet& captures
 
 /// `wrong_scale` beyond 3 stated deviations and k_scale_tolerance; `known_length_not_seen` without a view.
 std::optional<Fault> scale_fault(const ScaleBarCheck& check, const Board& board);
-constexpr double k_scale_tolerance =
-    0.002;  // a printer's own error is half of that; below it nothing is wrong
+constexpr double k_scale_tolerance = 0.002;  // a printer's own error is half of that
 
 }  // namespace limn::calib

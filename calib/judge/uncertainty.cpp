@@ -19,13 +19,16 @@ using Eigen::Vector3d;
 
 constexpr double k_moved_m = 0.15;
 constexpr double k_turned = 40 * std::numbers::pi / 180;
-constexpr int k_panel_grid = 9;               // points along each side of the panel
-constexpr double k_panel_share = 0.7;         // of its width and height: half of its light falls on the thing
-constexpr double k_relief_m = 0.05;           // of the thing, to both sides
-constexpr int k_least_points = 6;             // of a thing that a camera places
-constexpr size_t k_measured_points = 24;      // six markers
-constexpr double k_least_measured_px = 0.03;  // markers' corners tremble by that much in good images
-constexpr double k_least_cosine = 0.34;  // 70 degrees: on surfaces that light grazes nobody looks for a part
+constexpr int k_panel_grid = 9;  // points along each side of the panel
+// Share of its width and height: half of its light falls on the target.
+constexpr double k_panel_share = 0.7;
+constexpr double k_relief_m = 0.05;  // relief of the target, to both sides
+// Minimum number of points for a camera to measure a target's pose.
+constexpr int k_least_points = 6;
+constexpr size_t k_measured_points = 24;      // the corners of six markers
+constexpr double k_least_measured_px = 0.03;  // noise of markers' corners in good images
+// 70 degrees: nobody looks for a part on surfaces lit at a more grazing angle.
+constexpr double k_least_cosine = 0.34;
 constexpr double k_share = 0.95;
 
 Matrix3d cross(const Vector3d& v) {
@@ -34,17 +37,17 @@ Matrix3d cross(const Vector3d& v) {
   return m;
 }
 
-// A world point's pixel in an imager and what moves it.
+// The pixel of a world point in an imager, and its derivatives.
 struct Seen {
   Vector2d px;
-  Eigen::Matrix<double, 2, 3> by_point;   // world axes
-  Eigen::Matrix<double, 2, 6> by_imager;  // the imager's pose, boxplus's delta
+  Eigen::Matrix<double, 2, 3> by_point;   // derivative by the point, world axes
+  Eigen::Matrix<double, 2, 6> by_imager;  // derivative by the imager's pose (boxplus's perturbation)
   Derivatives::Values by_values;
 };
 
 std::optional<Seen> project_with_derivatives(const Imager& imager, const Vector3d& p_world) {
   const Vector3d p = imager.imager_from_world * p_world;
-  if (!imager.lens.project(p)) return std::nullopt;  // it knows where a polynomial has folded back
+  if (!imager.lens.project(p)) return std::nullopt;  // project() detects where a polynomial has folded back
   Seen seen;
   Eigen::Matrix<double, 2, 3, Eigen::RowMajor> by_p;
   seen.by_values.resize(2, imager.lens.model.value_count());
@@ -56,13 +59,13 @@ std::optional<Seen> project_with_derivatives(const Imager& imager, const Vector3
   return seen;
 }
 
-// How the pose of a thing (turned about `centre`, then moved) as a camera measures it follows the camera's
-// values and pose and the measured pixels' noise.
+// Derivatives of a target's pose, as a camera measures it (rotation about `centre`, then translation), by the
+// camera's values and pose and by the measured pixels' noise.
 struct Placed {
   Vector3d centre;
   MatrixXd by_values;         // 6 x value count
-  Matrix6d by_camera;         // the camera's pose
-  Matrix6d noise_covariance;  // for 1 px^2
+  Matrix6d by_camera;         // derivative by the camera's pose
+  Matrix6d noise_covariance;  // covariance for a noise of 1 px^2
 };
 
 std::optional<Placed> placed(const Imager& camera, const RigidTarget& thing) {
@@ -105,21 +108,21 @@ std::optional<Eigen::Matrix2d> light_covariance(const Solution& solution,
   const double towards_light = place.n_world.dot((p_light - place.p_world).normalized());
   if (std::abs(towards_light) < k_least_cosine ||
       towards_light * place.n_world.dot(p_eye - place.p_world) < 0)
-    return std::nullopt;  // grazed, or lit on the side that camera 0 does not see
+    return std::nullopt;  // grazing light, or light on the side that camera 0 does not see
   Eigen::Matrix<double, 2, 6> by_thing;
   by_thing << -seen->by_point * cross(place.p_world - thing.centre), seen->by_point;
   MatrixXd by_unknowns = MatrixXd::Zero(2, uncertainty.covariance.cols());
   const Eigen::Index camera_values = thing.by_values.cols(), values = seen->by_values.cols();
   const int at = solution.projector_at(projector);
-  by_unknowns.leftCols(camera_values) = by_thing * thing.by_values;  // camera 0's come first
+  by_unknowns.leftCols(camera_values) = by_thing * thing.by_values;  // camera 0's parameters come first
   by_unknowns.middleCols(camera_values, 6) = by_thing * thing.by_camera;
   by_unknowns.middleCols(at, values) = seen->by_values;
   by_unknowns.middleCols(at + values, 6) = seen->by_imager;
-  // From projector pixels to metres on the surface.
+  // Derivative of projector pixels by metres on the surface.
   const Vector3d u = place.n_world.unitOrthogonal(), v = place.n_world.cross(u);
   Eigen::Matrix2d px_by_m;
   px_by_m << seen->by_point * u, seen->by_point * v;
-  if (std::abs(px_by_m.determinant()) < 1e-6) return std::nullopt;  // light that grazes the surface
+  if (std::abs(px_by_m.determinant()) < 1e-6) return std::nullopt;  // grazing light
   const Eigen::Matrix2d m_by_px = px_by_m.inverse();
   const Eigen::Matrix2d px_covariance = by_unknowns * uncertainty.covariance * by_unknowns.transpose() +
                                         uncertainty.measured_px * uncertainty.measured_px * by_thing *
@@ -127,9 +130,10 @@ std::optional<Eigen::Matrix2d> light_covariance(const Solution& solution,
   return m_by_px * px_covariance * m_by_px.transpose();
 }
 
-// A thing that fills the middle of the projector's panel at the boards' distance, as far as camera 0 sees it:
-// points of a sheet with some relief that faces the middle between the two. Where the boards stood does not
-// matter: a rig whose boards kept to the middle is judged at the panel's edges, too.
+// A target that fills the middle of the projector's panel at the boards' distance, as far as camera 0 sees
+// it: points of a sheet with some relief, facing the middle between the two devices. It does not depend on
+// where the boards stood, so that a rig whose boards stayed in the middle is judged at the panel's edges,
+// too.
 std::vector<SurfaceTarget> panel_places(const Solution& solution, const Board& board, size_t projector) {
   const Imager &camera = solution.rig.cameras.front(), &light = solution.rig.projectors[projector];
   Vector3d p_boards = Vector3d::Zero();
@@ -157,9 +161,9 @@ std::vector<SurfaceTarget> panel_places(const Solution& solution, const Board& b
   return places;
 }
 
-// Some of the points that camera 0 sees, as far apart as they go: each the farthest from those before.
+// Selects points that camera 0 sees, as far apart as possible: each is the farthest from those before.
 RigidTarget measured_points(const Imager& camera, const std::vector<SurfaceTarget>& places) {
-  std::vector<std::pair<Vector3d, double>> left;  // and the distance to the nearest chosen
+  std::vector<std::pair<Vector3d, double>> left;  // each with its distance to the nearest chosen point
   for (const SurfaceTarget& place : places) {
     if (project_with_derivatives(camera, place.p_world)) left.emplace_back(place.p_world, std::numeric_limits<double>::infinity());
   }
@@ -173,7 +177,8 @@ RigidTarget measured_points(const Imager& camera, const std::vector<SurfaceTarge
   return chosen;
 }
 
-// The thing in place, moved each way, turned each way about its middle: world_from_before.
+// Motions of the target: none, translations in each direction, rotations about its middle
+// (world_from_before).
 std::array<std::vector<Pose>, 3> placements(const std::vector<SurfaceTarget>& places) {
   Vector3d centre = Vector3d::Zero();
   for (const SurfaceTarget& place : places) centre += place.p_world / static_cast<double>(places.size());
@@ -198,7 +203,7 @@ std::vector<SurfaceTarget> placed_anew(const Pose& world_from_before, std::vecto
   return places;
 }
 
-// The devices' unknowns of one rig as they differ from another's; empty when the lenses are of other models.
+// Differences of the devices' parameters between two rigs; empty when the lens models differ.
 Eigen::VectorXd unknowns_between(const Rig& rig, const Rig& from) {
   std::vector<double> values;
   for (const auto devices : {&Rig::cameras, &Rig::projectors}) {
@@ -248,8 +253,9 @@ std::vector<std::optional<Eigen::Matrix2d>> light_covariances(const Solution& so
 }
 
 double p95_of(std::span<const std::vector<Eigen::Matrix2d>> groups) {
-  // A 2-D normal scatter by polar angle in its unit circle: in each direction the radius is Rayleigh.
-  constexpr int k_angles = 16;                  // over a quarter turn; shares are right to 1e-4 for any shape
+  // A 2D normal distribution in polar coordinates of its unit circle: the radius is Rayleigh in each
+  // direction. This many angles over a quarter turn give shares accurate to 1e-4 for any shape.
+  constexpr int k_angles = 16;
   std::vector<std::pair<double, double>> rays;  // variance, weight
   double largest = 0, total = 0;
   for (const auto& group : groups) {
@@ -309,8 +315,8 @@ Uncertainty estimated_uncertainty(const Observations& observations,
   const auto scatter = propagated_error_mm(observations, solution, uncertainty);
   const auto jackknife =
       propagated_error_mm(observations, solution, {jackknife_covariance(solution, without), 0});
-  // Scatter alone is too small by up to a factor of 2 where poses have errors of their own, the jackknife is
-  // too large by as much: the standard deviation in between.
+  // Where poses have errors of their own, the covariance from scatter is too small by up to a factor of 2 and
+  // the jackknife's too large by as much: the geometric mean is used.
   double variance = 1;
   for (size_t i = 0; i < scatter.size(); ++i) {
     if (std::isfinite(jackknife[i]) && scatter[i] > 0)

@@ -12,21 +12,21 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double k_edge = 0.2;           // of an image's side: what counts as near its edge
-constexpr double k_bare = 0.3;           // of the cells near an edge; with fewer seen the edge is bare
-constexpr int k_edge_cells = 10;         // along an edge
-constexpr double k_wide_tilt_deg = 40;   // span of tilts about an axis that holds a focal length well
-constexpr double k_little_depth = 0.15;  // span of distances over their middle
-constexpr double k_steep = 2;            // the error of the volume's end over that of its middle
+constexpr double k_edge = 0.2;    // share of an image's side that counts as near its edge
+constexpr double k_bare = 0.3;    // share of the cells near an edge; with fewer covered the edge is bare
+constexpr int k_edge_cells = 10;  // number of cells along an edge
+constexpr double k_wide_tilt_deg = 40;   // span of tilts about an axis that determines a focal length well
+constexpr double k_little_depth = 0.15;  // span of distances divided by their middle
+constexpr double k_steep = 2;            // error at the volume's end divided by that in its middle
 constexpr int k_enough_poses = 8;
-constexpr int k_few_poses = 4;           // of a projector
-constexpr double k_many_outliers = 0.1;  // of a device's points
-constexpr double k_optimistic = 1.5;     // deviation of held-out normalised residuals
-constexpr double k_epipolar_px = 0.5;    // twice what a sound calibration shows (issue: 0.25)
+constexpr int k_few_poses = 4;           // for each projector
+constexpr double k_many_outliers = 0.1;  // share of a device's points
+constexpr double k_optimistic = 1.5;     // standard deviation of the held-out normalised residuals
+constexpr double k_epipolar_px = 0.5;    // twice the value of a sound calibration (0.25)
 
 double degrees(double radians) { return radians * 180 / std::numbers::pi; }
 
-// Where in an image: "upper left", "middle", … by shares of its width and height.
+// Names a place in an image, "upper left", "middle", …, from shares of its width and height.
 std::string place_in_image(double x, double y) {
   const std::string vertical = y < 1.0 / 3 ? "upper" : y > 2.0 / 3 ? "lower" : "";
   const std::string horizontal = x < 1.0 / 3 ? "left" : x > 2.0 / 3 ? "right" : "";
@@ -63,7 +63,7 @@ std::vector<SeenPixels> seen_pixels(const Observations& observations) {
   return all;
 }
 
-// Share of the cells along an edge with something seen: left, right, upper, lower.
+// Share of the cells along each edge with observations: left, right, upper, lower.
 std::array<double, 4> edge_coverage(const SeenPixels& seen) {
   std::array<std::array<bool, k_edge_cells>, 4> cells{};
   for (const Vector2d& px : seen.px) {
@@ -106,7 +106,8 @@ struct Span {
   double width() const { return high - low; }
 };
 
-// How boards stood before camera 0: turned about its vertical and horizontal axis (degrees), and how far (m).
+// How the boards stood in front of camera 0: tilt about its vertical and horizontal axis, degrees, and
+// distance.
 struct Stances {
   int poses = 0;
   Span about_vertical, about_horizontal, distance;
@@ -132,8 +133,8 @@ void advise_stances(const Stances& s, const Assessment& assessment, std::vector<
   const auto tilt = [&](const Span& span, const char* axis) {
     if (span.width() < k_wide_tilt_deg)
       advice->push_back(
-          fmt::format("Tilt the board more about the {} axis: its poses span {:.0f} degrees, {:.0f} "
-                      "or more hold the focal lengths.",
+          fmt::format("Tilt the board more about the {} axis: its poses span {:.0f} degrees; {:.0f} "
+                      "or more are needed to determine the focal lengths.",
                       axis, span.width(), k_wide_tilt_deg));
   };
   tilt(s.about_vertical, "vertical");
@@ -145,8 +146,8 @@ void advise_stances(const Stances& s, const Assessment& assessment, std::vector<
                     "{:.2f} m from the camera.",
                     s.distance.low, s.distance.high));
   if (!rests_on_enough_poses(assessment, s.poses))
-    advice->push_back(
-        fmt::format("Add {} more poses: {} leave little to judge by.", k_enough_poses - s.poses, s.poses));
+    advice->push_back(fmt::format("Add {} more poses: {} are too few to judge accuracy.",
+                                  k_enough_poses - s.poses, s.poses));
 }
 
 double worst_of(const ErrorMap::Plane& plane) {
@@ -168,7 +169,7 @@ void advise_depths(const Observations& observations,
     const ErrorMap::Plane& end = far_is_worse ? far : near;
     if (!(middle > 0) || worst_of(end) < k_steep * middle || worst_of(end) < k_good_mm) continue;
     advice->push_back(fmt::format(
-        "{}: capture {}, at about {:.2f} m: light may miss by {:.1f} mm there, by {:.1f} mm in the middle.",
+        "{}: capture poses {}, at about {:.2f} m: the error may be {:.1f} mm there, {:.1f} mm in the middle.",
         observations.projectors[static_cast<size_t>(map.projector)].name,
         far_is_worse ? "farther away" : "nearer", end.depth_m, worst_of(end), middle));
   }
@@ -184,14 +185,14 @@ void advise_devices(const Observations& observations,
     }
     const auto poses = std::count(lit.begin(), lit.end(), true);
     if (poses < k_few_poses)
-      advice->push_back(fmt::format("{}: it lights the board in {} poses only; show it the board more often.",
+      advice->push_back(fmt::format("{}: it reaches the board in {} poses only; add poses in its light.",
                                     observations.projectors[i].name, poses));
   }
   for (const DeviceQuality& device : assessment.devices) {
     if (device.points > 0 && device.outliers > k_many_outliers * device.points)
       advice->push_back(
-          fmt::format("{}: {} of its {} points fit nothing; keep board and devices still, and shiny "
-                      "things away.",
+          fmt::format("{}: {} of its {} points are outliers; keep board and devices still, and remove shiny "
+                      "things from the view.",
                       device.name, device.outliers, device.points));
   }
 }
@@ -200,28 +201,28 @@ void advise_trust(const Observations& observations,
                   const Assessment& assessment,
                   std::vector<std::string>* advice) {
   if (assessment.normalised_residuals.held_out.stddev > k_optimistic)
-    advice->push_back(
-        fmt::format("Go by the held-out errors: unseen poses are missed {:.1f} times as far as the noise "
-                    "explains. A lens model with more values, a flatter board or more poses may help.",
-                    assessment.normalised_residuals.held_out.stddev));
+    advice->push_back(fmt::format(
+        "Trust the held-out errors more than the stated ones: they are {:.1f} times as large as the "
+        "noise explains. A lens model with more values, a flatter board or more poses may help.",
+        assessment.normalised_residuals.held_out.stddev));
   for (const EpipolarResidual& pair : assessment.epipolar) {
     if (pair.board.rms_px > k_epipolar_px)
       advice->push_back(fmt::format(
-          "{} and {}: pixels lie {:.2f} px off their epipolar lines even on the board; fix both devices to "
-          "something stiff and let the projector warm up.",
+          "{} and {}: the epipolar residual is {:.2f} px even on the board; fix both devices to something "
+          "stiff and let the projector warm up.",
           observations.cameras[static_cast<size_t>(pair.camera)].name,
           observations.projectors[static_cast<size_t>(pair.projector)].name, pair.board.rms_px));
   }
 }
 
-// "1.90 mm at worst, 1.60 m from camera0, upper left of its picture"
+// For example "1.90 mm at worst, 1.60 m from camera0, upper left of its image".
 std::optional<std::string> worst_place(const Observations& observations, const ErrorMap& map) {
   const double worst = map.worst_mm();
   for (const ErrorMap::Plane& plane : map.planes) {
     for (size_t i = 0; i < plane.p95_mm.size() && worst > 0; ++i) {
       if (plane.p95_mm[i] != worst) continue;
       const int column = static_cast<int>(i) % map.columns, row = static_cast<int>(i) / map.columns;
-      return fmt::format("{:.2f} mm at worst, {:.2f} m from {}, {} of its picture", worst, plane.depth_m,
+      return fmt::format("{:.2f} mm at worst, {:.2f} m from {}, {} of its image", worst, plane.depth_m,
                          observations.cameras[0].name,
                          place_in_image((column + 0.5) / map.columns, (row + 0.5) / map.rows));
     }
@@ -237,9 +238,10 @@ std::string reason(const Assessment& assessment, double mm) {
   const double px_limit = reject ? k_usable_px : k_good_px, mm_limit = reject ? k_usable_mm : k_good_mm;
   const char* better = reject ? "usable" : "good";
   if (!(assessment.held_out.rms_px <= px_limit))
-    reasons.push_back(fmt::format("unseen poses are missed by {:.2f} px (at most {} for {})",
+    reasons.push_back(fmt::format("the held-out error is {:.2f} px (at most {} for {})",
                                   assessment.held_out.rms_px, px_limit, better));
-  if (!(mm <= mm_limit)) reasons.push_back(fmt::format("more than {} mm is not {}", mm_limit, better));
+  if (!(mm <= mm_limit))
+    reasons.push_back(fmt::format("the predicted error is above {} mm, the limit of {}", mm_limit, better));
   std::vector<std::string> names;
   for (const Fault& fault : assessment.faults) {
     const bool is_named = std::find(names.begin(), names.end(), fault.name) != names.end();
@@ -249,7 +251,7 @@ std::string reason(const Assessment& assessment, double mm) {
   const double shown =
       *std::max_element(assessment.held_out_error_mm.begin(), assessment.held_out_error_mm.end());
   if (mm <= mm_limit && mm > std::max(k_fine_mm, k_beyond_boards * shown))
-    reasons.push_back("the boards say little about the places between and beyond them");
+    reasons.push_back("the boards do not determine the accuracy between and beyond them");
   return reasons.empty() ? "" : "Why not better: " + joined(reasons) + ".";
 }
 
@@ -261,7 +263,7 @@ std::string verdict_words(const Observations& observations, const Assessment& as
   if (std::isfinite(*worst)) {
     text += fmt::format("predicted error {:.2f} mm on {}", *worst, observations.projectors[projector].name);
   } else {
-    text += fmt::format("the error of {} cannot be told", observations.projectors[projector].name);
+    text += fmt::format("the error of {} is unknown", observations.projectors[projector].name);
   }
   const auto& maps = assessment.error_maps;
   const auto map = std::find_if(maps.begin(), maps.end(), [&](const ErrorMap& m) {
@@ -273,8 +275,9 @@ std::string verdict_words(const Observations& observations, const Assessment& as
   const auto pose =
       std::max_element(poses.begin(), poses.end(),
                        [](const HeldOutPose& a, const HeldOutPose& b) { return a.rms_px < b.rms_px; });
-  text += fmt::format("; poses not seen by the solve are foretold to {:.2f} px", assessment.held_out.rms_px);
-  if (pose != poses.end()) text += fmt::format(", the worst ({}) to {:.2f} px", pose->pose, pose->rms_px);
+  text += fmt::format("; held-out error (poses that the solve has not used) {:.2f} px",
+                      assessment.held_out.rms_px);
+  if (pose != poses.end()) text += fmt::format(", the worst ({}) {:.2f} px", pose->pose, pose->rms_px);
   const std::string why = reason(assessment, *worst);
   return text + "." + (why.empty() ? "" : " " + why);
 }

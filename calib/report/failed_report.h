@@ -9,8 +9,8 @@
 
 namespace limn::calib {
 
-/// report.json of captures that no rig came of: verdict `reject`, `failure` (the solve's message) and the
-/// faults that explain it. Left alone where the folder holds a rig: that rig's report stays.
+/// Writes report.json for captures whose solve failed: verdict `reject`, `failure` (the solve's message) and
+/// the faults that explain it. If the folder holds a rig, that rig's report is kept.
 Status write_failed_report(const std::string& failure,
                            const std::vector<Fault>& faults,
                            const std::filesystem::path& folder);

@@ -36,7 +36,7 @@ PastCalibration past_of(const Json& entry) {
           moved_of(entry.value("moved", Json::array()))};
 }
 
-// A report's own numbers, as its successors remember them.
+// The key numbers of a report, as later reports keep them.
 PastCalibration past_of_report(const Json& report) {
   return {report.value("made_at", ""),
           report.at("verdict"),
@@ -53,7 +53,7 @@ const Imager* same_device(const std::vector<Imager>& earlier, const Imager& now)
   return found == earlier.end() ? nullptr : &*found;
 }
 
-// World points at which this solution's device looks, as camera 0 sees them.
+// World points that this solution's device observes, in camera 0's frame.
 std::vector<Vector3d> points_of(const Observations& observations,
                                 const Solution& solution,
                                 bool is_projector,
@@ -102,11 +102,11 @@ History read_history(const std::filesystem::path& folder) {
   History history;
   try {
     const Json report = Json::parse(*text);
-    if (report.contains("failure")) return {};  // nothing was solved
+    if (report.contains("failure")) return {};  // the solve failed
     for (const Json& entry : report.value("history", Json::array())) history.past.push_back(past_of(entry));
     history.past.push_back(past_of_report(report));
   } catch (const nlohmann::json::exception&) {
-    log_warning("{}: no report of an earlier calibration; its history is not kept.",
+    log_warning("{}: cannot be read as the report of an earlier calibration. The rig's history starts anew.",
                 (folder / "report.json").string());
     return {};
   }

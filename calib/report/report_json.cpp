@@ -68,10 +68,10 @@ Json error_json(const Report& report) {
       {"per_projector", by_projector(report, a.predicted_error_mm)},
       {"held_out", by_projector(report, a.held_out_error_mm)},
       {"propagated", by_projector(report, a.propagated_error_mm)},
-      {"from", "the larger of the held-out errors and of the noise propagated to moved and turned things"}};
+      {"from", "the larger of the held-out error and of the noise propagated to moved and turned targets"}};
 }
 
-// What was tried; with the models given by hand just those.
+// All models that were tried; only the given ones where nothing was selected.
 Json lenses_json(const Report& report) {
   Json list = Json::array();
   for (const ModelTrial& trial : report.lens_trials)

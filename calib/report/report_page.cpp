@@ -19,7 +19,7 @@ std::string section(const std::string& title, const std::string& content) {
   return fmt::format("<section><h2>{}</h2>\n{}</section>\n", xml_escaped(title), content);
 }
 
-// A table from its head and rows; the first column is text, the others are figures.
+// A table with head and rows; the first column is text, the others are numbers.
 std::string table(const std::vector<std::string>& head, const std::vector<std::vector<std::string>>& rows) {
   if (rows.empty()) return "";
   std::string html = "<div class='wide'><table><tr>";
@@ -42,7 +42,7 @@ double worst_mm(const Assessment& a) {
   return *std::max_element(a.predicted_error_mm.begin(), a.predicted_error_mm.end());
 }
 
-// The worst of the pairs, on the board.
+// The largest residual of all pairs, on the board.
 double epipolar_px(const Assessment& a) {
   double worst = 0;
   for (const EpipolarResidual& pair : a.epipolar) worst = std::max(worst, pair.board.rms_px);
@@ -60,9 +60,10 @@ std::string header(const Report& report) {
                   xml_escaped(words));
   html += fmt::format("<p class='soft'>{}</p>\n<div class='tiles'>\n", xml_escaped(report.made_at));
   html += tile(fmt::format("{:.2f}", worst_mm(a)), "mm", "predicted error (95 %), worst projector");
-  html += tile(fmt::format("{:.2f}", a.held_out.rms_px), "px", "error on poses the solve has not seen");
-  html += tile(fmt::format("{:.2f}", epipolar_px(a)), "px", "off the epipolar lines, on the board");
-  html += tile(fmt::format("{:.0f}", 100 * a.decoded_share), "%", "of lit pixels decoded");
+  html += tile(fmt::format("{:.2f}", a.held_out.rms_px), "px",
+               "held-out error: on poses that the solve has not used");
+  html += tile(fmt::format("{:.2f}", epipolar_px(a)), "px", "epipolar residual on the board");
+  html += tile(fmt::format("{:.0f}", 100 * a.decoded_share), "%", "of illuminated pixels decoded");
   return html + "</div>\n";
 }
 
@@ -82,13 +83,13 @@ std::string advice_list(const std::vector<std::string>& advice) {
   return html + "</ul>\n";
 }
 
-// The predicted error of each projector on planes before camera 0.
+// The predicted error of each projector on planes in front of camera 0.
 std::string error_maps_html(const Report& report) {
   const Observations& observations = report.observed.observations;
   const CapturedDevice& camera = observations.cameras.front();
   double most = 0;
   for (const ErrorMap& map : report.assessment.error_maps) most = std::max(most, map.worst_mm());
-  // Beyond what boards have reached the error may grow without end: colours are for the rest.
+  // Outside the volume of the boards the error may grow without limit; the colours cover the rest.
   constexpr double k_brightest = 4;  // times the predicted error
   if (const double predicted = worst_mm(report.assessment); std::isfinite(predicted))
     most = std::min(most, k_brightest * predicted);
@@ -107,12 +108,12 @@ std::string error_maps_html(const Report& report) {
   }
   if (html.empty() || !(most > 0)) return "";
   return fmt::format(
-      "<p>95 % error of light meant for a thing whose place {} measures, on planes across its "
-      "view; red: that much or more; grey: the projector does not reach.</p>{}\n{}",
+      "<p>95 % error of light on a target whose pose {} measures, on planes across its view. Red: this value "
+      "or more. Grey: the projector does not reach.</p>{}\n{}",
       xml_escaped(camera.name), colour_key(most, "mm"), html);
 }
 
-// Held-out errors on the boards as camera 0 saw them.
+// Held-out errors on the boards in camera 0's image.
 std::string board_errors_html(const Report& report) {
   const Observations& observations = report.observed.observations;
   const CapturedDevice& camera = observations.cameras.front();
@@ -131,10 +132,10 @@ std::string board_errors_html(const Report& report) {
     }
     html +=
         figure(dot_map(camera.width, camera.height, dots, most), observations.projectors[i].name,
-               fmt::format("on all boards, in {}'s picture: 95 % within {:.2f} mm", camera.name, errors[i]));
+               fmt::format("on all boards, in {}'s image: 95 % within {:.2f} mm", camera.name, errors[i]));
   }
-  return "<p>Each board pose foretold by a solve that has not seen it; how far its light lands beside the "
-         "spot, on the board.</p>" +
+  return "<p>Each board pose is predicted by a solve that has not used it. The colour shows how far "
+         "the light would land from its target on the board.</p>" +
          colour_key(most, "mm") + html + "</div>\n";
 }
 
@@ -188,8 +189,8 @@ std::string imagers_html(const Report& report) {
         imager_figure(device, fitted, report.assessment.devices[observations.cameras.size() + i], "matches");
     const SvgPlot plot = residual_field(device.width, device.height, foretold);
     html +=
-        figure(plot.svg, device.name + ", unseen poses",
-               fmt::format("what a solve without the pose foretells: 95 % within {:.2f} mm on the board. {}.",
+        figure(plot.svg, device.name + ", held-out poses",
+               fmt::format("prediction by a solve without the pose: 95 % within {:.2f} mm on the board. {}.",
                            report.assessment.held_out_error_mm[i], plot.key));
   }
   return html + "</div>\n";
@@ -209,8 +210,7 @@ std::string devices_table(const Report& report) {
          is_camera ? "" : fmt::format("{:.2f}", report.assessment.held_out_error_mm[i - cameras]),
          is_camera ? "" : fmt::format("{:.2f}", report.assessment.propagated_error_mm[i - cameras])});
   }
-  return table({"device", "lens", "residual px", "outliers", "coverage", "unseen poses mm", "noise mm"},
-               rows);
+  return table({"device", "lens", "residual px", "outliers", "coverage", "held-out mm", "noise mm"}, rows);
 }
 
 std::string lenses_table(const Report& report) {
@@ -223,7 +223,7 @@ std::string lenses_table(const Report& report) {
              ? ""
              : fmt::format("{:+.0f} % (chance: {:.0f} %)", 100 * trial.gain, 100 * trial.uncertainty),
          trial.chosen ? "chosen" : ""});
-  return table({"device", "lens model", "unseen poses px", "the richer one's gain", ""}, rows);
+  return table({"device", "lens model", "held-out px", "gain of the richer model", ""}, rows);
 }
 
 std::string trust_tables(const Report& report) {
@@ -238,11 +238,11 @@ std::string trust_tables(const Report& report) {
     rows.push_back({observations.cameras[static_cast<size_t>(pair.camera)].name + " to " +
                         observations.projectors[static_cast<size_t>(pair.projector)].name,
                     score(pair.board), score(pair.room)});
-  std::string html = table({"off the epipolar lines", "on the board", "in the room"}, rows);
+  std::string html = table({"epipolar residual", "on the board", "in the room"}, rows);
   rows.clear();
   const NormalisedResiduals& normalised_residuals = report.assessment.normalised_residuals;
   for (const auto& [name, s] :
-       {std::pair{"corners", normalised_residuals.corners}, {"matches", normalised_residuals.matches}, {"unseen poses", normalised_residuals.held_out}})
+       {std::pair{"corners", normalised_residuals.corners}, {"matches", normalised_residuals.matches}, {"held-out poses", normalised_residuals.held_out}})
     rows.push_back({name, fmt::format("{:.2f}", s.mean), fmt::format("{:.2f}", s.stddev),
                     fmt::format("{:.1f} %", 100 * s.beyond_3), fmt::format("{}", s.count)});
   return html + table({"residual / stated deviation", "mean (0)", "deviation (1)", "beyond 3 (0.3 %)",
@@ -279,9 +279,9 @@ std::string decode_table(const Report& report) {
                     fmt::format("{:.1f} %", 100.0 * share.decoded / std::max(share.contrasted, 1)),
                     fmt::format("{:.2f} %", 100 * share.outliers / lit)});
   }
-  return table(
-      {"pose", "camera", "projector", "lit pixels", "decoded", "of all that white brightens", "outliers"},
-      rows);
+  return table({"pose", "camera", "projector", "illuminated pixels", "decoded",
+                "share of all brightened pixels", "outliers"},
+               rows);
 }
 
 std::string moved_text(const std::vector<DeviceMove>& devices) {
@@ -311,9 +311,9 @@ std::string history_html(const Report& report) {
                   fmt::format("{:.3f}", a.held_out.rms_px), mm(worst_mm(a)), moved_text(now)});
   held_out.push_back(a.held_out.rms_px);
   std::reverse(rows.begin(), rows.end());
-  return figure(sparkline(held_out), "Unseen poses, px RMS,", "oldest to newest") +
-         table({"made", "verdict", "unseen px", "predicted mm",
-                "moved since the one before, seen from camera0"},
+  return figure(sparkline(held_out), "Held-out error, px RMS,", "oldest to newest") +
+         table({"made", "verdict", "held-out px", "predicted mm",
+                "moved since the one before, relative to camera0"},
                rows);
 }
 
@@ -350,14 +350,14 @@ std::string report_html(const Report& report) {
   html += header(report);
   html += section("Faults", fault_list(report.assessment.faults));
   html += section("What would help", advice_list(report.explanation.advice));
-  html += section("Where light may miss", error_maps_html(report));
-  html += section("Where light missed on poses not seen by the solve", board_errors_html(report));
-  html += section("Each pose, foretold without it", poses_html(report));
-  html += section("What each device saw, and what was left over", imagers_html(report));
+  html += section("Error maps of the working volume", error_maps_html(report));
+  html += section("Held-out error on the boards", board_errors_html(report));
+  html += section("Held-out error of each pose", poses_html(report));
+  html += section("Observations and residuals of each device", imagers_html(report));
   html += section("Devices", devices_table(report));
   html += section("Lens models tried", lenses_table(report));
-  html += section("Whether the figures can be believed", trust_tables(report));
-  html += section("Known lengths, measured by light", lengths_table(report));
+  html += section("Consistency checks", trust_tables(report));
+  html += section("Scale bars, measured with structured light", lengths_table(report));
   html += section("Decoding", decode_table(report));
   html += section("Earlier calibrations of this rig", history_html(report));
   return html + "</body></html>\n";

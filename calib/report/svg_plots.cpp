@@ -11,14 +11,14 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr int k_grid = 10;              // cells of coverage both ways, as in report.json
-constexpr size_t k_most_arrows = 4000;  // in one image; more are every n-th
-constexpr double k_long = 0.04;         // of the width: what nine of ten arrows stay below
-constexpr double k_longest = 0.1;       // of the width: longer arrows are cut
+constexpr int k_grid = 10;              // number of cells for coverage both ways, as in report.json
+constexpr size_t k_most_arrows = 4000;  // in one plot; of more, every n-th is drawn
+constexpr double k_long = 0.04;         // share of the width: nine of ten arrows stay below
+constexpr double k_longest = 0.1;       // share of the width: longer arrows are cut
 
 constexpr auto k_frame = "#cfd4da", k_empty = "#eceff2", k_ink = "#1d2329", k_soft = "#5d6670";
 
-// Blue, teal, green, amber, red: dark enough on white, in order of lightness and hue.
+// Blue, teal, green, amber, red: dark enough on white, ordered by lightness and hue.
 std::string colour_at(double share) {
   struct Colour {
     double r, g, b;
@@ -47,7 +47,7 @@ std::string framed(int width, int height) {
       height, k_frame, width / 400.0);
 }
 
-// Grey where nothing was observed.
+// Grey cells where nothing was observed.
 std::string bare_cells(int width, int height, const std::vector<FieldPoint>& points) {
   std::array<bool, k_grid * k_grid> seen{};
   for (const FieldPoint& p : points) {
@@ -66,7 +66,7 @@ std::string bare_cells(int width, int height, const std::vector<FieldPoint>& poi
   return svg + "</g>";
 }
 
-// Of the inliers' lengths, the one that nine of ten stay below.
+// The 90th percentile of the inliers' lengths.
 double usual_length(const std::vector<FieldPoint>& points) {
   std::vector<double> lengths;
   for (const FieldPoint& p : points) {
@@ -138,7 +138,7 @@ SvgPlot residual_field(int width, int height, const std::vector<FieldPoint>& poi
   std::string svg = opened(width, height) + bare_cells(width, height, points) +
                     fmt::format("<g stroke-width='{:.2f}' stroke-linecap='round'>", 1.6 * width / 1000.0);
   const size_t step = points.size() / k_most_arrows + 1;
-  std::string outliers;  // on top
+  std::string outliers;  // drawn on top
   bool any_outlier = false;
   for (size_t i = 0; i < points.size(); i += points[i].outlier ? 1 : step) {
     (points[i].outlier ? outliers : svg) += arrow(points[i], magnified, most, width);

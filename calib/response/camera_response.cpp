@@ -10,13 +10,15 @@ namespace {
 
 using Role = ResponseImage::Role;
 
-constexpr size_t k_most_samples = 1500;  // of all images together: a power is then good to 0.001
-constexpr double k_least_slope = 0.05;   // of the mean: an encoding that is flatter writes no level there
-// A simpler encoding may fit this much worse, relatively and in levels: a free curve always bends a little
-// with noise and rounding, and what it then explains is less than 0.1 % of full scale.
+// Number of samples of all images together; the exponent of a power is then accurate to 0.001.
+constexpr size_t k_most_samples = 1500;
+// Share of the mean slope: a flatter encoding cannot be distinguished there.
+constexpr double k_least_slope = 0.05;
+// A simpler encoding is chosen if its fit is worse by at most this, relatively and in levels: a free curve
+// always follows noise and rounding a little, and what it then explains is less than 0.1 % of full scale.
 constexpr double k_same_rms = 1.03, k_same_levels = 0.2;
 constexpr double k_worst_rms = 3;      // levels; sums that disagree by more are no sums of light
-constexpr double k_least_sure = 0.25;  // standard deviation of a power from one pixel alone; see power_stddev
+constexpr double k_least_sure = 0.25;  // maximum standard deviation of an exponent; see power_stddev
 constexpr int k_rows = 10, k_unknowns = 5;
 
 using Light = std::array<double, 256>;
@@ -26,8 +28,8 @@ using Values = Eigen::VectorXd;
 struct Sums {
   std::vector<std::array<double, k_rows>> levels;
   Eigen::Matrix<double, k_rows, k_unknowns> shown;  // dark and four shares
-  std::array<double, k_rows> repeats;               // images that a level is the mean of
-  double lowest = 0, highest = 255;                 // levels, but for the outermost pixels
+  std::array<double, k_rows> repeats;               // number of images that a level is the mean of
+  double lowest = 0, highest = 255;                 // levels, without the outermost pixels
 };
 
 void find_range(Sums* sums) {
@@ -74,12 +76,12 @@ Sums sums_of(std::span<const ResponseSamples* const> samples) {
   return sums;
 }
 
-// An encoding with unknowns, as the light of levels.
+// An encoding with parameters, as the light of levels.
 struct Family {
   std::string name;
   Values start;
   std::function<Light(const Values&)> light;
-  Eigen::MatrixXd prior;  // times unknowns less start: held to 0 weakly, in standard deviations
+  Eigen::MatrixXd prior;  // times (parameters - start): weak prior towards 0, in standard deviations
 };
 
 Light linear_light(const Values&) {
@@ -104,7 +106,7 @@ Light power_light(const Values& values) {
   return light;
 }
 
-// Logarithms of the slope at knots, straight between them, summed up and scaled to 1.
+// Logarithms of the slope at knots, linear between them, integrated and scaled to 1.
 constexpr std::array<double, 13> k_knots = {0, 10, 22, 36, 52, 72, 96, 122, 148, 174, 200, 226, 255};
 Light free_light(const Values& values) {
   Light light{};
@@ -120,8 +122,8 @@ Light free_light(const Values& values) {
   return light;
 }
 
-// The free curve's slope bends by a tenth from knot to knot unless the images say so, so that it goes on
-// straight where no pixel looks; its scale is a convention.
+// Prior: the free curve's slope changes by a tenth from knot to knot, so that it continues straight where no
+// pixel has data; its scale is a convention.
 Eigen::MatrixXd smooth_prior() {
   constexpr double k_bend = 0.1, k_scale = 1;
   const auto knots = static_cast<Eigen::Index>(k_knots.size());
@@ -153,12 +155,12 @@ double mean_slope(const Light& light, double low, double high) {
   return (light_at(light, high) - light_at(light, low)) / (high - low);
 }
 
-// Slope over a few levels: the weights must not jump with a level's noise.
+// Slope over a few levels, so that the weights do not jump with a level's noise.
 double slope_at(const Light& light, double level) {
   return mean_slope(light, std::max(0.0, level - 2), std::min(255.0, level + 2));
 }
 
-// One pixel's light in the rows' images, as the sums have it in an encoding.
+// One pixel's light in the rows' images, as predicted by the sums in an encoding.
 Eigen::Matrix<double, k_rows, 1> summed(const Sums& sums, size_t i, const Light& light) {
   const double least = k_least_slope * mean_slope(light, sums.lowest, sums.highest);
   Eigen::Matrix<double, k_rows, 1> y;
@@ -182,8 +184,9 @@ double level_of(const Light& light, double value) {
   return static_cast<double>(above - 1 - light.begin()) + (value - *(above - 1)) / (*above - *(above - 1));
 }
 
-// What the sums leave over, in levels' standard deviations of one image: k_rows numbers a pixel. Compared
-// as levels: compared as light over the curve's slope, a curve that bends enough would explain anything.
+// Residuals of the sums, in standard deviations of one image's levels: k_rows numbers for each pixel. They
+// are compared as levels: compared as light over the curve's slope, a curve that bends enough would explain
+// anything.
 Values residuals(const Sums& sums, const Light& light) {
   Values all(static_cast<Eigen::Index>(sums.levels.size()) * k_rows);
   for (size_t i = 0; i < sums.levels.size(); ++i) {
@@ -197,7 +200,7 @@ Values residuals(const Sums& sums, const Light& light) {
   return all;
 }
 
-// The same sums as they would be without noise.
+// The same sums without noise.
 Sums without_noise(const Sums& sums, const Light& light) {
   Sums smooth = sums;
   for (size_t i = 0; i < sums.levels.size(); ++i) {
@@ -207,9 +210,10 @@ Sums without_noise(const Sums& sums, const Light& light) {
   return smooth;
 }
 
-// Standard deviation of a power on top of an encoding: how much the images can tell at all. Asked of sums
-// without noise, for noise alone would look as if it told something. Thousands of pixels that each tell next
-// to nothing do not add up to much: what they tell is then smaller than what is systematically wrong.
+// Standard deviation of the exponent of a power on top of an encoding: it says how much the images determine
+// at all. It is computed from sums without noise, because noise alone would look like information. A minimum
+// for single pixels is needed as well: thousands of pixels with almost no information do not add up to much,
+// because systematic errors are then larger.
 double power_stddev(const Sums& sums, const Light& light, double rms) {
   constexpr double k_step = 0.05;
   Light bent = light;
@@ -268,7 +272,8 @@ Fit fitted(const Sums& sums, const Family& family) {
   return fit;
 }
 
-// Of one pixel, over the samples; the mean is taken out of each image, so that drift is no noise.
+// Scatter of one pixel, over the samples; each image's mean is removed, so that drift does not count as
+// noise.
 double scatter(std::span<const ResponseSamples* const> samples, Role role) {
   const auto images = images_of(role);
   std::vector<double> squares;

@@ -10,13 +10,13 @@ namespace {
 
 using Role = ResponseImage::Role;
 
-constexpr double k_least_sum =
-    0.02;  // of squared light over a channel's ramp: its darkest fifth alone tells nothing
+// Sum of squared light over a channel's ramp: its darkest fifth alone determines nothing.
+constexpr double k_least_sum = 0.02;
 
-// Normal equations of offset + three factors: each image lights one channel, so they are an arrow.
+// Normal equations of offset + three factors: each image shows one channel, so the matrix is an arrow.
 struct Arrow {
   double weight = 0, light = 0;                        // sums of w, w y
-  std::array<double, 3> first{}, second{}, product{};  // of w f, w f f, w f y, per channel
+  std::array<double, 3> first{}, second{}, product{};  // sums of w f, w f f, w f y, for each channel
 
   void add(int channel, double f, double y, double w) {
     weight += w;
@@ -49,7 +49,7 @@ struct Arrow {
 
 struct ShownImage {
   size_t image = 0;
-  int channel = -1;  // of a ramp
+  int channel = -1;  // channel of a ramp
   double light = 0;
 };
 
@@ -62,7 +62,8 @@ std::vector<ShownImage> shown_images(const ProjectorResponse& projector) {
   return shown;
 }
 
-// RMS of predicted minus photographed over the check colours, where the projector's light is seen unclipped.
+// RMS of predicted minus photographed over the check colours, where the projector's light is visible and
+// unclipped.
 double held_out_rms(const ResponseShots& shots,
                     const ColourMixing& mixing,
                     const ProjectorResponse& projector,

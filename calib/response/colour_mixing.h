@@ -4,9 +4,9 @@
 
 namespace limn::calib {
 
-/// What each pixel of a camera sees of each channel of a projector, by weighted least squares over the ramps
-/// and the black images; levels that are cut off are left out. Also says how well photographs of the check
-/// colours, which are not used, are predicted.
+/// Fits what each pixel of a camera receives from each channel of a projector, by weighted least squares over
+/// the ramps and the black images; clipped levels are not used. The result includes how well photographs of
+/// the check colours, which the fit does not use, are predicted.
 ColourMixing fitted_mixing(const ResponseShots& shots,
                            const ProjectorResponse& projector,
                            const CameraResponse& camera);

@@ -13,9 +13,10 @@
 namespace limn::calib {
 namespace {
 
-constexpr size_t k_most_of_curve = 20000;  // of a camera and projector; a curve's noise is then below 0.1 %
-constexpr double k_worst_drift = 0.01;     // of white from first to last image
-constexpr double k_worst_white = 0.03;     // of white from red + green + blue
+// For each camera and projector; a curve's noise is then below 0.1 %.
+constexpr size_t k_most_of_curve = 20000;
+constexpr double k_worst_drift = 0.01;  // change of white from the first to the last image
+constexpr double k_worst_white = 0.03;  // difference of white from red + green + blue
 constexpr double k_worst_residual = 0.02;
 
 struct Pair {
@@ -23,7 +24,7 @@ struct Pair {
   ResponseSamples samples;
 };
 
-// Samples of all pairs; those that are too dark are left out while another camera sees the projector.
+// Samples of all pairs; pairs that are too dark are skipped if another camera sees the projector.
 Result<std::vector<Pair>> sampled_pairs(const CaptureSet& captures, std::vector<std::string>* warnings) {
   LIMN_TRY(const std::vector<ResponsePair> pairs, response_pairs(captures));
   std::vector<Pair> all;
@@ -38,7 +39,7 @@ Result<std::vector<Pair>> sampled_pairs(const CaptureSet& captures, std::vector<
     const bool seen = std::any_of(all.begin(), all.end(),
                                   [wanted = projector](const Pair& p) { return p.pair.projector == wanted; });
     if (!seen) return problem;
-    warnings->push_back(problem.message + " Another camera sees this projector: left out.");
+    warnings->push_back(problem.message + " Another camera sees this projector, so this pair is skipped.");
   }
   return all;
 }
@@ -54,10 +55,10 @@ std::optional<CameraResponse> camera_response(const CaptureSet& captures,
   CameraResponse response = fitted_encoding(samples);
   response.camera = captures.cameras[static_cast<size_t>(camera)].name;
   if (response.encoding == "unknown")
-    warnings->push_back(fmt::format(
-        "{}: the pictures do not tell how it writes light; taken as linear. Does the projector scale or "
-        "sharpen its picture?",
-        response.camera));
+    warnings->push_back(
+        fmt::format("{}: the images do not determine how it encodes light; it is taken as linear. Does the "
+                    "projector scale or sharpen its image?",
+                    response.camera));
   return response;
 }
 
@@ -72,7 +73,7 @@ void judge(const ProjectorResponse& response, std::vector<std::string>* warnings
                     name, *response.white_over_sum));
   if (response.drift && std::abs(*response.drift) > k_worst_drift)
     warnings->push_back(
-        fmt::format("{}: white changed by {:.1f} % between first and last picture; let lamp and room "
+        fmt::format("{}: white changed by {:.1f} % between the first and the last image; let lamp and room "
                     "settle.",
                     name, 100 * *response.drift));
   if (response.worst_residual && *response.worst_residual > k_worst_residual)
@@ -82,7 +83,7 @@ void judge(const ProjectorResponse& response, std::vector<std::string>* warnings
                     name, 100 * *response.worst_residual));
 }
 
-// Everything about one projector; needs its images whole again.
+// Measures everything about one projector; reads its images again in full.
 Status measure_projector(const CaptureSet& captures,
                          int projector,
                          const std::vector<Pair>& pairs,

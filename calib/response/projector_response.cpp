@@ -13,12 +13,12 @@ namespace {
 
 using Role = ResponseImage::Role;
 
-constexpr double k_root = 2.2;  // light^(1 / 2.2) of a display is nearly straight
-constexpr double k_worst_jump =
-    0.035;  // of light^(1 / 2.2) from what its neighbours predict: half a step of the ramp
+constexpr double k_root = 2.2;  // light^(1 / 2.2) of a display is almost straight
+// Deviation of light^(1 / 2.2) from its neighbours' prediction: half a step of the ramp.
+constexpr double k_worst_jump = 0.035;
 constexpr int k_tile_px = 16;
 constexpr size_t k_least_tiles = 20;
-constexpr double k_least_light = 0.04;  // of full scale, white in a tile: ten levels
+constexpr double k_least_light = 0.04;  // share of full scale, white in a tile: ten levels
 
 struct Ramp {
   std::vector<size_t> images;
@@ -46,7 +46,7 @@ std::vector<double> shares_of(const Ramp& ramp,
       const auto& light = set.decoding.light;
       for (size_t k = first; k < set.samples->count; k += step) {
         const uchar* levels = set.samples->at(k);
-        double others = 0;  // the instrument: no image in it stands in the ratio
+        double others = 0;  // the instrument: it contains no image of the ratio
         for (const size_t other : ramp.images)
           if (other != image && other != full) others += light[levels[other]] - light[levels[blacks[0]]];
         double black = 0;
@@ -61,7 +61,7 @@ std::vector<double> shares_of(const Ramp& ramp,
   return shares;
 }
 
-// Slopes of a cubic that passes through all points and rises where they rise (Fritsch and Butland 1984).
+// Slopes of a cubic that passes through all points and is monotone where they are (Fritsch and Butland 1984).
 std::vector<double> monotone_slopes(const std::vector<double>& x, const std::vector<double>& y) {
   const size_t n = x.size();
   std::vector<double> h(n - 1), d(n - 1), slopes(n, 0);
@@ -122,7 +122,7 @@ std::vector<double> curve_through(const Points& points) {
   return curve;
 }
 
-// Standard deviations of light^(1 / 2.2), from how much eight parts of the samples scatter.
+// Standard deviations of light^(1 / 2.2), from the scatter of eight parts of the samples.
 std::vector<double> root_stddevs(const Ramp& ramp,
                                  const std::vector<double>& shares,
                                  std::span<const DecodedSamples> all) {
@@ -139,8 +139,8 @@ std::vector<double> root_stddevs(const Ramp& ramp,
   return stddevs;
 }
 
-// How far each of the ramp's images but the darkest and the brightest is from the cubic through four
-// neighbours, less what noise can do.
+// Distance of each of the ramp's images, without the darkest and the brightest, from the cubic through four
+// neighbours, less what noise explains; the largest.
 double worst_jump(const Ramp& ramp,
                   const std::vector<double>& shares,
                   const std::vector<double>& stddevs,
@@ -176,15 +176,14 @@ Status check_smooth(const Ramp& ramp,
   if (finite(shares) && finite(stddevs) && jump < k_worst_jump) return {};
   const size_t image = ramp.images[worst];
   return error(
-      "{}/{} or a picture near it: expected light that rises smoothly along the ramp ({}), found {:.3f} of "
-      "full "
-      "light between {:.3f} and {:.3f}. A picture is repeated, lost or out of order, or the camera sets its "
-      "exposure by itself. Capture again with fixed exposure and white balance.",
+      "{}/{} or an image near it: expected light that rises smoothly along the ramp ({}), found {:.3f} of "
+      "full light between {:.3f} and {:.3f}. An image is repeated, lost or out of order, or the camera sets "
+      "its exposure by itself. Capture again with fixed exposure and white balance.",
       where, image_name(static_cast<int>(image)), response_images()[image].what(), shares[worst],
       shares[worst > 0 ? worst - 1 : 0], shares[std::min(worst + 1, shares.size() - 1)]);
 }
 
-// Sums over samples of light over black in some images.
+// Sums over samples of the light above black in some images.
 double summed_light(std::span<const DecodedSamples> all, size_t image) {
   const auto blacks = images_of(Role::black);
   double sum = 0;
@@ -207,7 +206,7 @@ void add_checks(std::span<const DecodedSamples> all, ProjectorResponse* response
   double full[3];
   for (int c = 0; c < 3; ++c) full[c] = summed_light(all, ramp_of(c).back());
   const double white = summed_light(all, whites.front());
-  if (!(white > 0)) return;  // white is cut off everywhere
+  if (!(white > 0)) return;  // white is clipped everywhere
   response->white_over_sum = white / (full[0] + full[1] + full[2]);
   response->drift = summed_light(all, whites.back()) / white - 1;
   double worst = 0;
@@ -221,7 +220,7 @@ void add_checks(std::span<const DecodedSamples> all, ProjectorResponse* response
   response->worst_residual = worst;
 }
 
-// Decoded light, summed over channels, averaged over images; NaN where a level is cut off.
+// Decoded light, summed over channels, averaged over images; NaN where a level is clipped.
 cv::Mat light_image(const ResponseShots& shots,
                       const Decoding& decoding,
                       std::span<const size_t> images) {
@@ -248,7 +247,7 @@ struct Share {
 
 // One tile: black = plane + share * white.
 std::optional<Share> share_in(const cv::Mat& black, const cv::Mat& white, const cv::Mat& border) {
-  constexpr double k_lit = 0.5, k_unlit = 0.1;  // of the tile's brightest
+  constexpr double k_lit = 0.5, k_unlit = 0.1;  // shares of the tile's brightest
   constexpr int k_least_pixels = k_tile_px * k_tile_px / 10;
   double brightest = 0;
   cv::minMaxLoc(white, nullptr, &brightest);
@@ -279,7 +278,7 @@ std::optional<Share> share_in(const cv::Mat& black, const cv::Mat& white, const 
 std::vector<Share> shares_at_edges(const ResponseShots& shots, const Decoding& decoding) {
   const auto blacks = images_of(Role::black), whites = images_of(Role::white),
              borders = images_of(Role::border);
-  // No image stands on both sides of the fit: its noise would tilt it.
+  // No image is on both sides of the fit, because its noise would bias it.
   const std::span<const size_t> all(blacks);
   const cv::Mat black = light_image(shots, decoding, all.subspan(1)),
                 first = light_image(shots, decoding, all.first(1)),
@@ -321,7 +320,7 @@ std::optional<Measurement> fitted_black_level(std::span<const ResponseShots* con
     shares.insert(shares.end(), more.begin(), more.end());
   }
   if (shares.size() < k_least_tiles) return std::nullopt;
-  // Huber: an object's outline in a tile is no part of the plane.
+  // Huber: an object's outline in a tile does not belong to the plane.
   std::vector<double> sorted;
   for (const Share& share : shares) sorted.push_back(share.value);
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
@@ -341,7 +340,7 @@ std::optional<Measurement> fitted_black_level(std::span<const ResponseShots* con
     scatter =
         std::sqrt(2 * spread) / weights;  // tiles overlap by half: four share each pixel, half their noise
   }
-  // share = black / (white - black)
+  // The share follows from black / (white - black).
   return Measurement{std::max(0.0, centre / (1 + centre)), scatter};
 }
 

@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 using Role = ResponseImage::Role;
 
 constexpr double k_least_contrast = 10;  // levels, white over black: below it there is more noise than light
-constexpr size_t k_least_lit = 400;      // channels of pixels: a patch of 20 x 20
+constexpr size_t k_least_lit = 400;      // number of pixels' channels: a patch of 20 x 20
 
 fs::path folder_of(const CaptureSet& captures, int projector, int camera) {
   return captures.folder / "response" / captures.projectors[static_cast<size_t>(projector)].name /
@@ -33,7 +33,7 @@ std::string names_of(const std::vector<CapturedDevice>& devices) {
   return names;
 }
 
-// Folders in `folder`, each of which must be named after one of the devices; their indices, rising.
+// Folders in `folder`, each of which must be named after one of the devices; their indices, sorted.
 Result<std::vector<int>> devices_in(const fs::path& folder, const std::vector<CapturedDevice>& devices) {
   std::vector<int> found;
   std::error_code problem;
@@ -57,10 +57,10 @@ Status check_shot(const cv::Mat& shot,
                   const CapturedDevice& camera,
                   const cv::Mat& first) {
   if (shot.cols != camera.width || shot.rows != camera.height)
-    return error("{}: expected {}x{} as the other pictures of {}, found {}x{}. Capture it again.",
+    return error("{}: expected {}x{} as the other images of {}, found {}x{}. Capture it again.",
                  path.string(), camera.width, camera.height, camera.name, shot.cols, shot.rows);
   if (shot.channels() != first.channels())
-    return error("{}: expected {} as 000.png is, found {}. Take all pictures with one camera mode.",
+    return error("{}: expected {} as 000.png is, found {}. Take all images in the same camera mode.",
                  path.string(), first.channels() == 1 ? "grey" : "colour",
                  shot.channels() == 1 ? "grey" : "colour");
   return {};
@@ -70,22 +70,21 @@ Status check_count(const fs::path& folder) {
   const size_t count = response_images().size();
   const fs::path beyond = folder / image_name(static_cast<int>(count));
   if (!fs::exists(beyond)) return {};
-  return error("{}: expected {} response pictures, 000.png to {}, found more. See limn patterns --response.",
+  return error("{}: expected {} response images, 000.png to {}, found more. See limn patterns --response.",
                beyond.string(), count, image_name(static_cast<int>(count) - 1));
 }
 
 Error dark(const ResponseShots& shots, size_t lit) {
   return error(
-      "{}: expected pictures where white is at least {} levels brighter than black in {} places, found {}. "
-      "All "
+      "{}: expected images where white is at least {} levels brighter than black in {} places, found {}. All "
       "is dark: is the projector on, does the camera see its light? Expose longer.",
       shots.folder.string(), k_least_contrast, k_least_lit, lit);
 }
 
 Error saturated(const ResponseShots& shots, size_t unclipped, size_t lit) {
   return error(
-      "{}: expected light that the camera can tell apart (below level {}), found {} of {} lit places not "
-      "saturated. Expose shorter or close the lens.",
+      "{}: expected light below the sensor's limit (level {}), found it in only {} of {} illuminated places, "
+      "the others are saturated. Use a shorter exposure or close the aperture.",
       shots.folder.string(), k_clipped, unclipped, lit);
 }
 
@@ -145,7 +144,7 @@ Result<ResponseShots> read_response_shots(const CaptureSet& captures, const Resp
   for (size_t i = 0; i < response_images().size(); ++i) {
     const fs::path path = shots.folder / image_name(static_cast<int>(i));
     if (std::error_code ignored; !fs::exists(path, ignored))
-      return error("{}: missing; a response needs {} pictures (this one shows {}). Capture it again.",
+      return error("{}: missing; a response needs {} images (this one shows {}). Capture it again.",
                    path.string(), response_images().size(), response_images()[i].what());
     LIMN_TRY(cv::Mat shot, read_image(path));
     LIMN_TRY_STATUS(check_shot(shot, path, camera, shots.images.empty() ? shot : shots.images[0]));

@@ -12,31 +12,32 @@
 
 namespace limn::calib {
 
-/// The photographs of one camera while one projector showed the response images.
+/// The photographs by one camera of one projector's response images.
 struct ResponseShots {
   int projector = 0;
   int camera = 0;
   std::filesystem::path folder;   ///< response/projector0/camera0 of the captures
-  std::vector<cv::Mat> images;  ///< 8-bit grey or BGR, all alike, in the order of response_images()
+  std::vector<cv::Mat> images;  ///< 8-bit grey or BGR, all of one type, in the order of response_images()
 };
 
-/// Every projector shows the response images in turn, every camera photographs each of them, into the
-/// captures' response/ folder. What stands before the rig is to be the prototype, and nothing may move.
+/// Every projector shows the response images in turn, and every camera photographs each of them, into the
+/// captures' response/ folder. The prototype should stand in front of the rig, and nothing may move.
 Status capture_response(const CaptureSet& plan, const CaptureBackend& backend);
 
-/// Of which projectors and cameras the captures hold response images; empty when there is no response/
-/// folder. A folder in it that is named after no device is an error.
+/// A projector and a camera with response images.
 struct ResponsePair {
   int projector = 0;
   int camera = 0;
 };
+/// Lists the pairs of the captures; empty when there is no response/ folder. A subfolder that is named after
+/// no device is an error.
 Result<std::vector<ResponsePair>> response_pairs(const CaptureSet& captures);
 
-/// Reads them. A missing, damaged or additional image, another size than the camera's, or grey beside
-/// colour is an error that names the file.
+/// Reads the photographs of a pair. A missing, damaged or additional image, another size than the camera's,
+/// or grey mixed with colour is an error that names the file.
 Result<ResponseShots> read_response_shots(const CaptureSet& captures, const ResponsePair& pair);
 
-/// Levels of some pixels' channels in all images: what the fits work on.
+/// Levels of some pixels' channels in all images, the input of the fits.
 struct ResponseSamples {
   int camera = 0;
   int projector = 0;
@@ -45,16 +46,16 @@ struct ResponseSamples {
   const uchar* at(size_t sample) const { return levels.data() + sample * response_images().size(); }
 };
 
-/// Levels that the sensor may have cut off.
+/// Levels from here on may be clipped by the sensor.
 constexpr int k_clipped = 251;
 
-/// Pixels that the projector lights, evenly spread, at most `most`. Errors: none is lit (dark), or light is
-/// cut off nearly everywhere (saturated).
+/// Samples pixels that the projector illuminates, evenly spread, at most `most`. Errors: none is illuminated
+/// (dark), or nearly all are clipped (saturated).
 Result<ResponseSamples> sampled(const ResponseShots& shots, size_t most);
 
 /// Indices of the images of one role, in their order.
 std::vector<size_t> images_of(ResponseImage::Role role);
-/// Of the ramp of one channel (0 blue, 1 green, 2 red), darkest first.
+/// Indices of the ramp of one channel (0 blue, 1 green, 2 red), darkest first.
 std::vector<size_t> ramp_of(int channel);
 
 }  // namespace limn::calib

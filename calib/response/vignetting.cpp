@@ -17,13 +17,13 @@ constexpr double k_prior = 0.5;               // standard deviation of each coef
 constexpr double k_outlier = 4.7;             // Tukey's, in standard deviations of the logarithms
 constexpr int k_camera = 2, k_projector = 4;  // coefficients: r2, r4; tilt too
 
-// Pixel's place from the middle in half diagonals, as Vignetting has it.
+// Position of a pixel relative to the centre, in half diagonals, as in Vignetting.
 Eigen::Vector2d place(const Eigen::Vector2d& px, const CapturedDevice& device) {
   const Eigen::Vector2d half(device.width / 2.0, device.height / 2.0);
   return (px - half + Eigen::Vector2d::Constant(0.5)) / half.norm();
 }
 
-// The unknowns: a logarithm for each camera and projector that meet, then the cameras', then the projectors'.
+// The parameters: a logarithm for each camera and projector pair, then the cameras', then the projectors'.
 class Problem {
  public:
   Problem(std::span<const PaperLight> light,
@@ -88,7 +88,7 @@ class Problem {
     return normal;
   }
 
-  // log(model) - log(measured), and its derivatives by the unknowns.
+  // Computes log(model) - log(measured), and its derivatives by the parameters.
   double residual(const PaperLight& l, Eigen::VectorXd* row) const {
     const int pair = pairs_.at({l.camera, l.projector}), at_camera = camera_at_ + k_camera * l.camera,
               at_projector = projector_at_ + k_projector * l.projector;
@@ -143,11 +143,12 @@ Result<ShotPair> shots_of(const CaptureSet& captures, const Match& match) {
   return ShotPair{white, black};
 }
 
-constexpr double k_reach = 0.2;  // of a square, to each side of a match: holds paper even where a marker is
-constexpr double k_as_bright = 0.88;  // of the brightest tenth: paper, no edge of ink
+// Share of a square, to each side of a match: holds paper even where a marker is.
+constexpr double k_reach = 0.2;
+constexpr double k_as_bright = 0.88;  // share of the brightest tenth: paper, no edge of ink
 constexpr size_t k_least_pixels = 6;
 
-// Light of the paper around a match, white less black, and its place; nothing where it is cut off.
+// Light of the paper around a match, white minus black, and its position; nothing where it is clipped.
 std::optional<PaperLight> paper_around(const ShotPair& shots,
                                        const Decoding& decoding,
                                        const Match& match,
@@ -186,7 +187,7 @@ std::optional<PaperLight> paper_around(const ShotPair& shots,
   return mean;
 }
 
-// How large a square of the board stands in a camera's image, pixels.
+// Size of a square of the board in a camera's image, pixels.
 double square_px(const Imager& camera,
                  const Pose& world_from_board,
                  const Eigen::Vector3d& p,
@@ -198,14 +199,14 @@ double square_px(const Imager& camera,
   return std::min((*beside - *here).norm(), (*below - *here).norm());
 }
 
-// Ink is far darker than paper; what is neither lies across an edge.
+// Ink is far darker than paper; light between the two comes from an edge.
 void keep_paper(std::vector<PaperLight>* light) {
   std::map<std::pair<int, int>, std::vector<double>> values;
   for (const PaperLight& l : *light) values[{l.camera, l.projector}].push_back(l.light);
   for (auto& [pair, sorted] : values) std::sort(sorted.begin(), sorted.end());
   std::erase_if(*light, [&](const PaperLight& l) {
     const auto& sorted = values.at({l.camera, l.projector});
-    constexpr double k_paper = 0.4;  // of bright paper; ink is 0.05 to 0.15
+    constexpr double k_paper = 0.4;  // share of bright paper; ink is 0.05 to 0.15
     return l.light < k_paper * sorted[sorted.size() * 9 / 10];
   });
 }
@@ -229,7 +230,7 @@ Result<std::vector<PaperLight>> paper_light(const CaptureSet& captures,
     const std::array<int, 3> series = {match.pose, match.projector, match.camera};
     if (!shots.contains(series)) {
       LIMN_TRY(ShotPair read, shots_of(captures, match));
-      shots.clear();  // matches come series by series
+      shots.clear();  // matches are sorted by series
       shots.emplace(series, std::move(read));
     }
     const Decoding decode = decoding(*response);

@@ -10,9 +10,9 @@
 
 namespace limn::calib {
 
-/// Light of one place of white paper in one camera, less what geometry takes: (white - black) / (cosine of
-/// incidence / distance^2). What is left is one factor for the camera and projector, times the vignetting of
-/// both.
+/// Light of a point of the board's white paper in one camera, with the geometry divided out:
+/// (white - black) / (cosine of incidence / distance^2). The remaining value is one factor for the camera and
+/// projector, times the vignetting of both.
 struct PaperLight {
   int camera = 0;
   int projector = 0;
@@ -21,18 +21,18 @@ struct PaperLight {
   double light = 0;
 };
 
-/// The board's paper at the matches of a solve, from the white and black images of its poses. Cameras
-/// without a response are left out, and so is light that is cut off.
+/// Measures the board's paper at the matches of a solve, from the white and black images of its poses.
+/// Cameras without a response and clipped levels are skipped.
 Result<std::vector<PaperLight>> paper_light(const CaptureSet& captures,
                                             const Observations& observations,
                                             const Solution& solution,
                                             const std::vector<CameraResponse>& cameras);
 
-/// Vignetting of cameras and projectors, apart from each other: the board stands where it likes, so a
-/// projector's pixel is seen by different pixels of the camera. One robust fit of the logarithms. A
-/// projector's may be tilted (a shifted lens); a camera's only depends on the radius. Weak priors (a gain in
-/// a corner of 1, standard deviation 0.5) hold what the poses leave open; corner_stddev then tells. Nothing
-/// from fewer than 50 places.
+/// Estimates the vignetting of cameras and projectors. The two can be separated because the board stands in
+/// many places, so that different pixels of the camera see the same pixel of the projector. One robust fit of
+/// the logarithms. A projector's vignetting may be tilted (a shifted lens); a camera's depends on the radius
+/// only. Weak priors (a gain in a corner of 1, standard deviation 0.5) hold what the poses leave
+/// undetermined; corner_stddev is then large. With fewer than 50 points nothing is estimated.
 void add_vignetting(std::span<const PaperLight> light,
                     const std::vector<CapturedDevice>& cameras,
                     const std::vector<CapturedDevice>& projectors,

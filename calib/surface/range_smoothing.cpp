@@ -17,13 +17,13 @@ using Eigen::Vector3f;
 
 constexpr double k_nowhere = std::numeric_limits<double>::quiet_NaN();
 constexpr double k_degree = std::numbers::pi / 180;
-constexpr double k_outlier_sigmas = 5;  // of a pixel from its neighbours' fit
-constexpr int k_noise_half = 12;  // window for measuring noise: wide, so that the fit takes little of it
-constexpr int k_noise_step = 16;  // pixels between the places where it is measured
+constexpr double k_outlier_sigmas = 5;  // distance of a pixel from its neighbours' fit
+constexpr int k_noise_half = 12;  // window for measuring noise: wide, so that the fit absorbs little of it
+constexpr int k_noise_step = 16;  // pixels between the points where noise is measured
 constexpr int k_lag = 7;          // pixels over which the noise may be correlated
 
 // A quadric of the inverse range around a pixel: q = c0 + c1 x + c2 y + c3 x² + c4 xy + c5 y². Inverse ranges
-// of a plane are all but linear in the image, and a code's noise is even in them.
+// of a plane are almost linear in the image, and the code's noise is uniform in them.
 using Six = Eigen::Matrix<double, 6, 1>;
 using SixSix = Eigen::Matrix<double, 6, 6>;
 
@@ -38,7 +38,7 @@ struct Neighbour {
   double q = 0, sigma = 0, weight = 0;
 };
 
-// The pixels of the window that a path of links outwards joins with its middle.
+// The pixels of the window that are connected with its centre by a path of links that leads outwards.
 class Window {
  public:
   explicit Window(int half) : half_(half), side_(2 * half + 1), reached_(static_cast<size_t>(side_ * side_)) {
@@ -80,7 +80,7 @@ class Window {
 
 struct Fit {
   Six coefficients = Six::Zero();
-  double variance = 0;  // of the middle, were the noise independent and as stated
+  double variance = 0;  // variance of the centre, if the noise were independent and as stated
 };
 
 std::optional<Fit> fitted(const std::vector<Neighbour>& around) {
@@ -102,12 +102,13 @@ std::optional<Fit> fitted(const std::vector<Neighbour>& around) {
 
 double residual(const Neighbour& n, const Fit& fit) { return n.q - terms(n.dx, n.dy).dot(fit.coefficients); }
 
-// How large the noise is beside the stated one, place by place, and how neighbouring pixels share it.
+// The size of the noise relative to the stated one, by position, and its correlation between neighbouring
+// pixels.
 struct Noise {
-  cv::Mat scale;         // CV_32F, true standard deviation over the stated one, every k_noise_step pixels
-  double inflation = 1;  // of a smoothed middle's variance by the correlation
+  cv::Mat scale;         // CV_32F, true divided by stated standard deviation, every k_noise_step pixels
+  double inflation = 1;  // factor on the variance of a smoothed centre by the correlation
 
-  double scale_at(int x, int y) const {  // between the nodes, linear
+  double scale_at(int x, int y) const {  // linear between the nodes
     const double u = std::clamp(static_cast<double>(x) / k_noise_step - 0.5, 0.0, scale.cols - 1.0);
     const double v = std::clamp(static_cast<double>(y) / k_noise_step - 0.5, 0.0, scale.rows - 1.0);
     const int c = std::min(static_cast<int>(u), std::max(0, scale.cols - 2)),
@@ -119,7 +120,8 @@ struct Noise {
   }
 };
 
-// Variance of a full window's smoothed middle with correlated noise over that with independent noise.
+// Ratio of the variance of a full window's smoothed centre with correlated noise to that with independent
+// noise.
 double inflation_of(const cv::Mat& correlation, int half) {
   SixSix a = SixSix::Zero();
   for (int y = -half; y <= half; ++y)
@@ -138,7 +140,7 @@ double inflation_of(const cv::Mat& correlation, int half) {
   return std::max(1.0, together / alone);
 }
 
-// Sums over the pairs of a window's normalised residuals by their distance; NaN where there is none.
+// Sums over pairs of a window's normalised residuals, by their distance; NaN where there is none.
 struct Pairs {
   cv::Mat sums = cv::Mat(k_lag + 1, k_lag + 1, CV_64F, cv::Scalar(0)), counts = sums.clone();
 
@@ -153,7 +155,7 @@ struct Pairs {
             counts.at<double>(v - y, std::abs(u - x)) += 1;
           }
   }
-  // By |dx|, |dy|, 1 at 0; empty when there was too little.
+  // By |dx|, |dy|, 1 at 0; empty when there are too few.
   cv::Mat correlation() const {
     constexpr double k_least = 10000;  // residuals
     if (counts.at<double>(0, 0) < k_least || sums.at<double>(0, 0) <= 0) return {};
@@ -163,7 +165,7 @@ struct Pairs {
   }
 };
 
-// Normalised residuals around a place, as an image; empty where there is too little of one surface.
+// Normalised residuals around a pixel, as an image; empty where there is too little of one surface.
 cv::Mat residuals_around(const Ranges& ranges, const cv::Mat& links, cv::Point at, Window* window) {
   const std::vector<Neighbour>& around = window->around(ranges, links, at);
   if (static_cast<int>(around.size()) < window->area() / 2) return {};
@@ -175,8 +177,8 @@ cv::Mat residuals_around(const Ranges& ranges, const cv::Mat& links, cv::Point a
   return image;
 }
 
-// The size of residuals, outliers aside (1.4826 median for a normal distribution, no less than their RMS to 4
-// of it).
+// Robust size of residuals (1.4826 median, which is the standard deviation of a normal distribution; at least
+// the RMS of those within 4 of it).
 double size_of(const cv::Mat& residuals) {
   std::vector<double> sizes;
   for (const double r : cv::Mat_<double>(residuals))
@@ -195,7 +197,7 @@ double size_of(const cv::Mat& residuals) {
 }
 
 Noise measured_noise(const Ranges& ranges, const cv::Mat& links, int smooth_half) {
-  constexpr int k_every = 3;  // pairs from every third place: they cost the most
+  constexpr int k_every = 3;  // pairs from every third position, because they cost the most time
   Window window(k_noise_half);
   Noise noise;
   noise.scale = cv::Mat((links.rows + k_noise_step - 1) / k_noise_step,
@@ -227,7 +229,7 @@ Noise measured_noise(const Ranges& ranges, const cv::Mat& links, int smooth_half
   return noise;
 }
 
-// The fit once more with the outliers of the first one losing weight (Cauchy).
+// Repeats the fit with the outliers of the first one down-weighted (Cauchy).
 std::optional<Fit> robustly_fitted(std::vector<Neighbour> around, double scale) {
   auto fit = fitted(around);
   if (!fit) return fit;
@@ -267,7 +269,7 @@ Smoothed smoothed_at(const RangeView& view,
                      const RangeOptions& options,
                      cv::Point at,
                      Window* window) {
-  constexpr int k_least = 12;  // twice the quadric's unknowns
+  constexpr int k_least = 12;  // twice the number of the quadric's parameters
   const std::vector<Neighbour> around = window->around(ranges, links, at);
   if (static_cast<int>(around.size()) < k_least) return {};
   const double scale = noise.scale_at(at.x, at.y);
@@ -276,7 +278,7 @@ Smoothed smoothed_at(const RangeView& view,
   const Neighbour& own = around.front();
   const bool outlier = std::abs(residual(own, *fit)) > k_outlier_sigmas * scale * own.sigma;
   if (outlier && static_cast<int>(around.size()) < window->area() / 2)
-    return {};  // else its neighbours stand for it
+    return {};  // otherwise its neighbours represent it
   const auto normal = normal_of(view, at, fit->coefficients);
   if (!normal) return {};
   const Vector3d d = view.d_camera[flat(view.range.size(), at.x, at.y)].cast<double>();

@@ -8,15 +8,15 @@
 
 namespace limn::calib {
 
-/// Distance along each pixel's ray (m) and its variance, as triangulated; CV_64F, for differences of
-/// neighbours are what matters; NaN where there is none.
+/// Distance along each pixel's ray (m) and its variance, as triangulated; NaN where there is none. CV_64F,
+/// because differences between neighbours are used.
 struct Ranges {
   cv::Mat range, variance;
   explicit Ranges(const cv::Size& size)
       : range(size, CV_64F, cv::Scalar(std::numeric_limits<double>::quiet_NaN())), variance(range.clone()) {}
 };
 
-/// Index of a pixel in an array by rows.
+/// Index of a pixel in a row-major array.
 inline size_t flat(const cv::Size& size, int x, int y) {
   return static_cast<size_t>(y) * static_cast<size_t>(size.width) + static_cast<size_t>(x);
 }
@@ -26,10 +26,10 @@ constexpr std::uint8_t k_right = 1, k_down = 2;
 /// Whether two neighbours are on one surface.
 bool linked(const cv::Mat& links, cv::Point a, cv::Point b);
 
-/// Fits a quadric to the inverse ranges around each pixel, among those that `links` join with it; fills the
-/// view's range, stddev and normal, with what the fits' residuals say of the noise's true size and of its
-/// correlation between neighbours. Pixels that nothing holds, or that exceed the options' limits, stay as
-/// they are in the view.
+/// Fits a quadric to the inverse ranges around each pixel, from those that `links` connect with it. Fills the
+/// view's range, stddev and normal; the standard deviations use the noise's true size and its correlation
+/// between neighbours, as measured on the fits' residuals. Pixels with too few neighbours, or beyond the
+/// options' limits, stay unchanged in the view.
 void smooth(const Ranges& ranges, const cv::Mat& links, const RangeOptions& options, RangeView* view);
 
 }  // namespace limn::calib

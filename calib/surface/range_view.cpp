@@ -21,12 +21,15 @@ using Eigen::Vector3f;
 
 constexpr float k_no_range = std::numeric_limits<float>::quiet_NaN();
 constexpr double k_rad_per_deg = std::numbers::pi / 180;
-constexpr double k_code_sigmas = 4;      // of the epipolar residual that the code's noise may take
-constexpr double k_conflict_sigmas = 5;  // two projectors' answers differ by more: one is wrong
-constexpr double k_conflict_m = 0.5e-3;  // and by more than what a good rig leaves
-constexpr double k_step_sigmas = 4;      // of a step between neighbours that noise may take
-constexpr int k_least_piece = 30;        // pixels; smaller islands are wrong codes or unusable
-// Directions of a projector's pixels from a coarse map: a start for triangulation needs no more.
+// Standard deviations of the epipolar residual that the code's noise may explain.
+constexpr double k_code_sigmas = 4;
+// Standard deviations; projectors that differ by more: one of them is wrong.
+constexpr double k_conflict_sigmas = 5;
+constexpr double k_conflict_m = 0.5e-3;  // if they also differ by more than in a good rig
+// Standard deviations of a step between neighbours that noise may explain.
+constexpr double k_step_sigmas = 4;
+constexpr int k_least_piece = 30;  // pixels; smaller islands are wrong codes or useless
+// Directions of a projector's pixels from a coarse map; accurate enough to start a triangulation.
 class CoarseRays {
  public:
   explicit CoarseRays(const Imager& imager)
@@ -125,7 +128,7 @@ std::vector<Reading> read_all(const RangeView& view, const DecodedBy& seen, cons
   return readings;
 }
 
-// The answers of all projectors, weighted; where two contradict each other there is none.
+// The results of all projectors, weighted; none where two contradict each other.
 Ranges combined(const RangeView& view,
                 std::span<const DecodedBy> seen,
                 const RangeOptions& options,
@@ -166,7 +169,7 @@ Ranges combined(const RangeView& view,
   return all;
 }
 
-// Whether two neighbours can be one surface: the step is no larger than an oblique surface and noise make it.
+// Whether two neighbours can be one surface: an oblique surface and noise explain the step between them.
 bool joined(const RangeView& view, const Ranges& ranges, cv::Point a, cv::Point b, double steepest) {
   const double range_a = ranges.range.at<double>(a), range_b = ranges.range.at<double>(b);
   if (std::isnan(range_a) || std::isnan(range_b)) return false;
@@ -191,7 +194,7 @@ cv::Mat links_of(const RangeView& view, const Ranges& ranges, double max_inciden
   return links;
 }
 
-// Pixels beside a step in depth see both sides: their code is of one, the other, or neither.
+// Removes pixels beside a step in depth, which see both sides: their code is of one, the other, or neither.
 int drop_edges(const cv::Mat& links, Ranges* ranges) {
   cv::Mat edge(links.size(), CV_8U, cv::Scalar(0));
   const auto look = [&](cv::Point a, cv::Point b) {
@@ -211,7 +214,8 @@ int drop_edges(const cv::Mat& links, Ranges* ranges) {
 
 cv::Mat valid_in(const cv::Mat& numbers) { return numbers == numbers; }  // NaN differs from itself
 
-// Pixels at the rim of a larger gap (3x3 pixels and more) see the surface with a part of their area only.
+// Removes pixels at the rim of a larger gap (3x3 pixels and more), which see the surface with only a part of
+// their area.
 int drop_rims(Ranges* ranges) {
   const cv::Mat square = cv::Mat::ones(3, 3, CV_8U);
   const cv::Mat valid = valid_in(ranges->range);
@@ -223,7 +227,7 @@ int drop_rims(Ranges* ranges) {
   return cv::countNonZero(rim);
 }
 
-// Connected pixels get one number, from 1; 0 where `valid` is 0.
+// Gives connected pixels one number, from 1; 0 where `valid` is 0.
 cv::Mat labelled(const cv::Mat& links, const cv::Mat& valid, std::vector<int>* pixels) {
   cv::Mat label(links.size(), CV_32S, cv::Scalar(0));
   std::vector<cv::Point> stack;

@@ -18,19 +18,21 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double k_facing = 0.5;           // cosine; scan and mesh turn the same way within 60 degrees
-constexpr double k_least_scale_m = 20e-6;  // of the residuals; below it weights would hang on rounding
-constexpr double k_tukey = 4.685;          // 95 % efficient for normal residuals
-constexpr double k_sideways = 0.5;         // of a residual: further off along the surface lies beyond its end
+constexpr double k_facing = 0.5;  // cosine; scan and mesh face the same way within 60 degrees
+// Scale of the residuals; below it weights would depend on rounding.
+constexpr double k_least_scale_m = 20e-6;
+constexpr double k_tukey = 4.685;  // 95 % efficient for normal residuals
+// Share of a residual: a point further off along the surface lies beyond the mesh's end.
+constexpr double k_sideways = 0.5;
 constexpr double k_sideways_m = 0.5e-3;
-constexpr int k_least_points = 30;      // for six unknowns
-constexpr double k_settled_m = 1e-7;    // step, at the mesh's radius
-constexpr double k_held = 1e-6;         // share of the largest eigenvalue; below it rounding speaks
-constexpr double k_sensitive = 0.03;    // RMS residual per step; below, a tenth of a millimetre of form moves
-                                        // the fit by 3 mm
+constexpr int k_least_points = 30;    // for six parameters
+constexpr double k_settled_m = 1e-7;  // step, at the mesh's radius
+constexpr double k_held = 1e-6;       // share of the largest eigenvalue; below it rounding dominates
+// RMS residual per step; below it, a form error of a tenth of a millimetre moves the fit by 3 mm.
+constexpr double k_sensitive = 0.03;
 constexpr double k_loose_m = 0.5e-3;    // standard deviation that deserves a warning
-constexpr double k_free_m = 1;          // standard deviation given to what is free
-constexpr double k_cluster = 1 / 20.0;  // of the mesh's diagonal: errors are taken as shared within it
+constexpr double k_free_m = 1;          // standard deviation along free directions
+constexpr double k_cluster = 1 / 20.0;  // share of the mesh's diagonal: errors within it count as shared
 
 double diagonal(const std::vector<Eigen::Vector3f>& positions) {
   Eigen::AlignedBox3f box;
@@ -48,7 +50,7 @@ Cell cell_of(const Vector3d& p, double size) {
           static_cast<int>(std::floor(p.z() / size))};
 }
 
-// One point of each cell: the surest.
+// One point of each cell: the most accurate.
 std::vector<ScanPoint> thinned(const scene::ScanSurface& scan, double cell) {
   std::map<Cell, std::size_t> chosen;
   for (std::size_t i = 0; i < scan.positions.size(); ++i) {
@@ -81,9 +83,10 @@ std::optional<Off> off_mesh(const scene::MeshBvh& index,
 }
 
 struct Row {
-  Vector6d jacobian;  // of the residual by boxplus's delta with rotations about `pivot`, times radius
+  // Derivative of the residual by boxplus's perturbation with rotations about `pivot`, times radius.
+  Vector6d jacobian;
   double residual = 0, weight = 1;
-  double slope = 1;  // of weight x residual by the residual
+  double slope = 1;  // derivative of weight x residual by the residual
   Vector3d p;        // world
 };
 
@@ -95,8 +98,8 @@ double median_size(const std::vector<Row>& rows) {
   return *middle;
 }
 
-// What rotations are measured by: about the middle of the points, in metres at their radius, so that all six
-// unknowns are of one kind.
+// The frame and unit of rotations: about the centre of the points, in metres at their radius, so that all six
+// parameters have the same unit.
 struct Gauge {
   Vector3d pivot = Vector3d::Zero();
   double radius = 1;
@@ -111,7 +114,7 @@ Gauge gauge_of(const std::vector<Row>& rows) {
   return gauge;
 }
 
-// Residuals of the points near the mesh, weighted.
+// Weighted residuals of the points near the mesh.
 std::vector<Row> rows_at(const scene::MeshBvh& index,
                          const std::vector<ScanPoint>& points,
                          const Pose& world_from_prototype,
@@ -143,7 +146,7 @@ void add_rotations(const Gauge& gauge, std::vector<Row>* rows) {
   }
 }
 
-// Tukey's weights; the scale they were made with.
+// Applies Tukey's weights; returns their scale.
 double weigh(std::vector<Row>* rows) {
   const double scale = std::max(k_least_scale_m, 1.4826 * median_size(*rows));
   for (Row& row : *rows) {
@@ -161,7 +164,7 @@ Matrix6d information_of(const std::vector<Row>& rows) {
   return sum;
 }
 
-// The step that lessens the residuals, nothing along what is free; in the gauge.
+// The step that reduces the residuals, in the gauge; zero along free directions.
 Vector6d step_of(const std::vector<Row>& rows) {
   Vector6d gradient = Vector6d::Zero();
   for (const Row& row : rows) gradient += row.weight * row.residual * row.jacobian;
@@ -175,7 +178,8 @@ Vector6d step_of(const std::vector<Row>& rows) {
   return step;
 }
 
-// boxplus's delta of a step in the gauge: the rotation about the pivot also carries the prototype's origin.
+// boxplus's perturbation of a step in the gauge: the rotation about the pivot also moves the prototype's
+// origin.
 Eigen::Matrix<double, 6, 6> delta_from_gauge(const Gauge& gauge, const Pose& world_from_prototype) {
   Matrix6d m = Matrix6d::Zero();
   m.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() / gauge.radius;
@@ -193,7 +197,7 @@ Pose moved(const Pose& world_from_prototype, const Gauge& gauge, const Vector6d&
               gauge.pivot + turn * (world_from_prototype.translation - gauge.pivot) + step.tail<3>());
 }
 
-// The fit itself.
+// The state of the fit.
 struct Fitted {
   Pose pose;
   Gauge gauge;
@@ -207,8 +211,9 @@ std::optional<Fitted> fitted(const scene::MeshBvh& index,
                              const Pose& start,
                              double reach,
                              int max_iterations) {
-  constexpr double k_reach_scales = 8;  // of the residuals: what is beyond is something else
-  constexpr double k_shrink = 0.8;      // of the reach a step at most: not faster than the fit settles
+  constexpr double k_reach_scales = 8;  // in scales of the residuals: points beyond belong to something else
+  // Smallest ratio of the reach from step to step: it must not shrink faster than the fit converges.
+  constexpr double k_shrink = 0.8;
   constexpr double k_least_reach_m = 3e-3;
   Fitted fit;
   fit.pose = start;
@@ -231,8 +236,8 @@ std::optional<Fitted> fitted(const scene::MeshBvh& index,
   return fit;
 }
 
-// Cluster-robust (sandwich) covariance in the gauge, what is free apart: how the residuals' sums scatter,
-// through the slopes by which a step changes these sums (Huber 1967).
+// Cluster-robust (sandwich) covariance in the gauge, without free directions: from the scatter of the
+// residuals' sums and the derivatives of these sums by a step (Huber 1967).
 Matrix6d covariance_of(const Fitted& fit, double cluster) {
   Matrix6d slopes = Matrix6d::Zero();
   for (const Row& row : fit.rows) slopes += row.slope * row.jacobian * row.jacobian.transpose();
@@ -264,7 +269,8 @@ std::string axis_text(const Vector3d& d) {
   return fmt::format("({:.2f}, {:.2f}, {:.2f})", d.x(), d.y(), d.z());
 }
 
-// Directions of a subspace that lie in the first (offset 0: turns) or last three (3: slides) unknowns.
+// Directions of a subspace within the first (offset 0: rotations) or the last three (3: translations)
+// parameters.
 std::vector<Vector3d> pure(const Eigen::MatrixXd& space, int offset) {
   constexpr double k_pure = 0.9;
   const Eigen::MatrixXd part = space.middleRows(offset, 3);
@@ -275,7 +281,7 @@ std::vector<Vector3d> pure(const Eigen::MatrixXd& space, int offset) {
   return found;
 }
 
-// What the points' normals do not hold, or only loosely, named in the prototype's frame.
+// Directions that the points' normals do not determine, or only weakly, named in the prototype's frame.
 std::vector<std::string> free_directions(const Fitted& fit, const Matrix6d& covariance) {
   const Matrix6d information = information_of(fit.rows);
   double weights = 0;
@@ -299,7 +305,7 @@ std::vector<std::string> free_directions(const Fitted& fit, const Matrix6d& cova
   for (std::size_t i = 0; i < loose.size() && names.size() < loose.size(); ++i) {
     const Vector3d turn = prototype_from_world * loose[i].head<3>(),
                    slide = prototype_from_world * loose[i].tail<3>();
-    if (turn.norm() > 0.95 || slide.norm() > 0.95) continue;  // named above
+    if (turn.norm() > 0.95 || slide.norm() > 0.95) continue;  // already named
     names.push_back(fmt::format("turn about {} with a slide along {}", axis_text(turn.normalized()),
                                 axis_text(slide.normalized())));
   }
@@ -325,7 +331,7 @@ Registration alignment_of(const Fitted& fit, double mesh_diagonal) {
   return result;
 }
 
-// Truncated distances from the mesh on a grid around it, for many quick looks.
+// Truncated distances from the mesh on a grid around it, for fast tests of many poses.
 class DistanceField {
  public:
   DistanceField(const scene::Mesh& mesh, const scene::MeshBvh& index, double limit) : limit_(limit) {
@@ -372,7 +378,7 @@ Eigen::Quaterniond spread_rotation(int i, int count) {
   return {big_r * std::cos(beta), r * std::sin(alpha), r * std::cos(alpha), big_r * std::sin(beta)};
 }
 
-// Middles and areas of the mesh's triangles.
+// Centres and areas of the mesh's triangles.
 struct Patch {
   Vector3d p, n;
   double area = 0;
@@ -388,7 +394,7 @@ std::vector<Patch> patches_of(const scene::Mesh& mesh) {
   return patches;
 }
 
-// The middle of what an onlooker sees from direction d, were nothing hidden.
+// The centre of the surface that faces direction d, ignoring occlusion.
 Vector3d middle_seen(const std::vector<Patch>& patches, const Vector3d& d) {
   Vector3d sum = Vector3d::Zero();
   double weights = 0;
@@ -433,7 +439,7 @@ std::vector<Candidate> coarse_poses(const std::vector<Patch>& patches,
                                     const DistanceField& field,
                                     const std::vector<ScanPoint>& points,
                                     double mesh_diagonal) {
-  constexpr int k_turns = 1200;  // some 20 degrees apart
+  constexpr int k_turns = 1200;  // about 20 degrees apart
   constexpr std::size_t k_quick_points = 250, k_kept = 30;
   const std::vector<ScanPoint> few = every(points, k_quick_points);
   Vector3d middle = Vector3d::Zero(), d_scanner = Vector3d::Zero();
@@ -471,7 +477,7 @@ bool same_pose(const Pose& a, const Pose& b, const Vector3d& p, double mesh_diag
          (a * p - b * p).norm() < k_same_place * mesh_diagonal;
 }
 
-// Points of the scan within `within` of the mesh: what a pose explains.
+// Number of points of the scan within `within` of the mesh.
 int explained(const scene::MeshBvh& index,
               const std::vector<ScanPoint>& points,
               const Pose& pose,
@@ -498,8 +504,8 @@ Result<Registration> refined_registration(const scene::Mesh& mesh,
   const double size = diagonal(mesh.positions);
   const auto points = thinned(scan, options.cell * size);
   constexpr int k_goes = 3;
-  constexpr double k_narrower =
-      0.25;  // reach of another go: from far off, far points slow the last millimetres
+  // Reach of the next attempt as a share: far points slow down the last millimetres.
+  constexpr double k_narrower = 0.25;
   double reach = options.reach * size;
   auto fit = fitted(index, points, start, reach, options.max_iterations);
   for (int go = 1; go < k_goes && fit && fit->iterations == options.max_iterations; ++go) {
@@ -508,9 +514,8 @@ Result<Registration> refined_registration(const scene::Mesh& mesh,
   }
   if (!fit)
     return error(
-        "expected at least {} scan points within {} of the mesh at the start and facing as it does, found "
-        "fewer. "
-        "Check the start and the units; a mesh whose triangles are inside out fits nothing.",
+        "expected at least {} scan points within {} of the mesh at the start that face the same way, found "
+        "fewer. Check the start and the units; a mesh whose triangles are inside out does not fit.",
         k_least_points, size_text(options.reach * size));
   return alignment_of(*fit, size);
 }
@@ -530,7 +535,9 @@ Result<Pose> pose_from_picks(const std::vector<Pick>& picks, double max_apart_m)
        {Eigen::Matrix3d(da * da.transpose()), Eigen::Matrix3d(db * db.transpose())}) {
     const Eigen::Vector3d squares = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvalues();
     if (!(std::sqrt(std::max(0.0, squares[1])) > 0.02 * std::sqrt(squares[2])))
-      return error("the picked points lie on one line: the turn about it is open. Pick a point beside it.");
+      return error(
+          "the picked points lie on one line: the rotation about it is undetermined. Pick a point beside "
+          "it.");
   }
   const Eigen::Matrix3d rotation = nearest_rotation(db * da.transpose());
   const Pose pose(rotation, mean_b - rotation * mean_a);
@@ -539,14 +546,13 @@ Result<Pose> pose_from_picks(const std::vector<Pick>& picks, double max_apart_m)
   if (apart > max_apart_m)
     return error(
         "pair {}: after the best fit of all {} pairs its points are {:.0f} mm apart. Check this pair, the "
-        "order, and the "
-        "units of the CAD points.",
+        "order, and the units of the CAD points.",
         worst, picks.size(), 1e3 * apart);
   return pose;
 }
 
 Status comparable_sizes(const scene::Mesh& mesh, const scene::ScanSurface& scan) {
-  constexpr double k_plausible = 50;  // times; a unit mistaken is 25 and more, a room around a part less
+  constexpr double k_plausible = 50;  // ratio; a wrong unit gives 25 or more, a room around a part less
   const double cad = diagonal(mesh.positions), seen = diagonal(scan.positions);
   if (!(cad > 0) || !(seen > 0))
     return error("expected a mesh and a scan with extent, found sizes {} m and {} m.", cad, seen);
@@ -554,7 +560,7 @@ Status comparable_sizes(const scene::Mesh& mesh, const scene::ScanSurface& scan)
   if (ratio < k_plausible && ratio > 1 / k_plausible) return {};
   const bool larger = ratio > 1;
   const double factor = larger ? ratio : 1 / ratio;
-  // a round factor when a unit explains it: a scan holds one to some times the prototype's size
+  // A round factor when a unit explains it: a scan is one to some times as large as the prototype.
   const bool thousand = factor > 150 && factor < 5000;
   return error("the CAD is {} times {} than the scan ({} against {}): check --units.",
                thousand ? std::string("about 1000") : fmt::format("{:.0f}", factor),
@@ -567,7 +573,8 @@ Result<GlobalRegistration> global_registration(const scene::Mesh& mesh,
                              const RegistrationOptions& options) {
   constexpr std::size_t k_pieces = 4, k_short_points = 160, k_long_points = 600, k_long = 4;
   constexpr int k_short_steps = 15;
-  constexpr double k_largest = 1.3, k_smallest = 0.2;  // of the mesh's diagonal; a larger piece is a wall
+  // Share of the mesh's diagonal; a larger piece is a wall.
+  constexpr double k_largest = 1.3, k_smallest = 0.2;
   const double size = diagonal(mesh.positions);
   const DistanceField field(mesh, index, 0.1 * size);
   const std::vector<Patch> patches = patches_of(mesh);
@@ -611,8 +618,8 @@ Result<GlobalRegistration> global_registration(const scene::Mesh& mesh,
   const double least = 0.02 * static_cast<double>(all.size());
   if (fits.empty() || fits[0].explained < least)
     return error(
-        "no place found where the mesh lies on the scan. Give a start: --start, --points, or markers; check "
-        "--units.");
+        "found no pose in which the mesh lies on the scan. Give a start: --start, --points, or markers; "
+        "check --units.");
   GlobalRegistration found;
   LIMN_TRY(found.registration,
            refined_registration(mesh, index, scan, fits[0].fit.pose,

@@ -13,11 +13,11 @@
 namespace limn::calib {
 namespace {
 
-constexpr double k_changed_m =
-    1e-3;  // a pixel's range that differs by more (and 5 sigma) shows something else
-constexpr double k_changed_share = 0.05;   // of the pixels: more than edges and noise explain
+// A pixel's range that differs by more (and by 5 sigma) shows something else.
+constexpr double k_changed_m = 1e-3;
+constexpr double k_changed_share = 0.05;   // share of the pixels: more than edges and noise explain
 constexpr double k_bad_epipolar_px = 0.7;  // RMS; a good rig leaves 0.27 px (docs/measurements.md)
-constexpr double k_other_rig_share = 0.5;  // of the decoded pixels whose rays pass each other
+constexpr double k_other_rig_share = 0.5;  // share of the decoded pixels whose rays do not meet
 
 double seconds_since(std::chrono::steady_clock::time_point begun) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
@@ -39,12 +39,12 @@ Result<std::vector<const Imager*>> chosen(const std::vector<CapturedDevice>& dev
                                  [&](const Imager& imager) { return imager.name == device.name; });
     if (at == imagers.end())
       return error(
-          "the captures' {} {}: expected it in the rig, found there: {}. Take the rig that took these "
+          "the captures' {} {}: expected it in the rig, found there: {}. Use the rig that took these "
           "captures.",
           kind, device.name, names_of(imagers));
     if (at->width != device.width || at->height != device.height)
       return error(
-          "{} {}: the captures' pictures are {}x{}, the rig was calibrated at {}x{}. Capture at that size, "
+          "{} {}: the captures' images are {}x{}, but the rig was calibrated at {}x{}. Capture at that size, "
           "or calibrate again.",
           kind, device.name, device.width, device.height, at->width, at->height);
     found.push_back(&*at);
@@ -78,7 +78,7 @@ Result<std::vector<const CapturedPose*>> scene_poses(const CaptureSet& captures,
   }
   if (poses.empty())
     return error(
-        "{}: all {} poses show the board: there is nothing to scan. Put the prototype in its place and "
+        "{}: all {} poses show the board: there is nothing to scan. Put the prototype in place and "
         "capture a pose, or name poses with --poses.",
         captures.folder.string(), captures.poses.size());
   return poses;
@@ -90,7 +90,7 @@ void keep_pieces(int count, RangeView* view) {
   restrict_to((piece > 0) & (piece <= count), view);
 }
 
-// What one camera saw in one pose, by all projectors.
+// The surface that one camera measured in one pose with all projectors.
 Result<RangeView> view_of(const CaptureSet& captures,
                           const CapturedPose& pose,
                           size_t camera,
@@ -113,7 +113,7 @@ Result<RangeView> view_of(const CaptureSet& captures,
   if (options.pieces > 0)
     keep_pieces(options.pieces, &view);
   else if (options.moved)
-    keep_pieces(1, &view);  // what stands still must not be laid
+    keep_pieces(1, &view);  // objects that stood still must not be registered
   scan->seconds_range += seconds_since(decoded_at);
   return view;
 }
@@ -123,20 +123,19 @@ Status plausible(const ScanView& seen, std::vector<std::string>* warnings) {
   const auto decoded = static_cast<double>(counts.decoded);
   if (counts.epipolar > k_other_rig_share * decoded)
     return error(
-        "{} {}: camera and projector rays pass each other by {:.1f} pixels (median): this is not the rig "
-        "that "
-        "took the captures, or it has been nudged since. Calibrate again.",
+        "{} {}: camera and projector rays miss each other by {:.1f} pixels (median): this is not the rig "
+        "that took the captures, or a device has been moved since. Calibrate again.",
         seen.pose, seen.camera, counts.epipolar_median_px);
   if (counts.epipolar_rms_px > k_bad_epipolar_px)
-    warnings->push_back(
-        fmt::format("{} {}: camera and projector rays pass each other by {:.2f} pixels RMS; a good rig "
-                    "leaves 0.25. Has something been nudged?",
-                    seen.pose, seen.camera, counts.epipolar_rms_px));
+    warnings->push_back(fmt::format(
+        "{} {}: camera and projector rays miss each other by {:.2f} pixels RMS; in a good rig it is "
+        "0.25. Has a device been moved?",
+        seen.pose, seen.camera, counts.epipolar_rms_px));
   if (counts.conflicts > 0.02 * counts.kept)
-    warnings->push_back(
-        fmt::format("{} {}: the projectors contradict each other in {} pixels ({} agree or stand "
-                    "alone): has one of them been nudged?",
-                    seen.pose, seen.camera, counts.conflicts, counts.kept));
+    warnings->push_back(fmt::format(
+        "{} {}: the projectors contradict each other in {} pixels ({} agree or are seen by one projector "
+        "only): has one of them been moved?",
+        seen.pose, seen.camera, counts.conflicts, counts.kept));
   return {};
 }
 
@@ -162,17 +161,17 @@ Status standing_still(const std::vector<ScanView>& views) {
     const double share = changed_share(first.view, view.view);
     if (share > k_changed_share)
       return error(
-          "{}: {:.0f} % of {}'s pixels lie elsewhere than in {}: the prototype was moved between these "
-          "poses. Say --moved to lay the poses onto each other, or choose with --poses.",
+          "{}: {:.0f} % of {}'s pixels have another distance than in {}: the prototype was moved between "
+          "these poses. Use --moved to register the poses to each other, or choose poses with --poses.",
           view.pose, 100 * share, view.camera, first.pose);
   }
   return {};
 }
 
-constexpr double k_same_m = 2e-3;  // of two poses' surfaces, where they are one
-constexpr double k_laid_share =
-    0.7;  // of a pose's points on the first: nearly all but what only one pose saw
-constexpr double k_least_share = 0.3;  // less: nothing says that these are one thing
+constexpr double k_same_m = 2e-3;  // distance of two poses' surfaces where they are the same
+// Share of a pose's points on the first pose's surface: all except those that only one pose saw.
+constexpr double k_laid_share = 0.7;
+constexpr double k_least_share = 0.3;  // with less it is not certain that both are the same object
 
 scene::Mesh mesh_of(const scene::ScanSurface& surface) {
   scene::Mesh mesh;
@@ -183,7 +182,7 @@ scene::Mesh mesh_of(const scene::ScanSurface& surface) {
   return mesh;
 }
 
-// Views `from` to `to` as one surface.
+// Joins the views `from` to `to` to one surface.
 scene::ScanSurface joint_surface(const std::vector<ScanView>& views, size_t from, size_t to) {
   scene::ScanSurface all;
   for (size_t i = from; i < to; ++i) {
@@ -205,7 +204,7 @@ double share_laid(const scene::MeshBvh& index,
   return static_cast<double>(on) / static_cast<double>(std::max<size_t>(1, off.size()));
 }
 
-// As if the prototype had stood still and the camera had moved.
+// Moves a view as if the prototype had stood still and the camera had moved.
 void carry(const Pose& first_from_pose, ScanView* seen) {
   seen->first_from_pose = first_from_pose;
   seen->view.camera.imager_from_world = seen->view.camera.imager_from_world * first_from_pose.inverse();
@@ -215,7 +214,8 @@ void carry(const Pose& first_from_pose, ScanView* seen) {
   }
 }
 
-// Lays the surfaces of every later pose onto the first one's: from where they are, else from anywhere.
+// Registers the surfaces of every later pose to the first pose's: starting from where they are, else
+// globally.
 Status lay_onto_first(Scan* scan) {
   const auto same_pose = [&](size_t i) {
     size_t end = i;
@@ -225,7 +225,8 @@ Status lay_onto_first(Scan* scan) {
   const size_t first_end = same_pose(0);
   const scene::ScanSurface first = joint_surface(scan->views, 0, first_end);
   if (first.triangles.empty())
-    return error("{}: no surface was seen to lay the other poses onto.", scan->views[0].pose);
+    return error("{}: no surface was measured in this pose, so the other poses cannot be registered to it.",
+                 scan->views[0].pose);
   const scene::Mesh mesh = mesh_of(first);
   const scene::MeshBvh index(mesh);
   for (size_t begin = first_end; begin < scan->views.size(); begin = same_pose(begin)) {
@@ -246,14 +247,13 @@ Status lay_onto_first(Scan* scan) {
     }
     if (share < k_least_share)
       return error(
-          "{}: only {:.0f} % of its surface can be laid onto {}'s. Leave out what did not move with the "
-          "prototype "
-          "(--near, --far, --pieces), or the pose (--poses).",
+          "{}: only {:.0f} % of its surface can be registered to {}'s. Exclude what did not move with the "
+          "prototype (--near, --far, --pieces), or the pose (--poses).",
           name, 100 * share, scan->views[0].pose);
     for (const std::string& free : best.free_directions)
       scan->warnings.push_back(
-          fmt::format("{}: its shape does not hold it against a {} (world axes): views may be smeared "
-                      "that way.",
+          fmt::format("{}: its shape does not determine a {} (world axes): views may be blurred "
+                      "in that direction.",
                       name, free));
     const size_t end = same_pose(begin);
     for (size_t i = begin; i < end; ++i) carry(best.world_from_prototype.inverse(), &scan->views[i]);
@@ -282,12 +282,12 @@ Status nothing_seen(const CaptureSet& captures, const Scan& scan) {
   for (const ScanView& seen : scan.views) decoded += seen.view.counts.decoded;
   if (decoded == 0)
     return error(
-        "{}: no camera pixel could be decoded in {} views: no projector's light was seen. Look at the "
-        "pictures: are they dark, or out of focus?",
+        "{}: no camera pixel could be decoded in {} views: no projector's light was seen. Check the "
+        "images: are they dark, or out of focus?",
         captures.folder.string(), scan.views.size());
   return error(
-      "{}: {} camera pixels were decoded, but no surface is left of them (rays too parallel, too unsure, too "
-      "steep, or beyond the distance limits). Look at --near and --far and at the rig's report.",
+      "{}: {} camera pixels were decoded, but no surface is left of them (rays too parallel, too uncertain, "
+      "too steep, or beyond the distance limits). Check --near and --far and the rig's report.",
       captures.folder.string(), decoded);
 }
 

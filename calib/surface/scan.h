@@ -17,25 +17,25 @@ struct ScanOptions {
   DecodeOptions decode;
   /// Names of the poses to use; empty: all without a visible board.
   std::vector<std::string> poses;
-  /// The prototype stood elsewhere in every pose: each is laid onto the first by its shape. `pieces` is then
-  /// 1 unless it is more.
+  /// The prototype stood in another place in every pose: each pose is registered to the first by its shape.
+  /// `pieces` is then at least 1.
   bool moved = false;
-  /// Keep that many of the largest connected pieces of each view, after the distance limits; 0: all.
+  /// Keep this many of the largest connected pieces of each view, after the distance limits; 0: all.
   int pieces = 0;
-  /// Of the mesh, m; 0: one and a half times the distance of neighbouring points.
+  /// Voxel size of the mesh, m; 0: one and a half times the distance of neighbouring points.
   double voxel_m = 0;
-  /// Smaller pieces of the mesh are dropped.
+  /// Smaller pieces of the mesh are removed, m².
   double least_area_m2 = 1e-4;
 };
 
-/// Which camera and pose a view is of, and where the pose was laid when the prototype moved.
+/// A view with its camera and pose, and where the pose was registered when the prototype moved.
 struct ScanView {
   std::string camera, pose;
   RangeView view;
-  Pose first_from_pose;  ///< the view's camera has been carried along
+  Pose first_from_pose;  ///< already applied to the view's camera
 };
 
-/// What the captures say of the prototype's surface, in the rig's world (of the first pose when it moved).
+/// The prototype's measured surface, in the rig's world (as in the first pose when it moved).
 struct Scan {
   std::vector<ScanView> views;
   scene::ScanSurface points;
@@ -47,8 +47,8 @@ struct Scan {
 };
 
 /// Measures the surface from every scene pose of the captures. Errors: a camera or projector that the rig
-/// lacks or that has another size there, no pose without a board, nothing seen, rays that pass each other
-/// (another rig's captures), a prototype that moved between poses when `moved` is not said.
+/// lacks or that has another size there, no pose without a board, nothing measured, rays that do not meet
+/// (another rig's captures), a prototype that moved between poses without the option `moved`.
 Result<Scan> scan_captures(const CaptureSet& captures, const Rig& rig, const ScanOptions& options = {});
 
 }  // namespace limn::calib

@@ -8,13 +8,13 @@
 namespace limn::calib {
 namespace {
 
-constexpr int k_most_steps = 8;      // from a midpoint two suffice
-constexpr double k_settled = 1e-9;   // m; a thousandth of what a pixel's noise moves
+constexpr int k_most_steps = 8;      // two are enough from a midpoint
+constexpr double k_settled = 1e-9;   // m; a thousandth of the movement by a pixel's noise
 constexpr double k_parallel = 1e-6;  // sin² of 0.06 degrees
 
 using Jacobian = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
 
-// Residual and derivative of one imager, in standard deviations.
+// Residual and derivatives of one imager, in standard deviations.
 bool look(const Imager& imager,
           const MeasuredPixel& measured,
           const Eigen::Vector3d& p_world,

@@ -15,12 +15,12 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::Vector3i;
 
-constexpr double k_same_turn = 0.5;   // cosine of 60 degrees: a thin thing's two sides differ by more
-constexpr double k_agree_sigmas = 5;  // two views' answers differ by more: they see different things
-constexpr double k_agree_m = 1e-3;    // and by more than what a usable rig leaves between its cameras
-constexpr double k_truncation = 3;    // voxels: signed distances further off are another surface's
+constexpr double k_same_turn = 0.5;   // cosine of 60 degrees: the two sides of a thin object differ by more
+constexpr double k_agree_sigmas = 5;  // views that differ by more measured different surfaces
+constexpr double k_agree_m = 1e-3;    // if they also differ by more than a usable rig's cameras do
+constexpr double k_truncation = 3;    // voxels: larger signed distances belong to another surface
 
-// A grid node's place as one number; 21 bits an axis are 2 million voxels.
+// A grid node's position as one number; 21 bits for each axis are 2 million voxels.
 std::uint64_t key_of(const Vector3i& at) {
   constexpr std::int64_t k_middle = 1 << 20;
   const auto part = [](int i) { return static_cast<std::uint64_t>(i + k_middle) & 0x1FFFFF; };
@@ -38,7 +38,7 @@ void make_unique(std::vector<std::uint64_t>* keys) {
   keys->erase(std::unique(keys->begin(), keys->end()), keys->end());
 }
 
-// Cells that hold points, and their neighbours by faces: a surface between points is in one of them.
+// Cells that contain points, and their neighbours by faces: a surface between points is in one of them.
 std::vector<std::uint64_t> cells_near(std::span<const RangeView> views, double voxel) {
   std::vector<std::uint64_t> cells;
   for (const RangeView& view : views)
@@ -61,9 +61,9 @@ Vector3i corner(int i) { return {i & 1, i >> 1 & 1, i >> 2 & 1}; }
 // Signed distances at the corners of cells.
 struct Grid {
   double voxel = 0;
-  std::unordered_map<std::uint64_t, std::uint32_t> number;  // of a node
+  std::unordered_map<std::uint64_t, std::uint32_t> number;  // index of a node
   std::vector<std::uint64_t> nodes;
-  std::vector<float> distance;  // outside positive; NaN unknown
+  std::vector<float> distance;  // positive outside; NaN unknown
 };
 
 Grid distances_at(const std::vector<std::uint64_t>& cells, std::span<const RangeView> views, double voxel) {
@@ -88,7 +88,7 @@ Grid distances_at(const std::vector<std::uint64_t>& cells, std::span<const Range
   return grid;
 }
 
-// The middle of the places where the surface crosses a cell's edges; nullopt where it does not cross the cell
+// The mean of the points where the surface crosses a cell's edges; nullopt where it does not cross the cell
 // or a corner is unknown.
 std::optional<Vector3d> vertex_in(const Grid& grid, const Vector3i& cell) {
   std::array<double, 8> d{};
@@ -115,8 +115,8 @@ std::optional<Vector3d> vertex_in(const Grid& grid, const Vector3i& cell) {
 
 using CellVertices = std::unordered_map<std::uint64_t, std::uint32_t>;
 
-// The quadrilateral around a grid edge whose ends are on different sides, as two triangles along the shorter
-// diagonal, counter-clockwise from outside.
+// Adds the quadrilateral around a grid edge whose ends are on different sides, as two triangles along the
+// shorter diagonal, counter-clockwise from outside.
 void add_quad(
     const Vector3i& node, int axis, bool outward, const CellVertices& vertices, scene::ScanSurface* mesh) {
   const Vector3i u = Vector3i::Unit((axis + 1) % 3), v = Vector3i::Unit((axis + 2) % 3);
@@ -161,7 +161,7 @@ scene::ScanSurface net_of(const Grid& grid, const std::vector<std::uint64_t>& ce
   return mesh;
 }
 
-// Every vertex to where the views see the surface; vertices that none sees go.
+// Moves every vertex to the surface that the views measured; vertices without one are removed.
 scene::ScanSurface on_the_views(const scene::ScanSurface& mesh, std::span<const RangeView> views, double reach) {
   scene::ScanSurface out = mesh;
   out.normals.assign(mesh.positions.size(), Eigen::Vector3f::Zero());
@@ -236,7 +236,7 @@ Agreement agreement(const RangeView& a, const RangeView& b, double reach, int sa
 double point_spacing(std::span<const RangeView> views) {
   std::vector<double> distances;
   for (const RangeView& view : views)
-    for (int y = 0; y < view.range.rows; y += 7)  // a sample
+    for (int y = 0; y < view.range.rows; y += 7)  // every seventh row
       for (int x = 0; x + 1 < view.range.cols; x += 7)
         if (view.has(x, y) && view.has(x + 1, y))
           distances.push_back((view.p_world(x, y) - view.p_world(x + 1, y)).norm());

@@ -15,7 +15,7 @@ using namespace worlds;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// Words on a world whose solution is the truth and whose figures are as given: no solve is needed.
+// Advice for a world whose solution is the truth and whose numbers are given, so that no solve is needed.
 struct Judged {
   World world = make_world(1, 2, 9, 0.0);
   Assessment assessment;
@@ -42,7 +42,7 @@ bool says(const Explanation& words, const std::string& text) {
 
 TEST(Advice, NamesTheEdgesThatNobodySaw) {
   Judged judged;
-  // The two projectors' matches everywhere, then none of projector1 near its left edge.
+  // The two projectors' matches are everywhere; then those of projector1 near its left edge are removed.
   auto& matches = judged.world.observations.matches;
   for (int i = 0; i < 400; ++i) {
     const Vector2d px(1280 * (i % 20 + 0.5) / 20, 800 * (i / 20 + 0.5) / 20);
@@ -91,11 +91,11 @@ TEST(Advice, SendsTheBoardWhereTheErrorGrows) {
   map.rows = 3;
   map.planes = {plane(0.9, 0.5), plane(1.1, 0.6), plane(1.5, 0.9)};
   judged.assessment.error_maps = {map};
-  EXPECT_FALSE(says(judged.words(), "capture farther"));
+  EXPECT_FALSE(says(judged.words(), "capture poses farther"));
   map.planes.back().p95_mm[4] = 2.5;
   judged.assessment.error_maps = {map};
-  EXPECT_TRUE(says(judged.words(), "projector1: capture farther away, at about 1.50 m"));
-  EXPECT_NE(judged.words().verdict.find("(2.50 mm at worst, 1.50 m from camera0, left of its picture)"),
+  EXPECT_TRUE(says(judged.words(), "projector1: capture poses farther away, at about 1.50 m"));
+  EXPECT_NE(judged.words().verdict.find("(2.50 mm at worst, 1.50 m from camera0, left of its image)"),
             std::string::npos)
       << judged.words().verdict;
 }
@@ -104,26 +104,26 @@ TEST(Advice, TheVerdictNamesProjectorPoseAndReason) {
   Judged judged;
   const std::string words = judged.words().verdict;
   EXPECT_EQ(words.rfind("usable: predicted error 1.40 mm on projector1", 0), 0U) << words;
-  EXPECT_NE(words.find("(pose7) to 0.61 px"), std::string::npos) << words;
-  EXPECT_NE(words.find("more than 1 mm is not good"), std::string::npos) << words;
+  EXPECT_NE(words.find("(pose7) 0.61 px"), std::string::npos) << words;
+  EXPECT_NE(words.find("the predicted error is above 1 mm, the limit of good"), std::string::npos) << words;
   judged.assessment.faults = {
       {"odd_pose", "pose03", ""}, {"odd_pose", "pose04", ""}, {"bent_board", "bent", "flatten it"}};
   EXPECT_NE(judged.words().verdict.find("faults were found: odd_pose and bent_board"), std::string::npos)
       << judged.words().verdict;
   judged.assessment.predicted_error_mm = {0.8, 0.9};
   judged.assessment.held_out_error_mm = {0.05, 0.05};
-  EXPECT_NE(judged.words().verdict.find("the boards say little"), std::string::npos);
+  EXPECT_NE(judged.words().verdict.find("the boards do not determine the accuracy"), std::string::npos);
   judged.assessment.verdict = Verdict::good;
   EXPECT_EQ(judged.words().verdict.find("Why not better"), std::string::npos);
   judged.assessment.predicted_error_mm[1] = std::numeric_limits<double>::infinity();
-  EXPECT_NE(judged.words().verdict.find("the error of projector1 cannot be told"), std::string::npos);
+  EXPECT_NE(judged.words().verdict.find("the error of projector1 is unknown"), std::string::npos);
 }
 
 TEST(Advice, WarnsWhereStatedDeviationsAreTooSmall) {
   Judged judged;
-  EXPECT_FALSE(says(judged.words(), "Go by the held-out errors"));
+  EXPECT_FALSE(says(judged.words(), "Trust the held-out errors"));
   judged.assessment.normalised_residuals.held_out.stddev = 2.0;
-  EXPECT_TRUE(says(judged.words(), "2.0 times as far as the noise explains"));
+  EXPECT_TRUE(says(judged.words(), "2.0 times as large as the noise explains"));
 }
 
 TEST(ErrorMap, IsReadBetweenItsCells) {
@@ -135,10 +135,10 @@ TEST(ErrorMap, IsReadBetweenItsCells) {
   EXPECT_DOUBLE_EQ(map.at({0.125, 0.25}, 1), 1);
   EXPECT_DOUBLE_EQ(map.at({0.375, 0.75}, 2), 13);
   EXPECT_DOUBLE_EQ(map.at({0.25, 0.5}, 1.5), 7);
-  EXPECT_DOUBLE_EQ(map.at({0, 0}, 0.1), 1) << "beyond it as at its edge";
+  EXPECT_DOUBLE_EQ(map.at({0, 0}, 0.1), 1) << "outside the map, the value at its edge";
   EXPECT_DOUBLE_EQ(map.at({1, 1}, 9), 15);
   map.planes[0].p95_mm[0] = std::nan("");
-  EXPECT_DOUBLE_EQ(map.at({0.25, 0.25}, 1), 2) << "from what is known";
+  EXPECT_DOUBLE_EQ(map.at({0.25, 0.25}, 1), 2) << "from the known neighbours";
   EXPECT_TRUE(std::isnan(map.at({0.125, 0.25}, 1)));
 }
 

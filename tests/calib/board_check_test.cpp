@@ -16,7 +16,7 @@
 namespace limn::calib {
 namespace {
 
-// The board's sheet, seen a little from the side in an image of 640 x 480.
+// The board's sheet, seen slightly from the side in an image of 640 x 480.
 cv::Mat view_of(const std::string& board) {
   const BoardSheet sheet = draw_board(Board::parse(board).value(), {.square_px = 32});
   const auto w = static_cast<float>(sheet.image.cols), h = static_cast<float>(sheet.image.rows);
@@ -45,7 +45,7 @@ TEST(BoardCheck, SeesWhichBoardAnImageShows) {
   EXPECT_FALSE(identify_board(cv::Mat(480, 640, CV_8U, cv::Scalar(90))));
 }
 
-// What `limn solve` would say of captures that are described as `described` and show `shown`.
+// The message of the check for captures that are described as `described` and show `shown`.
 std::string said(const std::string& described, const std::string& shown) {
   const auto folder = test::test_folder() / "captures";
   const CaptureSet plan =

@@ -17,7 +17,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
 
-// A photograph of the sheet: `image_from_sheet` takes sheet pixels to image pixels (pixel centres at
+// A photograph of the sheet: `image_from_sheet` maps sheet pixels to image pixels (pixel centres at
 // integers). Exact area sampling by 8 x 8 points a pixel, then optional blur; paper 200, ink 20,
 // background 90.
 cv::Mat photograph(const cv::Mat& sheet, const Matrix3d& image_from_sheet, cv::Size size, double blur = 0) {
@@ -44,7 +44,7 @@ cv::Mat photograph(const cv::Mat& sheet, const Matrix3d& image_from_sheet, cv::S
   return grey;
 }
 
-// A tilted view of the whole sheet, `width` image pixels wide, its middle at `px_middle`.
+// A tilted view of the whole sheet, `width` image pixels wide, with its centre at `px_middle`.
 Matrix3d tilted_view(
     const BoardSheet& sheet, double width, double angle, Vector2d px_middle, double perspective) {
   Matrix3d centre = Matrix3d::Identity(), view = Matrix3d::Identity(), place = Matrix3d::Identity();
@@ -127,7 +127,7 @@ TEST(Board, DrawsItsGridOnWholePixels) {
     const double square = sheet.pixels_per_metre * board.square_m;
     EXPECT_NEAR(square, std::round(square), 1e-9) << text;
     EXPECT_NEAR(sheet.px_board_origin.x() + 0.5, std::round(sheet.px_board_origin.x() + 0.5), 1e-12);
-    // Around every corner black and white take turns, right up to the corner.
+    // Around every corner black and white alternate, right up to the corner.
     for (int id = 0; id < board.corner_count(); ++id) {
       const Vector2d px = sheet.px_board_origin + sheet.pixels_per_metre * board.p_corner(id).head<2>();
       const int x = static_cast<int>(std::lround(px.x() + 0.5)),

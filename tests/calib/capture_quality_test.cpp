@@ -83,7 +83,7 @@ TEST(CaptureQuality, NamesImagesThatAreRepeatedOrSwapped) {
   EXPECT_EQ(quality.odd[1].file, "016.png");
 
   photos = sound;
-  photos[25] = again[23];  // black never came
+  photos[25] = again[23];  // black was not shown
   quality = quality_of(bench, photos);
   ASSERT_EQ(quality.odd.size(), 1U);
   EXPECT_EQ(quality.odd[0].file, "025.png");

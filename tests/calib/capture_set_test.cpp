@@ -20,7 +20,8 @@ CaptureSet small_plan(const fs::path& folder, int projectors = 1) {
   return plan_captures(folder, {{"camera0", 20, 10}}, devices, Board::parse("charuco:5x4:25mm").value());
 }
 
-// A stage whose camera sees what the projector shows, as a grey level that says which one it is.
+// A capture backend whose camera sees what the projector shows, as a grey level that identifies the
+// projector.
 CaptureBackend plain_stage(int* shown) {
   return {.show = [shown](int projector, const cv::Mat&) { return *shown = 100 + projector, Status(); },
           .grab = [shown](int) { return Result<cv::Mat>(cv::Mat(10, 20, CV_8U, cv::Scalar(*shown))); }};
@@ -94,8 +95,8 @@ TEST(CaptureSet, OfDifferentRigsAreNotMixed) {
     const fs::path level = projectors == 1 ? folder / "pose01" : folder / "pose01" / "projector1";
     EXPECT_NE(with(level / "camera1").find("found 'camera1'"), std::string::npos);
     EXPECT_NE(with(folder / "pose01" / "projector7").find("found 'projector7'"), std::string::npos);
-    EXPECT_EQ(with(folder / "pose01" / ".thumbnails"), "") << "hidden folders are nobody's";
-    EXPECT_EQ(with(folder / "notes"), "") << "nor are those beside the poses";
+    EXPECT_EQ(with(folder / "pose01" / ".thumbnails"), "") << "hidden folders are ignored";
+    EXPECT_EQ(with(folder / "notes"), "") << "folders beside the poses are ignored, too";
     fs::copy(level / "camera0" / "000.png", level / "camera0" / image_name(plan.patterns.back().count()));
     const auto surplus = load_captures(folder);
     ASSERT_FALSE(surplus.ok());
@@ -128,7 +129,7 @@ TEST(CaptureSet, SayWhatIsWrongWithTheirFile) {
     EXPECT_NE(with("\"patterns.json\"", patterns).find("capture.json: patterns: expected"), std::string::npos)
         << patterns;
   EXPECT_NE(with("[", " [").find("pose*"), std::string::npos)
-      << "nothing wrong but that there are no poses yet";
+      << "the only problem is that there are no poses yet";
 }
 
 TEST(CaptureSet, AFailingCameraAndAnotherModeAreErrors) {
@@ -156,7 +157,7 @@ TEST(CaptureSet, ImportTakesForeignNames) {
   const auto read = import_opencv_gray(foreign);
   ASSERT_TRUE(read.ok()) << read.message();
   ASSERT_EQ(read->poses.size(), 2U);
-  EXPECT_EQ(read->poses[0].name, "capture_2");  // in the order of numbers
+  EXPECT_EQ(read->poses[0].name, "capture_2");  // sorted as numbers
   EXPECT_EQ(read->poses[1].images[0][0][9].filename(), "gray_9.png");
   EXPECT_EQ(read->cameras[0].width, 9);
   foreign.projector_width = 1024;

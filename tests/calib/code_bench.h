@@ -17,21 +17,22 @@
 
 namespace limn::test {
 
-/// A camera before a projector, whose pixels fall on straight lines of the projector's image: exact light,
-/// then blur, gain and noise.
+/// A camera in front of a projector: its pixels lie on straight lines of the projector's image. It computes
+/// exact light, then adds blur, gain and noise.
 struct CodeBench {
   calib::Patterns patterns = calib::Patterns::create("gray", 64, 64).value();
   int width = 160, height = 120;
-  double white = 180, black = 20;                   // levels
-  double blur = 0.3;                                // of the projector, its pixels, standard deviation
+  double white = 180, black = 20;  // levels
+  // Standard deviation of the projector's blur, projector pixels.
+  double blur = 0.3;
   double noise = 0;                                 // levels
-  double gamma = 1;                                 // of the projector: light = value ^ gamma
+  double gamma = 1;                                 // gamma of the projector: light = value ^ gamma
   std::array<double, 3> channel_gamma = {1, 1, 1};  // multiplies it in blue, green, red; the camera is grey
-  /// Light in the image number `index` as the camera sees it, 0 to 1, may be changed before it is taken.
+  /// May change the light of image number `index` as the camera sees it, 0 to 1, before it is photographed.
   std::function<void(int index, cv::Mat* light)> changed;
   std::mt19937_64 rng = test_rng();
 
-  // Where in the projector's image the middle of a camera pixel falls.
+  // Position in the projector's image of the centre of a camera pixel.
   double column_at(int x) const { return 5.3 + 0.35 * x; }
   double row_at(int y) const { return 3.1 + 0.4 * y; }
 
@@ -83,7 +84,7 @@ struct CodeBench {
     return std::pow(value, gamma * channel_gamma[static_cast<size_t>(channel)]);
   }
 
-  // How much each projector pixel of a line counts for each camera pixel.
+  // Weight of each projector pixel of a line for each camera pixel.
   cv::Mat weights(int camera, int projector, const std::function<double(int)>& place) const {
     cv::Mat weights(camera, projector, CV_64F);
     for (int i = 0; i < camera; ++i) {

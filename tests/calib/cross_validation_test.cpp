@@ -13,7 +13,7 @@ using namespace test;
 using namespace limn::calib::worlds;
 using Eigen::Vector2d;
 
-// One minimisation with the full solution's noise instead of all rounds with their own.
+// One minimisation with the full solution's noise is compared with all rounds with their own noise.
 TEST(CrossValidation, IsWhatASolveFromScratchWithoutThePoseForetells) {
   World world = make_world(1, 1, 6, 0.5);
   add_noise(&world, 0.08, 0.1, test_rng());
@@ -37,7 +37,7 @@ TEST(CrossValidation, IsWhatASolveFromScratchWithoutThePoseForetells) {
     }
   }
   EXPECT_LT(worst, 0.01);  // a tenth of the noise of one match
-  EXPECT_GT(worst, 0) << "two ways, not one";
+  EXPECT_GT(worst, 0) << "the two computations are not identical";
 }
 
 TEST(CrossValidation, LeavesThePoseOut) {
@@ -45,7 +45,7 @@ TEST(CrossValidation, LeavesThePoseOut) {
   add_noise(&world, 0.05, 0.05, test_rng());
   const auto solution = solve(world.observations);
   ASSERT_TRUE(solution.ok()) << solution.message();
-  Observations wrong = world.observations;  // what pose 2's projector pixels are must not matter to its solve
+  Observations wrong = world.observations;  // the projector pixels of pose 2 must not influence its solve
   for (Match& match : wrong.matches) match.px_projector += Vector2d(match.pose == 2 ? 7 : 0, 0);
   const auto a = cross_validate(world.observations, {}, *solution), b = cross_validate(wrong, {}, *solution);
   ASSERT_TRUE(a.ok() && b.ok());
@@ -81,7 +81,7 @@ TEST(ModelSelection, TakesWhatTheLensesNeedAndNoMore) {
   EXPECT_EQ(a->solution.rig.projectors[0].lens.model.name(), "LENSMODEL_PINHOLE");
   EXPECT_GE(a->trials.size(), 4U);
 
-  WorldOptions wild = plain;  // strong radial terms that no fourth power follows
+  WorldOptions wild = plain;  // strong radial terms that a polynomial of fourth degree cannot follow
   wild.projector_distortion = {-0.15, 0.1, 0.0004, 0.0003, -1.5};
   World rich = make_world(wild);
   add_noise(&rich, 0.05, 0.02, test_rng());

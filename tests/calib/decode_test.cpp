@@ -63,7 +63,7 @@ TEST(Decode, LabelsEverySharpPixelWithinHalfAProjectorPixel) {
 
 TEST(Decode, DropsUnresolvedFineBitsInsteadOfThePixel) {
   Bench bench;
-  bench.blur = 1.6;  // single-pixel stripes are gone: 1 - 2 exp(-2 pi^2 s^2 / 16) of them
+  bench.blur = 1.6;  // single-pixel stripes lose 1 - 2 exp(-2 pi^2 s^2 / 16) of their contrast
   bench.noise = 1.5;
   const auto decoded = decode(bench.patterns, bench.photograph(test::test_folder()), k_width, k_height);
   ASSERT_TRUE(decoded.ok()) << decoded.message();
@@ -71,12 +71,12 @@ TEST(Decode, DropsUnresolvedFineBitsInsteadOfThePixel) {
   EXPECT_GT(decoded->share(), 0.8);
   EXPECT_LT(std::abs(e.mean), 0.05);
   EXPECT_LT(e.worst, 4.0);
-  EXPECT_LT(e.squared_pull, 1.3);  // the variance says how coarse the labels are
+  EXPECT_LT(e.squared_pull, 1.3);  // the variance states how coarse the labels are
   EXPECT_GT(decoded->quality.unsure_finest, 0.5) << "most pixels have lost their finest bit";
 }
 
-// Noise alone, so that nothing but it makes the scatter: the variances must be neither hopeful nor cautious,
-// and the noise is what the images show.
+// Noise is the only cause of scatter, so the variances must be neither too small nor too large, and the
+// measured noise must be that of the images.
 TEST(Decode, FindsPlacesBetweenWholePixelsWithTheScatterThatItStates) {
   struct Case {
     const char* code;
@@ -95,7 +95,8 @@ TEST(Decode, FindsPlacesBetweenWholePixelsWithTheScatterThatItStates) {
     ASSERT_TRUE(decoded.ok()) << decoded.message();
     const Errors e = errors_of(*decoded, bench);
     printf(
-        "[ sub-pixel] %-5s %d: rms %.4f px, worst %.3f px, squared pull %.2f, %.1f %% within 1.96, noise "
+        "[ sub-pixel] %-5s %d: rms %.4f px, worst %.3f px, squared normalised error %.2f, %.1f %% within "
+        "1.96, noise "
         "%.2f\n",
         c.code, c.options.base_stripe_px, e.rms, e.worst, e.squared_pull, 100 * e.within_95,
         std::sqrt(decoded->quality.noise.read + 100 * decoded->quality.noise.per_level));
@@ -130,7 +131,7 @@ TEST(Decode, WhiteAndBlackStandForInversesThatAreNotShown) {
   }
 }
 
-// Half a period off would be 8 pixels.
+// An error of half a period would be 8 pixels.
 TEST(Decode, PhaseNeverTakesTheNextWave) {
   for (const double blur : {0.3, 1.6, 2.5}) {
     Bench bench;
@@ -158,7 +159,7 @@ TEST(Decode, PhaseSaysThatTheProjectorsResponseIsNotWhatItWasDrawnFor) {
   EXPECT_GT(decoded->quality.wave_level, 0.6);
 }
 
-// 3 steps, because every step more hides another harmonic of a wrong response.
+// 3 steps, because every additional step cancels another harmonic of a wrong response.
 TEST(Decode, PhaseErrsATenthAsMuchWhenItsWavesAreDrawnByTheProjectorsResponse) {
   Bench bench;
   bench.blur = 0.6;
@@ -187,9 +188,10 @@ TEST(Decode, PhaseErrsATenthAsMuchWhenItsWavesAreDrawnByTheProjectorsResponse) {
   EXPECT_LT(e.rms, 0.02);
 }
 
-// A white V-groove of 60 degrees whose crease runs down the middle of the image; light falls flatly onto
-// its left wall. Each wall lights the other: diffuse, three bounces, strips along the crease (the form factor
-// between strips at distances s and t from the crease is s t sin^2 / (2 r^3)), spread along them.
+// A white V-groove of 60 degrees whose crease runs down the middle of the image; light falls at a grazing
+// angle on its left wall. Each wall illuminates the other: diffuse, three bounces, strips along the crease
+// (the form factor between strips at distances s and t from the crease is s t sin^2 / (2 r^3)), spread along
+// them.
 class Groove {
  public:
   Groove() : across_(k_width, k_width, CV_64F, cv::Scalar(0)), along_(k_height, k_height, CV_64F) {
@@ -218,11 +220,11 @@ class Groove {
   static constexpr int k_scored = 60;  // nearer to the crease, light goes back and forth within a stripe
 
  private:
-  static constexpr double k_flat = 0.2;  // cosine of incidence over the other wall's
+  static constexpr double k_flat = 0.2;  // cosine of incidence as a share of the other wall's
   cv::Mat across_, along_;
 };
 
-// Share of the left wall's pixels whose coordinates are right, and of those that have any.
+// Share of the left wall's pixels whose coordinates are right, and share of those that have coordinates.
 struct WallScore {
   double right = 0, labelled = 0;
 };
@@ -260,7 +262,7 @@ TEST(Decode, XorHoldsInAGrooveWhoseWallsLightEachOtherAndGrayDoesNot) {
   for (const WallScore& score : {xor4, xor2}) EXPECT_GT(score.right, 0.98 * score.labelled);
 }
 
-// Light from elsewhere lifts every image by half of what white gains: bits must not look unsure for it.
+// Indirect light brightens every image by half of what white gains: bits must not look unsure because of it.
 TEST(Decode, DoesNotMindGlobalLight) {
   Bench bench;
   bench.blur = 0.6;
@@ -280,7 +282,7 @@ TEST(Decode, DoesNotMindGlobalLight) {
   EXPECT_LT(e.rms, 0.2);
 }
 
-// A wall that the projector's light reaches by way of the room alone sees the mean of each pattern.
+// A wall that the projector's light reaches only by the room sees the mean of each pattern.
 TEST(Decode, CallsPixelsUnlitThatReflectionsAloneReach) {
   Bench bench;
   const fs::path folder = test::test_folder();
@@ -329,7 +331,7 @@ TEST(Decode, LeavesUnlitPixelsAlone) {
 TEST(Decode, RemovesALabelThatItsNeighboursContradict) {
   Bench bench;
   const auto files = bench.photograph(test::test_folder());
-  for (const size_t pair : {0U, 1U}) {  // one pixel reads the coarsest column bit the wrong way
+  for (const size_t pair : {0U, 1U}) {  // one pixel reads the coarsest column bit wrong
     cv::Mat photo = read_image(files[pair]).value();
     photo.at<uchar>(60, 30) = pair == 0 ? 180 : 20;
     ASSERT_TRUE(write_png(files[pair], photo).ok());

@@ -21,7 +21,7 @@ std::vector<DensePixel> dense_of(const World& world) {
   return dense;
 }
 
-// Direction in the projector in which the pixel of a camera pixel's ray runs as the surface recedes.
+// Direction in the projector's image of a camera pixel's ray with increasing depth.
 Vector2d along_line(const World& world, const Match& match) {
   const Imager& camera = world.rig.cameras[static_cast<size_t>(match.camera)];
   const Ray ray = *camera.ray(match.px_camera);

@@ -14,7 +14,8 @@
 namespace limn::test {
 namespace {
 
-constexpr double k_share = 0.375;  // of each device's pixels by side: 480 x 384 and 480 x 300 on the bench
+// Share of each device's pixels by side: 480 x 384 and 480 x 300 on the bench.
+constexpr double k_share = 0.375;
 
 void shrink(Imager* imager) {
   imager->width = static_cast<int>(std::lround(imager->width * k_share));
@@ -70,9 +71,9 @@ sim::World with_board(const FaultBench& bench, const Pose& world_from_board) {
   return world;
 }
 
-// One pose's light paths; a second set after something moved.
+// One pose's light paths; a second set after a move.
 struct Traced {
-  std::vector<sim::Samples> before, after;  // by camera
+  std::vector<sim::Samples> before, after;  // for each camera
 };
 
 std::vector<sim::Samples> traced(const sim::World& world) {
@@ -98,7 +99,7 @@ Traced trace_pose(const FaultBench& bench, int pose) {
   return result;
 }
 
-// What every projector's panel gets while `projector` is meant to show `image`.
+// The image on every projector's panel while `projector` should show `image`.
 std::vector<cv::Mat> panels(const FaultBench& bench, int projector, const cv::Mat& image) {
   std::vector<cv::Mat> shown(bench.world.rig.projectors.size());
   const int display = bench.display_of ? bench.display_of(projector) : projector;
@@ -128,7 +129,7 @@ FaultBench FaultBench::create(const std::string& name, int poses) {
   std::ifstream file(config / "plans" / (name + ".json"));
   const nlohmann::json plan = nlohmann::json::parse(file, nullptr, true, true);
   const calib::Board planned = calib::Board::parse(plan.at("board")).value();
-  // As wide as the planned one: squares of some 20 camera pixels, of which every second is paper alone.
+  // As wide as the planned board: squares of about 20 camera pixels, of which every second is paper alone.
   bench.board =
       calib::Board::parse(fmt::format("chessboard:8x5:{}mm", std::lround(planned.width_m() * 1000 / 9)))
           .value();

@@ -13,8 +13,8 @@
 #include "tests/calib/fault_bench.h"
 #include "tests/support/matchers.h"
 
-// Each test captures on the virtual rig with one thing wrong and reads the report. Run the program for the
-// table of faults, names found and verdicts.
+// Each test captures on the virtual rig with one fault injected and reads the report. Run the program to get
+// the table of faults, names found and verdicts.
 
 namespace limn::calib {
 namespace {
@@ -25,12 +25,12 @@ using Eigen::Vector3d;
 using Names = std::set<std::string>;
 
 constexpr int k_poses = 5;
-constexpr int k_shots = 38;  // of a series on the bench: 9 + 9 bits, white and black
+constexpr int k_shots = 38;  // images of a series on the bench: 9 + 9 bits, white and black
 
-// What somebody who solves the captures is told.
+// The report for somebody who solves the captures.
 struct Told {
   Names names;
-  std::string verdict;  ///< "failed" when no rig comes of them
+  std::string verdict;  ///< "failed" when the solve fails
   std::optional<Solution> solution;
   std::vector<Fault> faults;
 };
@@ -67,7 +67,7 @@ Told told_of(const FaultBench& bench, const std::string& injected, const Rig* ea
   return captures ? told_of(*captures, injected, earlier) : Told{};
 }
 
-// Named, nothing else but what it implies, and not accepted.
+// The fault is named, no other fault except those it implies, and the rig is not accepted.
 void expect_named(const Told& told, const std::string& name, const Names& implied = {}) {
   EXPECT_TRUE(told.names.count(name)) << to_text(told.faults);
   EXPECT_NE(told.verdict, "good");
@@ -82,7 +82,7 @@ void expect_sound(const Told& told) {
 
 FaultBench bench(int poses = k_poses) { return FaultBench::create("bench", poses); }
 
-// The display makes one image of another by a homography, with bilinear interpolation.
+// The display warps an image by a homography, with bilinear interpolation.
 cv::Mat warped(const cv::Mat& image, const std::array<cv::Point2f, 4>& corners) {
   const auto w = static_cast<float>(image.cols), h = static_cast<float>(image.rows);
   const std::array<cv::Point2f, 4> from = {{{0, 0}, {w, 0}, {w, h}, {0, h}}};
@@ -124,7 +124,7 @@ TEST(SoundCaptures, OfOtherCodesHaveNoFault) {
   }
 }
 
-// 2.2 is what is taken for granted of a projector; nobody's is exactly that.
+// 2.2 is assumed for projectors; no projector has exactly that.
 TEST(SoundCaptures, OfAProjectorWhoseGammaIsNearlyTheWavesHaveNoFault) {
   FaultBench near = bench();
   near.code = "phase";
@@ -167,7 +167,7 @@ TEST(Faults, KeystoneLeftOn) {
   keystone.on_panel = [](const cv::Mat& image) {
     return warped(image, {{{0.08F, 0}, {0.92F, 0}, {1, 1}, {0, 1}}});
   };
-  // Its projector is none with a straight axis: poses disagree and the board seems bent.
+  // No projector has such an axis: poses contradict each other and the board seems bent.
   expect_named(told_of(keystone, "keystone"), "keystone_or_scaling", {"odd_pose", "bent_board"});
 }
 
@@ -185,8 +185,8 @@ TEST(Faults, BoardsAllButParallel) {
     flat.world_from_board[i] = Pose(Eigen::Quaterniond::Identity(), {0.05 * n - 0.1, 0, 0.02 * n}) * first *
                                Pose(exp_rotation({0.02 * n, 0.05 - 0.02 * n, 0}), Vector3d::Zero());
   }
-  // Boards side by side leave most of the image empty, too.
-  expect_named(told_of(flat, "boards all but parallel"), "little_tilt", {"low_coverage"});
+  // Boards side by side also leave most of the image empty.
+  expect_named(told_of(flat, "boards almost parallel"), "little_tilt", {"low_coverage"});
 }
 
 TEST(Faults, ExposureDriftsDown) {
@@ -221,7 +221,7 @@ TEST(Faults, ProjectorGammaNotWhatTheWavesWereDrawnFor) {
     other.world.projector_effects[0].gamma = gamma;
     const Told told = told_of(other, fmt::format("waves for gamma 2.2 at {}", gamma));
     expect_named(told, "projector_gamma");
-    // What the advice multiplies 2.2 by is what makes the waves right.
+    // The waves are right when 2.2 is multiplied by the factor in the advice.
     ASSERT_FALSE(told.faults.empty());
     const std::string& advice = told.faults[0].advice;
     const size_t at = advice.find("gamma by ");
@@ -236,7 +236,7 @@ TEST(Faults, WhiteDrivesTheCameraToFullScale) {
   expect_named(told_of(bright, "exposure 2.2 times too long"), "saturated");
 }
 
-// The display was late: the camera saw what had been shown before.
+// The display was late: the camera saw the previous image.
 TEST(Faults, OneImageIsTheOneBefore) {
   FaultBench late = bench();
   cv::Mat last;
@@ -248,7 +248,7 @@ TEST(Faults, OneImageIsTheOneBefore) {
     return last.clone();
   };
   const Told told = told_of(late, "one picture repeated");
-  expect_named(told, "repeated_pictures", {"low_decode"});  // of that pose: a wide stripe is missing
+  expect_named(told, "repeated_pictures", {"low_decode"});  // in that pose a wide stripe is missing
   EXPECT_NE(to_text(told.faults).find("pose02, camera0 of projector0: 009.png"), std::string::npos)
       << to_text(told.faults);
 }
@@ -319,7 +319,7 @@ TEST(Faults, CameraImageOfAnotherSizeNamesTheFile) {
   smaller.cameras[0].height = 480;
   const auto observed = observe(smaller);
   ASSERT_FALSE(observed.ok());
-  EXPECT_NE(observed.message().find("expected a picture of 640x480 pixels, found 480x384"), std::string::npos)
+  EXPECT_NE(observed.message().find("expected an image of 640x480 pixels, found 480x384"), std::string::npos)
       << observed.message();
 }
 

@@ -16,8 +16,8 @@ namespace {
 namespace fs = std::filesystem;
 using namespace test;
 
-// A camera of 48 x 24 pixels before a projector of 16 x 8: each pixel sees the light of column x / 3 and row
-// y / 3, `visible` columns only, with noise of `noise` levels.
+// A camera of 48 x 24 pixels in front of a projector of 16 x 8: each pixel sees the light of column x / 3 and
+// row y / 3, of `visible` columns only, with noise of `noise` levels.
 struct Camera {
   int visible = 16;
   double noise = 1;
@@ -54,7 +54,7 @@ void capture(const fs::path& folder, int poses, int projectors, Camera camera) {
   }
 }
 
-// What the check says of a folder; empty when it is content.
+// The message of the check for a folder; empty when nothing is wrong.
 std::string said(const fs::path& folder) {
   const auto captures = load_captures(folder);
   EXPECT_TRUE(captures.ok()) << captures.message();
@@ -78,7 +78,8 @@ TEST(ImageCheck, IsContentWithSoundCaptures) {
   EXPECT_EQ(said(folder / "two"), "");
 }
 
-// Without noise equal images are no copies: half of the projector unseen, all of it unseen, a dark room.
+// Without noise, equal images are no copies: half of the projector invisible, all of it invisible, a dark
+// room.
 TEST(ImageCheck, IsContentWithEqualImagesThatTheLightExplains) {
   const fs::path folder = test_folder();
   capture(folder / "half", 1, 1, {.visible = 8, .noise = 0});
@@ -130,7 +131,7 @@ TEST(ImageCheck, NamesSizesAndTruncationEvenWhereNoBoardIsSeen) {
   EXPECT_TRUE(names_both(said(folder), "pose01/camera0/003.png", "truncated")) << said(folder);
   ASSERT_TRUE(write_png(series / "003.png", cv::Mat(20, 40, CV_8U, cv::Scalar(0))).ok());
   EXPECT_TRUE(names_both(said(folder), "pose01/camera0/003.png", "40x20")) << said(folder);
-  EXPECT_NE(said(folder).find("Others beside it are not"), std::string::npos);
+  EXPECT_NE(said(folder).find("Not all images of this series"), std::string::npos);
   for (const auto& entry : fs::directory_iterator(series))
     ASSERT_TRUE(write_png(entry.path(), cv::Mat(20, 40, CV_8U, cv::Scalar(0))).ok());
   EXPECT_NE(said(folder).find("another rig"), std::string::npos) << said(folder);

@@ -40,7 +40,7 @@ struct Scene {
   }
 };
 
-// Central difference of `predict` when `change` moves one unknown by a step.
+// Central difference of `predict` when `change` moves one parameter by a step.
 Vector2d slope(const std::function<void(Scene*, double)>& change,
                const std::function<Vector2d(const Scene&)>& predict,
                double step) {

@@ -1,6 +1,6 @@
 #pragma once
 
-// mrcal's own optimiser on the corners that one camera sees: the independent judge of calib/solve's camera.
+// mrcal's own optimiser on the corners that one camera sees: an independent check of calib/solve's camera.
 
 extern "C" {
 #include <mrcal/mrcal.h>
@@ -18,11 +18,11 @@ namespace limn::calib::worlds {
 
 struct MrcalSolution {
   Imager camera;
-  std::map<int, Pose> camera_from_board;  // by pose
-  double rms_px = 0;                      // of one point
+  std::map<int, Pose> camera_from_board;  // for each pose
+  double rms_px = 0;                      // 2D error of one point
 };
 
-// From `start` and `camera_from_board`; a flat board, no priors. With `reject` mrcal's own outlier rejection.
+// Solves from `start` and `camera_from_board`: a flat board, no priors. `reject`: mrcal's outlier rejection.
 inline MrcalSolution mrcal_solve(const Observations& observations,
                                  int camera,
                                  const Imager& start,
@@ -30,7 +30,7 @@ inline MrcalSolution mrcal_solve(const Observations& observations,
                                  bool reject) {
   const Board& board = observations.board;
   const int across = board.columns - 1, down = board.rows - 1, corners = across * down;
-  // mrcal's board begins at its first corner, ours one square before.
+  // mrcal's board origin is its first corner, ours is one square before it.
   const Pose board_from_grid(Eigen::Quaterniond::Identity(), {board.square_m, board.square_m, 0});
   std::vector<mrcal_pose_t> frames;
   std::vector<mrcal_observation_board_t> seen;

@@ -1,4 +1,4 @@
-// calib/solve beside mrcal_optimize on the same corners.
+// Compares calib/solve with mrcal_optimize on the same corners.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -15,7 +15,7 @@ using namespace test;
 using namespace limn::calib::worlds;
 using Eigen::Vector2d;
 
-// Least squares as mrcal does it: no priors, no robust loss to speak of, a flat board.
+// Least squares as in mrcal: no priors, practically no robust loss, a flat board.
 SolveOptions plain_least_squares() {
   constexpr double k_infinite = std::numeric_limits<double>::infinity();
   SolveOptions options;
@@ -41,7 +41,7 @@ TEST_P(Mrcal, AgreesOnTheCameraAndTheBoardPoses) {
   options.camera_model = GetParam();
   const auto ours = solve(world.observations, options);
   ASSERT_TRUE(ours.ok()) << ours.message();
-  // From the truth, not from our answer: two ways to the same place.
+  // It starts from the truth, not from our answer, so that the two ways are independent.
   std::map<int, Pose> start;
   for (int pose = 0; pose < 6; ++pose) start[pose] = world.world_from_board[static_cast<size_t>(pose)];
   Imager first = world.rig.cameras[0];

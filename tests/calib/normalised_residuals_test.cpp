@@ -36,8 +36,8 @@ TEST(NormalisedResiduals, AreStandardNormalWhereTheNoiseIsAsStated) {
   EXPECT_NEAR(found.held_out.stddev, 1, 0.12);
 }
 
-// Few poses and noisy corners: what is predicted scatters by far more than the matches' own noise, and the
-// statement knows it.
+// Few poses and noisy corners: predictions scatter by far more than the matches' own noise, and the stated
+// covariance includes that.
 TEST(NormalisedResiduals, OfHeldOutPosesKnowWhatCornersAndDevicesLeaveOpen) {
   World world = make_world(1, 1, 4, 0.3);
   add_noise(&world, 0.3, 0.02, test_rng());

@@ -12,8 +12,8 @@ namespace {
 
 using Eigen::Vector2d;
 
-// A ChArUco sheet seen head on, each pixel of paper labelled with half its place; ink has no label, and paper
-// beside ink a wrong one, as blur makes it.
+// A ChArUco sheet seen head on. The label of each paper pixel is half its position; ink has no label, and
+// paper beside ink a wrong one, as blur would give it.
 struct Sheet {
   Board board = Board::parse("charuco:11x8:25mm").value();
   BoardSheet drawn = draw_board(board, {.square_px = 40});

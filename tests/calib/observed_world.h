@@ -1,6 +1,6 @@
 #pragma once
 
-// A rig with known truth, a board shown to it in some poses, and what it would observe: coordinates, not
+// A rig with known truth, a board in some poses, and the observations it would make: coordinates, without
 // images.
 
 #include <Eigen/Core>
@@ -28,9 +28,9 @@ struct WorldOptions {
   int cameras = 1;
   int projectors = 1;
   int poses = 6;
-  double shift = 0.5;  // how far the projectors' lenses are shifted, panel heights
+  double shift = 0.5;  // shift of the projectors' lenses, panel heights
   Eigen::Vector2d bend{0.0005, -0.0008};
-  // What follows fx fy cx cy; 4, 5 or 8 values. None: a pinhole.
+  // Lens values after fx fy cx cy: 4, 5 or 8. Empty: a pinhole.
   std::vector<double> camera_distortion = {-0.12, 0.08, 0.0006, -0.0004};
   std::vector<double> projector_distortion = {-0.06, 0.03, 0.0004, 0.0003};
   double distance_m = 1.1;
@@ -82,7 +82,7 @@ inline void observe_matches(World* world, int camera, int projector, int pose) {
   }
 }
 
-// The n-th place of the board: about its middle, turned to a side of its own.
+// The n-th pose of the board: around its centre, tilted to a side of its own.
 inline Pose board_place(int n, const BoardShape& shape, double distance_m, std::mt19937_64* rng) {
   std::uniform_real_distribution<double> share(-1, 1);
   const double around = 2.4 * n, tilt = 0.35 + 0.2 * share(*rng);
@@ -100,7 +100,7 @@ inline void add_devices(World* world, const WorldOptions& options) {
     world->rig.cameras.push_back(imager("camera1", 1280, 1024, {1500, 1499, 630, 520},
                                         {-0.05, 0.02, -0.0003, 0.0005},
                                         looking_at({0.5, 0.05, 0.05}, target, up)));
-  // A lens shift moves the image off the axis: the projector is turned so that it still meets the board.
+  // A lens shift moves the image off the axis; the projector is turned so that it still meets the board.
   const double shift_px = 800 * options.shift;
   for (int i = 0; i < options.projectors; ++i) {
     const Pose towards = looking_at({i == 0 ? -0.35 : 0.3, 0.1, 0.0}, target, up);
@@ -143,8 +143,8 @@ inline World make_world(int cameras, int projectors, int poses, double shift) {
   return make_world(options);
 }
 
-// Adds a pose without a board: a bulge of 0.1 m, as a door has it, on a grid of camera 0's pixels; seen by
-// every projector and every other camera.
+// Adds a pose without a board: a bulge of 0.1 m, like a car door's, on a grid of camera 0's pixels; observed
+// by every projector and every other camera.
 inline void observe_scene(World* world, int columns, int rows, double distance_m = 1.1) {
   const int pose = static_cast<int>(world->observations.poses.size());
   world->observations.poses.push_back("scene" + std::to_string(pose));
@@ -172,7 +172,7 @@ inline void observe_scene(World* world, int columns, int rows, double distance_m
   }
 }
 
-// Normal noise on everything observed; what observations claim to scatter becomes small.
+// Adds normal noise to all observations; their stated standard deviations become small.
 inline void add_noise(World* world, double corner_px, double match_px, std::mt19937_64 rng) {
   std::normal_distribution<double> scatter(0, 1);
   const auto noise = [&](double px) {

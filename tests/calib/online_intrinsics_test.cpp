@@ -20,7 +20,7 @@ double between(Rng* rng, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(*rng);
 }
 
-// 60 to 70 degrees, off its centre, with what distortion is left in images of phones.
+// A lens of 60 to 70 degrees, off its centre, with the distortion that is left in images of phones.
 IntrinsicsEstimate drawn_lens(Rng* rng) {
   IntrinsicsEstimate lens = prior_intrinsics(k_width, k_height, {.fov_deg = between(rng, 60, 70)});
   lens.values[1] += between(rng, -10, 10);
@@ -30,7 +30,7 @@ IntrinsicsEstimate drawn_lens(Rng* rng) {
   return lens;
 }
 
-// Eight markers of 40 mm, as on the door of the examples; `depth_m`: how far they stand out of a plane.
+// Eight markers of 40 mm, as on the door of the examples; `depth_m`: their distance from a plane.
 std::vector<Eigen::Vector3d> markers(double depth_m) {
   std::vector<Eigen::Vector3d> points;
   constexpr double k_half = 0.02;
@@ -42,8 +42,8 @@ std::vector<Eigen::Vector3d> markers(double depth_m) {
   return points;
 }
 
-// A camera that looks at the markers from about `distance_m`, up to `angle` off their normal, past their
-// middle by up to `past_m`.
+// The pose of a camera that views the markers from about `distance_m`, up to `angle` off their normal, aimed
+// up to `past_m` beside their centre.
 Pose drawn_place(Rng* rng, double distance_m, double angle, double past_m = 0.1) {
   const double turn = between(rng, 0, 2 * std::numbers::pi), tilt = between(rng, 0, angle);
   const double distance = distance_m * between(rng, 0.75, 1.25);
@@ -58,7 +58,7 @@ BodyView seen(const IntrinsicsEstimate& lens,
               const std::vector<Eigen::Vector3d>& points,
               Rng* rng) {
   BodyView view{place, {}};
-  view.camera_from_body.translation += Eigen::Vector3d(0.01, -0.01, 0.05);  // only about there
+  view.camera_from_body.translation += Eigen::Vector3d(0.01, -0.01, 0.05);  // a rough initial pose
   const Lens true_lens = lens.lens();
   for (const Eigen::Vector3d& p : points) {
     const auto px = true_lens.project(place * p);
@@ -69,7 +69,7 @@ BodyView seen(const IntrinsicsEstimate& lens,
   return view;
 }
 
-// Somebody looks round for so many images.
+// The estimate after a camera has viewed the markers in this many images.
 OnlineIntrinsics looked_round(const IntrinsicsEstimate& truth, const IntrinsicsEstimate& before, int images, Rng* rng) {
   OnlineIntrinsics lens(before);
   for (int i = 0; i < images; ++i)
@@ -94,12 +94,13 @@ TEST(OnlineIntrinsics, IsFoundWhileSomebodyLooksRoundAndSaysHowWell) {
       worst = std::max(worst, std::abs(pull));
     }
   }
-  std::printf("pulls of the lens: RMS %.2f, worst %.2f\n", std::sqrt(squares / (5 * k_lenses)), worst);
+  std::printf("normalised errors of the lens: RMS %.2f, worst %.2f\n", std::sqrt(squares / (5 * k_lenses)),
+              worst);
   EXPECT_NEAR(std::sqrt(squares / (5 * k_lenses)), 1, 0.3);
   EXPECT_LT(worst, 4);
 }
 
-// Focal length and distance trade there.
+// Focal length and distance cannot be separated there.
 TEST(OnlineIntrinsics, FlatMarkersFromStraightAheadLeaveTheFocalLengthUnsure) {
   Rng rng = test::test_rng();
   for (int i = 0; i < 5; ++i) {
@@ -126,7 +127,8 @@ TEST(OnlineIntrinsics, AMarkerThatWasMovedOnItsBodyChangesLittle) {
   OnlineIntrinsics lens(prior_intrinsics(k_width, k_height));
   for (int i = 0; i < 80; ++i) {
     BodyView view = seen(truth, drawn_place(&rng, 0.8, 0.9), markers(0.01), &rng);
-    for (BodyPoint& point : view.points)  // the first is said to stand 20 mm further right than it does
+    // The stated position of the first marker is 20 mm right of the true one.
+    for (BodyPoint& point : view.points)
       if (point.p_body.x() < -0.2 && point.p_body.y() < 0) point.p_body.x() += 0.02;
     if (lens.add(view)) lens.improve();
   }
@@ -150,7 +152,7 @@ TEST(OnlineIntrinsics, ImprovesWithUseAndIsTheSameAtAnotherSize) {
   EXPECT_FALSE(truth.resized(400, 640).has_value());
 }
 
-// A stored estimate of another lens is given up, at once or when the camera changes it in use.
+// A stored estimate of another lens is dropped, at once or when the camera changes its lens during use.
 TEST(OnlineIntrinsics, AnotherLensIsNoticed) {
   Rng rng = test::test_rng();
   IntrinsicsEstimate truth = drawn_lens(&rng);

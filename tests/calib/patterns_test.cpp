@@ -49,7 +49,7 @@ TEST(Patterns, ExchangedBitsAreGrayCodeWithNarrowStripes) {
   for (const int stripe : {2, 4, 8}) {
     const Patterns exchanged = Patterns::create("xor", 64, 32, {.base_stripe_px = stripe}).value();
     ASSERT_EQ(exchanged.count(), gray.count());
-    const int base = exchanged.column_bits() - 1 - exchanged.base_bit();  // pair of the base
+    const int base = exchanged.column_bits() - 1 - exchanged.base_bit();  // pair of the base bit
     cv::Mat differing;
     cv::compare(exchanged.image(2 * base), gray.image(2 * base), differing, cv::CMP_NE);
     EXPECT_EQ(cv::countNonZero(differing), 0);

@@ -31,7 +31,8 @@ sim::World bench() {
 
 constexpr int k_step = 8;  // camera pixels between points
 
-// What a scanner in the camera's place meets: one side of the door with its plates, the room behind it.
+// What a scanner at the camera's position measures: one side of the door with its plates, and the room behind
+// it.
 std::vector<std::optional<sim::Landing>> landings(const sim::World& world) {
   const sim::Truth truth(world);
   const Imager& camera = world.rig.cameras[0];
@@ -42,7 +43,7 @@ std::vector<std::optional<sim::Landing>> landings(const sim::World& world) {
 }
 
 // The same as a scan with noise along the rays. Columns from `first` to `last`, as shares of the image, are
-// seen.
+// visible.
 scene::ScanSurface scan_captures(const sim::World& world,
                        const std::vector<std::optional<sim::Landing>>& landings,
                        double first,
@@ -104,7 +105,7 @@ TEST(Align, ComesHomeFromFiftyMillimetresAndTenDegreesOffOnPartialScans) {
   constexpr int k_draws = 12;
   Errors e;
   for (int draw = 0; draw < k_draws; ++draw) {
-    // whole, or the left or right two thirds of the door
+    // The whole door, or its left or right two thirds.
     const double first = draw % 3 == 1 ? 0.4 : 0, last = draw % 3 == 2 ? 0.6 : 1;
     const scene::ScanSurface scan = scan_captures(world, met, first, last, rng);
     const auto found = refined_registration(door, index, scan, disturbed(truth, 10_deg, 50_mm, rng));
@@ -121,9 +122,9 @@ TEST(Align, ComesHomeFromFiftyMillimetresAndTenDegreesOffOnPartialScans) {
   }
   RecordProperty("rms_mm", std::to_string(std::sqrt(e.rms_mm)));
   RecordProperty("rms_deg", std::to_string(std::sqrt(e.rms_deg)));
-  EXPECT_LT(std::sqrt(e.rms_mm), 0.05);   // 0.013 measured with 0.1 mm of noise; asked: 0.3
-  EXPECT_LT(std::sqrt(e.rms_deg), 0.01);  // 0.003 measured; asked: 0.05
-  EXPECT_GT(e.pull2, 0.4);  // the covariance says how far off: 1 on average, 12 draws of 6 numbers
+  EXPECT_LT(std::sqrt(e.rms_mm), 0.05);   // 0.013 measured with 0.1 mm of noise; required: 0.3
+  EXPECT_LT(std::sqrt(e.rms_deg), 0.01);  // 0.003 measured; required: 0.05
+  EXPECT_GT(e.pull2, 0.4);  // the covariance states the error: 1 on average, 12 draws of 6 numbers
   EXPECT_LT(e.pull2, 2);
 }
 
@@ -134,7 +135,7 @@ TEST(Align, FindsTheDoorFromAnyPoseWithoutAStart) {
   const scene::MeshBvh index(door);
   const scene::ScanSurface scan = scan_captures(world, landings(world), 0, 1, rng);
   for (int draw = 0; draw < 3; ++draw) {
-    // the whole scan turned and carried away: the door may be anywhere
+    // The whole scan is rotated and moved: the door may be anywhere.
     const Pose turned_from_world = disturbed(Pose(), 0.6 + draw * 1.2, 0.8, rng);
     scene::ScanSurface turned = scan;
     for (auto& p : turned.positions) p = (turned_from_world * p.cast<double>()).cast<float>();
@@ -186,8 +187,9 @@ TEST(Align, NamesWhatAFlatShapeDoesNotHold) {
   EXPECT_EQ(names[0].substr(0, 11), "slide along");
   EXPECT_EQ(names[1].substr(0, 11), "slide along");
   EXPECT_EQ(names[2], "turn about z");
-  EXPECT_NEAR((found->world_from_prototype * Vector3d(0.03, 0.02, 0)).z(), 0, 1e-6);  // what is held is right
-  EXPECT_GT(found->covariance(3, 3), 0.1);  // and what is not is said to be unknown
+  // The determined direction is right.
+  EXPECT_NEAR((found->world_from_prototype * Vector3d(0.03, 0.02, 0)).z(), 0, 1e-6);
+  EXPECT_GT(found->covariance(3, 3), 0.1);  // the free direction is stated as unknown
 }
 
 TEST(Align, TellsWhereAndHowFarTheScanDiffers) {

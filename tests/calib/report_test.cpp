@@ -21,7 +21,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using nlohmann::json;
 
-// A calibration of a noisy world, as `limn solve` reports it into `folder`.
+// A calibration of a noisy world, with its report in `folder` as `limn solve` writes it.
 Report reported(const World& world, const fs::path& folder, const std::string& made_at) {
   Report report;
   report.observed.observations = world.observations;
@@ -51,7 +51,7 @@ TEST(Report, ThePageIsSelfContainedAndSaysTheVerdictInWords) {
   for (const char* outside : {"http", "<script", "src=", "@import", "url(", "<link"})
     EXPECT_EQ(html.find(outside), std::string::npos) << outside;
   EXPECT_NE(html.find("Predicted error"), std::string::npos)
-      << "the verdict's words, without the verdict itself";
+      << "the verdict's sentence starts without the verdict itself";
   for (const std::string& sentence : report.explanation.advice) EXPECT_NE(html.find(sentence), std::string::npos);
   EXPECT_NE(html.find("odd &lt;fault&gt;"), std::string::npos);
   EXPECT_EQ(html.find("nan"), std::string::npos);
@@ -83,7 +83,7 @@ TEST(Report, RemembersEarlierCalibrationsAndHowFarTheProjectorHasMoved) {
   World world = noisy_world();
   ASSERT_TRUE(write_rig_folder(reported(world, folder, "2026-11-20T10:00:00Z"), {}, folder).ok());
 
-  // The projector is nudged by half a degree and 5 mm; all matches follow it.
+  // The projector is moved by half a degree and 5 mm; all matches follow it.
   Imager& projector = world.rig.projectors[0];
   Pose world_from_projector = projector.imager_from_world.inverse();
   world_from_projector.rotation = world_from_projector.rotation * exp_rotation(Vector3d(0, 0.5_deg, 0));

@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace test;
 
-// A coloured, textured box before a wall, in a room with some light of its own; ordinary noise.
+// A coloured, textured box in front of a wall, in a room with some light of its own; ordinary noise.
 sim::World lit_world(int height = 240) {
   sim::World world = small_world(1.2);
   Imager& camera = world.rig.cameras[0];
@@ -57,7 +57,7 @@ sim::World lit_world(int height = 240) {
   return world;
 }
 
-// The largest difference of a measured curve from the true one, share of full light.
+// The largest difference of a measured curve from the true one, as a share of full light.
 double worst_error(const ProjectorResponse& response, const sim::ProjectorEffects& truth) {
   double worst = 0;
   const std::vector<double>* curves[] = {&response.blue, &response.green, &response.red};
@@ -68,8 +68,8 @@ double worst_error(const ProjectorResponse& response, const sim::ProjectorEffect
   return worst;
 }
 
-// The camera's true light of a level, and the largest difference of the measured one from it, both with the
-// levels that the images hold at their ends made the same (light has no zero or unit of its own).
+// The largest difference between the measured and the true light of a level. Both are scaled to agree at the
+// lowest and the highest level of the images, because light has no zero or unit of its own.
 double worst_error(const CameraResponse& response, const sim::CameraEffects& truth) {
   const auto true_light = [&](double level) {
     const double share = std::max(0.0, (level - truth.black_level) / (255 - truth.black_level));
@@ -86,7 +86,7 @@ double worst_error(const CameraResponse& response, const sim::CameraEffects& tru
   return worst;
 }
 
-// RMS, levels, of the predicted photograph of a colour from the photograph without noise, where light falls.
+// RMS, levels, of the predicted photograph of a colour minus the photograph without noise, where light falls.
 double foretold_error(const MeasuredResponse& measured, sim::World world, const cv::Vec3b& bgr) {
   sim::CameraEffects& effects = world.camera_effects[0];
   effects.full_well_e = effects.read_noise = 0;
@@ -153,7 +153,7 @@ TEST_P(ResponseOf, ProjectorAndCameraIsFoundAndForetellsOtherColours) {
     worst = std::max(worst, foretold_error(*measured, world, bgr));
   }
   EXPECT_LT(worst, 2);
-  EXPECT_LT(measured->mixings.at(0).held_out_levels, 3) << "the photographs' own noise included";
+  EXPECT_LT(measured->mixings.at(0).held_out_levels, 3) << "includes the photographs' own noise";
   fmt::print(
       "{}: curve {:.4f}, black {:.5f} +- {:.5f} of {}, camera {:.4f} ({}), colours {:.2f} levels RMS\n",
       a.name, worst_error(found, projector), found.black_level->value, found.black_level->stddev,
@@ -168,7 +168,7 @@ INSTANTIATE_TEST_SUITE_P(VirtualRig,
                                          Case{"SCurveGrey", 2.2, 0.6, 0.01, false, false}),
                          [](const auto& info) { return std::string(info.param.name); });
 
-// Samples of pixels with random light in the four shares, written by `level_of` light, with noise.
+// Samples of pixels with random light in the four shares, encoded by `level_of`, with noise.
 ResponseSamples made_samples(const std::function<double(double)>& level_of, double resolved = 0) {
   std::mt19937_64 rng = test_rng();
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -199,7 +199,7 @@ CameraResponse encoding_of(const ResponseSamples& samples) {
 
 TEST(CameraResponse, PowersAndUnknownCurvesAreFound) {
   const auto worst = [](const CameraResponse& response, const std::function<double(double)>& level_of) {
-    double low = 0, high = 0, worst = 0;  // the same scale at both ends of what was seen
+    double low = 0, high = 0, worst = 0;  // the same scale at both ends of the observed range
     const auto found = [&](double light) { return lookup(response.light, level_of(light) / 255); };
     low = found(0.05), high = found(0.9);
     for (double light = 0.05; light < 0.9; light += 0.01)
@@ -219,7 +219,7 @@ TEST(CameraResponse, PowersAndUnknownCurvesAreFound) {
   EXPECT_EQ(measured.encoding, "measured");
   EXPECT_LT(worst(measured, knee), 0.03) << "a kink between two of the curve's knots, 26 levels apart";
   EXPECT_GT(worst(encoding_of(made_samples([](double light) { return 4 + 240 * light; })), knee), 0.1)
-      << "what a linear camera would be off by";
+      << "the error if the camera were linear";
 }
 
 TEST(CameraResponse, WhatTheImagesDoNotTellIsCalledUnknown) {
@@ -240,7 +240,7 @@ class DamagedResponse : public testing::Test {
  protected:
   static sim::World small() {
     sim::World world = lit_world(120);
-    world.rig.cameras.push_back(world.rig.cameras[0]);  // a second camera that looks away
+    world.rig.cameras.push_back(world.rig.cameras[0]);  // a second camera that faces away
     world.rig.cameras[1].name = "camera1";
     world.rig.cameras[1].imager_from_world = looking_at({0, 0, 0}, {0, -1, 0}, Eigen::Vector3d::UnitZ());
     world.camera_effects.push_back(world.camera_effects[0]);
@@ -264,7 +264,7 @@ class DamagedResponse : public testing::Test {
 TEST_F(DamagedResponse, IsNamedWithItsImage) {
   const auto whole = measure_response(plan_);
   ASSERT_TRUE(whole.ok()) << whole.message();
-  ASSERT_EQ(whole->warnings.size(), 1U) << "camera1 sees nothing, and that is said";
+  ASSERT_EQ(whole->warnings.size(), 1U) << "a warning says that camera1 sees nothing";
   EXPECT_NE(whole->warnings[0].find("camera1"), std::string::npos);
   EXPECT_EQ(whole->mixings.size(), 1U);
 
@@ -288,7 +288,7 @@ TEST_F(DamagedResponse, IsNamedWithItsImage) {
   fs::create_directories(plan_.folder / "response" / "projektor0");
   EXPECT_NE(failure().find("projektor0"), std::string::npos);
   fs::remove(plan_.folder / "response" / "projektor0");
-  EXPECT_TRUE(measure_response(plan_).ok()) << "all is as it was";
+  EXPECT_TRUE(measure_response(plan_).ok()) << "everything is restored";
 }
 
 TEST_F(DamagedResponse, DarkAndSaturatedAreToldApart) {

@@ -23,7 +23,7 @@ Imager imager(const std::string& name, int width, int height, std::vector<double
   return {name, width, height, Lens::create("LENSMODEL_OPENCV4", std::move(values)).value(), pose};
 }
 
-// Up to two cameras and two projectors that look at boards 1.1 m away.
+// Up to two cameras and two projectors that face boards 1.1 m away.
 Rig true_rig(size_t cameras, size_t projectors) {
   Rig rig;
   rig.cameras = {imager("camera0", 1280, 1024, {1400, 1403, 652, 498, -0.12, 0.08, 0.0006, -0.0004}, Pose()),
@@ -53,7 +53,7 @@ Pose board_place(const Board& board, int pose, Rng* rng) {
          Pose(Eigen::Quaterniond::Identity(), {-board.width_m() / 2, -board.height_m() / 2, 0});
 }
 
-// What a rig sees of a board at these places, with noise.
+// The observations of a board at these poses, with noise.
 Observations seen_by(const Rig& rig, const std::vector<Pose>& world_from_board, Rng* rng) {
   Observations seen;
   seen.board = Board::parse("charuco:7x5:50mm").value();
@@ -92,7 +92,7 @@ Observations seen_by(const Rig& rig, const std::vector<Pose>& world_from_board, 
   return seen;
 }
 
-// What a rig sees, with noise, of a panel with a bump that stands where boards were: no board, tie points.
+// The observations of a panel with a bump where boards stood, with noise: no board, tie points only.
 Observations scene_seen_by(const Rig& rig, Rng* rng) {
   Observations seen = seen_by(rig, {}, rng);
   seen.poses = {"scene"};
@@ -128,10 +128,10 @@ std::vector<Pose> places(int count, Rng* rng) {
   return all;
 }
 
-// The rig as a solve of six noisy poses finds it.
+// The rig as solved from six noisy poses.
 Rig calibrated(const Rig& truth, Rng* rng) { return solve(seen_by(truth, places(6, rng), rng)).value().rig; }
 
-// A turn about a random axis by `degrees`, and a step of `mm`, of the device in its place.
+// Rotates the device in place about a random axis by `degrees`, and moves it by `mm`.
 void nudge(Imager* device, double degrees, double mm, Rng* rng) {
   std::normal_distribution<double> scatter(0, 1);
   const auto direction = [&] { return Vector3d(scatter(*rng), scatter(*rng), scatter(*rng)).normalized(); };
@@ -143,8 +143,8 @@ Imager& device_of(Rig* rig, size_t device) {
   return device < rig->cameras.size() ? rig->cameras[device] : rig->projectors[device - rig->cameras.size()];
 }
 
-// RMS distance on a panel of 0.6 x 0.4 m between where light of `rig`, aimed at points of the panel, is meant
-// to land and where the true projectors send it. The panel's place is what camera 0 of `rig` sees of it.
+// RMS distance on a panel of 0.6 x 0.4 m between where light of `rig` is meant to land and where the true
+// projectors send it. The panel's pose is the one that camera 0 of `rig` measures.
 double registration_mm(const Rig& rig, const Rig& truth) {
   Rng rng(3);
   const Pose panel(exp_rotation({0.3, 0.2, 0}), {-0.3, -0.15, 1.05});
@@ -152,7 +152,7 @@ double registration_mm(const Rig& rig, const Rig& truth) {
   std::vector<Vector3d> points;
   for (int i = 0; i < 12; ++i)
     for (int k = 0; k < 8; ++k) points.emplace_back(0.6 * (i + 0.5) / 12, 0.4 * (k + 0.5) / 8, 0);
-  // Gauss-Newton from the true place in the camera's world: small angles.
+  // Gauss-Newton from the true pose in the camera's world: small angles.
   Pose found = camera.imager_from_world.inverse() * true_camera.imager_from_world * panel;
   for (int round = 0; round < 8; ++round) {
     Matrix6d normal = Matrix6d::Zero();
@@ -256,7 +256,7 @@ TEST(RigCheck, TellsWhichOfTwoCamerasWasPushed) {
   const Rig rig = calibrated(true_rig(2, 1), &rng);
   for (const size_t device : {0u, 1u, 2u}) {
     Rig truth = true_rig(2, 1);
-    nudge(&device_of(&truth, device), 3, 30, &rng);  // no small one: kicked
+    nudge(&device_of(&truth, device), 3, 30, &rng);  // a large move
     const auto checked = check_rig(rig, seen_by(truth, places(1, &rng), &rng), {.rig_px = 0.08});
     ASSERT_TRUE(checked) << checked.message();
     ASSERT_EQ(checked->verdict, RigVerdict::moved) << device;
@@ -276,7 +276,7 @@ TEST(RigCheck, CannotTellOneCameraFromOneProjectorAndSaysSo) {
     ASSERT_TRUE(checked) << checked.message();
     ASSERT_EQ(checked->verdict, RigVerdict::undecided);
     ASSERT_EQ(checked->candidates.size(), 2u);
-    EXPECT_EQ(checked->candidates[0].device, "projector0");  // the one that is put back
+    EXPECT_EQ(checked->candidates[0].device, "projector0");  // the device that is corrected
     EXPECT_EQ(checked->candidates[1].device, "camera0");
     EXPECT_LT(registration_mm(checked->rig, truth), 1);
   }
@@ -318,7 +318,7 @@ TEST(RigCheck, SaysWhenNoSingleMoveExplainsWhatIsSeen) {
   EXPECT_TRUE(two->candidates.empty());
 
   truth = true_rig(1, 2);
-  truth.projectors[1].lens.values[0] *= 1.03;  // somebody zoomed
+  truth.projectors[1].lens.values[0] *= 1.03;  // its zoom was changed
   truth.projectors[1].lens.values[1] *= 1.03;
   const auto zoomed = check_rig(rig, seen_by(truth, places(1, &rng), &rng), {.rig_px = 0.08});
   ASSERT_TRUE(zoomed) << zoomed.message();

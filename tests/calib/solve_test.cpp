@@ -100,7 +100,8 @@ TEST(Solve, FindsTheNoiseThatWasPutIn) {
               0.003);
 }
 
-// Where light lands, not single values: those trade against each other. Weak priors must not show either.
+// Tests where light lands, not single values, because those are correlated. Weak priors must have no effect
+// either.
 TEST(Solve, NoisyShiftedProjectorLandsWithinATenthOfAPixel) {
   World world = make_world(1, 1, 10, 1.1);
   const Observations clean = world.observations;
@@ -192,9 +193,9 @@ TEST(Assess, HeldOutErrorIsTheNoiseOfTheCells) {
   const auto score = cross_validate(world.observations, {}, *solution);
   ASSERT_TRUE(score.ok()) << score.message();
   EXPECT_EQ(score->poses.size(), 8U);
-  EXPECT_GT(score->rms_px, 0.1 * std::sqrt(2.0) * 0.97);  // the 2-vector
+  EXPECT_GT(score->rms_px, 0.1 * std::sqrt(2.0) * 0.97);  // of the 2-vector
   EXPECT_LT(score->rms_px, 0.1 * std::sqrt(2.0) * 1.15);
-  // 0.1 px of 1600 px focal length at 1.1 m are 0.07 mm, a Rayleigh's 95 % is 2.45 of that.
+  // 0.1 px at 1600 px focal length and 1.1 m are 0.07 mm; 95 % of a Rayleigh distribution is 2.45 times that.
   Observed observed{world.observations, {{0, 0, 0, 1000, 900, 2}}, {}, 0, 0};
   const auto assessment = assess(observed, {}, *solution);
   ASSERT_TRUE(assessment.ok()) << assessment.message();
@@ -217,7 +218,7 @@ Eigen::VectorXd device_errors(const Solution& solution, const World& world) {
   return Eigen::Map<Eigen::VectorXd>(errors.data(), static_cast<Eigen::Index>(errors.size()));
 }
 
-// Squared errors in units of their covariance are chi-squared: one for each unknown.
+// Squared errors in units of their covariance are chi-squared, with one degree of freedom for each parameter.
 TEST(Solve, ErrorsScatterAsTheCovarianceSays) {
   const World clean = make_world(1, 1, 6, 0.5);
   std::mt19937_64 rng = test_rng();
@@ -271,7 +272,7 @@ TEST(Assess, ParallelBoardsInTheMiddleAreNeverGood) {
     EXPECT_EQ(assessment->verdict == Verdict::good, world == &healthy);
   }
   EXPECT_LT(propagated[0], 0.3);
-  EXPECT_GT(propagated[1], 1.5 * propagated[0]);  // measuring the thing itself costs both the same
+  EXPECT_GT(propagated[1], 1.5 * propagated[0]);  // measuring the target itself costs both the same
   printf("[ ill-posed] propagated %.3f mm healthy, %.3f mm parallel\n", propagated[0], propagated[1]);
 }
 

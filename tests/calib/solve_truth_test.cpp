@@ -1,4 +1,4 @@
-// The joint solve against worlds whose truth is known: where light lands on boards that no solve has seen.
+// The bundle adjustment in worlds with known truth: where light lands on boards that no solve has used.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,7 +15,7 @@ using namespace test;
 using namespace limn::calib::worlds;
 using Eigen::Vector2d;
 
-// Flat boards at other places before the same devices, seen without noise.
+// Flat boards at other poses in front of the same devices, observed without noise.
 World unseen_boards(const World& world, int poses, double distance_m) {
   World unseen;
   unseen.rig = world.rig;
@@ -35,9 +35,9 @@ World unseen_boards(const World& world, int poses, double distance_m) {
   return unseen;
 }
 
-// Errors of the projectors' pixels there; the place of a board is measured through the solved camera.
+// Errors of the projectors' pixels there; the pose of a board is measured with the solved camera.
 std::vector<Vector2d> errors_on(const World& unseen, Solution solution) {
-  solution.bend_m.setZero();  // of the calibration's board; these are flat
+  solution.bend_m.setZero();  // the bend belongs to the calibration's board; these are flat
   std::vector<Vector2d> errors;
   for (int pose = 0; pose < static_cast<int>(unseen.world_from_board.size()); ++pose) {
     const Pose board = board_pose_from_cameras(unseen.observations, solution, pose).value();
@@ -55,7 +55,7 @@ double rms(const std::vector<Vector2d>& errors) {
   return std::sqrt(squared / static_cast<double>(errors.size()));
 }
 
-// RMS over draws of noise; with the tie points or without.
+// RMS over draws of noise, with or without the tie points.
 double error_over_draws(const World& world, const World& unseen, bool with_points, int draws) {
   std::mt19937_64 rng = test_rng();
   double squared = 0;
@@ -89,7 +89,7 @@ TEST(FreePoints, HelpAWeakSetAndDoNoHarmToAHealthyOne) {
     ASSERT_GT(world.observations.points.size(), 100U);
     without[healthy] = error_over_draws(world, unseen, false, k_draws);
     with[healthy] = error_over_draws(world, unseen, true, k_draws);
-    printf("[ points   ] %s: unseen boards %.4f px without, %.4f px with %zu free points\n",
+    printf("[ points   ] %s: unseen boards %.4f px without, %.4f px with %zu tie points\n",
            healthy ? "8 poses" : "3 poses", without[healthy], with[healthy],
            world.observations.points.size());
   }
@@ -147,7 +147,7 @@ TEST(Bend, ABowIsFoundAndCostsNothing) {
   EXPECT_LT(error[1], 1.1 * error[0]);
 }
 
-// The mean over draws of where light lands is the prior's doing alone.
+// The mean over draws of where light lands depends on the prior alone.
 TEST(Priors, DoNotBiasALensShiftedProjector) {
   WorldOptions options;
   options.shift = 1.1;

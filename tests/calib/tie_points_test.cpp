@@ -17,7 +17,7 @@ using namespace limn::calib::worlds;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// A slanted wall before the rig, cut at x = 0: the right half stands 0.1 m nearer.
+// A slanted wall in front of the rig, cut at x = 0: the right half is 0.1 m nearer.
 std::optional<Vector3d> wall_at(const Imager& camera, const Vector2d& px) {
   const auto d_camera = camera.lens.unproject(px);
   if (!d_camera) return std::nullopt;
@@ -83,9 +83,11 @@ TEST(FreePointsOfAScene, AreSpreadAndAsSharpAsTheyClaim) {
                        static_cast<int>(point.px_camera.y() / 512));
   }
   EXPECT_EQ(quarters.size(), 4U);
-  printf("[ points   ] %zu points, %.0f projectors' and %.0f cameras' sightings; pulls %.2f and %.2f\n",
-         o.points.size(), count[0], count[1], std::sqrt(squared[0] / count[0]),
-         std::sqrt(squared[1] / count[1]));
+  printf(
+      "[ points   ] %zu points, %.0f projectors' and %.0f cameras' observations; normalised residuals %.2f "
+      "and %.2f\n",
+      o.points.size(), count[0], count[1], std::sqrt(squared[0] / count[0]),
+      std::sqrt(squared[1] / count[1]));
   EXPECT_GT(count[1], 100);
   for (const size_t kind : {0, 1}) {
     EXPECT_GT(std::sqrt(squared[kind] / count[kind]), 0.6);
@@ -102,7 +104,7 @@ TEST(RoomPoints, SurroundTheBoardAndLeaveItOut) {
   const std::vector<BoardCorner> board = {
       {0, {500, 400}, 0.1}, {1, {800, 420}, 0.1}, {2, {820, 600}, 0.1}, {3, {480, 580}, 0.1}};
   Observations& o = world.observations;
-  o.points.push_back({});  // there may be some already
+  o.points.push_back({});  // some may exist already
   add_room_points(decoded[1], board, 1, 7, {}, &o);
   ASSERT_GT(o.points.size(), 100U);
   int left = 0, right = 0;

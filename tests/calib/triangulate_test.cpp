@@ -60,7 +60,7 @@ TEST(Triangulate, RaysThatPassEachOtherLeaveTheirDistanceInPixels) {
   const Vector3d p(0.05, -0.1, 1.3);
   const MeasuredPixel a{*pair.camera.project(p)};
   MeasuredPixel b{*pair.projector.project(p)};
-  b.px.y() += 10;  // projector and camera stand beside each other: rows are what rays must agree in
+  b.px.y() += 10;  // projector and camera are side by side, so the rows of the rays must agree
   const auto found = triangulate(pair.camera, pair.projector, a, b, p);
   ASSERT_TRUE(found);
   EXPECT_GT(found->epipolar_px, 5);

@@ -17,12 +17,12 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double k_away = 1.3;  // m, from the camera to the middle of the space
+constexpr double k_away = 1.3;  // m, from the camera to the centre of the space
 constexpr double k_moved_m = 0.15;
 constexpr double k_turned = 40 * std::numbers::pi / 180;
-constexpr size_t k_measured = 24;        // points that the prototype's pose is measured by
-constexpr double k_edge_m = 0.003;       // light that lands this far off the point's plane went past an edge
-constexpr double k_least_cosine = 0.34;  // 70 degrees: light that grazes is not aimed
+constexpr size_t k_measured = 24;        // number of points that the prototype's pose is measured from
+constexpr double k_edge_m = 0.003;       // light that lands this far off the point's plane missed an edge
+constexpr double k_least_cosine = 0.34;  // 70 degrees: points lit at a more grazing angle are not used
 
 calib::ImagerView view(const Imager& imager) {
   return {imager.lens.model, imager.lens.values, imager.imager_from_world};
@@ -107,7 +107,7 @@ scene::Mesh concave_mesh() {
   return mesh;
 }
 
-// The project's car door looks along its +z; turned to face -z.
+// The project's car door faces its +z; it is turned to face -z.
 scene::Mesh panel_mesh() {
   scene::Mesh mesh = sim::car_door_scene().prototype->mesh;
   for (auto* list : {&mesh.positions, &mesh.normals}) {
@@ -132,7 +132,7 @@ bool seen(const sim::RayScene& scene, const Imager& imager, const Vector3d& p_wo
   return px && imager.contains(*px) && scene.reached(imager.imager_from_world.inverse().translation, p_world);
 }
 
-// Spread as far as they go: each the farthest from those before.
+// Points as far apart as possible: each is the farthest from those before.
 std::vector<Vector3d> spread(const std::vector<Vector3d>& points, size_t count) {
   std::vector<Vector3d> chosen = {points.front()};
   std::vector<double> distance(points.size(), 1e9);
@@ -184,7 +184,7 @@ std::optional<double> error_mm(const sim::RayScene& scene,
   return 1e3 * ((same_face ? landed : on_plane) - p_world).norm();
 }
 
-// Everything in one placement.
+// All errors in one placement.
 std::vector<double> errors_at(const TrueRig& truth,
                               const Rig& calibrated,
                               const scene::Mesh& mesh,
@@ -247,7 +247,7 @@ TrueRig make_true_rig(const RigOptions& options) {
   const Pose middle(Eigen::Quaterniond::Identity(),
                     Vector3d(-truth.board.width_m() / 2, -truth.board.height_m() / 2, 0));
   for (int pose = 0; pose < options.poses; ++pose) {
-    // Tilts go round the compass, places cover a grid with some disorder.
+    // Tilts go around all directions, positions cover a grid with some disorder.
     const double around = 2.4 * pose, tilt = options.tilt * (0.65 + 0.35 * even(rng));
     const double column = pose % 3 - 1, row = pose / 3 % 4 / 1.5 - 1;
     const Vector3d p(options.spread * (0.15 * column + 0.04 * even(rng)),
@@ -256,7 +256,7 @@ TrueRig make_true_rig(const RigOptions& options) {
     truth.world_from_board.push_back(
         Pose(exp_rotation({tilt * std::cos(around), tilt * std::sin(around), 0.3 * even(rng)}), p) * middle);
   }
-  // The prototype's back is turned away from the bisector of camera and projector.
+  // The prototype faces the bisector of camera and projector.
   truth.world_from_prototype = looking_at(p_target, 2 * p_target - p_eye / 2, Vector3d(0, -1, 0)).inverse();
   return truth;
 }

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double k_pnp_px = 0.03;
 
-// Observations as good images give them, solved and judged.
+// Observations as good images give them, solved and assessed.
 struct Calibrated {
   TrueRig truth;
   calib::Observed observed;
@@ -53,7 +53,7 @@ TEST(Propagate, TheNinetyFivePercentOfRoundAndOfThinScatterAreTheTextbooks) {
   EXPECT_TRUE(std::isinf(calib::p95_of(none)));
 }
 
-// The jackknife of a mean is the textbook's variance of the mean, exactly.
+// The jackknife covariance of a mean is exactly the textbook's variance of the mean.
 TEST(Propagate, TheJackknifeOfAMeanIsTheVarianceOfTheMean) {
   calib::Solution solution;
   solution.rig = make_true_rig({}).rig;
@@ -73,7 +73,7 @@ TEST(Propagate, TheJackknifeOfAMeanIsTheVarianceOfTheMean) {
   EXPECT_NEAR(covariance.squaredNorm(), 1.1 * 1.1, 1e-9);
 }
 
-// Rigs drawn from a covariance, each lit and measured for itself, against what the propagation predicts.
+// Rigs drawn from a covariance, each used and measured on its own, are compared with the predicted error.
 TEST(Propagate, DrawnRigsMissByWhatTheCovarianceSays) {
   const TrueRig truth = make_true_rig({.k1 = -0.05, .shift = 0.5});
   calib::Solution solution;
@@ -81,7 +81,7 @@ TEST(Propagate, DrawnRigsMissByWhatTheCovarianceSays) {
   for (const Pose& pose : truth.world_from_board) solution.world_from_board.emplace_back(pose);
   Eigen::VectorXd stddev = Eigen::VectorXd::Zero(28);
   stddev.segment(0, 4).setConstant(0.8);    // camera: focal lengths and centre, px
-  stddev.segment(14, 4).setConstant(0.4);   // projector, likewise
+  stddev.segment(14, 4).setConstant(0.4);   // projector, the same
   stddev.segment(22, 3).setConstant(1e-4);  // its pose, rad
   stddev.segment(25, 3).setConstant(1e-4);  // and m
   solution.covariance = stddev.cwiseAbs2().asDiagonal();
@@ -103,15 +103,15 @@ TEST(Propagate, DrawnRigsMissByWhatTheCovarianceSays) {
   const auto observations = observed_perfectly(truth, 8);
   const double foretold =
       calib::propagated_error_mm(observations, solution, {solution.covariance, k_pnp_px})[0];
-  printf("[ propagate] foretold p95 %.3f mm, drawn %.3f mm\n", foretold, p95(errors));
-  // 40 draws of some 8 free directions: one standard deviation of their 95 % is some 10 %; and the prototype
-  // is not the thing that the propagation takes.
+  printf("[ propagate] predicted p95 %.3f mm, drawn %.3f mm\n", foretold, p95(errors));
+  // 40 draws of about 8 free directions: one standard deviation of their 95 % is about 10 %; and the
+  // prototype differs from the target that the propagation assumes.
   EXPECT_NEAR(p95(errors) / foretold, 1.0, 0.35);
 }
 
 TEST(Propagate, TheStatedErrorHoldsForNinetyToNinetyEightPercentOfUnseenPoints) {
   std::mt19937_64 rng = test_rng();
-  std::vector<double> ratios;  // errors in units of what was stated
+  std::vector<double> ratios;  // errors divided by the stated error
   constexpr int k_cases = 8;
   for (int i = 0; i < k_cases; ++i) {
     const RigOptions rig{.k1 = -0.05 * (i % 4),
@@ -120,7 +120,7 @@ TEST(Propagate, TheStatedErrorHoldsForNinetyToNinetyEightPercentOfUnseenPoints) 
                          .poses = 8 + 2 * (i % 3),
                          .seed = static_cast<unsigned>(100 + i)};
     const double corner_px =
-        0.02 + 0.02 * (i % 3);  // the prototype's points are found as well as the board's
+        0.02 + 0.02 * (i % 3);  // the prototype's points are measured as well as the board's
     const Calibrated made = calibrated(rig, corner_px, 0.03 + 0.03 * (i % 2), &rng);
     const double stated = made.assessment.predicted_error_mm[0];
     const scene::Mesh mesh = prototype_mesh(static_cast<Prototype>(i % 3));
@@ -132,7 +132,7 @@ TEST(Propagate, TheStatedErrorHoldsForNinetyToNinetyEightPercentOfUnseenPoints) 
   }
   printf("[ stated   ] over %d rigs it holds for %.1f %%\n", k_cases, 100 * share_within(ratios, 1));
   EXPECT_GE(share_within(ratios, 1), 0.90);
-  EXPECT_LE(share_within(ratios, 1), 0.99);  // 8 rigs: a rig's share scatters by some 3 %
+  EXPECT_LE(share_within(ratios, 1), 0.99);  // 8 rigs: a rig's share scatters by about 3 %
 }
 
 TEST(Propagate, IllPosedSetsAreNeverGoodAndSayHowFarTheyMiss) {

@@ -16,7 +16,7 @@ using namespace test;
 
 constexpr double k_camera_loss = 0.15, k_projector_loss = 0.25;
 
-// Light of a white wall at some places and tilts, geometry taken out, with the sensor's noise.
+// Light of a white wall at some distances and tilts, with geometry divided out and the sensor's noise.
 std::vector<PaperLight> photographed_walls(std::span<const double> distances_m) {
   sim::World world = small_world();
   world.camera_effects[0] = {
@@ -56,7 +56,7 @@ RigResponses found_in(const std::vector<PaperLight>& light) {
   return responses;
 }
 
-// The largest difference over an image, where both are 1 in the middle.
+// The largest difference over an image; both are 1 in the centre.
 double worst_error(const Vignetting& found, double loss, int width, int height) {
   double worst = 0;
   const Eigen::Vector2d middle((width - 1) / 2.0, (height - 1) / 2.0);

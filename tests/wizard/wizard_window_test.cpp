@@ -103,7 +103,7 @@ WizardView an_end() {
   view.worth = calib::Verdict::good;
   view.verdict =
       "good: predicted error 0.31 mm on projector1 (0.52 mm at worst, 1.60 m from camera0, upper left of its "
-      "picture); poses not seen by the solve are foretold to 0.05 px, the worst (pose03) to 0.07 px.";
+      "image); held-out error (poses that the solve has not used) 0.05 px, the worst (pose03) 0.07 px.";
   view.to_do = {"projector1: add poses near its left edge."};
   view.faults.clear();
   for (int projector = 0; projector < 2; ++projector) {
