@@ -13,6 +13,7 @@
 #include "validate/check_page.h"
 #include "core/file.h"
 #include "core/log.h"
+#include "core/names.h"
 #include "core/image_io.h"
 #include "device/gl_context.h"
 
@@ -112,14 +113,15 @@ void compare(const fs::path& against, CheckResult* result) {
 }
 
 Status verdict_of(const std::vector<CheckResult>& results, const fs::path& page) {
-  std::string failed, problems;
+  std::vector<std::string> failed;
+  std::string problems;
   for (const CheckResult& result : results) {
-    if (!result.good()) failed += (failed.empty() ? "" : ", ") + result.name;
+    if (!result.good()) failed.push_back(result.name);
     if (!result.problem.empty()) problems += "\n  " + result.problem;
   }
   if (failed.empty()) return {};
-  return error("check: expected every limit to be met, found otherwise in {}. {} shows them.{}", failed,
-               page.string(), problems);
+  return error("check: expected every limit to be met, found otherwise in {}. {} shows them.{}",
+               joined_names(failed), page.string(), problems);
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/log.h"
+#include "core/median.h"
 #include "core/image_io.h"
 #include "core/rig.h"
 #include "tracker/detector.h"
@@ -66,9 +67,7 @@ double median_ms(tracker::Detector& detector, const cv::Mat& grey, const Lens* l
     times.push_back(
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - started).count());
   }
-  std::sort(times.begin(), times.end());
-  const std::size_t n = times.size();
-  return n % 2 ? times[n / 2] : 0.5 * (times[n / 2 - 1] + times[n / 2]);
+  return mean_median(std::move(times));
 }
 
 double corner_rms(const Lens& lens, double size_m, const Pose& pose, const tracker::Detection& detection) {

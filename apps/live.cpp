@@ -23,6 +23,7 @@
 #include "remote/tablet/tablet_view.h"
 #include "tracker/marker_image.h"
 #include "core/log.h"
+#include "core/names.h"
 #include "device/desktop.h"
 #include "device/gl_context.h"
 #include "device/open_camera.h"
@@ -97,15 +98,12 @@ Status check_fits(const Rig& rig, const Rig& devices) {
   for (const auto& [wanted, there] :
        {std::pair{&rig.cameras, &devices.cameras}, {&rig.projectors, &devices.projectors}}) {
     for (const Imager& imager : *wanted) {
-      const auto found =
-          std::find_if(there->begin(), there->end(), [&](const Imager& d) { return d.name == imager.name; });
-      std::string names;
-      for (const Imager& d : *there) names += (names.empty() ? "" : ", ") + d.name;
-      if (found == there->end())
+      const Imager* found = find_named(*there, imager.name);
+      if (!found)
         return error(
             "rig: {}: expected one of the devices ({}), found none of that name. This rig belongs to other "
             "devices; name the right one, or run limn calibrate.",
-            imager.name, names.empty() ? "none" : names);
+            imager.name, joined_names(*there));
       if (found->width != imager.width || found->height != imager.height)
         return error(
             "rig: {}: expected the device's size {}x{}, found {}x{}. This rig belongs to another device or "
@@ -136,15 +134,9 @@ Status set_up(const LiveOptions& options, SessionSetup* setup) {
 // The remote; null without one.
 Result<std::unique_ptr<Server>> served(const LiveOptions& options, const SessionSetup& setup) {
   if (options.serve.empty()) return std::unique_ptr<Server>();
-  const auto is_named = [&](const Imager& projector) { return projector.name == options.serve_show; };
-  if (!options.serve_show.empty() &&
-      std::none_of(setup.rig.projectors.begin(), setup.rig.projectors.end(), is_named)) {
-    std::string names;
-    for (const Imager& projector : setup.rig.projectors)
-      names += (names.empty() ? "" : ", ") + projector.name;
-    return usage_error("--serve-show: expected a projector of the rig ({}), found '{}'.", names,
-                       options.serve_show);
-  }
+  if (!options.serve_show.empty() && !find_named(setup.rig.projectors, options.serve_show))
+    return usage_error("--serve-show: expected a projector of the rig ({}), found '{}'.",
+                       joined_names(setup.rig.projectors), options.serve_show);
   ServeOptions serve;
   serve.at = options.serve;
   LIMN_TRY(const fs::path own, user_folder());
@@ -205,8 +197,7 @@ Status play_in_virtual_room(const LiveOptions& options) {
 }
 
 bool is_projector(const Rig& rig, const std::string& display) {
-  return std::any_of(rig.projectors.begin(), rig.projectors.end(),
-                     [&](const Imager& projector) { return projector.name == display; });
+  return find_named(rig.projectors, display) != nullptr;
 }
 
 // Opens what can be opened; what cannot is told of and left out.
@@ -225,13 +216,11 @@ SessionDevices opened(const Devices& devices, const Rig& rig, const device::Desk
   out.projectors.resize(rig.projectors.size());
   for (const device::DisplayConfig& wanted : devices.displays) {
     auto display = device::open_display(wanted, desktop);
-    const auto projector = std::find_if(rig.projectors.begin(), rig.projectors.end(),
-                                        [&](const Imager& p) { return p.name == wanted.name; });
-    if (!display)
-      miss(wanted.name, projector != rig.projectors.end() ? "projector" : "screen", display.message());
+    const Imager* projector = find_named(rig.projectors, wanted.name);
+    if (!display) miss(wanted.name, projector ? "projector" : "screen", display.message());
     auto opened = display ? std::move(*display) : nullptr;
-    if (projector != rig.projectors.end())
-      out.projectors[static_cast<std::size_t>(projector - rig.projectors.begin())] = std::move(opened);
+    if (projector)
+      out.projectors[static_cast<std::size_t>(projector - rig.projectors.data())] = std::move(opened);
     else
       out.screens.push_back(std::move(opened));
   }

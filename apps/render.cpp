@@ -13,6 +13,7 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/log.h"
+#include "core/names.h"
 #include "core/image_io.h"
 #include "core/rig.h"
 #include "device/gl_context.h"
@@ -30,12 +31,6 @@ namespace {
 
 // Images by camera, in the rig's order; empty where none was given.
 using Frames = std::vector<cv::Mat>;
-
-std::string names_of(const std::vector<Imager>& imagers) {
-  std::string names;
-  for (const Imager& imager : imagers) names += (names.empty() ? "" : ", ") + imager.name;
-  return names.empty() ? "none" : names;
-}
 
 // A camera file without a size (OpenCV's calibration writes none at times) takes its image's.
 Status accept(const cv::Mat& image, const std::string& file, Imager* camera) {
@@ -57,15 +52,14 @@ Result<Frames> read_frames(const std::vector<std::string>& arguments, Rig* rig) 
       return usage_error("--frame {}: expected CAMERA=PICTURE, such as camera0=picture.png.", argument);
     }
     const std::string name = argument.substr(0, equals), file = argument.substr(equals + 1);
-    const auto camera = std::find_if(rig->cameras.begin(), rig->cameras.end(),
-                                     [&](const Imager& c) { return c.name == name; });
-    if (camera == rig->cameras.end()) {
+    Imager* camera = find_named(rig->cameras, name);
+    if (!camera) {
       return usage_error("--frame {}: expected a camera of the rig ({}), found '{}'.", argument,
-                         names_of(rig->cameras), name);
+                         joined_names(rig->cameras), name);
     }
     LIMN_TRY(cv::Mat image, read_image(file));
-    LIMN_TRY_STATUS(accept(image, file, &*camera));
-    frames[static_cast<std::size_t>(camera - rig->cameras.begin())] = std::move(image);
+    LIMN_TRY_STATUS(accept(image, file, camera));
+    frames[static_cast<std::size_t>(camera - rig->cameras.data())] = std::move(image);
   }
   return frames;
 }

@@ -9,6 +9,7 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/log.h"
+#include "core/names.h"
 #include "core/image_io.h"
 #include "core/rig.h"
 #include "sim/sensor_model.h"
@@ -27,9 +28,8 @@ Result<std::vector<cv::Mat>> shown_images(const std::vector<std::string>& show, 
   for (const std::string& text : show) {
     const std::size_t equals = text.find('=');
     const std::string name = text.substr(0, equals);
-    const auto projector = std::find_if(rig.projectors.begin(), rig.projectors.end(),
-                                        [&](const Imager& p) { return p.name == name; });
-    if (equals == std::string::npos || projector == rig.projectors.end())
+    const Imager* projector = find_named(rig.projectors, name);
+    if (equals == std::string::npos || !projector)
       return usage_error(
           "--show: expected PROJECTOR=PICTURE with a projector of the world, found '{}'. Try --show "
           "projector0=picture.png.",
@@ -39,7 +39,7 @@ Result<std::vector<cv::Mat>> shown_images(const std::vector<std::string>& show, 
       return error("{}: expected {}x{}, the size of {}, found {}x{}. Draw it at the projector's size.",
                    text.substr(equals + 1), projector->width, projector->height, name, image.cols,
                    image.rows);
-    shown[static_cast<std::size_t>(projector - rig.projectors.begin())] = image;
+    shown[static_cast<std::size_t>(projector - rig.projectors.data())] = image;
   }
   return shown;
 }
@@ -53,9 +53,7 @@ Result<std::vector<std::string>> chosen_variants(const std::string& text, const 
     const std::size_t equals = item.find('=');
     const scene::Slot* slot = world.scene->find_slot(item.substr(0, equals));
     const bool known =
-        slot != nullptr && equals != std::string::npos &&
-        std::any_of(slot->variants.begin(), slot->variants.end(),
-                    [&](const scene::Variant& v) { return v.name == item.substr(equals + 1); });
+        slot != nullptr && equals != std::string::npos && find_named(slot->variants, item.substr(equals + 1));
     if (!known)
       return usage_error(
           "--variants: expected SLOT=VARIANT of the world's scene, found '{}'. The scene's scene.json lists "

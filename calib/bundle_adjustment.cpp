@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "calib/solve.h"
+#include "core/least_squares.h"
 #include "core/linear_algebra.h"
 
 namespace limn::calib {
@@ -79,12 +80,13 @@ void BundleAdjuster::index_parameters() {
   for (auto& [key, group] : groups) groups_.push_back(std::move(group));
 }
 
-// Cauchy's loss rho(s) = a^2 log(1 + s / a^2) of the squared length s of a residual.
+// Cauchy's loss of the squared length of a residual.
 double BundleAdjuster::robust_weight(double squared, NormalEquations* normal) const {
-  const double a2 = options_.robust_at * options_.robust_at, weight = 1 / (1 + squared / a2);
-  normal->cost += a2 * std::log1p(squared / a2) / 2;
+  const CauchyLoss loss(options_.robust_at);
+  const double weight = loss.weight(squared);
+  normal->cost += loss.cost(squared) / 2;
   normal->weight += weight;
-  normal->curvature += weight - squared * weight * weight / a2;
+  normal->curvature += weight - squared * weight * weight / loss.square_limit;
   normal->slope += weight * weight * squared / 2;
   normal->count += 1;
   return weight;
@@ -378,6 +380,39 @@ void BundleAdjuster::place_points(Parameters* parameters) const {
   }
 }
 
+// The whole problem for minimise(). The equations come with the cost.
+struct BundleAdjuster::Problem {
+  BundleAdjuster& joint;
+  const Noise& noise;
+  double enough;
+  Parameters here;
+  NormalEquations at_here;
+  Parameters there{};
+  NormalEquations at_there{};
+  Step step{};
+  double last_gain = 1;  // of the cost, in the last step that was accepted
+
+  double cost() const { return at_here.cost; }
+  bool solve(double damping) {
+    std::optional<Step> found = joint.step(at_here, damping);
+    if (found) step = std::move(*found);
+    return found.has_value();
+  }
+  double evaluate_trial() {
+    there = joint.moved(here, step);
+    at_there = joint.evaluate(there, noise);
+    return at_there.cost;
+  }
+  void accept_trial() {
+    last_gain = (at_here.cost - at_there.cost) / std::max(at_here.cost, k_to_rounding);
+    here = std::move(there);
+    at_here = std::move(at_there);
+  }
+  bool is_settled(const LeastSquaresTrial& tried) const {
+    return step.promised < k_settled * tried.cost_before + enough;
+  }
+};
+
 Result<BundleAdjuster::Summary> BundleAdjuster::minimise(Parameters start, const Noise& noise, double enough) {
   camera_at_.clear();
   projector_at_.clear();
@@ -396,42 +431,30 @@ Result<BundleAdjuster::Summary> BundleAdjuster::minimise(Parameters start, const
   if (!options_.bend) free_[static_cast<size_t>(size)] = free_[static_cast<size_t>(size) + 1] = false;
   if (start.inverse_depths.size() != observations_.points.size()) place_points(&start);
 
-  Summary descent{std::move(start)};
-  NormalEquations here = evaluate(descent.parameters, noise);
-  if (!std::isfinite(here.cost))
+  NormalEquations at_start = evaluate(start, noise);
+  Problem problem{.joint = *this,
+                  .noise = noise,
+                  .enough = enough,
+                  .here = std::move(start),
+                  .at_here = std::move(at_start)};
+  const LeastSquaresSummary found = minimise(&problem, {.max_steps = k_most_steps,
+                                                        .first_damping = k_first_damping,
+                                                        .least_damping = k_least_damping,
+                                                        .most_damping = k_most_damping,
+                                                        .damps_more_without_step = true});
+  if (found.end == LeastSquaresEnd::no_start)
     return error(
         "the joint solve has no finite start: the observations do not determine the devices. Capture more "
         "poses, tilted by 20 to 45 degrees to different sides.");
-  double damping = k_first_damping, last_gain = 1;
-  while (descent.steps < k_most_steps && damping < k_most_damping) {
-    ++descent.steps;
-    const std::optional<Step> tried = step(here, damping);
-    if (!tried) {
-      damping = std::max(10 * damping, k_first_damping);
-      continue;
-    }
-    const bool last = tried->promised < k_settled * here.cost + enough;
-    const Parameters there = moved(descent.parameters, *tried);
-    NormalEquations normal = evaluate(there, noise);
-    if (normal.cost <= here.cost) {
-      last_gain = (here.cost - normal.cost) / std::max(here.cost, k_to_rounding);
-      descent.parameters = there;
-      here = std::move(normal);
-      damping = std::max(damping / 10, k_least_damping);
-    } else {
-      damping *= 10;
-    }
-    descent.converged = last;
-    if (last) break;
-  }
-  descent.cost = here.cost;
+  const bool converged = found.end == LeastSquaresEnd::converged;
   // A valley: steps that no observation feels. The covariance says how long it is.
   constexpr double k_flat = 1e-4;  // share of the cost, in the last step
-  if (descent.converged || (last_gain < k_flat && std::isfinite(here.cost))) return descent;
+  if (converged || problem.last_gain < k_flat)
+    return Summary{std::move(problem.here), found.steps, converged, found.cost};
   return error(
       "the joint solve did not converge in {} steps. Check the board's description, leave out doubtful poses "
       "(--skip-poses), capture more poses.",
-      descent.steps);
+      found.steps);
 }
 
 MatrixXd BundleAdjuster::covariance(const Parameters& at, const Noise& noise) {
@@ -453,55 +476,73 @@ MatrixXd BundleAdjuster::covariance(const Parameters& at, const Noise& noise) {
   return robust * inverse.topLeftCorner(bend_at_, bend_at_);
 }
 
-Result<Pose> BundleAdjuster::board_pose(const Parameters& at, int pose, const Noise& noise, Pose start) const {
-  using Matrix6 = Eigen::Matrix<double, 6, 6>;
-  const auto normal_at = [&](const Pose& world_from_board, Matrix6* matrix, Vector6d* gradient) {
-    NormalEquations sums;
-    sums.cost = 0;
-    matrix->setZero();
-    gradient->setZero();
+// One placement of the board by its corners, for minimise().
+struct BundleAdjuster::BoardProblem {
+  struct Equations {
+    double cost = 0;
+    Matrix6d matrix = Matrix6d::Zero();
+    Vector6d gradient = Vector6d::Zero();
+  };
+  const BundleAdjuster& joint;
+  const Parameters& at;
+  int pose;
+  const Noise& noise;
+  Pose state, trial{};
+  Equations at_state{}, at_trial{};
+  Vector6d delta{};
+  double promised = 0;
+
+  Equations evaluate(const Pose& world_from_board) const {
+    Equations sums;
+    NormalEquations robust;
+    robust.cost = 0;
     Derivatives d;
-    for (const CornerObservation& corner : observations_.corners) {
+    for (const CornerObservation& corner : joint.observations_.corners) {
       if (corner.pose != pose) continue;
       const Imager& camera = at.cameras[static_cast<size_t>(corner.camera)];
       const double stddev = std::hypot(corner.stddev_px, noise.corner_px);
       Vector2d px;
-      if (!predict_corner(view(camera), world_from_board, shape_, at.bend_m,
-                          observations_.board.p_corner(corner.corner).head<2>(), &px, &d)) {
-        robust_weight(k_unseen * k_unseen, &sums);
+      if (!predict_corner(view(camera), world_from_board, joint.shape_, at.bend_m,
+                          joint.observations_.board.p_corner(corner.corner).head<2>(), &px, &d)) {
+        joint.robust_weight(k_unseen * k_unseen, &robust);
         continue;
       }
       const Vector2d residual = (px - corner.px) / stddev;
-      const double weight = robust_weight(residual.squaredNorm(), &sums);
-      *matrix += weight / (stddev * stddev) * d.board_pose.transpose() * d.board_pose;
-      *gradient += weight / stddev * d.board_pose.transpose() * residual;
+      const double weight = joint.robust_weight(residual.squaredNorm(), &robust);
+      sums.matrix += weight / (stddev * stddev) * d.board_pose.transpose() * d.board_pose;
+      sums.gradient += weight / stddev * d.board_pose.transpose() * residual;
     }
-    return sums.cost;
-  };
-  Matrix6 matrix;
-  Vector6d gradient;
-  double cost = normal_at(start, &matrix, &gradient), damping = k_first_damping;
-  for (int step = 0; step < k_most_steps && damping < k_most_damping; ++step) {
-    Matrix6 damped = matrix;
-    damped.diagonal() *= 1 + damping;
-    const Vector6d delta = -solve_ldlt(damped, gradient);
-    if (!delta.allFinite()) break;
-    const bool last = -delta.dot(gradient) / 2 < k_settled * cost + k_to_rounding;
-    const Pose tried = boxplus(start, delta);
-    Matrix6 next;
-    Vector6d slope;
-    const double there = normal_at(tried, &next, &slope);
-    if (there <= cost) {
-      start = tried;
-      cost = there;
-      matrix = next;
-      gradient = slope;
-      damping = std::max(damping / 10, k_least_damping);
-    } else {
-      damping *= 10;
-    }
-    if (last) return start;
+    sums.cost = robust.cost;
+    return sums;
   }
+  double cost() const { return at_state.cost; }
+  bool solve(double damping) {
+    delta = -solve_ldlt(damped(at_state.matrix, damping), at_state.gradient);
+    promised = -delta.dot(at_state.gradient) / 2;
+    return delta.allFinite();
+  }
+  double evaluate_trial() {
+    trial = boxplus(state, delta);
+    at_trial = evaluate(trial);
+    return at_trial.cost;
+  }
+  void accept_trial() {
+    state = trial;
+    at_state = at_trial;
+  }
+  bool is_settled(const LeastSquaresTrial& tried) const {
+    return promised < k_settled * tried.cost_before + k_to_rounding;
+  }
+};
+
+Result<Pose> BundleAdjuster::board_pose(const Parameters& at, int pose, const Noise& noise, Pose start) const {
+  BoardProblem problem{.joint = *this, .at = at, .pose = pose, .noise = noise, .state = start};
+  problem.at_state = problem.evaluate(start);
+  const LeastSquaresSummary found = minimise(&problem, {.max_steps = k_most_steps,
+                                                        .first_damping = k_first_damping,
+                                                        .least_damping = k_least_damping,
+                                                        .most_damping = k_most_damping});
+  if (found.end == LeastSquaresEnd::converged) return problem.state;
   return error("{}: the board's pose does not follow from its corners.",
                observations_.poses[static_cast<size_t>(pose)]);
 }

@@ -86,6 +86,9 @@ class BundleAdjuster {
     double promised = 0;  // decrease of the cost that the linearised problem predicts
   };
 
+  struct Problem;       // what minimise() works on: all of it,
+  struct BoardProblem;  // or one placement of the board
+
   void index_parameters();
   NormalEquations evaluate(const Parameters& at, const Noise& noise);
   void add_group(const Group& group, const Parameters& at, const Noise& noise, NormalEquations* normal);

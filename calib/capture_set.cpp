@@ -4,6 +4,7 @@
 #include <set>
 
 #include "core/config.h"
+#include "core/names.h"
 #include "core/image_io.h"
 
 namespace limn::calib {
@@ -48,7 +49,7 @@ Result<std::vector<std::string>> pose_names(const fs::path& folder,
     const auto found = std::find(names.begin(), names.end(), name);
     if (found == names.end())
       return error("--skip-poses: there is no pose '{}' in {}. Poses: {}.", name, folder.string(),
-                   fmt::join(names, ", "));
+                   joined_names(names));
     names.erase(found);
   }
   return names;
@@ -64,14 +65,12 @@ fs::path level_of(const CaptureSet& captures, const std::string& pose, size_t pr
 Status check_strangers(const fs::path& folder,
                        const std::vector<CapturedDevice>& devices,
                        const std::string& pose) {
-  std::vector<std::string> known;
-  for (const CapturedDevice& device : devices) known.push_back(device.name);
   for (const std::string& name : names_in(folder, "*", true)) {
-    if (name.starts_with(".") || std::find(known.begin(), known.end(), name) != known.end()) continue;
+    if (name.starts_with(".") || find_named(devices, name)) continue;
     return error(
         "{}: expected folders of the devices in capture.json ({}), found '{}'. Captures of different rigs "
         "are mixed: move {} to its own captures folder, or leave it out with --skip-poses {}.",
-        folder.string(), fmt::join(known, ", "), name, pose, pose);
+        folder.string(), joined_names(devices), name, pose, pose);
   }
   return {};
 }

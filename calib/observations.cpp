@@ -17,6 +17,7 @@
 #include "core/file.h"
 #include "core/frame.h"
 #include "core/log.h"
+#include "core/median.h"
 #include "core/image_io.h"
 
 namespace limn::calib {
@@ -112,10 +113,8 @@ struct Cell {
   // one side, and so its label is wrong. False when too few of the remaining pixels have labels.
   bool keep_bright() {
     if (pixels.empty()) return false;
-    std::vector<int> sorted = levels;
-    const auto bright = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 9 / 10);
-    std::nth_element(sorted.begin(), bright, sorted.end());
-    const double limit = k_bright * *bright;
+    std::vector<int> ranked = levels;
+    const double limit = k_bright * value_of_rank(&ranked, ranked.size() * 9 / 10);
     const auto all =
         std::count_if(least_levels.begin(), least_levels.end(), [&](int level) { return level >= limit; });
     size_t kept = 0;

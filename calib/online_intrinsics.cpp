@@ -7,7 +7,9 @@
 #include <limits>
 #include <numbers>
 
+#include "core/least_squares.h"
 #include "core/linear_algebra.h"
+#include "core/median.h"
 
 namespace limn::calib {
 namespace {
@@ -51,13 +53,6 @@ bool project(const std::array<double, 8>& values,
     return false;
   if (d_lens) *d_lens << d_values.col(0) + d_values.col(1), d_values.middleCols<4>(2);
   return true;
-}
-
-double middle(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
 }
 
 // Squared distance of a point's pixel from the predicted one, in standard deviations.
@@ -164,7 +159,7 @@ OnlineIntrinsics::Blocks OnlineIntrinsics::blocks(const Vector5d& values,
                                         double noise) const {
   Blocks out;
   const auto lens = model_values(values);
-  const double limit = options_.robust_at * options_.robust_at;
+  const CauchyLoss loss(options_.robust_at);
   for (const BodyPoint& point : view.points) {
     const Eigen::Vector3d turned = pose.rotation * point.p_body;
     Eigen::Vector2d px;
@@ -179,10 +174,10 @@ OnlineIntrinsics::Blocks OnlineIntrinsics::blocks(const Vector5d& values,
     const Eigen::Matrix2d information = point.covariance.inverse() / (noise * noise);
     const Eigen::Vector2d r = point.px - px;
     const double square = r.dot(information * r);
-    const double weight = 1 / (1 + square / limit);
+    const double weight = loss.weight(square);
     const Eigen::Matrix<double, 2, 5> weighted_lens = weight * information * d_lens;
     const Eigen::Matrix<double, 2, 6> weighted_place = weight * information * d_place;
-    out.cost += limit * std::log1p(square / limit);
+    out.cost += loss.cost(square);
     out.ll += d_lens.transpose() * weighted_lens;
     out.lp += d_lens.transpose() * weighted_place;
     out.pp += d_place.transpose() * weighted_place;
@@ -203,36 +198,55 @@ double OnlineIntrinsics::noise_of(const Vector5d& values,
   const auto numbers = 2.0 * static_cast<double>(squares.size());
   const double unknowns = 6.0 * static_cast<double>(views.size());
   const double freedom = std::max(0.25, (numbers - unknowns) / numbers);
-  return std::max(1.0, std::sqrt(middle(std::move(squares)) / k_median_square / freedom));
+  return std::max(1.0, std::sqrt(median(std::move(squares)) / k_median_square / freedom));
 }
+
+// The camera's pose for the given lens values, for minimise(). The equations come with the cost.
+struct OnlineIntrinsics::PlaceProblem {
+  const OnlineIntrinsics& lens;
+  const Vector5d& values;
+  const View& view;
+  double noise = 1;
+  Pose pose, next{};
+  Blocks now{}, there{};
+  Vector6d delta{};
+
+  void start(double with_noise) {
+    noise = with_noise;
+    now = lens.blocks(values, view, pose, noise);
+  }
+  double cost() const { return now.is_whole ? now.cost : std::numeric_limits<double>::infinity(); }
+  bool solve(double damping) {
+    delta = limn::solve_ldlt(damped(now.pp, damping), now.p);
+    return delta.allFinite();
+  }
+  double evaluate_trial() {
+    next = boxplus(pose, delta);
+    there = lens.blocks(values, view, next, noise);
+    return there.is_whole ? there.cost : std::numeric_limits<double>::infinity();
+  }
+  void accept_trial() {
+    pose = next;
+    now = there;
+  }
+  bool is_settled(const LeastSquaresTrial& tried) const {
+    return tried.is_accepted && tried.gain() < k_enough;
+  }
+};
 
 // The camera's pose for the given lens values; nullopt when the view does not fit them.
 std::optional<Pose> OnlineIntrinsics::find_pose(const Vector5d& values, const View& view, double* noise) const {
-  Pose pose = view.camera_from_body;
+  PlaceProblem problem{.lens = *this, .values = values, .view = view, .pose = view.camera_from_body};
   for (int round = 0; round < k_most_rounds; ++round) {
-    *noise = noise_of(values, std::span(&view, 1), std::span(&pose, 1));
-    double damping = 1e-6;
-    Blocks now = blocks(values, view, pose, *noise);
-    for (int step = 0; step < k_most_view_steps && now.is_whole && damping < k_most_view_damping; ++step) {
-      Matrix6d damped = now.pp;
-      damped.diagonal() *= 1 + damping;
-      const Vector6d delta = limn::solve_ldlt(damped, now.p);
-      if (!delta.allFinite()) return std::nullopt;
-      const Pose next = boxplus(pose, delta);
-      const Blocks there = blocks(values, view, next, *noise);
-      if (!there.is_whole || !(there.cost <= now.cost)) {
-        damping *= 10;
-        continue;
-      }
-      const double gain = now.cost - there.cost;
-      pose = next;
-      now = there;
-      damping = std::max(1e-12, damping / 10);
-      if (gain < k_enough) break;
-    }
-    if (!now.is_whole || !pose.is_finite()) return std::nullopt;
+    *noise = noise_of(values, std::span(&view, 1), std::span(&problem.pose, 1));
+    problem.start(*noise);
+    const LeastSquaresSummary found = minimise(
+        &problem, {.max_steps = k_most_view_steps, .first_damping = 1e-6, .most_damping = k_most_view_damping});
+    if (found.end == LeastSquaresEnd::no_start || found.end == LeastSquaresEnd::no_step ||
+        !problem.pose.is_finite())
+      return std::nullopt;
   }
-  return pose;
+  return problem.pose;
 }
 
 bool OnlineIntrinsics::add(const BodyView& seen) {
@@ -278,65 +292,77 @@ bool OnlineIntrinsics::add(const BodyView& seen) {
   return true;
 }
 
-std::optional<OnlineIntrinsics::Solved> OnlineIntrinsics::solve_views(Solved at) const {
-  const Matrix5d before = inverse_of(before_.covariance);
-  const auto evaluated = [&](const Vector5d& values, const std::vector<Pose>& poses, double noise,
-                             std::vector<Blocks>* all) {
-    const Vector5d off = values - before_.values;
+// The lens with all places, for minimise(): places meet no point of each other, so they are eliminated one by
+// one (Schur complement).
+struct OnlineIntrinsics::LensProblem {
+  const OnlineIntrinsics& lens;
+  Matrix5d before;  // information
+  Solved at, trial{};
+  std::vector<Blocks> now{}, there{};
+  Vector5d delta{};
+  std::vector<Vector6d> moves{};
+
+  double evaluated(const Solved& solve_views, std::vector<Blocks>* all) const {
+    const Vector5d off = solve_views.values - lens.before_.values;
     double cost = off.dot(before * off);
     all->clear();
-    for (std::size_t i = 0; i < views_.size(); ++i) {
-      all->push_back(blocks(values, views_[i], poses[i], noise));
+    for (std::size_t i = 0; i < lens.views_.size(); ++i) {
+      all->push_back(lens.blocks(solve_views.values, lens.views_[i], solve_views.poses[i], at.noise));
       if (!all->back().is_whole) return std::numeric_limits<double>::infinity();
       cost += all->back().cost;
     }
     return cost;
-  };
-  for (int round = 0; round < k_most_rounds; ++round) {
-    at.noise = noise_of(at.values, views_, at.poses);
-    std::vector<Blocks> now, there;
-    at.cost = evaluated(at.values, at.poses, at.noise, &now);
-    if (!std::isfinite(at.cost)) return std::nullopt;
-    double damping = 1e-4;
-    for (int step = 0; step < k_most_view_steps && damping < k_most_view_damping; ++step) {
-      Matrix5d lens = before;
-      Vector5d gradient = before * (before_.values - at.values);
-      std::vector<Matrix6d> inverses;
-      for (const Blocks& view : now) {
-        Matrix6d place = view.pp;
-        place.diagonal() *= 1 + damping;
-        inverses.push_back(place.inverse());
-        const Eigen::Matrix<double, 5, 6> cross = view.lp * inverses.back();
-        lens += view.ll - cross * view.lp.transpose();
-        gradient += view.l - cross * view.p;
-      }
-      lens.diagonal() *= 1 + damping;
-      const Vector5d delta = lens.ldlt().solve(gradient);
-      if (!delta.allFinite()) return std::nullopt;
-      const Vector5d values = at.values + delta;
-      std::vector<Pose> poses = at.poses;
-      for (std::size_t i = 0; i < poses.size(); ++i) {
-        const Vector6d moved = inverses[i] * (now[i].p - now[i].lp.transpose() * delta);
-        if (!moved.allFinite()) return std::nullopt;
-        poses[i] = boxplus(poses[i], moved);
-      }
-      const double cost = values[0] > 0 ? evaluated(values, poses, at.noise, &there)
-                                        : std::numeric_limits<double>::infinity();
-      if (!(cost <= at.cost)) {
-        damping *= 10;
-        continue;
-      }
-      const double gain = at.cost - cost;
-      at.values = values;
-      at.poses = std::move(poses);
-      at.cost = cost;
-      std::swap(now, there);
-      damping = std::max(1e-9, damping / 10);
-      if (gain < k_enough) break;
-    }
-    if (std::abs(noise_of(at.values, views_, at.poses) / at.noise - 1) < 0.05) break;
   }
-  return at;
+  void start(double noise) {
+    at.noise = noise;
+    at.cost = evaluated(at, &now);
+  }
+  double cost() const { return at.cost; }
+  bool solve(double damping) {
+    Matrix5d matrix = before;
+    Vector5d gradient = before * (lens.before_.values - at.values);
+    std::vector<Matrix6d> inverses;
+    for (const Blocks& view : now) {
+      inverses.push_back(damped(view.pp, damping).inverse());
+      const Eigen::Matrix<double, 5, 6> cross = view.lp * inverses.back();
+      matrix += view.ll - cross * view.lp.transpose();
+      gradient += view.l - cross * view.p;
+    }
+    delta = damped(matrix, damping).ldlt().solve(gradient);
+    moves.clear();
+    for (std::size_t i = 0; i < now.size(); ++i) {
+      moves.push_back(inverses[i] * (now[i].p - now[i].lp.transpose() * delta));
+      if (!moves.back().allFinite()) return false;
+    }
+    return delta.allFinite();
+  }
+  double evaluate_trial() {
+    trial = at;
+    trial.values += delta;
+    for (std::size_t i = 0; i < moves.size(); ++i) trial.poses[i] = boxplus(trial.poses[i], moves[i]);
+    trial.cost = trial.values[0] > 0 ? evaluated(trial, &there) : std::numeric_limits<double>::infinity();
+    return trial.cost;
+  }
+  void accept_trial() {
+    at = std::move(trial);
+    std::swap(now, there);
+  }
+  bool is_settled(const LeastSquaresTrial& tried) const {
+    return tried.is_accepted && tried.gain() < k_enough;
+  }
+};
+
+std::optional<OnlineIntrinsics::Solved> OnlineIntrinsics::solve_views(Solved start) const {
+  LensProblem problem{.lens = *this, .before = inverse_of(before_.covariance), .at = std::move(start)};
+  for (int round = 0; round < k_most_rounds; ++round) {
+    problem.start(noise_of(problem.at.values, views_, problem.at.poses));
+    const LeastSquaresSummary found = minimise(
+        &problem, {.max_steps = k_most_view_steps, .least_damping = 1e-9, .most_damping = k_most_view_damping});
+    if (found.end == LeastSquaresEnd::no_start || found.end == LeastSquaresEnd::no_step) return std::nullopt;
+    const double noise = noise_of(problem.at.values, views_, problem.at.poses);
+    if (std::abs(noise / problem.at.noise - 1) < 0.05) break;
+  }
+  return problem.at;
 }
 
 // Focal length and distance are correlated, so that far from the truth there are other minima.

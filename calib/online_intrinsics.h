@@ -103,6 +103,8 @@ class OnlineIntrinsics {
     std::vector<Pose> poses;
     double noise = 1, cost = 0;
   };
+  struct PlaceProblem;  // what minimise() works on: one view's place,
+  struct LensProblem;   // or the lens with all places
   Blocks blocks(const Vector5d& values, const View& view, const Pose& pose, double noise) const;
   double noise_of(const Vector5d& values, std::span<const View> views, std::span<const Pose> poses) const;
   std::optional<Pose> find_pose(const Vector5d& values, const View& view, double* noise) const;

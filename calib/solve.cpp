@@ -7,6 +7,7 @@
 
 #include "calib/bundle_adjustment.h"
 #include "calib/seed.h"
+#include "core/median.h"
 
 namespace limn::calib {
 namespace {
@@ -24,9 +25,7 @@ ImagerView view(const Imager& imager) {
 // Standard deviation of one coordinate by the median of |residual| (of a 2-D normal: 1.1774 sigma).
 double median_noise(std::vector<double> deviations, double otherwise) {
   if (deviations.empty()) return otherwise;
-  const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
-  std::nth_element(deviations.begin(), middle, deviations.end());
-  return std::max(*middle, k_least_noise_px);
+  return std::max(median(std::move(deviations)), k_least_noise_px);
 }
 
 double noise_of(const std::vector<Vector2d>& residuals) {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
+#include "core/names.h"
 
 namespace limn {
 
@@ -60,12 +61,6 @@ Json parse(const std::string& text, std::optional<std::string>* problem) {
     return true;
   };
   return Json::parse(text, look, true, true);
-}
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
 }
 
 }  // namespace
@@ -159,7 +154,7 @@ std::string ConfigNode::choice(const std::vector<std::string>& choices) const {
   if (!json_) return choices.front();
   const std::string word = text();
   if (std::find(choices.begin(), choices.end(), word) != choices.end()) return word;
-  problem(fmt::format("expected one of {}, found {}.", joined(choices), found(*json_)));
+  problem(fmt::format("expected one of {}, found {}.", joined_names(choices), found(*json_)));
   return choices.front();
 }
 
@@ -223,7 +218,7 @@ void ConfigNode::only(const std::set<std::string>& known) const {
       return edit_distance(a, key) < edit_distance(b, key);
     });
     problem(fmt::format("unknown key \"{}\"; did you mean \"{}\"? Known: {}.", key, *nearest,
-                        joined({known.begin(), known.end()})));
+                        joined_names(known)));
   }
 }
 

@@ -89,6 +89,10 @@ Result<ColourMixing> load_mixing(const std::filesystem::path& response_json,
                                  const std::string& projector,
                                  const std::string& camera);
 
+/// Of a display whose response was not measured: light = value^2.2. Close to sRGB's curve (IEC 61966-2-1) and
+/// what projectors are set to when they leave the factory.
+constexpr double k_display_gamma = 2.2;
+
 /// Linear light of an sRGB value, both 0 … 1 (IEC 61966-2-1), and back.
 double linear_from_srgb(double encoded);
 double srgb_from_linear(double light);

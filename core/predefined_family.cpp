@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <opencv2/aruco/dictionary.hpp>
 
+#include "core/names.h"
+
 namespace limn {
 namespace {
 
@@ -24,10 +26,6 @@ constexpr PredefinedFamily k_families[] = {
 
 std::span<const PredefinedFamily> predefined_families() { return k_families; }
 
-const PredefinedFamily* find_predefined_family(std::string_view name) {
-  const auto found = std::find_if(std::begin(k_families), std::end(k_families),
-                                  [&](const PredefinedFamily& family) { return family.name == name; });
-  return found == std::end(k_families) ? nullptr : found;
-}
+const PredefinedFamily* find_predefined_family(std::string_view name) { return find_named(k_families, name); }
 
 }  // namespace limn

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "core/config.h"
+#include "core/names.h"
 
 namespace limn::apps {
 namespace {
@@ -78,18 +79,6 @@ Error size_differs(const Devices& devices, const std::string& name, cv::Size fou
       devices.file.string(), name, imager.width, imager.height, found.width, found.height);
 }
 
-std::string names_of(const std::vector<Imager>& imagers) {
-  std::string list;
-  for (const Imager& imager : imagers) list += fmt::format("{}{}", list.empty() ? "" : ", ", imager.name);
-  return list.empty() ? "none" : list;
-}
-
-const Imager* find_in(const std::vector<Imager>& imagers, const std::string& name) {
-  const auto found =
-      std::find_if(imagers.begin(), imagers.end(), [&](const Imager& i) { return i.name == name; });
-  return found == imagers.end() ? nullptr : &*found;
-}
-
 // Each of the rig's imagers must be among the devices.
 template <class Item>
 Status all_there(const Devices& devices,
@@ -97,7 +86,7 @@ Status all_there(const Devices& devices,
                  const std::vector<Imager>& imagers,
                  const char* key) {
   for (const Imager& imager : imagers)
-    if (std::none_of(items.begin(), items.end(), [&](const Item& item) { return item.name == imager.name; }))
+    if (!find_named(items, imager.name))
       return error(
           "{}: {}: expected the rig's {} among them, found it nowhere. Add it, or take the rig of these "
           "devices.",
@@ -141,19 +130,19 @@ Result<Devices> matched(const Devices& devices, const Rig& rig) {
   LIMN_TRY_STATUS(all_there(devices, devices.displays, rig.projectors, "displays"));
   Devices fitted = devices;
   for (device::CameraConfig& camera : fitted.cameras) {
-    const Imager* imager = find_in(rig.cameras, camera.name);
+    const Imager* imager = find_named(rig.cameras, camera.name);
     if (!imager)
       return error(
           "{}: cameras: expected those of the rig ({}), found {}. Rename it, or calibrate it with the "
           "others.",
-          devices.file.string(), names_of(rig.cameras), camera.name);
+          devices.file.string(), joined_names(rig.cameras), camera.name);
     const cv::Size size(imager->width, imager->height);
     if (!camera.size.empty() && camera.size != size)
       return size_differs(devices, camera.name, camera.size, *imager);
     camera.size = size;
   }
   for (device::DisplayConfig& display : fitted.displays) {
-    const Imager* imager = find_in(rig.projectors, display.name);
+    const Imager* imager = find_named(rig.projectors, display.name);
     if (!imager) continue;
     const cv::Size size(imager->width, imager->height);
     if (!display.size.empty() && display.size != size)

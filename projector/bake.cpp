@@ -132,7 +132,7 @@ cv::Mat response_table(const ProjectorResponse* response, int columns) {
   for (int k = 0; k < columns; ++k) {
     const double light = std::pow(static_cast<double>(k) / (columns - 1), 2);
     auto& entry = table.at<cv::Vec3f>(0, k);
-    entry = cv::Vec3f::all(static_cast<float>(std::pow(light, 1 / 2.2)));
+    entry = cv::Vec3f::all(static_cast<float>(std::pow(light, 1 / k_display_gamma)));
     if (!response) continue;
     const std::vector<double>* channels[] = {&response->red, &response->green, &response->blue};
     for (int c = 0; c < 3; ++c) {

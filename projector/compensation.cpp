@@ -6,6 +6,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "core/median.h"
+
 namespace limn::projector {
 namespace {
 
@@ -13,14 +15,6 @@ constexpr double k_too_dim = 0.2;        // share of the surface that need not r
 constexpr std::size_t k_most_triangles = 4000;  // triangles that are asked for the level
 constexpr float k_least_light = 0.004F;  // of the camera's full scale, that a projector's white must give
 constexpr int k_edge_px = 2;             // beside shadows and silhouettes pixels see two things
-
-// The value that `share` of them lie below.
-double quantile(std::vector<double>* values, double share) {
-  const auto at =
-      values->begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values->size() - 1));
-  std::nth_element(values->begin(), at, values->end());
-  return *at;
-}
 
 // r, g, b of a map's pixel; a grey camera's value for each.
 Eigen::Vector3f colour_at(const cv::Mat& map, int row, int column) {
@@ -163,7 +157,7 @@ Result<SurfaceMixing> surface_mixing(const MeasuredSurface& surface, std::span<c
   std::vector<double> levels;
   for (const Eigen::Vector3f& white : whites)
     levels.push_back((white.array() / mean_white.array()).minCoeff());
-  out.level = quantile(&levels, k_too_dim);
+  out.level = quantile(std::move(levels), k_too_dim);
   return out;
 }
 
@@ -195,7 +189,7 @@ double geometric_level(const scene::Prototype& prototype, const Rig& rig, const 
     const auto& rgb = albedo.at<cv::Vec3f>(texel(1 - uv.y(), albedo.rows), texel(uv.x(), albedo.cols));
     levels.push_back(irradiance * std::min({rgb[0], rgb[1], rgb[2]}));
   }
-  return levels.empty() ? 1 : std::max(1e-6, quantile(&levels, k_too_dim));
+  return std::max(1e-6, quantile(std::move(levels), k_too_dim, 1.0));
 }
 
 cv::Mat relative_albedo(const scene::Prototype& prototype) {

@@ -13,7 +13,7 @@ cv::Mat light_of_display(const Rig& rig, const std::string& projector) {
   for (int v = 0; v < 256; ++v) {
     const double at = v / 255.0;
     cv::Vec3f& bgr = light.at<cv::Vec3f>(v);
-    bgr = cv::Vec3f::all(static_cast<float>(std::pow(at, 2.2)));
+    bgr = cv::Vec3f::all(static_cast<float>(std::pow(at, k_display_gamma)));
     if (found == rig.responses.end()) continue;
     bgr = {static_cast<float>(lookup(found->blue, at)), static_cast<float>(lookup(found->green, at)),
            static_cast<float>(lookup(found->red, at))};

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "core/median.h"
 #include "projector/light_levels.h"
 
 namespace limn::projector {
@@ -92,9 +93,7 @@ void MisalignmentDetector::place(IlluminatedPatches patches) {
   for (const cv::Vec4f& p : cv::Mat_<cv::Vec4f>(patches_.points))
     if (p[3] > 0) depths.push_back((imager_from_prototype * Eigen::Vector3d(p[0], p[1], p[2])).z());
   if (depths.empty()) return;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  mm_per_px_ = 1e3 * *middle / imager_.lens.fx();
+  mm_per_px_ = 1e3 * median(std::move(depths)) / imager_.lens.fx();
 }
 
 // A projector's light in the camera's image, where it is predicted.

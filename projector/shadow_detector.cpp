@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "core/median.h"
 #include "projector/light_levels.h"
 
 namespace limn::projector {
@@ -34,13 +35,6 @@ constexpr float k_infinity = 1e30F;
 constexpr std::size_t k_all_sets = 4;         // projectors; of more no three are blocked in one place
 constexpr std::size_t k_most_projectors = 7;  // whose sets are labels
 
-double median(std::vector<double> values, double otherwise) {
-  if (values.empty()) return otherwise;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // Of neighbours in a row that both have one.
 double typical_distance(const cv::Mat& places, int dimensions) {
   std::vector<double> distances;
@@ -54,7 +48,7 @@ double typical_distance(const cv::Mat& places, int dimensions) {
       for (int k = 0; k < dimensions; ++k) sum += std::pow(static_cast<double>(a[k] - b[k]), 2);
       distances.push_back(std::sqrt(sum));
     }
-  return median(std::move(distances), 1);
+  return median(std::move(distances), 1.0);
 }
 
 // Mean light of the patches.
@@ -497,7 +491,7 @@ void ShadowDetector::place(std::size_t index, IlluminatedPatches patches) {
     for (const auto& pixel : cv::Mat_<cv::Vec4f>(lit))
       if (pixel[2] > 0) irradiances.push_back(static_cast<double>(pixel[2]));
   }
-  if (is_first) watch.typical_irradiance = median(std::move(irradiances), 1);
+  if (is_first) watch.typical_irradiance = median(std::move(irradiances), 1.0);
   impl_->forget_all(&watch);
   if (is_first || watch.channels == 0) return;
   const std::size_t size = static_cast<std::size_t>(watch.channels) * impl_->belief_size();

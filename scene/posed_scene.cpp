@@ -5,6 +5,7 @@
 
 #include "core/config.h"
 #include "core/linear_algebra.h"
+#include "core/names.h"
 #include "scene/mesh_bvh.h"
 
 namespace limn::scene {
@@ -54,21 +55,14 @@ std::string chosen_variant(const Slot& slot, std::size_t index, std::span<const 
   return index < variants.size() && !variants[index].empty() ? variants[index] : slot.variants.front().name;
 }
 
-bool has_variant(const Slot& slot, const std::string& name) {
-  return std::any_of(slot.variants.begin(), slot.variants.end(),
-                     [&](const Variant& v) { return v.name == name; });
-}
-
 PosedPart read_part(const ConfigNode& node, const Slot& slot) {
   node.only({"world_from_part", "variant"});
   PosedPart part{slot.name, slot.variants.front().name, node.at("world_from_part").pose()};
   if (const auto variant = node.find("variant")) {
     part.variant = variant->text();
-    if (!has_variant(slot, part.variant)) {
-      std::string names;
-      for (const Variant& known : slot.variants) names += (names.empty() ? "" : ", ") + known.name;
-      variant->problem(fmt::format("expected a variant of the slot ({}), found '{}'.", names, part.variant));
-    }
+    if (!find_named(slot.variants, part.variant))
+      variant->problem(fmt::format("expected a variant of the slot ({}), found '{}'.",
+                                   joined_names(slot.variants), part.variant));
   }
   return part;
 }
@@ -154,11 +148,9 @@ Result<PosedScene> load_poses(const std::filesystem::path& path, const Scene& sc
   if (const auto pose = root.find("world_from_prototype")) out.world_from_prototype = pose->pose();
   if (const auto slots = root.find("slots")) {
     for (const std::string& name : slots->keys()) {
-      if (!scene.find_slot(name)) {
-        std::string names;
-        for (const Slot& known : scene.slots) names += (names.empty() ? "" : ", ") + known.name;
-        slots->at(name).problem(fmt::format("expected a slot of the scene ({}), found '{}'.", names, name));
-      }
+      if (!scene.find_slot(name))
+        slots->at(name).problem(
+            fmt::format("expected a slot of the scene ({}), found '{}'.", joined_names(scene.slots), name));
     }
     for (const Slot& slot : scene.slots) {
       if (const auto node = slots->find(slot.name)) out.parts.push_back(read_part(*node, slot));

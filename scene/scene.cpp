@@ -10,6 +10,7 @@
 
 #include "core/config.h"
 #include "core/log.h"
+#include "core/names.h"
 #include "core/image_io.h"
 #include "scene/marker_file.h"
 
@@ -239,14 +240,14 @@ Status check_size(const Mesh& mesh, const std::string& units) {
   const double size_m = box.diagonal().cast<double>().norm();
   if (size_m >= k_smallest_m && size_m <= k_largest_m) return {};
   const double in_file = size_m / metres_per_unit(units).value();
-  std::string likely;
+  std::vector<std::string> likely;
   for (const char* unit : {"mm", "cm", "m", "in", "ft"}) {
     const double as_m = in_file * metres_per_unit(unit).value();
     if (as_m >= k_likely_from_m && as_m <= k_likely_to_m)
-      likely += fmt::format("{}{} ({:.3g} m)", likely.empty() ? "" : ", ", unit, as_m);
+      likely.push_back(fmt::format("{} ({:.3g} m)", unit, as_m));
   }
   return error("expected a thing of 1 mm to 20 m, found one of {:.3g} m across in units \"{}\". {}", size_m,
-               units, likely.empty() ? "Look at the mesh." : "Is its unit " + likely + "?");
+               units, likely.empty() ? "Look at the mesh." : "Is its unit " + joined_names(likely) + "?");
 }
 
 Result<Mesh> load_named_mesh(const MeshFile& file, const fs::path& scene_path) {
@@ -311,8 +312,7 @@ Result<Variant> auto_import_meshes(const fs::path& file,
                              const Slot& slot,
                              const std::map<std::string, std::string>& told) {
   const std::string name = file.stem().string();
-  if (std::any_of(slot.variants.begin(), slot.variants.end(),
-                  [&](const Variant& known) { return known.name == name; }))
+  if (find_named(slot.variants, name))
     return error("{}: expected the name of no other variant of slot '{}', found '{}' twice. Rename the file.",
                  file.string(), slot.name, name);
   LIMN_TRY(const Mesh as_metres, load_mesh(file, "m"));
@@ -397,11 +397,7 @@ const Viewer* Scene::find_tablet(const std::string& guest) const {
   return of_all;
 }
 
-const Slot* Scene::find_slot(const std::string& name) const {
-  const auto found =
-      std::find_if(slots.begin(), slots.end(), [&](const Slot& slot) { return slot.name == name; });
-  return found == slots.end() ? nullptr : &*found;
-}
+const Slot* Scene::find_slot(const std::string& name) const { return find_named(slots, name); }
 
 Result<Scene> load_scene(const fs::path& path, std::vector<SkippedVariant>* skipped_variants) {
   std::error_code code;

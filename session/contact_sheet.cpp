@@ -5,6 +5,7 @@
 
 #include "core/html.h"
 #include "core/file.h"
+#include "core/names.h"
 #include "core/image_io.h"
 
 namespace limn::apps {
@@ -40,11 +41,12 @@ Status write_contact_sheet(std::span<const scene::Look> looks,
       "<div class=\"looks\">\n",
       k_sheet_style);
   for (const scene::Look& look : looks) {
-    std::string parts;
+    std::vector<std::string> parts;
     for (const scene::Look::Part& part : look.parts)
-      parts += fmt::format("{}{}: {}", parts.empty() ? "" : ", ", escaped(part.slot), escaped(part.variant));
+      parts.push_back(fmt::format("{}: {}", escaped(part.slot), escaped(part.variant)));
     html += fmt::format("<figure>{}<figcaption><b>{}</b>{}</figcaption></figure>\n",
-                        image_html(folder / (look.name + ".png"), look.name), escaped(look.name), parts);
+                        image_html(folder / (look.name + ".png"), look.name), escaped(look.name),
+                        joined_names(parts, ""));
   }
   return write_file(page, html + "</div></html>\n");
 }

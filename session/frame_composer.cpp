@@ -13,9 +13,9 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_sign = 0.7;   // display value of signs: bright ones could hide markers from cameras
-constexpr double k_gamma = 2.2;  // near enough to mix what fades
-const cv::Scalar k_background(40, 36, 34);  // of views: a dark room
+constexpr double k_sign = 0.7;  // display value of signs: bright ones could hide markers from cameras
+constexpr double k_gamma = k_display_gamma;  // near enough to mix what fades
+const cv::Scalar k_background(40, 36, 34);   // of views: a dark room
 const cv::Scalar k_green(90, 220, 90), k_amber(40, 170, 255), k_red(60, 60, 255), k_blue(255, 190, 110);
 constexpr double k_glide_s = 0.1;  // in which a guest's eye is followed to a third of its way
 constexpr const char* k_still_eye = "the scene's own";

@@ -6,6 +6,7 @@
 #include "tracker/camera_encoding.h"
 #include "gui/qr_code.h"
 #include "core/log.h"
+#include "core/names.h"
 
 namespace limn::apps {
 namespace {
@@ -17,9 +18,9 @@ constexpr double k_module_px = 12;  // of a QR code, so that its edges stay shar
 constexpr double k_pace_s = 1;      // over which devices' images are counted
 
 std::string list_of(const std::vector<BodyMarker>& markers) {
-  std::string text;
-  for (const BodyMarker& marker : markers) text += (text.empty() ? "" : ", ") + marker.marker.text();
-  return text;
+  std::vector<std::string> texts;
+  for (const BodyMarker& marker : markers) texts.push_back(marker.marker.text());
+  return joined_names(texts, "");
 }
 
 std::vector<OperatorView::Image> cameras_of(const Session& session) {

@@ -45,9 +45,7 @@ std::string arguments_of(const scene::Action& action) {
       break;
   }
   if (!action.of.empty()) words.push_back(fmt::format("{} (text)", action.of));
-  std::string all;
-  for (const std::string& word : words) all += (all.empty() ? "" : "; ") + word;
-  return all.empty() ? "none" : all;
+  return words.empty() ? "none" : fmt::format("{}", fmt::join(words, "; "));
 }
 
 bool is_printable(const std::string& text) {

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/photometric_response.h"
+
 namespace limn::apps {
 namespace {
 
@@ -14,9 +16,9 @@ using Eigen::Vector3f;
 
 constexpr float k_grid_m = 0.010F;
 constexpr int k_strong_every = 5;
-constexpr float k_weak = 90, k_strong = 180, k_split = 160;  // display values
-constexpr float k_gamma = 2.2F;                              // near enough to share a line between projectors
-constexpr float k_line_px = 1, k_strong_px = 1.6F;           // half as wide as a line with its soft edges
+constexpr float k_weak = 90, k_strong = 180, k_split = 160;    // display values
+constexpr auto k_gamma = static_cast<float>(k_display_gamma);  // near enough for lines of two projectors
+constexpr float k_line_px = 1, k_strong_px = 1.6F;             // half as wide as a line with its soft edges
 
 // How far the surface's point goes from one pixel to the next, to the right and down; zero at edges.
 struct Steps {

@@ -7,6 +7,7 @@
 
 #include "tracker/camera_encoding.h"
 #include "core/stopwatch.h"
+#include "core/names.h"
 #include "core/image_io.h"
 #include "tracker/family.h"
 #include "tracker/predict.h"
@@ -118,10 +119,9 @@ const Percepts& Perception::watch(std::span<const Frame> frames) {
   watched_.uses.clear();
   std::vector<std::size_t> cameras;
   for (const Frame& frame : frames) {
-    const auto camera = std::find_if(rig_.cameras.begin(), rig_.cameras.end(),
-                                     [&](const Imager& c) { return c.name == frame.camera; });
-    LIMN_CHECK(camera != rig_.cameras.end());
-    cameras.push_back(static_cast<std::size_t>(camera - rig_.cameras.begin()));
+    const Imager* camera = find_named(rig_.cameras, frame.camera);
+    LIMN_CHECK(camera != nullptr);
+    cameras.push_back(static_cast<std::size_t>(camera - rig_.cameras.data()));
     look(cameras.back(), frame);
     watched_.captured_at = std::max(watched_.captured_at, frame.captured_at);
   }

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/config.h"
+#include "core/names.h"
 
 namespace limn::apps {
 namespace {
@@ -109,8 +110,8 @@ void read_event(const ConfigNode& node, Script* script) {
 
 Status in_room(const char* what, const std::string& name, const std::vector<std::string>& known) {
   if (std::find(known.begin(), known.end(), name) != known.end()) return {};
-  return error("script: expected a {} that stands in the room ({}), found '{}'.", what,
-               fmt::join(known, ", "), name);
+  return error("script: expected a {} that stands in the room ({}), found '{}'.", what, joined_names(known),
+               name);
 }
 
 // The same events again and again, `period_s` apart, until the end.

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/names.h"
+
 namespace limn::apps {
 namespace {
 
@@ -21,9 +23,8 @@ cv::Mat draw_thumbnail(projector::Renderer* renderer,
                      int side_px) {
   const scene::Slot* of = scene.find_slot(slot);
   if (!of) return {};
-  const auto shown = std::find_if(of->variants.begin(), of->variants.end(),
-                                  [&](const scene::Variant& v) { return v.name == variant; });
-  if (shown == of->variants.end()) return {};
+  const scene::Variant* shown = find_named(of->variants, variant);
+  if (!shown) return {};
   // The world is the marker's frame: x right, y down, z into the surface it lies on.
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3f& p : shown->mesh.positions) box.extend(of->marker_from_part * p.cast<double>());

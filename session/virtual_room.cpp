@@ -120,7 +120,7 @@ Result<sim::World> room_for(const Rig& rig, const scene::Scene& scene) {
                                                    .read_noise = 0.6,
                                                    .black_level = 4});
   world.projector_effects.assign(rig.projectors.size(),
-                                 {.illuminance_at_1m = 2, .gamma = 2.2, .black_level = 0.002});
+                                 {.illuminance_at_1m = 2, .gamma = k_display_gamma, .black_level = 0.002});
   world.room.ambient = 0.6;
   world.scene = scene;
 

@@ -5,6 +5,7 @@
 #include <limits>
 #include <opencv2/core.hpp>
 
+#include "core/names.h"
 #include "core/result.h"
 #include "sim/directions.h"
 #include "sim/texture.h"
@@ -45,9 +46,8 @@ ReferenceRenderer::ReferenceRenderer(const World& world, const scene::PosedScene
   for (const scene::PosedPart& posed : parts.parts) {
     const scene::Slot* slot = world.scene->find_slot(posed.slot);
     LIMN_CHECK(slot != nullptr);
-    const auto variant = std::find_if(slot->variants.begin(), slot->variants.end(),
-                                      [&](const scene::Variant& v) { return v.name == posed.variant; });
-    LIMN_CHECK(variant != slot->variants.end());
+    const scene::Variant* variant = find_named(slot->variants, posed.variant);
+    LIMN_CHECK(variant != nullptr);
     parts_.push_back({rays_of({&variant->mesh, posed.world_from_part}), &variant->mesh,
                       slot->mode == scene::Mode::surface});
   }

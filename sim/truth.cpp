@@ -8,6 +8,8 @@
 #include <random>
 #include <utility>
 
+#include "core/names.h"
+
 namespace limn::sim {
 namespace {
 
@@ -30,9 +32,8 @@ std::pair<const scene::Slot*, const scene::Mesh*> shape_of(const World& world, c
   LIMN_CHECK(world.scene.has_value());
   const scene::Slot* slot = world.scene->find_slot(part.slot);
   LIMN_CHECK(slot != nullptr);
-  const auto variant = std::find_if(slot->variants.begin(), slot->variants.end(),
-                                    [&](const scene::Variant& v) { return v.name == part.variant; });
-  LIMN_CHECK(variant != slot->variants.end());
+  const scene::Variant* variant = find_named(slot->variants, part.variant);
+  LIMN_CHECK(variant != nullptr);
   return {slot, &variant->mesh};
 }
 

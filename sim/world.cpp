@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/config.h"
+#include "core/names.h"
 
 namespace limn::sim {
 namespace {
@@ -355,15 +356,9 @@ Status add_scene(World& world,
 
 }  // namespace
 
-const Object* World::find(const std::string& object) const {
-  const auto found =
-      std::find_if(objects.begin(), objects.end(), [&](const Object& o) { return o.name == object; });
-  return found == objects.end() ? nullptr : &*found;
-}
+const Object* World::find(const std::string& object) const { return find_named(objects, object); }
 
-Object* World::find(const std::string& object) {
-  return const_cast<Object*>(std::as_const(*this).find(object));
-}
+Object* World::find(const std::string& object) { return find_named(objects, object); }
 
 Result<World> load_world(const std::filesystem::path& path,
                          const MarkerImage& marker_image,

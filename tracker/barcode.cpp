@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "core/names.h"
+
 namespace limn::tracker {
 namespace {
 
@@ -58,8 +60,7 @@ std::span<const Barcode> barcodes() {
 
 const Barcode* find_barcode(std::string_view name) {
   const auto all = barcodes();
-  const auto found = std::find_if(all.begin(), all.end(), [&](const Barcode& b) { return b.name == name; });
-  return found == all.end() ? nullptr : &*found;
+  return find_named(all, name);
 }
 
 std::uint32_t barcode_word(const Barcode& barcode, std::size_t id) {

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/file.h"
+#include "core/names.h"
 #include "core/opencv_file.h"
 #include "core/predefined_family.h"
 #include "tracker/barcode.h"
@@ -31,10 +32,8 @@ constexpr const char* k_aruco_file = "aruco:";
 constexpr const char* k_artoolkit = "artoolkit:";
 
 std::string known_families() {
-  std::string list;
-  for (const PredefinedFamily& family : predefined_families()) list += std::string(family.name) + ", ";
-  for (const Barcode& barcode : barcodes()) list += std::string(barcode.name) + ", ";
-  return list + "aruco:FILE.yml, artoolkit:FILE.patt";
+  return joined_names(predefined_families()) + ", " + joined_names(barcodes()) +
+         ", aruco:FILE.yml, artoolkit:FILE.patt";
 }
 
 bool bit_of(std::uint64_t code, int cells, int row, int column) {

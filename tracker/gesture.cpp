@@ -7,6 +7,8 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "core/median.h"
+
 namespace limn::tracker {
 namespace {
 
@@ -200,9 +202,8 @@ void GestureReader::note_noise(const cv::Mat& patch) {
   if (patch.empty() || patch.size() != seen_patch_.size()) return;
   cv::Mat1f change;
   cv::absdiff(patch, seen_patch_, change);
-  const auto middle = change.begin() + static_cast<int>(change.total() / 2);
-  std::nth_element(change.begin(), middle, change.end());
-  noise_levels_ += k_noise_blend * (k_deviations_per_median * *middle - noise_levels_);
+  const float middle = value_of_rank(&change, change.total() / 2);
+  noise_levels_ += k_noise_blend * (k_deviations_per_median * middle - noise_levels_);
 }
 
 // Whether the marker itself looks as it did, but for an edge that a hand beside it hides.

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "core/names.h"
 #include "core/result.h"
 
 namespace limn::tracker {
@@ -57,9 +58,8 @@ cv::Mat marker_mask(const Imager& projector,
                     const MarkerLightOptions& options) {
   cv::Mat mask = cv::Mat::zeros(projector.height, projector.width, CV_8UC1);
   for (const Track& track : tracks) {
-    const auto body =
-        std::find_if(bodies.begin(), bodies.end(), [&](const Body& b) { return b.name == track.body; });
-    if (body == bodies.end() || track.tracking == TrackingState::lost) continue;
+    const Body* body = find_named(bodies, track.body);
+    if (!body || track.tracking == TrackingState::lost) continue;
     for (const BodyMarker& marker : body->markers) {
       const Pose world_from_marker = track.world_from_body * marker.body_from_marker;
       if (!faces(projector, world_from_marker)) continue;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/least_squares.h"
 #include "tracker/marker_pose.h"
 
 namespace limn::tracker {
@@ -12,7 +13,6 @@ namespace {
 
 constexpr int k_max_steps = 50;
 constexpr double k_small_step = 1e-9;  // radians and metres
-constexpr double k_max_damping = 1e8;
 
 // A corner of a marker in an image.
 struct Observation {
@@ -83,7 +83,7 @@ bool add(const Problem& problem, const State& state, const Observation& observat
   const Eigen::Vector3d turned = state.body_from_marker[observation.marker].rotation * observation.p_marker;
   j << by_body, -by_point * skew(turned), by_point;
   const double square = r.dot(corner_observation.information * r);
-  const double weight = square > k_huber * k_huber ? k_huber / std::sqrt(square) : 1;
+  const double weight = HuberLoss{k_huber}.weight(square);
   const Eigen::Matrix<double, 12, 12> h = weight * j.transpose() * corner_observation.information * j;
   const Eigen::Matrix<double, 12, 1> g = weight * j.transpose() * (corner_observation.information * r);
   const auto p = static_cast<Eigen::Index>(6 * observation.image);
@@ -107,29 +107,35 @@ bool fill(const Problem& problem, const State& state, Normal* normal) {
       [&](const Observation& observation) { return add(problem, state, observation, normal); });
 }
 
+// For minimise(): a trial needs the cost alone, and only where it is accepted the equations.
+struct BodyProblem {
+  const Problem& problem;
+  State state, trial{};
+  Normal normal{};
+  Eigen::VectorXd delta{};
+
+  double cost() const { return cost_of(problem, state); }
+  bool linearise() { return fill(problem, state, &normal); }
+  bool solve(double damping) {
+    delta = damped(normal.matrix, damping).ldlt().solve(-normal.gradient);
+    return delta.allFinite();
+  }
+  double evaluate_trial() {
+    trial = moved(state, problem, delta);
+    return cost_of(problem, trial);
+  }
+  void accept_trial() { state = std::move(trial); }
+  bool is_settled(const LeastSquaresTrial& tried) const {
+    return tried.is_accepted && delta.lpNorm<Eigen::Infinity>() < k_small_step;
+  }
+};
+
 // The minimum near a state; its cost.
 double adjust(const Problem& problem, State* state) {
-  double best = cost_of(problem, *state);
-  double damping = 1e-4;
-  Normal normal;
-  for (int step = 0; step < k_max_steps && damping < k_max_damping; ++step) {
-    if (!fill(problem, *state, &normal)) break;
-    Eigen::MatrixXd damped = normal.matrix;
-    damped.diagonal() *= 1 + damping;
-    const Eigen::VectorXd delta = damped.ldlt().solve(-normal.gradient);
-    if (!delta.allFinite()) break;
-    const State next = moved(*state, problem, delta);
-    const double next_cost = cost_of(problem, next);
-    if (next_cost > best) {
-      damping *= 10;
-      continue;
-    }
-    *state = next;
-    best = next_cost;
-    damping = std::max(1e-12, damping * 0.1);
-    if (delta.lpNorm<Eigen::Infinity>() < k_small_step) break;
-  }
-  return best;
+  BodyProblem body{.problem = problem, .state = *state};
+  const LeastSquaresSummary found = minimise(&body, {.max_steps = k_max_steps});
+  *state = std::move(body.state);
+  return found.cost;
 }
 
 // Images whose pose the start gives and that show two or more of its markers.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/least_squares.h"
 #include "core/linear_algebra.h"
 
 namespace limn::tracker {
@@ -20,14 +21,6 @@ constexpr int k_patient_steps = 10;
 constexpr double k_slow_gain = 1e-3;       // of the cost
 constexpr double k_min_condition = 1e-13;  // smallest over largest eigenvalue of the scaled normal matrix
 constexpr double k_surely_regular = 1e8;   // norm of one times its inverse's, below which its factors suffice
-
-// Robust weight of a squared normalised residual.
-double weight(double square, double huber) {
-  return huber > 0 && square > huber * huber ? huber / std::sqrt(square) : 1;
-}
-double loss(double square, double huber) {
-  return huber > 0 && square > huber * huber ? 2 * huber * std::sqrt(square) - huber * huber : square;
-}
 
 // Sights that one call of the lens projects, and what it makes of them.
 struct Batch {
@@ -109,12 +102,12 @@ struct Judged {
 void add_sight(const PointObservation& observation,
                const Eigen::Vector2d& px,
                const Gradients& by_delta,
-               double huber,
+               const HuberLoss& loss,
                Judged* judged) {
   const Eigen::Vector2d r = observation.px - px;
   const Eigen::Vector2d weighed = observation.information * r;
-  const double square = r.dot(weighed), w = weight(square, huber);
-  judged->cost += loss(square, huber);
+  const double square = r.dot(weighed), w = loss.weight(square);
+  judged->cost += loss.cost(square);
   judged->squares += r.squaredNorm();
   const Gradients weighed_by_delta = by_delta * (w * observation.information);
   judged->normal.noalias() += weighed_by_delta * by_delta.transpose();
@@ -134,17 +127,51 @@ void add_prior(const PosePrior& prior, const Pose& pose, Judged* judged) {
 // nullopt when a point has no pixel.
 std::optional<Judged> judged(std::span<const PointObservation> observations,
                              const Pose& pose,
-                             double huber,
+                             const HuberLoss& loss,
                              const PosePrior* prior) {
   Judged sum;
   const bool is_seen = each_batch(observations, pose, true, [&](const Batch& batch) {
     for (std::size_t i = 0; i < batch.observations.size(); ++i)
-      add_sight(batch.observations[i], batch.px[i], gradients(batch, i), huber, &sum);
+      add_sight(batch.observations[i], batch.px[i], gradients(batch, i), loss, &sum);
   });
   if (!is_seen) return std::nullopt;
   if (prior) add_prior(*prior, pose, &sum);
   return sum;
 }
+
+// The pose by its sights and prior, for minimise(): the equations come with the cost. Nothing is allocated.
+struct PoseProblem {
+  std::span<const PointObservation> observations;
+  HuberLoss loss;
+  const PosePrior* prior;
+  Pose pose;
+  std::optional<Judged> at_pose;
+  Pose next{};
+  std::optional<Judged> at_next{};
+  Vector6d delta{};
+  double promised = 0;  // how far the cost falls, at least, if the problem is what its equations say
+
+  double cost() const { return at_pose ? at_pose->cost : std::numeric_limits<double>::infinity(); }
+  bool solve(double damping) {
+    delta = solve_ldlt(damped(at_pose->normal, damping), -at_pose->gradient);
+    promised = -at_pose->gradient.dot(delta);
+    return delta.allFinite();
+  }
+  double evaluate_trial() {
+    next = boxplus(pose, delta);
+    at_next = judged(observations, next, loss, prior);
+    return at_next ? at_next->cost : std::numeric_limits<double>::infinity();
+  }
+  void accept_trial() {
+    pose = next;
+    at_pose = at_next;
+  }
+  bool is_settled(const LeastSquaresTrial& tried) const {
+    return promised < k_small_gain ||
+           (tried.step >= k_patient_steps && promised < k_slow_gain * tried.cost_before) ||
+           (!tried.is_accepted && promised < k_vain_gain);
+  }
+};
 
 // Inverse of a normal matrix, scaled so that radians and metres compare; nullopt when it is singular.
 std::optional<Matrix6d> inverse(const Matrix6d& matrix) {
@@ -160,8 +187,8 @@ std::optional<Matrix6d> inverse(const Matrix6d& matrix) {
   }
   const EigenPairs6 eigen = eigen_pairs(scaled);
   if (!(eigen.values[0] > k_min_condition * eigen.values[5])) return std::nullopt;
-  const Matrix6d middle = eigen.vectors * eigen.values.cwiseInverse().asDiagonal() *
-                          eigen.vectors.transpose();
+  const Matrix6d middle =
+      eigen.vectors * eigen.values.cwiseInverse().asDiagonal() * eigen.vectors.transpose();
   return Matrix6d(scale.asDiagonal() * middle * scale.asDiagonal());
 }
 
@@ -184,11 +211,12 @@ bool residual(const PointObservation& observation,
 }
 
 double cost(std::span<const PointObservation> observations, const Pose& world_from_body, double huber) {
+  const HuberLoss loss{huber};
   double sum = 0;
   const bool is_seen = each_batch(observations, world_from_body, false, [&](const Batch& batch) {
     for (std::size_t i = 0; i < batch.observations.size(); ++i) {
       const Eigen::Vector2d r = batch.observations[i].px - batch.px[i];
-      sum += loss(r.dot(batch.observations[i].information * r), huber);
+      sum += loss.cost(r.dot(batch.observations[i].information * r));
     }
   });
   return is_seen ? sum : std::numeric_limits<double>::infinity();
@@ -199,29 +227,16 @@ std::optional<PoseFit> fit_pose(std::span<const PointObservation> observations,
                                 double huber,
                                 const PosePrior* prior) {
   if (observations.size() < 3 || !start.is_finite()) return std::nullopt;
-  Pose pose = start;
-  auto best = judged(observations, pose, huber, prior);
-  if (!best || !std::isfinite(best->cost)) return std::nullopt;
-  double damping = 1e-6;
-  for (int step = 0; step < k_max_steps; ++step) {
-    Matrix6d damped = best->normal;
-    damped.diagonal() *= 1 + damping;
-    const Vector6d delta = solve_ldlt(damped, -best->gradient);
-    if (!delta.allFinite()) return std::nullopt;
-    const double gain = -best->gradient.dot(delta);
-    const bool is_last = gain < k_small_gain || (step >= k_patient_steps && gain < k_slow_gain * best->cost);
-    const Pose next = boxplus(pose, delta);
-    const auto after = judged(observations, next, huber, prior);
-    if (after && after->cost <= best->cost) {
-      pose = next;
-      best = after;
-      damping = std::max(1e-12, damping * 0.1);
-    } else {
-      damping = std::max(damping, 1e-9) * 10;
-      if (damping > 1e8 || gain < k_vain_gain) break;
-    }
-    if (is_last) break;
-  }
+  PoseProblem problem{.observations = observations,
+                      .loss = {huber},
+                      .prior = prior,
+                      .pose = start,
+                      .at_pose = judged(observations, start, {huber}, prior)};
+  const LeastSquaresSummary found = minimise(
+      &problem, {.max_steps = k_max_steps, .first_damping = 1e-6, .most_damping = 5e8, .raised_from = 1e-9});
+  if (found.end == LeastSquaresEnd::no_start || found.end == LeastSquaresEnd::no_step) return std::nullopt;
+  const Pose& pose = problem.pose;
+  const std::optional<Judged>& best = problem.at_pose;
   const auto covariance = inverse(best->normal);
   if (!covariance || !covariance->allFinite() || !pose.is_finite()) return std::nullopt;
   return PoseFit{pose, *covariance, best->cost,

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/median.h"
+#include "core/photometric_response.h"
 #include "tracker/simd.h"
 
 namespace limn::tracker {
@@ -118,10 +120,6 @@ EdgeRefiner::EdgeLine averaged(const EdgeRefiner::EdgeLine& straight,
 }
 
 // IEC 61966-2-1.
-double linear_from_srgb(double encoded) {
-  return encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
-}
-
 }  // namespace
 
 EdgeRefiner::EdgeRefiner(Encoding encoding) {
@@ -447,11 +445,9 @@ LIMN_SIMD float median_of_few(const float* __restrict values, std::size_t count)
   return middle;
 }
 
-float median(std::vector<float>& values) {
-  if (values.size() <= k_few) return median_of_few(values.data(), values.size());
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+float median_of_sizes(std::vector<float>* values) {
+  if (values->size() <= k_few) return median_of_few(values->data(), values->size());
+  return value_of_rank(values, values->size() / 2);
 }
 
 // The line through two crossings that the most others lie on: least squares would start between a side's own
@@ -537,7 +533,7 @@ double EdgeRefiner::fit_terms(int terms, bool from_line, EdgeLine* line) {
     deviations_.resize(count);
     std::transform(residual, residual + count, deviations_.begin(),
                    [](double deviation) { return static_cast<float>(deviation); });
-    scale = std::max(1.4826 * median(deviations_), 1e-3);
+    scale = std::max(1.4826 * median_of_sizes(&deviations_), 1e-3);
   }
   return variance;
 }

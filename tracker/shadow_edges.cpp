@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/median.h"
 #include "tracker/quad_sampler.h"
 #include "tracker/local_undistortion.h"
 
@@ -31,11 +32,6 @@ constexpr double k_max_slide = 4;   // pixels of a corner for one of its side: b
 constexpr double k_min_run = 0.4;   // of the side, between the two places that a line is drawn through
 
 double log_ratio(double outside, double inside) { return std::log((outside + k_dark) / (inside + k_dark)); }
-
-double median(std::array<double, 4> values) {
-  std::sort(values.begin(), values.end());
-  return 0.5 * (values[1] + values[2]);
-}
 
 double light_of(double level, const std::array<double, 256>& light) {
   return light[static_cast<std::size_t>(std::clamp(std::lround(level), 0L, 255L))];
@@ -236,7 +232,7 @@ ShadowEdges leave_shadow_edges(const cv::Mat& grey,
                                const SeenCells& cells,
                                const Lens* lens,
                                RefinedQuad* refined) {
-  if (std::min(grey.cols, grey.rows) < 2 || median(refined->blur_px) > k_max_blur_px)
+  if (std::min(grey.cols, grey.rows) < 2 || mean_median(refined->blur_px) > k_max_blur_px)
     return ShadowEdges::none;
   std::array<double, 4> ratio;
   for (std::size_t i = 0; i < 4; ++i)
@@ -244,7 +240,7 @@ ShadowEdges leave_shadow_edges(const cv::Mat& grey,
         log_ratio(light_of(refined->outside_level[i], light), light_of(refined->inside_level[i], light));
   const auto [least, most] = std::minmax_element(ratio.begin(), ratio.end());
   if (*most - *least < k_unlike) return ShadowEdges::none;
-  const double expected = ratio_of_cells(grey, light, *refined, cells).value_or(median(ratio));
+  const double expected = ratio_of_cells(grey, light, *refined, cells).value_or(mean_median(ratio));
   const LocalUndistortion image = LocalUndistortion::about(lens, refined->corners_px, k_max_reach);
   std::array<Eigen::Vector2d, 4> before = refined->corners_px;
   for (Eigen::Vector2d& corner : before) corner = image.straight(corner);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "core/names.h"
 #include "core/image_io.h"
 #include "tracker/candidates.h"
 #include "tracker/identify.h"
@@ -80,15 +81,15 @@ RefinedQuad upright(const RefinedQuad& frame) {
 }
 
 Error several(const std::vector<RefinedQuad>& frames) {
-  std::string places;
+  std::vector<std::string> places;
   for (const RefinedQuad& frame : frames) {
     const Eigen::Vector2d at = centre(frame.corners_px);
-    places += fmt::format("{}({:.0f}, {:.0f}) {:.0f} px wide", places.empty() ? "" : ", ", at.x(), at.y(),
-                          std::sqrt(area(frame.corners_px)));
+    places.push_back(
+        fmt::format("({:.0f}, {:.0f}) {:.0f} px wide", at.x(), at.y(), std::sqrt(area(frame.corners_px))));
   }
   return error(
       "expected one black frame, found {}: at {}. Cut the picture to the marker that is to be trained.",
-      frames.size(), places);
+      frames.size(), joined_names(places));
 }
 
 // The frame's inside upright, one pixel a value, as mean over each value's own area.

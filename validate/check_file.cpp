@@ -10,6 +10,7 @@
 #include "core/scale_resolution.h"
 #include "tracker/marker_image.h"
 #include "core/config.h"
+#include "core/names.h"
 
 namespace limn::apps {
 namespace {
@@ -84,11 +85,8 @@ std::vector<CheckLimit> read_limits(const ConfigNode& node) {
     if (limits.back().value < 0)
       limit->problem(fmt::format("expected a limit that is not negative, found {}.", limits.back().value));
   }
-  if (limits.empty()) {
-    std::string names;
-    for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
-    node.problem(fmt::format("expected at least one limit of: {}; found none.", names));
-  }
+  if (limits.empty())
+    node.problem(fmt::format("expected at least one limit of: {}; found none.", joined_names(known)));
   return limits;
 }
 
@@ -108,9 +106,8 @@ void put_on_stage(scene::Scene scene, sim::World* world) {
 const scene::Slot* known_slot(const scene::Scene& scene, const std::string& name, const ConfigNode& node) {
   const scene::Slot* slot = scene.find_slot(name);
   if (slot) return slot;
-  std::string names;
-  for (const scene::Slot& known : scene.slots) names += (names.empty() ? "" : ", ") + known.name;
-  node.problem(fmt::format("expected a slot of the scene ({}), found '{}'.", names, name));
+  node.problem(
+      fmt::format("expected a slot of the scene ({}), found '{}'.", joined_names(scene.slots), name));
   return nullptr;
 }
 
@@ -233,12 +230,10 @@ Status choose_viewer(const std::vector<Viewer>& told, Check* check) {
 // Moves the light of a projector by so many of its pixels: what a push against it does.
 void nudge(const ConfigNode& node, Rig* rig) {
   for (const std::string& name : node.keys()) {
-    const auto projector = std::find_if(rig->projectors.begin(), rig->projectors.end(),
-                                        [&](const Imager& p) { return p.name == name; });
-    if (projector == rig->projectors.end()) {
-      std::string names;
-      for (const Imager& known : rig->projectors) names += (names.empty() ? "" : ", ") + known.name;
-      node.at(name).problem(fmt::format("expected a projector of the world ({}), found '{}'.", names, name));
+    Imager* projector = find_named(rig->projectors, name);
+    if (!projector) {
+      node.at(name).problem(fmt::format("expected a projector of the world ({}), found '{}'.",
+                                        joined_names(rig->projectors), name));
       continue;
     }
     std::vector<double> px = node.at(name).numbers(2);

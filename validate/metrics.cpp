@@ -9,6 +9,7 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
+#include "core/median.h"
 #include "core/result.h"
 #include "sim/truth.h"
 
@@ -267,10 +268,8 @@ Registration judged_registration(const sim::World& world,
     sum += error_m * error_m * 1e6;
   }
   if (found.errors_mm.empty()) return found;
-  auto sorted = found.errors_mm;
-  std::sort(sorted.begin(), sorted.end());
-  found.rms_mm = std::sqrt(sum / static_cast<double>(sorted.size()));
-  found.p95_mm = sorted[static_cast<std::size_t>(0.95 * static_cast<double>(sorted.size() - 1))];
+  found.rms_mm = std::sqrt(sum / static_cast<double>(found.errors_mm.size()));
+  found.p95_mm = quantile(found.errors_mm, 0.95);
   return found;
 }
 

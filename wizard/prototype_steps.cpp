@@ -8,6 +8,7 @@
 #include "wizard/measure/scan_files.h"
 #include "wizard/error_colormap.h"
 #include "calib/capture.h"
+#include "core/median.h"
 #include "core/image_io.h"
 #include "device/gl_context.h"
 #include "projector/renderer.h"
@@ -19,7 +20,6 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t k_told = 3;  // differences from the CAD; all are in align.json
 constexpr double k_white = 0.9;    // of a colour's white, left out on the prototype
-constexpr double k_gamma = 2.2;    // near enough for colours that are signs
 
 // The colour without its white, which room light and projectors' black give it again.
 cv::Vec3d light_bgr(double mm) {
@@ -78,10 +78,7 @@ class Steps {
     LIMN_TRY(captures_, calib::load_captures(captures.folder));
     LIMN_TRY(scan_, written_scan(captures_, rig_, {}, out_));
     seen_.points = scan_.points.positions.size();
-    std::vector<float> stddevs = scan_.points.stddevs;
-    std::nth_element(stddevs.begin(), stddevs.begin() + static_cast<std::ptrdiff_t>(stddevs.size() / 2),
-                     stddevs.end());
-    seen_.scan_stddev_mm = 1e3 * static_cast<double>(stddevs[stddevs.size() / 2]);
+    seen_.scan_stddev_mm = 1e3 * static_cast<double>(median(scan_.points.stddevs));
     seen_.warnings = scan_.warnings;
     end(WizardStep::scan,
         fmt::format("{} points, standard deviation {:.3f} mm", seen_.points, seen_.scan_stddev_mm));
@@ -175,7 +172,8 @@ class Steps {
           const double mm = worst_mm(*posed.world_from_prototype * Eigen::Vector3d(p[0], p[1], p[2]));
           if (!std::isfinite(mm)) continue;
           all_mm.push_back(mm);
-          const double share = std::pow(static_cast<double>(shares.at<cv::Vec2f>(y, x)[0]), 1 / k_gamma);
+          const double share =
+              std::pow(static_cast<double>(shares.at<cv::Vec2f>(y, x)[0]), 1 / k_display_gamma);
           image.at<cv::Vec3b>(y, x) = light_bgr(mm) * share;
         }
       }
@@ -186,10 +184,7 @@ class Steps {
       return error(
           "paint: expected light on the prototype where the boards were, found none. Hold boards where it "
           "stands, or move it there.");
-    const auto at =
-        all_mm.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(all_mm.size() - 1));
-    std::nth_element(all_mm.begin(), at, all_mm.end());
-    seen_.painted_p95_mm = *at;
+    seen_.painted_p95_mm = quantile(all_mm, 0.95);
     seen_.painted_good =
         static_cast<double>(
             std::count_if(all_mm.begin(), all_mm.end(), [](double mm) { return mm <= calib::k_good_mm; })) /

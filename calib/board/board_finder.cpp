@@ -3,12 +3,14 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <opencv2/aruco.hpp>
 #include <opencv2/calib3d.hpp>
 #include <optional>
 
 #include "calib/board/board_dictionary.h"
+#include "core/least_squares.h"
 
 namespace limn::calib {
 namespace {
@@ -119,43 +121,59 @@ Junction first_guess(const std::vector<Sample>& samples, const Expected& at) {
   return junction;
 }
 
-// Levenberg-Marquardt; nullopt when it does not settle.
-std::optional<JunctionFit> fit_junction(const std::vector<Sample>& samples, const Junction& start) {
-  constexpr int n = Junction::k_size;
-  if (samples.size() < 4 * n) return std::nullopt;
-  JunctionFit fit{start};
-  double cost = squared_residual(start, samples), damping = 1e-3;
-  Eigen::Matrix<double, n, n> jtj;
-  for (int iteration = 0; iteration < 40; ++iteration) {
+// The samples' least squares over a junction, for minimise().
+struct JunctionProblem {
+  using Matrix = Eigen::Matrix<double, Junction::k_size, Junction::k_size>;
+  const std::vector<Sample>& samples;
+  Junction state, trial{};
+  Matrix jtj{};
+  Junction::Values jtr{}, step{};
+
+  double cost() const { return squared_residual(state, samples); }
+  bool linearise() {
     jtj.setZero();
-    Junction::Values jtr = Junction::Values::Zero(), row;
+    jtr.setZero();
+    Junction::Values row;
     for (const Sample& p : samples) {
-      const double r = p.value - fit.junction.predict(p, &row);
+      const double r = p.value - state.predict(p, &row);
       jtj.selfadjointView<Eigen::Lower>().rankUpdate(row);
       jtr += row * r;
     }
     jtj = jtj.selfadjointView<Eigen::Lower>();
-    Eigen::Matrix<double, n, n> damped = jtj;
-    damped.diagonal() *= 1 + damping;
-    damped.diagonal().array() += 1e-9;
-    const Junction::Values step = damped.ldlt().solve(jtr);
-    Junction tried{fit.junction.v + step};
-    tried.v[4] = std::clamp(tried.v[4], 0.2, 20.0);
-    const double tried_cost = tried.v.allFinite() ? squared_residual(tried, samples) : cost + 1;
-    if (tried_cost < cost) {
-      const bool settled = step.head<2>().norm() < 1e-4 && cost - tried_cost < 1e-6 * cost;
-      fit.junction = tried;
-      cost = tried_cost;
-      damping = std::max(damping / 10, 1e-9);
-      if (settled) break;
-    } else {
-      damping *= 10;
-      if (damping > 1e8) break;
-    }
+    return true;
   }
-  const double variance = cost / static_cast<double>(samples.size() - n);
+  bool solve(double damping) {
+    Matrix raised = damped(jtj, damping);
+    raised.diagonal().array() += 1e-9;
+    step = raised.ldlt().solve(jtr);
+    return true;
+  }
+  double evaluate_trial() {
+    trial.v = state.v + step;
+    trial.v[4] = std::clamp(trial.v[4], 0.2, 20.0);
+    return trial.v.allFinite() ? squared_residual(trial, samples) : std::numeric_limits<double>::infinity();
+  }
+  void accept_trial() { state = trial; }
+  bool is_settled(const LeastSquaresTrial& tried) const {
+    return tried.is_accepted && step.head<2>().norm() < 1e-4 && tried.gain() < 1e-6 * tried.cost_before;
+  }
+};
+
+// nullopt when the place does not follow from the samples.
+std::optional<JunctionFit> fit_junction(const std::vector<Sample>& samples, const Junction& start) {
+  constexpr int n = Junction::k_size;
+  if (samples.size() < 4 * n) return std::nullopt;
+  JunctionProblem problem{.samples = samples, .state = start};
+  const LeastSquaresSummary found = minimise(&problem, {.max_steps = 40,
+                                                        .first_damping = 1e-3,
+                                                        .least_damping = 1e-9,
+                                                        .most_damping = 5e8,
+                                                        .accepts_equal_cost = false});
+  if (found.end == LeastSquaresEnd::no_start) return std::nullopt;
+  JunctionFit fit{problem.state};
+  const double variance = found.cost / static_cast<double>(samples.size() - n);
   const Eigen::Matrix<double, n, n> covariance =
-      variance * jtj.ldlt().solve(Eigen::Matrix<double, n, n>::Identity());
+      variance * problem.jtj.ldlt().solve(Eigen::Matrix<double, n, n>::Identity());
   fit.residual = std::sqrt(variance);
   fit.stddev_px = std::sqrt(covariance.topLeftCorner<2, 2>().trace() / 2);
   if (!fit.junction.v.allFinite() || !std::isfinite(fit.stddev_px)) return std::nullopt;

@@ -6,9 +6,11 @@
 #include <cmath>
 #include <limits>
 #include <opencv2/core.hpp>
+#include <span>
 
 #include "calib/code/phase.h"
 #include "calib/code/subpixel.h"
+#include "core/median.h"
 #include "core/image_io.h"
 
 namespace limn::calib {
@@ -260,10 +262,8 @@ cv::Vec2f local_median(const cv::Mat& labels, int x, int y) {
       rows[count++] = label[1];
     }
   }
-  const auto middle = static_cast<std::ptrdiff_t>(count / 2), end = static_cast<std::ptrdiff_t>(count);
-  std::nth_element(columns.begin(), columns.begin() + middle, columns.begin() + end);
-  std::nth_element(rows.begin(), rows.begin() + middle, rows.begin() + end);
-  return {columns[count / 2], rows[count / 2]};
+  const std::span labelled_columns(columns.data(), count), labelled_rows(rows.data(), count);
+  return {value_of_rank(&labelled_columns, count / 2), value_of_rank(&labelled_rows, count / 2)};
 }
 
 bool apart(const cv::Vec2f& a, const cv::Vec2f& b, double limit) {

@@ -9,6 +9,7 @@
 
 #include "core/config.h"
 #include "core/file.h"
+#include "core/names.h"
 
 namespace limn::calib {
 namespace {
@@ -119,7 +120,7 @@ Result<Patterns> Patterns::create(const std::string& code,
                                   const CodeOptions& options) {
   const auto codes = pattern_codes();
   if (std::find(codes.begin(), codes.end(), code) == codes.end())
-    return error("pattern code '{}' is unknown. The codes are: {}.", code, fmt::join(codes, ", "));
+    return error("pattern code '{}' is unknown. The codes are: {}.", code, joined_names(codes));
   if (width < 2 || height < 2 || width > k_max_side || height > k_max_side)
     return error("expected a projector of 2 to {} pixels a side, found {}x{}.", k_max_side, width, height);
   LIMN_TRY_STATUS(check(code, options));
@@ -184,7 +185,7 @@ Result<Patterns> linearised(const Patterns& patterns,
     return Patterns::create(patterns.code, patterns.width, patterns.height, options);
   }
   return error("response: expected curves of {}, found those of {}. Measure its response, too.", projector,
-               names.empty() ? "no projector" : fmt::format("{}", fmt::join(names, ", ")));
+               joined_names(names, "no projector"));
 }
 
 std::string image_name(int index) { return fmt::format("{:03d}.png", index); }

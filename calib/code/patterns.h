@@ -35,7 +35,7 @@ struct CodeOptions {
   int steps = 6;
   /// phase: gamma of the projector (light = value ^ gamma); the waves are drawn so that their light is
   /// sinusoidal.
-  double gamma = 2.2;
+  double gamma = k_display_gamma;
   /// phase: the projector's measured curves, used instead of gamma: light is then sinusoidal in every
   /// channel.
   std::optional<DisplayCurves> response = {};

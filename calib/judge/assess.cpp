@@ -6,6 +6,7 @@
 #include <set>
 
 #include "calib/judge/uncertainty.h"
+#include "core/median.h"
 
 namespace limn::calib {
 namespace {
@@ -85,11 +86,9 @@ std::vector<double> held_out_errors_mm(const Observations& observations, const C
   }
   std::vector<double> p95;
   for (Errors& of : errors) {
-    std::sort(of.mm.begin(), of.mm.end());
     const double rig_share = of.squared > 0 ? std::sqrt(std::max(0.0, 1 - of.noise / of.squared)) : 0;
-    p95.push_back(of.mm.empty()
-                      ? std::numeric_limits<double>::infinity()
-                      : rig_share * of.mm[static_cast<size_t>(0.95 * static_cast<double>(of.mm.size() - 1))]);
+    p95.push_back(of.mm.empty() ? std::numeric_limits<double>::infinity()
+                                : rig_share * quantile(std::move(of.mm), 0.95));
   }
   return p95;
 }

@@ -7,19 +7,21 @@
 #include <map>
 #include <numbers>
 
+#include "core/least_squares.h"
+
 namespace limn::calib {
 namespace {
 
 using Eigen::Vector2d;
 
-constexpr double k_huber = 3;  // in rig_px; against wrong pixels and reflections
+constexpr HuberLoss k_loss{3};  // in rig_px; against wrong pixels and reflections
 // A weak prior: as far as a device may have moved.
 constexpr double k_loose_rad = 5 * std::numbers::pi / 180, k_loose_m = 0.2;
 // Without a board, a device is undetermined when its position along the light's direction has a larger
 // standard deviation: two devices alone do not give the scale.
 constexpr double k_undetermined_m = 0.02;
 
-// Levenberg-Marquardt on a handful of poses.
+// Least squares over a handful of poses.
 class Fit {
  public:
   Fit(const Observations& observations, const RigCheckOptions& options, const MoveHypothesis& free)
@@ -40,40 +42,50 @@ class Fit {
   }
 
   MovedDeviceFit run(RigCheckPlaces places) const {
-    MovedDeviceFit fitted{std::move(places)};
-    NormalEquations normal = linearised(&fitted.places);
-    double damping = 1e-4;
-    const auto should_continue = [this] { return !options_.should_continue || options_.should_continue(); };
-    for (int i = 0; i < k_most_steps && damping < 1e8 && should_continue(); ++i) {
-      Eigen::MatrixXd damped = normal.matrix;
-      damped.diagonal() *= 1 + damping;
-      const Eigen::VectorXd step = -damped.ldlt().solve(normal.right);
-      if (!step.allFinite()) break;
-      RigCheckPlaces moved = stepped(fitted.places, step);
-      NormalEquations next = linearised(&moved);
-      if (next.cost <= normal.cost && next.count == normal.count) {
-        const bool done = normal.cost - next.cost < 1e-9 * normal.cost;
-        fitted.places = std::move(moved);
-        normal = std::move(next);
-        damping = std::max(damping / 10, 1e-9);
-        if (done) break;
-      } else {
-        damping *= 10;
-      }
-    }
-    fitted.misfit = normal.cost;
-    judge(normal, &fitted);
+    NormalEquations normal = linearised(&places);
+    Problem problem{.fit = *this, .places = std::move(places), .normal = std::move(normal)};
+    minimise(&problem, {.max_steps = 60, .least_damping = 1e-9});
+    MovedDeviceFit fitted{std::move(problem.places)};
+    fitted.misfit = problem.normal.cost;
+    judge(problem.normal, &fitted);
     return fitted;
   }
 
  private:
-  static constexpr int k_most_steps = 60;
-
   struct NormalEquations {
     Eigen::MatrixXd matrix;
     Eigen::VectorXd right;
     double cost = 0;  ///< robust sum of squares of the independent samples, rig_px^2
     int count = 0;    ///< observations with a prediction
+  };
+
+  // For minimise(): the equations come with the cost. No step is found once the caller has had enough.
+  struct Problem {
+    const Fit& fit;
+    RigCheckPlaces places;
+    NormalEquations normal;
+    RigCheckPlaces moved{};
+    NormalEquations next{};
+    Eigen::VectorXd step{};
+
+    double cost() const { return normal.cost; }
+    bool solve(double damping) {
+      if (fit.options_.should_continue && !fit.options_.should_continue()) return false;
+      step = -damped(normal.matrix, damping).ldlt().solve(normal.right);
+      return step.allFinite();
+    }
+    double evaluate_trial() {
+      moved = fit.stepped(places, step);
+      next = fit.linearised(&moved);
+      return next.count == normal.count ? next.cost : std::numeric_limits<double>::infinity();
+    }
+    void accept_trial() {
+      places = std::move(moved);
+      normal = std::move(next);
+    }
+    bool is_settled(const LeastSquaresTrial& tried) const {
+      return tried.is_accepted && tried.gain() < 1e-9 * tried.cost_before;
+    }
   };
 
   // A residual with its derivatives by the parameters.
@@ -83,10 +95,10 @@ class Fit {
   };
   static void add(const Row& row, double stddev, double share, NormalEquations* normal) {
     const double size = row.residual.norm() / stddev;
-    const double weight = share * (size > k_huber ? k_huber / size : 1) / (stddev * stddev);
+    const double weight = share * k_loss.weight(size * size) / (stddev * stddev);
     normal->matrix.noalias() += weight * row.by.transpose() * row.by;
     normal->right.noalias() += weight * row.by.transpose() * row.residual;
-    normal->cost += share * (size > k_huber ? k_huber * (2 * size - k_huber) : size * size);
+    normal->cost += share * k_loss.cost(size * size);
     ++normal->count;
   }
 
@@ -137,8 +149,8 @@ class Fit {
       put(by.pose, device_at(device), &seen.row);
       const double stddev = std::hypot(tie_observation.stddev_px, options_.rig_px);
       const double size = seen.row.residual.norm() / stddev, share = share_of(coarse_sample_of(tie_observation));
-      seen.weight = share * (size > k_huber ? k_huber / size : 1) / (stddev * stddev);
-      seen.cost = share * (size > k_huber ? k_huber * (2 * size - k_huber) : size * size);
+      seen.weight = share * k_loss.weight(size * size) / (stddev * stddev);
+      seen.cost = share * k_loss.cost(size * size);
       rows.push_back(std::move(seen));
     }
     return rows;

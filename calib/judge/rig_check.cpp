@@ -10,6 +10,7 @@
 #include "calib/judge/moved_device_fit.h"
 #include "calib/measurement_model.h"
 #include "calib/seed.h"
+#include "core/names.h"
 
 namespace limn::calib {
 namespace {
@@ -29,14 +30,10 @@ Result<RigCheckPlaces> places_of(const Rig& rig, const Observations& observation
   const auto check_devices = [&](const std::vector<CapturedDevice>& captured, const std::vector<Imager>& known,
                         const char* kind) -> Status {
     for (const CapturedDevice& device : captured) {
-      const auto found = std::find_if(known.begin(), known.end(),
-                                      [&](const Imager& imager) { return imager.name == device.name; });
-      if (found == known.end()) {
-        std::string names;
-        for (const Imager& imager : known) names += (names.empty() ? "" : ", ") + imager.name;
+      const Imager* found = find_named(known, device.name);
+      if (!found)
         return error("captures: expected a {} of the rig ({}), found '{}'. Are they captures of another rig?",
-                     kind, names, device.name);
-      }
+                     kind, joined_names(known), device.name);
       if (found->width != device.width || found->height != device.height)
         return error("captures: expected {} at {}x{} as the rig was calibrated, found {}x{}.", device.name,
                      found->width, found->height, device.width, device.height);

@@ -9,6 +9,7 @@
 
 #include "calib/code/decode.h"
 #include "calib/surface/triangulate.h"
+#include "core/median.h"
 
 namespace limn::calib {
 namespace {
@@ -63,9 +64,8 @@ std::vector<Spot> paper_spots(const Decoded& decoded, const std::array<Vector2d,
     }
   }
   if (all.size() < k_least_pixels) return {};
-  const auto bright = contrasts.begin() + static_cast<std::ptrdiff_t>(contrasts.size() * 9 / 10);
-  std::nth_element(contrasts.begin(), bright, contrasts.end());
-  std::erase_if(all, [&](const Candidate& c) { return c.contrast < k_paper * *bright; });
+  const double least = k_paper * value_of_rank(&contrasts, contrasts.size() * 9 / 10);
+  std::erase_if(all, [&](const Candidate& c) { return c.contrast < least; });
   std::vector<Spot> spots;
   const size_t step = all.size() / k_most_pixels + 1;
   for (size_t i = 0; i < all.size(); i += step) spots.push_back(all[i].spot);

@@ -8,6 +8,7 @@
 
 #include "core/file.h"
 #include "core/log.h"
+#include "core/median.h"
 
 namespace limn::calib {
 namespace {
@@ -82,10 +83,7 @@ double median_shift(const Imager& before, const Imager& now, const std::vector<V
     const auto was = before.project(p), is = now.project(p);
     if (was && is) shifts.push_back((*is - *was).norm());
   }
-  if (shifts.empty()) return std::numeric_limits<double>::infinity();
-  const auto middle = shifts.begin() + static_cast<std::ptrdiff_t>(shifts.size() / 2);
-  std::nth_element(shifts.begin(), middle, shifts.end());
-  return *middle;
+  return median(std::move(shifts), std::numeric_limits<double>::infinity());
 }
 
 Imager seen_from(const Imager& imager, const Imager& camera) {

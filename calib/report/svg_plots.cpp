@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "core/median.h"
+
 namespace limn::calib {
 namespace {
 
@@ -73,9 +75,7 @@ double usual_length(const std::vector<FieldPoint>& points) {
     if (!p.outlier && p.residual.allFinite()) lengths.push_back(p.residual.norm());
   }
   if (lengths.empty()) return 0;
-  const auto at = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() * 9 / 10);
-  std::nth_element(lengths.begin(), at, lengths.end());
-  return *at;
+  return value_of_rank(&lengths, lengths.size() * 9 / 10);
 }
 
 double round_magnification(double wanted) {

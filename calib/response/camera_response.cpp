@@ -5,6 +5,8 @@
 #include <cmath>
 #include <functional>
 
+#include "core/least_squares.h"
+
 namespace limn::calib {
 namespace {
 
@@ -230,41 +232,65 @@ struct Fit {
   double rms = 0;  // levels
 };
 
-// Levenberg and Marquardt with derivatives by differences; few unknowns.
-Fit fitted(const Sums& sums, const Family& family) {
-  const auto stacked = [&](const Values& values) {
+// A family's unknowns by the sums and by what is known of them before, for minimise(): few of them,
+// derivatives by differences.
+struct FamilyProblem {
+  FamilyProblem(const Sums& all_sums, const Family& of)
+      : sums(all_sums), family(of), state(of.start), now(stacked(state)) {}
+
+  Values stacked(const Values& values) const {
     const Values data = residuals(sums, family.light(values));
     Values all(data.size() + family.prior.rows());
     all << data, family.prior * (values - family.start);
     return all;
-  };
-  Fit fit{family.name, family.start, {}, 0};
-  Values now = stacked(fit.values);
-  const Eigen::Index unknowns = fit.values.size();
-  double damping = 1e-3;
-  for (int iteration = 0; iteration < 30 && unknowns > 0; ++iteration) {
-    Eigen::MatrixXd jacobian(now.size(), unknowns);
-    for (Eigen::Index i = 0; i < unknowns; ++i) {
+  }
+  double cost() const { return now.squaredNorm(); }
+  bool linearise() {
+    Eigen::MatrixXd jacobian(now.size(), state.size());
+    for (Eigen::Index i = 0; i < state.size(); ++i) {
       constexpr double k_step = 1e-4;
-      Values moved = fit.values;
+      Values moved = state;
       moved[i] += k_step;
       jacobian.col(i) = (stacked(moved) - now) / k_step;
     }
-    Eigen::MatrixXd damped = jacobian.transpose() * jacobian;
-    damped.diagonal() *= 1 + damping;
-    const Values step = damped.ldlt().solve(-jacobian.transpose() * now);
-    const Values candidate = fit.values + step;
-    const Values then = stacked(candidate);
-    const double gain = now.squaredNorm() - then.squaredNorm();
-    if (!(gain > 0)) {
-      damping *= 10;
-      if (damping > 1e4) break;
-      continue;
-    }
-    fit.values = candidate;
+    matrix = jacobian.transpose() * jacobian;
+    downhill = -jacobian.transpose() * now;
+    return true;
+  }
+  bool solve(double damping) {
+    trial = state + damped(matrix, damping).ldlt().solve(downhill);
+    return true;
+  }
+  double evaluate_trial() {
+    then = stacked(trial);
+    return then.squaredNorm();
+  }
+  void accept_trial() {
+    state = trial;
     now = then;
-    damping = std::max(damping / 10, 1e-9);
-    if (gain < 1e-7 * now.squaredNorm()) break;
+  }
+  bool is_settled(const LeastSquaresTrial& tried) const {
+    return tried.is_accepted && tried.gain() < 1e-7 * tried.cost_after;
+  }
+
+  const Sums& sums;
+  const Family& family;
+  Values state, trial;
+  Values now, then;  // their residuals
+  Eigen::MatrixXd matrix;
+  Values downhill;
+};
+
+Fit fitted(const Sums& sums, const Family& family) {
+  Fit fit{family.name, family.start, {}, 0};
+  if (family.start.size() > 0) {
+    FamilyProblem problem(sums, family);
+    minimise(&problem, {.max_steps = 30,
+                        .first_damping = 1e-3,
+                        .least_damping = 1e-9,
+                        .most_damping = 5e4,
+                        .accepts_equal_cost = false});
+    fit.values = problem.state;
   }
   fit.light = family.light(fit.values);
   const double freedom = static_cast<double>(sums.levels.size()) * (k_rows - k_unknowns);

@@ -7,13 +7,14 @@
 #include <opencv2/core.hpp>
 
 #include "calib/code/patterns.h"
+#include "core/median.h"
+#include "core/photometric_response.h"
 
 namespace limn::calib {
 namespace {
 
 using Role = ResponseImage::Role;
 
-constexpr double k_root = 2.2;  // light^(1 / 2.2) of a display is almost straight
 // Deviation of light^(1 / 2.2) from its neighbours' prediction: half a step of the ramp.
 constexpr double k_worst_jump = 0.035;
 constexpr int k_tile_px = 16;
@@ -94,7 +95,7 @@ double cubic_at(const std::vector<double>& x,
          t * t * (3 - 2 * t) * y[i + 1] + t * t * (t - 1) * h * slopes[i + 1];
 }
 
-double root_of(double share) { return std::pow(std::max(share, 0.0), 1 / k_root); }
+double root_of(double share) { return std::pow(std::max(share, 0.0), 1 / k_display_gamma); }
 
 // The ramp with 0 in front, as points of light^(1 / 2.2).
 struct Points {
@@ -114,7 +115,7 @@ std::vector<double> curve_through(const Points& points) {
   std::vector<double> curve;
   for (int v = 0; v < 256; ++v) {
     const double root = std::max(0.0, cubic_at(points.x, points.y, slopes, v / 255.0));
-    const double light = std::pow(root, k_root);
+    const double light = std::pow(root, k_display_gamma);
     curve.push_back(curve.empty() ? light : std::max(curve.back(), light));
   }
   curve.front() = 0;
@@ -321,11 +322,9 @@ std::optional<Measurement> fitted_black_level(std::span<const ResponseShots* con
   }
   if (shares.size() < k_least_tiles) return std::nullopt;
   // Huber: an object's outline in a tile does not belong to the plane.
-  std::vector<double> sorted;
-  for (const Share& share : shares) sorted.push_back(share.value);
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
-                   sorted.end());
-  double centre = sorted[sorted.size() / 2], scatter = 0;
+  std::vector<double> values;
+  for (const Share& share : shares) values.push_back(share.value);
+  double centre = median(std::move(values)), scatter = 0;
   constexpr double k_robust_at = 2;
   for (int pass = 0; pass < 20; ++pass) {
     double weights = 0, sum = 0, spread = 0;

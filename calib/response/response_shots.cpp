@@ -5,6 +5,7 @@
 
 #include "calib/code/patterns.h"
 #include "core/file.h"
+#include "core/names.h"
 #include "core/image_io.h"
 
 namespace limn::calib {
@@ -27,12 +28,6 @@ int index_of(const std::vector<CapturedDevice>& devices, const std::string& name
   return -1;
 }
 
-std::string names_of(const std::vector<CapturedDevice>& devices) {
-  std::string names;
-  for (const CapturedDevice& device : devices) names += (names.empty() ? "" : ", ") + device.name;
-  return names;
-}
-
 // Folders in `folder`, each of which must be named after one of the devices; their indices, sorted.
 Result<std::vector<int>> devices_in(const fs::path& folder, const std::vector<CapturedDevice>& devices) {
   std::vector<int> found;
@@ -42,12 +37,12 @@ Result<std::vector<int>> devices_in(const fs::path& folder, const std::vector<Ca
     const int index = index_of(devices, entry.path().filename().string());
     if (index < 0)
       return error("{}: expected a folder named after one of {}, found another name. Rename or remove it.",
-                   entry.path().string(), names_of(devices));
+                   entry.path().string(), joined_names(devices));
     found.push_back(index);
   }
   if (found.empty())
     return error("{}: expected folders named after {}, found none. See limn patterns --response.",
-                 folder.string(), names_of(devices));
+                 folder.string(), joined_names(devices));
   std::sort(found.begin(), found.end());
   return found;
 }

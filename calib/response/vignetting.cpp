@@ -8,6 +8,7 @@
 
 #include "calib/code/decode.h"
 #include "calib/response/camera_response.h"
+#include "core/median.h"
 
 namespace limn::calib {
 namespace {
@@ -77,9 +78,7 @@ class Problem {
 
   static double median_size(std::vector<double> values) {
     for (double& value : values) value = std::abs(value);
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
+    return median(std::move(values));
   }
 
   Eigen::MatrixXd prior() const {

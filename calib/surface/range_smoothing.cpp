@@ -9,6 +9,8 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
+#include "core/median.h"
+
 namespace limn::calib {
 namespace {
 
@@ -183,9 +185,7 @@ double size_of(const cv::Mat& residuals) {
   std::vector<double> sizes;
   for (const double r : cv::Mat_<double>(residuals))
     if (!std::isnan(r)) sizes.push_back(std::abs(r));
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  const double limit = 4 * 1.4826 * *middle;
+  const double limit = 4 * 1.4826 * value_of_rank(&sizes, sizes.size() / 2);
   double sum = 0;
   int count = 0;
   for (const double size : sizes) {
@@ -218,10 +218,7 @@ Noise measured_noise(const Ranges& ranges, const cv::Mat& links, int smooth_half
       if (scale > 0 && number++ % k_every == 0) pairs.add(residuals / scale);
     }
   }
-  if (scales.empty()) scales.push_back(1);
-  std::nth_element(scales.begin(), scales.begin() + static_cast<std::ptrdiff_t>(scales.size() / 2),
-                   scales.end());
-  const float common = scales[scales.size() / 2];
+  const float common = median(std::move(scales), 1.0F);
   noise.scale.setTo(common, noise.scale != noise.scale);
   noise.scale = cv::max(noise.scale, common / 2);
   const cv::Mat correlation = pairs.correlation();

@@ -11,6 +11,7 @@
 
 #include "calib/surface/range_smoothing.h"
 #include "calib/surface/triangulate.h"
+#include "core/median.h"
 
 namespace limn::calib {
 namespace {
@@ -161,11 +162,7 @@ Ranges combined(const RangeView& view,
   counts->conflicts = cv::countNonZero(conflict);
   const int met = static_cast<int>(epipolar.size()) - counts->epipolar - counts->angle - counts->unsure;
   counts->epipolar_rms_px = met > 0 ? std::sqrt(counts->epipolar_rms_px / met) : 0;
-  if (!epipolar.empty()) {
-    const auto middle = epipolar.begin() + static_cast<std::ptrdiff_t>(epipolar.size() / 2);
-    std::nth_element(epipolar.begin(), middle, epipolar.end());
-    counts->epipolar_median_px = *middle;
-  }
+  if (!epipolar.empty()) counts->epipolar_median_px = median(std::move(epipolar));
   return all;
 }
 

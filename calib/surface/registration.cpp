@@ -12,6 +12,7 @@
 
 #include "core/linear_algebra.h"
 #include "core/log.h"
+#include "core/median.h"
 
 namespace limn::calib {
 namespace {
@@ -93,9 +94,7 @@ struct Row {
 double median_size(const std::vector<Row>& rows) {
   std::vector<double> sizes;
   for (const Row& row : rows) sizes.push_back(std::abs(row.residual));
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  return *middle;
+  return median(std::move(sizes));
 }
 
 // The frame and unit of rotations: about the centre of the points, in metres at their radius, so that all six

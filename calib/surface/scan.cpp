@@ -8,6 +8,7 @@
 #include "calib/board/board_finder.h"
 #include "calib/surface/registration.h"
 #include "core/log.h"
+#include "core/names.h"
 #include "scene/mesh_bvh.h"
 
 namespace limn::calib {
@@ -23,31 +24,24 @@ double seconds_since(std::chrono::steady_clock::time_point begun) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
 }
 
-std::string names_of(const std::vector<Imager>& imagers) {
-  std::string names;
-  for (const Imager& imager : imagers) names += (names.empty() ? "" : ", ") + imager.name;
-  return names.empty() ? "none" : names;
-}
-
 // The rig's imagers that the captures name, in the captures' order.
 Result<std::vector<const Imager*>> chosen(const std::vector<CapturedDevice>& devices,
                                           const std::vector<Imager>& imagers,
                                           const char* kind) {
   std::vector<const Imager*> found;
   for (const CapturedDevice& device : devices) {
-    const auto at = std::find_if(imagers.begin(), imagers.end(),
-                                 [&](const Imager& imager) { return imager.name == device.name; });
-    if (at == imagers.end())
+    const Imager* at = find_named(imagers, device.name);
+    if (!at)
       return error(
           "the captures' {} {}: expected it in the rig, found there: {}. Use the rig that took these "
           "captures.",
-          kind, device.name, names_of(imagers));
+          kind, device.name, joined_names(imagers));
     if (at->width != device.width || at->height != device.height)
       return error(
           "{} {}: the captures' images are {}x{}, but the rig was calibrated at {}x{}. Capture at that size, "
           "or calibrate again.",
           kind, device.name, device.width, device.height, at->width, at->height);
-    found.push_back(&*at);
+    found.push_back(at);
   }
   return found;
 }
@@ -65,11 +59,9 @@ Result<bool> shows_board(const CaptureSet& captures, const CapturedPose& pose) {
 Result<std::vector<const CapturedPose*>> scene_poses(const CaptureSet& captures, const ScanOptions& options) {
   std::vector<const CapturedPose*> poses;
   for (const std::string& name : options.poses) {
-    const auto at = std::find_if(captures.poses.begin(), captures.poses.end(),
-                                 [&](const CapturedPose& pose) { return pose.name == name; });
-    if (at == captures.poses.end())
-      return error("--poses: there is no pose '{}' in {}.", name, captures.folder.string());
-    poses.push_back(&*at);
+    const CapturedPose* at = find_named(captures.poses, name);
+    if (!at) return error("--poses: there is no pose '{}' in {}.", name, captures.folder.string());
+    poses.push_back(at);
   }
   if (!options.poses.empty()) return poses;
   for (const CapturedPose& pose : captures.poses) {

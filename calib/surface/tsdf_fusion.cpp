@@ -9,6 +9,8 @@
 #include <unordered_map>
 #include <vector>
 
+#include "core/median.h"
+
 namespace limn::calib {
 namespace {
 
@@ -223,13 +225,8 @@ Agreement agreement(const RangeView& a, const RangeView& b, double reach, int sa
   if (apart.empty()) return result;
   for (const double d : apart) result.rms_m += d * d;
   result.rms_m = std::sqrt(result.rms_m / result.count);
-  const auto median = [](std::vector<double>* values) {
-    const auto middle = values->begin() + static_cast<std::ptrdiff_t>(values->size() / 2);
-    std::nth_element(values->begin(), middle, values->end());
-    return *middle;
-  };
-  result.median_m = median(&apart);
-  result.median_sigmas = median(&sigmas);
+  result.median_m = median(std::move(apart));
+  result.median_sigmas = median(std::move(sigmas));
   return result;
 }
 
@@ -240,10 +237,7 @@ double point_spacing(std::span<const RangeView> views) {
       for (int x = 0; x + 1 < view.range.cols; x += 7)
         if (view.has(x, y) && view.has(x + 1, y))
           distances.push_back((view.p_world(x, y) - view.p_world(x + 1, y)).norm());
-  if (distances.empty()) return 0;
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return median(std::move(distances));
 }
 
 scene::ScanSurface fused_points(std::span<const RangeView> views) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "core/median.h"
+#include "core/names.h"
 #include "tracker/marker_pose.h"
 
 namespace limn::apps {
@@ -49,9 +51,7 @@ double misfit(const tracker::MarkerCorrespondences& marker, const Pose& pose) {
 double gate_of(const BodyCorrespondences& seen, const Pose& pose) {
   std::vector<double> off;
   for (const tracker::MarkerCorrespondences& marker : seen) off.push_back(misfit(marker, pose));
-  const auto middle = off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2);
-  std::nth_element(off.begin(), middle, off.end());
-  return std::max(k_gate_px, k_gate_of_median * *middle);
+  return std::max(k_gate_px, k_gate_of_median * median(std::move(off)));
 }
 
 BodyCorrespondences without_moved(const BodyCorrespondences& seen, const Pose& pose) {
@@ -110,9 +110,8 @@ std::vector<Track> moved_markers(const Imager& view,
   camera.imager_from_world = Pose();
   const tracker::View here{&camera, detections};
   for (const Track& track : tracks) {
-    const auto body =
-        std::find_if(bodies.begin(), bodies.end(), [&](const Body& b) { return b.name == track.body; });
-    if (body == bodies.end() || body->markers.size() != 1 || track.tracking == TrackingState::lost) continue;
+    const Body* body = find_named(bodies, track.body);
+    if (!body || body->markers.size() != 1 || track.tracking == TrackingState::lost) continue;
     const BodyCorrespondences seen = tracker::correspondences(*body, std::span(&here, 1));
     const Pose said = view.imager_from_world * track.world_from_body;
     if (seen.empty() || misfit(seen[0], said) <= gate_px) continue;

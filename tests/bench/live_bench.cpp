@@ -24,6 +24,7 @@
 #include "session/session.h"
 #include "session/perception.h"
 #include "tracker/marker_image.h"
+#include "core/median.h"
 #include "core/image_io.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"
@@ -62,12 +63,6 @@ double resident_mib() {
 
 double mean(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                   values.end());
-  return values[values.size() / 2];
 }
 
 // The studio, seen by a camera of 1280x1024.
@@ -238,13 +233,6 @@ FrameCost session_cost(const std::vector<Shot>& shots, SessionSetup setup, const
   return {median(times), (processor_ms() - begun_processor) / static_cast<double>(shots.size())};
 }
 
-double percentile(std::vector<double> values, double share) {
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
-
 // From a person's edit to the first images that show it, by the wall, without the display: what is left of
 // the frame in which it comes, at any moment of it alike, and the whole frame after it.
 void print_edits(const std::vector<Shot>& shots, const SessionSetup& setup) {
@@ -267,7 +255,7 @@ void print_edits(const std::vector<Shot>& shots, const SessionSetup& setup) {
     before_ms = wall_ms() - begun;
   }
   fmt::print("from an edit to its first pictures, display excluded: {:.0f} ms (median), {:.0f} ms (95 %)\n",
-             percentile(waits, 0.5), percentile(waits, 0.95));
+             quantile(waits, 0.5), quantile(waits, 0.95));
 }
 
 void print_recording(const std::vector<Shot>& shots, const SessionSetup& setup) {

@@ -15,6 +15,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "tracker/marker_image.h"
+#include "core/median.h"
 #include "device/gl_context.h"
 #include "projector/gl.h"
 #include "projector/renderer.h"
@@ -41,8 +42,7 @@ double median_ms(int count, const std::function<void()>& work) {
     glFinish();
     if (i > 0) times.push_back(now_ms() - start);  // the first one warms up
   }
-  std::nth_element(times.begin(), times.begin() + count / 2, times.end());
-  return times[static_cast<std::size_t>(count / 2)];
+  return median(std::move(times));
 }
 
 GLuint shader_of(GLenum kind, const char* source) {
@@ -228,10 +228,7 @@ int run(int frames) {
   renderer->time_passes(false);
   fmt::print("  passes of a frame with one projector's picture\n");
   for (const std::string& pass : order) {
-    std::vector<double>& times = passes[pass];
-    std::nth_element(times.begin(), times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2),
-                     times.end());
-    fmt::print("  {:<38}  {:6.2f}\n", pass, times[times.size() / 2]);
+    fmt::print("  {:<38}  {:6.2f}\n", pass, median(passes[pass]));
   }
   // What all projectors share, ids above all, is drawn once for all of them.
   const double sum = static_cast<double>(projectors) * (copy + draw + warp);

@@ -23,6 +23,7 @@
 #include "remote/server.h"
 #include "tracker/marker_image.h"
 #include "core/log.h"
+#include "core/median.h"
 #include "device/gl_context.h"
 #include "sim/virtual_rig.h"
 #include "tests/remote/remote_client.h"
@@ -41,12 +42,6 @@ constexpr auto k_between_edits = 100ms;
 
 double ms_since(Clock::time_point begun) {
   return std::chrono::duration<double, std::milli>(Clock::now() - begun).count();
-}
-
-double at_share(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
 // A session on the virtual studio; the rig's exposure is not its work.
@@ -197,7 +192,7 @@ int run(int argc, char** argv) {
       const double ms = stage.frame(server->get());
       if (i > 0) times.push_back(ms);
     }
-    return at_share(times, 0.5);
+    return quantile(times, 0.5);
   };
   turn();
   std::vector<double> alone, states, images, late_ms, late_with_images_ms;
@@ -218,16 +213,16 @@ int run(int argc, char** argv) {
     beside(true, &late_with_images_ms, &images);
   }
   fmt::print("a frame's time (found, told, painted), of turns of {} frames\n", k_frames - 1);
-  fmt::print("  without guests               {:.2f} ms (median; {:.2f} to {:.2f})\n", at_share(alone, 0.5),
-             at_share(alone, 0.1), at_share(alone, 0.9));
+  fmt::print("  without guests               {:.2f} ms (median; {:.2f} to {:.2f})\n", quantile(alone, 0.5),
+             quantile(alone, 0.1), quantile(alone, 0.9));
   fmt::print("  four who see the state       {:.3f} of it (median; {:.3f} to {:.3f})\n",
-             at_share(states, 0.5), at_share(states, 0.1), at_share(states, 0.9));
+             quantile(states, 0.5), quantile(states, 0.1), quantile(states, 0.9));
   fmt::print("  four with the live composite {:.3f} of it (median; {:.3f} to {:.3f})\n",
-             at_share(images, 0.5), at_share(images, 0.1), at_share(images, 0.9));
+             quantile(images, 0.5), quantile(images, 0.1), quantile(images, 0.9));
   fmt::print(
       "an edit is seen by four after {:.0f} ms (median), {:.0f} ms (95 %); with composites {:.0f}, {:.0f}\n",
-      at_share(late_ms, 0.5), at_share(late_ms, 0.95), at_share(late_with_images_ms, 0.5),
-      at_share(late_with_images_ms, 0.95));
+      quantile(late_ms, 0.5), quantile(late_ms, 0.95), quantile(late_with_images_ms, 0.5),
+      quantile(late_with_images_ms, 0.95));
   return 0;
 }
 

@@ -23,6 +23,7 @@
 #include "session/perception.h"
 #include "remote/tablet/tablet_view.h"
 #include "tracker/marker_image.h"
+#include "core/median.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"
 #include "sim/truth.h"
@@ -49,12 +50,6 @@ double processor_ms() {
   timespec time{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
   return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // A session in the studio, with its door lit.

@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "core/imager_file.h"
+#include "core/median.h"
 #include "core/image_io.h"
 #include "tests/bench/tracker_frames.h"
 #include "tests/bench/tracker_peers.h"
@@ -74,19 +75,11 @@ struct Tally {
   double pull_at(double share) const {
     if (pulls.empty()) return 0;
     std::vector<double> squares_of = pulls;
-    const auto at =
-        squares_of.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(pulls.size()));
-    std::nth_element(squares_of.begin(), at, squares_of.end());
-    return std::sqrt(*at / -std::log(1 - share));
+    const double square =
+        value_of_rank(&squares_of, static_cast<std::size_t>(share * static_cast<double>(pulls.size())));
+    return std::sqrt(square / -std::log(1 - share));
   }
 };
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                   values.end());
-  return values[values.size() / 2];
-}
 
 // The found corners in the truth's order: the cyclic one, in either direction, that lies nearest. Families
 // turn their markers differently.

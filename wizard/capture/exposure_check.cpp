@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "device/test_card.h"
+#include "core/median.h"
 #include "core/image_io.h"
 
 namespace limn::apps {
@@ -42,9 +43,8 @@ double blur_of(const cv::Mat& black, const cv::Mat& white, const cv::Mat& patter
     }
   }
   if (slopes.size() < 50) return 0;
-  const auto middle = slopes.begin() + static_cast<std::ptrdiff_t>(slopes.size() / 2);
-  std::nth_element(slopes.begin(), middle, slopes.end());
-  return *middle > 0 ? 1 / (*middle * std::sqrt(2 * std::numbers::pi)) : 0;
+  const auto middle = median(std::move(slopes));
+  return middle > 0 ? 1 / (middle * std::sqrt(2 * std::numbers::pi)) : 0;
 }
 
 }  // namespace
