@@ -3,12 +3,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
+#include "projector/bindings.h"
 #include "scene/mesh_bvh.h"
 
 namespace limn::projector {
 namespace {
 
-constexpr GLuint k_fields_binding = 7;  // of buffers, as in shaders/contact.glsl
 constexpr int k_most_in_a_row = 32;  // fields beside each other in the texture: GL 4.5 has 2048 texels a side
 
 }  // namespace
@@ -85,11 +85,11 @@ void ContactShadow::place(const scene::PosedScene& posed) {
   glNamedBufferSubData(*fields_, 0, static_cast<GLsizeiptr>(shown_.size() * sizeof(GpuField)), shown_.data());
 }
 
-void ContactShadow::bind(const Program& program, int unit) const {
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_fields_binding, *fields_);
-  program.bind("s_distances", unit, distances_);
-  program.set("u_free", static_cast<float>(k_free));
-  program.set("u_widening", static_cast<float>(k_widening));
+void ContactShadow::bind(const Use& use) const {
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_distance_fields_buffer, *fields_);
+  glBindTextureUnit(k_distances_unit, *distances_);
+  use.program.set("u_free", static_cast<float>(k_free));
+  use.program.set("u_widening", static_cast<float>(k_widening));
 }
 
 }  // namespace limn::projector

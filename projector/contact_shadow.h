@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "projector/gl.h"
-#include "projector/shader.h"
+#include "projector/resources.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 
@@ -26,7 +25,7 @@ DistanceField distance_field(const scene::Mesh& mesh, double farthest_m);
 /// light from all sides they keep from a point, the nearer the more (obscurance: Zhukov et al. 1998, "An
 /// ambient light illumination model"), by cones through each part's distance field (after Wright 2015,
 /// "Dynamic occlusion with signed distance fields"). Parts of mode `surface` have none.
-class ContactShadow {
+class ContactShadow final : public Bindable {
  public:
   /// Light that comes past a part counts the more the farther off the part is met, all of it at this length
   /// (m).
@@ -39,8 +38,8 @@ class ContactShadow {
   explicit ContactShadow(const scene::Scene& scene);
   /// Sends which parts are shown to the GPU.
   void place(const scene::PosedScene& posed);
-  /// Binds it for a program that includes contact.glsl.
-  void bind(const Program& program, int unit) const;
+  /// Resource::contact_shadow.
+  void bind(const Use& use) const override;
 
  private:
   struct GpuField {

@@ -2,6 +2,8 @@
 
 #include <cstddef>
 
+#include "projector/bindings.h"
+
 namespace limn::projector {
 namespace {
 
@@ -9,10 +11,27 @@ constexpr int k_block = 8;  // as in shaders/blocks.glsl
 
 int blocks_of(int texels) { return (texels + k_block - 1) / k_block; }
 
-void run(const Program& program, cv::Size blocks) {
+// The depth image that ids were drawn with.
+class DepthOfIds final : public Bindable {
+ public:
+  DepthOfIds(const GlName& depth, const PinholeView& pinhole) : depth_(depth), twin_(pinhole) {}
+  void bind(const Use& use) const override {
+    glBindTextureUnit(k_depth_unit, *depth_);
+    use.program.set("u_last", twin_.width - 1, twin_.height - 1);
+    use.program.set("u_near", static_cast<float>(k_near));
+    use.program.set("u_focal", static_cast<float>(twin_.focal));
+  }
+
+ private:
+  const GlName& depth_;
+  const PinholeView& twin_;
+};
+
+// Runs a pass over all blocks, 8 x 8 a group.
+void run(const ComputePass& pass, cv::Size blocks, const Resources& resources) {
   constexpr int k_group = 8;
-  program.set("u_blocks", blocks.width, blocks.height);
-  program.use();
+  pass.program().set("u_blocks", blocks.width, blocks.height);
+  pass.use(resources);
   glDispatchCompute(static_cast<GLuint>(blocks.width + k_group - 1) / k_group,
                     static_cast<GLuint>(blocks.height + k_group - 1) / k_group, 1);
   glMemoryBarrier(GL_SHADER_IMAGE_ACCESS_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT);
@@ -21,12 +40,20 @@ void run(const Program& program, cv::Size blocks) {
 }  // namespace
 
 Result<EdgeFeathering> EdgeFeathering::create(int projectors, int width, int height) {
+  using enum Resource;
   EdgeFeathering edges;
-  LIMN_TRY(edges.where_, Program::link_compute("jumps_where.comp"));
-  LIMN_TRY(edges.find_, Program::link_compute("jumps.comp"));
-  LIMN_TRY(edges.handed_, Program::link_compute("jump_handed.comp"));
-  LIMN_TRY(edges.rows_, Program::link_compute("jump_rows.comp"));
-  LIMN_TRY(edges.fade_, Program::link_compute("jump_fade.comp"));
+  LIMN_TRY(edges.where_,
+           ComputePass::link({.shader = "jumps_where.comp", .reads = {depth}, .writes = {work_list}}));
+  LIMN_TRY(
+      edges.find_,
+      ComputePass::link({.shader = "jumps.comp", .reads = {depth}, .writes = {depth_edges, deferred_list}}));
+  LIMN_TRY(edges.handed_, ComputePass::link({.shader = "jump_handed.comp",
+                                             .reads = {scene, viewpoints, projector, all_depth_edges},
+                                             .writes = {edge_marks}}));
+  LIMN_TRY(edges.rows_,
+           ComputePass::link({.shader = "jump_rows.comp", .reads = {edge_marks}, .writes = {edge_rows}}));
+  LIMN_TRY(edges.fade_,
+           ComputePass::link({.shader = "jump_fade.comp", .reads = {edge_rows}, .writes = {edge_fade}}));
   const int columns = blocks_of(width), rows = blocks_of(height);
   edges.blocks_.resize(static_cast<std::size_t>(projectors));
   edges.jumping_.resize(static_cast<std::size_t>(projectors));
@@ -42,44 +69,39 @@ Result<EdgeFeathering> EdgeFeathering::create(int projectors, int width, int hei
 void EdgeFeathering::find(int projector, const GlName& depth, const PinholeView& pinhole) {
   cv::Size& blocks = blocks_[static_cast<std::size_t>(projector)];
   blocks = {blocks_of(pinhole.width), blocks_of(pinhole.height)};
-  for (const Program* program : {&where_, &find_}) {
-    program->bind("s_depth", 0, depth);
-    program->set("u_last", pinhole.width - 1, pinhole.height - 1);
-    program->set("u_near", static_cast<float>(k_near));
-    program->set("u_focal", static_cast<float>(pinhole.focal));
-  }
+  PixelList& jumping = jumping_[static_cast<std::size_t>(projector)];
   may_jump_.start(blocks.area());
-  may_jump_.bind();
+  const DepthOfIds depth_of_ids(depth, pinhole);
+  const ImageAt jumps(k_depth_edges_image, jumps_, GL_RGBA32F, projector);
+  const Resources resources = Resources()
+                                  .with(Resource::depth, depth_of_ids)
+                                  .with(Resource::depth_edges, jumps)
+                                  .with(Resource::work_list, may_jump_)
+                                  .with(Resource::deferred_list, jumping);
   const cv::Rect all({0, 0}, blocks);
-  look_through(where_, {&all, 1});
+  where_.look_through({&all, 1}, resources);
   const float none[] = {-1, -1, -1, -1};
   glClearTexSubImage(*jumps_, 0, 0, 0, projector, blocks.width, blocks.height, 1, GL_RGBA, GL_FLOAT, none);
-  glBindImageTexture(0, *jumps_, 0, GL_FALSE, projector, GL_WRITE_ONLY, GL_RGBA32F);
-  PixelList& jumping = jumping_[static_cast<std::size_t>(projector)];
   jumping.start(blocks.area());
-  jumping.bind_as_rest();
-  may_jump_.work_through(find_);
+  find_.work_through(may_jump_, resources);
 }
 
-void EdgeFeathering::feather(const std::function<void(const Program&)>& bind_sights) {
-  constexpr int k_jumps_unit = 8;
-  bind_sights(handed_);
-  handed_.bind("s_jumps", k_jumps_unit, jumps_);
+void EdgeFeathering::feather(const Resources& seen) {
+  const TextureAt all_jumps(k_depth_edges_unit, jumps_);
+  const ImageAt marks(k_edge_marks_image, marks_, GL_R8), along_rows(k_edge_rows_image, along_rows_, GL_R8);
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    const int projector = static_cast<int>(i);
-    handed_.set("u_projector", projector);
+    const ProjectorIndex projector(i);
+    const ImageAt kept(k_edge_fade_image, kept_, GL_R16F, static_cast<int>(i));
+    const Resources resources = seen.with(Resource::all_depth_edges, all_jumps)
+                                    .with(Resource::projector, projector)
+                                    .with(Resource::edge_marks, marks)
+                                    .with(Resource::edge_rows, along_rows)
+                                    .with(Resource::edge_fade, kept);
     glClearTexImage(*marks_, 0, GL_RED, GL_FLOAT, nullptr);
-    glBindImageTexture(0, *marks_, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R8);
-    jumping_[i].work_through(handed_);
-    glBindImageTexture(0, *marks_, 0, GL_FALSE, 0, GL_READ_ONLY, GL_R8);
-    glBindImageTexture(1, *along_rows_, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_R8);
-    run(rows_, blocks_[i]);
-    glBindImageTexture(0, *along_rows_, 0, GL_FALSE, 0, GL_READ_ONLY, GL_R8);
-    glBindImageTexture(1, *kept_, 0, GL_FALSE, projector, GL_WRITE_ONLY, GL_R16F);
-    run(fade_, blocks_[i]);
+    handed_.work_through(jumping_[i], resources);
+    run(rows_, blocks_[i], resources);
+    run(fade_, blocks_[i], resources);
   }
 }
-
-void EdgeFeathering::bind(const Program& program, int unit) const { program.bind("s_kept", unit, kept_); }
 
 }  // namespace limn::projector

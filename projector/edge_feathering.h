@@ -1,13 +1,12 @@
 #pragma once
 
-#include <functional>
 #include <opencv2/core/types.hpp>
 #include <vector>
 
 #include "core/result.h"
 #include "projector/gl.h"
+#include "projector/pass.h"
 #include "projector/pixel_list.h"
-#include "projector/shader.h"
 #include "projector/pinhole_view.h"
 
 namespace limn::projector {
@@ -22,13 +21,13 @@ class EdgeFeathering {
 
   /// Looks through the depth image that a projector's ids were drawn with.
   void find(int projector, const GlName& depth, const PinholeView& pinhole);
-  /// Once that is done for all. `bind_sights`: Sights::bind, with fewer than 8 units from 0 on.
-  void feather(const std::function<void(const Program&)>& bind_sights);
-  /// Binds a layer a projector: 0 at an edge ... 1 away from edges, a texel a block.
-  void bind(const Program& program, int unit) const;
+  /// Once that is done for all. `seen`: the scene and its viewpoints.
+  void feather(const Resources& seen);
+  /// A layer a projector: 0 at an edge ... 1 away from edges, a texel a block.
+  const GlName& fade() const { return kept_; }
 
  private:
-  Program where_, find_, handed_, rows_, fade_;
+  ComputePass where_, find_, handed_, rows_, fade_;
   GlName jumps_, marks_, along_rows_, kept_;
   std::vector<cv::Size> blocks_;    // of each projector's image
   PixelList may_jump_;              // blocks

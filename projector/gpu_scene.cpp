@@ -9,15 +9,13 @@
 
 #include "core/log.h"
 #include "core/result.h"
+#include "projector/bindings.h"
 #include "projector/brdf_lut.h"
 
 namespace limn::projector {
 namespace {
 
 constexpr int k_cluster = 128;  // triangles
-// Texture units and bindings, as in shaders/scene.glsl, material.glsl and look.glsl.
-constexpr GLuint k_looks_unit = 1, k_first_texels_unit = 13, k_maps_unit = 18, k_mirrored_unit = 19;
-constexpr GLuint k_materials_binding = 3;
 
 // As in shaders/scene.glsl.
 struct GpuMaterial {
@@ -336,13 +334,16 @@ void GpuScene::place(const std::vector<PlacedRun>& runs) {
                        owners_shown_.data());
 }
 
-void GpuScene::bind() const {
-  const GlName* texels[] = {&corner_texels_, &normal_texels_, &triangle_texels_, &placement_texels_};
-  for (GLuint i = 0; i < std::size(texels); ++i) glBindTextureUnit(k_first_texels_unit + i, **texels[i]);
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_materials_binding, *materials_);
-  glBindTextureUnit(k_looks_unit, *looks_);
-  glBindTextureUnit(k_maps_unit, *maps_);
-  glBindTextureUnit(k_mirrored_unit, *mirrored_);
+void GpuScene::bind(const Use& use) const {
+  const std::pair<int, const GlName*> textures[] = {
+      {k_corners_unit, &corner_texels_},     {k_normals_unit, &normal_texels_},
+      {k_triangles_unit, &triangle_texels_}, {k_placements_unit, &placement_texels_},
+      {k_colour_maps_unit, &looks_},         {k_surface_maps_unit, &maps_},
+      {k_brdf_lut_unit, &mirrored_}};
+  for (const auto& [unit, texture] : textures) glBindTextureUnit(static_cast<GLuint>(unit), **texture);
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_materials_buffer, *materials_);
+  use.program.set("u_has_cut_outs", has_cut_outs_);
+  use.program.set("u_placement_count", owner_count());
 }
 
 std::array<Eigen::Vector3d, 8> bounds_of(const PlacedRun& placed, double margin_m) {

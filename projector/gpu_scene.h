@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/result.h"
-#include "projector/gl.h"
+#include "projector/resources.h"
 #include "scene/posed_scene.h"
 
 namespace limn::projector {
@@ -40,7 +40,7 @@ struct PlacedRun {
 };
 
 /// All meshes of a scene on the GPU, as shaders/scene.glsl reads them.
-class GpuScene {
+class GpuScene final : public Bindable {
  public:
   /// How many triangles the driver's largest texel buffer holds.
   static std::size_t most_triangles();
@@ -55,12 +55,12 @@ class GpuScene {
   static Pose scene_from_world(const scene::PosedScene& posed);
   /// Sends the places to the GPU.
   void place(const std::vector<PlacedRun>& runs);
-  /// Binds the buffers and the textures (units 1, 13 to 16, 18 and 19) for a drawing.
-  void bind() const;
+  /// Resource::scene.
+  void bind(const Use& use) const override;
 
   bool has_cut_outs() const { return has_cut_outs_; }
-  /// Whether a material has maps beyond its colour, or light of its own: shaders then need SURFACE_MAPS.
-  bool has_surface_maps() const { return has_surface_maps_; }
+  /// What programs that draw looks are made for: the scene's materials.
+  Defines looks() const { return has_surface_maps_ ? Defines{Define::surface_maps} : Defines{}; }
   GLuint vertex_array() const { return *vertex_array_; }
   int owner_count() const { return static_cast<int>(slots_.size()) + 1; }
 

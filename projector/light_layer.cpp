@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "projector/bindings.h"
 #include "projector/renderer.h"
 
 namespace limn::projector {
@@ -40,21 +41,53 @@ void PlacesByMode::divide(std::span<const cv::Rect> of_view, std::span<const cv:
   for (const cv::Rect& s : of_surface) add_outside(s, both, &surface);
 }
 
-Result<LightLayer> LightLayer::link(const std::string& looks, bool by_measurement) {
+Result<LightLayer> LightLayer::link(Defines looks, bool by_measurement) {
+  using enum Resource;
   LightLayer layer;
-  const std::string balance = by_measurement ? "BY_MEASUREMENT " : "", drawing = looks + balance;
-  LIMN_TRY(layer.hits_, Program::link_compute("light_hits.comp"));
-  LIMN_TRY(layer.unknown_, Program::link_compute("light_unknown.comp"));
-  LIMN_TRY(layer.listed_hits_, Program::link_compute("light_hits.comp", "LISTED"));
-  LIMN_TRY(layer.shares_, Program::link_compute("light_shares.comp", balance));
-  LIMN_TRY(layer.where_edges_, Program::link_compute("edges.comp", "KNOWN_SHARES"));
-  LIMN_TRY(layer.rest_, Program::link_compute("light_rest.comp", drawing + "VIEW_PARTS SURFACE_PARTS"));
-  const char* modes[] = {"VIEW_PARTS", "SURFACE_PARTS", "VIEW_PARTS SURFACE_PARTS"};
+  const Defines balance = by_measurement ? Defines{Define::by_measurement} : Defines{};
+  const Defines drawing = looks + balance;
+  const std::vector<Resource> rays = {scene, viewpoints, lens, projector};
+  LIMN_TRY(layer.hits_,
+           ComputePass::link({.shader = "light_hits.comp", .reads = rays, .writes = {hit_cache}}));
+  LIMN_TRY(layer.unknown_,
+           ComputePass::link({.shader = "light_unknown.comp", .reads = {hit_cache}, .writes = {work_list}}));
+  LIMN_TRY(
+      layer.listed_hits_,
+      ComputePass::link(
+          {.shader = "light_hits.comp", .defines = {Define::listed}, .reads = rays, .writes = {hit_cache}}));
+  LIMN_TRY(layer.shares_, ComputePass::link({.shader = "light_shares.comp",
+                                             .defines = balance,
+                                             .reads = {scene, viewpoints, occlusion, lens, projector,
+                                                       hit_cache, light_balance, target},
+                                             .writes = {hit_cache, target}}));
+  LIMN_TRY(layer.where_edges_, ComputePass::link({.shader = "edges.comp",
+                                                  .defines = {Define::known_shares},
+                                                  .reads = {light, hit_cache},
+                                                  .writes = {work_list, deferred_list}}));
+  LIMN_TRY(layer.rest_,
+           ComputePass::link({.shader = "light_rest.comp",
+                              .defines = drawing + Defines{Define::view_parts, Define::surface_parts},
+                              .reads = {scene, viewpoints, occlusion, lens, room_light, projector, hit_cache,
+                                        light_balance},
+                              .writes = {target}}));
+  const Defines modes[] = {
+      {Define::view_parts}, {Define::surface_parts}, {Define::view_parts, Define::surface_parts}};
   for (std::size_t i = 0; i < layer.modes_.size(); ++i) {
     ByMode& mode = layer.modes_[i];
-    LIMN_TRY(mode.where, Program::link_compute("light_where.comp", modes[i]));
-    LIMN_TRY(mode.centre, Program::link_compute("light_centre.comp", drawing + modes[i]));
-    LIMN_TRY(mode.edges, Program::link_compute("light_edges.comp", drawing + modes[i]));
+    LIMN_TRY(mode.where, ComputePass::link({.shader = "light_where.comp",
+                                            .defines = modes[i],
+                                            .reads = {scene, viewpoints, projector, hit_cache, light_balance},
+                                            .writes = {work_list}}));
+    const std::vector<Resource> reads = {scene,     viewpoints, lens,         room_light,
+                                         projector, hit_cache,  light_balance};
+    LIMN_TRY(mode.centre, ComputePass::link({.shader = "light_centre.comp",
+                                             .defines = drawing + modes[i],
+                                             .reads = reads,
+                                             .writes = {target, deferred_list}}));
+    LIMN_TRY(mode.edges, ComputePass::link({.shader = "light_edges.comp",
+                                            .defines = drawing + modes[i],
+                                            .reads = reads,
+                                            .writes = {target, deferred_list}}));
   }
   return layer;
 }
@@ -62,75 +95,95 @@ Result<LightLayer> LightLayer::link(const std::string& looks, bool by_measuremen
 void LightLayer::draw(const Target& target,
                       const PlacesByMode& places,
                       const Smoothing& smoothing,
-                      const std::function<void(const Program&)>& set_up,
+                      const Resources& resources,
                       PassTimes* times) {
-  const int pixels = target.size.area();
-  const auto for_modes = [&](const auto& draw_mode) {
-    for (std::size_t i = 0; i < modes_.size(); ++i)
-      if (modes_[i].is_used) draw_mode(modes_[i], *places.each()[i]);
-  };
+  const ImageAt drawn(k_target_image, target.light, GL_RGBA32F);
+  const TextureAt light(k_light_unit, target.light);
+  const Resources with_target = resources.with(Resource::target, drawn).with(Resource::light, light);
+  const Drawing drawing{target, places, smoothing, with_target, times};
   for (std::size_t i = 0; i < modes_.size(); ++i) modes_[i].is_used = !places.each()[i]->empty();
-  const auto work_through = [&](const PixelList& list, const Program& program) {
-    set_up(program);
-    glBindImageTexture(0, *target.light, 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
-    list.work_through(program);
-  };
-  for_modes(
-      [&](ByMode&, const std::vector<cv::Rect>& parted) { clear_light(target.light, target.size, parted); });
-  {
-    const PassTimes::Scope scope(times, "what is lit");
-    const Program& program = target.is_unknown ? hits_ : unknown_;
-    set_up(program);
-    rest_list_.start(pixels);
-    rest_list_.bind();
-    for_modes([&](ByMode&, const std::vector<cv::Rect>& parted) { look_through(program, parted); });
-    if (!target.is_unknown) work_through(rest_list_, listed_hits_);
-  }
-  {
-    const PassTimes::Scope scope(times, "where there may be light");
-    for_modes([&](ByMode& mode, const std::vector<cv::Rect>& parted) {
-      mode.lit.start(pixels);
-      mode.lit.bind();
-      set_up(mode.where);
-      look_through(mode.where, parted);
-    });
-  }
-  {
-    const PassTimes::Scope scope(times, "light at pixel centres");
-    rest_list_.start(pixels);
-    rest_list_.bind_as_rest();
-    for_modes([&](ByMode& mode, const std::vector<cv::Rect>&) { work_through(mode.lit, mode.centre); });
-    work_through(rest_list_, shares_);
-  }
-  {
-    const PassTimes::Scope scope(times, "where edges are");
-    rest_list_.start(pixels);
-    rest_list_.bind_as_rest();
-    where_edges_.bind("s_centre", k_edges_unit, target.light);
-    where_edges_.set("u_least_step", static_cast<float>(smoothing.least_step));
-    for_modes([&](ByMode& mode, const std::vector<cv::Rect>& parted) {
-      mode.at_edges.start(pixels);
-      mode.at_edges.bind();
-      look_through(where_edges_, parted);
-    });
-    work_through(rest_list_, shares_);
-  }
-  const PassTimes::Scope scope(times, "light at edges");
-  rest_list_.start(pixels);
-  rest_list_.bind_as_rest();
-  for_modes([&](ByMode& mode, const std::vector<cv::Rect>&) {
-    mode.edges.set("u_samples", smoothing.samples);
-    work_through(mode.at_edges, mode.edges);
+  for_modes(places, [&](ByMode&, const std::vector<cv::Rect>& parted) {
+    clear_light(target.light, target.size, parted);
   });
-  rest_.set("u_samples", smoothing.samples);
-  work_through(rest_list_, rest_);
+  find_hits(drawing);
+  list_lit(drawing);
+  draw_centres(drawing);
+  list_edges(drawing);
+  draw_edges(drawing);
 }
 
-void LightLayer::work_through_lit(const Program& program) const {
+// What the centres of all pixels see goes to the hit cache.
+void LightLayer::find_hits(const Drawing& drawing) {
+  const PassTimes::Scope scope(drawing.times, "what is lit");
+  PixelList& unknown = start_deferred(drawing);
+  const Resources resources = drawing.resources.with(Resource::work_list, unknown);
+  const ComputePass& pass = drawing.target.is_unknown ? hits_ : unknown_;
+  for_modes(drawing.places,
+            [&](ByMode&, const std::vector<cv::Rect>& parted) { pass.look_through(parted, resources); });
+  if (!drawing.target.is_unknown) listed_hits_.work_through(unknown, resources);
+}
+
+void LightLayer::list_lit(const Drawing& drawing) {
+  const PassTimes::Scope scope(drawing.times, "where there may be light");
+  for_modes(drawing.places, [&](ByMode& mode, const std::vector<cv::Rect>& parted) {
+    mode.lit.start(drawing.target.size.area());
+    mode.where.look_through(parted, drawing.resources.with(Resource::work_list, mode.lit));
+  });
+}
+
+// One sample a pixel. Where the share of the light is not in the hit cache yet, it gets there.
+void LightLayer::draw_centres(const Drawing& drawing) {
+  const PassTimes::Scope scope(drawing.times, "light at pixel centres");
+  PixelList& without_share = start_deferred(drawing);
+  const Resources resources = drawing.resources.with(Resource::deferred_list, without_share);
+  for_modes(drawing.places, [&](ByMode& mode, const std::vector<cv::Rect>&) {
+    mode.centre.work_through(mode.lit, resources);
+  });
+  shares_.work_through(without_share, resources);
+}
+
+// Pixels beside a step of light. Their samples use the shares at their centres.
+void LightLayer::list_edges(const Drawing& drawing) {
+  const PassTimes::Scope scope(drawing.times, "where edges are");
+  PixelList& without_share = start_deferred(drawing);
+  where_edges_.program().set("u_least_step", static_cast<float>(drawing.smoothing.least_step));
+  const Resources resources = drawing.resources.with(Resource::deferred_list, without_share);
+  for_modes(drawing.places, [&](ByMode& mode, const std::vector<cv::Rect>& parted) {
+    mode.at_edges.start(drawing.target.size.area());
+    where_edges_.look_through(parted, resources.with(Resource::work_list, mode.at_edges));
+  });
+  shares_.work_through(without_share, resources);
+}
+
+// Several samples a pixel; some pixels need a share for each of them.
+void LightLayer::draw_edges(const Drawing& drawing) {
+  const PassTimes::Scope scope(drawing.times, "light at edges");
+  PixelList& with_many_shares = start_deferred(drawing);
+  const Resources resources = drawing.resources.with(Resource::deferred_list, with_many_shares);
+  for_modes(drawing.places, [&](ByMode& mode, const std::vector<cv::Rect>&) {
+    mode.edges.program().set("u_samples", drawing.smoothing.samples);
+    mode.edges.work_through(mode.at_edges, resources);
+  });
+  rest_.program().set("u_samples", drawing.smoothing.samples);
+  rest_.work_through(with_many_shares, resources);
+}
+
+PixelList& LightLayer::start_deferred(const Drawing& drawing) {
+  deferred_.start(drawing.target.size.area());
+  return deferred_;
+}
+
+template <class Do>
+void LightLayer::for_modes(const PlacesByMode& places, const Do& draw_mode) {
+  for (std::size_t i = 0; i < modes_.size(); ++i)
+    if (modes_[i].is_used) draw_mode(modes_[i], *places.each()[i]);
+}
+
+void LightLayer::work_through_lit(const ComputePass& pass, const Resources& resources) const {
   for (const ByMode& mode : modes_) {
     if (!mode.is_used) continue;
-    mode.lit.work_through(program);
-    mode.at_edges.work_through(program);
+    pass.work_through(mode.lit, resources);
+    pass.work_through(mode.at_edges, resources);
   }
 }
 

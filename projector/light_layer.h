@@ -1,15 +1,14 @@
 #pragma once
 
 #include <array>
-#include <functional>
 #include <opencv2/core/types.hpp>
 #include <span>
 #include <vector>
 
 #include "core/result.h"
+#include "projector/pass.h"
 #include "projector/pass_times.h"
 #include "projector/pixel_list.h"
-#include "projector/shader.h"
 
 namespace limn::projector {
 
@@ -26,37 +25,55 @@ struct PlacesByMode {
 
 struct Smoothing;
 
-/// Draws the light that a projector is to give, by lists of pixels: each program does what all of its pixels
+/// Draws the light that a projector is to give, by lists of pixels: each pass does what all of its pixels
 /// need (shaders/light.glsl). Lists take 20 bytes a pixel, 28 where parts of both modes lie over each other.
 class LightLayer {
  public:
-  /// `looks`: names that are defined where looks are drawn, each with a blank behind it; `by_measurement`:
-  /// light is balanced by the measured surface.
-  static Result<LightLayer> link(const std::string& looks, bool by_measurement);
+  /// `looks`: what is defined where looks are drawn; `by_measurement`: light is balanced by the measured
+  /// surface.
+  static Result<LightLayer> link(Defines looks, bool by_measurement);
 
   struct Target {
     const GlName& light;  ///< GL_RGBA32F
     cv::Size size;
-    bool is_unknown;  ///< what shaders/known.glsl keeps is of another time
+    bool is_unknown;  ///< what the hit cache keeps is of another time
   };
-  /// Within `places` alone. `set_up` gives every program what it needs, and binds what is known.
+  /// Within `places` alone. `resources`: scene, viewpoints, occlusion, lens, room light, projector, hit cache
+  /// and light balance.
   void draw(const Target& target,
             const PlacesByMode& places,
             const Smoothing& smoothing,
-            const std::function<void(const Program&)>& set_up,
+            const Resources& resources,
             PassTimes* times);
-  /// Runs a program over all pixels that may have light since the last draw (shaders/listed.glsl).
-  void work_through_lit(const Program& program) const;
+  /// Runs a pass over all pixels that may have light since the last draw.
+  void work_through_lit(const ComputePass& pass, const Resources& resources) const;
 
  private:
   struct ByMode {
-    Program where, centre, edges;
+    ComputePass where, centre, edges;
     PixelList lit, at_edges;  // pixels that may be
     bool is_used = false;     // by the last draw
   };
-  Program hits_, unknown_, listed_hits_, shares_, where_edges_, rest_;
+  // What the phases of one draw share.
+  struct Drawing {
+    const Target& target;
+    const PlacesByMode& places;
+    const Smoothing& smoothing;
+    const Resources& resources;
+    PassTimes* times;
+  };
+  void find_hits(const Drawing& drawing);
+  void list_lit(const Drawing& drawing);
+  void draw_centres(const Drawing& drawing);
+  void list_edges(const Drawing& drawing);
+  void draw_edges(const Drawing& drawing);
+  PixelList& start_deferred(const Drawing& drawing);
+  template <class Do>
+  void for_modes(const PlacesByMode& places, const Do& draw_mode);
+
+  ComputePass hits_, unknown_, listed_hits_, shares_, where_edges_, rest_;
   std::array<ByMode, 3> modes_;  // in the order of PlacesByMode
-  PixelList rest_list_;
+  PixelList deferred_;           // of one phase at a time, which names what it holds
 };
 
 }  // namespace limn::projector

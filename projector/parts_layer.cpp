@@ -3,34 +3,47 @@
 #include <algorithm>
 #include <utility>
 
+#include "projector/bindings.h"
 #include "projector/renderer.h"
 
 namespace limn::projector {
 
-Result<PartsLayer> PartsLayer::link(const std::string& looks) {
+Result<PartsLayer> PartsLayer::link(Defines looks) {
+  using enum Resource;
   PartsLayer layer;
   layer.looks_ = looks;
   LIMN_TRY(layer.plain_, Both::link(looks));
-  LIMN_TRY(layer.where_edges_, Program::link_compute("edges.comp"));
+  LIMN_TRY(layer.where_edges_,
+           ComputePass::link({.shader = "edges.comp", .reads = {light}, .writes = {work_list}}));
   return layer;
 }
 
 Status PartsLayer::link_shadowed() {
   if (shadowed_) return {};
-  LIMN_TRY(shadowed_, Both::link(looks_ + "CONTACT_SHADOW"));
+  LIMN_TRY(shadowed_, Both::link(looks_ + Defines{Define::contact_shadow}));
   return {};
 }
 
-auto PartsLayer::Both::link(const std::string& defined) -> Result<Both> {
+auto PartsLayer::Both::link(Defines defines) -> Result<Both> {
+  using enum Resource;
+  std::vector<Resource> rays = {scene, viewpoints, lens}, parts = {room_light, composite_weights},
+                        view = {room_light, albedo};
+  parts.insert(parts.end(), rays.begin(), rays.end());
+  view.insert(view.end(), rays.begin(), rays.end());
+  if (defines.contains(Define::contact_shadow))
+    for (std::vector<Resource>* reads : {&parts, &view}) reads->push_back(contact_shadow);
   Both out;
-  const std::pair<Program*, const char*> computed[] = {
-      {&out.parts.where, "parts_where.comp"}, {&out.parts.centre, "parts_centre.comp"},
-      {&out.parts.edges, "parts_edges.comp"}, {&out.view.where, "view_where.comp"},
-      {&out.view.centre, "view_centre.comp"}, {&out.view.edges, "view_edges.comp"}};
-  for (const auto& [program, file] : computed) {
-    LIMN_TRY(*program, Program::link_compute(file, defined));
+  const std::pair<ComputePass*, Pass::Description> passes[] = {
+      {&out.parts.where, {"parts_where.comp", defines, rays, {work_list}}},
+      {&out.parts.centre, {"parts_centre.comp", defines, parts, {target}}},
+      {&out.parts.edges, {"parts_edges.comp", defines, parts, {target, deferred_list}}},
+      {&out.view.where, {"view_where.comp", defines, rays, {work_list}}},
+      {&out.view.centre, {"view_centre.comp", defines, view, {target}}},
+      {&out.view.edges, {"view_edges.comp", defines, view, {target}}}};
+  for (const auto& [pass, description] : passes) {
+    LIMN_TRY(*pass, ComputePass::link(description));
   }
-  LIMN_TRY(out.parts.rest, Program::link_compute("parts_rest.comp", defined));
+  LIMN_TRY(out.parts.rest, ComputePass::link({"parts_rest.comp", defines, parts, {target}}));
   return out;
 }
 
@@ -38,46 +51,41 @@ void PartsLayer::draw(What what,
                       const Target& target,
                       const std::vector<cv::Rect>& places,
                       const Smoothing& smoothing,
-                      const std::function<void(const Program&)>& set_up,
+                      const Resources& resources_in,
                       PassTimes* times) {
   Both& both = what.is_shadowed ? *shadowed_ : plain_;
-  const Programs& programs = what.is_view ? both.view : both.parts;
+  const Passes& passes = what.is_view ? both.view : both.parts;
   // Where places lie over each other pixels are listed again.
   const int room = target.size.area() * static_cast<int>(std::max<std::size_t>(1, places.size()));
-  const auto over_places = [&](const Program& program) {
-    list_.start(room);
-    list_.bind();
-    look_through(program, places);
-  };
-  const auto work_through = [&](const PixelList& pixels, const Program& program) {
-    set_up(program);
-    glBindImageTexture(0, *target.light, 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
-    pixels.work_through(program);
-  };
+  const ImageAt drawn(k_target_image, target.light, GL_RGBA32F);
+  const TextureAt light(k_light_unit, target.light);
+  const Resources resources = resources_in.with(Resource::target, drawn)
+                                  .with(Resource::light, light)
+                                  .with(Resource::work_list, list_)
+                                  .with(Resource::deferred_list, beside_unlit_);
   clear_light(target.light, target.size, places);
   {
     const PassTimes::Scope scope(times, "where there may be light");
-    set_up(programs.where);
-    over_places(programs.where);
+    list_.start(room);
+    passes.where.look_through(places, resources);
   }
   {
     const PassTimes::Scope scope(times, "light at pixel centres");
-    work_through(list_, programs.centre);
+    passes.centre.work_through(list_, resources);
   }
   {
     const PassTimes::Scope scope(times, "where edges are");
-    where_edges_.bind("s_centre", k_edges_unit, target.light);
-    where_edges_.set("u_least_step", static_cast<float>(smoothing.least_step));
-    over_places(where_edges_);
+    where_edges_.program().set("u_least_step", static_cast<float>(smoothing.least_step));
+    list_.start(room);
+    where_edges_.look_through(places, resources);
   }
   const PassTimes::Scope scope(times, "light at edges");
-  programs.edges.set("u_samples", smoothing.samples);
-  rest_list_.start(room);
-  rest_list_.bind_as_rest();
-  work_through(list_, programs.edges);
-  if (!programs.rest) return;
-  programs.rest->set("u_samples", smoothing.samples);
-  work_through(rest_list_, *programs.rest);
+  passes.edges.program().set("u_samples", smoothing.samples);
+  beside_unlit_.start(room);
+  passes.edges.work_through(list_, resources);
+  if (!passes.rest) return;
+  passes.rest->program().set("u_samples", smoothing.samples);
+  passes.rest->work_through(beside_unlit_, resources);
 }
 
 }  // namespace limn::projector

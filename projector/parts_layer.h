@@ -1,15 +1,13 @@
 #pragma once
 
-#include <functional>
 #include <opencv2/core/types.hpp>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "core/result.h"
+#include "projector/pass.h"
 #include "projector/pass_times.h"
 #include "projector/pixel_list.h"
-#include "projector/shader.h"
 
 namespace limn::projector {
 
@@ -19,8 +17,8 @@ struct Smoothing;
 /// where there may be some, at pixel centres, by more samples at edges, and what few of those need.
 class PartsLayer {
  public:
-  /// `looks`: names that are defined where looks are drawn, each with a blank behind it.
-  static Result<PartsLayer> link(const std::string& looks);
+  /// `looks`: what is defined where looks are drawn.
+  static Result<PartsLayer> link(Defines looks);
   /// Contact shadows, too; once is enough.
   Status link_shadowed();
 
@@ -32,28 +30,30 @@ class PartsLayer {
     const GlName& light;  ///< GL_RGBA32F
     cv::Size size;
   };
-  /// Within `places` alone. `set_up` gives every program what it needs.
+  /// Within `places` alone. `resources`: scene, viewpoints, lens, room light, albedo (views) or composite
+  /// weights (parts), and the contact shadow where there is one.
   void draw(What what,
             const Target& target,
             const std::vector<cv::Rect>& places,
             const Smoothing& smoothing,
-            const std::function<void(const Program&)>& set_up,
+            const Resources& resources,
             PassTimes* times);
 
  private:
-  struct Programs {
-    Program where, centre, edges;
-    std::optional<Program> rest;
+  struct Passes {
+    ComputePass where, centre, edges;
+    std::optional<ComputePass> rest;
   };
   struct Both {
-    Programs parts, view;
-    static Result<Both> link(const std::string& defined);
+    Passes parts, view;
+    static Result<Both> link(Defines defines);
   };
-  std::string looks_;
+  Defines looks_;
   Both plain_;
   std::optional<Both> shadowed_;
-  Program where_edges_;
-  PixelList list_, rest_list_;
+  ComputePass where_edges_;
+  PixelList list_;          // of pixels that may see something, then of those at edges
+  PixelList beside_unlit_;  // pixels at edges that may lack what light cannot show
 };
 
 }  // namespace limn::projector

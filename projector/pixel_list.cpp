@@ -2,13 +2,9 @@
 
 #include <cstdint>
 
+#include "projector/bindings.h"
+
 namespace limn::projector {
-namespace {
-
-constexpr GLuint k_listed_binding = 6,
-                 k_rest_binding = 5;  // of buffers, as in shaders/listed.glsl and rest.glsl
-
-}  // namespace
 
 void PixelList::start(int pixels) {
   if (room_ < pixels) {
@@ -19,17 +15,16 @@ void PixelList::start(int pixels) {
   glNamedBufferSubData(*buffer_, 0, sizeof(head), head);
 }
 
-void PixelList::bind() const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_listed_binding, *buffer_); }
+void PixelList::bind(const Use& use) const {
+  const int at = use.as == Resource::deferred_list ? k_deferred_list_buffer : k_work_list_buffer;
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, static_cast<GLuint>(at), *buffer_);
+}
 
-void PixelList::bind_as_rest() const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_rest_binding, *buffer_); }
-
-void PixelList::work_through(const Program& program) const {
+void PixelList::dispatch() const {
   constexpr GLintptr k_groups = sizeof(std::uint32_t);  // after the count
-  bind();
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_work_list_buffer, *buffer_);
   glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, *buffer_);
-  program.use();
   glDispatchComputeIndirect(k_groups);
-  glMemoryBarrier(GL_ALL_BARRIER_BITS);
 }
 
 void clear_light(const GlName& light, cv::Size size, std::span<const cv::Rect> places) {
@@ -39,17 +34,6 @@ void clear_light(const GlName& light, cv::Size size, std::span<const cv::Rect> p
     glClearTexSubImage(*light, 0, around.x, around.y, 0, around.width, around.height, 1, GL_RGBA, GL_FLOAT,
                        nullptr);
   }
-}
-
-void look_through(const Program& program, std::span<const cv::Rect> places) {
-  program.use();
-  for (const cv::Rect& place : places) {
-    program.set("u_first", place.x, place.y);
-    program.set("u_end", place.x + place.width, place.y + place.height);
-    glDispatchCompute(static_cast<GLuint>(place.width + 15) / 16, static_cast<GLuint>(place.height + 3) / 4,
-                      1);
-  }
-  glMemoryBarrier(GL_ALL_BARRIER_BITS);
 }
 
 }  // namespace limn::projector

@@ -45,12 +45,13 @@ std::string numbered(const std::vector<std::string>& files) {
   return text;
 }
 
-Result<GlName> compile(GLenum stage, const std::string& file, const std::string& defined = "") {
+Result<GlName> compile(GLenum stage, const std::string& file, Defines defines = {}) {
   Unrolled source;
   LIMN_TRY_STATUS(unroll(file, &source));
   std::string definitions;
-  std::istringstream names(defined);
-  for (std::string name; names >> name;) definitions += fmt::format("#define {}\n", name);
+  for (std::size_t i = 0; i < k_define_names.size(); ++i)
+    if (defines.contains(static_cast<Define>(i)))
+      definitions += fmt::format("#define {}\n", k_define_names[i]);
   if (!definitions.empty())  // after the first line, which says the version
     source.text.insert(source.text.find('\n') + 1, definitions + "#line 2 0\n");
   GlName shader(glCreateShader(stage), [](GLuint n) { glDeleteShader(n); });
@@ -66,6 +67,21 @@ Result<GlName> compile(GLenum stage, const std::string& file, const std::string&
                message);
 }
 
+// The location of each uniform by its name, without the uniforms of blocks, which have none.
+template <class Use>
+void for_each_uniform(GLuint program, const Use& use) {
+  GLint count = 0;
+  glGetProgramiv(program, GL_ACTIVE_UNIFORMS, &count);
+  for (GLuint i = 0; i < static_cast<GLuint>(count); ++i) {
+    char name[128] = "";
+    GLint size = 0;
+    GLenum type = 0;
+    glGetActiveUniform(program, i, sizeof(name), nullptr, &size, &type, name);
+    const GLint location = glGetUniformLocation(program, name);
+    if (location >= 0) use(std::string_view(name), location);
+  }
+}
+
 }  // namespace
 
 Result<Program> Program::link(const std::string& vertex_file, const std::string& fragment_file) {
@@ -75,9 +91,9 @@ Result<Program> Program::link(const std::string& vertex_file, const std::string&
   return linked(shaders, vertex_file + " and " + fragment_file);
 }
 
-Result<Program> Program::link_compute(const std::string& file, const std::string& defined) {
+Result<Program> Program::link_compute(const std::string& file, Defines defines) {
   std::array<GlName, 1> shaders;
-  LIMN_TRY(shaders[0], compile(GL_COMPUTE_SHADER, file, defined));
+  LIMN_TRY(shaders[0], compile(GL_COMPUTE_SHADER, file, defines));
   return linked(shaders, file);
 }
 
@@ -88,10 +104,23 @@ Result<Program> Program::linked(std::span<const GlName> shaders, const std::stri
   glLinkProgram(*program.name_);
   GLint ok = 0;
   glGetProgramiv(*program.name_, GL_LINK_STATUS, &ok);
-  if (ok) return program;
+  if (ok) {
+    for_each_uniform(*program.name_, [&](std::string_view name, GLint location) {
+      program.uniforms_.push_back({std::string(name.substr(0, name.find('['))), location});
+    });
+    std::sort(program.uniforms_.begin(), program.uniforms_.end(),
+              [](const Uniform& a, const Uniform& b) { return a.name < b.name; });
+    return program;
+  }
   char message[4096] = "";
   glGetProgramInfoLog(*program.name_, sizeof(message), nullptr, message);
   return error("shaders/{}: the graphics driver does not link: {}", files, message);
+}
+
+GLint Program::location_of(std::string_view uniform) const {
+  const auto found = std::lower_bound(uniforms_.begin(), uniforms_.end(), uniform,
+                                      [](const Uniform& u, std::string_view name) { return u.name < name; });
+  return found != uniforms_.end() && found->name == uniform ? found->location : -1;
 }
 
 }  // namespace limn::projector

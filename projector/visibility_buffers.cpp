@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "projector/bindings.h"
+
 namespace limn::projector {
 namespace {
 
@@ -13,8 +15,7 @@ constexpr double k_oversampling = 1.5;
 constexpr int k_eye_side = 2560;
 // Nodes of the pixel maps: 4-5 px a cell, within 0.01 px of the lens between them.
 constexpr int k_map_columns = 321, k_map_rows = 241;
-constexpr GLuint k_sight_texels_unit = 17;  // as in shaders/scene.glsl
-constexpr double k_on_surface = 0.002;      // m, as in shaders/on_surface.glsl
+constexpr double k_on_surface = 0.002;  // m, as in shaders/on_surface.glsl
 // Share of the image's smaller side over which a projector fades towards its border.
 constexpr double k_soft_border = 0.1;
 
@@ -102,6 +103,18 @@ cv::Rect texels_of(const PinholeView& pinhole, const TangentRect& rect) {
 
 }  // namespace
 
+GpuLens::GpuLens(const Imager& imager) : baked(projector::baked(imager)) {
+  tangents = make_texture(GL_TEXTURE_2D, GL_RG32F, baked.tangents.cols, baked.tangents.rows);
+  upload(tangents, baked.tangents);
+}
+
+void GpuLens::bind(const Use& use) const {
+  glBindTextureUnit(k_tangents_unit, *tangents);
+  use.program.set("u_tangents",
+                  Eigen::Vector4f(static_cast<float>(baked.step), static_cast<float>(baked.tangents.cols),
+                                  static_cast<float>(baked.tangents.rows), 0));
+}
+
 struct VisibilityBuffers::GpuViewpoint {
   Eigen::Matrix4f sight_from_scene;
   Eigen::Vector4f focal_centre, p_eye, size, map, quality, vignetting, focus;
@@ -150,9 +163,7 @@ Result<VisibilityBuffers> VisibilityBuffers::create(const Rig& rig) {
   const int count = static_cast<int>(projectors.size()) + 1;  // with the witness
   visibility.pixel_maps_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_RG32F, k_map_columns, k_map_rows, count);
   for (std::size_t i = 0; i < projectors.size(); ++i) {
-    GpuLens lens{baked(projectors[i]), {}};
-    lens.tangents = make_texture(GL_TEXTURE_2D, GL_RG32F, lens.baked.tangents.cols, lens.baked.tangents.rows);
-    upload(lens.tangents, lens.baked.tangents);
+    GpuLens lens(projectors[i]);
     visibility.upload_pixel_map(static_cast<int>(i), projectors[i], lens.baked.rect);
     const Eigen::Vector2d extent =
         k_oversampling * projectors[i].lens.fx() * (lens.baked.rect.upper - lens.baked.rect.lower);
@@ -203,7 +214,6 @@ void VisibilityBuffers::draw(const GpuScene& scene,
   glDisable(GL_CULL_FACE);
   glDisable(GL_BLEND);
   glBindVertexArray(scene.vertex_array());
-  scene.bind();
   const TangentRect rect = covered(pinhole);
   const auto draw_triangles = [](int first, int count) {
     if (count > 0) glDrawArrays(GL_TRIANGLES, 3 * first, 3 * count);
@@ -213,6 +223,7 @@ void VisibilityBuffers::draw(const GpuScene& scene,
     const Pose twin_from_owner = pinhole.pinhole_from_scene * placed.scene_from_owner;
     const Eigen::Matrix4d clip_from_owner = clip_from_pinhole(pinhole) * twin_from_owner.matrix();
     const Program& program = placed.run->has_cut_outs ? cut_program_ : program_;
+    scene.bind({Resource::scene, GL_READ_ONLY, program});
     program.use();
     program.set("u_has_cut_outs", placed.run->has_cut_outs);
     program.set("u_focal", static_cast<float>(pinhole.focal));
@@ -271,8 +282,7 @@ void VisibilityBuffers::draw_prototype_from_projectors(const GpuScene& scene,
     send(static_cast<int>(i), viewpoint);
   }
   if (!with_soft_edges || !edge_feathering_) return;
-  scene.bind();
-  edge_feathering_->feather([this](const Program& program) { bind(program, 0); });
+  edge_feathering_->feather(Resources().with(Resource::scene, scene).with(Resource::viewpoints, *this));
 }
 
 void VisibilityBuffers::draw_surface_parts_from_projectors(const GpuScene& scene,
@@ -388,16 +398,15 @@ void VisibilityBuffers::lit_rects(std::size_t projector,
   }
 }
 
-void VisibilityBuffers::bind(const Program& program, int first_unit) const {
-  glBindTextureUnit(k_sight_texels_unit, *sight_texels_);
-  program.bind("s_projector_ids", first_unit, projector_ids_);
-  program.bind("s_eye_ids", first_unit + 1, eye_ids_);
-  program.bind("s_pixel_maps", first_unit + 2, pixel_maps_);
-  program.set("s_kept",
-              first_unit + 3);  // samplers of other kinds may not share a unit, though it is not read
-  if (edge_feathering_) edge_feathering_->bind(program, first_unit + 3);
-  program.set("u_projector_count", static_cast<int>(projectors_.size()));
-  program.set("u_eye", eye());
+void VisibilityBuffers::bind(const Use& use) const {
+  glBindTextureUnit(k_viewpoints_unit, *sight_texels_);
+  glBindTextureUnit(k_projector_ids_unit, *projector_ids_);
+  glBindTextureUnit(k_eye_ids_unit, *eye_ids_);
+  glBindTextureUnit(k_pixel_maps_unit, *pixel_maps_);
+  if (edge_feathering_) glBindTextureUnit(k_edge_fade_unit, *edge_feathering_->fade());
+  use.program.set("u_projector_count", static_cast<int>(projectors_.size()));
+  use.program.set("u_eye", eye());
+  use.program.set("u_witness", reference_camera());
 }
 
 }  // namespace limn::projector

@@ -7,23 +7,27 @@
 #include "core/rig.h"
 #include "projector/bake.h"
 #include "projector/gpu_scene.h"
-#include "projector/shader.h"
+#include "projector/resources.h"
 #include "projector/edge_feathering.h"
 #include "projector/pinhole_view.h"
 
 namespace limn::projector {
 
-/// A lens on the GPU.
-struct GpuLens {
+/// A lens on the GPU: the rays of an imager.
+struct GpuLens final : public Bindable {
   BakedLens baked;
   GlName tangents;
+
+  explicit GpuLens(const Imager& imager);
+  /// Resource::lens.
+  void bind(const Use& use) const override;
 };
 
 /// Id images (shaders/ids.frag) from the eyes of all projectors and of one viewer or camera, and where
 /// those eyes are, as shaders/scene.glsl reads them. Layer 2 i of the projectors' ids is the prototype, 2 i +
 /// 1 the surface parts; layer 0 of the eye's ids is the prototype, 1 the parts. After the projectors' comes a
 /// witness: a camera that measured the prototype and keeps its place in the scene's frame.
-class VisibilityBuffers {
+class VisibilityBuffers final : public Bindable {
  public:
   static Result<VisibilityBuffers> create(const Rig& rig);
 
@@ -84,8 +88,8 @@ class VisibilityBuffers {
   /// Index of the eye among the sights of the shaders.
   int eye() const { return static_cast<int>(projectors_.size()); }
   int reference_camera() const { return eye() + 1; }
-  /// Binds ids and sights for a program that includes scene.glsl (and reach.glsl).
-  void bind(const Program& program, int first_unit) const;
+  /// Resource::viewpoints.
+  void bind(const Use& use) const override;
 
  private:
   struct GpuViewpoint;

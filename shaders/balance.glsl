@@ -1,5 +1,6 @@
 // From a part's colour to the light that one projector gives for it: distance, incidence and vignetting divided out, and
 // what the surface does to light (projector/compensation.h).
+#include "bindings.glsl"
 
 const int k_as_it_is = 0;  // else by geometry or, where BY_MEASUREMENT is defined, by measurement
 uniform int u_compensation;
@@ -10,9 +11,9 @@ uniform mat3 u_mean_mixing;
 uniform int u_witness;  // sight of the camera that measured the surface
 // Layer 3 i + c: what channel c of projector i gives in the camera at an irradiance of 1, a: 0 where unknown; the last
 // one: what is there without projectors.
-uniform sampler2DArray s_mixing;
+layout(binding = k_colour_mixing_unit) uniform sampler2DArray s_mixing;
 #endif
-uniform sampler2D s_albedo;  // of the prototype, over its mean
+layout(binding = k_albedo_unit) uniform sampler2D s_albedo;  // of the prototype, over its mean
 
 struct Surface {
   mat3 mixing;  // columns: what red, green and blue light of irradiance 1 look like

@@ -1,5 +1,6 @@
 // How much of even light from all sides the view parts near a point keep from it (projector/contact_shadow.h).
 // Nothing where CONTACT_SHADOW is not defined: software GL would go through all of it.
+#include "bindings.glsl"
 
 #ifndef CONTACT_SHADOW
 const bool k_contact_shadow = false;
@@ -12,8 +13,8 @@ struct Field {
   vec4 nodes_per_m;
   vec4 first;  // node in the texture
 };
-layout(std430, binding = 7) readonly buffer Fields { Field s_fields[]; };  // by owner
-uniform sampler3D s_distances;
+layout(std430, binding = k_distance_fields_buffer) readonly buffer Fields { Field s_fields[]; };  // by owner
+layout(binding = k_distances_unit) uniform sampler3D s_distances;
 uniform float u_free;      // m; what is met this far off keeps no light
 uniform float u_widening;  // radius a length of the cones
 uniform int u_placement_count;

@@ -1,13 +1,14 @@
 #version 450 core
 // Lists the pixels of an image of one sample a pixel that need more: beside an edge of coverage or colour. KNOWN_SHARES: in
 // a projector's image those at whose centres the share of the light is not known are left to light_shares.comp.
+#include "bindings.glsl"
 #include "listed.glsl"
 #ifdef KNOWN_SHARES
 #include "rest.glsl"
-layout(rgba32f, binding = 2) uniform readonly image2D u_known_shares;  // as shaders/known.glsl
+layout(rgba32f, binding = k_cached_shares_image) uniform readonly image2D u_known_shares;  // as known.glsl
 #endif
 layout(local_size_x = 16, local_size_y = 4) in;
-uniform sampler2D s_centre;  // linear light, a: coverage
+layout(binding = k_light_unit) uniform sampler2D s_centre;  // linear light, a: coverage
 uniform ivec2 u_first, u_end;  // of the rectangle to look through
 uniform float u_least_step;  // of full light; a smaller one is no edge
 

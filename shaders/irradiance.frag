@@ -1,10 +1,11 @@
 #version 450 core
 // How projector u_projector lights what the eye's pixels see of the prototype: irradiance, or 0 where it does not reach.
+#include "bindings.glsl"
 #include "scene.glsl"
 #include "lens.glsl"
 #include "reach.glsl"
 layout(location = 0) out float o_irradiance;
-uniform usampler2DArray s_eye_ids;
+layout(binding = k_eye_ids_unit) uniform usampler2DArray s_eye_ids;
 uniform int u_eye, u_projector;
 
 void main() {

@@ -1,9 +1,10 @@
 #version 450 core
 // For each block: how much light the projector keeps beside jumps of depth, 0 at one and in its neighbours, 1 far off.
+#include "bindings.glsl"
 #include "blocks.glsl"
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(r8, binding = 0) uniform readonly image2D u_rows;
-layout(r16f, binding = 1) uniform writeonly image2D u_fade;
+layout(r8, binding = k_edge_rows_image) uniform readonly image2D u_rows;
+layout(r16f, binding = k_edge_fade_image) uniform writeonly image2D u_fade;
 uniform ivec2 u_blocks;
 
 void main() {

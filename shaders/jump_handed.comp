@@ -1,13 +1,14 @@
 #version 450 core
 // Marks those of the listed blocks, in which depth jumps in a projector's image, where another projector's light goes on:
 // there it hands its own over. Where the prototype ends for all of them there is nobody to hand it to.
+#include "bindings.glsl"
 #include "scene.glsl"
 #include "lens.glsl"
 #include "reach.glsl"
 #include "listed.glsl"
 layout(local_size_x = 64) in;
-layout(r8, binding = 0) uniform writeonly image2D u_marks;
-uniform sampler2DArray s_jumps;  // shaders/jumps.comp, for each projector
+layout(r8, binding = k_edge_marks_image) uniform writeonly image2D u_marks;
+layout(binding = k_depth_edges_unit) uniform sampler2DArray s_jumps;  // shaders/jumps.comp, for each projector
 uniform int u_projector;
 
 // Whether projector j sees a jump of depth in the blocks around a point (scene frame).

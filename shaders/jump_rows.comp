@@ -1,9 +1,10 @@
 #version 450 core
 // For each block: blocks to the nearest one of its row with a jump, k_farthest or beyond as k_farthest.
+#include "bindings.glsl"
 #include "blocks.glsl"
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(r8, binding = 0) uniform readonly image2D u_marks;
-layout(r8, binding = 1) uniform writeonly image2D u_rows;  // in 255ths
+layout(r8, binding = k_edge_marks_image) uniform readonly image2D u_marks;
+layout(r8, binding = k_edge_rows_image) uniform writeonly image2D u_rows;  // in 255ths
 uniform ivec2 u_blocks;
 
 void main() {

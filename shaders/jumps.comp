@@ -1,11 +1,12 @@
 #version 450 core
 // Finds the jump of depth in each of the listed blocks, if there is one, and leaves those to shaders/jump_handed.comp.
+#include "bindings.glsl"
 #include "jumps.glsl"
 #include "listed.glsl"
 #include "rest.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform writeonly image2D u_jumps;  // texels on the jump's near side (xy) and its far side
-                                                                 // (zw); x: -1 without a jump, z: nothing is there
+// Texels on the jump's near side (xy) and its far side (zw); x: -1 without a jump, z: nothing is there.
+layout(rgba32f, binding = k_depth_edges_image) uniform writeonly image2D u_jumps;
 
 // Between the texels on both sides of one.
 vec4 sides(ivec2 at, ivec2 step) {

@@ -1,7 +1,8 @@
 // Where depth jumps: where the prototype ends or begins to hide itself.
+#include "bindings.glsl"
 #include "blocks.glsl"
 
-uniform sampler2D s_depth;  // nearness: k_near / z, 0 where there is nothing
+layout(binding = k_depth_unit) uniform sampler2D s_depth;  // nearness: k_near / z, 0 where there is nothing
 uniform ivec2 u_last;       // texel of the image
 uniform float u_near, u_focal;
 

@@ -1,8 +1,11 @@
 // What a projector's pixel centres see of the prototype and its share there, kept from image to image while the
 // prototype stays and light arrives as it did.
+#include "bindings.glsl"
 
-layout(rgba32ui, binding = 1) uniform uimage2D u_known_hits;  // id, bits of two weights, u_known_stamp of its time
-layout(rgba32f, binding = 2) uniform image2D u_known_shares;  // a Share; x: negative where unknown yet
+// Id, bits of two weights, u_known_stamp of its time.
+layout(rgba32ui, binding = k_cached_hits_image) uniform uimage2D u_known_hits;
+// A Share; x: negative where unknown yet.
+layout(rgba32f, binding = k_cached_shares_image) uniform image2D u_known_shares;
 uniform uint u_known_stamp;
 
 bool is_hit_known(ivec2 at) { return imageLoad(u_known_hits, at).w == u_known_stamp; }

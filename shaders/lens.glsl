@@ -1,6 +1,7 @@
 // The imager's lens, baked: tangents (x/z, y/z) of the directions of every `step`-th pixel.
+#include "bindings.glsl"
 
-uniform sampler2D s_tangents;
+layout(binding = k_tangents_unit) uniform sampler2D s_tangents;
 uniform vec4 u_tangents;  // step (px); yz: nodes
 
 // Bilinear by hand: the hardware's filter rounds its weights to 1/256.

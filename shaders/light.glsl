@@ -1,4 +1,5 @@
 // The light that one pixel sample of a projector should give. VIEW_PARTS, SURFACE_PARTS: what may be there.
+#include "bindings.glsl"
 #include "scene.glsl"
 #include "lens.glsl"
 #include "reach.glsl"
@@ -6,7 +7,7 @@
 #include "on_surface.glsl"
 #include "balance.glsl"
 
-uniform usampler2DArray s_eye_ids;
+layout(binding = k_eye_ids_unit) uniform usampler2DArray s_eye_ids;
 uniform int u_projector;
 uniform int u_eye;  // sight of the viewer
 uniform int u_placement_count;

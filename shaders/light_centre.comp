@@ -1,11 +1,12 @@
 #version 450 core
 // A projector's image: the listed pixels, one sample each at their centres. Where the share of the light is not known yet,
 // the image gets the colour that is to be seen, and the pixel is left to light_shares.comp.
+#include "bindings.glsl"
 #include "light.glsl"
 #include "listed.glsl"
 #include "rest.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform writeonly image2D u_image;
+layout(rgba32f, binding = k_target_image) uniform writeonly image2D u_image;
 
 void main() {
   if (!is_listed()) return;

@@ -1,12 +1,13 @@
 #version 450 core
 // A projector's image: the listed pixels by many samples. Those for which the centre's share is not good enough are left
 // to light_rest.comp.
+#include "bindings.glsl"
 #include "light.glsl"
 #include "listed.glsl"
 #include "rest.glsl"
 #include "samples.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform writeonly image2D u_image;
+layout(rgba32f, binding = k_target_image) uniform writeonly image2D u_image;
 
 void main() {
   if (!is_listed()) return;

@@ -1,12 +1,14 @@
 #version 450 core
 // A projector's image from its light, in the listed pixels: display values by the projector's response. Alpha says what
 // was clipped.
+#include "bindings.glsl"
 #include "scene.glsl"
 #include "listed.glsl"
 layout(local_size_x = 64) in;
-layout(rgba8, binding = 0) uniform writeonly image2D u_display;
-uniform sampler2D s_centre;    // linear light, a: coverage
-uniform sampler2D s_response;  // display value over the root of light, evenly spaced from 0 to 1
+layout(rgba8, binding = k_target_image) uniform writeonly image2D u_display;
+layout(binding = k_light_unit) uniform sampler2D s_centre;  // linear light, a: coverage
+// Display value over the root of light, evenly spaced from 0 to 1.
+layout(binding = k_response_unit) uniform sampler2D s_response;
 uniform int u_projector;
 uniform bool u_is_balanced;    // light counts over black, and bands are dithered
 

@@ -1,11 +1,12 @@
 #version 450 core
 // A projector's image: the listed pixels by many samples, each with a share of its own where the centre's is not good
 // enough for it.
+#include "bindings.glsl"
 #include "light.glsl"
 #include "listed.glsl"
 #include "samples.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform writeonly image2D u_image;
+layout(rgba32f, binding = k_target_image) uniform writeonly image2D u_image;
 
 void main() {
   if (!is_listed()) return;

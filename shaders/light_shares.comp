@@ -1,10 +1,11 @@
 #version 450 core
 // Shares of the light at the centres of the listed pixels; and their light, where the image has the colour that is to be
 // seen there.
+#include "bindings.glsl"
 #include "light.glsl"
 #include "listed.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform image2D u_image;
+layout(rgba32f, binding = k_target_image) uniform image2D u_image;
 
 void main() {
   if (!is_listed()) return;

@@ -1,9 +1,10 @@
 // Pixels that want work, listed by one pass and worked through by the next: programs of their own are cheaper than
 // branches. The head is what glDispatchComputeIndirect reads. Groups stand in rows: some drivers take no more than 65535
 // side by side, which are the pixels of half a 4K image.
+#include "bindings.glsl"
 
 const uint k_group = 64u, k_row = 1024u;  // pixels of a group, groups of a row
-layout(std430, binding = 6) buffer List {
+layout(std430, binding = k_work_list_buffer) buffer List {
   uint s_list_count;
   uint s_list_groups[3];
   uint s_list[];  // row << 16 | column

@@ -2,11 +2,12 @@
 // What lights the middle of each square patch of the eye's image. rgb: pixel of projector u_projector and its irradiance
 // there, 0 where it does not reach; for no projector (-1) the prototype's point in the scene's frame. a: 0 where the eye
 // sees no prototype.
+#include "bindings.glsl"
 #include "scene.glsl"
 #include "lens.glsl"
 #include "reach.glsl"
 layout(location = 0) out vec4 o_lit;
-uniform usampler2DArray s_eye_ids;
+layout(binding = k_eye_ids_unit) uniform usampler2DArray s_eye_ids;
 uniform int u_eye, u_projector;
 uniform float u_side;  // of a patch, pixels
 

@@ -1,4 +1,5 @@
 // What a part's surface looks like: linear light.
+#include "bindings.glsl"
 #include "material.glsl"
 
 // Shading where a material is not unlit: a hemisphere of soft light around an up direction, and lamps far away. Scene
@@ -22,7 +23,7 @@ vec3 diffuse_light(vec3 n) {
 // projector/brdf_lut.h. By cosine and roughness: the share of the soft light that a surface mirrors (red of its
 // colour head on, green of white), and how far from its normal to the mirrored direction most of that comes from
 // (alpha). By height (-1 ... 1) and roughness: the share of what is mirrored that comes from above (blue).
-layout(binding = 19) uniform sampler2D s_mirrored;
+layout(binding = k_brdf_lut_unit) uniform sampler2D s_mirrored;
 
 vec4 mirrored_at(float x, float roughness) {
   const float k_nodes = 32.0;

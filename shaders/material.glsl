@@ -1,5 +1,6 @@
 // What a part's material is at a hit. Maps beyond the colour (glTF 2.0's) are read where SURFACE_MAPS is defined:
 // software GL would go through all of it.
+#include "bindings.glsl"
 
 struct Finish {
   vec3 base;                // linear
@@ -25,7 +26,7 @@ bool is_unlit(Hit hit) {
 }
 
 #ifdef SURFACE_MAPS
-layout(binding = 18) uniform sampler2DArray s_maps;
+layout(binding = k_surface_maps_unit) uniform sampler2DArray s_maps;
 
 vec3 map_at(Hit hit, float footprint, float layer) {
   vec2 uv = uv_of(hit);

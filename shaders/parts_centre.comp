@@ -1,9 +1,10 @@
 #version 450 core
 // A composite: the listed pixels, one sample each at their centres.
+#include "bindings.glsl"
 #include "parts.glsl"
 #include "listed.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform writeonly image2D u_image;
+layout(rgba32f, binding = k_target_image) uniform writeonly image2D u_image;
 
 void main() {
   if (!is_listed()) return;

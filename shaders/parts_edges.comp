@@ -1,12 +1,13 @@
 #version 450 core
 // A composite: the listed pixels by many samples. Those with a part that is not drawn whole are left to parts_rest.comp,
 // too.
+#include "bindings.glsl"
 #include "parts.glsl"
 #include "listed.glsl"
 #include "rest.glsl"
 #include "samples.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform writeonly image2D u_image;
+layout(rgba32f, binding = k_target_image) uniform writeonly image2D u_image;
 
 void main() {
   if (!is_listed()) return;

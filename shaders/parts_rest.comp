@@ -1,11 +1,12 @@
 #version 450 core
 // A composite: light ends within a pixel of the projector's, and a pixel half of light, half of screen would be dark. Of
 // the listed pixels those beside what is left to the screen get the part whole, over its light.
+#include "bindings.glsl"
 #include "parts.glsl"
 #include "listed.glsl"
 #include "samples.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform writeonly image2D u_image;
+layout(rgba32f, binding = k_target_image) uniform writeonly image2D u_image;
 
 void main() {
   if (!is_listed()) return;

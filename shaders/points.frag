@@ -1,9 +1,10 @@
 #version 450 core
 // The prototype's point that each pixel of a projector lights, in the scene's frame; w: 0 where there is none.
+#include "bindings.glsl"
 #include "scene.glsl"
 #include "lens.glsl"
 layout(location = 0) out vec4 o_point;
-uniform usampler2DArray s_projector_ids;
+layout(binding = k_projector_ids_unit) uniform usampler2DArray s_projector_ids;
 uniform int u_projector;
 
 void main() {

@@ -1,10 +1,14 @@
 // Which projectors reach a point of the prototype, and how the light is shared among them.
+#include "bindings.glsl"
 #include "blocks.glsl"
 
-uniform usampler2DArray s_projector_ids;
-uniform sampler2DArray s_pixel_maps;  // for each projector: pixels over a grid of tangents
-uniform sampler2DArray s_arriving;    // for each projector, over its image: how much of its light arrives
-uniform sampler2DArray s_kept;        // for each projector, over its ids: share of its light kept beside edges and shadows
+layout(binding = k_projector_ids_unit) uniform usampler2DArray s_projector_ids;
+// For each projector: pixels over a grid of tangents.
+layout(binding = k_pixel_maps_unit) uniform sampler2DArray s_pixel_maps;
+// For each projector, over its image: how much of its light arrives.
+layout(binding = k_occlusion_unit) uniform sampler2DArray s_arriving;
+// For each projector, over its ids: share of its light kept beside edges and shadows.
+layout(binding = k_edge_fade_unit) uniform sampler2DArray s_kept;
 uniform int u_projector_count;
 
 // Weight beside shadows, of what is elsewhere: the step where light ends stays below it. Less would hand light over

@@ -1,6 +1,7 @@
 // Pixels that a pass leaves to another one, which does what few of them need.
+#include "bindings.glsl"
 
-layout(std430, binding = 5) buffer Rest {
+layout(std430, binding = k_deferred_list_buffer) buffer Rest {
   uint s_rest_count;
   uint s_rest_groups[3];
   uint s_rest[];  // as shaders/listed.glsl, which reads it

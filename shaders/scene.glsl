@@ -2,12 +2,13 @@
 // all of them; an id is the number + 1, so that 0 means none. "scene" is the frame that rays are cast in. What is read
 // most comes from texel buffers: software GL reads them several times faster than storage buffers, whose lanes it
 // loads one by one.
+#include "bindings.glsl"
 
-layout(binding = 13) uniform samplerBuffer s_corners;  // 3 a triangle: p in its owner's frame, u
-layout(binding = 14) uniform samplerBuffer s_normals;  // 3 a triangle: unit normal, v
+layout(binding = k_corners_unit) uniform samplerBuffer s_corners;  // 3 a triangle: p in its owner's frame, u
+layout(binding = k_normals_unit) uniform samplerBuffer s_normals;  // 3 a triangle: unit normal, v
 // 5 a triangle: owner (0 prototype, slot + 1), material, ids of the triangles across the sides that lie opposite each
 // corner (0 where the mesh ends)
-layout(binding = 15) uniform usamplerBuffer s_triangles;
+layout(binding = k_triangles_unit) uniform usamplerBuffer s_triangles;
 
 vec4 corner(uint i) { return texelFetch(s_corners, int(i)); }
 vec4 normal(uint i) { return texelFetch(s_normals, int(i)); }
@@ -24,8 +25,8 @@ struct Material {
   ivec4 more;   // added to the number of a corner: where its tangent is in s_normals (w: handedness); 1 when there is a
                 // map of roughness and metalness
 };
-layout(std430, binding = 3) readonly buffer Materials { Material s_materials[]; };
-layout(binding = 1) uniform sampler2DArray s_looks;  // all textures, one a layer, sRGB decoded on reading
+layout(std430, binding = k_materials_buffer) readonly buffer Materials { Material s_materials[]; };
+layout(binding = k_colour_maps_unit) uniform sampler2DArray s_looks;  // all textures, one a layer, sRGB decoded on reading
 uniform bool u_has_cut_outs;  // whether any alpha of s_looks means anything
 
 struct Owner {
@@ -35,7 +36,7 @@ struct Owner {
   vec4 colour; // linear light, instead of its materials' where w is 1
   vec4 look;   // metallic, roughness, instead of its materials' where not negative
 };
-layout(binding = 16) uniform samplerBuffer s_placements;  // 8 an owner
+layout(binding = k_placements_unit) uniform samplerBuffer s_placements;  // 8 an owner
 
 mat4 matrix_at(samplerBuffer texels, int first) {
   return mat4(texelFetch(texels, first), texelFetch(texels, first + 1), texelFetch(texels, first + 2),
@@ -61,7 +62,7 @@ struct Sight {
   vec4 vignetting;    // tilt (xy), r2, r4 of core/photometric_response.h
   vec4 focus;         // a point's disc at depth z is |x - y / z| pixels wide
 };
-layout(binding = 17) uniform samplerBuffer s_sights;  // 11 a sight
+layout(binding = k_viewpoints_unit) uniform samplerBuffer s_sights;  // 11 a sight
 
 Sight sight_at(int i) {
   int first = 11 * i;

@@ -1,11 +1,12 @@
 // What an imager (viewer or camera) sees of the parts at a pixel sample, and whether light can show it.
+#include "bindings.glsl"
 #include "scene.glsl"
 #include "lens.glsl"
 #include "reach.glsl"
 #include "look.glsl"
 #include "on_surface.glsl"
 
-uniform usampler2DArray s_eye_ids;
+layout(binding = k_eye_ids_unit) uniform usampler2DArray s_eye_ids;
 uniform int u_eye;
 
 const int k_nothing = 0, k_screen = 1, k_projected = 2, k_if_reached = 3;

@@ -1,12 +1,13 @@
 // Prototype and parts as a virtual camera sees them, linear light, a: coverage.
+#include "bindings.glsl"
 #include "scene.glsl"
 #include "lens.glsl"
 #include "look.glsl"
 #include "contact.glsl"
 
-uniform usampler2DArray s_eye_ids;
+layout(binding = k_eye_ids_unit) uniform usampler2DArray s_eye_ids;
 uniform int u_eye;
-uniform sampler2D s_albedo;  // of the prototype, over its mean
+layout(binding = k_albedo_unit) uniform sampler2D s_albedo;  // of the prototype, over its mean
 uniform float u_mean_albedo;
 
 vec4 view_at(vec2 px) {

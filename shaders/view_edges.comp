@@ -1,10 +1,11 @@
 #version 450 core
 // A virtual camera's image: the listed pixels by many samples.
+#include "bindings.glsl"
 #include "view.glsl"
 #include "listed.glsl"
 #include "samples.glsl"
 layout(local_size_x = 64) in;
-layout(rgba32f, binding = 0) uniform writeonly image2D u_image;
+layout(rgba32f, binding = k_target_image) uniform writeonly image2D u_image;
 
 void main() {
   if (!is_listed()) return;

@@ -1,0 +1,7 @@
+#pragma once
+
+namespace limn::projector {
+
+#include "shaders/bindings.glsl"
+
+}  // namespace limn::projector

@@ -1,0 +1,210 @@
+#include "projector/projector_view.h"
+
+#include <algorithm>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+
+#include "projector/bindings.h"
+#include "projector/renderer.h"
+
+namespace limn::projector {
+namespace {
+
+constexpr int k_response_columns = 1025;
+// Steps of light that ask for more samples: beside light, and between blacks.
+constexpr Smoothing k_light_edges, k_quick_edges{.samples = 4},
+    k_dark_edges{.samples = 16, .least_step = 0.0001};
+
+const ProjectorResponse* find_response(const Rig& rig, const std::string& projector) {
+  const auto found = std::find_if(rig.responses.begin(), rig.responses.end(),
+                                  [&](const ProjectorResponse& r) { return r.projector == projector; });
+  return found == rig.responses.end() ? nullptr : &*found;
+}
+
+}  // namespace
+
+ProjectorView::HitCache::HitCache(int width, int height)
+    : hits_(make_texture(GL_TEXTURE_2D, GL_RGBA32UI, width, height)),
+      shares_(make_texture(GL_TEXTURE_2D, GL_RGBA32F, width, height)) {
+  glClearTexImage(*hits_, 0, GL_RGBA_INTEGER, GL_UNSIGNED_INT, nullptr);
+}
+
+void ProjectorView::HitCache::bind(const Use& use) const {
+  glBindImageTexture(k_cached_hits_image, *hits_, 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32UI);
+  glBindImageTexture(k_cached_shares_image, *shares_, 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
+  use.program.set_id("u_known_stamp", stamp_);
+}
+
+bool ProjectorView::Shown::shows(const scene::PosedScene& posed_now, const Imager& viewer) const {
+  return is_current && is_same(posed, posed_now) && is_same(imager_from_world, viewer.imager_from_world);
+}
+
+void ProjectorView::Shown::keep(const scene::PosedScene& posed_now, const Imager& viewer) {
+  posed = posed_now;
+  imager_from_world = viewer.imager_from_world;
+  image.release();
+  is_current = true;
+}
+
+Result<ProjectorView> ProjectorView::create(const Shared& shared, Defines looks) {
+  using enum Resource;
+  ProjectorView view(shared);
+  LIMN_TRY(view.light_layer_, LightLayer::link(looks, false));
+  LIMN_TRY(view.response_pass_, ComputePass::link({.shader = "light_response.comp",
+                                                   .reads = {viewpoints, projector, light, response},
+                                                   .writes = {target}}));
+  LIMN_TRY(view.points_pass_,
+           FullscreenPass::link({.shader = "points.frag", .reads = {scene, viewpoints, lens, projector}}));
+  LIMN_TRY(view.blend_pass_,
+           FullscreenPass::link(
+               {.shader = "blend.frag", .reads = {scene, viewpoints, occlusion, lens, projector}}));
+  for (const Imager& imager : shared.rig.projectors) {
+    view.responses_.push_back(make_texture(GL_TEXTURE_2D, GL_RGB32F, k_response_columns, 1));
+    upload(view.responses_.back(),
+           response_table(find_response(shared.rig, imager.name), k_response_columns));
+  }
+  return view;
+}
+
+Status ProjectorView::link_measured() {
+  if (measured_light_layer_) return {};
+  const Defines looks = shared_.scene.scene().looks();
+  LIMN_TRY(measured_light_layer_, LightLayer::link(looks, true));
+  return {};
+}
+
+void ProjectorView::forget() {
+  for (Shown& shown : shown_) shown.is_current = false;
+}
+
+// How smooth: motion may be drawn by half the samples, and a still image is drawn whole once. Even black
+// begins and ends within a pixel: it would be seen to jump.
+bool ProjectorView::is_quick(bool is_still) const {
+  return quick_motion_ && !is_still && !shared_.balance.options().even_black;
+}
+
+const Smoothing& ProjectorView::smoothing(bool is_quick) const {
+  if (shared_.balance.options().even_black) return k_dark_edges;
+  return is_quick ? k_quick_edges : k_light_edges;
+}
+
+LightLayer& ProjectorView::layer() {
+  const bool by_measurement = shared_.balance.options().compensation == Compensation::measured;
+  return by_measurement ? *measured_light_layer_ : light_layer_;
+}
+
+// Where there may be light: at the parts, or on all of the prototype where black is to be even.
+void ProjectorView::find_places(std::size_t index, const Imager& viewer) {
+  const SceneCache& scene = shared_.scene;
+  if (shared_.balance.options().even_black) {
+    light_places_.clear();
+    light_places_.both.push_back(
+        scene.visibility().prototype_rect(index, scene.runs(), scene.scene_from_world()));
+    return;
+  }
+  const Eigen::Vector3d p_viewer_scene =
+      (scene.scene_from_world() * viewer.imager_from_world.inverse()).translation;
+  scene.visibility().lit_rects(index, scene.runs(), scene.scene_from_world(), p_viewer_scene, &view_places_,
+                              &surface_places_);
+  light_places_.divide(view_places_, surface_places_);
+}
+
+GLuint ProjectorView::draw(std::size_t index, const scene::PosedScene& posed, const Imager& viewer) {
+  LIMN_CHECK(index < shown_.size());
+  Shown& shown = shown_[index];
+  const bool is_still = shown.shows(posed, viewer);
+  if (is_still && !shown.is_quick) return *shown.display.texture;
+  shown.is_quick = is_quick(is_still);
+
+  SceneCache& scene = shared_.scene;
+  scene.prepare(posed, SceneCache::FromProjectors::all);
+  scene.look_from_eye(viewer);
+  shared_.balance.find_level(shared_.rig, posed);
+  find_places(index, viewer);
+
+  const Imager& imager = shared_.rig.projectors[index];
+  if (!shown.display.texture) {
+    shown.display = Canvas(imager.width, imager.height, GL_RGBA8);
+    shown.hit_cache = HitCache(imager.width, imager.height);
+  }
+  const Canvas& light = shared_.canvases.canvas(imager.width, imager.height, GL_RGBA32F);
+  const ProjectorIndex projector(index);
+  const Resources resources = scene.resources(scene.projector_lens(index), viewer)
+                                  .with(Resource::projector, projector)
+                                  .with(Resource::hit_cache, shown.hit_cache)
+                                  .with(Resource::light_balance, shared_.balance);
+  draw_light(index, light, resources);
+  draw_display(index, light, resources);
+  shown.keep(posed, viewer);
+  return *shown.display.texture;
+}
+
+void ProjectorView::draw_light(std::size_t index, const Canvas& light, const Resources& resources) {
+  Shown& shown = shown_[index];
+  const GLuint stamp = shared_.scene.stamp();
+  shown.hit_cache.begin(stamp);
+  layer().draw({light.texture, {light.width, light.height}, shown.hit_cache.is_outdated(stamp)},
+               light_places_, smoothing(shown.is_quick), resources, &shared_.times);
+  shown.hit_cache.end();
+}
+
+// Display values of the light.
+void ProjectorView::draw_display(std::size_t index, const Canvas& light, const Resources& resources) {
+  const PassTimes::Scope scope(&shared_.times, "response");
+  const LightOptions& options = shared_.balance.options();
+  const GlName& display = shown_[index].display.texture;
+  const TextureAt linear(k_light_unit, light.texture), response(k_response_unit, responses_[index]);
+  const ImageAt drawn(k_target_image, display, GL_RGBA8);
+  response_pass_.program().set("u_is_balanced",
+                               options.compensation != Compensation::none || options.even_black);
+  glClearTexImage(*display, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
+  layer().work_through_lit(response_pass_, resources.with(Resource::light, linear)
+                                               .with(Resource::response, response)
+                                               .with(Resource::target, drawn));
+}
+
+cv::Mat ProjectorView::image(std::size_t index, const scene::PosedScene& posed, const Imager& viewer) {
+  draw(index, posed, viewer);
+  Shown& shown = shown_[index];
+  if (shown.image.empty()) {
+    const Canvas& display = shown.display;
+    const cv::Mat bgra = read_back(display.framebuffer, display.width, display.height, CV_8UC4, GL_BGRA);
+    cv::cvtColor(bgra, shown.image, cv::COLOR_BGRA2BGR);
+    cv::extractChannel(bgra, shown.clipped, 3);
+  }
+  return shown.image.clone();
+}
+
+cv::Mat ProjectorView::surface_points(std::size_t index, const scene::PosedScene& posed) {
+  LIMN_CHECK(index < shown_.size());
+  const Imager& imager = shared_.rig.projectors[index];
+  shared_.scene.prepare(posed, SceneCache::FromProjectors::prototype);
+  const Canvas& canvas = shared_.canvases.canvas(imager.width, imager.height, GL_RGBA32F);
+  const ProjectorIndex projector(index);
+  points_pass_.draw(
+      canvas,
+      shared_.scene.resources(shared_.scene.projector_lens(index)).with(Resource::projector, projector));
+  const cv::Mat points = read_back(canvas.framebuffer, imager.width, imager.height, CV_32FC4, GL_RGBA);
+  cv::Mat out(points.size(), CV_32FC3, cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()));
+  for (int row = 0; row < out.rows; ++row) {
+    for (int column = 0; column < out.cols; ++column) {
+      const auto& p = points.at<cv::Vec4f>(row, column);
+      if (p[3] > 0) out.at<cv::Vec3f>(row, column) = {p[0], p[1], p[2]};
+    }
+  }
+  return out;
+}
+
+cv::Mat ProjectorView::blend(std::size_t index, const scene::PosedScene& posed) {
+  LIMN_CHECK(index < shown_.size());
+  const Imager& imager = shared_.rig.projectors[index];
+  shared_.scene.prepare(posed, SceneCache::FromProjectors::all);
+  const Canvas& canvas = shared_.canvases.canvas(imager.width, imager.height, GL_RG32F);
+  const ProjectorIndex projector(index);
+  blend_pass_.draw(
+      canvas,
+      shared_.scene.resources(shared_.scene.projector_lens(index)).with(Resource::projector, projector));
+  return read_back(canvas.framebuffer, imager.width, imager.height, CV_32FC2, GL_RG);
+}
+
+}  // namespace limn::projector

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <vector>
+
+#include "core/rig.h"
+#include "projector/light_balance.h"
+#include "projector/light_layer.h"
+#include "projector/scene_cache.h"
+
+namespace limn::projector {
+
+/// What the renderer's views share; each outlives them.
+struct Shared {
+  const Rig& rig;
+  SceneCache& scene;
+  LightBalance& balance;
+  CanvasPool& canvases;
+  PassTimes& times;
+};
+
+/// Draws what projectors are to show, and what is known of their pixels.
+class ProjectorView {
+ public:
+  /// `looks`: what is defined where looks are drawn.
+  static Result<ProjectorView> create(const Shared& shared, Defines looks);
+
+  /// Needed before anything is drawn by Compensation::measured; once is enough.
+  Status link_measured();
+  /// Renderer::set_quick_motion.
+  void set_quick_motion(bool wanted) { quick_motion_ = wanted; }
+  /// The last images are no longer what is to be shown.
+  void forget();
+
+  /// Renderer::draw_projector, projector_image, clipped, surface_points and blend.
+  GLuint draw(std::size_t index, const scene::PosedScene& posed, const Imager& viewer);
+  cv::Mat image(std::size_t index, const scene::PosedScene& posed, const Imager& viewer);
+  cv::Mat clipped(std::size_t index) const { return shown_.at(index).clipped; }
+  cv::Mat surface_points(std::size_t index, const scene::PosedScene& posed);
+  cv::Mat blend(std::size_t index, const scene::PosedScene& posed);
+
+ private:
+  // What the centres of a projector's pixels see (shaders/known.glsl).
+  class HitCache final : public Bindable {
+   public:
+    HitCache() = default;
+    HitCache(int width, int height);
+    // What is kept is of another time.
+    bool is_outdated(GLuint stamp) const { return filled_at_ != stamp; }
+    // For a drawing at this time, before it and once it is done.
+    void begin(GLuint stamp) { stamp_ = stamp; }
+    void end() { filled_at_ = stamp_; }
+    void bind(const Use& use) const override;
+
+   private:
+    GlName hits_, shares_;
+    GLuint stamp_ = 0, filled_at_ = 0;
+  };
+  // A projector's last image.
+  struct Shown {
+    Canvas display;
+    HitCache hit_cache;
+    scene::PosedScene posed;
+    Pose imager_from_world;    // of the viewer
+    cv::Mat image, clipped;  // once read back
+    bool is_current = false;
+    bool is_quick = false;
+
+    bool shows(const scene::PosedScene& posed_now, const Imager& viewer) const;
+    void keep(const scene::PosedScene& posed_now, const Imager& viewer);
+  };
+
+  explicit ProjectorView(const Shared& shared) : shared_(shared), shown_(shared.rig.projectors.size()) {}
+  bool is_quick(bool is_still) const;
+  const Smoothing& smoothing(bool is_quick) const;
+  LightLayer& layer();
+  void find_places(std::size_t index, const Imager& viewer);
+  void draw_light(std::size_t index, const Canvas& light, const Resources& resources);
+  void draw_display(std::size_t index, const Canvas& light, const Resources& resources);
+
+  Shared shared_;
+  LightLayer light_layer_;
+  std::optional<LightLayer> measured_light_layer_;  // linked when it is asked for
+  ComputePass response_pass_;
+  FullscreenPass points_pass_, blend_pass_;
+  std::vector<GlName> responses_;
+  std::vector<Shown> shown_;
+  bool quick_motion_ = false;
+  PlacesByMode light_places_;  // of the projector drawn last
+  std::vector<cv::Rect> view_places_, surface_places_;
+};
+
+}  // namespace limn::projector

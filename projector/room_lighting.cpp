@@ -1,0 +1,52 @@
+#include "projector/room_lighting.h"
+
+#include <Eigen/Geometry>
+
+namespace limn::projector {
+namespace {
+
+// The light where no room is known: soft, and a lamp, in the viewer's frame above and behind the left
+// shoulder.
+constexpr double k_soft_below = 0.15, k_soft_above = 0.35, k_lamp = 0.65;
+const Eigen::Vector3d k_d_lamp_viewer = Eigen::Vector3d(-0.36, -0.64, -0.68).normalized();
+
+Eigen::Vector4f homogeneous(const Eigen::Vector3d& v) { return v.cast<float>().homogeneous(); }
+
+}  // namespace
+
+RoomLighting::RoomLighting(const std::optional<scene::RoomLight>& room) : room_(room) {
+  viewer_light_.below_rgb.setConstant(k_soft_below);
+  viewer_light_.above_rgb.setConstant(k_soft_above);
+  viewer_light_.lamps.resize(1);
+  viewer_light_.lamps[0].strength_rgb.setConstant(k_lamp);
+}
+
+void RoomLighting::place(const scene::PosedScene& posed, const Pose& scene_from_world, const Imager& viewer) {
+  const Eigen::Quaterniond world_from_viewer = viewer.imager_from_world.rotation.inverse();
+  viewer_light_.d_up_world = world_from_viewer * -Eigen::Vector3d::UnitY();
+  viewer_light_.lamps[0].d_world = world_from_viewer * k_d_lamp_viewer;
+  const std::optional<scene::RoomLight>& known = posed.light ? posed.light : room_;
+  const scene::RoomLight& light = known ? *known : viewer_light_;
+  is_room_known_ = known.has_value();
+  d_up_ = homogeneous(scene_from_world.rotation * light.d_up_world);
+  soft_below_ = homogeneous(light.below_rgb);
+  soft_above_ = homogeneous(light.above_rgb);
+  d_lamps_.clear();
+  lamps_.clear();
+  for (const auto& lamp : light.lamps) {
+    d_lamps_.push_back(homogeneous(scene_from_world.rotation * lamp.d_world));
+    lamps_.push_back(homogeneous(lamp.strength_rgb));
+  }
+}
+
+void RoomLighting::bind(const Use& use) const {
+  use.program.set("u_is_room_known", is_room_known_);
+  use.program.set("u_d_up", d_up_);
+  use.program.set("u_soft_below", soft_below_);
+  use.program.set("u_soft_above", soft_above_);
+  use.program.set("u_lamp_count", static_cast<int>(lamps_.size()));
+  use.program.set_vectors("u_d_lamps", d_lamps_);
+  use.program.set_vectors("u_lamps", lamps_);
+}
+
+}  // namespace limn::projector

@@ -1,0 +1,122 @@
+#include "projector/scene_cache.h"
+
+#include <algorithm>
+
+namespace limn::projector {
+namespace {
+
+bool is_same_prototype(const scene::PosedScene& a, const scene::PosedScene& b) {
+  if (a.world_from_prototype.has_value() != b.world_from_prototype.has_value()) return false;
+  return !a.world_from_prototype || is_same(*a.world_from_prototype, *b.world_from_prototype);
+}
+
+}  // namespace
+
+bool is_same(const Pose& a, const Pose& b) {
+  return a.rotation.coeffs() == b.rotation.coeffs() && a.translation == b.translation;
+}
+
+bool is_same(const scene::PosedScene& a, const scene::PosedScene& b) {
+  return is_same_prototype(a, b) && a.light == b.light &&
+         std::equal(a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(),
+                    [](const auto& p, const auto& q) {
+                      return p.slot == q.slot && p.variant == q.variant && p.material == q.material &&
+                             is_same(p.world_from_part, q.world_from_part);
+                    });
+}
+
+bool is_same_lens(const Imager& a, const Imager& b) {
+  return a.width == b.width && a.height == b.height && a.lens.model == b.lens.model &&
+         a.lens.values == b.lens.values;
+}
+
+Result<SceneCache> SceneCache::create(const scene::Scene& scene, const Rig& rig, PassTimes* times) {
+  LIMN_TRY_STATUS(GpuScene::check_fits(scene, GpuScene::most_triangles()));
+  LIMN_TRY(VisibilityBuffers visibility, VisibilityBuffers::create(rig));
+  return SceneCache(scene, rig, std::move(visibility), times);
+}
+
+SceneCache::SceneCache(const scene::Scene& scene, const Rig& rig, VisibilityBuffers visibility, PassTimes* times)
+    : scene_(scene),
+      visibility_(std::move(visibility)),
+      occlusion_(rig.projectors.size()),
+      room_lighting_(scene.light),
+      times_(times) {}
+
+void SceneCache::prepare(const scene::PosedScene& posed, FromProjectors needed) {
+  if (!prepared_ || !is_same(*prepared_, posed)) {
+    const bool stays = prepared_ && is_same_prototype(*prepared_, posed);
+    scene_.placed(posed, &runs_);
+    scene_from_world_ = GpuScene::scene_from_world(posed);
+    scene_.place(runs_);
+    if (!stays) ++prototype_moves_;
+    is_prototype_seen_ &= stays;
+    are_soft_edges_seen_ &= stays;
+    are_surface_parts_seen_ = false;
+    eye_kind_ = EyeKind::none;
+    prepared_ = posed;
+  }
+  const bool all = needed == FromProjectors::all;
+  if (needed == FromProjectors::nothing || (is_prototype_seen_ && !all) ||
+      (are_soft_edges_seen_ && are_surface_parts_seen_))
+    return;
+  const PassTimes::Scope scope(times_, "ids from projectors");
+  if (!is_prototype_seen_ || (all && !are_soft_edges_seen_)) {
+    visibility_.draw_prototype_from_projectors(scene_, runs_, scene_from_world_, all);
+    is_prototype_seen_ = true;
+    are_soft_edges_seen_ = all;
+  }
+  if (!all) return;
+  visibility_.draw_surface_parts_from_projectors(scene_, runs_, scene_from_world_);
+  are_surface_parts_seen_ = true;
+}
+
+void SceneCache::look_from_eye(const Imager& viewer) {
+  if (eye_kind_ == EyeKind::eye && is_same(eye_.imager_from_world, viewer.imager_from_world)) return;
+  const Pose scene_from_viewer = scene_from_world_ * viewer.imager_from_world.inverse();
+  const PassTimes::Scope scope(times_, "ids from the eye");
+  visibility_.draw_from_eye(scene_, runs_, scene_from_world_, scene_from_viewer.translation,
+                       scene_from_viewer.rotation * -Eigen::Vector3d::UnitY());
+  eye_kind_ = EyeKind::eye;
+  eye_ = viewer;
+}
+
+void SceneCache::look_from_imager(const Imager& imager, bool parts_alone) {
+  const EyeKind wanted = parts_alone ? EyeKind::parts_of_imager : EyeKind::imager;
+  if (eye_kind_ == wanted && is_same_lens(eye_, imager) &&
+      is_same(eye_.imager_from_world, imager.imager_from_world)) {
+    return;
+  }
+  const PassTimes::Scope scope(times_, "ids from a camera");
+  visibility_.draw_from_imager(scene_, runs_, scene_from_world_, imager, lens_of(imager).baked, parts_alone);
+  eye_kind_ = wanted;
+  eye_ = imager;
+}
+
+void SceneCache::look_from_witness(const Imager& camera) {
+  visibility_.draw_from_reference_camera(scene_, runs_, scene_from_world_, camera, lens_of(camera).baked);
+}
+
+const GpuLens& SceneCache::lens_of(const Imager& imager) {
+  for (const auto& [known, lens] : lenses_) {
+    if (is_same_lens(known, imager)) return lens;
+  }
+  constexpr std::size_t k_most = 8;  // cameras and viewers of a session
+  if (lenses_.size() >= k_most) lenses_.erase(lenses_.begin());
+  return lenses_.emplace_back(imager, GpuLens(imager)).second;
+}
+
+Resources SceneCache::resources(const GpuLens& lens) const {
+  return Resources()
+      .with(Resource::scene, scene_)
+      .with(Resource::viewpoints, visibility_)
+      .with(Resource::occlusion, occlusion_)
+      .with(Resource::lens, lens);
+}
+
+Resources SceneCache::resources(const GpuLens& lens, const Imager& viewer) {
+  room_lighting_.place(*prepared_, scene_from_world_, viewer);
+  return resources(lens).with(Resource::room_light, room_lighting_);
+}
+
+}  // namespace limn::projector
