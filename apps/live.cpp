@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <atomic>
 #include <csignal>
+#include <functional>
 #include <limits>
 #include <optional>
+#include <span>
 
 #include "core/scale_resolution.h"
 #include "device/devices_file.h"
@@ -157,6 +159,37 @@ Session::Drawing drawing_in(std::optional<device::GlContext>* context) {
           }};
 }
 
+// Opens all that a session consists of beside where it takes place, plays it there, and closes it. `setup`
+// becomes what a replay will read of it.
+Status played(const LiveOptions& options,
+              SessionSetup setup,
+              std::span<const scene::SkippedVariant> skipped_variants,
+              const device::Desktop* desktop,
+              const std::function<Status(const SessionParts&, Keys*)>& play) {
+  std::optional<device::GlContext> context;
+  LIMN_TRY(context, device::GlContext::create());
+  log_info("live: {}", context->description());
+  LIMN_TRY(OscPort osc, OscPort::open(options.osc, options.osc_to));
+  LIMN_TRY(const std::unique_ptr<Server> server, served(options, setup));
+  LIMN_TRY(SessionOutput output, SessionOutput::open(options.out, options.record, &setup));
+  tell(skipped_variants, {}, &output.telemetry());
+  LIMN_TRY(Perception perception, Perception::create(setup.scene, setup.rig, setup.watch));
+  LIMN_TRY(Session session, Session::create(setup, &output.telemetry(), output.recorder()));
+  session.survive_losses(drawing_in(&context));
+  std::optional<OperatorConsole> console;
+  if (options.window) {
+    LIMN_TRY(console, OperatorConsole::open(*desktop, setup.scene));
+    if (server) console->invite(server.get());
+  }
+  SessionParts parts{perception, session, output, {&osc}};
+  if (server) parts.clients.push_back(server.get());
+  if (console) parts.clients.push_back(&*console);
+  LIMN_TRY_STATUS(play(parts, console ? &console->keys() : nullptr));
+  console.reset();
+  if (server) server->stop();
+  return output.close(&session, options.json);
+}
+
 Status play_in_virtual_room(const LiveOptions& options) {
   LIMN_TRY(Script script, options.script.empty() ? Result<Script>(Script{}) : load_script(options.script));
   LIMN_TRY(Stage stage, virtual_stage(options));
@@ -173,27 +206,14 @@ Status play_in_virtual_room(const LiveOptions& options) {
                                                .frame_period_s = options.frame_period_s,
                                                .grab_waits_for_light = false});
   LIMN_TRY(ScriptedRoom room, ScriptedRoom::create(std::move(script), &rig));
-  std::optional<device::GlContext> context;
-  LIMN_TRY(context, device::GlContext::create());
-  log_info("live: {}", context->description());
-  LIMN_TRY(OscPort osc, OscPort::open(options.osc, options.osc_to));
-  LIMN_TRY(const std::unique_ptr<Server> server, served(options, setup));
-  LIMN_TRY(SessionOutput output, SessionOutput::open(options.out, options.record, &setup));
-  tell(stage.skipped_variants, {}, &output.telemetry());
-  LIMN_TRY(Perception perception, Perception::create(setup.scene, setup.rig, setup.watch));
-  LIMN_TRY(Session session, Session::create(setup, &output.telemetry(), output.recorder()));
-  session.survive_losses(drawing_in(&context));
-  std::optional<OperatorConsole> console;
+  std::optional<device::Desktop> desktop;
   if (options.window) {
-    LIMN_TRY(const device::Desktop desktop, device::Desktop::open());
-    LIMN_TRY(console, OperatorConsole::open(desktop, setup.scene));
-    if (server) console->invite(server.get());
+    LIMN_TRY(desktop, device::Desktop::open());
   }
-  LIMN_TRY_STATUS(play_virtually(end_s, g_is_ended, &rig, &room, &perception, &session, &output,
-                                 console ? &*console : nullptr, &osc, server.get()));
-  console.reset();
-  if (server) server->stop();
-  return output.close(&session, options.json);
+  return played(options, setup, stage.skipped_variants, desktop ? &*desktop : nullptr,
+                [&](const SessionParts& parts, Keys*) {
+                  return play_virtually(end_s, g_is_ended, &rig, &room, parts);
+                });
 }
 
 bool is_projector(const Rig& rig, const std::string& display) {
@@ -249,26 +269,11 @@ Status play_with_devices(const LiveOptions& options) {
     LIMN_TRY(desktop, device::Desktop::open());
   }
   SessionDevices open = opened(devices, setup.rig, desktop ? &*desktop : nullptr);
-  std::optional<device::GlContext> context;
-  LIMN_TRY(context, device::GlContext::create());
-  log_info("live: {}", context->description());
-  LIMN_TRY(OscPort osc, OscPort::open(options.osc, options.osc_to));
-  LIMN_TRY(const std::unique_ptr<Server> server, served(options, setup));
-  LIMN_TRY(SessionOutput output, SessionOutput::open(options.out, options.record, &setup));
-  tell(skipped_variants, {}, &output.telemetry());
-  LIMN_TRY(Perception perception, Perception::create(setup.scene, setup.rig, setup.watch));
-  LIMN_TRY(Session session, Session::create(setup, &output.telemetry(), output.recorder()));
-  session.survive_losses(drawing_in(&context));
-  std::optional<OperatorConsole> console;
-  if (options.window) {
-    LIMN_TRY(console, OperatorConsole::open(*desktop, setup.scene));
-    if (server) console->invite(server.get());
-  }
-  LIMN_TRY_STATUS(play_on_devices(&open, options.seconds, g_is_ended, &perception, &session, &output,
-                                  console ? &*console : nullptr, &osc, server.get()));
-  console.reset();
-  if (server) server->stop();
-  return output.close(&session, options.json);
+  return played(options, setup, skipped_variants, desktop ? &*desktop : nullptr,
+                [&](const SessionParts& parts, Keys* keys) {
+                  open.chosen = keys;
+                  return play_on_devices(&open, options.seconds, g_is_ended, parts);
+                });
 }
 
 }  // namespace

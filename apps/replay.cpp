@@ -1,5 +1,6 @@
 #include "apps/replay.h"
 
+#include <atomic>
 #include <chrono>
 #include <deque>
 #include <fstream>
@@ -8,10 +9,8 @@
 #include <optional>
 #include <thread>
 
-#include "session/session_output.h"
+#include "session/frame_loop.h"
 #include "session/recording.h"
-#include "session/session.h"
-#include "session/perception.h"
 #include "core/log.h"
 #include "device/gl_context.h"
 #include "device/window.h"
@@ -50,67 +49,86 @@ Result<Events> load_events(const fs::path& path) {
   return events;
 }
 
-class Replay {
- public:
-  Replay(const ReplayOptions& options, Perception perception, Session session, SessionOutput output)
-      : options_(options),
-        perception_(std::move(perception)),
-        session_(std::move(session)),
-        output_(std::move(output)) {}
+// How many moments' frames had been watched when an event happened that depends on them; 0 for others.
+std::size_t known_moments(const Json& event) {
+  const bool depends = event.contains("paint") || event.contains("rig");
+  return depends ? event.at("moments").get<std::size_t>() : event.value("moments", std::size_t{0});
+}
 
-  Status play(const Events& events) {
-    if (options_.window) {
-      LIMN_TRY(window_, device::Window::open("Limn replay", 1280, 720));
+// A recording as the frame loop's clock and source. A frame ends with an image; or where somebody did
+// something after more frames had been watched, for then they have to be perceived first.
+class Recording final : public FrameClock, public FrameSource {
+ public:
+  Recording(const ReplayOptions& options, const Events& events, Perception* perception, Session* session)
+      : options_(options), events_(events.all), perception_(perception), session_(session) {}
+
+  Stamp now() const override { return now_; }
+
+  Result<std::optional<FrameTimes>> next_frame() override try {
+    const Json* event = next();
+    if (!event || !event->contains("paint") || !is_perceived(*event)) return std::optional<FrameTimes>();
+    const Json& paint = event->at("paint");
+    const FrameTimes times{stamp_of(paint.at("painted_at_ns")), stamp_of(paint.at("shown_at_ns"))};
+    painted_ = {paint, event->at("pictures")};
+    pass();
+    wait_for(times.shown_at);
+    now_ = times.now;
+    return std::optional(times);
+  } catch (const nlohmann::json::exception& problem) {
+    return damage(problem);
+  }
+  // The newest frame as it was recorded.
+  struct PaintedBefore {
+    Json poses, images;
+  };
+  const PaintedBefore& painted() const { return painted_; }
+  // How many events have happened.
+  int passed() const { return static_cast<int>(at_); }
+
+  bool is_over() const override { return !next(); }
+
+  // Frames that the next event knew of; a thread of its own watched them, perhaps further than that.
+  Result<Perceived> perceive() override try {
+    while (next() && next()->contains("watch")) queue_frames();
+    Perceived out;
+    if (!next() || is_perceived(*next())) return out;
+    asked_ = known_moments(*next());
+    while (moments_ < asked_ && !unwatched_.empty()) {
+      LIMN_TRY_STATUS(watch(*unwatched_.front()));
+      unwatched_.pop_front();
     }
-    Progress progress("replay", static_cast<int>(events.all.size()));
-    int done = 0;
-    for (const Json& event : events.all) {
-      const Status played = play(event);
-      if (!played) return played;
-      progress.step(++done);
-      if (window_ && !window_->is_open()) break;
-    }
-    return {};
+    out.watched = perception_->watched();
+    out.watched->uses.clear();  // what came of them was recorded as edits
+    out.moments = moments_;
+    return out;
+  } catch (const nlohmann::json::exception& problem) {
+    return damage(problem);
   }
 
-  // Error: what differs from the recording.
-  Status close() {
-    LIMN_TRY_STATUS(output_.close(&session_, options_.json));
-    if (first_pose_)
-      return error("{}: expected the recorded poses, found others in {} of {} pictures, first at {:.3f} s.",
-                   options_.session.string(), other_poses_, images_, *first_pose_);
-    if (first_image_)
-      return error(
-          "{}: expected the recorded projector pictures, found others in {} of {}, first at {:.3f} s "
-          "(poses are identical; another machine or driver draws a little differently).",
-          options_.session.string(), other_images_, images_, *first_image_);
-    log_info("replay: {} pictures, poses and pictures identical to the recording's", images_);
+  Status edit(Session*) override try {
+    for (; next() && !next()->contains("paint") && is_perceived(*next()); pass()) {
+      const Status done = apply(*next());
+      if (!done) return done;
+    }
     return {};
+  } catch (const nlohmann::json::exception& problem) {
+    return damage(problem);
   }
 
  private:
-  Status play(const Json& event) try {
-    if (event.contains("watch")) {
-      unwatched_.push_back(event.at("watch"));
-      return {};
-    }
-    if (event.contains("scene")) return show(event.at("scene"));
-    if (event.contains("rig")) {
-      LIMN_TRY_STATUS(watch_until(event.at("moments")));
-      return mend(event.at("rig"));
-    }
-    if (event.contains("edit")) {
-      LIMN_TRY_STATUS(watch_until(event.value("moments", moments_)));
-      return edit(event.at("edit"), event.at("source"));
-    }
-    if (event.contains("eye")) {
-      see(event.at("eye"));
-      return {};
-    }
-    return paint(event);
-  } catch (const nlohmann::json::exception& problem) {
+  const Json* next() const { return at_ < events_.size() ? &events_[at_] : nullptr; }
+  void pass() { ++at_; }
+  // Whether all frames that an event knew of were perceived.
+  bool is_perceived(const Json& event) const { return known_moments(event) <= asked_; }
+
+  Error damage(const nlohmann::json::exception& problem) const {
     return error("{}: expected whole events, found a damaged one ({}).",
                  (options_.session / "events.jsonl").string(), problem.what());
+  }
+
+  void queue_frames() {
+    unwatched_.push_back(&next()->at("watch"));
+    pass();
   }
 
   Status watch(const Json& list) {
@@ -118,7 +136,7 @@ class Replay {
     for (const Json& item : list) {
       const std::string file = item.at("file"), camera = item.at("camera");
       if (fs::path(file).is_absolute() || file.find("..") != std::string::npos ||
-          !session_.setup().rig.find(camera))
+          !session_->setup().rig.find(camera))
         return error("{}: expected a frame of one of the rig's cameras inside the folder, found {} of {}.",
                      options_.session.string(), file, camera);
       LIMN_TRY(Frame frame, load_frame(options_.session / file));
@@ -126,21 +144,17 @@ class Replay {
       frame.captured_at = stamp_of(item.at("captured_at_ns"));
       frames.push_back(std::move(frame));
     }
-    perception_.watch(frames);
+    perception_->watch(frames);
     ++moments_;
     return {};
   }
 
-  // Frames that the image knew of; a thread of its own watched them, perhaps further than that.
-  Status watch_until(std::size_t moments) {
-    if (moments <= moments_) return {};
-    while (moments_ < moments && !unwatched_.empty()) {
-      LIMN_TRY_STATUS(watch(unwatched_.front()));
-      unwatched_.pop_front();
-    }
-    Percepts watched = perception_.watched();
-    watched.uses.clear();  // what came of them was recorded as edits
-    session_.take(std::move(watched), moments_);
+  Status apply(const Json& event) {
+    if (event.contains("watch")) unwatched_.push_back(&event.at("watch"));
+    if (event.contains("scene")) return show(event.at("scene"));
+    if (event.contains("rig")) return mend(event.at("rig"));
+    if (event.contains("edit")) return edit(event.at("edit"), event.at("source"));
+    if (event.contains("eye")) see(event.at("eye"));
     return {};
   }
 
@@ -154,9 +168,9 @@ class Replay {
   Status mend(const std::string& folder) {
     LIMN_TRY(const fs::path path, inside(folder));
     LIMN_TRY(Rig rig, load_rig(path));
-    LIMN_TRY_STATUS(session_.mend(std::move(rig), session_.watched().captured_at));
-    const SessionSetup& setup = session_.setup();
-    LIMN_TRY(perception_, Perception::create(setup.scene, setup.rig, setup.watch));
+    LIMN_TRY_STATUS(session_->mend(std::move(rig), session_->watched().captured_at));
+    const SessionSetup& setup = session_->setup();
+    LIMN_TRY(*perception_, Perception::create(setup.scene, setup.rig, setup.watch));
     return {};
   }
 
@@ -164,12 +178,12 @@ class Replay {
     LIMN_TRY(const fs::path path, inside(folder));
     std::vector<scene::SkippedVariant> skipped_variants;  // as the session left it out
     LIMN_TRY(scene::Scene scene, scene::load_scene(path, &skipped_variants));
-    return session_.show(std::move(scene), session_.watched().captured_at);
+    return session_->show(std::move(scene), session_->watched().captured_at);
   }
 
   Status edit(const Json& json, const std::string& source) {
     const scene::Edit edit{json.at("action"), json.at("slot"), json.at("value")};
-    return session_.edit(edit, source, session_.watched().captured_at);
+    return session_->edit(edit, source, session_->watched().captured_at);
   }
 
   void see(const Json& eye) {
@@ -178,25 +192,7 @@ class Replay {
       const Json& p = eye.at("p_world");
       p_world = {p.at(0).get<double>(), p.at(1).get<double>(), p.at(2).get<double>()};
     }
-    session_.see(eye.at("guest"), p_world, stamp_of(eye.at("at_ns")));
-  }
-
-  Status paint(const Json& event) {
-    const Stamp shown_at = stamp_of(event.at("paint").at("shown_at_ns"));
-    LIMN_TRY_STATUS(watch_until(event.at("moments")));
-    wait_for(shown_at);
-    const Stamp painted_at = stamp_of(event.at("paint").at("painted_at_ns"));
-    const ComposedFrame& painted = session_.paint(painted_at, shown_at);
-    session_.look_for_drift(painted_at);
-    ++images_;
-    const double at_s = seconds_between(Stamp{}, shown_at);
-    if (pose_log(painted) != event.at("paint") && ++other_poses_ == 1) first_pose_ = at_s;
-    const std::string print = fmt::format("{:016x}", fingerprint(painted.projectors));
-    if (print != event.at("pictures") && ++other_images_ == 1) first_image_ = at_s;
-    if (window_)
-      if (const cv::Mat screen = session_.screen(); !screen.empty()) window_->show(screen);
-    output_.shown(session_.measured(), painted);
-    return {};
+    session_->see(eye.at("guest"), p_world, stamp_of(eye.at("at_ns")));
   }
 
   void wait_for(Stamp shown_at) {
@@ -214,13 +210,62 @@ class Replay {
   }
 
   const ReplayOptions& options_;
-  Perception perception_;
-  Session session_;
-  SessionOutput output_;
-  std::optional<device::Window> window_;
+  const std::vector<Json>& events_;
+  Perception* perception_;
+  Session* session_;
+  std::size_t at_ = 0;                   // the next event
+  std::deque<const Json*> unwatched_;    // frames of moments
+  std::size_t moments_ = 0, asked_ = 0;  // that were watched; that events knew of
+  PaintedBefore painted_;
+  Stamp now_;
   std::optional<std::pair<std::chrono::steady_clock::time_point, Stamp>> begun_;
-  std::deque<Json> unwatched_;
-  std::size_t moments_ = 0, images_ = 0, other_poses_ = 0, other_images_ = 0;
+};
+
+// Compares what is painted with the recording, and may show a screen in a window.
+class Comparison final : public FrameSink {
+ public:
+  Comparison(const Recording* recording, const Session* session, std::optional<device::Window> window)
+      : recording_(recording), session_(session), window_(std::move(window)) {}
+
+  Status show(const ComposedFrame& painted, const std::vector<cv::Mat>&) override {
+    ++images_;
+    const double at_s = seconds_between(Stamp{}, painted.shown_at);
+    if (pose_log(painted) != recording_->painted().poses && ++other_poses_ == 1) first_pose_ = at_s;
+    const std::string print = fmt::format("{:016x}", fingerprint(painted.projectors));
+    if (print != recording_->painted().images && ++other_images_ == 1) first_image_ = at_s;
+    return {};
+  }
+
+  std::set<scene::Screen> wanted_screens() const override {
+    return window_ ? std::set{session_->show_state().screen} : std::set<scene::Screen>();
+  }
+  void show_screens(const std::map<scene::Screen, cv::Mat>& images) override {
+    for (const auto& [what, image] : images)
+      if (!image.empty()) window_->show(image);
+    is_closed_ = window_ && !window_->is_open();
+  }
+  const std::atomic<bool>& is_closed() const { return is_closed_; }
+
+  // Error: what differs from the recording.
+  Status result(const fs::path& session) const {
+    if (first_pose_)
+      return error("{}: expected the recorded poses, found others in {} of {} pictures, first at {:.3f} s.",
+                   session.string(), other_poses_, images_, *first_pose_);
+    if (first_image_)
+      return error(
+          "{}: expected the recorded projector pictures, found others in {} of {}, first at {:.3f} s "
+          "(poses are identical; another machine or driver draws a little differently).",
+          session.string(), other_images_, images_, *first_image_);
+    log_info("replay: {} pictures, poses and pictures identical to the recording's", images_);
+    return {};
+  }
+
+ private:
+  const Recording* recording_;
+  const Session* session_;
+  std::optional<device::Window> window_;
+  std::atomic<bool> is_closed_ = false;
+  std::size_t images_ = 0, other_poses_ = 0, other_images_ = 0;
   std::optional<double> first_pose_, first_image_;
 };
 
@@ -234,9 +279,19 @@ Status run_replay(const ReplayOptions& options) {
   LIMN_TRY(SessionOutput output, SessionOutput::open(options.out, {}, &setup));
   LIMN_TRY(Perception perception, Perception::create(setup.scene, setup.rig, setup.watch));
   LIMN_TRY(Session session, Session::create(setup, nullptr, nullptr, false));
-  Replay replay(options, std::move(perception), std::move(session), std::move(output));
-  const Status played = replay.play(events);
-  LIMN_TRY_STATUS(replay.close());
+  std::optional<device::Window> window;
+  if (options.window) {
+    LIMN_TRY(window, device::Window::open("Limn replay", 1280, 720));
+  }
+  Recording recording(options, events, &perception, &session);
+  Comparison comparison(&recording, &session, std::move(window));
+  DeviceHealth no_devices;
+  FrameLoop loop({perception, session, output}, {recording, recording, comparison, no_devices});
+  std::optional<Progress> progress(std::in_place, "replay", static_cast<int>(events.all.size()));
+  const Status played = loop.run(comparison.is_closed(), [&] { progress->step(recording.passed()); });
+  progress.reset();
+  LIMN_TRY_STATUS(output.close(&session, options.json));
+  LIMN_TRY_STATUS(comparison.result(options.session));
   LIMN_TRY_STATUS(played);
   if (events.damage) return error("{}; what stands before it was replayed.", *events.damage);
   return {};

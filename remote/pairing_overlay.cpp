@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <vector>
@@ -20,7 +19,6 @@ constexpr int k_nodes = 8;               // looked at along each side of a place
 constexpr double k_flat = 0.03;          // of a sign's width, from a plane
 constexpr double k_smaller = 0.93;       // from one size to the next
 constexpr double k_least_upright = 0.2;  // sine of the angle between the surface's normal and up
-constexpr int k_finer = 3;
 
 std::optional<Eigen::Vector3d> point_at(const cv::Mat& points, int x, int y) {
   const auto& p = points.at<cv::Vec3f>(y, x);
@@ -109,38 +107,6 @@ std::optional<OverlayPlace> overlay_place(const Imager& projector,
     for (const Seat& seat : seats)
       if (const OverlayPlace place = place_at(seat, px * seat.m_per_px); is_free(place)) return place;
   return std::nullopt;
-}
-
-void draw_pairing_overlay(const cv::Mat& sign,
-               const OverlayPlace& place,
-               const Imager& projector,
-               const Pose& world_from_prototype,
-               cv::Mat* image) {
-  std::array<cv::Point2f, 4> corners;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const double right = i == 1 || i == 2, down = i >= 2;
-    const auto px = projector.project(world_from_prototype *
-                                      (place.p_corner + right * place.d_right + down * place.d_down));
-    if (!px) return;
-    corners[i] = cv::Point2f(static_cast<float>(px->x()), static_cast<float>(px->y()));
-  }
-  const cv::Rect box = cv::boundingRect(corners) & cv::Rect({}, image->size());
-  if (box.empty()) return;
-  for (cv::Point2f& corner : corners) corner -= cv::Point2f(cv::Point(box.tl()));
-  const float width = static_cast<float>(sign.cols) - 0.5F, height = static_cast<float>(sign.rows) - 0.5F;
-  const std::array<cv::Point2f, 4> from = {
-      {{-0.5F, -0.5F}, {width, -0.5F}, {width, height}, {-0.5F, height}}};
-  const cv::Mat turn = cv::getPerspectiveTransform(from.data(), corners.data());
-  // Many of the sign's pixels to one of the image's: drawn larger and made smaller, so that edges are even.
-  const cv::Mat larger = (cv::Mat_<double>(3, 3) << k_finer, 0, 0.5 * (k_finer - 1),  //
-                          0, k_finer, 0.5 * (k_finer - 1),                            //
-                          0, 0, 1);
-  cv::Mat cover(sign.size(), CV_8U, cv::Scalar(255)), drawn, share;
-  cv::warpPerspective(sign, drawn, larger * turn, box.size() * k_finer, cv::INTER_LINEAR);
-  cv::warpPerspective(cover, share, larger * turn, box.size() * k_finer, cv::INTER_NEAREST);
-  cv::resize(drawn, drawn, box.size(), 0, 0, cv::INTER_AREA);
-  cv::resize(share, share, box.size(), 0, 0, cv::INTER_AREA);
-  drawn.copyTo((*image)(box), share > 127);
 }
 
 }  // namespace limn::apps

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "session/overlays.h"
 #include "core/imager.h"
 
 namespace limn::apps {
@@ -16,12 +17,6 @@ cv::Mat pairing_code_image(const std::string& text, const std::string& pin, cons
 /// The PIN and whose it is alone, `width` pixels wide: for where there is no room for the code.
 cv::Mat pin_image(const std::string& pin, const std::string& role, int width);
 
-/// Where a sign lies on the prototype, in its frame, m: as wide as d_right is long, as high as d_down.
-struct OverlayPlace {
-  Eigen::Vector3d p_corner = Eigen::Vector3d::Zero();  ///< top left
-  Eigen::Vector3d d_right = Eigen::Vector3d::Zero(), d_down = Eigen::Vector3d::Zero();
-};
-
 /// The largest place, in the projector's pixels, for a sign of that shape on a flat enough piece of the
 /// prototype. `points` is the prototype's point (m) that each of its pixels lights, CV_32FC3, NaN where none
 /// is or where nothing may be drawn; `d_up` is up in the prototype's frame. nullopt: none is `least_px` wide.
@@ -32,13 +27,5 @@ std::optional<OverlayPlace> overlay_place(const Imager& projector,
                                     const Eigen::Vector3d& d_up,
                                     cv::Size shape,
                                     double least_px);
-
-/// Draws a sign into a projector's image so that it lies there undistorted. Nothing is drawn where a corner
-/// is not in the projector's view.
-void draw_pairing_overlay(const cv::Mat& sign,
-               const OverlayPlace& place,
-               const Imager& projector,
-               const Pose& world_from_prototype,
-               cv::Mat* image);
 
 }  // namespace limn::apps

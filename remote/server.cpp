@@ -1,8 +1,6 @@
 #include "remote/server.h"
 
 #include <algorithm>
-#include <limits>
-#include <opencv2/imgproc.hpp>
 
 #include "remote/own_addresses.h"
 #include "core/log.h"
@@ -16,14 +14,6 @@ namespace fs = std::filesystem;
 constexpr std::chrono::milliseconds k_between_news{50}, k_between_unwatched{1000}, k_longest_hearing{5};
 
 constexpr std::chrono::seconds k_cameras_late{2};  // after which no image shows a code any more
-constexpr double k_code_share = 0.5;               // of a projector's shorter side, without a prototype
-constexpr std::chrono::milliseconds k_between_searches{300}, k_longest_search{2000};
-constexpr int k_pin_px = 360;            // a PIN's sign, as it is kept
-constexpr double k_least_pin_px = 50;    // in the projector's image
-constexpr int k_dark = 8;                // display value
-constexpr int k_module_px = 12;          // of the code, as it is kept
-constexpr double k_least_module_px = 2;  // of the projector's image, that a phone still reads
-constexpr double k_code_light = 0.75;    // display value: white paper would outshine all else
 
 bool is_late(const Wish& wish, std::chrono::steady_clock::time_point now) {
   return now - wish.since >= k_longest_wish;
@@ -63,30 +53,6 @@ Result<std::optional<Certificate>> certificate_for(const ServeOptions& options, 
   return std::optional(std::move(made));
 }
 
-// Where the prototype is free of markers and, if there is room, of parts.
-std::optional<OverlayPlace> free_place(Session* session,
-                                    std::size_t projector,
-                                    cv::Size shape,
-                                    double least_px) {
-  cv::Mat points = session->free_surface(projector);
-  if (points.empty() || shape.empty()) return std::nullopt;
-  const Rig& rig = session->setup().rig;
-  const Imager& imager = rig.projectors[projector];
-  const Pose& world_from_prototype = *session->painted().posed.world_from_prototype;
-  const Eigen::Vector3d d_up_world =
-      (rig.cameras.empty() ? imager : rig.cameras[0]).imager_from_world.rotation.inverse() *
-      Eigen::Vector3d(0, -1, 0);
-  const auto place = [&](const cv::Mat& free) {
-    return overlay_place(imager, world_from_prototype, free,
-                      world_from_prototype.rotation.inverse() * d_up_world, shape, least_px);
-  };
-  cv::Mat parts, free = points.clone();
-  cv::cvtColor(session->painted().projectors[projector], parts, cv::COLOR_BGR2GRAY);
-  free.setTo(cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()), parts > k_dark);
-  const auto beside = place(free);
-  return beside ? beside : place(points);
-}
-
 }  // namespace
 
 Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, ImageProviders providers) {
@@ -104,7 +70,7 @@ Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, ImageP
   std::unique_ptr<Server> out(new Server());
   out->network_ = std::move(*network);
   out->know_ = providers.know;
-  out->code_lasts_ = options.code_lasts;
+  out->code_.set_duration(options.code_lasts);
   Server* server = out.get();
   out->reception_ = std::make_unique<Reception>(Reception::Setup{
       .is_encrypted = certificate->has_value(),
@@ -163,7 +129,7 @@ std::optional<Wish> Server::next_wish() {
   return wish;
 }
 
-void Server::apply_requests(Session* session, Stamp at) {
+void Server::hear(Session* session, Stamp at) {
   const auto begun = Clock::now();
   std::map<std::string, std::optional<Eigen::Vector3d>> places;
   {
@@ -180,70 +146,26 @@ void Server::apply_requests(Session* session, Stamp at) {
   }
 }
 
+void Server::hear(const SessionMoment& moment) {
+  hear(&moment.session, moment.at);
+  tell(moment.session, moment.telemetry, moment.health, moment.at);
+}
+
+std::vector<Overlay> Server::overlays(Session* session) { return code_.overlays(session); }
+
 void Server::show_code(const std::string& projector, Role role) {
-  code_ = {};
-  code_.projector = projector;
-  code_.role = role;
+  const std::string& pin = invitation_.pins[static_cast<std::size_t>(role)];
+  code_.show(projector, {invitation_.url_for(role), pin, name_of(role)},
+             [this, role](std::chrono::steady_clock::time_point until) {
+               network_->post([this, role, until] { reception_->hide_room(role, until + k_cameras_late); });
+             });
   log_info("live: {} shows the code of the remote for {}", projector, name_of(role));
 }
 
-// The code begins with a place for it; after a while without one, too: the prototype may not be seen.
-bool Server::has_code_begun(Session* session, std::size_t projector) {
-  if (code_.until) return true;
-  const auto now = Clock::now();
-  const std::string& pin = invitation_.pins[static_cast<std::size_t>(code_.role)];
-  if (!code_.asked) {
-    code_.asked = now;
-    code_.sign =
-        k_code_light * pairing_code_image(invitation_.url_for(code_.role), pin, name_of(code_.role), k_module_px);
-  }
-  if (code_.searched && now - *code_.searched < k_between_searches) return false;
-  code_.searched = now;
-  code_.place =
-      free_place(session, projector, code_.sign.size(), k_least_module_px * code_.sign.cols / k_module_px);
-  if (!code_.place && now - *code_.asked < k_longest_search) return false;
-  if (!code_.place) {
-    const cv::Mat smaller = k_code_light * pin_image(pin, name_of(code_.role), k_pin_px);
-    code_.place = free_place(session, projector, smaller.size(), k_least_pin_px);
-    if (code_.place) code_.sign = smaller;
-  }
-  code_.until = now + code_lasts_;
-  network_->post([this, role = code_.role, until = *code_.until + k_cameras_late] {
-    reception_->hide_room(role, until);
-  });
-  return true;
-}
-
-cv::Mat Server::projector_image(Session* session, std::size_t projector) {
-  const ComposedFrame& painted = session->painted();
-  const cv::Mat& image = painted.projectors[projector];
-  const Imager& imager = session->setup().rig.projectors[projector];
-  if (imager.name != code_.projector || session->show_state().blackout) return image;
-  if (!has_code_begun(session, projector)) return image;
-  if (Clock::now() >= *code_.until) code_ = {};
-  if (code_.sign.empty()) return image;
-  cv::Mat out = image.clone();
-  if (code_.place) {
-    if (painted.posed.world_from_prototype)
-      draw_pairing_overlay(code_.sign, *code_.place, imager, *painted.posed.world_from_prototype, &out);
-    return out;
-  }
-  const int module_px =
-      static_cast<int>(k_code_share * std::min(out.cols, out.rows) * k_module_px / code_.sign.cols);
-  if (module_px < 1) return image;
-  cv::Mat plain;
-  cv::resize(code_.sign, plain, {}, 1.0 * module_px / k_module_px, 1.0 * module_px / k_module_px,
-             cv::INTER_AREA);
-  plain.copyTo(out(cv::Rect({(out.cols - plain.cols) / 2, (out.rows - plain.rows) / 2}, plain.size())));
-  return out;
-}
-
-void Server::publish_state(const Session& session,
-                           const Telemetry& telemetry,
-                           const DeviceHealth& health,
-                           Stamp at) {
+void Server::tell(const Session& session, const Telemetry& telemetry, const DeviceHealth& health, Stamp at) {
   if (!begun_at_) begun_at_ = at;
   if (know_) know_(session);
+  if (session.is_writing()) return;  // what people ask for as soon as they are told must be on the disk
   const auto now = Clock::now();
   const std::size_t edits = session.last_edit() ? session.last_edit()->count : 0;
   const bool is_due = !told_at_ || !outcomes_.empty() || edits != told_edits_ ||

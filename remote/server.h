@@ -15,11 +15,12 @@
 #include "session/device_health.h"
 #include "session/remote_link.h"
 #include "session/session.h"
+#include "session/session_client.h"
 #include "session/telemetry.h"
 #include "core/worker_thread.h"
-#include "remote/pairing_overlay.h"
 #include "remote/image_provider.h"
 #include "remote/network.h"
+#include "remote/projected_code.h"
 #include "remote/reception.h"
 #include "core/result.h"
 
@@ -34,9 +35,9 @@ struct ServeOptions {
   std::chrono::milliseconds code_lasts{60000};  ///< in a projector's light
 };
 
-/// The remote of a session (docs/remote.md): guests on its network. What RemoteLink has belongs to the session's
-/// thread and never waits; everything else happens on threads of the server's own.
-class Server : public RemoteLink {
+/// The remote of a session (docs/remote.md): guests on its network. What SessionClient and RemoteLink have belongs
+/// to the session's thread and never waits; everything else happens on threads of the server's own.
+class Server : public SessionClient, public RemoteLink {
  public:
   /// Tells on stderr where it is and the PINs. Errors name the option. `eyes` may be
   /// empty.
@@ -46,23 +47,22 @@ class Server : public RemoteLink {
   /// Tells the session where guests' tablets look from. Does what guests want, at most k_most_at_once edits
   /// and for at most 5 ms; the others wait for the next call. What cannot be done is answered to who wanted
   /// it.
-  void apply_requests(Session* session, Stamp at) override;
+  void hear(Session* session, Stamp at);
   /// Lets guests know: at once after an edit, else twenty times a second, and once a second while there are
   /// none.
-  void publish_state(const Session& session,
-                     const Telemetry& telemetry,
-                     const DeviceHealth& health,
-                     Stamp at) override;
+  void tell(const Session& session, const Telemetry& telemetry, const DeviceHealth& health, Stamp at);
+
+  /// Both hear and tell: what came while a frame was made need not wait for the next one.
+  void hear(const SessionMoment& moment) override;
+  void tell(const SessionMoment& moment) override { hear(moment); }
+  std::vector<Overlay> overlays(Session* session) override;
+
   /// From its next image on a projector shows the code that pairs for a role, for ServeOptions::code_lasts;
   /// no other one does then. Guests of lesser roles see no images of the room meanwhile, since its cameras
   /// see the code.
   void show_code(const std::string& projector, Role role) override;
   /// Who shows it; empty: nobody.
-  const std::string& code_projector() const override { return code_.projector; }
-  /// What a projector of the session's rig is to give: what was painted, and the code on the largest flat and
-  /// free piece of the prototype (in the image's middle, where there is none). Not under a blackout. What
-  /// guests and recordings get is what was painted.
-  cv::Mat projector_image(Session* session, std::size_t projector) override;
+  const std::string& code_projector() const override { return code_.projector(); }
   /// Says goodbye to all, lets go of the eyes and ends the threads.
   void stop();
 
@@ -75,16 +75,6 @@ class Server : public RemoteLink {
   using Clock = std::chrono::steady_clock;
   Server() = default;
   std::optional<Wish> next_wish();
-  bool has_code_begun(Session* session, std::size_t projector);
-
-  // In a projector's light.
-  struct Code {
-    std::string projector;
-    Role role = Role::look;
-    std::optional<Clock::time_point> asked, searched, until;  // none before the first image
-    cv::Mat sign;
-    std::optional<OverlayPlace> place;  // on the prototype
-  };
 
   Invitation invitation_;
   WorkerThread worker_;
@@ -102,8 +92,7 @@ class Server : public RemoteLink {
   std::function<void(const Session&)> know_;
   std::shared_ptr<const scene::Scene> scene_;
   int scenes_ = 0;
-  Code code_;
-  std::chrono::milliseconds code_lasts_{};
+  ProjectedCode code_;
   std::optional<Clock::time_point> told_at_;
   std::optional<Stamp> begun_at_;
   std::size_t told_edits_ = 0;

@@ -4,13 +4,9 @@
 #include <memory>
 #include <vector>
 
-#include "session/session_output.h"
 #include "session/device_health.h"
-#include "session/operator_console.h"
-#include "session/osc_port.h"
-#include "session/session.h"
-#include "session/perception.h"
-#include "session/remote_link.h"
+#include "session/frame_loop.h"
+#include "session/keys.h"
 #include "core/result.h"
 #include "device/camera_source.h"
 #include "device/display.h"
@@ -26,22 +22,20 @@ struct SessionDevices {
   std::vector<std::unique_ptr<device::Display>> screens;       ///< show what ShowState::screen says
   std::vector<device::KeySource> keys = {};
   std::vector<DeviceState> missing = {};  ///< what could not be opened, and why
+  Keys* chosen = nullptr;                 ///< what keys do, shared with the operator's; null: their own
 };
 
-/// Plays a session on devices, in real time, until `seconds` are over (0: no end), `is_ended`, or the window
-/// the operator ends it (`desk`, `osc` and `remote` may be null); at least a camera and a projector must be
-/// there. A thread for each camera takes its newest frame, one thread watches, this one (its GL context
-/// current) paints and shows. Newest wins, nothing queues: what was not taken in time is dropped and counted.
-/// Devices that fail are told of, once, and tried again. Sources with stamps of their own (images, videos)
-/// are played at their pace.
+/// Plays a session on devices, in real time, until `seconds` are over (0: no end), `is_ended`, or a client
+/// ends it; at least a camera and a projector must be there. A thread for each camera takes its newest frame,
+/// one thread perceives, this one (its GL context current) runs the frame loop. Newest wins, nothing queues:
+/// what was not taken in time is dropped and counted. Devices that fail are told of, once, and tried again.
+/// Sources with stamps of their own (images, videos) are played at their pace.
 Status play_on_devices(SessionDevices* devices,
                        double seconds,
                        const std::atomic<bool>& is_ended,
-                       Perception* perception,
-                       Session* session,
-                       SessionOutput* output,
-                       OperatorConsole* console,
-                       OscPort* osc,
-                       RemoteLink* remote);
+                       const SessionParts& parts);
+
+/// Error: no camera that works, or no projector.
+Status check_devices(const SessionDevices& devices);
 
 }  // namespace limn::apps

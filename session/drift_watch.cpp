@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "session/stillness.h"
+
 namespace limn::apps {
 namespace {
 
@@ -45,6 +47,13 @@ std::string sentence(const Drift& drift) {
       "mended "
       "rig (with one camera and one projector end it, and let limn recheck look at the board).",
       names, drift.px, drift.mm);
+}
+
+std::optional<std::string> DriftNotices::news(const std::optional<Drift>& drift) {
+  const bool is_news = drift.has_value() != told_.has_value() || (drift && drift->devices != told_->devices);
+  if (!is_news) return std::nullopt;
+  told_ = drift;
+  return drift ? sentence(*drift) : "all light is where the rig says again";
 }
 
 DriftWatch::DriftWatch(const Rig& rig) : rig_(rig) {

@@ -25,6 +25,20 @@ struct Drift {
 /// What is wrong and what to do, in two sentences.
 std::string sentence(const Drift& drift);
 
+/// What people were told of drift.
+class DriftNotices {
+ public:
+  /// The sentence to tell when what has moved is another device than was told.
+  std::optional<std::string> news(const std::optional<Drift>& drift);
+  /// What has moved, as far as people were told.
+  const std::optional<Drift>& told() const { return told_; }
+  /// The rig is another one: nothing is said of it yet.
+  void forget() { told_.reset(); }
+
+ private:
+  std::optional<Drift> told_;
+};
+
 /// Watches by the light itself whether cameras and projectors stand where the rig says: of all devices the
 /// one that, moved, explains best what all cameras see. Some cells of an image are compared at each call, so
 /// that none takes long. Sees only while the prototype rests and something with edges is shown.

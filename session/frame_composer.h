@@ -1,49 +1,28 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <map>
+#include <memory>
 #include <opencv2/core/mat.hpp>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "session/drift_watch.h"
+#include "session/frame_input.h"
+#include "session/overlays.h"
+#include "session/part_fading.h"
+#include "session/screen_composer.h"
 #include "session/shadow_watch.h"
 #include "session/projection_history.h"
+#include "session/viewpoint_selector.h"
 #include "session/perception.h"
 #include "core/result.h"
 #include "core/rig.h"
 #include "projector/renderer.h"
-#include "projector/composite_policy.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
-#include "tracker/marker_light.h"
-#include "tracker/predict.h"
 
 namespace limn::apps {
-
-struct ComposeOptions {
-  tracker::Prediction prediction = tracker::Prediction::filtered;
-  tracker::MotionModel motion;  ///< as the Watcher's
-  tracker::MarkerLight marker_light = tracker::MarkerLight::keep_out;
-  double fade_s = 0.15;   ///< in which a part's light goes when its marker is lost
-  double label_s = 1.2;   ///< for which a variant's name stands by its marker
-  double lost_s = 1.5;    ///< for which a ring marks where a part was lost
-  double stereo_mm = 63;  ///< between the eyes of Screen::stereo
-  bool refill = true;     ///< light lost to a shadow is given by other projectors
-  /// Camera 0's images are proportional to light; a screen's are made of them as sRGB.
-  bool is_linear_camera = false;
-};
-
-/// Where a guest's tablet looks from, by its own image; the guest has a name.
-struct TabletViewpoint {
-  std::string guest;
-  Eigen::Vector3d p_eye_world = Eigen::Vector3d::Zero();
-  Stamp at;  ///< when it became known
-};
-/// A place as old as this is no guest's any more.
-constexpr double k_guest_place_lasts_s = 1;
 
 /// What is shown at a moment.
 struct ComposedFrame {
@@ -56,6 +35,10 @@ struct ComposedFrame {
   /// That eye's place while a guest has part in it, or it is on its way back.
   std::optional<Eigen::Vector3d> p_guest_eye_world = {};
 };
+
+/// What projectors show: what was painted, and overlays over it. Images that nothing is drawn over are the
+/// painted ones themselves.
+std::vector<cv::Mat> with_overlays(const ComposedFrame& painted, const Rig& rig, std::span<const Overlay> overlays);
 
 /// Loose markers that lie still for a second and carry no slot: they glow. The last one is the one that a
 /// `pair` without a marker means.
@@ -70,23 +53,19 @@ class FrameComposer {
  public:
   static Result<FrameComposer> create(const scene::Scene& scene, const Rig& rig, const ComposeOptions& options = {});
 
-  /// Projector images for the moment at which their light arrives; what is lost is judged by `now`. Stamps
-  /// must not go back. A guest's place counts while it is new, for the guest that the show state names, whose
-  /// eye is then the only one, else for those who are among the scene's viewers: the eye passes to it, and
-  /// back, as between viewers (scene/viewpoint.h), and glides with it.
-  const ComposedFrame& paint(const Percepts& watched,
-                       const scene::ShowState& show_state,
-                       Stamp now,
-                       Stamp shown_at,
-                       std::span<const TabletViewpoint> places = {});
+  /// Projector images for the moment at which their light arrives. Stamps must not go back.
+  const ComposedFrame& compose(const FrameInput& input);
 
   /// Whether the light lies where the rig says, as the same frames show it that were painted for last. When
   /// the prototype has come to rest this takes longer than an image: call it when that is shown.
   void look_for_drift(const Percepts& watched);
 
-  /// A large screen's image for the newest frame of camera 0, at that frame's own stamp; empty before the
-  /// first frame and for Screen::off.
-  cv::Mat screen(const Percepts& watched, const scene::ShowState& show_state, scene::Screen what);
+  /// A large screen's image for the newest frame of camera 0; empty before the first frame and for
+  /// Screen::off. `tracks`: Prediction::at_image.
+  cv::Mat screen(const Percepts& watched,
+                 std::span<const Track> tracks,
+                 const scene::ShowState& show_state,
+                 scene::Screen what);
 
   /// The prototype's point (its own frame, m) that each pixel of a projector lights, CV_32FC3, as painted
   /// last; NaN where none, and on markers.
@@ -98,63 +77,33 @@ class FrameComposer {
   const std::optional<Drift>& drift() const { return drifts_.drift(); }
 
  private:
-  struct Fading {
-    scene::PosedPart part;
-    Stamp lost_at;
+  // What the parts of a painter refer to stays where it is when the painter moves.
+  struct Subject {
+    scene::Scene scene;
+    Rig rig;
   };
-  struct Gone {
-    scene::PosedScene posed;
-    Stamp lost_at;
-  };
-  struct Label {
-    std::string text;
-    Stamp since;
-  };
-  FrameComposer(const scene::Scene& scene,
-          const Rig& rig,
-          projector::Renderer renderer,
-          const ComposeOptions& options);
-  const Imager* still_viewer() const;
-  const Imager& stand_in() const;
-  std::vector<scene::Viewpoint> guests_eyes(const scene::ShowState& show_state,
-                                      std::span<const TabletViewpoint> places,
-                                      Stamp now) const;
-  Imager viewer_for(const scene::PosedScene& posed, std::vector<scene::Viewpoint> guests, Stamp at);
-  void glide(std::vector<scene::Viewpoint>* guests, double seconds);
-  void note_changes(const scene::PosedScene& posed, const scene::ShowState& show_state, Stamp at);
-  cv::Mat lit(std::size_t projector, const scene::PosedScene& posed, const Imager& viewer, Stamp at);
-  cv::Mat screen_of(const cv::Mat& behind,
-                    const scene::PosedScene& posed,
-                    scene::Screen what,
-                    std::span<const projector::CompositePolicy> policies);
-  cv::Mat lit_for(std::size_t projector, const scene::ShowState& show_state, const Imager& viewer, Stamp at);
-  void draw_feedback(const scene::ShowState& show_state);
-  void draw_waiting(std::span<const LooseMarker> waiting);
-  const Imager* best_projector(const Pose& world_from_marker) const;
+  FrameComposer(std::unique_ptr<const Subject> subject, projector::Renderer renderer, const ComposeOptions& options);
+  void select_viewpoint(const FrameInput& input);
+  std::vector<Overlay> surface_overlays(const scene::ShowState& show_state) const;
+  std::vector<Overlay> marker_overlays(const FrameInput& input) const;
+  cv::Mat drawn(std::size_t projector, std::span<const Overlay> on_surface);
+  void keep_off_markers(const FrameInput& input);
+  OverlayTarget target(std::size_t projector, cv::Mat* image);
+  std::optional<std::size_t> best_projector(const Pose& world_from_marker) const;
 
-  scene::Scene scene_;
-  Rig rig_;
+  std::unique_ptr<const Subject> subject_;
   projector::Renderer renderer_;
   ComposeOptions options_;
   std::vector<Body> bodies_;
+  Eigen::AlignedBox3d prototype_box_;  // its own frame
+  ViewpointSelector viewpoints_;
+  PartFading fading_;
+  ScreenComposer screens_;
   ProjectionHistory shown_;
   ShadowWatch shadows_;
   DriftWatch drifts_;
-  Eigen::Vector3d d_up_world_;
-  Eigen::AlignedBox3d prototype_box_;  // its own frame
   ComposedFrame painted_;
   bool is_black_ = false;  // by blackout, which goes before a freeze
-  scene::SharedViewpoint shared_viewpoint_;
-  Stamp eye_at_;
-  std::vector<scene::Viewpoint> gliding_;  // guests' eyes, as they are followed
-  bool is_away_ = false;             // a guest has part in the eye, or it is on its way back
-  std::vector<projector::CompositePolicy> policies_;
-  Stamp treated_at_;
-  scene::PosedScene last_;                       // as last shown
-  std::map<std::string, Fading> fading_;         // parts whose marker was lost, by slot
-  std::optional<Gone> gone_;                     // all, since the prototype was lost
-  std::map<std::string, std::string> variants_;  // last shown
-  std::map<std::string, Label> labels_;
 };
 
 }  // namespace limn::apps

@@ -88,6 +88,11 @@ void OperatorConsole::shown(const ShownFrame& frame) {
   if (frame.screen_ms >= 0) screen_s_ = 1e-3 * frame.screen_ms;
 }
 
+void OperatorConsole::tell(const SessionMoment& moment) {
+  if (moment.shown) shown(*moment.shown);
+  ends_session_ = !serve(&moment.session, &moment.telemetry, moment.health, moment.screen, moment.at);
+}
+
 bool OperatorConsole::serve(
     Session* session, Telemetry* telemetry, const DeviceHealth& health, const cv::Mat& screen, Stamp now) {
   if (!begun_at_) begun_at_ = paced_at_ = now;

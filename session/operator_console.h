@@ -9,6 +9,7 @@
 #include "session/keys.h"
 #include "session/operator_panel.h"
 #include "session/session.h"
+#include "session/session_client.h"
 #include "session/telemetry.h"
 #include "session/remote_link.h"
 #include "gui/gui_window.h"
@@ -22,7 +23,7 @@ OperatorView::Remote shown(const Invitation& invitation);
 
 /// Where the operator of a session sits: its window and keys. Belongs to the session's thread; the session's
 /// GL context stays current.
-class OperatorConsole {
+class OperatorConsole : public SessionClient {
  public:
   static Result<OperatorConsole> open(const device::Desktop& desktop, const scene::Scene& scene);
 
@@ -41,6 +42,11 @@ class OperatorConsole {
   bool serve(
       Session* session, Telemetry* telemetry, const DeviceHealth& health, const cv::Mat& screen, Stamp now);
 
+  void hear(const SessionMoment&) override {}  // serve() does both
+  void tell(const SessionMoment& moment) override;
+  bool wants_screen() const override { return is_due(); }
+  bool ends_session() const override { return ends_session_; }
+
  private:
   OperatorConsole(GuiWindow window, const scene::Scene& scene) : window_(std::move(window)), keys_(scene) {}
   OperatorView view_of(const Session& session,
@@ -57,6 +63,7 @@ class OperatorConsole {
   std::deque<ShownFrame> recent_;
   cv::Mat screen_;
   double screen_s_ = 0;  // what it cost
+  bool ends_session_ = false;
   std::optional<Stamp> begun_at_;
   struct Pace {
     std::size_t images = 0;

@@ -7,6 +7,7 @@
 
 #include "session/osc.h"
 #include "session/session.h"
+#include "session/session_client.h"
 #include "session/telemetry.h"
 #include "session/udp_socket.h"
 #include "core/result.h"
@@ -16,7 +17,7 @@ namespace limn::apps {
 /// A session's ear and mouth for other programs (docs/osc.md), over UDP. Belongs to the session's thread and
 /// never waits. What it has not heard yet lies in the system's buffer for this socket, which does not grow:
 /// when that is full, datagrams are lost.
-class OscPort {
+class OscPort : public SessionClient {
  public:
   /// `hear`: PORT on the loopback, or ADDRESS:PORT; `tell`: HOST:PORT; empty: not. Port 0 to hear: any free
   /// one. Errors name the option.
@@ -28,6 +29,9 @@ class OscPort {
   void hear(Session* session, Telemetry* telemetry, Stamp at);
   /// What has changed since it was told last; once a second everything, for datagrams get lost.
   void tell(const Session& session, Stamp at);
+
+  void hear(const SessionMoment& moment) override { hear(&moment.session, &moment.telemetry, moment.at); }
+  void tell(const SessionMoment& moment) override { tell(moment.session, moment.at); }
 
   /// The port that it hears on, 0: none.
   int port() const { return ear_ ? ear_->port() : 0; }

@@ -28,7 +28,6 @@ constexpr int k_rarer = 3;
 constexpr int k_covered_every = 2;
 // Between images, as shares of the one before: a longer one says nothing of the next.
 constexpr double k_like_moments = 3;
-constexpr double k_trembles_m = 0.5e-3, k_trembles_rad = 1e-3;
 
 Result<tracker::Gesture> gesture_of(const scene::Control& control) {
   static const std::map<std::string, tracker::Gesture> gestures = {{"", tracker::Gesture::cover},
@@ -82,11 +81,6 @@ std::vector<std::string> families_of(const scene::Scene& scene, std::vector<Body
 
 }  // namespace
 
-bool is_elsewhere(const Pose& before, const Pose& now) {
-  return (before.translation - now.translation).norm() > k_trembles_m ||
-         angle_between(before.rotation, now.rotation) > k_trembles_rad;
-}
-
 double loose_size_m(const scene::Scene& scene) { return scene.slots.empty() ? 0 : scene.slots[0].size_m; }
 
 Result<Perception> Perception::create(const scene::Scene& scene, const Rig& rig, const PerceptionOptions& options) {
@@ -139,6 +133,8 @@ const Percepts& Perception::watch(std::span<const Frame> frames) {
         bodies.push_back({scene::loose_body(loose.marker), {{loose.marker, loose_size_m_, Pose()}}});
     watched_.motions =
         tracker::observed(watched_.motions, bodies, views, watched_.captured_at, options_.motion);
+    watched_.tracks = tracker::predicted(watched_.motions, watched_.captured_at,
+                                         tracker::Prediction::filtered, options_.motion);
     follow_loose();
   }
   watched_.filter_ms = milliseconds_since(filtering);
@@ -208,8 +204,7 @@ void Perception::note_loose(std::span<const std::size_t> cameras) {
 void Perception::follow_loose() {
   watched_.loose.clear();
   if (loose_.empty()) return;
-  for (const Track& track : tracker::predicted(watched_.motions, watched_.captured_at,
-                                               tracker::Prediction::filtered, options_.motion)) {
+  for (const Track& track : watched_.tracks) {
     const auto loose = std::find_if(loose_.begin(), loose_.end(), [&](const Loose& l) {
       return scene::loose_body(l.marker) == track.body;
     });

@@ -8,6 +8,7 @@
 #include "core/frame.h"
 #include "core/result.h"
 #include "core/rig.h"
+#include "core/track.h"
 #include "scene/scene.h"
 #include "tracker/body_filter.h"
 #include "tracker/detector.h"
@@ -41,11 +42,9 @@ struct Percepts {
   std::vector<LooseMarker> loose;  ///< seen in the newest images; the one that lies longest first
   std::vector<ControlUse> uses;    ///< made in this moment
   Stamp captured_at;
+  std::vector<Track> tracks;  ///< where bodies are at captured_at, by the filter
   double detect_ms = 0, filter_ms = 0;
 };
-
-/// Whether a still body's pose has changed by more than it trembles (0.5 mm, 1 mrad).
-bool is_elsewhere(const Pose& before, const Pose& now);
 
 struct PerceptionOptions {
   /// Every how many images of a camera all of it is searched, a third as often while all markers of the

@@ -1,13 +1,9 @@
 #pragma once
 
 #include <array>
-#include <opencv2/core/mat.hpp>
 #include <string>
 
 #include "scene/actions.h"
-#include "session/device_health.h"
-#include "session/session.h"
-#include "session/telemetry.h"
 
 namespace limn::apps {
 
@@ -24,23 +20,12 @@ struct Invitation {
   }
 };
 
-/// What a session's loop and its operator's window use of the remote. remote/server.h implements it; the
-/// session knows no network. All calls belong to the session's thread and never wait.
+/// What the operator's window uses of the remote. remote/server.h implements it; the session knows no network.
+/// All calls belong to the session's thread and never wait.
 class RemoteLink {
  public:
   virtual ~RemoteLink() = default;
 
-  /// Sets the viewpoints of guests' tablets and does what guests ask for: some edits a call, the others wait
-  /// for the next one. A guest whose edit cannot be done gets the error as answer.
-  virtual void apply_requests(Session* session, Stamp at) = 0;
-  /// Sends the session's state to guests, as often as they need it.
-  virtual void publish_state(const Session& session,
-                             const Telemetry& telemetry,
-                             const DeviceHealth& health,
-                             Stamp at) = 0;
-  /// The image that a projector of the session's rig shows: what was composed, and the pairing code where one
-  /// is asked for.
-  virtual cv::Mat projector_image(Session* session, std::size_t projector) = 0;
   /// Shows the code that pairs for a role on a projector, from its next image on.
   virtual void show_code(const std::string& projector, scene::Role role) = 0;
   /// The projector that shows the code; empty: none.

@@ -3,41 +3,19 @@
 #include <algorithm>
 #include <chrono>
 
-#include "session/contact_sheet.h"
 #include "core/stopwatch.h"
-#include "session/swapped_cameras.h"
-#include "core/file.h"
 #include "core/log.h"
-#include "core/image_io.h"
 
 namespace limn::apps {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double k_compare_cameras_every_s = 2;
-constexpr double k_renew_every_s = 1;  // a context that was lost
-constexpr const char* k_pairings = "pairings.json";
-constexpr const char* k_deleted = "deleted";  // in the folder of looks
-
 // A turn backwards undoes what a turn forwards does.
 scene::Edit edit_of(const scene::Control& control, int steps) {
   const scene::Action* action = scene::find_action(control.action);
   LIMN_CHECK(action != nullptr);  // Session::create() has seen to it
   return scene::make_edit(steps > 0 ? action->id : action->opposite.value_or(action->id), control.slot);
-}
-
-// What is not there is not moved.
-Status move_look(const std::string& name, const fs::path& from, const fs::path& to) {
-  LIMN_TRY_STATUS(make_folder(to));
-  std::error_code failed;
-  for (const char* end : {".json", ".png"}) {
-    const fs::path file = from / (name + end);
-    if (fs::exists(file, failed)) fs::rename(file, to / file.filename(), failed);
-    if (failed)
-      return error("{}: could not be moved to {}: {}.", file.string(), to.string(), failed.message());
-  }
-  return {};
 }
 
 std::vector<std::string> variant_names(const scene::Slot& slot) {
@@ -92,18 +70,17 @@ Result<Session> Session::create(const SessionSetup& setup,
                    control.action);
   }
   LIMN_TRY(FrameComposer composer, FrameComposer::create(setup.scene, setup.rig, setup.paint));
-  Session out(setup, std::move(composer), telemetry, recorder);
-  out.keeps_looks_ = keeps_looks;
-  out.load_looks();
-  out.load_pairings();
+  Session out(setup, std::move(composer), telemetry, recorder, keeps_looks);
+  out.show_state_ = ShowStore::loaded(out.setup_.scene, std::move(out.show_state_));
   out.ask_units();
   return out;
 }
 
-Session::Session(SessionSetup setup, FrameComposer composer, Telemetry* telemetry, Recorder* recorder)
+Session::Session(
+    SessionSetup setup, FrameComposer composer, Telemetry* telemetry, Recorder* recorder, bool keeps_looks)
     : setup_(std::move(setup)),
       composer_(std::move(composer)),
-      painted_(composer_->painted()),
+      store_(keeps_looks),
       telemetry_(telemetry),
       recorder_(recorder),
       show_state_(scene::initial_show_state(setup_.scene)) {
@@ -112,32 +89,6 @@ Session::Session(SessionSetup setup, FrameComposer composer, Telemetry* telemetr
   const Eigen::Quaterniond world_from_camera = setup_.rig.cameras[0].imager_from_world.rotation.inverse();
   show_state_.d_up_world = world_from_camera * -Eigen::Vector3d::UnitY();
   show_state_.d_front_world = world_from_camera * -Eigen::Vector3d::UnitZ();
-}
-
-void Session::load_looks() {
-  std::error_code none;
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(setup_.scene.folder / "looks", none))
-    if (entry.path().extension() == ".json") files.push_back(entry.path());
-  std::sort(files.begin(), files.end());
-  for (const fs::path& file : files) {
-    Result<scene::Look> look = scene::load_look(file, setup_.scene);
-    if (look)
-      show_state_.looks.push_back(std::move(*look));
-    else
-      log_warning("live: {} The look is left alone.", look.message());
-  }
-}
-
-void Session::load_pairings() {
-  const fs::path file = setup_.scene.folder / k_pairings;
-  std::error_code none;
-  if (!fs::exists(file, none)) return;
-  auto paired = scene::with_pairings(file, setup_.scene, show_state_);
-  if (paired)
-    show_state_ = std::move(*paired);
-  else
-    log_warning("live: {} The scene's own markers carry the parts.", paired.message());
 }
 
 // Of parts that were dropped in, once each.
@@ -153,39 +104,23 @@ void Session::ask_units() {
 void Session::take(Percepts watched, std::size_t moments) {
   watched_ = std::move(watched);
   moments_ = moments;
+  prediction_ = predicted_at_capture(watched_, setup_.paint);
   show_state_ =
-      scene::without_moved_pins(setup_.scene, show_state_,
-                      scene::assign_tracks(setup_.scene, show_state_,
-                                     tracker::predicted(watched_.motions, watched_.captured_at,
-                                                        setup_.paint.prediction, setup_.paint.motion)));
+      scene::without_moved_pins(setup_.scene, show_state_, scene::assign_tracks(setup_.scene, show_state_, prediction_.at_capture));
   for (const ControlUse& use : watched_.uses) {
     const scene::Control& control = setup_.scene.controls[use.control];
     const Status done = edit(edit_of(control, use.steps), control.marker.text(), watched_.captured_at);
     if (!done) log_warning("live: {}: {}", control.marker.text(), done.message());
   }
   watched_.uses.clear();
-  tell_of_swapped_cameras();
+  const auto swapped =
+      swapped_.check(setup_.rig, scene::bodies(setup_.scene), watched_.detections, watched_.captured_at);
+  if (swapped) warn(watched_.captured_at, *swapped);
 }
 
 void Session::warn(Stamp at, const std::string& what) {
   if (telemetry_) telemetry_->note(at, what);
   log_warning("live: {}", what);
-}
-
-void Session::tell_of_swapped_cameras() {
-  if (told_swapped_ || setup_.rig.cameras.size() < 2 ||
-      seconds_between(compared_cameras_at_, watched_.captured_at) < k_compare_cameras_every_s)
-    return;
-  compared_cameras_at_ = watched_.captured_at;
-  const auto swapped =
-      swapped_cameras(setup_.rig, scene::bodies(setup_.scene), watched_.detections, watched_.captured_at);
-  if (!swapped) return;
-  told_swapped_ = true;
-  const std::string what = fmt::format(
-      "{} and {} seem to be exchanged: each sees what the other should. Exchange their cables, or their "
-      "addresses in the devices file.",
-      swapped->first, swapped->second);
-  warn(watched_.captured_at, what);
 }
 
 Status Session::edit(const scene::Edit& wanted, const std::string& source, Stamp at) {
@@ -196,7 +131,7 @@ Status Session::edit(const scene::Edit& wanted, const std::string& source, Stamp
       *marker = waiting.back().marker;  // the one that glows; it is recorded by its name
       edit.value = (*marker)->text();
     }
-  LIMN_TRY(scene::ShowState changed, scene::apply_edit(setup_.scene, show_state_, painted_.posed, command));
+  LIMN_TRY(scene::ShowState changed, scene::apply_edit(setup_.scene, show_state_, painted().posed, command));
   std::swap(show_state_, changed);
   last_edit_ = Edited{edit, source, last_edit_ ? last_edit_->count + 1 : 1};
   if (recorder_) recorder_->edited(edit, source, moments_);
@@ -204,22 +139,14 @@ Status Session::edit(const scene::Edit& wanted, const std::string& source, Stamp
   if (telemetry_)
     telemetry_->note(at, fmt::format("{}{}{}{}{} ({})", edit.action, edit.slot.empty() ? "" : " ", edit.slot,
                                      edit.value.empty() ? "" : " ", edit.value, source));
-  return keeps_looks_ ? keep(changed, command) : Status();
+  store_.keep(setup_.scene, changed, show_state_, command, [this] { return screen(scene::Screen::view); });
+  return {};
 }
 
 void Session::see(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at) {
   if (p_eye_world && !p_eye_world->allFinite()) return;
-  if (p_eye_world)
-    windows_.insert(guest);
-  else
-    windows_.erase(guest);
-  const bool counts = guest == show_state_.viewer || setup_.scene.find_tablet(guest);
-  const auto known = std::find_if(places_.begin(), places_.end(),
-                                  [&](const TabletViewpoint& place) { return place.guest == guest; });
-  const bool is_known = known != places_.end();
-  if (!counts || (!p_eye_world && !is_known)) return;
-  if (is_known) places_.erase(known);
-  if (p_eye_world) places_.push_back({guest, *p_eye_world, at});
+  const bool goes_by_it = guest == show_state_.viewer || setup_.scene.find_tablet(guest);
+  if (!tablets_.note(guest, p_eye_world, goes_by_it, at)) return;
   if (recorder_) recorder_->saw(guest, p_eye_world, at);
 }
 
@@ -243,7 +170,7 @@ Status Session::show(scene::Scene scene, Stamp at) {
   }
   if (recorder_) recorder_->shown(scene);
   if (telemetry_) telemetry_->note(at, "the scene's files have changed; it was loaded anew");
-  composer_ = std::move(composer);
+  composer_.replace(std::move(composer));
   setup_.scene = std::move(scene);
   ++scenes_;
   ask_units();
@@ -253,12 +180,11 @@ Status Session::show(scene::Scene scene, Stamp at) {
 Status Session::mend(Rig rig, Stamp at) {
   if (recorder_) rig = recorder_->mended(std::move(rig), moments_);
   LIMN_TRY(FrameComposer composer, FrameComposer::create(setup_.scene, rig, setup_.paint));
-  composer_ = std::move(composer);
+  composer_.replace(std::move(composer));
   setup_.rig = std::move(rig);
   ++scenes_;
-  told_drift_.reset();
-  told_swapped_ = false;
-  compared_cameras_at_ = at;
+  drift_.forget();
+  swapped_.begin_anew(at);
   return {};
 }
 
@@ -284,113 +210,44 @@ Status Session::show_if_whole(SceneNews news, Stamp at) {
   return {};
 }
 
-Status Session::keep(const scene::ShowState& before, const scene::Command& command) {
-  LIMN_TRY_STATUS(keep_pairings(before));
-  if (const auto* unit = std::get_if<scene::PartUnit>(&command.value))
-    LIMN_TRY_STATUS(keep_unit(setup_.scene.slots[command.slot], *unit));
-  return keep_looks(before);
+FrameInput Session::predict(const FrameTimes& times) {
+  prediction_.at_light = predicted_at_light(watched_, setup_.paint, times);
+  return {watched_, show_state_, times, scene::assign_tracks(setup_.scene, show_state_, prediction_.at_light),
+          tablets_.places()};
 }
 
-Status Session::keep_pairings(const scene::ShowState& before) {
-  const std::string text = scene::pairings_json(setup_.scene, show_state_);
-  if (text == scene::pairings_json(setup_.scene, before)) return {};
-  const fs::path file = setup_.scene.folder / k_pairings;
-  if (!text.empty()) return write_file(file, text);
-  std::error_code ignored;
-  fs::remove(file, ignored);
-  return {};
+const ComposedFrame& Session::compose(const FrameInput& input) {
+  const auto begun = std::chrono::steady_clock::now();
+  if (const auto news = composer_.compose(input, setup_)) warn(input.times.now, *news);
+  paint_ms_ = milliseconds_since(begun);
+  return painted();
 }
 
-// The part comes anew when SceneWatch sees the answer.
-Status Session::keep_unit(const scene::Slot& slot, const scene::PartUnit& unit) {
-  return write_file(setup_.scene.folder / "slots" / slot.name / "units.json",
-                    scene::units_json(slot, unit.part, unit.unit));
-}
-
-// Looks that were saved or deleted, on disk, and the page of all.
-Status Session::keep_looks(const scene::ShowState& before) {
-  const auto text_of = [](const scene::ShowState& show_state, const std::string& name) {
-    for (const scene::Look& look : show_state.looks)
-      if (look.name == name) return scene::look_json(look);
-    return std::string();
-  };
-  const fs::path folder = setup_.scene.folder / "looks";
-  bool has_changed = false;
-  for (const scene::Look& look : before.looks) {
-    if (!text_of(show_state_, look.name).empty()) continue;
-    has_changed = true;
-    LIMN_TRY_STATUS(move_look(look.name, folder, folder / k_deleted));
-  }
-  for (const scene::Look& look : show_state_.looks) {
-    const std::string text = scene::look_json(look);
-    if (text == text_of(before, look.name)) continue;
-    has_changed = true;
-    if (before.deleted_look && text == scene::look_json(*before.deleted_look) && !show_state_.deleted_look) {
-      LIMN_TRY_STATUS(move_look(look.name, folder / k_deleted, folder));
-      continue;
-    }
-    LIMN_TRY_STATUS(make_folder(folder));
-    LIMN_TRY_STATUS(write_file(folder / (look.name + ".json"), text));
-    const cv::Mat image = screen(scene::Screen::view);
-    if (!image.empty()) LIMN_TRY_STATUS(write_png(folder / (look.name + ".png"), image));
-  }
-  return has_changed ? write_contact_sheet(show_state_.looks, folder, folder / "looks.html") : Status();
+void Session::record_frame() {
+  const auto begun = std::chrono::steady_clock::now();
+  if (recorder_) recorder_->painted(painted(), moments_);
+  record_ms_ = recorder_ ? milliseconds_since(begun) : -1;
 }
 
 const ComposedFrame& Session::paint(Stamp now, Stamp shown_at) {
-  const auto begun = std::chrono::steady_clock::now();
-  if (composer_) composer_->paint(watched_, show_state_, now, shown_at, places_);
-  if (composer_ && !(drawing_.is_lost && drawing_.is_lost()))
-    painted_ = composer_->painted();
-  else
-    draw_anew(now, shown_at);
-  paint_ms_ = milliseconds_since(begun);
-  const auto recording = std::chrono::steady_clock::now();
-  if (recorder_) recorder_->painted(painted_, moments_);
-  record_ms_ = recorder_ ? milliseconds_since(recording) : -1;
-  return painted_;
-}
-
-// The GL context is gone, and what was drawn in it: the image before it stays until there is another.
-void Session::draw_anew(Stamp now, Stamp shown_at) {
-  if (!composer_ && seconds_between(renewed_at_, now) < k_renew_every_s) return;
-  const bool was_drawing = composer_.has_value();
-  composer_.reset();
-  renewed_at_ = now;
-  Status renewed = drawing_.renew();
-  if (renewed) {
-    auto composer = FrameComposer::create(setup_.scene, setup_.rig, setup_.paint);
-    if (composer) {
-      composer_ = std::move(*composer);
-      painted_ = composer_->paint(watched_, show_state_, now, shown_at, places_);
-    } else {
-      renewed = composer.error();
-    }
-  }
-  if (!renewed && !was_drawing) return;
-  const std::string what =
-      renewed ? "the graphics card lost what it drew; it was drawn anew"
-              : fmt::format(
-                    "the graphics card lost what it drew; the last picture stays until it can draw "
-                    "again: {}",
-                    renewed.message());
-  warn(now, what);
+  compose(predict({now, shown_at}));
+  record_frame();
+  return painted();
 }
 
 void Session::look_for_drift(Stamp now) {
-  if (!composer_) return;
-  composer_->look_for_drift(watched_);
-  const std::optional<Drift>& drift = composer_->drift();
-  const bool is_news =
-      drift.has_value() != told_drift_.has_value() || (drift && drift->devices != told_drift_->devices);
-  if (!is_news) return;
-  told_drift_ = drift;
-  const std::string what = drift ? sentence(*drift) : "all light is where the rig says again";
-  warn(now, what);
+  FrameComposer* composer = composer_.composer();
+  if (!composer) return;
+  composer->look_for_drift(watched_);
+  if (const auto news = drift_.news(composer->drift())) warn(now, *news);
+}
+
+void Session::tell_unwritten(Stamp at) {
+  for (const std::string& what : store_.failures()) warn(at, what);
 }
 
 ShownFrame Session::measured() const {
-  const ComposedFrame& painted = painted_;
+  const ComposedFrame& painted = composer_.painted();
   ShownFrame out{.captured_at = watched_.captured_at,
                  .shown_at = painted.shown_at,
                  .detect_ms = watched_.detect_ms,
@@ -405,11 +262,13 @@ ShownFrame Session::measured() const {
 }
 
 cv::Mat Session::free_surface(std::size_t projector) {
-  return composer_ && painted_.posed.world_from_prototype ? composer_->free_surface(projector) : cv::Mat();
+  FrameComposer* composer = composer_.composer();
+  return composer && painted().posed.world_from_prototype ? composer->free_surface(projector) : cv::Mat();
 }
 
 cv::Mat Session::screen(scene::Screen what) {
-  return composer_ ? composer_->screen(watched_, show_state_, what) : cv::Mat();
+  FrameComposer* composer = composer_.composer();
+  return composer ? composer->screen(watched_, prediction_.at_image, show_state_, what) : cv::Mat();
 }
 
 }  // namespace limn::apps

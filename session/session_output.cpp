@@ -72,6 +72,8 @@ void SessionOutput::add_poses(const ComposedFrame& painted) {
 
 Status SessionOutput::close(Session* session, bool as_json) {
   poses_.flush();
+  session->finish_writing();
+  session->tell_unwritten(session->painted().shown_at);
   const Status recorded = recorder_ ? recorder_->finish() : Status();
   nlohmann::ordered_json json = {{"schema", "limn.live/1"}};
   json.update(telemetry_.summary());

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "session/stillness.h"
+
 namespace limn::apps {
 namespace {
 

@@ -9,6 +9,8 @@
 namespace limn::apps {
 namespace {
 
+constexpr double k_compare_cameras_every_s = 2;
+
 // Residuals of what all cameras see of one body: those of cameras in their places, and of others.
 constexpr double k_right_px = 3, k_wrong_px = 12;
 
@@ -52,6 +54,29 @@ std::optional<std::pair<std::string, std::string>> swapped_cameras(
     }
   }
   return std::nullopt;
+}
+
+std::optional<std::string> SwappedCamerasCheck::check(
+    const Rig& rig,
+    std::span<const Body> bodies,
+    std::span<const std::vector<tracker::Detection>> detections,
+    Stamp captured_at) {
+  if (has_told_ || rig.cameras.size() < 2 ||
+      seconds_between(compared_at_, captured_at) < k_compare_cameras_every_s)
+    return std::nullopt;
+  compared_at_ = captured_at;
+  const auto swapped = swapped_cameras(rig, bodies, detections, captured_at);
+  if (!swapped) return std::nullopt;
+  has_told_ = true;
+  return fmt::format(
+      "{} and {} seem to be exchanged: each sees what the other should. Exchange their cables, or their "
+      "addresses in the devices file.",
+      swapped->first, swapped->second);
+}
+
+void SwappedCamerasCheck::begin_anew(Stamp at) {
+  has_told_ = false;
+  compared_at_ = at;
 }
 
 }  // namespace limn::apps

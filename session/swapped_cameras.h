@@ -22,4 +22,20 @@ std::optional<std::pair<std::string, std::string>> swapped_cameras(
     std::span<const std::vector<tracker::Detection>> detections,
     Stamp captured_at);
 
+/// Looks for swapped cameras while a session runs, now and then, until some were found.
+class SwappedCamerasCheck {
+ public:
+  /// What people are to be told, once.
+  std::optional<std::string> check(const Rig& rig,
+                                   std::span<const Body> bodies,
+                                   std::span<const std::vector<tracker::Detection>> detections,
+                                   Stamp captured_at);
+  /// The rig is another one from now on.
+  void begin_anew(Stamp at);
+
+ private:
+  Stamp compared_at_;
+  bool has_told_ = false;
+};
+
 }  // namespace limn::apps

@@ -3,22 +3,16 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
-#include <opencv2/core.hpp>
+#include <optional>
 
-#include "session/session_output.h"
 #include "session/frame_gate.h"
-#include "session/device_health.h"
-#include "session/live_recalibration.h"
-#include "session/scene_watch.h"
+#include "session/scene_files_client.h"
 #include "core/stopwatch.h"
 #include "wizard/capture/virtual_backend.h"
 #include "core/log.h"
 
 namespace limn::apps {
 namespace {
-
-constexpr auto k_errand_wait = std::chrono::milliseconds(10);  // for what a repair wants
 
 double seconds_of(Stamp at) { return seconds_between(Stamp{}, at); }
 
@@ -59,169 +53,151 @@ double placement_mm(const ComposedFrame& painted,
   return count > 0 ? 1e3 * std::sqrt(sum / count) : -1;
 }
 
-class VirtualLoop {
+class VirtualClock final : public FrameClock {
  public:
-  VirtualLoop(const std::atomic<bool>& is_ended,
-              sim::VirtualRig* rig,
-              ScriptedRoom* room,
-              Perception* perception,
-              Session* session,
-              SessionOutput* output,
-              OperatorConsole* console,
-              OscPort* osc,
-              RemoteLink* remote)
-      : is_ended_(is_ended),
-        rig_(rig),
-        room_(room),
-        perception_(perception),
-        session_(session),
-        output_(output),
-        console_(console),
-        osc_(osc),
-        remote_(remote),
-        files_(session->setup().scene.folder) {
-    for (const Imager& camera : rig->world().rig.cameras) {
-      cameras_.push_back(health_.add({camera.name, "camera"}));
-      gates_.emplace_back(camera.name, cv::Size(camera.width, camera.height), cameras_.back(), &health_);
-    }
-    for (const Imager& projector : session->setup().rig.projectors)
-      projectors_.push_back(health_.add({projector.name, "projector"}));
-  }
-
-  // False: the operator ends the session.
-  Result<bool> step() {
-    const Stamp exposed_at = rig_->next_exposure();
-    room_->set(seconds_of(exposed_at));
-    const std::vector<Frame> frames = exposed(exposed_at);
-    double frames_ms = 0;  // to hand over to the recording
-    if (!frames.empty()) {
-      const auto begun = std::chrono::steady_clock::now();
-      if (output_->recorder()) output_->recorder()->watched(frames);
-      frames_ms = milliseconds_since(begun);
-      session_->take(perception_->watch(frames), ++moments_);
-    }
-    play_edits(exposed_at);
-    session_->show_news(&files_, rig_->now());
-    if (osc_) osc_->hear(session_, &output_->telemetry(), rig_->now());
-    if (remote_) serve();
-    if (session_->take_recalibration_request()) {
-      LIMN_TRY(const bool should_continue, mend());
-      if (!should_continue) return false;
-    }
-    const ComposedFrame& painted = session_->paint(rig_->now(), shifted(rig_->now(), k_virtual_display_s));
-    for (std::size_t i = 0; i < painted.projectors.size(); ++i) {
-      if (!is_there(session_->setup().rig.projectors[i].name, projectors_[i], rig_->now())) continue;
-      LIMN_TRY(const Stamp shown_at, rig_->projector(static_cast<int>(i)).show(lit(painted, i)));
-      LIMN_CHECK(shown_at == painted.shown_at);
-    }
-    session_->look_for_drift(rig_->now());
-    if (osc_) osc_->tell(*session_, rig_->now());
-    if (remote_) serve();  // what came while it painted need not wait for the next exposure
-    ShownFrame shown = session_->measured();
-    if (shown.record_ms >= 0) shown.record_ms += frames_ms;
-    shown.missed = static_cast<int>(rig_->world().rig.cameras.size() - frames.size());
-    shown.placement_mm = placement_mm(painted, *session_, *room_, rig_->world());
-    const auto begun = std::chrono::steady_clock::now();
-    const bool wants_screen = console_ && console_->is_due();
-    const cv::Mat screen = wants_screen ? session_->screen() : cv::Mat();
-    shown.screen_ms = wants_screen ? milliseconds_since(begun) : -1;
-    output_->shown(shown, painted);
-    if (!console_) return true;
-    console_->shown(shown);
-    return console_->serve(session_, &output_->telemetry(), health_, screen, rig_->now());
+  explicit VirtualClock(const sim::VirtualRig* rig) : rig_(rig) {}
+  Stamp now() const override { return rig_->now(); }
+  Result<std::optional<FrameTimes>> next_frame() override {
+    return std::optional(FrameTimes{rig_->now(), shifted(rig_->now(), k_virtual_display_s)});
   }
 
  private:
-  // The clock goes on while patterns are shown and stands while the rest is computed; the room stays as it
-  // is. People are answered. False: somebody ends the session.
-  Result<bool> mend() {
-    LIMN_TRY(const std::filesystem::path folder, recalibration_folder(output_->out()));
-    const Plan no_board{};
-    LiveRecalibration repair(session_->setup().rig, folder, [&](ImageWriter* writer) {
-      Surroundings around = virtual_backend(no_board, rig_, writer);
-      for (std::size_t i = 0; i < projectors_.size(); ++i)
-        around.use_latency(static_cast<int>(i), k_virtual_display_s);
-      return around;
-    });
-    for (;;) {
-      repair.serve(k_errand_wait);
-      session_->set_recalibration_progress(repair.words());
-      if (osc_) osc_->hear(session_, &output_->telemetry(), rig_->now());
-      if (remote_) serve();
-      const bool is_left = console_ && !console_->serve(session_, &output_->telemetry(), health_, {}, rig_->now());
-      if (is_left || is_ended_) return false;
-      if (const auto checked = repair.take()) {
-        apply_recalibration(*checked, folder, rig_->now(), perception_, session_);
-        return true;
-      }
+  const sim::VirtualRig* rig_;
+};
+
+// Each perception is of the room's next exposure; edits are the script's.
+class VirtualSource final : public FrameSource {
+ public:
+  VirtualSource(double end_s,
+                sim::VirtualRig* rig,
+                ScriptedRoom* room,
+                Perception* perception,
+                Recorder* recorder,
+                DeviceHealth* health)
+      : end_s_(end_s), rig_(rig), room_(room), perception_(perception), recorder_(recorder), health_(health) {
+    for (const Imager& camera : rig->world().rig.cameras) {
+      cameras_.push_back(health->add({camera.name, "camera"}));
+      gates_.emplace_back(camera.name, cv::Size(camera.width, camera.height), cameras_.back(), health);
     }
   }
 
-  void serve() {
-    remote_->apply_requests(session_, rig_->now());
-    remote_->publish_state(*session_, output_->telemetry(), health_, rig_->now());
+  bool is_over() const override { return !is_paused_ && seconds_of(rig_->next_exposure()) > end_s_; }
+
+  Result<Perceived> perceive() override {
+    exposed_at_ = rig_->next_exposure();
+    room_->set(seconds_of(exposed_at_));
+    const std::vector<Frame> frames = exposed();
+    Perceived out;
+    out.missed = static_cast<int>(rig_->world().rig.cameras.size() - frames.size());
+    if (frames.empty()) return out;
+    const auto begun = std::chrono::steady_clock::now();
+    if (recorder_) recorder_->watched(frames);
+    out.record_ms = milliseconds_since(begun);
+    out.watched = perception_->watch(frames);
+    out.moments = ++moments_;
+    return out;
   }
 
-  cv::Mat lit(const ComposedFrame& painted, std::size_t projector) {
-    return remote_ ? remote_->projector_image(session_, projector) : painted.projectors[projector];
+  Status edit(Session* session) override {
+    const std::vector<Script::Action>& edits = room_->script().edits;
+    for (; edited_ < edits.size() && edits[edited_].at_s <= seconds_of(exposed_at_); ++edited_) {
+      const Status done = session->edit(edits[edited_].edit, "script", exposed_at_);
+      if (!done) log_warning("live: {:.2f} s: {}", seconds_of(exposed_at_), done.message());
+    }
+    return {};
   }
 
+  // While it is paused the session is not over, however late it is.
+  void pause(bool is_paused) { is_paused_ = is_paused; }
+
+ private:
   // What is taken of this moment's images.
-  std::vector<Frame> exposed(Stamp at) {
+  std::vector<Frame> exposed() {
     std::vector<int> plugged;
     const std::vector<Imager>& cameras = rig_->world().rig.cameras;
     for (std::size_t i = 0; i < cameras.size(); ++i)
-      if (room_->script().is_plugged(cameras[i].name, seconds_of(at)))
+      if (room_->script().is_plugged(cameras[i].name, seconds_of(exposed_at_)))
         plugged.push_back(static_cast<int>(i));
       else
-        health_.fails(cameras_[i], "");
+        health_->fails(cameras_[i], "");
     std::vector<Frame> exposed = rig_->expose(plugged), taken;
     for (std::size_t k = 0; k < plugged.size(); ++k) {
       FrameGate& gate = gates_[static_cast<std::size_t>(plugged[k])];
-      auto frame = gate.taken(room_->sent(std::move(exposed[k]), seconds_of(at)), rig_->now());
+      auto frame = gate.taken(room_->sent(std::move(exposed[k]), seconds_of(exposed_at_)), rig_->now());
       if (frame) taken.push_back(std::move(*frame));
     }
-    tell_of_devices(at);
     return taken;
   }
 
-  bool is_there(const std::string& projector, std::size_t number, Stamp at) {
-    const bool is = room_->script().is_plugged(projector, seconds_of(at));
-    is ? health_.works(number) : health_.fails(number, "");
-    tell_of_devices(at);
-    return is;
-  }
-
-  // Of those that came or went, or whose clocks stepped.
-  void tell_of_devices(Stamp at) {
-    for (const std::string& what : health_.news()) {
-      output_->telemetry().note(at, what);
-      log_warning("live: {:.2f} s: {}", seconds_of(at), what);
-    }
-  }
-
-  void play_edits(Stamp at) {
-    const std::vector<Script::Action>& edits = room_->script().edits;
-    for (; played_ < edits.size() && edits[played_].at_s <= seconds_of(at); ++played_) {
-      const Status done = session_->edit(edits[played_].edit, "script", at);
-      if (!done) log_warning("live: {:.2f} s: {}", seconds_of(at), done.message());
-    }
-  }
-
-  const std::atomic<bool>& is_ended_;
+  double end_s_;
   sim::VirtualRig* rig_;
   ScriptedRoom* room_;
   Perception* perception_;
-  Session* session_;
-  SessionOutput* output_;
-  OperatorConsole* console_;
-  OscPort* osc_;
-  RemoteLink* remote_;
-  SceneWatch files_;
-  DeviceHealth health_;
-  std::vector<std::size_t> cameras_, projectors_;  // as health_ calls them
-  std::vector<FrameGate> gates_;              // of cameras_
-  std::size_t moments_ = 0, played_ = 0;
+  Recorder* recorder_;
+  DeviceHealth* health_;
+  std::vector<std::size_t> cameras_;   // as health_ calls them
+  std::vector<FrameGate> gates_;  // of cameras_
+  Stamp exposed_at_;
+  std::size_t moments_ = 0, edited_ = 0;
+  bool is_paused_ = false;
+};
+
+// The virtual projectors, of which the script may unplug some.
+class VirtualSink final : public FrameSink {
+ public:
+  VirtualSink(sim::VirtualRig* rig, const ScriptedRoom* room, const Session* session, DeviceHealth* health)
+      : rig_(rig), room_(room), session_(session), health_(health) {
+    for (const Imager& projector : session->setup().rig.projectors)
+      projectors_.push_back(health->add({projector.name, "projector"}));
+  }
+
+  Status show(const ComposedFrame& painted, const std::vector<cv::Mat>& light) override {
+    for (std::size_t i = 0; i < light.size(); ++i) {
+      if (!is_there(i)) continue;
+      LIMN_TRY(const Stamp shown_at, rig_->projector(static_cast<int>(i)).show(light[i]));
+      LIMN_CHECK(shown_at == painted.shown_at);
+    }
+    return {};
+  }
+
+  double placement_mm(const ComposedFrame& painted) const override {
+    return apps::placement_mm(painted, *session_, *room_, rig_->world());
+  }
+
+ private:
+  bool is_there(std::size_t projector) {
+    const std::string& name = session_->setup().rig.projectors[projector].name;
+    const bool is = room_->script().is_plugged(name, seconds_of(rig_->now()));
+    is ? health_->works(projectors_[projector]) : health_->fails(projectors_[projector], "");
+    return is;
+  }
+
+  sim::VirtualRig* rig_;
+  const ScriptedRoom* room_;
+  const Session* session_;
+  DeviceHealth* health_;
+  std::vector<std::size_t> projectors_;  // as health_ calls them
+};
+
+// The clock goes on while patterns are shown and stands while the rest is computed; the room stays as it is.
+class VirtualCapture final : public CaptureDevices {
+ public:
+  VirtualCapture(sim::VirtualRig* rig, VirtualSource* source) : rig_(rig), source_(source) {}
+
+  Surroundings surroundings(ImageWriter* writer) override {
+    Surroundings around = virtual_backend(no_board_, rig_, writer);
+    for (std::size_t i = 0; i < rig_->world().rig.projectors.size(); ++i)
+      around.use_latency(static_cast<int>(i), k_virtual_display_s);
+    return around;
+  }
+  void pause_perception(Session*) override { source_->pause(true); }
+  void resume_perception() override { source_->pause(false); }
+  bool waits_for_result() const override { return true; }
+
+ private:
+  sim::VirtualRig* rig_;
+  VirtualSource* source_;
+  const Plan no_board_{};
 };
 
 }  // namespace
@@ -230,21 +206,21 @@ Status play_virtually(double end_s,
                       const std::atomic<bool>& is_ended,
                       sim::VirtualRig* rig,
                       ScriptedRoom* room,
-                      Perception* perception,
-                      Session* session,
-                      SessionOutput* output,
-                      OperatorConsole* console,
-                      OscPort* osc,
-                      RemoteLink* remote) {
-  VirtualLoop loop(is_ended, rig, room, perception, session, output, console, osc, remote);
+                      const SessionParts& parts) {
+  DeviceHealth health;
+  VirtualClock clock(rig);
+  VirtualSource source(end_s, rig, room, &parts.perception, parts.output.recorder(), &health);
+  VirtualSink sink(rig, room, &parts.session, &health);
+  VirtualCapture capture(rig, &source);
+  SceneFilesClient files(parts.session.setup().scene.folder);
+  SessionParts with_own = parts;
+  with_own.clients.insert(with_own.clients.begin(), &files);
+  FrameLoop loop(std::move(with_own), {clock, source, sink, health, &capture});
   std::optional<Progress> progress;
   if (std::isfinite(end_s)) progress.emplace("live", static_cast<int>(std::ceil(end_s)));
-  while (!is_ended && seconds_of(rig->next_exposure()) <= end_s) {
-    LIMN_TRY(const bool should_continue, loop.step());
+  return loop.run(is_ended, [&] {
     if (progress) progress->step(static_cast<int>(seconds_of(rig->now())));
-    if (!should_continue) break;
-  }
-  return {};
+  });
 }
 
 }  // namespace limn::apps

@@ -5,7 +5,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "validate/metrics.h"
-#include "projector/shadow_detector.h"
+#include "session/shadow_watch.h"
+#include "session/projection_history.h"
 #include "projector/renderer.h"
 #include "sim/sensor_model.h"
 #include "sim/trace.h"
@@ -13,8 +14,8 @@
 namespace limn::apps {
 namespace {
 
-constexpr int k_side_px = 8;      // of the patches
-constexpr int k_dark_frames = 2;  // at first: a session begins without parts
+constexpr double k_period_s = 1 / 30.0;  // from one frame's light to the next one's
+constexpr int k_dark_frames = 2;         // at first: a session begins without parts
 constexpr int k_still_frames = 30;
 constexpr int k_stay_frames = 6, k_move_frames = 5, k_gone_frames = 6;
 constexpr int k_allowed_frames = 3;    // from a shadow to light
@@ -78,18 +79,16 @@ class Session {
     add_responses(world_, &rig);
     LIMN_TRY(renderer_, projector::Renderer::create(scene, rig));
     LIMN_TRY_STATUS(renderer_->set_light({.compensation = projector::Compensation::geometry}));
-    arriving_.emplace(rig);
-    for (std::size_t i = 0; i < rig.cameras.size(); ++i)
-      arriving_->place(i, renderer_->illuminated_patches(i, posed_, k_side_px));
+    shadows_.emplace(rig);
     const Traced free = traced(std::nullopt);
-    const std::vector<cv::Mat> black(rig.projectors.size());
-    for (int k = 0; k < k_dark_frames; ++k) watch(free, black);
+    shown_.resize(rig.projectors.size());
+    for (int k = 0; k < k_dark_frames; ++k) monitor(free);
     draw();
     first_ = shown_;
     before_ = light(free, shown_);
     ShadowFillReading reading;
     for (int k = 0; k < k_still_frames; ++k) {
-      watch(free, shown_);
+      monitor(free);
       draw();
       reading.still_levels = std::max(reading.still_levels, worst_difference(shown_, first_));
     }
@@ -135,16 +134,21 @@ class Session {
     return out;
   }
 
-  void watch(const Traced& traced, const std::vector<cv::Mat>& shown) {
+  // The frame loop's steps around what is shown, with every camera's frame of it: shadows are found as in a
+  // session.
+  void monitor(const Traced& traced) {
+    const Stamp at = shifted(Stamp{}, static_cast<double>(frames_ + 1) * k_period_s);
+    history_.add(shown_, at);
+    Percepts watched;
     for (std::size_t i = 0; i < traced.cameras.size(); ++i)
-      arriving_->see(i, sim::photograph(world_, traced.cameras[i], shown, seed_ + frames_), shown);
+      watched.frames.push_back({world_.rig.cameras[i].name,
+                                sim::photograph(world_, traced.cameras[i], shown_, seed_ + frames_), at});
+    shadows_->look(watched, posed_, history_, &*renderer_);
     ++frames_;
   }
 
   void draw() {
     shown_.clear();
-    for (std::size_t i = 0; i < world_.rig.projectors.size(); ++i)
-      renderer_->set_occlusion(i, arriving_->map(i));
     for (std::size_t i = 0; i < world_.rig.projectors.size(); ++i)
       shown_.push_back(renderer_->projector_image(i, posed_, viewer_));
   }
@@ -226,7 +230,7 @@ class Session {
       reading->share = std::min(reading->share, back_share(lost, actual, old));
     reading->flash = std::max(reading->flash, frame.flash);
     reading->frames.push_back(frame);
-    watch(traced, shown_);
+    monitor(traced);
     draw();
   }
 
@@ -263,7 +267,8 @@ class Session {
   std::uint64_t seed_;
   std::uint64_t frames_ = 0;
   std::optional<projector::Renderer> renderer_;
-  std::optional<projector::ShadowDetector> arriving_;
+  ProjectionHistory history_;
+  std::optional<ShadowWatch> shadows_;
   std::vector<cv::Mat> shown_, first_;
   cv::Mat before_;
   cv::Mat since_;  // CV_32S: frames that a pixel has been in the shadow

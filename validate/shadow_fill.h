@@ -40,7 +40,7 @@ struct ShadowFillReading {
   cv::Mat before, lost, refilled;  ///< from the viewer's eye, linear light (CV_32FC3)
 };
 
-/// Plays a session on the virtual rig: a renderer and projector::ShadowDetector in a loop with every camera's
+/// Plays a session on the virtual rig: a renderer and a session's ShadowWatch in a loop with every camera's
 /// noisy frames of `world`, one frame from light to light. 30 frames without a hand; the hand suddenly there,
 /// staying, moving, suddenly gone. Light is what the projectors' light makes of the prototype in the viewer's
 /// image. Error where the hand shades nothing that others could light.

@@ -16,7 +16,8 @@
 #include <set>
 #include <thread>
 
-#include "session/overlays.h"
+#include "session/grid_and_split.h"
+#include "session/stillness.h"
 #include "core/stopwatch.h"
 #include "core/screen_encoding.h"
 #include "remote/tablet/tablet_localizer.h"
@@ -30,7 +31,6 @@
 #include "projector/composite_policy.h"
 #include "scene/posed_scene.h"
 #include "tracker/family.h"
-#include "tracker/predict.h"
 
 namespace limn::apps {
 namespace {
@@ -52,7 +52,7 @@ struct Known {
   std::shared_ptr<const Rig> rig;
   int scenes = 0;
   scene::ShowState show_state;
-  std::vector<tracker::BodyFilter> motions;
+  std::vector<Track> tracks;  // at the moment of `room`
   ComposeOptions paint;
   Frame room;
   std::string follows;  // the guest whom light shows `view` parts to
@@ -79,9 +79,7 @@ std::vector<Body> bodies_of(const scene::Scene& scene, const scene::ShowState& s
 
 // What carries what, as of the room's newest image.
 std::vector<Track> tracks_of(const Known& known) {
-  return scene::assign_tracks(
-      *known.scene, known.show_state,
-      tracker::predicted(known.motions, known.room.captured_at, known.paint.prediction, known.paint.motion));
+  return scene::assign_tracks(*known.scene, known.show_state, known.tracks);
 }
 
 bool is_in_image(const Imager& view, const scene::Scene& scene, const scene::PosedScene& posed) {
@@ -137,7 +135,7 @@ struct TabletView::Impl {
   std::deque<Watching> watching;                         // the one that asked last at the end
   Sides room{{.is_viewer = true}, {.is_viewer = true}};  // as the room's screen
   Eigen::AlignedBox3d prototype_box;                     // its own frame
-  std::optional<Pose> held;  // world_from_prototype that is drawn by, see steadied()
+  std::optional<Pose> held;  // world_from_prototype that is drawn by (stillness.h)
 
   std::thread thread;
 
@@ -148,7 +146,6 @@ struct TabletView::Impl {
   void keep(Watching* device);
   Seen seen_by(const Guest& guest, const Known& known);
   Seen seen_in_room(const Known& known);
-  Pose steadied(std::vector<Track>* tracks);
   Watching& watching_of(const std::string& device);
   Status follow_scene(const Known& known);
   void measure(const scene::Scene& scene);
@@ -282,22 +279,6 @@ TabletView::Impl::Watching& TabletView::Impl::watching_of(const std::string& dev
   return watching.back();
 }
 
-// Turns all bodies together so that the prototype stands exactly where it did while it but trembles, and what
-// projectors see of it need not be drawn anew for each image. What is drawn over an image goes by where
-// bodies are to each other and to its camera, so nothing moves in it. Returns turned_from_world.
-Pose TabletView::Impl::steadied(std::vector<Track>* tracks) {
-  const auto prototype = std::find_if(tracks->begin(), tracks->end(), [](const Track& track) {
-    return track.body == "prototype" && track.tracking != TrackingState::lost;
-  });
-  if (prototype == tracks->end()) return Pose();
-  const Pose world_from_prototype = prototype->world_from_body;
-  if (!held || is_elsewhere(*held, world_from_prototype)) held = world_from_prototype;
-  const Pose turned_from_world = *held * world_from_prototype.inverse();
-  for (Track& track : *tracks) track.world_from_body = turned_from_world * track.world_from_body;
-  prototype->world_from_body = *held;  // to the last bit
-  return turned_from_world;
-}
-
 // Parts over an image with another look left of the split, if there is one.
 cv::Mat TabletView::Impl::drawn(const Imager& camera,
                               const cv::Mat& image,
@@ -362,7 +343,7 @@ TabletView::Seen TabletView::Impl::seen_by(const Guest& guest, const Known& know
 
   const Stamp tracking = std::chrono::steady_clock::now();
   std::vector<Track> tracks = tracks_of(known);
-  const Pose turned_from_world = steadied(&tracks);
+  const Pose turned_from_world = steadied(&held, &tracks);
   Watching& device = watching_of(guest.window.device);
   const TabletPose observation = device.eye.look(*image, bodies_of(*known.scene, known.show_state), tracks);
   const double track_ms = milliseconds_since(tracking);
@@ -418,7 +399,7 @@ TabletView::Seen TabletView::Impl::seen_in_room(const Known& known) {
     cv::resize(image, image, size, 0, 0, cv::INTER_AREA);
   }
   std::vector<Track> tracks = tracks_of(known);
-  camera.imager_from_world = camera.imager_from_world * steadied(&tracks).inverse();
+  camera.imager_from_world = camera.imager_from_world * steadied(&held, &tracks).inverse();
   const scene::PosedScene posed = scene::compose_scene(*known.scene, known.show_state, tracks);
   const cv::Mat out = drawn(camera, image, posed, tracks, known, TabletViewMode::as_screen, &room);
   return {nlohmann::json{{"why", ""}}.dump(), device::encode_jpeg(out, k_quality)};
@@ -469,11 +450,10 @@ void TabletView::know(const Session& session) {
                                              .rig = impl_->told_rig,
                                              .scenes = session.scenes(),
                                              .show_state = session.show_state(),
-                                             .motions = watched.motions,
+                                             .tracks = session.prediction().at_image,
                                              .paint = session.setup().paint,
                                              .room = watched.frames.empty() ? Frame{} : watched.frames[0],
                                              .follows = session.painted().follows});
-  if (known->room.captured_at == Stamp{}) known->room.captured_at = watched.captured_at;
   const std::lock_guard lock(impl_->mutex);
   impl_->known = std::move(known);
 }

@@ -55,6 +55,12 @@ class AServedSession : public AServer {
   }
   void TearDown() override { server_.reset(); }
 
+  // What a projector shows, as the frame loop hands it over.
+  cv::Mat lit_by(std::size_t projector) {
+    return with_overlays(session_->painted(), session_->setup().rig,
+                         server_->overlays(&*session_))[projector];
+  }
+
   void turn() {
     at_ = shifted(at_, 0.01);
     server_->apply_requests(&*session_, at_);
@@ -318,18 +324,18 @@ TEST_F(AServedSession, ProjectsACodeForAWhile) {
   session_->paint(at_, at_);
   const cv::Mat painted = session_->painted().projectors[0].clone();
   const auto is_painted = [&](const cv::Mat& lit) { return cv::norm(lit, painted, cv::NORM_INF) == 0; };
-  EXPECT_TRUE(is_painted(server_->projector_image(&*session_, 0)));
+  EXPECT_TRUE(is_painted(lit_by(0)));
   server_->show_code("projector0", Role::work);
   EXPECT_EQ(server_->code_projector(), "projector0");
   ASSERT_TRUE(session_->edit({"blackout", "", "on"}, "test", at_));
-  EXPECT_TRUE(is_painted(server_->projector_image(&*session_, 0))) << "under a blackout";
+  EXPECT_TRUE(is_painted(lit_by(0))) << "under a blackout";
   ASSERT_TRUE(session_->edit({"blackout", "", "off"}, "test", at_));
   // No prototype is seen: after a while it is in the image's middle.
-  cv::Mat lit = server_->projector_image(&*session_, 0);
+  cv::Mat lit = lit_by(0);
   EXPECT_TRUE(is_painted(lit));
   for (const auto asked = Clock::now(); is_painted(lit) && seconds_since(asked) < 5;) {
     std::this_thread::sleep_for(50ms);
-    lit = server_->projector_image(&*session_, 0);
+    lit = lit_by(0);
   }
   const auto begun = Clock::now();
   cv::Mat sign;
@@ -338,7 +344,7 @@ TEST_F(AServedSession, ProjectsACodeForAWhile) {
   const cv::Rect middle({(lit.cols - sign.cols) / 2, (lit.rows - sign.rows) / 2}, sign.size());
   EXPECT_LE(cv::norm(lit(middle), sign, cv::NORM_INF), 1);
   EXPECT_TRUE(is_painted(session_->painted().projectors[0])) << "what is recorded and told";
-  EXPECT_EQ(cv::norm(server_->projector_image(&*session_, 1), session_->painted().projectors[1], cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(lit_by(1), session_->painted().projectors[1], cv::NORM_INF), 0);
   play_while([&] {
     const std::string looks = token_of(Role::look, "Ben"), works = token_of(Role::work, "Ann");
     std::this_thread::sleep_for(100ms);
@@ -365,7 +371,7 @@ TEST_F(AServedSession, ProjectsACodeForAWhile) {
   });
   EXPECT_LT(seconds_since(begun), 1.4) << "too slow a machine for this test";
   std::this_thread::sleep_until(begun + options.code_lasts);
-  EXPECT_TRUE(is_painted(server_->projector_image(&*session_, 0)));
+  EXPECT_TRUE(is_painted(lit_by(0)));
   EXPECT_EQ(server_->code_projector(), "");
 }
 
@@ -539,7 +545,7 @@ TEST_F(AServedSession, UnderAttackMemoryIsBoundedAndItsImagesGoOn) {
       const ComposedFrame& painted = session_->paint(at_, shifted(at_, 0.04));
       EXPECT_EQ(painted.painted_at, at_);
       for (std::size_t i = 0; i < painted.projectors.size(); ++i)
-        EXPECT_TRUE(rig.projector(static_cast<int>(i)).show(server_->projector_image(&*session_, i)));
+        EXPECT_TRUE(rig.projector(static_cast<int>(i)).show(lit_by(i)));
       out.all_ms.push_back(1e3 * seconds_since(frame));
       out.guests_ms.push_back(guests_ms);
       out.most_mib = std::max(out.most_mib, resident_mib());

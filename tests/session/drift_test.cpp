@@ -56,7 +56,8 @@ std::vector<RendererInput> found(const json& events, double seconds) {
     room.set(seconds_between(Stamp{}, rig.next_exposure()));
     const int camera = 0;
     const Percepts& watched = perception.watch(rig.expose(std::span(&camera, 1)));
-    const ComposedFrame& painted = composer.paint(watched, show_state, rig.now(), shifted(rig.now(), 0.033));
+    const ComposedFrame& painted = composer.compose(
+        frame_input(setup.scene, {}, watched, show_state, {rig.now(), shifted(rig.now(), 0.033)}));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i)
       EXPECT_TRUE(rig.projector(static_cast<int>(i)).show(painted.projectors[i]));
     composer.look_for_drift(watched);

@@ -44,7 +44,7 @@ TEST(FrameComposer, APrototypeThatStandsStillIsShownWhereItWas) {
     const int camera = 0;
     const Percepts& watched = perception.watch(rig.expose(std::span(&camera, 1)));
     const Stamp shown_at = shifted(rig.now(), 0.033);
-    const ComposedFrame& painted = composer.paint(watched, show_state, rig.now(), shown_at);
+    const ComposedFrame& painted = composer.compose(frame_input(scene, {}, watched, show_state, {rig.now(), shown_at}));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i)
       EXPECT_TRUE(rig.projector(static_cast<int>(i)).show(painted.projectors[i]));
     Place place{painted.posed.world_from_prototype.value_or(Pose{}), {}};

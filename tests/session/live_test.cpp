@@ -309,8 +309,7 @@ TEST(Live, EachScreenShowsWhatWasChosenForIt) {
     devices.screens.push_back(std::move(canvas));
   }
   const std::atomic<bool> is_ended = false;
-  const Status played =
-      play_on_devices(&devices, 1.5, is_ended, &*perception, &*session, &*output, nullptr, nullptr, nullptr);
+  const Status played = play_on_devices(&devices, 1.5, is_ended, {*perception, *session, *output});
   ASSERT_TRUE(played) << played.message();
   for (const Canvas* screen : screens) ASSERT_FALSE(screen->shown.empty()) << screen->name();
   EXPECT_EQ(cv::norm(screens[0]->shown, seen, cv::NORM_INF), 0);

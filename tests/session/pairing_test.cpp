@@ -426,6 +426,7 @@ TEST_F(ASession, AsksForTheUnitOfWhatIsDroppedAndTakesTheAnswer) {
       read_file(page).value().find("new part of slot 'mirror' is taken to be in m, 149 mm long. Is it?"),
       std::string::npos);
   edit("units", "mirror", "new part cm");
+  session_->finish_writing();
   scene = scene::load_scene(folder_ / "door");
   ASSERT_TRUE(scene) << scene.message();
   EXPECT_NEAR(long_side(*scene) / guessed, 0.01, 1e-5);

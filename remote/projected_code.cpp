@@ -1,0 +1,105 @@
+#include "remote/projected_code.h"
+
+#include <algorithm>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+
+#include "remote/pairing_overlay.h"
+
+namespace limn::apps {
+namespace {
+
+constexpr double k_code_share = 0.5;  // of a projector's shorter side, without a prototype
+constexpr std::chrono::milliseconds k_between_searches{300}, k_longest_search{2000};
+constexpr int k_pin_px = 360;            // a PIN's sign, as it is kept
+constexpr double k_least_pin_px = 50;    // in the projector's image
+constexpr int k_dark = 8;                // display value
+constexpr int k_code_module_px = 12;     // of the code, as it is kept
+constexpr double k_least_module_px = 2;  // of the projector's image, that a phone still reads
+constexpr double k_code_light = 0.75;    // display value: white paper would outshine all else
+
+// Where the prototype is free of markers and, if there is room, of parts.
+std::optional<OverlayPlace> free_place(Session* session,
+                                    std::size_t projector,
+                                    cv::Size shape,
+                                    double least_px) {
+  cv::Mat points = session->free_surface(projector);
+  if (points.empty() || shape.empty()) return std::nullopt;
+  const Rig& rig = session->setup().rig;
+  const Imager& imager = rig.projectors[projector];
+  const Pose& world_from_prototype = *session->painted().posed.world_from_prototype;
+  const Eigen::Vector3d d_up_world =
+      (rig.cameras.empty() ? imager : rig.cameras[0]).imager_from_world.rotation.inverse() *
+      Eigen::Vector3d(0, -1, 0);
+  const auto place = [&](const cv::Mat& free) {
+    return overlay_place(imager, world_from_prototype, free,
+                      world_from_prototype.rotation.inverse() * d_up_world, shape, least_px);
+  };
+  cv::Mat parts, free = points.clone();
+  cv::cvtColor(session->painted().projectors[projector], parts, cv::COLOR_BGR2GRAY);
+  free.setTo(cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()), parts > k_dark);
+  const auto beside = place(free);
+  return beside ? beside : place(points);
+}
+
+}  // namespace
+
+void ProjectedCode::show(const std::string& projector,
+                         Text text,
+                         std::function<void(Clock::time_point until)> begun) {
+  end();
+  projector_ = projector;
+  text_ = std::move(text);
+  begun_ = std::move(begun);
+}
+
+void ProjectedCode::end() {
+  projector_.clear();
+  asked_ = searched_ = until_ = std::nullopt;
+  sign_ = cv::Mat();
+  place_.reset();
+}
+
+// It begins with a place for it; after a while without one, too: the prototype may not be seen.
+bool ProjectedCode::has_begun(Session* session, std::size_t projector) {
+  if (until_) return true;
+  const auto now = Clock::now();
+  if (!asked_) {
+    asked_ = now;
+    sign_ = k_code_light * pairing_code_image(text_.url, text_.pin, text_.role, k_code_module_px);
+  }
+  if (searched_ && now - *searched_ < k_between_searches) return false;
+  searched_ = now;
+  place_ = free_place(session, projector, sign_.size(), k_least_module_px * sign_.cols / k_code_module_px);
+  if (!place_ && now - *asked_ < k_longest_search) return false;
+  if (!place_) {
+    const cv::Mat smaller = k_code_light * pin_image(text_.pin, text_.role, k_pin_px);
+    place_ = free_place(session, projector, smaller.size(), k_least_pin_px);
+    if (place_) sign_ = smaller;
+  }
+  until_ = now + duration_;
+  begun_(*until_);
+  return true;
+}
+
+std::vector<Overlay> ProjectedCode::overlays(Session* session) {
+  const std::vector<Imager>& projectors = session->setup().rig.projectors;
+  const auto imager = std::find_if(projectors.begin(), projectors.end(),
+                                   [&](const Imager& p) { return p.name == projector_; });
+  if (imager == projectors.end() || session->show_state().blackout) return {};
+  const auto projector = static_cast<std::size_t>(imager - projectors.begin());
+  if (!has_begun(session, projector)) return {};
+  if (Clock::now() >= *until_) end();
+  if (sign_.empty()) return {};
+  SignOverlay overlay{projector, sign_, place_};
+  if (!place_) {
+    const int module_px = static_cast<int>(k_code_share * std::min(imager->width, imager->height) *
+                                           k_code_module_px / sign_.cols);
+    if (module_px < 1) return {};
+    const double scale = 1.0 * module_px / k_code_module_px;
+    cv::resize(sign_, overlay.image, {}, scale, scale, cv::INTER_AREA);
+  }
+  return {overlay};
+}
+
+}  // namespace limn::apps

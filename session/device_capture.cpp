@@ -1,0 +1,93 @@
+#include "session/device_capture.h"
+
+#include <algorithm>
+
+namespace limn::apps {
+namespace {
+
+constexpr auto k_grab_wait =
+    std::chrono::milliseconds(50);            // for a frame, before it is asked whether all is over
+constexpr double k_patience_s = 5;            // for an image
+constexpr double k_longest_exposure_s = 0.1;  // while a camera's period is not known
+
+std::vector<std::string> device_names(const std::vector<Imager>& imagers) {
+  std::vector<std::string> out;
+  for (const Imager& imager : imagers) out.push_back(imager.name);
+  return out;
+}
+
+}  // namespace
+
+DeviceCapture::DeviceCapture(SessionDevices* devices,
+                             CameraThreads* cameras,
+                             PerceptionThread* perception,
+                             const Rig& rig,
+                             const std::atomic<bool>& is_ended)
+    : devices_(devices),
+      cameras_(cameras),
+      perception_(perception),
+      camera_names_(device_names(rig.cameras)),
+      projector_names_(device_names(rig.projectors)),
+      is_ended_(is_ended) {}
+
+Surroundings DeviceCapture::surroundings(ImageWriter* writer) {
+  grabbed_.clear();
+  latency_s_.assign(devices_->projectors.size(), FlashOptions().limit_s);
+  Surroundings around;
+  around.stage.show = [this](int projector, const cv::Mat& image) {
+    return show_pattern(static_cast<std::size_t>(projector), image);
+  };
+  around.stage.grab = [this](int camera) { return grab(camera_names_.at(static_cast<std::size_t>(camera))); };
+  around.stage.store = [writer](const std::filesystem::path& path, const cv::Mat& image) {
+    return writer->store(path, image);
+  };
+  around.written = [writer] { return writer->finish(); };
+  around.use_latency = [this](int projector, double seconds) {
+    latency_s_.at(static_cast<std::size_t>(projector)) = seconds;
+  };
+  return around;
+}
+
+void DeviceCapture::pause_perception(Session* session) {
+  perception_->stop();
+  if (Perceived last = perception_->take({}); last.watched)
+    session->take(std::move(*last.watched), last.moments);
+}
+
+// One projector shows an image, the others nothing.
+Status DeviceCapture::show_pattern(std::size_t projector, const cv::Mat& image) {
+  for (std::size_t i = 0; i < devices_->projectors.size(); ++i) {
+    device::Display* display = devices_->projectors[i].get();
+    if (!display) return error("{}: expected a projector that works, found none.", projector_names_[i]);
+    const Stamp begun = now();
+    LIMN_TRY(const Stamp shown_at,
+             display->show(i == projector ? image : cv::Mat(display->size(), CV_8UC1, cv::Scalar(0))));
+    on_surface_at_ = std::max({on_surface_at_, shown_at, shifted(begun, latency_s_[i])});
+  }
+  return {};
+}
+
+// An image whose whole exposure lies after what was shown last: a stamp is of an exposure's middle.
+Result<cv::Mat> DeviceCapture::grab(const std::string& camera) {
+  const Stamp begun = now();
+  for (;;) {
+    auto newest = cameras_->take(k_grab_wait);
+    if (newest)
+      for (auto& [name, frame] : *newest) {
+        const auto [known, is_first] = grabbed_.try_emplace(name, Grabbed{{}, k_longest_exposure_s});
+        if (!is_first)
+          known->second.period_s = std::min(
+              known->second.period_s, seconds_between(known->second.frame.captured_at, frame.captured_at));
+        known->second.frame = std::move(frame);
+      }
+    const auto found = grabbed_.find(camera);
+    if (found != grabbed_.end() &&
+        found->second.frame.captured_at >= shifted(on_surface_at_, found->second.period_s / 2))
+      return found->second.frame.image;
+    if (is_ended_) return error("the session was ended.");
+    if (seconds_between(begun, now()) > k_patience_s)
+      return error("{}: expected a picture within {} s, found none.", camera, k_patience_s);
+  }
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <atomic>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "session/camera_threads.h"
+#include "session/device_session.h"
+#include "session/perception_thread.h"
+#include "session/recalibration_stage.h"
+#include "core/rig.h"
+
+namespace limn::apps {
+
+/// The cameras and displays of a session on devices, as its recalibration captures with them. Frames are
+/// shown again while the result is computed.
+class DeviceCapture final : public CaptureDevices {
+ public:
+  /// Borrows all of them. `rig`: the names and the order of the devices.
+  DeviceCapture(SessionDevices* devices,
+                CameraThreads* cameras,
+                PerceptionThread* perception,
+                const Rig& rig,
+                const std::atomic<bool>& is_ended);
+
+  Surroundings surroundings(ImageWriter* writer) override;
+  void pause_perception(Session* session) override;
+  void resume_perception() override { perception_->start(); }
+  bool waits_for_result() const override { return false; }
+
+ private:
+  // A camera's newest image.
+  struct Grabbed {
+    Frame frame;
+    double period_s;
+  };
+  Status show_pattern(std::size_t projector, const cv::Mat& image);
+  Result<cv::Mat> grab(const std::string& camera);
+
+  SessionDevices* devices_;
+  CameraThreads* cameras_;
+  PerceptionThread* perception_;
+  std::vector<std::string> camera_names_, projector_names_;
+  const std::atomic<bool>& is_ended_;
+  std::map<std::string, Grabbed> grabbed_;
+  std::vector<double> latency_s_;  // of the projectors
+  Stamp on_surface_at_;            // what was shown last is on the surface
+};
+
+}  // namespace limn::apps

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <vector>
+
+#include "session/device_health.h"
+#include "session/keys.h"
+#include "session/session_client.h"
+#include "device/key_source.h"
+
+namespace limn::apps {
+
+/// Hands the edits of clickers, pedals and keyboards to a session.
+class KeyClient final : public SessionClient {
+ public:
+  /// `keys`: what keys do, shared with the operator's; null: their own.
+  KeyClient(std::vector<device::KeySource>& sources,
+            const scene::Scene& scene,
+            Keys* keys,
+            DeviceHealth* health);
+
+  void hear(const SessionMoment& moment) override;
+  void tell(const SessionMoment&) override {}
+
+ private:
+  struct Source {
+    device::KeySource* keys;
+    std::size_t number;  // as health_ calls it
+    bool is_gone = false;
+  };
+  void edit(int key, const Source& source, const SessionMoment& moment);
+
+  Keys own_;
+  Keys* keys_;
+  DeviceHealth* health_;
+  std::vector<Source> sources_;
+};
+
+}  // namespace limn::apps

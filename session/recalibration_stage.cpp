@@ -1,0 +1,52 @@
+#include "session/recalibration_stage.h"
+
+#include "session/frame_loop.h"
+
+namespace limn::apps {
+namespace {
+
+constexpr auto k_errand_wait =
+    std::chrono::milliseconds(10);  // for what a recalibration wants of the devices
+
+}  // namespace
+
+RecalibrationStage::RecalibrationStage(Perception* perception,
+                                       Session* session,
+                                       SessionOutput* output,
+                                       CaptureDevices* devices)
+    : perception_(perception), session_(session), output_(output), devices_(devices) {}
+
+void RecalibrationStage::step(const FrameClock& clock) {
+  if (!devices_) return;
+  if (!recalibration_) {
+    if (session_->take_recalibration_request()) begin(clock);
+    return;
+  }
+  if (holds_light()) recalibration_->serve(k_errand_wait);
+  session_->set_recalibration_progress(recalibration_->words());
+  if (const auto checked = recalibration_->take()) {
+    pause();
+    apply_recalibration(*checked, recalibration_->folder(), clock.now(), perception_, session_);
+    recalibration_.reset();
+  }
+  if (!holds_light()) resume();
+}
+
+void RecalibrationStage::begin(const FrameClock& clock) {
+  const auto folder = recalibration_folder(output_->out());
+  if (!folder) return session_->warn(clock.now(), folder.message());
+  pause();
+  recalibration_ = std::make_unique<LiveRecalibration>(session_->setup().rig, *folder, [this](ImageWriter* writer) {
+    return devices_->surroundings(writer);
+  });
+}
+
+void RecalibrationStage::pause() {
+  if (!std::exchange(is_paused_, true)) devices_->pause_perception(session_);
+}
+
+void RecalibrationStage::resume() {
+  if (std::exchange(is_paused_, false)) devices_->resume_perception();
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,43 @@
+#include "session/recovering_composer.h"
+
+namespace limn::apps {
+namespace {
+
+constexpr double k_renew_every_s = 1;
+
+}  // namespace
+
+RecoveringComposer::RecoveringComposer(FrameComposer composer)
+    : composer_(std::move(composer)), painted_(composer_->painted()) {}
+
+std::optional<std::string> RecoveringComposer::compose(const FrameInput& input, const SessionSetup& setup) {
+  if (composer_) composer_->compose(input);
+  if (!composer_ || (drawing_.is_lost && drawing_.is_lost())) return compose_anew(input, setup);
+  painted_ = composer_->painted();
+  return std::nullopt;
+}
+
+std::optional<std::string> RecoveringComposer::compose_anew(const FrameInput& input,
+                                                            const SessionSetup& setup) {
+  if (!composer_ && seconds_between(renewed_at_, input.times.now) < k_renew_every_s) return std::nullopt;
+  const bool was_drawing = composer_.has_value();
+  composer_.reset();
+  renewed_at_ = input.times.now;
+  Status renewed = drawing_.renew();
+  if (renewed) {
+    auto composer = FrameComposer::create(setup.scene, setup.rig, setup.paint);
+    if (composer) {
+      composer_ = std::move(*composer);
+      painted_ = composer_->compose(input);
+    } else {
+      renewed = composer.error();
+    }
+  }
+  if (renewed) return "the graphics card lost what it drew; it was drawn anew";
+  if (!was_drawing) return std::nullopt;
+  return fmt::format(
+      "the graphics card lost what it drew; the last picture stays until it can draw again: {}",
+      renewed.message());
+}
+
+}  // namespace limn::apps

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <opencv2/core/mat.hpp>
+#include <span>
+#include <vector>
+
+#include "session/frame_input.h"
+#include "core/imager.h"
+#include "core/rig.h"
+#include "projector/renderer.h"
+#include "projector/composite_policy.h"
+#include "scene/posed_scene.h"
+#include "scene/scene.h"
+#include "scene/show_state.h"
+
+namespace limn::apps {
+
+/// What a screen's image is made of.
+struct ScreenInput {
+  const Frame& frame;  ///< camera 0's newest
+  const scene::ShowState& show_state;
+  std::vector<Track> tracks;  ///< at that frame's stamp, carried as the show state pairs markers
+  const Imager& viewer;       ///< whose eye `view` parts are drawn for; of width 0: camera 0's
+};
+
+/// Composes images for screens that stand beside the prototype. Holds how parts were treated last, so that
+/// they do not flicker.
+class ScreenComposer {
+ public:
+  /// Borrows scene and rig. `prototype_box`: its own frame.
+  ScreenComposer(const scene::Scene* scene,
+                 const Rig* rig,
+                 const ComposeOptions& options,
+                 const Eigen::AlignedBox3d& prototype_box);
+
+  /// Empty before the first frame and for Screen::off.
+  cv::Mat image(const ScreenInput& input, scene::Screen what, projector::Renderer* renderer);
+
+ private:
+  cv::Mat composed(const cv::Mat& behind,
+                   const scene::PosedScene& posed,
+                   const Imager& viewer,
+                   scene::Screen what,
+                   std::span<const projector::CompositePolicy> policies,
+                   projector::Renderer* renderer) const;
+
+  const scene::Scene* scene_;
+  const Rig* rig_;
+  ComposeOptions options_;
+  Eigen::AlignedBox3d prototype_box_;
+  std::vector<projector::CompositePolicy> policies_;
+  Stamp treated_at_;
+};
+
+}  // namespace limn::apps

@@ -1,0 +1,139 @@
+#include "session/show_store.h"
+
+#include <algorithm>
+
+#include "session/contact_sheet.h"
+#include "core/file.h"
+#include "core/log.h"
+#include "core/image_io.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* k_pairings = "pairings.json";
+constexpr const char* k_deleted = "deleted";  // in the folder of looks
+
+// What is not there is not moved.
+Status move_look(const std::string& name, const fs::path& from, const fs::path& to) {
+  LIMN_TRY_STATUS(make_folder(to));
+  std::error_code failed;
+  for (const char* end : {".json", ".png"}) {
+    const fs::path file = from / (name + end);
+    if (fs::exists(file, failed)) fs::rename(file, to / file.filename(), failed);
+    if (failed)
+      return error("{}: could not be moved to {}: {}.", file.string(), to.string(), failed.message());
+  }
+  return {};
+}
+
+Status write_look(const fs::path& folder,
+                  const std::string& name,
+                  const std::string& json,
+                  const cv::Mat& image) {
+  LIMN_TRY_STATUS(make_folder(folder));
+  LIMN_TRY_STATUS(write_file(folder / (name + ".json"), json));
+  return image.empty() ? Status() : write_png(folder / (name + ".png"), image);
+}
+
+// Empty: there is no such look.
+std::string json_of(const std::vector<scene::Look>& looks, const std::string& name) {
+  for (const scene::Look& look : looks)
+    if (look.name == name) return scene::look_json(look);
+  return {};
+}
+
+}  // namespace
+
+ShowStore::ShowStore(bool keeps) : writer_(keeps ? std::make_unique<FileWriter>() : nullptr) {}
+
+scene::ShowState ShowStore::loaded(const scene::Scene& scene, scene::ShowState show_state) {
+  std::error_code none;
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(scene.folder / "looks", none))
+    if (entry.path().extension() == ".json") files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  for (const fs::path& file : files) {
+    Result<scene::Look> look = scene::load_look(file, scene);
+    if (look)
+      show_state.looks.push_back(std::move(*look));
+    else
+      log_warning("live: {} The look is left alone.", look.message());
+  }
+  const fs::path file = scene.folder / k_pairings;
+  if (!fs::exists(file, none)) return show_state;
+  auto paired = scene::with_pairings(file, scene, show_state);
+  if (paired) return std::move(*paired);
+  log_warning("live: {} The scene's own markers carry the parts.", paired.message());
+  return show_state;
+}
+
+void ShowStore::keep(const scene::Scene& scene,
+                     const scene::ShowState& before,
+                     const scene::ShowState& after,
+                     const scene::Command& command,
+                     const std::function<cv::Mat()>& look_image) {
+  if (!writer_) return;
+  keep_pairings(scene, before, after);
+  if (const auto* unit = std::get_if<scene::PartUnit>(&command.value))
+    keep_unit(scene, scene.slots[command.slot], *unit);
+  keep_looks(scene.folder / "looks", before, after, look_image);
+}
+
+void ShowStore::keep_pairings(const scene::Scene& scene,
+                              const scene::ShowState& before,
+                              const scene::ShowState& after) {
+  const std::string text = scene::pairings_json(scene, after);
+  if (text == scene::pairings_json(scene, before)) return;
+  writer_->add([file = scene.folder / k_pairings, text]() -> Status {
+    if (!text.empty()) return write_file(file, text);
+    std::error_code ignored;
+    fs::remove(file, ignored);
+    return {};
+  });
+}
+
+// The part comes anew when SceneWatch sees the answer.
+void ShowStore::keep_unit(const scene::Scene& scene, const scene::Slot& slot, const scene::PartUnit& unit) {
+  writer_->add([file = scene.folder / "slots" / slot.name / "units.json",
+                text = scene::units_json(slot, unit.part, unit.unit)] { return write_file(file, text); });
+}
+
+// Looks that were saved or deleted, and the page of all.
+void ShowStore::keep_looks(const fs::path& folder,
+                           const scene::ShowState& before,
+                           const scene::ShowState& after,
+                           const std::function<cv::Mat()>& look_image) {
+  bool has_changed = false;
+  for (const scene::Look& look : before.looks) {
+    if (!json_of(after.looks, look.name).empty()) continue;
+    has_changed = true;
+    writer_->add([=, name = look.name] { return move_look(name, folder, folder / k_deleted); });
+  }
+  for (const scene::Look& look : after.looks) {
+    const std::string text = scene::look_json(look);
+    if (text == json_of(before.looks, look.name)) continue;
+    has_changed = true;
+    const bool is_back =
+        before.deleted_look && text == scene::look_json(*before.deleted_look) && !after.deleted_look;
+    if (is_back)
+      writer_->add([=, name = look.name] { return move_look(name, folder / k_deleted, folder); });
+    else
+      writer_->add(
+          [=, name = look.name, image = look_image()] { return write_look(folder, name, text, image); });
+  }
+  if (has_changed)
+    writer_->add(
+        [=, looks = after.looks] { return write_contact_sheet(looks, folder, folder / "looks.html"); });
+}
+
+void ShowStore::finish() {
+  if (writer_) writer_->finish();
+}
+
+std::vector<std::string> ShowStore::failures() {
+  return writer_ ? writer_->failures() : std::vector<std::string>();
+}
+
+}  // namespace limn::apps

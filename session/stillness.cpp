@@ -1,0 +1,46 @@
+#include "session/stillness.h"
+
+#include <algorithm>
+
+namespace limn::apps {
+namespace {
+
+constexpr double k_trembles_m = 0.5e-3, k_trembles_rad = 1e-3;
+constexpr double k_stays_m = 0.1e-3;  // an eighth of a pixel where 1280 pixels light a metre
+
+}  // namespace
+
+bool is_elsewhere(const Pose& before, const Pose& now) {
+  return (before.translation - now.translation).norm() > k_trembles_m ||
+         angle_between(before.rotation, now.rotation) > k_trembles_rad;
+}
+
+void keep_still(const std::optional<Pose>& shown,
+                const Eigen::AlignedBox3d& box,
+                std::vector<Track>* tracks) {
+  if (!shown || box.isEmpty()) return;
+  for (Track& track : *tracks) {
+    if (track.body != "prototype") continue;
+    double most_m = 0;
+    for (int i = 0; i < 8; ++i) {
+      const Eigen::Vector3d p = box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i));
+      most_m = std::max(most_m, (track.world_from_body * p - *shown * p).norm());
+    }
+    if (most_m < k_stays_m) track.world_from_body = *shown;
+  }
+}
+
+Pose steadied(std::optional<Pose>* held, std::vector<Track>* tracks) {
+  const auto prototype = std::find_if(tracks->begin(), tracks->end(), [](const Track& track) {
+    return track.body == "prototype" && track.tracking != TrackingState::lost;
+  });
+  if (prototype == tracks->end()) return Pose();
+  const Pose world_from_prototype = prototype->world_from_body;
+  if (!*held || is_elsewhere(**held, world_from_prototype)) *held = world_from_prototype;
+  const Pose turned_from_world = **held * world_from_prototype.inverse();
+  for (Track& track : *tracks) track.world_from_body = turned_from_world * track.world_from_body;
+  prototype->world_from_body = **held;  // to the last bit
+  return turned_from_world;
+}
+
+}  // namespace limn::apps

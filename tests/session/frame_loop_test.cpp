@@ -1,0 +1,134 @@
+// The order of a frame, the same wherever a session takes place.
+#include "session/frame_loop.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <string>
+
+#include "core/scale_resolution.h"
+#include "tracker/marker_image.h"
+#include "device/gl_context.h"
+#include "sim/virtual_rig.h"
+#include "tests/session/studio.h"
+#include "tests/support/matchers.h"
+
+namespace limn::apps {
+namespace {
+
+// Clock, source, sink and client that note what is asked of them.
+class Notes final : public FrameClock, public FrameSource, public FrameSink, public SessionClient {
+ public:
+  Notes(sim::VirtualRig* rig, Perception* perception) : rig_(rig), perception_(perception) {}
+
+  Stamp now() const override { return rig_->now(); }
+  Result<std::optional<FrameTimes>> next_frame() override {
+    if (!shows) return std::optional<FrameTimes>();
+    return std::optional(FrameTimes{rig_->now(), shifted(rig_->now(), 0.04)});
+  }
+  bool is_over() const override { return steps == 0; }
+  Result<Perceived> perceive() override {
+    --steps;
+    said += "perceive ";
+    const int camera = 0;
+    Perceived out;
+    out.watched = perception_->watch(rig_->expose(std::span(&camera, 1)));
+    out.moments = ++moments_;
+    return out;
+  }
+  Status edit(Session* session) override {
+    said += "edit ";
+    EXPECT_EQ(session->watched().captured_at, perception_->watched().captured_at) << "perceived before";
+    return session->edit({"grid", "", "toggle"}, "test", now());
+  }
+  Status show(const ComposedFrame& painted, const std::vector<cv::Mat>& light) override {
+    said += "show ";
+    EXPECT_EQ(painted.painted_at, now());
+    covered = cv::norm(light[0], painted.projectors[0], cv::NORM_INF) > 0;
+    same = cv::norm(light[1], painted.projectors[1], cv::NORM_INF) == 0;
+    return {};
+  }
+  void show_screens(const std::map<scene::Screen, cv::Mat>& images) override {
+    said += images.empty() ? "no-screens " : "screens ";
+  }
+  void hear(const SessionMoment&) override { said += "hear "; }
+  void tell(const SessionMoment& moment) override {
+    said += moment.shown ? "tell-shown " : "tell ";
+    if (moment.shown) {
+      EXPECT_EQ(moment.shown->shown_at, shifted(now(), 0.04));
+    }
+  }
+  std::vector<Overlay> overlays(Session*) override {
+    said += "overlay ";
+    return {SignOverlay{0, cv::Mat(8, 8, CV_8UC3, cv::Scalar::all(255)), std::nullopt}};
+  }
+  bool ends_session() const override { return ends; }
+
+  std::string said;
+  int steps = 0;
+  bool shows = true, ends = false, covered = false, same = false;
+
+ private:
+  sim::VirtualRig* rig_;
+  Perception* perception_;
+  std::size_t moments_ = 0;
+};
+
+class AFrameLoop : public testing::Test {
+ protected:
+  AFrameLoop() : context_(device::GlContext::create().value()) {
+    const sim::World world = studio(0.25);
+    setup_.rig = world.rig;
+    setup_.scene = *world.scene;
+    rig_.emplace(world, sim::VirtualRigOptions{.grab_waits_for_light = false});
+    output_ = SessionOutput::open({}, {}, &setup_).value();
+    perception_ = Perception::create(setup_.scene, setup_.rig).value();
+    session_ = Session::create(setup_, nullptr, nullptr, false).value();
+    notes_.emplace(&*rig_, &*perception_);
+  }
+  Status played(int steps) {
+    notes_->steps = steps;
+    notes_->said.clear();
+    FrameLoop loop({*perception_, *session_, *output_, {&*notes_}}, {*notes_, *notes_, *notes_, health_});
+    return loop.run(is_ended_);
+  }
+
+  device::GlContext context_;
+  SessionSetup setup_;
+  std::optional<sim::VirtualRig> rig_;
+  std::optional<SessionOutput> output_;
+  std::optional<Perception> perception_;
+  std::optional<Session> session_;
+  std::optional<Notes> notes_;
+  DeviceHealth health_;
+  std::atomic<bool> is_ended_ = false;
+};
+
+TEST_F(AFrameLoop, GoesInOneOrder) {
+  ASSERT_TRUE(played(1));
+  EXPECT_EQ(notes_->said, "perceive edit hear overlay show no-screens tell-shown ");
+  EXPECT_TRUE(session_->show_state().grid) << "what is edited counts in the same frame";
+}
+
+TEST_F(AFrameLoop, OverlaysAreInTheLightAndNotInWhatWasPainted) {
+  ASSERT_TRUE(played(1));
+  EXPECT_TRUE(notes_->covered);
+  EXPECT_TRUE(notes_->same) << "another projector's light is what was painted";
+}
+
+TEST_F(AFrameLoop, TakesInWhatChangesWhenNoImageIsDue) {
+  notes_->shows = false;
+  ASSERT_TRUE(played(2));
+  EXPECT_EQ(notes_->said, "perceive edit hear perceive edit hear ");
+  EXPECT_EQ(session_->painted().painted_at, Stamp{});
+}
+
+TEST_F(AFrameLoop, EndsWhenAClientDoes) {
+  notes_->ends = true;
+  ASSERT_TRUE(played(5));
+  EXPECT_EQ(notes_->steps, 4);
+}
+
+}  // namespace
+}  // namespace limn::apps
