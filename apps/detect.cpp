@@ -30,7 +30,7 @@ struct Marker {
   std::vector<tracker::MarkerPose> poses;
 };
 
-struct Outcome {
+struct DetectOutcome {
   std::filesystem::path path;
   int width = 0, height = 0;
   std::vector<Marker> markers;
@@ -133,7 +133,7 @@ void draw_axes(cv::Mat& image, const Lens& lens, const Pose& camera_from_marker,
   }
 }
 
-cv::Mat drawn(const cv::Mat& grey, const Outcome& outcome, const Lens* lens, double size_m) {
+cv::Mat drawn(const cv::Mat& grey, const DetectOutcome& outcome, const Lens* lens, double size_m) {
   cv::Mat image;
   cv::cvtColor(grey, image, cv::COLOR_GRAY2BGR);
   for (const Marker& marker : outcome.markers) {
@@ -186,9 +186,9 @@ nlohmann::json json_of(const Marker& marker) {
   return node;
 }
 
-std::string json_text(const std::vector<Outcome>& outcomes) {
+std::string json_text(const std::vector<DetectOutcome>& outcomes) {
   nlohmann::json images = nlohmann::json::array();
-  for (const Outcome& outcome : outcomes) {
+  for (const DetectOutcome& outcome : outcomes) {
     if (!outcome.problem.empty()) continue;
     nlohmann::json node = {{"file", outcome.path.filename().string()},
                            {"size", {outcome.width, outcome.height}}};
@@ -200,9 +200,9 @@ std::string json_text(const std::vector<Outcome>& outcomes) {
   return nlohmann::json{{"images", images}}.dump(1) + "\n";
 }
 
-std::string csv_text(const std::vector<Outcome>& outcomes, bool with_family) {
+std::string csv_text(const std::vector<DetectOutcome>& outcomes, bool with_family) {
   std::string text = "file,id,x0,y0,x1,y1,x2,y2,x3,y3,score\n";
-  for (const Outcome& outcome : outcomes)
+  for (const DetectOutcome& outcome : outcomes)
     for (const Marker& marker : outcome.markers) {
       const MarkerName& name = marker.detection.marker;
       text += outcome.path.filename().string() + "," + (with_family ? name.text() : name.id);
@@ -213,7 +213,7 @@ std::string csv_text(const std::vector<Outcome>& outcomes, bool with_family) {
   return text;
 }
 
-void print(const Outcome& outcome) {
+void print(const DetectOutcome& outcome) {
   const std::string time = outcome.ms ? fmt::format(", {:.3f} ms", *outcome.ms) : "";
   fmt::print("{}: {} markers{}\n", outcome.path.string(), outcome.markers.size(), time);
   for (const Marker& marker : outcome.markers) {
@@ -234,7 +234,7 @@ void print(const Outcome& outcome) {
 Status detect_in(const DetectOptions& options,
                  const std::optional<Imager>& camera,
                  tracker::Detector& detector,
-                 Outcome* outcome) {
+                 DetectOutcome* outcome) {
   LIMN_TRY(const cv::Mat grey, read_grey_image(outcome->path));
   outcome->width = grey.cols;
   outcome->height = grey.rows;
@@ -259,7 +259,7 @@ Status detect_in(const DetectOptions& options,
 void detect_all(const DetectOptions& options,
                 const std::optional<Imager>& camera,
                 const tracker::Families& families,
-                std::vector<Outcome>* outcomes) {
+                std::vector<DetectOutcome>* outcomes) {
   const int count = static_cast<int>(outcomes->size());
   // Timed images come one after the other; threads beyond one an image share out the image.
   const int images = options.repeat > 0 ? 1 : std::max(1, count);
@@ -274,7 +274,7 @@ void detect_all(const DetectOptions& options,
   const auto work = [&] {
     tracker::Detector detector(families, detector_options);
     for (int i = next++; i < count; i = next++) {
-      Outcome& outcome = (*outcomes)[static_cast<std::size_t>(i)];
+      DetectOutcome& outcome = (*outcomes)[static_cast<std::size_t>(i)];
       const Status status = detect_in(options, camera, detector, &outcome);
       if (!status) outcome.problem = status.message();
       const std::lock_guard lock(progress_mutex);
@@ -312,12 +312,12 @@ Status run_detect(const DetectOptions& options) {
     LIMN_TRY(camera, load_imager(options.camera));
   }
   if (!options.draw.empty()) LIMN_TRY_STATUS(make_folder(options.draw));
-  std::vector<Outcome> outcomes;
+  std::vector<DetectOutcome> outcomes;
   for (const auto& path : options.images) outcomes.push_back({path, 0, 0, {}, {}, {}});
   detect_all(options, camera, *families, &outcomes);
 
   int failed = 0;
-  for (const Outcome& outcome : outcomes) {
+  for (const DetectOutcome& outcome : outcomes) {
     if (outcome.problem.empty()) {
       print(outcome);
     } else {

@@ -437,17 +437,17 @@ Result<BundleAdjuster::Summary> BundleAdjuster::minimise(Parameters start, const
                   .enough = enough,
                   .here = std::move(start),
                   .at_here = std::move(at_start)};
-  const LeastSquaresSummary found = minimise(&problem, {.max_steps = k_most_steps,
+  const LeastSquaresSummary found = limn::minimise(&problem, {.max_steps = k_most_steps,
                                                         .first_damping = k_first_damping,
                                                         .least_damping = k_least_damping,
                                                         .most_damping = k_most_damping,
                                                         .damps_more_without_step = true});
   if (found.end == LeastSquaresEnd::no_start)
     return error(
-        "the joint solve has no finite start: the observations do not determine the devices. Capture more "
+        "the bundle adjustment has no finite start: the observations do not determine the devices. Capture more "
         "poses, tilted by 20 to 45 degrees to different sides.");
-  const bool converged = found.end == LeastSquaresEnd::converged;
-  // A valley: steps that no observation feels. The covariance says how long it is.
+  const bool converged = found.end == LeastSquaresEnd::settled;
+  // A flat valley: steps change the cost by less than this. The covariance states its length.
   constexpr double k_flat = 1e-4;  // share of the cost, in the last step
   if (converged || problem.last_gain < k_flat)
     return Summary{std::move(problem.here), found.steps, converged, found.cost};
@@ -538,11 +538,11 @@ struct BundleAdjuster::BoardProblem {
 Result<Pose> BundleAdjuster::board_pose(const Parameters& at, int pose, const Noise& noise, Pose start) const {
   BoardProblem problem{.joint = *this, .at = at, .pose = pose, .noise = noise, .state = start};
   problem.at_state = problem.evaluate(start);
-  const LeastSquaresSummary found = minimise(&problem, {.max_steps = k_most_steps,
+  const LeastSquaresSummary found = limn::minimise(&problem, {.max_steps = k_most_steps,
                                                         .first_damping = k_first_damping,
                                                         .least_damping = k_least_damping,
                                                         .most_damping = k_most_damping});
-  if (found.end == LeastSquaresEnd::converged) return problem.state;
+  if (found.end == LeastSquaresEnd::settled) return problem.state;
   return error("{}: the board's pose does not follow from its corners.",
                observations_.poses[static_cast<size_t>(pose)]);
 }

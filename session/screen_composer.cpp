@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "tracker/camera_encoding.h"
+#include "core/screen_encoding.h"
 #include "session/grid_and_split.h"
 
 namespace limn::apps {

@@ -12,13 +12,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* k_schema = "limn.guest_lens/1";
+constexpr const char* k_lenses_schema = "limn.guest_lens/1";
 constexpr std::size_t k_most_devices = 200, k_most_lenses = 4;
 
 fs::path file_of(const fs::path& folder, const std::string& device) { return folder / (device + ".json"); }
 
 Result<std::vector<calib::IntrinsicsEstimate>> read(const fs::path& file) {
-  LIMN_TRY(const Config config, Config::load(file, k_schema));
+  LIMN_TRY(const Config config, Config::load(file, k_lenses_schema));
   config.root().only({"schema", "lenses"});
   std::vector<calib::IntrinsicsEstimate> lenses;
   for (const ConfigNode& node : config.root().at("lenses").items()) {
@@ -87,7 +87,7 @@ Status save_lenses(const fs::path& folder,
                     {"views", lens.views}});
   }
   LIMN_TRY_STATUS(make_folder(folder));
-  const nlohmann::ordered_json json = {{"schema", k_schema}, {"lenses", list}};
+  const nlohmann::ordered_json json = {{"schema", k_lenses_schema}, {"lenses", list}};
   LIMN_TRY_STATUS(write_file(file_of(folder, device), json.dump(1) + "\n"));
   make_room(folder);
   return {};
