@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "wizard/capture/capture_plan.h"
+#include "apps/capture.h"
 #include "apps/solve.h"
 #include "wizard/capture/virtual_capture.h"
 #include "tracker/marker_image.h"

@@ -437,7 +437,7 @@ TEST(SolveCommand, ContradictionsAreRejectedWithFiniteNumbers) {
     EXPECT_FALSE(fs::exists(out / "rig.json"));
     return;
   }
-  EXPECT_EQ(report->assessment.verdict, calib::Verdict::reject) << report->words.verdict;
+  EXPECT_EQ(report->assessment.verdict, calib::Verdict::reject) << report->explanation.verdict;
   EXPECT_FALSE(report->assessment.faults.empty());
   for (const char* file : {"rig.json", "report.json", "projector0.cameramodel"}) {
     const std::string text = read_file(out / file).value();

@@ -71,8 +71,8 @@ class Stage {
     const std::vector<Frame> frames = rig_->expose(k_cameras);
     const auto begun = Clock::now();
     if (!frames.empty()) session_->take(perception_->watch(frames), ++moments_);
-    server->apply_requests(&*session_, rig_->now());
-    server->publish_state(*session_, *telemetry_, health_, rig_->now());
+    server->hear(&*session_, rig_->now());
+    server->tell(*session_, *telemetry_, health_, rig_->now());
     session_->paint(rig_->now(), shifted(rig_->now(), k_lag_s));
     const double took_ms = ms_since(begun);
     for (std::size_t i = 0; i < setup_.rig.projectors.size(); ++i)
@@ -181,7 +181,7 @@ int run(int argc, char** argv) {
     return 1;
   }
   const apps::ServeOptions options{.at = "0", .page = {}, .keys = {}};
-  const auto server = apps::Server::open(options, apps::eyes_of(std::move(*tablet_view)));
+  const auto server = apps::Server::open(options, apps::image_providers(std::move(*tablet_view)));
   if (!server) {
     fmt::print(stderr, "{}\n", server.message());
     return 1;

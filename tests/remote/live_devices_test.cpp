@@ -345,7 +345,7 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
   EXPECT_GT(std::count_if(told.begin(), told.end(),
                           [](const std::string& words) { return words.ends_with(" patterns"); }),
             3);
-  EXPECT_EQ(session->repairing(), "");
+  EXPECT_EQ(session->recalibration_progress(), "");
   EXPECT_TRUE(
       test::pose_near(session->setup().rig.cameras[0].imager_from_world, truth, 0.02 * M_PI / 180, 0.0015));
   ASSERT_TRUE(session->painted().posed.world_from_prototype);

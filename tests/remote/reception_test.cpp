@@ -25,7 +25,7 @@ class AReception : public testing::Test {
     out.cookie = "limn";
     out.watched = [](bool) {};
     out.post = [](const std::function<void()>& job) { job(); };
-    out.eyes.room = [this](ImageProviders::Answer answer) { asked_.push_back(std::move(answer)); };
+    out.providers.room = [this](ImageProviders::Answer answer) { asked_.push_back(std::move(answer)); };
     return out;
   }
 

@@ -63,8 +63,8 @@ class AServedSession : public AServer {
 
   void turn() {
     at_ = shifted(at_, 0.01);
-    server_->apply_requests(&*session_, at_);
-    server_->publish_state(*session_, *telemetry_, health_, at_);
+    server_->hear(&*session_, at_);
+    server_->tell(*session_, *telemetry_, health_, at_);
   }
   // Plays the session while guests do something on another thread.
   void play_while(const std::function<void()>& guests) {
@@ -521,7 +521,7 @@ TEST_F(AServedSession, UnderAttackMemoryIsBoundedAndItsImagesGoOn) {
   Perception perception = Perception::create(setup.scene, setup.rig, setup.watch).value();
   auto tablet_view = TabletView::create(setup, folder_ / "lenses");
   ASSERT_TRUE(tablet_view) << tablet_view.message();
-  open({}, eyes_of(std::move(*tablet_view)));
+  open({}, image_providers(std::move(*tablet_view)));
   const auto ben = guest(Role::work, "Ben");
   Attack attack(server_->port(), token_of(Role::look, "Eve"));
   struct Frames {
@@ -539,8 +539,8 @@ TEST_F(AServedSession, UnderAttackMemoryIsBoundedAndItsImagesGoOn) {
       at_ = rig.now();
       EXPECT_TRUE(session_->edit({"nudge", "mirror", count % 2 ? "0.2 0 0" : "-0.2 0 0"}, "test", at_));
       double guests_ms = -thread_ms();
-      server_->apply_requests(&*session_, at_);
-      server_->publish_state(*session_, *telemetry_, health_, at_);
+      server_->hear(&*session_, at_);
+      server_->tell(*session_, *telemetry_, health_, at_);
       guests_ms += thread_ms();
       const ComposedFrame& painted = session_->paint(at_, shifted(at_, 0.04));
       EXPECT_EQ(painted.painted_at, at_);

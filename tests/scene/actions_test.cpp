@@ -233,7 +233,7 @@ TEST(Actions, EachChangesWhatItIsToChangeAndNothingElse) {
     ASSERT_TRUE(after) << action.name << ": " << after.message();
     EXPECT_EQ(changed(wanted->before, *after), wanted->members) << action.name;
     EXPECT_TRUE(wanted->is_done(*after)) << action.name;
-    if (action.takes != ArgumentKind::on_off) continue;
+    if (action.argument_kind != ArgumentKind::on_off) continue;
     // A switch goes off again, and to the other side.
     const auto value = [&](const std::string& word) {
       return changed(wanted->before, *apply_edit(scene, *after, {}, make_edit(action.id, wanted->slot, word)));
@@ -264,7 +264,7 @@ TEST(Actions, AreFoundByTheirNames) {
     EXPECT_EQ(&action_of(action.id), &action);
     EXPECT_EQ(make_edit(action.id, "mirror", "x").action, action.name);
     EXPECT_FALSE(action.what.empty()) << action.name;
-    EXPECT_EQ(action.value.empty(), action.takes == ArgumentKind::nothing) << action.name;
+    EXPECT_EQ(action.value.empty(), action.argument_kind == ArgumentKind::nothing) << action.name;
   }
   for (const char* unknown : {"", "dance", "next_variant ", "NEXT_VARIANT", "count"})
     EXPECT_EQ(find_action(unknown), nullptr) << unknown;
@@ -276,7 +276,7 @@ TEST(Actions, WhatIsOppositeGoesThereAndBack) {
   for (const Action& action : actions()) {
     if (!action.opposite) continue;
     EXPECT_EQ(action_of(*action.opposite).opposite, action.id) << action.name;
-    EXPECT_EQ(action.takes, ArgumentKind::nothing) << action.name;
+    EXPECT_EQ(action.argument_kind, ArgumentKind::nothing) << action.name;
     const auto start = apply_edit(scene, a_staging(scene), {}, make_edit(action.id, "mirror"));
     ASSERT_TRUE(start) << start.message();
     const auto there = apply_edit(scene, *start, {}, make_edit(*action.opposite, "mirror"));

@@ -152,9 +152,9 @@ TEST(OperatorPanel, EditsAreAClickAway) {
   EXPECT_FALSE(bar.contains("repair"));
   view.moved = "projector1";
   EXPECT_TRUE(reachable(view, {1000, 640}, {420, 25, 60, 10}, 3).contains("repair"));
-  view.repairing = "12 of 44 patterns";  // which stands in its place
+  view.recalibration_progress = "12 of 44 patterns";  // which stands in its place
   EXPECT_FALSE(reachable(view, {1000, 640}, {420, 25, 60, 10}, 3).contains("repair"));
-  view.repairing.clear();
+  view.recalibration_progress.clear();
   view.moved.clear();
   std::set<std::string> column = reachable(view, {1000, 640}, {730, 60, 220, 400}, 1);
   column.merge(reachable(view, {1000, 640}, {950, 60, 10, 400}, 1));

@@ -81,7 +81,7 @@ TEST(ShowStore, KeepsLooksInTheOrderOfEdits) {
                                     {"undelete_look", "", ""}}) {
       const scene::ShowState before = now;
       now = edited(scene, before, edit);
-      store.keep(scene, before, now, edit, [&] { return image; });
+      store.keep(scene, before, now, scene::command_of(scene, edit).value(), [&] { return image; });
     }
   }
   const fs::path looks = scene.folder / "looks";
@@ -104,7 +104,7 @@ TEST(ShowStore, TellsWhatCannotBeWritten) {
   ShowStore store(true);
   const scene::Edit edit{"save_look", "", "calm"};
   const scene::ShowState before = scene::initial_show_state(scene);
-  store.keep(scene, before, edited(scene, before, edit), edit, [] { return cv::Mat(); });
+  store.keep(scene, before, edited(scene, before, edit), scene::command_of(scene, edit).value(), [] { return cv::Mat(); });
   store.finish();
   const std::vector<std::string> failures = store.failures();
   ASSERT_FALSE(failures.empty());
@@ -117,7 +117,7 @@ TEST(ShowStore, WritesNothingWhereItOnlyReads) {
   ShowStore store(false);
   const scene::Edit edit{"save_look", "", "calm"};
   const scene::ShowState before = scene::initial_show_state(scene);
-  store.keep(scene, before, edited(scene, before, edit), edit, [] { return cv::Mat(); });
+  store.keep(scene, before, edited(scene, before, edit), scene::command_of(scene, edit).value(), [] { return cv::Mat(); });
   store.finish();
   EXPECT_FALSE(fs::exists(scene.folder / "looks"));
 }

@@ -1,3 +1,4 @@
+#include "apps/recheck.h"
 #include "wizard/capture/device_backend.h"
 
 #include <gtest/gtest.h>
