@@ -100,7 +100,7 @@ void ImagerView::draw_parts(const Imager& imager, const scene::PosedScene& posed
   SceneCache& scene = shared_.scene;
   const bool is_view = overlay->is_view;
   scene.prepare(posed, is_view ? SceneCache::FromProjectors::nothing : SceneCache::FromProjectors::prototype);
-  scene.look_from_imager(imager, !is_view && !has_contact_shadow_);
+  scene.draw_from_imager(imager, !is_view && !has_contact_shadow_);
   const GpuLens& lens = scene.lens_of(imager);
   overlay->places = scene.visibility().visible_rects(imager, lens.baked, scene.runs(), scene.scene_from_world(),
                                                is_view, has_contact_shadow_ ? ContactShadow::k_reach : 0);
@@ -159,7 +159,7 @@ cv::Mat ImagerView::view(const Imager& imager, const scene::PosedScene& posed, c
 std::vector<PartCoverage> ImagerView::coverage(const scene::PosedScene& posed, const Imager& viewer) {
   SceneCache& scene = shared_.scene;
   scene.prepare(posed, SceneCache::FromProjectors::prototype);
-  scene.look_from_imager(viewer);
+  scene.draw_from_imager(viewer);
   const Canvas& canvas = shared_.canvases.canvas(viewer.width, viewer.height, GL_RG8);
   const GpuLens& lens = scene.lens_of(viewer);
   coverage_pass_.draw(
@@ -179,7 +179,7 @@ std::vector<PartCoverage> ImagerView::coverage(const scene::PosedScene& posed, c
 IlluminatedPatches ImagerView::illuminated_patches(const Imager& imager, const scene::PosedScene& posed, int side_px) {
   SceneCache& scene = shared_.scene;
   scene.prepare(posed, SceneCache::FromProjectors::prototype);
-  scene.look_from_imager(imager);
+  scene.draw_from_imager(imager);
   const Canvas& canvas = shared_.canvases.canvas(std::max(1, imager.width / side_px),
                                                  std::max(1, imager.height / side_px), GL_RGBA32F);
   const Resources resources = scene.resources(scene.lens_of(imager));

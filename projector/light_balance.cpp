@@ -50,7 +50,7 @@ Status LightBalance::measure(const MeasuredSurface& measured,
   scene::PosedScene bare;
   bare.world_from_prototype = measured.world_from_prototype;
   scene->prepare(bare, SceneCache::FromProjectors::prototype);
-  scene->look_from_imager(camera);
+  scene->draw_from_imager(camera);
   const Canvas& canvas = canvases->canvas(camera.width, camera.height, GL_R32F);
   const Resources seen = scene->resources(scene->lens_of(camera));
   std::vector<cv::Mat> irradiances;
@@ -60,7 +60,7 @@ Status LightBalance::measure(const MeasuredSurface& measured,
     irradiances.push_back(read_back(canvas.framebuffer, camera.width, camera.height, CV_32FC1, GL_RED));
   }
   LIMN_TRY(SurfaceMixing found, surface_mixing(measured, irradiances));
-  scene->look_from_witness(camera);
+  scene->draw_from_reference_camera(camera);
   mixing_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_RGBA16F, camera.width, camera.height,
                          static_cast<int>(found.layers.size()));
   for (std::size_t i = 0; i < found.layers.size(); ++i)

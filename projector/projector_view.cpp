@@ -118,7 +118,7 @@ GLuint ProjectorView::draw(std::size_t index, const scene::PosedScene& posed, co
 
   SceneCache& scene = shared_.scene;
   scene.prepare(posed, SceneCache::FromProjectors::all);
-  scene.look_from_eye(viewer);
+  scene.draw_from_eye(viewer);
   shared_.balance.find_level(shared_.rig, posed);
   find_places(index, viewer);
 

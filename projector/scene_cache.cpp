@@ -71,7 +71,7 @@ void SceneCache::prepare(const scene::PosedScene& posed, FromProjectors needed) 
   are_surface_parts_seen_ = true;
 }
 
-void SceneCache::look_from_eye(const Imager& viewer) {
+void SceneCache::draw_from_eye(const Imager& viewer) {
   if (eye_kind_ == EyeKind::eye && is_same(eye_.imager_from_world, viewer.imager_from_world)) return;
   const Pose scene_from_viewer = scene_from_world_ * viewer.imager_from_world.inverse();
   const PassTimes::Scope scope(times_, "ids from the eye");
@@ -81,7 +81,7 @@ void SceneCache::look_from_eye(const Imager& viewer) {
   eye_ = viewer;
 }
 
-void SceneCache::look_from_imager(const Imager& imager, bool parts_alone) {
+void SceneCache::draw_from_imager(const Imager& imager, bool parts_alone) {
   const EyeKind wanted = parts_alone ? EyeKind::parts_of_imager : EyeKind::imager;
   if (eye_kind_ == wanted && is_same_lens(eye_, imager) &&
       is_same(eye_.imager_from_world, imager.imager_from_world)) {
@@ -93,7 +93,7 @@ void SceneCache::look_from_imager(const Imager& imager, bool parts_alone) {
   eye_ = imager;
 }
 
-void SceneCache::look_from_witness(const Imager& camera) {
+void SceneCache::draw_from_reference_camera(const Imager& camera) {
   visibility_.draw_from_reference_camera(scene_, runs_, scene_from_world_, camera, lens_of(camera).baked);
 }
 

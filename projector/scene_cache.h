@@ -32,10 +32,10 @@ class SceneCache {
   /// Puts everything in its place and draws what projectors see of it.
   void prepare(const scene::PosedScene& posed, FromProjectors needed);
   /// Draws what an eye, or an imager, sees of what was prepared; `parts_alone`: only where parts may be.
-  void look_from_eye(const Imager& viewer);
-  void look_from_imager(const Imager& imager, bool parts_alone = false);
+  void draw_from_eye(const Imager& viewer);
+  void draw_from_imager(const Imager& imager, bool parts_alone = false);
   /// Draws what the camera that measured the prototype sees of what was prepared, for good.
-  void look_from_witness(const Imager& camera);
+  void draw_from_reference_camera(const Imager& camera);
 
   /// Keeps those of the newest few imagers.
   const GpuLens& lens_of(const Imager& imager);

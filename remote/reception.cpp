@@ -210,7 +210,7 @@ void Reception::get_room(const Asked& asked, Answering answering) {
   });
 }
 
-void Reception::do_in_backroom(std::function<HttpAnswer()> job, Answering answering) {
+void Reception::do_on_worker(std::function<HttpAnswer()> job, Answering answering) {
   if (!setup_.worker->take([job = std::move(job), answering] { answering(job()); }))
     answering(refusal(k_unavailable, "too many pictures are asked for at once."));
 }
@@ -222,7 +222,7 @@ void Reception::get_projector(const Asked& asked, Answering answering) {
   while (name && index < count && news_->state.projectors[index] != *name) ++index;
   if (!name || index >= count || news_->projectors[index].empty())
     return answering(refusal(k_absent, "expected a projector of the state, found another name."));
-  do_in_backroom(
+  do_on_worker(
       [known = encoded_, name = *name, image = news_->projectors[index]] {
         Encoded& encoded = (*known)[name];
         if (!encoded.jpeg || encoded.image.data != image.data) {
@@ -238,7 +238,7 @@ void Reception::get_look_image(const Asked& asked, Answering answering) {
   const auto name = name_in(asked.path, "/picture/look/", ".png");
   if (!name || !news_ || !is_in(news_->state.looks, *name))
     return answering(refusal(k_absent, "expected a look of the state, found another name."));
-  do_in_backroom(
+  do_on_worker(
       [path = news_->scene->folder / "looks" / (*name + ".png")] {
         auto png = read_file(path);
         return png ? unkept("image/png", std::move(*png)) : refusal(k_absent, "this look has no picture.");
@@ -253,7 +253,7 @@ void Reception::get_look_assembly(const Asked& asked, Answering answering) {
     for (const scene::Look& each : news_->looks)
       if (each.name == *name) look = &each;
   if (!look) return answering(refusal(k_absent, "expected a look of the state, found another name."));
-  do_in_backroom(
+  do_on_worker(
       [scene = news_->scene, look = *look] {
         const std::string bytes = assembly_of(*scene, look);
         return bytes.empty() ? refusal(k_absent, "this look has no parts.")
@@ -272,7 +272,7 @@ void Reception::get_variant_image(const Asked& asked, Answering answering) {
   const auto variant = name_in(asked.path, asked.path.substr(0, slash) + "/", ".png");
   if (!slot || !variant || !news_)
     return answering(refusal(k_absent, "expected a slot and a variant of the state, found others."));
-  do_in_backroom(
+  do_on_worker(
       [images = thumbnails_, scene = news_->scene, slot = *slot, variant = *variant] {
         const auto png = images->png(scene, slot, variant);
         return png ? unkept("image/png", **png) : refusal(k_absent, png.message());

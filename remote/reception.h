@@ -130,7 +130,7 @@ class Reception {
   void get_look_image(const Asked& asked, Answering answering);
   void get_look_assembly(const Asked& asked, Answering answering);
   void get_variant_image(const Asked& asked, Answering answering);
-  void do_in_backroom(std::function<HttpAnswer()> job, Answering answering);
+  void do_on_worker(std::function<HttpAnswer()> job, Answering answering);
   void post_comment(const Asked& asked, Answering answering);
   void post_edit(const Asked& asked, Answering answering);
   void post_leave(const Asked& asked, Answering answering);

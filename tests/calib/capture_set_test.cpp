@@ -161,7 +161,7 @@ TEST(CaptureSet, ImportTakesForeignNames) {
   EXPECT_EQ(read->poses[1].images[0][0][9].filename(), "gray_9.png");
   EXPECT_EQ(read->cameras[0].width, 9);
   foreign.projector_width = 1024;
-  EXPECT_NE(import_opencv_gray(foreign).message().find("expected 26 pictures"), std::string::npos);
+  EXPECT_NE(import_opencv_gray(foreign).message().find("expected 26 images"), std::string::npos);
   foreign.poses = "nothing*";
   EXPECT_NE(import_opencv_gray(foreign).message().find("nothing*"), std::string::npos);
 }

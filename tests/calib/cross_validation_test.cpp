@@ -68,7 +68,7 @@ SolveOptions any_lens() {
   return options;
 }
 
-TEST(ModelSelection, TakesWhatTheLensesNeedAndNoMore) {
+TEST(LensChoice, TakesWhatTheLensesNeedAndNoMore) {
   WorldOptions plain;
   plain.poses = 6;
   plain.projector_distortion = {};
@@ -97,7 +97,7 @@ TEST(ModelSelection, TakesWhatTheLensesNeedAndNoMore) {
   EXPECT_GT(b->solution.covariance.rows(), 0);
 }
 
-TEST(ModelSelection, GivesEveryDeviceOfALargerRigItsOwn) {
+TEST(LensChoice, GivesEveryDeviceOfALargerRigItsOwn) {
   World world = make_world(2, 2, 6, 0.5);
   add_noise(&world, 0.05, 0.05, test_rng());
   SolveOptions options = any_lens();

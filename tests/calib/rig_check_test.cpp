@@ -183,7 +183,7 @@ double registration_mm(const Rig& rig, const Rig& truth) {
 
 constexpr int k_seeds = 50;
 
-TEST(RigCheck, NeverFlagsASoundRigInFiftySeeds) {
+TEST(Recheck, NeverFlagsASoundRigInFiftySeeds) {
   Rng rng = test_rng();
   const Rig truth = true_rig(1, 2);
   for (int seed = 0; seed < k_seeds; ++seed) {
@@ -195,7 +195,7 @@ TEST(RigCheck, NeverFlagsASoundRigInFiftySeeds) {
   }
 }
 
-TEST(RigCheck, NamesTheDeviceThatWasTurnedByAFifthOfADegreeAndPutsItBack) {
+TEST(Recheck, NamesTheDeviceThatWasTurnedByAFifthOfADegreeAndPutsItBack) {
   Rng rng = test_rng();
   Rig rig;
   double worst_mm = 0, error_deg = 0;
@@ -220,7 +220,7 @@ TEST(RigCheck, NamesTheDeviceThatWasTurnedByAFifthOfADegreeAndPutsItBack) {
   RecordProperty("worst_error_of_turn_deg", std::to_string(error_deg));
 }
 
-TEST(RigCheck, ASceneWithoutABoardTellsWhichDeviceMovedAndPutsItBack) {
+TEST(Recheck, ASceneWithoutABoardTellsWhichDeviceMovedAndPutsItBack) {
   Rng rng = test_rng();
   double worst_mm = 0;
   for (const auto& [cameras, projectors] : {std::pair<size_t, size_t>{1, 2}, {2, 1}, {2, 2}}) {
@@ -244,14 +244,14 @@ TEST(RigCheck, ASceneWithoutABoardTellsWhichDeviceMovedAndPutsItBack) {
   EXPECT_LT(worst_mm, 1);
 }
 
-TEST(RigCheck, ASceneThatTwoDevicesShareTellsNoScale) {
+TEST(Recheck, ASceneThatTwoDevicesShareTellsNoScale) {
   Rng rng = test_rng();
   const auto checked = check_rig(true_rig(1, 1), scene_seen_by(true_rig(1, 1), &rng));
   ASSERT_FALSE(checked);
   EXPECT_NE(checked.message().find("three of the rig's devices share"), std::string::npos);
 }
 
-TEST(RigCheck, TellsWhichOfTwoCamerasWasPushed) {
+TEST(Recheck, TellsWhichOfTwoCamerasWasPushed) {
   Rng rng = test_rng();
   const Rig rig = calibrated(true_rig(2, 1), &rng);
   for (const size_t device : {0u, 1u, 2u}) {
@@ -266,7 +266,7 @@ TEST(RigCheck, TellsWhichOfTwoCamerasWasPushed) {
   }
 }
 
-TEST(RigCheck, CannotTellOneCameraFromOneProjectorAndSaysSo) {
+TEST(Recheck, CannotTellOneCameraFromOneProjectorAndSaysSo) {
   Rng rng = test_rng();
   const Rig rig = calibrated(true_rig(1, 1), &rng);
   for (const size_t device : {0u, 1u}) {
@@ -282,7 +282,7 @@ TEST(RigCheck, CannotTellOneCameraFromOneProjectorAndSaysSo) {
   }
 }
 
-TEST(RigCheck, ABoardThatStoodStillTellsOneCameraFromOneProjector) {
+TEST(Recheck, ABoardThatStoodStillTellsOneCameraFromOneProjector) {
   Rng rng = test_rng();
   const Rig rig = calibrated(true_rig(1, 1), &rng);
   const std::vector<Pose> board = places(1, &rng);
@@ -306,7 +306,7 @@ TEST(RigCheck, ABoardThatStoodStillTellsOneCameraFromOneProjector) {
   EXPECT_TRUE(touched->board_moved);
 }
 
-TEST(RigCheck, SaysWhenNoSingleMoveExplainsWhatIsSeen) {
+TEST(Recheck, SaysWhenNoSingleMoveExplainsWhatIsSeen) {
   Rng rng = test_rng();
   const Rig rig = calibrated(true_rig(1, 2), &rng);
   Rig truth = true_rig(1, 2);
@@ -325,7 +325,7 @@ TEST(RigCheck, SaysWhenNoSingleMoveExplainsWhatIsSeen) {
   EXPECT_NE(zoomed->verdict, RigVerdict::sound);
 }
 
-TEST(RigCheck, NamesDevicesThatTheRigDoesNotHave) {
+TEST(Recheck, NamesDevicesThatTheRigDoesNotHave) {
   Rng rng = test_rng();
   const Rig rig = true_rig(1, 1);
   Observations seen = seen_by(rig, places(1, &rng), &rng);

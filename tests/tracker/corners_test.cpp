@@ -203,7 +203,7 @@ TEST(Detector, FindsSmallMarkers) {
   EXPECT_LT(r.rms_px, 0.15);
 }
 
-TEST(Detector, StraightensTheSidesOfADistortedImageThroughItsLens) {
+TEST(Detector, StraightensTheSidesOfADistortedPictureThroughItsLens) {
   Sweep sweep{120, 200, 45_deg, {}};
   sweep.lens = bent_vga();
   sweep.image.blur_px = 0.5;

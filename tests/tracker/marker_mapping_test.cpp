@@ -63,7 +63,7 @@ Pose true_pose(const Body& body, const MarkerName& frame, const MarkerName& mark
   return pose(frame).inverse() * pose(marker);
 }
 
-TEST(MarkerMap, ComesBackExactlyFromPerfectCorners) {
+TEST(LearnedBody, ComesBackExactlyFromPerfectCorners) {
   auto rng = test::test_rng();
   const Body body = prism();
   Images images = images_of(body, 12, 0.6, 1e-6, rng);
@@ -77,7 +77,7 @@ TEST(MarkerMap, ComesBackExactlyFromPerfectCorners) {
                                 true_pose(body, learned->frame, marker.marker.marker), 1e-5, 1e-6));
 }
 
-TEST(MarkerMap, HasTheDeviationsOfItsErrorsFarAwayToo) {
+TEST(LearnedBody, HasTheDeviationsOfItsErrorsFarAwayToo) {
   auto rng = test::test_rng();
   const Body body = prism();
   for (const double depth : {0.6, 2.0}) {  // 107 px, 32 px
@@ -109,7 +109,7 @@ TEST(MarkerMap, HasTheDeviationsOfItsErrorsFarAwayToo) {
   }
 }
 
-TEST(MarkerMap, LeavesOutWhatIsTwiceInAnImageAndNamesWhatItCannotPlace) {
+TEST(LearnedBody, LeavesOutWhatIsTwiceInAnImageAndNamesWhatItCannotPlace) {
   auto rng = test::test_rng();
   const Body body = prism();
   Images images = images_of(body, 12, 0.6, 0.05, rng);
@@ -131,7 +131,7 @@ TEST(MarkerMap, LeavesOutWhatIsTwiceInAnImageAndNamesWhatItCannotPlace) {
                                 true_pose(body, learned->frame, marker.marker.marker), 0.5_deg, 0.5_mm));
 }
 
-TEST(MarkerMap, SaysWhenNoTwoMarkersAreTogether) {
+TEST(LearnedBody, SaysWhenNoTwoMarkersAreTogether) {
   auto rng = test::test_rng();
   const Body body = test::body_of(1);
   Images images = images_of(body, 3, 0.6, 0.05, rng);
