@@ -1,7 +1,7 @@
 #pragma once
 
-#include "wizard/measure/scan_alignment.h"
 #include "core/result.h"
+#include "wizard/measure/scan_alignment.h"
 
 namespace limn::apps {
 

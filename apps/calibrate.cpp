@@ -9,17 +9,17 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "wizard/pose_instructions.h"
+#include "core/log.h"
 #include "device/devices_file.h"
-#include "wizard/capture/capture_plan.h"
-#include "wizard/capture/virtual_capture.h"
+#include "tracker/marker_image.h"
 #include "wizard/capture/capture_folder.h"
-#include "wizard/guided_poses.h"
+#include "wizard/capture/capture_plan.h"
 #include "wizard/capture/virtual_backend.h"
+#include "wizard/capture/virtual_capture.h"
+#include "wizard/guided_poses.h"
+#include "wizard/pose_instructions.h"
 #include "wizard/sequence.h"
 #include "wizard/window/wizard_window.h"
-#include "tracker/marker_image.h"
-#include "core/log.h"
 
 namespace limn::apps {
 namespace {
@@ -124,9 +124,9 @@ Status played(const CalibrateOptions& options,
     return calibrated({options.out, options.scene, options.scan, options.all}, plan_json, plan.captures,
                       plan.places, where, audience);
   };
-  LIMN_TRY(const Calibrated done, window
-                                      ? calibrated_in_window(&*window, plan, around, say, wish, executor, work)
-                                      : work(around, {.say = say}));
+  LIMN_TRY(const Calibrated done,
+           window ? calibrated_in_window(&*window, plan, around, say, wish, executor, work)
+                  : work(around, {.say = say}));
   say_end(options, done, say);
   if (options.json) fmt::print("{}", to_json(done));
   return {};
@@ -149,8 +149,7 @@ Status calibrate_virtually(const CalibrateOptions& asked) {
       options, text,
       {captures, pose_instructions(cameras[0], plan.board, plan.world_from_board),
        outlines(plan.board, plan.world_from_board, cameras), devices_in_words(captures, "virtual rig: ")},
-      virtual_backend(plan, &rig, &writer), window_for(options, device::Desktop::open()), &wish,
-      &executor);
+      virtual_backend(plan, &rig, &writer), window_for(options, device::Desktop::open()), &wish, &executor);
 }
 
 // A display of the main thread, for another one.

@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <string>
 
-#include "wizard/capture/device_backend.h"
 #include "core/result.h"
 #include "device/desktop.h"
+#include "wizard/capture/device_backend.h"
 
 namespace limn::apps {
 

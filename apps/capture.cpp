@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
+#include "sim/virtual_rig.h"
+#include "tracker/marker_image.h"
 #include "wizard/capture/capture_plan.h"
 #include "wizard/capture/virtual_capture.h"
-#include "tracker/marker_image.h"
-#include "sim/virtual_rig.h"
 
 namespace limn::apps {
 

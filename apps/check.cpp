@@ -8,14 +8,14 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
+#include "core/file.h"
+#include "core/image_io.h"
+#include "core/log.h"
+#include "core/names.h"
+#include "device/gl_context.h"
 #include "validate/check_file.h"
 #include "validate/check_judge.h"
 #include "validate/check_page.h"
-#include "core/file.h"
-#include "core/log.h"
-#include "core/names.h"
-#include "core/image_io.h"
-#include "device/gl_context.h"
 
 namespace limn::apps {
 namespace {

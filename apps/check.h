@@ -12,8 +12,8 @@ struct CheckOptions {
   std::vector<std::filesystem::path> files;  ///< limn.check/1; none: all of config/checks
   std::filesystem::path out = "out/check";
   bool json = false;  ///< print check.json instead of a table
-  /// `out` of another run of the same checks, on another machine perhaps; empty: none. What it drew may differ
-  /// by two levels, and by more in 0.1 % of an image's pixels.
+  /// `out` of another run of the same checks, on another machine perhaps; empty: none. What it drew may
+  /// differ by two levels, and by more in 0.1 % of an image's pixels.
   std::filesystem::path against;
 };
 

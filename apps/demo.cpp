@@ -7,13 +7,13 @@
 #include <thread>
 #include <vector>
 
-#include "validate/demo_page.h"
-#include "validate/demo_session.h"
 #include "core/file.h"
 #include "core/frame.h"
 #include "core/image_io.h"
 #include "device/gl_context.h"
 #include "device/window.h"
+#include "validate/demo_page.h"
+#include "validate/demo_session.h"
 
 namespace limn::apps {
 namespace {

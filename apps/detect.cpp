@@ -14,9 +14,9 @@
 
 #include "core/config.h"
 #include "core/file.h"
+#include "core/image_io.h"
 #include "core/log.h"
 #include "core/median.h"
-#include "core/image_io.h"
 #include "core/rig.h"
 #include "tracker/detector.h"
 #include "tracker/marker_pose.h"

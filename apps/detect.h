@@ -20,7 +20,7 @@ struct DetectOptions {
   std::string encoding = "linear";
   std::filesystem::path csv, json, draw;  ///< what to write; empty: nothing. `draw` is a folder
   int threads = 1;                        ///< images worked on at a time; with `repeat` always one
-  int repeat = 0;  ///< N: also the median time of N detections of the image in memory
+  int repeat = 0;                         ///< N: also the median time of N detections of the image in memory
 };
 
 /// One line a marker on stdout, and the files asked for. An image that cannot be read is reported on stderr,

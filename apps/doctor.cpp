@@ -12,12 +12,12 @@
 #include <sstream>
 #include <thread>
 
-#include "device/devices_file.h"
-#include "device/test_card.h"
 #include "core/file.h"
 #include "core/log.h"
+#include "device/devices_file.h"
 #include "device/gige_camera.h"
 #include "device/gl_context.h"
+#include "device/test_card.h"
 #include "device/v4l2_camera.h"
 
 namespace limn::apps {

@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "exchange/projector_maps.h"
 #include "core/log.h"
 #include "device/gl_context.h"
+#include "exchange/projector_maps.h"
 #include "projector/renderer.h"
 
 namespace limn::apps {

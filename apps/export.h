@@ -1,7 +1,7 @@
 #pragma once
 
-#include "exchange/exporter.h"
 #include "core/result.h"
+#include "exchange/exporter.h"
 
 namespace limn::apps {
 

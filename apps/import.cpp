@@ -5,11 +5,11 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "core/log.h"
+#include "core/rig.h"
 #include "exchange/mpcdi_reader.h"
 #include "exchange/mpcdi_report.h"
 #include "exchange/mpcdi_rig.h"
-#include "core/log.h"
-#include "core/rig.h"
 
 namespace limn::apps {
 namespace {

@@ -6,11 +6,11 @@
 
 #include "core/config.h"
 #include "core/file.h"
+#include "core/image_io.h"
 #include "core/imager_file.h"
 #include "core/log.h"
-#include "core/image_io.h"
-#include "tracker/marker_mapping.h"
 #include "tracker/detector.h"
+#include "tracker/marker_mapping.h"
 
 namespace limn::apps {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "exchange/printing/marker_mount.h"
-#include "exchange/printing/marker_templates.h"
 #include "exchange/printing/marker_sheet.h"
+#include "exchange/printing/marker_templates.h"
 
 namespace limn::apps {
 

@@ -16,9 +16,9 @@ struct MarkersOptions {
   std::filesystem::path train;  ///< instead: an image whose frame becomes the template `out`
   std::vector<std::filesystem::path> compare;  ///< instead: template files to tell apart
   std::filesystem::path json;                  ///< of the comparison; empty: none
-  std::filesystem::path mount;                 ///< also a holder for a marker (exchange/printing/marker_mount.h): .stl
-  double paper_mm = 0.1;                       ///< of the holder: thickness of paper and glue
-  std::filesystem::path out;                   ///< .pdf or .svg; a board also .png; a template .patt
+  std::filesystem::path mount;  ///< also a holder for a marker (exchange/printing/marker_mount.h): .stl
+  double paper_mm = 0.1;        ///< of the holder: thickness of paper and glue
+  std::filesystem::path out;    ///< .pdf or .svg; a board also .png; a template .patt
 };
 
 /// Sheets to print on A4 at true size: black squares as vectors, white margin, name, a mark outside the

@@ -3,19 +3,17 @@
 #include <functional>
 #include <opencv2/core/mat.hpp>
 
-#include "wizard/measure/pixel_size.h"
 #include "calib/code/patterns.h"
 #include "calib/response/response_patterns.h"
 #include "core/file.h"
-#include "core/log.h"
 #include "core/image_io.h"
+#include "core/log.h"
+#include "wizard/measure/pixel_size.h"
 
 namespace limn::apps {
 namespace {
 
-Status write_images(const std::filesystem::path& out,
-                      int count,
-                      const std::function<cv::Mat(int)>& image) {
+Status write_images(const std::filesystem::path& out, int count, const std::function<cv::Mat(int)>& image) {
   LIMN_TRY_STATUS(make_folder(out));
   Progress progress("patterns", count);
   for (int i = 0; i < count; ++i) {
@@ -28,7 +26,7 @@ Status write_images(const std::filesystem::path& out,
 Status write_response(const PatternsOptions& options, const PixelSize& size) {
   const int count = static_cast<int>(calib::response_images().size());
   LIMN_TRY_STATUS(write_images(options.out, count,
-                                 [&](int i) { return calib::draw_response(i, size.width, size.height); }));
+                               [&](int i) { return calib::draw_response(i, size.width, size.height); }));
   LIMN_TRY_STATUS(calib::save_response_patterns(size.width, size.height, options.out / "patterns.json"));
   fmt::print("{} response pictures of {}x{} in {}\n", count, size.width, size.height, options.out.string());
   return {};

@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include "design/design_report.h"
-#include "design/rig_design.h"
-#include "design/plan_page.h"
 #include "core/file.h"
+#include "design/design_report.h"
+#include "design/plan_page.h"
+#include "design/rig_design.h"
 
 namespace limn::apps {
 
@@ -13,7 +13,8 @@ Status run_plan_rig(const PlanRigOptions& options) {
   LIMN_TRY(const DescribedRig described, load_described(options.described));
   auto predicted_accuracy = predict_accuracy(described);
   if (!predicted_accuracy)
-    return error("{}: no calibration comes of this rig: {}", options.described.string(), predicted_accuracy.message());
+    return error("{}: no calibration comes of this rig: {}", options.described.string(),
+                 predicted_accuracy.message());
   if (options.json) {
     fmt::print("{}\n", design_json(*predicted_accuracy));
   } else {

@@ -6,16 +6,16 @@
 #include <string>
 #include <system_error>
 
-#include "device/devices_file.h"
-#include "core/image_writer.h"
-#include "wizard/capture/capture_plan.h"
-#include "wizard/capture/virtual_capture.h"
-#include "wizard/capture/device_backend.h"
-#include "tracker/marker_image.h"
 #include "calib/capture_set.h"
 #include "core/file.h"
+#include "core/image_writer.h"
 #include "core/rig.h"
 #include "device/desktop.h"
+#include "device/devices_file.h"
+#include "tracker/marker_image.h"
+#include "wizard/capture/capture_plan.h"
+#include "wizard/capture/device_backend.h"
+#include "wizard/capture/virtual_capture.h"
 
 namespace limn::apps {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <filesystem>
 
-#include "wizard/capture/rig_recheck.h"
 #include "core/result.h"
+#include "wizard/capture/rig_recheck.h"
 
 namespace limn::apps {
 

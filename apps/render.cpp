@@ -9,22 +9,22 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
-#include "tracker/camera_encoding.h"
 #include "core/config.h"
 #include "core/file.h"
+#include "core/image_io.h"
 #include "core/log.h"
 #include "core/names.h"
-#include "core/image_io.h"
 #include "core/rig.h"
 #include "device/gl_context.h"
 #include "projector/renderer.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 #include "scene/viewpoint.h"
+#include "tracker/body_estimate.h"
+#include "tracker/camera_encoding.h"
 #include "tracker/detector.h"
 #include "tracker/family.h"
 #include "tracker/marker_light.h"
-#include "tracker/body_estimate.h"
 
 namespace limn::apps {
 namespace {

@@ -15,8 +15,8 @@ struct RenderOptions {
   std::filesystem::path scene;
   std::vector<std::string> frames;  ///< CAMERA=PICTURE
   std::filesystem::path poses;      ///< POSES.json; places everything, frames are then only drawn over
-  /// Viewer files; none: the scene's, else camera 0. Several share an eye (scene/viewpoint.h), that of one who
-  /// has just come in.
+  /// Viewer files; none: the scene's, else camera 0. Several share an eye (scene/viewpoint.h), that of one
+  /// who has just come in.
   std::vector<std::filesystem::path> viewers;
   std::string composite = "full";  ///< or "rest": only what light cannot show
   bool undistorted = false;        ///< composites without the cameras' distortion

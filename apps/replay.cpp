@@ -9,11 +9,11 @@
 #include <optional>
 #include <thread>
 
-#include "session/frame_loop.h"
-#include "session/recording.h"
 #include "core/log.h"
 #include "device/gl_context.h"
 #include "device/window.h"
+#include "session/frame_loop.h"
+#include "session/recording.h"
 
 namespace limn::apps {
 namespace {

@@ -2,14 +2,14 @@
 
 #include <fmt/format.h>
 
-#include "wizard/capture/capture_plan.h"
-#include "wizard/measure/scan_files.h"
-#include "wizard/capture/virtual_capture.h"
-#include "tracker/marker_image.h"
 #include "calib/capture_set.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "core/rig.h"
+#include "tracker/marker_image.h"
+#include "wizard/capture/capture_plan.h"
+#include "wizard/capture/virtual_capture.h"
+#include "wizard/measure/scan_files.h"
 
 namespace limn::apps {
 namespace {

@@ -5,16 +5,16 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
-#include "tracker/marker_image.h"
 #include "core/config.h"
 #include "core/file.h"
+#include "core/image_io.h"
 #include "core/log.h"
 #include "core/names.h"
-#include "core/image_io.h"
 #include "core/rig.h"
 #include "sim/sensor_model.h"
 #include "sim/truth.h"
 #include "sim/world.h"
+#include "tracker/marker_image.h"
 
 namespace limn::apps {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "wizard/measure/solve_captures.h"
 #include "core/result.h"
+#include "wizard/measure/solve_captures.h"
 
 namespace limn::apps {
 

@@ -92,7 +92,10 @@ double BundleAdjuster::robust_weight(double squared, NormalEquations* normal) co
   return weight;
 }
 
-void BundleAdjuster::add_group(const Group& group, const Parameters& at, const Noise& noise, NormalEquations* normal) {
+void BundleAdjuster::add_group(const Group& group,
+                               const Parameters& at,
+                               const Noise& noise,
+                               NormalEquations* normal) {
   const auto& board = at.world_from_board[static_cast<size_t>(group.pose)];
   if (!board) return;
   const Imager& camera = at.cameras[static_cast<size_t>(group.camera)];
@@ -221,7 +224,10 @@ void BundleAdjuster::add_points(const Parameters& at, const Noise& noise, Normal
   }
 }
 
-void BundleAdjuster::add_lens_prior(const Imager& imager, bool is_projector, int at, NormalEquations* normal) const {
+void BundleAdjuster::add_lens_prior(const Imager& imager,
+                                    bool is_projector,
+                                    int at,
+                                    NormalEquations* normal) const {
   const auto add = [&](int value, double expected, double stddev) {
     const double residual = (imager.lens.values[static_cast<size_t>(value)] - expected) / stddev;
     normal->cost += residual * residual / 2;
@@ -301,7 +307,8 @@ MatrixXd BundleAdjuster::reduced(const NormalEquations& normal, double damping, 
   return schur;
 }
 
-std::optional<BundleAdjuster::Step> BundleAdjuster::step(const NormalEquations& normal, double damping) const {
+std::optional<BundleAdjuster::Step> BundleAdjuster::step(const NormalEquations& normal,
+                                                         double damping) const {
   Step step;
   VectorXd gradient;
   const MatrixXd schur = reduced(normal, damping, &gradient);
@@ -364,10 +371,12 @@ void BundleAdjuster::place_points(Parameters* parameters) const {
   std::vector<double> sums(observations_.points.size(), 0.0);
   std::vector<int> counts(observations_.points.size(), 0);
   for (const TiePointObservation& tie_observation : observations_.tie_observations) {
-    const auto index = static_cast<size_t>(tie_observation.point), which = static_cast<size_t>(tie_observation.imager);
+    const auto index = static_cast<size_t>(tie_observation.point),
+               which = static_cast<size_t>(tie_observation.imager);
     const TiePoint& point = observations_.points[index];
     const Imager& camera = parameters->cameras[static_cast<size_t>(point.camera)];
-    const Imager& seeing = tie_observation.by_projector ? parameters->projectors[which] : parameters->cameras[which];
+    const Imager& seeing =
+        tie_observation.by_projector ? parameters->projectors[which] : parameters->cameras[which];
     LensRay ray;
     if (!find_ray(camera.lens.model, camera.lens.values, point.px_camera, false, &ray)) continue;
     const double depth = triangulated_depth(view(camera), ray, view(seeing), tie_observation.px);
@@ -413,7 +422,9 @@ struct BundleAdjuster::Problem {
   }
 };
 
-Result<BundleAdjuster::Summary> BundleAdjuster::minimise(Parameters start, const Noise& noise, double enough) {
+Result<BundleAdjuster::Summary> BundleAdjuster::minimise(Parameters start,
+                                                         const Noise& noise,
+                                                         double enough) {
   camera_at_.clear();
   projector_at_.clear();
   int size = 0;
@@ -438,13 +449,14 @@ Result<BundleAdjuster::Summary> BundleAdjuster::minimise(Parameters start, const
                   .here = std::move(start),
                   .at_here = std::move(at_start)};
   const LeastSquaresSummary found = limn::minimise(&problem, {.max_steps = k_most_steps,
-                                                        .first_damping = k_first_damping,
-                                                        .least_damping = k_least_damping,
-                                                        .most_damping = k_most_damping,
-                                                        .damps_more_without_step = true});
+                                                              .first_damping = k_first_damping,
+                                                              .least_damping = k_least_damping,
+                                                              .most_damping = k_most_damping,
+                                                              .damps_more_without_step = true});
   if (found.end == LeastSquaresEnd::no_start)
     return error(
-        "the bundle adjustment has no finite start: the observations do not determine the devices. Capture more "
+        "the bundle adjustment has no finite start: the observations do not determine the devices. Capture "
+        "more "
         "poses, tilted by 20 to 45 degrees to different sides.");
   const bool converged = found.end == LeastSquaresEnd::settled;
   // A flat valley: steps change the cost by less than this. The covariance states its length.
@@ -535,13 +547,16 @@ struct BundleAdjuster::BoardProblem {
   }
 };
 
-Result<Pose> BundleAdjuster::board_pose(const Parameters& at, int pose, const Noise& noise, Pose start) const {
+Result<Pose> BundleAdjuster::board_pose(const Parameters& at,
+                                        int pose,
+                                        const Noise& noise,
+                                        Pose start) const {
   BoardProblem problem{.joint = *this, .at = at, .pose = pose, .noise = noise, .state = start};
   problem.at_state = problem.evaluate(start);
   const LeastSquaresSummary found = limn::minimise(&problem, {.max_steps = k_most_steps,
-                                                        .first_damping = k_first_damping,
-                                                        .least_damping = k_least_damping,
-                                                        .most_damping = k_most_damping});
+                                                              .first_damping = k_first_damping,
+                                                              .least_damping = k_least_damping,
+                                                              .most_damping = k_most_damping});
   if (found.end == LeastSquaresEnd::settled) return problem.state;
   return error("{}: the board's pose does not follow from its corners.",
                observations_.poses[static_cast<size_t>(pose)]);

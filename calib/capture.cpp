@@ -21,7 +21,8 @@ std::string patterns_file(const CaptureSet& plan, size_t projector) {
   return "patterns-" + plan.projectors[projector].name + ".json";
 }
 
-Status capture_image(const CaptureSet& plan, int pose, int projector, int pattern, const CaptureBackend& backend) {
+Status capture_image(
+    const CaptureSet& plan, int pose, int projector, int pattern, const CaptureBackend& backend) {
   for (int camera = 0; camera < static_cast<int>(plan.cameras.size()); ++camera) {
     const CapturedDevice& device = plan.cameras[static_cast<size_t>(camera)];
     LIMN_TRY(const cv::Mat image, backend.grab(camera));

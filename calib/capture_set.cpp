@@ -4,8 +4,8 @@
 #include <set>
 
 #include "core/config.h"
-#include "core/names.h"
 #include "core/image_io.h"
+#include "core/names.h"
 
 namespace limn::calib {
 namespace {
@@ -161,11 +161,11 @@ Status read_patterns(const Config& config, CaptureSet* captures) {
 }  // namespace
 
 CaptureSet plan_captures(const fs::path& folder,
-                       std::vector<CapturedDevice> cameras,
-                       std::vector<CapturedDevice> projectors,
-                       const Board& board,
-                       const std::string& code,
-                       const CodeOptions& options) {
+                         std::vector<CapturedDevice> cameras,
+                         std::vector<CapturedDevice> projectors,
+                         const Board& board,
+                         const std::string& code,
+                         const CodeOptions& options) {
   CaptureSet plan{folder, std::move(cameras), std::move(projectors), {}, board, {}};
   for (const CapturedDevice& projector : plan.projectors)
     plan.patterns.push_back(Patterns::create(code, projector.width, projector.height, options).value());
@@ -209,7 +209,7 @@ Result<CaptureSet> import_opencv_gray(const ForeignCaptureSet& foreign) {
   LIMN_TRY(const Patterns patterns,
            Patterns::create("gray", foreign.projector_width, foreign.projector_height));
   CaptureSet captures{foreign.folder, {{"camera0", 0, 0}}, {{"projector0", patterns.width, patterns.height}},
-                    {patterns},     foreign.board,       {}};
+                      {patterns},     foreign.board,       {}};
   LIMN_TRY(const auto names, pose_names(foreign.folder, foreign.poses, foreign.skip));
   for (const std::string& name : names) {
     std::vector<fs::path> files;

@@ -39,11 +39,11 @@ struct CaptureSet {
 /// A captures folder that is about to be filled: patterns of a code for every projector, no poses yet. An
 /// unknown code, or options out of their range, throw: the caller must have checked what people entered.
 CaptureSet plan_captures(const std::filesystem::path& folder,
-                       std::vector<CapturedDevice> cameras,
-                       std::vector<CapturedDevice> projectors,
-                       const Board& board,
-                       const std::string& code = "gray",
-                       const CodeOptions& options = {});
+                         std::vector<CapturedDevice> cameras,
+                         std::vector<CapturedDevice> projectors,
+                         const Board& board,
+                         const std::string& code = "gray",
+                         const CodeOptions& options = {});
 
 /// The file of one image: pose00/camera0/000.png, or pose00/projector0/camera0/000.png where there are
 /// several projectors.
@@ -54,7 +54,7 @@ std::filesystem::path image_path(
 /// image is an error that names the first missing file. Poses named in `skip` are not read; a name in it that
 /// no pose has is an error.
 Result<CaptureSet> load_captures(const std::filesystem::path& folder,
-                               const std::vector<std::string>& skip = {});
+                                 const std::vector<std::string>& skip = {});
 
 /// Images that another program captured: one camera, one projector, OpenCV's Gray code.
 struct ForeignCaptureSet {

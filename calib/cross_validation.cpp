@@ -107,9 +107,9 @@ std::vector<PoseScore> score_poses(const Observations& observations,
 }  // namespace
 
 Result<CrossValidation> cross_validate(const Observations& observations,
-                         const SolveOptions& options,
-                         const Solution& solution,
-                         bool with_errors) {
+                                       const SolveOptions& options,
+                                       const Solution& solution,
+                                       bool with_errors) {
   const Vector2d none = Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   CrossValidation score;
   score.residuals.assign(observations.matches.size(), none);

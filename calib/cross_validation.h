@@ -34,8 +34,8 @@ struct CrossValidation {
 /// (solve_again); another start ends in the same minimum (tests/calib/cross_validation_test.cpp).
 /// `with_errors`: also compute errors_m. Uses all cores; the result does not depend on their number.
 Result<CrossValidation> cross_validate(const Observations& observations,
-                         const SolveOptions& options,
-                         const Solution& solution,
-                         bool with_errors = true);
+                                       const SolveOptions& options,
+                                       const Solution& solution,
+                                       bool with_errors = true);
 
 }  // namespace limn::calib

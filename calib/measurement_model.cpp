@@ -141,11 +141,11 @@ bool find_ray(const LensModel& model,
 }
 
 bool intersect_board(const ImagerView& camera,
-                const Pose& world_from_board,
-                const BoardShape& shape,
-                const Vector2d& bend,
-                const Vector2d& px_camera,
-                Vector3d* p_world) {
+                     const Pose& world_from_board,
+                     const BoardShape& shape,
+                     const Vector2d& bend,
+                     const Vector2d& px_camera,
+                     Vector3d* p_world) {
   LensRay ray;
   Hit hit;
   if (!find_ray(camera.model, camera.values, px_camera, false, &ray)) return false;
@@ -212,11 +212,11 @@ bool predict_match(const ImagerView& camera,
 }
 
 bool predict_tie_point(const ImagerView& camera,
-                      const ImagerView& seeing,
-                      const LensRay& ray,
-                      double inverse_depth,
-                      Vector2d* px,
-                      TiePointDerivatives* derivatives) {
+                       const ImagerView& seeing,
+                       const LensRay& ray,
+                       double inverse_depth,
+                       Vector2d* px,
+                       TiePointDerivatives* derivatives) {
   if (!(inverse_depth > 0)) return false;
   const Vector3d p_camera = ray.d / inverse_depth;
   const Matrix3d world_from_camera = camera.imager_from_world.rotation_matrix().transpose();
@@ -236,7 +236,10 @@ bool predict_tie_point(const ImagerView& camera,
   return true;
 }
 
-double triangulated_depth(const ImagerView& camera, const LensRay& ray, const ImagerView& seeing, const Vector2d& px) {
+double triangulated_depth(const ImagerView& camera,
+                          const LensRay& ray,
+                          const ImagerView& seeing,
+                          const Vector2d& px) {
   LensRay other;
   if (!find_ray(seeing.model, seeing.values, px, false, &other)) return 0;
   const Pose camera_from_seeing = camera.imager_from_world * seeing.imager_from_world.inverse();

@@ -67,11 +67,11 @@ bool predict_corner(const ImagerView& camera,
 
 /// Intersects the ray of a camera pixel with the board; gives the world point. False when they do not meet.
 bool intersect_board(const ImagerView& camera,
-                const Pose& world_from_board,
-                const BoardShape& shape,
-                const Eigen::Vector2d& bend,
-                const Eigen::Vector2d& px_camera,
-                Eigen::Vector3d* p_world);
+                     const Pose& world_from_board,
+                     const BoardShape& shape,
+                     const Eigen::Vector2d& bend,
+                     const Eigen::Vector2d& px_camera,
+                     Eigen::Vector3d* p_world);
 
 /// Predicts the projector pixel of that point.
 bool predict_match(const ImagerView& camera,
@@ -100,17 +100,17 @@ struct TiePointDerivatives {
   Eigen::Vector2d inverse_depth;
 };
 bool predict_tie_point(const ImagerView& camera,
-                      const ImagerView& seeing,
-                      const LensRay& ray,
-                      double inverse_depth,
-                      Eigen::Vector2d* px,
-                      TiePointDerivatives* derivatives = nullptr);
+                       const ImagerView& seeing,
+                       const LensRay& ray,
+                       double inverse_depth,
+                       Eigen::Vector2d* px,
+                       TiePointDerivatives* derivatives = nullptr);
 
 /// Depth along a camera's `ray` (in units of its d) of the point nearest to the ray of another imager's
 /// pixel; 0 when the rays are almost parallel or meet behind an imager.
 double triangulated_depth(const ImagerView& camera,
-                const LensRay& ray,
-                const ImagerView& seeing,
-                const Eigen::Vector2d& px);
+                          const LensRay& ray,
+                          const ImagerView& seeing,
+                          const Eigen::Vector2d& px);
 
 }  // namespace limn::calib

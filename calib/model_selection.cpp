@@ -137,7 +137,7 @@ Result<ModelSelection> solve_selecting_models(const Observations& observations, 
 
   // Projectors first: nearly all of the remaining error is theirs.
   ModelSelector choosing(observations, choice.options,
-                    {choice.options.lens_models, choice.solution, choice.held_out});
+                         {choice.options.lens_models, choice.solution, choice.held_out});
   const size_t cameras = observations.cameras.size();
   for (size_t i = 0; i < asked.size(); ++i) {
     const size_t device = (i + cameras) % asked.size();

@@ -39,6 +39,7 @@ extern const char* const k_auto_lens;
 /// explains (Student's t over the poses' differences); otherwise the simpler one is. The returned held-out
 /// error is that of the poses that were used for the selection, so it is slightly too low, but by less than
 /// the stated uncertainties.
-Result<ModelSelection> solve_selecting_models(const Observations& observations, const SolveOptions& options = {});
+Result<ModelSelection> solve_selecting_models(const Observations& observations,
+                                              const SolveOptions& options = {});
 
 }  // namespace limn::calib

@@ -16,9 +16,9 @@
 #include "calib/tie_points.h"
 #include "core/file.h"
 #include "core/frame.h"
+#include "core/image_io.h"
 #include "core/log.h"
 #include "core/median.h"
-#include "core/image_io.h"
 
 namespace limn::calib {
 namespace {
@@ -266,7 +266,10 @@ double now() {
 constexpr TiePointOptions k_room_points{.columns = 12, .rows = 9};
 
 // What one camera observed in one pose.
-Result<Observed> observe_pose(const CaptureSet& captures, int pose, int camera, const DecodeOptions& options) {
+Result<Observed> observe_pose(const CaptureSet& captures,
+                              int pose,
+                              int camera,
+                              const DecodeOptions& options) {
   const auto at_pose = static_cast<size_t>(pose), at_camera = static_cast<size_t>(camera);
   Observed seen;
   const double started = now();
@@ -332,9 +335,9 @@ Status observe_scenes(const CaptureSet& captures,
                       const std::function<bool()>& should_continue,
                       Observed* observed) {
   for (size_t pose = 0; pose < captures.poses.size(); ++pose) {
-    const bool has_board =
-        std::any_of(observed->observations.corners.begin(), observed->observations.corners.end(),
-                    [&](const CornerObservation& corner) { return static_cast<size_t>(corner.pose) == pose; });
+    const bool has_board = std::any_of(
+        observed->observations.corners.begin(), observed->observations.corners.end(),
+        [&](const CornerObservation& corner) { return static_cast<size_t>(corner.pose) == pose; });
     if (has_board) continue;
     const double started = now();
     std::vector<std::vector<Decoded>> decoded(captures.cameras.size());

@@ -154,9 +154,9 @@ OnlineIntrinsics::OnlineIntrinsics(const IntrinsicsEstimate& before, const Onlin
 }
 
 OnlineIntrinsics::Blocks OnlineIntrinsics::blocks(const Vector5d& values,
-                                        const View& view,
-                                        const Pose& pose,
-                                        double noise) const {
+                                                  const View& view,
+                                                  const Pose& pose,
+                                                  double noise) const {
   Blocks out;
   const auto lens = model_values(values);
   const CauchyLoss loss(options_.robust_at);
@@ -189,8 +189,8 @@ OnlineIntrinsics::Blocks OnlineIntrinsics::blocks(const Vector5d& values,
 
 // Estimated by the median, so that points that were moved do not count.
 double OnlineIntrinsics::noise_of(const Vector5d& values,
-                             std::span<const View> views,
-                             std::span<const Pose> poses) const {
+                                  std::span<const View> views,
+                                  std::span<const Pose> poses) const {
   std::vector<double> squares;
   const auto lens = model_values(values);
   for (std::size_t i = 0; i < views.size(); ++i)
@@ -235,13 +235,16 @@ struct OnlineIntrinsics::PlaceProblem {
 };
 
 // The camera's pose for the given lens values; nullopt when the view does not fit them.
-std::optional<Pose> OnlineIntrinsics::find_pose(const Vector5d& values, const View& view, double* noise) const {
+std::optional<Pose> OnlineIntrinsics::find_pose(const Vector5d& values,
+                                                const View& view,
+                                                double* noise) const {
   PlaceProblem problem{.lens = *this, .values = values, .view = view, .pose = view.camera_from_body};
   for (int round = 0; round < k_most_rounds; ++round) {
     *noise = noise_of(values, std::span(&view, 1), std::span(&problem.pose, 1));
     problem.start(*noise);
     const LeastSquaresSummary found = minimise(
-        &problem, {.max_steps = k_most_view_steps, .first_damping = 1e-6, .most_damping = k_most_view_damping});
+        &problem,
+        {.max_steps = k_most_view_steps, .first_damping = 1e-6, .most_damping = k_most_view_damping});
     if (found.end == LeastSquaresEnd::no_start || found.end == LeastSquaresEnd::no_step ||
         !problem.pose.is_finite())
       return std::nullopt;
@@ -357,7 +360,8 @@ std::optional<OnlineIntrinsics::Solved> OnlineIntrinsics::solve_views(Solved sta
   for (int round = 0; round < k_most_rounds; ++round) {
     problem.start(noise_of(problem.at.values, views_, problem.at.poses));
     const LeastSquaresSummary found = minimise(
-        &problem, {.max_steps = k_most_view_steps, .least_damping = 1e-9, .most_damping = k_most_view_damping});
+        &problem,
+        {.max_steps = k_most_view_steps, .least_damping = 1e-9, .most_damping = k_most_view_damping});
     if (found.end == LeastSquaresEnd::no_start || found.end == LeastSquaresEnd::no_step) return std::nullopt;
     const double noise = noise_of(problem.at.values, views_, problem.at.poses);
     if (std::abs(noise / problem.at.noise - 1) < 0.05) break;

@@ -180,7 +180,7 @@ Points points_of(const Observations& observations, const Seed& seeded, int proje
     const Imager& camera = seeded.cameras[static_cast<size_t>(match.camera)];
     Vector3d p;
     if (!intersect_board({camera.lens.model, camera.lens.values, camera.imager_from_world}, *world_from_board,
-                    shape, Vector2d::Zero(), match.px_camera, &p))
+                         shape, Vector2d::Zero(), match.px_camera, &p))
       continue;
     points.p_world.push_back(p);
     points.px.push_back(match.px_projector);

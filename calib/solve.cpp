@@ -72,7 +72,8 @@ Noise noise_of(const Solution& solution) {
   return {solution.corner_noise_px, solution.match_noise_px, solution.tie_point_noise_px};
 }
 
-std::vector<std::optional<Eigen::Vector3d>> places_of(const Observations& observations, const Parameters& at) {
+std::vector<std::optional<Eigen::Vector3d>> places_of(const Observations& observations,
+                                                      const Parameters& at) {
   std::vector<std::optional<Eigen::Vector3d>> places;
   for (size_t i = 0; i < observations.points.size(); ++i) {
     const TiePoint& point = observations.points[i];
@@ -88,7 +89,10 @@ std::vector<std::optional<Eigen::Vector3d>> places_of(const Observations& observ
   return places;
 }
 
-void add_residuals(const Observations& observations, const Parameters& at, const Noise& noise, Solution* into) {
+void add_residuals(const Observations& observations,
+                   const Parameters& at,
+                   const Noise& noise,
+                   Solution* into) {
   const BoardShape shape{observations.board.width_m(), observations.board.height_m()};
   const Vector2d none = Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   const auto is_outlier = [](const Vector2d& r, double own, double common) {
@@ -137,7 +141,8 @@ Result<Solution> rounds(const Observations& observations,
   for (int round = 0;; ++round) {
     const bool is_last = round == k_rounds - 1;
     LIMN_TRY(BundleAdjuster::Summary descent,
-             joint.minimise(std::move(start), noise, is_last ? BundleAdjuster::k_to_rounding : BundleAdjuster::k_to_significance));
+             joint.minimise(std::move(start), noise,
+                            is_last ? BundleAdjuster::k_to_rounding : BundleAdjuster::k_to_significance));
     steps += descent.steps;
     solution = solution_at(descent.parameters, noise, steps);
     add_residuals(observations, descent.parameters, noise, &solution);
@@ -210,7 +215,8 @@ Status check_finite(const Observations& observations) {
   }
   for (const TiePointObservation& tie_observation : observations.tie_observations) {
     const TiePoint& point = observations.points[static_cast<size_t>(tie_observation.point)];
-    if (!tie_observation.px.allFinite() || !point.px_camera.allFinite() || !std::isfinite(tie_observation.stddev_px))
+    if (!tie_observation.px.allFinite() || !point.px_camera.allFinite() ||
+        !std::isfinite(tie_observation.stddev_px))
       return broken("a scene point", point.pose);
   }
   return {};
@@ -233,8 +239,8 @@ Parameters unknowns_of(const Solution& solution) {
 }
 
 Result<Parameters> unknowns_with_models(const Observations& observations,
-                                      const SolveOptions& options,
-                                      const Solution& start) {
+                                        const SolveOptions& options,
+                                        const Solution& start) {
   LIMN_TRY(const Models models, models_of(observations, options));
   Parameters parameters = unknowns_of(start);
   for (size_t i = 0; i < parameters.cameras.size(); ++i)
@@ -289,7 +295,8 @@ Result<Solution> solve_again(const Observations& observations,
   if (left_out >= 0) parameters.world_from_board[static_cast<size_t>(left_out)].reset();
   BundleAdjuster joint(observations, options, left_out);
   LIMN_TRY(const BundleAdjuster::Summary descent,
-           joint.minimise(std::move(parameters), noise, to_rounding ? BundleAdjuster::k_to_rounding : BundleAdjuster::k_to_significance));
+           joint.minimise(std::move(parameters), noise,
+                          to_rounding ? BundleAdjuster::k_to_rounding : BundleAdjuster::k_to_significance));
   return solution_at(descent.parameters, noise, descent.steps);
 }
 
@@ -328,8 +335,8 @@ std::optional<Eigen::Vector3d> surface_point(const Observations& observations,
   const Imager& camera = solution.rig.cameras[static_cast<size_t>(match.camera)];
   Eigen::Vector3d p;
   if (!intersect_board({camera.lens.model, camera.lens.values, camera.imager_from_world}, world_from_board,
-                  {observations.board.width_m(), observations.board.height_m()}, solution.bend_m,
-                  match.px_camera, &p))
+                       {observations.board.width_m(), observations.board.height_m()}, solution.bend_m,
+                       match.px_camera, &p))
     return std::nullopt;
   return p;
 }

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "calib/observations.h"
 #include "calib/measurement_model.h"
+#include "calib/observations.h"
 #include "core/result.h"
 #include "core/rig.h"
 

@@ -87,10 +87,10 @@ class Reverse {
 // The pixel of another camera that a projector's pixel illuminates: from a pixel near it along the plane
 // there.
 std::optional<TiePointObservation> tie_observation_by(const cv::Mat& labels,
-                                    const Reverse& reverse,
-                                    const Vector2d& label,
-                                    double label_stddev,
-                                    const TiePointOptions& options) {
+                                                      const Reverse& reverse,
+                                                      const Vector2d& label,
+                                                      double label_stddev,
+                                                      const TiePointOptions& options) {
   const int start = reverse.pixel_of(label);
   if (start < 0) return std::nullopt;
   Vector2d px(start % labels.cols, start / labels.cols);
@@ -105,7 +105,8 @@ std::optional<TiePointObservation> tie_observation_by(const cv::Mat& labels,
       TiePointObservation tie_observation;
       tie_observation.by_projector = false;
       tie_observation.px = px;
-      tie_observation.stddev_px = std::hypot(patch->stddev_px, label_stddev) * inverse.norm() / std::sqrt(2.0);
+      tie_observation.stddev_px =
+          std::hypot(patch->stddev_px, label_stddev) * inverse.norm() / std::sqrt(2.0);
       return tie_observation;
     }
   }
@@ -163,9 +164,9 @@ int add_point(const Choice& choice, int camera, int pose, Observations* into) {
 }  // namespace
 
 void add_tie_points(const std::vector<std::vector<Decoded>>& decoded,
-                     int pose,
-                     const TiePointOptions& options,
-                     Observations* into) {
+                    int pose,
+                    const TiePointOptions& options,
+                    Observations* into) {
   std::vector<std::vector<Reverse>> reverse;  // only needed where cameras share the view
   for (size_t camera = 0; decoded.size() > 1 && camera < decoded.size(); ++camera) {
     reverse.emplace_back();
@@ -182,8 +183,8 @@ void add_tie_points(const std::vector<std::vector<Decoded>>& decoded,
         if (other == camera) continue;
         for (size_t p = 0; p < choice.patches.size(); ++p) {
           if (!choice.patches[p]) continue;
-          auto seen = tie_observation_by(decoded[other][p].px_projector, reverse[other][p], choice.patches[p]->label,
-                                  choice.patches[p]->stddev_px, options);
+          auto seen = tie_observation_by(decoded[other][p].px_projector, reverse[other][p],
+                                         choice.patches[p]->label, choice.patches[p]->stddev_px, options);
           if (!seen) continue;
           seen->point = point;
           seen->imager = static_cast<int>(other);

@@ -24,9 +24,9 @@ struct TiePointOptions {
 /// pixels of other cameras that one of these projector pixels illuminates. The result is appended to `into`.
 /// Input: `decoded[camera][projector]`.
 void add_tie_points(const std::vector<std::vector<Decoded>>& decoded,
-                     int pose,
-                     const TiePointOptions& options,
-                     Observations* into);
+                    int pose,
+                    const TiePointOptions& options,
+                    Observations* into);
 
 /// Does the same with what one camera sees around the board. The room reaches the edges of the images, where
 /// boards seldom do, and so determines the lens distortion there. `decoded`: one for each projector.

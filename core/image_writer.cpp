@@ -8,15 +8,13 @@ namespace limn {
 // An exception must not leave the thread.
 Status ImageWriter::stored(const Job& job) {
   try {
-    return job.bytes ? write_file(job.path, *job.bytes)
-                     : write_png(job.path, job.image, {.compression = 1});
+    return job.bytes ? write_file(job.path, *job.bytes) : write_png(job.path, job.image, {.compression = 1});
   } catch (const std::exception& problem) {
     return error("{}: cannot encode this picture: {}.", job.path.string(), problem.what());
   }
 }
 
-ImageWriter::ImageWriter(std::size_t most_queued)
-    : most_queued_(most_queued), thread_([this] { run(); }) {}
+ImageWriter::ImageWriter(std::size_t most_queued) : most_queued_(most_queued), thread_([this] { run(); }) {}
 
 ImageWriter::~ImageWriter() {
   {

@@ -215,7 +215,8 @@ Result<ArtoolkitCamera> parse_artoolkit(const std::string& bytes, const fs::path
     camera.width = static_cast<int>(read_bytes(4));
     camera.height = static_cast<int>(read_bytes(4));
     for (int i = 0; i < 12; ++i) camera.matrix.push_back(std::bit_cast<double>(read_bytes(8)));
-    for (std::size_t i = 0; i < factor_count; ++i) camera.factors.push_back(std::bit_cast<double>(read_bytes(8)));
+    for (std::size_t i = 0; i < factor_count; ++i)
+      camera.factors.push_back(std::bit_cast<double>(read_bytes(8)));
   }
   const auto is_side = [](int side) { return side > 0 && side <= k_max_side; };
   bool sane = camera.version != 0 && is_side(camera.width) && is_side(camera.height);

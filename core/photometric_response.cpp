@@ -56,7 +56,7 @@ ProjectorResponse read_projector(const ConfigNode& node) {
   node.only({"name", "red", "green", "blue", "black_level", "vignetting", "white_over_sum", "worst_residual",
              "drift", "captures"});
   ProjectorResponse response{node.at("name").text(), node.at("red").numbers(-1), node.at("green").numbers(-1),
-                    node.at("blue").numbers(-1)};
+                             node.at("blue").numbers(-1)};
   for (const auto* curve : {&response.red, &response.green, &response.blue}) check_curve(node, *curve);
   response.black_level = read_measured(node, "black_level");
   response.vignetting = read_vignetting(node);
@@ -220,7 +220,8 @@ Status save_responses(const RigResponses& responses,
                       {"projectors", OrderedJson::array()},
                       {"cameras", OrderedJson::array()},
                       {"mixing", OrderedJson::array()}};
-  for (const ProjectorResponse& response : responses.projectors) json["projectors"].push_back(json_of(response));
+  for (const ProjectorResponse& response : responses.projectors)
+    json["projectors"].push_back(json_of(response));
   for (const CameraResponse& response : responses.cameras) json["cameras"].push_back(json_of(response));
   LIMN_TRY_STATUS(make_folder(mixings.empty() ? folder : folder / "response"));
   for (const ColourMixing& mixing : mixings) {

@@ -37,8 +37,8 @@ struct ProjectorResponse {
   std::vector<double> red, green, blue;
 
   // Evidence; absent in files that people write by hand.
-  std::optional<Measurement> black_level = {};   ///< light of black as a share of white
-  std::optional<Vignetting> vignetting = {};  ///< geometry's falloff (distance, incidence) taken out
+  std::optional<Measurement> black_level = {};  ///< light of black as a share of white
+  std::optional<Vignetting> vignetting = {};    ///< geometry's falloff (distance, incidence) taken out
   std::optional<double> white_over_sum =
       {};  ///< light of white over red + green + blue; 1: channels just add
   std::optional<double> worst_residual = {};  ///< of an image's mean from the model, share of full light

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstddef>
 
+#include "calib/judge/assess.h"
 #include "design/sight_lines.h"
 #include "design/volume_points.h"
-#include "calib/judge/assess.h"
 
 namespace limn::apps {
 namespace {
@@ -21,7 +21,9 @@ constexpr double k_most_steep_deg = 60;   // there a pixel is twice as long as w
 constexpr double k_least_marker_px = 32;  // below, poses flip (measured: 6 % at 24 px, none at 48)
 constexpr double k_least_contrast = 5;    // projected white over the room's light: black looks black enough
 
-void advise_on_error(const PredictedAccuracy& predicted_accuracy, const DescribedRig& described, std::vector<std::string>* advice) {
+void advise_on_error(const PredictedAccuracy& predicted_accuracy,
+                     const DescribedRig& described,
+                     std::vector<std::string>* advice) {
   for (std::size_t i = 0; i < predicted_accuracy.error_mm.size(); ++i) {
     if (predicted_accuracy.error_mm[i] <= calib::k_good_mm) continue;
     const std::string& name = described.rig.projectors[i].name;
@@ -37,7 +39,9 @@ void advise_on_error(const PredictedAccuracy& predicted_accuracy, const Describe
   }
 }
 
-void advise_on_pairs(const PredictedAccuracy& predicted_accuracy, const DescribedRig& described, std::vector<std::string>* advice) {
+void advise_on_pairs(const PredictedAccuracy& predicted_accuracy,
+                     const DescribedRig& described,
+                     std::vector<std::string>* advice) {
   for (const PredictedPair& pair : predicted_accuracy.pairs) {
     if (pair.camera != described.rig.cameras.front().name) continue;
     if (pair.angle_deg < k_least_angle_deg)
@@ -117,7 +121,8 @@ void advise_on_coverage(const PredictedAccuracy& predicted_accuracy,
 
 }  // namespace
 
-std::vector<std::string> design_advice(const PredictedAccuracy& predicted_accuracy, const DescribedRig& described) {
+std::vector<std::string> design_advice(const PredictedAccuracy& predicted_accuracy,
+                                       const DescribedRig& described) {
   std::vector<std::string> advice;
   advise_on_error(predicted_accuracy, described, &advice);
   advise_on_coverage(predicted_accuracy, described, volume_points(described), &advice);

@@ -58,7 +58,9 @@ nlohmann::ordered_json json_of(const PredictedAccuracy& predicted_accuracy) {
 
 }  // namespace
 
-std::string design_json(const PredictedAccuracy& predicted_accuracy) { return json_of(predicted_accuracy).dump(2); }
+std::string design_json(const PredictedAccuracy& predicted_accuracy) {
+  return json_of(predicted_accuracy).dump(2);
+}
 
 std::string design_table(const PredictedAccuracy& predicted_accuracy, const DescribedRig& described) {
   std::string out;
@@ -85,8 +87,8 @@ std::string design_table(const PredictedAccuracy& predicted_accuracy, const Desc
   for (std::size_t i = 0; i < predicted_accuracy.error_mm.size(); ++i)
     out += fmt::format(
         "{}: light lands within {:.2f} mm (95 %; calibration {:.2f}, measuring the prototype {:.2f})\n",
-        described.rig.projectors[i].name, predicted_accuracy.error_mm[i], predicted_accuracy.calibration_mm[i],
-        predicted_accuracy.measuring_mm[i]);
+        described.rig.projectors[i].name, predicted_accuracy.error_mm[i],
+        predicted_accuracy.calibration_mm[i], predicted_accuracy.measuring_mm[i]);
   for (const std::string& sentence : predicted_accuracy.advice) out += fmt::format("advice: {}\n", sentence);
   if (predicted_accuracy.advice.empty())
     out += fmt::format("nothing is too small, too far, too steep or out of reach\n");

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <vector>
 
-#include "design/design_report.h"
-#include "core/html.h"
 #include "calib/judge/assess.h"
+#include "core/html.h"
+#include "design/design_report.h"
 
 namespace limn::apps {
 namespace {
@@ -160,7 +160,8 @@ std::string plan_page(const DescribedRig& described, const PredictedAccuracy& pr
   html += "<div class=\"views\">\n";
   for (const View& view : {View{"from above", 0, 1}, View{"from the side", 1, 2}})
     html += view_svg(view, described);
-  return html + fmt::format("</div>\n<pre>{}</pre>\n</html>\n", escaped(design_table(predicted_accuracy, described)));
+  return html + fmt::format("</div>\n<pre>{}</pre>\n</html>\n",
+                            escaped(design_table(predicted_accuracy, described)));
 }
 
 }  // namespace limn::apps

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "design/sight_lines.h"
 #include "core/config.h"
+#include "design/sight_lines.h"
 
 namespace limn::apps {
 namespace {

@@ -8,13 +8,13 @@
 #include <limits>
 #include <optional>
 
+#include "calib/judge/assess.h"
+#include "calib/judge/uncertainty.h"
+#include "calib/solve.h"
 #include "design/design_advice.h"
 #include "design/sight_lines.h"
 #include "design/simulated_observations.h"
 #include "design/volume_points.h"
-#include "calib/judge/assess.h"
-#include "calib/judge/uncertainty.h"
-#include "calib/solve.h"
 #include "tracker/pose_fit.h"
 
 namespace limn::apps {
@@ -33,9 +33,9 @@ double facing(const DescribedRig& described, const Imager& imager, const Vector3
 }
 
 PredictedImager imager_foreseen(const DescribedRig& described,
-                               const Imager& imager,
-                               double lumens,
-                               const std::vector<Vector3d>& points) {
+                                const Imager& imager,
+                                double lumens,
+                                const std::vector<Vector3d>& points) {
   PredictedImager out{.name = imager.name};
   const Vector3d p_imager = imager.imager_from_world * described.p_centre;
   const double cosine = facing(described, imager, described.p_centre);
@@ -95,8 +95,8 @@ double side_px(const std::array<Vector2d, 4>& corners) {
 
 // By the covariance that the tracker itself gives a marker's pose. nullopt: the camera does not see it.
 std::optional<PredictedMarker> marker_of(const DescribedRig& described,
-                                        const Imager& camera,
-                                        const std::vector<Vector3d>& points) {
+                                         const Imager& camera,
+                                         const std::vector<Vector3d>& points) {
   const Pose world_from_marker = marker_at(described, described.p_centre);
   const auto corners = corners_of(described, camera, world_from_marker);
   if (!corners || !reaches(camera, described.p_centre) || facing(described, camera, described.p_centre) <= 0)
@@ -120,10 +120,10 @@ std::optional<PredictedMarker> marker_of(const DescribedRig& described,
       });
   const auto farthest = corners_of(described, camera, marker_at(described, p_farthest));
   return PredictedMarker{.camera = camera.name,
-                        .side_px = side_px(*corners),
-                        .farthest_px = farthest ? side_px(*farthest) : 0,
-                        .across_mm = 1000 * calib::p95_of({&across, 1}),
-                        .along_mm = 1000 * k_two_sided_95 * std::sqrt(place(2, 2))};
+                         .side_px = side_px(*corners),
+                         .farthest_px = farthest ? side_px(*farthest) : 0,
+                         .across_mm = 1000 * calib::p95_of({&across, 1}),
+                         .along_mm = 1000 * k_two_sided_95 * std::sqrt(place(2, 2))};
 }
 
 }  // namespace
@@ -139,7 +139,8 @@ Result<PredictedAccuracy> predict_accuracy(const DescribedRig& described) {
   });
   for (const Imager& camera : described.rig.cameras) {
     predicted_accuracy.cameras.push_back(imager_foreseen(described, camera, 0, points));
-    if (const auto marker = marker_of(described, camera, points)) predicted_accuracy.markers.push_back(*marker);
+    if (const auto marker = marker_of(described, camera, points))
+      predicted_accuracy.markers.push_back(*marker);
   }
   for (std::size_t i = 0; i < described.rig.projectors.size(); ++i)
     predicted_accuracy.projectors.push_back(
@@ -149,7 +150,8 @@ Result<PredictedAccuracy> predict_accuracy(const DescribedRig& described) {
   LIMN_TRY(const calib::Solution solution, calib::solve(observed.observations));
   LIMN_TRY(const calib::Assessment assessment, calib::assess(observed, {}, solution));
   predicted_accuracy.error_mm = assessment.predicted_error_mm;
-  calib::Uncertainty believed = calib::estimated_uncertainty(observed.observations, solution, assessment.held_out.rigs);
+  calib::Uncertainty believed =
+      calib::estimated_uncertainty(observed.observations, solution, assessment.held_out.rigs);
   const double measured_px = believed.measured_px;
   believed.measured_px = 0;
   predicted_accuracy.calibration_mm = calib::propagated_error_mm(observed.observations, solution, believed);

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "design/rig_description.h"
 #include "core/result.h"
+#include "design/rig_description.h"
 
 namespace limn::apps {
 

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "design/sight_lines.h"
 #include "calib/measurement_model.h"
+#include "design/sight_lines.h"
 
 namespace limn::apps {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "design/rig_description.h"
 #include "calib/observations.h"
+#include "design/rig_description.h"
 
 namespace limn::apps {
 

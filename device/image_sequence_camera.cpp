@@ -36,7 +36,7 @@ Result<std::vector<std::filesystem::path>> images_of(const std::filesystem::path
 }  // namespace
 
 Result<ImageSequenceCamera> ImageSequenceCamera::open(const std::filesystem::path& path,
-                                          const ImageSequenceCameraOptions& options) {
+                                                      const ImageSequenceCameraOptions& options) {
   ImageSequenceCamera camera;
   camera.options_ = options;
   LIMN_TRY(camera.images_, images_of(path));

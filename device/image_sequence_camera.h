@@ -20,7 +20,7 @@ class ImageSequenceCamera : public CameraSource {
  public:
   /// Errors: no such path, no image in the folder, first image unreadable.
   static Result<ImageSequenceCamera> open(const std::filesystem::path& path,
-                                    const ImageSequenceCameraOptions& options = {});
+                                          const ImageSequenceCameraOptions& options = {});
 
   const std::string& name() const override { return options_.name; }
   cv::Size size() const override { return size_; }

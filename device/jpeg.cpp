@@ -124,9 +124,8 @@ Result<cv::Mat> decode_jpeg(std::span<const std::uint8_t> bytes, const JpegOptio
   LIMN_TRY(const Header header, read_header(bytes, options, decoder));
   const bool grey = options.grey || header.colours == TJCS_GRAY;
   cv::Mat image(reduced(header.size, options.longest_side), grey ? CV_8UC1 : CV_8UC3);
-  const int done =
-      tjDecompress2(decoder.get(), bytes.data(), bytes.size(), image.data, image.cols,
-                    static_cast<int>(image.step), image.rows, grey ? TJPF_GRAY : TJPF_BGR, 0);
+  const int done = tjDecompress2(decoder.get(), bytes.data(), bytes.size(), image.data, image.cols,
+                                 static_cast<int>(image.step), image.rows, grey ? TJPF_GRAY : TJPF_BGR, 0);
   if (done != 0 && !is_whole(decoder)) return damaged(bytes, decoder);
   return image;
 }
@@ -157,9 +156,8 @@ std::vector<std::uint8_t> encode_jpeg(const cv::Mat& image, int quality) {
   std::vector<std::uint8_t> jpeg(tjBufSize(image.cols, image.rows, sampling));
   unsigned char* at = jpeg.data();
   unsigned long size = jpeg.size();
-  LIMN_CHECK(tjCompress2(encoder.get(), image.data, image.cols, static_cast<int>(image.step),
-                         image.rows, grey ? TJPF_GRAY : TJPF_BGR, &at, &size, sampling, quality,
-                         TJFLAG_NOREALLOC) == 0);
+  LIMN_CHECK(tjCompress2(encoder.get(), image.data, image.cols, static_cast<int>(image.step), image.rows,
+                         grey ? TJPF_GRAY : TJPF_BGR, &at, &size, sampling, quality, TJFLAG_NOREALLOC) == 0);
   jpeg.resize(size);
   return jpeg;
 }

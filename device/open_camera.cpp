@@ -3,8 +3,8 @@
 #include <filesystem>
 
 #include "device/gige_camera.h"
-#include "device/mjpeg_camera.h"
 #include "device/image_sequence_camera.h"
+#include "device/mjpeg_camera.h"
 #include "device/v4l2_camera.h"
 #include "device/video_camera.h"
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "exchange/projector_maps.h"
 #include "core/result.h"
 #include "core/rig.h"
+#include "exchange/projector_maps.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 

@@ -20,9 +20,8 @@ std::string exr_bytes(const cv::Mat& image, const std::string& comment) {
   const char* names[] = {"R", "G", "B"};
   for (std::size_t c = 0; c < 3; ++c) {
     header.channels().insert(names[c], Imf::Channel(Imf::FLOAT));
-    channels.insert(names[c],
-                    Imf::Slice(Imf::FLOAT, const_cast<char*>(image.ptr<char>()) + c * sizeof(float),
-                               image.elemSize(), image.step[0]));
+    channels.insert(names[c], Imf::Slice(Imf::FLOAT, const_cast<char*>(image.ptr<char>()) + c * sizeof(float),
+                                         image.elemSize(), image.step[0]));
   }
   Imf::StdOSStream stream;
   {

@@ -12,8 +12,8 @@
 #include <string>
 #include <utility>
 
-#include "exchange/mpcdi_writer.h"
 #include "core/photometric_response.h"
+#include "exchange/mpcdi_writer.h"
 
 namespace limn::apps {
 namespace {

@@ -10,9 +10,9 @@
 #include <pugixml.hpp>
 #include <set>
 
+#include "core/file.h"
 #include "exchange/pfm.h"
 #include "exchange/zip.h"
-#include "core/file.h"
 
 namespace limn::apps {
 namespace {

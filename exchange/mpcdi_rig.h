@@ -2,9 +2,9 @@
 
 #include <string>
 
-#include "exchange/mpcdi.h"
 #include "core/result.h"
 #include "core/rig.h"
+#include "exchange/mpcdi.h"
 
 namespace limn::apps {
 

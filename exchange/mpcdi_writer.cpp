@@ -4,9 +4,9 @@
 #include <pugixml.hpp>
 #include <sstream>
 
+#include "core/file.h"
 #include "exchange/pfm.h"
 #include "exchange/zip.h"
-#include "core/file.h"
 
 namespace limn::apps {
 namespace {

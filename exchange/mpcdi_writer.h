@@ -2,8 +2,8 @@
 
 #include <filesystem>
 
-#include "exchange/mpcdi.h"
 #include "core/result.h"
+#include "exchange/mpcdi.h"
 
 namespace limn::apps {
 

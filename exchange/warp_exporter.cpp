@@ -5,9 +5,9 @@
 #include <cstddef>
 #include <string>
 
+#include "core/file.h"
 #include "exchange/exr.h"
 #include "exchange/pfm.h"
-#include "core/file.h"
 
 namespace limn::apps {
 namespace {

@@ -10,8 +10,8 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
-#include "core/screen_encoding.h"
 #include "core/result.h"
+#include "core/screen_encoding.h"
 
 namespace limn::apps {
 namespace {
@@ -142,9 +142,9 @@ PlacedImage Gui::image(
   const float scale =
       std::min(size.x / static_cast<float>(image.cols), size.y / static_cast<float>(image.rows));
   PlacedImage placed{{0, 0},
-                       {std::floor(scale * static_cast<float>(image.cols)),
-                        std::floor(scale * static_cast<float>(image.rows))},
-                       scale};
+                     {std::floor(scale * static_cast<float>(image.cols)),
+                      std::floor(scale * static_cast<float>(image.rows))},
+                     scale};
   placed.corner = {std::floor(corner.x + (size.x - placed.size.x) / 2),
                    std::floor(corner.y + (size.y - placed.size.y) / 2)};
   cv::Mat shown = image;

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "gui/gui.h"
 #include "core/result.h"
 #include "device/desktop.h"
 #include "device/window.h"
+#include "gui/gui.h"
 
 namespace limn::apps {
 

@@ -11,7 +11,7 @@
 namespace limn::projector {
 namespace {
 
-constexpr double k_too_dim = 0.2;        // share of the surface that need not reach white
+constexpr double k_too_dim = 0.2;               // share of the surface that need not reach white
 constexpr std::size_t k_most_triangles = 4000;  // triangles that are asked for the level
 constexpr float k_least_light = 0.004F;  // of the camera's full scale, that a projector's white must give
 constexpr int k_edge_px = 2;             // beside shadows and silhouettes pixels see two things

@@ -7,9 +7,9 @@
 namespace limn::projector {
 
 std::vector<CompositePolicy> updated_policies(std::span<const CompositePolicy> before,
-                               std::span<const PartCoverage> coverage,
-                               double seconds,
-                               const CompositePolicyOptions& options) {
+                                              std::span<const PartCoverage> coverage,
+                                              double seconds,
+                                              const CompositePolicyOptions& options) {
   LIMN_CHECK(options.full_below <= options.rest_above && options.hold_s >= 0 && options.fade_s > 0);
   std::vector<CompositePolicy> after(before.begin(), before.end());
   for (CompositePolicy& treatment : after) {
@@ -19,8 +19,8 @@ std::vector<CompositePolicy> updated_policies(std::span<const CompositePolicy> b
   for (const PartCoverage& part : coverage) {
     if (part.viewer_pixels == 0) continue;
     const double share = part.on_surface_share;
-    const auto known =
-        std::find_if(after.begin(), after.end(), [&](const CompositePolicy& t) { return t.slot == part.slot; });
+    const auto known = std::find_if(after.begin(), after.end(),
+                                    [&](const CompositePolicy& t) { return t.slot == part.slot; });
     if (known == after.end()) {
       const bool is_lit = share >= 0.5 * (options.full_below + options.rest_above);
       after.push_back({part.slot, is_lit ? Composite::rest : Composite::full, 0});

@@ -33,8 +33,8 @@ struct CompositePolicy {
 /// that a marker lost for a moment changes nothing. Between two changes of a slot lie hold_s or more; one
 /// that comes before the last has passed goes on from what shows.
 std::vector<CompositePolicy> updated_policies(std::span<const CompositePolicy> before,
-                               std::span<const PartCoverage> coverage,
-                               double seconds,
-                               const CompositePolicyOptions& options = {});
+                                              std::span<const PartCoverage> coverage,
+                                              double seconds,
+                                              const CompositePolicyOptions& options = {});
 
 }  // namespace limn::projector

@@ -6,8 +6,8 @@
 #include "core/result.h"
 #include "projector/gl.h"
 #include "projector/pass.h"
-#include "projector/pixel_list.h"
 #include "projector/pinhole_view.h"
+#include "projector/pixel_list.h"
 
 namespace limn::projector {
 

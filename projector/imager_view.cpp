@@ -102,8 +102,9 @@ void ImagerView::draw_parts(const Imager& imager, const scene::PosedScene& posed
   scene.prepare(posed, is_view ? SceneCache::FromProjectors::nothing : SceneCache::FromProjectors::prototype);
   scene.draw_from_imager(imager, !is_view && !has_contact_shadow_);
   const GpuLens& lens = scene.lens_of(imager);
-  overlay->places = scene.visibility().visible_rects(imager, lens.baked, scene.runs(), scene.scene_from_world(),
-                                               is_view, has_contact_shadow_ ? ContactShadow::k_reach : 0);
+  overlay->places =
+      scene.visibility().visible_rects(imager, lens.baked, scene.runs(), scene.scene_from_world(), is_view,
+                                       has_contact_shadow_ ? ContactShadow::k_reach : 0);
   Resources resources = scene.resources(lens, imager)
                             .with(Resource::albedo, shared_.balance.albedo())
                             .with(Resource::composite_weights, overlay->weights);
@@ -176,7 +177,9 @@ std::vector<PartCoverage> ImagerView::coverage(const scene::PosedScene& posed, c
   return out;
 }
 
-IlluminatedPatches ImagerView::illuminated_patches(const Imager& imager, const scene::PosedScene& posed, int side_px) {
+IlluminatedPatches ImagerView::illuminated_patches(const Imager& imager,
+                                                   const scene::PosedScene& posed,
+                                                   int side_px) {
   SceneCache& scene = shared_.scene;
   scene.prepare(posed, SceneCache::FromProjectors::prototype);
   scene.draw_from_imager(imager);

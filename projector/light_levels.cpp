@@ -27,8 +27,8 @@ cv::Mat light_of_levels(const Rig& rig, const std::string& camera) {
                                   [&](const CameraResponse& r) { return r.camera == camera; });
   const bool measured = found != rig.camera_responses.end() && found->light.size() == 256;
   for (int v = 0; v < 256; ++v)
-    light.at<float>(v) =
-        static_cast<float>(measured ? found->light[static_cast<std::size_t>(v)] : linear_from_srgb(v / 255.0));
+    light.at<float>(v) = static_cast<float>(measured ? found->light[static_cast<std::size_t>(v)]
+                                                     : linear_from_srgb(v / 255.0));
   return light;
 }
 

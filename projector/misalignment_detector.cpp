@@ -108,9 +108,9 @@ cv::Mat MisalignmentDetector::given(std::size_t projector, const cv::Mat& image)
 }
 
 void MisalignmentDetector::begin(const Frame& frame,
-                           std::span<const cv::Mat> shown,
-                           std::span<const cv::Mat> before,
-                           std::span<const std::vector<cv::Point>> avoid) {
+                                 std::span<const cv::Mat> shown,
+                                 std::span<const cv::Mat> before,
+                                 std::span<const std::vector<cv::Point>> avoid) {
   LIMN_CHECK(frame.image.cols == imager_.width && frame.image.rows == imager_.height);
   LIMN_CHECK(shown.size() == lights_.size() && before.size() == lights_.size());
   cells_.clear();

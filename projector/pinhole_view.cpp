@@ -28,7 +28,8 @@ PinholeView pinhole_view_over(
   pinhole.focal =
       std::min({focal, (max_width - 2 * k_margin) / extent.x(), (max_height - 2 * k_margin) / extent.y()});
   pinhole.width = std::min(max_width, static_cast<int>(std::ceil(pinhole.focal * extent.x() + 2 * k_margin)));
-  pinhole.height = std::min(max_height, static_cast<int>(std::ceil(pinhole.focal * extent.y() + 2 * k_margin)));
+  pinhole.height =
+      std::min(max_height, static_cast<int>(std::ceil(pinhole.focal * extent.y() + 2 * k_margin)));
   pinhole.centre = Eigen::Vector2d::Constant(k_margin - 0.5) - pinhole.focal * rect.lower;
   return pinhole;
 }

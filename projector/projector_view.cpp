@@ -105,7 +105,7 @@ void ProjectorView::find_places(std::size_t index, const Imager& viewer) {
   const Eigen::Vector3d p_viewer_scene =
       (scene.scene_from_world() * viewer.imager_from_world.inverse()).translation;
   scene.visibility().lit_rects(index, scene.runs(), scene.scene_from_world(), p_viewer_scene, &view_places_,
-                              &surface_places_);
+                               &surface_places_);
   light_places_.divide(view_places_, surface_places_);
 }
 

@@ -62,7 +62,7 @@ class ProjectorView {
     Canvas display;
     HitCache hit_cache;
     scene::PosedScene posed;
-    Pose imager_from_world;    // of the viewer
+    Pose imager_from_world;  // of the viewer
     cv::Mat image, clipped;  // once read back
     bool is_current = false;
     bool is_quick = false;

@@ -1,8 +1,8 @@
 #include "projector/renderer.h"
 
+#include "projector/composite_policy.h"
 #include "projector/imager_view.h"
 #include "projector/projector_view.h"
-#include "projector/composite_policy.h"
 
 namespace limn::projector {
 namespace {
@@ -109,7 +109,9 @@ cv::Mat Renderer::blend(std::size_t index, const scene::PosedScene& posed) {
   return impl_->projectors.blend(index, posed);
 }
 
-IlluminatedPatches Renderer::illuminated_patches(std::size_t camera, const scene::PosedScene& posed, int side_px) {
+IlluminatedPatches Renderer::illuminated_patches(std::size_t camera,
+                                                 const scene::PosedScene& posed,
+                                                 int side_px) {
   LIMN_CHECK(side_px > 0);
   return impl_->imagers.illuminated_patches(impl_->camera(camera), posed, side_px);
 }

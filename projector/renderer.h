@@ -8,9 +8,9 @@
 
 #include "core/result.h"
 #include "core/rig.h"
-#include "projector/shadow_detector.h"
 #include "projector/compensation.h"
 #include "projector/pass_times.h"
+#include "projector/shadow_detector.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 
@@ -114,10 +114,7 @@ class Renderer {
 
   /// The parts drawn into a camera's own (distorted) image, 8-bit grey or BGR of the camera's size; sRGB
   /// BGR.
-  cv::Mat composite(std::size_t camera,
-                    const cv::Mat& image,
-                    const scene::PosedScene& posed,
-                    Composite what);
+  cv::Mat composite(std::size_t camera, const cv::Mat& image, const scene::PosedScene& posed, Composite what);
 
   /// The same with each slot treated in its own way (projector/composite_policy.h); one that is not among the
   /// treatments by `rest`.

@@ -36,7 +36,10 @@ Result<SceneCache> SceneCache::create(const scene::Scene& scene, const Rig& rig,
   return SceneCache(scene, rig, std::move(visibility), times);
 }
 
-SceneCache::SceneCache(const scene::Scene& scene, const Rig& rig, VisibilityBuffers visibility, PassTimes* times)
+SceneCache::SceneCache(const scene::Scene& scene,
+                       const Rig& rig,
+                       VisibilityBuffers visibility,
+                       PassTimes* times)
     : scene_(scene),
       visibility_(std::move(visibility)),
       occlusion_(rig.projectors.size()),
@@ -76,7 +79,7 @@ void SceneCache::draw_from_eye(const Imager& viewer) {
   const Pose scene_from_viewer = scene_from_world_ * viewer.imager_from_world.inverse();
   const PassTimes::Scope scope(times_, "ids from the eye");
   visibility_.draw_from_eye(scene_, runs_, scene_from_world_, scene_from_viewer.translation,
-                       scene_from_viewer.rotation * -Eigen::Vector3d::UnitY());
+                            scene_from_viewer.rotation * -Eigen::Vector3d::UnitY());
   eye_kind_ = EyeKind::eye;
   eye_ = viewer;
 }

@@ -238,8 +238,8 @@ void ShadowDetector::Impl::forget_all(Watch* watch) const {
 }
 
 Sight ShadowDetector::Impl::sight_of(const Watch& watch,
-                                    const cv::Mat& frame,
-                                    std::span<const cv::Mat> shown) const {
+                                     const cv::Mat& frame,
+                                     std::span<const cv::Mat> shown) const {
   Sight viewpoint;
   const IlluminatedPatches& patches = watch.patches;
   const cv::Size size = patches.points.size();
@@ -311,7 +311,8 @@ void ShadowDetector::Impl::explain(const Watch& watch, Sight* viewpoint) const {
             const float variance = f.variance + variance_of(belief, x);
             const float misfit = std::min(k_most_cost, square(f.mean - light) / variance);
             viewpoint->misfits[k].at<float>(row, column) += tells * misfit;
-            viewpoint->costs[k].at<float>(row, column) += tells * (misfit + std::log(variance / square(k_noise)));
+            viewpoint->costs[k].at<float>(row, column) +=
+                tells * (misfit + std::log(variance / square(k_noise)));
           }
         }
       }
@@ -330,8 +331,8 @@ void ShadowDetector::Impl::explain(const Watch& watch, Sight* viewpoint) const {
 
 // Sets of projectors that reach a patch, and those of them whose light did not arrive at the last frame.
 std::pair<unsigned, unsigned> ShadowDetector::Impl::reached_and_blocked(const Watch& watch,
-                                                                       int row,
-                                                                       int column) const {
+                                                                        int row,
+                                                                        int column) const {
   unsigned reached = 0, blocked = 0;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const auto& lit = watch.patches.by_projector[i].at<cv::Vec4f>(row, column);
@@ -397,7 +398,8 @@ void ShadowDetector::Impl::vote(const Sight& viewpoint, Watch* watch) const {
         const std::uint8_t label = viewpoint.labels.at<std::uint8_t>(row, column);
         const auto& lit = watch->patches.by_projector[i].at<cv::Vec4f>(row, column);
         if (label >= k_dark || !(lit[2] > 0)) continue;
-        watch->votes[i].at<cv::Vec2f>(cell_of(lit))[label >> i & 1] += viewpoint.gaps[i].at<float>(row, column);
+        watch->votes[i].at<cv::Vec2f>(cell_of(lit))[label >> i & 1] +=
+            viewpoint.gaps[i].at<float>(row, column);
       }
   }
 }

@@ -77,9 +77,9 @@ TangentRect spanned_behind(const Pose& pinhole_from_scene,
 
 // The tangents that a twin's image covers.
 TangentRect covered(const PinholeView& pinhole) {
-  return {
-      (Eigen::Vector2d::Constant(-0.5) - pinhole.centre) / pinhole.focal,
-      (Eigen::Vector2d(pinhole.width, pinhole.height).array() - 0.5 - pinhole.centre.array()).matrix() / pinhole.focal};
+  return {(Eigen::Vector2d::Constant(-0.5) - pinhole.centre) / pinhole.focal,
+          (Eigen::Vector2d(pinhole.width, pinhole.height).array() - 0.5 - pinhole.centre.array()).matrix() /
+              pinhole.focal};
 }
 
 std::array<Eigen::Vector3d, 8> corners_of(const Eigen::AlignedBox3d& box) {
@@ -98,7 +98,8 @@ cv::Rect texels_of(const PinholeView& pinhole, const TangentRect& rect) {
     const Eigen::Vector2d at = pinhole.focal * tangent + pinhole.centre;
     return cv::Point(static_cast<int>(std::floor(at.x())), static_cast<int>(std::floor(at.y())));
   };
-  return cv::Rect(texel(rect.lower) - cv::Point(1, 1), texel(rect.upper) + cv::Point(3, 3)) & whole_of(pinhole);
+  return cv::Rect(texel(rect.lower) - cv::Point(1, 1), texel(rect.upper) + cv::Point(3, 3)) &
+         whole_of(pinhole);
 }
 
 }  // namespace
@@ -167,8 +168,10 @@ Result<VisibilityBuffers> VisibilityBuffers::create(const Rig& rig) {
     visibility.upload_pixel_map(static_cast<int>(i), projectors[i], lens.baked.rect);
     const Eigen::Vector2d extent =
         k_oversampling * projectors[i].lens.fx() * (lens.baked.rect.upper - lens.baked.rect.lower);
-    visibility.ids_width_ = std::clamp(static_cast<int>(extent.x()) + 8, visibility.ids_width_, 2 * k_eye_side);
-    visibility.ids_height_ = std::clamp(static_cast<int>(extent.y()) + 8, visibility.ids_height_, 2 * k_eye_side);
+    visibility.ids_width_ =
+        std::clamp(static_cast<int>(extent.x()) + 8, visibility.ids_width_, 2 * k_eye_side);
+    visibility.ids_height_ =
+        std::clamp(static_cast<int>(extent.y()) + 8, visibility.ids_height_, 2 * k_eye_side);
     visibility.lenses_.push_back(std::move(lens));
   }
   visibility.projector_ids_ =
@@ -176,11 +179,13 @@ Result<VisibilityBuffers> VisibilityBuffers::create(const Rig& rig) {
   glClearTexImage(*visibility.projector_ids_, 0, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
   visibility.surface_places_.resize(projectors.size());
   visibility.eye_ids_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_R32UI, k_eye_side, k_eye_side, 2);
-  visibility.depth_ = make_texture(GL_TEXTURE_2D, GL_DEPTH_COMPONENT32F, std::max(k_eye_side, visibility.ids_width_),
-                               std::max(k_eye_side, visibility.ids_height_));
+  visibility.depth_ =
+      make_texture(GL_TEXTURE_2D, GL_DEPTH_COMPONENT32F, std::max(k_eye_side, visibility.ids_width_),
+                   std::max(k_eye_side, visibility.ids_height_));
   if (projectors.size() > 1) {
     LIMN_TRY(visibility.edge_feathering_,
-             EdgeFeathering::create(static_cast<int>(projectors.size()), visibility.ids_width_, visibility.ids_height_));
+             EdgeFeathering::create(static_cast<int>(projectors.size()), visibility.ids_width_,
+                                    visibility.ids_height_));
   }
   visibility.framebuffer_ = make_framebuffer();
   glNamedFramebufferTexture(*visibility.framebuffer_, GL_DEPTH_ATTACHMENT, *visibility.depth_, 0);
@@ -191,12 +196,12 @@ Result<VisibilityBuffers> VisibilityBuffers::create(const Rig& rig) {
 }
 
 void VisibilityBuffers::draw(const GpuScene& scene,
-                  const std::vector<PlacedRun>& runs,
-                  bool (*wanted)(const PlacedRun&),
-                  const PinholeView& pinhole,
-                  const cv::Rect& within,
-                  const GlName& ids,
-                  int layer) {
+                             const std::vector<PlacedRun>& runs,
+                             bool (*wanted)(const PlacedRun&),
+                             const PinholeView& pinhole,
+                             const cv::Rect& within,
+                             const GlName& ids,
+                             int layer) {
   glNamedFramebufferTextureLayer(*framebuffer_, GL_COLOR_ATTACHMENT0, *ids, 0, layer);
   glBindFramebuffer(GL_FRAMEBUFFER, *framebuffer_);
   glViewport(0, 0, pinhole.width, pinhole.height);
@@ -246,7 +251,8 @@ void VisibilityBuffers::draw(const GpuScene& scene,
 }
 
 void VisibilityBuffers::send(int index, const GpuViewpoint& viewpoint) {
-  glNamedBufferSubData(*visibility_, static_cast<GLintptr>(sizeof(GpuViewpoint)) * index, sizeof(GpuViewpoint), &viewpoint);
+  glNamedBufferSubData(*visibility_, static_cast<GLintptr>(sizeof(GpuViewpoint)) * index,
+                       sizeof(GpuViewpoint), &viewpoint);
 }
 
 void VisibilityBuffers::upload_pixel_map(int layer, const Imager& imager, const TangentRect& rect) {
@@ -256,17 +262,18 @@ void VisibilityBuffers::upload_pixel_map(int layer, const Imager& imager, const 
 
 // Over the prototype: nothing else is lit.
 PinholeView VisibilityBuffers::projector_pinhole_view(std::size_t projector,
-                            const std::vector<PlacedRun>& runs,
-                            const Pose& scene_from_world) const {
+                                                      const std::vector<PlacedRun>& runs,
+                                                      const Pose& scene_from_world) const {
   const Pose pose = sight_pose(projectors_[projector], scene_from_world);
-  return pinhole_view_over(pose, intersected(lenses_[projector].baked.rect, spanned_by(pose, runs, is_prototype)),
-                   k_oversampling * projectors_[projector].lens.fx(), ids_width_, ids_height_);
+  return pinhole_view_over(pose,
+                           intersected(lenses_[projector].baked.rect, spanned_by(pose, runs, is_prototype)),
+                           k_oversampling * projectors_[projector].lens.fx(), ids_width_, ids_height_);
 }
 
 void VisibilityBuffers::draw_prototype_from_projectors(const GpuScene& scene,
-                                           const std::vector<PlacedRun>& runs,
-                                           const Pose& scene_from_world,
-                                           bool with_soft_edges) {
+                                                       const std::vector<PlacedRun>& runs,
+                                                       const Pose& scene_from_world,
+                                                       bool with_soft_edges) {
   for (std::size_t i = 0; i < projectors_.size(); ++i) {
     const PinholeView pinhole = projector_pinhole_view(i, runs, scene_from_world);
     const int layer = 2 * static_cast<int>(i);
@@ -286,8 +293,8 @@ void VisibilityBuffers::draw_prototype_from_projectors(const GpuScene& scene,
 }
 
 void VisibilityBuffers::draw_surface_parts_from_projectors(const GpuScene& scene,
-                                               const std::vector<PlacedRun>& runs,
-                                               const Pose& scene_from_world) {
+                                                           const std::vector<PlacedRun>& runs,
+                                                           const Pose& scene_from_world) {
   for (std::size_t i = 0; i < projectors_.size(); ++i) {
     const PinholeView pinhole = projector_pinhole_view(i, runs, scene_from_world);
     const int layer = 2 * static_cast<int>(i) + 1;
@@ -301,14 +308,15 @@ void VisibilityBuffers::draw_surface_parts_from_projectors(const GpuScene& scene
 }
 
 void VisibilityBuffers::draw_from_imager(const GpuScene& scene,
-                             const std::vector<PlacedRun>& runs,
-                             const Pose& scene_from_world,
-                             const Imager& imager,
-                             const BakedLens& lens,
-                             bool parts_alone) {
+                                         const std::vector<PlacedRun>& runs,
+                                         const Pose& scene_from_world,
+                                         const Imager& imager,
+                                         const BakedLens& lens,
+                                         bool parts_alone) {
   const Pose pose = sight_pose(imager, scene_from_world);
   const TangentRect rect = intersected(lens.rect, spanned_by(pose, runs, parts_alone ? is_part : is_any));
-  const PinholeView pinhole = pinhole_view_over(pose, rect, k_oversampling * imager.lens.fx(), k_eye_side, k_eye_side);
+  const PinholeView pinhole =
+      pinhole_view_over(pose, rect, k_oversampling * imager.lens.fx(), k_eye_side, k_eye_side);
   draw(scene, runs, is_prototype, pinhole, whole_of(pinhole), eye_ids_, 0);
   draw(scene, runs, is_part, pinhole, whole_of(pinhole), eye_ids_, 1);
   GpuViewpoint viewpoint(pinhole, 0);
@@ -317,13 +325,14 @@ void VisibilityBuffers::draw_from_imager(const GpuScene& scene,
 }
 
 void VisibilityBuffers::draw_from_reference_camera(const GpuScene& scene,
-                              const std::vector<PlacedRun>& runs,
-                              const Pose& scene_from_world,
-                              const Imager& camera,
-                              const BakedLens& lens) {
+                                                   const std::vector<PlacedRun>& runs,
+                                                   const Pose& scene_from_world,
+                                                   const Imager& camera,
+                                                   const BakedLens& lens) {
   const Pose pose = sight_pose(camera, scene_from_world);
-  const PinholeView pinhole = pinhole_view_over(pose, intersected(lens.rect, spanned_by(pose, runs, is_prototype)),
-                              k_oversampling * camera.lens.fx(), ids_width_, ids_height_);
+  const PinholeView pinhole =
+      pinhole_view_over(pose, intersected(lens.rect, spanned_by(pose, runs, is_prototype)),
+                        k_oversampling * camera.lens.fx(), ids_width_, ids_height_);
   const int layer = 2 * eye();
   draw(scene, runs, is_prototype, pinhole, whole_of(pinhole), projector_ids_, layer);
   upload_pixel_map(eye(), camera, lens.rect);
@@ -334,10 +343,10 @@ void VisibilityBuffers::draw_from_reference_camera(const GpuScene& scene,
 }
 
 void VisibilityBuffers::draw_from_eye(const GpuScene& scene,
-                          const std::vector<PlacedRun>& runs,
-                          const Pose& scene_from_world,
-                          const Eigen::Vector3d& p_eye_scene,
-                          const Eigen::Vector3d& d_up_scene) {
+                                      const std::vector<PlacedRun>& runs,
+                                      const Pose& scene_from_world,
+                                      const Eigen::Vector3d& p_eye_scene,
+                                      const Eigen::Vector3d& d_up_scene) {
   const Eigen::AlignedBox3d box = box_of(runs, is_view_part);
   const Pose pose = box.isEmpty() ? Pose() : looking_at(p_eye_scene, box.center(), d_up_scene);
   const Eigen::AlignedBox3d prototype = box_of(runs, is_prototype);
@@ -350,25 +359,26 @@ void VisibilityBuffers::draw_from_eye(const GpuScene& scene,
                             : (prototype.center() - p_eye_scene).norm() + 0.5 * prototype.diagonal().norm();
     focal = std::max(focal, k_oversampling * projector.lens.fx() * farthest / distance);
   }
-  const PinholeView pinhole = pinhole_view_over(pose, spanned_by(pose, runs, is_view_part), focal, k_eye_side, k_eye_side);
+  const PinholeView pinhole =
+      pinhole_view_over(pose, spanned_by(pose, runs, is_view_part), focal, k_eye_side, k_eye_side);
   draw(scene, runs, is_prototype, pinhole, whole_of(pinhole), eye_ids_, 0);
   draw(scene, runs, is_part, pinhole, whole_of(pinhole), eye_ids_, 1);
   send(eye(), GpuViewpoint(pinhole, 0));
 }
 
 cv::Rect VisibilityBuffers::prototype_rect(std::size_t projector,
-                                 const std::vector<PlacedRun>& runs,
-                                 const Pose& scene_from_world) const {
+                                           const std::vector<PlacedRun>& runs,
+                                           const Pose& scene_from_world) const {
   const Pose pose = sight_pose(projectors_[projector], scene_from_world);
   return pixels_of(projectors_[projector], lenses_[projector].baked, spanned_by(pose, runs, is_prototype));
 }
 
 std::vector<cv::Rect> VisibilityBuffers::visible_rects(const Imager& imager,
-                                          const BakedLens& lens,
-                                          const std::vector<PlacedRun>& runs,
-                                          const Pose& scene_from_world,
-                                          bool prototype_too,
-                                          double around_m) const {
+                                                       const BakedLens& lens,
+                                                       const std::vector<PlacedRun>& runs,
+                                                       const Pose& scene_from_world,
+                                                       bool prototype_too,
+                                                       double around_m) const {
   const Pose pose = sight_pose(imager, scene_from_world);
   std::vector<cv::Rect> places;
   for (const PlacedRun& run : runs) {
@@ -380,11 +390,11 @@ std::vector<cv::Rect> VisibilityBuffers::visible_rects(const Imager& imager,
 }
 
 void VisibilityBuffers::lit_rects(std::size_t projector,
-                          const std::vector<PlacedRun>& runs,
-                          const Pose& scene_from_world,
-                          const Eigen::Vector3d& p_eye_scene,
-                          std::vector<cv::Rect>* of_view,
-                          std::vector<cv::Rect>* of_surface) const {
+                                  const std::vector<PlacedRun>& runs,
+                                  const Pose& scene_from_world,
+                                  const Eigen::Vector3d& p_eye_scene,
+                                  std::vector<cv::Rect>* of_view,
+                                  std::vector<cv::Rect>* of_surface) const {
   const Pose pose = sight_pose(projectors_[projector], scene_from_world);
   const cv::Rect whole = prototype_rect(projector, runs, scene_from_world);
   of_view->clear();

@@ -6,10 +6,10 @@
 
 #include "core/rig.h"
 #include "projector/bake.h"
-#include "projector/gpu_scene.h"
-#include "projector/resources.h"
 #include "projector/edge_feathering.h"
+#include "projector/gpu_scene.h"
 #include "projector/pinhole_view.h"
+#include "projector/resources.h"
 
 namespace limn::projector {
 
@@ -34,55 +34,55 @@ class VisibilityBuffers final : public Bindable {
   /// Draws the projectors' ids of the prototype; `with_soft_edges`: also where their light fades beside
   /// edges, which only their own images need.
   void draw_prototype_from_projectors(const GpuScene& scene,
-                                     const std::vector<PlacedRun>& runs,
-                                     const Pose& scene_from_world,
-                                     bool with_soft_edges);
+                                      const std::vector<PlacedRun>& runs,
+                                      const Pose& scene_from_world,
+                                      bool with_soft_edges);
   /// Draws their ids of the surface parts, once the prototype's are there for the same pose.
   void draw_surface_parts_from_projectors(const GpuScene& scene,
-                                         const std::vector<PlacedRun>& runs,
-                                         const Pose& scene_from_world);
+                                          const std::vector<PlacedRun>& runs,
+                                          const Pose& scene_from_world);
   /// Draws the ids from an imager's own eye, over its image; `parts_alone`: only where parts may be.
   void draw_from_imager(const GpuScene& scene,
-                       const std::vector<PlacedRun>& runs,
-                       const Pose& scene_from_world,
-                       const Imager& imager,
-                       const BakedLens& lens,
-                       bool parts_alone);
+                        const std::vector<PlacedRun>& runs,
+                        const Pose& scene_from_world,
+                        const Imager& imager,
+                        const BakedLens& lens,
+                        bool parts_alone);
   /// Draws the ids from an eye, over its view parts, as finely as the projectors show them; `d_up_scene` is
   /// any direction but the line of sight.
   void draw_from_eye(const GpuScene& scene,
-                    const std::vector<PlacedRun>& runs,
-                    const Pose& scene_from_world,
-                    const Eigen::Vector3d& p_eye_scene,
-                    const Eigen::Vector3d& d_up_scene);
+                     const std::vector<PlacedRun>& runs,
+                     const Pose& scene_from_world,
+                     const Eigen::Vector3d& p_eye_scene,
+                     const Eigen::Vector3d& d_up_scene);
 
   /// Rectangles of the projector's image, outside of which it gives no light for the parts: each part's
   /// own, where the eye sees the prototype behind it, or where it lies on the surface.
   void lit_rects(std::size_t projector,
-                    const std::vector<PlacedRun>& runs,
-                    const Pose& scene_from_world,
-                    const Eigen::Vector3d& p_eye_scene,
-                    std::vector<cv::Rect>* of_view,
-                    std::vector<cv::Rect>* of_surface) const;
+                 const std::vector<PlacedRun>& runs,
+                 const Pose& scene_from_world,
+                 const Eigen::Vector3d& p_eye_scene,
+                 std::vector<cv::Rect>* of_view,
+                 std::vector<cv::Rect>* of_surface) const;
   /// Rectangles of an imager's image, outside of which it sees none of the parts (and of the prototype),
   /// nor anything within `around_m` of them.
   std::vector<cv::Rect> visible_rects(const Imager& imager,
-                                    const BakedLens& lens,
-                                    const std::vector<PlacedRun>& runs,
-                                    const Pose& scene_from_world,
-                                    bool prototype_too,
-                                    double around_m) const;
+                                      const BakedLens& lens,
+                                      const std::vector<PlacedRun>& runs,
+                                      const Pose& scene_from_world,
+                                      bool prototype_too,
+                                      double around_m) const;
   /// The rectangle of the image that the prototype lies in.
   cv::Rect prototype_rect(std::size_t projector,
-                           const std::vector<PlacedRun>& runs,
-                           const Pose& scene_from_world) const;
+                          const std::vector<PlacedRun>& runs,
+                          const Pose& scene_from_world) const;
 
   /// Draws the prototype's ids from a camera, and keeps them: `scene_from_world` is the camera's, for good.
   void draw_from_reference_camera(const GpuScene& scene,
-                        const std::vector<PlacedRun>& runs,
-                        const Pose& scene_from_world,
-                        const Imager& camera,
-                        const BakedLens& lens);
+                                  const std::vector<PlacedRun>& runs,
+                                  const Pose& scene_from_world,
+                                  const Imager& camera,
+                                  const BakedLens& lens);
 
   const GpuLens& projector_lens(std::size_t i) const { return lenses_[i]; }
   /// Index of the eye among the sights of the shaders.
@@ -101,8 +101,8 @@ class VisibilityBuffers final : public Bindable {
             const GlName& ids,
             int layer);
   PinholeView projector_pinhole_view(std::size_t projector,
-                      const std::vector<PlacedRun>& runs,
-                      const Pose& scene_from_world) const;
+                                     const std::vector<PlacedRun>& runs,
+                                     const Pose& scene_from_world) const;
   void send(int index, const GpuViewpoint& viewpoint);
   void upload_pixel_map(int layer, const Imager& imager, const TangentRect& rect);
 
@@ -110,7 +110,7 @@ class VisibilityBuffers final : public Bindable {
   std::vector<ProjectorResponse> responses_;
   std::vector<Focus> focuses_;
   std::vector<GpuLens> lenses_;
-  Program program_, cut_program_;        // of triangles whole, and of such as have pieces cut out
+  Program program_, cut_program_;                  // of triangles whole, and of such as have pieces cut out
   std::optional<EdgeFeathering> edge_feathering_;  // with several projectors
   GlName framebuffer_, depth_, projector_ids_, eye_ids_, pixel_maps_, visibility_, sight_texels_;
   int ids_width_ = 1, ids_height_ = 1;    // room of the projectors' ids

@@ -19,8 +19,8 @@
 #include <memory>
 #include <optional>
 
-#include "remote/own_addresses.h"
 #include "core/file.h"
+#include "remote/own_addresses.h"
 
 namespace limn::apps {
 namespace {

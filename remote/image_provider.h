@@ -24,11 +24,11 @@ struct ImageProviders {
 /// An onlooker's, which lives as long as they do.
 inline ImageProviders image_providers(std::unique_ptr<TabletView> tablet_view) {
   const std::shared_ptr<TabletView> shared = std::move(tablet_view);
-  return {[shared](const Session& session) { shared->know(session); },
-          [shared](const TabletView::Window& window, std::vector<std::uint8_t> jpeg, ImageProviders::Answer answer) {
-            shared->look(window, std::move(jpeg), std::move(answer));
-          },
-          [shared](ImageProviders::Answer answer) { shared->room(std::move(answer)); }};
+  return {
+      [shared](const Session& session) { shared->know(session); },
+      [shared](const TabletView::Window& window, std::vector<std::uint8_t> jpeg,
+               ImageProviders::Answer answer) { shared->look(window, std::move(jpeg), std::move(answer)); },
+      [shared](ImageProviders::Answer answer) { shared->room(std::move(answer)); }};
 }
 
 }  // namespace limn::apps

@@ -254,9 +254,9 @@ Result<FrameMessage> frame_of(std::span<const std::uint8_t> bytes) {
 }
 
 std::string image_message(ImageKind kind,
-                            std::uint32_t number,
-                            const std::string& json,
-                            std::span<const std::uint8_t> jpeg) {
+                          std::uint32_t number,
+                          const std::string& json,
+                          std::span<const std::uint8_t> jpeg) {
   std::string out;
   out.reserve(12 + json.size() + jpeg.size());
   put_number(static_cast<std::uint32_t>(kind), &out);

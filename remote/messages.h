@@ -9,8 +9,8 @@
 #include <variant>
 #include <vector>
 
-#include "remote/tablet/tablet_view_mode.h"
 #include "core/result.h"
+#include "remote/tablet/tablet_view_mode.h"
 #include "scene/actions.h"
 #include "scene/comments.h"
 
@@ -78,8 +78,8 @@ Result<FrameMessage> frame_of(std::span<const std::uint8_t> bytes);
 /// A binary message to the page: kind, number, JSON and image.
 enum class ImageKind : std::uint32_t { room = 1, window = 2 };
 std::string image_message(ImageKind kind,
-                            std::uint32_t number,
-                            const std::string& json,
-                            std::span<const std::uint8_t> jpeg);
+                          std::uint32_t number,
+                          const std::string& json,
+                          std::span<const std::uint8_t> jpeg);
 
 }  // namespace limn::apps

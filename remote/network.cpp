@@ -13,8 +13,8 @@
 #include <map>
 #include <thread>
 
-#include "remote/own_addresses.h"
 #include "core/log.h"
+#include "remote/own_addresses.h"
 
 namespace limn::apps {
 namespace {

@@ -6,10 +6,10 @@
 #include <optional>
 #include <string>
 
-#include "session/udp_socket.h"
+#include "core/result.h"
 #include "remote/certificate.h"
 #include "remote/reception.h"
-#include "core/result.h"
+#include "session/udp_socket.h"
 
 namespace limn::apps {
 

@@ -40,7 +40,10 @@ int write(const std::string& text, double share, int top, cv::Mat* sign) {
 
 }  // namespace
 
-cv::Mat pairing_code_image(const std::string& text, const std::string& pin, const std::string& role, int module_px) {
+cv::Mat pairing_code_image(const std::string& text,
+                           const std::string& pin,
+                           const std::string& role,
+                           int module_px) {
   const cv::Mat code = qr_code(text);
   if (code.empty()) return {};
   cv::Mat large;
@@ -60,11 +63,11 @@ cv::Mat pin_image(const std::string& pin, const std::string& role, int width) {
 }
 
 std::optional<OverlayPlace> overlay_place(const Imager& projector,
-                                    const Pose& world_from_prototype,
-                                    const cv::Mat& points,
-                                    const Eigen::Vector3d& d_up,
-                                    cv::Size shape,
-                                    double least_px) {
+                                          const Pose& world_from_prototype,
+                                          const cv::Mat& points,
+                                          const Eigen::Vector3d& d_up,
+                                          cv::Size shape,
+                                          double least_px) {
   const double aspect = 1.0 * shape.height / shape.width;
   const int step = std::max(1, std::min(points.cols, points.rows) / k_grid);
   struct Seat {

@@ -5,14 +5,17 @@
 #include <optional>
 #include <string>
 
-#include "session/overlays.h"
 #include "core/imager.h"
+#include "session/overlays.h"
 
 namespace limn::apps {
 
 /// A code that phones read, over a PIN and whose it is, in black on white: 8-bit BGR, `module_px` pixels for
 /// each module of the code. Empty: the text is too long for a code.
-cv::Mat pairing_code_image(const std::string& text, const std::string& pin, const std::string& role, int module_px);
+cv::Mat pairing_code_image(const std::string& text,
+                           const std::string& pin,
+                           const std::string& role,
+                           int module_px);
 
 /// The PIN and whose it is alone, `width` pixels wide: for where there is no room for the code.
 cv::Mat pin_image(const std::string& pin, const std::string& role, int width);
@@ -22,10 +25,10 @@ cv::Mat pin_image(const std::string& pin, const std::string& role, int width);
 /// is or where nothing may be drawn; `d_up` is up in the prototype's frame. nullopt: none is `least_px` wide.
 /// Some 50 ms.
 std::optional<OverlayPlace> overlay_place(const Imager& projector,
-                                    const Pose& world_from_prototype,
-                                    const cv::Mat& points,
-                                    const Eigen::Vector3d& d_up,
-                                    cv::Size shape,
-                                    double least_px);
+                                          const Pose& world_from_prototype,
+                                          const cv::Mat& points,
+                                          const Eigen::Vector3d& d_up,
+                                          cv::Size shape,
+                                          double least_px);
 
 }  // namespace limn::apps

@@ -20,9 +20,9 @@ constexpr double k_code_light = 0.75;    // display value: white paper would out
 
 // Where the prototype is free of markers and, if there is room, of parts.
 std::optional<OverlayPlace> free_place(Session* session,
-                                    std::size_t projector,
-                                    cv::Size shape,
-                                    double least_px) {
+                                       std::size_t projector,
+                                       cv::Size shape,
+                                       double least_px) {
   cv::Mat points = session->free_surface(projector);
   if (points.empty() || shape.empty()) return std::nullopt;
   const Rig& rig = session->setup().rig;
@@ -33,7 +33,7 @@ std::optional<OverlayPlace> free_place(Session* session,
       Eigen::Vector3d(0, -1, 0);
   const auto place = [&](const cv::Mat& free) {
     return overlay_place(imager, world_from_prototype, free,
-                      world_from_prototype.rotation.inverse() * d_up_world, shape, least_px);
+                         world_from_prototype.rotation.inverse() * d_up_world, shape, least_px);
   };
   cv::Mat parts, free = points.clone();
   cv::cvtColor(session->painted().projectors[projector], parts, cv::COLOR_BGR2GRAY);

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "remote/own_addresses.h"
 #include "core/file.h"
 #include "core/log.h"
 #include "device/jpeg.h"
+#include "remote/own_addresses.h"
 #include "scene/glb.h"
 
 namespace limn::apps {
@@ -308,7 +308,9 @@ void Reception::post_leave(const Asked& asked, Answering answering) {
   tick(Clock::now());
 }
 
-std::optional<HttpAnswer> Reception::wish(const AuthSessions::Guest& guest, const scene::Edit& edit, Done done) {
+std::optional<HttpAnswer> Reception::wish(const AuthSessions::Guest& guest,
+                                          const scene::Edit& edit,
+                                          Done done) {
   const Role role = role_for(edit.action);
   if (guest.role < role) return refusal(k_forbidden, may_not(guest, edit.action, role));
   if (wishes_.size() >= k_most_wishes)
@@ -325,7 +327,9 @@ void Reception::load_comments() {
   if (!*comments_) log_warning("live: {} Nobody can comment.", comments_->message());
 }
 
-std::optional<HttpAnswer> Reception::remark(const AuthSessions::Guest& guest, const Remark& remark, Done done) {
+std::optional<HttpAnswer> Reception::remark(const AuthSessions::Guest& guest,
+                                            const Remark& remark,
+                                            Done done) {
   if (guest.role < Role::work) return refusal(k_forbidden, may_not(guest, "comment", Role::work));
   if (!comments_) return refusal(k_unavailable, "the session has not begun yet.");
   if (!*comments_) return refusal(k_unavailable, comments_->message());
@@ -448,7 +452,8 @@ void Reception::hear(const std::shared_ptr<WsClient>& client, const SeenMessage&
 }
 
 void Reception::hear(const std::shared_ptr<WsClient>& client, const WindowMessage& message) {
-  if (message.on && !setup_.providers.look) return refuse(client, std::nullopt, "this session has no window.");
+  if (message.on && !setup_.providers.look)
+    return refuse(client, std::nullopt, "this session has no window.");
   const auto windows = std::count_if(visitors_.begin(), visitors_.end(), [&](const auto& other) {
     return other != client && !other->device.empty();
   });
@@ -491,7 +496,8 @@ void Reception::look(const std::shared_ptr<WsClient>& client, WsClient::Frame fr
   setup_.providers.look(
       {client->device, is_eye(client, client->frame_since) ? client->guest.name : "", client->parts},
       std::move(frame.jpeg),
-      [this, post = setup_.post, weak = std::weak_ptr(client), number = frame.number](ImageProviders::Seen seen) {
+      [this, post = setup_.post, weak = std::weak_ptr(client),
+       number = frame.number](ImageProviders::Seen seen) {
         post([this, weak, number, seen = std::move(seen)] {
           if (const auto client = weak.lock()) looked(client, number, seen);
         });
@@ -510,7 +516,7 @@ void Reception::looked(const std::shared_ptr<WsClient>& client,
       setup_.place(client->guest.name, seen.p_eye_world);
     }
     client->outbox.show(ImageKind::window, std::make_shared<const std::string>(image_message(
-                                                  ImageKind::window, number, seen.json, seen.jpeg)));
+                                               ImageKind::window, number, seen.json, seen.jpeg)));
     client->wake();
   }
   if (client->frame_waiting) look(client, *std::exchange(client->frame_waiting, std::nullopt));
@@ -547,17 +553,16 @@ void Reception::room_came(ImageProviders::Seen seen) {
     room_role_ = room_asked_at_ < hidden_.second ? hidden_.first : Role::look;
   }
   for (const auto& client : visitors_)
-    if (client->wants_room && !client->room_in_flight && client->room_sent != room_number_)
-      show_room(client);
+    if (client->wants_room && !client->room_in_flight && client->room_sent != room_number_) show_room(client);
 }
 
 void Reception::show_room(const std::shared_ptr<WsClient>& client) {
   client->room_in_flight = client->room_sent = room_number_;
   const bool may_see = may_see_room(client->guest) && client->guest.role >= room_role_;
   client->outbox.show(ImageKind::room,
-                       may_see ? room_message_
-                               : std::make_shared<const std::string>(image_message(
-                                     ImageKind::room, room_number_, dumped({{"why", k_hidden}}), {})));
+                      may_see ? room_message_
+                              : std::make_shared<const std::string>(image_message(
+                                    ImageKind::room, room_number_, dumped({{"why", k_hidden}}), {})));
   client->wake();
 }
 

@@ -12,13 +12,13 @@
 #include <vector>
 
 #include "core/worker_thread.h"
-#include "remote/image_provider.h"
 #include "remote/auth_sessions.h"
 #include "remote/http.h"
+#include "remote/image_provider.h"
 #include "remote/messages.h"
-#include "remote/thumbnails.h"
 #include "remote/state.h"
 #include "remote/static_files.h"
+#include "remote/thumbnails.h"
 #include "remote/ws_client.h"
 #include "scene/comments.h"
 
@@ -154,7 +154,9 @@ class Reception {
   void look(const std::shared_ptr<WsClient>& client, WsClient::Frame frame);
   void close_window(const std::shared_ptr<WsClient>& client);
   bool is_eye(const std::shared_ptr<WsClient>& client, Clock::time_point now) const;
-  void looked(const std::shared_ptr<WsClient>& client, std::uint32_t number, const ImageProviders::Seen& seen);
+  void looked(const std::shared_ptr<WsClient>& client,
+              std::uint32_t number,
+              const ImageProviders::Seen& seen);
   void ask_for_room(Clock::time_point now);
   void room_came(ImageProviders::Seen seen);
   void show_room(const std::shared_ptr<WsClient>& client);
@@ -196,7 +198,7 @@ class Reception {
   std::map<std::string, GuestEye> guest_eyes_;  // by the guest's name
   std::pair<Role, Clock::time_point> hidden_{Role::look, Clock::time_point::min()};
   std::shared_ptr<std::map<std::string, Encoded>> encoded_;  // of projectors; the backroom's alone
-  std::shared_ptr<Thumbnails> thumbnails_;              // likewise
+  std::shared_ptr<Thumbnails> thumbnails_;                   // likewise
 };
 
 }  // namespace limn::apps

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "remote/own_addresses.h"
 #include "core/log.h"
 #include "core/user_folder.h"
+#include "remote/own_addresses.h"
 
 namespace limn::apps {
 namespace {
@@ -61,7 +61,8 @@ Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, ImageP
   };
   const auto place = net_place(options.at, "127.0.0.1", true);
   if (!place) return named(place.error());
-  auto files = StaticFiles::read(options.page.empty() ? fs::path(LIMN_SOURCE_DIR) / "remote/web" : options.page);
+  auto files =
+      StaticFiles::read(options.page.empty() ? fs::path(LIMN_SOURCE_DIR) / "remote/web" : options.page);
   if (!files) return named(files.error());
   const auto certificate = certificate_for(options, place->host);
   if (!certificate) return named(certificate.error());

@@ -12,17 +12,17 @@
 #include <string>
 #include <vector>
 
-#include "session/device_health.h"
-#include "session/remote_link.h"
-#include "session/session.h"
-#include "session/session_client.h"
-#include "session/telemetry.h"
+#include "core/result.h"
 #include "core/worker_thread.h"
 #include "remote/image_provider.h"
 #include "remote/network.h"
 #include "remote/projected_code.h"
 #include "remote/reception.h"
-#include "core/result.h"
+#include "session/device_health.h"
+#include "session/remote_link.h"
+#include "session/session.h"
+#include "session/session_client.h"
+#include "session/telemetry.h"
 
 namespace limn::apps {
 
@@ -35,8 +35,8 @@ struct ServeOptions {
   std::chrono::milliseconds code_lasts{60000};  ///< in a projector's light
 };
 
-/// The remote of a session (docs/remote.md): guests on its network. What SessionClient and RemoteLink have belongs
-/// to the session's thread and never waits; everything else happens on threads of the server's own.
+/// The remote of a session (docs/remote.md): guests on its network. What SessionClient and RemoteLink have
+/// belongs to the session's thread and never waits; everything else happens on threads of the server's own.
 class Server : public SessionClient, public RemoteLink {
  public:
   /// Tells on stderr where it is and the PINs. Errors name the option. `eyes` may be

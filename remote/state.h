@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "core/pose.h"
+#include "scene/show_state.h"
 #include "session/device_health.h"
 #include "session/session.h"
 #include "session/telemetry.h"
-#include "core/pose.h"
-#include "scene/show_state.h"
 
 namespace limn::apps {
 

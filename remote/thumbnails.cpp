@@ -2,8 +2,8 @@
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "session/thumbnail.h"
 #include "device/gl_context.h"
+#include "session/thumbnail.h"
 
 namespace limn::apps {
 namespace {
@@ -13,8 +13,8 @@ constexpr int k_side_px = 320;
 }  // namespace
 
 Result<std::shared_ptr<const std::string>> Thumbnails::png(const std::shared_ptr<const scene::Scene>& scene,
-                                                             const std::string& slot,
-                                                             const std::string& variant) {
+                                                           const std::string& slot,
+                                                           const std::string& variant) {
   if (drawn_ != scene) {
     images_.clear();
     drawn_.reset();

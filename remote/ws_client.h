@@ -70,7 +70,7 @@ struct WsClient {
   std::optional<std::uint32_t> room_in_flight;  ///< an image that was sent and not seen yet
   std::optional<std::uint32_t> room_sent;       ///< the last one
 
-  std::string device;                          ///< of the window; empty: it is not on
+  std::string device;                                ///< of the window; empty: it is not on
   TabletViewMode parts = TabletViewMode::as_screen;  ///< that it shows
   struct Frame {
     std::uint32_t number = 0;

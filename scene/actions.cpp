@@ -137,7 +137,8 @@ Status save_look(Change* change, const std::string& name) {
 }
 
 Error no_such_look(const Change& change, const std::string& name) {
-  return error("{}: expected one of {}, found '{}'.", change.name, listed(look_names(change.show_state)), name);
+  return error("{}: expected one of {}, found '{}'.", change.name, listed(look_names(change.show_state)),
+               name);
 }
 
 Status restore_look(Change* change, const std::string& name) {
@@ -179,7 +180,8 @@ Status delete_look(Change* change, const std::string& name) {
 
 Status undelete_look(Change* change, std::monostate) {
   ShowState& show_state = change->show_state;
-  if (!show_state.deleted_look) return error("{}: expected a look that was deleted, found none.", change->name);
+  if (!show_state.deleted_look)
+    return error("{}: expected a look that was deleted, found none.", change->name);
   if (find_look(show_state, show_state.deleted_look->name))
     return error("{}: expected no look of that name, found another '{}'. Delete it first.", change->name,
                  show_state.deleted_look->name);
@@ -538,9 +540,9 @@ Result<Command> command_of(const Scene& scene, const Edit& edit) {
 }
 
 Result<ShowState> apply_edit(const Scene& scene,
-                       const ShowState& show_state,
-                       const PosedScene& posed,
-                       const Command& command) {
+                             const ShowState& show_state,
+                             const PosedScene& posed,
+                             const Command& command) {
   const Action& action = action_of(command.action);
   Change change{scene, posed, action.name, command.slot, show_state};
   LIMN_TRY_STATUS(action.functions.apply(&change, command.value));
@@ -548,9 +550,9 @@ Result<ShowState> apply_edit(const Scene& scene,
 }
 
 Result<ShowState> apply_edit(const Scene& scene,
-                       const ShowState& show_state,
-                       const PosedScene& posed,
-                       const Edit& edit) {
+                             const ShowState& show_state,
+                             const PosedScene& posed,
+                             const Edit& edit) {
   LIMN_TRY(const Command command, command_of(scene, edit));
   return apply_edit(scene, show_state, posed, command);
 }

@@ -101,13 +101,16 @@ struct Command {
 /// Error: an unknown action or slot, or a value that is not what the action takes.
 Result<Command> command_of(const Scene& scene, const Edit& edit);
 
-/// The show state after a command. `posed` is what was shown last: looks are saved from it. Error, and nothing
-/// has changed: a variant, look, marker or screen that is not there, or what cannot be done now.
+/// The show state after a command. `posed` is what was shown last: looks are saved from it. Error, and
+/// nothing has changed: a variant, look, marker or screen that is not there, or what cannot be done now.
 Result<ShowState> apply_edit(const Scene& scene,
-                       const ShowState& show_state,
-                       const PosedScene& posed,
-                       const Command& command);
+                             const ShowState& show_state,
+                             const PosedScene& posed,
+                             const Command& command);
 /// The same from text; errors of command_of(), too.
-Result<ShowState> apply_edit(const Scene& scene, const ShowState& show_state, const PosedScene& posed, const Edit& edit);
+Result<ShowState> apply_edit(const Scene& scene,
+                             const ShowState& show_state,
+                             const PosedScene& posed,
+                             const Edit& edit);
 
 }  // namespace limn::scene

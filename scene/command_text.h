@@ -12,7 +12,8 @@ namespace limn::scene {
 /// Names in a row, "a, b"; "none" when there are none.
 std::string listed(const std::vector<std::string>& names);
 
-/// The words that parse_material_override() takes: colours to a level of 255, shares to 0.001. Empty: no change.
+/// The words that parse_material_override() takes: colours to a level of 255, shares to 0.001. Empty: no
+/// change.
 std::string format_material_override(const MaterialOverride& change);
 
 /// The numbers that parse_room_light() takes, with the same front: degrees to 0.1, light to 0.001.

@@ -35,9 +35,9 @@ Status check(const Comment& comment) {
 }  // namespace
 
 Result<Comment> make_comment(const std::string& who,
-                           const std::string& look,
-                           const std::string& slot,
-                           const std::string& text) {
+                             const std::string& look,
+                             const std::string& slot,
+                             const std::string& text) {
   Comment comment{time_now(), who, look, slot, text};
   LIMN_TRY_STATUS(check(comment));
   return comment;

@@ -23,9 +23,9 @@ constexpr std::size_t k_longest_comment = 2000, k_longest_name = 64, k_most_comm
 /// A comment at this moment. Error: no text, or longer than the bounds, or not UTF-8 without control
 /// characters but line feeds.
 Result<Comment> make_comment(const std::string& who,
-                           const std::string& look,
-                           const std::string& slot,
-                           const std::string& text);
+                             const std::string& look,
+                             const std::string& slot,
+                             const std::string& text);
 
 /// limn.comments/1, the oldest first. A file that is not there holds none; one that is damaged is an error.
 Result<std::vector<Comment>> load_comments(const std::filesystem::path& path);

@@ -9,7 +9,7 @@ namespace limn::scene {
 /// An image in a mesh's uv, 8-bit BGR, whose v counts up from its bottom row, as in OBJ; beyond 0 … 1 it
 /// repeats.
 struct Texture {
-  cv::Mat image;   ///< empty: none
+  cv::Mat image;     ///< empty: none
   std::string file;  ///< that it came from, for messages
 };
 

@@ -149,9 +149,9 @@ std::uint32_t MeshBvh::build(std::uint32_t first, std::uint32_t count) {
 }
 
 std::optional<MeshPoint> MeshBvh::nearest(const Eigen::Vector3d& p,
-                                                  double max_distance,
-                                                  const Eigen::Vector3d* d_facing,
-                                                  double min_cos) const {
+                                          double max_distance,
+                                          const Eigen::Vector3d* d_facing,
+                                          double min_cos) const {
   double best = max_distance * max_distance;
   std::optional<MeshPoint> found;
   Eigen::Vector3d weights = {1, 0, 0};

@@ -37,9 +37,9 @@ class MeshBvh {
   /// triangles that turn the same way: geometric normal . d_facing >= min_cos, so that a thin thing's back is
   /// not taken for its front.
   std::optional<MeshPoint> nearest(const Eigen::Vector3d& p,
-                                      double max_distance,
-                                      const Eigen::Vector3d* d_facing = nullptr,
-                                      double min_cos = 0.5) const;
+                                   double max_distance,
+                                   const Eigen::Vector3d* d_facing = nullptr,
+                                   double min_cos = 0.5) const;
 
  private:
   struct Box {

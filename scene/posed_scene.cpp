@@ -13,8 +13,9 @@ namespace {
 
 // A lost body is not where its track says: it is as if it were not seen.
 const Track* find_track(std::span<const Track> tracks, const std::string& body) {
-  const auto found = std::find_if(tracks.begin(), tracks.end(),
-                                  [&](const Track& t) { return t.body == body && t.tracking != TrackingState::lost; });
+  const auto found = std::find_if(tracks.begin(), tracks.end(), [&](const Track& t) {
+    return t.body == body && t.tracking != TrackingState::lost;
+  });
   return found == tracks.end() ? nullptr : &*found;
 }
 
@@ -72,7 +73,8 @@ std::vector<Viewpoint> fixed_viewpoints(const Scene& scene) {
   for (std::size_t i = 0; i < scene.viewers.size(); ++i) {
     const Viewer& viewer = scene.viewers[i];
     if (viewer.fixed)
-      viewpoints.push_back({viewer_body(i), viewer.fixed->imager_from_world.inverse().translation, viewer.weight});
+      viewpoints.push_back(
+          {viewer_body(i), viewer.fixed->imager_from_world.inverse().translation, viewer.weight});
   }
   return viewpoints;
 }

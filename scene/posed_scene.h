@@ -25,8 +25,8 @@ struct PosedPart {
 struct PosedScene {
   std::optional<Pose> world_from_prototype;
   std::vector<PosedPart> parts;
-  std::vector<Viewpoint> viewpoints = {};           ///< of the viewers whose markers are seen and of fixed ones
-  std::optional<RoomLight> light = {};  ///< absent: the scene's own
+  std::vector<Viewpoint> viewpoints = {};  ///< of the viewers whose markers are seen and of fixed ones
+  std::optional<RoomLight> light = {};     ///< absent: the scene's own
 };
 
 /// The scene as the tracks (bodies of `bodies(scene)`) place it; `variants[i]` is the chosen variant of slot

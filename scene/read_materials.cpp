@@ -13,8 +13,8 @@
 #include <optional>
 #include <utility>
 
-#include "core/log.h"
 #include "core/image_io.h"
+#include "core/log.h"
 
 namespace limn::scene {
 namespace {
@@ -124,7 +124,7 @@ class Images {
     const aiTexture* embedded = scene_.GetEmbeddedTexture(name.C_Str());
     const fs::path file = embedded ? path_ : texture_path(name.C_Str(), path_);
     LIMN_TRY(cv::Mat image, embedded ? embedded_texture(*embedded, path_, with_alpha)
-                                       : texture_beside(file, path_, with_alpha));
+                                     : texture_beside(file, path_, with_alpha));
     if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
     return known_[{name.C_Str(), with_alpha}] = Texture{image, file.string()};
   }

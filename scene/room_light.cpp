@@ -73,8 +73,8 @@ Result<LightNumbers> light_numbers_of(const std::string& words) {
 }
 
 RoomLight parse_room_light(const LightNumbers& numbers,
-                        const Eigen::Vector3d& d_up_world,
-                        const Eigen::Vector3d& d_front_world) {
+                           const Eigen::Vector3d& d_up_world,
+                           const Eigen::Vector3d& d_front_world) {
   const auto [right_deg, up_deg, strength, above, below] = numbers;
   const Eigen::Vector3d d_up = d_up_world.normalized();
   Eigen::Vector3d d_front = d_front_world - d_front_world.dot(d_up) * d_up;

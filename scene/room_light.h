@@ -40,7 +40,7 @@ using LightNumbers = std::array<double, 5>;
 Result<LightNumbers> light_numbers_of(const std::string& words);
 /// The light of such numbers. Of `d_front_world` what is level counts.
 RoomLight parse_room_light(const LightNumbers& numbers,
-                        const Eigen::Vector3d& d_up_world,
-                        const Eigen::Vector3d& d_front_world);
+                           const Eigen::Vector3d& d_up_world,
+                           const Eigen::Vector3d& d_front_world);
 
 }  // namespace limn::scene

@@ -19,10 +19,10 @@ cv::Mat draw_scan_preview(const ScanSurface& surface, const Imager& viewer);
 /// A viewer of the given size that has the whole surface in its image, looking from where `d_from` points
 /// to (a direction in the surface's frame, from its middle), with `d_up` up.
 Imager preview_viewer(const ScanSurface& surface,
-                 const Eigen::Vector3d& d_from,
-                 const Eigen::Vector3d& d_up,
-                 int width,
-                 int height);
+                      const Eigen::Vector3d& d_from,
+                      const Eigen::Vector3d& d_up,
+                      int width,
+                      int height);
 
 /// Blue below -1, over grey at 0, to red above 1: the colour of a signed quantity as a share of its limit.
 std::array<std::uint8_t, 3> signed_colour_rgb(double share);

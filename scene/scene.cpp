@@ -9,9 +9,9 @@
 #include <span>
 
 #include "core/config.h"
+#include "core/image_io.h"
 #include "core/log.h"
 #include "core/names.h"
-#include "core/image_io.h"
 #include "scene/marker_file.h"
 
 namespace limn::scene {
@@ -309,8 +309,8 @@ Result<std::map<std::string, std::string>> load_units(const fs::path& file) {
 
 // A mesh that was laid into a slot's folder; `told`: units by variant, as people have said.
 Result<Variant> auto_import_meshes(const fs::path& file,
-                             const Slot& slot,
-                             const std::map<std::string, std::string>& told) {
+                                   const Slot& slot,
+                                   const std::map<std::string, std::string>& told) {
   const std::string name = file.stem().string();
   if (find_named(slot.variants, name))
     return error("{}: expected the name of no other variant of slot '{}', found '{}' twice. Rename the file.",
@@ -363,7 +363,10 @@ Status load_variants(std::span<const MeshFile> listed,
   return {};
 }
 
-Status load_files(const Reader& reader, const fs::path& path, Scene* scene, std::vector<SkippedVariant>* skipped_variants) {
+Status load_files(const Reader& reader,
+                  const fs::path& path,
+                  Scene* scene,
+                  std::vector<SkippedVariant>* skipped_variants) {
   if (scene->prototype) {
     LIMN_TRY(scene->prototype->mesh, load_named_mesh(*reader.prototype_mesh, path));
     for (Material& material : scene->prototype->mesh.materials)

@@ -20,7 +20,7 @@ struct Prototype {
   Mesh mesh;
   std::vector<BodyMarker> markers;  ///< body_from_marker is prototype_from_marker
   double albedo = 0.8;              ///< diffuse, when no image is given
-  cv::Mat albedo_image;           ///< 8-bit BGR sRGB in the mesh's uv; empty: none
+  cv::Mat albedo_image;             ///< 8-bit BGR sRGB in the mesh's uv; empty: none
 };
 
 enum class Mode {
@@ -91,9 +91,10 @@ struct SkippedVariant {
 
 /// `path` is the scene.json or its folder. Meshes in its folder slots/NAME/ are variants of slot NAME, too,
 /// called as their files; their units are those of slots/NAME/units.json (limn.units/1), else guessed and
-/// told. A variant that cannot be loaded is an error; with `skipped_variants` it is named there and left out instead,
-/// and a slot that has no other, with its controls, too.
-Result<Scene> load_scene(const std::filesystem::path& path, std::vector<SkippedVariant>* skipped_variants = nullptr);
+/// told. A variant that cannot be loaded is an error; with `skipped_variants` it is named there and left out
+/// instead, and a slot that has no other, with its controls, too.
+Result<Scene> load_scene(const std::filesystem::path& path,
+                         std::vector<SkippedVariant>* skipped_variants = nullptr);
 
 /// A question for people about a dropped variant whose unit is a guess, and how to answer it; empty for
 /// others.

@@ -39,7 +39,8 @@ std::optional<std::string> user_of(const Scene& scene,
                                    const MarkerName& marker,
                                    std::size_t but_slot) {
   for (std::size_t i = 0; i < scene.slots.size(); ++i)
-    if (i != but_slot && slot_marker(scene, show_state, i) == marker) return "slot '" + scene.slots[i].name + "'";
+    if (i != but_slot && slot_marker(scene, show_state, i) == marker)
+      return "slot '" + scene.slots[i].name + "'";
   for (const Body& body : bodies(scene)) {
     if (scene.find_slot(body.name)) continue;
     for (const BodyMarker& known : body.markers)
@@ -113,7 +114,10 @@ const MarkerName& slot_marker(const Scene& scene, const ShowState& show_state, s
   return show_state.slots[slot].marker ? *show_state.slots[slot].marker : scene.slots[slot].marker;
 }
 
-Status check_carrier(const Scene& scene, const ShowState& show_state, const MarkerName& marker, std::size_t slot) {
+Status check_carrier(const Scene& scene,
+                     const ShowState& show_state,
+                     const MarkerName& marker,
+                     std::size_t slot) {
   const std::set<std::string> families = families_of(scene);
   if (!families.count(marker.family))
     return error("expected a marker of the scene's families ({}), found {}.",
@@ -123,7 +127,9 @@ Status check_carrier(const Scene& scene, const ShowState& show_state, const Mark
   return {};
 }
 
-std::vector<Track> assign_tracks(const Scene& scene, const ShowState& show_state, std::span<const Track> tracks) {
+std::vector<Track> assign_tracks(const Scene& scene,
+                                 const ShowState& show_state,
+                                 std::span<const Track> tracks) {
   std::vector<Track> out;
   for (const Track& track : tracks) {
     const Slot* own = scene.find_slot(track.body);
@@ -165,7 +171,8 @@ Result<ShowState> with_pairings(const std::filesystem::path& path, const Scene& 
     const auto marker = MarkerName::parse(slots.at(name).text());
     if (!slot) slots.at(name).problem("expected a slot of the scene, found another name.");
     if (!marker) slots.at(name).problem(marker.message());
-    if (slot && marker) show_state.slots[static_cast<std::size_t>(slot - scene.slots.data())].marker = *marker;
+    if (slot && marker)
+      show_state.slots[static_cast<std::size_t>(slot - scene.slots.data())].marker = *marker;
   }
   for (std::size_t i = 0; i < scene.slots.size(); ++i)  // all together: they may have changed places
     if (const auto& marker = show_state.slots[i].marker)

@@ -56,7 +56,7 @@ struct ShowState {
     Eigen::Vector3d nudge = Eigen::Vector3d::Zero();  ///< along the part's own axes, m
     std::optional<Pin> pin;
     std::optional<MarkerName> marker;  ///< carries the part instead of the scene's own
-    MaterialOverride material = {};      ///< of whichever variant is shown
+    MaterialOverride material = {};    ///< of whichever variant is shown
   };
   std::vector<Slot> slots;  ///< in the scene's order
   std::vector<Look> looks;
@@ -99,13 +99,18 @@ const MarkerName& slot_marker(const Scene& scene, const ShowState& show_state, s
 
 /// Whether a marker may carry a slot's part. Error: it is of no family that the scene uses, or carries or
 /// does something else.
-Status check_carrier(const Scene& scene, const ShowState& show_state, const MarkerName& marker, std::size_t slot);
+Status check_carrier(const Scene& scene,
+                     const ShowState& show_state,
+                     const MarkerName& marker,
+                     std::size_t slot);
 
 /// Tracks by what they carry: a slot's is its carrier's, under the slot's name; loose markers keep theirs.
-std::vector<Track> assign_tracks(const Scene& scene, const ShowState& show_state, std::span<const Track> tracks);
+std::vector<Track> assign_tracks(const Scene& scene,
+                                 const ShowState& show_state,
+                                 std::span<const Track> tracks);
 
-/// The show state once pins have gone of parts whose marker was moved on the prototype by more than 10 mm or 5
-/// degrees since it was first seen under the pin. Tracks as of carried().
+/// The show state once pins have gone of parts whose marker was moved on the prototype by more than 10 mm or
+/// 5 degrees since it was first seen under the pin. Tracks as of carried().
 ShowState without_moved_pins(const Scene& scene, const ShowState& show_state, std::span<const Track> tracks);
 
 /// The scene as tracks (carried()) and people place it: posed() with the chosen variants, nudged, pinned

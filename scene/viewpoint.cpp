@@ -17,24 +17,26 @@ double count_of(const Viewpoint& eye, const Eigen::Vector3d& p_middle) {
 }
 
 // 1 within `full_weight_deg` of the leader's direction, falling smoothly to 0 at `zero_weight_deg`.
-double beside(const Eigen::Vector3d& d, const Eigen::Vector3d& d_leader, const SharedViewpointOptions& options) {
+double beside(const Eigen::Vector3d& d,
+              const Eigen::Vector3d& d_leader,
+              const SharedViewpointOptions& options) {
   const double angle = std::atan2(d.cross(d_leader).norm(), d.dot(d_leader)) * 180 / std::numbers::pi;
-  const double t =
-      std::clamp((options.zero_weight_deg - angle) / (options.zero_weight_deg - options.full_weight_deg), 0.0, 1.0);
+  const double t = std::clamp(
+      (options.zero_weight_deg - angle) / (options.zero_weight_deg - options.full_weight_deg), 0.0, 1.0);
   return t * t * (3 - 2 * t);
 }
 
 // Who leads: the one before, unless gone or outdone.
 const Viewpoint& leader_of(std::span<const Viewpoint> viewpoints,
-                     const std::string& before,
-                     const Eigen::Vector3d& p_middle,
-                     double takeover_ratio) {
+                           const std::string& before,
+                           const Eigen::Vector3d& p_middle,
+                           double takeover_ratio) {
   const auto counts_less = [&](const Viewpoint& a, const Viewpoint& b) {
     return count_of(a, p_middle) < count_of(b, p_middle);
   };
   const Viewpoint& most = *std::max_element(viewpoints.begin(), viewpoints.end(), counts_less);
-  const auto known =
-      std::find_if(viewpoints.begin(), viewpoints.end(), [&](const Viewpoint& eye) { return eye.viewer == before; });
+  const auto known = std::find_if(viewpoints.begin(), viewpoints.end(),
+                                  [&](const Viewpoint& eye) { return eye.viewer == before; });
   if (known == viewpoints.end()) return most;
   return count_of(most, p_middle) > takeover_ratio * count_of(*known, p_middle) ? most : *known;
 }
@@ -43,7 +45,8 @@ const Viewpoint& leader_of(std::span<const Viewpoint> viewpoints,
 void join_gone(std::span<const Viewpoint> viewpoints, std::vector<SharedViewpoint::Share>* shares) {
   SharedViewpoint::Share gone;
   const auto is_gone = [&](const SharedViewpoint::Share& share) {
-    return std::none_of(viewpoints.begin(), viewpoints.end(), [&](const Viewpoint& eye) { return eye.viewer == share.viewer; });
+    return std::none_of(viewpoints.begin(), viewpoints.end(),
+                        [&](const Viewpoint& eye) { return eye.viewer == share.viewer; });
   };
   for (const SharedViewpoint::Share& share : *shares) {
     if (!is_gone(share)) continue;
@@ -66,11 +69,12 @@ std::optional<Eigen::Vector3d> SharedViewpoint::p_world() const {
 }
 
 SharedViewpoint updated_viewpoint(const SharedViewpoint& before,
-                   std::span<const Viewpoint> viewpoints,
-                   const Eigen::Vector3d& p_middle_world,
-                   double seconds,
-                   const SharedViewpointOptions& options) {
-  LIMN_CHECK(options.fade_s > 0 && options.takeover_ratio >= 1 && options.zero_weight_deg > options.full_weight_deg);
+                                  std::span<const Viewpoint> viewpoints,
+                                  const Eigen::Vector3d& p_middle_world,
+                                  double seconds,
+                                  const SharedViewpointOptions& options) {
+  LIMN_CHECK(options.fade_s > 0 && options.takeover_ratio >= 1 &&
+             options.zero_weight_deg > options.full_weight_deg);
   SharedViewpoint after = before;
   join_gone(viewpoints, &after.shares);
   if (viewpoints.empty()) return after;

@@ -20,7 +20,7 @@ struct SharedViewpointOptions {
   double takeover_ratio =
       1.5;  ///< the leader changes when another counts this many times more (1: flips to and fro)
   double full_weight_deg = 35;  ///< viewers within this of the leader, seen from the middle, count fully,
-  double zero_weight_deg = 80;     ///< and beyond this not at all
+  double zero_weight_deg = 80;  ///< and beyond this not at all
 };
 
 /// The one eye that view parts are drawn for when several people look: the light of a part falls in one place
@@ -47,9 +47,9 @@ struct SharedViewpoint {
 /// seconds / fade_s of the distance between the farthest two. While nobody is seen it stays. Somebody who
 /// comes back counts as somebody new.
 SharedViewpoint updated_viewpoint(const SharedViewpoint& before,
-                   std::span<const Viewpoint> viewpoints,
-                   const Eigen::Vector3d& p_middle_world,
-                   double seconds,
-                   const SharedViewpointOptions& options = {});
+                                  std::span<const Viewpoint> viewpoints,
+                                  const Eigen::Vector3d& p_middle_world,
+                                  double seconds,
+                                  const SharedViewpointOptions& options = {});
 
 }  // namespace limn::scene

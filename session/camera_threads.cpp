@@ -2,9 +2,9 @@
 
 #include <atomic>
 
+#include "core/log.h"
 #include "session/frame_gate.h"
 #include "session/latest.h"
-#include "core/log.h"
 
 namespace limn::apps {
 namespace {

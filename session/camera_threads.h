@@ -9,9 +9,9 @@
 #include <thread>
 #include <vector>
 
-#include "session/device_health.h"
 #include "core/frame.h"
 #include "device/camera_source.h"
+#include "session/device_health.h"
 
 namespace limn::apps {
 

@@ -3,10 +3,10 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
-#include "core/html.h"
 #include "core/file.h"
-#include "core/names.h"
+#include "core/html.h"
 #include "core/image_io.h"
+#include "core/names.h"
 
 namespace limn::apps {
 namespace {

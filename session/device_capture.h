@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "core/rig.h"
 #include "session/camera_threads.h"
 #include "session/device_session.h"
 #include "session/perception_thread.h"
 #include "session/recalibration_stage.h"
-#include "core/rig.h"
 
 namespace limn::apps {
 

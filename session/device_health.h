@@ -11,7 +11,7 @@ struct DeviceState {
   std::string name;
   std::string kind;  ///< camera, projector, screen, keys
   bool works = true;
-  std::string why = {};      ///< it does not work
+  std::string why = {};    ///< it does not work
   std::size_t images = 0;  ///< taken or shown so far
 };
 

@@ -5,12 +5,12 @@
 #include <opencv2/imgproc.hpp>
 #include <thread>
 
+#include "core/log.h"
 #include "session/camera_threads.h"
 #include "session/device_capture.h"
 #include "session/key_client.h"
 #include "session/perception_thread.h"
 #include "session/scene_files_client.h"
-#include "core/log.h"
 
 namespace limn::apps {
 namespace {

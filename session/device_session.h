@@ -4,13 +4,13 @@
 #include <memory>
 #include <vector>
 
-#include "session/device_health.h"
-#include "session/frame_loop.h"
-#include "session/keys.h"
 #include "core/result.h"
 #include "device/camera_source.h"
 #include "device/display.h"
 #include "device/key_source.h"
+#include "session/device_health.h"
+#include "session/frame_loop.h"
+#include "session/keys.h"
 
 namespace limn::apps {
 

@@ -4,12 +4,12 @@
 #include <string>
 #include <vector>
 
-#include "session/projection_history.h"
-#include "session/perception.h"
 #include "core/rig.h"
 #include "projector/misalignment_detector.h"
 #include "projector/renderer.h"
 #include "scene/posed_scene.h"
+#include "session/perception.h"
+#include "session/projection_history.h"
 
 namespace limn::apps {
 
@@ -60,10 +60,10 @@ class DriftWatch {
 
   Rig rig_;
   std::vector<projector::MisalignmentDetector> lights_;  // one a camera
-  std::size_t turn_ = 0;                           // the camera that is looked at
-  Stamp began_at_, compared_at_;                   // its look
-  std::optional<Pose> placed_;                     // world_from_prototype that light was predicted for
-  std::optional<Pose> rests_;                      // where the prototype is
+  std::size_t turn_ = 0;                                 // the camera that is looked at
+  Stamp began_at_, compared_at_;                         // its look
+  std::optional<Pose> placed_;                           // world_from_prototype that light was predicted for
+  std::optional<Pose> rests_;                            // where the prototype is
   Stamp rests_since_;
   std::optional<Drift> drift_;
   std::optional<Stamp> differs_since_;  // what is found from drift_

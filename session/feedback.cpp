@@ -66,8 +66,7 @@ void draw_word(const Imager& projector,
   int below = 0;
   const cv::Size text = cv::getTextSize(word, k_font, k_font_scale, 3, &below);
   const int border = 6;
-  cv::Mat sheet(text.height + below + 2 * border, text.width + 2 * border, image->type(),
-                cv::Scalar::all(0));
+  cv::Mat sheet(text.height + below + 2 * border, text.width + 2 * border, image->type(), cv::Scalar::all(0));
   cv::putText(sheet, word, {border, border + text.height}, k_font, k_font_scale,
               cv::Scalar::all(255 * strength), 3, cv::LINE_AA);
   const double height = k_word_height * size_m, width = height * sheet.cols / sheet.rows;

@@ -49,14 +49,16 @@ std::vector<LooseMarker> waiting_markers(const scene::Scene& scene,
   return waiting;
 }
 
-Result<FrameComposer> FrameComposer::create(const scene::Scene& scene, const Rig& rig, const ComposeOptions& options) {
+Result<FrameComposer> FrameComposer::create(const scene::Scene& scene,
+                                            const Rig& rig,
+                                            const ComposeOptions& options) {
   LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, rig));
   return FrameComposer(std::make_unique<const Subject>(scene, rig), std::move(renderer), options);
 }
 
 FrameComposer::FrameComposer(std::unique_ptr<const Subject> subject,
-                 projector::Renderer renderer,
-                 const ComposeOptions& options)
+                             projector::Renderer renderer,
+                             const ComposeOptions& options)
     : subject_(std::move(subject)),
       renderer_(std::move(renderer)),
       options_(options),
@@ -203,9 +205,9 @@ void FrameComposer::look_for_drift(const Percepts& watched) {
 }
 
 cv::Mat FrameComposer::screen(const Percepts& watched,
-                        std::span<const Track> tracks,
-                        const scene::ShowState& show_state,
-                        scene::Screen what) {
+                              std::span<const Track> tracks,
+                              const scene::ShowState& show_state,
+                              scene::Screen what) {
   if (watched.frames.empty()) return {};
   ScreenInput input{watched.frames[0], show_state, scene::assign_tracks(subject_->scene, show_state, tracks),
                     viewpoints_.selected().viewer};

@@ -7,20 +7,20 @@
 #include <string>
 #include <vector>
 
-#include "session/drift_watch.h"
-#include "session/frame_input.h"
-#include "session/overlays.h"
-#include "session/part_fading.h"
-#include "session/screen_composer.h"
-#include "session/shadow_watch.h"
-#include "session/projection_history.h"
-#include "session/viewpoint_selector.h"
-#include "session/perception.h"
 #include "core/result.h"
 #include "core/rig.h"
 #include "projector/renderer.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
+#include "session/drift_watch.h"
+#include "session/frame_input.h"
+#include "session/overlays.h"
+#include "session/part_fading.h"
+#include "session/perception.h"
+#include "session/projection_history.h"
+#include "session/screen_composer.h"
+#include "session/shadow_watch.h"
+#include "session/viewpoint_selector.h"
 
 namespace limn::apps {
 
@@ -38,7 +38,9 @@ struct ComposedFrame {
 
 /// What projectors show: what was painted, and overlays over it. Images that nothing is drawn over are the
 /// painted ones themselves.
-std::vector<cv::Mat> with_overlays(const ComposedFrame& painted, const Rig& rig, std::span<const Overlay> overlays);
+std::vector<cv::Mat> with_overlays(const ComposedFrame& painted,
+                                   const Rig& rig,
+                                   std::span<const Overlay> overlays);
 
 /// Loose markers that lie still for a second and carry no slot: they glow. The last one is the one that a
 /// `pair` without a marker means.
@@ -46,12 +48,14 @@ std::vector<LooseMarker> waiting_markers(const scene::Scene& scene,
                                          const scene::ShowState& show_state,
                                          const Percepts& watched);
 
-/// The projector side of a session: motions of bodies + show state -> projector images and the screen's. Holds
-/// what fades; the same calls give the same images. A GL context must be current at every call and at
+/// The projector side of a session: motions of bodies + show state -> projector images and the screen's.
+/// Holds what fades; the same calls give the same images. A GL context must be current at every call and at
 /// destruction.
 class FrameComposer {
  public:
-  static Result<FrameComposer> create(const scene::Scene& scene, const Rig& rig, const ComposeOptions& options = {});
+  static Result<FrameComposer> create(const scene::Scene& scene,
+                                      const Rig& rig,
+                                      const ComposeOptions& options = {});
 
   /// Projector images for the moment at which their light arrives. Stamps must not go back.
   const ComposedFrame& compose(const FrameInput& input);
@@ -82,7 +86,9 @@ class FrameComposer {
     scene::Scene scene;
     Rig rig;
   };
-  FrameComposer(std::unique_ptr<const Subject> subject, projector::Renderer renderer, const ComposeOptions& options);
+  FrameComposer(std::unique_ptr<const Subject> subject,
+                projector::Renderer renderer,
+                const ComposeOptions& options);
   void select_viewpoint(const FrameInput& input);
   std::vector<Overlay> surface_overlays(const scene::ShowState& show_state) const;
   std::vector<Overlay> marker_overlays(const FrameInput& input) const;

@@ -4,10 +4,10 @@
 #include <optional>
 #include <string>
 
-#include "session/device_health.h"
-#include "session/source_clock.h"
 #include "core/frame.h"
 #include "core/result.h"
+#include "session/device_health.h"
+#include "session/source_clock.h"
 
 namespace limn::apps {
 

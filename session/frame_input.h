@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "session/perception.h"
 #include "core/frame.h"
 #include "core/track.h"
 #include "scene/show_state.h"
+#include "session/perception.h"
 #include "tracker/marker_light.h"
 #include "tracker/predict.h"
 
@@ -64,7 +64,7 @@ struct FrameInput {
   const Percepts& watched;
   const scene::ShowState& show_state;
   FrameTimes times;
-  std::vector<Track> tracks;                ///< Prediction::at_light, carried as the show state pairs markers
+  std::vector<Track> tracks;  ///< Prediction::at_light, carried as the show state pairs markers
   std::span<const TabletViewpoint> places = {};  ///< whose light goes by guests' eyes
 };
 

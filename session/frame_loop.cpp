@@ -1,7 +1,7 @@
 #include "session/frame_loop.h"
 
-#include "core/stopwatch.h"
 #include "core/log.h"
+#include "core/stopwatch.h"
 
 namespace limn::apps {
 

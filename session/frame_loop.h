@@ -8,14 +8,14 @@
 #include <set>
 #include <vector>
 
-#include "session/session_output.h"
+#include "core/result.h"
 #include "session/device_health.h"
 #include "session/frame_input.h"
+#include "session/perception.h"
 #include "session/recalibration_stage.h"
 #include "session/session.h"
 #include "session/session_client.h"
-#include "session/perception.h"
-#include "core/result.h"
+#include "session/session_output.h"
 
 namespace limn::apps {
 
@@ -39,9 +39,9 @@ class FrameClock {
 /// What is new from the cameras.
 struct Perceived {
   std::optional<Percepts> watched;  ///< nullopt: nothing is
-  std::size_t moments = 0;         ///< calls of Watcher::watch so far
-  int missed = 0;                  ///< camera frames that never came or were not looked at
-  double record_ms = 0;            ///< what it cost to hand the frames to the recording
+  std::size_t moments = 0;          ///< calls of Watcher::watch so far
+  int missed = 0;                   ///< camera frames that never came or were not looked at
+  double record_ms = 0;             ///< what it cost to hand the frames to the recording
 };
 
 /// Where perceptions, and edits that nobody sends, come from: cameras, a virtual room with its script, or a

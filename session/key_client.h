@@ -2,10 +2,10 @@
 
 #include <vector>
 
+#include "device/key_source.h"
 #include "session/device_health.h"
 #include "session/keys.h"
 #include "session/session_client.h"
-#include "device/key_source.h"
 
 namespace limn::apps {
 

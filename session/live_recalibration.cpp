@@ -1,7 +1,7 @@
 #include "session/live_recalibration.h"
 
-#include "core/worker_thread.h"
 #include "core/user_folder.h"
+#include "core/worker_thread.h"
 
 namespace limn::apps {
 namespace {
@@ -25,8 +25,11 @@ std::string words_of(const calib::RigCheck& result, const fs::path& folder) {
       move.device, others, move.degrees, move.mm, folder.string());
 }
 
-Status mend(
-    const Result<Rechecked>& checked, const fs::path& folder, Stamp at, Perception* perception, Session* session) {
+Status mend(const Result<Rechecked>& checked,
+            const fs::path& folder,
+            Stamp at,
+            Perception* perception,
+            Session* session) {
   if (!checked) return checked.error();
   if (checked->result.verdict != calib::RigVerdict::sound) {
     LIMN_TRY_STATUS(session->mend(checked->result.rig, at));
@@ -51,7 +54,9 @@ Result<fs::path> recalibration_folder(const fs::path& out) {
   }
 }
 
-LiveRecalibration::LiveRecalibration(const Rig& rig, fs::path folder, const std::function<Surroundings(ImageWriter*)>& around)
+LiveRecalibration::LiveRecalibration(const Rig& rig,
+                                     fs::path folder,
+                                     const std::function<Surroundings(ImageWriter*)>& around)
     : folder_(std::move(folder)), images_(recheck_images(rig)) {
   result_ = std::async(std::launch::async,
                        [this, rig, around = through_errands(around(&writer_))]() -> Result<Rechecked> {
@@ -111,8 +116,11 @@ std::optional<Result<Rechecked>> LiveRecalibration::take() {
   return result_.get();
 }
 
-void apply_recalibration(
-    const Result<Rechecked>& checked, const fs::path& folder, Stamp at, Perception* perception, Session* session) {
+void apply_recalibration(const Result<Rechecked>& checked,
+                         const fs::path& folder,
+                         Stamp at,
+                         Perception* perception,
+                         Session* session) {
   session->set_recalibration_progress("");
   static_cast<void>(session->take_recalibration_request());  // who asked meanwhile has it
   const Status mended = mend(checked, folder, at, perception, session);

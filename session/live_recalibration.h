@@ -8,28 +8,28 @@
 #include <optional>
 #include <string>
 
-#include "session/session.h"
-#include "session/perception.h"
 #include "core/image_writer.h"
-#include "wizard/capture/rig_recheck.h"
-#include "wizard/capture/main_thread_executor.h"
+#include "session/perception.h"
+#include "session/session.h"
 #include "wizard/capture/backend.h"
+#include "wizard/capture/main_thread_executor.h"
+#include "wizard/capture/rig_recheck.h"
 
 namespace limn::apps {
 
 /// Where mended rigs of a session go: a new folder in `out`, in Limn's own folder without one.
 Result<std::filesystem::path> recalibration_folder(const std::filesystem::path& out);
 
-/// The rig of a running session is checked by the prototype as it stands (wizard/capture/rig_recheck.h), with the
-/// session's own devices, on a thread of its own: what it shows and photographs is done by serve(), so that
-/// the session's thread answers people in between. When all is photographed the session may paint again while
-/// the rest is computed, with low priority.
+/// The rig of a running session is checked by the prototype as it stands (wizard/capture/rig_recheck.h), with
+/// the session's own devices, on a thread of its own: what it shows and photographs is done by serve(), so
+/// that the session's thread answers people in between. When all is photographed the session may paint again
+/// while the rest is computed, with low priority.
 class LiveRecalibration {
  public:
   /// `around` needs stage, written and use_latency, which store images in the writer that it is given.
   LiveRecalibration(const Rig& rig,
-         std::filesystem::path folder,
-         const std::function<Surroundings(ImageWriter*)>& around);
+                    std::filesystem::path folder,
+                    const std::function<Surroundings(ImageWriter*)>& around);
   /// Ends it where it is; a second at most.
   ~LiveRecalibration();
   LiveRecalibration(const LiveRecalibration&) = delete;
@@ -62,9 +62,9 @@ class LiveRecalibration {
 /// next session; what could not be done is told, and the session goes on as it was. Nobody may use the
 /// watcher meanwhile.
 void apply_recalibration(const Result<Rechecked>& checked,
-                  const std::filesystem::path& folder,
-                  Stamp at,
-                  Perception* perception,
-                  Session* session);
+                         const std::filesystem::path& folder,
+                         Stamp at,
+                         Perception* perception,
+                         Session* session);
 
 }  // namespace limn::apps

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
-#include "tracker/camera_encoding.h"
-#include "gui/qr_code.h"
 #include "core/log.h"
 #include "core/names.h"
+#include "gui/qr_code.h"
+#include "tracker/camera_encoding.h"
 
 namespace limn::apps {
 namespace {
@@ -119,9 +119,9 @@ bool OperatorConsole::serve(
 }
 
 OperatorView OperatorConsole::view_of(const Session& session,
-                                   const Telemetry& telemetry,
-                                   const DeviceHealth& health,
-                                   Stamp now) {
+                                      const Telemetry& telemetry,
+                                      const DeviceHealth& health,
+                                      Stamp now) {
   OperatorView view;
   view.at_s = seconds_between(*begun_at_, now);
   view.cameras = cameras_of(session);

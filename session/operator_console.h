@@ -5,16 +5,16 @@
 #include <string>
 #include <vector>
 
+#include "core/result.h"
+#include "device/desktop.h"
+#include "gui/gui_window.h"
 #include "session/device_health.h"
 #include "session/keys.h"
 #include "session/operator_panel.h"
+#include "session/remote_link.h"
 #include "session/session.h"
 #include "session/session_client.h"
 #include "session/telemetry.h"
-#include "session/remote_link.h"
-#include "gui/gui_window.h"
-#include "core/result.h"
-#include "device/desktop.h"
 
 namespace limn::apps {
 

@@ -33,14 +33,14 @@ ImU32 colour_of(const std::optional<Track>& track) {
   if (!track) return colour::k_quiet;
   return track->tracking == TrackingState::measured       ? colour::k_good
          : track->tracking == TrackingState::extrapolated ? colour::k_warn
-                                               : colour::k_bad;
+                                                          : colour::k_bad;
 }
 
 std::string words_of(const std::optional<Track>& track) {
   if (!track) return "not seen yet";
   return track->tracking == TrackingState::measured       ? "tracked"
          : track->tracking == TrackingState::extrapolated ? "carried on"
-                                               : "lost";
+                                                          : "lost";
 }
 
 void dot(const Gui& gui, ImU32 colour) {
@@ -280,11 +280,11 @@ void OperatorPanel::draw_bar(const Gui& gui, const OperatorView& view) {
 
 // True when it was clicked.
 bool OperatorPanel::draw_image(Gui& gui,
-                                 const OperatorView::Image& image,
-                                 const OperatorView& view,
-                                 ImVec2 corner,
-                                 ImVec2 size,
-                                 bool is_large) {
+                               const OperatorView::Image& image,
+                               const OperatorView& view,
+                               ImVec2 corner,
+                               ImVec2 size,
+                               bool is_large) {
   const float caption = cell_height(gui);
   const OperatorView::Device* device = device_of(view, image.name);
   const bool is_gone = device && !device->state.works;
@@ -442,7 +442,9 @@ void OperatorPanel::draw_slots(const Gui& gui, const OperatorView& view) {
 }
 
 // Colour, metalness and roughness of a part, in a box that opens.
-void OperatorPanel::draw_material(const Gui& gui, const std::string& slot, const scene::MaterialOverride& now) {
+void OperatorPanel::draw_material(const Gui& gui,
+                                  const std::string& slot,
+                                  const scene::MaterialOverride& now) {
   if (small_button(gui, "material", !now.is_none())) ImGui::OpenPopup("material");
   if (!ImGui::BeginPopup("material")) return;
   scene::MaterialOverride wanted = now;
@@ -464,8 +466,9 @@ void OperatorPanel::draw_material(const Gui& gui, const std::string& slot, const
 // The light that parts are shaded by, in a box that opens.
 void OperatorPanel::draw_light(const Gui& gui, const scene::ShowState& show_state) {
   if (small_button(gui, "light", show_state.light.has_value())) ImGui::OpenPopup("light");
-  const auto numbers =
-      show_state.light ? scene::room_light_numbers(*show_state.light, show_state.d_front_world) : std::nullopt;
+  const auto numbers = show_state.light
+                           ? scene::room_light_numbers(*show_state.light, show_state.d_front_world)
+                           : std::nullopt;
   if (numbers && !ImGui::IsAnyItemActive())
     std::transform(numbers->begin(), numbers->end(), light_.begin(),
                    [](double number) { return static_cast<float>(number); });

@@ -3,8 +3,8 @@
 #include <array>
 #include <string>
 
-#include "session/operator_view.h"
 #include "gui/gui.h"
+#include "session/operator_view.h"
 
 namespace limn::apps {
 
@@ -21,11 +21,11 @@ class OperatorPanel {
   void draw_bar(const Gui& gui, const OperatorView& view);
   void draw_images(Gui& gui, const OperatorView& view, ImVec2 size);
   bool draw_image(Gui& gui,
-                    const OperatorView::Image& image,
-                    const OperatorView& view,
-                    ImVec2 corner,
-                    ImVec2 size,
-                    bool is_large);
+                  const OperatorView::Image& image,
+                  const OperatorView& view,
+                  ImVec2 corner,
+                  ImVec2 size,
+                  bool is_large);
   void draw_remote(Gui& gui, const OperatorView& view, ImVec2 size);
   void draw_viewers(const Gui& gui, const OperatorView& view);
   void draw_slots(const Gui& gui, const OperatorView& view);

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "session/device_health.h"
-#include "session/telemetry.h"
 #include "core/track.h"
 #include "scene/actions.h"
 #include "scene/show_state.h"
+#include "session/device_health.h"
+#include "session/telemetry.h"
 
 namespace limn::apps {
 
@@ -71,7 +71,7 @@ struct OperatorView {
   std::vector<ShownFrame> recent;  ///< images shown, the newest last
   std::vector<Notice> notices;     ///< the newest last
   std::optional<Remote> remote = {};
-  std::string moved = {};      ///< devices that do not stand where the rig says; empty: none is known of
+  std::string moved = {};  ///< devices that do not stand where the rig says; empty: none is known of
   std::string recalibration_progress = {};  ///< how far a repair is; empty: there is none
 };
 

@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "session/osc.h"
 #include "session/session.h"
 #include "session/session_client.h"
 #include "session/telemetry.h"
 #include "session/udp_socket.h"
-#include "core/result.h"
 
 namespace limn::apps {
 

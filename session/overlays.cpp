@@ -3,8 +3,8 @@
 #include <array>
 #include <opencv2/imgproc.hpp>
 
-#include "session/grid_and_split.h"
 #include "session/feedback.h"
+#include "session/grid_and_split.h"
 
 namespace limn::apps {
 namespace {
@@ -68,10 +68,10 @@ void draw(std::span<const Overlay> overlays, const OverlayTarget& target) {
 }
 
 void draw_pairing_overlay(const cv::Mat& sign,
-               const OverlayPlace& place,
-               const Imager& projector,
-               const Pose& world_from_prototype,
-               cv::Mat* image) {
+                          const OverlayPlace& place,
+                          const Imager& projector,
+                          const Pose& world_from_prototype,
+                          cv::Mat* image) {
   std::array<cv::Point2f, 4> corners;
   for (std::size_t i = 0; i < 4; ++i) {
     const double right = i == 1 || i == 2, down = i >= 2;

@@ -79,9 +79,9 @@ void draw(std::span<const Overlay> overlays, const OverlayTarget& target);
 /// Draws a sign into a projector's image so that it lies there undistorted. Nothing is drawn where a corner
 /// is not in the projector's view.
 void draw_pairing_overlay(const cv::Mat& sign,
-               const OverlayPlace& place,
-               const Imager& projector,
-               const Pose& world_from_prototype,
-               cv::Mat* image);
+                          const OverlayPlace& place,
+                          const Imager& projector,
+                          const Pose& world_from_prototype,
+                          cv::Mat* image);
 
 }  // namespace limn::apps

@@ -5,12 +5,12 @@
 #include <optional>
 #include <string>
 
-#include "session/frame_input.h"
 #include "core/imager.h"
 #include "projector/renderer.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
+#include "session/frame_input.h"
 
 namespace limn::apps {
 

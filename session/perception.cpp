@@ -5,13 +5,13 @@
 #include <map>
 #include <numbers>
 
-#include "tracker/camera_encoding.h"
-#include "core/stopwatch.h"
-#include "core/names.h"
 #include "core/image_io.h"
+#include "core/names.h"
+#include "core/stopwatch.h"
+#include "tracker/body_correspondences.h"
+#include "tracker/camera_encoding.h"
 #include "tracker/family.h"
 #include "tracker/predict.h"
-#include "tracker/body_correspondences.h"
 
 namespace limn::apps {
 namespace {
@@ -83,7 +83,9 @@ std::vector<std::string> families_of(const scene::Scene& scene, std::vector<Body
 
 double loose_size_m(const scene::Scene& scene) { return scene.slots.empty() ? 0 : scene.slots[0].size_m; }
 
-Result<Perception> Perception::create(const scene::Scene& scene, const Rig& rig, const PerceptionOptions& options) {
+Result<Perception> Perception::create(const scene::Scene& scene,
+                                      const Rig& rig,
+                                      const PerceptionOptions& options) {
   LIMN_CHECK(options.full_scan_every > 0);
   Perception out;
   out.rig_ = rig;

@@ -64,7 +64,9 @@ double loose_size_m(const scene::Scene& scene);
 class Perception {
  public:
   /// Error: a family that cannot be loaded, a control whose gesture is unknown.
-  static Result<Perception> create(const scene::Scene& scene, const Rig& rig, const PerceptionOptions& options = {});
+  static Result<Perception> create(const scene::Scene& scene,
+                                   const Rig& rig,
+                                   const PerceptionOptions& options = {});
 
   /// Takes frames of one moment (at most one a camera; cameras without one keep what they saw). The result
   /// stays valid until the next call.

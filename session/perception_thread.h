@@ -9,8 +9,8 @@
 #include "session/device_health.h"
 #include "session/frame_loop.h"
 #include "session/latest.h"
-#include "session/recording.h"
 #include "session/perception.h"
+#include "session/recording.h"
 
 namespace limn::apps {
 

@@ -36,9 +36,8 @@ void RecalibrationStage::begin(const FrameClock& clock) {
   const auto folder = recalibration_folder(output_->out());
   if (!folder) return session_->warn(clock.now(), folder.message());
   pause();
-  recalibration_ = std::make_unique<LiveRecalibration>(session_->setup().rig, *folder, [this](ImageWriter* writer) {
-    return devices_->surroundings(writer);
-  });
+  recalibration_ = std::make_unique<LiveRecalibration>(
+      session_->setup().rig, *folder, [this](ImageWriter* writer) { return devices_->surroundings(writer); });
 }
 
 void RecalibrationStage::pause() {

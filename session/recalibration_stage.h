@@ -2,10 +2,10 @@
 
 #include <memory>
 
-#include "session/session_output.h"
 #include "session/live_recalibration.h"
-#include "session/session.h"
 #include "session/perception.h"
+#include "session/session.h"
+#include "session/session_output.h"
 
 namespace limn::apps {
 
@@ -29,13 +29,18 @@ class CaptureDevices {
 class RecalibrationStage {
  public:
   /// Borrows all of them. `devices` may be null: what is asked for is left alone.
-  RecalibrationStage(Perception* perception, Session* session, SessionOutput* output, CaptureDevices* devices);
+  RecalibrationStage(Perception* perception,
+                     Session* session,
+                     SessionOutput* output,
+                     CaptureDevices* devices);
 
   /// Begins one that was asked for, does what a running one wants of the devices (10 ms at most, and a
   /// pattern's time), and lets the session go on with the mended rig of one that is over.
   void step(const FrameClock& clock);
   /// Whether the projectors' light is its own: no frame is to be composed.
-  bool holds_light() const { return recalibration_ && (devices_->waits_for_result() || recalibration_->is_capturing()); }
+  bool holds_light() const {
+    return recalibration_ && (devices_->waits_for_result() || recalibration_->is_capturing());
+  }
 
  private:
   void begin(const FrameClock& clock);

@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "session/frame_composer.h"
-#include "core/image_writer.h"
 #include "core/frame.h"
+#include "core/image_writer.h"
 #include "core/result.h"
 #include "core/rig.h"
 #include "scene/actions.h"
+#include "session/frame_composer.h"
 
 namespace limn::apps {
 

@@ -4,9 +4,9 @@
 #include <optional>
 #include <string>
 
+#include "core/result.h"
 #include "session/frame_composer.h"
 #include "session/recording.h"
-#include "core/result.h"
 
 namespace limn::apps {
 

@@ -15,13 +15,11 @@ struct Invitation {
   std::array<std::string, 3> pins;    ///< by Role
 
   /// The page that pairs by itself: the text of the QR code.
-  std::string url_for(scene::Role role) const {
-    return url + "#pin=" + pins[static_cast<std::size_t>(role)];
-  }
+  std::string url_for(scene::Role role) const { return url + "#pin=" + pins[static_cast<std::size_t>(role)]; }
 };
 
-/// What the operator's window uses of the remote. remote/server.h implements it; the session knows no network.
-/// All calls belong to the session's thread and never wait.
+/// What the operator's window uses of the remote. remote/server.h implements it; the session knows no
+/// network. All calls belong to the session's thread and never wait.
 class RemoteLink {
  public:
   virtual ~RemoteLink() = default;

@@ -44,8 +44,8 @@ cv::Mat ScreenComposer::image(const ScreenInput& input, scene::Screen what, proj
   if (!line) return image;
   const scene::PosedScene other = scene::compose_scene(*scene_, *left, input.tracks);
   const auto policies = what == rest
-                              ? projector::updated_policies({}, renderer->coverage(other, rig_->cameras[0]), 0)
-                              : std::vector<projector::CompositePolicy>();
+                            ? projector::updated_policies({}, renderer->coverage(other, rig_->cameras[0]), 0)
+                            : std::vector<projector::CompositePolicy>();
   return split_along(*line, composed(behind, other, viewer, what, policies, renderer), image);
 }
 

@@ -5,14 +5,14 @@
 #include <span>
 #include <vector>
 
-#include "session/frame_input.h"
 #include "core/imager.h"
 #include "core/rig.h"
-#include "projector/renderer.h"
 #include "projector/composite_policy.h"
+#include "projector/renderer.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
+#include "session/frame_input.h"
 
 namespace limn::apps {
 

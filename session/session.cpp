@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <chrono>
 
-#include "core/stopwatch.h"
 #include "core/log.h"
+#include "core/stopwatch.h"
 
 namespace limn::apps {
 namespace {
@@ -105,8 +105,8 @@ void Session::take(Percepts watched, std::size_t moments) {
   watched_ = std::move(watched);
   moments_ = moments;
   prediction_ = predicted_at_capture(watched_, setup_.paint);
-  show_state_ =
-      scene::without_moved_pins(setup_.scene, show_state_, scene::assign_tracks(setup_.scene, show_state_, prediction_.at_capture));
+  show_state_ = scene::without_moved_pins(
+      setup_.scene, show_state_, scene::assign_tracks(setup_.scene, show_state_, prediction_.at_capture));
   for (const ControlUse& use : watched_.uses) {
     const scene::Control& control = setup_.scene.controls[use.control];
     const Status done = edit(edit_of(control, use.steps), control.marker.text(), watched_.captured_at);

@@ -10,8 +10,12 @@
 #include <utility>
 #include <vector>
 
+#include "core/result.h"
+#include "scene/actions.h"
+#include "scene/show_state.h"
 #include "session/drift_watch.h"
 #include "session/frame_input.h"
+#include "session/perception.h"
 #include "session/recording.h"
 #include "session/recovering_composer.h"
 #include "session/scene_watch.h"
@@ -19,10 +23,6 @@
 #include "session/swapped_cameras.h"
 #include "session/tablet_registry.h"
 #include "session/telemetry.h"
-#include "session/perception.h"
-#include "core/result.h"
-#include "scene/actions.h"
-#include "scene/show_state.h"
 
 namespace limn::apps {
 
@@ -58,8 +58,8 @@ class Session {
   /// without a marker means the one that glows (waiting_markers).
   Status edit(const scene::Edit& edit, const std::string& source, Stamp at);
 
-  /// Where a guest's tablet looks from; nullopt: its window is closed. Frames go by it while ShowState::viewer
-  /// names the guest, or the guest is among the scene's viewers.
+  /// Where a guest's tablet looks from; nullopt: its window is closed. Frames go by it while
+  /// ShowState::viewer names the guest, or the guest is among the scene's viewers.
   void see(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at);
 
   /// Shows another scene from now on, with the same markers and controls: parts that were edited, added or
@@ -123,7 +123,8 @@ class Session {
   ShownFrame measured() const;
 
  private:
-  Session(SessionSetup setup, FrameComposer composer, Telemetry* telemetry, Recorder* recorder, bool keeps_looks);
+  Session(
+      SessionSetup setup, FrameComposer composer, Telemetry* telemetry, Recorder* recorder, bool keeps_looks);
   Status show_if_whole(SceneNews news, Stamp at);
   void ask_units();
 

@@ -3,8 +3,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
-#include "core/log.h"
 #include "core/image_io.h"
+#include "core/log.h"
 
 namespace limn::apps {
 namespace {
@@ -24,8 +24,8 @@ void print_summary(const nlohmann::ordered_json& json) {
 }  // namespace
 
 Result<SessionOutput> SessionOutput::open(const std::filesystem::path& out,
-                          const std::filesystem::path& record,
-                          SessionSetup* setup) {
+                                          const std::filesystem::path& record,
+                                          SessionSetup* setup) {
   LIMN_TRY(Telemetry telemetry, Telemetry::create(out));
   SessionOutput output(std::move(telemetry));
   output.out_ = out;

@@ -4,11 +4,11 @@
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 
+#include "core/result.h"
 #include "session/append_log.h"
 #include "session/recording.h"
 #include "session/session.h"
 #include "session/telemetry.h"
-#include "core/result.h"
 
 namespace limn::apps {
 
@@ -18,8 +18,8 @@ class SessionOutput {
   /// `out`: folder for telemetry.csv and poses.csv; `record`: for the recording; empty: none. With a
   /// recording `setup` becomes what replay will read of it, to the last bit.
   static Result<SessionOutput> open(const std::filesystem::path& out,
-                            const std::filesystem::path& record,
-                            SessionSetup* setup);
+                                    const std::filesystem::path& record,
+                                    SessionSetup* setup);
 
   Telemetry& telemetry() { return telemetry_; }
   Recorder* recorder() { return recorder_.get(); }  ///< null without one

@@ -3,12 +3,12 @@
 #include <optional>
 #include <vector>
 
-#include "session/projection_history.h"
-#include "session/perception.h"
 #include "core/rig.h"
-#include "projector/shadow_detector.h"
 #include "projector/renderer.h"
+#include "projector/shadow_detector.h"
 #include "scene/posed_scene.h"
+#include "session/perception.h"
+#include "session/projection_history.h"
 
 namespace limn::apps {
 

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
-#include "session/contact_sheet.h"
 #include "core/file.h"
-#include "core/log.h"
 #include "core/image_io.h"
+#include "core/log.h"
+#include "session/contact_sheet.h"
 
 namespace limn::apps {
 namespace {

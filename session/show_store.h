@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "session/file_writer.h"
 #include "scene/actions.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
+#include "session/file_writer.h"
 
 namespace limn::apps {
 
@@ -22,8 +22,8 @@ class ShowStore {
   /// `keeps`: false only reads.
   explicit ShowStore(bool keeps);
 
-  /// A show state with the looks and pairings that are in the scene's folder. Damaged ones are named in the log
-  /// and left alone.
+  /// A show state with the looks and pairings that are in the scene's folder. Damaged ones are named in the
+  /// log and left alone.
   static scene::ShowState loaded(const scene::Scene& scene, scene::ShowState show_state);
 
   /// Keeps what an edit has changed. `look_image` is called for a look that was saved, at once; it may return
@@ -42,7 +42,9 @@ class ShowStore {
   std::vector<std::string> failures();
 
  private:
-  void keep_pairings(const scene::Scene& scene, const scene::ShowState& before, const scene::ShowState& after);
+  void keep_pairings(const scene::Scene& scene,
+                     const scene::ShowState& before,
+                     const scene::ShowState& after);
   void keep_unit(const scene::Scene& scene, const scene::Slot& slot, const scene::PartUnit& unit);
   void keep_looks(const std::filesystem::path& folder,
                   const scene::ShowState& before,

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <limits>
 
-#include "tracker/body_pose.h"
 #include "tracker/body_correspondences.h"
+#include "tracker/body_pose.h"
 
 namespace limn::apps {
 namespace {

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "core/html.h"
 #include "core/file.h"
+#include "core/html.h"
 
 namespace limn::apps {
 namespace {
@@ -87,8 +87,8 @@ Result<Telemetry> Telemetry::create(const std::filesystem::path& folder) {
   LIMN_TRY_STATUS(make_folder(folder));
   LIMN_TRY(out.csv_,
            AppendLog::create(folder / "telemetry.csv",
-                               "captured_at_s,shown_at_s,latency_ms,detect_ms,filter_ms,paint_ms,screen_ms,"
-                               "record_ms,markers,lost,missed,placement_mm\n"));
+                             "captured_at_s,shown_at_s,latency_ms,detect_ms,filter_ms,paint_ms,screen_ms,"
+                             "record_ms,markers,lost,missed,placement_mm\n"));
   return out;
 }
 

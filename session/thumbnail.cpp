@@ -17,10 +17,10 @@ const cv::Scalar k_ground(34, 29, 27);
 }  // namespace
 
 cv::Mat draw_thumbnail(projector::Renderer* renderer,
-                     const scene::Scene& scene,
-                     const std::string& slot,
-                     const std::string& variant,
-                     int side_px) {
+                       const scene::Scene& scene,
+                       const std::string& slot,
+                       const std::string& variant,
+                       int side_px) {
   const scene::Slot* of = scene.find_slot(slot);
   if (!of) return {};
   const scene::Variant* shown = find_named(of->variants, variant);

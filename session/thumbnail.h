@@ -12,9 +12,9 @@ namespace limn::apps {
 /// `side_px` x `side_px` pixels, sRGB BGR over a dark ground. `renderer` was made of `scene`; its GL context
 /// must be current. Empty: the scene has no such variant.
 cv::Mat draw_thumbnail(projector::Renderer* renderer,
-                     const scene::Scene& scene,
-                     const std::string& slot,
-                     const std::string& variant,
-                     int side_px);
+                       const scene::Scene& scene,
+                       const std::string& slot,
+                       const std::string& variant,
+                       int side_px);
 
 }  // namespace limn::apps

@@ -80,7 +80,7 @@ Imager ViewpointSelector::viewer_for(const scene::PosedScene& posed,
   const auto p_middle = scene::middle_of(*scene_, posed);
   if (!p_middle) return selected_.viewer.width > 0 ? selected_.viewer : still ? *still : stand_in();
   const scene::Viewpoint waiting{k_still_eye,
-                           (still ? *still : stand_in()).imager_from_world.inverse().translation};
+                                 (still ? *still : stand_in()).imager_from_world.inverse().translation};
   std::vector<scene::Viewpoint> eyes = posed.viewpoints;
   if (still) eyes = {waiting};
   if (!selected_.follows.empty()) eyes.clear();

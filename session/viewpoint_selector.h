@@ -6,13 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "session/frame_input.h"
 #include "core/imager.h"
 #include "core/rig.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
 #include "scene/viewpoint.h"
+#include "session/frame_input.h"
 
 namespace limn::apps {
 
@@ -50,7 +50,7 @@ class ViewpointSelector {
   scene::SharedViewpoint shared_eye_;
   Stamp eye_at_;
   std::vector<scene::Viewpoint> gliding_;  // guests' eyes, as they are followed
-  bool is_away_ = false;             // a guest has part in the eye, or it is on its way back
+  bool is_away_ = false;                   // a guest has part in the eye, or it is on its way back
 };
 
 }  // namespace limn::apps

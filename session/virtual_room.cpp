@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <numbers>
 
-#include "tracker/marker_image.h"
 #include "core/linear_algebra.h"
 #include "scene/mesh_bvh.h"
+#include "tracker/marker_image.h"
 
 namespace limn::apps {
 namespace {
@@ -73,8 +73,7 @@ std::vector<BodyMarker> slot_markers(const scene::Scene& scene,
           scene::nearest_on(prototype.mesh, box.center() + prototype_from_face * in_face);
       const Eigen::Vector3d d_face = prototype_from_face * Eigen::Vector3d::UnitZ();
       const Eigen::Vector3d d_in = on.d_normal.dot(d_face) > 0 ? on.d_normal : -on.d_normal;
-      const Pose at(rotation_between(d_face, d_in) * prototype_from_face,
-                    on.p - k_paper_m * d_in);
+      const Pose at(rotation_between(d_face, d_in) * prototype_from_face, on.p - k_paper_m * d_in);
       const bool is_free = std::none_of(all.begin(), all.end(), [&](const BodyMarker& other) {
         return (other.body_from_marker.translation - at.translation).norm() <
                0.5 * k_spacing * (other.size_m + slot.size_m);

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <optional>
 
+#include "core/log.h"
+#include "core/stopwatch.h"
 #include "session/frame_gate.h"
 #include "session/scene_files_client.h"
-#include "core/stopwatch.h"
 #include "wizard/capture/virtual_backend.h"
-#include "core/log.h"
 
 namespace limn::apps {
 namespace {
@@ -135,8 +135,8 @@ class VirtualSource final : public FrameSource {
   Perception* perception_;
   Recorder* recorder_;
   DeviceHealth* health_;
-  std::vector<std::size_t> cameras_;   // as health_ calls them
-  std::vector<FrameGate> gates_;  // of cameras_
+  std::vector<std::size_t> cameras_;  // as health_ calls them
+  std::vector<FrameGate> gates_;      // of cameras_
   Stamp exposed_at_;
   std::size_t moments_ = 0, edited_ = 0;
   bool is_paused_ = false;

@@ -2,9 +2,9 @@
 
 #include <atomic>
 
+#include "core/result.h"
 #include "session/frame_loop.h"
 #include "session/script.h"
-#include "core/result.h"
 #include "sim/virtual_rig.h"
 
 namespace limn::apps {

@@ -155,8 +155,8 @@ void RayScene::first_hits(const Eigen::Vector3d& p_origin,
 }
 
 void RayScene::reached(const Eigen::Vector3d& p_light,
-                   std::span<const Eigen::Vector3f> p,
-                   std::span<std::uint8_t> reached) const {
+                       std::span<const Eigen::Vector3f> p,
+                       std::span<std::uint8_t> reached) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;

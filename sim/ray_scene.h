@@ -44,8 +44,8 @@ class RayScene {
   /// Whether the straight line from each point (on a surface) to p_light is free: what lies within 0.1 mm of
   /// the point does not count.
   void reached(const Eigen::Vector3d& p_light,
-           std::span<const Eigen::Vector3f> p,
-           std::span<std::uint8_t> reached) const;
+               std::span<const Eigen::Vector3f> p,
+               std::span<std::uint8_t> reached) const;
   bool reached(const Eigen::Vector3d& p_light, const Eigen::Vector3d& p) const;
 
   /// Geometric normal of the triangle, by its corners' order, unit.

@@ -73,7 +73,7 @@ PartImage ReferenceRenderer::averaged(const Imager& imager, const SampleAt& samp
     return a.part == b.part && (a.light - b.light).cwiseAbs().maxCoeff() < k_same_light;
   };
   PartImage out{cv::Mat(imager.height, imager.width, CV_32FC3, cv::Scalar::all(0)),
-                  cv::Mat(imager.height, imager.width, CV_32F, cv::Scalar(0))};
+                cv::Mat(imager.height, imager.width, CV_32F, cv::Scalar(0))};
   const auto average = [&](int column, int row) {
     Eigen::Vector3f light = Eigen::Vector3f::Zero();
     float cover = 0;
@@ -129,10 +129,11 @@ bool ReferenceRenderer::is_hidden(const Nearest& nearest, const Ray& ray, const 
 }
 
 Eigen::Vector3f ReferenceRenderer::radiance_along(const Eigen::Vector3d& d,
-                                const Nearest& nearest,
-                                const PartsLight& light) const {
+                                                  const Nearest& nearest,
+                                                  const PartsLight& light) const {
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
-  const SurfaceMaterial substance = surface_material(*part.mesh, nearest.hit.triangle, part.rays.uv(nearest.hit));
+  const SurfaceMaterial substance =
+      surface_material(*part.mesh, nearest.hit.triangle, part.rays.uv(nearest.hit));
   if (substance.is_unlit) return substance.base.cast<float>();
   const Eigen::Vector3d face = turned_against(part.rays.face_normal(nearest.hit), d);
   const double side = part.rays.shading_normal(nearest.hit).dot(face) < 0 ? -1 : 1;
@@ -141,9 +142,11 @@ Eigen::Vector3f ReferenceRenderer::radiance_along(const Eigen::Vector3d& d,
 }
 
 // Where no room is known light comes from along the normal of the prototype, and nothing is mirrored.
-Eigen::Vector3f ReferenceRenderer::radiance_on_surface(const Nearest& nearest, const Eigen::Vector3d& d_normal) const {
+Eigen::Vector3f ReferenceRenderer::radiance_on_surface(const Nearest& nearest,
+                                                       const Eigen::Vector3d& d_normal) const {
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
-  const SurfaceMaterial substance = surface_material(*part.mesh, nearest.hit.triangle, part.rays.uv(nearest.hit));
+  const SurfaceMaterial substance =
+      surface_material(*part.mesh, nearest.hit.triangle, part.rays.uv(nearest.hit));
   if (substance.is_unlit) return substance.base.cast<float>();
   const double side = part.rays.shading_normal(nearest.hit).dot(d_normal) < 0 ? -1 : 1;
   const Eigen::Vector3d n = aside(side * part.rays.mapped_normal(nearest.hit, substance.along), -d_normal);
@@ -154,7 +157,8 @@ Eigen::Vector3f ReferenceRenderer::radiance_on_surface(const Nearest& nearest, c
 }
 
 // The view part that the viewer sees before p, a point of the prototype.
-ReferenceRenderer::Sample ReferenceRenderer::view_sample(const Eigen::Vector3d& p, const Eigen::Vector3d& n_face) const {
+ReferenceRenderer::Sample ReferenceRenderer::view_sample(const Eigen::Vector3d& p,
+                                                         const Eigen::Vector3d& n_face) const {
   const double distance = (p - p_eye_).norm();
   const Ray ray{p_eye_, (p - p_eye_) / distance};
   if (n_face.dot(ray.d) >= 0) return {};  // the viewer looks at the other side
@@ -166,7 +170,8 @@ ReferenceRenderer::Sample ReferenceRenderer::view_sample(const Eigen::Vector3d& 
 }
 
 // The surface part nearest to p along the normal, within 2 mm on either side.
-ReferenceRenderer::Sample ReferenceRenderer::surface_sample(const Eigen::Vector3d& p, const Eigen::Vector3d& n) const {
+ReferenceRenderer::Sample ReferenceRenderer::surface_sample(const Eigen::Vector3d& p,
+                                                            const Eigen::Vector3d& n) const {
   Nearest best;
   double best_height = k_on_surface;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
@@ -197,7 +202,8 @@ ReferenceRenderer::Sample ReferenceRenderer::parts_along(const Ray& ray, const P
   const Nearest nearest = nearest_part(ray);
   if (nearest.part < 0 || is_hidden(nearest, ray, prototype_.first_hit(ray))) return {};
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
-  if (part.on_surface) return {nearest.part, radiance_on_surface(nearest, part.rays.shading_normal(nearest.hit))};
+  if (part.on_surface)
+    return {nearest.part, radiance_on_surface(nearest, part.rays.shading_normal(nearest.hit))};
   return {nearest.part, radiance_along(ray.d, nearest, light)};
 }
 

@@ -6,8 +6,8 @@
 
 #include "core/imager.h"
 #include "scene/posed_scene.h"
-#include "sim/reference_brdf.h"
 #include "sim/ray_scene.h"
+#include "sim/reference_brdf.h"
 #include "sim/world.h"
 
 namespace limn::sim {
@@ -65,7 +65,9 @@ class ReferenceRenderer {
 
   Nearest nearest_part(const Ray& ray) const;
   bool is_hidden(const Nearest& nearest, const Ray& ray, const Hit& behind) const;
-  Eigen::Vector3f radiance_along(const Eigen::Vector3d& d, const Nearest& nearest, const PartsLight& light) const;
+  Eigen::Vector3f radiance_along(const Eigen::Vector3d& d,
+                                 const Nearest& nearest,
+                                 const PartsLight& light) const;
   Eigen::Vector3f radiance_on_surface(const Nearest& nearest, const Eigen::Vector3d& d_normal) const;
   Sample view_sample(const Eigen::Vector3d& p, const Eigen::Vector3d& n_face) const;
   Sample surface_sample(const Eigen::Vector3d& p, const Eigen::Vector3d& n) const;

@@ -95,8 +95,7 @@ SurfaceMaterial surface_material(const scene::Mesh& mesh, int triangle, const Ei
   found.is_unlit = material.unlit;
   found.metallic = static_cast<double>(material.metallic);
   found.roughness = static_cast<double>(material.roughness);
-  found.is_plain =
-      material.metallic == 0 && material.roughness == 1 && maps.metallic_roughness.image.empty();
+  found.is_plain = material.metallic == 0 && material.roughness == 1 && maps.metallic_roughness.image.empty();
   found.emitted = material.emitted.reverse().cast<double>();
   found.along = Eigen::Vector3d::UnitZ();
   if (!maps.metallic_roughness.image.empty()) {

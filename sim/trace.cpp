@@ -145,7 +145,8 @@ class Tracer {
     return s.n_face.dot(p_light.cast<float>() - s.p) > 0;
   }
 
-  std::vector<std::uint8_t> reached_from(const Eigen::Vector3d& p_light, std::span<const Surface> surfaces) const {
+  std::vector<std::uint8_t> reached_from(const Eigen::Vector3d& p_light,
+                                         std::span<const Surface> surfaces) const {
     std::vector<Eigen::Vector3f> points;
     for (const Surface& s : surfaces)  // NaN points cost no traversal
       points.push_back(s.object >= 0 && faces(s, p_light) ? s.p : Eigen::Vector3f::Constant(NAN));
@@ -264,7 +265,8 @@ class Tracer {
     }
     const std::vector<Surface> found = surfaces(d);
     std::vector<std::vector<std::uint8_t>> lit_by;
-    for (const Eigen::Vector3d& p_projector : p_projectors_) lit_by.push_back(reached_from(p_projector, found));
+    for (const Eigen::Vector3d& p_projector : p_projectors_)
+      lit_by.push_back(reached_from(p_projector, found));
     std::vector<float> room(found.size());
     for (std::size_t k = 0; k < found.size(); ++k) room[k] = ambient_light(found[k]);
     for (const LampPoint& lamp : lamps_) {

@@ -70,7 +70,8 @@ std::optional<Landing> Truth::landing(const Imager& imager, const Eigen::Vector2
 
 bool Truth::visible(const Imager& imager, const Eigen::Vector3d& p_world) const {
   const auto px = imager.project(p_world);
-  return px && imager.contains(*px) && physical_.reached(imager.imager_from_world.inverse().translation, p_world);
+  return px && imager.contains(*px) &&
+         physical_.reached(imager.imager_from_world.inverse().translation, p_world);
 }
 
 std::vector<Hit> Truth::hits(const RayScene& scene, const Imager& imager) const {

@@ -109,8 +109,7 @@ Result<Stamp> VirtualRig::show(int projector, const cv::Mat& image) {
     return error(
         "{}: expected an 8-bit grey or BGR picture of {}x{}, found {}x{} with {} channels. Draw it at the "
         "projector's size.",
-        this->projector(projector).name(), size.width, size.height, image.cols, image.rows,
-        image.channels());
+        this->projector(projector).name(), size.width, size.height, image.cols, image.rows, image.channels());
   const Stamp shown_at = shifted(now_, options_.display_delay_s);
   shown_[static_cast<std::size_t>(projector)].push_back({image.clone(), shown_at});
   return shown_at;
@@ -125,8 +124,8 @@ Stamp VirtualRig::light_settles_at() const {
 std::vector<cv::Mat> VirtualRig::images_at(Stamp moment) const {
   std::vector<cv::Mat> images;
   for (const auto& queue : shown_) {
-    const auto later =
-        std::find_if(queue.begin() + 1, queue.end(), [&](const ShownImage& s) { return s.shown_at > moment; });
+    const auto later = std::find_if(queue.begin() + 1, queue.end(),
+                                    [&](const ShownImage& s) { return s.shown_at > moment; });
     images.push_back(std::prev(later)->image);
   }
   return images;

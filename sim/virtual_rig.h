@@ -45,8 +45,8 @@ class VirtualRig {
   CameraEffects& camera_effects(int camera) {
     return world_.camera_effects.at(static_cast<std::size_t>(camera));
   }
-  /// For calibration: the prototype is carried out of the room, cameras deliver grey. restore_prototype() undoes
-  /// it.
+  /// For calibration: the prototype is carried out of the room, cameras deliver grey. restore_prototype()
+  /// undoes it.
   void remove_prototype();
   void restore_prototype();
   /// All projectors black.

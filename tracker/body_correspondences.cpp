@@ -29,15 +29,15 @@ std::array<PointObservation, 4> corners_of(const MarkerCorrespondences& seen, co
   const auto corners = square_corners(seen.marker->size_m);
   for (std::size_t i = 0; i < 4; ++i)
     observations[i] = {&seen.camera->lens, seen.camera->imager_from_world,
-                 seen.marker->body_from_marker * corners[i], detection.corners_px[i],
-                 detection.corner_covariance[i].inverse()};
+                       seen.marker->body_from_marker * corners[i], detection.corners_px[i],
+                       detection.corner_covariance[i].inverse()};
   return observations;
 }
 
 // The corners of this marker's detection that agrees best with a pose, and their cost; nullptr when none has
 // pixels.
 std::pair<const std::array<PointObservation, 4>*, double> most_consistent(const MarkerCorrespondences& seen,
-                                                                    const Pose& world_from_body) {
+                                                                          const Pose& world_from_body) {
   const std::array<PointObservation, 4>* best = nullptr;
   double least = std::numeric_limits<double>::infinity();
   for (const std::array<PointObservation, 4>& corners : seen.corners) {
@@ -72,7 +72,9 @@ struct Proposal {
 std::vector<Proposal> proposals(const BodyCorrespondences& correspondences, std::size_t most) {
   BodyCorrespondences largest = correspondences;
   std::stable_sort(largest.begin(), largest.end(),
-                   [](const MarkerCorrespondences& a, const MarkerCorrespondences& b) { return width_px(a) > width_px(b); });
+                   [](const MarkerCorrespondences& a, const MarkerCorrespondences& b) {
+                     return width_px(a) > width_px(b);
+                   });
   largest.resize(std::min(largest.size(), most));
   std::vector<Proposal> found;
   for (const MarkerCorrespondences& seen : largest)
@@ -123,7 +125,9 @@ ChosenCorners corners_at(const BodyCorrespondences& correspondences, const Pose&
   return chosen;
 }
 
-std::vector<PoseFit> minima(const BodyCorrespondences& correspondences, std::span<const Pose> foretold, Minima wanted) {
+std::vector<PoseFit> minima(const BodyCorrespondences& correspondences,
+                            std::span<const Pose> foretold,
+                            Minima wanted) {
   std::vector<PoseFit> found;
   if (correspondences.empty()) return found;
   const auto refine = [&](const Pose& start, double most_cost) {

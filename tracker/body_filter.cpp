@@ -174,7 +174,10 @@ double log_weight_alone(const PoseFit& fit) {
   return 0.5 * (std::log(fit.covariance.determinant()) - fit.chi_square);
 }
 
-BodyFilter started(const Body& body, const BodyCorrespondences& seen, std::span<const PoseFit> fits, Stamp captured_at) {
+BodyFilter started(const Body& body,
+                   const BodyCorrespondences& seen,
+                   std::span<const PoseFit> fits,
+                   Stamp captured_at) {
   BodyFilter motion;
   motion.body = body.name;
   std::vector<Update> updates;

@@ -8,8 +8,8 @@
 #include "core/frame.h"
 #include "core/marker.h"
 #include "core/track.h"
-#include "tracker/motion.h"
 #include "tracker/body_correspondences.h"
+#include "tracker/motion.h"
 
 namespace limn::tracker {
 

@@ -198,8 +198,11 @@ void Detector::detect_more(const cv::Mat& grey,
   team.work([&] { find_markers(grey, lens, broken, detections, team); });
 }
 
-void Detector::find_markers(
-    const cv::Mat& grey, const Lens* lens, bool broken, std::vector<Detection>* detections, WorkerTeam& team) {
+void Detector::find_markers(const cv::Mat& grey,
+                            const Lens* lens,
+                            bool broken,
+                            std::vector<Detection>* detections,
+                            WorkerTeam& team) {
   threshold_.apply(grey, {options_.min_contrast}, corner_codes_, team);
   quads_.clear();
   UnreadQuads open(quads_);
@@ -218,7 +221,8 @@ void Detector::find_markers(
   join_segments(grey, *detections, team);
   UnreadQuads covered(quads_);
   covered.end();
-  team.parallel_for(team.size(), [&](int worker) { read_quads(grey, lens, Reading::covered, covered, worker); });
+  team.parallel_for(team.size(),
+                    [&](int worker) { read_quads(grey, lens, Reading::covered, covered, worker); });
   add_read(bleed, detections);
 }
 
@@ -236,7 +240,7 @@ void Detector::read_quads(
 // What has been read, as if it had been read one after the other, less the retreat of the ink that it shows,
 // or else the one that is known. What it shows.
 std::optional<EdgeBleed> Detector::add_read(const std::optional<EdgeBleed>& known,
-                                             std::vector<Detection>* detections) {
+                                            std::vector<Detection>* detections) {
   std::sort(read_.begin(), read_.end(), [](const Read& a, const Read& b) { return a.number < b.number; });
   retreats_.clear();
   for (const Read& read : read_)
@@ -413,12 +417,13 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
 }
 
 // Edges whose blur overlaps with others': by the whole pattern, or else with the doubt that they deserve.
-std::optional<PatternAppearance> Detector::settle_overlapping_edges(const cv::Mat& grey,
-                                                              const Lens* lens,
-                                                              const Identity& identity,
-                                                              Worker& worker,
-                                                              const std::optional<PatternAppearance>& known,
-                                                              RefinedQuad* refined) const {
+std::optional<PatternAppearance> Detector::settle_overlapping_edges(
+    const cv::Mat& grey,
+    const Lens* lens,
+    const Identity& identity,
+    Worker& worker,
+    const std::optional<PatternAppearance>& known,
+    RefinedQuad* refined) const {
   const auto& light = worker.refiner.light();
   const bool is_kept = known && known->age < known->kept_for;
   if (is_kept) {

@@ -8,12 +8,12 @@
 
 #include "core/lens.h"
 #include "tracker/candidates.h"
-#include "tracker/fork_join.h"
 #include "tracker/detection.h"
-#include "tracker/family.h"
-#include "tracker/exclusion_zone.h"
-#include "tracker/identify.h"
 #include "tracker/edge_bleed.h"
+#include "tracker/exclusion_zone.h"
+#include "tracker/family.h"
+#include "tracker/fork_join.h"
+#include "tracker/identify.h"
 #include "tracker/refine.h"
 #include "tracker/segment_quads.h"
 #include "tracker/segments.h"
@@ -105,11 +105,14 @@ class Detector {
   class UnreadQuads;
   std::optional<Read> follow_by_pattern(const cv::Mat& grey, const Lens* lens, const Detection& last);
   std::optional<Read> found_again(const cv::Mat& grey, const Lens* lens, const Detection& last);
-  void find_markers(
-      const cv::Mat& grey, const Lens* lens, bool broken, std::vector<Detection>* detections, WorkerTeam& team);
+  void find_markers(const cv::Mat& grey,
+                    const Lens* lens,
+                    bool broken,
+                    std::vector<Detection>* detections,
+                    WorkerTeam& team);
   void read_quads(const cv::Mat& grey, const Lens* lens, Reading reading, UnreadQuads& unread, int worker);
   std::optional<EdgeBleed> add_read(const std::optional<EdgeBleed>& known,
-                                     std::vector<Detection>* detections);
+                                    std::vector<Detection>* detections);
   void join_segments(const cv::Mat& grey, const std::vector<Detection>& found, WorkerTeam& team);
   std::optional<Read> read(const cv::Mat& grey,
                            const Quad& quad,
@@ -118,11 +121,11 @@ class Detector {
                            Worker& worker,
                            const Detection* last = nullptr) const;
   std::optional<PatternAppearance> settle_overlapping_edges(const cv::Mat& grey,
-                                                      const Lens* lens,
-                                                      const Identity& identity,
-                                                      Worker& worker,
-                                                      const std::optional<PatternAppearance>& known,
-                                                      RefinedQuad* refined) const;
+                                                            const Lens* lens,
+                                                            const Identity& identity,
+                                                            Worker& worker,
+                                                            const std::optional<PatternAppearance>& known,
+                                                            RefinedQuad* refined) const;
 };
 
 }  // namespace limn::tracker

@@ -56,9 +56,9 @@ void add_edges(const SeenCells& cells, bool down, Edges* edges) {
 }  // namespace
 
 std::optional<EdgeBleed> find_edge_bleed(const cv::Mat& grey,
-                                           const std::array<double, 256>& light,
-                                           const std::array<Eigen::Vector2d, 4>& corners_px,
-                                           const SeenCells& cells) {
+                                         const std::array<double, 256>& light,
+                                         const std::array<Eigen::Vector2d, 4>& corners_px,
+                                         const SeenCells& cells) {
   Edges edges;
   add_edges(cells, false, &edges);
   add_edges(cells, true, &edges);
@@ -122,8 +122,8 @@ std::optional<EdgeBleed> common_edge_bleed(std::span<const EdgeBleed> of_markers
 }
 
 void undo_edge_bleed(const EdgeBleed& bleed,
-                      std::array<Eigen::Vector2d, 4>* corners_px,
-                      std::array<Eigen::Matrix2d, 4>* covariance) {
+                     std::array<Eigen::Vector2d, 4>* corners_px,
+                     std::array<Eigen::Matrix2d, 4>* covariance) {
   const double square = bleed.px * bleed.px;
   constexpr double k_limit = k_clear_deviations * k_clear_deviations;
   const double evidence = square / bleed.variance;

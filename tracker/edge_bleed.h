@@ -24,9 +24,9 @@ struct EdgeBleed {
 /// (EdgeRefiner::light). nullopt where there are too few such edges. Cells should be wider than five sigmas
 /// of the blur.
 std::optional<EdgeBleed> find_edge_bleed(const cv::Mat& grey,
-                                           const std::array<double, 256>& light,
-                                           const std::array<Eigen::Vector2d, 4>& corners_px,
-                                           const SeenCells& cells);
+                                         const std::array<double, 256>& light,
+                                         const std::array<Eigen::Vector2d, 4>& corners_px,
+                                         const SeenCells& cells);
 
 /// What the markers of one image say together, whose variance counts their disagreement; nullopt of none.
 std::optional<EdgeBleed> common_edge_bleed(std::span<const EdgeBleed> of_markers);
@@ -34,7 +34,7 @@ std::optional<EdgeBleed> common_edge_bleed(std::span<const EdgeBleed> of_markers
 /// Moves a marker's sides out by what is sure of the retreat: all of what shows clearly, nothing of what
 /// noise makes as large once in 370 times. Adds to the covariances what is not sure.
 void undo_edge_bleed(const EdgeBleed& bleed,
-                      std::array<Eigen::Vector2d, 4>* corners_px,
-                      std::array<Eigen::Matrix2d, 4>* covariance);
+                     std::array<Eigen::Vector2d, 4>* corners_px,
+                     std::array<Eigen::Matrix2d, 4>* covariance);
 
 }  // namespace limn::tracker

@@ -24,7 +24,8 @@ class WorkerTeam {
     cv::parallel_for_(
         cv::Range(0, size_),
         [&](const cv::Range& range) {
-          for (int i = range.start; i < range.end; ++i) has_leader_.exchange(true) ? help() : run_leader(leader);
+          for (int i = range.start; i < range.end; ++i)
+            has_leader_.exchange(true) ? help() : run_leader(leader);
         },
         size_);
   }

@@ -42,8 +42,8 @@ LocalUndistortion::LocalUndistortion(const Lens& lens, const Eigen::Vector2d& mi
 }
 
 LocalUndistortion LocalUndistortion::about(const Lens* lens,
-                                       const std::array<Eigen::Vector2d, 4>& corners_px,
-                                       double outside_px) {
+                                           const std::array<Eigen::Vector2d, 4>& corners_px,
+                                           double outside_px) {
   if (!lens) return {};
   const Eigen::Vector2d middle = 0.25 * (corners_px[0] + corners_px[1] + corners_px[2] + corners_px[3]);
   double radius = 0;

@@ -19,8 +19,8 @@ class LocalUndistortion {
 
   /// About a quadrilateral and as far as `outside_px` from it; with no lens nothing is moved.
   static LocalUndistortion about(const Lens* lens,
-                               const std::array<Eigen::Vector2d, 4>& corners_px,
-                               double outside_px);
+                                 const std::array<Eigen::Vector2d, 4>& corners_px,
+                                 double outside_px);
 
   bool moves() const { return moves_; }
 

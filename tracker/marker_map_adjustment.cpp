@@ -157,7 +157,7 @@ Problem posed_problem(const Body& start, const MarkerName& fixed, std::span<cons
         problem.observations.push_back(
             {image, static_cast<std::size_t>(marker.marker - start.markers.data()), corners[i],
              PointObservation{&view.camera->lens, view.camera->imager_from_world, Eigen::Vector3d::Zero(),
-                        detection.corners_px[i], detection.corner_covariance[i].inverse()}});
+                              detection.corners_px[i], detection.corner_covariance[i].inverse()}});
     }
     state->world_from_body.push_back(fits.front().world_from_body);
   }
@@ -177,7 +177,9 @@ double rms_px(const Problem& problem, const State& state) {
 
 }  // namespace
 
-Result<Adjustment> adjusted_marker_map(const Body& start, const MarkerName& fixed, std::span<const View> views) {
+Result<Adjustment> adjusted_marker_map(const Body& start,
+                                       const MarkerName& fixed,
+                                       std::span<const View> views) {
   State state;
   const Problem problem = posed_problem(start, fixed, views, &state);
   if (state.world_from_body.empty())

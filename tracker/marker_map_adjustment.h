@@ -22,6 +22,8 @@ struct Adjustment {
 /// fixed one, on the pixels of all corners through the true lenses, weighted by their covariance, with a
 /// Huber loss. A view is one image of its own moment. Error: fewer than two markers of the body in every
 /// image, or markers that the corners do not fix.
-Result<Adjustment> adjusted_marker_map(const Body& start, const MarkerName& fixed, std::span<const View> views);
+Result<Adjustment> adjusted_marker_map(const Body& start,
+                                       const MarkerName& fixed,
+                                       std::span<const View> views);
 
 }  // namespace limn::tracker

@@ -22,10 +22,10 @@ struct MappedMarker {
 /// A rigid thing as its images show it.
 struct MarkerMap {
   std::vector<MappedMarker> markers;  ///< by name
-  MarkerName frame;                    ///< the body's frame is this marker's: the one seen in most images
-  int images = 0;                    ///< used
-  double rms_px = 0;                   ///< per corner
-  std::vector<MarkerName> unplaced;    ///< seen, but in no image together with a placed one
+  MarkerName frame;                   ///< the body's frame is this marker's: the one seen in most images
+  int images = 0;                     ///< used
+  double rms_px = 0;                  ///< per corner
+  std::vector<MarkerName> unplaced;   ///< seen, but in no image together with a placed one
 };
 
 /// Learns where markers of one size stand on a rigid thing, from images that show two or more of them each,

@@ -53,10 +53,11 @@ bool is_clockwise(const std::array<Eigen::Vector2d, 4>& c) {
   return true;
 }
 
-std::optional<std::array<PointObservation, 4>> corner_sights(const Lens& lens,
-                                                       const std::array<Eigen::Vector3d, 4>& corners,
-                                                       const std::array<Eigen::Vector2d, 4>& corners_px,
-                                                       const std::array<Eigen::Matrix2d, 4>& covariance) {
+std::optional<std::array<PointObservation, 4>> corner_sights(
+    const Lens& lens,
+    const std::array<Eigen::Vector3d, 4>& corners,
+    const std::array<Eigen::Vector2d, 4>& corners_px,
+    const std::array<Eigen::Matrix2d, 4>& covariance) {
   std::array<PointObservation, 4> observations;
   for (std::size_t i = 0; i < 4; ++i) {
     const Eigen::Matrix2d information = covariance[i].inverse();
@@ -100,8 +101,7 @@ std::vector<Eigen::Matrix3d> planar_rotations(const Eigen::Matrix3d& h) {
   j -= v * h.row(2).head<2>() / h(2, 2);
   // Turn the ray through the origin's image onto the optical axis.
   const Eigen::Vector3d d = Eigen::Vector3d(v.x(), v.y(), 1).normalized();
-  const Eigen::Matrix3d ray_turn =
-      rotation_between(Eigen::Vector3d::UnitZ(), d).toRotationMatrix();
+  const Eigen::Matrix3d ray_turn = rotation_between(Eigen::Vector3d::UnitZ(), d).toRotationMatrix();
   Eigen::Matrix<double, 2, 3> projection;
   projection << 1, 0, -v.x(), 0, 1, -v.y();
   const Eigen::Matrix2d b = (projection * ray_turn).leftCols<2>();

@@ -36,7 +36,7 @@ struct Appearance {
 struct PatternAppearance {
   SeenCells cells;
   std::size_t first_corner = 0;  ///< which of the quad's corners is the marker's own top left
-  Appearance look;                     ///< as seen last
+  Appearance look;               ///< as seen last
   // Of the last fit that started from nothing known:
   double misfit = 0;       ///< mean square residual, of the contrast's square
   double explained = 0;    ///< share of the pixels that agree with the model

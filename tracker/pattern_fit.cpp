@@ -8,10 +8,10 @@
 #include <span>
 #include <vector>
 
+#include "tracker/local_undistortion.h"
 #include "tracker/pattern_model.h"
 #include "tracker/pattern_normal_sums.h"
 #include "tracker/square_to_quad.h"
-#include "tracker/local_undistortion.h"
 
 namespace limn::tracker {
 namespace {
@@ -334,7 +334,7 @@ class PatternFit {
     std::vector<std::int32_t>& shows = buffers_.keeps;
     shows.resize(padded_count());
     light_.find_edges(guess_of(cells_, known, has_ground_, origin_), samples_.x.data(), samples_.y.data(),
-                     padded_count(), shows.data());
+                      padded_count(), shows.data());
     int flat = 0;
     for (std::size_t i = 0; i < count_; ++i)
       if (!shows[i]) shows[i] = ++flat % k_flat_stride == 0;

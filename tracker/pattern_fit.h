@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/lens.h"
-#include "tracker/refine.h"
 #include "tracker/pattern_appearance.h"
+#include "tracker/refine.h"
 
 namespace limn::tracker {
 

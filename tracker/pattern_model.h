@@ -3,8 +3,8 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "tracker/pattern_kernels.h"
 #include "tracker/pattern_appearance.h"
+#include "tracker/pattern_kernels.h"
 
 /// What pattern_fit fits: the light of a code's pixels and its derivatives by all that is unknown.
 namespace limn::tracker::pattern {

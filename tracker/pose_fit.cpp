@@ -25,8 +25,8 @@ constexpr double k_surely_regular = 1e8;   // norm of one times its inverse's, b
 // Sights that one call of the lens projects, and what it makes of them.
 struct Batch {
   static constexpr std::size_t k_most = 16;
-  std::span<const PointObservation> observations;            // of one camera
-  std::array<Eigen::Vector3d, k_most> d_turned;  // from the body's origin, along the world's axes
+  std::span<const PointObservation> observations;  // of one camera
+  std::array<Eigen::Vector3d, k_most> d_turned;    // from the body's origin, along the world's axes
   std::array<Eigen::Vector2d, k_most> px;
   std::array<PixelByPoint, k_most> by_camera;
   Eigen::Matrix3d camera_from_world;

@@ -84,8 +84,8 @@ std::vector<Track> predicted(std::span<const BodyFilter> known,
     track.captured_at = motion.measured_at;
     track.at = std::max(at, motion.measured_at);
     track.tracking = lost                                     ? TrackingState::lost
-                  : motion.looked_at == motion.measured_at ? TrackingState::measured
-                                                           : TrackingState::extrapolated;
+                     : motion.looked_at == motion.measured_at ? TrackingState::measured
+                                                              : TrackingState::extrapolated;
     tracks.push_back(std::move(track));
   }
   return tracks;

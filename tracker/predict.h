@@ -24,9 +24,9 @@ std::optional<Prediction> prediction_of(const std::string& name);
 
 /// Every known body as a track at a moment, not before its measured_at (earlier moments get the pose of
 /// then). The covariance grows with the time since. A body in the newest image is `measured`; one that is
-/// not is `extrapolated`; one unseen for longer than lost_after_s() before `at` is `lost` and stays where it was
-/// last measured. With `decided_at` (not after `at`) that is judged then: what is drawn for a moment
-/// to come is not lost because drawing takes long. Pure: the clock is the caller's.
+/// not is `extrapolated`; one unseen for longer than lost_after_s() before `at` is `lost` and stays where it
+/// was last measured. With `decided_at` (not after `at`) that is judged then: what is drawn for a moment to
+/// come is not lost because drawing takes long. Pure: the clock is the caller's.
 std::vector<Track> predicted(std::span<const BodyFilter> known,
                              Stamp at,
                              Prediction how = Prediction::filtered,

@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "core/median.h"
-#include "tracker/quad_sampler.h"
 #include "tracker/local_undistortion.h"
+#include "tracker/quad_sampler.h"
 
 namespace limn::tracker {
 namespace {

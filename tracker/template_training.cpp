@@ -6,8 +6,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "core/names.h"
 #include "core/image_io.h"
+#include "core/names.h"
 #include "tracker/candidates.h"
 #include "tracker/identify.h"
 #include "tracker/refine.h"

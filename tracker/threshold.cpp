@@ -123,7 +123,8 @@ void Threshold::apply(const cv::Mat& grey,
     join_rows();
     widen_tiles(0, tiles_y_);
   }
-  team.parallel_for(shares, [&](int i) { compare(grey, options, rows_[static_cast<std::size_t>(i)], corners); });
+  team.parallel_for(shares,
+                    [&](int i) { compare(grey, options, rows_[static_cast<std::size_t>(i)], corners); });
 }
 
 // A tile at the right or lower end also takes the pixels that are too few for one of their own.

@@ -7,10 +7,10 @@
 #include <numbers>
 #include <set>
 
-#include "core/scale_resolution.h"
-#include "tracker/marker_image.h"
 #include "core/config.h"
 #include "core/names.h"
+#include "core/scale_resolution.h"
+#include "tracker/marker_image.h"
 
 namespace limn::apps {
 namespace {
@@ -213,7 +213,8 @@ Status choose_viewer(const std::vector<Viewer>& told, Check* check) {
   }
   const Eigen::Vector3d d_up_world = Eigen::Vector3d::UnitZ();
   if (eyes.empty()) return error("viewer: expected one, for the scene has none in the world, found nothing.");
-  const scene::SharedViewpoint shared = scene::updated_viewpoint({}, eyes, *scene::middle_of(scene, check->posed), 0);
+  const scene::SharedViewpoint shared =
+      scene::updated_viewpoint({}, eyes, *scene::middle_of(scene, check->posed), 0);
   const auto viewer = scene::viewer_at(*shared.p_world(), scene, check->posed, d_up_world);
   if (!viewer)
     return error("viewer: expected viewers apart from the prototype, found their eye in its middle.");

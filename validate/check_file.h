@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "validate/shadow_fill.h"
 #include "core/result.h"
 #include "core/rig.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 #include "sim/world.h"
+#include "validate/shadow_fill.h"
 
 namespace limn::apps {
 
@@ -40,13 +40,13 @@ struct Check {
   std::string name;  ///< the file's stem
   std::string about;
   std::vector<CheckLimit> limits;
-  Imager viewer;                                ///< whose eye view parts are drawn for
+  Imager viewer;                                      ///< whose eye view parts are drawn for
   std::vector<scene::SharedViewpoint::Share> shares;  ///< of the viewers, where several share that eye
-  Hand hand;                                    ///< that shades in `refill_…`
+  Hand hand;                                          ///< that shades in `refill_…`
 
   sim::World truth;         ///< with the injected nudges
   scene::PosedScene posed;  ///< where the parts truly are
-  RendererInput told;                ///< the same, but for the nudges
+  RendererInput told;       ///< the same, but for the nudges
 };
 
 /// Reads a check file (limn.check/1; config/README.md says its keys) with the world, scene and poses that it

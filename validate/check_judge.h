@@ -1,8 +1,8 @@
 #pragma once
 
+#include "core/result.h"
 #include "validate/check_file.h"
 #include "validate/check_result.h"
-#include "core/result.h"
 
 namespace limn::apps {
 

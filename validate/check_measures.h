@@ -1,7 +1,7 @@
 #pragma once
 
-#include "validate/check_run.h"
 #include "core/result.h"
+#include "validate/check_run.h"
 
 namespace limn::apps {
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
-#include "core/html.h"
 #include "core/file.h"
+#include "core/html.h"
 #include "core/image_io.h"
 
 namespace limn::apps {

@@ -4,8 +4,8 @@
 #include <span>
 #include <string>
 
-#include "validate/check_judge.h"
 #include "core/result.h"
+#include "validate/check_judge.h"
 
 namespace limn::apps {
 

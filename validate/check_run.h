@@ -8,12 +8,12 @@
 #include <utility>
 #include <vector>
 
-#include "validate/check_file.h"
-#include "validate/reference_view.h"
-#include "validate/check_result.h"
 #include "core/result.h"
 #include "projector/renderer.h"
 #include "sim/reference_renderer.h"
+#include "validate/check_file.h"
+#include "validate/check_result.h"
+#include "validate/reference_view.h"
 
 namespace limn::apps {
 

@@ -5,10 +5,10 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
-#include "validate/metrics.h"
+#include "sim/truth.h"
 #include "validate/check_images.h"
 #include "validate/check_measures.h"
-#include "sim/truth.h"
+#include "validate/metrics.h"
 
 namespace limn::apps {
 namespace {

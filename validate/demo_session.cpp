@@ -8,20 +8,20 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
-#include "validate/metrics.h"
-#include "wizard/capture/capture_plan.h"
-#include "wizard/measure/solve_captures.h"
-#include "wizard/capture/virtual_capture.h"
-#include "tracker/marker_image.h"
-#include "core/log.h"
 #include "core/image_io.h"
+#include "core/log.h"
 #include "projector/renderer.h"
 #include "sim/sensor_model.h"
 #include "sim/trace.h"
 #include "sim/truth.h"
 #include "sim/virtual_rig.h"
-#include "tracker/detector.h"
 #include "tracker/body_estimate.h"
+#include "tracker/detector.h"
+#include "tracker/marker_image.h"
+#include "validate/metrics.h"
+#include "wizard/capture/capture_plan.h"
+#include "wizard/capture/virtual_capture.h"
+#include "wizard/measure/solve_captures.h"
 
 namespace limn::apps {
 namespace {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "validate/demo_page.h"
 #include "core/result.h"
+#include "validate/demo_page.h"
 
 namespace limn::apps {
 

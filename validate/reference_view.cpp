@@ -12,7 +12,8 @@ cv::Mat binned(const cv::Mat& fine, int factor) {
   return out;
 }
 
-ReferenceView::ReferenceView(const sim::World& stage, const Imager& viewer, int rays) : finer(rays), world(stage) {
+ReferenceView::ReferenceView(const sim::World& stage, const Imager& viewer, int rays)
+    : finer(rays), world(stage) {
   world.rig.cameras = {resized(viewer, rays * viewer.width, rays * viewer.height).value()};
   world.camera_effects = {sim::CameraEffects{.colour = true}};
   samples = sim::trace(world, 0);

@@ -5,10 +5,10 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
-#include "validate/metrics.h"
+#include "scene/scan_preview.h"
 #include "validate/check_images.h"
 #include "validate/check_measures.h"
-#include "scene/scan_preview.h"
+#include "validate/metrics.h"
 
 namespace limn::apps {
 namespace {

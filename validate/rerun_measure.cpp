@@ -1,7 +1,7 @@
 #include <opencv2/core.hpp>
 
-#include "validate/metrics.h"
 #include "validate/check_measures.h"
+#include "validate/metrics.h"
 
 namespace limn::apps {
 

@@ -5,11 +5,11 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
-#include "validate/reference_view.h"
-#include "validate/check_images.h"
-#include "validate/check_measures.h"
 #include "sim/sensor_model.h"
 #include "sim/trace.h"
+#include "validate/check_images.h"
+#include "validate/check_measures.h"
+#include "validate/reference_view.h"
 
 namespace limn::apps {
 namespace {

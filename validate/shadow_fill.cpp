@@ -4,12 +4,12 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "validate/metrics.h"
-#include "session/shadow_watch.h"
-#include "session/projection_history.h"
 #include "projector/renderer.h"
+#include "session/projection_history.h"
+#include "session/shadow_watch.h"
 #include "sim/sensor_model.h"
 #include "sim/trace.h"
+#include "validate/metrics.h"
 
 namespace limn::apps {
 namespace {
@@ -225,7 +225,7 @@ class Session {
     since_ = since;
     const cv::Mat old = since_ > k_allowed_frames;
     ShadowFillFrame frame{phase, back_share(lost, actual, lost.where), flash(traced, actual),
-                      worst_difference(shown_, first_)};
+                          worst_difference(shown_, first_)};
     if (cv::countNonZero(old) >= k_least_pixels)
       reading->share = std::min(reading->share, back_share(lost, actual, old));
     reading->flash = std::max(reading->flash, frame.flash);
@@ -277,11 +277,11 @@ class Session {
 }  // namespace
 
 Result<ShadowFillReading> measured_shadow_fill(const sim::World& world,
-                                    const scene::Scene& scene,
-                                    const scene::PosedScene& posed,
-                                    const Imager& viewer,
-                                    const Hand& hand,
-                                    std::uint64_t seed) {
+                                               const scene::Scene& scene,
+                                               const scene::PosedScene& posed,
+                                               const Imager& viewer,
+                                               const Hand& hand,
+                                               std::uint64_t seed) {
   return Session(world, posed, viewer, hand, seed).run(scene);
 }
 

@@ -25,9 +25,9 @@ struct Hand {
 
 /// One frame of a session with a hand in it, as the ray tracer judges it.
 struct ShadowFillFrame {
-  std::string phase;          ///< "still", "stays", "moves", "gone"
-  double share = 1;           ///< of the light lost to the shadow, where others can give it: what is back
-  double flash = 0;           ///< light over what was there without the hand, as a share of it, worst pixel
+  std::string phase;        ///< "still", "stays", "moves", "gone"
+  double share = 1;         ///< of the light lost to the shadow, where others can give it: what is back
+  double flash = 0;         ///< light over what was there without the hand, as a share of it, worst pixel
   double image_change = 0;  ///< worst level of the projectors' images from those without a hand
 };
 
@@ -45,10 +45,10 @@ struct ShadowFillReading {
 /// staying, moving, suddenly gone. Light is what the projectors' light makes of the prototype in the viewer's
 /// image. Error where the hand shades nothing that others could light.
 Result<ShadowFillReading> measured_shadow_fill(const sim::World& world,
-                                    const scene::Scene& scene,
-                                    const scene::PosedScene& posed,
-                                    const Imager& viewer,
-                                    const Hand& hand,
-                                    std::uint64_t seed);
+                                               const scene::Scene& scene,
+                                               const scene::PosedScene& posed,
+                                               const Imager& viewer,
+                                               const Hand& hand,
+                                               std::uint64_t seed);
 
 }  // namespace limn::apps

@@ -4,9 +4,9 @@
 #include <string>
 #include <utility>
 
-#include "validate/shadow_fill.h"
 #include "validate/check_images.h"
 #include "validate/check_measures.h"
+#include "validate/shadow_fill.h"
 
 namespace limn::apps {
 
@@ -15,8 +15,8 @@ Status judge_refill(CheckRun& run) {
   const auto [scene, posed] = run.check().told.posed.parts.empty()
                                   ? run.shown_instead(run.coat(), scene::Mode::surface)
                                   : std::pair(run.check().told.scene, run.check().told.posed);
-  const auto reading = measured_shadow_fill(run.check().truth, scene, posed, run.check().viewer, run.check().hand,
-                                     run.check().truth.seed);
+  const auto reading = measured_shadow_fill(run.check().truth, scene, posed, run.check().viewer,
+                                            run.check().hand, run.check().truth.seed);
   if (!reading) return error("{}: {}", run.check().name, reading.message());
   run.set("refill_share", reading->share);
   run.set("refill_flash_share", reading->flash);

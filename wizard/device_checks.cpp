@@ -17,8 +17,8 @@ class Checks {
     LIMN_TRY(out.light, measured_exposure(captures_, around_.stage));
     if (audience_.lit) audience_.lit(out.light);
     report_progress(WizardStep::outputs, unseen(out.light),
-         fmt::format("{} of {} seen", captures_.projectors.size() - unseen(out.light).size(),
-                     captures_.projectors.size()));
+                    fmt::format("{} of {} seen", captures_.projectors.size() - unseen(out.light).size(),
+                                captures_.projectors.size()));
     std::vector<std::string> advice;
     double bright = 255, saturated = 0, blur_px = 0;
     for (const ExposureReading& seen : out.light) {
@@ -29,8 +29,9 @@ class Checks {
       saturated = std::max(saturated, seen.saturated);
       blur_px = std::max(blur_px, seen.blur_px);
     }
-    report_progress(WizardStep::exposure, advice,
-         fmt::format("level {:.0f}, {:.1f} % saturated, edges {:.1f} px", bright, 100 * saturated, blur_px));
+    report_progress(
+        WizardStep::exposure, advice,
+        fmt::format("level {:.0f}, {:.1f} % saturated, edges {:.1f} px", bright, 100 * saturated, blur_px));
     return {};
   }
 

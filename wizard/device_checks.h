@@ -3,12 +3,12 @@
 #include <optional>
 #include <vector>
 
-#include "wizard/capture/display_latency.h"
-#include "wizard/capture/exposure_check.h"
-#include "wizard/capture/backend.h"
-#include "wizard/steps.h"
 #include "calib/capture_set.h"
 #include "core/result.h"
+#include "wizard/capture/backend.h"
+#include "wizard/capture/display_latency.h"
+#include "wizard/capture/exposure_check.h"
+#include "wizard/steps.h"
 
 namespace limn::apps {
 

@@ -64,8 +64,8 @@ std::string place(const Imager& camera, const Vector3d& p_world) {
 }  // namespace
 
 std::vector<std::string> pose_instructions(const Imager& camera,
-                                         const calib::Board& board,
-                                         const std::vector<Pose>& world_from_board) {
+                                           const calib::Board& board,
+                                           const std::vector<Pose>& world_from_board) {
   std::vector<double> distances;
   for (const Pose& pose : world_from_board)
     distances.push_back((camera.imager_from_world * (pose * p_centre(board))).norm());

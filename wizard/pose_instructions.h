@@ -15,8 +15,8 @@ namespace limn::apps {
 /// that the board's face looks further up than at the camera; near and far compare the poses with each other.
 /// `camera`: its world is the one that the poses are in.
 std::vector<std::string> pose_instructions(const Imager& camera,
-                                         const calib::Board& board,
-                                         const std::vector<Pose>& world_from_board);
+                                           const calib::Board& board,
+                                           const std::vector<Pose>& world_from_board);
 
 /// The board's four corners in the image of each camera, pixels, for each of its places: [place][camera];
 /// empty where one of them is behind the camera.

@@ -4,14 +4,14 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "wizard/measure/scan_alignment.h"
-#include "wizard/measure/scan_files.h"
-#include "wizard/error_colormap.h"
 #include "calib/capture.h"
-#include "core/median.h"
 #include "core/image_io.h"
+#include "core/median.h"
 #include "device/gl_context.h"
 #include "projector/renderer.h"
+#include "wizard/error_colormap.h"
+#include "wizard/measure/scan_alignment.h"
+#include "wizard/measure/scan_files.h"
 
 namespace limn::apps {
 namespace {

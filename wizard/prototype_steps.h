@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "wizard/capture/backend.h"
-#include "wizard/steps.h"
 #include "calib/capture_set.h"
 #include "calib/judge/error_map.h"
 #include "core/result.h"
+#include "wizard/capture/backend.h"
+#include "wizard/steps.h"
 
 namespace limn::apps {
 
@@ -18,7 +18,7 @@ namespace limn::apps {
 struct PrototypeSteps {
   std::filesystem::path rig;    ///< folder that is solved; the steps write into its folder `scan`
   std::filesystem::path scene;  ///< whose prototype is laid onto the scan; empty: the scan alone
-  calib::CaptureSet captures;     ///< planned: devices and patterns
+  calib::CaptureSet captures;   ///< planned: devices and patterns
   std::vector<calib::ErrorMap> maps;
 };
 

@@ -9,9 +9,6 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "wizard/measure/solve_captures.h"
-#include "wizard/capture/capture_folder.h"
-#include "wizard/device_checks.h"
 #include "calib/cross_validation.h"
 #include "calib/judge/board_check.h"
 #include "calib/judge/capture_faults.h"
@@ -20,6 +17,9 @@
 #include "calib/solve.h"
 #include "core/config.h"
 #include "core/file.h"
+#include "wizard/capture/capture_folder.h"
+#include "wizard/device_checks.h"
+#include "wizard/measure/solve_captures.h"
 
 namespace limn::apps {
 namespace {

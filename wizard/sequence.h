@@ -6,13 +6,13 @@
 #include <utility>
 #include <vector>
 
-#include "wizard/pose_quality.h"
-#include "wizard/prototype_steps.h"
-#include "wizard/capture/backend.h"
-#include "wizard/steps.h"
 #include "calib/capture_set.h"
 #include "calib/report/report.h"
 #include "core/result.h"
+#include "wizard/capture/backend.h"
+#include "wizard/pose_quality.h"
+#include "wizard/prototype_steps.h"
+#include "wizard/steps.h"
 
 namespace limn::apps {
 

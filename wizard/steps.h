@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "wizard/capture/exposure_check.h"
-#include "wizard/pose_quality.h"
-#include "wizard/capture/request.h"
 #include "calib/observations.h"
 #include "calib/report/report.h"
+#include "wizard/capture/exposure_check.h"
+#include "wizard/capture/request.h"
+#include "wizard/pose_quality.h"
 
 namespace limn::apps {
 

@@ -170,7 +170,7 @@ BoardSheet draw_board(const Board& board, const DrawOptions& options) {
   sheet.pixels_per_metre = grid.square / board.square_m;
   sheet.px_board_origin = Eigen::Vector2d::Constant(margin - 0.5);
   sheet.image = cv::Mat(2 * margin + board.rows * grid.square, 2 * margin + board.columns * grid.square,
-                          CV_8U, cv::Scalar(255));
+                        CV_8U, cv::Scalar(255));
   cv::Ptr<cv::aruco::Dictionary> dictionary;
   if (board.kind == BoardKind::charuco) dictionary = dictionary_of(board);
   int id = 0;

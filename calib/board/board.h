@@ -43,7 +43,7 @@ struct Board {
 
 /// The whole sheet as an exact image: every square and every marker cell is a whole number of pixels.
 struct BoardSheet {
-  cv::Mat image;              ///< 8-bit grey: 0 black ink, 255 paper
+  cv::Mat image;                ///< 8-bit grey: 0 black ink, 255 paper
   double pixels_per_metre = 0;  ///< for pHYs (the resolution in a PNG) and for texturing a plane
   /// Pixel coordinates (pixel centres at integers) of the board frame's origin. They end in .5, because the
   /// origin lies on a pixel's edge: px = px_board_origin + pixels_per_metre * p_board.xy

@@ -321,7 +321,9 @@ std::vector<DetectedMarker> consistent(std::vector<DetectedMarker> markers) {
 
 // The corner's position by a homography of the nearest markers; nullopt without a marker in a square beside
 // it.
-std::optional<Expected> expected_beside(const Board& board, const std::vector<DetectedMarker>& markers, int id) {
+std::optional<Expected> expected_beside(const Board& board,
+                                        const std::vector<DetectedMarker>& markers,
+                                        int id) {
   const int column = id % (board.columns - 1), row = id / (board.columns - 1);
   auto distance = [&](const DetectedMarker& m) {
     return std::max(std::abs(2 * (m.column - column) - 1), std::abs(2 * (m.row - row) - 1));

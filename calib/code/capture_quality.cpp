@@ -19,11 +19,11 @@ using Eigen::Vector4f;
 
 // About the maximum; medians over them are accurate to a fraction of a level.
 constexpr int k_samples = 20000;
-constexpr int k_reduced_width = 320;  // width of the images that motion is measured in
-constexpr int k_patch = 32;           // side of their patches
-constexpr int k_steps = 5;            // Gauss-Newton steps; each halves the remaining error, or better
-constexpr float k_least_texture = 4;  // levels per pixel, root mean square of a patch's weaker gradient
-constexpr float k_max_patch_shift = 6;      // reduced pixels; larger steps have diverged
+constexpr int k_reduced_width = 320;    // width of the images that motion is measured in
+constexpr int k_patch = 32;             // side of their patches
+constexpr int k_steps = 5;              // Gauss-Newton steps; each halves the remaining error, or better
+constexpr float k_least_texture = 4;    // levels per pixel, root mean square of a patch's weaker gradient
+constexpr float k_max_patch_shift = 6;  // reduced pixels; larger steps have diverged
 constexpr int k_saturated = 254;
 constexpr double k_lit = 10;  // levels between bright and dark
 // Times a sum's noise, the second limit: one dark sample in thousands exceeds it.
@@ -134,9 +134,9 @@ double difference(const Samples& lit, int a, int b, bool inverse) {
 
 // Explains why a pair does not add up, as far as the series shows; nullopt when no other image is like it.
 std::optional<OddImage> finding(const Samples& lit,
-                                  const std::vector<PatternGroup>& groups,
-                                  const std::vector<std::filesystem::path>& files,
-                                  int first) {
+                                const std::vector<PatternGroup>& groups,
+                                const std::vector<std::filesystem::path>& files,
+                                int first) {
   const auto name = [&](int i) { return files[static_cast<size_t>(i)].filename().string(); };
   for (const int image : {first, first + 1}) {
     const auto& file = files[static_cast<size_t>(image)];
@@ -153,8 +153,8 @@ std::optional<OddImage> finding(const Samples& lit,
                            difference(lit, first, group.first + 1, true) < k_same;
       if (crossed)
         return OddImage{files[static_cast<size_t>(first)],
-                          fmt::format("or {} has changed places with {} or {}", name(first + 1),
-                                      name(group.first), name(group.first + 1))};
+                        fmt::format("or {} has changed places with {} or {}", name(first + 1),
+                                    name(group.first), name(group.first + 1))};
     }
   }
   return std::nullopt;
@@ -172,7 +172,7 @@ void find_odd(const Samples& lit,
     } else if (group.off > k_wrong_group) {
       const auto name = files[static_cast<size_t>(group.first) + 1].filename().string();
       quality->odd.push_back({files[static_cast<size_t>(group.first)],
-                             "and " + name + " do not add up to what the other pairs do"});
+                              "and " + name + " do not add up to what the other pairs do"});
     }
   }
 }

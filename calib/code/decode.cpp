@@ -10,8 +10,8 @@
 
 #include "calib/code/phase.h"
 #include "calib/code/subpixel.h"
-#include "core/median.h"
 #include "core/image_io.h"
+#include "core/median.h"
 
 namespace limn::calib {
 namespace {

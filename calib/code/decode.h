@@ -4,8 +4,8 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
-#include "calib/code/patterns.h"
 #include "calib/code/capture_quality.h"
+#include "calib/code/patterns.h"
 #include "core/result.h"
 
 namespace limn::calib {

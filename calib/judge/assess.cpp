@@ -52,13 +52,13 @@ std::vector<DeviceQuality> device_qualities(const Observations& observations, co
     const CornerObservation& seen = observations.corners[i];
     const auto camera = static_cast<size_t>(seen.camera);
     cameras[camera].add(seen.px, observations.cameras[camera], solution.corner_residuals[i],
-                         solution.corner_outlier[i]);
+                        solution.corner_outlier[i]);
   }
   for (size_t i = 0; i < observations.matches.size(); ++i) {
     const Match& match = observations.matches[i];
     const auto projector = static_cast<size_t>(match.projector);
     projectors[projector].add(match.px_projector, observations.projectors[projector],
-                               solution.match_residuals[i], solution.match_outlier[i]);
+                              solution.match_residuals[i], solution.match_outlier[i]);
   }
   std::vector<DeviceQuality> qualities;
   for (size_t i = 0; i < cameras.size(); ++i)
@@ -121,7 +121,8 @@ Assessment assess(const Observed& observed, const Solution& solution, CrossValid
   assessment.devices = device_qualities(observations, solution);
   const Uncertainty uncertainty = estimated_uncertainty(observations, solution, assessment.held_out.rigs);
   assessment.epipolar = epipolar_residuals(solution.rig, observed.dense);
-  assessment.normalised_residuals = normalised_residuals(observations, solution, assessment.held_out.residuals);
+  assessment.normalised_residuals =
+      normalised_residuals(observations, solution, assessment.held_out.residuals);
   assessment.held_out_error_mm = held_out_errors_mm(observations, assessment.held_out);
   assessment.propagated_error_mm = propagated_error_mm(observations, solution, uncertainty);
   assessment.error_maps = error_maps(observations, solution, uncertainty);

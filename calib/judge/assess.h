@@ -38,8 +38,8 @@ struct Assessment {
   double decoded_share = 0;          ///< share of illuminated pixels
   double decoded_of_contrasted = 0;  ///< share of all pixels that white makes brighter than black
   int decode_outliers = 0;
-  std::vector<EpipolarResidual> epipolar;  ///< over decoded pixels of the whole image, on the board or not
-  NormalisedResiduals normalised_residuals;                             ///< whether the stated standard deviations are true
+  std::vector<EpipolarResidual> epipolar;    ///< over decoded pixels of the whole image, on the board or not
+  NormalisedResiduals normalised_residuals;  ///< whether the stated standard deviations are true
   std::vector<Fault> faults;
 };
 

@@ -18,8 +18,8 @@ constexpr double k_near = 0.4;      // in squares; lens distortion over the boar
 constexpr double k_most_fit = 0.8;  // share of the markers that the right dictionary explains
 // Share of the corners; a board with so many detected is the described one.
 constexpr double k_described = 0.5;
-constexpr int k_widest = 30;   // in squares
-constexpr int k_images = 4;  // number of images to search, a second each
+constexpr int k_widest = 30;  // in squares
+constexpr int k_images = 4;   // number of images to search, a second each
 
 struct Marker {
   int id = 0;

@@ -12,11 +12,11 @@ namespace limn::calib {
 /// A board as an image shows it, whether or not it is the described one.
 struct DetectedBoard {
   BoardKind kind = BoardKind::charuco;
-  int columns = 0;               ///< squares across
-  int rows = 0;                  ///< squares down; for a ChArUco board as many as the visible markers prove
-  std::string dictionary;        ///< dictionary of a ChArUco board's markers
-  int markers = 0;               ///< number of visible markers that fit
-  bool white_first = false;      ///< its top-left square is white: not a board printed by Limn
+  int columns = 0;           ///< squares across
+  int rows = 0;              ///< squares down; for a ChArUco board as many as the visible markers prove
+  std::string dictionary;    ///< dictionary of a ChArUco board's markers
+  int markers = 0;           ///< number of visible markers that fit
+  bool white_first = false;  ///< its top-left square is white: not a board printed by Limn
   std::string description() const;  ///< "a charuco board 11 squares across and at least 8 down, …"
 };
 

@@ -56,8 +56,8 @@ struct Seen {
   const Observed& observed;
   int camera = 0, projector = 0;
   std::vector<const CaptureQuality*> series;  // with enough illuminated samples
-  std::vector<double> lit;                  // for every series, share of the image
-  std::vector<Matrix2d> maps;               // for each pose: d projector pixel / d camera pixel
+  std::vector<double> lit;                    // for every series, share of the image
+  std::vector<Matrix2d> maps;                 // for each pose: d projector pixel / d camera pixel
 
   const std::string& camera_name() const {
     return observed.observations.cameras[static_cast<size_t>(camera)].name;
@@ -235,7 +235,7 @@ Between between(const Seen& seen, const CaptureQuality& quality) {
   for (const int axis : {0, 1}) {
     if (pairs.per_axis(axis) < 4 || pairs.lowest > 0) continue;
     const GroupQuality &fine = quality.groups[pairs.finest(axis)],
-                      &wide = quality.groups[pairs.finest(axis) - 2];
+                       &wide = quality.groups[pairs.finest(axis) - 2];
     const Between here{fine.off - wide.off, wide.level - fine.level};
     if (here.off > worst.off) worst = here;
   }
@@ -312,7 +312,8 @@ void note_motion(const Seen& seen, std::vector<Fault>* faults) {
         {"moved_during_capture",
          fmt::format("{}, {}: the image moved by {:.2f} px (parts of it by {:.2f} px) between the first "
                      "images and the last; {:.2f} px may be noise",
-                     seen.pose_name(*quality), seen.both(), quality->shift_px, quality->shift_worst_px, limit),
+                     seen.pose_name(*quality), seen.both(), quality->shift_px, quality->shift_worst_px,
+                     limit),
          "put board, camera and projector on firm ground and capture this pose again, or leave it out with "
          "--skip-poses " +
              seen.pose_name(*quality)});
@@ -346,7 +347,8 @@ Sharpness sharpness(const Seen& seen, const CaptureQuality& quality) {
 }
 
 void note_defocus(const Seen& seen, std::vector<Fault>* faults) {
-  const double contrast = seen.median_of([&](const CaptureQuality& h) { return sharpness(seen, h).contrast; });
+  const double contrast =
+      seen.median_of([&](const CaptureQuality& h) { return sharpness(seen, h).contrast; });
   if (contrast >= k_sharp) return;
   faults->push_back(
       {"defocus",

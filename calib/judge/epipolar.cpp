@@ -73,8 +73,8 @@ std::vector<EpipolarResidual> epipolar_residuals(const Rig& rig, const std::vect
     const auto camera = static_cast<size_t>(pixel.camera), projector = static_cast<size_t>(pixel.projector);
     EpipolarResidual& pair = pairs[camera * projectors + projector];
     add(epipolar_distance(rig.cameras[camera], rig.projectors[projector], pixel.px_camera.cast<double>(),
-                           pixel.px_projector.cast<double>()),
-         pixel.on_board ? &pair.board : &pair.room);
+                          pixel.px_projector.cast<double>()),
+        pixel.on_board ? &pair.board : &pair.room);
   }
   for (size_t i = 0; i < pairs.size(); ++i) {
     pairs[i].camera = static_cast<int>(i / projectors);

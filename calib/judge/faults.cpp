@@ -81,8 +81,8 @@ void note_geometry(const Observations& observations, const Solution& solution, s
 }
 
 void note_images(const Observed& observed,
-                   const std::vector<DeviceQuality>& devices,
-                   std::vector<Fault>* faults) {
+                 const std::vector<DeviceQuality>& devices,
+                 std::vector<Fault>* faults) {
   const Observations& observations = observed.observations;
   for (const DecodeShare& share : observed.decoded) {
     const double part = share.lit > 0 ? static_cast<double>(share.decoded) / share.lit : 0;

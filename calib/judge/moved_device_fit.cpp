@@ -38,7 +38,8 @@ class Fit {
     unknowns_ = at + 2;
     for (const CornerObservation& seen : observations.corners) ++counts_[{seen.camera, -1, seen.pose}];
     for (const Match& match : observations.matches) ++counts_[{match.camera, match.projector, match.pose}];
-    for (const TiePointObservation& tie_observation : observations.tie_observations) ++counts_[coarse_sample_of(tie_observation)];
+    for (const TiePointObservation& tie_observation : observations.tie_observations)
+      ++counts_[coarse_sample_of(tie_observation)];
   }
 
   MovedDeviceFit run(RigCheckPlaces places) const {
@@ -107,7 +108,8 @@ class Fit {
   using CoarseSample = std::array<int, 3>;
   CoarseSample coarse_sample_of(const TiePointObservation& tie_observation) const {
     const TiePoint& point = observations_.points[static_cast<size_t>(tie_observation.point)];
-    return {point.camera, tie_observation.by_projector ? tie_observation.imager : -2 - tie_observation.imager, point.pose};
+    return {point.camera, tie_observation.by_projector ? tie_observation.imager : -2 - tie_observation.imager,
+            point.pose};
   }
   // The share of one observation of a sample group that is independent of the others.
   double share_of(const CoarseSample& coarse_sample) const {
@@ -148,7 +150,8 @@ class Fit {
       put(by.camera_pose, device_at(camera), &seen.row);
       put(by.pose, device_at(device), &seen.row);
       const double stddev = std::hypot(tie_observation.stddev_px, options_.rig_px);
-      const double size = seen.row.residual.norm() / stddev, share = share_of(coarse_sample_of(tie_observation));
+      const double size = seen.row.residual.norm() / stddev,
+                   share = share_of(coarse_sample_of(tie_observation));
       seen.weight = share * k_loss.weight(size * size) / (stddev * stddev);
       seen.cost = share * k_loss.cost(size * size);
       rows.push_back(std::move(seen));
@@ -281,9 +284,9 @@ class Fit {
 }  // namespace
 
 MovedDeviceFit fit_moved_device(const Observations& observations,
-                const RigCheckOptions& options,
-                const MoveHypothesis& free,
-                const RigCheckPlaces& places) {
+                                const RigCheckOptions& options,
+                                const MoveHypothesis& free,
+                                const RigCheckPlaces& places) {
   return Fit(observations, options, free).run(places);
 }
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "calib/judge/rig_check.h"
-#include "calib/observations.h"
 #include "calib/measurement_model.h"
+#include "calib/observations.h"
 #include "core/imager.h"
 #include "core/pose.h"
 
@@ -62,8 +62,8 @@ struct MovedDeviceFit {
 
 /// Fits the free parameters of the hypothesis to all observations, starting from `places`; lenses are kept.
 MovedDeviceFit fit_moved_device(const Observations& observations,
-                const RigCheckOptions& options,
-                const MoveHypothesis& free,
-                const RigCheckPlaces& places);
+                                const RigCheckOptions& options,
+                                const MoveHypothesis& free,
+                                const RigCheckPlaces& places);
 
 }  // namespace limn::calib

@@ -146,18 +146,18 @@ std::vector<Matrix2d> held_out_covariances(const Observations& observations, con
 }
 
 NormalisedResiduals normalised_residuals(const Observations& observations,
-            const Solution& solution,
-            const std::vector<Vector2d>& held_out_residuals) {
+                                         const Solution& solution,
+                                         const std::vector<Vector2d>& held_out_residuals) {
   Tally corners, matches, held_out;
   for (size_t i = 0; i < observations.corners.size(); ++i)
     corners.add(solution.corner_residuals[i],
-                 Vector2d::Constant(corner_variance(solution, observations.corners[i])),
-                 solution.corner_outlier[i]);
+                Vector2d::Constant(corner_variance(solution, observations.corners[i])),
+                solution.corner_outlier[i]);
   const std::vector<Matrix2d> covariances = held_out_covariances(observations, solution);
   for (size_t i = 0; i < observations.matches.size(); ++i) {
     const Match& match = observations.matches[i];
     matches.add(solution.match_residuals[i], Vector2d::Constant(match_variance(solution, match)),
-                 solution.match_outlier[i]);
+                solution.match_outlier[i]);
     held_out.add(held_out_residuals[i], covariances[i].diagonal(), solution.match_outlier[i]);
   }
   return {corners.finished(), matches.finished(), held_out.finished()};

@@ -31,7 +31,7 @@ std::vector<Eigen::Matrix2d> held_out_covariances(const Observations& observatio
 
 /// `held_out_residuals` runs parallel to the matches; NaN where none was scored.
 NormalisedResiduals normalised_residuals(const Observations& observations,
-            const Solution& solution,
-            const std::vector<Eigen::Vector2d>& held_out_residuals);
+                                         const Solution& solution,
+                                         const std::vector<Eigen::Vector2d>& held_out_residuals);
 
 }  // namespace limn::calib

@@ -27,8 +27,8 @@ constexpr double k_sound_rig_px = 4;  // RMS misfit that a sound rig may show be
 // The rig's devices in the observations' order.
 Result<RigCheckPlaces> places_of(const Rig& rig, const Observations& observations) {
   RigCheckPlaces places;
-  const auto check_devices = [&](const std::vector<CapturedDevice>& captured, const std::vector<Imager>& known,
-                        const char* kind) -> Status {
+  const auto check_devices = [&](const std::vector<CapturedDevice>& captured,
+                                 const std::vector<Imager>& known, const char* kind) -> Status {
     for (const CapturedDevice& device : captured) {
       const Imager* found = find_named(known, device.name);
       if (!found)
@@ -77,7 +77,9 @@ void place_points(const Observations& observations, RigCheckPlaces* places) {
 }
 
 // Estimates board poses from the corners that cameras see, where nothing else is known.
-Status place_boards(const Observations& observations, const RigCheckOptions& options, RigCheckPlaces* places) {
+Status place_boards(const Observations& observations,
+                    const RigCheckOptions& options,
+                    RigCheckPlaces* places) {
   Rig seen_by;
   seen_by.cameras.assign(places->devices.begin(),
                          places->devices.begin() + static_cast<std::ptrdiff_t>(places->cameras));
@@ -85,7 +87,8 @@ Status place_boards(const Observations& observations, const RigCheckOptions& opt
   bool any = false;
   for (size_t pose = 0; pose < observations.poses.size(); ++pose) {
     Observations only = observations;
-    std::erase_if(only.corners, [&](const CornerObservation& c) { return static_cast<size_t>(c.pose) != pose; });
+    std::erase_if(only.corners,
+                  [&](const CornerObservation& c) { return static_cast<size_t>(c.pose) != pose; });
     if (only.corners.empty()) continue;
     if (pose < options.still_boards.size() && options.still_boards[pose]) {
       places->world_from_board[pose] = options.still_boards[pose];
@@ -209,7 +212,8 @@ class RigChecker {
       const auto& board = places.world_from_board[static_cast<size_t>(match.pose)];
       Eigen::Vector3d p;
       if (places.cameras + static_cast<size_t>(match.projector) != device || !board ||
-          !intersect_board(view_of(places.camera(match.camera)), *board, shape, places.bend, match.px_camera, &p))
+          !intersect_board(view_of(places.camera(match.camera)), *board, shape, places.bend, match.px_camera,
+                           &p))
         continue;
       visit(places.devices[device].project(p), match.px_projector, p);
     }

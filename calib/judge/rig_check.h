@@ -47,7 +47,7 @@ struct Move {
 
 enum class RigVerdict {
   sound,       ///< no device has moved
-  moved,      ///< one device has moved
+  moved,       ///< one device has moved
   undecided,   ///< one of the candidates has moved; these observations cannot tell which
   unexplained  ///< no move of a single device explains the observations
 };
@@ -76,6 +76,8 @@ struct RigCheck {
 /// that have not moved give its depth. A device has moved when its fit is clearly better than that of "none"
 /// and shifts its pixels clearly; other devices that fit as well are candidates too. Errors: devices that the
 /// rig does not have or has in another size; neither a board nor such a scene in view.
-Result<RigCheck> check_rig(const Rig& rig, const Observations& observations, const RigCheckOptions& options = {});
+Result<RigCheck> check_rig(const Rig& rig,
+                           const Observations& observations,
+                           const RigCheckOptions& options = {});
 
 }  // namespace limn::calib

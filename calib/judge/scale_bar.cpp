@@ -210,7 +210,10 @@ double calibration_of(const Solution& solution, int camera, int projector, const
   return std::sqrt(std::max(0.0, gradient.dot(solution.covariance * gradient)));
 }
 
-const DetectedMark* find(const std::vector<DetectedMark>& marks, int camera, int pose, const std::string& name) {
+const DetectedMark* find(const std::vector<DetectedMark>& marks,
+                         int camera,
+                         int pose,
+                         const std::string& name) {
   const auto found = std::find_if(marks.begin(), marks.end(), [&](const DetectedMark& mark) {
     return mark.camera == camera && mark.pose == pose && mark.name == name;
   });
@@ -218,11 +221,11 @@ const DetectedMark* find(const std::vector<DetectedMark>& marks, int camera, int
 }
 
 void measure_view(const Solution& solution,
-               const Decoded& decoded,
-               const DetectedMark& a,
-               const DetectedMark& b,
-               int projector,
-               ScaleBarCheck* check) {
+                  const Decoded& decoded,
+                  const DetectedMark& a,
+                  const DetectedMark& b,
+                  int projector,
+                  ScaleBarCheck* check) {
   const Imager& eye = solution.rig.cameras[static_cast<size_t>(a.camera)];
   const Imager& light = solution.rig.projectors[static_cast<size_t>(projector)];
   const Pair pair{&a, &b, paper_spots(decoded, a.corners_px), paper_spots(decoded, b.corners_px)};
@@ -271,10 +274,10 @@ Result<ScaleBar> parse_scale_bar(const std::string& text) {
 }
 
 Result<std::vector<ScaleBarCheck>> measure_scale_bars(const CaptureSet& captures,
-                                                  const Solution& solution,
-                                                  const std::vector<DetectedMark>& marks,
-                                                  const std::vector<ScaleBar>& lengths,
-                                                  double widened) {
+                                                      const Solution& solution,
+                                                      const std::vector<DetectedMark>& marks,
+                                                      const std::vector<ScaleBar>& lengths,
+                                                      double widened) {
   std::vector<ScaleBarCheck> checks;
   for (const ScaleBar& known : lengths) checks.push_back({known, {}, 0, 0});
   for (size_t pose = 0; pose < captures.poses.size(); ++pose) {

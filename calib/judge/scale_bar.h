@@ -45,8 +45,8 @@ struct ScaleBarView {
 struct ScaleBarCheck {
   ScaleBar known;
   std::vector<ScaleBarView> views;  ///< empty: in no pose were both marks seen and illuminated
-  double measured_m = 0;          ///< mean of the views, weighted by noise
-  double stddev_m = 0;            ///< stated standard deviation of the mean, calibration included
+  double measured_m = 0;            ///< mean of the views, weighted by noise
+  double stddev_m = 0;              ///< stated standard deviation of the mean, calibration included
 };
 
 /// Measures each scale bar with structured light: the paper in and around each mark is decoded and
@@ -55,10 +55,10 @@ struct ScaleBarCheck {
 /// the devices' standard deviations, such as the standard deviation of the held-out normalised residuals
 /// where that is above 1.
 Result<std::vector<ScaleBarCheck>> measure_scale_bars(const CaptureSet& captures,
-                                                  const Solution& solution,
-                                                  const std::vector<DetectedMark>& marks,
-                                                  const std::vector<ScaleBar>& lengths,
-                                                  double widened = 1);
+                                                      const Solution& solution,
+                                                      const std::vector<DetectedMark>& marks,
+                                                      const std::vector<ScaleBar>& lengths,
+                                                      double widened = 1);
 
 /// `wrong_scale` beyond 3 stated deviations and k_scale_tolerance; `known_length_not_seen` without a view.
 std::optional<Fault> scale_fault(const ScaleBarCheck& check, const Board& board);

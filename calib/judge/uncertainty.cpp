@@ -165,7 +165,8 @@ std::vector<SurfaceTarget> panel_places(const Solution& solution, const Board& b
 RigidTarget measured_points(const Imager& camera, const std::vector<SurfaceTarget>& places) {
   std::vector<std::pair<Vector3d, double>> left;  // each with its distance to the nearest chosen point
   for (const SurfaceTarget& place : places) {
-    if (project_with_derivatives(camera, place.p_world)) left.emplace_back(place.p_world, std::numeric_limits<double>::infinity());
+    if (project_with_derivatives(camera, place.p_world))
+      left.emplace_back(place.p_world, std::numeric_limits<double>::infinity());
   }
   RigidTarget chosen;
   while (chosen.size() < std::min(k_measured_points, left.size())) {
@@ -309,8 +310,8 @@ std::vector<double> propagated_error_mm(const Observations& observations,
 }
 
 Uncertainty estimated_uncertainty(const Observations& observations,
-                     const Solution& solution,
-                     std::span<const Rig> without) {
+                                  const Solution& solution,
+                                  std::span<const Rig> without) {
   Uncertainty uncertainty{solution.covariance, 0};
   const auto scatter = propagated_error_mm(observations, solution, uncertainty);
   const auto jackknife =

@@ -58,7 +58,7 @@ std::vector<double> propagated_error_mm(const Observations& observations,
 /// jackknife's, and never narrowed. Targets are assumed to be measured as well as the board's corners were,
 /// but not better than markers are. Reasons and evidence: docs/decisions/0004-the-stated-error.md.
 Uncertainty estimated_uncertainty(const Observations& observations,
-                     const Solution& solution,
-                     std::span<const Rig> without);
+                                  const Solution& solution,
+                                  std::span<const Rig> without);
 
 }  // namespace limn::calib

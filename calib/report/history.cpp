@@ -114,7 +114,9 @@ History read_history(const std::filesystem::path& folder) {
   return history;
 }
 
-std::vector<DeviceMove> device_moves(const Rig& earlier, const Observations& observations, const Solution& solution) {
+std::vector<DeviceMove> device_moves(const Rig& earlier,
+                                     const Observations& observations,
+                                     const Solution& solution) {
   std::vector<DeviceMove> all;
   const Imager& eye = solution.rig.cameras.front();
   const Imager* eye_before = same_device(earlier.cameras, eye);

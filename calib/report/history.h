@@ -27,7 +27,7 @@ struct PastCalibration {
   std::string verdict;
   double held_out_px = 0;
   double worst_px = 0;
-  double predicted_mm = 0;   ///< infinite when it was not known
+  double predicted_mm = 0;        ///< infinite when it was not known
   std::vector<DeviceMove> moved;  ///< since the calibration before; empty for the first
 };
 
@@ -44,6 +44,8 @@ History read_history(const std::filesystem::path& folder);
 
 /// Moves of each device of `solution` that the earlier rig had, with the same name and size. Camera 0 is not
 /// listed, because it is the reference.
-std::vector<DeviceMove> device_moves(const Rig& earlier, const Observations& observations, const Solution& solution);
+std::vector<DeviceMove> device_moves(const Rig& earlier,
+                                     const Observations& observations,
+                                     const Solution& solution);
 
 }  // namespace limn::calib

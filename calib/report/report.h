@@ -22,8 +22,8 @@ struct Report {
   Solution solution;
   Assessment assessment;
   std::vector<std::pair<std::string, double>> seconds;  ///< time of each stage, in order
-  std::vector<ModelTrial> lens_trials = {};              ///< empty where the models were given
-  Explanation explanation = {};                                     ///< the verdict and the advice, as sentences
+  std::vector<ModelTrial> lens_trials = {};             ///< empty where the models were given
+  Explanation explanation = {};                         ///< the verdict and the advice, as sentences
   std::string made_at = {};                             ///< as PastCalibration::made_at
   History history = {};                                 ///< history of the folder that the report is for
   std::vector<ScaleBarCheck> scale_bar_lengths = {};

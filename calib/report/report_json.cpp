@@ -50,8 +50,9 @@ Json normalised_residuals_json(const NormalisedResiduals& normalised_residuals) 
             {"beyond_3", rounded(s.beyond_3)},
             {"count", s.count}};
   };
-  return {
-      {"corners", one(normalised_residuals.corners)}, {"matches", one(normalised_residuals.matches)}, {"held_out", one(normalised_residuals.held_out)}};
+  return {{"corners", one(normalised_residuals.corners)},
+          {"matches", one(normalised_residuals.matches)},
+          {"held_out", one(normalised_residuals.held_out)}};
 }
 
 Json by_projector(const Report& report, const std::vector<double>& errors) {
@@ -144,9 +145,9 @@ std::string report_json(const Report& report) {
   for (const Fault& fault : a.faults)
     faults.push_back({{"name", fault.name}, {"evidence", fault.evidence}, {"advice", fault.advice}});
   for (const auto& [stage, value] : report.seconds) seconds[stage] = std::round(value * 1e3) / 1e3;
-  const auto since_last = report.history.rig
-                              ? device_moves(*report.history.rig, report.observed.observations, report.solution)
-                              : std::vector<DeviceMove>();
+  const auto since_last =
+      report.history.rig ? device_moves(*report.history.rig, report.observed.observations, report.solution)
+                         : std::vector<DeviceMove>();
   const Json json = {{"schema", "limn.report/1"},
                      {"made_at", report.made_at},
                      {"verdict", to_text(a.verdict)},

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calib/report/svg_plots.h"
 #include "calib/report/report.h"
+#include "calib/report/svg_plots.h"
 
 namespace limn::calib {
 namespace {
@@ -34,8 +34,8 @@ std::string table(const std::vector<std::string>& head, const std::vector<std::v
 }
 
 std::string tile(const std::string& value, const std::string& unit, const std::string& what) {
-  return fmt::format("<div class='tile'><b>{}</b> {}<span>{}</span></div>\n", xml_escaped(value), xml_escaped(unit),
-                     xml_escaped(what));
+  return fmt::format("<div class='tile'><b>{}</b> {}<span>{}</span></div>\n", xml_escaped(value),
+                     xml_escaped(unit), xml_escaped(what));
 }
 
 double worst_mm(const Assessment& a) {
@@ -241,8 +241,9 @@ std::string trust_tables(const Report& report) {
   std::string html = table({"epipolar residual", "on the board", "in the room"}, rows);
   rows.clear();
   const NormalisedResiduals& normalised_residuals = report.assessment.normalised_residuals;
-  for (const auto& [name, s] :
-       {std::pair{"corners", normalised_residuals.corners}, {"matches", normalised_residuals.matches}, {"held-out poses", normalised_residuals.held_out}})
+  for (const auto& [name, s] : {std::pair{"corners", normalised_residuals.corners},
+                                {"matches", normalised_residuals.matches},
+                                {"held-out poses", normalised_residuals.held_out}})
     rows.push_back({name, fmt::format("{:.2f}", s.mean), fmt::format("{:.2f}", s.stddev),
                     fmt::format("{:.1f} %", 100 * s.beyond_3), fmt::format("{}", s.count)});
   return html + table({"residual / stated deviation", "mean (0)", "deviation (1)", "beyond 3 (0.3 %)",

@@ -118,9 +118,9 @@ ColourMixing fitted_mixing(const ResponseShots& shots,
 }
 
 cv::Mat predicted_photograph(const ColourMixing& mixing,
-                            const ProjectorResponse& projector,
-                            const CameraResponse& camera,
-                            const cv::Vec3b& bgr) {
+                             const ProjectorResponse& projector,
+                             const CameraResponse& camera,
+                             const cv::Vec3b& bgr) {
   const auto share = [&](int channel) { return light_over_black(projector, channel, bgr[channel]); };
   cv::Mat light = mixing.offset + share(0) * mixing.blue + share(1) * mixing.green + share(2) * mixing.red;
   cv::Mat values = light.reshape(1);

@@ -14,8 +14,8 @@ ColourMixing fitted_mixing(const ResponseShots& shots,
 /// The photograph, in levels (CV_32F or CV_32FC3), that a mixing predicts while the projector shows one
 /// colour (display values, BGR) everywhere.
 cv::Mat predicted_photograph(const ColourMixing& mixing,
-                            const ProjectorResponse& projector,
-                            const CameraResponse& camera,
-                            const cv::Vec3b& bgr);
+                             const ProjectorResponse& projector,
+                             const CameraResponse& camera,
+                             const cv::Vec3b& bgr);
 
 }  // namespace limn::calib

@@ -28,8 +28,7 @@ struct Ramp {
 
 Ramp ramp(int channel) {
   Ramp ramp{ramp_of(channel), {}};
-  for (const size_t image : ramp.images)
-    ramp.values.push_back(response_images()[image].bgr[channel] / 255.0);
+  for (const size_t image : ramp.images) ramp.values.push_back(response_images()[image].bgr[channel] / 255.0);
   return ramp;
 }
 
@@ -222,9 +221,7 @@ void add_checks(std::span<const DecodedSamples> all, ProjectorResponse* response
 }
 
 // Decoded light, summed over channels, averaged over images; NaN where a level is clipped.
-cv::Mat light_image(const ResponseShots& shots,
-                      const Decoding& decoding,
-                      std::span<const size_t> images) {
+cv::Mat light_image(const ResponseShots& shots, const Decoding& decoding, std::span<const size_t> images) {
   const cv::Mat& first = shots.images[0];
   cv::Mat light(first.size(), CV_32F, cv::Scalar(0));
   const int channels = first.channels();
@@ -297,8 +294,8 @@ std::vector<Share> shares_at_edges(const ResponseShots& shots, const Decoding& d
 }  // namespace
 
 Result<ProjectorResponse> fitted_curves(const std::string& projector,
-                               const std::string& where,
-                               std::span<const DecodedSamples> samples) {
+                                        const std::string& where,
+                                        std::span<const DecodedSamples> samples) {
   ProjectorResponse response;
   response.projector = projector;
   std::vector<double>* curves[] = {&response.blue, &response.green, &response.red};
@@ -314,7 +311,7 @@ Result<ProjectorResponse> fitted_curves(const std::string& projector,
 }
 
 std::optional<Measurement> fitted_black_level(std::span<const ResponseShots* const> shots,
-                                           std::span<const Decoding> decodings) {
+                                              std::span<const Decoding> decodings) {
   std::vector<Share> shares;
   for (size_t i = 0; i < shots.size(); ++i) {
     const auto more = shares_at_edges(*shots[i], decodings[i]);
@@ -343,7 +340,8 @@ std::optional<Measurement> fitted_black_level(std::span<const ResponseShots* con
   return Measurement{std::max(0.0, centre / (1 + centre)), scatter};
 }
 
-ProjectorResponse with_black_level(ProjectorResponse response, const std::optional<Measurement>& black_level) {
+ProjectorResponse with_black_level(ProjectorResponse response,
+                                   const std::optional<Measurement>& black_level) {
   response.black_level = black_level;
   if (!black_level) return response;
   for (auto* curve : {&response.red, &response.green, &response.blue})

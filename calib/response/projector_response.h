@@ -24,14 +24,14 @@ struct DecodedSamples {
 /// light^(1/2.2). The black level is not included (the curves begin at 0). Errors: a curve that jumps or
 /// falls (an image repeated, lost or out of order; automatic exposure), with the image's name.
 Result<ProjectorResponse> fitted_curves(const std::string& projector,
-                               const std::string& where,
-                               std::span<const DecodedSamples> samples);
+                                        const std::string& where,
+                                        std::span<const DecodedSamples> samples);
 
 /// Fits the black level (light of black as a share of white's) from small tiles of a camera's image that the
 /// panel's edge crosses. Black's light ends where white's does, and the room's light does not: in each tile
 /// the black image is fitted as a plane plus a share of white minus black.
 std::optional<Measurement> fitted_black_level(std::span<const ResponseShots* const> shots,
-                                           std::span<const Decoding> decodings);
+                                              std::span<const Decoding> decodings);
 
 /// The curves with the black level added: they begin at it.
 ProjectorResponse with_black_level(ProjectorResponse response, const std::optional<Measurement>& black_level);

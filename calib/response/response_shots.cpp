@@ -5,8 +5,8 @@
 
 #include "calib/code/patterns.h"
 #include "core/file.h"
-#include "core/names.h"
 #include "core/image_io.h"
+#include "core/names.h"
 
 namespace limn::calib {
 namespace {
@@ -158,9 +158,8 @@ Result<ResponseSamples> sampled(const ResponseShots& shots, size_t most) {
     if (black.data[i] >= k_clipped) ++saturated_black;
     if (white.data[i] - black.data[i] < k_least_contrast) continue;
     ++lit_at_all;
-    const bool clipped = std::any_of(brightest.begin(), brightest.end(), [&](size_t image) {
-      return shots.images[image].data[i] >= k_clipped;
-    });
+    const bool clipped = std::any_of(brightest.begin(), brightest.end(),
+                                     [&](size_t image) { return shots.images[image].data[i] >= k_clipped; });
     if (!clipped) lit.push_back(i);
   }
   if (saturated_black > black.total() * black.elemSize() / 2)

@@ -16,8 +16,8 @@ namespace limn::calib {
 struct ResponseShots {
   int projector = 0;
   int camera = 0;
-  std::filesystem::path folder;   ///< response/projector0/camera0 of the captures
-  std::vector<cv::Mat> images;  ///< 8-bit grey or BGR, all of one type, in the order of response_images()
+  std::filesystem::path folder;  ///< response/projector0/camera0 of the captures
+  std::vector<cv::Mat> images;   ///< 8-bit grey or BGR, all of one type, in the order of response_images()
 };
 
 /// Every projector shows the response images in turn, and every camera photographs each of them, into the

@@ -496,10 +496,10 @@ std::string size_text(double metres) {
 }  // namespace
 
 Result<Registration> refined_registration(const scene::Mesh& mesh,
-                          const scene::MeshBvh& index,
-                          const scene::ScanSurface& scan,
-                          const Pose& start,
-                          const RegistrationOptions& options) {
+                                          const scene::MeshBvh& index,
+                                          const scene::ScanSurface& scan,
+                                          const Pose& start,
+                                          const RegistrationOptions& options) {
   const double size = diagonal(mesh.positions);
   const auto points = thinned(scan, options.cell * size);
   constexpr int k_goes = 3;
@@ -567,9 +567,9 @@ Status comparable_sizes(const scene::Mesh& mesh, const scene::ScanSurface& scan)
 }
 
 Result<GlobalRegistration> global_registration(const scene::Mesh& mesh,
-                             const scene::MeshBvh& index,
-                             const scene::ScanSurface& scan,
-                             const RegistrationOptions& options) {
+                                               const scene::MeshBvh& index,
+                                               const scene::ScanSurface& scan,
+                                               const RegistrationOptions& options) {
   constexpr std::size_t k_pieces = 4, k_short_points = 160, k_long_points = 600, k_long = 4;
   constexpr int k_short_steps = 15;
   // Share of the mesh's diagonal; a larger piece is a wall.
@@ -620,9 +620,10 @@ Result<GlobalRegistration> global_registration(const scene::Mesh& mesh,
         "found no pose in which the mesh lies on the scan. Give a start: --start, --points, or markers; "
         "check --units.");
   GlobalRegistration found;
-  LIMN_TRY(found.registration,
-           refined_registration(mesh, index, scan, fits[0].fit.pose,
-                   {.reach = 0.03, .cell = options.cell, .max_iterations = options.max_iterations}));
+  LIMN_TRY(
+      found.registration,
+      refined_registration(mesh, index, scan, fits[0].fit.pose,
+                           {.reach = 0.03, .cell = options.cell, .max_iterations = options.max_iterations}));
   for (std::size_t i = 1; i < fits.size() && !found.rival; ++i) {
     if (same_pose(fits[i].fit.pose, fits[0].fit.pose, patches[0].p, size)) continue;
     found.rival = fits[i].fit.pose;
@@ -656,7 +657,8 @@ std::vector<Difference> differences(const scene::ScanSurface& scan,
   const auto limit = [&](std::size_t i) {
     const Vector3d n = scan.normals[i].cast<double>();
     Vector6d jacobian;
-    jacobian << (scan.positions[i].cast<double>() - registration.world_from_prototype.translation).cross(n), n;
+    jacobian << (scan.positions[i].cast<double>() - registration.world_from_prototype.translation).cross(n),
+        n;
     const double own = scan.stddevs.empty() ? 0 : static_cast<double>(scan.stddevs[i]);
     return std::max(options.least_m,
                     options.sigmas * std::sqrt(own * own + jacobian.dot(registration.covariance * jacobian)));

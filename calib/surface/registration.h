@@ -43,10 +43,10 @@ struct Registration {
 /// shrinks with them. Along directions that the shape does not determine, the start is kept. Error: too few
 /// scan points near the mesh.
 Result<Registration> refined_registration(const scene::Mesh& mesh,
-                          const scene::MeshBvh& index,
-                          const scene::ScanSurface& scan,
-                          const Pose& start,
-                          const RegistrationOptions& options = {});
+                                          const scene::MeshBvh& index,
+                                          const scene::ScanSurface& scan,
+                                          const Pose& start,
+                                          const RegistrationOptions& options = {});
 
 /// A point on the mesh and the same point in the scan, m.
 struct Pick {
@@ -73,9 +73,9 @@ struct GlobalRegistration {
 /// `refined_registration`. Takes some seconds. Error: in no pose does a fair share of any piece lie on the
 /// mesh.
 Result<GlobalRegistration> global_registration(const scene::Mesh& mesh,
-                             const scene::MeshBvh& index,
-                             const scene::ScanSurface& scan,
-                             const RegistrationOptions& options = {});
+                                               const scene::MeshBvh& index,
+                                               const scene::ScanSurface& scan,
+                                               const RegistrationOptions& options = {});
 
 /// An error when the sizes of mesh and scan cannot belong to one object: wrong units.
 Status comparable_sizes(const scene::Mesh& mesh, const scene::ScanSurface& scan);

@@ -5,8 +5,8 @@
 
 #include "calib/capture_set.h"
 #include "calib/code/decode.h"
-#include "calib/surface/tsdf_fusion.h"
 #include "calib/surface/range_view.h"
+#include "calib/surface/tsdf_fusion.h"
 #include "core/result.h"
 #include "core/rig.h"
 

@@ -164,7 +164,9 @@ scene::ScanSurface net_of(const Grid& grid, const std::vector<std::uint64_t>& ce
 }
 
 // Moves every vertex to the surface that the views measured; vertices without one are removed.
-scene::ScanSurface on_the_views(const scene::ScanSurface& mesh, std::span<const RangeView> views, double reach) {
+scene::ScanSurface on_the_views(const scene::ScanSurface& mesh,
+                                std::span<const RangeView> views,
+                                double reach) {
   scene::ScanSurface out = mesh;
   out.normals.assign(mesh.positions.size(), Eigen::Vector3f::Zero());
   out.stddevs.assign(mesh.positions.size(), 0);
@@ -183,7 +185,9 @@ scene::ScanSurface on_the_views(const scene::ScanSurface& mesh, std::span<const 
 
 }  // namespace
 
-std::optional<SurfaceSample> surface_sample(std::span<const RangeView> views, const Vector3d& p_world, double reach) {
+std::optional<SurfaceSample> surface_sample(std::span<const RangeView> views,
+                                            const Vector3d& p_world,
+                                            double reach) {
   std::optional<SurfaceSample> surest;
   std::vector<SurfaceSample> all;
   for (const RangeView& view : views) {

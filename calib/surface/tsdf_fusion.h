@@ -11,7 +11,9 @@ namespace limn::calib {
 /// The surface near a point as measured by all views, weighted by their variances. Views whose surface is
 /// further than `reach` from the point along the normal, or turned by more than 60 degrees from the most
 /// accurate view's normal, see another surface there. nullopt when no view sees one.
-std::optional<SurfaceSample> surface_sample(std::span<const RangeView> views, const Eigen::Vector3d& p_world, double reach);
+std::optional<SurfaceSample> surface_sample(std::span<const RangeView> views,
+                                            const Eigen::Vector3d& p_world,
+                                            double reach);
 
 /// How far two views' surfaces are apart where both have one: root mean square and median of the absolute
 /// distance, m, over at most `samples` points of the first. `count` 0: they share nothing. Points where a

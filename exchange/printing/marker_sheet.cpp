@@ -67,8 +67,7 @@ void draw_cells(cairo_t* cairo, const cv::Mat& image, double x_mm, double y_mm, 
   std::map<std::uint8_t, std::vector<cv::Rect>> levels;
   for (int y = 0; y < image.rows;) {
     int below = y + 1;
-    while (below < image.rows &&
-           std::equal(image.ptr(y), image.ptr(y) + image.cols, image.ptr(below)))
+    while (below < image.rows && std::equal(image.ptr(y), image.ptr(y) + image.cols, image.ptr(below)))
       ++below;
     for (int x = 0; x < image.cols;) {
       const std::uint8_t level = image.at<std::uint8_t>(y, x);

@@ -19,15 +19,16 @@ constexpr double k_noticed_px = 0.15;   // of a change of the lens, anywhere in 
 constexpr double k_known_share = 0.03;  // of the focal length: a lens good enough to straighten sides with
 constexpr double k_learnt = 0.8;        // of a deviation: less of it is worth keeping
 
-using tracker::PoseFit;
 using tracker::BodyCorrespondences;
+using tracker::PoseFit;
 
 // The markers of bodies whose place is known, as one body in the world.
 Body room_of(std::span<const Body> bodies, std::span<const Track> tracks, std::size_t least_markers) {
   Body room{"room", {}};
   for (const Body& body : bodies)
     for (const Track& track : tracks) {
-      if (track.body != body.name || track.tracking == TrackingState::lost || body.markers.size() < least_markers)
+      if (track.body != body.name || track.tracking == TrackingState::lost ||
+          body.markers.size() < least_markers)
         continue;
       for (const BodyMarker& marker : body.markers)
         room.markers.push_back(
@@ -45,7 +46,8 @@ double misfit(const tracker::MarkerCorrespondences& marker, const Pose& pose) {
     if (!tracker::residual(observation, pose, &r)) return 1e6;
     squares += r.squaredNorm();
   }
-  return chosen.observations.empty() ? 1e6 : std::sqrt(squares / static_cast<double>(chosen.observations.size()));
+  return chosen.observations.empty() ? 1e6
+                                     : std::sqrt(squares / static_cast<double>(chosen.observations.size()));
 }
 
 double gate_of(const BodyCorrespondences& seen, const Pose& pose) {
@@ -75,7 +77,8 @@ std::optional<PoseFit> fitted_near(const BodyCorrespondences& seen, const std::o
 // One standard deviation of where a fit puts the middle of what it sees, px.
 double unsure_px(const Imager& camera, const PoseFit& fit, const BodyCorrespondences& seen) {
   Eigen::Vector3d p_middle = Eigen::Vector3d::Zero();
-  for (const tracker::MarkerCorrespondences& marker : seen) p_middle += marker.marker->body_from_marker.translation;
+  for (const tracker::MarkerCorrespondences& marker : seen)
+    p_middle += marker.marker->body_from_marker.translation;
   p_middle /= static_cast<double>(seen.size());
   const tracker::PointObservation observation{&camera.lens, Pose(), p_middle, Eigen::Vector2d::Zero()};
   Eigen::Vector2d r;
@@ -136,7 +139,8 @@ std::vector<Track> moved_markers(const Imager& view,
 
 }  // namespace
 
-TabletLocalizer::TabletLocalizer(tracker::Families families, std::span<const calib::IntrinsicsEstimate> lenses)
+TabletLocalizer::TabletLocalizer(tracker::Families families,
+                                 std::span<const calib::IntrinsicsEstimate> lenses)
     : detector_(std::move(families),
                 {.encoding = tracker::Encoding::srgb, .broken_markers = false, .pattern_fits = false}) {
   for (const calib::IntrinsicsEstimate& lens : lenses)
@@ -155,7 +159,7 @@ TabletLocalizer::Aspect& TabletLocalizer::aspect_of(int width, int height) {
   const double scale = static_cast<double>(k_lens_side) / std::max(width, height);
   const calib::IntrinsicsEstimate lens =
       calib::prior_intrinsics(std::max(1, static_cast<int>(std::lround(scale * width))),
-                           std::max(1, static_cast<int>(std::lround(scale * height))));
+                              std::max(1, static_cast<int>(std::lround(scale * height))));
   aspects_.push_back({calib::OnlineIntrinsics(lens), lens, lens.focal_stddev_px()});
   return aspects_.back();
 }
@@ -163,9 +167,9 @@ TabletLocalizer::Aspect& TabletLocalizer::aspect_of(int width, int height) {
 // What the image shows of each body with several markers, for learning of the lens: of bodies alone, so
 // that it matters little where the session takes them to be.
 void TabletLocalizer::note_views(const Imager& camera,
-                          std::span<const tracker::Detection> detections,
-                          std::span<const Body> bodies,
-                          std::span<const Track> tracks) {
+                                 std::span<const tracker::Detection> detections,
+                                 std::span<const Body> bodies,
+                                 std::span<const Track> tracks) {
   Imager here = camera;
   here.imager_from_world = Pose();
   const tracker::View view{&here, detections};
@@ -178,7 +182,8 @@ void TabletLocalizer::note_views(const Imager& camera,
       const BodyCorrespondences seen = tracker::correspondences(body, std::span(&view, 1));
       if (seen.size() < 2) continue;
       calib::BodyView noted{camera.imager_from_world * track.world_from_body, {}};
-      for (const tracker::PointObservation& observation : tracker::corners_at(seen, noted.camera_from_body).observations)
+      for (const tracker::PointObservation& observation :
+           tracker::corners_at(seen, noted.camera_from_body).observations)
         noted.points.push_back(
             {observation.p_body, (scale.array() * (observation.px.array() + 0.5) - 0.5).matrix(),
              scale.asDiagonal() * Eigen::Matrix2d(observation.information.inverse()) * scale.asDiagonal()});
@@ -186,7 +191,9 @@ void TabletLocalizer::note_views(const Imager& camera,
     }
 }
 
-TabletPose TabletLocalizer::look(const cv::Mat& bgr, std::span<const Body> bodies, std::span<const Track> tracks) {
+TabletPose TabletLocalizer::look(const cv::Mat& bgr,
+                                 std::span<const Body> bodies,
+                                 std::span<const Track> tracks) {
   cv::Mat grey;
   cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
   views_.clear();

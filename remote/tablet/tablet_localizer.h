@@ -10,8 +10,8 @@
 #include "core/imager.h"
 #include "core/marker.h"
 #include "core/track.h"
-#include "tracker/detector.h"
 #include "tracker/body_correspondences.h"
+#include "tracker/detector.h"
 
 namespace limn::apps {
 
@@ -36,7 +36,8 @@ struct TabletPose {
 class TabletLocalizer {
  public:
   /// `lenses` are what is known of the device's from before, one for each aspect ratio of its images.
-  explicit TabletLocalizer(tracker::Families families, std::span<const calib::IntrinsicsEstimate> lenses = {});
+  explicit TabletLocalizer(tracker::Families families,
+                           std::span<const calib::IntrinsicsEstimate> lenses = {});
 
   /// `bgr` is a whole image, sRGB, of any size. `bodies` are what markers stand on, `tracks` where those
   /// are; a body without a track, or with a lost one, is not to be gone by.

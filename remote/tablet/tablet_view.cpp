@@ -16,20 +16,20 @@
 #include <set>
 #include <thread>
 
-#include "session/grid_and_split.h"
-#include "session/stillness.h"
-#include "core/stopwatch.h"
-#include "core/screen_encoding.h"
-#include "remote/tablet/tablet_localizer.h"
-#include "remote/tablet/tablet_image.h"
-#include "remote/tablet/intrinsics_store.h"
 #include "core/config.h"
 #include "core/log.h"
+#include "core/screen_encoding.h"
+#include "core/stopwatch.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"
-#include "projector/renderer.h"
 #include "projector/composite_policy.h"
+#include "projector/renderer.h"
+#include "remote/tablet/intrinsics_store.h"
+#include "remote/tablet/tablet_image.h"
+#include "remote/tablet/tablet_localizer.h"
 #include "scene/posed_scene.h"
+#include "session/grid_and_split.h"
+#include "session/stillness.h"
 #include "tracker/family.h"
 
 namespace limn::apps {
@@ -281,12 +281,12 @@ TabletView::Impl::Watching& TabletView::Impl::watching_of(const std::string& dev
 
 // Parts over an image with another look left of the split, if there is one.
 cv::Mat TabletView::Impl::drawn(const Imager& camera,
-                              const cv::Mat& image,
-                              const scene::PosedScene& posed,
-                              std::span<const Track> tracks,
-                              const Known& known,
-                              TabletViewMode parts,
-                              Sides* shown) {
+                                const cv::Mat& image,
+                                const scene::PosedScene& posed,
+                                std::span<const Track> tracks,
+                                const Known& known,
+                                TabletViewMode parts,
+                                Sides* shown) {
   const cv::Mat right = with_parts(camera, image, posed, known, parts, &shown->right);
   const auto left = scene::left_of_split(*known.scene, known.show_state);
   const auto line =
@@ -299,11 +299,11 @@ cv::Mat TabletView::Impl::drawn(const Imager& camera,
 // Parts over an image. As the room's screen treats them `view` parts that light shows to another eye than
 // this camera's are drawn whole.
 cv::Mat TabletView::Impl::with_parts(const Imager& camera,
-                                   const cv::Mat& image,
-                                   const scene::PosedScene& posed,
-                                   const Known& known,
-                                   TabletViewMode parts,
-                                   Shown* shown) {
+                                     const cv::Mat& image,
+                                     const scene::PosedScene& posed,
+                                     const Known& known,
+                                     TabletViewMode parts,
+                                     Shown* shown) {
   const bool as_screen = parts == TabletViewMode::as_screen;
   if (parts == TabletViewMode::full || (as_screen && known.show_state.screen == scene::Screen::full))
     return renderer->composite(camera, image, posed, projector::Composite::full);
@@ -408,7 +408,7 @@ TabletView::Seen TabletView::Impl::seen_in_room(const Known& known) {
 TabletView::TabletView(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 Result<std::unique_ptr<TabletView>> TabletView::create(const SessionSetup& setup,
-                                                   std::filesystem::path lens_folder) {
+                                                       std::filesystem::path lens_folder) {
   auto impl = std::make_unique<Impl>();
   impl->rig = setup.rig;
   impl->lens_folder = std::move(lens_folder);
@@ -458,7 +458,9 @@ void TabletView::know(const Session& session) {
   impl_->known = std::move(known);
 }
 
-void TabletView::look(const Window& window, std::vector<std::uint8_t> jpeg, std::function<void(Seen)> answer) {
+void TabletView::look(const Window& window,
+                      std::vector<std::uint8_t> jpeg,
+                      std::function<void(Seen)> answer) {
   {
     const std::lock_guard lock(impl_->mutex);
     const auto before = std::find_if(impl_->guests.begin(), impl_->guests.end(), [&](const Guest& guest) {

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "core/result.h"
+#include "remote/tablet/tablet_view_mode.h"
 #include "session/recording.h"
 #include "session/session.h"
-#include "remote/tablet/tablet_view_mode.h"
-#include "core/result.h"
 
 namespace limn::apps {
 
@@ -24,7 +24,7 @@ class TabletView {
   /// `lens_folder` keeps what is known of guests' lenses; made when there is something to keep. Errors: no GL
   /// context, marker families that cannot be loaded, a scene that cannot be drawn.
   static Result<std::unique_ptr<TabletView>> create(const SessionSetup& setup,
-                                                  std::filesystem::path lens_folder);
+                                                    std::filesystem::path lens_folder);
   /// Everybody who still waits is answered first, with nothing.
   ~TabletView();
 

@@ -5,15 +5,15 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "wizard/capture/capture_plan.h"
 #include "apps/capture.h"
 #include "apps/solve.h"
-#include "wizard/capture/virtual_capture.h"
-#include "tracker/marker_image.h"
 #include "core/file.h"
 #include "core/rig.h"
 #include "sim/world.h"
 #include "tests/support/matchers.h"
+#include "tracker/marker_image.h"
+#include "wizard/capture/capture_plan.h"
+#include "wizard/capture/virtual_capture.h"
 
 // Every code's whole way on the virtual rig: a plan, its captures, the rig that they give.
 

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include <nlohmann/json.hpp>
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <sstream>
 
@@ -380,7 +380,8 @@ TEST_F(CommandLine, ConfigsWithAnyValueSpoiledNeverCrash) {
 }
 
 TEST_F(CommandLine, BenchNamesTheBenchesThereAre) {
-  expect({"bench", "tracking"}, 2, {"tracking", "tracker, id, calib, solve, projector, live, remote, tablet"});
+  expect({"bench", "tracking"}, 2,
+         {"tracking", "tracker, id, calib, solve, projector, live, remote, tablet"});
 }
 
 TEST_F(CommandLine, BenchSaysWhichProgramIsMissing) {  // none stands beside the test's own

@@ -8,8 +8,8 @@
 #include <sstream>
 
 #include "apps/command_line.h"
-#include "design/rig_description.h"
 #include "core/file.h"
+#include "design/rig_description.h"
 
 namespace limn::apps {
 namespace {

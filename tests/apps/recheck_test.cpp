@@ -8,11 +8,11 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "tracker/marker_image.h"
 #include "core/file.h"
 #include "core/rig.h"
 #include "sim/world.h"
 #include "tests/support/matchers.h"
+#include "tracker/marker_image.h"
 
 namespace limn::apps {
 namespace {

@@ -7,19 +7,19 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/align.h"
-#include "wizard/capture/capture_plan.h"
-#include "wizard/capture/virtual_capture.h"
-#include "tracker/marker_image.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/rig.h"
 #include "scene/marker_file.h"
 #include "scene/mesh_bvh.h"
-#include "scene/scan_surface.h"
 #include "scene/posed_scene.h"
+#include "scene/scan_surface.h"
 #include "sim/truth.h"
 #include "sim/world.h"
 #include "tests/support/matchers.h"
+#include "tracker/marker_image.h"
+#include "wizard/capture/capture_plan.h"
+#include "wizard/capture/virtual_capture.h"
 
 namespace limn::apps {
 namespace {

@@ -5,12 +5,12 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
-#include "tracker/marker_image.h"
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/rig.h"
 #include "sim/world.h"
 #include "tests/support/matchers.h"
+#include "tracker/marker_image.h"
 
 namespace limn {
 namespace {

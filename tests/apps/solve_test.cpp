@@ -13,17 +13,17 @@
 #include <opencv2/imgproc.hpp>
 #include <regex>
 
-#include "tracker/marker_image.h"
 #include "calib/board/board.h"
 #include "calib/capture.h"
 #include "calib/code/patterns.h"
 #include "calib/response/response_patterns.h"
 #include "core/file.h"
-#include "core/median.h"
 #include "core/image_io.h"
+#include "core/median.h"
 #include "core/rig.h"
 #include "tests/calib/true_rig.h"
 #include "tests/support/matchers.h"
+#include "tracker/marker_image.h"
 
 namespace limn::apps {
 namespace {

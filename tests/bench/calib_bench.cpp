@@ -14,8 +14,6 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
-#include "wizard/capture/capture_plan.h"
-#include "wizard/capture/virtual_capture.h"
 #include "calib/board/board_dictionary.h"
 #include "calib/capture.h"
 #include "calib/judge/assess.h"
@@ -23,6 +21,8 @@
 #include "sim/sensor_model.h"
 #include "sim/trace.h"
 #include "tests/calib/true_rig.h"
+#include "wizard/capture/capture_plan.h"
+#include "wizard/capture/virtual_capture.h"
 
 namespace limn::test {
 namespace {
@@ -107,12 +107,12 @@ Result<calib::CaptureSet> captured(const TrueRig& truth, const fs::path& folder)
     const sim::Samples samples = sim::trace(world, 0);
     cv::Mat shown;
     const calib::CaptureBackend stage{.show = [&](int, const cv::Mat& image) -> Status {
-                               shown = image.clone();
-                               return {};
-                             },
-                             .grab = [&](int) -> Result<cv::Mat> {
-                               return sim::photograph(world, samples, {&shown, 1}, seed++);
-                             }};
+                                        shown = image.clone();
+                                        return {};
+                                      },
+                                      .grab = [&](int) -> Result<cv::Mat> {
+                                        return sim::photograph(world, samples, {&shown, 1}, seed++);
+                                      }};
     LIMN_TRY_STATUS(calib::capture_pose(plan, static_cast<int>(pose), stage));
   }
   cv::imwrite((folder / "complete.png").string(), cv::Mat::zeros(1, 1, CV_8U));
@@ -200,8 +200,8 @@ std::vector<View> opencv_views(const calib::CaptureSet& captures) {
   for (const calib::CapturedPose& pose : captures.poses) {
     const auto& images = pose.images[0][0];
     const cv::Mat labels = opencv_labels(captures.patterns[0], images);
-    const cv::Mat white = cv::imread(images[static_cast<size_t>(captures.patterns[0].white())].string(),
-                                     cv::IMREAD_GRAYSCALE);
+    const cv::Mat white =
+        cv::imread(images[static_cast<size_t>(captures.patterns[0].white())].string(), cv::IMREAD_GRAYSCALE);
     View view;
     for (const auto& [id, px] : opencv_corners(captures.board, white)) {
       const auto lit = local_corner(labels, px);

@@ -18,28 +18,28 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "core/image_io.h"
+#include "core/median.h"
+#include "device/gl_context.h"
+#include "device/jpeg.h"
 #include "session/latest.h"
+#include "session/perception.h"
 #include "session/recording.h"
 #include "session/script.h"
 #include "session/session.h"
-#include "session/perception.h"
-#include "tracker/marker_image.h"
-#include "core/median.h"
-#include "core/image_io.h"
-#include "device/gl_context.h"
-#include "device/jpeg.h"
 #include "sim/virtual_rig.h"
 #include "tests/bench/tracker_peers.h"
+#include "tracker/marker_image.h"
 #include "tracker/predict.h"
 
 namespace limn::test {
 namespace {
 
 namespace fs = std::filesystem;
+using apps::Perception;
+using apps::Percepts;
 using apps::Session;
 using apps::SessionSetup;
-using apps::Percepts;
-using apps::Perception;
 
 constexpr double k_lag_s = 0.06;
 
@@ -181,7 +181,8 @@ void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup, const
   fmt::print("{}: {} frames of 1280x1024, {:.1f} markers each; mean processor ms\n", wire.name, decode.size(),
              static_cast<double>(markers) / static_cast<double>(decode.size()));
   fmt::print(
-      "decode {:.2f}, find markers {:.2f}, poses and motions {:.2f} (by the wall), hand-over and prediction {:.2f}: "
+      "decode {:.2f}, find markers {:.2f}, poses and motions {:.2f} (by the wall), hand-over and prediction "
+      "{:.2f}: "
       "{:.2f}\n",
       mean(decode), mean(watch) - mean(filter), mean(filter), mean(hand), ours);
   fmt::print(

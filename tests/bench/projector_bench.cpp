@@ -14,12 +14,12 @@
 #include <map>
 #include <opencv2/imgproc.hpp>
 
-#include "tracker/marker_image.h"
 #include "core/median.h"
 #include "device/gl_context.h"
 #include "projector/gl.h"
 #include "projector/renderer.h"
 #include "sim/world.h"
+#include "tracker/marker_image.h"
 
 namespace limn::test {
 namespace {
@@ -255,8 +255,8 @@ int run(int frames) {
   fmt::print("\n  composites, {}x{}                        ms   of copies of this size\n", camera.width,
              camera.height);
   const auto composite = [&](const char* name, const std::function<scene::PosedScene()>& place) {
-    const double ms = median_ms(
-        frames, [&] { (void)renderer->composite(0, image, place(), projector::Composite::full); });
+    const double ms =
+        median_ms(frames, [&] { (void)renderer->composite(0, image, place(), projector::Composite::full); });
     fmt::print("  {:<38}  {:6.2f}  {:5.2f}\n", name, ms, ms / (copy * scale));
   };
   composite("a part moves", moved);

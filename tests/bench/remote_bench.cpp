@@ -17,16 +17,16 @@
 #include <thread>
 #include <vector>
 
-#include "core/scale_resolution.h"
-#include "session/session.h"
-#include "session/perception.h"
-#include "remote/server.h"
-#include "tracker/marker_image.h"
 #include "core/log.h"
 #include "core/median.h"
+#include "core/scale_resolution.h"
 #include "device/gl_context.h"
+#include "remote/server.h"
+#include "session/perception.h"
+#include "session/session.h"
 #include "sim/virtual_rig.h"
 #include "tests/remote/remote_client.h"
+#include "tracker/marker_image.h"
 
 namespace limn::test {
 namespace {
@@ -49,8 +49,7 @@ class Stage {
  public:
   Stage() : context_(device::GlContext::create().value()) {
     sim::World world =
-        sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image)
-            .value();
+        sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
     static_cast<void>(apps::scale_resolution(k_resolution, &world.rig).ok());
     setup_.rig = world.rig;
     setup_.scene = *world.scene;

@@ -19,18 +19,18 @@
 #include <opencv2/imgproc.hpp>
 #include <thread>
 
-#include "session/session.h"
-#include "session/perception.h"
-#include "remote/tablet/tablet_view.h"
-#include "tracker/marker_image.h"
 #include "core/median.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"
+#include "remote/tablet/tablet_view.h"
+#include "session/perception.h"
+#include "session/session.h"
 #include "sim/truth.h"
 #include "sim/virtual_rig.h"
 #include "tests/remote/virtual_tablet.h"
 #include "tracker/detector.h"
 #include "tracker/family.h"
+#include "tracker/marker_image.h"
 
 namespace limn::test {
 namespace {
@@ -85,7 +85,8 @@ struct Room {
 
 apps::TabletView::Seen look(apps::TabletView* tablet_view, const std::vector<std::uint8_t>& jpeg) {
   std::promise<apps::TabletView::Seen> answered;
-  tablet_view->look({k_device}, jpeg, [&](apps::TabletView::Seen seen) { answered.set_value(std::move(seen)); });
+  tablet_view->look({k_device}, jpeg,
+                    [&](apps::TabletView::Seen seen) { answered.set_value(std::move(seen)); });
   return answered.get_future().get();
 }
 

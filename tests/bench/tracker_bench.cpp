@@ -22,9 +22,9 @@
 #include <string>
 #include <vector>
 
+#include "core/image_io.h"
 #include "core/imager_file.h"
 #include "core/median.h"
-#include "core/image_io.h"
 #include "tests/bench/tracker_frames.h"
 #include "tests/bench/tracker_peers.h"
 #include "tracker/detector.h"
@@ -317,7 +317,7 @@ void bench_hostile(const Options& options) {
       {"nested squares", test::nested_squares(k_width, k_height)}};
   for (const int square : {1, 2, 3, 5, 8, 12, 20, 40})
     images.emplace_back(fmt::format("checkerboard of {} px", square),
-                          test::checkerboard(k_width, k_height, square));
+                        test::checkerboard(k_width, k_height, square));
   const double ordinary =
       least_ms(limn, test::cluttered_frame(k_width, k_height, 1000 * options.seed).grey, 1);
   fmt::print("\n  {:<40}{:>18}{:>10.2f}\n", "hostile, 1280x720", "ms; ordinary:", ordinary);

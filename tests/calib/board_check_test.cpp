@@ -53,7 +53,7 @@ std::string said(const std::string& described, const std::string& shown) {
   EXPECT_TRUE(begin_captures(plan).ok());
   const cv::Mat view = view_of(shown);
   const CaptureBackend backend{.show = [](int, const cv::Mat&) { return Status(); },
-                    .grab = [&](int) { return Result<cv::Mat>(view); }};
+                               .grab = [&](int) { return Result<cv::Mat>(view); }};
   EXPECT_TRUE(capture_pose(plan, 0, backend).ok());
   Observations observations;
   for (const BoardCorner& corner : find_board(plan.board, view))

@@ -153,7 +153,7 @@ TEST(CaptureSet, ImportTakesForeignNames) {
           write_png(folder / pose / fmt::format("gray_{}.png", i), cv::Mat(6, 9, CV_8U, cv::Scalar(i))).ok());
   }
   ForeignCaptureSet foreign{folder,       4, 4, Board::parse("chessboard:9x7:75mm").value(), "capture_*",
-                          "gray_*.png", {}};
+                            "gray_*.png", {}};
   const auto read = import_opencv_gray(foreign);
   ASSERT_TRUE(read.ok()) << read.message();
   ASSERT_EQ(read->poses.size(), 2U);

@@ -113,7 +113,7 @@ TEST(Predict, AMatchLiesOnTheBentSheetAndOnTheCameraRay) {
   const Scene scene;
   Vector3d p_world;
   ASSERT_TRUE(intersect_board(scene.camera_view(), scene.world_from_board, scene.shape, scene.bend,
-                         scene.px_camera, &p_world));
+                              scene.px_camera, &p_world));
   const Vector3d p_board = scene.world_from_board.inverse() * p_world;
   EXPECT_NEAR(p_board.z(), scene.shape.z(scene.bend, p_board.x(), p_board.y()), 1e-12);
   const auto px = scene.camera.project(scene.camera_from_world * p_world);

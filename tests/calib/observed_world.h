@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "calib/observations.h"
 #include "calib/measurement_model.h"
+#include "calib/observations.h"
 #include "core/rig.h"
 #include "tests/support/matchers.h"
 

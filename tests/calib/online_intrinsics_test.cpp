@@ -70,7 +70,10 @@ BodyView seen(const IntrinsicsEstimate& lens,
 }
 
 // The estimate after a camera has viewed the markers in this many images.
-OnlineIntrinsics looked_round(const IntrinsicsEstimate& truth, const IntrinsicsEstimate& before, int images, Rng* rng) {
+OnlineIntrinsics looked_round(const IntrinsicsEstimate& truth,
+                              const IntrinsicsEstimate& before,
+                              int images,
+                              Rng* rng) {
   OnlineIntrinsics lens(before);
   for (int i = 0; i < images; ++i)
     if (lens.add(seen(truth, drawn_place(rng, 0.8, 0.9), markers(0.01), rng))) lens.improve();

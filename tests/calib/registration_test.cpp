@@ -9,11 +9,11 @@
 #include <optional>
 #include <random>
 
-#include "tracker/marker_image.h"
 #include "sim/car_door.h"
 #include "sim/truth.h"
 #include "sim/world.h"
 #include "tests/support/matchers.h"
+#include "tracker/marker_image.h"
 
 namespace limn::calib {
 namespace {
@@ -45,10 +45,10 @@ std::vector<std::optional<sim::Landing>> landings(const sim::World& world) {
 // The same as a scan with noise along the rays. Columns from `first` to `last`, as shares of the image, are
 // visible.
 scene::ScanSurface scan_captures(const sim::World& world,
-                       const std::vector<std::optional<sim::Landing>>& landings,
-                       double first,
-                       double last,
-                       std::mt19937_64& rng) {
+                                 const std::vector<std::optional<sim::Landing>>& landings,
+                                 double first,
+                                 double last,
+                                 std::mt19937_64& rng) {
   const Vector3d eye = world.rig.cameras[0].imager_from_world.inverse().translation;
   const int columns = world.rig.cameras[0].width / k_step, rows = static_cast<int>(landings.size()) / columns;
   std::normal_distribution<double> noise(0, k_noise_m);

@@ -52,7 +52,8 @@ TEST(Report, ThePageIsSelfContainedAndSaysTheVerdictInWords) {
     EXPECT_EQ(html.find(outside), std::string::npos) << outside;
   EXPECT_NE(html.find("Predicted error"), std::string::npos)
       << "the verdict's sentence starts without the verdict itself";
-  for (const std::string& sentence : report.explanation.advice) EXPECT_NE(html.find(sentence), std::string::npos);
+  for (const std::string& sentence : report.explanation.advice)
+    EXPECT_NE(html.find(sentence), std::string::npos);
   EXPECT_NE(html.find("odd &lt;fault&gt;"), std::string::npos);
   EXPECT_EQ(html.find("nan"), std::string::npos);
   EXPECT_EQ(html.find("inf"), std::string::npos);

@@ -1,5 +1,3 @@
-#include "calib/response/measure_response.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +7,7 @@
 
 #include "calib/response/camera_response.h"
 #include "calib/response/colour_mixing.h"
+#include "calib/response/measure_response.h"
 #include "calib/response/response_patterns.h"
 #include "calib/response/response_shots.h"
 #include "core/file.h"
@@ -99,7 +98,7 @@ double foretold_error(const MeasuredResponse& measured, sim::World world, const 
   const cv::Mat black = taken({0, 0, 0}), white = taken({255, 255, 255}),
                 photo = taken({bgr[0] * 1.0, bgr[1] * 1.0, bgr[2] * 1.0});
   const cv::Mat foretold = predicted_photograph(measured.mixings.at(0), measured.responses.projectors.at(0),
-                                               measured.responses.cameras.at(0), bgr)
+                                                measured.responses.cameras.at(0), bgr)
                                .reshape(1);
   double squares = 0;
   int count = 0;

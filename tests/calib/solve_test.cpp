@@ -296,7 +296,8 @@ TEST(Assess, NoticesABoardThatMovedWhileItWasCaptured) {
 TEST(Assess, LeavesOutABoardWhoseCornersAreOnALine) {
   World world = make_world(1, 1, 6, 0.5);
   add_noise(&world, 0.05, 0.05, test_rng());
-  std::erase_if(world.observations.corners, [](const CornerObservation& c) { return c.pose == 4 && c.corner >= 5; });
+  std::erase_if(world.observations.corners,
+                [](const CornerObservation& c) { return c.pose == 4 && c.corner >= 5; });
   const auto solution = solve(world.observations);
   ASSERT_TRUE(solution.ok()) << solution.message();
   const auto assessment = assess({world.observations, {}, {}, 0, 0}, {}, *solution);

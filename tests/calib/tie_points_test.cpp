@@ -70,7 +70,8 @@ TEST(FreePointsOfAScene, AreSpreadAndAsSharpAsTheyClaim) {
     const TiePoint& point = o.points[static_cast<size_t>(tie_observation.point)];
     EXPECT_EQ(point.pose, 3);
     const auto which = static_cast<size_t>(tie_observation.imager);
-    const Imager& seeing = tie_observation.by_projector ? world.rig.projectors[which] : world.rig.cameras[which];
+    const Imager& seeing =
+        tie_observation.by_projector ? world.rig.projectors[which] : world.rig.cameras[which];
     const auto p = wall_at(world.rig.cameras[static_cast<size_t>(point.camera)], point.px_camera);
     const auto px = seeing.project(*p);
     ASSERT_TRUE(px.has_value());
@@ -122,7 +123,8 @@ TEST(RoomPoints, SurroundTheBoardAndLeaveItOut) {
   ASSERT_FALSE(o.tie_observations.empty());
   EXPECT_EQ(o.tie_observations.front().point, 1);
   for (const TiePointObservation& tie_observation : o.tie_observations) {
-    const auto p = wall_at(world.rig.cameras[1], o.points[static_cast<size_t>(tie_observation.point)].px_camera);
+    const auto p =
+        wall_at(world.rig.cameras[1], o.points[static_cast<size_t>(tie_observation.point)].px_camera);
     EXPECT_LT((*world.rig.projectors[0].project(*p) - tie_observation.px).norm(), 0.3);
   }
 }

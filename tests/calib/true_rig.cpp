@@ -216,8 +216,8 @@ std::vector<double> errors_at(const TrueRig& truth,
   for (const ReferenceRenderer& reference : aims) {
     const auto px = calibrated.projectors[0].project(measured * reference.p);
     if (!px) continue;
-    const auto error =
-        error_mm(scene, projector, *px, world_from_prototype * reference.p, world_from_prototype.rotation * reference.n);
+    const auto error = error_mm(scene, projector, *px, world_from_prototype * reference.p,
+                                world_from_prototype.rotation * reference.n);
     if (error) errors.push_back(*error);
   }
   return errors;

@@ -1,12 +1,13 @@
+#include "design/rig_design.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "design/design_report.h"
-#include "design/rig_design.h"
 #include "apps/plan_rig.h"
 #include "core/file.h"
+#include "design/design_report.h"
 #include "tests/support/matchers.h"
 
 namespace limn::apps {

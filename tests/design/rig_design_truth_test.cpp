@@ -8,14 +8,14 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/calibrate.h"
-#include "design/rig_design.h"
-#include "wizard/capture/capture_plan.h"
-#include "tracker/marker_image.h"
 #include "calib/solve.h"
 #include "core/file.h"
+#include "design/rig_design.h"
 #include "sim/world.h"
 #include "tests/calib/true_rig.h"
 #include "tests/support/matchers.h"
+#include "tracker/marker_image.h"
+#include "wizard/capture/capture_plan.h"
 
 namespace limn::apps {
 namespace {
@@ -84,7 +84,8 @@ void check_rig(DescribedRig described,
     const double reported_mm = report["predicted_error_mm"]["per_projector"][rig->projectors[i].name];
     std::printf("%s, %s: foreseen %.3f mm (calibration %.3f, measuring %.3f), reported %.3f, true %.3f\n",
                 plan.stem().c_str(), rig->projectors[i].name.c_str(), predicted_accuracy->error_mm[i],
-                predicted_accuracy->calibration_mm[i], predicted_accuracy->measuring_mm[i], reported_mm, true_mm);
+                predicted_accuracy->calibration_mm[i], predicted_accuracy->measuring_mm[i], reported_mm,
+                true_mm);
     expect_within_two(predicted_accuracy->error_mm[i], reported_mm,
                       rig->projectors[i].name + " as the report states it");
     expect_within_two(predicted_accuracy->error_mm[i], true_mm, rig->projectors[i].name + " as it truly is");

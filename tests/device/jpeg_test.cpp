@@ -30,8 +30,8 @@ std::vector<uchar> sampled(const cv::Mat& image, int sampling) {
   const tjhandle encoder = tjInitCompress();
   unsigned char* data = nullptr;
   unsigned long size = 0;
-  EXPECT_EQ(tjCompress2(encoder, image.data, image.cols, static_cast<int>(image.step), image.rows,
-                        TJPF_BGR, &data, &size, sampling, 95, 0),
+  EXPECT_EQ(tjCompress2(encoder, image.data, image.cols, static_cast<int>(image.step), image.rows, TJPF_BGR,
+                        &data, &size, sampling, 95, 0),
             0);
   const std::vector<uchar> bytes(data, data + size);
   tjFree(data);

@@ -54,7 +54,7 @@ cv::Mat lit(cv::Point position, cv::Size size) {
     for (int x = 0; x < size.width; ++x) {
       const unsigned long pixel = XGetPixel(x_image, x, y);
       image.at<cv::Vec3b>(y, x) = {static_cast<uchar>(pixel), static_cast<uchar>(pixel >> 8),
-                                     static_cast<uchar>(pixel >> 16)};
+                                   static_cast<uchar>(pixel >> 16)};
     }
   if (x_image) XDestroyImage(x_image);
   XCloseDisplay(server);

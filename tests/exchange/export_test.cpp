@@ -11,16 +11,16 @@
 #include <opencv2/imgproc.hpp>
 #include <regex>
 
-#include "exchange/mpcdi_reader.h"
-#include "exchange/mpcdi_writer.h"
-#include "exchange/pfm.h"
-#include "exchange/zip.h"
 #include "apps/import.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/rig.h"
 #include "device/gl_context.h"
+#include "exchange/mpcdi_reader.h"
+#include "exchange/mpcdi_writer.h"
+#include "exchange/pfm.h"
+#include "exchange/zip.h"
 #include "projector/renderer.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"

@@ -125,7 +125,7 @@ TEST(Markers, LearnABodyFromItsImages) {
     options.images.push_back(folder / fmt::format("{}.png", image));
     ASSERT_TRUE(
         write_png(options.images.back(), test::image_of(camera.lens, test::plain(800, 600, 100), markers,
-                                                          {.blur_px = 0.6, .noise_levels = 2}, rng)));
+                                                        {.blur_px = 0.6, .noise_levels = 2}, rng)));
   }
   const Status status = run_learn_body(options);
   ASSERT_TRUE(status) << status.message();

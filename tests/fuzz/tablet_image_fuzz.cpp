@@ -1,6 +1,6 @@
 // What a guest's tablet sends as its image: decoded or refused, and looked at like any other.
-#include "remote/tablet/tablet_localizer.h"
 #include "remote/tablet/tablet_image.h"
+#include "remote/tablet/tablet_localizer.h"
 #include "tests/fuzz/fuzz_file.h"
 #include "tracker/family.h"
 

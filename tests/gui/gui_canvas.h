@@ -9,9 +9,9 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "gui/gui.h"
 #include "core/image_io.h"
 #include "device/gl_context.h"
+#include "gui/gui.h"
 
 namespace limn::test {
 

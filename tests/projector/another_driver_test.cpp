@@ -127,7 +127,7 @@ void expect_same_images(const std::string& driver, const Settings& settings) {
 TEST(AnotherDriver, OfScalarShadersDrawsTheSame) {
   // It says 3.3, and does what is asked of it here.
   expect_same_images("softpipe",
-                       {{"MESA_GL_VERSION_OVERRIDE", "4.5"}, {"MESA_GLSL_VERSION_OVERRIDE", "450"}});
+                     {{"MESA_GL_VERSION_OVERRIDE", "4.5"}, {"MESA_GLSL_VERSION_OVERRIDE", "450"}});
 }
 
 TEST(AnotherDriver, OfVulkanDrawsTheSame) {

@@ -68,8 +68,8 @@ cv::Mat paint() {
   for (int y = 0; y < image.rows; ++y)
     for (int x = 0; x < image.cols; ++x)
       image.at<cv::Vec3b>(y, x) = cv::Vec3b(static_cast<uchar>(190 + 45 * std::sin(x / 80.0)),
-                                              static_cast<uchar>(190 + 45 * std::sin(y / 60.0 + 1)),
-                                              static_cast<uchar>(190 + 45 * std::cos((x + y) / 90.0)));
+                                            static_cast<uchar>(190 + 45 * std::sin(y / 60.0 + 1)),
+                                            static_cast<uchar>(190 + 45 * std::cos((x + y) / 90.0)));
   cv::putText(image, "LIMN", {60, 230}, cv::FONT_HERSHEY_DUPLEX, 4, cv::Scalar(235, 190, 170), 14,
               cv::LINE_AA);
   return image;

@@ -269,8 +269,9 @@ TEST_F(RendererTest, EachPartOfACompositeIsTreatedInItsOwnWay) {
   ASSERT_GT(cv::norm(full(left), rest(left), cv::NORM_INF), 30);
   ASSERT_GT(cv::norm(full(right), rest(right), cv::NORM_INF), 30);
   for (const bool left_whole : {true, false, true}) {
-    const std::vector<CompositePolicy> policies = {{"left", left_whole ? Composite::full : Composite::rest, 0},
-                                               {"right", left_whole ? Composite::rest : Composite::full, 0}};
+    const std::vector<CompositePolicy> policies = {
+        {"left", left_whole ? Composite::full : Composite::rest, 0},
+        {"right", left_whole ? Composite::rest : Composite::full, 0}};
     const cv::Mat out = drawing.composite(0, image, posed, policies);
     EXPECT_EQ(cv::norm(out(left), (left_whole ? full : rest)(left), cv::NORM_INF), 0);
     EXPECT_EQ(cv::norm(out(right), (left_whole ? rest : full)(right), cv::NORM_INF), 0);
@@ -644,10 +645,9 @@ TEST_F(RendererTest, AnImageAfterOthersIsTheSameAsTheFirstOfItsKind) {
            anew_in_shadow = renderer(scene, two_projectors());
   anew_in_shadow.set_occlusion(1, shadow);
   (void)drawing.projector_image(0, still, viewer);
-  EXPECT_EQ(
-      cv::norm(drawing.projector_image(0, part_moved, viewer),
-               renderer(scene, two_projectors()).projector_image(0, part_moved, viewer), cv::NORM_INF),
-      0);
+  EXPECT_EQ(cv::norm(drawing.projector_image(0, part_moved, viewer),
+                     renderer(scene, two_projectors()).projector_image(0, part_moved, viewer), cv::NORM_INF),
+            0);
   EXPECT_EQ(cv::norm(drawing.projector_image(0, all_moved, viewer),
                      anew.projector_image(0, all_moved, viewer), cv::NORM_INF),
             0);

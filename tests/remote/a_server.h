@@ -14,8 +14,8 @@
 #include <thread>
 #include <vector>
 
-#include "remote/server.h"
 #include "core/file.h"
+#include "remote/server.h"
 #include "tests/remote/remote_client.h"
 #include "tests/support/matchers.h"
 

@@ -9,24 +9,24 @@
 #include <set>
 #include <thread>
 
+#include "apps/replay.h"
+#include "core/file.h"
+#include "core/image_io.h"
 #include "core/scale_resolution.h"
+#include "device/gl_context.h"
+#include "device/image_sequence_camera.h"
+#include "device/jpeg.h"
+#include "remote/server.h"
 #include "session/camera_threads.h"
 #include "session/device_session.h"
 #include "session/latest.h"
 #include "session/live_recalibration.h"
-#include "apps/replay.h"
 #include "session/source_clock.h"
-#include "remote/server.h"
-#include "tracker/marker_image.h"
-#include "core/file.h"
-#include "core/image_io.h"
-#include "device/gl_context.h"
-#include "device/jpeg.h"
-#include "device/image_sequence_camera.h"
 #include "sim/virtual_rig.h"
 #include "tests/remote/remote_client.h"
 #include "tests/support/clicker.h"
 #include "tests/support/matchers.h"
+#include "tracker/marker_image.h"
 
 namespace limn::apps {
 namespace {
@@ -202,8 +202,9 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
   ASSERT_TRUE(session) << session.message();
   SessionDevices devices;
   devices.cameras.push_back(std::make_unique<LooseCamera>(
-      device::ImageSequenceCamera::open(folder / "pictures", {.frames_per_second = 20, .repeat = true}).value(), 8,
-      16));
+      device::ImageSequenceCamera::open(folder / "pictures", {.frames_per_second = 20, .repeat = true})
+          .value(),
+      8, 16));
   const Imager& first = setup.rig.projectors[0];
   auto canvas = std::make_unique<Canvas>(first.name, cv::Size(first.width, first.height));
   const Canvas& projector = *canvas;
@@ -335,7 +336,8 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1500));
     is_ended = true;
   });
-  const Status played = play_on_devices(&devices, 60, is_ended, {*perception, *session, *output, {server.get()}});
+  const Status played =
+      play_on_devices(&devices, 60, is_ended, {*perception, *session, *output, {server.get()}});
   guest.join();
   ASSERT_TRUE(played.ok()) << played.message();
   ASSERT_TRUE(output->close(&*session, false).ok());

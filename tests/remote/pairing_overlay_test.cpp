@@ -7,15 +7,15 @@
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
 
-#include "session/session.h"
-#include "session/perception.h"
-#include "gui/qr_code.h"
-#include "tracker/marker_image.h"
 #include "core/image_io.h"
 #include "device/gl_context.h"
+#include "gui/qr_code.h"
+#include "session/perception.h"
+#include "session/session.h"
 #include "sim/virtual_rig.h"
 #include "tests/remote/virtual_tablet.h"
 #include "tests/support/matchers.h"
+#include "tracker/marker_image.h"
 
 namespace limn::apps {
 namespace {
@@ -70,7 +70,8 @@ TEST(CodeSign, IsReadOnThePrototype) {
   const cv::Mat points = session.free_surface(0);
   const Eigen::Vector3d d_up = world_from_prototype.rotation.inverse() * Eigen::Vector3d::UnitZ();
   const auto begun = std::chrono::steady_clock::now();
-  const auto place = overlay_place(setup.rig.projectors[0], world_from_prototype, points, d_up, sign.size(), 70);
+  const auto place =
+      overlay_place(setup.rig.projectors[0], world_from_prototype, points, d_up, sign.size(), 70);
   const double ms = 1e3 * seconds_between(begun, std::chrono::steady_clock::now());
   ASSERT_TRUE(place.has_value());
   light[0] = light[0].clone();
@@ -96,7 +97,8 @@ TEST(CodeSign, IsReadOnThePrototype) {
   // A PIN alone finds room where the code does not.
   const cv::Mat pin = pin_image("123456", "work", 360);
   EXPECT_FALSE(overlay_place(setup.rig.projectors[0], world_from_prototype, points, d_up, sign.size(), 110));
-  const auto wide = overlay_place(setup.rig.projectors[0], world_from_prototype, points, d_up, pin.size(), 110);
+  const auto wide =
+      overlay_place(setup.rig.projectors[0], world_from_prototype, points, d_up, pin.size(), 110);
   ASSERT_TRUE(wide.has_value());
   cv::Mat alone(light[0].size(), CV_8UC3, cv::Scalar::all(0));
   draw_pairing_overlay(pin, *wide, setup.rig.projectors[0], world_from_prototype, &alone);

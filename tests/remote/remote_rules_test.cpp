@@ -7,14 +7,14 @@
 #include <regex>
 #include <set>
 
+#include "core/file.h"
+#include "gui/qr_code.h"
 #include "remote/auth_sessions.h"
 #include "remote/http.h"
 #include "remote/messages.h"
 #include "remote/own_addresses.h"
-#include "gui/qr_code.h"
 #include "remote/static_files.h"
 #include "remote/ws_client.h"
-#include "core/file.h"
 #include "tests/support/matchers.h"
 
 namespace limn::apps {
@@ -207,7 +207,8 @@ TEST(AuthSessions, OfOneNameAreToldApart) {
   AuthSessions guests;
   const AuthSessions::Time now{};
   const auto paired = [&](const std::string& name, const std::optional<AuthSessions::Guest>& replaced = {}) {
-    return std::get<AuthSessions::Paired>(guests.pair(guests.pin(Role::look), name, "10.0.0.1", now, replaced));
+    return std::get<AuthSessions::Paired>(
+        guests.pair(guests.pin(Role::look), name, "10.0.0.1", now, replaced));
   };
   const AuthSessions::Paired first = paired("Ann"), second = paired("ann");
   EXPECT_EQ(first.guest.name, "Ann");
@@ -274,9 +275,10 @@ TEST(AuthSessions, AfterAHundredWrongPinsEverybodyWaits) {
   const AuthSessions::Time now{};
   const std::string wrong = wrong_pin(guests);
   for (int i = 0; i < k_most_wrong_of_all; ++i)
-    EXPECT_TRUE(
-        std::holds_alternative<AuthSessions::WrongPin>(guests.pair(wrong, "", fmt::format("10.0.{}.1", i), now)));
-  EXPECT_TRUE(std::holds_alternative<AuthSessions::Wait>(guests.pair(guests.pin(Role::look), "", "10.1.0.1", now)));
+    EXPECT_TRUE(std::holds_alternative<AuthSessions::WrongPin>(
+        guests.pair(wrong, "", fmt::format("10.0.{}.1", i), now)));
+  EXPECT_TRUE(
+      std::holds_alternative<AuthSessions::Wait>(guests.pair(guests.pin(Role::look), "", "10.1.0.1", now)));
 }
 
 TEST(AuthSessions, ANetworkOfIPv6IsOnePlace) {

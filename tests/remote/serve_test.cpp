@@ -282,7 +282,8 @@ TEST_F(AServer, OneWindowOfAGuestIsItsTablet) {
   ImageProviders eyes;
   std::mutex mutex;
   std::map<std::string, std::string> named;  // by device
-  eyes.look = [&](const TabletView::Window& window, std::vector<std::uint8_t>, ImageProviders::Answer answer) {
+  eyes.look = [&](const TabletView::Window& window, std::vector<std::uint8_t>,
+                  ImageProviders::Answer answer) {
     {
       const std::lock_guard lock(mutex);
       named[window.device] = window.guest;

@@ -10,18 +10,18 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
-#include "core/scale_resolution.h"
 #include "apps/live.h"
 #include "apps/replay.h"
-#include "session/perception.h"
-#include "remote/pairing_overlay.h"
-#include "tracker/marker_image.h"
+#include "core/scale_resolution.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"
+#include "remote/pairing_overlay.h"
 #include "scene/comments.h"
+#include "session/perception.h"
 #include "sim/virtual_rig.h"
 #include "tests/remote/a_server.h"
 #include "tests/remote/virtual_tablet.h"
+#include "tracker/marker_image.h"
 
 namespace limn::apps {
 namespace {
@@ -339,8 +339,9 @@ TEST_F(AServedSession, ProjectsACodeForAWhile) {
   }
   const auto begun = Clock::now();
   cv::Mat sign;
-  cv::resize(0.75 * pairing_code_image(server_->invitation().url_for(Role::work), pin(Role::work), "work", 12), sign,
-             {}, 1.0 / 6, 1.0 / 6, cv::INTER_AREA);
+  cv::resize(
+      0.75 * pairing_code_image(server_->invitation().url_for(Role::work), pin(Role::work), "work", 12), sign,
+      {}, 1.0 / 6, 1.0 / 6, cv::INTER_AREA);
   const cv::Rect middle({(lit.cols - sign.cols) / 2, (lit.rows - sign.rows) / 2}, sign.size());
   EXPECT_LE(cv::norm(lit(middle), sign, cv::NORM_INF), 1);
   EXPECT_TRUE(is_painted(session_->painted().projectors[0])) << "what is recorded and told";

@@ -9,23 +9,23 @@
 #include <regex>
 #include <thread>
 
-#include "core/scale_resolution.h"
-#include "session/session.h"
-#include "session/perception.h"
-#include "remote/tablet/tablet_localizer.h"
-#include "remote/tablet/tablet_image.h"
-#include "remote/tablet/intrinsics_store.h"
-#include "remote/tablet/tablet_view.h"
-#include "tracker/marker_image.h"
 #include "core/file.h"
 #include "core/image_io.h"
+#include "core/scale_resolution.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"
+#include "remote/tablet/intrinsics_store.h"
+#include "remote/tablet/tablet_image.h"
+#include "remote/tablet/tablet_localizer.h"
+#include "remote/tablet/tablet_view.h"
+#include "session/perception.h"
+#include "session/session.h"
 #include "sim/truth.h"
 #include "sim/virtual_rig.h"
 #include "tests/remote/virtual_tablet.h"
 #include "tests/support/matchers.h"
 #include "tracker/family.h"
+#include "tracker/marker_image.h"
 
 namespace limn::apps {
 namespace {
@@ -81,7 +81,7 @@ class Room {
               TabletViewMode parts = TabletViewMode::as_screen) {
     std::promise<TabletView::Seen> answered;
     tablet_view_->look({device, "", parts}, std::move(jpeg),
-                    [&](TabletView::Seen seen) { answered.set_value(std::move(seen)); });
+                       [&](TabletView::Seen seen) { answered.set_value(std::move(seen)); });
     TabletView::Seen seen = answered.get_future().get();
     Window window{json::parse(seen.json), {}, seen.jpeg, seen.p_eye_world};
     if (!seen.jpeg.empty()) window.image = device::decode_jpeg(seen.jpeg).value();
@@ -449,11 +449,11 @@ TEST(Tablet, TheNewestImageOfADeviceWinsAndAllAreAnswered) {
   for (int i = 0; i < 2 * k_images; ++i) {
     const bool is_one = i % 2 == 0;
     room.tablet_view().look({is_one ? "tablet-one" : "tablet-other"}, is_one ? one.jpeg : other.jpeg,
-                         [&answers, i](TabletView::Seen seen) {
-                           const std::lock_guard lock(answers.mutex);
-                           answers.said[static_cast<std::size_t>(i)].push_back(json::parse(seen.json));
-                           ++answers.count;
-                         });
+                            [&answers, i](TabletView::Seen seen) {
+                              const std::lock_guard lock(answers.mutex);
+                              answers.said[static_cast<std::size_t>(i)].push_back(json::parse(seen.json));
+                              ++answers.count;
+                            });
   }
   for (int i = 0; i < 600; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
@@ -477,7 +477,7 @@ TEST(Tablet, TheNewestImageOfADeviceWinsAndAllAreAnswered) {
   std::promise<TabletView::Seen> late;
   room.tablet_view().look({k_tablet}, one.jpeg, [](const TabletView::Seen&) {});
   room.tablet_view().look({"tablet-late"}, one.jpeg,
-                       [&](TabletView::Seen seen) { late.set_value(std::move(seen)); });
+                          [&](TabletView::Seen seen) { late.set_value(std::move(seen)); });
   room.end_onlooker();
   EXPECT_EQ(late.get_future().wait_for(std::chrono::seconds(0)), std::future_status::ready);
   // What was found of the lenses is kept.

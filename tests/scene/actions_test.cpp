@@ -229,14 +229,16 @@ TEST(Actions, EachChangesWhatItIsToChangeAndNothingElse) {
   for (const Action& action : actions()) {
     const auto wanted = case_of(action.id, scene);
     ASSERT_TRUE(wanted) << action.name << ": expected a case in this test, found none.";
-    const auto after = apply_edit(scene, wanted->before, {}, make_edit(action.id, wanted->slot, wanted->value));
+    const auto after =
+        apply_edit(scene, wanted->before, {}, make_edit(action.id, wanted->slot, wanted->value));
     ASSERT_TRUE(after) << action.name << ": " << after.message();
     EXPECT_EQ(changed(wanted->before, *after), wanted->members) << action.name;
     EXPECT_TRUE(wanted->is_done(*after)) << action.name;
     if (action.argument_kind != ArgumentKind::on_off) continue;
     // A switch goes off again, and to the other side.
     const auto value = [&](const std::string& word) {
-      return changed(wanted->before, *apply_edit(scene, *after, {}, make_edit(action.id, wanted->slot, word)));
+      return changed(wanted->before,
+                     *apply_edit(scene, *after, {}, make_edit(action.id, wanted->slot, word)));
     };
     EXPECT_EQ(value("off"), Members()) << action.name;
     EXPECT_EQ(value("toggle"), Members()) << action.name;

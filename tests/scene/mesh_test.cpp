@@ -612,7 +612,8 @@ TEST(Glb, PutsMeshesInTheirPlaces) {
       {"plain", &plain, {}}, {"lifted", &textured, lifted}, {"again", &plain, lifted}};
   const std::string bytes = encode_glb(placed);
   EXPECT_EQ(bytes, encode_glb(placed));
-  EXPECT_LT(bytes.size(), encode_glb(std::vector{placed[0], placed[1]}).size() + 300);  // a mesh is in it once
+  EXPECT_LT(bytes.size(),
+            encode_glb(std::vector{placed[0], placed[1]}).size() + 300);  // a mesh is in it once
 
   const auto loaded = load_mesh(written("placed.glb", bytes), "m");
   ASSERT_TRUE(loaded) << loaded.message();

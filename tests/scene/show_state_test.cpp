@@ -122,7 +122,8 @@ TEST(ShowState, EachScreenHasItsChoice) {
   EXPECT_EQ(screen_content(show_state, "another"), Screen::rest);
   EXPECT_EQ(show_state.screen, Screen::rest);
   show_state = done(scene, show_state, {}, {"screen", "", "view"});
-  for (const char* name : {"wall", "desk", "another"}) EXPECT_EQ(screen_content(show_state, name), Screen::view);
+  for (const char* name : {"wall", "desk", "another"})
+    EXPECT_EQ(screen_content(show_state, name), Screen::view);
   EXPECT_FALSE(apply_edit(scene, show_state, {}, {"screen", "mirror", "full"}));
 }
 
@@ -134,7 +135,8 @@ TEST(ShowState, APlacedPartStaysOnThePrototypeUntilItsMarkerIsMoved) {
   const auto found = [&](const Pose& prototype_from_marker) {
     const std::vector<Track> tracks = tracks_with(prototype_from_marker);
     show_state = without_moved_pins(scene, show_state, tracks);
-    return k_world_from_prototype.inverse() * compose_scene(scene, show_state, tracks).parts.at(0).world_from_part;
+    return k_world_from_prototype.inverse() *
+           compose_scene(scene, show_state, tracks).parts.at(0).world_from_part;
   };
   EXPECT_TRUE(test::pose_near(found(k_prototype_from_marker), placed, 1e-9, 1e-9));
   show_state = done(scene, show_state, {}, {"nudge", "mirror", "0 0 2"});
@@ -205,7 +207,8 @@ TEST(ShowState, APartIsCarriedByTheMarkerThatItIsPairedWith) {
   std::vector<Track> tracks = tracks_with(k_prototype_from_marker);
   tracks.push_back(track_of(loose_body(nine), elsewhere));
   const auto place = [&](const ShowState& show_state, const std::string& slot) {
-    for (const PosedPart& part : compose_scene(scene, show_state, assign_tracks(scene, show_state, tracks)).parts)
+    for (const PosedPart& part :
+         compose_scene(scene, show_state, assign_tracks(scene, show_state, tracks)).parts)
       if (part.slot == slot) return part.world_from_part;
     return Pose(Eigen::Quaterniond::Identity(), {9, 9, 9});
   };
@@ -240,7 +243,8 @@ TEST(ShowState, APartIsCarriedByTheMarkerThatItIsPairedWith) {
 
 TEST(ShowState, TwoLooksAreFlippedAndSplit) {
   const Scene scene = two_slots();
-  const PosedScene posed = compose_scene(scene, initial_show_state(scene), tracks_with(k_prototype_from_marker));
+  const PosedScene posed =
+      compose_scene(scene, initial_show_state(scene), tracks_with(k_prototype_from_marker));
   ShowState show_state = done(scene, initial_show_state(scene), posed, {"save_look", "", "A"});
   show_state = done(scene, show_state, {}, {"choose_variant", "mirror", "b"});
   const PosedScene other = compose_scene(scene, show_state, tracks_with(k_prototype_from_marker));

@@ -23,7 +23,9 @@ Viewpoint eye_at(const std::string& viewer, double distance, double turn_deg, do
                                                  std::sin(off) * std::sin(turn), std::cos(off))};
 }
 
-Vector3d settled(const std::vector<Viewpoint>& viewpoints) { return *updated_viewpoint({}, viewpoints, k_middle, 0).p_world(); }
+Vector3d settled(const std::vector<Viewpoint>& viewpoints) {
+  return *updated_viewpoint({}, viewpoints, k_middle, 0).p_world();
+}
 
 TEST(SharedViewpoint, OfOnePersonIsThatEye) {
   EXPECT_FALSE(SharedViewpoint().p_world());
@@ -32,7 +34,8 @@ TEST(SharedViewpoint, OfOnePersonIsThatEye) {
 }
 
 TEST(SharedViewpoint, OfPeopleOnOneSideMisplacesPartsLeastInTheMeanSquare) {
-  const std::vector<Viewpoint> viewpoints = {eye_at("a", 0.8, 0, 15), eye_at("b", 1.3, 100, 15), eye_at("c", 2, 220, 15)};
+  const std::vector<Viewpoint> viewpoints = {eye_at("a", 0.8, 0, 15), eye_at("b", 1.3, 100, 15),
+                                             eye_at("c", 2, 220, 15)};
   // Light on the plane through the middle for a point 2 mm over it.
   const auto error = [&](const Vector3d& p_eye) {
     const auto light = [](const Vector3d& p_from) {
@@ -56,7 +59,8 @@ TEST(SharedViewpoint, StaysWithItsLeaderWhenAnotherOnTheOtherSideIsAboutAsNear) 
   std::normal_distribution<double> noise(0, 0.05);
   SharedViewpoint eye;
   for (int frame = 0; frame < 2000; ++frame) {
-    const std::vector<Viewpoint> viewpoints = {eye_at("a", 1 + noise(rng), 0, 60), eye_at("b", 1 + noise(rng), 180, 60)};
+    const std::vector<Viewpoint> viewpoints = {eye_at("a", 1 + noise(rng), 0, 60),
+                                               eye_at("b", 1 + noise(rng), 180, 60)};
     if (frame == 0) eye = updated_viewpoint(eye, std::span(viewpoints).first(1), k_middle, 0);
     eye = updated_viewpoint(eye, viewpoints, k_middle, 1 / 60.0);
     ASSERT_EQ(eye.leader, "a");

@@ -10,16 +10,16 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "core/file.h"
 #include "core/scale_resolution.h"
+#include "device/gl_context.h"
 #include "session/frame_composer.h"
+#include "session/perception.h"
 #include "session/recording.h"
 #include "session/script.h"
-#include "session/perception.h"
-#include "tracker/marker_image.h"
-#include "core/file.h"
-#include "device/gl_context.h"
 #include "sim/virtual_rig.h"
 #include "tests/support/matchers.h"
+#include "tracker/marker_image.h"
 
 namespace limn::apps {
 namespace {

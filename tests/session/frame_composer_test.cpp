@@ -7,11 +7,11 @@
 #include <span>
 
 #include "core/scale_resolution.h"
-#include "session/perception.h"
-#include "tracker/marker_image.h"
 #include "device/gl_context.h"
+#include "session/perception.h"
 #include "sim/virtual_rig.h"
 #include "tests/support/matchers.h"
+#include "tracker/marker_image.h"
 
 namespace limn::apps {
 namespace {
@@ -44,7 +44,8 @@ TEST(FrameComposer, APrototypeThatStandsStillIsShownWhereItWas) {
     const int camera = 0;
     const Percepts& watched = perception.watch(rig.expose(std::span(&camera, 1)));
     const Stamp shown_at = shifted(rig.now(), 0.033);
-    const ComposedFrame& painted = composer.compose(frame_input(scene, {}, watched, show_state, {rig.now(), shown_at}));
+    const ComposedFrame& painted =
+        composer.compose(frame_input(scene, {}, watched, show_state, {rig.now(), shown_at}));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i)
       EXPECT_TRUE(rig.projector(static_cast<int>(i)).show(painted.projectors[i]));
     Place place{painted.posed.world_from_prototype.value_or(Pose{}), {}};

@@ -8,11 +8,11 @@
 #include <string>
 
 #include "core/scale_resolution.h"
-#include "tracker/marker_image.h"
 #include "device/gl_context.h"
 #include "sim/virtual_rig.h"
 #include "tests/session/studio.h"
 #include "tests/support/matchers.h"
+#include "tracker/marker_image.h"
 
 namespace limn::apps {
 namespace {

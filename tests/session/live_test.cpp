@@ -13,26 +13,26 @@
 #include <opencv2/imgproc.hpp>
 #include <thread>
 
+#include "apps/replay.h"
+#include "core/file.h"
+#include "core/image_io.h"
 #include "core/scale_resolution.h"
+#include "device/gl_context.h"
+#include "device/image_sequence_camera.h"
 #include "session/device_session.h"
 #include "session/osc.h"
-#include "apps/replay.h"
-#include "session/virtual_room.h"
+#include "session/perception.h"
 #include "session/scene_watch.h"
 #include "session/script.h"
 #include "session/session.h"
 #include "session/swapped_cameras.h"
 #include "session/telemetry.h"
 #include "session/udp_socket.h"
-#include "session/perception.h"
-#include "tracker/marker_image.h"
-#include "core/file.h"
-#include "core/image_io.h"
-#include "device/gl_context.h"
-#include "device/image_sequence_camera.h"
+#include "session/virtual_room.h"
 #include "sim/virtual_rig.h"
 #include "tests/session/studio.h"
 #include "tests/support/matchers.h"
+#include "tracker/marker_image.h"
 #include "tracker/predict.h"
 
 namespace limn::apps {
@@ -497,7 +497,8 @@ TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
   ASSERT_TRUE(broken.has_value());
   ASSERT_TRUE(*broken);
   ASSERT_EQ((*broken)->skipped_variants.size(), 1u);
-  EXPECT_NE((*broken)->skipped_variants[0].why.find("new.glb"), std::string::npos) << (*broken)->skipped_variants[0].why;
+  EXPECT_NE((*broken)->skipped_variants[0].why.find("new.glb"), std::string::npos)
+      << (*broken)->skipped_variants[0].why;
   fs::remove(dropped);
 
   LiveOptions options;
@@ -596,8 +597,7 @@ TEST(Live, ViewersOfAllKindsShareAnEyeThatNeverJumps) {
   const Eigen::Vector3d p_cap(0.2, -0.75, 0.62);
   const Eigen::Vector3d p_camera = world.rig.cameras[0].imager_from_world.inverse().translation;
   const Pose world_from_cap = looking_at(p_cap, 2 * p_cap - p_camera, Eigen::Vector3d::UnitZ()).inverse();
-  ASSERT_TRUE(
-      sim::add_marker(world, {*cap.marker, cap.marker_size_m, world_from_cap}, false, marker_image));
+  ASSERT_TRUE(sim::add_marker(world, {*cap.marker, cap.marker_size_m, world_from_cap}, false, marker_image));
   const fs::path folder = test::test_folder();
   const auto script = load_script(
       written(folder / "script.json", script_of(6, {{{"at_s", 2.4}, {"until_s", 4.8}, {"cover", k_cap}}})));

@@ -7,14 +7,14 @@
 #include <thread>
 
 #include "apps/live.h"
+#include "core/file.h"
+#include "gui/qr_code.h"
 #include "session/operator_console.h"
 #include "session/operator_panel.h"
-#include "gui/qr_code.h"
-#include "tracker/marker_image.h"
-#include "core/file.h"
 #include "sim/virtual_rig.h"
 #include "tests/gui/gui_canvas.h"
 #include "tests/support/matchers.h"
+#include "tracker/marker_image.h"
 // X's macros go last.
 #include "tests/gui/x_person.h"
 
@@ -113,14 +113,11 @@ TEST(OperatorPanel, ShowsImagesUndistortedWithTheirMarkers) {
     const cv::Rect camera = box_of(image(cv::Rect(0, 0, size.width, size.height / 2)), k_orange);
     ASSERT_GT(camera.width, size.width / 2) << size;
     const double scale = camera.width / 1280.0;
-    const cv::Vec3b edge =
-        around(image, camera.x + cvRound(scale * 550), camera.y + cvRound(scale * 200.5));
-    const cv::Vec3b left =
-        around(image, camera.x + cvRound(scale * 400.5), camera.y + cvRound(scale * 350));
+    const cv::Vec3b edge = around(image, camera.x + cvRound(scale * 550), camera.y + cvRound(scale * 200.5));
+    const cv::Vec3b left = around(image, camera.x + cvRound(scale * 400.5), camera.y + cvRound(scale * 350));
     EXPECT_GT(edge[1], edge[2]) << "green on orange";
     EXPECT_GT(left[1], left[2]) << "green on orange";
-    const cv::Vec3b inside =
-        around(image, camera.x + cvRound(scale * 550), camera.y + cvRound(scale * 300));
+    const cv::Vec3b inside = around(image, camera.x + cvRound(scale * 550), camera.y + cvRound(scale * 300));
     EXPECT_EQ(inside, cv::Vec3b(30, 120, 230));
   }
 }

@@ -11,13 +11,13 @@
 #include <sstream>
 #include <thread>
 
-#include "core/scale_resolution.h"
-#include "session/osc_port.h"
-#include "tracker/marker_image.h"
 #include "core/file.h"
+#include "core/scale_resolution.h"
 #include "device/gl_context.h"
+#include "session/osc_port.h"
 #include "sim/virtual_rig.h"
 #include "tests/support/matchers.h"
+#include "tracker/marker_image.h"
 
 namespace limn::apps {
 namespace {
@@ -241,7 +241,8 @@ TEST_F(AnOscSession, HearsAnotherPrograms) {
   hear();
   EXPECT_EQ(session_->show_state().slots[0].variant, variants[1].name);
   EXPECT_TRUE(session_->show_state().blackout);
-  EXPECT_TRUE(test::near(session_->show_state().slots[0].nudge, Eigen::Vector3d(0.001, 0.002, -0.0035), 1e-9));
+  EXPECT_TRUE(
+      test::near(session_->show_state().slots[0].nudge, Eigen::Vector3d(0.001, 0.002, -0.0035), 1e-9));
 
   // A pose: as it is told, and where the part then is.
   ASSERT_GT(lo_send(to, "/limn/place", "sfffffff", "mirror", 20.0, -30.0, 12.5, 1.2, 0.0, 1.2, 0.0), 0);

@@ -7,18 +7,18 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
-#include "core/scale_resolution.h"
 #include "apps/live.h"
 #include "apps/replay.h"
-#include "session/session.h"
-#include "tracker/marker_image.h"
 #include "core/file.h"
 #include "core/image_io.h"
+#include "core/scale_resolution.h"
 #include "device/gl_context.h"
+#include "session/session.h"
 #include "sim/ray_scene.h"
 #include "sim/virtual_rig.h"
 #include "tests/support/matchers.h"
 #include "tests/tracker/marker_images.h"
+#include "tracker/marker_image.h"
 
 namespace limn::apps {
 namespace {

@@ -8,11 +8,11 @@
 #include <opencv2/core.hpp>
 #include <thread>
 
-#include "session/file_writer.h"
 #include "core/file.h"
 #include "core/image_io.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
+#include "session/file_writer.h"
 #include "tests/support/matchers.h"
 
 namespace limn::apps {
@@ -28,7 +28,9 @@ scene::Scene door_in(const fs::path& folder) {
   return scene::load_scene(folder / "door").value();
 }
 
-scene::ShowState edited(const scene::Scene& scene, const scene::ShowState& show_state, const scene::Edit& edit) {
+scene::ShowState edited(const scene::Scene& scene,
+                        const scene::ShowState& show_state,
+                        const scene::Edit& edit) {
   return scene::apply_edit(scene, show_state, {}, edit).value();
 }
 
@@ -104,7 +106,8 @@ TEST(ShowStore, TellsWhatCannotBeWritten) {
   ShowStore store(true);
   const scene::Edit edit{"save_look", "", "calm"};
   const scene::ShowState before = scene::initial_show_state(scene);
-  store.keep(scene, before, edited(scene, before, edit), scene::command_of(scene, edit).value(), [] { return cv::Mat(); });
+  store.keep(scene, before, edited(scene, before, edit), scene::command_of(scene, edit).value(),
+             [] { return cv::Mat(); });
   store.finish();
   const std::vector<std::string> failures = store.failures();
   ASSERT_FALSE(failures.empty());
@@ -117,7 +120,8 @@ TEST(ShowStore, WritesNothingWhereItOnlyReads) {
   ShowStore store(false);
   const scene::Edit edit{"save_look", "", "calm"};
   const scene::ShowState before = scene::initial_show_state(scene);
-  store.keep(scene, before, edited(scene, before, edit), scene::command_of(scene, edit).value(), [] { return cv::Mat(); });
+  store.keep(scene, before, edited(scene, before, edit), scene::command_of(scene, edit).value(),
+             [] { return cv::Mat(); });
   store.finish();
   EXPECT_FALSE(fs::exists(scene.folder / "looks"));
 }

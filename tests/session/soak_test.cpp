@@ -18,8 +18,8 @@
 #include <thread>
 
 #include "apps/live.h"
-#include "core/stopwatch.h"
 #include "core/file.h"
+#include "core/stopwatch.h"
 #include "tests/session/studio.h"
 #include "tests/support/matchers.h"
 #include "tests/support/small_disk.h"

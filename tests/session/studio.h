@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "core/scale_resolution.h"
-#include "tracker/marker_image.h"
 #include "core/file.h"
+#include "core/scale_resolution.h"
 #include "sim/world.h"
+#include "tracker/marker_image.h"
 
 namespace limn::apps {
 

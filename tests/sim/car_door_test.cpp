@@ -110,8 +110,7 @@ TEST(CarDoor, TheTrimLiesOnTheSurfaceWithinAFifthOfAMillimetre) {
   tracks[1].world_from_body = sim::car_door_slot_places().at("trim");
   const Pose prototype_from_part = scene::posed(scene, tracks).parts.at(0).world_from_part;
   for (const sim::SampledPoint& point : sim::surface_points(trim.variants[0].mesh, 500, 5)) {
-    const scene::MeshPoint nearest =
-        scene::nearest_on(scene.prototype->mesh, prototype_from_part * point.p);
+    const scene::MeshPoint nearest = scene::nearest_on(scene.prototype->mesh, prototype_from_part * point.p);
     ASSERT_LT(nearest.distance, 0.2_mm);
     ASSERT_GT((prototype_from_part * point.p - nearest.p).dot(nearest.d_normal), 0.0) << "under the clay";
   }

@@ -31,8 +31,7 @@ TEST(FinishPanel, TheCommittedFilesAreWhatTheGeneratorMakes) {
       ASSERT_LT((found->positions[i] - expected->positions[i]).norm(), 2e-6F);
     for (const auto map : {&scene::SurfaceMaps::metallic_roughness, &scene::SurfaceMaps::normals,
                            &scene::SurfaceMaps::occlusion, &scene::SurfaceMaps::emission}) {
-      const cv::Mat &a = (found->materials[0].maps.*map).image,
-                    &b = (expected->materials[0].maps.*map).image;
+      const cv::Mat &a = (found->materials[0].maps.*map).image, &b = (expected->materials[0].maps.*map).image;
       ASSERT_EQ(a.size(), b.size());
       if (a.empty()) continue;
       EXPECT_LE(cv::norm(a, b, cv::NORM_INF), 1);

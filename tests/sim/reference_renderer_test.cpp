@@ -124,7 +124,8 @@ TEST(ReferenceRenderer, SeenPartsCoverTheirEdgesInPart) {
   // From column 139.75 to column 171.75.
   const World world =
       plane_world(scene::Mode::view, sheet_at(32 / 400.0 * 0.9, 24 / 400.0 * 0.9, -3.75 / 400.0 * 0.9, -0.1));
-  const PartImage seen = ReferenceRenderer(world, posed(world), world.rig.cameras[0]).parts_image(world.rig.cameras[0]);
+  const PartImage seen =
+      ReferenceRenderer(world, posed(world), world.rig.cameras[0]).parts_image(world.rig.cameras[0]);
   EXPECT_NEAR(cv::sum(seen.cover)[0], 32 * 24, 0.5);
   EXPECT_NEAR(seen.cover.at<float>(119, 140), 0.75, 1e-6);
   EXPECT_NEAR(seen.cover.at<float>(119, 172), 0.25, 1e-6);

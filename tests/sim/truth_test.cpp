@@ -111,8 +111,7 @@ TEST(Truth, ASurfacePartMayLieUpToTwoMillimetresDeep) {
 
 TEST(Truth, ObjectImageNamesTheNearestThing) {
   const Stage stage(0.1);
-  const sim::ObjectImage seen =
-      sim::Truth(stage.world, stage.parts).object_image(stage.world.rig.cameras[0]);
+  const sim::ObjectImage seen = sim::Truth(stage.world, stage.parts).object_image(stage.world.rig.cameras[0]);
   const auto name = [&](int c, int r) {
     return seen.names.at(static_cast<std::size_t>(seen.image.at<std::int16_t>(r, c)));
   };

@@ -157,8 +157,8 @@ TEST(Barcode, MarkersOfOtherFamiliesAreNone) {
         markers.push_back(test::placed(
             lens, {family, std::to_string(i + k)}, {120 + 200 * (k % 3), 140 + 200 * (k / 3)},
             uniform(rng, 24, 110), uniform(rng, 0, 6.28), uniform(rng, 0, 50_deg), uniform(rng, 0, 6.28)));
-      const cv::Mat grey = test::image_of(lens, test::plain(640, 480, 100), markers,
-                                            {.blur_px = 0.6, .noise_levels = 2}, rng);
+      const cv::Mat grey =
+          test::image_of(lens, test::plain(640, 480, 100), markers, {.blur_px = 0.6, .noise_levels = 2}, rng);
       shown += 6;
       taken += static_cast<int>(detector.detect(grey).size());
     }
@@ -195,8 +195,8 @@ TEST(Barcode, IsToldFromALargerOneWhicheverWayItIsTurned) {
     for (int turn = 0; turn < 4; ++turn) {
       const std::vector<PlacedMarker> placed = {
           test::placed(lens, name, {320, 240}, 70, turn * 90_deg, 0, 0)};
-      const cv::Mat grey = test::image_of(lens, test::plain(640, 480, 100), placed,
-                                            {.blur_px = 0.6, .noise_levels = 2}, rng);
+      const cv::Mat grey =
+          test::image_of(lens, test::plain(640, 480, 100), placed, {.blur_px = 0.6, .noise_levels = 2}, rng);
       const auto found = Detector(families(names)).detect(grey);
       ASSERT_EQ(found.size(), 1U) << name.text() << " turned " << turn << " times";
       EXPECT_EQ(found[0].marker, name);
@@ -238,7 +238,7 @@ TEST(Barcode, AreNotTakenForCodesOfOtherFamilies) {
                                              uniform(rng, 0, 6.28), uniform(rng, 0, 70_deg), i);
     const auto found = detector.detect(
         test::image_of(pinhole_vga(), test::plain(640, 480, 100), std::vector{marker},
-                         {.blur_px = uniform(rng, 0.4, 2.5), .noise_levels = uniform(rng, 2, 12)}, rng));
+                       {.blur_px = uniform(rng, 0.4, 2.5), .noise_levels = uniform(rng, 2, 12)}, rng));
     for (const Detection& detection : found) {
       ++read;
       EXPECT_EQ(detection.marker, name);

@@ -68,8 +68,7 @@ cv::Mat image_of(const Sweep& sweep, const PlacedMarker& marker, std::mt19937_64
     cv::GaussianBlur(light, light, {0, 0}, sweep.image.blur_px);
     return test::noisy_grey(light, sweep.image.noise_levels, rng);
   }
-  if (sweep.motion_px == 0)
-    return test::image_of(sweep.lens, ground, std::vector{marker}, sweep.image, rng);
+  if (sweep.motion_px == 0) return test::image_of(sweep.lens, ground, std::vector{marker}, sweep.image, rng);
   const double angle = uniform(rng, 0, 6.28);
   const cv::Mat light = test::light_of(sweep.lens, ground, std::vector{marker}, sweep.image, rng);
   return test::noisy_grey(
@@ -385,7 +384,7 @@ TEST(Detector, HasNoBiasWhereTheWhiteMarginIsAPixelWide) {
     const auto truth = test::true_corners(pinhole_vga(), marker);
     const auto found =
         detector.detect(test::image_of(pinhole_vga(), test::plain(640, 480, 90), std::vector{marker},
-                                         {.blur_px = 0.5, .noise_levels = 2}, rng));
+                                       {.blur_px = 0.5, .noise_levels = 2}, rng));
     ASSERT_EQ(found.size(), 1u) << i;
     const Eigen::Vector2d centre = 0.25 * (truth[0] + truth[1] + truth[2] + truth[3]);
     for (std::size_t k = 0; k < 4; ++k) {

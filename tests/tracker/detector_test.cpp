@@ -28,8 +28,7 @@ void expect_whole_family(const std::string& family, int count) {
                                    {100.0 * (cell % k_columns) + 50, 100.0 * (cell / k_columns) + 50}, 60,
                                    0.5 * std::numbers::pi * (id % 4) + 0.1, 0.1, 1));
     }
-    const cv::Mat grey =
-        test::image_of(lens, test::plain(1600, 1200, 160), sheet, {.noise_levels = 2}, rng);
+    const cv::Mat grey = test::image_of(lens, test::plain(1600, 1200, 160), sheet, {.noise_levels = 2}, rng);
     const auto found = detector.detect(grey);
     EXPECT_EQ(found.size(), sheet.size());
     for (const PlacedMarker& marker : sheet) {

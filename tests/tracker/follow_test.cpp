@@ -74,7 +74,7 @@ TEST(Detector, FollowsABlurredMarkerByItsPattern) {
         pinhole_vga(), {"apriltag_36h11", "3"}, {300 + 0.37 * i, 240}, 40, 0.2 + 0.01 * i, 20_deg, 0)};
     const int level = 170 + static_cast<int>(40 * std::sin(0.1 * i));
     const cv::Mat grey = test::image_of(pinhole_vga(), test::plain(640, 480, level), marker,
-                                          {.blur_px = 1.2, .noise_levels = 2}, rng);
+                                        {.blur_px = 1.2, .noise_levels = 2}, rng);
     const auto truth = test::true_corners(pinhole_vga(), marker[0]);
     if (i == 0)
       detector.detect(grey, nullptr, &found);
@@ -115,7 +115,7 @@ TEST(Detector, FollowsNoPatternThatIsNoLongerThere) {
     const std::vector<PlacedMarker> marker = {
         test::placed(pinhole_vga(), {"apriltag_36h11", id}, {320.0 + moved_px, 240}, 40, 0.2, 20_deg, 0)};
     cv::Mat grey = test::image_of(pinhole_vga(), test::plain(640, 480, 200), marker,
-                                    {.blur_px = 1.2, .noise_levels = 1}, rng);
+                                  {.blur_px = 1.2, .noise_levels = 1}, rng);
     const Eigen::Vector2d at = test::true_corners(pinhole_vga(), marker[0])[0];
     if (finger)
       cv::circle(grey, {static_cast<int>(at.x()), static_cast<int>(at.y())}, 9, cv::Scalar(150), -1);

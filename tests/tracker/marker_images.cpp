@@ -236,10 +236,10 @@ cv::Mat noisy_grey(const cv::Mat& light, double noise_levels, std::mt19937_64& r
 }
 
 cv::Mat image_of(const Lens& lens,
-                   const cv::Mat& background,
-                   std::span<const PlacedMarker> markers,
-                   const ImageOptions& options,
-                   std::mt19937_64& rng) {
+                 const cv::Mat& background,
+                 std::span<const PlacedMarker> markers,
+                 const ImageOptions& options,
+                 std::mt19937_64& rng) {
   cv::Mat light = light_of(lens, background, markers, options, rng);
   if (options.blur_px > 0) cv::GaussianBlur(light, light, {0, 0}, options.blur_px);
   return noisy_grey(light, options.noise_levels, rng);

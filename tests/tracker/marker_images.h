@@ -48,10 +48,10 @@ cv::Mat noisy_grey(const cv::Mat& light, double noise_levels, std::mt19937_64& r
 
 /// The camera's image of it all: light, blur, noise.
 cv::Mat image_of(const Lens& lens,
-                   const cv::Mat& background,
-                   std::span<const PlacedMarker> markers,
-                   const ImageOptions& options,
-                   std::mt19937_64& rng);
+                 const cv::Mat& background,
+                 std::span<const PlacedMarker> markers,
+                 const ImageOptions& options,
+                 std::mt19937_64& rng);
 
 /// The corners' true pixels in the order of Detection::corners_px.
 std::array<Eigen::Vector2d, 4> true_corners(const Lens& lens, const PlacedMarker& marker);

@@ -76,8 +76,7 @@ TEST(MarkerMask, LightsSparesOrLeavesTheImage) {
   EXPECT_EQ(with_marker_light(image, mask, MarkerLight::spotlight).at<cv::Vec3b>(1, 2),
             cv::Vec3b(255, 255, 255));
   EXPECT_EQ(with_marker_light(image, mask, MarkerLight::as_is).at<cv::Vec3b>(1, 2), cv::Vec3b(10, 20, 30));
-  EXPECT_EQ(with_marker_light(image, mask, MarkerLight::keep_out).at<cv::Vec3b>(1, 1),
-            cv::Vec3b(10, 20, 30));
+  EXPECT_EQ(with_marker_light(image, mask, MarkerLight::keep_out).at<cv::Vec3b>(1, 1), cv::Vec3b(10, 20, 30));
 }
 
 }  // namespace

@@ -48,8 +48,7 @@ Images images_of(const Body& body, int count, double depth, double noise_px, std
                                   .dot(camera_from_marker.translation.normalized());
       if (cos_tilt > 0.35) facing.markers.push_back(marker);
     }
-    images.detections.push_back(
-        test::detections_of(facing, images.camera, world_from_body, noise_px, rng));
+    images.detections.push_back(test::detections_of(facing, images.camera, world_from_body, noise_px, rng));
   }
   return images;
 }
@@ -116,8 +115,8 @@ TEST(LearnedBody, LeavesOutWhatIsTwiceInAnImageAndNamesWhatItCannotPlace) {
   const Body elsewhere{"elsewhere",
                        {{{"aruco_4x4_50", "40"}, 0.04, Pose{}},
                         {{"aruco_4x4_50", "41"}, 0.04, Pose(exp_rotation({0, 0, 1}), {0.1, 0, 0})}}};
-  images.detections.push_back(test::detections_of(elsewhere, images.camera,
-                                                    Pose(exp_rotation({0.5, 0, 0}), {0, 0, 0.6}), 0.05, rng));
+  images.detections.push_back(
+      test::detections_of(elsewhere, images.camera, Pose(exp_rotation({0.5, 0, 0}), {0, 0, 0.6}), 0.05, rng));
   Detection twice = images.detections[0][0];
   for (auto& px : twice.corners_px) px += Eigen::Vector2d(200, 0);
   images.detections[0].push_back(twice);

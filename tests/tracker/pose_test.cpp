@@ -6,9 +6,9 @@
 
 #include "tests/support/matchers.h"
 #include "tests/tracker/marker_images.h"
+#include "tracker/body_estimate.h"
 #include "tracker/body_pose.h"
 #include "tracker/marker_pose.h"
-#include "tracker/body_estimate.h"
 #include "tracker/pose_fit.h"
 #include "tracker/triangle_pose.h"
 
@@ -125,11 +125,12 @@ TEST(PoseFit, HasTheDerivativeOfItsResidual) {
   const Lens lens = bent_lens();
   for (int i = 0; i < 30; ++i) {
     const Pose world_from_body = random_pose(rng, 30_deg, 0.8);
-    const PointObservation observation{&lens,
-                           Pose(exp_rotation({0.1, -0.2, 0.05}), Eigen::Vector3d(0.02, 0.01, 0.1)),
-                           {0.03, -0.02, 0.01},
-                           {300, 200},
-                           Eigen::Matrix2d::Identity()};
+    const PointObservation observation{
+        &lens,
+        Pose(exp_rotation({0.1, -0.2, 0.05}), Eigen::Vector3d(0.02, 0.01, 0.1)),
+        {0.03, -0.02, 0.01},
+        {300, 200},
+        Eigen::Matrix2d::Identity()};
     Eigen::Vector2d r, high, low;
     Eigen::Matrix<double, 2, 6> j;
     ASSERT_TRUE(residual(observation, world_from_body, &r, &j));

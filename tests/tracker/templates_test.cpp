@@ -36,7 +36,7 @@ std::filesystem::path bars(const std::filesystem::path& folder, const std::strin
 
 cv::Mat image_with(const std::vector<PlacedMarker>& markers, std::mt19937_64& rng) {
   return test::image_of(pinhole_vga(), test::plain(640, 480, 110), markers,
-                          {.blur_px = 0.7, .noise_levels = 2}, rng);
+                        {.blur_px = 0.7, .noise_levels = 2}, rng);
 }
 
 PlacedMarker placed(const std::filesystem::path& file, double x, double side_px, double spin, double tilt) {
@@ -165,7 +165,7 @@ TEST(Templates, NearlyAlikeAreDoubtedWhereTheyAreBlurred) {
     const PlacedMarker marker = placed(file, 320, is_sharp ? 140 : 32, 0.3 * i, is_sharp ? 20_deg : 60_deg);
     const cv::Mat image =
         test::image_of(pinhole_vga(), test::plain(640, 480, 110), std::vector{marker},
-                         {.blur_px = is_sharp ? 0.7 : 2.5, .noise_levels = is_sharp ? 6.0 : 15.0}, rng);
+                       {.blur_px = is_sharp ? 0.7 : 2.5, .noise_levels = is_sharp ? 6.0 : 15.0}, rng);
     for (const Detection& detection : detector.detect(image)) {
       const bool right = detection.marker.id == file.filename();
       sharp += right && is_sharp;

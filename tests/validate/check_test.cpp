@@ -12,12 +12,12 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "validate/check_judge.h"
 #include "apps/command_line.h"
 #include "core/file.h"
 #include "core/image_io.h"
 #include "device/gl_context.h"
 #include "tests/support/matchers.h"
+#include "validate/check_judge.h"
 
 namespace limn::apps {
 namespace {

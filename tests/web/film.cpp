@@ -11,12 +11,12 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "tracker/marker_image.h"
 #include "device/jpeg.h"
 #include "sim/reference_renderer.h"
 #include "sim/sensor_model.h"
 #include "sim/trace.h"
 #include "sim/world.h"
+#include "tracker/marker_image.h"
 
 namespace {
 
@@ -59,8 +59,7 @@ int main(int argc, char** argv) {
   const fs::path folder = argv[1];
   fs::remove_all(folder);
   fs::create_directories(folder);
-  auto loaded =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image);
+  auto loaded = sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image);
   if (!loaded) {
     fmt::print(stderr, "{}\n", loaded.message());
     return 1;
@@ -74,8 +73,7 @@ int main(int argc, char** argv) {
   world.camera_effects = {{.colour = true, .exposure = 0.57, .psf_px = 0.6, .read_noise = 1, .srgb = true}};
   for (int view = 0; view < k_views; ++view) {
     world.rig.cameras = {tablet(world, view)};
-    const cv::Mat image =
-        sim::photograph(world, sim::trace(world, 0), {}, static_cast<std::uint64_t>(view));
+    const cv::Mat image = sim::photograph(world, sim::trace(world, 0), {}, static_cast<std::uint64_t>(view));
     const std::vector<std::uint8_t> jpeg = device::encode_jpeg(image, 85);
     cv::Mat where;
     sim::ReferenceRenderer(world, parts, world.rig.cameras[0])

@@ -5,11 +5,11 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "wizard/capture/capture_plan.h"
-#include "wizard/capture/virtual_capture.h"
-#include "wizard/capture/device_backend.h"
-#include "tracker/marker_image.h"
 #include "sim/virtual_rig.h"
+#include "tracker/marker_image.h"
+#include "wizard/capture/capture_plan.h"
+#include "wizard/capture/device_backend.h"
+#include "wizard/capture/virtual_capture.h"
 
 namespace limn::test {
 
@@ -83,9 +83,9 @@ class BoardRoomProjector : public device::Display {
 
 inline apps::DeviceBackend::Devices BoardRoom::devices() {
   apps::DeviceBackend::Devices all{.cameras = {},
-                                 .projectors = {},
-                                 .now = [this] { return rig.now(); },
-                                 .wait = [this](double seconds) { rig.advance(seconds); }};
+                                   .projectors = {},
+                                   .now = [this] { return rig.now(); },
+                                   .wait = [this](double seconds) { rig.advance(seconds); }};
   all.cameras.push_back(std::make_unique<BoardRoomCamera>(this));
   all.projectors.push_back(std::make_unique<BoardRoomProjector>(this));
   return all;

@@ -5,15 +5,15 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "wizard/pose_instructions.h"
-#include "wizard/pose_quality.h"
-#include "tracker/marker_image.h"
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/rig.h"
 #include "sim/world.h"
-#include "tests/wizard/small_plan.h"
 #include "tests/support/matchers.h"
+#include "tests/wizard/small_plan.h"
+#include "tracker/marker_image.h"
+#include "wizard/pose_instructions.h"
+#include "wizard/pose_quality.h"
 
 namespace limn::apps {
 namespace {

@@ -1,20 +1,20 @@
-#include "apps/recheck.h"
 #include "wizard/capture/device_backend.h"
 
 #include <gtest/gtest.h>
 
 #include <opencv2/core.hpp>
 
-#include "wizard/pose_instructions.h"
+#include "apps/recheck.h"
+#include "core/file.h"
+#include "tests/support/matchers.h"
+#include "tests/wizard/board_room.h"
+#include "tests/wizard/small_plan.h"
 #include "wizard/capture/capture_plan.h"
 #include "wizard/capture/rig_recheck.h"
 #include "wizard/capture/virtual_capture.h"
 #include "wizard/guided_poses.h"
+#include "wizard/pose_instructions.h"
 #include "wizard/sequence.h"
-#include "core/file.h"
-#include "tests/wizard/board_room.h"
-#include "tests/wizard/small_plan.h"
-#include "tests/support/matchers.h"
 
 namespace limn::apps {
 namespace {
@@ -102,8 +102,8 @@ TEST(DeviceBackend, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
 
   // A recheck by the same devices, of what stands there.
   const Rig rig = load_rig(options.out).value();
-  const calib::CaptureSet again = calib::plan_captures(folder / "again", captures.cameras, captures.projectors,
-                                                     captures.board, "gray", {.inverses = false});
+  const calib::CaptureSet again = calib::plan_captures(
+      folder / "again", captures.cameras, captures.projectors, captures.board, "gray", {.inverses = false});
   const Stamp before = room.rig.now();
   const Status taken = captured_once(again, rig, stage.surroundings(&writer));
   ASSERT_TRUE(taken) << taken.message();

@@ -4,13 +4,13 @@
 
 #include <opencv2/core.hpp>
 
-#include "wizard/capture/capture_plan.h"
-#include "wizard/capture/virtual_capture.h"
-#include "wizard/capture/display_latency.h"
-#include "tracker/marker_image.h"
 #include "sim/virtual_rig.h"
-#include "tests/wizard/small_plan.h"
 #include "tests/support/matchers.h"
+#include "tests/wizard/small_plan.h"
+#include "tracker/marker_image.h"
+#include "wizard/capture/capture_plan.h"
+#include "wizard/capture/display_latency.h"
+#include "wizard/capture/virtual_capture.h"
 
 namespace limn::apps {
 namespace {

@@ -6,18 +6,18 @@
 #include <filesystem>
 #include <thread>
 
-#include "wizard/window/wizard_panel.h"
 #include "core/config.h"
 #include "core/rig.h"
 #include "device/desktop.h"
-#include "tests/wizard/board_room.h"
 #include "tests/gui/gui_canvas.h"
-#include "tests/wizard/small_plan.h"
 #include "tests/support/matchers.h"
+#include "tests/wizard/board_room.h"
+#include "tests/wizard/small_plan.h"
+#include "wizard/window/wizard_panel.h"
 // X's macros go last.
 #include "apps/calibrate.h"
-#include "wizard/capture/virtual_capture.h"
 #include "tests/gui/x_person.h"
+#include "wizard/capture/virtual_capture.h"
 
 namespace limn::apps {
 namespace {
@@ -75,8 +75,7 @@ TEST(WizardPanel, ShowsWhereTheBoardIsAndWhereItIsToGo) {
     canvas.keep(fmt::format("wizard-{}", size.width));
     const auto count = [&](const cv::Scalar& low, const cv::Scalar& high) {
       cv::Mat mask;
-      cv::inRange(canvas.image()(cv::Rect(size.width / 4, 0, size.width / 2, size.height)), low, high,
-                  mask);
+      cv::inRange(canvas.image()(cv::Rect(size.width / 4, 0, size.width / 2, size.height)), low, high, mask);
       return cv::countNonZero(mask);
     };
     const cv::Scalar amber(66, 182, 245), green(120, 211, 110), slack = cv::Scalar::all(4);

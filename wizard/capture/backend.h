@@ -4,11 +4,11 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
-#include "wizard/capture/display_latency.h"
 #include "calib/board/board_finder.h"
 #include "calib/capture.h"
 #include "core/frame.h"
 #include "core/result.h"
+#include "wizard/capture/display_latency.h"
 
 namespace limn::apps {
 

@@ -13,7 +13,9 @@ namespace limn::apps {
 Result<std::string> captured_plan(const std::filesystem::path& plan, const std::filesystem::path& world);
 
 /// What decides what devices capture (limn.captured_plan/1): the board, the code and the devices' sizes.
-std::string captured_plan(const std::string& board, const std::string& code, const calib::CaptureSet& captures);
+std::string captured_plan(const std::string& board,
+                          const std::string& code,
+                          const calib::CaptureSet& captures);
 
 /// Makes the captures folder for this plan, or finds that the same plan made it; a plan may have grown at its
 /// end. Error: the folder holds captures of another plan; the message says what differs.

@@ -6,8 +6,8 @@
 
 #include "calib/board/board.h"
 #include "calib/code/patterns.h"
-#include "core/pose.h"
 #include "core/photometric_response.h"
+#include "core/pose.h"
 #include "core/result.h"
 
 namespace limn::apps {
@@ -19,7 +19,8 @@ struct Plan {
   calib::Board board;
   std::string code = "gray";
   calib::CodeOptions code_options;
-  std::vector<ProjectorResponse> responses;     ///< measured, for phase; empty: waves are drawn by code_options.gamma
+  std::vector<ProjectorResponse>
+      responses;                       ///< measured, for phase; empty: waves are drawn by code_options.gamma
   std::vector<Pose> world_from_board;  ///< board frame as in calib/board/board.h
   bool response = false;               ///< also the response images, of the prototype
 };

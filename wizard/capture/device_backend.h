@@ -4,15 +4,15 @@
 #include <memory>
 #include <vector>
 
-#include "device/devices_file.h"
 #include "core/image_writer.h"
-#include "wizard/capture/still_board.h"
-#include "wizard/capture/still_room.h"
-#include "wizard/capture/backend.h"
-#include "wizard/capture/request.h"
 #include "device/camera_source.h"
 #include "device/desktop.h"
+#include "device/devices_file.h"
 #include "device/display.h"
+#include "wizard/capture/backend.h"
+#include "wizard/capture/request.h"
+#include "wizard/capture/still_board.h"
+#include "wizard/capture/still_room.h"
 
 namespace limn::apps {
 

@@ -8,9 +8,9 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
-#include "device/test_card.h"
-#include "core/median.h"
 #include "core/image_io.h"
+#include "core/median.h"
+#include "device/test_card.h"
 
 namespace limn::apps {
 namespace {
@@ -102,7 +102,8 @@ cv::Mat squares(int width, int height) {
   return image;
 }
 
-Result<std::vector<ExposureReading>> measured_exposure(const calib::CaptureSet& captures, const calib::CaptureBackend& stage) {
+Result<std::vector<ExposureReading>> measured_exposure(const calib::CaptureSet& captures,
+                                                       const calib::CaptureBackend& stage) {
   std::vector<ExposureReading> all;
   const auto grabbed = [&](int projector, const cv::Mat& image) -> Result<std::vector<cv::Mat>> {
     LIMN_TRY_STATUS(stage.show(projector, image));

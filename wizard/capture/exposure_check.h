@@ -32,7 +32,8 @@ cv::Mat squares(int width, int height);
 
 /// Each projector in turn shows its number and colour (for people), then black, white and squares; what every
 /// camera sees of it, projector by projector. Error: a device fails.
-Result<std::vector<ExposureReading>> measured_exposure(const calib::CaptureSet& captures, const calib::CaptureBackend& stage);
+Result<std::vector<ExposureReading>> measured_exposure(const calib::CaptureSet& captures,
+                                                       const calib::CaptureBackend& stage);
 
 /// Projectors that no camera sees, a sentence each; empty: all are seen.
 std::vector<std::string> unseen(const std::vector<ExposureReading>& seen);

@@ -4,12 +4,12 @@
 #include <functional>
 #include <string>
 
-#include "wizard/capture/backend.h"
 #include "calib/board/board.h"
 #include "calib/capture_set.h"
 #include "calib/judge/rig_check.h"
 #include "core/result.h"
 #include "core/rig.h"
+#include "wizard/capture/backend.h"
 
 namespace limn::apps {
 
@@ -25,8 +25,8 @@ struct CheckedRig {
 };
 
 /// Checks a rig by the captures in `folder` and writes recheck.json into `out`. `still`: an earlier
-/// recheck.json whose boards have not been touched since; empty: none. Error also when `should_continue`, which is
-/// asked now and then, says false.
+/// recheck.json whose boards have not been touched since; empty: none. Error also when `should_continue`,
+/// which is asked now and then, says false.
 Result<CheckedRig> recheck_rig(const Rig& rig,
                                const std::filesystem::path& folder,
                                const std::filesystem::path& still,
@@ -49,7 +49,8 @@ Status captured_once(const calib::CaptureSet& captures, const Rig& rig, const Su
 /// The prototype as it stands, captured once by devices that are open already (those of `around`, with the
 /// names and in the order of the rig's; of it stage, written and use_latency are needed), against the rig.
 /// The result's rig is the mended one; it, recheck.json and captures/ are in `folder`. Error, and no rig is
-/// written: no single move explains what is seen, or `should_continue`, which is asked now and then, says false.
+/// written: no single move explains what is seen, or `should_continue`, which is asked now and then, says
+/// false.
 Result<Rechecked> rechecked_in_place(const Rig& rig,
                                      const Surroundings& around,
                                      const std::filesystem::path& folder,

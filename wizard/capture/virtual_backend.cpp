@@ -5,9 +5,9 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
-#include "wizard/capture/virtual_capture.h"
 #include "calib/board/board_finder.h"
 #include "core/image_io.h"
+#include "wizard/capture/virtual_capture.h"
 
 namespace limn::apps {
 namespace {

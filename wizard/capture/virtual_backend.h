@@ -1,9 +1,9 @@
 #pragma once
 
 #include "core/image_writer.h"
-#include "wizard/capture/capture_plan.h"
-#include "wizard/capture/backend.h"
 #include "sim/virtual_rig.h"
+#include "wizard/capture/backend.h"
+#include "wizard/capture/capture_plan.h"
 
 namespace limn::apps {
 

@@ -39,8 +39,8 @@ Status capture_poses(const calib::CaptureSet& captures,
 }  // namespace
 
 Result<calib::CaptureSet> planned(const Plan& plan,
-                                const sim::VirtualRig& rig,
-                                const std::filesystem::path& out) {
+                                  const sim::VirtualRig& rig,
+                                  const std::filesystem::path& out) {
   calib::CaptureSet captures =
       calib::plan_captures(out, devices(rig.world().rig.cameras), devices(rig.world().rig.projectors),
                            plan.board, plan.code, plan.code_options);
@@ -52,7 +52,9 @@ Result<calib::CaptureSet> planned(const Plan& plan,
   return captures;
 }
 
-calib::CaptureBackend stage_of(sim::VirtualRig* rig, ImageWriter* writer, calib::ReportProgress report_progress) {
+calib::CaptureBackend stage_of(sim::VirtualRig* rig,
+                               ImageWriter* writer,
+                               calib::ReportProgress report_progress) {
   return {.show = [rig](int projector, const cv::Mat& image) -> Status {
             rig->darken();
             const auto shown_at = rig->projector(projector).show(image);
@@ -85,8 +87,8 @@ sim::Object board_object(const calib::Board& board, const Pose& world_from_board
   const Eigen::Vector2d px_centre((drawn.image.cols - 1) / 2.0, (drawn.image.rows - 1) / 2.0);
   const Eigen::Vector2d p_centre = (px_centre - drawn.px_board_origin) * metres_per_px;
   const Pose board_from_sheet(Eigen::Quaterniond::Identity(), {p_centre.x(), p_centre.y(), 0});
-  return sim::sheet("board", drawn.image.cols * metres_per_px, drawn.image.rows * metres_per_px,
-                    drawn.image, world_from_board * board_from_sheet);
+  return sim::sheet("board", drawn.image.cols * metres_per_px, drawn.image.rows * metres_per_px, drawn.image,
+                    world_from_board * board_from_sheet);
 }
 
 Status capture_virtually(const Plan& plan, sim::VirtualRig* rig, const std::filesystem::path& out) {

@@ -3,12 +3,12 @@
 #include <filesystem>
 #include <vector>
 
-#include "core/image_writer.h"
-#include "wizard/capture/capture_plan.h"
 #include "calib/capture.h"
 #include "calib/capture_set.h"
+#include "core/image_writer.h"
 #include "core/result.h"
 #include "sim/virtual_rig.h"
+#include "wizard/capture/capture_plan.h"
 
 namespace limn::apps {
 
@@ -17,11 +17,13 @@ sim::Object board_object(const calib::Board& board, const Pose& world_from_board
 
 /// The captures folder that a plan makes of this rig, still without poses.
 Result<calib::CaptureSet> planned(const Plan& plan,
-                                const sim::VirtualRig& rig,
-                                const std::filesystem::path& out);
+                                  const sim::VirtualRig& rig,
+                                  const std::filesystem::path& out);
 
 /// The rig's devices as calib asks for them; images go to `writer`.
-calib::CaptureBackend stage_of(sim::VirtualRig* rig, ImageWriter* writer, calib::ReportProgress report_progress);
+calib::CaptureBackend stage_of(sim::VirtualRig* rig,
+                               ImageWriter* writer,
+                               calib::ReportProgress report_progress);
 
 /// Captures the response images of whatever stands before the rig.
 Status capture_lit(const calib::CaptureSet& captures, sim::VirtualRig* rig);

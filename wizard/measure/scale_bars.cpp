@@ -22,8 +22,8 @@ calib::DetectedMark mark_of(const tracker::Detection& detection, int camera, int
 }  // namespace
 
 Result<std::vector<calib::DetectedMark>> scale_bar_marks(const calib::CaptureSet& captures,
-                                                const Rig& rig,
-                                                const std::vector<calib::ScaleBar>& lengths) {
+                                                         const Rig& rig,
+                                                         const std::vector<calib::ScaleBar>& lengths) {
   std::set<std::string> wanted, family_set;
   for (const calib::ScaleBar& known : lengths) {
     for (const std::string& name : {known.from, known.to}) {
@@ -57,7 +57,7 @@ Result<std::vector<calib::DetectedMark>> scale_bar_marks(const calib::CaptureSet
 }
 
 Result<std::vector<calib::ScaleBar>> scale_bar_lengths(const calib::CaptureSet& captures,
-                                                      const std::vector<std::string>& options) {
+                                                       const std::vector<std::string>& options) {
   std::vector<calib::ScaleBar> lengths;
   for (const std::string& text : captures.scale_bar_lengths) {
     auto known = calib::parse_scale_bar(text);

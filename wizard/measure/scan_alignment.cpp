@@ -7,14 +7,14 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
-#include "core/stopwatch.h"
 #include "core/config.h"
 #include "core/file.h"
-#include "core/log.h"
 #include "core/image_io.h"
+#include "core/log.h"
 #include "core/rig.h"
-#include "scene/scan_preview.h"
+#include "core/stopwatch.h"
 #include "scene/marker_file.h"
+#include "scene/scan_preview.h"
 #include "scene/scene.h"
 #include "tracker/body_pose.h"
 #include "tracker/detector.h"
@@ -172,7 +172,8 @@ Result<MeshAligned> align(const AlignOptions& command,
                           const std::optional<Start>& start) {
   MeshAligned result;
   if (start) {
-    LIMN_TRY(result.registration, calib::refined_registration(mesh, index, scan, start->world_from_prototype));
+    LIMN_TRY(result.registration,
+             calib::refined_registration(mesh, index, scan, start->world_from_prototype));
     result.how = start->how;
   } else {
     log_info("align: no start given, looking everywhere");
@@ -235,8 +236,8 @@ nlohmann::ordered_json json_of(const MeshAligned& aligned,
 
 // The scan's points near the mesh in the colours of their residuals, in the prototype's frame.
 scene::ScanSurface coloured(const scene::ScanSurface& scan,
-                        const std::vector<float>& residuals,
-                        const Pose& world_from_prototype) {
+                            const std::vector<float>& residuals,
+                            const Pose& world_from_prototype) {
   std::vector<bool> keep;
   for (const float residual : residuals) keep.push_back(!std::isnan(residual));
   scene::ScanSurface part = scan;
@@ -259,8 +260,8 @@ Status write_images(const scene::ScanSurface& map, const fs::path& out) {
   for (const auto& [name, turn] : {std::pair{"residual.png", 0.0}, std::pair{"residual-side.png", 0.9}}) {
     const Vector3d d_from = Eigen::AngleAxisd(turn, up) * d_seen;
     const auto viewer = scene::preview_viewer(map, d_from, up, k_image_width, k_image_height);
-    LIMN_TRY_STATUS(write_png(out / name, scene::with_scale(scene::draw_scan_preview(map, viewer), -k_colour_limit_mm,
-                                                            k_colour_limit_mm, caption)));
+    LIMN_TRY_STATUS(write_png(out / name, scene::with_scale(scene::draw_scan_preview(map, viewer),
+                                                            -k_colour_limit_mm, k_colour_limit_mm, caption)));
   }
   return {};
 }
@@ -324,7 +325,8 @@ Result<MeshAligned> written_alignment(const AlignOptions& command) {
   LIMN_TRY_STATUS(write_file(command.out / "align.json",
                              json_of(aligned, differences, 1e-3 * milliseconds_since(begun)).dump(2) + "\n"));
   LIMN_TRY_STATUS(write_pose(aligned.registration.world_from_prototype, command.out));
-  if (!command.body.empty()) LIMN_TRY_STATUS(write_markers(command, aligned.registration.world_from_prototype));
+  if (!command.body.empty())
+    LIMN_TRY_STATUS(write_markers(command, aligned.registration.world_from_prototype));
   return aligned;
 }
 

@@ -6,10 +6,10 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
-#include "core/stopwatch.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/image_io.h"
+#include "core/stopwatch.h"
 #include "scene/scan_preview.h"
 
 namespace limn::apps {
@@ -119,8 +119,8 @@ Status write_images(const calib::Scan& scan, const std::filesystem::path& out) {
   std::vector<bool> largest;
   for (const int piece : pieces.of_vertex) largest.push_back(piece == 0);
   const Imager viewer =
-      scene::preview_viewer(scene::with_vertices_kept(scan.mesh, largest), d_from, world_from_camera * Eigen::Vector3d(0, -1, 0),
-                       k_preview_width, k_preview_height);
+      scene::preview_viewer(scene::with_vertices_kept(scan.mesh, largest), d_from,
+                            world_from_camera * Eigen::Vector3d(0, -1, 0), k_preview_width, k_preview_height);
   return write_png(out / "mesh.png", scene::draw_scan_preview(scan.mesh, viewer));
 }
 

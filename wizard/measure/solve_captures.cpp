@@ -4,8 +4,6 @@
 #include <chrono>
 #include <cmath>
 
-#include "wizard/measure/scale_bars.h"
-#include "wizard/measure/pixel_size.h"
 #include "calib/capture_set.h"
 #include "calib/judge/assess.h"
 #include "calib/judge/board_check.h"
@@ -23,6 +21,8 @@
 #include "core/log.h"
 #include "core/rig.h"
 #include "core/time_now.h"
+#include "wizard/measure/pixel_size.h"
+#include "wizard/measure/scale_bars.h"
 
 namespace limn::apps {
 namespace {
@@ -79,7 +79,9 @@ Status check_lengths(const calib::CaptureSet& captures,
 }
 
 // What kept a rig from being made, with the faults that explain it; they also stand in report.json.
-Error explained(const Error& failure, const std::vector<calib::Fault>& faults, const SolveCommandOptions& options) {
+Error explained(const Error& failure,
+                const std::vector<calib::Fault>& faults,
+                const SolveCommandOptions& options) {
   if (faults.empty()) return failure;
   if (const auto written = calib::write_failed_report(failure.message, faults, options.out); !written)
     log_warning("{}", written.message());

@@ -102,8 +102,8 @@ void draw_camera(
   draw.AddRectFilled(inner, end, IM_COL32(12, 13, 15, 255), 3);
   ImGui::PushClipRect(inner, end, true);
   const cv::Mat empty(camera.height, camera.width, CV_8UC1, cv::Scalar(12));
-  const PlacedImage placed = gui.image(camera.name, camera.image.empty() ? empty : camera.image,
-                                           inner, {size.x, size.y - caption});
+  const PlacedImage placed =
+      gui.image(camera.name, camera.image.empty() ? empty : camera.image, inner, {size.x, size.y - caption});
   draw_cells(camera.seen, placed, colour::k_blue);
   if (!view.is_over && !camera.target.empty()) outline(camera.target, placed, colour::k_warn);
   if (!view.is_over)

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "wizard/capture/exposure_check.h"
-#include "wizard/steps.h"
 #include "calib/judge/assess.h"
 #include "calib/observations.h"
+#include "wizard/capture/exposure_check.h"
+#include "wizard/steps.h"
 
 namespace limn::apps {
 
@@ -34,7 +34,7 @@ struct WizardView {
   struct Camera {
     std::string name;
     int width = 0, height = 0;
-    cv::Mat image = {};                       ///< newest, 8-bit grey or BGR; empty: none yet
+    cv::Mat image = {};                         ///< newest, 8-bit grey or BGR; empty: none yet
     std::vector<Eigen::Vector2d> corners = {};  ///< of the board, as last found
     std::vector<Eigen::Vector2d> target =
         {};  ///< outline of where to hold the board; empty: not in this image
@@ -50,7 +50,7 @@ struct WizardView {
     std::optional<double> held_out_px, predicted_mm;  ///< none: no rig yet
   };
   std::array<Step, k_wizard_steps> steps;  ///< in the order of WizardStep
-  std::vector<ExposureReading> light;            ///< as the exposure step saw it
+  std::vector<ExposureReading> light;      ///< as the exposure step saw it
   std::vector<Camera> cameras;
   std::vector<Projector> projectors;
   int pose = 0, poses = 0;  ///< number of the pose in work, of how many planned

@@ -5,9 +5,9 @@
 #include <mutex>
 #include <thread>
 
+#include "calib/board/board_finder.h"
 #include "wizard/window/wizard_panel.h"
 #include "wizard/window/wizard_view.h"
-#include "calib/board/board_finder.h"
 
 namespace limn::apps {
 namespace {

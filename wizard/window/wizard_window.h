@@ -6,18 +6,18 @@
 #include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "gui/gui_window.h"
-#include "wizard/capture/main_thread_executor.h"
 #include "wizard/capture/backend.h"
+#include "wizard/capture/main_thread_executor.h"
 #include "wizard/sequence.h"
 #include "wizard/steps.h"
-#include "core/result.h"
 
 namespace limn::apps {
 
 /// What the wizard's window is told beforehand.
 struct WizardPlan {
-  calib::CaptureSet captures;         ///< planned
+  calib::CaptureSet captures;       ///< planned
   std::vector<std::string> places;  ///< where each pose's board is to be held, in words
   /// The same as the board's outline in each camera's image, pixels; empty where it would not be seen.
   std::vector<std::vector<std::vector<Eigen::Vector2d>>> targets;  ///< [pose][camera]
