@@ -7,6 +7,7 @@
 
 #include "calib/judge/assess.h"
 #include "core/html.h"
+#include "core/svg.h"
 #include "design/design_report.h"
 
 namespace limn::apps {
@@ -19,20 +20,15 @@ constexpr double k_margin_m = 0.35, k_tick_m = 0.5;
 constexpr double k_view_px = 620;  // of the longer side of a drawing
 
 constexpr const char* k_plan_style = R"(
-:root { color-scheme: light dark; --ground: #fbfaf8; --text: #1d1f23; --faint: #6b6862; --line: #dddad3;
-        --camera: #1f66b1; --projector: #b36b00; --good: #17683c; --doubt: #8a5a00; --bad: #b3261e; }
-@media (prefers-color-scheme: dark) { :root { --ground: #14161a; --text: #e8e6e1; --faint: #a9a69f; --line: #2b2f36;
-        --camera: #7db2f0; --projector: #f5b642; --good: #7fd1a0; --doubt: #f5b642; --bad: #ff9a7a; } }
-body { margin: 0 auto; max-width: 1320px; padding: 2rem 1.5rem 4rem; background: var(--ground); color: var(--text);
-       font: 16px/1.5 system-ui, sans-serif; }
-h1 { font-weight: 600; margin: 0 0 .3rem; } .lead { color: var(--faint); margin: 0 0 1.5rem; max-width: 50rem; }
-.views { display: flex; flex-wrap: wrap; gap: 1.5rem; } figure { margin: 0; } figcaption { color: var(--faint); }
+:root { --camera: #1f66b1; --projector: #b36b00; }
+@media (prefers-color-scheme: dark) { :root { --camera: #7db2f0; --projector: #f5b642; } }
+.views { display: flex; flex-wrap: wrap; gap: 1.5rem; }
 svg { max-width: 100%; height: auto; font: 13px system-ui, sans-serif; } svg text { fill: var(--text); }
 .volume { fill: var(--line); stroke: var(--faint); } .tick { stroke: var(--line); }
 .camera { stroke: var(--camera); fill: var(--camera); } .projector { stroke: var(--projector); fill: var(--projector); }
-.reach { fill-opacity: .12; } .name { stroke: none; }
-.light { font-size: 1.25rem; margin: .2rem 0; } .good { color: var(--good); } .doubt { color: var(--doubt); }
-.bad { color: var(--bad); } pre { overflow-x: auto; padding: 1rem; border: 1px solid var(--line); border-radius: 4px; }
+.reach { fill-opacity: .12; } svg .name { stroke: none; }
+.light { font-size: 1.25rem; margin: .2rem 0; }
+pre { overflow-x: auto; padding: 1rem; border: 1px solid var(--line); border-radius: 4px; }
 )";
 
 // Two of the world's axes as they lie in a drawing: to the right, and up.
@@ -87,20 +83,17 @@ std::vector<Vector2d> hull(std::vector<Vector2d> points) {
   return out;
 }
 
-std::string imager_svg(const Imager& imager,
-                       const char* kind,
-                       const DescribedRig& described,
-                       const Sheet& sheet) {
-  const Vector3d p_eye = imager.imager_from_world.inverse().translation;
-  std::vector<Vector2d> points = {sheet.at(p_eye)};
+void add_imager(const Imager& imager,
+                const std::string& kind,
+                const DescribedRig& described,
+                const Sheet& sheet,
+                Svg* svg) {
+  const Vector2d at = sheet.at(imager.imager_from_world.inverse().translation);
+  std::vector<Vector2d> points = {at};
   for (const Vector3d& corner : reach_of(imager, described)) points.push_back(sheet.at(corner));
-  std::string polygon;
-  for (const Vector2d& p : hull(points)) polygon += fmt::format("{:.1f},{:.1f} ", p.x(), p.y());
-  const Vector2d at = points.front();
-  return fmt::format(
-      "<polygon class=\"{} reach\" points=\"{}\"/><circle class=\"{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"6\"/>"
-      "<text class=\"name\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>",
-      kind, polygon, kind, at.x(), at.y(), at.x() + 10, at.y() + 5, escaped(imager.name));
+  svg->polygon(hull(points), fmt::format("class='{} reach'", kind));
+  svg->circle(at, 6, fmt::format("class='{}'", kind));
+  svg->text(at + Vector2d(10, 5), imager.name, "class='name'");
 }
 
 std::string view_svg(const View& view, const DescribedRig& described) {
@@ -113,41 +106,31 @@ std::string view_svg(const View& view, const DescribedRig& described) {
               Vector2d(box.max()[view.right], box.max()[view.up]) + margin};
   sheet.px_per_m = k_view_px / (sheet.high - sheet.low).maxCoeff();
   const Vector2d size = sheet.size();
-  std::string svg = fmt::format("<svg viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" height=\"{1:.0f}\">",
-                                size.x(), size.y());
+  Svg svg({0, 0}, size, fmt::format("width='{:.0f}' height='{:.0f}'", size.x(), size.y()));
   for (double x = std::ceil(sheet.low.x() / k_tick_m) * k_tick_m; x < sheet.high.x(); x += k_tick_m) {
     const double px = (x - sheet.low.x()) * sheet.px_per_m;
-    svg += fmt::format("<line class=\"tick\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"0\" y2=\"{1:.0f}\"/>", px,
-                       size.y());
+    svg.line({px, 0}, {px, size.y()}, "class='tick'");
   }
   for (double y = std::ceil(sheet.low.y() / k_tick_m) * k_tick_m; y < sheet.high.y(); y += k_tick_m) {
     const double px = (sheet.high.y() - y) * sheet.px_per_m;
-    svg += fmt::format("<line class=\"tick\" y1=\"{0:.1f}\" y2=\"{0:.1f}\" x1=\"0\" x2=\"{1:.0f}\"/>", px,
-                       size.x());
+    svg.line({0, px}, {size.x(), px}, "class='tick'");
   }
   const Vector2d a = sheet.at(described.p_centre - described.size_m / 2),
                  b = sheet.at(described.p_centre + described.size_m / 2);
-  svg += fmt::format("<rect class=\"volume\" x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/>",
-                     std::min(a.x(), b.x()), std::min(a.y(), b.y()), std::abs(b.x() - a.x()),
-                     std::abs(b.y() - a.y()));
+  svg.rect(a.cwiseMin(b), (b - a).cwiseAbs(), "class='volume'");
   for (const Imager& imager : described.rig.projectors)
-    svg += imager_svg(imager, "projector", described, sheet);
-  for (const Imager& imager : described.rig.cameras) svg += imager_svg(imager, "camera", described, sheet);
-  return fmt::format("<figure>{}</svg><figcaption>{}; a square is {:g} m</figcaption></figure>\n", svg,
-                     view.caption, k_tick_m);
+    add_imager(imager, "projector", described, sheet, &svg);
+  for (const Imager& imager : described.rig.cameras) add_imager(imager, "camera", described, sheet, &svg);
+  return html_figure(svg.element(), view.caption, fmt::format("(a square is {:g} m)", k_tick_m));
 }
 
 }  // namespace
 
 std::string plan_page(const DescribedRig& described, const PredictedAccuracy& predicted_accuracy) {
-  std::string html = fmt::format(
-      "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" "
-      "content=\"width=device-width\"><title>The rig as planned</title><style>{}</style><h1>The rig as "
-      "planned</h1>\n"
-      "<p class=\"lead\">Foreseen by playing its calibration with the noise of real pictures. Room light, "
-      "defocus and "
-      "a board that bends are not in it.</p>\n",
-      k_plan_style);
+  std::string html =
+      "<h1>Rig design</h1>\n<p class=\"lead\">The accuracy is predicted by a simulated calibration with the "
+      "noise of "
+      "real images. Room light, defocus and a bending board are not simulated.</p>\n";
   for (std::size_t i = 0; i < predicted_accuracy.error_mm.size(); ++i) {
     const double mm = predicted_accuracy.error_mm[i];
     const char* worth = mm <= calib::k_good_mm ? "good" : mm <= calib::k_usable_mm ? "doubt" : "bad";
@@ -160,8 +143,8 @@ std::string plan_page(const DescribedRig& described, const PredictedAccuracy& pr
   html += "<div class=\"views\">\n";
   for (const View& view : {View{"from above", 0, 1}, View{"from the side", 1, 2}})
     html += view_svg(view, described);
-  return html + fmt::format("</div>\n<pre>{}</pre>\n</html>\n",
-                            escaped(design_table(predicted_accuracy, described)));
+  html += fmt::format("</div>\n<pre>{}</pre>\n", escaped(design_table(predicted_accuracy, described)));
+  return html_page("Limn: rig design", HtmlColours::of_system, k_plan_style, html);
 }
 
 }  // namespace limn::apps

@@ -8,6 +8,7 @@
 
 #include "core/file.h"
 #include "core/html.h"
+#include "core/svg.h"
 
 namespace limn::apps {
 namespace {
@@ -16,14 +17,7 @@ constexpr double k_least = 1e-4, k_growth = 1.02;
 constexpr std::size_t k_most_notes = 500, k_most_slices = 240;
 
 constexpr const char* k_telemetry_style = R"(
-:root { color-scheme: dark; }
-body { margin: 0 auto; max-width: 1000px; padding: 2rem 1.5rem 4rem; background: #14161a; color: #e8e6e1;
-       font: 16px/1.5 system-ui, sans-serif; }
-h1 { font-weight: 600; margin: 0 0 .3rem; } h2 { font-weight: 500; margin: 2rem 0 .5rem; font-size: 1.1rem; }
-.lead { color: #a9a69f; margin: 0 0 2rem; }
-table { border-collapse: collapse; } th { text-align: left; color: #a9a69f; font-weight: 500; }
-td, th { padding: .3rem 1.6rem .3rem 0; border-bottom: 1px solid #2b2f36; }
-td.n { font-variant-numeric: tabular-nums; text-align: right; white-space: nowrap; }
+body { max-width: 1000px; } h2 { font-weight: 500; margin: 2rem 0 .5rem; font-size: 1.1rem; }
 svg { width: 100%; height: 140px; background: #1b1e24; border-radius: 4px; }
 polyline { fill: none; stroke: #7fb4ff; stroke-width: 1.5; } text { fill: #a9a69f; font-size: 12px; }
 )";
@@ -37,14 +31,13 @@ std::string chart(const std::string& title,
   for (const auto& [x, y] : points) high = std::max(high, y);
   if (!(high > 0)) return "";
   const double begin = points.front().first, span = std::max(1e-9, points.back().first - begin);
-  std::string line;
-  for (const auto& [x, y] : points)
-    line += fmt::format("{:.1f},{:.1f} ", 10 + 980 * (x - begin) / span, 120 - 95 * y / high);
-  return fmt::format(
-      "<h2>{}</h2><svg viewBox=\"0 0 1000 140\" preserveAspectRatio=\"none\" role=\"img\" aria-label=\"{}\">"
-      "<polyline points=\"{}\"/><text x=\"10\" y=\"16\">{:.{}f} {}</text>"
-      "<text x=\"990\" y=\"136\" text-anchor=\"end\">{:.0f} s</text></svg>\n",
-      escaped(title), escaped(title), line, high, high < 10 ? 2 : 0, unit, begin + span);
+  std::vector<Eigen::Vector2d> line;
+  for (const auto& [x, y] : points) line.emplace_back(10 + 980 * (x - begin) / span, 120 - 95 * y / high);
+  Svg svg({0, 0}, {1000, 140}, fmt::format("preserveAspectRatio='none' aria-label='{}'", escaped(title)));
+  svg.polyline(line, "");
+  svg.text({10, 16}, fmt::format("{:.{}f} {}", high, high < 10 ? 2 : 0, unit), "");
+  svg.text({990, 136}, fmt::format("{:.0f} s", begin + span), "text-anchor='end'");
+  return fmt::format("<h2>{}</h2>{}\n", escaped(title), svg.element());
 }
 
 }  // namespace
@@ -157,19 +150,21 @@ nlohmann::ordered_json Telemetry::summary() const {
 Status Telemetry::write_page(const std::filesystem::path& path, const std::string& title) const {
   const nlohmann::ordered_json json = summary();
   std::string html = fmt::format(
-      "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>{0}</title><style>{1}</style>"
-      "<h1>{0}</h1><p class=\"lead\">{2:.1f} s, {3} pictures shown, {4} camera frames missed, {5} pictures "
-      "with a lost body.</p>\n<table><tr><th>what</th><th>median</th><th>95 %</th><th>99 %</th></tr>\n",
-      escaped(title), k_telemetry_style, json["seconds"].get<double>(), frames_, missed_, with_lost_);
+      "<h1>{}</h1>\n<p class=\"lead\">{:.1f} s, {} images shown, {} camera frames missed, {} images with a "
+      "lost "
+      "body.</p>\n",
+      escaped(title), json["seconds"].get<double>(), frames_, missed_, with_lost_);
+  const HtmlRow headings = {text_cell("measured"), text_cell("median", "number"), text_cell("95 %", "number"),
+                            text_cell("99 %", "number")};
+  std::vector<HtmlRow> rows;
   for (const Measure& measure : measures_) {
     if (measure.all.count() == 0) continue;
-    html += fmt::format(
-        "<tr><td>{} ({})</td><td class=\"n\">{:.2f} {}</td><td class=\"n\">{:.2f}</td><td "
-        "class=\"n\">{:.2f}</td></tr>\n",
-        measure.name, escaped(measure.what), measure.all.at(0.5), measure.unit, measure.all.at(0.95),
-        measure.all.at(0.99));
+    rows.push_back({text_cell(fmt::format("{} ({})", measure.name, measure.what)),
+                    text_cell(fmt::format("{:.2f} {}", measure.all.at(0.5), measure.unit), "number"),
+                    text_cell(fmt::format("{:.2f}", measure.all.at(0.95)), "number"),
+                    text_cell(fmt::format("{:.2f}", measure.all.at(0.99)), "number")});
   }
-  html += "</table>\n";
+  html += html_table(headings, rows);
   std::vector<std::pair<double, double>> latency, paint, placement;
   for (const Slice& slice : slices_) {
     latency.emplace_back(slice.begins_s, slice.latency_ms);
@@ -179,10 +174,11 @@ Status Telemetry::write_page(const std::filesystem::path& path, const std::strin
   html += chart("Camera to light, the worst in each slice", latency, "ms");
   html += chart("Painting, the worst in each slice", paint, "ms");
   html += chart("Parts from their true places, the worst in each slice", placement, "mm");
-  html += "<h2>What happened</h2><table>\n";
+  rows.clear();
   for (const auto& [at_s, what] : notes_)
-    html += fmt::format("<tr><td class=\"n\">{:.2f} s</td><td>{}</td></tr>\n", at_s, escaped(what));
-  return write_file(path, html + "</table></html>\n");
+    rows.push_back({text_cell(fmt::format("{:.2f} s", at_s), "number"), text_cell(what)});
+  html += "<h2>Events</h2>\n" + html_table({}, rows);
+  return write_file(path, html_page(title, HtmlColours::dark, k_telemetry_style, html));
 }
 
 }  // namespace limn::apps

@@ -1,41 +1,38 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
 #include "calib/report/report.h"
 #include "calib/report/svg_plots.h"
+#include "core/html.h"
 
 namespace limn::calib {
 namespace {
 
 using Eigen::Vector2d;
 
-std::string figure(const std::string& svg, const std::string& title, const std::string& text) {
-  return fmt::format("<figure>{}<figcaption><b>{}</b> {}</figcaption></figure>\n", svg, xml_escaped(title),
-                     xml_escaped(text));
-}
-
 std::string section(const std::string& title, const std::string& content) {
   if (content.empty()) return "";
-  return fmt::format("<section><h2>{}</h2>\n{}</section>\n", xml_escaped(title), content);
+  return fmt::format("<section><h2>{}</h2>\n{}</section>\n", escaped(title), content);
 }
 
-// A table with head and rows; the first column is text, the others are numbers.
+// A table of texts; empty without rows.
 std::string table(const std::vector<std::string>& head, const std::vector<std::vector<std::string>>& rows) {
   if (rows.empty()) return "";
-  std::string html = "<div class='wide'><table><tr>";
-  for (const std::string& cell : head) html += "<th>" + xml_escaped(cell) + "</th>";
-  html += "</tr>\n";
-  for (const auto& row : rows) {
-    html += "<tr>";
-    for (const std::string& cell : row) html += "<td>" + xml_escaped(cell) + "</td>";
-    html += "</tr>\n";
-  }
-  return html + "</table></div>\n";
+  const auto cells = [](const std::vector<std::string>& texts) {
+    HtmlRow row;
+    for (const std::string& text : texts) row.push_back(text_cell(text));
+    return row;
+  };
+  std::vector<HtmlRow> html_rows;
+  for (const auto& row : rows) html_rows.push_back(cells(row));
+  return "<div class='wide'>" + html_table(cells(head), html_rows) + "</div>\n";
 }
 
 std::string tile(const std::string& value, const std::string& unit, const std::string& what) {
-  return fmt::format("<div class='tile'><b>{}</b> {}<span>{}</span></div>\n", xml_escaped(value),
-                     xml_escaped(unit), xml_escaped(what));
+  return fmt::format("<div class='tile'><b>{}</b> {}<span>{}</span></div>\n", escaped(value), escaped(unit),
+                     escaped(what));
 }
 
 double worst_mm(const Assessment& a) {
@@ -57,8 +54,8 @@ std::string header(const Report& report) {
   if (!words.empty()) words[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(words[0])));
   std::string html =
       fmt::format("<h1>Calibration <span class='{0}'>{0}</span></h1>\n<p class='lead'>{1}</p>\n", verdict,
-                  xml_escaped(words));
-  html += fmt::format("<p class='soft'>{}</p>\n<div class='tiles'>\n", xml_escaped(report.made_at));
+                  escaped(words));
+  html += fmt::format("<p class='soft'>{}</p>\n<div class='tiles'>\n", escaped(report.made_at));
   html += tile(fmt::format("{:.2f}", worst_mm(a)), "mm", "predicted error (95 %), worst projector");
   html += tile(fmt::format("{:.2f}", a.held_out.rms_px), "px",
                "held-out error: on poses that the solve has not used");
@@ -71,15 +68,15 @@ std::string fault_list(const std::vector<Fault>& faults) {
   if (faults.empty()) return "";
   std::string html = "<ul class='faults'>\n";
   for (const Fault& fault : faults)
-    html += fmt::format("<li><b>{}</b> {}.<br><em>What to do:</em> {}.</li>\n", xml_escaped(fault.name),
-                        xml_escaped(fault.evidence), xml_escaped(fault.advice));
+    html += fmt::format("<li><b>{}</b> {}.<br><em>What to do:</em> {}.</li>\n", escaped(fault.name),
+                        escaped(fault.evidence), escaped(fault.advice));
   return html + "</ul>\n";
 }
 
 std::string advice_list(const std::vector<std::string>& advice) {
   if (advice.empty()) return "";
   std::string html = "<ul>\n";
-  for (const std::string& sentence : advice) html += "<li>" + xml_escaped(sentence) + "</li>\n";
+  for (const std::string& sentence : advice) html += "<li>" + escaped(sentence) + "</li>\n";
   return html + "</ul>\n";
 }
 
@@ -100,9 +97,9 @@ std::string error_maps_html(const Report& report) {
     for (const ErrorMap::Plane& plane : map.planes) {
       double worst = 0;
       for (const double mm : plane.p95_mm) worst = std::isfinite(mm) ? std::max(worst, mm) : worst;
-      html += figure(heat_map(camera.width, camera.height, map.columns, plane.p95_mm, most),
-                     fmt::format("{}, {:.2f} m", name, plane.depth_m),
-                     worst > 0 ? fmt::format("at most {:.2f} mm", worst) : "out of reach");
+      html += html_figure(heat_map(camera.width, camera.height, map.columns, plane.p95_mm, most),
+                          fmt::format("{}, {:.2f} m", name, plane.depth_m),
+                          worst > 0 ? fmt::format("at most {:.2f} mm", worst) : "out of reach");
     }
     html += "</div>\n";
   }
@@ -110,7 +107,7 @@ std::string error_maps_html(const Report& report) {
   return fmt::format(
       "<p>95 % error of light on a target whose pose {} measures, on planes across its view. Red: this value "
       "or more. Grey: the projector does not reach.</p>{}\n{}",
-      xml_escaped(camera.name), colour_key(most, "mm"), html);
+      escaped(camera.name), colour_key(most, "mm"), html);
 }
 
 // Held-out errors on the boards in camera 0's image.
@@ -130,9 +127,9 @@ std::string board_errors_html(const Report& report) {
       if (static_cast<size_t>(match.projector) == i && match.camera == 0 && std::isfinite(error))
         dots.push_back({match.px_camera, error});
     }
-    html +=
-        figure(dot_map(camera.width, camera.height, dots, most), observations.projectors[i].name,
-               fmt::format("on all boards, in {}'s image: 95 % within {:.2f} mm", camera.name, errors[i]));
+    html += html_figure(
+        dot_map(camera.width, camera.height, dots, most), observations.projectors[i].name,
+        fmt::format("on all boards, in {}'s image: 95 % within {:.2f} mm", camera.name, errors[i]));
   }
   return "<p>Each board pose is predicted by a solve that has not used it. The colour shows how far "
          "the light would land from its target on the board.</p>" +
@@ -156,7 +153,7 @@ std::string imager_figure(const CapturedDevice& device,
                           const DeviceQuality& quality,
                           const std::string& what) {
   const SvgPlot plot = residual_field(device.width, device.height, points);
-  return figure(
+  return html_figure(
       plot.svg, device.name,
       fmt::format("{}: {:.3f} px RMS, {} of {} outliers, {:.0f} % covered. {}.", what, quality.rms_px,
                   quality.outliers, quality.points, 100 * quality.coverage, plot.key));
@@ -188,10 +185,10 @@ std::string imagers_html(const Report& report) {
     html +=
         imager_figure(device, fitted, report.assessment.devices[observations.cameras.size() + i], "matches");
     const SvgPlot plot = residual_field(device.width, device.height, foretold);
-    html +=
-        figure(plot.svg, device.name + ", held-out poses",
-               fmt::format("prediction by a solve without the pose: 95 % within {:.2f} mm on the board. {}.",
-                           report.assessment.held_out_error_mm[i], plot.key));
+    html += html_figure(
+        plot.svg, device.name + ", held-out poses",
+        fmt::format("prediction by a solve without the pose: 95 % within {:.2f} mm on the board. {}.",
+                    report.assessment.held_out_error_mm[i], plot.key));
   }
   return html + "</div>\n";
 }
@@ -312,43 +309,37 @@ std::string history_html(const Report& report) {
                   fmt::format("{:.3f}", a.held_out.rms_px), mm(worst_mm(a)), moved_text(now)});
   held_out.push_back(a.held_out.rms_px);
   std::reverse(rows.begin(), rows.end());
-  return figure(sparkline(held_out), "Held-out error, px RMS,", "oldest to newest") +
+  return html_figure(sparkline(held_out), "Held-out error, px RMS,", "oldest to newest") +
          table({"made", "verdict", "held-out px", "predicted mm",
                 "moved since the one before, relative to camera0"},
                rows);
 }
 
 constexpr auto k_style = R"(
-:root{color-scheme:light}*{box-sizing:border-box}
-body{background:#fff;color:#1d2329;font:16px/1.5 system-ui,-apple-system,'Segoe UI',Roboto,sans-serif;margin:0 auto;
-max-width:1180px;padding:28px 20px 60px}
-h1{font-weight:600;font-size:28px;margin:0 0 8px}h1 span{border-radius:6px;padding:1px 12px;color:#fff}
-.good{background:#2c8a4b}.usable{background:#b97a06}.reject{background:#c43139}
-h2{font-size:19px;font-weight:600;margin:40px 0 10px}.lead{font-size:18px;margin:0 0 6px;max-width:52em}
+*{box-sizing:border-box}
+body{background:#fff;color:#1d2329;max-width:1180px;padding:28px 20px 60px}
+h1{font-size:28px;margin:0 0 8px}h1 span{border-radius:6px;padding:1px 12px;color:#fff}
+h1 .good{background:#2c8a4b}h1 .usable{background:#b97a06}h1 .reject{background:#c43139}
+h2{font-size:19px;margin:40px 0 10px}.lead{color:inherit;font-size:18px;margin:0 0 6px;max-width:52em}
 .soft,figcaption,th{color:#5d6670}.soft{margin:0;font-size:14px}p{max-width:60em}
 .tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));gap:12px;margin:20px 0 0}
 .tile{background:#f5f6f8;border-radius:8px;padding:12px 14px}.tile b{font-size:26px;font-weight:600}
 .tile span{display:block;color:#5d6670;font-size:14px;line-height:1.35}
 .grid{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,460px),1fr));gap:22px;margin:12px 0}
 .small{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(47%,200px),1fr));gap:12px;margin:12px 0}
-figure{margin:0}figure svg{display:block;width:100%;height:auto}figcaption{font-size:14px;margin-top:6px}
-figcaption b{color:#1d2329}.key{width:320px;max-width:100%;display:block}.bars{width:760px;max-width:none;height:auto}
+figure svg{display:block;width:100%;height:auto}figcaption{font-size:14px}
+.key{width:320px;max-width:100%;display:block}.bars{width:760px;max-width:none;height:auto}
 .spark{max-width:420px}ul{padding-left:20px;max-width:60em}li{margin:6px 0}
 .faults{list-style:none;padding:0}.faults li{border-left:4px solid #c43139;background:#fdf3f3;padding:8px 14px;
 border-radius:0 6px 6px 0}.faults em{font-style:normal;color:#5d6670}
-.wide{overflow-x:auto;margin:10px 0}table{border-collapse:collapse;font-size:14px;font-variant-numeric:tabular-nums}
-th{font-weight:500;text-align:left}th,td{white-space:nowrap}td:nth-child(5){white-space:normal;min-width:12em}td,th{padding:5px 22px 5px 0;border-bottom:1px solid #e4e7eb;vertical-align:top}
+.wide{overflow-x:auto;margin:10px 0}table{font-size:14px;font-variant-numeric:tabular-nums}
+th,td{white-space:nowrap;padding:5px 22px 5px 0}td:nth-child(5){white-space:normal;min-width:12em}
 )";
 
 }  // namespace
 
 std::string report_html(const Report& report) {
-  std::string html = fmt::format(
-      "<!doctype html>\n<html lang='en'><head><meta charset='utf-8'><meta name='viewport' "
-      "content='width=device-width,initial-scale=1'><title>Limn: "
-      "calibration</title>\n<style>{}</style></head><body>\n",
-      k_style);
-  html += header(report);
+  std::string html = header(report);
   html += section("Faults", fault_list(report.assessment.faults));
   html += section("What would help", advice_list(report.explanation.advice));
   html += section("Error maps of the working volume", error_maps_html(report));
@@ -361,7 +352,7 @@ std::string report_html(const Report& report) {
   html += section("Scale bars, measured with structured light", lengths_table(report));
   html += section("Decoding", decode_table(report));
   html += section("Earlier calibrations of this rig", history_html(report));
-  return html + "</body></html>\n";
+  return html_page("Limn: calibration", HtmlColours::light, k_style, html);
 }
 
 }  // namespace limn::calib

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/median.h"
+#include "core/svg.h"
 
 namespace limn::calib {
 namespace {
@@ -36,36 +37,33 @@ std::string colour_at(double share) {
                      mix(k_stops[i].g, k_stops[i + 1].g), mix(k_stops[i].b, k_stops[i + 1].b));
 }
 
-std::string opened(int width, int height) {
-  return fmt::format(
-      "<svg viewBox='-0.5 -0.5 {0} {1}' role='img'><rect x='-0.5' y='-0.5' width='{0}' "
-      "height='{1}' fill='#fff'/>",
-      width, height);
+Svg image_plot(int width, int height) {
+  const Vector2d low(-0.5, -0.5), size(width, height);
+  Svg svg(low, size);
+  svg.rect(low, size, "fill='#fff'");
+  return svg;
 }
 
-std::string framed(int width, int height) {
-  return fmt::format(
-      "<rect x='-0.5' y='-0.5' width='{}' height='{}' fill='none' stroke='{}' stroke-width='{:.1f}'/>", width,
-      height, k_frame, width / 400.0);
+void add_frame(int width, int height, Svg* svg) {
+  svg->rect({-0.5, -0.5}, {static_cast<double>(width), static_cast<double>(height)},
+            fmt::format("fill='none' stroke='{}' stroke-width='{:.1f}'", k_frame, width / 400.0));
 }
 
 // Grey cells where nothing was observed.
-std::string bare_cells(int width, int height, const std::vector<FieldPoint>& points) {
+void add_empty_cells(int width, int height, const std::vector<FieldPoint>& points, Svg* svg) {
   std::array<bool, k_grid * k_grid> seen{};
   for (const FieldPoint& p : points) {
     const int x = std::clamp(static_cast<int>((p.px.x() + 0.5) / width * k_grid), 0, k_grid - 1);
     const int y = std::clamp(static_cast<int>((p.px.y() + 0.5) / height * k_grid), 0, k_grid - 1);
     seen[static_cast<size_t>(y * k_grid + x)] = true;
   }
-  std::string svg = fmt::format("<g fill='{}'>", k_empty);
+  const Vector2d cell = Vector2d(width, height) / k_grid;
+  svg->begin_group(fmt::format("fill='{}'", k_empty));
   for (int i = 0; i < k_grid * k_grid; ++i) {
     if (seen[static_cast<size_t>(i)]) continue;
-    svg += fmt::format("<rect x='{:.1f}' y='{:.1f}' width='{:.1f}' height='{:.1f}'/>",
-                       i % k_grid * width / static_cast<double>(k_grid) - 0.5,
-                       i / k_grid * height / static_cast<double>(k_grid) - 0.5,
-                       width / static_cast<double>(k_grid), height / static_cast<double>(k_grid));
+    svg->rect(cell.cwiseProduct(Vector2d(i % k_grid, i / k_grid)) - Vector2d(0.5, 0.5), cell, "");
   }
-  return svg + "</g>";
+  svg->end_group();
 }
 
 // The 90th percentile of the inliers' lengths.
@@ -88,109 +86,83 @@ double round_magnification(double wanted) {
   return best;
 }
 
-std::string arrow(const FieldPoint& p, double magnified, double most, int width) {
+void add_arrow(const FieldPoint& p, double magnified, double most, int width, Svg* svg) {
   const double unit = width / 1000.0;
-  if (p.outlier)
-    return fmt::format(
-        "<circle cx='{:.1f}' cy='{:.1f}' r='{:.1f}' fill='none' stroke='{}' stroke-width='{:.1f}'/>",
-        p.px.x(), p.px.y(), 6 * unit, k_ink, 1.8 * unit);
+  if (p.outlier) {
+    svg->circle(p.px, 6 * unit,
+                fmt::format("fill='none' stroke='{}' stroke-width='{:.1f}'", k_ink, 1.8 * unit));
+    return;
+  }
   const std::string colour = colour_at(p.residual.norm() / most);
   Vector2d shift = p.residual.allFinite() ? Vector2d(magnified * p.residual) : Vector2d::Zero();
   if (shift.norm() > k_longest * width) shift *= k_longest * width / shift.norm();
-  return fmt::format(
-      "<path d='M{:.1f} {:.1f}l{:.1f} {:.1f}' stroke='{}'/><circle cx='{:.1f}' cy='{:.1f}' "
-      "r='{:.1f}' fill='{}'/>",
-      p.px.x(), p.px.y(), shift.x(), shift.y(), colour, p.px.x(), p.px.y(), 2.2 * unit, colour);
+  svg->line(p.px, p.px + shift, fmt::format("stroke='{}'", colour));
+  svg->circle(p.px, 2.2 * unit, fmt::format("fill='{}'", colour));
 }
 
 }  // namespace
-
-std::string xml_escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '&':
-        out += "&amp;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
 
 SvgPlot residual_field(int width, int height, const std::vector<FieldPoint>& points) {
   const double usual = usual_length(points);
   const double magnified = usual > 0 ? round_magnification(k_long * width / usual) : 1;
   const double most = usual > 0 ? 1.5 * usual : 1;
-  std::string svg = opened(width, height) + bare_cells(width, height, points) +
-                    fmt::format("<g stroke-width='{:.2f}' stroke-linecap='round'>", 1.6 * width / 1000.0);
+  Svg svg = image_plot(width, height);
+  add_empty_cells(width, height, points, &svg);
+  svg.begin_group(fmt::format("stroke-width='{:.2f}' stroke-linecap='round'", 1.6 * width / 1000.0));
   const size_t step = points.size() / k_most_arrows + 1;
-  std::string outliers;  // drawn on top
-  bool any_outlier = false;
+  std::vector<FieldPoint> outliers;  // drawn on top
   for (size_t i = 0; i < points.size(); i += points[i].outlier ? 1 : step) {
-    (points[i].outlier ? outliers : svg) += arrow(points[i], magnified, most, width);
-    any_outlier = any_outlier || points[i].outlier;
+    if (points[i].outlier)
+      outliers.push_back(points[i]);
+    else
+      add_arrow(points[i], magnified, most, width, &svg);
   }
-  svg += outliers + "</g>" + framed(width, height) + "</svg>";
+  for (const FieldPoint& p : outliers) add_arrow(p, magnified, most, width, &svg);
+  svg.end_group();
+  add_frame(width, height, &svg);
   std::string key = fmt::format(
       "Arrows magnified {:.0f} times, from blue (0) to red ({:.2g} px and more); grey: "
       "nothing observed",
       magnified, most);
-  if (any_outlier) key += "; black rings: outliers";
+  if (!outliers.empty()) key += "; black rings: outliers";
   if (step > 1) key += fmt::format("; one of {} drawn", step);
-  return {svg, key};
+  return {svg.element(), key};
 }
 
 std::string dot_map(int width, int height, const std::vector<Dot>& dots, double most) {
-  std::string svg = opened(width, height);
+  Svg svg = image_plot(width, height);
   const size_t step = dots.size() / k_most_arrows + 1;
   for (size_t i = 0; i < dots.size(); i += step)
-    svg += fmt::format("<circle cx='{:.1f}' cy='{:.1f}' r='{:.1f}' fill='{}'/>", dots[i].px.x(),
-                       dots[i].px.y(), 5 * width / 1000.0, colour_at(dots[i].value / most));
-  return svg + framed(width, height) + "</svg>";
+    svg.circle(dots[i].px, 5 * width / 1000.0, fmt::format("fill='{}'", colour_at(dots[i].value / most)));
+  add_frame(width, height, &svg);
+  return svg.element();
 }
 
 std::string heat_map(int width, int height, int columns, const std::vector<double>& values, double most) {
-  std::string svg = opened(width, height);
+  Svg svg = image_plot(width, height);
   const int rows = static_cast<int>(values.size()) / std::max(columns, 1);
   const double w = static_cast<double>(width) / columns, h = static_cast<double>(height) / std::max(rows, 1);
   for (size_t i = 0; i < values.size(); ++i) {
     const int column = static_cast<int>(i) % columns, row = static_cast<int>(i) / columns;
-    svg += fmt::format("<rect x='{:.1f}' y='{:.1f}' width='{:.1f}' height='{:.1f}' fill='{}'>",
-                       column * w - 0.5, row * h - 0.5, w + 0.5, h + 0.5, colour_at(values[i] / most));
-    if (std::isfinite(values[i])) svg += fmt::format("<title>{:.2f} mm</title>", values[i]);
-    svg += "</rect>";
+    svg.rect({column * w - 0.5, row * h - 0.5}, {w + 0.5, h + 0.5},
+             fmt::format("fill='{}'", colour_at(values[i] / most)),
+             std::isfinite(values[i]) ? fmt::format("{:.2f} mm", values[i]) : "");
   }
-  return svg + framed(width, height) + "</svg>";
+  add_frame(width, height, &svg);
+  return svg.element();
 }
 
 std::string colour_key(double most, const std::string& unit) {
-  std::string svg = "<svg class='key' viewBox='0 0 320 34' role='img'>";
+  Svg svg({0, 0}, {320, 34}, "class='key'");
   constexpr int k_steps = 40;
   for (int i = 0; i < k_steps; ++i)
-    svg += fmt::format("<rect x='{:.1f}' y='0' width='8.5' height='12' fill='{}'/>", 8.0 * i,
-                       colour_at((i + 0.5) / k_steps));
-  for (const double share : {0.0, 0.5, 1.0})
-    svg += fmt::format("<text x='{:.0f}' y='29' font-size='13' fill='{}' text-anchor='{}'>{:.2g} {}</text>",
-                       320 * share, k_soft,
-                       share == 0   ? "start"
-                       : share == 1 ? "end"
-                                    : "middle",
-                       most * share, xml_escaped(unit));
-  return svg + "</svg>";
+    svg.rect({8.0 * i, 0}, {8.5, 12}, fmt::format("fill='{}'", colour_at((i + 0.5) / k_steps)));
+  for (const double share : {0.0, 0.5, 1.0}) {
+    const char* anchor = share == 0 ? "start" : share == 1 ? "end" : "middle";
+    svg.text({320 * share, 29}, fmt::format("{:.2g} {}", most * share, unit),
+             fmt::format("font-size='13' fill='{}' text-anchor='{}'", k_soft, anchor));
+  }
+  return svg.element();
 }
 
 std::string bar_chart(const std::vector<Bar>& bars, double limit, const std::string& limit_note) {
@@ -198,43 +170,36 @@ std::string bar_chart(const std::vector<Bar>& bars, double limit, const std::str
   double most = limit * 1.05;
   for (const Bar& bar : bars) most = std::max(most, bar.value);
   const double height = k_row * static_cast<double>(bars.size()) + 24;
-  std::string svg = fmt::format("<svg class='bars' viewBox='0 0 {} {}' role='img' font-size='13'>",
-                                k_from + k_wide + k_right, height);
+  Svg svg({0, 0}, {k_from + k_wide + k_right, height}, "class='bars' font-size='13'");
   double y = 4;
   for (const Bar& bar : bars) {
     const double length = std::isfinite(bar.value) ? std::max(1.0, bar.value / most * k_wide) : k_wide;
-    svg += fmt::format("<text x='{}' y='{:.0f}' text-anchor='end' fill='{}'>{}</text>", k_from - 10, y + 14,
-                       k_ink, xml_escaped(bar.label));
-    svg += fmt::format("<rect x='{}' y='{:.0f}' width='{:.1f}' height='18' rx='2' fill='{}'/>", k_from, y,
-                       length, colour_at(bar.value / limit * 0.8));
-    svg += fmt::format("<text x='{:.1f}' y='{:.0f}' fill='{}'>{}</text>", k_from + length + 8, y + 14, k_soft,
-                       xml_escaped(bar.note));
+    svg.text({k_from - 10, y + 14}, bar.label, fmt::format("text-anchor='end' fill='{}'", k_ink));
+    svg.rect({k_from, y}, {length, 18}, fmt::format("rx='2' fill='{}'", colour_at(bar.value / limit * 0.8)));
+    svg.text({k_from + length + 8, y + 14}, bar.note, fmt::format("fill='{}'", k_soft));
     y += k_row;
   }
   const double x = k_from + limit / most * k_wide;
-  svg += fmt::format(
-      "<path d='M{0:.1f} 0V{1:.0f}' stroke='{2}' stroke-dasharray='4 3'/><text x='{0:.1f}' "
-      "y='{3:.0f}' fill='{2}' text-anchor='middle'>{4}</text>",
-      x, height - 18, k_soft, height - 4, xml_escaped(limit_note));
-  return svg + "</svg>";
+  svg.line({x, 0}, {x, height - 18}, fmt::format("stroke='{}' stroke-dasharray='4 3'", k_soft));
+  svg.text({x, height - 4}, limit_note, fmt::format("fill='{}' text-anchor='middle'", k_soft));
+  return svg.element();
 }
 
 std::string sparkline(const std::vector<double>& values) {
   double most = 0;
   for (const double v : values) most = std::isfinite(v) ? std::max(most, v) : most;
-  std::string path, dots;
+  std::vector<Vector2d> points;
+  const double last = std::max<double>(1, static_cast<double>(values.size()) - 1);
   for (size_t i = 0; i < values.size(); ++i) {
     if (!std::isfinite(values[i])) continue;
-    const double x =
-        8 + 284.0 * static_cast<double>(i) / std::max<double>(1, static_cast<double>(values.size()) - 1);
-    const double y = 52 - 44 * (most > 0 ? values[i] / most : 0);
-    path += fmt::format("{}{:.1f} {:.1f}", path.empty() ? "M" : "L", x, y);
-    dots += fmt::format("<circle cx='{:.1f}' cy='{:.1f}' r='3' fill='{}'/>", x, y, colour_at(0));
+    points.emplace_back(8 + 284.0 * static_cast<double>(i) / last,
+                        52 - 44 * (most > 0 ? values[i] / most : 0));
   }
-  return fmt::format(
-      "<svg class='spark' viewBox='0 0 300 60' role='img'><path d='M0 52H300' stroke='{}'/>"
-      "<path d='{}' fill='none' stroke='{}' stroke-width='1.5'/>{}</svg>",
-      k_frame, path, colour_at(0), dots);
+  Svg svg({0, 0}, {300, 60}, "class='spark'");
+  svg.line({0, 52}, {300, 52}, fmt::format("stroke='{}'", k_frame));
+  svg.polyline(points, fmt::format("fill='none' stroke='{}' stroke-width='1.5'", colour_at(0)));
+  for (const Vector2d& p : points) svg.circle(p, 3, fmt::format("fill='{}'", colour_at(0)));
+  return svg.element();
 }
 
 }  // namespace limn::calib

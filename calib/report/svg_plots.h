@@ -50,7 +50,4 @@ std::string bar_chart(const std::vector<Bar>& bars, double limit, const std::str
 /// Values over time, oldest first, on a scale from 0 to the largest.
 std::string sparkline(const std::vector<double>& values);
 
-/// `text` with <, >, & and quotes escaped.
-std::string xml_escaped(const std::string& text);
-
 }  // namespace limn::calib
