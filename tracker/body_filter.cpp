@@ -93,7 +93,7 @@ Forecast forecast(const Branch& branch, double seconds, const MotionModel& model
 
 struct Update {
   Branch branch;
-  double log_weight;  // of the branch, not normalised
+  double log_weight;  // the branch's, not normalised
   PoseFit moving;     // posterior for a moving body
 };
 

@@ -24,9 +24,9 @@ struct MotionModel {
   double turn_drift = 0.9e-3;  ///< rad per square root of a second (0.05°)
   double starts_per_s = 0.5;   ///< how often a still body begins to move
   double stops_per_s = 1;      ///< how often a moving one comes to rest
-  /// A body that is not seen is extrapolated for this long, then it is lost. Where images come
-  /// more rarely it first stays at the extrapolated place, until one and a half times the interval between
-  /// images has passed.
+  /// A body that is not seen is extrapolated for this long, then it is lost. Where images come more
+  /// rarely it first stays at the extrapolated place, until one and a half times the interval between images
+  /// has passed.
   double extrapolation_limit_s = 0.3;
 };
 

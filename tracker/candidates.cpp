@@ -17,12 +17,12 @@ constexpr double k_min_box_share = 0.04;
 // Distance at which a boundary point becomes a corner: larger than the staircase, noise and the bow that a
 // lens gives a side.
 constexpr double k_corner_px = 1.4;
-constexpr double k_corner_share = 0.012;  // of the boundary's length
+constexpr double k_corner_share = 0.012;  // share of the boundary's length
 // Largest RMS distance of a side's cracks from its line: 0.3 px for a perfect staircase, plus noise and the
 // lens's bow.
 constexpr double k_max_side_rms_px = 0.75;
-constexpr double k_max_side_rms_share = 0.012;  // of the side's length
-constexpr double k_side_trim = 0.1;             // of a side, left out at each end because corners are rounded
+constexpr double k_max_side_rms_share = 0.012;  // share of the side's length
+constexpr double k_side_trim = 0.1;  // share of a side that is left out at each end: corners are rounded
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 

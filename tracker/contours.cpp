@@ -65,7 +65,7 @@ __attribute__((always_inline)) inline Farthest farthest(const Packed* points,
       most[k] = more ? distance : most[k];
       where[k] = more ? i : where[k];
     }
-  // bits of the largest distance, which are ordered like the distance; the last four bits hold the lane
+  // The bits of the largest distance, which are ordered like the distance; the last four hold the lane.
   std::int32_t best = 0;
 #pragma omp simd reduction(max : best)
   for (std::size_t k = 0; k < k_together; ++k) {
@@ -182,7 +182,7 @@ inline Packed Contours::End::go_on(const Way& way) {
   *corner = step.code;
   direction = static_cast<std::size_t>(step.next);
   corner += step.offset;
-  // every row of codes is in another cache line
+  // Every row of codes is in another cache line.
   __builtin_prefetch(corner + 8 * std::ptrdiff_t{step.offset});
   area += std::int64_t{at & 0xFFFF} * step.dy;
   const Packed middle = at + way.moves[from];

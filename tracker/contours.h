@@ -53,8 +53,7 @@ class Contours {
   void find_corners(double tolerance_px, std::size_t max_count, std::size_t min_run = 2);
 
   /// Indices of the corners' points, ascending; the first is 0. Point indices start at the first corner;
-  /// point(size()) is
-  /// the first point again, and line() takes indices of a second round.
+  /// point(size()) is the first point again, and line() takes indices of a second round.
   std::span<const std::size_t> corners() const { return corners_; }
   std::size_t size() const { return count_; }
   Eigen::Vector2d point(std::size_t i) const { return at(points_[i]); }

@@ -74,7 +74,7 @@ bool is_blurred(const RefinedQuad& quad, const SeenCells& cells, double cell_sig
 // sides of a marker's sides stays the same, for k_keep_images. The number doubles, up to k_keep_at_most, each
 // time the full reading confirms the result.
 constexpr int k_keep_images = 30, k_keep_at_most = 120;
-// a share of the level, and at least this many grey levels
+// Largest change: a share of the level, and at least this many grey levels.
 constexpr double k_like_level = 0.06, k_like_dark_level = 3;
 
 // Corner i of the marker is corner corner_of(i) of the quadrilateral in which it was read.

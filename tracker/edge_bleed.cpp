@@ -12,10 +12,10 @@ namespace {
 constexpr std::size_t k_steps = 8;                    // samples from one cell's middle to the next
 constexpr std::array<float, 2> k_lines{-0.2F, 0.2F};  // sample lines, in cells beside a cell's middle
 constexpr int k_min_edges = 12;
-constexpr double k_min_contrast = 8;  // of light, between two cells
-// a smaller bleed is treated as noise, as curvature is in refine.cpp
+constexpr double k_min_contrast = 8;  // light, between two cells
+// A smaller bleed is treated as noise, as curvature is in refine.cpp.
 constexpr double k_clear_deviations = 3;
-constexpr double k_unsure_share = 0.2;         // of the bleed: photographs of boards agree up to this share
+constexpr double k_unsure_share = 0.2;         // share of the bleed: photographs of boards agree up to it
 constexpr double k_between_markers_px = 0.02;  // smallest standard deviation between an image's markers
 
 // Edges between neighbouring cells in x, or in y if `down`: direction, polarity, and the places of their

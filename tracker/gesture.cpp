@@ -18,7 +18,7 @@ constexpr double k_rest_s = 0.1;   // a turn counts when the marker has rested t
 constexpr double k_rest_rad = 0.05;
 constexpr double k_neighbour_sides = 5;  // radius in which an arm hides other markers as well
 constexpr double k_memory_s = 3;
-// width of the patch that is checked for stillness; it contains a hand's outline
+// Width of the patch that is checked for stillness; it contains a hand's outline.
 constexpr double k_patch_sides = 3;
 constexpr int k_patch_cells = 20;
 constexpr int k_few_cells = 4;

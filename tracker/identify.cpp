@@ -187,7 +187,7 @@ struct Pattern {
   double border = 0, cells = 0;  // width of the border, cells along a side
   std::uint64_t code = 0;
   const TemplatePattern* drawn = nullptr;  // a template instead of a code
-  std::size_t rotation = 0;                // of the template
+  std::size_t rotation = 0;                // the template's
 
   bool operator==(const Pattern&) const = default;
 
@@ -440,7 +440,7 @@ LIMN_POPCOUNT Nearest nearest(const std::vector<std::array<std::uint64_t, 4>>& c
 
 SeenCells cells_of(const CodeFamily& family, std::uint64_t code) {
   SeenCells cells;
-  // its border is not always a whole number of cells
+  // A barcode's border is not always a whole number of cells.
   if (is_barcode(family)) return cells;
   cells.count = family.cells + 2;
   int bit = family.cells * family.cells;
@@ -472,7 +472,7 @@ LIMN_POPCOUNT std::uint64_t next_code(const Families& families,
                                       const Bits& bits,
                                       std::uint64_t code) {
   const auto count = static_cast<std::size_t>(family.cells * family.cells);
-  std::array<double, 65> least{};  // smallest sum of margins of so many wrong bits
+  std::array<double, 65> least{};  // smallest sum of margins, by the number of wrong bits
   std::copy_n(bits.margin.begin(), count, least.begin() + 1);
   std::sort(least.begin() + 1, least.begin() + 1 + static_cast<std::ptrdiff_t>(count));
   for (std::size_t i = 1; i <= count; ++i) least[i] += least[i - 1];

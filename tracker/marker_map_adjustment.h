@@ -12,8 +12,9 @@ namespace limn::tracker {
 /// A body after bundle adjustment; vectors run parallel to the body's markers.
 struct Adjustment {
   Body body;
-  std::vector<Matrix6d> covariance;  ///< of boxplus(body_from_marker, delta); zero for the fixed marker
-  std::vector<int> seen;             ///< number of images that each marker was used in
+  std::vector<Matrix6d>
+      covariance;         ///< covariance of boxplus(body_from_marker, delta); zero for the fixed marker
+  std::vector<int> seen;  ///< number of images that each marker was used in
   int images = 0;
   double rms_px = 0;  ///< for each corner
 };

@@ -13,7 +13,7 @@ namespace limn::tracker {
 struct MarkerPose {
   Pose camera_from_marker;
   double rms_px = 0;    ///< for each corner
-  Matrix6d covariance;  ///< of boxplus(camera_from_marker, delta), within this branch
+  Matrix6d covariance;  ///< covariance of boxplus(camera_from_marker, delta) in this branch
   /// Likelihood of this branch relative to the other, exp(-chi^2 / 2) of its corners; both add up to 1.
   double weight = 1;
 };

@@ -27,29 +27,29 @@ constexpr std::size_t k_followed_samples = 300;
 constexpr int k_rounds = 16;
 constexpr int k_rounds_followed = 4;
 constexpr double k_may_move_px = 1.0;     // with less blur, motion cannot be measured separately
-constexpr double k_clearly_better = 0.9;  // in mean square residuals: with motion against without
+constexpr double k_clearly_better = 0.9;  // ratio of mean square residuals, with motion to without
 constexpr double k_max_motion_px = 30;
-constexpr double k_min_blur_px = 0.28;    // that of a pixel's own area
+constexpr double k_min_blur_px = 0.28;    // the blur of a pixel's own area
 constexpr double k_no_margin = 1e3;       // cells: no outer edge of the paper within reach
-constexpr double k_max_residual = 0.075;  // of the contrast, RMS: above it the model is wrong
+constexpr double k_max_residual = 0.075;  // share of the contrast, RMS: above it the model is wrong
 constexpr double k_min_explained = 0.77;  // perfect Gaussian residuals give 0.89
 constexpr double k_settled_px = 0.02;     // movement in a round: further rounds would add a quarter of it
 constexpr double k_roughly_settled_px = 0.03;
 constexpr double k_followed_settled_px = 0.1;  // a quarter of it is less than the corners' noise
-// corners that still move more than this in the last round have not converged
+// Corners that still move more than this in the last round have not converged.
 constexpr double k_astray_px = 0.1;
 constexpr double k_max_moved_px = 6;  // plus half the motion
-// chi-square with four degrees of freedom: flat paper exceeds it once in 2000 times
+// Chi-square with four degrees of freedom: flat paper exceeds it once in 2000 times.
 constexpr double k_bend_evidence = 20;
-constexpr double k_max_bend = 0.1;   // of half a side
+constexpr double k_max_bend = 0.1;   // share of half a side
 constexpr std::size_t k_choice = 3;  // times as many pixels are considered, and most flat ones are dropped
 constexpr std::size_t k_choice_of_seen = 2;
 constexpr double k_steep = 0.8;        // share of the largest change of light over two pixels at an edge
 constexpr int k_flat_stride = 8;       // one of this many flat samples is kept
-constexpr double k_rough_scale = 0.1;  // of the contrast
+constexpr double k_rough_scale = 0.1;  // share of the contrast
 constexpr double k_least_scale = 0.5;  // in light
-constexpr double k_bound = 0.15;       // of the contrast: larger residuals do not count more
-constexpr double k_noise = 0.02;       // of the contrast, RMS: with residuals below it no motion is tried
+constexpr double k_bound = 0.15;       // share of the contrast: larger residuals do not count more
+constexpr double k_noise = 0.02;       // share of the contrast: with lower RMS residuals no motion is tried
 // A pattern still looks the same while its contrast, blur, misfit and explained share are within these
 // limits.
 constexpr double k_like_contrast = 0.5, k_like_log_blur = 0.3, k_like_misfit = 1.5, k_like_explained = 0.06;
@@ -86,7 +86,7 @@ struct Fitted {
   // From the last round: the information matrix of the fitted unknowns, and the chi-square that the bend
   // would explain if it were fitted.
   SomeMatrix information;
-  double variance = 0;  // of one sample
+  double variance = 0;  // one sample's
   double bend_evidence = 0;
 };
 
@@ -184,7 +184,7 @@ class PatternFit {
   bool has_ground_ = false;
   Eigen::Vector4d margin_;  // at the start
   double contrast_ = 0;     // at the start
-  // smallest scale of residuals: far from the solution most of them look like outliers
+  // Smallest scale of residuals: far from the solution most of them look like outliers.
   double least_scale_ = 0;
   PatternFitBuffers& buffers_;
   PatternFitBuffers::Samples& samples_ = buffers_.samples;
@@ -549,7 +549,7 @@ class PatternFit {
         Eigen::Map<const Moves>(sums.products, 8, 8).cast<double>();
     const Eigen::Matrix<double, 8, 8> together = (blocks.transpose() * blocks).cast<double>();
     constexpr double k_number = k_blocks * k_blocks;
-    // the shape's eight unknowns have absorbed this much of the sums
+    // The shape's eight unknowns have absorbed a part of the sums.
     constexpr double k_unseen = k_number / (k_number - 8);
     return std::max(1.0, k_unseen * independent.ldlt().solve(together).trace() / 8);
   }

@@ -17,7 +17,7 @@ namespace limn::tracker {
 struct PatternFitBuffers {
   struct Samples {
     std::vector<float> x, y;  ///< pixels from the marker's middle
-    /// marker coordinates, -1 to 1, at the fit's start: places of the planes of levels
+    /// Marker coordinates at the fit's start, -1 to 1, for the planes of levels.
     std::vector<float> level_x, level_y;
     std::vector<float> light;
   };

@@ -216,7 +216,7 @@ inline void add_ground(const Guess& guess,
 }
 
 inline void find_edges(const Guess& guess, const Lanes& px, const Lanes& py, std::int32_t* shows) {
-  constexpr float k_edge = 0.01F;  // of a step's steepest slope
+  constexpr float k_edge = 0.01F;  // share of a step's steepest slope
   Place place;
   find_place(guess, px, py, &place);
   Ink seen;

@@ -38,7 +38,7 @@ Unlike sum_behind(const float* residuals, const float* behind, std::size_t count
 
 struct Weights {  ///< sums over the samples
   float weights, trusted, misfit;
-  /// squares of the biweight's score, and its slopes: they give the variance of a robust mean (Huber 1981)
+  /// Squares of the biweight's score, and its slopes; they give the variance of a robust mean (Huber 1981).
   float scores, slopes;
 };
 

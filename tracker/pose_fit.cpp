@@ -13,12 +13,12 @@ namespace limn::tracker {
 namespace {
 
 constexpr int k_max_steps = 60;
-constexpr double k_small_gain = 1e-7;  // of the cost: three ten-thousandths of a standard deviation
+constexpr double k_small_gain = 1e-7;  // difference of cost: three ten-thousandths of a standard deviation
 // Where a predicted gain below this is not reached, the error in the prior's derivative limits the fit.
 constexpr double k_vain_gain = 1e-4;
 // Far from corners with large residuals the robust cost is nearly flat and falls little for many steps.
 constexpr int k_patient_steps = 10;
-constexpr double k_slow_gain = 1e-3;       // of the cost
+constexpr double k_slow_gain = 1e-3;       // share of the cost
 constexpr double k_min_condition = 1e-13;  // smallest over largest eigenvalue of the scaled normal matrix
 constexpr double k_surely_regular = 1e8;   // condition number below which the Cholesky factors suffice
 

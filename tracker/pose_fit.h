@@ -26,7 +26,7 @@ struct PosePrior {
 
 struct PoseFit {
   Pose world_from_body;
-  Matrix6d covariance;    ///< of boxplus(world_from_body, delta), from the observations' information
+  Matrix6d covariance;    ///< covariance of boxplus(world_from_body, delta), from the observations
   double chi_square = 0;  ///< sum of squared normalised residuals, with the robust loss; includes the prior's
   double rms_px = 0;      ///< for each point, sqrt(mean(dx^2 + dy^2))
 };

@@ -29,17 +29,18 @@ constexpr double k_valley_share = 0.35;
 constexpr double k_settled_px = 2e-3;
 constexpr double k_near_start_px = 0.1;  // corners that moved less need no second round
 constexpr int k_max_reach = 10;
-constexpr int k_rough_rows = 12;         // of a side, for Effort::rough
-constexpr double k_huber = 1.5;          // in robust standard deviations
-constexpr double k_reject = 4;           // in the same unit: crossings beyond it belong to something else
-constexpr double k_min_share = 0.2;      // of the side's contrast: rows with less are covered or have no edge
+constexpr int k_rough_rows = 12;  // rows of a side for Effort::rough
+constexpr double k_huber = 1.5;   // in robust standard deviations
+constexpr double k_reject = 4;    // in the same unit: crossings beyond it belong to something else
+// Share of the side's contrast: rows with less have no edge or are covered.
+constexpr double k_min_share = 0.2;
 constexpr double k_end_px = 3;           // a corner is visible when most rows this near to it are on the line
 constexpr double k_end_share = 0.1;      // or within this share of the side
 constexpr double k_min_scale_px = 0.04;  // smaller residuals are no reason to reject
 constexpr double k_consensus_px = 0.2;   // typical residual of crossings on one line
 constexpr int k_min_crossings = 3;
 constexpr std::size_t k_min_bent_crossings = 12;
-// a smaller bow is treated as noise: one straight side in 370 shows as much
+// A smaller bow is treated as noise: one straight side in 370 shows as much.
 constexpr double k_bow_deviations = 3;
 // Largest bow in half a side: paper around a cylinder eight sides wide, seen along its edge (sagitta half^2 /
 // 2R). With half as much again, the corner lies elsewhere.
@@ -86,8 +87,8 @@ Bow bow_of(const Lens& lens, const Eigen::Vector2d& from, const Eigen::Vector2d&
 }
 
 struct Belief {
-  double share;        // of the bow that is applied
-  double probability;  // that there is a bow
+  double share;        // share of the bow that is applied
+  double probability;  // probability that there is a bow
 };
 
 // The share is the non-negative garrote (Breiman 1995), 1 - (k s / b)^2 for a bow b with standard deviation
@@ -402,7 +403,7 @@ LIMN_SIMD Sums weighted_sums(const double* __restrict d,
   return {w0, w1, w2, w3, w4, v0, v1, v2};
 }
 
-struct Spread {  // of residuals that are not foreign
+struct Spread {  // sums over residuals that are not foreign
   double squares = 0, count = 0, largest = 0;
 };
 

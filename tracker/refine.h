@@ -69,9 +69,9 @@ class EdgeRefiner {
   struct Row {  // across the main axis of a side
     int u, centre;
   };
-  struct Crossings {           // of the rows that show the edge
+  struct Crossings {           // for the rows that show the edge
     std::vector<double> u, v;  // the edge's position v across the main axis, at u
-    // share of the side's contrast, at most 1: the inverse of its relative deviation
+    // Share of the side's contrast, at most 1: the inverse of the crossing's relative deviation.
     std::vector<double> share;
     std::vector<double> d;         // u - u_middle of the line
     std::vector<double> residual;  // distance from the line, times share
@@ -84,7 +84,7 @@ class EdgeRefiner {
   std::array<double, 256> light_;  // light of each grey level, 0 ... 255
   std::vector<Row> rows_;
   Crossings crossings_;
-  std::vector<double> gradients_;  // of all rows, two times the reach for each
+  std::vector<double> gradients_;  // two times the reach for each row
   std::vector<float> deviations_;  // scratch memory of the robust scale
 
  public:
@@ -95,12 +95,12 @@ class EdgeRefiner {
     bool flat = true;  ///< true: u is x and v is y; false: u is y and v is x
     double u_middle = 0;
     double offset = 0, slope = 0, curvature = 0;
-    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of (offset, slope, curvature)
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< covariance of (offset, slope, curvature)
     double correlation = 1;  ///< the variance over that for independent crossings
     double outside_level = 0, inside_level = 0;
     double blur_px = 0;
     bool separate = true;  ///< no other edge lies within the edge's blur
-    /// whether the edge is visible next to the side's corners
+    /// Whether the edge is visible next to the side's corners.
     bool seen_at_start = true, seen_at_end = true;
 
     double at(double u) const {

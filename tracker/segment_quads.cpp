@@ -12,18 +12,18 @@ namespace limn::tracker {
 namespace {
 
 constexpr double k_cell_px = 64;
-constexpr double k_min_length_px = 12;   // of a segment: the directions of shorter ones are too uncertain
-constexpr double k_min_sine = 0.25;      // of a quad's corner: steeper markers are found as regions
+constexpr double k_min_length_px = 12;   // shortest segment: the directions of shorter ones are too uncertain
+constexpr double k_min_sine = 0.25;      // sine of a quad's corner: steeper markers are found as regions
 constexpr double k_max_opposite = -0.3;  // cosine between opposite sides
-// from a segment's end to the corner, as a share of the longer segment's length
+// Largest gap from a segment's end to the corner, as a share of the longer segment's length.
 constexpr double k_max_gap_share = 0.9;
 constexpr double k_gap_px = 6;
-constexpr double k_overlap_px = 3;  // by which a segment may run past the corner
+constexpr double k_overlap_px = 3;  // length by which a segment may run past the corner
 constexpr double k_overlap_share = 0.2;
-constexpr double k_max_reach_px = 75;     // between the segments of a corner
-constexpr double k_reach_share = 1.2;     // of the longer segment's length
-constexpr std::size_t k_max_corners = 8;  // that are kept for a segment
-constexpr double k_min_visible = 0.5;     // of the outline
+constexpr double k_max_reach_px = 75;     // distance between the segments of a corner
+constexpr double k_reach_share = 1.2;     // share of the longer segment's length
+constexpr std::size_t k_max_corners = 8;  // corners that are kept for a segment
+constexpr double k_min_visible = 0.5;     // share of the outline
 constexpr double k_min_side_visible = 0.15;
 constexpr double k_min_side_px = 12;
 constexpr double k_same_px = 3;  // quads are the same when all of their corners lie nearer than this

@@ -46,7 +46,7 @@ class SegmentQuadFinder {
   struct Part {
     std::uint32_t first = 0, last = 0;
     std::vector<Segment> joined;
-    std::vector<Corner> corners;  // of all segments of the part; each segment's best first
+    std::vector<Corner> corners;  // corners of all segments of the part; each segment's best first
     std::vector<std::uint32_t> corner_end;
     std::vector<SegmentQuad> quads;
     std::vector<Corner> found;          // scratch: corners of one segment

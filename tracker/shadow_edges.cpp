@@ -15,23 +15,24 @@ namespace {
 constexpr double k_dark = 1;       // light, of 255, added to both sides of a ratio
 constexpr double k_unlike = 0.15;  // largest difference of a side's ratio from the others, natural logarithms
 constexpr double k_like = 0.3;     // the same for one place
-// of a cell, from a cell's border to the sampled places on both sides of it
+// Distance from a cell's border to the sampled places on both sides of it.
 constexpr double k_beside_cells = 0.3;
-constexpr double k_reach_share = 0.14;  // of the shortest side: a little more than a cell of most families
-constexpr int k_max_reach = 12;         // pixels
-constexpr int k_edge_px = 3;            // largest distance from an edge to where its levels are measured
-constexpr double k_max_blur_px = 1.2;   // with more blur there are no flat levels there
-constexpr int k_rows = 24;              // sampled across each side
-constexpr int k_most_a_row = 4;         // falls of light in a row: more are texture
-constexpr double k_end_share = 0.06;    // of a side, left out at each end, where other edges are
+// Share of the shortest side: a little more than a cell of most families.
+constexpr double k_reach_share = 0.14;
+constexpr int k_max_reach = 12;        // pixels
+constexpr int k_edge_px = 3;           // largest distance from an edge to where its levels are measured
+constexpr double k_max_blur_px = 1.2;  // with more blur there are no flat levels there
+constexpr int k_rows = 24;             // sampled across each side
+constexpr int k_most_a_row = 4;        // falls of light in a row: more are texture
+constexpr double k_end_share = 0.06;   // share of a side that is left out at each end, where other edges are
 constexpr double k_on_line_px = 0.75;
-constexpr double k_min_rows_share = 0.35;   // of the rows must agree with a line
-constexpr double k_more_rows_share = 1.25;  // times the rows that agree with the side at its present place
+constexpr double k_min_rows_share = 0.35;   // share of the rows that must agree with a line
+constexpr double k_more_rows_share = 1.25;  // times the rows that agree with the present side
 constexpr double k_beside_px = 0.15;        // error of a line by another edge nearby
 constexpr double k_doubt_px = 1.5;  // error of a side that a shadow's edge hides: measured on slatted shadow
-// pixels that a corner moves for one pixel of its side; at flatter angles it is not moved
+// Pixels that a corner moves for one pixel of its side. At flatter angles it is not moved.
 constexpr double k_max_slide = 4;
-constexpr double k_min_run = 0.4;  // of the side, between the two places that define a line
+constexpr double k_min_run = 0.4;  // share of the side between the two places that define a line
 
 double log_ratio(double outside, double inside) { return std::log((outside + k_dark) / (inside + k_dark)); }
 

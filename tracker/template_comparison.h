@@ -13,7 +13,7 @@ namespace limn::tracker {
 enum class Discriminability {
   apart,  ///< correlation below k_min_correlation: neither is ever read in place of the other
   alike,  ///< the other one can be read in its place when it is not loaded or is badly visible
-  /// they differ by less than k_min_rotation_lead, so noise decides; a template that is like its own rotation
+  /// They differ by less than k_min_rotation_lead, so noise decides; a template that is like its own rotation
   /// is never read
   confused
 };

@@ -20,9 +20,9 @@ namespace {
 constexpr int k_min_contrast = 32;      // levels: training images have good contrast
 constexpr double k_min_search_px = 20;  // side; smaller frames cannot be read
 constexpr double k_min_side_px = 64;    // two pixels for each value
-// of the grey values: identify's smallest, a fifteenth of black to white
+// Grey levels: identify's smallest, a fifteenth of black to white.
 constexpr double k_min_deviation = 15;
-constexpr double k_border = 0.25;  // of the side, as the detector reads it
+constexpr double k_border = 0.25;  // share of the side, as the detector reads it
 
 double area(const std::array<Eigen::Vector2d, 4>& q) {
   const Eigen::Vector2d a = q[2] - q[0];
@@ -96,7 +96,7 @@ Error several(const std::vector<RefinedQuad>& frames) {
 // The upright inside of the frame, one pixel for each value, as the mean over the value's area.
 cv::Mat rectified(const cv::Mat& image, const RefinedQuad& frame, double side_px) {
   const int size = TrainedTemplate::k_size;
-  // places along each value
+  // Places along each value.
   const int fine = std::clamp(static_cast<int>(std::ceil(side_px / (2 * size))), 4, 16);
   const int count = size * fine;
   const SquareToQuad px_from_square(frame.corners_px);

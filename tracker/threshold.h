@@ -15,7 +15,7 @@ struct CornerCodes {
   static constexpr std::uint8_t k_upper_left = 1, k_upper_right = 2, k_lower_left = 4, k_lower_right = 8;
   static constexpr std::uint8_t k_visited = 16;  ///< bit: the boundary through this corner has been traced
 
-  int width = 0;  ///< of the image
+  int width = 0;  ///< image size
   int height = 0;
   std::ptrdiff_t stride = 0;
   std::vector<std::uint8_t> codes;
@@ -52,7 +52,7 @@ class Threshold {
   int tiles_x_ = 0;
   int tiles_y_ = 0;
   std::vector<std::uint8_t> darkest_, brightest_;  // per tile
-  // per tile, over itself and its two neighbours in the row
+  // Per tile, over itself and its two neighbours in the row.
   std::vector<std::uint8_t> wide_darkest_, wide_brightest_;
   std::vector<Rows> rows_;  // one for each share of the work
 

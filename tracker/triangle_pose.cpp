@@ -9,7 +9,7 @@
 namespace limn::tracker {
 namespace {
 
-// below it the first terms of the series are exact in double precision
+// Below it the first terms of the series are exact in double precision.
 constexpr double k_small_angle = 1e-6;
 
 Eigen::Matrix3d skew(const Eigen::Vector3d& v) {

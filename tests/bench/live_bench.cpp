@@ -209,7 +209,7 @@ void print_codes(const std::vector<Shot>& shots) {
 
 // Cost of one frame of a session: decoding, perception and rendering.
 struct FrameCost {
-  double wall_ms = 0, processor_ms = 0;  // of all threads, including the recording's
+  double wall_ms = 0, processor_ms = 0;  // in all threads, including the recording's
 };
 FrameCost session_cost(const std::vector<Shot>& shots, SessionSetup setup, const fs::path& record) {
   std::unique_ptr<apps::Recorder> recorder;

@@ -54,7 +54,7 @@ struct Tally {
   double squares = 0;  // px^2, sum over the corners
   double outward = 0;  // px, away from the marker's centre
   Eigen::Vector2d offset = Eigen::Vector2d::Zero();
-  // mean of both coordinates' squared normalised errors, for each corner that is not covered
+  // Mean of both coordinates' squared normalised errors, for each corner that is not covered.
   std::vector<double> pulls;
   std::vector<double> turn_deg, shift_mm;  // pose errors
 

@@ -21,7 +21,7 @@ struct Sweep {
   bool give_lens = false;
   bool srgb_image = false;
   Encoding encoding = Encoding::linear;
-  double bow = 0;        ///< of the upper and lower sides, as share of a side
+  double bow = 0;        ///< bow of the upper and lower sides, as share of a side
   double motion_px = 0;  ///< uniform, in any direction
   double stains = 0;     ///< standard deviation of the light: spots some pixels wide on paper and ink
   int jpeg_quality = 0;  ///< 0: none
@@ -324,7 +324,7 @@ TEST(Detector, SaysHowSureCornersAreByTheirSidesAlone) {
   EXPECT_EQ(r.found, fitted.found);
   EXPECT_GT(r.rms_px, 1.5 * fitted.rms_px);
   EXPECT_LT(r.rms_px, 0.3);
-  // it may be much less: the enlarged covariance is made for blurs three times as wide
+  // It may be much less: the enlarged covariance is made for blurs three times as wide.
   EXPECT_LT(r.mahalanobis, 1.5);
 }
 

@@ -84,7 +84,7 @@ cv::Rect bounds(const Lens& lens, const PlacedMarker& placed, const cv::Size& si
     low = low.cwiseMin(px);
     high = high.cwiseMax(px);
   }
-  // sides may be curved in a lens's image
+  // Sides may be curved in a lens's image.
   const Eigen::Vector2d bow = 0.05 * (high - low) + Eigen::Vector2d(2, 2);
   low -= bow;
   high += bow;
