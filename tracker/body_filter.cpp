@@ -23,7 +23,7 @@ constexpr double k_most_evidence = 2;
 // Branches nearer than this (rad) are the same. Beyond it, the planar ambiguity has two separate minima.
 constexpr double k_same_branch = 0.02;
 // Largest excess of chi² by which an image may miss the motion. Noise in the prior's six degrees of freedom
-// never exceeds it (probability 1e-10).
+// exceeds it with a probability of 1e-10.
 constexpr double k_max_excess = 60;
 constexpr int k_misfits_believed = 2;
 // While there is one branch, a second is searched for once in this many images.

@@ -169,7 +169,8 @@ Contours::Steps::Steps(std::ptrdiff_t stride) {
       way->moves[at] = static_cast<Packed>(dx) + (static_cast<Packed>(dy) << 16);
     };
     step_to(&on, i, d, 1, d);
-    // Steps back: a crack behind the corner is a boundary only where black is on its right alone.
+    // Steps back: a crack behind the corner is a boundary where there is black on its right and not on its
+    // left.
     if (!(code & ahead_right[(from + 1) % 4]) || code & ahead_left[(from + 3) % 4]) continue;
     step_to(&back, 32 * d + i % 32, from, -1, from);
   }

@@ -193,8 +193,7 @@ Result<Adjustment> adjusted_marker_map(const Body& start,
   if (!projects || !std::isfinite(chi_square) || !inverse.isPositive() || inverse.info() != Eigen::Success)
     return error(
         "expected {} images to determine the places of all markers, found markers that they do not "
-        "determine. "
-        "Take more photographs, from nearer and from other sides.",
+        "determine. Take more photographs, from nearer and from other sides.",
         state.world_from_body.size());
   const Eigen::MatrixXd covariance =
       inverse.solve(Eigen::MatrixXd::Identity(normal.matrix.rows(), normal.matrix.cols()));

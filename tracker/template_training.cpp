@@ -161,8 +161,7 @@ Result<TrainedTemplate> train_template(const cv::Mat& image) {
   if (const double found = deviation(trained); found < k_min_deviation)
     return error(
         "the frame's inside is uniform (its grey values have a standard deviation of {:.0f} of 255), "
-        "expected "
-        "a pattern (at least {:.0f})",
+        "expected a pattern (at least {:.0f})",
         found, k_min_deviation);
   return trained;
 }

@@ -306,8 +306,7 @@ int main(int argc, char** argv) {
   if (!options) {
     fmt::print(stderr,
                "id_bench [--frames N for each condition and kind (4)] [--seed S] [--only TEXT of a condition "
-               "or kind] "
-               "[--detail: every wrong id]\n");
+               "or kind] [--detail: every wrong id]\n");
     return 2;
   }
   const auto folder = std::filesystem::temp_directory_path() / fmt::format("limn-id-bench-{}", options->seed);

@@ -183,9 +183,7 @@ void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup, const
              static_cast<double>(markers) / static_cast<double>(decode.size()));
   fmt::print(
       "decode {:.2f}, find markers {:.2f}, poses and motions {:.2f} (wall-clock time), hand-over and "
-      "prediction "
-      "{:.2f}; "
-      "sum {:.2f}\n",
+      "prediction {:.2f}; sum {:.2f}\n",
       mean(decode), mean(watch) - mean(filter), mean(filter), mean(hand), ours);
   fmt::print(
       "libapriltag (36h11, decimate 2, one thread), detection alone: {:.2f}; the sum divided by it: {:.2f} "

@@ -182,9 +182,7 @@ void print_window(const std::vector<TabletShot>& shots, Room* room, apps::Tablet
              median(alone[0]), median(alone[1]), median(alone[2]), yardstick);
   fmt::print(
       "tablet view: decode {:.2f}, track {:.2f}, composite {:.2f}, encode {:.2f}; a frame {:.2f} ms, {:.2f} "
-      "times "
-      "the "
-      "sum (at most 3); from request to answer {:.2f} ms\n",
+      "times the sum (at most 3); from request to answer {:.2f} ms\n",
       median(parts[0]), median(parts[1]), median(parts[2]), median(parts[3]), median(server),
       median(server) / yardstick, median(answer));
   fmt::print("processor time of all threads: alone {:.2f} ms, tablet view {:.2f} ms, {:.2f} times\n",
@@ -225,8 +223,7 @@ void print_projector_loop(const std::vector<TabletShot>& shots, Room* room, apps
   }
   fmt::print(
       "projector loop: {:.1f} ms for an image, {:.1f} with a tablet view open ({:+.1f} %, at most 10); "
-      "publishing the "
-      "session to it {:.4f} ms\n",
+      "publishing the session to it {:.4f} ms\n",
       median(without), median(with), 100 * (median(with) / median(without) - 1), median(know));
 }
 
