@@ -16,7 +16,7 @@ Rows plain_rows(int bits) {
   return rows;
 }
 
-// Even parity in the highest bit.
+// The data bits, with even parity in the highest bit.
 Rows parity_rows(int bits) {
   Rows rows = plain_rows(bits);
   for (std::uint32_t& row : rows) row |= 1u << bits;
@@ -24,7 +24,7 @@ Rows parity_rows(int bits) {
 }
 
 // The systematic cyclic code of a generator polynomial (highest power first): the id's bits, then the
-// remainder of their division by it.
+// remainder of their division by the polynomial.
 Rows cyclic_rows(int bits, std::uint32_t generator) {
   const int checks = static_cast<int>(std::bit_width(generator)) - 1;
   Rows rows;
@@ -38,8 +38,8 @@ Rows cyclic_rows(int bits, std::uint32_t generator) {
   return rows;
 }
 
-// BCH generators in octal: Lin and Costello, "Error Control Coding", table 6.4: (15,11), (15,7), (31,21),
-// (31,16), shortened.
+// The BCH generators are in octal, from Lin and Costello, "Error Control Coding", table 6.4: (15,11), (15,7),
+// (31,21), (31,16), shortened.
 std::vector<Barcode> all_barcodes() {
   return {{"artoolkit_3x3", 3, plain_rows(6)},
           {"artoolkit_3x3_parity65", 3, parity_rows(5)},

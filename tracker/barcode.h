@@ -7,15 +7,16 @@
 
 namespace limn::tracker {
 
-/// A family of ARToolKit 5's matrix codes (`AR_MATRIX_CODE_3x3` and so on). The inner half of the black
-/// square, its border a quarter of the side, holds cells x cells cells. Upright the top-left and bottom-left
-/// cells are black and the bottom-right one is white; the others, row by row from the top left, are the
-/// word's bits, highest first, and 1 is BLACK. Source: get_matrix_code in ARToolKit5's
+/// A family of ARToolKit 5's matrix codes (`AR_MATRIX_CODE_3x3` and so on). The black border is a quarter of
+/// the side wide; the inner half of the square holds cells x cells cells. When the marker is upright, its
+/// top-left and bottom-left cells are black and its bottom-right cell is white. The other cells, row by row
+/// from the top left, are the word's bits, highest first; 1 is BLACK. Source: get_matrix_code in ARToolKit5's
 /// lib/SRC/AR/arPattGetID.c.
 struct Barcode {
   std::string_view name;  ///< `artoolkit_3x3`
   int cells = 0;
-  /// The word of an id is the exclusive or of the rows of its bits, lowest first: id 5 is row 0 and row 2.
+  /// The word of an id is the exclusive or of the rows that belong to the id's set bits, lowest bit first: id
+  /// 5 is row 0 xor row 2.
   std::vector<std::uint32_t> rows;
 
   std::size_t ids() const { return std::size_t{1} << rows.size(); }
@@ -26,13 +27,13 @@ struct Barcode {
 /// (4096), `artoolkit_5x5_bch_22_7_7` (128).
 std::span<const Barcode> barcodes();
 
-/// The one of that name; null when there is none.
+/// The family with that name; null when there is none.
 const Barcode* find_barcode(std::string_view name);
 
-/// The word before its cells are laid out: as ARToolKit reads it, 1 is black.
+/// The word of an id, before it is laid out as cells. As in ARToolKit, 1 is black.
 std::uint32_t barcode_word(const Barcode& barcode, std::size_t id);
 
-/// All cells upright, row by row, first bit highest, 1 is white: as CodeFamily::codes.
+/// All cells of the upright marker, row by row, first bit highest. As in CodeFamily::codes, 1 is white.
 std::uint64_t barcode_cells(const Barcode& barcode, std::size_t id);
 
 }  // namespace limn::tracker

@@ -11,17 +11,18 @@
 namespace limn::tracker {
 namespace {
 
-// Markers that may propose a pose, largest first: the rest add nothing but time.
+// Number of markers that may propose a pose, largest first. More only cost time.
 constexpr std::size_t k_max_proposers = 6;
-// A marker that cannot be placed at all costs as much as one that is far off.
+// Cost of a marker that cannot be projected at all; as much as for one that is far off.
 constexpr double k_lost_marker_cost = 1e7;
-// Proposals nearer than this to a minimum lead to it: the noise of a small marker's tilt.
+// Proposals nearer than this to a minimum (rad) lead to it. It is the noise of a small marker's tilt.
 constexpr double k_same_basin = 0.1;
-// Refined poses nearer than this are one minimum: refinement stops far below it.
+// Refined poses nearer than this (rad) are the same minimum: refinement stops far below it.
 constexpr double k_same_minimum = 1e-3;
-// Proposals that are refined in search of a second minimum.
+// Number of proposals that are refined in search of a second minimum.
 constexpr int k_max_refined = 3;
-// Robust cost of a pose that is no worse than its corners are, for each of their coordinates: pulls of two.
+// Largest robust cost, for each corner coordinate, of a pose that explains its corners: normalised residuals
+// of two.
 constexpr double k_explained_cost = 4;
 
 std::array<PointObservation, 4> corners_of(const MarkerCorrespondences& seen, const Detection& detection) {
@@ -34,8 +35,8 @@ std::array<PointObservation, 4> corners_of(const MarkerCorrespondences& seen, co
   return observations;
 }
 
-// The corners of this marker's detection that agrees best with a pose, and their cost; nullptr when none has
-// pixels.
+// The corners of the marker's detection that agrees best with a pose, and their cost; nullptr when no
+// detection's corners have pixels there.
 std::pair<const std::array<PointObservation, 4>*, double> most_consistent(const MarkerCorrespondences& seen,
                                                                           const Pose& world_from_body) {
   const std::array<PointObservation, 4>* best = nullptr;
@@ -67,8 +68,7 @@ struct Proposal {
   double cost = 0;
 };
 
-// Both branches of every detection of the `most` largest markers, as poses of the body, the most suitable
-// first.
+// Both branches of every detection of the `most` largest markers, as poses of the body, lowest cost first.
 std::vector<Proposal> proposals(const BodyCorrespondences& correspondences, std::size_t most) {
   BodyCorrespondences largest = correspondences;
   std::stable_sort(largest.begin(), largest.end(),

@@ -11,10 +11,10 @@
 
 namespace limn::tracker {
 
-/// Residuals beyond this many standard deviations count linearly: a corner under a finger.
+/// Residuals beyond this many standard deviations count linearly, for example a corner under a finger.
 constexpr double k_huber = 3;
 
-/// What one camera saw at a moment.
+/// What one camera detected at one moment.
 struct View {
   const Imager* camera = nullptr;
   std::span<const Detection> detections;
@@ -25,7 +25,7 @@ struct MarkerCorrespondences {
   const BodyMarker* marker = nullptr;
   const Imager* camera = nullptr;
   std::vector<const Detection*> detections;
-  std::vector<std::array<PointObservation, 4>> corners;  ///< of each of them
+  std::vector<std::array<PointObservation, 4>> corners;  ///< One entry for each detection.
 };
 
 /// A body's markers in the images of one moment. Borrows bodies, cameras and detections.
@@ -33,8 +33,8 @@ using BodyCorrespondences = std::vector<MarkerCorrespondences>;
 
 BodyCorrespondences correspondences(const Body& body, std::span<const View> views);
 
-/// The corners that a pose of the body speaks for: of a marker found twice in an image, the detection that
-/// agrees best.
+/// The corners that a body's pose is computed from. Where a marker was found twice in an image, these are the
+/// corners of the detection that agrees best with the pose.
 struct ChosenCorners {
   std::vector<PointObservation> observations;
   int marker_count = 0;
@@ -43,15 +43,15 @@ ChosenCorners corners_at(const BodyCorrespondences& correspondences, const Pose&
 
 enum class Minima { all, foretold };
 
-/// The local minima of the body's robust reprojection error, likeliest first, at most two: the second is the
-/// other branch of the planar ambiguity, where there is one. Every marker proposes both of its branches;
-/// where the body was predicted to stand by one of the `predicted` poses and does, the largest marker alone,
-/// and none where only the predicted minima are wanted.
+/// The local minima of the body's robust reprojection error, at most two, likeliest first. The second is the
+/// other branch of the planar ambiguity, where there is one. Every marker proposes both of its branches as
+/// starts. If one of the `foretold` poses leads to a minimum that explains the corners, only the largest
+/// marker proposes starts; with Minima::foretold no marker does.
 std::vector<PoseFit> minima(const BodyCorrespondences& correspondences,
                             std::span<const Pose> foretold = {},
                             Minima wanted = Minima::all);
 
-/// Whether a detection is this marker. Names of files compare without their folders.
+/// Whether a detection is this marker. File names are compared without their folders.
 bool is_marker(const MarkerName& found, const MarkerName& wanted);
 
 }  // namespace limn::tracker

@@ -10,8 +10,8 @@
 
 namespace limn::tracker {
 
-/// Where every body is by one moment's images of all cameras alone, without history (body_motion.h has
-/// one). A view's camera is placed by its `imager_from_world`. Bodies without a pose are absent.
+/// The pose of every body from one moment's images of all cameras, without history (body_filter.h uses
+/// history). A view's camera is placed by its `imager_from_world`. Bodies without a pose are absent.
 std::vector<Track> observed(std::span<const Body> bodies, std::span<const View> views, Stamp captured_at);
 
 }  // namespace limn::tracker

@@ -9,25 +9,27 @@
 namespace limn::tracker {
 namespace {
 
-// The branch that is not reported keeps at least this weight, so that evidence can bring it back: corner
-// errors that last (a bent sheet, a lens that does not fit) make the other branch surer than it is.
+// The branch that is not reported keeps at least this weight, so that evidence can bring it back. Persistent
+// corner errors (a bent sheet, a lens model that does not fit) make the filter surer of the reported branch
+// than it should be.
 constexpr double k_least_weight = 1e-6;
-// The reported branch changes when the other is this likely: odds that waver about even ones would flicker.
+// The reported branch changes only when the other one is this likely, so that it does not flicker when both
+// are about equally likely.
 constexpr double k_change_at = 0.9;
-// Odds between the branches change by at most e to this in one image. Corner errors of an image go
-// together (a patch of light, a covered side, a small marker's pattern) and are then rarer by the model than
-// in truth: one image must not outweigh all before it.
+// One image changes the log odds between the branches by at most this. Corner errors of one image are
+// correlated (a patch of light, a covered side, a small marker's pattern), so large ones are more frequent
+// than the model says. One image must not outweigh all earlier ones.
 constexpr double k_most_evidence = 2;
-// Branches nearer than this are one: beyond, the planar ambiguity has two minima of their own.
+// Branches nearer than this (rad) are the same. Beyond it, the planar ambiguity has two separate minima.
 constexpr double k_same_branch = 0.02;
-// chi² by which an image may miss the motion: the prior's six degrees of freedom exceed it never by noise
-// (1e-10).
+// Largest excess of chi² by which an image may miss the motion. Noise in the prior's six degrees of freedom
+// exceeds it with a probability of 1e-10.
 constexpr double k_max_excess = 60;
 constexpr int k_misfits_believed = 2;
-// While there is one branch, a second is looked for in one of so many images.
+// While there is one branch, a second is searched for once in this many images.
 constexpr int k_second_every = 3;
-// Standard deviations of velocity and acceleration of a body that has just come into view, and of one that
-// was still.
+// Standard deviations of velocity and acceleration of a body that has just come into view (k_seen), and of
+// one that was still and starts to move (k_start).
 constexpr double k_seen_turn = 2, k_seen_speed = 0.5;                     // rad/s, m/s
 constexpr double k_seen_turn_acceleration = 15, k_seen_acceleration = 3;  // rad/s², m/s²
 constexpr double k_start_turn = 0.5, k_start_speed = 0.1;
@@ -46,7 +48,7 @@ Motion at_rest(const Pose& world_from_body, const Matrix6d& covariance) {
   return motion;
 }
 
-// Velocity and acceleration may be anything within these deviations of nothing.
+// The same pose, with velocity and acceleration of zero mean and these standard deviations.
 Motion roused(const Motion& still, const Rates& rates) {
   Motion motion = at_rest(still.world_from_body, still.pose_covariance());
   Eigen::Matrix<double, 12, 1> deviations;
@@ -68,11 +70,11 @@ std::optional<PoseFit> posterior(const BodyCorrespondences& seen, const Motion& 
   return fit_pose(corners_at(seen, start).observations, start, k_huber, &known);
 }
 
-// The branch of a moment, before and after its images.
+// A branch, predicted to the time of the new images.
 struct Forecast {
   Motion still, moving;
   double still_share;  // probability that it is still
-  double weight;       // the branch's
+  double weight;       // weight of the branch
 };
 
 Forecast forecast(const Branch& branch, double seconds, const MotionModel& model) {
@@ -91,8 +93,8 @@ Forecast forecast(const Branch& branch, double seconds, const MotionModel& model
 
 struct Update {
   Branch branch;
-  double log_weight;  // of the branch, not normalised
-  PoseFit moving;     // its posterior as a moving body
+  double log_weight;  // the branch's, not normalised
+  PoseFit moving;     // posterior for a moving body
 };
 
 // nullopt when no pose near the forecast suits the corners.
@@ -112,8 +114,8 @@ std::optional<Update> updated(const Forecast& at, const BodyCorrespondences& see
   return Update{branch, std::log(at.weight) + highest + std::log(sum), *moving};
 }
 
-// The second mode of the posterior, when it has one near another minimum of the corners' own error: how a
-// branch is born again after the frontal view, where both are one.
+// The posterior's second mode, when it has one near another minimum of the corners' own error. This restores
+// the second branch after a frontal view, in which both branches are the same.
 std::optional<Update> second_mode(const Forecast& at,
                                   const Update& first,
                                   const BodyCorrespondences& seen,
@@ -134,7 +136,7 @@ bool are_one(const Update& a, const Update& b) {
          k_same_branch;
 }
 
-// Weights add up to 1; the reported branch stays first until another is much likelier.
+// Normalises the weights to a sum of 1. The reported branch stays first until another one is much likelier.
 std::vector<Branch> weighed(const std::vector<Update>& updates) {
   double highest = updates.front().log_weight;
   for (const Update& update : updates) highest = std::max(highest, update.log_weight);
@@ -169,7 +171,7 @@ void note_measured(const BodyCorrespondences& seen,
   motion->measured_at = motion->looked_at = captured_at;
 }
 
-// A flat prior: the likelihood's integral over each minimum.
+// With a flat prior: Laplace's approximation of the likelihood's integral over each minimum.
 double log_weight_alone(const PoseFit& fit) {
   return 0.5 * (std::log(fit.covariance.determinant()) - fit.chi_square);
 }

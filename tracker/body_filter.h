@@ -13,69 +13,70 @@
 
 namespace limn::tracker {
 
-/// How bodies are expected to move. The defaults are a hand's.
+/// How bodies are expected to move. The defaults suit a hand.
 struct MotionModel {
-  /// Raise it for jerky motion; costs jitter while moving. 3 suits reaches of 0.25 m/s
-  /// (tests/tracker/motion_test).
+  /// White jerk of a moving body. Raise it for jerky motion; that costs jitter while the body moves. 3 suits
+  /// a hand at 0.25 m/s (tests/tracker/motion_test).
   double jerk = 3;        ///< m²/s⁵
   double turn_jerk = 50;  ///< rad²/s⁵
-  /// Of a body that stands still: what of its pose's change is believed. Raise it for stands that sway; costs
-  /// jitter.
+  /// Random walk of a body that stands still. Raise it for stands that sway; that costs jitter.
   double drift = 0.05e-3;      ///< m per square root of a second
   double turn_drift = 0.9e-3;  ///< rad per square root of a second (0.05°)
   double starts_per_s = 0.5;   ///< how often a still body begins to move
   double stops_per_s = 1;      ///< how often a moving one comes to rest
-  /// For so long an unseen body is carried on; then it is lost. Where images come more rarely, it stays there
-  /// until one and a half times between them have passed.
+  /// A body that is not seen is extrapolated for this long, then it is lost. Where images come more
+  /// rarely it first stays at the extrapolated place, until one and a half times the interval between images
+  /// has passed.
   double extrapolation_limit_s = 0.3;
 };
 
 MotionNoise still_noise(const MotionModel& model);
 MotionNoise moving_noise(const MotionModel& model);
 
-/// One belief of how a body stands, of the two that a lone flat marker leaves open. Whether it moves is open,
-/// too: both answers are carried with their odds (an interacting multiple model: Blom and Bar-Shalom, "The
-/// interacting multiple model algorithm", 1988).
+/// One hypothesis of a body's pose, of the two that a lone flat marker leaves open. Whether the body moves is
+/// unknown too: both cases are filtered, with their probabilities (an interacting multiple model: Blom and
+/// Bar-Shalom, "The interacting multiple model algorithm", 1988).
 struct Branch {
   Motion still;  ///< may only drift
   Motion moving;
-  double still_weight = 0.5;  ///< moving: the rest
-  double weight = 1;          ///< of this branch; all branches' add up to 1
+  double still_weight = 0.5;  ///< probability of `still`; `moving` has the rest
+  double weight = 1;          ///< probability of this branch; those of all branches add up to 1
 };
 
-/// An image's own pose of a body, without history.
+/// A body's pose from one moment's images alone, without history.
 struct Fix {
   Pose world_from_body;
   Matrix6d covariance;
   Stamp captured_at;
 };
 
-/// What is known of a body from the images up to a moment.
+/// The filter's state of one body, from all images up to a moment.
 struct BodyFilter {
   std::string body;
-  std::vector<Branch> branches;  ///< one or two, as of measured_at; the first is the one to report
+  std::vector<Branch> branches;  ///< one or two, at the time measured_at; the first is the one to report
   std::vector<Fix> fixes;        ///< the newest one or two, oldest first, on the reported branch
   int marker_count = 0;
   double rms_px = 0;
   int misfits = 0;    ///< images in a row that contradict the motion
-  int of_one = 0;     ///< images with one branch alone
-  Stamp measured_at;  ///< of the newest image that showed the body
-  Stamp looked_at;    ///< of the newest image
-  /// Between the newest three images, the older first; 0: not known yet.
+  int of_one = 0;     ///< images in a row with only one branch
+  Stamp measured_at;  ///< capture time of the newest image that showed the body
+  Stamp looked_at;    ///< capture time of the newest image
+  /// Seconds between the newest three images, the older interval first. 0: not known yet.
   std::array<double, 2> gaps_s = {};
 };
 
-/// A body unseen for longer is lost: the model's limit, or one and a half times between images where these
-/// come more rarely. Of the last two the shorter: a pause is no rate.
+/// A body that is not seen for longer than this is lost: the model's limit, or one and a half times the
+/// interval between images where these come more rarely. The shorter of the last two intervals counts, so
+/// that a pause is not taken for a slow camera.
 double lost_after_s(const BodyFilter& motion, const MotionModel& model);
 
-/// What is known after one more moment's images (of all cameras that took one): the step of the filter. The
-/// corners themselves are its measurement, with their covariance, so that a marker seen from straight ahead,
-/// whose four corners know little of its tilt, moves its tilt little. `known` is what the step before
-/// returned (at first nothing). Both branches live on with their likelihoods; a body that is not seen keeps
-/// its motion; one unseen for longer than the limit starts afresh when seen again. Images older than what
-/// is known change nothing. An image that contradicts the motion altogether (a false marker) is passed over;
-/// two in a row are believed.
+/// The filter's step: `known` (the result of the step before, empty at first), updated by the images of one
+/// moment from all cameras that took one. The measurements are the corners themselves with their covariance,
+/// so that a marker seen from straight ahead, whose four corners say little about its tilt, changes the tilt
+/// little. Both branches are kept with their likelihoods. A body that is not seen keeps its motion. One that
+/// is unseen for longer than the limit starts anew when it is seen again. Images older than `known` change
+/// nothing. One image that contradicts the motion altogether (a false marker) is skipped; two in a row are
+/// accepted.
 std::vector<BodyFilter> observed(std::span<const BodyFilter> known,
                                  std::span<const Body> bodies,
                                  std::span<const View> views,

@@ -10,9 +10,10 @@
 
 namespace limn::tracker {
 
-/// The pose of a body from its markers in one or several cameras' images of one moment, without history:
-/// the pose of several cameras and markers that suits all their corners best (sighting.h: minima), weighted
-/// by the corners' covariance, with a Huber loss. nullopt when none of the body's markers gives a pose.
+/// The pose of a body from its markers in the images of one or several cameras at one moment, without
+/// history: the likeliest minimum of the corners' reprojection error (body_correspondences.h: minima),
+/// weighted by the corners' covariance, with a Huber loss. nullopt when none of the body's markers gives a
+/// pose.
 std::optional<Track> world_from_body(const Body& body, std::span<const View> views, Stamp captured_at);
 
 }  // namespace limn::tracker

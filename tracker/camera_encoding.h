@@ -5,7 +5,8 @@
 
 namespace limn::apps {
 
-/// How a camera writes light, as near as the detector can tell apart: by what was measured, else linear.
+/// Whether a camera's grey levels are linear or sRGB, whichever is nearer to its measured response; linear
+/// when it was not measured.
 tracker::Encoding encoding_of(const Rig& rig, const Imager& camera);
 
 }  // namespace limn::apps

@@ -7,31 +7,32 @@
 namespace limn::tracker {
 namespace {
 
-// The cracks around a convex region are exactly as many as around its bounding box. Noise on soft edges and
-// small bites add some, and half as many again where all sides run through pixel centres, whose noise then
-// decides pixel by pixel; regions of clutter have many more.
+// Largest ratio of a boundary's length to that of its bounding box. Around a convex region both have the same
+// number of cracks. Noise on soft edges and small bites add some, and half as many again where all sides run
+// through pixel centres, so that noise decides pixel by pixel. Regions of clutter have many more.
 constexpr double k_max_roughness = 1.75;
-// A quadrilateral's area is at least this share of its bounding box, for the steepest markers along a
+// Smallest share of a quadrilateral's area in its bounding box, for the steepest markers that lie along a
 // diagonal.
 constexpr double k_min_box_share = 0.04;
-// Distance at which a boundary point makes a corner: staircase and noise, and the bow that a lens gives a
-// side.
+// Distance at which a boundary point becomes a corner: larger than the staircase, noise and the bow that a
+// lens gives a side.
 constexpr double k_corner_px = 1.4;
-constexpr double k_corner_share = 0.012;  // of the boundary's length
-// RMS distance of a side's cracks from its line: 0.3 px for a perfect staircase, plus the same two.
+constexpr double k_corner_share = 0.012;  // share of the boundary's length
+// Largest RMS distance of a side's cracks from its line: 0.3 px for a perfect staircase, plus noise and the
+// lens's bow.
 constexpr double k_max_side_rms_px = 0.75;
-constexpr double k_max_side_rms_share = 0.012;  // of the side's length
-constexpr double k_side_trim = 0.1;             // of a side at each end: corners are round
+constexpr double k_max_side_rms_share = 0.012;  // share of the side's length
+constexpr double k_side_trim = 0.1;  // share of a side that is left out at each end: corners are rounded
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-// Whether a boundary is an outer one and large enough to be a quadrilateral's.
+// Whether a boundary is an outer one and is large enough for a quadrilateral.
 bool is_large(const Contours::Extent& contour, double min_side_px) {
   return static_cast<double>(contour.count) >= 3 * min_side_px &&
          contour.area >= 0.5 * min_side_px * min_side_px;
 }
 
-// Whether it is as long as a quadrilateral's, and holds as much.
+// Whether the size, roughness and area of a boundary can be a quadrilateral's.
 bool is_full(const Contours::Extent& contour, const Contours::Box& box, double min_side_px) {
   return std::max(box.width, box.height) >= min_side_px &&
          std::min(box.width, box.height) >= 0.5 * min_side_px &&
@@ -59,7 +60,7 @@ void QuadFinder::find(CornerCodes& corners,
   });
 }
 
-// From one of the outline's corners to another, without its ends.
+// The line from one of the outline's corners to another, without its ends.
 const QuadFinder::Side& QuadFinder::side(std::size_t from_corner, std::size_t to_corner) {
   Side& side = sides_[from_corner][to_corner];
   if (side.known) return side;
@@ -76,12 +77,12 @@ const QuadFinder::Side& QuadFinder::side(std::size_t from_corner, std::size_t to
   return side;
 }
 
-// Whether the outline turns as a convex one at the second of three of its corners.
+// Whether the outline makes a convex turn at the second of three of its corners.
 bool QuadFinder::turns_right(std::size_t a, std::size_t b, std::size_t c) const {
   return cross(corners_[b] - corners_[a], corners_[c] - corners_[b]) > 0;
 }
 
-// The four corners among those found, convex, whose sides are straightest.
+// Chooses the convex four of the corners whose sides are straightest.
 bool QuadFinder::choose_quad(double min_side_px, Quad* quad) {
   const std::size_t n = contours_.corners().size();
   double best = std::numeric_limits<double>::infinity();
@@ -110,7 +111,8 @@ bool QuadFinder::fit_quad(const std::array<std::size_t, 4>& corners, double min_
     const Contours::Line& before = side(corners[(i + 3) % 4], corners[i]).line;
     const Contours::Line& after = side(corners[i], corners[(i + 1) % 4]).line;
     const double sine = cross(before.d, after.d);
-    if (std::abs(sine) < 0.06) return false;  // 3.4 degrees: the sharpest corner of a marker 84 degrees steep
+    // 3.4 degrees: the sharpest corner of a marker that is 84 degrees steep
+    if (std::abs(sine) < 0.06) return false;
     const double along = cross(after.p - before.p, after.d) / sine;
     quad->corners_px[i] = before.p + along * before.d;
     if ((quad->corners_px[i] - corners_[corners[i]]).norm() > 2.5 + 0.1 * before.count) return false;

@@ -9,23 +9,23 @@
 
 namespace limn::tracker {
 
-/// A dark quadrilateral of the image; corners clockwise as seen (x right, y down), pixel centres at
-/// integers, good to about a pixel.
+/// A dark quadrilateral in the image. Corners run clockwise as seen (x right, y down), with pixel centres at
+/// integers, and are good to about a pixel.
 struct Quad {
   std::array<Eigen::Vector2d, 4> corners_px;
   double within_px = 3;  ///< how far off a corner may be
 };
 
 struct CandidateOptions {
-  /// Sides shorter than this are none: a marker of 8 cells cannot be read below some 11 px. A steep marker's
-  /// height may be half of it.
+  /// Quadrilaterals whose longest side is shorter than this are ignored: a marker of 8 cells cannot be read
+  /// below some 11 px. The height of a steep marker may be half of it.
   double min_side_px = 6;
 };
 
-/// Keeps the outlines of black regions that four straight lines describe. Holds its buffers between calls.
+/// Finds the outlines of black regions that four straight lines describe. Holds its buffers between calls.
 class QuadFinder {
  public:
-  /// Sets the visited bits of `corners`. Each quadrilateral is told when it is found.
+  /// Calls tell(quad) for each quadrilateral when it is found. Sets the visited bits of `corners`.
   void find(CornerCodes& corners,
             const CandidateOptions& options,
             const std::function<void(const Quad&)>& tell);
@@ -37,8 +37,8 @@ class QuadFinder {
   };
   static constexpr std::size_t k_max_corners = 10;
   Contours contours_;
-  std::array<Eigen::Vector2d, k_max_corners> corners_;                // of the outline
-  std::array<std::array<Side, k_max_corners>, k_max_corners> sides_;  // from corner to corner
+  std::array<Eigen::Vector2d, k_max_corners> corners_;                // corners of the outline
+  std::array<std::array<Side, k_max_corners>, k_max_corners> sides_;  // from one corner to another
 
   const Side& side(std::size_t from, std::size_t to);
   bool turns_right(std::size_t a, std::size_t b, std::size_t c) const;

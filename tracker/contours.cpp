@@ -11,8 +11,8 @@
 namespace limn::tracker {
 namespace {
 
-constexpr float k_nearly = 0.99999F;   // products may be rounded otherwise where they are fused
-constexpr std::size_t k_block = 1024;  // points that are traced before the trail is looked after
+constexpr float k_nearly = 0.99999F;   // products may be rounded differently where they are fused
+constexpr std::size_t k_block = 1024;  // points that are traced before the trail's memory is checked
 
 constexpr std::array<int, 4> k_dx = {0, 1, 0, -1};  // up, right, down, left
 constexpr std::array<int, 4> k_dy = {-1, 0, 1, 0};
@@ -39,7 +39,7 @@ LIMN_SIMD Bounds bounds_of(const Packed* points, std::size_t count) {
   return {low_x, high_x, low_y, high_y};
 }
 
-// Points are looked at by so many: buffers reach as far behind the last.
+// Points are processed in groups of this many; buffers extend that far beyond the last point.
 constexpr std::size_t k_together = 16;
 
 struct Farthest {
@@ -47,7 +47,8 @@ struct Farthest {
   std::size_t index;
 };
 
-// One of the points with the largest distance_of(x, y), which is not negative, but for the last four bits.
+// A point with the largest distance_of(x, y), which must not be negative. Lanes whose distances differ only
+// in the last four bits count as equal.
 template <typename DistanceOf>
 __attribute__((always_inline)) inline Farthest farthest(const Packed* points,
                                                         std::size_t count,
@@ -64,7 +65,8 @@ __attribute__((always_inline)) inline Farthest farthest(const Packed* points,
       most[k] = more ? distance : most[k];
       where[k] = more ? i : where[k];
     }
-  std::int32_t best = 0;  // its bits, which are ordered as it is, and in the last four who has it
+  // The bits of the largest distance, which are ordered like the distance; the last four hold the lane.
+  std::int32_t best = 0;
 #pragma omp simd reduction(max : best)
   for (std::size_t k = 0; k < k_together; ++k) {
     const std::int32_t key = (std::bit_cast<std::int32_t>(most[k]) & ~15) | static_cast<std::int32_t>(15 - k);
@@ -85,8 +87,8 @@ struct Limits {
   std::size_t max_count, min_run;
 };
 
-// Adds the corners strictly between two points (Douglas and Peucker): of a piece the first of the points
-// farthest from the chord between its ends, and so on on both sides.
+// Adds the corners strictly between two points (Douglas and Peucker): the first point farthest from the chord
+// between the ends, then the same for the pieces on both sides of it.
 LIMN_SIMD void split(const Packed* points,
                      std::size_t from,
                      std::size_t to,
@@ -119,7 +121,8 @@ struct Moments {  // sums, in half pixels
   double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
 };
 
-// From `origin` on: whole numbers, so their order makes no difference.
+// Sums of coordinates relative to `origin`. They are whole numbers, so the order of summation does not
+// matter.
 LIMN_SIMD Moments moments_of(const Packed* points, std::size_t count, Packed origin) {
   constexpr std::size_t k_lanes = 8;
   static_assert(k_lanes <= k_together);
@@ -146,7 +149,7 @@ LIMN_SIMD Moments moments_of(const Packed* points, std::size_t count, Packed ori
 
 }  // namespace
 
-// Diagonal neighbours are connected: left first.
+// Fills in the steps. Diagonal neighbours are connected: a left turn is tried first.
 Contours::Steps::Steps(std::ptrdiff_t stride) {
   using C = CornerCodes;
   constexpr std::array<int, 4> ahead_left = {C::k_upper_left, C::k_upper_right, C::k_lower_right,
@@ -166,27 +169,29 @@ Contours::Steps::Steps(std::ptrdiff_t stride) {
       way->moves[at] = static_cast<Packed>(dx) + (static_cast<Packed>(dy) << 16);
     };
     step_to(&on, i, d, 1, d);
-    // What lies behind, on both sides: black on the right alone is a boundary.
+    // Steps back: a crack behind the corner is a boundary where there is black on its right and not on its
+    // left.
     if (!(code & ahead_right[(from + 1) % 4]) || code & ahead_left[(from + 3) % 4]) continue;
     step_to(&back, 32 * d + i % 32, from, -1, from);
   }
 }
 
-// The middle of the crack to the next corner.
+// Moves to the next corner and returns the middle of the crack between them.
 inline Packed Contours::End::go_on(const Way& way) {
   const std::size_t from = direction + *corner;
   const Step& step = way.steps[from];
   *corner = step.code;
   direction = static_cast<std::size_t>(step.next);
   corner += step.offset;
-  __builtin_prefetch(corner + 8 * std::ptrdiff_t{step.offset});  // every row of codes is another cache line
+  // Every row of codes is in another cache line.
+  __builtin_prefetch(corner + 8 * std::ptrdiff_t{step.offset});
   area += std::int64_t{at & 0xFFFF} * step.dy;
   const Packed middle = at + way.moves[from];
   at = middle + way.moves[from];
   return middle;
 }
 
-// The trail's middle, with room for another block on both sides of what is there.
+// The middle of the trail, after making room for another block on both sides of its points.
 Packed* Contours::Tracing::middle_with_room() {
   const std::size_t half = std::max(back, on) + k_block + k_together;
   if (trail.size() < 2 * half) {
@@ -206,8 +211,8 @@ void Contours::begin(CornerCodes& corners) {
   for (Tracing& tracing : tracings_) tracing.start = nullptr;
 }
 
-// The next boundary from a corner on with black at its lower right alone, not visited: the upper left pixel
-// of a region's top row has one, so every outer boundary runs through such corners.
+// Starts the next boundary, at a corner that has black at its lower right only and is not visited. The upper
+// left pixel of a region's top row has such a corner, so every outer boundary is found.
 void Contours::start(CornerCodes& corners, Tracing* tracing) const {
   constexpr std::size_t k_up = 0, k_right = 32;
   std::uint8_t* const codes = corners.codes.data();
@@ -229,10 +234,10 @@ void Contours::start(CornerCodes& corners, Tracing* tracing) const {
   middle[0] = t.end.go_on(steps_.on);
   middle[-1] = t.begin.go_on(steps_.back);
   t.on = t.back = 1;
-  *t.start = CornerCodes::k_lower_right;  // visited when another tracing comes by
+  *t.start = CornerCodes::k_lower_right;  // marked as visited when the other tracing passes
 }
 
-// Whether the ends have met after another crack at one of them.
+// Moves one end by a crack; whether the two ends have met.
 inline bool Contours::meets(
     const Way& way, End* moved, Packed* point, const End& end, const End& begin) const {
   *point = moved->go_on(way);
@@ -240,7 +245,7 @@ inline bool Contours::meets(
          static_cast<std::size_t>(steps_.on.steps[end.direction + *end.corner].next) == begin.direction;
 }
 
-// Until its ends have met.
+// Traces a boundary until its ends have met.
 void Contours::follow(Tracing* tracing) const {
   Tracing& t = *tracing;
   for (bool closed = false; !closed;) {
@@ -254,7 +259,7 @@ void Contours::follow(Tracing* tracing) const {
   }
 }
 
-// Until the ends of one have met: that one.
+// Traces both boundaries in turn, until the ends of one have met; returns that one.
 Contours::Tracing& Contours::follow_both() {
   Tracing &a = tracings_[0], &b = tracings_[1];
   for (;;) {
@@ -280,8 +285,8 @@ Contours::Tracing& Contours::follow_both() {
   }
 }
 
-// The boundary whose ends meet next; nullopt: all have been traced. What the other tracing has of the same
-// one is dropped.
+// The boundary whose ends meet next; nullopt when all have been traced. If the other tracing is on the same
+// boundary, it is dropped.
 std::optional<Contours::Extent> Contours::trace_next(CornerCodes& corners) {
   for (Tracing& tracing : tracings_)
     if (!tracing.start) start(corners, &tracing);
@@ -309,7 +314,7 @@ Contours::Box Contours::box() const {
 }
 
 void Contours::find_corners(double tolerance_px, std::size_t max_count, std::size_t min_run) {
-  // The points before the first corner once more behind the last, and what may be looked at beside them.
+  // Repeat the points before the first corner behind the last point, and leave room for reading whole groups.
   std::vector<Packed>& trail = tracings_[last_].trail;
   const std::size_t most = begin_ + 2 * count_ + k_together;
   if (trail.size() < most) trail.resize(most);
@@ -349,7 +354,7 @@ std::optional<Contours::Line> Contours::line(std::size_t from, std::size_t to, d
   const double root = std::sqrt(square);
   Line line;
   line.p = point(0) + Eigen::Vector2d(x, y);
-  // The eigenvector of the larger one, the way that does not cancel.
+  // The eigenvector of the larger eigenvalue, by the formula without cancellation.
   line.d = apart > 0 ? Eigen::Vector2d(apart + root, xy) : Eigen::Vector2d(xy, root - apart);
   line.d /= std::max(1e-12, line.d.norm());
   line.squares = n * std::max(0.0, middle - root);

@@ -30,9 +30,9 @@ Eigen::Vector2d centre(const Detection& detection) {
   return 0.25 * (c[0] + c[1] + c[2] + c[3]);
 }
 
-constexpr double k_around_region_px = 8;  // that the threshold sees beside a marker
+constexpr double k_around_region_px = 8;  // surroundings of a marker, for the threshold
 
-// Two readings of one black square.
+// Whether two readings are of the same black square.
 bool is_same_square(const Detection& a, const Detection& b) {
   return (centre(a) - centre(b)).norm() < 0.15 * std::min(longest_side(a), longest_side(b));
 }
@@ -46,19 +46,20 @@ void add_best_of_square(Detection detection, std::vector<Detection>* detections)
   detections->push_back(std::move(detection));
 }
 
-constexpr double k_refined_contrast = 0.7;  // share of min_contrast that an edge must keep on average
+constexpr double k_refined_contrast = 0.7;  // share of min_contrast that a refined edge must have on average
 
-constexpr double k_rough_above_px = 32;  // smaller quads are refined in full at once: it costs as little
+constexpr double k_rough_above_px = 32;  // smaller quads are refined in full at once, which costs no more
 
 constexpr double k_fit_above_px = 12;  // smaller markers have too few pixels for the fit
 
-// Cells narrower than so many sigmas of the blur lie within each other's edges.
+// Cells narrower than this many sigmas of the blur lie within each other's edges.
 constexpr double k_cell_sigmas = 5;
-// The middles of narrower cells are no longer black or white.
+// In cells narrower than this many sigmas, the middle is no longer black or white, so edge bleed is not
+// measured.
 constexpr double k_retreat_sigmas = 3.5;
 
-// Error of a corner whose edges overlap, in their blur: measured on sigma 2.5 to 3.5 and motion of 8 to 16
-// px.
+// Error of a corner whose edges overlap, as a share of their blur; measured with sigma 2.5 to 3.5 and motion
+// of 8 to 16 px.
 constexpr double k_overlap_doubt = 0.15;
 
 double blur_of(const RefinedQuad& quad) {
@@ -69,13 +70,14 @@ bool is_blurred(const RefinedQuad& quad, const SeenCells& cells, double cell_sig
   return shortest_side(Quad{quad.corners_px}) < cell_sigmas * blur_of(quad) * cells.count;
 }
 
-// A pattern is followed from image to image, and no shadow's edge is looked for at a side while the light
-// on both sides of it is as it was. Either for so many images, and for twice as many, up to a limit, each
-// time that it is found again.
+// A pattern is followed from image to image, and no shadow's edge is searched for while the light on both
+// sides of a marker's sides stays the same, for k_keep_images. The number doubles, up to k_keep_at_most, each
+// time the full reading confirms the result.
 constexpr int k_keep_images = 30, k_keep_at_most = 120;
-constexpr double k_like_level = 0.06, k_like_dark_level = 3;  // a share of it, and grey levels at least
+// Largest change: a share of the level, and at least this many grey levels.
+constexpr double k_like_level = 0.06, k_like_dark_level = 3;
 
-// Corner i of the marker is corner_of(i) of the quadrilateral that showed it.
+// Corner i of the marker is corner corner_of(i) of the quadrilateral in which it was read.
 template <class Shown>
 std::size_t corner_of(const Shown& shown, std::size_t i) {
   return (i + shown.first_corner) % 4;
@@ -112,7 +114,8 @@ std::optional<T> aged(std::optional<T> known) {
   return known;
 }
 
-// Whether it is the square of a marker found before: another one may lie inside or around it.
+// Whether it is the square of a marker that was found before. Another marker may lie inside or around that
+// one.
 bool is_known(const Quad& quad, const std::vector<Detection>& detections) {
   const auto& q = quad.corners_px;
   const Eigen::Vector2d middle = 0.25 * (q[0] + q[1] + q[2] + q[3]);
@@ -126,14 +129,14 @@ bool is_known(const Quad& quad, const std::vector<Detection>& detections) {
 
 }  // namespace
 
-// Some of the crew find quads while others read them.
+// A queue: one thread finds quads while others read them.
 class Detector::UnreadQuads {
  public:
   struct Next {
     std::size_t number;
     Quad quad;
   };
-  struct End {  // however the search for them ends, nobody waits for more
+  struct End {  // ends the queue however the search ends, so that no thread waits for more
     UnreadQuads& quads;
     ~End() { quads.end(); }
   };
@@ -146,7 +149,7 @@ class Detector::UnreadQuads {
   }
   void end() { ended_ = true; }
 
-  // Waits for one, unless all are taken and there will be no more.
+  // Waits for the next quad; nullopt when all are taken and there will be no more.
   std::optional<Next> take() {
     for (;;) {
       bool ended = false;
@@ -226,7 +229,7 @@ void Detector::find_markers(const cv::Mat& grey,
   add_read(bleed, detections);
 }
 
-// Until none is left.
+// Reads quads until none is left.
 void Detector::read_quads(
     const cv::Mat& grey, const Lens* lens, Reading reading, UnreadQuads& unread, int worker) {
   while (const auto next = unread.take())
@@ -237,8 +240,8 @@ void Detector::read_quads(
     }
 }
 
-// What has been read, as if it had been read one after the other, less the retreat of the ink that it shows,
-// or else the one that is known. What it shows.
+// Adds the markers that were read, in the order of their quads, so that threads do not change the result.
+// Corrects them by the edge bleed that they show, or else by `known`. Returns the bleed that was used.
 std::optional<EdgeBleed> Detector::add_read(const std::optional<EdgeBleed>& known,
                                             std::vector<Detection>* detections) {
   std::sort(read_.begin(), read_.end(), [](const Read& a, const Read& b) { return a.number < b.number; });
@@ -272,7 +275,7 @@ void Detector::follow(const cv::Mat& grey,
   add_read(std::nullopt, detections);
 }
 
-// By the pattern that it showed there.
+// Finds a marker by the pattern that was fitted in the last image.
 std::optional<Detector::Read> Detector::follow_by_pattern(const cv::Mat& grey,
                                                           const Lens* lens,
                                                           const Detection& last) {
@@ -294,8 +297,8 @@ std::optional<Detector::Read> Detector::follow_by_pattern(const cv::Mat& grey,
   return read;
 }
 
-// By its pattern, or else first from its old corners at once, then from all quads about there, then from what
-// covers it has left.
+// Tries to find a marker by its pattern, then from its old corners, then from all quads around there, then
+// from segments, for a partly covered one.
 std::optional<Detector::Read> Detector::found_again(const cv::Mat& grey,
                                                     const Lens* lens,
                                                     const Detection& last) {
@@ -334,9 +337,9 @@ std::optional<Detector::Read> Detector::found_again(const cv::Mat& grey,
   return read_quads(Reading::covered);
 }
 
-// The quads that straight edges suggest where none of these markers are, into quads_.
+// Puts into quads_ the quads that segments form where no marker of `found` lies.
 void Detector::join_segments(const cv::Mat& grey, const std::vector<Detection>& found, WorkerTeam& team) {
-  constexpr std::size_t k_max_candidates = 400;  // of each kind of edges
+  constexpr std::size_t k_max_candidates = 400;  // for each of the two kinds of segments
   squares_.clear();
   for (const Detection& detection : found) squares_.emplace_back(detection);
   quads_.clear();
@@ -379,7 +382,7 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
   }
   auto refined = refine(start, Effort::full);
   auto identity = refined ? identify(grey, *refined, families_, reading) : std::nullopt;
-  if (!identity) {  // what a small marker has around it may bend its sides
+  if (!identity) {  // what lies around a small marker may bend its sides
     refined = rough ? rough : refine(quad, Effort::rough);
     identity = refined ? identify(grey, *refined, families_, reading) : std::nullopt;
     if (!identity) return std::nullopt;
@@ -416,7 +419,8 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
   return read;
 }
 
-// Edges whose blur overlaps with others': by the whole pattern, or else with the doubt that they deserve.
+// Treats a marker whose edges blur into each other: fits the whole pattern, or else enlarges the corners'
+// covariance.
 std::optional<PatternAppearance> Detector::settle_overlapping_edges(
     const cv::Mat& grey,
     const Lens* lens,

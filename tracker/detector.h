@@ -22,54 +22,55 @@
 namespace limn::tracker {
 
 struct DetectorOptions {
-  /// Grey levels between black and white below which there is no marker. Lower finds markers in the dark and
+  /// Smallest difference between black and white in grey levels. A lower value finds markers in the dark and
   /// costs time in noise; noise of 2 levels needs 12.
   int min_contrast = 16;
-  /// Smallest side, as CandidateOptions.
+  /// Smallest side, as in CandidateOptions.
   double min_side_px = 6;
-  /// How the camera writes light. Wrong, markers shrink, the more the softer their edges; the edges of their
-  /// cells show and undo most of it (ink_retreat.h).
+  /// How the camera encodes light as grey levels. With the wrong value markers appear too small, the more the
+  /// softer their edges are; the correction by the edges of their cells removes most of that (edge_bleed.h).
   Encoding encoding = Encoding::linear;
-  /// Also joins straight edges to quadrilaterals, for markers that fingers, bites or slatted shadows break
-  /// up. Costs about half as much again as the rest; left out where no family can_be_covered().
+  /// Also joins straight edges to quadrilaterals, to find markers that are broken up by fingers, bites or
+  /// slatted shadows. Costs about half as much again as the rest. Skipped when no family can_be_covered().
   bool broken_markers = true;
-  /// Also fits the whole pattern of markers whose edges blur into each other, as those of small ones do:
-  /// their corners are up to ten times better. Costs several times what reading one does; without it their
-  /// covariances say so, rather too much than too little.
+  /// Also fits the whole pattern of markers whose edges blur into each other, which is common for small ones:
+  /// their corners become up to ten times better. A fit costs several times what reading a marker costs.
+  /// Without it the corners' covariances are larger accordingly, rather too large than too small.
   bool pattern_fits = true;
-  /// How many threads an image is shared out to, of OpenCV's pool (cv::setNumThreads limits them). The
-  /// result is the same with any number.
+  /// Number of threads of OpenCV's pool that work on one image (cv::setNumThreads limits them). The result
+  /// does not depend on it.
   int threads = 1;
 };
 
 /// Finds markers: grey -> local threshold -> boundaries of black regions -> quadrilaterals -> sub-pixel edge
-/// lines -> rectified cells -> ids; what is left: straight edges -> quadrilaterals -> the same. Holds its
-/// buffers, so keep one per thread.
+/// lines -> rectified cells -> ids. In the rest of the image: straight edges -> quadrilaterals -> the same.
+/// Holds its buffers, so use one for each thread.
 class Detector {
  public:
   explicit Detector(Families families, DetectorOptions options = {});
 
-  /// `grey` is the camera's raw image: 8-bit, one channel, at most k_max_image_side a side; an empty one
-  /// has no markers. With `lens` sides are straight in undistorted directions, without one in the image.
-  /// Corners are raw pixels either way.
+  /// `grey` is the camera's raw image: 8-bit, one channel, at most k_max_image_side a side. An empty image
+  /// has no markers. With `lens` a marker's sides are straight in undistorted directions, without it they are
+  /// straight in the image. Corners are pixels of the raw image in both cases.
   std::vector<Detection> detect(const cv::Mat& grey, const Lens* lens = nullptr);
 
-  /// The same into `detections`. Allocates nothing once its buffers are large enough, but what OpenCV's pool
-  /// does with several threads.
+  /// The same, with the result in `detections`. Allocates nothing once its buffers are large enough, except
+  /// in OpenCV's pool with several threads.
   void detect(const cv::Mat& grey, const Lens* lens, std::vector<Detection>* detections);
 
-  /// Adds the markers that stand beside the `detections` there are: those of follow() need not be read twice.
-  /// Broken ones too where that is an option, unless only Reading::open is asked for.
+  /// Adds the markers that are not yet in `detections`, so that those of follow() are not read twice. Broken
+  /// markers are included if that option is set, unless `reading` is Reading::open.
   void detect_more(const cv::Mat& grey,
                    const Lens* lens,
                    std::vector<Detection>* detections,
                    Reading reading = Reading::covered);
 
-  /// Finds markers again that were at `last`, looking only about there: a marker that moved by more than half
-  /// of its side is lost, and new ones want detect_more(). Each square once, in the order of `last`, which
-  /// `detections` must not be. A marker that was found by its whole pattern is found by how that looked; it
-  /// is read from nothing now and then, and when it looks otherwise. Shadows are looked for anew now and
-  /// then, and when the light at a side changes.
+  /// Finds the markers of `last` again and searches only around their last places: a marker that moved by
+  /// more than half of its side is lost, and new ones need detect_more(). Each square is found once, in the
+  /// order of `last`; `detections` must not be the memory of `last`. A marker that was found by its whole
+  /// pattern is found by fitting the pattern again, starting from its last appearance. The full reading is
+  /// repeated from time to time, and when the appearance changes. Shadows are searched for from time to time,
+  /// and when the light at a side changes.
   void follow(const cv::Mat& grey,
               const Lens* lens,
               std::span<const Detection> last,
@@ -88,19 +89,19 @@ class Detector {
     EdgeRefiner refiner;
     PatternFitBuffers fit;
   };
-  std::vector<Worker> workers_;  // one for each of the crew
+  std::vector<Worker> workers_;  // one for each thread of the team
   SegmentFinder segment_finder_;
   Segments segments_;
-  std::vector<ExclusionZone> squares_;  // of markers found before segments are joined
+  std::vector<ExclusionZone> squares_;  // places of markers that were found before segments are joined
   SegmentQuadFinder segment_quad_finder_;
   std::vector<SegmentQuad> segment_quads_;
   struct Read {
-    std::size_t number = 0;  // of its quad
+    std::size_t number = 0;  // index of its quad
     Detection detection;
     std::optional<EdgeBleed> bleed;
   };
   std::vector<Read> read_;
-  std::vector<EdgeBleed> retreats_;  // of those read
+  std::vector<EdgeBleed> retreats_;  // edge bleed of the markers that were read
 
   class UnreadQuads;
   std::optional<Read> follow_by_pattern(const cv::Mat& grey, const Lens* lens, const Detection& last);

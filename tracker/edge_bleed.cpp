@@ -9,20 +9,22 @@
 namespace limn::tracker {
 namespace {
 
-constexpr std::size_t k_steps = 8;                    // from a cell's middle to the next
-constexpr std::array<float, 2> k_lines{-0.2F, 0.2F};  // of a cell beside its middle
+constexpr std::size_t k_steps = 8;                    // samples from one cell's middle to the next
+constexpr std::array<float, 2> k_lines{-0.2F, 0.2F};  // sample lines, in cells beside a cell's middle
 constexpr int k_min_edges = 12;
-constexpr double k_min_contrast = 8;           // of light, between two cells
-constexpr double k_clear_deviations = 3;       // below them a retreat is noise, as a bow is (refine.cpp)
-constexpr double k_unsure_share = 0.2;         // of the retreat: photographs of boards agree to so much
-constexpr double k_between_markers_px = 0.02;  // that markers of one image differ by at least
+constexpr double k_min_contrast = 8;  // light, between two cells
+// A smaller bleed is treated as noise, as curvature is in refine.cpp.
+constexpr double k_clear_deviations = 3;
+constexpr double k_unsure_share = 0.2;         // share of the bleed: photographs of boards agree up to it
+constexpr double k_between_markers_px = 0.02;  // smallest standard deviation between an image's markers
 
-// Edges between cells one after the other along x, or y if `down`: where each lies and its lines' places.
+// Edges between neighbouring cells in x, or in y if `down`: direction, polarity, and the places of their
+// samples.
 struct Edges {
   static constexpr std::size_t k_most = 2 * SeenCells::k_max * (SeenCells::k_max - 1);
   static constexpr std::size_t k_places = k_lines.size() * (k_steps + 1);
   std::size_t count = 0;
-  std::array<double, k_most> leverage;  // of the retreat on the way that is measured
+  std::array<double, k_most> leverage;  // factor of the bleed in the measured width of white
   std::array<bool, k_most> rising, down;
   std::array<float, k_most * k_places> x, y;
 };
@@ -34,8 +36,9 @@ void add_edges(const SeenCells& cells, bool down, Edges* edges) {
       const bool first = down ? cells.is_white(i, line) : cells.is_white(line, i);
       const bool second = down ? cells.is_white(i + 1, line) : cells.is_white(line, i + 1);
       if (first == second) continue;
-      // The corners have drawn back, too, so that the edge seems nearer to the border than it is: white on
-      // its inner side seems wider for both reasons, on its outer side for one less the other.
+      // The corners have drawn back, too, so the edge seems nearer to the border than it is. White on an
+      // edge's inner side seems wider for both reasons; on its outer side the two effects have opposite
+      // signs.
       const double from_middle = 2 * (i + 1.0) / cells.count - 1;
       edges->leverage[edges->count] = 1 + (first ? from_middle : -from_middle);
       edges->rising[edges->count] = second;
@@ -80,12 +83,12 @@ std::optional<EdgeBleed> find_edge_bleed(const cv::Mat& grey,
   const auto light_at = [&](std::size_t place) {
     return light[static_cast<std::size_t>(std::clamp(levels[place] + 0.5F, 0.0F, 255.0F))];
   };
-  // a: leverage, b: how much wider than half the way white is, px
+  // a: leverage; b: width of white minus half the distance between the middles, px
   double aa = 0, ab = 0, bb = 0;
   int number = 0;
   for (std::size_t i = 0; i < edges.count; ++i) {
     const double cell_px = (edges.down[i] ? height : width) / cells.count;
-    double white = 0;  // share of the way, of all lines
+    double white = 0;  // share of white on the way, mean over the lines
     bool shows = true;
     for (std::size_t line = 0; line < k_lines.size(); ++line) {
       const std::size_t at = i * Edges::k_places + line * (k_steps + 1);
@@ -128,7 +131,8 @@ void undo_edge_bleed(const EdgeBleed& bleed,
   constexpr double k_limit = k_clear_deviations * k_clear_deviations;
   const double evidence = square / bleed.variance;
   if (!(evidence > 0)) return;
-  // The non-negative garrote, and how far off it is if there is a retreat or none: as for bows (refine.cpp).
+  // The non-negative garrote, and its expected square error, whether there is a bleed or none; as for
+  // curvature in refine.cpp.
   const double share = std::max(0.0, 1 - k_limit / evidence);
   const double probability = 1 / (1 + std::exp(0.5 * (k_limit - evidence)));
   const double off = probability * (1 - share) * (1 - share) + (1 - probability) * share * share;
@@ -139,7 +143,7 @@ void undo_edge_bleed(const EdgeBleed& bleed,
     const Eigen::Vector2d to_here = (before[i] - before[(i + 3) % 4]).normalized();
     const Eigen::Vector2d from_here = (before[(i + 1) % 4] - before[i]).normalized();
     const Eigen::Vector2d outward[2] = {{to_here.y(), -to_here.x()}, {from_here.y(), -from_here.x()}};
-    // The corner of both sides, each a pixel farther out.
+    // Moving both sides out by a pixel moves their corner by `out`.
     const Eigen::Vector2d out = (outward[0] + outward[1]) / (1 + outward[0].dot(outward[1]));
     if (!out.allFinite()) continue;
     (*corners_px)[i] += share * bleed.px * out;

@@ -5,7 +5,7 @@
 namespace limn::tracker {
 namespace {
 
-constexpr double k_around_px = 3;  // beside the square
+constexpr double k_around_px = 3;  // width around the square that belongs to it
 
 }  // namespace
 

@@ -9,25 +9,25 @@
 
 namespace limn::tracker {
 
-/// The place of a marker that was found in the image: nothing else is looked for there.
+/// The place of a marker that was found in the image. No other marker is searched for there.
 class ExclusionZone {
  public:
   explicit ExclusionZone(const Detection& detection);
 
-  /// Whether both of a segment's ends lie in the marker's square or next to it.
+  /// Whether both ends of a segment lie in the marker's square or next to it.
   bool holds(const Segment& segment) const {
     return (segment.from - corner_).squaredNorm() < around_square_ && holds_both_ends(segment);
   }
 
-  /// Whether the quadrilateral lies about where the marker lies.
+  /// Whether the quadrilateral's middle lies near the marker's.
   bool takes(const Quad& quad) const;
 
  private:
   bool holds_both_ends(const Segment& segment) const;
 
   Eigen::Vector2d corner_, middle_;
-  double half_square_;    // of half the longest side
-  double around_square_;  // of the distance from corner_ beyond which nothing lies in the marker
+  double half_square_;    // square of half the longest side, px^2
+  double around_square_;  // square of the distance from corner_ beyond which nothing lies in the marker, px^2
   std::array<Eigen::Vector2d, 4> inward_;
   std::array<double, 4> offset_;
 };

@@ -21,12 +21,12 @@
 namespace limn::tracker {
 namespace {
 
-// A quad with random cells passes as a marker with at most this probability: clutter gives some hundred quads
-// an image, and the border and margin tests of identify.cpp take another factor of 1000.
+// Largest probability that a quad with random cells passes as a marker. Clutter gives some hundred quads an
+// image, and the border and margin tests of identify.cpp reject all but one in 1000 of them.
 constexpr double k_max_random_hit = 2e-4;
-constexpr int k_max_cells = 7;  // 49 bits: OpenCV's largest
+constexpr int k_max_cells = 7;  // 49 bits: OpenCV's largest code
 constexpr int k_max_codes = 100000;
-// The largest ARToolKit pattern resolution we expect (ARToolKit's own AR_PATT_SIZE1_MAX).
+// The largest ARToolKit pattern resolution that is accepted (ARToolKit's own AR_PATT_SIZE1_MAX).
 constexpr int k_max_template_size = 64;
 constexpr const char* k_aruco_file = "aruco:";
 constexpr const char* k_artoolkit = "artoolkit:";
@@ -40,7 +40,7 @@ bool bit_of(std::uint64_t code, int cells, int row, int column) {
   return (code >> (cells * cells - 1 - (row * cells + column))) & 1;
 }
 
-// The code turned clockwise by 90 degrees: what was at the top left comes to the top right.
+// The code turned clockwise by 90 degrees: the top left cell comes to the top right.
 std::uint64_t turned(std::uint64_t code, int cells) {
   std::uint64_t result = 0;
   for (int row = 0; row < cells; ++row)
@@ -55,7 +55,7 @@ std::array<std::uint64_t, 4> four_turns(std::uint64_t code, int cells) {
   return turns;
 }
 
-// Smallest Hamming distance between any two codes in any rotation (and of a code to its own rotations).
+// Smallest Hamming distance between any two codes in any rotation, and between a code and its own rotations.
 int smallest_distance(const CodeFamily& family) {
   int smallest = family.cells * family.cells;
   for (std::size_t i = 0; i < family.codes.size(); ++i) {
@@ -68,7 +68,7 @@ int smallest_distance(const CodeFamily& family) {
   return smallest;
 }
 
-// Negative when not even a flawless reading of the other bits says which code it is.
+// Negative when even an error-free reading of the other bits does not determine the code.
 int correctable_errors(const CodeFamily& family, int distance, int hidden) {
   const int bits = family.cells * family.cells - hidden;
   const int unique = distance > hidden ? (distance - hidden - 1) / 2 : -1;
@@ -82,7 +82,7 @@ int correctable_errors(const CodeFamily& family, int distance, int hidden) {
   }
 }
 
-// A flawless code is always read, whatever the family's size.
+// A code without errors is always read, whatever the family's size.
 std::vector<int> correctable_errors(const CodeFamily& family) {
   const int bits = family.cells * family.cells;
   if (4 * static_cast<double>(family.codes.size()) > std::ldexp(k_max_random_hit, bits)) return {0};
@@ -141,9 +141,8 @@ Result<CodeFamily> load_dictionary(const std::filesystem::path& path) {
   const auto count = file->integer("nmarkers");
   const auto cells = file->integer("markersize");
   if (!count || !cells)
-    return error(
-        "{}: expected integers nmarkers and markersize, found none. It must be an OpenCV dictionary file.",
-        path.string());
+    return error("{}: expected integers nmarkers and markersize, found none. Use an OpenCV dictionary file.",
+                 path.string());
   if (*cells < 3 || *cells > k_max_cells)
     return error("{}: markersize: expected 3 to {}, found {}", path.string(), k_max_cells, *cells);
   if (*count < 1 || *count > k_max_codes)
@@ -183,7 +182,7 @@ std::vector<double> numbers_in(const std::string& text, bool* only_numbers) {
   }
 }
 
-// Zero mean, unit length; empty when all values are the same.
+// Scales to zero mean and unit length; empty when all values are equal.
 std::vector<float> normalised(const std::vector<float>& values) {
   double mean = 0;
   for (const float v : values) mean += v;
@@ -214,13 +213,12 @@ Result<TemplatePattern> load_template(const std::filesystem::path& path) {
     return error(
         "{}: expected numbers from 0 to 255 (an ARToolKit template), found something else after {} of them",
         path.string(), values.size());
-  // Four rotations, three colours each.
+  // A file has four rotations of three colours each.
   const int size = static_cast<int>(std::lround(std::sqrt(static_cast<double>(values.size()) / 12)));
   if (size < 8 || size > k_max_template_size || values.size() != static_cast<std::size_t>(12 * size * size))
     return error(
-        "{}: expected 3072 numbers (4 rotations x 3 colours x 16 x 16; or another square), found {}: the "
-        "file is cut short "
-        "or no ARToolKit template",
+        "{}: expected 3072 numbers (4 rotations x 3 colours x 16 x 16; or another square), found {}. The "
+        "file is cut short or is not an ARToolKit template.",
         path.string(), values.size());
   TemplatePattern pattern;
   pattern.id = path.filename().string();
@@ -231,10 +229,10 @@ Result<TemplatePattern> load_template(const std::filesystem::path& path) {
     grey[i] = static_cast<float>((values[i] + values[i + area] + values[i + 2 * area]) / 3);
     pattern.grey.push_back(static_cast<std::uint8_t>(std::lround(grey[i])));
   }
-  // The file's other three rotations are the same values turned; turning them here settles the direction.
+  // The file's other three rotations are the same values turned. Turning them here fixes the direction.
   pattern.rotations[0] = normalised(smoothed(grey, size));
   if (pattern.rotations[0].empty())
-    return error("{}: expected a picture, found one grey value throughout", path.string());
+    return error("{}: expected different grey values, found the same value everywhere", path.string());
   for (std::size_t k = 1; k < 4; ++k) pattern.rotations[k] = turned(pattern.rotations[k - 1], size);
   return pattern;
 }
@@ -252,7 +250,7 @@ cv::Mat drawn_cells(int cells, int pixels_per_cell, auto&& grey_of_cell) {
   return image;
 }
 
-// In half cells.
+// The black square with its cells, drawn in half cells.
 cv::Mat drawn_barcode(const CodeFamily& family, std::size_t id, int pixels_per_half) {
   return drawn_cells(4 * family.cells, pixels_per_half, [&](int row, int column) -> std::uint8_t {
     const int r = row - family.cells;
@@ -280,7 +278,7 @@ cv::Mat drawn_template(const TemplatePattern& pattern, int pixels_per_cell) {
   });
 }
 
-// (1, 2, 1) / 4 of three lines, value by value.
+// (1, 2, 1) / 4 over three rows, value by value.
 LIMN_SIMD void smooth_across(const float* __restrict before,
                              const float* __restrict here,
                              const float* __restrict after,
@@ -291,7 +289,7 @@ LIMN_SIMD void smooth_across(const float* __restrict before,
 
 }  // namespace
 
-// The ends go on outside.
+// Values at the ends are repeated outside.
 void smooth(std::span<float> values, std::span<float> scratch, int size) {
   const auto count = static_cast<std::size_t>(size);
   const std::size_t last = count - 1;

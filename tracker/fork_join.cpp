@@ -5,7 +5,7 @@
 
 namespace limn::tracker {
 
-// Of some microseconds nothing is given to others; of longer ones the processor is.
+// Spins; yields the processor only in waits that are longer than some microseconds.
 void WorkerTeam::pause(int times) {
   constexpr int k_patience = 500;
   if (times % k_patience == 0) std::this_thread::yield();

@@ -7,16 +7,17 @@
 
 namespace limn::tracker {
 
-/// Threads of OpenCV's pool that work on one image together. They stay awake from its first to its last
-/// step: waking one takes as long as some of the steps.
+/// Threads of OpenCV's pool that work together on one image. They stay awake from its first step to its last,
+/// because waking a thread takes as long as some of the steps.
 class WorkerTeam {
  public:
-  /// cv::setNumThreads limits how many of them there are.
+  /// cv::setNumThreads limits the number of threads.
   explicit WorkerTeam(int size) : size_(size) {}
 
   int size() const { return size_; }
 
-  /// Calls lead(); the others help with what it hands to parallel_for(). Throws what lead() throws.
+  /// Calls leader() on one thread; the other threads help with what it hands to parallel_for(). Throws what
+  /// leader() throws.
   template <typename Lead>
   void work(const Lead& leader) {
     if (size_ == 1) return leader();
@@ -30,14 +31,14 @@ class WorkerTeam {
         size_);
   }
 
-  /// Waits, awake, for what another of the crew is about to do.
+  /// Waits, spinning, for something that another thread of the team is about to do.
   template <typename Reached>
   static void wait_until(const Reached& reached) {
     for (int times = 1; !reached(); ++times) pause(times);
   }
 
-  /// Calls work(i), i = 0 ... count - 1, at once where there are helpers: for the lead alone, and not from
-  /// within `work`. Throws what `work` throws, when all that has begun has ended.
+  /// Calls work(i), i = 0 ... count - 1, on all threads of the team. Only the leader may call it, and not
+  /// from within `work`. Throws what `work` throws, after all calls that have begun have ended.
   template <typename Work>
   void parallel_for(int count, const Work& work) {
     if (size_ == 1 || count == 1) {
@@ -51,9 +52,10 @@ class WorkerTeam {
   using Call = void (*)(const void* work, int i);
   int size_;
   std::atomic<bool> has_leader_ = false, has_ended_ = true;
-  // What is shared out: its number, how many there are of it and the next of them, 32, 16 and 16 bits.
+  // The current parallel_for() in one word: its number (32 bits), its count of calls (16 bits), the index of
+  // the next call (16 bits).
   std::atomic<std::uint64_t> distributed_ = 0;
-  std::atomic<int> left_ = 0;  // that have not ended
+  std::atomic<int> left_ = 0;  // calls that have not ended
   std::atomic<bool> has_failed_ = false;
   std::exception_ptr failure_;
   const void* work_ = nullptr;

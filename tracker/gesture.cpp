@@ -12,18 +12,19 @@
 namespace limn::tracker {
 namespace {
 
-constexpr double k_armed_s = 0.2;  // seen for so long before a gesture counts
-constexpr double k_gap_s = 0.15;   // shorter absences are the detector's, not a hand's
-constexpr double k_rest_s = 0.1;   // a turn counts when the marker has come to rest
+constexpr double k_armed_s = 0.2;  // a marker must be seen this long before a gesture counts
+constexpr double k_gap_s = 0.15;   // shorter absences are missed detections, not a hand
+constexpr double k_rest_s = 0.1;   // a turn counts when the marker has rested this long
 constexpr double k_rest_rad = 0.05;
-constexpr double k_neighbour_sides = 5;  // how near another marker stands that an arm hides as well
+constexpr double k_neighbour_sides = 5;  // radius in which an arm hides other markers as well
 constexpr double k_memory_s = 3;
-constexpr double k_patch_sides = 3;  // of what is watched for stillness: a hand's outline is in it
+// Width of the patch that is checked for stillness; it contains a hand's outline.
+constexpr double k_patch_sides = 3;
 constexpr int k_patch_cells = 20;
 constexpr int k_few_cells = 4;
-constexpr double k_mostly = 2 / 3.0, k_alike = 0.1;  // of the marker's contrast
+constexpr double k_mostly = 2 / 3.0, k_alike = 0.1;  // k_alike: share of the marker's contrast
 constexpr double k_noise_blend = 0.2, k_deviations_per_median = 1.4826, k_noise_deviations = 3;
-constexpr double k_tremor = 1 / 25.0;  // of a hand that rests, in sides of the marker
+constexpr double k_tremor = 1 / 25.0;  // movement of a resting hand, in sides of the marker
 
 double direction(const Detection& detection) {
   const Eigen::Vector2d d =
@@ -46,7 +47,7 @@ double area(const std::array<Eigen::Vector2d, 4>& corners) {
   return 0.5 * std::abs(twice);
 }
 
-// By how much a square is turned away, from how it is foreshortened (as if seen from far away).
+// Tilt of a square from how much it is foreshortened, as if seen from far away.
 double tilt(const std::array<Eigen::Vector2d, 4>& c) {
   Eigen::Matrix2d sides;
   sides << c[1] + c[2] - c[0] - c[3], c[2] + c[3] - c[0] - c[1];
@@ -54,7 +55,7 @@ double tilt(const std::array<Eigen::Vector2d, 4>& c) {
   return std::acos(std::clamp(stretch(1) / stretch(0), 0.0, 1.0));
 }
 
-// The marker and one side more all around it.
+// The marker and one side more around it.
 cv::Rect place_of(const std::array<Eigen::Vector2d, 4>& corners, cv::Size image) {
   const Eigen::Vector2d px = centre(corners);
   const double half = 0.5 * k_patch_sides * std::sqrt(area(corners));
@@ -62,7 +63,7 @@ cv::Rect place_of(const std::array<Eigen::Vector2d, 4>& corners, cv::Size image)
          cv::Rect({0, 0}, image);
 }
 
-// Means over its cells.
+// The place as k_patch_cells x k_patch_cells means.
 cv::Mat patch_of(const cv::Mat& grey, const cv::Rect& place) {
   cv::Mat levels, patch;
   if (place.width < k_patch_cells || place.height < k_patch_cells) return patch;
@@ -71,8 +72,8 @@ cv::Mat patch_of(const cv::Mat& grey, const cv::Rect& place) {
   return patch;
 }
 
-// Whether nothing has moved by more than a tremor: a step of brightness that shifts by it changes the mean of
-// the cell that it runs through by that share of the cell.
+// Whether nothing has moved by more than a tremor. A brightness step that moves by this much changes the mean
+// of its cell by the same share of the cell.
 bool is_still(const cv::Mat& now, const cv::Mat& before, double levels) {
   if (now.empty() || now.size() != before.size()) return false;
   cv::Mat change, brightest, darkest, allowed;
@@ -123,7 +124,7 @@ int GestureReader::hidden(const cv::Mat& grey, Stamp at) {
   if (seconds_between(seen_at_, at) < options_.cover_s || still_s < options_.still_s) return 0;
   if (is_mostly_there(patch) || hides_across(at)) return 0;
   is_armed_ = false;
-  is_tipped_ = gesture_ == Gesture::lay;  // if it is, once it is seen again
+  is_tipped_ = gesture_ == Gesture::lay;  // whether it is tipped is decided when it is seen again
   return 1;
 }
 
@@ -138,7 +139,7 @@ int GestureReader::turned(const Detection& detection, Stamp at) {
   const double turn = wrapped(now - *turn_rest_);
   if (std::abs(turn) < step || seconds_between(turn_since_, at) < k_rest_s) return 0;
   turn_rest_ = now;
-  return turn > 0 ? 1 : -1;  // y points down: clockwise as seen
+  return turn > 0 ? 1 : -1;  // y points down, so positive is clockwise as seen
 }
 
 int GestureReader::laid(const Detection& detection, Stamp at) {
@@ -172,7 +173,7 @@ void GestureReader::note_neighbours(std::span<const Detection> detections, Stamp
                   [&](const Neighbour& n) { return seconds_between(n.seen_at, at) > k_memory_s; });
 }
 
-// Whether what hides this marker reaches beyond it on both sides, as an arm does that lies across.
+// Whether markers on both sides of this one are hidden too, as by an arm across them.
 bool GestureReader::hides_across(Stamp at) const {
   const double reach = k_neighbour_sides * std::sqrt(area(corners_px_));
   std::vector<Eigen::Vector2d> hidden;
@@ -185,7 +186,7 @@ bool GestureReader::hides_across(Stamp at) const {
   });
 }
 
-// For how long the marker's place has looked as it does: as the mean of its images since then.
+// How many seconds the marker's place has looked the same, compared with the mean of its images since then.
 double GestureReader::still_for(const cv::Mat& patch, Stamp at) {
   const double levels = std::max(options_.still_levels, k_noise_deviations * noise_levels_);
   if (is_still(patch, still_patch_, levels)) {
@@ -206,7 +207,7 @@ void GestureReader::note_noise(const cv::Mat& patch) {
   noise_levels_ += k_noise_blend * (k_deviations_per_median * middle - noise_levels_);
 }
 
-// Whether the marker itself looks as it did, but for an edge that a hand beside it hides.
+// Whether the marker itself is unchanged, except for an edge that a hand beside it hides.
 bool GestureReader::is_mostly_there(const cv::Mat& patch) const {
   if (patch.empty() || patch.size() != seen_patch_.size()) return false;
   const int side = cvFloor(k_patch_cells / k_patch_sides), first = (k_patch_cells - side) / 2;

@@ -18,31 +18,33 @@ namespace limn::tracker {
 namespace {
 
 constexpr int k_max_grid = 9;  // 7 cells and the border
-// Share of border cells that may read white (a finger, glare): families whose code has few bits need it
-// clean.
+// Largest share of border cells that may read white (a finger, glare). Families with few bits need a clean
+// border.
 constexpr double k_border_errors = 0.12;
 constexpr double k_border_errors_few_bits = 0.05;
-// The same where something covers the marker, and margins below which cells then count as hidden.
+// The same where the marker may be covered, and the margins below which cells are then counted as hidden.
 constexpr double k_border_errors_covered = 0.25;
 constexpr std::array<double, 4> k_hidden_below = {0, 0.2, 0.4, 0.6};
 constexpr int k_few_bits = 25;
-// Mean margin of the cells (0: at the limit, 1: as black or white as beside the edge). Clutter lies below.
+// Smallest mean margin of the cells (0: at the limit between black and white, 1: as black or white as beside
+// the edge). Clutter has less.
 constexpr double k_min_margin = 0.35;
 constexpr double k_min_margin_few_bits = 0.5;
-// Margin that wrong bits may hold together, as share of all: a clear bit that is wrong is no noise.
+// Largest margin that all wrong bits may have together, as a share of the sum over all bits: a clear bit that
+// is wrong is not noise.
 constexpr double k_max_wrong_margin = 0.1;
 constexpr double k_uneven_paper = 1.3;            // brightest side over the second darkest
-constexpr double k_min_template_variance = 0.02;  // stdev a fifteenth of black to white
-constexpr double k_brightest = 2;                 // glare counts no more than this
-constexpr double k_sharpen_below_px = 4;          // cells smaller than this blur into each other
-constexpr double k_sharpening = 0.25;             // Laplacian weight
-// A barcode's every bit is data: nothing in the code tells a marker from clutter, so its light must. Least
-// and mean margin of its cells, share of its border's places that may be light.
+constexpr double k_min_template_variance = 0.02;  // standard deviation of a fifteenth of black to white
+constexpr double k_brightest = 2;         // bound on brightness, so that glare counts no more than this
+constexpr double k_sharpen_below_px = 4;  // smaller cells blur into each other
+constexpr double k_sharpening = 0.25;     // weight of the Laplacian
+// Every bit of a barcode is data. Its code cannot reject clutter, so its light must: smallest and mean margin
+// of its cells, and the share of its border's places that may be light.
 constexpr double k_min_barcode_margin = 0.4;
 constexpr double k_min_mean_barcode_margin = 0.75;
 constexpr double k_barcode_border_errors = 0.02;
 
-// Plane a + b x + c y over the unit square through the values at the middles of its four sides.
+// The plane a + b x + c y over the unit square, through the values at the middles of its four sides.
 struct Plane {
   float a, b, c;
   explicit Plane(const std::array<double, 4>& side)
@@ -52,7 +54,7 @@ struct Plane {
         c(static_cast<float>(side[2] - side[0])) {}
 };
 
-// Places of the unit square.
+// Places in the unit square.
 struct Places {
   std::size_t count = 0;
   std::array<float, QuadSampler::k_most> x, y;
@@ -61,7 +63,7 @@ struct Places {
     x[count] = static_cast<float>(at_x);
     y[count++] = static_cast<float>(at_y);
   }
-  // In the middle half of the cell about (x, y) of a grid with `cells` a side.
+  // Adds one or five places in the middle half of the cell about (x, y), of a grid with `cells` a side.
   void add_cell(double at_x, double at_y, double cells, bool several) {
     add(at_x, at_y);
     if (!several) return;
@@ -76,15 +78,15 @@ struct Places {
 using Fractions = std::array<float, QuadSampler::k_most>;
 using Grid = std::array<double, k_max_grid * k_max_grid>;
 
-// Where the limit between black and white lies: the middle, or lower when a shadow crosses, whose white paper
-// must stay lighter than the ink in the light (a shadow 4 times darker against ink 7 times darker than
-// paper).
+// The limits between black and white that are tried. It is the middle, or lower where a shadow crosses: white
+// paper in the shadow must be lighter than the ink in the light (a shadow 4 times darker and ink 7 times
+// darker than paper).
 constexpr double k_middle = 0.5;
 constexpr std::array<double, 3> k_limits = {k_middle, 0.35, 0.22};
 
-// Fraction of the way from black to white, at one or five places of every cell, border included.
+// Samples as fractions of the way from black to white, at one or five places of every cell, border included.
 struct CellSamples {
-  int cells = 0;  // a side
+  int cells = 0;  // cells along a side, border included
   bool several = false;
   Fractions fraction;
 
@@ -92,7 +94,7 @@ struct CellSamples {
 };
 static_assert(5 * k_max_grid * k_max_grid <= QuadSampler::k_most);
 
-// -1 at black, 0 at the limit, 1 as far above it as black lies below.
+// -1 at black, 0 at the limit, 1 as far above the limit as black is below it.
 inline float relative(float fraction, float limit) {
   constexpr auto k_most = static_cast<float>(k_brightest);
   const float value = (fraction - limit) / limit;
@@ -100,7 +102,7 @@ inline float relative(float fraction, float limit) {
   return bounded > -k_most ? bounded : -k_most;
 }
 
-// Levels in their place as fractions of the way from dark to light.
+// Replaces levels by fractions of the way from dark to light at their places.
 LIMN_SIMD void to_fractions(const Plane& dark,
                             const Plane& light,
                             const float* __restrict x,
@@ -115,7 +117,7 @@ LIMN_SIMD void to_fractions(const Plane& dark,
   }
 }
 
-// What one quad shows, between the levels inside and outside its edges.
+// Reads one quad, relative to the levels inside and outside its edges.
 struct Reader {
   QuadSampler levels;
   Plane light, dark;
@@ -139,7 +141,7 @@ struct Reader {
     to_fractions(dark, light, x.data(), y.data(), places.count, into->data());
   }
 
-  // How many of them are light.
+  // Number of places that are light.
   int light_places(const Places& places) const {
     Fractions found;
     fractions(places, &found);
@@ -153,7 +155,8 @@ struct Reader {
         cells, cells, [&](int i) { return (i + 0.5) / cells; }, samples);
   }
 
-  // A family whose border is wider than a cell: the border as one ring of cells, read in its middle.
+  // For a family whose border is wider than a cell: the border counts as one ring of cells, read in its
+  // middle.
   void read_barcode(const CodeFamily& family, CellSamples* samples) const {
     const double side_cells = family.cells + 2 * family.border_cells;
     const auto middle = [&](int i) {
@@ -177,23 +180,23 @@ struct Reader {
   }
 };
 
-// ---- how sure ----
+// ---- certainty ----
 
-// What a quad would show, as it is turned in the image.
+// The pattern that a quad would show, in the quad's rotation.
 struct Pattern {
-  double border = 0, cells = 0;  // in cells
+  double border = 0, cells = 0;  // width of the border, cells along a side
   std::uint64_t code = 0;
-  const TemplatePattern* drawn = nullptr;  // instead of a code
-  std::size_t rotation = 0;                // of the template
+  const TemplatePattern* drawn = nullptr;  // a template instead of a code
+  std::size_t rotation = 0;                // the template's
 
   bool operator==(const Pattern&) const = default;
 
-  // Which row (or column) of cells lies at a share of the side; -1 for the border.
+  // The row (or column) of cells at a share of the side; -1 in the border.
   int cell_at(double share) const {
     const double place = share * (cells + 2 * border) - border;
     return place < 0 || place >= cells ? -1 : static_cast<int>(place);
   }
-  // -1 black … 1 white of a cell.
+  // Value of a cell, -1 black … 1 white.
   float value(int row, int column) const {
     if (row < 0 || column < 0) return -1;
     const int columns = static_cast<int>(cells);
@@ -210,13 +213,13 @@ Pattern pattern_of(const TemplatePattern& drawn, std::size_t rotation) {
   return {0.5 * drawn.size, static_cast<double>(drawn.size), 0, &drawn, rotation};
 }
 
-// What is read in a quad, and what else it might be.
+// The patterns accepted in a quad, and rival patterns that it might show instead.
 struct Readings {
   struct Accepted {
     Identity identity;
     Pattern pattern;
-    double limit = k_middle;  // between black and white
-    double random_hit = 1;    // probability that random cells are read as some marker like that
+    double limit = k_middle;  // the one between black and white
+    double random_hit = 1;    // probability that random cells are accepted as some marker of the family
   };
   Certainty certainty = Certainty::weighed;
   std::pmr::vector<Accepted> accepted;
@@ -226,20 +229,21 @@ struct Readings {
       : certainty(wanted), accepted(memory), others(memory) {}
 };
 
-// The whole square at the same places for every pattern, whatever its cells; smoothed as templates are.
+// The whole square, sampled at the same places for every pattern, whatever its cells, and smoothed as
+// templates are.
 class SeenSquare {
  public:
   SeenSquare(const Reader& reader, double limit);
-  /// How well the pattern explains it: -1 … 1.
+  /// Correlation of the pattern with the square, -1 … 1.
   double correlation(const Pattern& pattern) const;
 
  private:
-  static constexpr std::size_t k_places = 20;  // a side
+  static constexpr std::size_t k_places = 20;  // places along a side
   using Values = std::array<float, k_places * k_places>;
   Values values_;
 
   static double share(std::size_t place) { return (static_cast<double>(place) + 0.5) / k_places; }
-  // Smoothed, of zero mean and unit length.
+  // Smooths and scales to zero mean and unit length.
   static void normalise(Values* values);
 };
 
@@ -283,10 +287,11 @@ SeenSquare::SeenSquare(const Reader& reader, double limit) {
   normalise(&values_);
 }
 
-// A place between two cells shows half of each, whichever way round the square is read.
+// A place on the border between two cells counts half of each, so that the value does not depend on the
+// square's rotation.
 double SeenSquare::correlation(const Pattern& pattern) const {
   constexpr double k_beside = 1e-6;
-  std::array<int, k_places> before, after;  // the cells on both sides
+  std::array<int, k_places> before, after;  // the cells on both sides of each place
   for (std::size_t i = 0; i < k_places; ++i) {
     before[i] = pattern.cell_at(share(i) - k_beside);
     after[i] = pattern.cell_at(share(i) + k_beside);
@@ -311,8 +316,8 @@ double SeenSquare::correlation(const Pattern& pattern) const {
   return product_of(shown.data(), values_.data(), values_.size());
 }
 
-// Logarithm of the likelihood ratio of a pattern to none: `k_independent` values in Gaussian noise whose
-// strength the residual tells; the floor is what geometry and light leave unexplained at best.
+// Log likelihood ratio of a pattern and none, for `k_independent` values in Gaussian noise whose variance is
+// estimated from the residual. The floor is the share that geometry and light leave unexplained at best.
 constexpr double k_independent = 60;
 constexpr double k_residual_floor = 0.03;
 double evidence(double correlation) {
@@ -320,11 +325,10 @@ double evidence(double correlation) {
   return 0.5 * k_independent * std::log((1 + k_residual_floor) / (1 - c * c + k_residual_floor));
 }
 
-// Something that is none of the patterns looked for explains what is seen as well as a pattern of this
-// correlation.
+// An unknown pattern is assumed to explain the square as well as a pattern with this correlation.
 constexpr double k_unknown_correlation = 0.75;
 
-// The likeliest reading, as sure as it leads over whatever else might be there.
+// The likeliest reading, with the probability that it is right; nullopt when that is too low.
 std::optional<Identity> chosen(const Reader& reader, const Readings& readings) {
   if (readings.accepted.empty()) return std::nullopt;
   if (readings.certainty == Certainty::any) return readings.accepted.front().identity;
@@ -358,7 +362,7 @@ std::optional<Identity> chosen(const Reader& reader, const Readings& readings) {
   return identity;
 }
 
-// Takes off what blur brought over from the four neighbours (outside the marker: white).
+// Removes blur from the four neighbours (outside the marker is white).
 void sharpen(int cells, Grid* grid) {
   const Grid before = *grid;
   const auto value = [&](int row, int column) {
@@ -374,7 +378,7 @@ void sharpen(int cells, Grid* grid) {
     }
 }
 
-// All cells, border included.
+// Values of all cells, border included.
 Grid grid_of(const CellSamples& samples, double limit) {
   Grid grid;
   const auto count = static_cast<std::size_t>(samples.cells * samples.cells);
@@ -386,7 +390,7 @@ Grid grid_of(const CellSamples& samples, double limit) {
 
 struct Bits {
   std::uint64_t code = 0;
-  std::array<double, 64> margin;  // by bit, lowest first; clipped to 1
+  std::array<double, 64> margin;  // for each bit, lowest first; at most 1
   double mean_margin = 0;
   int border_errors = 0;
   int border_cells = 0;
@@ -419,7 +423,7 @@ struct Nearest {
   int errors = 64;
 };
 
-// With the processor's own bit count where it has one.
+// Uses the processor's own bit count where it has one.
 #define LIMN_POPCOUNT __attribute__((target_clones("popcnt", "default")))
 
 LIMN_POPCOUNT Nearest nearest(const std::vector<std::array<std::uint64_t, 4>>& codes,
@@ -436,7 +440,8 @@ LIMN_POPCOUNT Nearest nearest(const std::vector<std::array<std::uint64_t, 4>>& c
 
 SeenCells cells_of(const CodeFamily& family, std::uint64_t code) {
   SeenCells cells;
-  if (is_barcode(family)) return cells;  // half cells, or more than it holds
+  // A barcode's border is not always a whole number of cells.
+  if (is_barcode(family)) return cells;
   cells.count = family.cells + 2;
   int bit = family.cells * family.cells;
   for (int row = 1; row <= family.cells; ++row)
@@ -445,7 +450,7 @@ SeenCells cells_of(const CodeFamily& family, std::uint64_t code) {
   return cells;
 }
 
-// Bits whose margin is no smaller.
+// The bits whose margin is at least `margin`.
 std::uint64_t readable_bits(const Bits& bits, int count, double margin) {
   std::uint64_t readable = 0;
   for (int i = 0; i < count; ++i)
@@ -460,14 +465,14 @@ double margin_of(const Bits& bits, std::uint64_t chosen) {
   return sum;
 }
 
-// The code other than `code` that bits of the least margin together contradict, of any family whose cells lie
-// where this one's do.
+// The code other than `code` that would need the least margin of wrong bits, of any family with the same
+// geometry of cells.
 LIMN_POPCOUNT std::uint64_t next_code(const Families& families,
                                       const CodeFamily& family,
                                       const Bits& bits,
                                       std::uint64_t code) {
   const auto count = static_cast<std::size_t>(family.cells * family.cells);
-  std::array<double, 65> least{};  // of so many bits together
+  std::array<double, 65> least{};  // smallest sum of margins, by the number of wrong bits
   std::copy_n(bits.margin.begin(), count, least.begin() + 1);
   std::sort(least.begin() + 1, least.begin() + 1 + static_cast<std::ptrdiff_t>(count));
   for (std::size_t i = 1; i <= count; ++i) least[i] += least[i - 1];
@@ -544,9 +549,9 @@ void read_code(const Families& families,
   }
 }
 
-// Whether the whole border is dark, near its outer edge and near the cells, where other families have some.
+// Whether the whole border is dark, near its outer edge and near the cells, where other families have cells.
 bool is_border_dark(const Reader& reader) {
-  constexpr int k_places = 24;  // a side
+  constexpr int k_places = 24;  // places along a side
   Places places;
   for (const double inset : {0.08, 0.19})
     for (int i = 0; i < k_places; ++i) {
@@ -576,7 +581,8 @@ void read_barcodes(const Reader& reader, const Families& families, Readings* rea
   }
 }
 
-// Barcodes too blurred to be read: almost any cells are a barcode of fewer.
+// Adds the nearest code of every barcode family as a rival, even if its margins are too small for reading:
+// almost any cells are a barcode with fewer cells.
 void add_rival_barcodes(const Reader& reader, const Families& families, Readings* readings) {
   for (const CodeFamily& family : families.codes()) {
     if (!is_barcode(family)) continue;
@@ -586,7 +592,7 @@ void add_rival_barcodes(const Reader& reader, const Families& families, Readings
   }
 }
 
-// Border of a template: a quarter of the side; dark at 12 places of its middle ring.
+// Whether there is a template's border, a quarter of the side wide: dark at 12 places of its middle ring.
 bool has_template_border(const Reader& reader) {
   Places places;
   for (int i = 0; i < 3; ++i) {
@@ -605,7 +611,7 @@ double correlation(const std::vector<float>& a, const std::vector<float>& b) {
   return sum;
 }
 
-// The inner half as size x size values, smoothed, of zero mean and unit length; empty when it is flat.
+// The inner half as size x size values, smoothed, with zero mean and unit length; empty when it is flat.
 std::vector<float> read_inner_half(const Reader& reader, int size) {
   std::vector<float> values;
   const double cells = 2.0 * size;
@@ -632,7 +638,7 @@ std::vector<float> read_inner_half(const Reader& reader, int size) {
 
 void read_templates(const Reader& reader, const std::vector<TemplatePattern>& templates, Readings* readings) {
   if (templates.empty() || !has_template_border(reader)) return;
-  std::map<int, std::vector<float>> seen;  // by size
+  std::map<int, std::vector<float>> seen;  // by the template's size
   std::vector<std::pair<double, Pattern>> alike;
   std::optional<Readings::Accepted> best;
   double most = 0;
@@ -653,7 +659,7 @@ void read_templates(const Reader& reader, const std::vector<TemplatePattern>& te
     best = {{{"artoolkit", drawn.id}, top, 0, {}}, pattern_of(drawn, top), k_middle, 1};
   }
   if (best) readings->accepted.push_back(*best);
-  // Of all templates and their turns the two most alike: one of them may be the best.
+  // The two most similar of all templates and their rotations; one of them may be the best itself.
   const auto two = alike.begin() + std::min<std::ptrdiff_t>(2, std::ssize(alike));
   std::partial_sort(alike.begin(), two, alike.end(),
                     [](const auto& a, const auto& b) { return a.first > b.first; });
@@ -679,7 +685,7 @@ std::optional<Identity> read(const Reader& reader,
                              const Families& families,
                              Reading reading,
                              Certainty certainty) {
-  std::array<std::byte, 1 << 14> buffer;  // enough for what is read but rarely
+  std::array<std::byte, 1 << 14> buffer;  // enough in nearly all cases
   std::pmr::monotonic_buffer_resource memory(buffer.data(), buffer.size());
   Readings readings(certainty, &memory);
   read_codes(reader, families, reading, &readings);
@@ -692,7 +698,7 @@ std::optional<Identity> read(const Reader& reader,
   return chosen(reader, readings);
 }
 
-// The level of which `rank` others are smaller. Levels are few: all are compared with all.
+// The level at `rank` in ascending order. There are few levels, so all are compared with all.
 LIMN_SIMD int level_of_rank(const std::uint8_t* levels, int count, int rank) {
   constexpr int k_lanes = 64;
   std::array<std::uint8_t, k_lanes> padded{}, smaller{};
@@ -711,7 +717,7 @@ LIMN_SIMD int level_of_rank(const std::uint8_t* levels, int count, int rank) {
   return highest;
 }
 
-// The nearest pixels' levels at some places of a quad.
+// Levels of the nearest pixels at some places of a quad.
 template <std::size_t count>
 std::array<std::uint8_t, count> nearest_levels(const cv::Mat& grey,
                                                const Quad& quad,
@@ -726,7 +732,7 @@ std::array<std::uint8_t, count> nearest_levels(const cv::Mat& grey,
 bool can_be_covered(const CodeFamily& family) { return !is_barcode(family) && family.max_errors.size() > 1; }
 
 bool may_be_marker(const cv::Mat& grey, const Quad& quad, double min_contrast) {
-  constexpr float k_inset = 0.07F;  // within the border of every family (a ninth and more)
+  constexpr float k_inset = 0.07F;  // inside the border of every family (a ninth or more)
   constexpr std::size_t k_border = 20, k_inside = 25;
   static constexpr auto k_at = [] {
     std::array<std::array<float, k_border + k_inside>, 2> at{};
@@ -746,16 +752,17 @@ bool may_be_marker(const cv::Mat& grey, const Quad& quad, double min_contrast) {
   const int lightest = *std::max_element(inside, levels.end());
   const int middle = level_of_rank(levels.data(), k_border, k_border / 2);
   if (lightest - middle < min_contrast) return false;
-  // Three quarters of the border darker than half way to what is lightest inside.
+  // Three quarters of the border must be darker than a limit halfway to the lightest inside.
   return level_of_rank(levels.data(), k_border, k_border * 3 / 4) < middle + 0.6 * (lightest - middle);
 }
 
 bool may_be_covered_code(const cv::Mat& grey, const Quad& quad) {
   constexpr std::size_t k_along = 10, k_border = 4 * k_along;
-  constexpr int k_max_light = k_border * 7 / 40;  // of codes with fingers, bites, slatted shadow: up to 5
+  constexpr int k_max_light = k_border * 7 / 40;  // codes with fingers, bites or slatted shadow have up to 5
   constexpr std::size_t k_cells = 6;
-  // Between neighbours among the cells, 60 pairs. No code of the families that are read when covered has
-  // fewer than 17, and a quarter may be hidden; two or three edges through a quad make 12.
+  // Smallest number of changes between neighbouring cells, of 60 pairs. Every code of the families that are
+  // read when covered has at least 17, and a quarter may be hidden. Two or three edges through a quad make
+  // 12.
   constexpr int k_min_changes = 13;
   static constexpr auto k_at = [] {
     std::array<std::array<float, k_border + k_cells * k_cells>, 2> at{};
@@ -775,7 +782,7 @@ bool may_be_covered_code(const cv::Mat& grey, const Quad& quad) {
   const auto border = std::span(levels).first(k_border);
   const auto inside = std::span(levels).subspan(k_border);
   const double dark = level_of_rank(border.data(), k_border, k_border / 2);
-  // Some of the brightest may be glare.
+  // The brightest may be glare.
   const double light = level_of_rank(inside.data(), static_cast<int>(inside.size()), 31);
   const double middle = dark + k_middle * (light - dark);
   if (std::count_if(border.begin(), border.end(), [&](int level) { return level > middle; }) > k_max_light)
@@ -803,7 +810,8 @@ std::optional<Identity> identify(const cv::Mat& grey,
                                  Certainty certainty) {
   if (reading == Reading::covered) return read(Reader(grey, quad), families, reading, certainty);
   if (const auto found = read(Reader(grey, quad), families, reading, certainty)) return found;
-  // Something brighter than the paper may stand behind one side: try the second darkest side's paper for all.
+  // Something brighter than the paper may lie behind one side: use the level of the second darkest side for
+  // all.
   std::array<double, 4> levels = quad.outside_level;
   std::sort(levels.begin(), levels.end());
   if (levels[3] < k_uneven_paper * levels[1]) return std::nullopt;

@@ -23,7 +23,7 @@ LocalUndistortion::LocalUndistortion(const Lens& lens, const Eigen::Vector2d& mi
   if (!d_middle) return;
   const Eigen::Quaterniond ahead = Eigen::Quaterniond::FromTwoVectors(*d_middle, Eigen::Vector3d::UnitZ());
   Eigen::Matrix<double, k_side * k_side, k_terms> places;
-  Eigen::Matrix<double, k_side * k_side, 2> seen;  // in the plane z = 1 ahead of the middle
+  Eigen::Matrix<double, k_side * k_side, 2> seen;  // in the plane z = 1, whose axis is the middle's direction
   for (int i = 0; i < k_side * k_side; ++i) {
     const Eigen::Vector2d place(2.0 * (i % k_side) / (k_side - 1) - 1, 2.0 * (i / k_side) / (k_side - 1) - 1);
     const auto d = lens.unproject(middle_px + radius_px * place);
@@ -53,7 +53,7 @@ LocalUndistortion LocalUndistortion::about(const Lens* lens,
 }
 
 Eigen::Vector2d LocalUndistortion::found_bent(const Eigen::Vector2d& straight_px) const {
-  constexpr int k_rounds = 6;  // each leaves a tenth or less
+  constexpr int k_rounds = 6;  // each leaves a tenth of the error or less
   constexpr double k_settled_px = 1e-6;
   Eigen::Vector2d px = straight_px;
   for (int round = 0; round < k_rounds; ++round) {

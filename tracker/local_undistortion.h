@@ -7,29 +7,31 @@
 
 namespace limn::tracker {
 
-/// A part of a lens's image as a pinhole camera sees it in which straight things are straight, and which
-/// shows the part's middle in the same place, size and shape. To the fourth order of the distance from there.
+/// Turns a small part of a lens's image into one where straight lines are straight, as a pinhole camera sees
+/// it. The part's middle keeps its place, size and shape. It is a polynomial of fourth order in the distance
+/// from there.
 class LocalUndistortion {
  public:
-  /// Nothing is moved.
+  /// The identity.
   LocalUndistortion() = default;
 
-  /// About `middle_px`, as far as `radius_px`; moves nothing where the lens's model has no directions.
+  /// A map for the surroundings of `middle_px`, as far as `radius_px`. It is the identity where the lens
+  /// model has no directions.
   LocalUndistortion(const Lens& lens, const Eigen::Vector2d& middle_px, double radius_px);
 
-  /// About a quadrilateral and as far as `outside_px` from it; with no lens nothing is moved.
+  /// A map for a quadrilateral and `outside_px` around it; the identity when there is no lens.
   static LocalUndistortion about(const Lens* lens,
                                  const std::array<Eigen::Vector2d, 4>& corners_px,
                                  double outside_px);
 
   bool moves() const { return moves_; }
 
-  /// Of the lens's pixel.
+  /// The place in the undistorted part of a pixel of the lens.
   Eigen::Vector2d straight(const Eigen::Vector2d& px) const {
     return moves_ ? Eigen::Vector2d(px + bend(px)) : px;
   }
 
-  /// The lens's pixel of it.
+  /// The lens's pixel of a place in the undistorted part.
   Eigen::Vector2d bent(const Eigen::Vector2d& straight_px) const {
     return moves_ ? found_bent(straight_px) : straight_px;
   }

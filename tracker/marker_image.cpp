@@ -5,7 +5,7 @@
 namespace limn::apps {
 
 Result<cv::Mat> marker_image(const MarkerName& marker) {
-  constexpr int k_pixels_per_cell = 8;  // cells are plain: any number draws the same edges
+  constexpr int k_pixels_per_cell = 8;  // any number draws the same edges, because cells are uniform
   return tracker::draw_marker(marker, k_pixels_per_cell);
 }
 

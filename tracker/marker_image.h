@@ -7,8 +7,8 @@
 
 namespace limn::apps {
 
-/// A marker's black square as the tracker's families draw it: what sim::load_world asks for, for the virtual
-/// rig must not know the tracker.
+/// A marker's black square as the tracker draws it. It is passed to sim::load_world, because the virtual rig
+/// must not depend on the tracker.
 Result<cv::Mat> marker_image(const MarkerName& marker);
 
 }  // namespace limn::apps

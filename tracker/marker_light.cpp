@@ -12,11 +12,11 @@
 namespace limn::tracker {
 namespace {
 
-// A side is straight in the world, not in a distorted image: it is drawn as so many pieces.
+// A side is straight in the world but not in a distorted image, so it is drawn as this many pieces.
 constexpr int k_pieces = 6;
 constexpr int k_fraction_bits = 4;
 
-// Deviation of the marker's place in its least certain direction.
+// Standard deviation of the marker's place in its least certain direction, metres.
 double place_deviation(const Track& track, const Pose& body_from_marker) {
   const Eigen::Vector3d d = track.world_from_body.rotation * body_from_marker.translation;
   Eigen::Matrix<double, 3, 6> by_pose;
@@ -28,7 +28,8 @@ double place_deviation(const Track& track, const Pose& body_from_marker) {
       std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues()[2]));
 }
 
-// Outline of a square of half side `reach` about the marker's centre; empty when it is not wholly in front.
+// Outline of a square with half side `reach` around the marker's centre; empty when it is not completely in
+// front.
 std::vector<cv::Point> contour(const Imager& projector, const Pose& world_from_marker, double reach) {
   static const Eigen::Vector2d k_corners[] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
   std::vector<cv::Point> points;
@@ -37,7 +38,7 @@ std::vector<cv::Point> contour(const Imager& projector, const Pose& world_from_m
       const double t = static_cast<double>(i) / k_pieces;
       const Eigen::Vector2d p = reach * ((1 - t) * k_corners[side] + t * k_corners[(side + 1) % 4]);
       const auto px = projector.project(world_from_marker * Eigen::Vector3d(p.x(), p.y(), 0));
-      // Far beside the image nothing is drawn, and OpenCV's fixed point would overflow.
+      // Far outside the image nothing is drawn, and OpenCV's fixed-point numbers would overflow.
       if (!px || px->cwiseAbs().maxCoeff() > 1e5) return {};
       points.emplace_back(static_cast<int>(std::lround(px->x() * (1 << k_fraction_bits))),
                           static_cast<int>(std::lround(px->y() * (1 << k_fraction_bits))));

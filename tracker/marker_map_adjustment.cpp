@@ -14,22 +14,22 @@ namespace {
 constexpr int k_max_steps = 50;
 constexpr double k_small_step = 1e-9;  // radians and metres
 
-// A corner of a marker in an image.
+// One corner of a marker in an image.
 struct Observation {
   std::size_t image, marker;
   Eigen::Vector3d p_marker;
-  PointObservation corner_observation;  // its p_body is set by the state
+  PointObservation corner_observation;  // its p_body is computed from the state
 };
 
-// What is adjusted. Unknowns in order: images, then markers but the fixed one, six each.
+// The adjusted poses. The unknowns are ordered: images, then all markers except the fixed one, six each.
 struct State {
-  std::vector<Pose> world_from_body;   // per image
-  std::vector<Pose> body_from_marker;  // per marker
+  std::vector<Pose> world_from_body;   // one for each image
+  std::vector<Pose> body_from_marker;  // one for each marker
 };
 
 struct Problem {
   std::vector<Observation> observations;
-  std::size_t fixed = 0;  // marker
+  std::size_t fixed = 0;  // index of the fixed marker
 
   Eigen::Index column(const State& state, std::size_t marker) const {
     return static_cast<Eigen::Index>(6 * (state.world_from_body.size() + marker - (marker > fixed ? 1 : 0)));
@@ -107,7 +107,7 @@ bool fill(const Problem& problem, const State& state, Normal* normal) {
       [&](const Observation& observation) { return add(problem, state, observation, normal); });
 }
 
-// For minimise(): a trial needs the cost alone, and only where it is accepted the equations.
+// The problem for minimise(): a trial needs only the cost, an accepted trial also the equations.
 struct BodyProblem {
   const Problem& problem;
   State state, trial{};
@@ -130,7 +130,7 @@ struct BodyProblem {
   }
 };
 
-// The minimum near a state; its cost.
+// Moves the state to the minimum near it; returns the cost there.
 double adjust(const Problem& problem, State* state) {
   BodyProblem body{.problem = problem, .state = *state};
   const LeastSquaresSummary found = minimise(&body, {.max_steps = k_max_steps});
@@ -138,7 +138,8 @@ double adjust(const Problem& problem, State* state) {
   return found.cost;
 }
 
-// Images whose pose the start gives and that show two or more of its markers.
+// The problem with all images that show two or more of the start's markers and whose pose the start
+// determines.
 Problem posed_problem(const Body& start, const MarkerName& fixed, std::span<const View> views, State* state) {
   Problem problem;
   for (std::size_t m = 0; m < start.markers.size(); ++m) {
@@ -183,7 +184,7 @@ Result<Adjustment> adjusted_marker_map(const Body& start,
   State state;
   const Problem problem = posed_problem(start, fixed, views, &state);
   if (state.world_from_body.empty())
-    return error("expected pictures that show two or more of the body's {} markers, found none among {}.",
+    return error("expected images that show two or more of the body's {} markers, found none among {}.",
                  start.markers.size(), views.size());
   const double chi_square = adjust(problem, &state);
   Normal normal;
@@ -191,8 +192,8 @@ Result<Adjustment> adjusted_marker_map(const Body& start,
   const Eigen::LDLT<Eigen::MatrixXd> inverse(normal.matrix);
   if (!projects || !std::isfinite(chi_square) || !inverse.isPositive() || inverse.info() != Eigen::Success)
     return error(
-        "expected markers whose places {} pictures fix, found some that they leave open. Take more pictures, "
-        "nearer and from other sides.",
+        "expected {} images to determine the places of all markers, found markers that they do not "
+        "determine. Take more photographs, from nearer and from other sides.",
         state.world_from_body.size());
   const Eigen::MatrixXd covariance =
       inverse.solve(Eigen::MatrixXd::Identity(normal.matrix.rows(), normal.matrix.cols()));

@@ -12,11 +12,11 @@
 namespace limn::tracker {
 namespace {
 
-// Relative poses agree when they differ by less than this: the tilt noise of a small marker, far less than
-// what separates the branches.
+// Relative poses agree when they differ by less than this: the tilt noise of a small marker, which is far
+// less than the difference between the branches.
 constexpr double k_agree_turn = 0.2;          // rad
-constexpr double k_agree_shift_in_sides = 1;  // of the marker
-// Images of a pair that are compared with each other: the work grows with the square.
+constexpr double k_agree_shift_in_sides = 1;  // in sides of the marker
+// Largest number of images that are compared for a pair; the work grows with its square.
 constexpr std::size_t k_max_compared = 24;
 
 // Both branches of every marker in one image, likeliest first.
@@ -44,7 +44,7 @@ ImageOfMarkers poses_in(const Imager& camera, std::span<const Detection> detecti
 
 struct RelativePose {
   Pose a_from_b;
-  double weight = 0;  // of the branches it is made of
+  double weight = 0;  // product of the weights of its two branches
 };
 
 std::vector<RelativePose> relative_poses(const ImageOfMarkers& image,
@@ -60,7 +60,7 @@ std::vector<RelativePose> relative_poses(const ImageOfMarkers& image,
   return found;
 }
 
-// How well an image agrees with a relative pose: 1 fully, 0 not at all.
+// How well an image agrees with a relative pose, from 1 (fully) to 0 (not at all).
 double agreement(const std::vector<RelativePose>& image, const Pose& a_from_b, double size_m) {
   double best = 0;
   for (const RelativePose& relative : image) {
@@ -74,10 +74,10 @@ double agreement(const std::vector<RelativePose>& image, const Pose& a_from_b, d
 
 struct Link {
   Pose a_from_b;
-  double support = 0;  // images that agree
+  double support = 0;  // sum of the images' agreement
 };
 
-// The relative pose of two markers that the images agree on best.
+// The relative pose of two markers that most images agree on.
 std::optional<Link> link(std::span<const ImageOfMarkers> images,
                          const MarkerName& a,
                          const MarkerName& b,
@@ -104,14 +104,15 @@ MarkerName most_seen(const std::map<MarkerName, int>& counts) {
       ->first;
 }
 
-// From the frame's marker outwards, by the best supported link each time (Prim's spanning tree).
+// Places markers outwards from the frame's marker, by the best supported link each time (Prim's spanning
+// tree).
 std::map<MarkerName, Pose> chained(std::span<const ImageOfMarkers> images,
                                    const std::map<MarkerName, int>& counts,
                                    const MarkerName& frame,
                                    double size_m) {
   std::map<MarkerName, Pose> placed = {{frame, Pose{}}};
   std::map<MarkerName, std::pair<MarkerName, Link>>
-      nearest;  // unplaced marker: its best link to a placed one
+      nearest;  // for each unplaced marker, its best link to a placed one
   MarkerName newest = frame;
   while (true) {
     for (const auto& [name, count] : counts) {
@@ -147,9 +148,8 @@ Result<MarkerMap> map_markers(std::span<const View> views, double size_m) {
   }
   if (counts.empty())
     return error(
-        "expected pictures that show two or more markers of the body together, found none among {}. Look at "
-        "light, "
-        "focus and --family, and photograph so that neighbours are seen together.",
+        "expected images that show two or more markers of the body together, found none among {}. Check the "
+        "light, the focus and --family, and photograph neighbouring markers together.",
         views.size());
   MarkerMap learned;
   learned.frame = most_seen(counts);

@@ -12,7 +12,7 @@
 namespace limn::tracker {
 namespace {
 
-// Minima nearer than this are one: refinement stops far below it.
+// Minima nearer than this (rad) are the same: refinement stops far below it.
 constexpr double k_same_angle = 1e-4;
 
 std::optional<std::array<Eigen::Vector2d, 4>> undistorted(const Lens& lens,
@@ -26,7 +26,7 @@ std::optional<std::array<Eigen::Vector2d, 4>> undistorted(const Lens& lens,
   return points;
 }
 
-// The translation that brings the turned corners nearest to the rays (linear least squares of x - z u = 0).
+// The translation that brings the rotated corners nearest to the rays (linear least squares of x - z u = 0).
 Eigen::Vector3d best_translation(const Eigen::Matrix3d& rotation,
                                  const std::array<Eigen::Vector3d, 4>& corners,
                                  const std::array<Eigen::Vector2d, 4>& points) {
@@ -43,7 +43,7 @@ Eigen::Vector3d best_translation(const Eigen::Matrix3d& rotation,
   return a.colPivHouseholderQr().solve(b);
 }
 
-// Whether the corners run clockwise as seen (y down): a marker's face, not its back.
+// Whether the corners run clockwise as seen (y down), so that the marker's face is visible and not its back.
 bool is_clockwise(const std::array<Eigen::Vector2d, 4>& c) {
   for (std::size_t i = 0; i < 4; ++i) {
     const Eigen::Vector2d a = c[(i + 1) % 4] - c[i];
@@ -67,7 +67,7 @@ std::optional<std::array<PointObservation, 4>> corner_sights(
   return observations;
 }
 
-// Likeliest first; weights add up to 1.
+// Sets the weights, which add up to 1, and sorts likeliest first.
 void weigh(std::vector<MarkerPose>* poses, const std::vector<double>& chi_squares) {
   const double least = *std::min_element(chi_squares.begin(), chi_squares.end());
   double sum = 0;
@@ -99,7 +99,7 @@ std::vector<Eigen::Matrix3d> planar_rotations(const Eigen::Matrix3d& h) {
   const Eigen::Vector2d v = h.col(2).head<2>() / h(2, 2);
   Eigen::Matrix2d j = h.topLeftCorner<2, 2>() / h(2, 2);
   j -= v * h.row(2).head<2>() / h(2, 2);
-  // Turn the ray through the origin's image onto the optical axis.
+  // This rotation takes the optical axis to the ray through the origin's image.
   const Eigen::Vector3d d = Eigen::Vector3d(v.x(), v.y(), 1).normalized();
   const Eigen::Matrix3d ray_turn = rotation_between(Eigen::Vector3d::UnitZ(), d).toRotationMatrix();
   Eigen::Matrix<double, 2, 3> projection;
@@ -109,7 +109,7 @@ std::vector<Eigen::Matrix3d> planar_rotations(const Eigen::Matrix3d& h) {
   const Eigen::JacobiSVD<Eigen::Matrix2d> svd(a);
   const double gamma = svd.singularValues()[0];
   if (!(gamma > 1e-12) || !a.allFinite()) return {};
-  // a / gamma is the upper left block of the rotation; the rest follows but for one sign.
+  // a / gamma is the upper left block of the rotation. The rest follows from it except for one sign.
   const Eigen::Matrix2d block = a / gamma;
   const Eigen::Matrix2d rest = Eigen::Matrix2d::Identity() - block.transpose() * block;
   const double b1 = std::sqrt(std::max(0.0, rest(0, 0)));

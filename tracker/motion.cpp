@@ -23,10 +23,11 @@ Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& w) {
   return Eigen::Matrix3d::Identity() + first * cross + second * cross * cross;
 }
 
-// Derivative of a motion after `dt` seconds, in which it moves by `delta`, by the motion before:
-//   [diag(R, 1)  dt diag(J, 1)  dt²/2 diag(J, 1)]
-//   [    0             1               dt       ]
-//   [    0             0               1        ]
+// Derivative of the motion after `dt` seconds, in which it moves by `delta`, with respect to the motion
+// before:
+// [diag(R, 1)  dt diag(J, 1)  dt²/2 diag(J, 1)]
+// [    0             1               dt       ]
+// [    0             0               1        ]
 class Transition {
  public:
   Transition(const Vector6d& delta, double dt)
@@ -48,8 +49,8 @@ class Transition {
   Eigen::Matrix3d turn_, jacobian_;
 };
 
-// Integral of white jerk over dt (Bar-Shalom, Li and Kirubarajan, "Estimation with applications to tracking
-// and navigation", 6.2.3), and of white velocity.
+// Process noise: white jerk integrated over dt (Bar-Shalom, Li and Kirubarajan, "Estimation with applications
+// to tracking and navigation", 6.2.3), and white velocity.
 Matrix18d grown(const MotionNoise& noise, double dt) {
   const Matrix6d q = per_axis(noise.turn_jerk, noise.jerk);
   const double dt2 = dt * dt, dt3 = dt2 * dt;

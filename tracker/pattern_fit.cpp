@@ -18,7 +18,7 @@ namespace {
 
 using namespace pattern;
 
-constexpr std::size_t k_few_samples = 150;  // while hypotheses of the motion compete
+constexpr std::size_t k_few_samples = 150;  // while several motions are tried
 constexpr std::size_t k_coarse_samples = 300;
 constexpr std::size_t k_moving_samples = 600;
 constexpr std::size_t k_samples = 400;
@@ -26,36 +26,39 @@ constexpr std::size_t k_most_samples = 600;
 constexpr std::size_t k_followed_samples = 300;
 constexpr int k_rounds = 16;
 constexpr int k_rounds_followed = 4;
-constexpr double k_may_move_px = 1.0;     // blur below which motion tells nothing of its own
-constexpr double k_clearly_better = 0.9;  // in mean square residuals: motion against blur alone
+constexpr double k_may_move_px = 1.0;     // with less blur, motion cannot be measured separately
+constexpr double k_clearly_better = 0.9;  // ratio of mean square residuals, with motion to without
 constexpr double k_max_motion_px = 30;
-constexpr double k_min_blur_px = 0.28;    // of a pixel's own area
-constexpr double k_no_margin = 1e3;       // cells: no outer edge of the paper in reach
-constexpr double k_max_residual = 0.075;  // of the contrast, RMS: above it the model is wrong
-constexpr double k_min_explained = 0.77;  // of perfect Gaussian residuals: 0.89
-constexpr double k_settled_px = 0.02;     // of a round: the next ones would add a quarter of it
+constexpr double k_min_blur_px = 0.28;    // the blur of a pixel's own area
+constexpr double k_no_margin = 1e3;       // cells: no outer edge of the paper within reach
+constexpr double k_max_residual = 0.075;  // share of the contrast, RMS: above it the model is wrong
+constexpr double k_min_explained = 0.77;  // perfect Gaussian residuals give 0.89
+constexpr double k_settled_px = 0.02;     // movement in a round: further rounds would add a quarter of it
 constexpr double k_roughly_settled_px = 0.03;
 constexpr double k_followed_settled_px = 0.1;  // a quarter of it is less than the corners' noise
-constexpr double k_astray_px = 0.1;            // corners that still move so far at last have not settled
-constexpr double k_max_moved_px = 6;           // and half the motion
-constexpr double k_bend_evidence = 20;  // chi-square of four: flat paper shows as much once in 2000 times
-constexpr double k_max_bend = 0.1;      // of half a side
-constexpr std::size_t k_choice = 3;     // times as many pixels, of which the flat ones are left out
+// Corners that still move more than this in the last round have not converged.
+constexpr double k_astray_px = 0.1;
+constexpr double k_max_moved_px = 6;  // plus half the motion
+// Chi-square with four degrees of freedom: flat paper exceeds it once in 2000 times.
+constexpr double k_bend_evidence = 20;
+constexpr double k_max_bend = 0.1;   // share of half a side
+constexpr std::size_t k_choice = 3;  // times as many pixels are considered, and most flat ones are dropped
 constexpr std::size_t k_choice_of_seen = 2;
-constexpr double k_steep = 0.8;        // of the most that light changes over two pixels at an edge
-constexpr int k_flat_stride = 8;       // but one in so many
-constexpr double k_rough_scale = 0.1;  // of the contrast
-constexpr double k_least_scale = 0.5;  // of light
-constexpr double k_bound = 0.15;       // of the contrast: residuals beyond tell no more
-constexpr double k_noise = 0.02;       // of the contrast, RMS: residuals that ask for no motion
-// A pattern looks as it did while its contrast, blur, misfit and what is explained are within these.
+constexpr double k_steep = 0.8;        // share of the largest change of light over two pixels at an edge
+constexpr int k_flat_stride = 8;       // one of this many flat samples is kept
+constexpr double k_rough_scale = 0.1;  // share of the contrast
+constexpr double k_least_scale = 0.5;  // in light
+constexpr double k_bound = 0.15;       // share of the contrast: larger residuals do not count more
+constexpr double k_noise = 0.02;       // share of the contrast: with lower RMS residuals no motion is tried
+// A pattern still looks the same while its contrast, blur, misfit and explained share are within these
+// limits.
 constexpr double k_like_contrast = 0.5, k_like_log_blur = 0.3, k_like_misfit = 1.5, k_like_explained = 0.06;
-constexpr double k_systematic_px = 0.002;  // as edge lines keep (refine.cpp)
-constexpr double k_most_outside_px = 10;   // of the samples, from the marker
+constexpr double k_systematic_px = 0.002;  // the same as for edge lines (refine.cpp)
+constexpr double k_most_outside_px = 10;   // largest distance of samples from the marker
 
 enum class Bend {
   none,
-  tested,  // how much there would be
+  tested,  // its evidence is computed, but it is not fitted
   fitted
 };
 
@@ -65,7 +68,7 @@ struct Free {
   bool levels_alone = false;
 };
 
-// The unknowns that take part in a round, ascending.
+// The unknowns that are fitted in a round, ascending.
 struct Active {
   std::array<int, k_unknowns> unknowns{};
   int count = 0;
@@ -77,12 +80,13 @@ using SomeVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, k_unknowns, 1>;
 
 struct Fitted {
   State state;
-  double misfit = std::numeric_limits<double>::infinity();  // mean square residual, bounded
+  double misfit = std::numeric_limits<double>::infinity();  // mean square residual, with bounded residuals
   double explained = 0;                                     // share of the samples that agree with the model
-  double moved_px = 0;                                      // the most that a corner moved in the last round
-  // Of the last round: what it fitted, with how much certainty; bend, had it been free, over its covariance.
+  double moved_px = 0;                                      // largest movement of a corner in the last round
+  // From the last round: the information matrix of the fitted unknowns, and the chi-square that the bend
+  // would explain if it were fitted.
   SomeMatrix information;
-  double variance = 0;  // of a sample
+  double variance = 0;  // one sample's
   double bend_evidence = 0;
 };
 
@@ -91,10 +95,10 @@ Eigen::Vector2d middle_of(const RefinedQuad& quad) {
   return 0.25 * (c[0] + c[1] + c[2] + c[3]);
 }
 
-// Which of the pixels a fit takes, most of them at least.
+// Which pixels are taken as samples; most of them follow this choice.
 enum class Taken {
   evenly,
-  at_known_edges,  // of the pattern
+  at_known_edges,  // edges of the pattern
   at_seen_edges
 };
 
@@ -158,7 +162,7 @@ class PatternFit {
     fitted.state.corners = start_.corners_px;
     const Free free{.motion = moves, .bend = known.look.bend.isZero() ? Bend::none : Bend::fitted};
     fitted = settled(fitted.state, free, k_followed_settled_px, k_rounds_followed);
-    // Residuals are those before the last step, which may have been a large one.
+    // The residuals are from before the last step, which may have been large; so one more step may be needed.
     if (!is_like(known, fitted) &&
         !(fitted.moved_px > k_settled_px && step(free, &fitted) && is_like(known, fitted)))
       return std::nullopt;
@@ -174,17 +178,18 @@ class PatternFit {
   const cv::Mat& grey_;
   const std::array<double, 256>& levels_;
   const SeenCells& cells_;
-  RefinedQuad start_;  // corners in the straight image, as all that follows
+  RefinedQuad start_;  // its corners are in the undistorted image, like everything that follows
   const LocalUndistortion straight_;
-  const Eigen::Vector2d origin_ = middle_of(start_);  // of the samples' pixels
+  const Eigen::Vector2d origin_ = middle_of(start_);  // origin of the samples' pixels
   bool has_ground_ = false;
   Eigen::Vector4d margin_;  // at the start
   double contrast_ = 0;     // at the start
-  double least_scale_ = 0;  // of residuals: far from the solution most look wrong
+  // Smallest scale of residuals: far from the solution most of them look like outliers.
+  double least_scale_ = 0;
   PatternFitBuffers& buffers_;
   PatternFitBuffers::Samples& samples_ = buffers_.samples;
   const PatternKernels& light_ = pattern_kernels(pattern_kernel_versions() - 1);
-  std::size_t count_ = 0;  // of the samples, of which the last is repeated up to padded_count()
+  std::size_t count_ = 0;  // number of samples; the last one is repeated up to padded_count()
 
   double light_at(const Eigen::Vector2d& px) const {
     const auto nearest = [](double at, int size) {
@@ -204,7 +209,7 @@ class PatternFit {
     return std::abs(along.x() * across.y() - along.y() * across.x()) / cells_.count;
   }
 
-  // Blur and levels from the refiner's edges; margins from where the light falls again outside.
+  // The initial state: blur and levels from the refined edges; margins from where light falls again outside.
   State begun() {
     State state;
     state.corners = start_.corners_px;
@@ -230,7 +235,7 @@ class PatternFit {
     std::array<double, k_reach> level{};
     for (int i = 0; i < k_columns; ++i) {
       const Eigen::Vector2d at = from + (i + 0.5) / k_columns * along;
-      const Eigen::Vector2d bent = straight_.bent(at);  // and what is near by as much
+      const Eigen::Vector2d bent = straight_.bent(at);  // pixels nearby are bent by as much
       for (int d = 0; d < k_reach; ++d)
         level[static_cast<std::size_t>(d)] += light_at(bent + 0.5 * (d + 1) * outward) / k_columns;
     }
@@ -249,12 +254,12 @@ class PatternFit {
       }
   }
 
-  // About so many pixels over the marker and what blur mixes with it.
+  // Takes about `most` pixels on the marker and in the surroundings that blur mixes with it.
   void take_samples(std::size_t most, Taken taken = Taken::evenly, const State* known = nullptr) {
     for (auto* values : samples_values()) values->clear();
     const std::array<Eigen::Vector2d, 4>& corners = start_.corners_px;
     const Eigen::Matrix3d square_from_px = SquareToQuad(corners).matrix().inverse();
-    Eigen::AlignedBox2d box;  // of the grey image
+    Eigen::AlignedBox2d box;  // in the grey image
     for (const Eigen::Vector2d& c : corners) box.extend(straight_.bent(c));
     const double blur_px = *std::max_element(start_.blur_px.begin(), start_.blur_px.end());
     const double outside_px = std::clamp(2.5 * blur_px, 2.0, k_most_outside_px);
@@ -274,13 +279,13 @@ class PatternFit {
                                                                : k_choice;
     const double wanted = static_cast<double>(choice * most);
     const int stride = std::max(1, static_cast<int>(std::lround(pixels / wanted)));
-    const int lean = std::max(1, static_cast<int>(std::lround(0.618 * stride)));  // from row to row
+    const int lean = std::max(1, static_cast<int>(std::lround(0.618 * stride)));  // offset from row to row
     const auto columns = static_cast<std::size_t>((std::max(x1, x0 - 1) - x0) / stride + 1);
     const auto rows = static_cast<std::size_t>(std::max(y1, y0 - 1) - y0 + 1);
     for (auto* values : samples_values()) values->resize(columns * rows);
     count_ = 0;
     int flat = 0;
-    // Of a step under the blur.
+    // For a step edge under the blur.
     const double least_rise = k_steep * contrast_ * std::erf(1 / (std::numbers::sqrt2 * blur_px));
     for (int y = y0; y <= y1; ++y)
       for (int x = x0 + (lean * (y - y0)) % stride; x <= x1; x += stride) {
@@ -300,7 +305,7 @@ class PatternFit {
                 samples_.level_x.data(), samples_.level_y.data(), buffers_.keeps.data());
     keep();
     if (taken == Taken::at_known_edges) keep_edges(*known);
-    // Blurred or small, they all show edges.
+    // In blurred or small markers all pixels show edges.
     if (count_ > k_most_samples) {
       const double every = static_cast<double>(count_) / static_cast<double>(k_most_samples);
       for (auto* values : samples_values())
@@ -315,7 +320,8 @@ class PatternFit {
     }
   }
 
-  // By how much light changes over the two pixels about this one, along both axes; its own noise has no part.
+  // How much light changes over the two pixels around this one, along both axes; the pixel's own noise does
+  // not count.
   double rise_at(int x, int y) const {
     const int left = std::max(0, x - 1), right = std::min(grey_.cols - 1, x + 1);
     const std::uint8_t* row = grey_.ptr(y);
@@ -328,7 +334,7 @@ class PatternFit {
     return {&samples_.x, &samples_.y, &samples_.level_x, &samples_.level_y, &samples_.light};
   }
 
-  // The samples that show an edge of the pattern, and some that do not.
+  // Keeps the samples that show an edge of the pattern, and some others.
   void keep_edges(const State& known) {
     for (auto* values : samples_values()) values->resize(padded_count(), 0);
     std::vector<std::int32_t>& shows = buffers_.keeps;
@@ -341,7 +347,7 @@ class PatternFit {
     keep();
   }
 
-  // The samples whose `keeps` is not 0.
+  // Keeps the samples whose `keeps` is not 0.
   void keep() {
     const std::int32_t* keeps = buffers_.keeps.data();
     float *x = samples_.x.data(), *y = samples_.y.data(), *light = samples_.light.data();
@@ -355,7 +361,7 @@ class PatternFit {
     count_ = kept;
   }
 
-  // Whether the pattern looks as it did.
+  // Whether the pattern still looks the same.
   static bool is_like(const PatternAppearance& known, const Fitted& now) {
     const double contrast = now.state.contrast(), before = known.look.contrast();
     return contrast > k_like_contrast * before && contrast * k_like_contrast < before &&
@@ -374,7 +380,7 @@ class PatternFit {
     return fitted;
   }
 
-  // Whether blur alone leaves no more than noise.
+  // Whether blur alone explains everything except noise.
   static bool is_explained(const Fitted& fitted) {
     const double contrast = fitted.state.contrast();
     return fitted.misfit < k_noise * k_noise * contrast * contrast;
@@ -383,7 +389,7 @@ class PatternFit {
   static constexpr int k_directions = 8;
   static constexpr std::array<double, 2> k_lengths = {7, 14};  // pixels
 
-  // Motions in all directions compete, the better ones on with more rounds and samples.
+  // Tries motions in all directions; the better ones continue with more rounds and samples.
   Fitted most_likely_motion(const State& begun) {
     std::array<Fitted, k_directions * k_lengths.size()> all;
     std::size_t count = 0;
@@ -404,7 +410,7 @@ class PatternFit {
     return fits.empty() ? Fitted{} : fits[0];
   }
 
-  // Those that fit best after some rounds more, at most so many.
+  // The best of the fits after some more rounds, at most `most`.
   std::span<Fitted> best_of(std::span<Fitted> fits, int rounds, std::size_t most) {
     for (Fitted& fitted : fits)
       for (int round = 0; round < rounds; ++round)
@@ -420,7 +426,7 @@ class PatternFit {
 
   std::size_t padded_count() const { return (count_ + k_together - 1) / k_together * k_together; }
 
-  // Bend comes last.
+  // The unknowns to fit; the bend comes last.
   static Active active(Free free, const State& state, bool has_ground) {
     Active active;
     const auto add = [&](int from, int number) {
@@ -438,7 +444,7 @@ class PatternFit {
     return active;
   }
 
-  // How far an unknown may well be from the guess.
+  // Standard deviation of a weak prior that keeps an unknown near its current value.
   static double loose(int unknown) {
     if (unknown < log_blur) return 0.2;
     if (unknown < motion_x) return 1;
@@ -468,7 +474,7 @@ class PatternFit {
     light_.see(guess_of(cells_, fitted->state, has_ground_, origin_), places, stride, results);
     compare(samples.light.data(), count_, residuals.data(), sizes.data());
     const double scale = std::max(least_scale_, 1.4826 * median(sizes.data(), count_));
-    // What is behind the paper is one level a side only by chance.
+    // The background is one level for each side only by chance, so its residuals are weighted by their size.
     const Unlike unlike = sum_behind(residuals.data(), behind.data(), count_);
     const double bound = k_bound * k_bound * contrast_ * contrast_;
     pulls.assign(stride, 0);
@@ -485,7 +491,7 @@ class PatternFit {
     return solved(free, active, scale * scale, fitted);
   }
 
-  // The change that the weighted derivatives and residuals ask for.
+  // Solves for the change from the weighted derivatives and residuals, and applies it.
   bool solved(Free free, const Active& active, double noise, Fitted* fitted) const {
     constexpr int k_padded = (k_unknowns + k_fours - 1) / k_fours * k_fours;
     const int padded = active.padded();
@@ -507,7 +513,7 @@ class PatternFit {
     const Eigen::LDLT<SomeMatrix> solver(fitted->information);
     const SomeVector some = solver.solve(right.head(number));
     if (!some.allFinite()) return false;
-    if (free.bend == Bend::tested) {  // what would be left to it (Schur's complement)
+    if (free.bend == Bend::tested) {  // what the fitted unknowns would leave to it (Schur complement)
       const Eigen::Matrix<double, Eigen::Dynamic, 4, 0, k_unknowns, 4> beside =
           information.topRightCorner(number, 4);
       const Eigen::Matrix4d own =
@@ -520,7 +526,7 @@ class PatternFit {
     return moved(change, fitted);
   }
 
-  // Of the first eight unknowns, had each sample its own noise.
+  // The covariance with the first eight unknowns (the shape), if samples had independent noise.
   static Eigen::Matrix<double, Eigen::Dynamic, 8, 0, k_unknowns, 8> shape_covariance(const Fitted& fitted) {
     const Eigen::Index number = fitted.information.rows();
     const Eigen::Matrix<double, Eigen::Dynamic, 8, 0, k_unknowns, 8> ones =
@@ -528,9 +534,9 @@ class PatternFit {
     return fitted.variance * fitted.information.ldlt().solve(ones);
   }
 
-  // By how much the shape's covariance is larger for neighbouring residuals that have one cause: from the
-  // sums over blocks of the last step's samples ("sandwich", Liang and Zeger 1986) over that of independent
-  // ones.
+  // Ratio by which the shape's covariance grows because neighbouring residuals are correlated: from the sums
+  // over blocks of the last step's samples ("sandwich", Liang and Zeger 1986), divided by that of independent
+  // samples.
   double correlation(const Eigen::Matrix<double, Eigen::Dynamic, 8, 0, k_unknowns, 8>& covariance) const {
     const Eigen::Matrix<float, Eigen::Dynamic, 8, Eigen::RowMajor, k_unknowns, 8> by =
         covariance.cast<float>();
@@ -543,7 +549,8 @@ class PatternFit {
         Eigen::Map<const Moves>(sums.products, 8, 8).cast<double>();
     const Eigen::Matrix<double, 8, 8> together = (blocks.transpose() * blocks).cast<double>();
     constexpr double k_number = k_blocks * k_blocks;
-    constexpr double k_unseen = k_number / (k_number - 8);  // the shape has taken up so much of the sums
+    // The shape's eight unknowns have absorbed a part of the sums.
+    constexpr double k_unseen = k_number / (k_number - 8);
     return std::max(1.0, k_unseen * independent.ldlt().solve(together).trace() / 8);
   }
 
@@ -578,7 +585,7 @@ class PatternFit {
     return true;
   }
 
-  // Of the unit square's corner, -1 to 1.
+  // A corner of the unit square in coordinates from -1 to 1.
   static Eigen::Vector2d corner_place(std::size_t i) {
     return {i == 1 || i == 2 ? 1.0 : -1.0, i >= 2 ? 1.0 : -1.0};
   }
@@ -645,7 +652,7 @@ std::optional<FittedPattern> follow_pattern(const cv::Mat& grey,
   RefinedQuad start{};
   start.corners_px = corners_px;
   start.corner_covariance.fill(Eigen::Matrix2d::Zero());
-  // An even motion's deviation is its length over sqrt(12).
+  // The standard deviation of a uniform motion is its length over sqrt(12).
   start.blur_px.fill(std::sqrt(std::exp(2 * known.look.log_blur) + known.look.motion.squaredNorm() / 12));
   return PatternFit(grey, light, known.cells, start, lens, buffers).follow(known);
 }

@@ -13,37 +13,37 @@
 
 namespace limn::tracker {
 
-/// The memory of fit_pattern, kept between calls.
+/// Memory of fit_pattern, kept between calls.
 struct PatternFitBuffers {
   struct Samples {
-    std::vector<float> x, y;              ///< pixels from the marker's middle
-    std::vector<float> level_x, level_y;  ///< -1 to 1 over the marker at first, of the levels' planes
+    std::vector<float> x, y;  ///< pixels from the marker's middle
+    /// Marker coordinates at the fit's start, -1 to 1, for the planes of levels.
+    std::vector<float> level_x, level_y;
     std::vector<float> light;
   };
   Samples samples;
-  std::vector<std::int32_t> keeps;  ///< of each sample
+  std::vector<std::int32_t> keeps;  ///< one for each sample
   std::vector<float> residuals, sizes, behind;
-  std::vector<float> roots, pulls;  ///< of the weights; residuals times these
-  std::vector<float> derivatives;   ///< one unknown's after the other's, then times the weight's root
-  std::vector<float> unused;        ///< derivatives by what takes no part
+  std::vector<float> roots, pulls;  ///< roots of the weights; residuals times roots
+  std::vector<float> derivatives;   ///< one unknown after the other, later times the weight's root
+  std::vector<float> unused;        ///< derivatives by unknowns that are not fitted
 };
 
-/// A quad by its whole pattern; of `seen` the fit knows no age.
+/// A quad fitted by its whole pattern. The fit does not set the age in `seen`.
 struct FittedPattern {
   std::array<Eigen::Vector2d, 4> corners_px;
   std::array<Eigen::Matrix2d, 4> corner_covariance;
   PatternAppearance seen;
 };
 
-/// Refines a quad whose code is known where edges lie too near to each other for EdgeRefiner: blur wider than
-/// the cells leave room for, motion, small or steep cells, white margins of a pixel. The marker's pixels are
-/// fitted as what they are: a homography's image of black border, cells, white margin and what lies behind,
-/// seen through one Gaussian and an even straight motion, in light that changes linearly over the marker;
-/// bent paper where the residuals ask for it. Motions in several directions compete before the best is
-/// refined. The covariance comes from the residuals, with neighbouring ones that have one cause counted as
-/// one. nullopt when the pixels do not settle it or contradict the model. `light` is the light of a grey
-/// level; with a `lens` sides are straight as EdgeRefiner's are; what `buffers` hold from other calls makes
-/// no difference.
+/// Refines a quad with a known code where edges lie too close together for EdgeRefiner: with strong blur or
+/// motion, small or steep cells, or white margins of a pixel. The model is a homography's image of the black
+/// border, cells, white margin and background, blurred by one Gaussian and by uniform straight motion, in
+/// light that changes linearly over the marker, with bent paper where the residuals need it. Motions in
+/// several directions are tried and the best one is refined. The covariance comes from the residuals and
+/// accounts for correlation between neighbouring ones. nullopt when the pixels do not determine the fit or
+/// contradict the model. `light` is the light of each grey level. With a `lens`, sides are straight as in
+/// EdgeRefiner. The previous content of `buffers` does not matter.
 std::optional<FittedPattern> fit_pattern(const cv::Mat& grey,
                                          const std::array<double, 256>& light,
                                          const RefinedQuad& start,
@@ -51,9 +51,9 @@ std::optional<FittedPattern> fit_pattern(const cv::Mat& grey,
                                          const Lens* lens,
                                          PatternFitBuffers* buffers);
 
-/// The same pattern in another image, at about `corners_px`, in a tenth of the time: the look it had is all
-/// but right there. nullopt also when it does not look like that any more: light or blur have changed,
-/// something lies over it, it is another marker.
+/// Fits the same pattern in another image near `corners_px`, in a tenth of the time, because the known
+/// appearance is almost right already. Also nullopt when the appearance has changed: light or blur differ,
+/// something covers the marker, or it is another marker.
 std::optional<FittedPattern> follow_pattern(const cv::Mat& grey,
                                             const std::array<double, 256>& light,
                                             const std::array<Eigen::Vector2d, 4>& corners_px,

@@ -1,5 +1,6 @@
-// Compiled once for every kind of processor, LIMN_VERSION naming it (tracker/CMakeLists.txt), and once for
-// any: GCC takes vectors apart before it makes versions of a function (LIMN_SIMD).
+// Compiled once for every kind of processor, with LIMN_VERSION as its name (tracker/CMakeLists.txt), and once
+// for any processor. LIMN_SIMD cannot be used here, because GCC splits vector types before it makes versions
+// of a function.
 #include "tracker/pattern_kernels.h"
 
 namespace limn::tracker::pattern {
@@ -26,10 +27,10 @@ inline void square_root(const Lanes& squares, Lanes* roots) {
   for (int i = 0; i < k_lanes; ++i) (*roots)[i] = __builtin_sqrtf(squares[i]);
 }
 
-// e^x of x <= 0: 2^n times a polynomial (Cephes, expf). Never so small that products of some become
-// denormal, which processors are slow at.
+// e^x for x <= 0: 2^n times a polynomial (Cephes, expf). Bounded from below, so that products of several
+// results do not become denormal, which is slow.
 inline void exponential(const Lanes& x, Lanes* result) {
-  constexpr float k_rounds = 12582912;  // adds no fraction
+  constexpr float k_rounds = 12582912;  // adding it rounds to a whole number
   const Lanes least = x * 0 - 20;
   const Lanes bounded = x < least ? least : x;
   const Lanes shifted = bounded * 1.44269504F + k_rounds;
@@ -44,9 +45,9 @@ inline void exponential(const Lanes& x, Lanes* result) {
   *result = (1 + f + f * f * tail) * __builtin_bit_cast(Lanes, power);
 }
 
-constexpr float k_reach = 4;  // sigmas within which an edge is seen
+constexpr float k_reach = 4;  // an edge has an effect within this many sigmas
 
-// Standard normal distribution and density (Abramowitz and Stegun 26.2.17: within 1e-7).
+// Standard normal distribution and density (Abramowitz and Stegun 26.2.17, error below 1e-7).
 inline void normal(const Lanes& z, Lanes* below, Lanes* density) {
   exponential(-0.5F * z * z, density);
   *density *= 0.39894228F;
@@ -58,11 +59,11 @@ inline void normal(const Lanes& z, Lanes* below, Lanes* density) {
   *below = z < 0 ? beyond : 1 - beyond;
 }
 
-// The cells about one coordinate of some places, seen through a Gaussian: of every cell its share, and the
-// share's first and second derivative by the place in sigmas.
+// The cells around one coordinate of some places, seen through a Gaussian: each cell's share, and the share's
+// first and second derivative by the place in sigmas.
 struct Shares {
   static constexpr int k_most = Guess::k_row;
-  int first, count;  // cells, -1 the paper before the marker
+  int first, count;  // cells; -1 is the paper before the marker
   Lanes share[k_most], slope[k_most], bend[k_most];
 };
 
@@ -73,7 +74,7 @@ inline void find_shares(const Lanes& at, const Lanes& sigma, int cells, Shares* 
     low = least(low, at[i] - k_reach * sigma[i]);
     high = most(high, at[i] + k_reach * sigma[i]);
   }
-  // The lines within reach: from ... to.
+  // The lines between cells within reach, first and last.
   const auto last = static_cast<float>(cells);
   const int from = !(low > 0) ? 0 : low > last ? cells + 1 : static_cast<int>(__builtin_ceilf(low));
   const int to = !(high >= 0) ? -1 : high >= last ? cells : static_cast<int>(high);
@@ -99,8 +100,8 @@ inline void find_shares(const Lanes& at, const Lanes& sigma, int cells, Shares* 
   shares->bend[i] = turn;
 }
 
-// How far pixels blur the cells at some places: sigmas along rows and columns, in cells, and their
-// correlation where the view is skewed.
+// The blur at some places, in cells: sigmas along rows and columns, and their correlation where the view is
+// skewed.
 struct Blur {
   Lanes x, y, correlation;
 };
@@ -110,7 +111,8 @@ struct Ink {
   Lanes value, by_x, by_y, by_log_blur;
 };
 
-// By the bivariate normal's first terms in its correlation (tetrachoric series, Pearson 1900).
+// Uses the first terms of the bivariate normal distribution in its correlation (tetrachoric series, Pearson
+// 1900).
 inline void see_ink(const Guess& guess, const Lanes& x, const Lanes& y, const Blur& blur, Ink* seen) {
   Shares columns, rows;
   find_shares(x, blur.x, guess.cells, &columns);
@@ -138,10 +140,10 @@ inline void see_ink(const Guess& guess, const Lanes& x, const Lanes& y, const Bl
   seen->by_y = by_y / blur.y;
 }
 
-// Where pixels lie in cells, homogeneous, and how they are blurred there.
+// Pixels' coordinates in cells, homogeneous, and the blur there.
 struct Place {
   Lanes x, y, z;
-  Lanes xx, xy, yx, yy;  // cells a pixel
+  Lanes xx, xy, yx, yy;  // derivatives: cells for each pixel
   Blur blur;
 };
 
@@ -164,7 +166,7 @@ inline void find_place(const Guess& guess, const Lanes& px, const Lanes& py, Pla
   place->blur.correlation = (place->xx * place->yx + place->xy * place->yy) / (across * down);
 }
 
-// What lies behind the paper: its share a side, and what derivatives it adds.
+// The background behind the paper: its share at each side, and derivatives.
 struct Ground {
   Lanes share[4], by_margin[4], by_log_blur;
 };
@@ -214,7 +216,7 @@ inline void add_ground(const Guess& guess,
 }
 
 inline void find_edges(const Guess& guess, const Lanes& px, const Lanes& py, std::int32_t* shows) {
-  constexpr float k_edge = 0.01F;  // of a step's steepest slope
+  constexpr float k_edge = 0.01F;  // share of a step's steepest slope
   Place place;
   find_place(guess, px, py, &place);
   Ink seen;

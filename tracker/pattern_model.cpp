@@ -11,7 +11,7 @@ namespace {
 
 static_assert(Guess::k_max_cells == SeenCells::k_max);
 
-// Even motion as so many places, whose spread is that of the motion.
+// Number of places along a uniform motion; their spread is that of the motion.
 int places_of(const State& state) {
   const double length = state.motion.norm();
   return length == 0 ? 1 : std::clamp(2 + static_cast<int>(length / (1.3 * std::exp(state.log_blur))), 2, 40);

@@ -13,19 +13,19 @@ namespace limn::tracker {
 namespace {
 
 constexpr int k_max_steps = 60;
-constexpr double k_small_gain = 1e-7;  // of the cost: three ten-thousandths of a standard deviation
-// A step that is predicted to gain less and gains nothing has met the error of the prior's derivative.
+constexpr double k_small_gain = 1e-7;  // difference of cost: three ten-thousandths of a standard deviation
+// Where a predicted gain below this is not reached, the error in the prior's derivative limits the fit.
 constexpr double k_vain_gain = 1e-4;
-// Far from corners that miss by much the robust cost is all but flat, and falls little for many steps.
+// Far from corners with large residuals the robust cost is nearly flat and falls little for many steps.
 constexpr int k_patient_steps = 10;
-constexpr double k_slow_gain = 1e-3;       // of the cost
+constexpr double k_slow_gain = 1e-3;       // share of the cost
 constexpr double k_min_condition = 1e-13;  // smallest over largest eigenvalue of the scaled normal matrix
-constexpr double k_surely_regular = 1e8;   // norm of one times its inverse's, below which its factors suffice
+constexpr double k_surely_regular = 1e8;   // condition number below which the Cholesky factors suffice
 
-// Sights that one call of the lens projects, and what it makes of them.
+// Observations that are projected by one call of the lens, and the result.
 struct Batch {
   static constexpr std::size_t k_most = 16;
-  std::span<const PointObservation> observations;  // of one camera
+  std::span<const PointObservation> observations;  // all of one camera
   std::array<Eigen::Vector3d, k_most> d_turned;    // from the body's origin, along the world's axes
   std::array<Eigen::Vector2d, k_most> px;
   std::array<PixelByPoint, k_most> by_camera;
@@ -55,7 +55,7 @@ bool project(const Pose& world_from_body, bool with_derivatives, Batch* batch) {
     batch->d_turned[i] = world_from_body_turn * batch->observations[i].p_body;
     p_camera[i] = batch->camera_from_world * (batch->d_turned[i] + world_from_body.translation) +
                   first.camera_from_world.translation;
-    // Beside the camera some lens models go on projecting; a marker there is turned through itself.
+    // Some lens models also project points behind the camera; a marker there would be mirrored.
     if (!(p_camera[i].z() > 0)) return false;
   }
   return first.lens->model.project_all(
@@ -63,10 +63,10 @@ bool project(const Pose& world_from_body, bool with_derivatives, Batch* batch) {
       with_derivatives ? std::span(batch->by_camera).first(count) : std::span<PixelByPoint>());
 }
 
-// Derivative of a residual by the delta of boxplus; transposed, it is summed up in half the time.
+// Derivative of a residual by the delta of boxplus; it is transposed because sums are then twice as fast.
 using Gradients = Eigen::Matrix<double, 6, 2>;
 
-// Of a batch's i-th sight.
+// Derivative for the i-th observation of a batch.
 Gradients gradients(const Batch& batch, std::size_t i) {
   const Eigen::Matrix<double, 3, 2> by_world = (batch.by_camera[i] * batch.camera_from_world).transpose();
   Gradients by_delta;
@@ -76,7 +76,7 @@ Gradients gradients(const Batch& batch, std::size_t i) {
   return by_delta;
 }
 
-// Calls take(batch) for all sights, a batch at a time; false when a point has no pixel.
+// Calls take(batch) for all observations, a batch at a time. False when a point has no pixel.
 template <class Take>
 bool each_batch(std::span<const PointObservation> observations,
                 const Pose& world_from_body,
@@ -91,9 +91,9 @@ bool each_batch(std::span<const PointObservation> observations,
   return true;
 }
 
-// A pose as the sights and its prior judge it.
+// A pose with its cost and normal equations.
 struct Judged {
-  double cost = 0;     // robust, in squared standard deviations, the prior's included
+  double cost = 0;     // robust, of squared normalised residuals, with the prior's
   double squares = 0;  // px^2
   Matrix6d normal = Matrix6d::Zero();
   Vector6d gradient = Vector6d::Zero();
@@ -114,8 +114,8 @@ void add_sight(const PointObservation& observation,
   judged->gradient.noalias() += by_delta * (w * weighed);
 }
 
-// The delta's own derivative by a further small step is taken for the identity: a prior is far narrower than
-// a radian.
+// The derivative of delta by a further small step is taken as the identity, because a prior is far narrower
+// than a radian.
 void add_prior(const PosePrior& prior, const Pose& pose, Judged* judged) {
   const Vector6d delta = boxminus(pose, prior.world_from_body);
   const Vector6d weighed = prior.information * delta;
@@ -139,7 +139,7 @@ std::optional<Judged> judged(std::span<const PointObservation> observations,
   return sum;
 }
 
-// The pose by its sights and prior, for minimise(): the equations come with the cost. Nothing is allocated.
+// The problem for minimise(): the equations are computed together with the cost. Nothing is allocated.
 struct PoseProblem {
   std::span<const PointObservation> observations;
   HuberLoss loss;
@@ -149,7 +149,7 @@ struct PoseProblem {
   Pose next{};
   std::optional<Judged> at_next{};
   Vector6d delta{};
-  double promised = 0;  // how far the cost falls, at least, if the problem is what its equations say
+  double promised = 0;  // how far the cost falls at least, if the linear equations are exact
 
   double cost() const { return at_pose ? at_pose->cost : std::numeric_limits<double>::infinity(); }
   bool solve(double damping) {
@@ -173,7 +173,7 @@ struct PoseProblem {
   }
 };
 
-// Inverse of a normal matrix, scaled so that radians and metres compare; nullopt when it is singular.
+// Inverse of a normal matrix, scaled to make radians and metres comparable; nullopt when it is singular.
 std::optional<Matrix6d> inverse(const Matrix6d& matrix) {
   const Vector6d diagonal = matrix.diagonal();
   if (!matrix.allFinite() || !(diagonal.minCoeff() > 0)) return std::nullopt;

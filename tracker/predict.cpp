@@ -10,7 +10,8 @@ struct Believed {
   Matrix6d covariance;
 };
 
-// White acceleration of a hand (0.25 m/s, 0.5 Hz: 0.8 m/s²), as `hold` and `linear` leave it out.
+// Typical motion of a hand (0.25 m/s at 0.5 Hz: 0.8 m/s²), which `hold` and `linear` ignore; it widens their
+// covariance.
 constexpr double k_hand_speed = 0.25, k_hand_turn = 1;                     // m/s, rad/s
 constexpr double k_hand_acceleration = 0.8, k_hand_turn_acceleration = 3;  // m/s², rad/s²
 

@@ -12,7 +12,7 @@ namespace {
 
 using View = QuadSampler::View;
 
-// Comparisons are such that NaN becomes a pixel, too.
+// The comparisons are written so that NaN also gives a pixel.
 inline void find_place(const View& view, float u, float v, float* x, float* y) {
   const auto& h = view.homography;
   const float scale = 1 / (h[6] * u + h[7] * v + 1);

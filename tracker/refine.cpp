@@ -12,40 +12,43 @@
 namespace limn::tracker {
 namespace {
 
-// What edge lines keep however little noise there is: .002 to .004 px in images without any. What pixels,
-// print and paper do changes along a side and shows in its residuals.
+// Smallest standard deviation of an edge line, however little noise there is: .002 to .004 px in images
+// without noise. Effects of pixels, print and paper vary along a side and show in its residuals.
 constexpr double k_systematic_px = 0.002;
-// The averaged gradient's tails below this share of its peak count as flat.
+// Below this share of its peak the averaged gradient counts as flat.
 constexpr double k_flat_share = 0.05;
-// From this share to twice it, and from half as much again as the next place to twice and a half, what lies
-// just outside counts more and more as the edge's tail.
+// What lies just outside the window counts as the edge's tail, increasingly: from this share of the peak to
+// twice it, and from 1.5 times the next place's gradient to 2.5 times.
 constexpr double k_tail_share = 0.02;
 constexpr double k_tail_lead = 1.5;
-// Of the square of two noisy sums' larger one, in their variance: 1.64 is its mean.
+// Factor for the variance of the larger of two noisy sums; the mean of its square is 1.64 times the variance.
 constexpr double k_noise_of_two = 2;
-// Below this share a rise means another edge of the same direction behind the first: grey paper, then a white
-// table.
+// After the gradient has fallen below this share, a rise means another edge of the same direction behind the
+// first: grey paper, then a white table.
 constexpr double k_valley_share = 0.35;
 constexpr double k_settled_px = 2e-3;
-constexpr double k_near_start_px = 0.1;  // corners that were so near at first need no second round
+constexpr double k_near_start_px = 0.1;  // corners that moved less need no second round
 constexpr int k_max_reach = 10;
-constexpr int k_rough_rows = 12;         // of a side, where the effort is rough
-constexpr double k_huber = 1.5;          // in robust standard deviations
-constexpr double k_reject = 4;           // in the same: what lies beyond belongs to something else
-constexpr double k_min_share = 0.2;      // of the side's contrast: rows with less are covered or show no edge
-constexpr double k_end_px = 3;           // a corner is seen when most rows this near to it are on the line
-constexpr double k_end_share = 0.1;      // or this share of the side
-constexpr double k_min_scale_px = 0.04;  // below which residuals are no reason to reject
+constexpr int k_rough_rows = 12;  // rows of a side for Effort::rough
+constexpr double k_huber = 1.5;   // in robust standard deviations
+constexpr double k_reject = 4;    // in the same unit: crossings beyond it belong to something else
+// Share of the side's contrast: rows with less have no edge or are covered.
+constexpr double k_min_share = 0.2;
+constexpr double k_end_px = 3;           // a corner is visible when most rows this near to it are on the line
+constexpr double k_end_share = 0.1;      // or within this share of the side
+constexpr double k_min_scale_px = 0.04;  // smaller residuals are no reason to reject
 constexpr double k_consensus_px = 0.2;   // typical residual of crossings on one line
 constexpr int k_min_crossings = 3;
 constexpr std::size_t k_min_bent_crossings = 12;
-constexpr double k_bow_deviations = 3;  // below them a bow is noise: one straight side in 370 shows as much
-// Of half a side: paper around a cylinder eight sides wide, seen along its edge (sagitta half^2 / 2R). Half
-// as much again is a corner that lies elsewhere.
+// A smaller bow is treated as noise: one straight side in 370 shows as much.
+constexpr double k_bow_deviations = 3;
+// Largest bow in half a side: paper around a cylinder eight sides wide, seen along its edge (sagitta half^2 /
+// 2R). With half as much again, the corner lies elsewhere.
 constexpr double k_max_bow_share = 0.0625;
 constexpr double k_no_bow_share = 1.5 * k_max_bow_share;
 
-// v of the lens's bow against the chord: t (1 - t) (c0 + c1 t + c2 t^2), t from 0 to 1 along the chord.
+// The bow of a lens against the chord, in v: t (1 - t) (c0 + c1 t + c2 t^2), with t from 0 to 1 along the
+// chord.
 struct Bow {
   Eigen::Vector3d c = Eigen::Vector3d::Zero();
   double u_from = 0, u_length = 1;
@@ -84,26 +87,26 @@ Bow bow_of(const Lens& lens, const Eigen::Vector2d& from, const Eigen::Vector2d&
 }
 
 struct Belief {
-  double share;        // of a bend that is taken
-  double probability;  // that there is one
+  double share;        // share of the bow that is applied
+  double probability;  // probability that there is a bow
 };
 
-// The share is the non-negative garrote (Breiman 1995), 1 - (k s / b)^2 of a bow b with standard deviation s.
-// It grows steadily with the evidence, so that a corner does not jump between frames whose evidence lies on
-// either side of a limit; a bow that shows clearly keeps its whole size. The probability is even at that
-// limit.
+// The share is the non-negative garrote (Breiman 1995), 1 - (k s / b)^2 for a bow b with standard deviation
+// s. It grows steadily with the evidence, so that a corner does not jump between frames whose evidence lies
+// on either side of a limit; a clear bow keeps its whole size. The probability is one half at that limit.
 Belief belief_in_bow(const EdgeRefiner::EdgeLine& bent, double half) {
   const double bow_share = std::abs(bent.curvature) * half;
   const double plausible =
       std::clamp((k_no_bow_share - bow_share) / (k_no_bow_share - k_max_bow_share), 0.0, 1.0);
   constexpr double k_limit = k_bow_deviations * k_bow_deviations;
-  if (bent.curvature == 0) return {0, 0};  // exactly, as its covariance then is
+  if (bent.curvature == 0) return {0, 0};  // exactly 0, with a covariance of 0
   const double evidence = bent.curvature * bent.curvature / bent.covariance(2, 2);
   return {plausible * std::max(0.0, 1 - k_limit / evidence),
           plausible / (1 + std::exp(0.5 * (k_limit - evidence)))};
 }
 
-// The mean of both lines; its covariance holds how far off it is if either is true.
+// The weighted mean of both lines. Its covariance includes the expected square error if either line is the
+// true one.
 EdgeRefiner::EdgeLine averaged(const EdgeRefiner::EdgeLine& straight,
                                const EdgeRefiner::EdgeLine& bent,
                                const Belief& belief) {
@@ -119,7 +122,6 @@ EdgeRefiner::EdgeLine averaged(const EdgeRefiner::EdgeLine& straight,
   return line;
 }
 
-// IEC 61966-2-1.
 }  // namespace
 
 EdgeRefiner::EdgeRefiner(Encoding encoding) {
@@ -131,11 +133,11 @@ EdgeRefiner::EdgeRefiner(Encoding encoding) {
 
 namespace {
 
-using Profile = std::array<double, 2 * k_max_reach>;  // of gradients across an edge
+using Profile = std::array<double, 2 * k_max_reach>;  // gradients across an edge
 
 struct Window {
   std::size_t low, high;
-  Profile parts{};  // of each place in [low, high)
+  Profile parts{};  // weight of each place in [low, high)
 };
 
 Window whole(std::size_t low, std::size_t high) {
@@ -144,9 +146,9 @@ Window whole(std::size_t low, std::size_t high) {
   return window;
 }
 
-// A window that reaches as far to both sides of the edge's centre as [from, to) does to either. One that
-// cuts off more of the blur on one side moves all crossings of the line alike, which their residuals do not
-// show.
+// A window that reaches equally far to both sides of the edge's centre: as far as [from, to) does on its
+// longer side. If it cut off more of the blur on one side, all crossings of the line would shift alike, which
+// their residuals do not show.
 Window centred(const Profile& mean, std::size_t size, double from, double to) {
   Profile parts{};
   double centre = 0.5 * (from + to);
@@ -163,7 +165,7 @@ Window centred(const Profile& mean, std::size_t size, double from, double to) {
     }
     if (round == k_rounds) break;
     centre = moment / sum;
-    if (!(centre > 0 && centre < static_cast<double>(size)))  // light of both signs
+    if (!(centre > 0 && centre < static_cast<double>(size)))  // gradients of both signs
       return whole(static_cast<std::size_t>(from), static_cast<std::size_t>(std::ceil(to)));
     half = std::min({std::max(centre - from, to - centre), centre, static_cast<double>(size) - centre});
   }
@@ -171,7 +173,8 @@ Window centred(const Profile& mean, std::size_t size, double from, double to) {
           std::min(size, static_cast<std::size_t>(std::ceil(centre + half))), parts};
 }
 
-// Size of the sum of a place's gradients over all rows, less what noise alone gives the larger of two places.
+// Absolute sum of a place's gradients over all rows, minus what noise alone gives for the larger of two
+// places.
 double surely(const std::vector<double>& gradients,
               std::size_t rows,
               std::size_t profile,
@@ -190,8 +193,9 @@ double surely(const std::vector<double>& gradients,
 
 }  // namespace
 
-// Crossings of one side. First the gradient profile averaged along the side says how wide the edge is (blur,
-// thin margins), then every row's centroid is taken over that window alone.
+// Finds the crossings of one side and fits its line. First the gradient profile, averaged along the side,
+// gives the width of the edge (blur, thin margins). Then each row's centroid is computed over that window
+// only.
 bool EdgeRefiner::fit_side(const cv::Mat& grey,
                            const std::array<Eigen::Vector2d, 4>& corners,
                            std::size_t side,
@@ -209,7 +213,7 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   const int u_axis = line->flat ? 0 : 1;
   const int v_axis = 1 - u_axis;
   const double u_length = chord[u_axis];
-  // Clockwise, y down: the inside lies to the right of the chord.
+  // Corners run clockwise with y down, so the inside lies to the right of the chord.
   const int inward = (line->flat ? chord.x() : -chord.y()) > 0 ? 1 : -1;
   const double slope = chord[v_axis] / u_length;
   const int reach =
@@ -252,7 +256,8 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   }
   if (static_cast<int>(rows_.size()) < k_min_crossings) return false;
 
-  // The edge's window [low, high) in the averaged profile. Nearer peaks win over slightly higher ones.
+  // The edge's window [low, high) in the averaged profile. Nearer peaks are preferred to slightly higher
+  // ones.
   std::size_t peak = 0;
   double best = 0;
   for (std::size_t k = 0; k < profile; ++k) {
@@ -272,23 +277,26 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   while (high < profile && mean[high] > flat_below &&
          !(mean[high - 1] < valley_below && mean[high] > mean[high - 1]))
     ++high;
-  // Flat beyond the window, not the slope of another edge or the end of what was looked at.
+  // Separate: the profile is flat beyond the window, and neither another edge's slope nor the profile's end
+  // is there.
   line->separate = low >= 2 && high + 2 <= profile && std::abs(mean[low - 1]) <= flat_below &&
                    std::abs(mean[high]) <= flat_below && std::abs(mean[low - 2]) <= 4 * flat_below &&
                    std::abs(mean[high + 1]) <= 4 * flat_below;
-  double beyond = 0;  // the window
+  double beyond = 0;  // light beyond the window
   if (low > 1) beyond = surely(gradients_, rows_.size(), profile, low - 2);
   if (high + 1 < profile) beyond = std::max(beyond, surely(gradients_, rows_.size(), profile, high + 1));
-  double contrast = 0;  // in light
+  double contrast = 0;  // in linear light
   for (std::size_t k = low; k < high; ++k) contrast += mean[k];
-  // A Gaussian's peak is its area over sigma sqrt(2 pi); v is not the edge's normal when the side leans.
+  // A Gaussian's peak is its area over sigma sqrt(2 pi). The slope corrects for v not being normal to the
+  // edge.
   line->blur_px = 0.4 * contrast / mean[peak] / std::hypot(1.0, slope);
-  // Up to as much light at the window's end moves all crossings up to so far, the less likely the farther.
+  // Other light of this size at the window's end shifts all crossings by up to this much; smaller shifts are
+  // more likely.
   const double unknown_px = 0.5 * static_cast<double>(high - low) * beyond / contrast;
   contrast /= static_cast<double>(rows_.size());
   if (!(contrast > 0)) return false;
   const auto is_flat = [&](std::size_t k) { return std::abs(mean[k]) <= flat_below; };
-  // How much of place k is the edge's tail.
+  // The share of place k that is the edge's tail.
   const auto tail = [&](std::size_t k, std::size_t beyond) {
     const double large = mean[k] / (k_tail_share * mean[peak]) - 1;
     const double leads = mean[k] - k_tail_lead * std::abs(mean[beyond]);
@@ -299,9 +307,9 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
     window = centred(mean, profile, static_cast<double>(low) - tail(low - 1, low - 2),
                      static_cast<double>(high) + tail(high, high + 1));
 
-  // Rows beside a corner see the other edge as far as the blur reaches.
+  // Rows beside a corner contain the other edge, as far as the blur reaches.
   const double blur_trim = std::min(0.2 * (u_high - u_low), 0.5 * static_cast<double>(high - low) + 0.5);
-  double inside_sum = 0;  // in grey levels, as all that is no position
+  double inside_sum = 0;  // grey levels, not linear light: only positions are computed in linear light
   double outside_sum = 0;
   crossings_.clear();
   for (std::size_t i = 0; i < rows_.size(); ++i) {
@@ -336,7 +344,7 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   return true;
 }
 
-// Of the contrast of rows in the light, where some lie in shadow.
+// Where some rows lie in shadow, rescales the shares to the contrast of the rows in light.
 void EdgeRefiner::settle_shares(Effort effort) {
   double sum = 0;
   double count = 0;
@@ -349,7 +357,7 @@ void EdgeRefiner::settle_shares(Effort effort) {
   for (double& share : crossings_.share) share = std::min(1.0, share * scale);
 }
 
-// A straight line and a bent one, averaged by what speaks for the bow.
+// Fits a straight and a bent line, and averages them by the evidence for a bow.
 bool EdgeRefiner::fit_line(Effort effort, Sides sides, EdgeLine* line, double* variance) {
   double u_sum = 0;
   for (const double u : crossings_.u) u_sum += u;
@@ -369,11 +377,11 @@ bool EdgeRefiner::fit_line(Effort effort, Sides sides, EdgeLine* line, double* v
   return true;
 }
 
-struct Sums {  // weighted, of crossings: powers of d, and of v times them
+struct Sums {  // weighted sums over the crossings: powers of d, and products of v with them
   double w = 0, wd = 0, wdd = 0, wddd = 0, wdddd = 0, v = 0, vd = 0, vdd = 0;
 };
 
-// Weights bounded as Huber's beyond `huber`, none beyond `foreign`.
+// Huber weights beyond `huber`, zero weight beyond `foreign`.
 LIMN_SIMD Sums weighted_sums(const double* __restrict d,
                              const double* __restrict v,
                              const double* __restrict share,
@@ -395,7 +403,7 @@ LIMN_SIMD Sums weighted_sums(const double* __restrict d,
   return {w0, w1, w2, w3, w4, v0, v1, v2};
 }
 
-struct Spread {  // of residuals that are not foreign
+struct Spread {  // sums over residuals that are not foreign
   double squares = 0, count = 0, largest = 0;
 };
 
@@ -424,8 +432,8 @@ LIMN_SIMD Spread new_residuals(const double* __restrict d,
 
 constexpr std::size_t k_few = 64;
 
-// The middle one of values that are not negative, k_few at most: all are compared with all, and no branch
-// goes wrong.
+// The median of at most k_few values that are not negative. All are compared with all, so that there are no
+// mispredicted branches.
 LIMN_SIMD float median_of_few(const float* __restrict values, std::size_t count) {
   std::array<float, k_few> lanes;
   std::array<std::int32_t, k_few> smaller{};
@@ -450,8 +458,8 @@ float median_of_sizes(std::vector<float>* values) {
   return value_of_rank(values, values->size() / 2);
 }
 
-// The line through two crossings that the most others lie on: least squares would start between a side's own
-// edge and that of what covers a part of it (Torr and Zisserman 2000, "MLESAC").
+// The line through two crossings that most other crossings lie on. A least-squares start would lie between a
+// side's own edge and the edge of an object that partly covers it (Torr and Zisserman 2000, "MLESAC").
 void EdgeRefiner::find_consensus(EdgeLine* line) {
   constexpr std::size_t k_anchors = 9;
   const std::size_t count = crossings_.u.size();
@@ -476,9 +484,10 @@ void EdgeRefiner::find_consensus(EdgeLine* line) {
     }
 }
 
-// Weighted least squares of the first `terms` of offset, slope, curvature; then Huber weights on the
-// residuals' robust scale; then without what belongs to something else. The residuals' variance; negative
-// when the crossings do not determine the terms. `from_line` starts from the line's own and rejects at once.
+// Weighted least squares of the first `terms` of offset, slope and curvature; then with Huber weights at the
+// residuals' robust scale; then without crossings that belong to something else. Returns the residuals'
+// variance, which is negative when the crossings do not determine the terms. With `from_line` it starts from
+// the given line and rejects at once.
 double EdgeRefiner::fit_terms(int terms, bool from_line, EdgeLine* line) {
   constexpr double k_all = std::numeric_limits<double>::infinity();
   constexpr int k_huber_rounds = 3;
@@ -524,9 +533,9 @@ double EdgeRefiner::fit_terms(int terms, bool from_line, EdgeLine* line) {
     if (terms == 2) inverse(2, 2) = 0;
     const Spread spread =
         new_residuals(d, v, share, count, solution, scale > 0 ? 3 * scale : k_all, foreign, residual);
-    variance = spread.squares / std::max(1.0, spread.count - terms);  // of a row of full contrast
+    variance = spread.squares / std::max(1.0, spread.count - terms);  // for a row with full contrast
     line->covariance = inverse * variance;
-    // Settled, with nothing to reject in the rounds to come.
+    // The fit has converged and later rounds have nothing to reject.
     if (round > 0 && moved < k_settled_px && spread.largest < k_reject * std::max(scale, k_min_scale_px))
       break;
     if (round + 1 == k_rounds) break;
@@ -538,8 +547,9 @@ double EdgeRefiner::fit_terms(int terms, bool from_line, EdgeLine* line) {
   return variance;
 }
 
-// How many times larger the line's variance is where neighbouring crossings err alike: print, paper, shadows
-// and JPEG do that. From sums of residuals over blocks (the "sandwich", Liang and Zeger 1986).
+// Ratio by which the line's variance grows because the errors of neighbouring crossings are correlated,
+// through print, paper, shadows and JPEG. From sums of residuals over blocks (the "sandwich", Liang and Zeger
+// 1986).
 double EdgeRefiner::correlation_along(const EdgeLine& line, double variance) const {
   constexpr std::size_t k_blocks = 10;
   constexpr std::size_t k_least_rows = 4;
@@ -565,8 +575,8 @@ double EdgeRefiner::correlation_along(const EdgeLine& line, double variance) con
   return together / (blocks - terms) * blocks / (alone / (number - terms) * number);
 }
 
-// Whether most rows next to the side's ends lie on the line. Rows nearer than `trim` to an end are not looked
-// at.
+// Whether most rows next to the side's ends lie on the line. Rows nearer than `trim` to an end have no
+// crossings.
 void EdgeRefiner::find_ends(double from, double to, double trim, double variance, EdgeLine* line) const {
   const double band = std::max(k_end_px, k_end_share * std::abs(to - from));
   const double near = k_reject * std::max(k_min_scale_px, std::sqrt(variance));
@@ -584,7 +594,7 @@ void EdgeRefiner::find_ends(double from, double to, double trim, double variance
 
 namespace {
 
-// Where two edges meet: their tangents at the corner, a few times over when they are bent.
+// The intersection of two edges, by their tangents at the corner; repeated when they are bent.
 bool intersect(const EdgeRefiner::EdgeLine& a,
                const EdgeRefiner::EdgeLine& b,
                Eigen::Vector2d* corner,
@@ -639,7 +649,7 @@ std::optional<RefinedQuad> EdgeRefiner::refine(const cv::Mat& grey,
   RefinedQuad refined;
   refined.corners_px = quad.corners_px;
   std::array<EdgeLine, 4> lines;
-  // The second one's windows and bow start from the first one's corners.
+  // The second round's windows and bow start from the first round's corners.
   const int rounds = effort == Effort::rough ? 1 : 2;
   for (int round = 0; round < rounds; ++round) {
     const double reach =

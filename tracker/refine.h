@@ -11,51 +11,50 @@
 
 namespace limn::tracker {
 
-/// What a grey level says about light.
+/// How a grey level relates to light.
 enum class Encoding {
-  linear,  ///< proportional to it: machine-vision cameras
+  linear,  ///< proportional to light: machine-vision cameras
   srgb     ///< the sRGB curve: webcams, photographs
 };
 
 enum class Effort {
-  rough,  ///< some rows of each side, once: good to a tenth of a pixel, for reading the cells
+  rough,  ///< some rows of each side, one round: good to a tenth of a pixel, enough to read the cells
   full
 };
 
-/// What the rows of a side show.
+/// Whether a side may be partly hidden.
 enum class Sides {
   whole,
-  covered  ///< something may lie over a part: a straight line along most of what is seen
+  covered  ///< something may cover a part: the line follows most of what is visible
 };
 
 /// A quad whose corners are the intersections of its sub-pixel edge lines.
 struct RefinedQuad {
   std::array<Eigen::Vector2d, 4> corners_px;
   std::array<Eigen::Matrix2d, 4> corner_covariance;
-  /// Grey levels on both sides of each edge (of the side from corner i to i + 1), averaged along it.
+  /// Grey levels on both sides of each edge (side i runs from corner i to i + 1), averaged along it.
   std::array<double, 4> outside_level, inside_level;
-  /// How wide each side's edge is, as the sigma of a Gaussian, pixels.
+  /// Width of each side's edge, as the sigma of a Gaussian in pixels.
   std::array<double, 4> blur_px;
-  /// False when another edge stood so near to one of a side's that their blur overlaps: corners may be off.
+  /// False when another edge is so near to a side's that their blur overlaps: corners may be wrong.
   bool separate = true;
-  /// Whether both sides are seen next to the corner.
+  /// Whether both sides are visible next to the corner.
   std::array<bool, 4> corner_visible;
 };
 
 /// Finds where each side's edge crosses the rows (steep sides) or columns (flat sides) of the raw image and
-/// fits its line. A crossing is the centroid of the grey differences along the row. For the image of a
-/// straight edge that pixels of square shape and any symmetric blur have averaged, that centroid is exact at
-/// any phase and slope (the sampled first moment of a function that was twice averaged over a pixel has no
-/// aliasing), which crossings of a middle level are not. With a lens the side is straight in undistorted
-/// directions: the bow that the lens gives it is taken off before the line is fitted. Holds its buffers
-/// between calls.
+/// fits its line. A crossing is the centroid of the grey differences along the row. For a straight edge,
+/// averaged over square pixels and blurred symmetrically, that centroid is exact at any phase and slope: the
+/// sampled first moment of a function that was averaged twice over a pixel has no aliasing. Crossings of a
+/// middle grey level are not exact. With a lens, the side is straight in undistorted directions: the
+/// curvature that the lens gives it is subtracted before the line is fitted. Holds its buffers between calls.
 class EdgeRefiner {
  public:
-  /// Centroids are taken in linear light: a pixel half covered by ink is no middle level of an encoded
-  /// image.
+  /// Centroids are computed in linear light, because a pixel half covered by ink does not have the middle
+  /// level of an encoded image.
   explicit EdgeRefiner(Encoding encoding = Encoding::linear);
 
-  /// nullopt when a side shows no edge from light outside to dark inside of at least `min_contrast` levels.
+  /// nullopt when a side has no edge from light outside to dark inside of at least `min_contrast` levels.
   std::optional<RefinedQuad> refine(const cv::Mat& grey,
                                     const Quad& quad,
                                     double min_contrast,
@@ -67,13 +66,14 @@ class EdgeRefiner {
   const std::array<double, 256>& light() const { return light_; }
 
  private:
-  struct Row {  // across a side's main axis
+  struct Row {  // across the main axis of a side
     int u, centre;
   };
-  struct Crossings {               // of rows that show the edge
-    std::vector<double> u, v;      // v(u) across the side's main axis
-    std::vector<double> share;     // of the side's contrast, at most 1: the inverse of its relative deviation
-    std::vector<double> d;         // u less the line's u_middle
+  struct Crossings {           // for the rows that show the edge
+    std::vector<double> u, v;  // the edge's position v across the main axis, at u
+    // Share of the side's contrast, at most 1: the inverse of the crossing's relative deviation.
+    std::vector<double> share;
+    std::vector<double> d;         // u - u_middle of the line
     std::vector<double> residual;  // distance from the line, times share
 
     void clear() { u.clear(), v.clear(), share.clear(); }
@@ -81,26 +81,27 @@ class EdgeRefiner {
       u.push_back(at_u), v.push_back(at_v), share.push_back(its_share);
     }
   };
-  std::array<double, 256> light_;  // of a grey level, 0 ... 255
+  std::array<double, 256> light_;  // light of each grey level, 0 ... 255
   std::vector<Row> rows_;
   Crossings crossings_;
-  std::vector<double> gradients_;  // of all rows, reach_ * 2 each
-  std::vector<float> deviations_;  // scratch of the robust scale
+  std::vector<double> gradients_;  // two times the reach for each row
+  std::vector<float> deviations_;  // scratch memory of the robust scale
 
  public:
-  /// A side's line v = offset + slope * d + curvature * d^2, d = u - u_middle, in the raw image less the
-  /// lens's bow. Bent paper and a lens that is not given show as curvature; it is 0 where the crossings show
-  /// none, and grows steadily with the evidence.
+  /// The line of a side, v = offset + slope * d + curvature * d^2, d = u - u_middle, in the raw image without
+  /// the lens's curvature. Curvature comes from bent paper or from a lens that is not given. It is 0 where
+  /// the crossings do not show it and grows steadily with the evidence.
   struct EdgeLine {
-    bool flat = true;  ///< u is x and v is y; otherwise the other way round
+    bool flat = true;  ///< true: u is x and v is y; false: u is y and v is x
     double u_middle = 0;
     double offset = 0, slope = 0, curvature = 0;
-    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of (offset, slope, curvature)
-    double correlation = 1;  ///< variance over that of crossings with an error each of its own
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< covariance of (offset, slope, curvature)
+    double correlation = 1;  ///< the variance over that for independent crossings
     double outside_level = 0, inside_level = 0;
     double blur_px = 0;
-    bool separate = true;                           ///< no other edge within the edge's blur
-    bool seen_at_start = true, seen_at_end = true;  ///< next to the side's corners
+    bool separate = true;  ///< no other edge lies within the edge's blur
+    /// Whether the edge is visible next to the side's corners.
+    bool seen_at_start = true, seen_at_end = true;
 
     double at(double u) const {
       const double d = u - u_middle;

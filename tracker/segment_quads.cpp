@@ -12,26 +12,28 @@ namespace limn::tracker {
 namespace {
 
 constexpr double k_cell_px = 64;
-constexpr double k_min_length_px = 12;   // of a segment: shorter ones' directions are too vague
-constexpr double k_min_sine = 0.25;      // of a quad's corner: steeper markers show as regions
+constexpr double k_min_length_px = 12;   // shortest segment: the directions of shorter ones are too uncertain
+constexpr double k_min_sine = 0.25;      // sine of a quad's corner: steeper markers are found as regions
 constexpr double k_max_opposite = -0.3;  // cosine between opposite sides
-constexpr double k_max_gap_share = 0.9;  // of the longer segment's length, from a segment's end to the corner
+// Largest gap from a segment's end to the corner, as a share of the longer segment's length.
+constexpr double k_max_gap_share = 0.9;
 constexpr double k_gap_px = 6;
-constexpr double k_overlap_px = 3;  // by which a segment may run past the corner
+constexpr double k_overlap_px = 3;  // length by which a segment may run past the corner
 constexpr double k_overlap_share = 0.2;
-constexpr double k_max_reach_px = 75;     // between the segments of a corner
-constexpr double k_reach_share = 1.2;     // of the longer one's length
-constexpr std::size_t k_max_corners = 8;  // that are kept of a segment
-constexpr double k_min_visible = 0.5;     // of the outline
+constexpr double k_max_reach_px = 75;     // distance between the segments of a corner
+constexpr double k_reach_share = 1.2;     // share of the longer segment's length
+constexpr std::size_t k_max_corners = 8;  // corners that are kept for a segment
+constexpr double k_min_visible = 0.5;     // share of the outline
 constexpr double k_min_side_visible = 0.15;
 constexpr double k_min_side_px = 12;
-constexpr double k_same_px = 3;            // quads whose corners all lie nearer are the same
-constexpr std::size_t k_max_quads = 2500;  // of a part
+constexpr double k_same_px = 3;  // quads are the same when all of their corners lie nearer than this
+constexpr std::size_t k_max_quads = 2500;  // for each part
 constexpr double k_max_collinear_sine = 0.06;
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-// The sides of a quadrilateral are of like lengths: a short piece may belong to a side as long as the next.
+// The sides of a quadrilateral have similar lengths, so a short piece may belong to a side as long as the
+// next one.
 double max_gap(const Segment& a, const Segment& b) {
   return k_gap_px + k_max_gap_share * std::max(a.length, b.length);
 }
@@ -40,7 +42,7 @@ double reach(const Segment& a, const Segment& b) {
 }
 double max_overlap(const Segment& s) { return k_overlap_px + k_overlap_share * s.length; }
 
-// Where the outline turns from one segment to the next; false when it cannot.
+// Finds the corner from one segment to the next; false when they form none.
 bool corner_of(const Segment& a, const Segment& b, Eigen::Vector2d* px, double* cost) {
   const double sine = cross(a.direction, b.direction);
   if (sine < k_min_sine) return false;
@@ -53,7 +55,7 @@ bool corner_of(const Segment& a, const Segment& b, Eigen::Vector2d* px, double* 
   return true;
 }
 
-// One segment among many: its end that is looked from, its direction and length.
+// A segment that others are compared with: its end, direction and length.
 struct Probe {
   float x, y, dx, dy, length;
 };
@@ -63,10 +65,11 @@ Probe probe_of(const Segment& s) {
           static_cast<float>(s.direction.y()), static_cast<float>(s.length)};
 }
 
-// Entries are looked at by blocks: runs of them are short, and end with some that do not belong.
+// Entries are compared in blocks. Runs of entries are short, and the last block contains some that do not
+// belong.
 constexpr int k_block = 16;
 
-// Marks the entries that corner_of may join to the probe, and some more behind the last.
+// Marks the entries that corner_of may join to the probe, and possibly some beyond the last.
 LIMN_SIMD void match_corners(const Probe p,
                              const float* __restrict x,
                              const float* __restrict y,
@@ -75,7 +78,7 @@ LIMN_SIMD void match_corners(const Probe p,
                              const float* __restrict length,
                              int count,
                              std::uint8_t* __restrict matches) {
-  constexpr float k_slack_px = 0.01F;  // of single precision
+  constexpr float k_slack_px = 0.01F;  // for single precision
   constexpr auto k_reach = static_cast<float>(k_max_reach_px), k_least_gap = static_cast<float>(k_gap_px);
   constexpr auto k_gap_share = static_cast<float>(k_max_gap_share);
   constexpr auto k_least_overlap = static_cast<float>(k_overlap_px) + k_slack_px;
@@ -87,7 +90,7 @@ LIMN_SIMD void match_corners(const Probe p,
       const float ax = x[i] - p.x;
       const float ay = y[i] - p.y;
       const float sine = p.dx * dy[i] - p.dy * dx[i];
-      // Along the probe to the corner, and along the entry from the corner, times sine.
+      // Distances along the probe to the corner, and along the entry from the corner, times sine.
       const float own = ax * dy[i] - ay * dx[i];
       const float other = ax * p.dy - ay * p.dx;
       const float longer = p.length > length[i] ? p.length : length[i];
@@ -104,7 +107,7 @@ LIMN_SIMD void match_corners(const Probe p,
   }
 }
 
-// Marks the entries that may go on along the probe's line.
+// Marks the entries that may continue the probe's line.
 LIMN_SIMD void match_collinear(const Probe p,
                                float radius,
                                const float* __restrict x,
@@ -202,7 +205,7 @@ void SegmentQuadFinder::sort_into_cells() {
   }
 }
 
-// The segments that begin about `px` and that match(first, count, matches) marks.
+// Visits the segments that begin around `px` and that match(first, count, matches) marks.
 template <typename Match, typename Visit>
 void SegmentQuadFinder::visit(const Eigen::Vector2d& px,
                               double radius,
@@ -239,7 +242,7 @@ void SegmentQuadFinder::for_each_part(WorkerTeam& team, const Work& work) {
   });
 }
 
-// Two pieces of one line, what covers it between them: one segment more.
+// Joins two pieces of one line, between which something covers it, to one more segment.
 void SegmentQuadFinder::join_collinear(Part& part) const {
   constexpr double k_max_beside_px = 1.5;
   part.joined.clear();
@@ -274,7 +277,7 @@ void SegmentQuadFinder::join_collinear(Part& part) const {
   }
 }
 
-// Corners within reach of either segment, each segment's best first.
+// Finds the corners within reach of each segment's end, best first.
 void SegmentQuadFinder::find_corners(Part& part) {
   part.corners.clear();
   part.corner_end.clear();
@@ -315,7 +318,7 @@ void SegmentQuadFinder::find_quads(Part& part) const {
     add_quads(i, part.quads);
 }
 
-// All quadrilaterals whose first segment, of the lowest number, is this one.
+// Adds all quadrilaterals whose segment with the lowest index is `first`.
 void SegmentQuadFinder::add_quads(std::uint32_t first, std::vector<SegmentQuad>& quads) const {
   for (const Corner& one : corners_[first]) {
     if (one.next <= first) continue;

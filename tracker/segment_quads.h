@@ -11,18 +11,19 @@
 
 namespace limn::tracker {
 
-/// A quadrilateral that four straight edges suggest.
+/// A quadrilateral that four straight edges form.
 struct SegmentQuad {
   Quad quad;
   double visible = 0;  ///< share of its outline that the segments cover
 };
 
-/// Joins straight edges, dark on their right, to quadrilaterals: each side may be seen in part only, and
+/// Joins straight edges, dark on their right, to quadrilaterals. Each side may be visible in part only, and
 /// corners may be hidden (Olson 2011, "AprilTag: a robust and flexible visual fiducial system", joins
 /// segments likewise). Holds its buffers between calls.
 class SegmentQuadFinder {
  public:
-  /// Best visible first, `most` at most; each once. The result is the same with any crew.
+  /// Finds at most `most` quadrilaterals, each once, best visible first. The result does not depend on the
+  /// team's size.
   void find(std::span<const Segment> segments,
             int width,
             int height,
@@ -32,29 +33,29 @@ class SegmentQuadFinder {
 
  private:
   struct Corner {
-    std::uint32_t next;  // to which the outline turns
-    double cost;         // gaps over lengths
+    std::uint32_t next;  // index of the segment that the outline turns to
+    double cost;         // sum of the gaps over sum of the lengths
     Eigen::Vector2d px;
   };
-  struct Cells {                       // of k_cell_px: the segments by where they begin
-    std::vector<std::uint32_t> begin;  // first entry of every cell, and the end
+  struct Cells {  // a grid of k_cell_px: the segments, sorted by the cell where they begin
+    std::vector<std::uint32_t> begin;  // first entry of every cell, then the end
     std::vector<std::uint32_t> segment;
-    std::vector<float> x, y, dx, dy, length;  // where it begins, its direction and length
+    std::vector<float> x, y, dx, dy, length;  // start, direction and length of each entry's segment
   };
-  // A share of the segments, and what it gives.
+  // A share of the segments, and its results.
   struct Part {
     std::uint32_t first = 0, last = 0;
     std::vector<Segment> joined;
-    std::vector<Corner> corners;  // of all its segments, each one's best first
+    std::vector<Corner> corners;  // corners of all segments of the part; each segment's best first
     std::vector<std::uint32_t> corner_end;
     std::vector<SegmentQuad> quads;
-    std::vector<Corner> found;          // scratch: of one segment
-    std::vector<std::uint8_t> matches;  // scratch: of a run of entries, 1 or 0
+    std::vector<Corner> found;          // scratch: corners of one segment
+    std::vector<std::uint8_t> matches;  // scratch: 1 or 0 for each entry of a run
   };
-  std::vector<Segment> segments_;  // those found, and those joined of two on one line
+  std::vector<Segment> segments_;  // the found segments, then those joined from two on one line
   Cells cells_;
   std::array<Part, 8> parts_;
-  std::vector<std::span<const Corner>> corners_;  // of each segment
+  std::vector<std::span<const Corner>> corners_;  // one entry for each segment
   int columns_ = 0, rows_ = 0;
 
   int cell_of(const Eigen::Vector2d& px) const;

@@ -7,16 +7,16 @@
 namespace limn::tracker {
 namespace {
 
-// The limit of black at half size. Shadows that take three quarters of the light leave paper darker than the
-// middle between ink and lit paper, but lighter than this.
+// The limit of black at half size. In shadows that take three quarters of the light, paper is darker than the
+// middle between ink and bright paper, but lighter than this limit.
 constexpr int k_black_share = 46;  // 256ths of the way from the darkest to the brightest
 constexpr int k_black_reach = 3;   // tiles of 8 pixels of the whole image
 
-// Lengths at half or a quarter of the size.
-constexpr double k_min_side = 6;           // as quadrilaterals of them want (segment_quads.cpp)
+// Lengths in the reduced image, at half or a quarter of the size.
+constexpr double k_min_side = 6;           // as segment_quads.cpp needs
 constexpr double k_min_blurred_side = 10;  // cells smaller than a quarter of it would blur into each other
-constexpr double k_min_width = 0.8;        // half of a stroke's: writing, lines
-constexpr double k_corner_px = 1.4;        // distance at which a boundary point makes a corner
+constexpr double k_min_width = 0.8;        // half the width of a stroke: excludes writing and lines
+constexpr double k_corner_px = 1.4;        // distance at which a boundary point becomes a corner
 constexpr double k_trim_share = 0.1;
 constexpr double k_max_rms_px = 0.75;
 
@@ -47,7 +47,7 @@ void SegmentFinder::find(const cv::Mat& grey, int min_contrast, Segments& segmen
   add_contours(quarter_, 4, k_min_blurred_side, {min_contrast}, segments.of_blurred);
 }
 
-// Of the image at a `scale`-th of its size.
+// Adds the segments of the image at 1 / scale of its size.
 void SegmentFinder::add_contours(const cv::Mat& image,
                                  int scale,
                                  double min_side,
@@ -65,7 +65,7 @@ void SegmentFinder::add_contours(const cv::Mat& image,
   });
 }
 
-// The straight ones of the outline's sides between corners.
+// Adds the straight sides of the outline between its corners.
 void SegmentFinder::add_sides(int scale, double min_side, std::vector<Segment>& segments) {
   const auto corners = contours_.corners();
   for (std::size_t i = 0; i < corners.size(); ++i) {

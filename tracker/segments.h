@@ -10,8 +10,8 @@
 
 namespace limn::tracker {
 
-/// A straight piece of edge, pixels of the whole image; dark lies on the right of the way from `from` to
-/// `to` as seen (x right, y down).
+/// A straight piece of an edge, in pixels of the whole image. Dark lies to the right of the direction from
+/// `from` to `to` as seen (x right, y down).
 struct Segment {
   Eigen::Vector2d from, to;
   Eigen::Vector2d direction;  ///< unit
@@ -20,17 +20,17 @@ struct Segment {
 
 /// Straight pieces of outlines.
 struct Segments {
-  /// Of what is nearly black, at half the image's size: a marker's ink remains where shadows, fingers and
-  /// light paper that lies over it are cut off.
+  /// Edges of nearly black regions, at half the image's size. A marker's ink remains, while shadows, fingers
+  /// and lighter paper that lie over it are cut off.
   std::vector<Segment> of_black;
-  /// Of what is darker than the middle, at a quarter: strong blur leaves no black.
+  /// Edges of regions darker than the middle level, at a quarter of the size. Strong blur leaves no black.
   std::vector<Segment> of_blurred;
 };
 
 /// Holds its buffers between calls.
 class SegmentFinder {
  public:
-  /// `grey` is 8-bit, one channel. Surroundings whose levels differ by less than `min_contrast` hold none.
+  /// `grey` is 8-bit, one channel. Regions whose levels differ by less than `min_contrast` have no segments.
   void find(const cv::Mat& grey, int min_contrast, Segments& segments);
 
  private:

@@ -12,24 +12,27 @@
 namespace limn::tracker {
 namespace {
 
-constexpr double k_dark = 1;            // light, of 255, that is added to both sides of a ratio
-constexpr double k_unlike = 0.15;       // of a side's ratio to the others', natural logarithms
-constexpr double k_like = 0.3;          // of a place's
-constexpr double k_beside_cells = 0.3;  // of a cell, from a border to the places on both sides of it
-constexpr double k_reach_share = 0.14;  // of the shortest side: some more than a cell of most families
-constexpr int k_max_reach = 12;         // pixels
-constexpr int k_edge_px = 3;            // from an edge to where its levels are, at most
-constexpr double k_max_blur_px = 1.2;   // that leaves levels there
-constexpr int k_rows = 24;              // across a side
-constexpr int k_most_a_row = 4;         // places: more are texture
-constexpr double k_end_share = 0.06;    // of a side, at each end, where other edges are
+constexpr double k_dark = 1;       // light, of 255, added to both sides of a ratio
+constexpr double k_unlike = 0.15;  // largest difference of a side's ratio from the others, natural logarithms
+constexpr double k_like = 0.3;     // the same for one place
+// Distance from a cell's border to the sampled places on both sides of it.
+constexpr double k_beside_cells = 0.3;
+// Share of the shortest side: a little more than a cell of most families.
+constexpr double k_reach_share = 0.14;
+constexpr int k_max_reach = 12;        // pixels
+constexpr int k_edge_px = 3;           // largest distance from an edge to where its levels are measured
+constexpr double k_max_blur_px = 1.2;  // with more blur there are no flat levels there
+constexpr int k_rows = 24;             // sampled across each side
+constexpr int k_most_a_row = 4;        // falls of light in a row: more are texture
+constexpr double k_end_share = 0.06;   // share of a side that is left out at each end, where other edges are
 constexpr double k_on_line_px = 0.75;
-constexpr double k_min_rows_share = 0.35;   // of the rows, that agree with a line
-constexpr double k_more_rows_share = 1.25;  // times those that agree with the side as it was
-constexpr double k_beside_px = 0.15;        // that another edge nearby moves a line
-constexpr double k_doubt_px = 1.5;  // of a side that a shadow's edge hides: measured on slatted shadow
-constexpr double k_max_slide = 4;   // pixels of a corner for one of its side: blunter ones are no corners
-constexpr double k_min_run = 0.4;   // of the side, between the two places that a line is drawn through
+constexpr double k_min_rows_share = 0.35;   // share of the rows that must agree with a line
+constexpr double k_more_rows_share = 1.25;  // times the rows that agree with the present side
+constexpr double k_beside_px = 0.15;        // error of a line by another edge nearby
+constexpr double k_doubt_px = 1.5;  // error of a side that a shadow's edge hides: measured on slatted shadow
+// Pixels that a corner moves for one pixel of its side. At flatter angles it is not moved.
+constexpr double k_max_slide = 4;
+constexpr double k_min_run = 0.4;  // share of the side between the two places that define a line
 
 double log_ratio(double outside, double inside) { return std::log((outside + k_dark) / (inside + k_dark)); }
 
@@ -37,15 +40,15 @@ double light_of(double level, const std::array<double, 256>& light) {
   return light[static_cast<std::size_t>(std::clamp(std::lround(level), 0L, 255L))];
 }
 
-// By how many times, as a logarithm, black cells are darker than the white ones beside them: shadows end
-// between some, so what the most alike quarter of them says.
+// The logarithm of the ratio between the light of white cells and of black cells beside them. Shadows end
+// between some cells, so it is taken from the most similar quarter of all pairs.
 std::optional<double> ratio_of_cells(const cv::Mat& grey,
                                      const std::array<double, 256>& light,
                                      const RefinedQuad& refined,
                                      const SeenCells& cells) {
   constexpr std::size_t k_most = 2 * 2 * SeenCells::k_max * (SeenCells::k_max - 1);
   static_assert(k_most <= QuadSampler::k_most);
-  std::array<float, k_most> x, y;  // of a white place and the black one beside it, in turn
+  std::array<float, k_most> x, y;  // white place and black place of each pair in turn
   std::size_t places = 0;
   const auto add = [&](int row, int column, int down, int right) {
     if (cells.is_white(row, column) == cells.is_white(row + down, column + right)) return;
@@ -76,7 +79,7 @@ std::optional<double> ratio_of_cells(const cv::Mat& grey,
   return 0.5 * (ratios[best] + ratios[best + some]);
 }
 
-// Across a side, outside first: `along` the side, 0 to 1, and `across` it, pixels inward.
+// A place near a side: `along` the side, 0 to 1, and `across` it, in pixels inward.
 struct Place {
   double along, across;
 };
@@ -94,7 +97,7 @@ struct Side {
 
 Side side_of(const std::array<Eigen::Vector2d, 4>& corners, std::size_t i) {
   const Eigen::Vector2d run = corners[(i + 1) % 4] - corners[i];
-  return {corners[i], run, Eigen::Vector2d(-run.y(), run.x()).normalized()};  // clockwise, y down
+  return {corners[i], run, Eigen::Vector2d(-run.y(), run.x()).normalized()};  // corners run clockwise, y down
 }
 
 double light_at(const cv::Mat& grey, const std::array<double, 256>& light, const Eigen::Vector2d& px) {
@@ -108,7 +111,7 @@ double light_at(const cv::Mat& grey, const std::array<double, 256>& light, const
          down * ((1 - right) * light[lower[0]] + right * light[lower[1]]);
 }
 
-// Where light falls by about as many times as exp(`expected`), across a side of the straight image.
+// The places across a side of the undistorted image where light falls by about the factor exp(`expected`).
 Places places_like(const cv::Mat& grey,
                    const std::array<double, 256>& light,
                    const LocalUndistortion& image,
@@ -134,7 +137,7 @@ Places places_like(const cv::Mat& grey,
     int found = 0;
     for (int k = -reach; k < reach && found < k_most_a_row; ++k) {
       if (fall(k) < fall(k - 1) || fall(k) <= fall(k + 1)) continue;
-      int before = k;  // where light falls least
+      int before = k;  // place where light falls least on this side of the edge
       int after = k;
       while (before > k - k_edge_px && fall(before - 1) < fall(before)) --before;
       while (after < k + k_edge_px && fall(after + 1) < fall(after)) ++after;
@@ -153,7 +156,7 @@ Places places_like(const cv::Mat& grey,
   return places;
 }
 
-// How far inward a line lies at a side's start and end.
+// A line, by its distance inward at a side's start and end.
 struct Line {
   double at_start = 0, at_end = 0;
   double across(double along) const { return at_start + along * (at_end - at_start); }
@@ -196,7 +199,7 @@ Agreed agreed_line(const Places& places) {
     }
   agreed.by_many = most >= k_min_rows_share * k_rows;
   if (!agreed.elsewhere || !agreed.by_many) return agreed;
-  // Least squares of start and end over the places there.
+  // Least squares of the line's start and end over the places on it.
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
   Eigen::Vector2d right = Eigen::Vector2d::Zero();
   double squares = 0;
@@ -218,7 +221,8 @@ Agreed agreed_line(const Places& places) {
   return agreed;
 }
 
-// Corners slide along the sides beside a side of the `before` quad that moves inward.
+// How a corner moves along the neighbouring side when side `side` of the quad `before` moves inward by a
+// pixel.
 Eigen::Vector2d slide(const std::array<Eigen::Vector2d, 4>& before, std::size_t side, std::size_t corner) {
   const Side here = side_of(before, side);
   const Side beside = side_of(before, corner == side ? (side + 3) % 4 : corner);

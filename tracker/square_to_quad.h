@@ -5,7 +5,7 @@
 
 namespace limn::tracker {
 
-/// The homography of the unit square, (0,0) (1,0) (1,1) (0,1), to four pixels (Heckbert 1989, "Fundamentals
+/// The homography from the unit square, (0,0) (1,0) (1,1) (0,1), to four pixels (Heckbert 1989, "Fundamentals
 /// of texture mapping and image warping").
 class SquareToQuad {
  public:

@@ -13,7 +13,7 @@ Discriminability telling_of(double correlation) {
   return correlation >= k_min_correlation ? Discriminability::alike : Discriminability::apart;
 }
 
-// Of itself only turned ones.
+// A template is compared with itself only in other rotations.
 TemplateSimilarity likeness(const TemplatePattern& a, const TemplatePattern& b, bool is_itself) {
   TemplateSimilarity most{a.id, b.id, 0, -2, Discriminability::apart};
   for (std::size_t k = is_itself ? 1 : 0; k < 4; ++k) {

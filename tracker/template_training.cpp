@@ -17,11 +17,12 @@
 namespace limn::tracker {
 namespace {
 
-constexpr int k_min_contrast = 32;      // levels: an image to train from is a good one
-constexpr double k_min_search_px = 20;  // side; smaller frames are read by nobody
-constexpr double k_min_side_px = 64;    // two pixels a value
-constexpr double k_min_deviation = 15;  // of the grey values: identify's least, a fifteenth of black to white
-constexpr double k_border = 0.25;       // of the side, as the detector reads it
+constexpr int k_min_contrast = 32;      // levels: training images have good contrast
+constexpr double k_min_search_px = 20;  // side; smaller frames cannot be read
+constexpr double k_min_side_px = 64;    // two pixels for each value
+// Grey levels: identify's smallest, a fifteenth of black to white.
+constexpr double k_min_deviation = 15;
+constexpr double k_border = 0.25;  // share of the side, as the detector reads it
 
 double area(const std::array<Eigen::Vector2d, 4>& q) {
   const Eigen::Vector2d a = q[2] - q[0];
@@ -65,7 +66,7 @@ std::vector<RefinedQuad> frames_in(const cv::Mat& grey) {
   return outer;
 }
 
-// Corner 0 the one nearest to the image's top left.
+// The frame with corner 0 nearest to the image's top left.
 RefinedQuad upright(const RefinedQuad& frame) {
   std::size_t first = 0;
   for (std::size_t i = 1; i < 4; ++i)
@@ -88,14 +89,15 @@ Error several(const std::vector<RefinedQuad>& frames) {
         fmt::format("({:.0f}, {:.0f}) {:.0f} px wide", at.x(), at.y(), std::sqrt(area(frame.corners_px))));
   }
   return error(
-      "expected one black frame, found {}: at {}. Cut the picture to the marker that is to be trained.",
+      "expected one black frame, found {}: at {}. Crop the image to the marker that is to be trained.",
       frames.size(), joined_names(places));
 }
 
-// The frame's inside upright, one pixel a value, as mean over each value's own area.
+// The upright inside of the frame, one pixel for each value, as the mean over the value's area.
 cv::Mat rectified(const cv::Mat& image, const RefinedQuad& frame, double side_px) {
   const int size = TrainedTemplate::k_size;
-  const int fine = std::clamp(static_cast<int>(std::ceil(side_px / (2 * size))), 4, 16);  // places a value
+  // Places along each value.
+  const int fine = std::clamp(static_cast<int>(std::ceil(side_px / (2 * size))), 4, 16);
   const int count = size * fine;
   const SquareToQuad px_from_square(frame.corners_px);
   cv::Mat x(count, count, CV_32F), y(count, count, CV_32F);
@@ -143,8 +145,10 @@ Result<TrainedTemplate> train_template(const cv::Mat& image) {
   trained.corners_px = frame.corners_px;
   trained.side_px = std::sqrt(area(frame.corners_px));
   if (trained.side_px < k_min_side_px)
-    return error("the frame is {:.0f} px wide, expected at least {:.0f} (two pixels a value). Go nearer.",
-                 trained.side_px, k_min_side_px);
+    return error(
+        "the frame is {:.0f} px wide, expected at least {:.0f} (two pixels for each value). Photograph it "
+        "from nearer.",
+        trained.side_px, k_min_side_px);
   const cv::Mat values = rectified(image, frame, trained.side_px);
   const double black = mean(frame.inside_level);
   const double scale = 255 / (mean(frame.outside_level) - black);
@@ -156,8 +160,8 @@ Result<TrainedTemplate> train_template(const cv::Mat& image) {
     }
   if (const double found = deviation(trained); found < k_min_deviation)
     return error(
-        "the frame's inside is even (its grey values deviate by {:.0f} of 255), expected a picture (at least "
-        "{:.0f})",
+        "the frame's inside is uniform (its grey values have a standard deviation of {:.0f} of 255), "
+        "expected a pattern (at least {:.0f})",
         found, k_min_deviation);
   return trained;
 }

@@ -10,24 +10,24 @@
 
 namespace limn::tracker {
 
-/// What an image says about one ARToolKit template: the inside of a black frame whose border is a quarter of
-/// its side, size x size values, B, G and R, each size * size, row by row; 0 is the frame's black, 255 the
-/// paper beside it, so that the light of the image does not go into the template.
+/// An ARToolKit template that was trained from an image: the inside of a black frame whose border is a
+/// quarter of its side wide. It holds size x size values for each of B, G and R, row by row. 0 is the frame's
+/// black and 255 the paper beside it, so that the light in the image does not influence the template.
 struct TrainedTemplate {
   static constexpr int k_size = 16;  ///< ARToolKit's default, AR_PATT_SIZE1
   std::array<std::vector<std::uint8_t>, 3> bgr;
-  std::array<Eigen::Vector2d, 4> corners_px;  ///< of the frame, from its top left, clockwise
-  double side_px = 0;                         ///< square root of its area
+  std::array<Eigen::Vector2d, 4> corners_px;  ///< corners of the frame, clockwise from its top left
+  double side_px = 0;                         ///< square root of the frame's area
 };
 
-/// Finds the one frame of the image (8-bit grey or BGR, as read_image gives it), whose corner nearest to
-/// the image's top left becomes the marker's own: hold the marker upright. Frames inside the frame belong
-/// to its image. Errors: no such frame, several (their places), one too small for its values, one whose
-/// inside is even.
+/// Finds the only frame in the image (8-bit grey or BGR, as from read_image). Its corner nearest to the
+/// image's top left becomes the marker's top left, so hold the marker upright. Frames inside the frame belong
+/// to its pattern. Errors: no such frame, several (with their places), one that is too small for its values,
+/// one whose inside is uniform.
 Result<TrainedTemplate> train_template(const cv::Mat& image);
 
-/// As ARToolKit's mk_patt writes it: 4 blocks, each the block before turned anticlockwise by 90 degrees, of 3
-/// colours of size lines of size numbers.
+/// The text of a template file as ARToolKit's mk_patt writes it: 4 blocks, each the previous one turned
+/// anticlockwise by 90 degrees, of 3 colours of size lines of size numbers.
 std::string template_text(const TrainedTemplate& trained);
 
 }  // namespace limn::tracker

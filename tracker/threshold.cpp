@@ -8,7 +8,7 @@
 namespace limn::tracker {
 namespace {
 
-constexpr int k_shares = 3;  // for each of a crew: some come late
+constexpr int k_shares = 3;  // shares of the work for each thread, because some threads start late
 
 constexpr int k_tile = 4;
 
@@ -16,7 +16,7 @@ std::size_t index(int x, int y, int width) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
 }
 
-// Extremes of rows of pixels.
+// Minima and maxima over four rows of pixels.
 LIMN_SIMD void join_four_rows(const std::array<const std::uint8_t*, k_tile> rows,
                               int count,
                               std::uint8_t* __restrict low,
@@ -54,7 +54,7 @@ LIMN_SIMD void highest(const std::uint8_t* a,
   for (int i = 0; i < count; ++i) into[i] = std::max(std::max(a[i], b[i]), c[i]);
 }
 
-// Smallest of every four values, largest of every four others.
+// The smallest of every four values in `low`, and the largest of every four in `high`.
 LIMN_SIMD void join_fours(const std::uint8_t* low,
                           const std::uint8_t* high,
                           int count,
@@ -71,7 +71,7 @@ LIMN_SIMD void darker(const std::uint8_t* grey, const std::uint8_t* limit, int c
   for (int x = 0; x < count; ++x) black[x] = grey[x] < limit[x];
 }
 
-// Rows of black pixels start with the white one left of the image.
+// Rows of black pixels start with the white pixel left of the image.
 LIMN_SIMD void corner_row(const std::uint8_t* above,
                           const std::uint8_t* here,
                           int count,
@@ -80,7 +80,7 @@ LIMN_SIMD void corner_row(const std::uint8_t* above,
     codes[x] = static_cast<std::uint8_t>(above[x] | above[x + 1] << 1 | here[x] << 2 | here[x + 1] << 3);
 }
 
-// The limits between black and white of tiles, each for the pixels of a row.
+// The thresholds of tiles, repeated for each pixel of a row.
 LIMN_SIMD void limits_between(const std::uint8_t* low,
                               const std::uint8_t* high,
                               int count,
@@ -127,7 +127,7 @@ void Threshold::apply(const cv::Mat& grey,
                     [&](int i) { compare(grey, options, rows_[static_cast<std::size_t>(i)], corners); });
 }
 
-// A tile at the right or lower end also takes the pixels that are too few for one of their own.
+// The last tile of a row or column also includes the remaining pixels, which are too few for a tile.
 void Threshold::measure_tiles(const cv::Mat& grey, Rows& rows) {
   const auto width = static_cast<std::size_t>(grey.cols);
   rows.low.resize(width);
@@ -154,7 +154,8 @@ void Threshold::measure_tiles(const cv::Mat& grey, Rows& rows) {
   }
 }
 
-// Each tile's extremes over itself and its left and right neighbours; join_wide_rows() joins three such rows.
+// Computes each tile's extremes over itself and its left and right neighbours. join_wide_rows() joins three
+// such rows.
 void Threshold::widen_tiles(int first, int last) {
   for (int y = first; y < last; ++y) {
     const std::size_t row = index(0, y, tiles_x_);
@@ -169,7 +170,7 @@ void Threshold::widen_tiles(int first, int last) {
   }
 }
 
-// What the rows of tiles above, here and below have in them.
+// The extremes over the rows of tiles above, here and below.
 void Threshold::join_wide_rows(int tile_y, std::uint8_t* low, std::uint8_t* high) const {
   const std::size_t above = index(0, std::max(0, tile_y - 1), tiles_x_), here = index(0, tile_y, tiles_x_);
   const std::size_t below = index(0, std::min(tiles_y_ - 1, tile_y + 1), tiles_x_);
@@ -177,7 +178,7 @@ void Threshold::join_wide_rows(int tile_y, std::uint8_t* low, std::uint8_t* high
   highest(&wide_brightest_[above], &wide_brightest_[here], &wide_brightest_[below], tiles_x_, high);
 }
 
-// The same as new tiles.
+// Stores the joined rows as new tiles.
 void Threshold::join_rows() {
   for (int y = 0; y < tiles_y_; ++y) {
     const std::size_t row = index(0, y, tiles_x_);
@@ -185,7 +186,7 @@ void Threshold::join_rows() {
   }
 }
 
-// The limits of the pixels in a row of tiles.
+// Computes the thresholds for the pixels in a row of tiles.
 void Threshold::set_limits(int tile_y, const ThresholdOptions& options, Rows& rows) const {
   const auto tiles = static_cast<std::size_t>(tiles_x_);
   join_wide_rows(tile_y, rows.low.data(), rows.high.data());

@@ -8,14 +8,14 @@
 
 namespace limn::tracker {
 
-/// A black-and-white image as codes of its pixels' corners: which of the four pixels about the corner are
-/// black. Beside the image all is white. Corner (x, y) is the upper left one of pixel (x, y), so there is
-/// one more of them along rows and columns than pixels.
+/// A black-and-white image, stored as a code for each pixel corner that says which of the four pixels around
+/// the corner are black. Outside the image everything is white. Corner (x, y) is the upper left one of pixel
+/// (x, y), so each row and column has one more corner than pixels.
 struct CornerCodes {
   static constexpr std::uint8_t k_upper_left = 1, k_upper_right = 2, k_lower_left = 4, k_lower_right = 8;
   static constexpr std::uint8_t k_visited = 16;  ///< bit: the boundary through this corner has been traced
 
-  int width = 0;  ///< of the image
+  int width = 0;  ///< image size
   int height = 0;
   std::ptrdiff_t stride = 0;
   std::vector<std::uint8_t> codes;
@@ -26,34 +26,35 @@ struct CornerCodes {
 
 struct ThresholdOptions {
   int min_contrast = 16;
-  /// Of the way from the darkest to the brightest where the limit lies, in 256ths.
+  /// The threshold's place between the darkest and the brightest level, in 256ths.
   int share = 128;
-  /// How many tiles of 4 pixels away the surroundings end.
+  /// Radius of the surroundings, in tiles of 4 pixels.
   int reach = 1;
 };
 
-/// Black where a pixel is darker than the limit between the darkest and the brightest of its surroundings,
-/// tiles of 4 x 4 pixels (Olson 2011, "AprilTag: a robust and flexible visual fiducial system", takes the
-/// middle and one tile around). Where these differ by less than min_contrast all is white, so that flat
-/// regions stay empty: a marker's border keeps its outer edge, which is all that is traced. Holds its buffers
-/// between calls.
+/// A pixel is black when it is darker than the threshold between the darkest and the brightest level of its
+/// surroundings, tiles of 4 x 4 pixels (Olson 2011, "AprilTag: a robust and flexible visual fiducial system",
+/// uses the middle level and one tile around). Where these levels differ by less than min_contrast everything
+/// is white, so that flat regions stay empty. A marker's border keeps its outer edge, which is all that is
+/// traced. Holds its buffers between calls.
 class Threshold {
  public:
-  /// `grey` is 8-bit, one channel, not empty. The result is the same with any crew.
+  /// `grey` is 8-bit, one channel, not empty. The result does not depend on the team's size.
   void apply(const cv::Mat& grey, const ThresholdOptions& options, CornerCodes& corners, WorkerTeam& team);
 
  private:
-  // What a thread writes on the way through its rows of tiles.
+  // Buffers for one share of the rows of tiles.
   struct Rows {
     int first = 0, last = 0;
     std::vector<std::uint8_t> low, high, limit;
-    std::vector<std::uint8_t> above, here;  // black pixels of two rows, from column -1
+    std::vector<std::uint8_t> above, here;  // two rows of black pixels, starting at column -1
   };
   int tiles_x_ = 0;
   int tiles_y_ = 0;
-  std::vector<std::uint8_t> darkest_, brightest_;            // per tile
-  std::vector<std::uint8_t> wide_darkest_, wide_brightest_;  // per tile, of a row of three
-  std::vector<Rows> rows_;                                   // one for each of the crew
+  std::vector<std::uint8_t> darkest_, brightest_;  // per tile
+  // Per tile, over itself and its two neighbours in the row.
+  std::vector<std::uint8_t> wide_darkest_, wide_brightest_;
+  std::vector<Rows> rows_;  // one for each share of the work
 
   void measure_tiles(const cv::Mat& grey, Rows& rows);
   void widen_tiles(int first, int last);

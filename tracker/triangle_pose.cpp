@@ -9,7 +9,8 @@
 namespace limn::tracker {
 namespace {
 
-constexpr double k_small_angle = 1e-6;  // below it the series' first terms are exact in double
+// Below it the first terms of the series are exact in double precision.
+constexpr double k_small_angle = 1e-6;
 
 Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
   Eigen::Matrix3d m;

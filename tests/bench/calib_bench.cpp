@@ -1,8 +1,8 @@
-// Calibration against the truth in millimetres: ray-traced captures of bowed and flat boards, solved by Limn
-// and by OpenCV's joint solve, both judged on prototypes whose place the same camera measures; beside them
-// the floor (the true rig, the same measurement): mm RMS in place, moved by 150 mm, turned by 40 degrees.
-// Captures are kept for the next run. Usage: limn bench calib [NAME…]     (names of the rigs below; all when
-// none is given)
+// Calibration against the truth in millimetres. Ray-traced captures of bowed and flat boards are solved by
+// Limn and by OpenCV's joint solve. Both are judged on prototypes whose place the same camera measures,
+// together with the floor (the true rig with the same measurement): mm RMS in place, moved by 150 mm, turned
+// by 40 degrees. Captures are kept for the next run. Usage: limn bench calib [NAME…]     (names of the rigs
+// below; all when none is given)
 #include <fmt/core.h>
 
 #include <chrono>
@@ -50,7 +50,7 @@ std::vector<Case> all_cases() {
 
 // ---- captures ----
 
-// The board as a bent sheet: strips across its width.
+// The board as a bent sheet, made of strips across its width.
 sim::Object bowed_board(const TrueRig& truth, const Pose& world_from_board) {
   sim::Object object = apps::board_object(truth.board, world_from_board);
   const scene::Mesh flat = *object.mesh;
@@ -120,14 +120,15 @@ Result<calib::CaptureSet> captured(const TrueRig& truth, const fs::path& folder)
   return calib::load_captures(folder);
 }
 
-// ---- OpenCV's way ----
+// ---- OpenCV's method ----
 
 struct View {
   std::vector<cv::Point3f> points;
   std::vector<cv::Point2f> camera, projector;
 };
 
-// ChArUco corners as OpenCV finds them, refined in the image: its interpolation is half a pixel off.
+// ChArUco corners as OpenCV finds them, then refined in the image, because its interpolation is half a pixel
+// off.
 std::map<int, cv::Point2f> opencv_corners(const calib::Board& board, const cv::Mat& white) {
   const cv::Ptr<cv::aruco::CharucoBoard> charuco = cv::aruco::CharucoBoard::create(
       board.columns, board.rows, static_cast<float>(board.square_m),
@@ -145,8 +146,8 @@ std::map<int, cv::Point2f> opencv_corners(const calib::Board& board, const cv::M
   return found;
 }
 
-// Whole-pixel labels as cv::structured_light::GrayCodePattern decodes them: a bit is the sign of image
-// minus inverse, a pixel with a bit that differs by 5 levels or less is dropped, and so is one without light.
+// Whole-pixel labels as cv::structured_light::GrayCodePattern decodes them. A bit is the sign of image minus
+// inverse. A pixel is dropped when one of its bits differs by 5 levels or less, or when it gets no light.
 cv::Mat opencv_labels(const calib::Patterns& patterns, const std::vector<fs::path>& images) {
   const auto read = [&](int i) {
     return cv::imread(images[static_cast<size_t>(i)].string(), cv::IMREAD_GRAYSCALE);
@@ -177,7 +178,7 @@ cv::Mat opencv_labels(const calib::Patterns& patterns, const std::vector<fs::pat
 
 // The projector's pixel at a corner: a robust homography over the whole-pixel labels around it.
 std::optional<cv::Point2f> local_corner(const cv::Mat& labels, const cv::Point2f& corner) {
-  constexpr int k_window = 20;  // camera pixels to each side: half a square and some
+  constexpr int k_window = 20;  // camera pixels to each side: a little more than half a square
   std::vector<cv::Point2f> from, to;
   for (int y = cvRound(corner.y) - k_window; y <= cvRound(corner.y) + k_window; ++y) {
     for (int x = cvRound(corner.x) - k_window; x <= cvRound(corner.x) + k_window; ++x) {
@@ -223,7 +224,8 @@ Imager imager_of(const std::string& name, const cv::Size& size, const cv::Mat& k
   return {name, size.width, size.height, Lens::create("LENSMODEL_OPENCV4", values).value(), Pose()};
 }
 
-// Each device alone, then cv::stereoCalibrate over all views with every value free (k1 k2 p1 p2).
+// Calibrates each device alone, then runs cv::stereoCalibrate over all views with all values free (k1 k2 p1
+// p2).
 Rig opencv_rig(const calib::CaptureSet& captures, const std::vector<View>& views) {
   std::vector<std::vector<cv::Point3f>> points;
   std::vector<std::vector<cv::Point2f>> camera, projector;
@@ -257,7 +259,7 @@ Rig opencv_rig(const calib::CaptureSet& captures, const std::vector<View>& views
   return rig;
 }
 
-// ---- what was measured, against the truth ----
+// ---- measurements against the truth ----
 
 calib::ImagerView view_of(const Imager& imager) {
   return {imager.lens.model, imager.lens.values, imager.imager_from_world};
@@ -319,7 +321,7 @@ void print_opencv_offsets(const TrueRig& truth, const std::vector<View>& views) 
 
 // ---- the table ----
 
-constexpr double k_pnp_px = 0.03;  // of the prototype's known points, as the stated error takes it
+constexpr double k_pnp_px = 0.03;  // noise of the prototype's known points, as in the stated error
 constexpr int k_points = 2000;
 
 std::string row(const Landed& errors) {
@@ -354,7 +356,7 @@ Status run_case(const Case& test_case, const fs::path& folder) {
   const double opencv_seconds = seconds() - begun_solving - limn_seconds;
   for (const Prototype prototype : {Prototype::panel, Prototype::cluster, Prototype::concave}) {
     const scene::Mesh mesh = prototype_mesh(prototype);
-    // The same points and the same measurement noise for each.
+    // The same points with the same measurement noise for each rig.
     const auto judged = [&](const Rig& rig) {
       std::mt19937_64 rng(17);
       return landed(truth, rig, mesh, k_pnp_px, k_points, &rng);
@@ -368,7 +370,7 @@ Status run_case(const Case& test_case, const fs::path& folder) {
         assessment.held_out_error_mm[0], assessment.propagated_error_mm[0], p95(limn.pooled_mm()),
         100 * share_within(limn.pooled_mm(), stated));
   }
-  fmt::print("  Limn {:.1f} s, OpenCV {:.1f} s, from pictures to rig\n", limn_seconds, opencv_seconds);
+  fmt::print("  Limn {:.1f} s, OpenCV {:.1f} s, from images to rig\n", limn_seconds, opencv_seconds);
   return {};
 }
 

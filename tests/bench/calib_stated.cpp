@@ -1,6 +1,6 @@
-// How often the stated 95 % error holds: rigs with known truth, observations made with noise (no images, so
-// that there can be many), each solved, judged, and lit: the share of unseen points within the stated error.
-// Usage: calib_stated [CASES [FIRST]]
+// How often the stated 95 % error holds. Rigs with known truth and noisy observations (no images, so that
+// there can be many) are solved and assessed; then the share of unseen points within the stated error is
+// counted. Usage: calib_stated [CASES [FIRST]]
 #include <fmt/core.h>
 
 #include "calib/judge/assess.h"
@@ -18,7 +18,7 @@ struct Drawn {
   double corner_px = 0, match_px = 0, pose_mm = 0;
 };
 
-// Cases differ in everything that a person's rig may differ in.
+// Cases vary in everything in which real rigs may differ.
 Drawn drawn(unsigned seed) {
   std::mt19937_64 rng(seed);
   std::uniform_real_distribution<double> even(0, 1);
@@ -39,7 +39,7 @@ Drawn drawn(unsigned seed) {
   return drawn;
 }
 
-// Boards sag differently in each pose, which no model of the solve holds.
+// Boards sag differently in each pose; the solver has no model for that.
 void sag(const TrueRig& truth, double mm, std::mt19937_64* rng, calib::Observations* observations) {
   std::normal_distribution<double> scatter(0, 1e-3 * mm);
   for (size_t pose = 0; pose < truth.world_from_board.size(); ++pose) {
@@ -70,7 +70,7 @@ Status run(unsigned seed, double* share_sum) {
   for (calib::Match& match : observations.matches) match.stddev_px = draw.match_px;
   LIMN_TRY(const calib::Solution solution, calib::solve(observations));
   LIMN_TRY(const calib::Assessment assessment, calib::assess({observations, {}, {}, 0, 0}, {}, solution));
-  const double pnp_px = std::max(0.03, draw.corner_px);  // things are measured as well as the board
+  const double pnp_px = std::max(0.03, draw.corner_px);  // the prototype is measured as well as the board
   std::vector<double> errors, clean;
   for (const Prototype prototype : {Prototype::panel, Prototype::cluster, Prototype::concave}) {
     const scene::Mesh mesh = prototype_mesh(prototype);

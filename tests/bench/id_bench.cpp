@@ -1,4 +1,4 @@
-// Wrong ids on real markers under hard conditions, with every family loaded, and what a score means.
+// Counts wrong ids on real markers under hard conditions, with every family loaded, and checks the scores.
 // id_bench [--frames N] [--seed S] [--only TEXT] [--detail]
 #include <fmt/format.h>
 
@@ -30,7 +30,7 @@ using tracker::Detection;
 
 struct Options {
   int frames = 4;
-  std::uint64_t seed = 2026;  // kept for reports: development uses another
+  std::uint64_t seed = 2026;  // reserved for reports; use another one for development
   std::string only;
   bool detail = false;
 };
@@ -64,7 +64,7 @@ std::vector<Condition> hard_conditions() {
 
 // ---- markers ----
 
-// Letters, some of them alike, as ARToolKit templates of 16 x 16 values; their names.
+// Writes letters, some of them similar, as ARToolKit templates of 16 x 16 values; returns their family names.
 std::vector<std::string> write_templates(const std::filesystem::path& folder) {
   std::vector<std::string> names;
   for (const std::string letter :
@@ -124,7 +124,7 @@ std::vector<Kind> all_kinds(const std::vector<std::string>& templates) {
   return kinds;
 }
 
-// Families share markers (aruco_4x4_50 is the beginning of aruco_4x4_1000): what counts is the image.
+// Families share markers (aruco_4x4_50 is the beginning of aruco_4x4_1000), so the images are compared.
 bool is_same_image(const MarkerName& found, const MarkerName& truth) {
   if (found.family == "artoolkit" || truth.family == "artoolkit")
     return found.family == truth.family &&
@@ -137,14 +137,14 @@ bool is_same_image(const MarkerName& found, const MarkerName& truth) {
   };
   const cv::Mat& a = image(found);
   cv::Mat b = image(truth).clone();
-  for (int turn = 0; turn < 4; ++turn) {  // aruco_4x4_250:227 is apriltag_16h5:16 turned
+  for (int turn = 0; turn < 4; ++turn) {  // aruco_4x4_250:227 is apriltag_16h5:16, rotated
     if (a.size() == b.size() && cv::norm(a, b, cv::NORM_INF) == 0) return true;
     cv::rotate(b, b, cv::ROTATE_90_CLOCKWISE);
   }
   return false;
 }
 
-// ---- judgement ----
+// ---- comparison with the truth ----
 
 constexpr std::array<double, 10> k_bins = {0, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 0.999, 0.9999};
 
@@ -174,7 +174,7 @@ double longest_side(const std::array<Eigen::Vector2d, 4>& c) {
   return longest;
 }
 
-// The marker on whose square the detection's centre lies, if any.
+// The true marker whose square contains the detection's centre, if any.
 const TrueMarker* marker_below(const Detection& detection, const TrackerFrame& frame) {
   for (const TrueMarker& truth : frame.markers) {
     const std::vector<cv::Point2f> outline = {
@@ -226,7 +226,7 @@ void print_row(const std::string& name, const Tally& t) {
 
 void print_table(const std::string& title, const std::vector<std::pair<std::string, Tally>>& rows) {
   fmt::print("\n  {:<36}{:>9}{:>9}{:>9}{:>8}{:>10}{:>8}{:>8}\n", title, "markers", "found", "recall", "wrong",
-             "wrong", "turned", "beside");
+             "wrong", "turned", "outside");
   for (const auto& [name, tally] : rows) print_row(name, tally);
 }
 
@@ -304,10 +304,9 @@ int main(int argc, char** argv) {
   cv::setNumThreads(1);
   const auto options = parsed(argc, argv);
   if (!options) {
-    fmt::print(
-        stderr,
-        "id_bench [--frames N a condition and kind (4)] [--seed S] [--only TEXT of a condition or kind] "
-        "[--detail: every wrong id]\n");
+    fmt::print(stderr,
+               "id_bench [--frames N for each condition and kind (4)] [--seed S] [--only TEXT of a condition "
+               "or kind] [--detail: every wrong id]\n");
     return 2;
   }
   const auto folder = std::filesystem::temp_directory_path() / fmt::format("limn-id-bench-{}", options->seed);

@@ -1,7 +1,7 @@
-// What a live session costs beside its rendering: processor time for each 1280x1024 frame (JPEG decoded,
-// markers found, poses, filter, hand-over) beside what libapriltag needs to detect in the same frames, what a
-// recording adds to a frame's time, how long an edit takes, and whether memory grows. Usage: limn bench live
-// [--frames N (60)]
+// What a live session costs apart from rendering: processor time for each 1280x1024 frame (JPEG decoding,
+// marker detection, poses, filter, hand-over), compared with libapriltag's detection in the same frames. Also
+// what a recording adds to a frame's time, how long an edit takes, and whether memory grows. Usage: limn
+// bench live [--frames N (60)]
 #include <fmt/core.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -82,7 +82,8 @@ struct Shot {
   Stamp captured_at;
 };
 
-// A session's frames as a camera would send them: lit by the session's own images, a marker in a hand.
+// A session's frames as a camera would send them: illuminated by the session's own images, with a marker in a
+// hand.
 std::vector<Shot> shots(int count, SessionSetup* setup) {
   sim::World world = studio();
   setup->rig = world.rig;
@@ -118,10 +119,10 @@ Frame decoded(const Shot& shot, const SessionSetup& setup) {
 
 constexpr std::size_t k_rounds = 10;
 
-// What a camera hands over and what becomes of it.
+// A format in which a camera sends images, and how it is decoded.
 struct Wire {
   std::string name;
-  std::function<std::function<Frame()>(const Shot&)> decoder;  // of a shot: decodes it
+  std::function<std::function<Frame()>(const Shot&)> decoder;  // decodes a shot
 };
 
 std::vector<Wire> wires() {
@@ -133,11 +134,11 @@ std::vector<Wire> wires() {
   const auto raw = [](const Shot& shot) {
     return [sent = device::decode_frame(shot.jpeg, {.grey = true}).value().image] {
       Frame frame;
-      frame.image = sent.clone();  // out of the driver's buffer
+      frame.image = sent.clone();  // copied out of the driver's buffer
       return frame;
     };
   };
-  return {{"colour JPEG", jpeg(false)}, {"JPEG, brightness alone", jpeg(true)}, {"raw brightness", raw}};
+  return {{"colour JPEG", jpeg(false)}, {"JPEG, brightness only", jpeg(true)}, {"raw brightness", raw}};
 }
 
 void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup, const Wire& wire) {
@@ -181,17 +182,16 @@ void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup, const
   fmt::print("{}: {} frames of 1280x1024, {:.1f} markers each; mean processor ms\n", wire.name, decode.size(),
              static_cast<double>(markers) / static_cast<double>(decode.size()));
   fmt::print(
-      "decode {:.2f}, find markers {:.2f}, poses and motions {:.2f} (by the wall), hand-over and prediction "
-      "{:.2f}: "
-      "{:.2f}\n",
+      "decode {:.2f}, find markers {:.2f}, poses and motions {:.2f} (wall-clock time), hand-over and "
+      "prediction {:.2f}; sum {:.2f}\n",
       mean(decode), mean(watch) - mean(filter), mean(filter), mean(hand), ours);
   fmt::print(
-      "libapriltag (36h11, decimate 2, one thread), detection alone: {:.2f}; ours, of that: {:.2f} "
+      "libapriltag (36h11, decimate 2, one thread), detection alone: {:.2f}; the sum divided by it: {:.2f} "
       "(without decoding {:.2f})\n",
       mean(theirs), ours / mean(theirs), (ours - mean(decode)) / mean(theirs));
 }
 
-// What no decoder of JPEG is spared: its codes are read one after the other, whatever is made of them.
+// The least work of any JPEG decoder: the codes must be read one after the other, whatever is done with them.
 void print_codes(const std::vector<Shot>& shots) {
   std::vector<double> times;
   for (std::size_t i = 0; i < k_rounds * shots.size(); ++i) {
@@ -202,12 +202,12 @@ void print_codes(const std::vector<Shot>& shots) {
         .value();
     times.push_back(processor_ms() - begun);
   }
-  fmt::print("to read a JPEG's codes (brightness at an eighth of the size): {:.2f}\n", mean(times));
+  fmt::print("reading a JPEG's codes (brightness at an eighth of the size): {:.2f} ms\n", mean(times));
 }
 
-// A frame of a session, decoded, watched and painted.
+// Cost of one frame of a session: decoding, perception and rendering.
 struct FrameCost {
-  double wall_ms = 0, processor_ms = 0;  // of all threads, that of the recording included
+  double wall_ms = 0, processor_ms = 0;  // in all threads, including the recording's
 };
 FrameCost session_cost(const std::vector<Shot>& shots, SessionSetup setup, const fs::path& record) {
   std::unique_ptr<apps::Recorder> recorder;
@@ -234,8 +234,8 @@ FrameCost session_cost(const std::vector<Shot>& shots, SessionSetup setup, const
   return {median(times), (processor_ms() - begun_processor) / static_cast<double>(shots.size())};
 }
 
-// From a person's edit to the first images that show it, by the wall, without the display: what is left of
-// the frame in which it comes, at any moment of it alike, and the whole frame after it.
+// Time from a person's edit to the first images that show it, by wall clock, without the display: the rest of
+// the frame in which the edit arrives (at a uniformly distributed moment) and the whole next frame.
 void print_edits(const std::vector<Shot>& shots, const SessionSetup& setup) {
   auto perception = Perception::create(setup.scene, setup.rig, setup.watch).value();
   auto session = Session::create(setup, nullptr, nullptr, false).value();
@@ -255,8 +255,10 @@ void print_edits(const std::vector<Shot>& shots, const SessionSetup& setup) {
       for (int k = 0; k < k_moments; ++k) waits.push_back((k + 0.5) / k_moments * before_ms + painted_ms);
     before_ms = wall_ms() - begun;
   }
-  fmt::print("from an edit to its first pictures, display excluded: {:.0f} ms (median), {:.0f} ms (95 %)\n",
-             quantile(waits, 0.5), quantile(waits, 0.95));
+  fmt::print(
+      "from an edit to the first images that show it, without the display: {:.0f} ms (median), {:.0f} ms (95 "
+      "%)\n",
+      quantile(waits, 0.5), quantile(waits, 0.95));
 }
 
 void print_recording(const std::vector<Shot>& shots, const SessionSetup& setup) {
@@ -270,9 +272,11 @@ void print_recording(const std::vector<Shot>& shots, const SessionSetup& setup) 
     processor_with.push_back(recorded.processor_ms);
     fs::remove_all(folder);
   }
-  fmt::print("a frame of the session, decoded, watched, painted: {:.1f} ms; recorded {:.1f} ms: {:+.1f} %\n",
-             median(without), median(with), 100 * (median(with) / median(without) - 1));
-  fmt::print("its processor time, of all threads: {:.1f} ms; recorded {:.1f} ms: {:+.1f} %\n",
+  fmt::print(
+      "a frame of the session (decoding, perception, rendering): {:.1f} ms; with recording {:.1f} ms: "
+      "{:+.1f} %\n",
+      median(without), median(with), 100 * (median(with) / median(without) - 1));
+  fmt::print("its processor time in all threads: {:.1f} ms; with recording {:.1f} ms: {:+.1f} %\n",
              median(processor_without), median(processor_with),
              100 * (median(processor_with) / median(processor_without) - 1));
 }
@@ -290,7 +294,7 @@ void print_memory(const std::vector<Shot>& shots, const SessionSetup& setup) {
     }
     if (round == 0) first_mib = resident_mib();
   }
-  fmt::print("memory after {} and {} frames of one watcher: {:.1f} and {:.1f} MiB\n", shots.size(),
+  fmt::print("memory after {} and {} frames of perception: {:.1f} and {:.1f} MiB\n", shots.size(),
              k_rounds * shots.size(), first_mib, resident_mib());
 }
 

@@ -1,7 +1,6 @@
-// What the projectors' images cost: milliseconds a pass by GPU timer queries, whole frames of a moving and
-// of a still scene beside yardsticks of the same run, and what compensation gives. Usage: limn bench
-// projector
-// [--frames N (5)]
+// What the projectors' images cost: milliseconds for each pass, by GPU timer queries; whole frames of a
+// moving and of a still scene, compared with simple reference passes of the same run; and the gain by
+// compensation. Usage: limn bench projector [--frames N (5)]
 #include <epoxy/gl.h>
 #include <fmt/core.h>
 
@@ -33,14 +32,14 @@ double now_ms() {
       .count();
 }
 
-// Median time of `work`, the GPU's included.
+// Median time of `work`, including the GPU's.
 double median_ms(int count, const std::function<void()>& work) {
   std::vector<double> times;
   for (int i = 0; i <= count; ++i) {
     const double start = now_ms();
     work();
     glFinish();
-    if (i > 0) times.push_back(now_ms() - start);  // the first one warms up
+    if (i > 0) times.push_back(now_ms() - start);  // the first run warms up
   }
   return median(std::move(times));
 }
@@ -65,7 +64,7 @@ GlName program_of(const char* vertex, const char* fragment) {
   return {program, [](GLuint n) { glDeleteProgram(n); }};
 }
 
-// The corners of the scene's triangles, three each, in a box that fills clip space nearly.
+// The corners of the scene's triangles, three for each, in a box that nearly fills clip space.
 std::vector<Eigen::Vector3f> all_corners(const scene::Scene& scene, const scene::PosedScene& posed) {
   std::vector<Eigen::Vector3f> corners;
   const auto add = [&](const scene::Mesh& mesh, const Pose& world_from_mesh) {
@@ -83,7 +82,7 @@ std::vector<Eigen::Vector3f> all_corners(const scene::Scene& scene, const scene:
   return corners;
 }
 
-// The simplest passes of their kinds, into an image of the projector's size.
+// The simplest passes of each kind, into an image of the projector's size, for comparison.
 class Yardsticks {
  public:
   explicit Yardsticks(const std::vector<Eigen::Vector3f>& corners)
@@ -109,7 +108,7 @@ class Yardsticks {
     glTextureParameteri(*from_, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
     map_ = cv::Mat(k_height, k_width, CV_32FC2);
     for (int row = 0; row < k_height; ++row)
-      for (int column = 0; column < k_width; ++column)  // some px of a smooth warp
+      for (int column = 0; column < k_width; ++column)  // a smooth warp by some px
         map_.at<cv::Vec2f>(row, column) = {static_cast<float>(column + 4 * std::sin(row / 90.0)),
                                            static_cast<float>(row + 4 * std::cos(column / 110.0))};
     cv::Mat shares = map_.clone();
@@ -193,16 +192,16 @@ int run(int frames) {
   const double copy = median_ms(frames, [&] { yardsticks.clear(), yardsticks.copy(); });
   const double draw = median_ms(frames, [&] { yardsticks.draw_triangles(); });
   const double warp = median_ms(frames, [&] { yardsticks.draw_warp(); });
-  fmt::print("  yardsticks                                  ms\n");
+  fmt::print("  reference passes                            ms\n");
   fmt::print("  clear and copy                          {:6.2f}\n", copy);
   fmt::print("  {} triangles                         {:6.2f}\n", triangles, draw);
-  fmt::print("  warp by a map, whole picture            {:6.2f}\n", warp);
+  fmt::print("  warp by a map, whole image              {:6.2f}\n", warp);
   fmt::print("  cv::remap                               {:6.2f}\n\n",
              median_ms(frames, [&] { yardsticks.remap(); }));
 
   renderer->set_quick_motion(true);  // as in a session
   int step = 0;
-  const auto moved = [&] {  // the part, a little, as in a hand
+  const auto moved = [&] {  // the part moves a little, as in a hand
     scene::PosedScene out = posed;
     out.parts[0].world_from_part.translation.x() += 1e-3 * (++step % 7);
     return out;
@@ -226,14 +225,15 @@ int run(int frames) {
     }
   }
   renderer->time_passes(false);
-  fmt::print("  passes of a frame with one projector's picture\n");
+  fmt::print("  passes of a frame with one projector's image\n");
   for (const std::string& pass : order) {
     fmt::print("  {:<38}  {:6.2f}\n", pass, median(passes[pass]));
   }
-  // What all projectors share, ids above all, is drawn once for all of them.
+  // Whatever all projectors share, mainly the ids, is drawn once for all of them.
   const double sum = static_cast<double>(projectors) * (copy + draw + warp);
-  fmt::print("\n  frames of {} projectors                      ms   of triangles + warp + copy for each\n",
-             projectors);
+  fmt::print(
+      "\n  frames of {} projectors                      ms   divided by triangles + warp + copy for each\n",
+      projectors);
   const auto frame = [&](const char* name, const std::function<scene::PosedScene()>& place) {
     const double ms = median_ms(frames, [&] {
       const scene::PosedScene placed = place();
@@ -245,15 +245,15 @@ int run(int frames) {
   frame("prototype and part move", prototype_moved);
   frame("a part moves", moved);
   const double still = frame("nothing moves", [&] { return posed; });
-  fmt::print("  nothing moves, of clear and copy                {:5.2f}\n",
+  fmt::print("  nothing moves, divided by clear and copy        {:5.2f}\n",
              still / (static_cast<double>(projectors) * copy));
 
-  // Composites: the image is new each time. Their yardstick has the camera's size.
+  // Composites: each image is new. The passes for comparison have the camera's size.
   const Imager& camera = world.rig.cameras[0];
   const cv::Mat image(camera.height, camera.width, CV_8UC3, cv::Scalar(60, 70, 80));
   const double scale = 1.0 * camera.width * camera.height / (k_width * k_height);
-  fmt::print("\n  composites, {}x{}                        ms   of copies of this size\n", camera.width,
-             camera.height);
+  fmt::print("\n  composites, {}x{}                        ms   divided by a copy of this size\n",
+             camera.width, camera.height);
   const auto composite = [&](const char* name, const std::function<scene::PosedScene()>& place) {
     const double ms =
         median_ms(frames, [&] { (void)renderer->composite(0, image, place(), projector::Composite::full); });

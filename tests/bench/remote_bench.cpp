@@ -1,5 +1,6 @@
-// What guests of the remote cost a live session, and how soon they see an edit: a frame's time (found,
-// painted, told) without guests beside that with four, in turns. Usage: limn bench remote [--rounds N (12)]
+// What guests of the remote cost a live session, and how soon they see an edit. The time of a frame
+// (detection, rendering, updates to guests) without guests is compared with that for four guests, in turns.
+// Usage: limn bench remote [--rounds N (12)]
 #include <fmt/core.h>
 #include <unistd.h>
 
@@ -37,14 +38,14 @@ using Clock = std::chrono::steady_clock;
 using nlohmann::json;
 
 constexpr double k_resolution = 0.5, k_lag_s = 0.06, k_period_s = 1 / 30.0;
-constexpr int k_guests = 4, k_frames = 12;  // a turn; the first is not counted
+constexpr int k_guests = 4, k_frames = 12;  // for each turn; the first frame is not counted
 constexpr auto k_between_edits = 100ms;
 
 double ms_since(Clock::time_point begun) {
   return std::chrono::duration<double, std::milli>(Clock::now() - begun).count();
 }
 
-// A session on the virtual studio; the rig's exposure is not its work.
+// A session on the virtual studio. The virtual rig's rendering is not counted.
 class Stage {
  public:
   Stage() : context_(device::GlContext::create().value()) {
@@ -64,7 +65,7 @@ class Stage {
 
   const apps::SessionSetup& setup() const { return setup_; }
 
-  // How long a frame took, ms.
+  // Duration of a frame, ms.
   double frame(apps::Server* server) {
     constexpr int k_cameras[] = {0};
     const std::vector<Frame> frames = rig_->expose(k_cameras);
@@ -90,8 +91,8 @@ class Stage {
   std::size_t moments_ = 0;
 };
 
-// Four guests who look at the state; one of them edits, and with `rooms` all have the live composite. Their
-// own work is little and goes after everybody's.
+// Four guests who receive the state. One of them edits; with `rooms` all receive the live composite. Their
+// own work is small and has the lowest priority.
 class AuthSessions {
  public:
   AuthSessions(const apps::Server& server, bool rooms, std::vector<double>* late_ms) : late_ms_(late_ms) {
@@ -196,7 +197,7 @@ int run(int argc, char** argv) {
   turn();
   std::vector<double> alone, states, images, late_ms, late_with_images_ms;
   alone.push_back(turn());
-  // Each turn with guests stands between two without: other work on the machine comes and goes.
+  // Each turn with guests is between two without, because other work on the machine varies.
   const auto beside = [&](bool rooms, std::vector<double>* late, std::vector<double>* shares) {
     double with = 0;
     {
@@ -211,12 +212,13 @@ int run(int argc, char** argv) {
     beside(false, &late_ms, &states);
     beside(true, &late_with_images_ms, &images);
   }
-  fmt::print("a frame's time (found, told, painted), of turns of {} frames\n", k_frames - 1);
+  fmt::print("time of a frame (detection, updates to guests, rendering), in turns of {} frames\n",
+             k_frames - 1);
   fmt::print("  without guests               {:.2f} ms (median; {:.2f} to {:.2f})\n", quantile(alone, 0.5),
              quantile(alone, 0.1), quantile(alone, 0.9));
-  fmt::print("  four who see the state       {:.3f} of it (median; {:.3f} to {:.3f})\n",
+  fmt::print("  four who receive the state   {:.3f} times that (median; {:.3f} to {:.3f})\n",
              quantile(states, 0.5), quantile(states, 0.1), quantile(states, 0.9));
-  fmt::print("  four with the live composite {:.3f} of it (median; {:.3f} to {:.3f})\n",
+  fmt::print("  four with the live composite {:.3f} times that (median; {:.3f} to {:.3f})\n",
              quantile(images, 0.5), quantile(images, 0.1), quantile(images, 0.9));
   fmt::print(
       "an edit is seen by four after {:.0f} ms (median), {:.0f} ms (95 %); with composites {:.0f}, {:.0f}\n",

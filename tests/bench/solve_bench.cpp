@@ -1,6 +1,6 @@
 #include "wizard/measure/solve_captures.h"
-// The whole `limn solve` over the real captures beside cv::imread alone over the same images on one thread.
-// Usage: solve_bench FOLDER_OF_GRAYCODE OUT [REPEATS]
+// Time of the whole `limn solve` over the real captures, compared with cv::imread over the same images on one
+// thread. Usage: solve_bench FOLDER_OF_GRAYCODE OUT [REPEATS]
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -44,7 +44,7 @@ int main(int argc, char** argv) {
   options.poses = "capture_*";
   options.shots = "graycode_*.png";
   const std::vector<fs::path> files = images_in(options.captures);
-  // The two take turns, so that whatever else runs here slows both; the quickest of each counts.
+  // The two take turns, so that other work on the machine slows both; the fastest run of each counts.
   double reading = 1e9, solving = 1e9, held_out = 0, worst = 0;
   const int repeats = argc > 3 ? std::stoi(argv[3]) : 3;
   for (int i = 0; i < repeats; ++i) {
@@ -62,7 +62,7 @@ int main(int argc, char** argv) {
                        }));
   }
   fmt::print(
-      "{} pictures: cv::imread, one thread {:.2f} s; limn solve {:.2f} s, {:.2f} times; held-out {:.3f} px, "
+      "{} images: cv::imread, one thread {:.2f} s; limn solve {:.2f} s, {:.2f} times; held-out {:.3f} px, "
       "worst {:.3f} px\n",
       files.size(), reading, solving, solving / reading, held_out, worst);
   return held_out > 0 ? 0 : 1;

@@ -1,6 +1,7 @@
-// What a guest's window costs the server: decode, track, composite and encode of one client's 640x400
-// images beside a JPEG decode, a detection and a JPEG encode alone in the same run; how exact it is; and
-// what the projector loop feels of it. Usage: limn bench tablet [--frames N (60)] [--seed S (2026)]
+// What a guest's tablet view costs the server: decode, track, composite and encode of one client's 640x400
+// images, compared with a JPEG decode, a detection and a JPEG encode alone in the same run. Also its
+// accuracy, and how much it slows the projector loop. Usage: limn bench tablet [--frames N (60)] [--seed S
+// (2026)]
 #include <fmt/core.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
@@ -52,7 +53,7 @@ double processor_ms() {
   return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
 }
 
-// A session in the studio, with its door lit.
+// A session in the studio, with light on its door.
 struct Room {
   device::GlContext context = device::GlContext::create().value();
   apps::SessionSetup setup;
@@ -96,7 +97,7 @@ Pose pose_of(const json& node) {
   return {Eigen::Quaterniond(q[0], q[1], q[2], q[3]), Eigen::Vector3d(t[0], t[1], t[2])};
 }
 
-// Squared distances of part points from where they belong, px^2, and their number.
+// Sum of squared distances of part points from their true places, px^2, and the number of points.
 struct Off {
   double squares = 0;
   int count = 0;
@@ -131,13 +132,13 @@ void print_window(const std::vector<TabletShot>& shots, Room* room, apps::Tablet
                                                      room->setup.scene.folder)
                                  .value(),
                              {.encoding = tracker::Encoding::srgb});
-  // All with the onlooker's priority, so that a busy machine disturbs both alike.
+  // Everything runs with the tablet view's priority, so that a busy machine slows both alike.
   setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), 19);
   std::vector<double> alone[3], parts[4], server, answer, yardstick_processor, processor;
   Off off;
   json last;
   constexpr const char* k_parts[] = {"decode", "track", "composite", "encode"};
-  // As in a session, each image meets other tracks.
+  // As in a session, each image has different tracks.
   std::vector<apps::Percepts> moments;
   for (std::size_t i = 0; i < shots.size(); ++i) moments.push_back(room->see());
   for (int round = 0; round < 3; ++round) {
@@ -160,7 +161,7 @@ void print_window(const std::vector<TabletShot>& shots, Room* room, apps::Tablet
       const double answered_processor = processor_ms(), answered = now_ms();
       const json said = json::parse(seen.json);
       LIMN_CHECK(said["sees"] != "nothing");
-      if (round == 0) continue;  // warms up, and finds the lens
+      if (round == 0) continue;  // the first round warms up and estimates the lens
       const double own[3] = {decoded - begun, detected - turned_grey, encoded - detected};
       for (int k = 0; k < 3; ++k) alone[k].push_back(own[k]);
       double sum = 0;
@@ -180,23 +181,21 @@ void print_window(const std::vector<TabletShot>& shots, Room* room, apps::Tablet
   fmt::print("alone: JPEG decode {:.2f}, detection {:.2f}, JPEG encode {:.2f}; sum {:.2f} ms\n",
              median(alone[0]), median(alone[1]), median(alone[2]), yardstick);
   fmt::print(
-      "window: decode {:.2f}, track {:.2f}, composite {:.2f}, encode {:.2f}; a frame {:.2f} ms, {:.2f} times "
-      "the "
-      "sum (at most 3); asked to answered {:.2f} ms\n",
+      "tablet view: decode {:.2f}, track {:.2f}, composite {:.2f}, encode {:.2f}; a frame {:.2f} ms, {:.2f} "
+      "times the sum (at most 3); from request to answer {:.2f} ms\n",
       median(parts[0]), median(parts[1]), median(parts[2]), median(parts[3]), median(server),
       median(server) / yardstick, median(answer));
-  fmt::print("processor time of all threads: alone {:.2f} ms, window {:.2f} ms, {:.2f} times\n",
+  fmt::print("processor time of all threads: alone {:.2f} ms, tablet view {:.2f} ms, {:.2f} times\n",
              median(yardstick_processor), median(processor), median(processor) / median(yardstick_processor));
   fmt::print(
-      "parts lie {:.2f} px RMS from where they belong (at most 1.5); focal length {:.1f} +- {:.1f} px, in "
-      "truth "
-      "{:.1f}\n",
+      "parts lie {:.2f} px RMS from their true places (at most 1.5); focal length {:.1f} +- {:.1f} px, "
+      "true value {:.1f}\n",
       off.rms(), last["lens"]["values"][0].get<double>(), last["lens"]["focal_stddev_px"].get<double>(),
       shots[0].camera.lens.fx());
 }
 
-// Images painted one after the other, a part nudged in each, with and without somebody who looks on ten
-// times a second; in turn, so that a busy machine disturbs both.
+// Renders images one after the other, with a part nudged in each, with and without a tablet view ten times a
+// second. The two take turns, so that a busy machine slows both.
 void print_projector_loop(const std::vector<TabletShot>& shots, Room* room, apps::TabletView* tablet_view) {
   constexpr int k_turns = 6, k_images = 14;
   std::vector<double> with, without, know;
@@ -223,8 +222,8 @@ void print_projector_loop(const std::vector<TabletShot>& shots, Room* room, apps
     guest.join();
   }
   fmt::print(
-      "projector loop: {:.1f} ms a picture, {:.1f} with a window open ({:+.1f} %, at most 10); know() {:.4f} "
-      "ms\n",
+      "projector loop: {:.1f} ms for an image, {:.1f} with a tablet view open ({:+.1f} %, at most 10); "
+      "publishing the session to it {:.4f} ms\n",
       median(without), median(with), 100 * (median(with) / median(without) - 1), median(know));
 }
 
@@ -257,7 +256,7 @@ int main(int argc, char** argv) {
   const fs::path folder = fs::temp_directory_path() / fmt::format("limn-bench-lenses-{}", getpid());
   {
     const auto tablet_view = apps::TabletView::create(room.setup, folder).value();
-    fmt::print("{} pictures of {}x{}, seed {}; {}\n", shots.size(), k_width, k_height, seed,
+    fmt::print("{} images of {}x{}, seed {}; {}\n", shots.size(), k_width, k_height, seed,
                room.context.description());
     tablet_view->know(room.session);
     std::thread([&] { print_window(shots, &room, tablet_view.get()); }).join();

@@ -1,5 +1,6 @@
-// Ours beside libapriltag (quad_decimate 1 and 2) and OpenCV aruco on the same frames with exact truth.
-// tracker_bench [--frames N] [--seed S] [--only TEXT] [--detail] [--ours] [--save FOLDER] [--photos FOLDER]
+// Compares Limn with libapriltag (quad_decimate 1 and 2) and OpenCV aruco on the same frames with exact
+// truth. tracker_bench [--frames N] [--seed S] [--only TEXT] [--detail] [--ours] [--save FOLDER] [--photos
+// FOLDER]
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
@@ -41,7 +42,7 @@ using test::TrueMarker;
 
 struct Options {
   int frames = 4;
-  std::uint64_t seed = 2026;  // kept for reports: development uses another
+  std::uint64_t seed = 2026;  // reserved for reports; use another one for development
   std::string only;
   bool detail = false;
   bool ours_alone = false;
@@ -50,10 +51,11 @@ struct Options {
 
 struct Tally {
   int markers = 0, found = 0, wrong = 0, flips = 0, poses = 0;
-  double squares = 0;  // px^2, of corners
+  double squares = 0;  // px^2, sum over the corners
   double outward = 0;  // px, away from the marker's centre
   Eigen::Vector2d offset = Eigen::Vector2d::Zero();
-  std::vector<double> pulls;  // mean of both coordinates' squares, of each corner that nothing covers
+  // Mean of both coordinates' squared normalised errors, for each corner that is not covered.
+  std::vector<double> pulls;
   std::vector<double> turn_deg, shift_mm;  // pose errors
 
   int corners() const { return std::max(1, 4 * found); }
@@ -70,8 +72,8 @@ struct Tally {
     return std::sqrt(std::accumulate(pulls.begin(), pulls.end(), 0.0) /
                      std::max(1.0, static_cast<double>(pulls.size())));
   }
-  // The pull that a Gaussian would have with as many corners beyond this quantile: mean squares of two
-  // coordinates are distributed exponentially.
+  // The normalised error that a Gaussian has at the quantile that this share of corners exceeds: mean squares
+  // of two coordinates are distributed exponentially.
   double pull_at(double share) const {
     if (pulls.empty()) return 0;
     std::vector<double> squares_of = pulls;
@@ -81,8 +83,8 @@ struct Tally {
   }
 };
 
-// The found corners in the truth's order: the cyclic one, in either direction, that lies nearest. Families
-// turn their markers differently.
+// The found corners in the order of the truth: the nearest of all cyclic orders, in both directions. Families
+// rotate their markers differently.
 Found in_order(const Found& found, const TrueMarker& truth) {
   Found best = found;
   double least = 1e18;
@@ -161,7 +163,7 @@ Tally judged(const std::vector<Found>& list, const TrackerFrame& frame) {
 
 // ---- accuracy ----
 
-using Row = std::vector<Tally>;  // one a peer
+using Row = std::vector<Tally>;  // one for each peer
 
 void print_rows(const std::vector<Peer>& peers, const std::vector<std::pair<std::string, Row>>& rows) {
   fmt::print("\n  {:<40}{:>8}", "recall / corner RMS px / wrong", "markers");
@@ -217,7 +219,7 @@ void bench_accuracy(const Options& options) {
     for (int i = 0; i < options.frames; ++i) {
       const TrackerFrame frame = test::tracker_frame(condition, options.seed, i);
       for (std::size_t p = 0; p < peers.size(); ++p) {
-        // The lens goes to ours only where it bends: the others take none.
+        // Only Limn gets the lens, where it distorts; the others take none.
         const Tally tally =
             judged(peers[p].detect(frame.grey, condition.bent_lens ? &frame.lens : nullptr), frame);
         if (p == 0) save_frame(options, condition, i, frame, tally);
@@ -240,8 +242,8 @@ void bench_accuracy(const Options& options) {
 
 // ---- time ----
 
-// The thread's own processor time where there is one thread, so that what else the machine does counts
-// little; with more threads what the clock on the wall says.
+// The thread's processor time where there is one thread, so that other work on the machine counts little;
+// wall-clock time with more threads.
 double now_ms(int threads) {
   if (threads > 1)
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch())
@@ -251,8 +253,8 @@ double now_ms(int threads) {
   return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
 }
 
-// Of each, in rounds of one after the other, each at least so long in every round: what else the machine does
-// falls upon all alike.
+// The times of each peer. The peers take turns in rounds, each for a minimum time in every round, so that
+// other work on the machine affects all alike.
 std::vector<double> least_ms(std::span<const Peer> peers, const cv::Mat& grey, int threads) {
   constexpr int k_rounds = 6;
   constexpr double k_round_ms = 20;
@@ -305,7 +307,7 @@ void bench_time(const Options& options) {
   cv::setNumThreads(1);
 }
 
-// Images made against detectors, beside an ordinary one of the same size, for every kind of code.
+// Images that are hard for detectors, compared with an ordinary one of the same size, for every kind of code.
 void bench_hostile(const Options& options) {
   constexpr int k_width = 1280;
   constexpr int k_height = 720;
@@ -320,14 +322,14 @@ void bench_hostile(const Options& options) {
                         test::checkerboard(k_width, k_height, square));
   const double ordinary =
       least_ms(limn, test::cluttered_frame(k_width, k_height, 1000 * options.seed).grey, 1);
-  fmt::print("\n  {:<40}{:>18}{:>10.2f}\n", "hostile, 1280x720", "ms; ordinary:", ordinary);
+  fmt::print("\n  {:<40}{:>18}{:>10.2f}\n", "hard images, 1280x720", "ms; ordinary:", ordinary);
   for (const auto& [name, grey] : images) {
     const double ms = least_ms(limn, grey, 1);
     fmt::print("  {:<40}{:>18.2f}{:>9.1f}x\n", name, ms, ms / ordinary);
   }
 }
 
-// The 12 markers of a 1920x1080 clutter frame, found again in the next image of a still scene.
+// The 12 markers of a 1920x1080 clutter frame, followed to the next image of a still scene.
 void bench_regions(const Options& options) {
   std::vector<double> ms;
   std::size_t markers = 0;
@@ -392,7 +394,7 @@ void bench_photographs(const std::filesystem::path& folder) {
   fmt::print("\n");
 }
 
-// A flat board of OpenCV's photographs: where each marker's top left corner lies on it, in marker sides.
+// A flat board in OpenCV's photographs: the position of each marker's top left corner on it, in marker sides.
 struct Board {
   const char* image;
   const char* family;
@@ -402,15 +404,15 @@ struct Board {
 
 Eigen::Vector2d place_on_grid(int id) { return 1.2 * Eigen::Vector2d(id % 5, id / 5); }
 
-// Of 5 x 7 squares twice as wide as the markers, which stand in the white ones' middles.
+// A board of 5 x 7 squares twice as wide as the markers, which are in the middles of the white squares.
 Eigen::Vector2d place_on_charuco(int id) {
   for (int square = 0, marker = 0;; ++square)
     if ((square % 5 + square / 5) % 2 == 1 && marker++ == id)
       return 2 * Eigen::Vector2d(square % 5, square / 5) + Eigen::Vector2d(0.5, 0.5);
 }
 
-// What is left of `apart` when paper may bend and the lens file may err smoothly: a cubic in the image for
-// each coordinate, with the share of freedom that it takes up given back.
+// The residuals left of `apart` when bent paper and smooth errors of the lens file are fitted by a cubic in
+// the image for each coordinate. They are scaled up for the degrees of freedom that the fit uses.
 std::vector<double> beside_smooth(const std::vector<cv::Point2d>& seen,
                                   const std::vector<cv::Point2d>& fitted) {
   constexpr int k_terms = 10;
@@ -431,7 +433,7 @@ std::vector<double> beside_smooth(const std::vector<cv::Point2d>& seen,
   return distances;
 }
 
-// Pixels of corners beside their boards' planes, and what is left of them beside_smooth().
+// Distances of corners in pixels from their boards' planes, and what is left of them after beside_smooth().
 struct BesidePlane {
   std::size_t markers = 0;
   std::vector<double> px, bent_px;
@@ -443,13 +445,13 @@ struct BesidePlane {
   }
   void print(const char* name) const {
     fmt::print(
-        "  {:<28}{:>3} markers, px from the board's plane: median {:.3f}, worst {:.3f}; bent: median "
-        "{:.3f}\n",
+        "  {:<28}{:>3} markers, px from the board's plane: median {:.3f}, worst {:.3f}; after "
+        "the smooth fit: median {:.3f}\n",
         name, markers, median(px), *std::max_element(px.begin(), px.end()), median(bent_px));
   }
 };
 
-// Of all found corners, lens undistorted by OpenCV's file.
+// For all found corners, undistorted with OpenCV's lens file.
 BesidePlane bench_board(const std::filesystem::path& folder, const Board& board) {
   const std::string family =
       board.family[0] == '/' ? "aruco:" + (folder / (board.family + 1)).string() : board.family;
@@ -508,8 +510,8 @@ int main(int argc, char** argv) {
   const auto options = parsed(argc, argv);
   if (!options) {
     fmt::print(stderr,
-               "tracker_bench [--frames N (4)] [--seed S] [--only TEXT of a condition] [--detail] [--ours: "
-               "no peers] "
+               "tracker_bench [--frames N (4)] [--seed S] [--only TEXT of a condition] [--detail] "
+               "[--ours: Limn without peers] "
                "[--save FOLDER for the frames] [--photos FOLDER of OpenCV's photographs]\n");
     return 2;
   }

@@ -43,7 +43,7 @@ PlacedMarker drawn_marker(const Condition& condition,
   const double spin = any_angle(rng);
   const double tilt = uniform(rng, condition.tilt_deg) * degree;
   PlacedMarker marker = placed(lens, name, px, side, spin, tilt, any_angle(rng));
-  Pose& pose = marker.camera_from_marker;  // tilted against the ray, not against the camera's axis
+  Pose& pose = marker.camera_from_marker;  // tilted relative to the ray, not to the camera's axis
   const auto ray = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), lens.unproject(px).value());
   pose = Pose(ray.toRotationMatrix() * pose.rotation_matrix(), pose.translation);
   marker.margin = condition.margin;
@@ -52,7 +52,7 @@ PlacedMarker drawn_marker(const Condition& condition,
   return marker;
 }
 
-// Of the i-th marker of a frame.
+// The name of the i-th marker of a frame.
 using NameOf = std::function<MarkerName(int i, Rng& rng)>;
 
 MarkerName benchmark_name(int i, Rng& rng) {
@@ -76,7 +76,7 @@ std::vector<PlacedMarker> drawn_markers(const Condition& condition,
   return markers;
 }
 
-// ---- what is behind, on and above the papers ----
+// ---- background, paper and things that cover it ----
 
 std::array<Eigen::Vector2d, 4> outline(const Lens& lens, PlacedMarker marker, double around) {
   marker.size_m *= 1 + 2 * around;
@@ -101,7 +101,7 @@ cv::Mat background(const Condition& condition,
   const double level = condition.black + uniform(rng, {0.1, 0.7}) * (condition.white - condition.black);
   cv::Mat image =
       cluttered ? clutter(k_width, k_height, rng) : plain(k_width, k_height, static_cast<int>(level));
-  if (cluttered) {  // in the condition's own levels
+  if (cluttered) {  // in the levels of the condition
     const double gain = (condition.white - condition.black) / 235;
     image.convertTo(image, CV_8U, gain, condition.black - 10 * gain);
   }
@@ -111,8 +111,7 @@ cv::Mat background(const Condition& condition,
   return image;
 }
 
-// Something between dark and light that lies over a marker's corner or edge, or paper that eats into the
-// border.
+// Draws something of a medium grey over a marker's corner or edge, or paper that covers a part of the border.
 void cover(const Condition& condition,
            const Lens& lens,
            const PlacedMarker& marker,
@@ -145,7 +144,7 @@ void cover(const Condition& condition,
   if (on_corner) truth->corner_covered[i] = true;
 }
 
-// Factor of the light at every pixel.
+// Factor on the light at every pixel.
 cv::Mat shade(const Condition& condition, Rng& rng) {
   cv::Mat factor(k_height, k_width, CV_32F, cv::Scalar(1));
   const double angle = any_angle(rng);
@@ -158,11 +157,11 @@ cv::Mat shade(const Condition& condition, Rng& rng) {
       const double s = d.dot(Eigen::Vector2d(x - k_width / 2.0, y - k_height / 2.0));
       double f = 1;
       if (condition.light == Light::slats) {
-        // Two pixels of penumbra.
+        // The penumbra is two pixels wide.
         const double wave =
             std::sin(2 * std::numbers::pi * s / slat_px + phase) * slat_px / (2 * std::numbers::pi);
         f = 0.25 + 0.75 * std::clamp(0.5 + wave / 2, 0.0, 1.0);
-      } else {  // 10:1 over the span, to and fro
+      } else {  // 10:1 over the span, rising and falling in turn
         const double t = std::abs(std::remainder(s / span_px + phase, 2.0));
         f = std::pow(10.0, -std::clamp(t, 0.0, 1.0));
       }
@@ -171,7 +170,7 @@ cv::Mat shade(const Condition& condition, Rng& rng) {
   return factor;
 }
 
-// A projector's image over everything: light that adds to the room's, reflected as the paper and ink do.
+// A projector's image over everything: its light adds to the room's and is reflected by paper and ink.
 cv::Mat with_projected_content(const cv::Mat& light, Rng& rng) {
   cv::Mat content;
   clutter(k_width, k_height, rng).convertTo(content, CV_32F, 1.0 / 255);
@@ -191,7 +190,7 @@ cv::Mat lit(const Condition& condition, const cv::Mat& light, Rng& rng) {
 
 // ---- the camera ----
 
-// Even motion over `length` pixels: the line's share of every pixel of the kernel, from many points.
+// Uniform motion over `length` pixels: each kernel pixel's share of the line, from many points.
 cv::Mat motion_kernel(double length, double angle) {
   const int half = static_cast<int>(std::ceil(0.5 * length)) + 1;
   cv::Mat kernel(2 * half + 1, 2 * half + 1, CV_32F, cv::Scalar(0));

@@ -19,19 +19,19 @@ struct Range {
   double low = 0, high = 0;
 };
 
-/// What one series of frames has in common. Everything is drawn evenly from its range.
+/// What all frames of a series have in common. Values are drawn uniformly from their ranges.
 struct Condition {
   std::string group, name;
   Range side_px = {60, 120};
   Range tilt_deg = {0, 50};
-  Range blur_px = {0.4, 0.4};  ///< sigma of a Gaussian after the pixels' own area
-  double motion_px = 0;        ///< length of a straight even motion during the exposure, in any direction
+  Range blur_px = {0.4, 0.4};  ///< sigma of a Gaussian, in addition to the pixels' own area
+  double motion_px = 0;        ///< length of a straight uniform motion during the exposure, in any direction
   double black = 30, white = 210;
   Light light = Light::even;
   double margin = 0.125;   ///< white paper around the marker, as share of its side
   bool dark_card = false;  ///< the paper lies on a dark square card, the card on light ground
   Cover cover = Cover::none;
-  double cover_share = 0;    ///< width of what covers, as share of the side
+  double cover_share = 0;    ///< width of the covering object, as share of the side
   double bow = 0;            ///< bent paper, as PlacedMarker::bow
   double row_motion_px = 0;  ///< rolling shutter: motion over 1000 rows, in any direction
   bool bent_lens = false;
@@ -49,7 +49,7 @@ struct TrueMarker {
   Pose camera_from_marker;
 };
 
-/// An image and what is in it.
+/// An image with its ground truth.
 struct TrackerFrame {
   cv::Mat grey;
   Lens lens;
@@ -60,9 +60,10 @@ struct TrackerFrame {
 /// The markers of all frames come from these families, in turn.
 std::vector<std::string> tracker_frame_families();
 
-/// 1280x960 pixels, 12 markers. Every other frame's background is cluttered. The same for the same numbers.
+/// A frame of 1280x960 pixels with 12 markers. Every other frame has a cluttered background. The same
+/// arguments give the same frame.
 TrackerFrame tracker_frame(const Condition& condition, std::uint64_t seed, int number);
-/// The same with markers drawn from these names.
+/// The same, with markers drawn from these names.
 TrackerFrame tracker_frame(const Condition& condition,
                            std::uint64_t seed,
                            int number,

@@ -23,7 +23,7 @@ std::array<Eigen::Matrix2d, 4> unstated() {
   return covariance;
 }
 
-// Owns what the C library makes.
+// Owns what the C library allocates.
 class Apriltag {
  public:
   Apriltag(std::span<const std::string> families, float decimate, int threads)
@@ -42,7 +42,7 @@ class Apriltag {
       zarray_get(list, i, &d);
       const bool large = std::string(d->family->name) == "tag36h11";
       Found f{{large ? "apriltag_36h11" : "apriltag_25h9", std::to_string(d->id)}, {}, unstated()};
-      // Its pixel centres lie at halves.
+      // AprilTag's pixel centres lie at halves.
       for (int k = 0; k < 4; ++k)
         f.corners_px[static_cast<std::size_t>(k)] = {d->p[k][0] - 0.5, d->p[k][1] - 0.5};
       found.push_back(f);
@@ -52,7 +52,7 @@ class Apriltag {
   }
 
  private:
-  // Families before the detector: it is destroyed first.
+  // The families are declared before the detector, because the detector must be destroyed first.
   std::vector<std::shared_ptr<apriltag_family_t>> families_;
   std::unique_ptr<apriltag_detector_t, decltype(&apriltag_detector_destroy)> detector_;
 

@@ -18,7 +18,7 @@ namespace limn::test {
 struct Found {
   MarkerName marker;
   std::array<Eigen::Vector2d, 4> corners_px;
-  std::array<Eigen::Matrix2d, 4> covariance;  ///< ours; identity for detectors that state none
+  std::array<Eigen::Matrix2d, 4> covariance;  ///< from Limn; identity for detectors that give none
 };
 
 struct Peer {
@@ -26,11 +26,11 @@ struct Peer {
   std::function<std::vector<Found>(const cv::Mat& grey, const Lens* lens)> detect;
 };
 
-/// Limn's detector; `lens` is used where it is given.
+/// Limn's detector. It uses `lens` where one is given.
 Peer limn_peer(std::span<const std::string> families, int threads);
-/// libapriltag at quad_decimate 1 or 2; only families named apriltag_36h11 and apriltag_25h9.
+/// libapriltag at quad_decimate 1 or 2. It accepts only families named apriltag_36h11 and apriltag_25h9.
 Peer apriltag_peer(std::span<const std::string> families, float decimate, int threads);
-/// OpenCV aruco with sub-pixel corners, one pass for each family; threads are OpenCV's own
+/// OpenCV aruco with sub-pixel corners, one pass for each family. It uses OpenCV's own threads
 /// (cv::setNumThreads).
 Peer opencv_peer(std::span<const std::string> families);
 

@@ -1,4 +1,4 @@
-// No memory is asked for in a frame once the detector's buffers have grown to it.
+// A frame allocates no memory once the detector's buffers have grown to its size.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -13,7 +13,7 @@ namespace {
 long allocations = 0;
 }
 
-// Not inlined: half a pair would be taken for a mismatch.
+// Not inlined: with only one of a pair inlined, the compiler would report a mismatch of new and free.
 [[gnu::noinline]] void* operator new(std::size_t size) {
   ++allocations;
   if (void* memory = std::malloc(size)) return memory;
@@ -48,7 +48,7 @@ TEST(Allocation, StopsAfterTheFirstFrame) {
   EXPECT_EQ(again.size(), 4);
 }
 
-// Fitted patterns, motion among them, lines between shadows, covered codes.
+// Images with fitted patterns (one with motion), lines between shadows, and covered codes.
 TEST(Allocation, StopsInHardImagesToo) {
   auto rng = test::test_rng();
   const Lens lens =

@@ -42,7 +42,7 @@ int smallest_distance(const std::vector<std::uint32_t>& words) {
   return smallest;
 }
 
-// The encoder tables that ARToolKit 5 states beside its decoders, lib/SRC/AR/arPattGetID.c.
+// The encoder tables that ARToolKit 5 lists beside its decoders, lib/SRC/AR/arPattGetID.c.
 TEST(Barcode, WordsAreThoseThatARToolKitDecodes) {
   EXPECT_EQ(words("artoolkit_3x3_hamming63"), (std::vector<std::uint32_t>{0, 7, 25, 30, 42, 45, 51, 52}));
   const auto parity = words("artoolkit_3x3_parity65");
@@ -52,7 +52,7 @@ TEST(Barcode, WordsAreThoseThatARToolKitDecodes) {
   EXPECT_EQ(parity[31], 63u);
 }
 
-// Their names say length, data bits and smallest distance; ARToolKit reads the id from the highest bits.
+// The names give length, data bits and smallest distance. ARToolKit reads the id from the highest bits.
 TEST(Barcode, BchCodesKeepTheDistanceOfTheirNames) {
   for (const auto& [name, bits, distance] :
        {std::tuple{"artoolkit_4x4_bch_13_9_3", 13, 3}, std::tuple{"artoolkit_4x4_bch_13_5_5", 13, 5},
@@ -64,8 +64,8 @@ TEST(Barcode, BchCodesKeepTheDistanceOfTheirNames) {
   }
 }
 
-// get_matrix_code's drawing of direction 0: black at the top left and bottom left, white at the bottom right;
-// id 5 = 000101 makes the middle cell and the one below it black.
+// As get_matrix_code draws direction 0: black at the top left and bottom left, white at the bottom right. Id
+// 5 = 000101 makes the middle cell and the one below it black.
 TEST(Barcode, CellsStandUprightAsInARToolKit) {
   EXPECT_EQ(barcode_cells(*find_barcode("artoolkit_3x3"), 0), 0b011'111'011u);
   EXPECT_EQ(barcode_cells(*find_barcode("artoolkit_3x3"), 5), 0b011'101'001u);
@@ -87,7 +87,7 @@ struct Count {
   double worst_px = 0;
 };
 
-// One marker an image, its id by its number.
+// One marker in each image; its id is the image's number.
 Count seen(const std::string& family,
            double low_px,
            double high_px,
@@ -142,8 +142,8 @@ TEST(Barcode, AreFoundWhereLightIsPoor) {
   EXPECT_EQ(small.wrong, 0);
 }
 
-// Hundreds of black squares whose inside is no barcode: other families' markers, half of whose random insides
-// a reader of the six bits alone would take.
+// Hundreds of black squares whose inside is no barcode: markers of other families. If only the six bits were
+// checked, half of their random insides would be read.
 TEST(Barcode, MarkersOfOtherFamiliesAreNone) {
   auto rng = test::test_rng();
   const Lens lens = pinhole_vga();
@@ -185,7 +185,7 @@ TEST(Barcode, MixWithOtherFamiliesInOneImage) {
   EXPECT_EQ(found, shown);
 }
 
-// Cells of 8 of 3x3 and of 544 of 4x4 end 1/24 of the side apart, whichever way they are turned.
+// The cells of marker 8 of 3x3 and marker 544 of 4x4 end 1/24 of the side apart, in every rotation.
 TEST(Barcode, IsToldFromALargerOneWhicheverWayItIsTurned) {
   auto rng = test::test_rng();
   const Lens lens = pinhole_vga();
@@ -203,7 +203,8 @@ TEST(Barcode, IsToldFromALargerOneWhicheverWayItIsTurned) {
     }
 }
 
-// None in 219 photographs: 210 of Gray code stripes on a wall and a chessboard, 9 of other families' markers.
+// Nothing is found in 219 photographs: 210 of Gray code stripes on a wall and a chessboard, 9 of other
+// families' markers.
 TEST(Barcode, PhotographsWithoutThemShowNone) {
   const auto folder = test::real_data("");
   if (!folder) GTEST_SKIP() << "no photographs";
@@ -212,7 +213,7 @@ TEST(Barcode, PhotographsWithoutThemShowNone) {
   for (const auto& entry : std::filesystem::recursive_directory_iterator(*folder)) {
     const std::string extension = entry.path().extension().string();
     if (extension != ".png" && extension != ".jpg") continue;
-    // Every sixth pair of a Gray code's images, by its place in the sequence.
+    // Every sixth pair of a Gray code's images, by its number in the sequence.
     const std::string stem = entry.path().stem().string();
     if (stem.rfind("graycode_", 0) == 0 && std::stoi(stem.substr(9)) % 12 > 1) continue;
     ++images;
@@ -223,8 +224,8 @@ TEST(Barcode, PhotographsWithoutThemShowNone) {
   EXPECT_GE(images, 40);
 }
 
-// Their cells are wider or narrower than those of other families, whose codes they may show by chance: three
-// in a hundred, as long as the first family that accepts them has them.
+// Their cells are wider or narrower than those of other families, whose codes they may show by chance. Three
+// in a hundred were misread when the first family that accepts a quad won.
 TEST(Barcode, AreNotTakenForCodesOfOtherFamilies) {
   auto rng = test::test_rng();
   Detector detector(families(

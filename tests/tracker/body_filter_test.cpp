@@ -36,8 +36,7 @@ double uniform(std::mt19937_64& rng, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(rng);
 }
 
-// A marker whose tilt against its own line of sight goes to and fro between 10 and 60 degrees, towards
-// changing sides.
+// A marker whose tilt against its own line of sight varies between 10 and 60 degrees, towards changing sides.
 class Tilting {
  public:
   Tilting(double depth, std::mt19937_64& rng)
@@ -66,7 +65,7 @@ class Tilting {
   Eigen::Vector3d place_;
 };
 
-// Nearer to the true pose's mirror image along the line of sight than to itself.
+// Whether a pose is nearer to the true pose's mirror image along the line of sight than to the true pose.
 bool is_flipped(const Pose& found, const Pose& truth) {
   const Eigen::Vector3d d_sight = truth.translation.normalized();
   const Eigen::Vector3d d_true = truth.rotation * Eigen::Vector3d::UnitZ();
@@ -75,7 +74,7 @@ bool is_flipped(const Pose& found, const Pose& truth) {
   return d_found.dot(d_mirrored) > d_found.dot(d_true);
 }
 
-// From where the body was predicted to be, from where it is not, and from nowhere: the same minima.
+// The minima are the same with a correct prediction, with a wrong one and with none.
 TEST(Minima, AreTheSameFromWhereverTheyAreLookedFor) {
   auto rng = test::test_rng();
   const Imager camera = camera_1080p();
@@ -100,7 +99,7 @@ TEST(Minima, AreTheSameFromWhereverTheyAreLookedFor) {
       ASSERT_EQ(found.size(), alone.size()) << i;
       for (std::size_t k = 0; k < found.size(); ++k) {
         const Vector6d off = boxminus(found[k].world_from_body, alone[k].world_from_body);
-        if (alone[k].chi_square > 500) continue;  // hopeless: left on its way
+        if (alone[k].chi_square > 500) continue;  // bad fit: left before convergence
         EXPECT_LT(std::sqrt(off.dot(alone[k].covariance.inverse() * off)), 0.01) << i;
       }
     }
@@ -154,7 +153,7 @@ struct Errors {
   double hold_mm = 0, linear_mm = 0, filtered_mm = 0, normalised = 0;
 };
 
-// RMS errors of the position 60 ms after each image, of a body in a moving hand.
+// RMS errors of the predicted position 60 ms after each image, for a body in a moving hand.
 Errors prediction_errors(int markers, double depth, double noise_px, std::mt19937_64& rng) {
   constexpr double k_ahead_s = 0.06;
   const Imager camera = camera_1080p();
@@ -235,7 +234,7 @@ TEST(BodyFilter, HasTheCovarianceOfItsErrorsWhileMoving) {
   EXPECT_NEAR(normalised / count, 1, 0.2);
 }
 
-// Scatter about the mean, RMS of the vector, of the reported poses of seconds 2 to 8.
+// Scatter about the mean, RMS of the vector, of the poses reported in seconds 2 to 8.
 TEST(BodyFilter, StillMarkerOf64PixelsJittersByLessThanATenth) {
   auto rng = test::test_rng();
   const Lens lens = Lens::pinhole(1600, 1600, 99.5, 99.5);
@@ -301,7 +300,7 @@ TEST(Predicted, UnseenBodyIsExtrapolatedThenLostAtTheLimit) {
     EXPECT_EQ(predicted(known, at(seen + 0.299), how)[0].tracking, TrackingState::extrapolated);
     EXPECT_EQ(predicted(known, at(seen + 0.301), how)[0].tracking, TrackingState::lost);
   }
-  now = seen + 2;  // elsewhere, after a long time: starts afresh at once
+  now = seen + 2;  // elsewhere, after a long time: starts anew at once
   known = step(known, body, camera, detections_of(body, camera, hand.at(now), 0.1, rng), now);
   EXPECT_EQ(predicted(known, at(now))[0].tracking, TrackingState::measured);
   EXPECT_TRUE(test::pose_near(predicted(known, at(now))[0].world_from_body, hand.at(now), 1_deg, 2_mm));
@@ -349,7 +348,7 @@ TEST(BodyFilter, PassesOverAFalseMarkerButBelievesTwo) {
   EXPECT_TRUE(test::pose_near(predicted(known, at(now))[0].world_from_body, elsewhere, 1.5_deg, 3_mm));
 }
 
-// Corners that a patch of light drags all at once towards the other branch.
+// A patch of light shifts all corners of one image towards the other branch.
 TEST(BodyFilter, OneImageDoesNotOutweighASecond) {
   auto rng = test::test_rng();
   const Imager camera = {"camera0", 1280, 960, Lens::pinhole(1200, 1200, 639.5, 479.5), Pose{}};

@@ -21,9 +21,9 @@ struct Sweep {
   bool give_lens = false;
   bool srgb_image = false;
   Encoding encoding = Encoding::linear;
-  double bow = 0;        ///< of the upper and lower sides, as share of a side
-  double motion_px = 0;  ///< even, in any direction
-  double stains = 0;     ///< of the light, standard deviation: spots some pixels wide on paper and ink
+  double bow = 0;        ///< bow of the upper and lower sides, as share of a side
+  double motion_px = 0;  ///< uniform, in any direction
+  double stains = 0;     ///< standard deviation of the light: spots some pixels wide on paper and ink
   int jpeg_quality = 0;  ///< 0: none
   bool pattern_fits = true;
 };
@@ -41,7 +41,7 @@ cv::Mat in_motion(const cv::Mat& light, const Eigen::Vector2d& motion) {
   return sum;
 }
 
-// Light that differs from place to place, as that of a projector's image does.
+// Light that differs from place to place, like that of a projector's image.
 cv::Mat stained(const cv::Mat& light, double deviation, std::mt19937_64& rng) {
   constexpr double k_spot_px = 2;
   cv::Mat spots(light.size(), CV_32F);
@@ -76,7 +76,7 @@ cv::Mat image_of(const Sweep& sweep, const PlacedMarker& marker, std::mt19937_64
       sweep.image.noise_levels, rng);
 }
 
-// Of linear levels (0 ... 255).
+// Encodes linear levels (0 ... 255).
 cv::Mat srgb_encoded(cv::Mat grey) {
   for (int i = 0; i < grey.rows * grey.cols; ++i) {
     const double light = grey.data[i] / 255.0;
@@ -160,7 +160,8 @@ TEST(Detector, HasNoBiasWhereSidesRunAlongThePixels) {
   EXPECT_LT(std::abs(r.outward), 0.015);
 }
 
-// Pixels on such sides are half black, half white, and noise decides: a ragged boundary, half as long again.
+// Pixels on such sides are half black and half white, so noise decides: a ragged boundary, half as long
+// again.
 TEST(Detector, FindsMarkersWhoseSidesRunThroughPixelCentres) {
   std::mt19937_64 rng = test::test_rng();
   const Lens lens = pinhole_vga();
@@ -188,7 +189,7 @@ TEST(Detector, HasNoBiasInImagesOfAnSrgbCameraWhenToldSo) {
   const SweepResult told = swept(sweep, 40);
   EXPECT_EQ(told.found, told.markers);
   EXPECT_LT(std::abs(told.outward), 0.012);
-  EXPECT_GT(untold.outward, -0.04);  // .06 without what the cells' own edges say (ink_retreat.h)
+  EXPECT_GT(untold.outward, -0.04);  // .06 without the correction by the cells' edges (edge_bleed.h)
   EXPECT_LT(untold.outward, -0.012);
 }
 
@@ -216,7 +217,7 @@ TEST(Detector, StraightensTheSidesOfADistortedPictureThroughItsLens) {
   EXPECT_GT(without.rms_px, 1.4 * with.rms_px);  // bent lines follow most of the bow
 }
 
-// Pulls of N(0, 1) within a fifth.
+// Normalised errors are N(0, 1) within a fifth.
 void expect_true_covariance(const SweepResult& r) {
   EXPECT_GE(r.found, r.markers - 2);
   EXPECT_GT(r.mahalanobis, 0.8 * 0.8);
@@ -241,7 +242,7 @@ TEST(Detector, SaysHowSureItsCornersAreWithoutAnyBlur) {
   EXPECT_LT(r.rms_px, 0.02);
 }
 
-// Of sides that end where pixels do, no crossing errs: what is computed from residuals is 0 of 0.
+// Where sides end at pixel borders no crossing has an error: the correlation of the residuals is 0 / 0.
 TEST(Detector, SaysHowSureItsCornersAreInAPerfectImage) {
   auto rng = test::test_rng();
   const cv::Mat white(480, 640, CV_8UC1, cv::Scalar(210));
@@ -280,7 +281,7 @@ TEST(Detector, FindsMovingCornersAndSaysHowSureTheyAre) {
     sweep.image.noise_levels = 2;
     sweep.motion_px = motion;
     const SweepResult r = swept(sweep, 30);
-    EXPECT_GE(r.found, 20) << motion;  // reading the cells is another matter
+    EXPECT_GE(r.found, 20) << motion;  // whether cells can be read is tested elsewhere
     EXPECT_EQ(r.wrong, 0);
     EXPECT_LT(r.rms_px, 0.1) << motion;
     EXPECT_LT(r.mean.norm(), 0.02) << motion;
@@ -323,7 +324,8 @@ TEST(Detector, SaysHowSureCornersAreByTheirSidesAlone) {
   EXPECT_EQ(r.found, fitted.found);
   EXPECT_GT(r.rms_px, 1.5 * fitted.rms_px);
   EXPECT_LT(r.rms_px, 0.3);
-  EXPECT_LT(r.mahalanobis, 1.5);  // much less: the doubt is made for blurs three times as wide
+  // It may be much less: the enlarged covariance is made for blurs three times as wide.
+  EXPECT_LT(r.mahalanobis, 1.5);
 }
 
 TEST(Detector, FindsTheCornersOfBlurredMarkersThroughTheLens) {
@@ -347,7 +349,7 @@ TEST(Detector, FindsTheCornersOfBentPaper) {
     sweep.bow = bow;
     const SweepResult r = swept(sweep, 25);
     EXPECT_EQ(r.found, r.markers);
-    EXPECT_LT(r.rms_px, 0.07) << bow;  // 0.15 and more when straight lines are fitted
+    EXPECT_LT(r.rms_px, 0.07) << bow;  // 0.15 and more with straight lines
     expect_true_covariance(r);
   }
 }
@@ -360,7 +362,7 @@ TEST(Detector, MovesACornerSteadilyAsItsPaperBends) {
   options.noise_levels = 4;
   constexpr double k_step_px = 0.05;
   std::array<Eigen::Vector2d, 4> before;
-  for (int step = 0; step <= 50; ++step) {  // to 2.5 px: past the largest bow that is believed
+  for (int step = 0; step <= 50; ++step) {  // up to 2.5 px: beyond the largest bow that is accepted
     marker.bow = k_step_px * step / 60;
     std::mt19937_64 rng(7);  // the same noise in all images
     const auto found = detector.detect(
@@ -392,7 +394,7 @@ TEST(Detector, HasNoBiasWhereTheWhiteMarginIsAPixelWide) {
       outward += (found[0].corners_px[k] - truth[k]).dot((truth[k] - centre).normalized()) / (4 * k_count);
     }
   }
-  EXPECT_LT(std::abs(outward), 0.02);  // 0.1 and more by edge lines alone
+  EXPECT_LT(std::abs(outward), 0.02);  // 0.1 and more with edge lines only
 }
 
 }  // namespace

@@ -13,7 +13,7 @@
 namespace limn::tracker {
 namespace {
 
-// Every marker of a family in a sheet, turned by quarters: right id, right corner order.
+// Every marker of a family in a sheet, in quarter turns: ids and corner order are right.
 void expect_whole_family(const std::string& family, int count) {
   auto rng = test::test_rng();
   const Lens lens = Lens::pinhole(2000, 2000, 799.5, 599.5);
@@ -120,7 +120,7 @@ TEST(Detector, FindsMarkersUnderFingersAndSaysWhichCornersAreCovered) {
   }
 }
 
-// How long they take: tests/bench/tracker_bench.
+// tests/bench/tracker_bench measures how long they take.
 TEST(Detector, FindsNothingInHostileImages) {
   auto rng = test::test_rng();
   constexpr int k_width = 1280;
@@ -155,7 +155,7 @@ TEST(Detector, FindsAMarkerInAPartOfALargerImage) {
   const PlacedMarker marker = test::placed(pinhole_vga(), {"aruco_4x4_50", "3"}, {320, 240}, 80, 0.3, 0.2, 1);
   const cv::Mat whole =
       test::image_of(pinhole_vga(), test::plain(640, 480, 60), std::vector{marker}, {}, rng);
-  const cv::Mat part = whole(cv::Rect(201, 101, 237, 281));  // its rows do not follow each other in memory
+  const cv::Mat part = whole(cv::Rect(201, 101, 237, 281));  // its rows are not contiguous in memory
   Detector detector(families({"aruco_4x4_50"}));
   const auto in_whole = detector.detect(whole);
   const auto in_part = detector.detect(part);

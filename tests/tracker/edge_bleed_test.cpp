@@ -14,7 +14,7 @@
 namespace limn::tracker {
 namespace {
 
-using Camera = std::function<cv::Mat(cv::Mat light)>;  // what it makes of 0 ... 255
+using Camera = std::function<cv::Mat(cv::Mat light)>;  // turns light, 0 ... 255, into grey levels
 
 cv::Mat srgb_encoded(cv::Mat light) {
   light.forEach<float>([](float& level, const int*) {
@@ -29,14 +29,14 @@ cv::Mat overexposed(cv::Mat light) { return cv::min(1.8 * light, 255); }
 cv::Mat sharpened(cv::Mat light) {
   cv::Mat blurred;
   cv::GaussianBlur(light, blurred, {}, 1.2);
-  return 1.2 * light - 0.2 * blurred;  // no level ends at black or white
+  return 1.2 * light - 0.2 * blurred;  // no level is clipped at black or white
 }
 
 struct Outward {
   double by_sides = 0, by_detector = 0;  // px, mean of all corners
 };
 
-// Of the corners of twelve markers in two images.
+// For the corners of twelve markers in two images.
 Outward outward(const Camera& camera) {
   auto rng = test::test_rng();
   const Lens lens = Lens::pinhole(600, 600, 319.5, 239.5);
@@ -109,7 +109,7 @@ TEST(EdgeBleed, MovesAllSidesOutByWhatIsSureOfIt) {
   undo_edge_bleed({0.2, 1e-8}, &corners, &covariance);
   EXPECT_TRUE(test::near(corners[0], Eigen::Vector2d(9.8, 9.8), 1e-4));
   EXPECT_TRUE(test::near(corners[2], Eigen::Vector2d(50.2, 40.2), 1e-4));
-  // It is sure of no more than four fifths of it.
+  // It treats no more than four fifths of the bleed as certain.
   EXPECT_NEAR(std::sqrt(covariance[1].trace() / 2), 0.04, 0.01);
   corners = square;
   undo_edge_bleed({0.2, 0.01}, &corners, &covariance);  // two standard deviations

@@ -61,8 +61,8 @@ double square_error(const Detection& found, const std::array<Eigen::Vector2d, 4>
   return sum / 4;
 }
 
-// A blurred marker that moves, and turns in light that falls and rises: its pattern is fitted from nothing
-// now and then, and followed between, which is as good.
+// A blurred marker moves and turns, in light that falls and rises. Its pattern is fitted anew from time to
+// time and followed between, with the same accuracy.
 TEST(Detector, FollowsABlurredMarkerByItsPattern) {
   auto rng = test::test_rng();
   Detector detector(families({"apriltag_36h11"}));
@@ -107,7 +107,7 @@ TEST(Detector, FollowsABlurredMarkerByItsPattern) {
   EXPECT_LT(std::sqrt(pulls / count), 1.4);
 }
 
-// What was known of a blurred marker's pattern is not believed of what has come in its place.
+// The known pattern of a blurred marker is not applied to something else in its place.
 TEST(Detector, FollowsNoPatternThatIsNoLongerThere) {
   auto rng = test::test_rng();
   Detector detector(families({"apriltag_36h11"}));
@@ -149,7 +149,7 @@ TEST(Detector, FollowsNoPatternThatIsNoLongerThere) {
   for (std::size_t k = 0; k < 4; ++k) EXPECT_LT((found[0].corners_px[k] - anew[0].corners_px[k]).norm(), 0.2);
 }
 
-// Markers of one id, 70 px wide and so steep that each lies within half a side of the next.
+// Markers with the same id, 70 px wide and so steep that each lies within half a side of the next.
 cv::Mat stacked_markers(int count, double moved_px, std::mt19937_64& rng) {
   std::vector<PlacedMarker> markers;
   for (int i = 0; i < count; ++i)

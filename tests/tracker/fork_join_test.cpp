@@ -10,7 +10,7 @@
 namespace limn::tracker {
 namespace {
 
-// Sums in steps that all want the one before.
+// Sums in steps that each need the step before.
 long summed_in_steps(int size, int steps, int count) {
   WorkerTeam team(size);
   std::vector<long> sums(static_cast<std::size_t>(count), 1);

@@ -14,7 +14,7 @@ namespace {
 using namespace test::literals;
 
 constexpr double k_frame_s = 1 / 30.0;
-constexpr int k_side = 240;  // of the image; a pixel is a millimetre of the table
+constexpr int k_side = 240;  // width of the image; a pixel is a millimetre of the table
 const Eigen::Vector2d k_px_control(120, 120);
 const MarkerName k_control{"aruco_4x4_50", "7"}, k_other{"aruco_4x4_50", "3"}, k_another{"aruco_4x4_50", "5"};
 
@@ -92,7 +92,7 @@ TEST(Gesture, LayingDownActsOnceUntilItStandsAgain) {
     for (int i = 0; i < 20; ++i) acts += watch.see(table.photographed(light));
     return acts;
   };
-  EXPECT_EQ(rest_at(65_deg), 0);  // stands, seen from above
+  EXPECT_EQ(rest_at(65_deg), 0);  // stands upright, seen from above
   EXPECT_EQ(rest_at(8_deg), 1);
   EXPECT_EQ(rest_at(8_deg), 0);
   EXPECT_EQ(rest_at(65_deg), 0);

@@ -13,15 +13,15 @@
 namespace limn::test {
 namespace {
 
-// Of a pixel that an edge runs through: a Fibonacci lattice knows its coverage to 0.9 level of 180.
+// Samples of a pixel that an edge crosses: a Fibonacci lattice gives its coverage within 0.9 of 180 levels.
 constexpr int k_samples = 233;
 constexpr int k_lattice = 144;
 
-// Intersection of a camera direction with the marker's plane, in marker coordinates over its side (0 … 1
+// Intersects a camera direction with the marker's plane, in marker coordinates divided by its side (0 … 1
 // inside).
 struct MarkerPlane {
-  Eigen::Matrix3d rotation;  // marker from camera
-  Eigen::Vector3d origin;    // the camera in the marker
+  Eigen::Matrix3d rotation;  // marker_from_camera
+  Eigen::Vector3d origin;    // position of the camera, in marker coordinates
   double size_m;
   double bow;
   explicit MarkerPlane(const PlacedMarker& placed)
@@ -38,7 +38,7 @@ struct MarkerPlane {
   }
 };
 
-// A rolling shutter's shear of the image about a marker's centre.
+// The shear that a rolling shutter causes around a marker's centre.
 struct RowMotion {
   Eigen::Vector2d px_a_row;
   double centre_row;
@@ -53,7 +53,7 @@ struct RowMotion {
   }
 };
 
-// Where a place along the marker lies: -2 and count + 1 beside the paper, -1 and count on its margin.
+// The zone of a place along the marker: -2 and count + 1 beside the paper, -1 and count on its margin.
 int zone_of(double place, double margin, int count) {
   if (place < -margin) return -2;
   if (place < 0) return -1;
@@ -61,7 +61,7 @@ int zone_of(double place, double margin, int count) {
   return std::min(static_cast<int>(place * count), count);
 }
 
-// 1 white, 0 black, nullopt beside the paper.
+// 1 for white, 0 for black, nullopt beside the paper.
 std::optional<double> ink(const cv::Mat& cells, int column, int row) {
   if (std::min(column, row) < -1 || column > cells.cols || row > cells.rows) return std::nullopt;
   if (std::min(column, row) < 0 || column == cells.cols || row == cells.rows) return 1.0;
@@ -84,7 +84,8 @@ cv::Rect bounds(const Lens& lens, const PlacedMarker& placed, const cv::Size& si
     low = low.cwiseMin(px);
     high = high.cwiseMax(px);
   }
-  const Eigen::Vector2d bow = 0.05 * (high - low) + Eigen::Vector2d(2, 2);  // sides bend in a lens
+  // Sides may be curved in a lens's image.
+  const Eigen::Vector2d bow = 0.05 * (high - low) + Eigen::Vector2d(2, 2);
   low -= bow;
   high += bow;
   const cv::Rect box(cv::Point(static_cast<int>(low.x()), static_cast<int>(low.y())),
@@ -92,7 +93,7 @@ cv::Rect bounds(const Lens& lens, const PlacedMarker& placed, const cv::Size& si
   return box & cv::Rect({}, size);
 }
 
-// Means over the areas of the pixels of one marker's box.
+// Computes means over the areas of the pixels in one marker's box.
 class MarkerPainter {
  public:
   MarkerPainter(const Lens& lens, const PlacedMarker& placed, const ImageOptions& options)
@@ -113,7 +114,7 @@ class MarkerPainter {
   const ImageOptions& options_;
   cv::Mat cells_;
 
-  // Of the box's pixels and of a frame of one pixel around it; zero where the lens has none.
+  // The directions of the box's pixels and of a frame one pixel wide around it; zero where the lens has none.
   cv::Mat directions_of(const cv::Rect& box) const {
     cv::Mat directions(box.height + 2, box.width + 2, CV_64FC3);
     const RowMotion motion(lens_, placed_);
@@ -142,7 +143,7 @@ class MarkerPainter {
     return white ? options_.black + *white * (options_.white - options_.black) : behind;
   }
 
-  // Directions are linear over a pixel to far better than 1e-4 of it.
+  // Within a pixel, directions are linear to far better than 1e-4 pixels.
   void paint_pixel(float& pixel, const cv::Mat& directions, int x, int y, std::mt19937_64& rng) const {
     const Eigen::Vector3d centre = direction(directions, x, y);
     const Eigen::Vector3d du = 0.5 * (direction(directions, x + 1, y) - direction(directions, x - 1, y));

@@ -28,7 +28,7 @@ TEST(MarkerMask, CoversExactlyThePaperThroughTheProjectorsLens) {
   const Imager imager = projector();
   const Track track = track_of(body, Pose(exp_rotation({0.2, -0.1, 0.4}), {0.02, 0.01, 1}));
   const cv::Mat mask = marker_mask(imager, std::span(&body, 1), std::span(&track, 1), {.margin = 0.2});
-  // Every projector pixel whose ray meets a marker's plane: inside or outside by the paper's own size.
+  // For every projector pixel whose ray meets a marker's plane: it is inside or outside the paper.
   int wrong = 0, on = 0;
   for (int row = 0; row < mask.rows; row += 2)
     for (int column = 0; column < mask.cols; column += 2) {

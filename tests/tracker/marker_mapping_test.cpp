@@ -34,7 +34,7 @@ struct Images {
   }
 };
 
-// The body turned about its axis and nodding, `depth` away; only markers that face the camera are found.
+// The body turns about its axis and nods, `depth` away; only markers that face the camera are found.
 Images images_of(const Body& body, int count, double depth, double noise_px, std::mt19937_64& rng) {
   std::uniform_real_distribution<double> nod(-0.5, 0.5), aside(-0.1, 0.1);
   Images images;

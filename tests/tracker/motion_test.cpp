@@ -55,7 +55,7 @@ TEST(Motion, CarriesItsCovarianceByTheDerivativeOfItsOwnStep) {
 
 TEST(Motion, GrowsAlikeInOneStepAndInMany) {
   Motion whole = some_motion();
-  whole.velocity.setZero();  // turning would mix the axes
+  whole.velocity.setZero();  // rotation would mix the axes
   whole.acceleration.setZero();
   Motion steps = whole;
   const MotionNoise noise{.turn_jerk = 7, .jerk = 3, .turn_drift = 0.1, .drift = 0.2};

@@ -1,4 +1,4 @@
-// The light that the pattern's fit expects, and its derivatives.
+// The light that the pattern fit expects, and its derivatives.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ SeenCells some_cells() {
   return cells;
 }
 
-// A marker of some 30 px, turned and seen from the side, blurred and a little moved and bent.
+// A marker of some 30 px, turned and seen from the side, blurred, with a little motion and bend.
 State some_state() {
   State state;
   state.corners = {k_origin + Eigen::Vector2d(-17, -9), k_origin + Eigen::Vector2d(9, -18),
@@ -41,11 +41,11 @@ State some_state() {
 
 struct Light {
   std::vector<float> light, behind;
-  std::vector<std::vector<float>> derivatives;  // by unknown
+  std::vector<std::vector<float>> derivatives;  // for each unknown
   std::vector<std::int32_t> edges;
 };
 
-// At the pixels about the marker, all of them.
+// At all pixels around the marker.
 Light light_of(const State& state, int version) {
   std::vector<float> x, y, level_x, level_y;
   const Eigen::Matrix3d square_from_px = SquareToQuad(some_state().corners).matrix().inverse();
@@ -71,7 +71,7 @@ Light light_of(const State& state, int version) {
   return seen;
 }
 
-// The cells as they are, looked at through the Gaussian and the motion place by place.
+// The cells, convolved with the Gaussian and the motion place by place.
 double expected_light(const State& state, const Eigen::Vector2d& px) {
   const SeenCells cells = some_cells();
   const Eigen::Matrix3d square_from_px = SquareToQuad(state.corners).matrix().inverse();
@@ -141,7 +141,7 @@ TEST(PatternLight, ChangesAsItsDerivativesSay) {
 }
 
 TEST(PatternLight, IsTheSameOnEveryProcessor) {
-  // What lies beyond four sigmas of all samples that are looked at together is left out: 3e-5.
+  // Samples are processed together. What lies beyond four sigmas of all of them is omitted: 3e-5.
   const Light any = light_of(some_state(), 0);
   for (int version = 1; version < pattern_kernel_versions(); ++version) {
     const Light own = light_of(some_state(), version);

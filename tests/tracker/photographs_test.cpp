@@ -49,10 +49,11 @@ std::vector<Detection> detections_in(const std::filesystem::path& image,
   const auto folder##_data = test::real_data("markers/" #folder); \
   if (!folder##_data) GTEST_SKIP() << "no photographs: markers/" #folder
 
-// Every listed marker, once, in its corner order, within so much of its listed corners; nothing else.
+// Every listed marker is found once, in its corner order, within this distance of its listed corners; nothing
+// else is found.
 constexpr double k_corner_px = 1.2;
 
-// The lists name the last black pixel: its middle lies half a pixel inside both sides.
+// The lists give the last black pixel; its middle lies half a pixel inside both sides.
 Eigen::Vector2d corner_of_pixel(const Listed& row, std::size_t corner) {
   const auto& c = row.corners;
   const Eigen::Vector2d to = (c[corner] - c[(corner + 3) % 4]).normalized();
@@ -61,10 +62,10 @@ Eigen::Vector2d corner_of_pixel(const Listed& row, std::size_t corner) {
   return c[corner] + 0.5 * outward / (1 + to.dot(on));
 }
 
-// One listed corner of 284 lies 1.9 px beside the plane through the corners of the board's other markers
-// (lens undistorted by the file beside the images), and as far from where cv::cornerSubPix ends that starts
-// there. This is the plane's pixel. The board is not quite flat: its corners scatter by 0.5 px about the
-// plane.
+// One listed corner of 284 lies 1.9 px off the plane through the corners of the board's other markers
+// (undistorted with the lens file beside the images), and as far from where cv::cornerSubPix ends when it
+// starts there. This is the plane's pixel. The board is not quite flat: its corners scatter by 0.5 px about
+// the plane.
 std::optional<Eigen::Vector2d> by_plane(const Listed& row, std::size_t corner) {
   if (row.file == "gboriginal.png" && row.id == "9" && corner == 0) return Eigen::Vector2d(419.0, 137.4);
   return std::nullopt;
@@ -120,7 +121,8 @@ TEST(Photographs, ShowTheIdsOfAllDiamonds) {
   EXPECT_EQ(ids, wanted);
 }
 
-// AprilTag's own list: its corners start elsewhere; at its pixels' convention the median distance is .4 px.
+// In AprilTag's own list a tag's corners start at another corner. In its pixel convention the median distance
+// is .4 px.
 bool is_listed_tag(const Listed& row, const Detection& found, double within_px) {
   if (found.marker.id != row.id) return false;
   return std::all_of(row.corners.begin(), row.corners.end(), [&](const Eigen::Vector2d& corner) {
@@ -129,7 +131,7 @@ bool is_listed_tag(const Listed& row, const Detection& found, double within_px) 
   });
 }
 
-// The list's corners of one that is ten pixels high lie 3.5 px within ours, and within its ink.
+// For one tag that is ten pixels high, the listed corners lie 3.5 px inside ours, within its ink.
 TEST(Photographs, ShowAllDistantTagsAnd46Of47WhereTheyAreListed) {
   DATA_OR_SKIP(apriltag);
   std::map<std::string, std::vector<Detection>> found;
@@ -149,7 +151,7 @@ TEST(Photographs, ShowAllDistantTagsAnd46Of47WhereTheyAreListed) {
   EXPECT_EQ(listed, 47);
   EXPECT_EQ(read, 47);
   EXPECT_GE(hits, 46);
-  for (const auto& [file, detections] : found)  // all tags there are of two kinds
+  for (const auto& [file, detections] : found)  // there are only two kinds of tags
     for (const Detection& d : detections)
       EXPECT_TRUE(d.marker.id == "0" || d.marker.id == "1") << file << d.marker.id;
 }
@@ -168,12 +170,12 @@ TEST(Photographs, ShowHiroAtItsDistance) {
   const auto found = Detector(Families::load(names).value()).detect(grey, &camera->lens);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].marker.text(), "artoolkit:hiro.patt");
-  // The writing runs from the upper left to the lower right of the image.
+  // The text on the marker runs from the image's upper left to its lower right.
   EXPECT_TRUE(test::near(found[0].corners_px[0], Eigen::Vector2d(177, 21), 1.5));
   const auto poses = marker_poses(camera->lens, 0.08, found[0].corners_px, found[0].corner_covariance);
   ASSERT_FALSE(poses.empty());
-  // No bound on rms_px: at this file's focal length the wrinkled paper is no square (2.5 px with even
-  // weights). The file is read as ARToolKit reads version 1: x0, y0, f, s; (p - c) s (1 - f 1e-8 r^2).
+  // There is no bound on rms_px: with this file's focal length the wrinkled paper is not square (2.5 px with
+  // equal weights). The file is read as ARToolKit reads version 1: x0, y0, f, s; (p - c) s (1 - f 1e-8 r^2).
   EXPECT_GT(poses[0].camera_from_marker.translation.z(), 0.15);
   EXPECT_LT(poses[0].camera_from_marker.translation.z(), 0.5);
 }

@@ -28,7 +28,7 @@ double uniform(std::mt19937_64& rng, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(rng);
 }
 
-// A marker in front of the camera, tilted by `tilt`.
+// A pose of a marker in front of the camera, tilted by `tilt`.
 Pose random_pose(std::mt19937_64& rng, double tilt, double depth) {
   const double towards = uniform(rng, 0, 6.28);
   const Eigen::Quaterniond turn =
@@ -177,12 +177,12 @@ TEST(TrianglePose, KnowsThatTheTwistIsTheGeneratorAndNotTheMotion) {
   const Eigen::Matrix4d theta = twist(motion);
   EXPECT_NEAR((theta.topLeftCorner<3, 3>() + theta.topLeftCorner<3, 3>().transpose()).norm(), 0, 1e-12);
   EXPECT_TRUE(test::pose_near(exp_twist(theta), motion, 1e-9, 1e-9));
-  // exp as its power series: nothing of ours.
+  // exp as its power series, independent of Limn's code.
   Eigen::Matrix4d term = Eigen::Matrix4d::Identity();
   Eigen::Matrix4d sum = term;
   for (int k = 1; k < 40; ++k) sum += term = Eigen::Matrix4d(term * theta / k);
   EXPECT_NEAR((sum - motion.matrix()).norm(), 0, 1e-12);
-  EXPECT_GT((theta - motion.matrix()).norm(), 0.5);  // what the paper prints is another matrix
+  EXPECT_GT((theta - motion.matrix()).norm(), 0.5);  // the paper's printed matrix differs
   const Pose small(exp_rotation({1e-5, 2e-5, 0}), Eigen::Vector3d(1e-5, 0, 0));
   EXPECT_NEAR((Eigen::Matrix4d::Identity() + twist(small) - small.matrix()).norm(), 0, 1e-9);
 }
@@ -314,7 +314,7 @@ TEST(BodyPose, OfTwoCamerasHasTheCovarianceOfItsErrors) {
                  .squaredNorm();
   }
   EXPECT_NEAR(normalised, 1, 0.15);
-  EXPECT_LT(joint, 0.25 * alone);  // two lines of sight: depth is no longer weak
+  EXPECT_LT(joint, 0.25 * alone);  // two lines of sight: depth is no longer uncertain
 }
 
 }  // namespace

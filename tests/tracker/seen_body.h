@@ -18,7 +18,7 @@ inline Imager camera_1080p() {
   return {"camera0", 1920, 1080, Lens::pinhole(1600, 1600, 959.5, 539.5), Pose{}};
 }
 
-/// `count` markers of 40 mm, 200 mm apart in a square, a little tilted to each other; one stands in the
+/// `count` markers of 40 mm, 200 mm apart in a square, slightly tilted against each other; one is at the
 /// origin.
 inline Body body_of(int count) {
   Body body{"prototype", {}};
@@ -32,7 +32,8 @@ inline Body body_of(int count) {
   return body;
 }
 
-/// What a detector finds of the body: true corners with Gaussian noise, whose covariance it states.
+/// What a detector would find of the body: true corners with Gaussian noise, with the covariance of that
+/// noise.
 inline std::vector<tracker::Detection> detections_of(const Body& body,
                                                      const Imager& camera,
                                                      const Pose& world_from_body,
@@ -55,7 +56,7 @@ inline std::vector<tracker::Detection> detections_of(const Body& body,
   return found;
 }
 
-/// A hand that carries a body about a place: 0.25 m/s and 0.5 rad/s RMS, along and about every axis at a
+/// A hand that moves a body around a place: 0.25 m/s and 0.5 rad/s RMS, along and about every axis with a
 /// frequency of its own, 0.3 to 0.6 Hz.
 class HandMotion {
  public:

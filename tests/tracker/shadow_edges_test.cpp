@@ -10,8 +10,8 @@
 namespace limn::tracker {
 namespace {
 
-// Strips of shadow, 4:1, one of which begins on the paper beside the ink: `angle` off one of the marker's
-// sides, `beside_px` from its middle.
+// Strips of shadow, 4:1. One of them begins on the paper beside the ink: `angle` away from one of the
+// marker's sides, `beside_px` from the side's middle.
 cv::Mat with_slats(const cv::Mat& light,
                    const std::array<Eigen::Vector2d, 4>& corners,
                    std::size_t side,
@@ -58,14 +58,14 @@ void expect_no_shadows_edge(const Lens& lens, double low_px, double high_px, dou
     }
   }
   EXPECT_GE(corners, 4 * 0.75 * k_count);
-  EXPECT_GE(near, 0.9 * corners);                      // without looking for shadows: half
-  EXPECT_LT(std::sqrt(squares / corners), most_pull);  // without: a hundred
+  EXPECT_GE(near, 0.9 * corners);                      // half without the search for shadows
+  EXPECT_LT(std::sqrt(squares / corners), most_pull);  // a hundred without it
 }
 
 TEST(Detector, TakesNoShadowsEdgeForTheInks) { expect_no_shadows_edge(pinhole_vga(), 70, 120, 1.2); }
 TEST(Detector, TakesNoShadowsEdgeForTheInksThroughALens) { expect_no_shadows_edge(bent_vga(), 120, 160, 2); }
 
-// What was known of a marker's light is not believed when a shadow has come.
+// The known light of a marker is not used any more when a shadow has come.
 TEST(Detector, SeesAShadowComeUponAMarkerThatItFollows) {
   auto rng = test::test_rng();
   const Lens lens = pinhole_vga();

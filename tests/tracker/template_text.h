@@ -8,7 +8,7 @@ namespace limn::tracker {
 
 /// An ARToolKit template's file, `size` cells a side.
 inline std::string template_text(int size) {
-  // An L with a dot: no rotation looks like another.
+  // An L with a dot, which differs from all of its rotations.
   const auto grey = [&](int row, int column) {
     const bool stem = column > size / 5 && column < size / 2 && row > size / 8;
     const bool foot = row > size * 3 / 4 && column > size / 5 && column < size * 7 / 8;

@@ -22,7 +22,7 @@ Lens pinhole_vga() { return Lens::pinhole(600, 600, 319.5, 239.5); }
 
 std::string detected_text(const std::filesystem::path& file) { return "artoolkit:" + file.string(); }
 
-// A template file of three bars and a corner, unlike itself turned.
+// A template file of three bars and a corner, which differs from its own rotations.
 std::filesystem::path bars(const std::filesystem::path& folder, const std::string& name, int wide) {
   std::string text;
   for (int block = 0; block < 12; ++block)
@@ -121,7 +121,7 @@ TEST(Templates, AreToldApartByTheDetectorsOwnLimits) {
   const auto folder = test::test_folder();
   const auto a = bars(folder, "a.patt", 4);
   const auto b = bars(folder, "b.patt", 5);
-  std::string even;  // looks the same from four sides
+  std::string even;  // the same in all four rotations
   for (int block = 0; block < 12; ++block)
     for (int row = 0; row < 16; ++row)
       for (int column = 0; column < 16; ++column)
@@ -144,13 +144,13 @@ TEST(Templates, AreToldApartByTheDetectorsOwnLimits) {
             of("a.patt", "b.patt").correlation > 0.9 ? Discriminability::confused : Discriminability::alike);
   EXPECT_GT(of("a.patt", "b.patt").correlation, 0.8);
   EXPECT_EQ(of("a.patt", "a.patt").telling, Discriminability::apart);
-  // What the report calls confused, the detector does not read.
+  // The detector does not read what the report calls confused.
   auto rng = test::test_rng();
   Detector detector(Families::load(std::vector{detected_text(folder / "even.patt")}).value());
   EXPECT_TRUE(detector.detect(image_with({placed(folder / "even.patt", 300, 120, 0, 0)}, rng)).empty());
 }
 
-// Two that differ by the width of a bar: sharp they are told apart, blurred they are doubted.
+// Two that differ by the width of a bar: they are told apart when sharp, and rejected when blurred.
 TEST(Templates, NearlyAlikeAreDoubtedWhereTheyAreBlurred) {
   auto rng = test::test_rng();
   const auto folder = test::test_folder();

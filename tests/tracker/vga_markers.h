@@ -8,7 +8,7 @@
 #include "tests/tracker/marker_images.h"
 #include "tracker/detector.h"
 
-/// Markers before cameras of 640x480, for the detector's tests.
+/// Markers in front of cameras of 640x480, for the detector's tests.
 namespace limn::tracker {
 
 using namespace test::literals;
@@ -26,7 +26,7 @@ inline Lens bent_vga() {
       .value();
 }
 
-/// Six, in clutter.
+/// Six markers in clutter.
 inline cv::Mat scattered_markers(int moved_px, std::mt19937_64& rng) {
   std::vector<PlacedMarker> markers;
   for (int i = 0; i < 6; ++i)
