@@ -16,10 +16,11 @@ struct Canvas {
   Canvas(int width, int height, GLenum format);
 };
 
-/// Canvases for what is drawn and used up at once, one a size and format.
+/// Temporary canvases, one for each size and format.
 class CanvasPool {
  public:
-  /// Good until the next call with the same values draws into it.
+  /// Its contents are valid until somebody draws into the canvas of another call with the same size and
+  /// format.
   const Canvas& canvas(int width, int height, GLenum format);
 
  private:
