@@ -8,16 +8,16 @@
 
 namespace limn::sim {
 
-/// How a projector sees one sample: everything that its light needs apart from the image shown.
+/// How one projector lights one sample: everything that is needed for its light except the image shown.
 struct ProjectorView {
-  float u = 0, v = 0;  ///< pixel, through the true lens
-  float gain = 0;   ///< share that is reached (shadow rays, facing) x cosine of incidence / distance², 1/m²
-  float depth = 1;  ///< along the projector's axis, m
+  float u = 0, v = 0;  ///< Pixel, by the true lens.
+  float gain = 0;      ///< Unshadowed share x cosine of incidence / distance², 1/m².
+  float depth = 1;     ///< Along the projector's axis, m.
 };
 
-/// What a camera's pixels see, traced once per geometry; showing another image is a lookup. Sample i <
-/// width * height is the first of pixel i; further samples of pixels on edges follow, sorted by pixel. Arrays
-/// run in parallel.
+/// What a camera's pixels see. It is traced once for each geometry; other projected images only need lookups.
+/// Sample i < width * height is the first sample of pixel i; further samples of pixels on edges follow,
+/// sorted by pixel. All arrays have the same length and order.
 struct Samples {
   int camera = 0;
   int width = 0;
