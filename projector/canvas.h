@@ -7,7 +7,7 @@
 
 namespace limn::projector {
 
-/// An image that is drawn into.
+/// A texture with a framebuffer, into which passes draw.
 struct Canvas {
   int width = 0, height = 0;
   GlName texture, framebuffer;
@@ -19,8 +19,7 @@ struct Canvas {
 /// Temporary canvases, one for each size and format.
 class CanvasPool {
  public:
-  /// Its contents are valid until somebody draws into the canvas of another call with the same size and
-  /// format.
+  /// Its contents are valid until the next call with the same size and format draws into it.
   const Canvas& canvas(int width, int height, GLenum format);
 
  private:

@@ -34,7 +34,7 @@ class ContactShadow final : public Bindable {
   /// Radius of a cone divided by its length: tan of the half angle of 30 degrees, with which six cones fill a
   /// hemisphere.
   static constexpr double k_widening = 0.577;
-  /// Farther than this (m) from every part there is no shadow.
+  /// Largest distance (m) from a part at which there is a shadow.
   static constexpr double k_reach = (1 + k_widening) * k_free;
 
   explicit ContactShadow(const scene::Scene& scene);

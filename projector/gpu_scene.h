@@ -46,7 +46,8 @@ class GpuScene final : public Bindable {
   static std::size_t most_triangles();
   /// Error: more than `most` triangles.
   static Status check_fits(const scene::Scene& scene, std::size_t most);
-  /// A texture larger than 4096 texels a side, or than the driver's limit, is reduced to it, with a warning.
+  /// A texture that is larger than 4096 x 4096 texels, or than the driver's limit, is reduced to it, with a
+  /// warning.
   explicit GpuScene(const scene::Scene& scene);
 
   /// Writes the meshes that a posed scene shows to `runs`. Their poses are in the coordinate frame "scene",

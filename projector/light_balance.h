@@ -31,8 +31,8 @@ class LightBalance final : public Bindable {
   const PrototypeAlbedo& albedo() const { return albedo_; }
   /// Returns false when nothing changes. Compensation::measured needs an earlier call of measure().
   bool set_options(const LightOptions& options);
-  /// Uploads a measured surface, and makes the scene keep the ids that its camera sees. Error: no pixel of
-  /// the surface was lit; then nothing changes.
+  /// Uploads a measured surface, and makes the scene keep the ids that its camera sees. Error: no projector
+  /// lit the surface; then nothing changes.
   Status measure(const MeasuredSurface& surface, const Rig& rig, SceneCache* scene, CanvasPool* canvases);
   /// Computes the default of LightOptions::level. To be called before the first drawing in which the
   /// prototype is placed.

@@ -34,8 +34,8 @@ struct LightDisplacements {
 };
 
 /// Compares a camera's frames with what the projectors showed, to find devices that have moved: their light
-/// lies beside its predicted place. Works cell by cell. Only cells are used that lie wholly on the prototype
-/// and whose light has edges and has not changed recently. The measure is the zero-mean normalised
+/// is shifted from its predicted place. Works cell by cell. Only cells are used that lie wholly on the
+/// prototype and whose light has edges and has not changed recently. The measure is the zero-mean normalised
 /// cross-correlation of the frame with the predicted light, with the light of one projector (or all light)
 /// shifted. No albedo is needed; a print on the prototype only lowers the correlation. The results of some
 /// seconds are summed with exponential forgetting.

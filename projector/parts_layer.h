@@ -54,7 +54,7 @@ class PartsLayer {
   std::optional<Both> shadowed_;
   ComputePass where_edges_;
   PixelList list_;          // first the pixels that may see something, then those at edges
-  PixelList beside_unlit_;  // pixels at edges of which projected light may not show every sample
+  PixelList beside_unlit_;  // pixels at edges with samples that light may not show
 };
 
 }  // namespace limn::projector

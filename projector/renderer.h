@@ -25,7 +25,7 @@ enum class Composite {
 
 struct CompositePolicy;
 
-/// How smooth the edges of parts are drawn.
+/// Anti-aliasing of the edges of parts.
 struct Smoothing {
   /// Samples for each pixel on an edge: 8, or 4 in half the time for small and compressed images.
   int samples = 8;
@@ -60,8 +60,8 @@ class Renderer {
   ~Renderer();
 
   /// Sets how colours become light, from the next image on. The default is LightOptions(). `surface` is
-  /// needed for Compensation::measured. Error: a surface that does not fit the rig, or of which no pixel was
-  /// lit; then nothing changes.
+  /// needed for Compensation::measured. Error: a surface that does not fit the rig, or that no projector lit;
+  /// then nothing changes.
   Status set_light(const LightOptions& options, const MeasuredSurface* surface = nullptr);
 
   /// Sets which share of projector `index`'s light arrives, from the next image on (ShadowDetector estimates

@@ -47,8 +47,8 @@ struct ShadowDetectorOptions {
 /// Limits. Where two projectors give the same light and nothing else differs, it is unknown which one is
 /// blocked: one is guessed, and the next frame corrects it. A thing before the camera may look just like the
 /// shadow. This is harmless: the other projectors then give the light, and the sum is wrong by 7 % at most.
-/// Shadows are not found where no camera looks, where the hand hides them from all cameras, or where no light
-/// is shown. Something that stood in the light from the start is learned as part of the scene.
+/// Shadows are not found where no camera sees them, where the hand hides them from all cameras, or where no
+/// light is shown. Something that stood in the light from the start is learned as part of the scene.
 class ShadowDetector {
  public:
   explicit ShadowDetector(const Rig& rig, const ShadowDetectorOptions& options = {});

@@ -53,12 +53,13 @@ CentreShare centre_share(ivec2 at) {
 }
 
 bool is_beside(CentreShare centre, Hit hit, Place place, float footprint) {
-  const float k_steepest = 4.0;    // m of depth a m across, 76 degrees
-  const float k_same_side = 0.99;  // cosine between triangles, 8 degrees
+  const float k_steepest = 4.0;    // slope: depth divided by width, 76 degrees
+  const float k_same_side = 0.99;  // cosine of the angle between triangles, 8 degrees
   return abs(hit.t - centre.t) < k_steepest * footprint && dot(place.d_flat, centre.d_flat) > k_same_side;
 }
 
-// Colour that is to be seen at a place, t along the projector's ray; a: 0 where there is none.
+// The colour that should be visible at a place at distance t along the projector's ray; a: 0 where there is
+// none.
 vec4 wanted_colour(Place place, float t) {
   float footprint = t / sight_at(u_projector).quality.x;
   vec4 colour = vec4(0);
@@ -71,7 +72,7 @@ vec4 wanted_colour(Place place, float t) {
   return colour;
 }
 
-// A sample of a pixel.
+// One sample of a projector's pixel.
 struct Sample {
   Hit prototype;
   Place place;

@@ -77,7 +77,7 @@ vec3 look_along(vec3 d, Hit hit, float footprint) {
 }
 
 // Colour of a part that lies on the surface. It is the same for every viewer: shaded as seen along the
-// prototype's normal, and lit from there if no room light is known.
+// prototype's normal, and illuminated from there if no room light is known.
 vec3 radiance_on_surface(Hit hit, vec3 d_prototype_normal, float footprint) {
   if (is_unlit(hit)) return base_colour(hit, footprint);
   Finish finish = finish_at(hit, footprint);

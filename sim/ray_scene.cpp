@@ -13,7 +13,7 @@
 namespace limn::sim {
 namespace {
 
-// offset, relative to the distance, at which a ray continues behind a cut-out.
+// A ray continues behind a cut-out after this share of its distance, but at least after this length (m).
 constexpr float k_behind_cut_out = 1e-6F;
 constexpr double k_surface_gap = 1e-4;  // m; nearer surfaces do not occlude a shadow ray
 

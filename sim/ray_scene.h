@@ -21,10 +21,10 @@ struct MeshInstance {
 /// Where a ray first hits a surface. `distance` (m) is exact for the triangle that was hit: computed in
 /// double precision from its plane, not taken from the ray tracer's single precision.
 struct Hit {
-  int object = -1;  ///< index of the placed mesh; -1: nothing
+  int object = -1;  ///< Index of the mesh instance; -1: nothing.
   int triangle = -1;
   double distance = 0;
-  Eigen::Vector2f barycentric = {0, 0};  ///< weights of the triangle's second and third corner
+  Eigen::Vector2f barycentric = {0, 0};  ///< Weights of the triangle's second and third corner.
 };
 
 /// Triangles in the world frame, prepared for ray queries (Embree). Queries are thread-safe.

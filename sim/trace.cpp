@@ -385,7 +385,7 @@ class Tracer {
   Eigen::Vector3d p_eye_;
   std::vector<LampPoint> lamps_;
   std::vector<Eigen::Vector3d> p_projectors_;
-  std::vector<Surface> surfaces_;  // of pixel centres
+  std::vector<Surface> surfaces_;  // at pixel centres
   std::vector<std::uint8_t> edge_;
   std::vector<float> room_;
   std::vector<std::vector<std::uint8_t>> lit_;  // for each projector, at pixel centres

@@ -22,15 +22,15 @@ struct Samples {
   int camera = 0;
   int width = 0;
   int height = 0;
-  std::vector<std::int32_t> pixel;                     ///< row * width + column
-  std::vector<float> weight;                           ///< share of the pixel; those of one pixel sum to 1
-  std::vector<std::int16_t> object;                    ///< index into World::objects; -1: nothing was hit
-  std::vector<Eigen::Vector3f> p_world;                ///< mean hit point
-  std::vector<Eigen::Vector3f> n_world;                ///< unit normal towards the camera
-  std::vector<Eigen::Vector3f> albedo;                 ///< linear BGR
-  std::vector<float> grey;                             ///< weight x mean albedo, what a grey camera sees
-  std::vector<float> room_light;                       ///< illuminance by the room
-  std::vector<std::vector<ProjectorView>> projectors;  ///< per projector
+  std::vector<std::int32_t> pixel;       ///< Row * width + column.
+  std::vector<float> weight;             ///< Share of the pixel; the weights of one pixel sum to 1.
+  std::vector<std::int16_t> object;      ///< Index into World::objects; -1: nothing was hit.
+  std::vector<Eigen::Vector3f> p_world;  ///< Mean hit point.
+  std::vector<Eigen::Vector3f> n_world;  ///< Unit normal towards the camera.
+  std::vector<Eigen::Vector3f> albedo;   ///< Linear BGR.
+  std::vector<float> grey;               ///< Weight x mean albedo: what a grey camera sees.
+  std::vector<float> room_light;         ///< Illuminance by the room.
+  std::vector<std::vector<ProjectorView>> projectors;  ///< One entry for each projector.
   std::size_t size() const { return pixel.size(); }
 };
 

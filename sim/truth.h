@@ -18,14 +18,14 @@ namespace limn::sim {
 struct Landing {
   std::string object;
   Eigen::Vector3d p_world;
-  Eigen::Vector3d p_object;  ///< in the object's own frame
-  Eigen::Vector3d n_world;   ///< geometric normal, towards the imager
+  Eigen::Vector3d p_object;  ///< In the object's own frame.
+  Eigen::Vector3d n_world;   ///< Geometric normal, towards the imager.
 };
 
 /// A point of a surface, in its mesh's frame.
 struct SampledPoint {
   Eigen::Vector3d p;
-  Eigen::Vector3d n;  ///< unit, interpolated
+  Eigen::Vector3d n;  ///< Unit normal, interpolated.
 };
 
 /// The object that each pixel shows: `image` (CV_16S) holds indices into `names`, -1 for nothing.

@@ -49,7 +49,7 @@ class VirtualRig {
   /// restore_prototype() undoes both.
   void remove_prototype();
   void restore_prototype();
-  /// All projectors black.
+  /// Makes all projectors black.
   void darken();
 
   /// Frames of these cameras, all exposed at one moment, as with a trigger line. Advances the clock as their
@@ -82,7 +82,8 @@ class VirtualRig {
   std::uint64_t frames_ = 0;
   std::optional<Pose> prototype_home_;  // set while the prototype is removed
   std::vector<CameraEffects> effects_home_;
-  std::vector<std::vector<ShownImage>> shown_;  // per projector, oldest first; the first is on the surface
+  // For each projector, oldest first; the first one is on the surface.
+  std::vector<std::vector<ShownImage>> shown_;
   std::vector<std::optional<Samples>> samples_;
   std::vector<std::unique_ptr<Camera>> cameras_;
   std::vector<std::unique_ptr<Projector>> projectors_;

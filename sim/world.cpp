@@ -60,8 +60,7 @@ Pose read_imager_pose(const ConfigNode& node) {
   if (d.norm() < 1e-6 || d.head<2>().norm() < 1e-6 * d.norm()) {
     node.at("target_m")
         .problem(
-            "expected a target that is neither at eye_m nor vertically above or below it, found such a "
-            "target. "
+            "expected a target that is neither at eye_m nor vertically above or below it, found one that is. "
             "Give imager_from_world instead.");
     return {};
   }

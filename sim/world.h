@@ -26,7 +26,7 @@ struct CameraEffects {
   bool colour = false;    ///< BGR frames instead of grey ones.
   double exposure = 1;    ///< Share of full scale for each unit of light (albedo x illuminance).
   double psf_px = 0;      ///< Standard deviation of the lens's Gaussian blur; 0: off.
-  double vignetting = 0;  ///< share of light lost in the image's corners, quadratic in radius; 0: off
+  double vignetting = 0;  ///< Share of light lost in the image's corners, quadratic in radius; 0: off.
   /// Electrons at full scale; the variance of shot noise is signal / full_well_e; 0: off.
   double full_well_e = 0;
   double read_noise = 0;   ///< Standard deviation in 8-bit levels of linear signal; 0: off.
@@ -44,7 +44,7 @@ struct ProjectorEffects {
   Eigen::Vector3d channel_gamma = {1, 1, 1};  ///< Factors on gamma for blue, green, red; 1: off.
   double s_curve = 0;      ///< Share of smoothstep(value) in the response, as with films and LCDs; 0: off.
   double black_level = 0;  ///< Light of black, as a share of white; 0: off.
-  double vignetting = 0;   ///< share of light lost in the panel's corners, quadratic in radius; 0: off
+  double vignetting = 0;   ///< Share of light lost in the panel's corners, quadratic in radius; 0: off.
   double focus_m = 1;      ///< Depth of sharp focus.
   double aperture_m = 0;   ///< Diameter of the exit pupil, for defocus; 0: off.
   bool falloff = true;     ///< Light falls with the square of the distance; false: as at 1 m.
@@ -56,9 +56,9 @@ struct Object {
   std::string name;
   std::shared_ptr<const scene::Mesh> mesh;
   Pose world_from_object;
-  Eigen::Vector3d albedo = {0.8, 0.8, 0.8};  ///< linear BGR reflectance where the texture is white
-  double ink_albedo = 0;                     ///< reflectance where the texture is black
-  cv::Mat texture;                           ///< 8-bit sRGB, grey or BGR, in the mesh's uv; empty: plain
+  Eigen::Vector3d albedo = {0.8, 0.8, 0.8};  ///< Linear BGR reflectance where the texture is white.
+  double ink_albedo = 0;                     ///< Reflectance where the texture is black.
+  cv::Mat texture;                           ///< 8-bit sRGB, grey or BGR, in the mesh's uv; empty: plain.
   bool sharp_texture = false;                ///< Pixels are small squares (printed cells), not interpolated.
   bool by_material = false;                  ///< Uses the mesh's own materials instead of albedo and texture.
   std::optional<Pose> prototype_from_object;  ///< When set, the object moves with the prototype.
