@@ -45,9 +45,9 @@ struct PartCoverage {
 };
 
 /// Draws a scene for a rig: projector images, composites over camera images, coverage. For every pixel the
-/// ray of the true (distorted) lens is intersected exactly with triangles; which triangles, says an image of
-/// triangle ids that was rasterised from the same position. Belongs to the GL context (4.5 core) that is
-/// current when it is created; that context must be current at every call and at destruction. Poses,
+/// ray of the true (distorted) lens is intersected exactly with triangles. An image of triangle ids,
+/// rasterised from the same position, says which triangles to test. Belongs to the GL context (4.5 core) that
+/// is current when it is created; that context must be current at every call and at destruction. Poses,
 /// materials and light may change from call to call; what did not change is not drawn again.
 class Renderer {
  public:
