@@ -9,8 +9,8 @@ namespace limn::projector {
 namespace {
 
 constexpr int k_widest_step = 4;
-constexpr double k_tolerance_px = 0.005;  // of the table between its nodes
-constexpr int k_probes = 24;              // a side of the image, for checking that
+constexpr double k_tolerance_px = 0.005;  // largest error of the table between its nodes
+constexpr int k_probes = 24;              // points for each side of the image at which this is checked
 
 cv::Vec2f tangent_of(const Eigen::Vector3f& d) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
@@ -27,7 +27,7 @@ cv::Mat tangents_every(const Imager& imager, int step) {
   return tangents;
 }
 
-// Bilinear, as shaders/lens.glsl reads it.
+// Reads the table bilinearly, as shaders/lens.glsl does.
 Eigen::Vector2d read(const cv::Mat& tangents, int step, const Eigen::Vector2d& px) {
   const Eigen::Vector2d node = px / step;
   const int x = static_cast<int>(node.x()), y = static_cast<int>(node.y());
@@ -42,7 +42,7 @@ Eigen::Vector2d read(const cv::Mat& tangents, int step, const Eigen::Vector2d& p
 double worst_error_px(const Imager& imager, const cv::Mat& tangents, int step) {
   double worst = 0;
   for (int i = 0; i < k_probes * k_probes; ++i) {
-    // Whole cells plus one half, where interpolation is worst.
+    // Cell centres, where interpolation is worst.
     const int column = (i % k_probes) * (imager.width / step - 1) / k_probes;
     const int row = (i / k_probes) * (imager.height / step - 1) / k_probes;
     const Eigen::Vector2d px = (Eigen::Vector2d(column, row).array() + 0.5).matrix() * step;
@@ -55,7 +55,8 @@ double worst_error_px(const Imager& imager, const cv::Mat& tangents, int step) {
   return worst;
 }
 
-// Display value that gives `light`, between the levels; levels that fall count as the highest before.
+// The display value that gives `light`, interpolated between the measured levels. A level below an earlier
+// one is replaced by the highest before it.
 float display_value(const std::vector<double>& levels, double light) {
   double before = levels.front();
   if (light <= before) return 0;
@@ -86,7 +87,7 @@ BakedLens baked(const Imager& imager) {
     lens.rect.lower = lens.rect.lower.cwiseMin(tangent);
     lens.rect.upper = lens.rect.upper.cwiseMax(tangent);
   }
-  // The first nodes are pixel centres; the image begins half a pixel before.
+  // The first nodes are pixel centres; the image begins half a pixel before them.
   const Eigen::Vector2d half_pixel(0.5 / imager.lens.fx(), 0.5 / imager.lens.fy());
   lens.rect.lower -= 2 * half_pixel;
   return lens;
@@ -107,8 +108,8 @@ cv::Mat pixel_map(const Imager& imager, const TangentRect& rect, int columns, in
 }
 
 cv::Rect pixels_of(const Imager& imager, const BakedLens& lens, const TangentRect& rect) {
-  constexpr int k_nodes = 17;        // a side: a lens bends lines little between them
-  constexpr double k_margin_px = 4;  // for that, and for what pixels see beside their centres
+  constexpr int k_nodes = 17;        // nodes for each side; a lens bends lines little between them
+  constexpr double k_margin_px = 4;  // for this bending, and because a pixel sees more than its centre
   const TangentRect seen = intersected(rect, lens.rect);
   if (seen.is_empty()) return {};
   Eigen::AlignedBox2d box;

@@ -9,24 +9,24 @@ namespace limn::projector {
 namespace {
 
 constexpr int k_nodes = 32;        // as in shaders/look.glsl
-constexpr int k_samples = 512;     // of a node; 16 times as many change no level in renderer_test
-constexpr double k_horizon = 0.3;  // height where all light is that from above
+constexpr int k_samples = 512;     // samples for each node; 16 times as many change no level in renderer_test
+constexpr double k_horizon = 0.3;  // height at which all light counts as light from above
 constexpr double k_least_roughness = 0.03, k_least_cosine = 1e-3, k_most_cosine = 0.999;
 
-// Of light from a direction of height -1 … 1 (its sine): share that is that from above.
+// The share of light from above in the light from a direction of this height (sine of its elevation, -1 … 1).
 double share_from_above(double height) {
   const double t = std::clamp((height / k_horizon + 1) / 2, 0.0, 1.0);
   return t * t * (3 - 2 * t);
 }
 
-// Of 0 … count - 1: spread evenly over 0 … 1 whatever their number (van der Corput).
+// Value i of the van der Corput sequence: any number of first values is spread evenly over 0 … 1.
 double spread(unsigned i) {
   double sum = 0;
   for (double digit = 0.5; i > 0; i >>= 1, digit /= 2) sum += (i & 1) * digit;
   return sum;
 }
 
-// Half vectors around z as GGX has them.
+// Calls `use` with half vectors around z that are distributed as GGX.
 template <class Use>
 void for_each_half_vector(double roughness, const Use& use) {
   const double a2 = std::pow(roughness, 4);
@@ -38,10 +38,10 @@ void for_each_half_vector(double roughness, const Use& use) {
   }
 }
 
-// In even light from everywhere.
+// What is reflected of uniform light from everywhere.
 struct Mirrored {
-  double head_on = 0, white = 0;  // factors
-  double aside = 0;               // of the mean direction, from the normal (0) to the mirrored one (1)
+  double head_on = 0, white = 0;  // factors of the colour at normal incidence and of white
+  double aside = 0;               // mean direction, from the normal (0) to the mirror direction (1)
 };
 
 Mirrored mirrored(double cosine, double roughness) {
@@ -65,7 +65,8 @@ Mirrored mirrored(double cosine, double roughness) {
   return sum;
 }
 
-// Of the lobe around a direction of that height, as if it were seen head on.
+// The share of light from above in the reflection lobe around a direction of this height; the lobe is that of
+// normal incidence.
 double mirrored_from_above(double height, double roughness) {
   const double level = std::sqrt(std::max(0.0, 1 - height * height)), a2 = std::pow(roughness, 4);
   double above = 0, all = 0;

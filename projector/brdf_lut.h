@@ -4,11 +4,13 @@
 
 namespace limn::projector {
 
-/// How a glTF surface (GGX, Smith's shadowing, appendix B) mirrors soft light, for shaders/look.glsl:
-/// CV_32FC4, 32 x 32 nodes, roughness 0 … 1 down. By the cosine to the eye 0 … 1: factors of the colour head
-/// on and of white (channels 0 and 1, the split sum of Karis 2013), and what mixes normal (0) and mirrored
-/// direction (1) to the one that most is mirrored from (3). By the height -1 … 1 of that: share of the
-/// mirrored light that comes from above the horizon (2). Made at the first call.
+/// How a glTF surface (GGX, Smith's shadowing, glTF 2.0 appendix B) reflects the soft light, for
+/// shaders/look.glsl: CV_32FC4, 32 x 32 nodes. Rows: roughness 0 … 1. For channels 0, 1 and 3 the columns are
+/// the cosine between normal and viewing direction, 0 … 1. Channels 0 and 1 are the two terms of the
+/// split-sum approximation (Karis 2013): factors of the colour at normal incidence and of white. Channel 3
+/// says where most of the reflected light comes from: 0 is the normal, 1 the mirror direction. For channel 2
+/// the columns are the height of that direction, -1 … 1, and the value is the share of the reflected light
+/// that comes from above the horizon. Computed at the first call.
 const cv::Mat& brdf_lut();
 
 }  // namespace limn::projector

@@ -7,7 +7,7 @@
 
 namespace limn::projector {
 
-/// An image that is drawn into.
+/// A texture with a framebuffer, into which passes draw.
 struct Canvas {
   int width = 0, height = 0;
   GlName texture, framebuffer;
@@ -16,10 +16,10 @@ struct Canvas {
   Canvas(int width, int height, GLenum format);
 };
 
-/// Canvases for what is drawn and used up at once, one a size and format.
+/// Temporary canvases, one for each size and format.
 class CanvasPool {
  public:
-  /// Good until the next call with the same values draws into it.
+  /// Its contents are valid until the next call with the same size and format draws into it.
   const Canvas& canvas(int width, int height, GLenum format);
 
  private:

@@ -11,19 +11,21 @@
 namespace limn::projector {
 namespace {
 
-constexpr double k_too_dim = 0.2;               // share of the surface that need not reach white
-constexpr std::size_t k_most_triangles = 4000;  // triangles that are asked for the level
-constexpr float k_least_light = 0.004F;  // of the camera's full scale, that a projector's white must give
-constexpr int k_edge_px = 2;             // beside shadows and silhouettes pixels see two things
+constexpr double k_too_dim = 0.2;               // share of the surface that may be too dim for the level
+constexpr std::size_t k_most_triangles = 4000;  // triangles that are sampled for the level
+// Least light of a projector's white, as a share of the camera's full scale.
+constexpr float k_least_light = 0.004F;
+constexpr int k_edge_px = 2;  // margin: pixels beside shadows and silhouettes see two surfaces
 
-// r, g, b of a map's pixel; a grey camera's value for each.
+// r, g, b of a map's pixel; for a grey camera three times its value.
 Eigen::Vector3f colour_at(const cv::Mat& map, int row, int column) {
   if (map.channels() == 1) return Eigen::Vector3f::Constant(map.at<float>(row, column));
   const auto& bgr = map.at<cv::Vec3f>(row, column);
   return {bgr[2], bgr[1], bgr[0]};
 }
 
-// Columns: what red, green and blue look like. Grey: each like all of them together.
+// Columns: the colours that the camera sees for red, green and blue. For a grey camera: a diagonal matrix of
+// their sum.
 Eigen::Matrix3f mixing_at(const ColourMixing& mixing, int row, int column) {
   const Eigen::Vector3f red = colour_at(mixing.red, row, column),
                         green = colour_at(mixing.green, row, column),
@@ -36,14 +38,14 @@ Eigen::Matrix3f mixing_at(const ColourMixing& mixing, int row, int column) {
 
 cv::Vec4f known(const Eigen::Vector3f& v) { return {v.x(), v.y(), v.z(), 1}; }
 
-// Where the projector lights the surface well away from the edges of its light.
+// Mask of where the projector lights the surface, without a margin at the edges of its light.
 cv::Mat lit_inside(const cv::Mat& irradiance) {
   cv::Mat lit = irradiance > 0;
   cv::erode(lit, lit, cv::Mat(), {-1, -1}, k_edge_px, cv::BORDER_CONSTANT, cv::Scalar(0));
   return lit;
 }
 
-// Carries what is known on into its unknown surroundings, so far that light's edges find something there.
+// Extends known values into unknown pixels around them, far enough to fill the margin of lit_inside.
 void spread(cv::Mat* layer) {
   for (int i = 0; i < 2 * k_edge_px; ++i) {
     cv::Mat around;
@@ -57,7 +59,7 @@ void spread(cv::Mat* layer) {
   }
 }
 
-// Irradiance of an unshadowed point by geometry; 0 where the projector does not reach.
+// Irradiance of an unshadowed point, computed from geometry; 0 where the projector does not reach.
 double irradiance_at(const Imager& projector,
                      const Vignetting& vignetting,
                      const Eigen::Vector3d& p_world,
@@ -69,7 +71,7 @@ double irradiance_at(const Imager& projector,
   return cosine / to_eye.squaredNorm() * vignetting.gain(*px, projector.width, projector.height);
 }
 
-// Of the albedo image: linear r, g, b.
+// The albedo image as linear r, g, b.
 cv::Mat linear_albedo(const scene::Prototype& prototype) {
   cv::Mat linear(prototype.albedo_image.size(), CV_32FC3);
   for (int row = 0; row < linear.rows; ++row)
@@ -92,7 +94,8 @@ Status check_fits(const MeasuredSurface& surface, const Rig& rig) {
   const Imager& camera = surface.camera;
   if (surface.mixings.size() != rig.projectors.size()) {
     return error(
-        "colour mixing: expected that of the rig's {} projectors, found {}. Measure the response of all.",
+        "colour mixing: expected one for each of the rig's {} projectors, found {}. Measure the response of "
+        "all projectors.",
         rig.projectors.size(), surface.mixings.size());
   }
   for (std::size_t i = 0; i < surface.mixings.size(); ++i) {
@@ -103,7 +106,8 @@ Status check_fits(const MeasuredSurface& surface, const Rig& rig) {
     }
     if (mixing.red.cols != camera.width || mixing.red.rows != camera.height) {
       return error(
-          "colour mixing of {}: expected maps of {}'s size {}x{}, found {}x{}. Measure the response again.",
+          "colour mixing of {}: expected maps of the size of {}'s images, {}x{}, found {}x{}. Measure the "
+          "response again.",
           mixing.projector, camera.name, camera.width, camera.height, mixing.red.cols, mixing.red.rows);
     }
   }
@@ -119,7 +123,7 @@ Result<SurfaceMixing> surface_mixing(const MeasuredSurface& surface, std::span<c
   for (const cv::Mat& image : irradiance) lit.push_back(lit_inside(image));
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   std::size_t seen = 0;
-  std::vector<Eigen::Vector3f> whites;  // of pixels, all projectors on
+  std::vector<Eigen::Vector3f> whites;  // of each pixel, with all projectors at white
   for (int row = 0; row < size.height; ++row)
     for (int column = 0; column < size.width; ++column) {
       Eigen::Vector3f white = Eigen::Vector3f::Zero();
@@ -146,9 +150,9 @@ Result<SurfaceMixing> surface_mixing(const MeasuredSurface& surface, std::span<c
     }
   if (seen == 0) {
     return error(
-        "colour mixing of camera {}: expected pixels that see the prototype lit, found none where the rig "
-        "and "
-        "the prototype's place say that it is lit. Measure the response again with the prototype in place.",
+        "colour mixing of camera {}: expected pixels that see projected light on the prototype, found none "
+        "where light is predicted from the rig and the prototype's pose. Measure the response again with the "
+        "prototype in place.",
         surface.camera.name);
   }
   for (cv::Mat& layer : out.layers) spread(&layer);
@@ -175,7 +179,7 @@ double geometric_level(const scene::Prototype& prototype, const Rig& rig, const 
     }
     const Eigen::Vector3d n = (p[1] - p[0]).cross(p[2] - p[0]).normalized();
     const Eigen::Vector3d middle = (p[0] + p[1] + p[2]) / 3;
-    double irradiance = 0;  // of either face: meshes need not be closed
+    double irradiance = 0;  // the larger of the two faces': meshes need not be closed
     for (const Eigen::Vector3d& face : {n, Eigen::Vector3d(-n)}) {
       double sum = 0;
       for (const Imager& projector : rig.projectors)

@@ -8,30 +8,31 @@
 
 namespace limn::projector {
 
-/// When the screen draws a part whole, and when it leaves to light what light can show.
+/// When the screen draws a whole part, and when only what projected light cannot show.
 struct CompositePolicyOptions {
-  double full_below = 0.3;  ///< of a part's viewer pixels shown by light: fewer make it `full`,
-  double rest_above = 0.5;  ///< more make it `rest`; between the two it stays as it is
-  double hold_s = 2;        ///< after a change it stays for so long, whatever its coverage
-  double fade_s = 0.4;      ///< in which one passes into the other; longer: calmer, twice for longer
+  /// Below this share of a part's viewer pixels that light shows, it becomes `full`.
+  double full_below = 0.3;
+  double rest_above = 0.5;  ///< Above this share it becomes `rest`. Between the two limits it stays as it is.
+  double hold_s = 2;        ///< Least time between two changes, whatever the coverage.
+  double fade_s = 0.4;  ///< Duration of the cross-fade. Longer is calmer, but shows parts twice for longer.
 };
 
 /// How the screen treats the part of a slot.
 struct CompositePolicy {
   std::string slot;
   Composite what = Composite::rest;
-  double for_s = 0;  ///< since it has been so
-  /// Share of the other treatment that still shows: 1 at a change, falling to 0 within fade_s.
+  double for_s = 0;  ///< Time since the last change.
+  /// Weight of the previous treatment in the cross-fade: 1 at a change, falling to 0 within fade_s.
   double passing = 0;
 
-  /// How much of what light can show the screen draws, too: 0 `rest` ... 1 `full`.
+  /// Weight with which the screen also draws what light can show: 0 is `rest`, 1 is `full`.
   double whole() const { return what == Composite::full ? 1 - passing : passing; }
 };
 
-/// The treatments `seconds` later, by the coverage found then. A slot that is met for the first time goes by
-/// the middle of the two limits; one that is absent, or of which the viewer sees nothing, stays as it is, so
-/// that a marker lost for a moment changes nothing. Between two changes of a slot lie hold_s or more; one
-/// that comes before the last has passed goes on from what shows.
+/// The policies `seconds` later, given the coverage at that time. A new slot is decided by the middle of the
+/// two limits. A slot that is absent, or of which the viewer sees nothing, stays as it is, so that a marker
+/// lost for a moment changes nothing. A slot changes at most once in hold_s; a change during a cross-fade
+/// starts from the current weights.
 std::vector<CompositePolicy> updated_policies(std::span<const CompositePolicy> before,
                                               std::span<const PartCoverage> coverage,
                                               double seconds,

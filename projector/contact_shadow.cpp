@@ -9,7 +9,8 @@
 namespace limn::projector {
 namespace {
 
-constexpr int k_most_in_a_row = 32;  // fields beside each other in the texture: GL 4.5 has 2048 texels a side
+// Distance fields side by side in the texture: GL 4.5 guarantees 2048 texels for each side.
+constexpr int k_most_in_a_row = 32;
 
 }  // namespace
 

@@ -5,15 +5,15 @@
 
 namespace limn::projector {
 
-/// A name that shaders ask for with #ifdef.
+/// A name that shaders test with #ifdef.
 enum class Define {
-  by_measurement,  ///< light is balanced by the measured surface
-  contact_shadow,  ///< parts darken the prototype around them
-  known_shares,    ///< edges of a projector's image, whose shares of the light are kept
-  listed,          ///< works through a list instead of rectangles
-  surface_maps,    ///< materials have maps beyond their colour, or light of their own
-  surface_parts,   ///< parts that lie on the prototype may be there
-  view_parts       ///< parts that are drawn as the viewer sees them may be there
+  by_measurement,  ///< Light is compensated by the measured surface (Compensation::measured).
+  contact_shadow,  ///< Parts cast contact shadows on the prototype.
+  known_shares,    ///< The image is a projector's: its blending shares are in the hit cache.
+  listed,          ///< The shader processes a pixel list instead of rectangles.
+  surface_maps,    ///< Materials have maps besides their colour, or emit light.
+  surface_parts,   ///< Surface parts (lying on the prototype) may be visible.
+  view_parts       ///< View parts (drawn for the viewer's position) may be visible.
 };
 
 /// Each Define as shaders spell it, in the order of the enumeration.

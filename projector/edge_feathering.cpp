@@ -11,7 +11,7 @@ constexpr int k_block = 8;  // as in shaders/blocks.glsl
 
 int blocks_of(int texels) { return (texels + k_block - 1) / k_block; }
 
-// The depth image that ids were drawn with.
+// The depth buffer that ids were drawn with.
 class DepthOfIds final : public Bindable {
  public:
   DepthOfIds(const GlName& depth, const PinholeView& pinhole) : depth_(depth), twin_(pinhole) {}
@@ -27,7 +27,7 @@ class DepthOfIds final : public Bindable {
   const PinholeView& twin_;
 };
 
-// Runs a pass over all blocks, 8 x 8 a group.
+// Runs a pass over all blocks, in work groups of 8 x 8 blocks.
 void run(const ComputePass& pass, cv::Size blocks, const Resources& resources) {
   constexpr int k_group = 8;
   pass.program().set("u_blocks", blocks.width, blocks.height);

@@ -113,8 +113,8 @@ cv::Mat fitting_texture(const cv::Mat& image, const std::string& name) {
   if (image.cols <= most && image.rows <= most) return image;
   const cv::Size size(std::min(most, image.cols), std::min(most, image.rows));
   log_warning(
-      "{}: expected a texture of at most {} x {} texels, found {} x {}; it is shown reduced to {} x {}. "
-      "Save it smaller.",
+      "{}: expected a texture of at most {} x {} texels, found {} x {}; it was reduced to {} x {}. "
+      "Save the image in a smaller size.",
       name, most, most, image.cols, image.rows, size.width, size.height);
   cv::Mat reduced;
   cv::resize(image, reduced, size, 0, 0, cv::INTER_AREA);

@@ -7,7 +7,7 @@
 
 namespace limn::projector {
 
-/// A GL object that is owned here. Needs the context that made it to be current when it dies.
+/// Owns one GL object. The context that made it must be current when it is destroyed.
 class GlName {
  public:
   GlName() = default;
@@ -35,23 +35,25 @@ GlName make_texture(GLenum target, GLenum format, int width, int height, int lay
 GlName make_framebuffer();
 GlName make_vertex_array();
 GlName make_depth_buffer(int width, int height);
-/// A buffer with this content.
+/// Makes a buffer with these contents.
 GlName make_buffer(const void* data, std::size_t bytes);
-/// All of a buffer as the texels of a GL_TEXTURE_BUFFER, which shows what the buffer holds by then.
+/// A GL_TEXTURE_BUFFER over a whole buffer. It always reads the buffer's current contents.
 GlName make_texels(const GlName& buffer, GLenum format);
 
-/// Fills a GL_TEXTURE_2D of make_texture from an image of 1-4 channels, 8-bit or float; first row first.
+/// Fills a GL_TEXTURE_2D made by make_texture from an image of 1 to 4 channels, 8-bit or float; the first row
+/// first.
 void upload(const GlName& texture, const cv::Mat& image);
-/// The same for a rectangle of the image alone, to the same place of the texture.
+/// Uploads only a rectangle of the image, to the same place in the texture.
 void upload(const GlName& texture, const cv::Mat& image, const cv::Rect& place);
-/// A rectangle of the colour attachment of a framebuffer to the same place of the image (CV_8UC3, BGR).
+/// Reads a rectangle of a framebuffer's colour attachment into the same place of the image (CV_8UC3, BGR).
 void read_back(const GlName& framebuffer, const cv::Rect& place, cv::Mat* image);
-/// The colour attachment of a framebuffer, first row first, as an image of `type` (CV_8UC3 comes as BGR).
+/// Reads the whole colour attachment of a framebuffer, the first row first, as an image of `type` (CV_8UC3 is
+/// BGR).
 cv::Mat read_back(const GlName& framebuffer, int width, int height, int type, GLenum format);
 
-/// Texels a side that an image of a scene may have: what the context holds, 4096 at most.
+/// Largest side of a scene's texture, in texels: the context's limit, and at most 4096.
 int largest_texture();
-/// The image, reduced to largest_texture() where it is larger; that is told, under its name.
+/// The image, reduced to largest_texture() if it is larger; a warning then names it.
 cv::Mat fitting_texture(const cv::Mat& image, const std::string& name);
 
 }  // namespace limn::projector

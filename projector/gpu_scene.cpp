@@ -15,12 +15,12 @@
 namespace limn::projector {
 namespace {
 
-constexpr int k_cluster = 128;  // triangles
+constexpr int k_cluster = 128;  // triangles in a cluster
 
 // As in shaders/scene.glsl.
 struct GpuMaterial {
   Eigen::Vector4f colour;  // a: 1 when unlit
-  Eigen::Vector4f look;    // texture layer (-1 when it has none), metallic, roughness, what cuts out
+  Eigen::Vector4f look;    // texture layer (-1 when it has none), metallic, roughness, alpha cutoff
   Eigen::Vector4f emitted = {0, 0, 0, -1};
   Eigen::Vector4f maps = {-1, -1, 1, 1};
   Eigen::Vector4i more = Eigen::Vector4i::Zero();
@@ -38,7 +38,7 @@ std::size_t triangles_of(const scene::Scene& scene) {
   return count;
 }
 
-// Of them, those whose tangents follow the normals.
+// Number of triangles with tangents, which are stored after the normals.
 std::size_t triangles_with_tangents(const scene::Scene& scene) {
   const auto of = [](const scene::Mesh& mesh) { return mesh.tangents.empty() ? 0 : mesh.triangles.size(); };
   std::size_t count = scene.prototype ? of(scene.prototype->mesh) : 0;
@@ -55,8 +55,8 @@ struct GpuTriangle {
 
 constexpr std::size_t k_triangle_texels = sizeof(GpuTriangle) / sizeof(std::uint32_t);
 
-// Appends a mesh's triangles that know their neighbours: one of them where many share a side. Corners in one
-// place are one corner.
+// Appends a mesh's triangles with the ids of their neighbours. Where more than two triangles share a side,
+// each gets one neighbour. Corners at the same position count as one.
 void append_linked(const scene::Mesh& mesh, std::vector<GpuTriangle>* triangles) {
   std::vector<std::uint32_t> by_place(mesh.positions.size()), place(mesh.positions.size());
   std::iota(by_place.begin(), by_place.end(), 0U);
@@ -71,8 +71,8 @@ void append_linked(const scene::Mesh& mesh, std::vector<GpuTriangle>* triangles)
     place[by_place[i]] = is_same ? place[by_place[i - 1]] : by_place[i];
   }
   struct Side {
-    std::uint32_t lower, upper;  // places
-    std::uint32_t corner;        // opposite to it, three a triangle
+    std::uint32_t lower, upper;  // indices of positions
+    std::uint32_t corner;        // index of the opposite corner, three for each triangle
     auto operator<=>(const Side&) const = default;
   };
   std::vector<Side> sides;
@@ -105,7 +105,7 @@ cv::Mat resized(const cv::Mat& image, const cv::Size& size) {
   return out;
 }
 
-// The layer of a texture in an array of textures, where it is put if it is not there yet.
+// The layer of a texture in an array of textures. Adds it if it is not there yet.
 float layer_of(const scene::Texture& texture, std::vector<scene::Texture>* layers) {
   const auto known = std::find_if(layers->begin(), layers->end(), [&](const scene::Texture& layer) {
     return layer.image.data == texture.image.data;
@@ -115,8 +115,8 @@ float layer_of(const scene::Texture& texture, std::vector<scene::Texture>* layer
   return layer;
 }
 
-// One layer a texture, all brought to the size of the largest, so that one sampler serves and uv stays 0
-// to 1.
+// One layer for each texture, all resized to the largest width and height, so that a single sampler is enough
+// and uv stays 0 to 1.
 GlName make_layers(const std::vector<scene::Texture>& textures, GLenum format) {
   const int most = largest_texture();
   int width = 1, height = 1;
@@ -141,8 +141,8 @@ GlName make_layers(const std::vector<scene::Texture>& textures, GLenum format) {
   return layers;
 }
 
-// Occlusion, roughness and metalness in red, green and blue, 1 where there is none. An image that has them
-// all is taken as it is.
+// Packs occlusion, roughness and metalness into red, green and blue; a missing one is 1. An image that has
+// all three is used as it is.
 scene::Texture packed(const scene::SurfaceMaps& maps) {
   const scene::Texture &metal = maps.metallic_roughness, &open = maps.occlusion;
   if (metal.image.data == open.image.data) return metal;
@@ -154,7 +154,7 @@ scene::Texture packed(const scene::SurfaceMaps& maps) {
     *image = image->empty() ? cv::Mat(size, CV_8UC3, cv::Scalar::all(255)) : resized(*image, size);
   const cv::Mat from[] = {of_metal, of_open};
   cv::Mat all(size, CV_8UC3);
-  const int from_to[] = {0, 0, 1, 1, 5, 2};  // blue and green of the one, red of the other
+  const int from_to[] = {0, 0, 1, 1, 5, 2};  // blue and green come from `of_metal`, red comes from `of_open`
   cv::mixChannels(from, 2, &all, 1, from_to, 3);
   return {all, metal.file.empty() ? open.file : metal.file};
 }
@@ -163,7 +163,7 @@ scene::Texture packed(const scene::SurfaceMaps& maps) {
 
 struct GpuScene::Staging {
   std::vector<Eigen::Vector4f> corners, normals;
-  std::vector<Eigen::Vector4f> tangents;  // of the corners of meshes that have some, to follow the normals
+  std::vector<Eigen::Vector4f> tangents;  // tangents at the corners, stored after the normals
   std::vector<GpuTriangle> triangles;
   std::vector<GpuMaterial> materials;
   std::vector<scene::Texture> looks, maps;
@@ -180,14 +180,15 @@ Status GpuScene::check_fits(const scene::Scene& scene, std::size_t most) {
   if (count <= most) return {};
   return error(
       "scene: expected at most {} triangles in the prototype and all variants (the largest buffer of {}; "
-      "those of meshes with a map of normals count twice), found {}. Simplify the largest mesh.",
+      "triangles of meshes with a normal map count twice), found {}. Simplify the largest mesh.",
       most, reinterpret_cast<const char*>(glGetString(GL_RENDERER)), count);
 }
 
 GpuScene::GpuScene(const scene::Scene& scene) {
   Staging staging;
   const std::size_t count = triangles_of(scene);
-  // Neighbours first: what finds them is gone before corners and normals need their room.
+  // The neighbours come first, so that their temporary memory is freed before the corners and normals need
+  // memory.
   staging.triangles.reserve(count);
   if (scene.prototype) append_linked(scene.prototype->mesh, &staging.triangles);
   for (const scene::Slot& slot : scene.slots)
@@ -203,7 +204,7 @@ GpuScene::GpuScene(const scene::Scene& scene) {
     }
     slots_.push_back(std::move(runs));
   }
-  corners_ = buffer_of(std::exchange(staging.corners, {}));  // freed one by one
+  corners_ = buffer_of(std::exchange(staging.corners, {}));  // each array is freed after its upload
   staging.normals.insert(staging.normals.end(), staging.tangents.begin(), staging.tangents.end());
   normals_ = buffer_of(std::exchange(staging.normals, {}));
   triangles_ = buffer_of(std::exchange(staging.triangles, {}));
@@ -215,7 +216,7 @@ GpuScene::GpuScene(const scene::Scene& scene) {
   triangle_texels_ = make_texels(triangles_, GL_R32UI);
   placement_texels_ = make_texels(placements_, GL_RGBA32F);
   looks_ = make_layers(staging.looks, GL_SRGB8_ALPHA8);
-  // Finer than their 8 bits: software GL mixes texels in the format's own.
+  // 16 bits for 8-bit images: software GL interpolates texels with the precision of the format.
   maps_ = make_layers(staging.maps, GL_RGBA16);
   const cv::Mat& mirrored = brdf_lut();
   mirrored_ = make_texture(GL_TEXTURE_2D, GL_RGBA32F, mirrored.cols, mirrored.rows);
@@ -253,9 +254,9 @@ void GpuScene::add_material(const scene::Material& material, bool has_uvs, Stagi
   staging->materials.push_back(gpu);
 }
 
-// Before the mesh's own corners are in.
+// Must be called before the mesh's own corners are added.
 void GpuScene::add_tangents(const scene::Mesh& mesh, std::size_t first_material, Staging* staging) {
-  // They will follow all normals, of which `triangles` knows the number.
+  // The tangents come after all normals, three for each of `triangles`.
   const std::size_t first = 3 * staging->triangles.size() + staging->tangents.size();
   for (std::size_t i = first_material; i < staging->materials.size(); ++i) {
     GpuMaterial& material = staging->materials[i];

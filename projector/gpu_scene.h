@@ -14,9 +14,9 @@
 
 namespace limn::projector {
 
-/// A run of triangles on the GPU and its bounds in its own frame (m).
+/// A range of triangles on the GPU (one mesh) and its bounds in the mesh's frame (m).
 struct TriangleRun {
-  /// Neighbours in the mesh's order, to be left out together where they are out of sight.
+  /// Consecutive triangles of the mesh, which are culled together.
   struct Cluster {
     int first = 0;
     int count = 0;
@@ -24,42 +24,43 @@ struct TriangleRun {
   };
   int first = 0;
   int count = 0;
-  bool has_cut_outs = false;  ///< a material of it has pieces cut out
+  bool has_cut_outs = false;  ///< Whether a material uses an alpha cutoff.
   Eigen::Vector3d p_lower = Eigen::Vector3d::Zero();
   Eigen::Vector3d p_upper = Eigen::Vector3d::Zero();
-  std::vector<Cluster> clusters = {};  ///< all of the run, in its order
+  std::vector<Cluster> clusters = {};  ///< Together they cover the whole run, in its order.
 };
 
-/// A piece in its place: owner 0 is the prototype, owner i + 1 slot i.
+/// A mesh with its pose. Owner 0 is the prototype, owner i + 1 is slot i.
 struct PlacedRun {
   int owner = 0;
   const TriangleRun* run = nullptr;
   Pose scene_from_owner;
-  bool on_surface = false;  ///< its slot's mode is surface
+  bool on_surface = false;  ///< Whether its slot's mode is `surface`.
   scene::MaterialOverride material = {};
 };
 
-/// All meshes of a scene on the GPU, as shaders/scene.glsl reads them.
+/// All meshes of a scene on the GPU, in the layout that shaders/scene.glsl reads.
 class GpuScene final : public Bindable {
  public:
-  /// How many triangles the driver's largest texel buffer holds.
+  /// Number of triangles that the driver's largest texel buffer holds.
   static std::size_t most_triangles();
   /// Error: more than `most` triangles.
   static Status check_fits(const scene::Scene& scene, std::size_t most);
-  /// A texture larger than 4096 texels a side, or than the driver's limit, is reduced to it, with a warning.
+  /// A texture that is larger than 4096 x 4096 texels, or than the driver's limit, is reduced to it, with a
+  /// warning.
   explicit GpuScene(const scene::Scene& scene);
 
-  /// What a posed scene shows. Rays are cast in the frame "scene": the prototype's where it is placed, else
-  /// the world.
+  /// Writes the meshes that a posed scene shows to `runs`. Their poses are in the coordinate frame "scene",
+  /// in which rays are cast: the prototype's frame if it is placed, else the world.
   void placed(const scene::PosedScene& posed, std::vector<PlacedRun>* runs) const;
   static Pose scene_from_world(const scene::PosedScene& posed);
-  /// Sends the places to the GPU.
+  /// Uploads the poses.
   void place(const std::vector<PlacedRun>& runs);
-  /// Resource::scene.
+  /// Binds Resource::scene.
   void bind(const Use& use) const override;
 
   bool has_cut_outs() const { return has_cut_outs_; }
-  /// What programs that draw looks are made for: the scene's materials.
+  /// Defines that the shading programs need for the scene's materials.
   Defines looks() const { return has_surface_maps_ ? Defines{Define::surface_maps} : Defines{}; }
   GLuint vertex_array() const { return *vertex_array_; }
   int owner_count() const { return static_cast<int>(slots_.size()) + 1; }
@@ -73,7 +74,7 @@ class GpuScene final : public Bindable {
   struct Staging;
   struct GpuOwner {
     Eigen::Matrix4f owner_from_scene = Eigen::Matrix4f::Identity();
-    Eigen::Vector4f lower = Eigen::Vector4f::Zero();  // w: 1 when it is shown
+    Eigen::Vector4f lower = Eigen::Vector4f::Zero();  // w: 1 when the part is shown
     Eigen::Vector4f upper = Eigen::Vector4f::Zero();  // w: 1 when its mode is surface
     Eigen::Vector4f colour = Eigen::Vector4f::Zero();
     Eigen::Vector4f look = Eigen::Vector4f::Constant(-1);
@@ -87,11 +88,11 @@ class GpuScene final : public Bindable {
   bool has_cut_outs_ = false, has_surface_maps_ = false;
   std::vector<GpuOwner> owners_shown_;
   GlName corners_, normals_, triangles_, materials_, placements_, vertex_array_;
-  GlName corner_texels_, normal_texels_, triangle_texels_, placement_texels_;  // of those buffers
+  GlName corner_texels_, normal_texels_, triangle_texels_, placement_texels_;  // texel views of the buffers
   GlName looks_, maps_, mirrored_;
 };
 
-/// The corners of a run's bounds, with a margin, in the scene's frame.
+/// The corners of a mesh's bounds, with a margin, in the scene's frame.
 std::array<Eigen::Vector3d, 8> bounds_of(const PlacedRun& placed, double margin_m = 0);
 
 }  // namespace limn::projector

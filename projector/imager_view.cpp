@@ -10,7 +10,7 @@
 namespace limn::projector {
 namespace {
 
-// The mask and shares of the part of one owner in what coverage.frag wrote.
+// The mask and shares of one part, counted in the output of coverage.frag.
 PartCoverage counted(const scene::PosedPart& part, const cv::Mat& seen, std::uint8_t owner) {
   constexpr std::uint8_t k_projected = 2;  // as in shaders/seen.glsl
   PartCoverage out{part.slot, part.variant, 0, 0, 0, cv::Mat::zeros(seen.size(), CV_8U)};
@@ -77,12 +77,12 @@ bool ImagerView::Overlay::shows(const Imager& imager_now,
          is_same(imager.imager_from_world, imager_now.imager_from_world);
 }
 
-// The one drawn for this imager before, or room for a new one.
+// The overlay drawn for this imager before, or a new one.
 ImagerView::Overlay& ImagerView::overlay_of(const Imager& imager, bool is_view, Kind kind) {
   for (Overlay& overlay : overlays_)
     if (overlay.is_view == is_view && overlay.kind == kind && is_same_lens(overlay.imager, imager))
       return overlay;
-  constexpr std::size_t k_most = 8;  // cameras and virtual ones of a session
+  constexpr std::size_t k_most = 8;  // real and virtual cameras of a session
   if (overlays_.size() >= k_most) overlays_.erase(overlays_.begin());
   const int width = imager.width, height = imager.height;
   Overlay& overlay = overlays_.emplace_back();
@@ -95,7 +95,7 @@ ImagerView::Overlay& ImagerView::overlay_of(const Imager& imager, bool is_view, 
   return overlay;
 }
 
-// What the imager sees of the parts, and of the prototype in a view.
+// Draws the parts as the imager sees them, and in a view the prototype, too.
 void ImagerView::draw_parts(const Imager& imager, const scene::PosedScene& posed, Overlay* overlay) {
   SceneCache& scene = shared_.scene;
   const bool is_view = overlay->is_view;
@@ -119,7 +119,8 @@ void ImagerView::draw_parts(const Imager& imager, const scene::PosedScene& posed
   overlay->imager = imager;
 }
 
-// The parts, drawn again only where they have changed, over an imager's image (BGR).
+// Draws the parts over an imager's image (BGR). The parts themselves are drawn again only if something has
+// changed.
 cv::Mat ImagerView::lay_over(const cv::Mat& bgr,
                              const Imager& imager,
                              const scene::PosedScene& posed,
@@ -133,7 +134,7 @@ cv::Mat ImagerView::lay_over(const cv::Mat& bgr,
   for (const cv::Rect& place : overlay->places) upload(overlay->behind, out, place);
   const TextureAt light(k_light_unit, overlay->parts.texture), behind(k_camera_image_unit, overlay->behind);
   {
-    const PassTimes::Scope scope(&shared_.times, "over the picture");
+    const PassTimes::Scope scope(&shared_.times, "over the image");
     composite_pass_.draw(overlay->out, overlay->places,
                          Resources().with(Resource::light, light).with(Resource::camera_image, behind));
   }

@@ -13,15 +13,16 @@
 
 namespace limn::projector {
 
-/// How much of what light can show of each part a composite draws: a byte an owner, in 255ths.
+/// For each part, the weight with which a composite also draws what projected light can show: one byte for
+/// each owner, 255 is all.
 class CompositeWeights final : public Bindable {
  public:
-  /// Nothing of it.
+  /// All weights are 0.
   CompositeWeights() = default;
   explicit CompositeWeights(Composite what);
-  /// Of one that is not among the treatments nothing. `slots`: by owner, from the first on.
+  /// A slot without a policy gets 0. `slots`: the slot names in the order of owners, from owner 1 on.
   CompositeWeights(std::span<const CompositePolicy> policies, std::span<const std::string> slots);
-  /// Resource::composite_weights.
+  /// Binds Resource::composite_weights.
   void bind(const Use& use) const override { use.program.set_bits("u_whole", bytes_); }
   bool operator==(const CompositeWeights& other) const { return bytes_ == other.bytes_; }
 
@@ -29,19 +30,19 @@ class CompositeWeights final : public Bindable {
   std::array<GLuint, 64> bytes_ = {};
 };
 
-/// Draws what cameras, viewers and virtual cameras see of the parts.
+/// Draws the parts as cameras, viewers and virtual cameras see them.
 class ImagerView {
  public:
-  /// `looks`: what is defined where looks are drawn.
+  /// `looks`: the defines of the shading programs (GpuScene::looks).
   static Result<ImagerView> create(const Shared& shared, const scene::Scene& scene, Defines looks);
 
-  /// Renderer::set_smoothing and set_contact_shadow.
+  /// As Renderer::set_smoothing and set_contact_shadow.
   void set_smoothing(const Smoothing& smoothing) { smoothing_ = smoothing; }
   Status set_contact_shadow(const scene::Scene* scene);
 
-  /// Which composite it is: drawn anew only where that has changed.
+  /// Kind of composite. Each kind has its own cache.
   enum class Kind { rest, full, each };
-  /// Renderer::composite, view, coverage and illuminated_patches.
+  /// As Renderer::composite, view, coverage and illuminated_patches.
   cv::Mat composite(const Imager& camera,
                     const cv::Mat& image,
                     const scene::PosedScene& posed,
@@ -54,16 +55,16 @@ class ImagerView {
   const std::vector<std::string>& slot_names() const { return slot_names_; }
 
  private:
-  // What was laid over an imager's images.
+  // The parts last drawn for an imager.
   struct Overlay {
     Imager imager;
     bool is_view = false;
     Kind kind = Kind::rest;
     CompositeWeights weights;
-    std::optional<scene::PosedScene> posed;  // of the parts
-    std::vector<cv::Rect> places;            // where there may be some
+    std::optional<scene::PosedScene> posed;  // The scene that was drawn; empty: nothing valid.
+    std::vector<cv::Rect> places;            // Rectangles that may contain parts.
     Canvas parts;
-    GlName behind;  // the image
+    GlName behind;  // The background image.
     Canvas out;
 
     bool shows(const Imager& imager_now,

@@ -14,30 +14,30 @@ namespace limn::projector {
 class PrototypeAlbedo final : public Bindable {
  public:
   explicit PrototypeAlbedo(const scene::Prototype& prototype);
-  /// Resource::albedo.
+  /// Binds Resource::albedo.
   void bind(const Use& use) const override;
 
  private:
-  GlName relative_;  // over its mean
+  GlName relative_;  // Divided by its mean.
   float mean_ = 0;
 };
 
-/// How wanted colours become light (compensation.h), for shaders/balance.glsl.
+/// The compensation of colours (compensation.h), for shaders/balance.glsl.
 class LightBalance final : public Bindable {
  public:
   static Result<LightBalance> create(const scene::Scene& scene);
 
   const LightOptions& options() const { return options_; }
   const PrototypeAlbedo& albedo() const { return albedo_; }
-  /// False when they were so already. Compensation::measured needs measure() before.
+  /// Returns false when nothing changes. Compensation::measured needs an earlier call of measure().
   bool set_options(const LightOptions& options);
-  /// Takes a measured surface to the GPU; the scene then remembers what its camera saw. Error, and nothing
-  /// changes: a surface that shows nothing.
+  /// Uploads a measured surface, and makes the scene keep the ids that its camera sees. Error: no projector
+  /// lit the surface; then nothing changes.
   Status measure(const MeasuredSurface& surface, const Rig& rig, SceneCache* scene, CanvasPool* canvases);
-  /// Before the first drawing with the prototype in its place: finds the level of light that most of it can
-  /// reach.
+  /// Computes the default of LightOptions::level. To be called before the first drawing in which the
+  /// prototype is placed.
   void find_level(const Rig& rig, const scene::PosedScene& posed);
-  /// Resource::light_balance.
+  /// Binds Resource::light_balance.
   void bind(const Use& use) const override;
 
  private:
@@ -47,8 +47,8 @@ class LightBalance final : public Bindable {
   LightOptions options_;
   std::optional<scene::Prototype> prototype_;
   PrototypeAlbedo albedo_;
-  std::optional<SurfaceMixing> surface_;     // its layers are on the GPU
-  std::optional<double> level_by_geometry_;  // of the first place that the prototype had
+  std::optional<SurfaceMixing> surface_;     // Its layers are kept only on the GPU.
+  std::optional<double> level_by_geometry_;  // For the first pose of the prototype.
   GlName mixing_;
 };
 

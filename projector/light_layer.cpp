@@ -8,7 +8,7 @@
 namespace limn::projector {
 namespace {
 
-// Adds what a rectangle has outside of others, and outside of what is there already.
+// Adds the area of `place` that lies outside `others` and outside `*places`, as rectangles.
 void add_outside(const cv::Rect& place, std::span<const cv::Rect> others, std::vector<cv::Rect>* places) {
   if (place.empty()) return;
   for (const std::span<const cv::Rect> taken : {others, std::span<const cv::Rect>(*places)}) {
@@ -112,9 +112,9 @@ void LightLayer::draw(const Target& target,
   draw_edges(drawing);
 }
 
-// What the centres of all pixels see goes to the hit cache.
+// Computes what the pixel centres see, where the hit cache does not hold it yet.
 void LightLayer::find_hits(const Drawing& drawing) {
-  const PassTimes::Scope scope(drawing.times, "what is lit");
+  const PassTimes::Scope scope(drawing.times, "hits at pixel centres");
   PixelList& unknown = start_deferred(drawing);
   const Resources resources = drawing.resources.with(Resource::work_list, unknown);
   const ComputePass& pass = drawing.target.is_unknown ? hits_ : unknown_;
@@ -131,7 +131,8 @@ void LightLayer::list_lit(const Drawing& drawing) {
   });
 }
 
-// One sample a pixel. Where the share of the light is not in the hit cache yet, it gets there.
+// Draws one sample for each pixel. Blending shares that the hit cache does not hold yet are computed and
+// cached.
 void LightLayer::draw_centres(const Drawing& drawing) {
   const PassTimes::Scope scope(drawing.times, "light at pixel centres");
   PixelList& without_share = start_deferred(drawing);
@@ -142,7 +143,8 @@ void LightLayer::draw_centres(const Drawing& drawing) {
   shares_.work_through(without_share, resources);
 }
 
-// Pixels beside a step of light. Their samples use the shares at their centres.
+// Lists the pixels beside an edge of light. Their samples will use the shares at their centres, so missing
+// shares are computed here.
 void LightLayer::list_edges(const Drawing& drawing) {
   const PassTimes::Scope scope(drawing.times, "where edges are");
   PixelList& without_share = start_deferred(drawing);
@@ -155,7 +157,7 @@ void LightLayer::list_edges(const Drawing& drawing) {
   shares_.work_through(without_share, resources);
 }
 
-// Several samples a pixel; some pixels need a share for each of them.
+// Draws several samples for each pixel. Some pixels need a share of their own for each sample.
 void LightLayer::draw_edges(const Drawing& drawing) {
   const PassTimes::Scope scope(drawing.times, "light at edges");
   PixelList& with_many_shares = start_deferred(drawing);

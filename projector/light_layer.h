@@ -12,49 +12,49 @@
 
 namespace limn::projector {
 
-/// Rectangles of a projector's image in which it may give light, none over another: for parts of one mode,
-/// or of both.
+/// Rectangles of a projector's image in which it may give light. They do not overlap. A rectangle is for
+/// parts of one mode or of both.
 struct PlacesByMode {
   std::vector<cv::Rect> view, surface, both;
 
   std::array<const std::vector<cv::Rect>*, 3> each() const { return {&view, &surface, &both}; }
   void clear();
-  /// The places of these parts' own rectangles.
+  /// Sets the rectangles from those of the view parts and of the surface parts, which may overlap.
   void divide(std::span<const cv::Rect> of_view, std::span<const cv::Rect> of_surface);
 };
 
 struct Smoothing;
 
-/// Draws the light that a projector is to give, by lists of pixels: each pass does what all of its pixels
-/// need (shaders/light.glsl). Lists take 20 bytes a pixel, 28 where parts of both modes lie over each other.
+/// Draws the light that a projector should give (shaders/light.glsl). Each pass processes a list of pixels
+/// that all need the same work. The lists take 20 bytes for each pixel, 28 where parts of both modes overlap.
 class LightLayer {
  public:
-  /// `looks`: what is defined where looks are drawn; `by_measurement`: light is balanced by the measured
-  /// surface.
+  /// `looks`: the defines of the shading programs (GpuScene::looks); `by_measurement`: light is compensated
+  /// by the measured surface.
   static Result<LightLayer> link(Defines looks, bool by_measurement);
 
   struct Target {
     const GlName& light;  ///< GL_RGBA32F
     cv::Size size;
-    bool is_unknown;  ///< what the hit cache keeps is of another time
+    bool is_unknown;  ///< The contents of the hit cache are outdated.
   };
-  /// Within `places` alone. `resources`: scene, viewpoints, occlusion, lens, room light, projector, hit cache
-  /// and light balance.
+  /// Draws within `places` only. `resources` must hold scene, viewpoints, occlusion, lens, room light,
+  /// projector, hit cache and light balance.
   void draw(const Target& target,
             const PlacesByMode& places,
             const Smoothing& smoothing,
             const Resources& resources,
             PassTimes* times);
-  /// Runs a pass over all pixels that may have light since the last draw.
+  /// Runs a pass over all pixels that the last draw may have given light.
   void work_through_lit(const ComputePass& pass, const Resources& resources) const;
 
  private:
   struct ByMode {
     ComputePass where, centre, edges;
-    PixelList lit, at_edges;  // pixels that may be
-    bool is_used = false;     // by the last draw
+    PixelList lit, at_edges;  // the pixels that may give light, and those at edges
+    bool is_used = false;     // whether the last draw had places of this mode
   };
-  // What the phases of one draw share.
+  // The arguments of one draw, which its phases share.
   struct Drawing {
     const Target& target;
     const PlacesByMode& places;
@@ -73,7 +73,7 @@ class LightLayer {
 
   ComputePass hits_, unknown_, listed_hits_, shares_, where_edges_, rest_;
   std::array<ByMode, 3> modes_;  // in the order of PlacesByMode
-  PixelList deferred_;           // of one phase at a time, which names what it holds
+  PixelList deferred_;           // used by one phase at a time, which gives it a name that says what it holds
 };
 
 }  // namespace limn::projector

@@ -10,15 +10,16 @@
 namespace limn::projector {
 namespace {
 
-constexpr int k_width = 640;               // of the images that are compared, about
-constexpr int k_cell = 24;                 // side, their pixels
-constexpr int k_reach = 24;                // of a shift, likewise
-constexpr int k_most_cells = 60;           // of a look
-constexpr double k_least_contrast = 0.02;  // standard deviation of a cell's light, of what white gives
-constexpr double k_most_change = 0.2;      // of a cell's light lately, as a share of its contrast
-constexpr double k_least_share = 0.2;      // of a cell's contrast, so that it tells of a projector
-// Of likeness, that a pixel of displacement costs: along straight edges many explain the same, and a nudge is
-// small rather than large.
+constexpr int k_width = 640;               // approximate width of the images that are compared
+constexpr int k_cell = 24;                 // side of a cell, pixels of these images
+constexpr int k_reach = 24;                // largest shift, pixels of these images
+constexpr int k_most_cells = 60;           // cells that are compared in a frame
+constexpr double k_least_contrast = 0.02;  // standard deviation of a cell's light, as a share of white
+constexpr double k_most_change = 0.2;      // recent change of a cell's light, as a share of its contrast
+// A projector's share of a cell's contrast, below which the cell is not used for it.
+constexpr double k_least_share = 0.2;
+// Loss of correlation for each pixel of displacement. Along straight edges many displacements fit equally
+// well; the smallest is the most likely.
 constexpr float k_cost_of_px = 0.0005F;
 constexpr double k_memory_s = 2;
 
@@ -32,8 +33,8 @@ double stddev(const cv::Mat& m) {
   return deviation[0];
 }
 
-// Of each window of a cell's size in `region`: the sum of products with `cell`, by the shift that takes the
-// window into the cell: what lies right of its place has a positive column.
+// For each window of a cell's size in `region`, the sum of products with `cell`. The result is indexed by the
+// shift from the predicted to the found place: light that lies too far right has a positive column.
 cv::Mat products(const cv::Mat& region, const cv::Mat& cell) {
   cv::Mat sums, by_shift;
   cv::matchTemplate(region, cell, sums, cv::TM_CCORR);
@@ -41,7 +42,7 @@ cv::Mat products(const cv::Mat& region, const cv::Mat& cell) {
   return by_shift;
 }
 
-// Sums over windows, likewise.
+// Sums over the windows, indexed in the same way.
 cv::Mat sums(const cv::Mat& region) {
   cv::Mat whole, by_shift;
   cv::boxFilter(region, whole, CV_32F, {k_cell, k_cell}, {0, 0}, false);
@@ -96,7 +97,7 @@ void MisalignmentDetector::place(IlluminatedPatches patches) {
   mm_per_px_ = 1e3 * median(std::move(depths)) / imager_.lens.fx();
 }
 
-// A projector's light in the camera's image, where it is predicted.
+// The predicted light of a projector in the camera's image.
 cv::Mat MisalignmentDetector::given(std::size_t projector, const cv::Mat& image) const {
   const cv::Mat& lit = patches_.by_projector[projector];
   if (image.empty()) return cv::Mat::zeros(lit.size(), CV_32F);
@@ -172,8 +173,8 @@ bool MisalignmentDetector::compare(int cells) {
   return true;
 }
 
-// Correlation of the frame F with A, shifted, and B, not shifted: A is one projector's light, B the others';
-// or A is all light.
+// Correlates the frame F with the sum of A, shifted, and B, not shifted. A is one projector's light and B
+// that of the others, or A is all light.
 void MisalignmentDetector::compare_cell(const cv::Rect& cell) {
   const cv::Rect around(cell.x - k_reach, cell.y - k_reach, cell.width + 2 * k_reach,
                         cell.height + 2 * k_reach);
@@ -193,7 +194,8 @@ void MisalignmentDetector::compare_cell(const cv::Rect& cell) {
     cv::Mat variance = sums(a.mul(a)) - a_sums.mul(a_sums) / area;
     variance += 2 * products(a, b_centred) + b_centred.dot(b_centred);
     const cv::Mat covariance = products(a, f) + f.dot(b_centred);
-    const double least = std::pow(0.1 * contrast, 2) * area;  // a shift into the dark explains nothing
+    // Keeps a shift into the dark from having a high correlation.
+    const double least = std::pow(0.1 * contrast, 2) * area;
     cv::Mat norm;
     cv::sqrt(cv::max(variance, least), norm);
     const cv::Mat likeness = covariance / norm / f_norm;

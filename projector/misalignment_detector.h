@@ -12,61 +12,63 @@
 
 namespace limn::projector {
 
-/// Where light is found that may lie elsewhere than the rig says, in a camera's images.
+/// The shift between the light seen in a camera's images and the light predicted from the rig.
 struct Displacement {
-  Eigen::Vector2d px = Eigen::Vector2d::Zero();  ///< found minus predicted, camera pixels
-  double likeness = 0;     ///< of the frames with light so displaced: correlation, up to 1
-  double as_foretold = 0;  ///< of the frames with all light where the rig says
-  /// What these rest upon: the sum over the cells of some seconds of their light's standard deviation, as a
-  /// share of white; cells count by how much of the light there is such as may be displaced. 0: nothing with
-  /// edges was lit.
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();  ///< Found minus predicted, camera pixels.
+  double likeness = 0;     ///< Correlation of the frames with the light shifted by `px`, up to 1.
+  double as_foretold = 0;  ///< Correlation of the frames with the light as predicted, without a shift.
+  /// Weight of the evidence: the sum over the cells of the last seconds of the standard deviation of their
+  /// light, as a share of white. Each cell is weighted by the share of the light in question in its contrast.
+  /// 0: no light with edges was shown.
   double contrast = 0;
-  /// By how much more of all the light that was seen is explained so: the sum over all cells of their light's
-  /// standard deviation times the likeness gained.
+  /// How much better the shift explains the light: the sum over all cells of the standard deviation of their
+  /// light times the gain in correlation.
   double gain = 0;
 };
 
-/// What one camera's last seconds say of where the light lies.
+/// The displacements of light that one camera found in its last seconds.
 struct LightDisplacements {
-  std::vector<Displacement> projectors;  ///< best when one projector's light alone lies elsewhere
-  Displacement all;                      ///< best when all light does, as when the camera itself has moved
-  double mm_per_px = 0;                  ///< on the prototype, in the middle of what was seen
+  std::vector<Displacement> projectors;  ///< Best shift when only the light of this projector moves.
+  Displacement all;      ///< Best shift when all light moves, as it does when the camera has moved.
+  double mm_per_px = 0;  ///< On the prototype, at the median depth of what is seen.
 };
 
-/// Compares a camera's frames with what the projectors showed, cell by cell, to find light that lies beside
-/// its place: a device has been nudged. Judged are cells that lie wholly on the prototype, whose light has
-/// edges and did not change lately, by zero-mean normalized cross-correlation of the frame with the light
-/// predicted, one projector's part (or all) shifted. No albedo is needed; a print on the prototype only
-/// lowers the likeness. Looks of some seconds are summed (their mean, that forgets).
+/// Compares a camera's frames with what the projectors showed, to find devices that have moved: their light
+/// is shifted from its predicted place. Works cell by cell. Only cells are used that lie wholly on the
+/// prototype and whose light has edges and has not changed recently. The measure is the zero-mean normalised
+/// cross-correlation of the frame with the predicted light, with the light of one projector (or all light)
+/// shifted. No albedo is needed; a print on the prototype only lowers the correlation. The results of some
+/// seconds are summed with exponential forgetting.
 ///
-/// Cannot tell: shifts along all edges there are; displacements over reach_px; anything where no light with
-/// edges is shown.
+/// Cannot detect: shifts along the edges, where all edges have one direction; shifts larger than the search
+/// range (24 pixels of the reduced image); anything where no light with edges is shown.
 class MisalignmentDetector {
  public:
   MisalignmentDetector(const Rig& rig, std::size_t camera);
 
-  /// Side of the patches that place() wants, camera pixels.
+  /// Side of the patches that place() expects, camera pixels.
   int side_px() const { return side_px_; }
-  /// Where the light falls from now on. What was found before stays.
+  /// Sets where the light falls from now on. The sums so far are kept.
   void place(IlluminatedPatches patches);
 
   bool is_looking() const { return !cells_.empty(); }
-  /// Begins a look at a frame (8-bit grey or BGR of the camera's size). `shown`: what each projector showed
-  /// while it was exposed (8-bit BGR; empty: black), and shortly `before`. `avoid`: quadrilaterals of the
-  /// frame that are left out (markers: paper has edges of its own). Nothing happens before place().
+  /// Begins the comparison with a frame (8-bit grey or BGR of the camera's size). `shown` and `before` are
+  /// the images that each projector showed during the exposure and shortly before it (8-bit BGR; empty:
+  /// black). `avoid`: quadrilaterals of the frame that are left out (markers, because paper has edges of its
+  /// own). Nothing happens before place().
   void begin(const Frame& frame,
              std::span<const cv::Mat> shown,
              std::span<const cv::Mat> before,
              std::span<const std::vector<cv::Point>> avoid);
-  /// Compares some cells; true when that ends a look.
+  /// Compares some cells; returns true when the frame is finished.
   bool compare(int cells);
 
   LightDisplacements places() const;
 
  private:
   struct Light {
-    cv::Mat table;  // CV_32FC3, 1 x 256: of display values
-    cv::Mat given;  // CV_32F: by one projector, where predicted
+    cv::Mat table;  // CV_32FC3, 1 x 256: light of each display value
+    cv::Mat given;  // CV_32F: predicted light of this projector in the camera's image
   };
   cv::Mat given(std::size_t projector, const cv::Mat& image) const;
   void compare_cell(const cv::Rect& cell);
@@ -76,20 +78,20 @@ class MisalignmentDetector {
   cv::Mat light_of_levels_;
   IlluminatedPatches patches_;
   double mm_per_px_ = 0;
-  cv::Mat usable_;               // CV_8U: on the prototype, lit, not to be avoided
+  cv::Mat usable_;               // CV_8U: on the prototype, illuminated, and not in `avoid`
   cv::Mat frame_;                // CV_32F
-  std::vector<Light> lights_;    // one a projector
+  std::vector<Light> lights_;    // one for each projector
   std::vector<cv::Rect> cells_;  // still to be compared, the best last
-  double white_ = 0;             // mean irradiance
+  double white_ = 0;             // mean irradiance of white on the usable pixels
   Stamp looked_at_;
-  // Sums over cells, for each projector and, last, for all light.
+  // Sums over cells: one for each projector, and the last one for all light.
   struct Sum {
-    cv::Mat map;          // CV_32F, a pixel a shift: contrast x share x likeness
-    cv::Mat gains;        // likewise: contrast x likeness gained
-    double contrast = 0;  // what it rests upon
+    cv::Mat map;          // CV_32F, a pixel for each shift: contrast x share x correlation
+    cv::Mat gains;        // CV_32F, likewise: contrast x gain in correlation
+    double contrast = 0;  // sum of the weights contrast x share
   };
   static Sum nothing();
-  std::vector<Sum> look_, all_;  // of the look that goes on; of all, those that are past forgotten
+  std::vector<Sum> look_, all_;  // of the current frame; of all frames, with forgetting
 };
 
 }  // namespace limn::projector

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int k_occlusion_side = 256;  // texels of a projector's map
 
-// The map as a layer has it: CV_32FC1, 0 ... 1.
+// The map as a layer stores it: CV_32FC1, 0 ... 1.
 cv::Mat as_layer(const cv::Mat& map) {
   cv::Mat layer(k_occlusion_side, k_occlusion_side, CV_32F, cv::Scalar(1));
   if (map.empty()) return layer;

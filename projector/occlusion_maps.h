@@ -7,21 +7,21 @@
 
 namespace limn::projector {
 
-/// How much of each projector's light arrives (Renderer::set_occlusion), a layer a projector.
+/// The share of each projector's light that arrives (Renderer::set_occlusion), one layer for each projector.
 class OcclusionMaps final : public Bindable {
  public:
-  /// All of it.
+  /// Starts with all light arriving.
   explicit OcclusionMaps(std::size_t projectors);
-  /// As Renderer::set_occlusion. False when it was so already.
+  /// As Renderer::set_occlusion. Returns false when nothing changes.
   bool set(std::size_t projector, const cv::Mat& map);
-  /// How often any of them has changed.
+  /// Number of changes of any map so far.
   unsigned changes() const { return changes_; }
-  /// Resource::occlusion.
+  /// Binds Resource::occlusion.
   void bind(const Use& use) const override;
 
  private:
   GlName layers_;
-  std::vector<cv::Mat> maps_;  // as they are in the layers
+  std::vector<cv::Mat> maps_;  // the same values as in the layers
   unsigned changes_ = 0;
 };
 

@@ -55,7 +55,7 @@ void PartsLayer::draw(What what,
                       PassTimes* times) {
   Both& both = what.is_shadowed ? *shadowed_ : plain_;
   const Passes& passes = what.is_view ? both.view : both.parts;
-  // Where places lie over each other pixels are listed again.
+  // Where places overlap, pixels are listed more than once.
   const int room = target.size.area() * static_cast<int>(std::max<std::size_t>(1, places.size()));
   const ImageAt drawn(k_target_image, target.light, GL_RGBA32F);
   const TextureAt light(k_light_unit, target.light);

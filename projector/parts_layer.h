@@ -13,25 +13,26 @@ namespace limn::projector {
 
 struct Smoothing;
 
-/// Draws what an imager is to see of parts, linear light and coverage, by lists of pixels as LightLayer does:
-/// where there may be some, at pixel centres, by more samples at edges, and what few of those need.
+/// Draws the parts as an imager sees them, in linear light with coverage. It works with pixel lists, as
+/// LightLayer does: it lists the pixels that may see a part, draws one sample at their centres, then several
+/// samples at edges, and then the few pixels that need an extra pass.
 class PartsLayer {
  public:
-  /// `looks`: what is defined where looks are drawn.
+  /// `looks`: the defines of the shading programs (GpuScene::looks).
   static Result<PartsLayer> link(Defines looks);
-  /// Contact shadows, too; once is enough.
+  /// Links the programs with contact shadows. Further calls do nothing.
   Status link_shadowed();
 
   struct What {
-    bool is_view;      ///< of a virtual camera, with the prototype; else of parts over a camera's image
-    bool is_shadowed;  ///< with contact shadows: link_shadowed() has been called
+    bool is_view;      ///< A virtual camera's view, with the prototype; else parts over a camera's image.
+    bool is_shadowed;  ///< With contact shadows; link_shadowed() must have been called.
   };
   struct Target {
     const GlName& light;  ///< GL_RGBA32F
     cv::Size size;
   };
-  /// Within `places` alone. `resources`: scene, viewpoints, lens, room light, albedo (views) or composite
-  /// weights (parts), and the contact shadow where there is one.
+  /// Draws within `places` only. `resources` must hold scene, viewpoints, lens, room light, albedo (views) or
+  /// composite weights (parts), and the contact shadow if it is used.
   void draw(What what,
             const Target& target,
             const std::vector<cv::Rect>& places,
@@ -52,8 +53,8 @@ class PartsLayer {
   Both plain_;
   std::optional<Both> shadowed_;
   ComputePass where_edges_;
-  PixelList list_;          // of pixels that may see something, then of those at edges
-  PixelList beside_unlit_;  // pixels at edges that may lack what light cannot show
+  PixelList list_;          // first the pixels that may see something, then those at edges
+  PixelList beside_unlit_;  // pixels at edges with samples that light may not show
 };
 
 }  // namespace limn::projector

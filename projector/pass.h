@@ -13,8 +13,8 @@
 
 namespace limn::projector {
 
-/// A step of drawing: one program with all that it reads and writes. When it runs it binds these and nothing
-/// else, so that it needs nothing of what ran before it but the contents.
+/// One drawing step: a program with the list of resources that it reads and writes. When it runs, it binds
+/// exactly these. It depends on earlier passes only through the contents of the resources.
 class Pass {
  public:
   struct Description {
@@ -23,10 +23,9 @@ class Pass {
     std::vector<Resource> reads = {};
     std::vector<Resource> writes = {};
   };
-  /// For values of its own, such as the number of samples.
+  /// The program, for setting uniforms that belong to no resource, such as the number of samples.
   const Program& program() const { return program_; }
-  /// Binds what it reads and writes, all of which `resources` must have, and makes its program the current
-  /// one.
+  /// Binds what it reads and writes and makes its program current. `resources` must hold all of these.
   void use(const Resources& resources) const;
 
  protected:
@@ -48,9 +47,10 @@ class ComputePass : public Pass {
   ComputePass() = default;
   static Result<ComputePass> link(const Description& description);
 
-  /// Over rectangles, 16 x 4 pixels a group, which are u_first ... u_end to the shader.
+  /// Runs over rectangles in work groups of 16 x 4 pixels. The shader gets each rectangle as u_first and
+  /// u_end.
   void look_through(std::span<const cv::Rect> places, const Resources& resources) const;
-  /// Over listed pixels, 64 a group (shaders/listed.glsl).
+  /// Runs over a pixel list, 64 pixels in each work group (shaders/listed.glsl).
   void work_through(const PixelList& pixels, const Resources& resources) const;
 
  private:
@@ -63,7 +63,7 @@ class FullscreenPass : public Pass {
   FullscreenPass() = default;
   static Result<FullscreenPass> link(const Description& description);
 
-  /// Black outside of `places`.
+  /// Draws within `places`; the rest becomes black.
   void draw(const Canvas& into, std::span<const cv::Rect> places, const Resources& resources) const;
   void draw(const Canvas& into, const Resources& resources) const;
 

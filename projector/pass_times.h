@@ -7,13 +7,13 @@
 
 namespace limn::projector {
 
-/// How long the GPU took for one pass.
+/// GPU time of one pass.
 struct PassTime {
   std::string pass;
   double ms = 0;
 };
 
-/// GPU timer queries around passes, where they are asked for. Belongs to the current GL context.
+/// GPU timer queries around passes, if enabled. Belongs to the current GL context.
 class PassTimes {
  public:
   PassTimes() = default;
@@ -23,7 +23,7 @@ class PassTimes {
 
   void enable(bool wanted) { is_enabled_ = wanted; }
 
-  /// Ends with the object.
+  /// Measures from its construction to its destruction.
   class Scope {
    public:
     Scope(PassTimes* times, const char* pass);
@@ -35,7 +35,7 @@ class PassTimes {
     PassTimes* times_;
   };
 
-  /// Of all passes since the last call, in their order; waits for the GPU.
+  /// Times of all passes since the last call, in their order. Waits for the GPU.
   std::vector<PassTime> taken();
 
  private:

@@ -6,7 +6,8 @@
 namespace limn::projector {
 namespace {
 
-constexpr double k_widest_tangent = 3.7;  // 75 degrees; a flat image of more is mostly its border
+// 75 degrees; a wider pinhole image would spend most of its pixels on the border.
+constexpr double k_widest_tangent = 3.7;
 
 }  // namespace
 
@@ -23,7 +24,7 @@ PinholeView pinhole_view_over(
   PinholeView pinhole;
   pinhole.pinhole_from_scene = pinhole_from_scene;
   if (rect.is_empty()) return pinhole;
-  constexpr double k_margin = 2;  // texels around, so that the border has neighbours
+  constexpr double k_margin = 2;  // texels around the image, so that texels at the border have neighbours
   const Eigen::Vector2d extent = rect.upper - rect.lower;
   pinhole.focal =
       std::min({focal, (max_width - 2 * k_margin) / extent.x(), (max_height - 2 * k_margin) / extent.y()});
@@ -50,7 +51,7 @@ TangentRect tangents_spanned(const Pose& pinhole_from_scene, std::span<const Eig
 }
 
 Eigen::Matrix4d clip_from_pinhole(const PinholeView& pinhole) {
-  // GL's window coordinate of a pixel centre is the pixel's number plus one half.
+  // GL's window coordinate of a pixel centre is the pixel's index plus one half.
   Eigen::Matrix4d clip = Eigen::Matrix4d::Zero();
   clip(0, 0) = 2 * pinhole.focal / pinhole.width;
   clip(0, 2) = 2 * (pinhole.centre.x() + 0.5) / pinhole.width - 1;

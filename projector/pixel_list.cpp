@@ -21,7 +21,7 @@ void PixelList::bind(const Use& use) const {
 }
 
 void PixelList::dispatch() const {
-  constexpr GLintptr k_groups = sizeof(std::uint32_t);  // after the count
+  constexpr GLintptr k_groups = sizeof(std::uint32_t);  // the group counts follow the pixel count
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_work_list_buffer, *buffer_);
   glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, *buffer_);
   glDispatchComputeIndirect(k_groups);

@@ -8,15 +8,14 @@
 
 namespace limn::projector {
 
-/// Pixels on the GPU that want work, listed by one program and worked through by the next one
-/// (shaders/listed.glsl).
+/// A list of pixels on the GPU. One pass fills it, the next one processes it (shaders/listed.glsl).
 class PixelList final : public Bindable {
  public:
-  /// Empties it; room for so many pixels.
+  /// Empties the list and makes room for `pixels` entries.
   void start(int pixels);
-  /// As Resource::work_list or Resource::deferred_list.
+  /// Binds it as Resource::work_list or Resource::deferred_list.
   void bind(const Use& use) const override;
-  /// Runs the current program over its pixels, 64 a group.
+  /// Runs the current program over its pixels, 64 in each work group.
   void dispatch() const;
 
  private:
@@ -24,8 +23,8 @@ class PixelList final : public Bindable {
   int room_ = 0;
 };
 
-/// Empties an image of linear light (GL_RGBA32F) within rectangles, and their neighbours, by which edges are
-/// judged.
+/// Clears an image of linear light (GL_RGBA32F) within rectangles and in the pixels around them, which the
+/// edge detection reads.
 void clear_light(const GlName& light, cv::Size size, std::span<const cv::Rect> places);
 
 }  // namespace limn::projector

@@ -11,7 +11,8 @@ namespace limn::projector {
 namespace {
 
 constexpr int k_response_columns = 1025;
-// Steps of light that ask for more samples: beside light, and between blacks.
+// Anti-aliasing of the edges of light: for still images, for moving images, and for even black, whose steps
+// are very small.
 constexpr Smoothing k_light_edges, k_quick_edges{.samples = 4},
     k_dark_edges{.samples = 16, .least_step = 0.0001};
 
@@ -77,8 +78,8 @@ void ProjectorView::forget() {
   for (Shown& shown : shown_) shown.is_current = false;
 }
 
-// How smooth: motion may be drawn by half the samples, and a still image is drawn whole once. Even black
-// begins and ends within a pixel: it would be seen to jump.
+// Whether to use half the samples. Only for images in motion; a still image is then drawn once more with all
+// samples. Never with even black: its light begins and ends within a pixel, and the change would be visible.
 bool ProjectorView::is_quick(bool is_still) const {
   return quick_motion_ && !is_still && !shared_.balance.options().even_black;
 }
@@ -93,7 +94,7 @@ LightLayer& ProjectorView::layer() {
   return by_measurement ? *measured_light_layer_ : light_layer_;
 }
 
-// Where there may be light: at the parts, or on all of the prototype where black is to be even.
+// Finds where there may be light: at the parts, or on the whole prototype with even black.
 void ProjectorView::find_places(std::size_t index, const Imager& viewer) {
   const SceneCache& scene = shared_.scene;
   if (shared_.balance.options().even_black) {
@@ -148,7 +149,7 @@ void ProjectorView::draw_light(std::size_t index, const Canvas& light, const Res
   shown.hit_cache.end();
 }
 
-// Display values of the light.
+// Converts the light to display values.
 void ProjectorView::draw_display(std::size_t index, const Canvas& light, const Resources& resources) {
   const PassTimes::Scope scope(&shared_.times, "response");
   const LightOptions& options = shared_.balance.options();

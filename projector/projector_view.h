@@ -11,7 +11,7 @@
 
 namespace limn::projector {
 
-/// What the renderer's views share; each outlives them.
+/// What the renderer's views share. Each member outlives the views.
 struct Shared {
   const Rig& rig;
   SceneCache& scene;
@@ -20,20 +20,21 @@ struct Shared {
   PassTimes& times;
 };
 
-/// Draws what projectors are to show, and what is known of their pixels.
+/// Draws the projectors' images, and data about their pixels.
 class ProjectorView {
  public:
-  /// `looks`: what is defined where looks are drawn.
+  /// `looks`: the defines of the shading programs (GpuScene::looks).
   static Result<ProjectorView> create(const Shared& shared, Defines looks);
 
-  /// Needed before anything is drawn by Compensation::measured; once is enough.
+  /// Links the programs for Compensation::measured. Must be called before drawing with it; further calls do
+  /// nothing.
   Status link_measured();
-  /// Renderer::set_quick_motion.
+  /// As Renderer::set_quick_motion.
   void set_quick_motion(bool wanted) { quick_motion_ = wanted; }
-  /// The last images are no longer what is to be shown.
+  /// Marks all images as outdated, so that they are drawn again.
   void forget();
 
-  /// Renderer::draw_projector, projector_image, clipped, surface_points and blend.
+  /// As Renderer::draw_projector, projector_image, clipped, surface_points and blend.
   GLuint draw(std::size_t index, const scene::PosedScene& posed, const Imager& viewer);
   cv::Mat image(std::size_t index, const scene::PosedScene& posed, const Imager& viewer);
   cv::Mat clipped(std::size_t index) const { return shown_.at(index).clipped; }
@@ -41,14 +42,14 @@ class ProjectorView {
   cv::Mat blend(std::size_t index, const scene::PosedScene& posed);
 
  private:
-  // What the centres of a projector's pixels see (shaders/known.glsl).
+  // What the centres of a projector's pixels see, and their blending shares (shaders/known.glsl).
   class HitCache final : public Bindable {
    public:
     HitCache() = default;
     HitCache(int width, int height);
-    // What is kept is of another time.
+    // Whether the contents belong to another stamp.
     bool is_outdated(GLuint stamp) const { return filled_at_ != stamp; }
-    // For a drawing at this time, before it and once it is done.
+    // Called before and after a drawing with this stamp.
     void begin(GLuint stamp) { stamp_ = stamp; }
     void end() { filled_at_ = stamp_; }
     void bind(const Use& use) const override;
@@ -62,8 +63,8 @@ class ProjectorView {
     Canvas display;
     HitCache hit_cache;
     scene::PosedScene posed;
-    Pose imager_from_world;  // of the viewer
-    cv::Mat image, clipped;  // once read back
+    Pose imager_from_world;  // the viewer's pose
+    cv::Mat image, clipped;  // read back from the GPU on demand
     bool is_current = false;
     bool is_quick = false;
 
@@ -81,13 +82,13 @@ class ProjectorView {
 
   Shared shared_;
   LightLayer light_layer_;
-  std::optional<LightLayer> measured_light_layer_;  // linked when it is asked for
+  std::optional<LightLayer> measured_light_layer_;  // linked on demand
   ComputePass response_pass_;
   FullscreenPass points_pass_, blend_pass_;
   std::vector<GlName> responses_;
   std::vector<Shown> shown_;
   bool quick_motion_ = false;
-  PlacesByMode light_places_;  // of the projector drawn last
+  PlacesByMode light_places_;  // places of the projector drawn last
   std::vector<cv::Rect> view_places_, surface_places_;
 };
 

@@ -20,7 +20,7 @@ ImagerView::Kind kind_of(Composite what) {
 }  // namespace
 
 struct Renderer::Impl {
-  // What the views share.
+  // The objects that the views share.
   struct Base {
     Rig rig;
     std::unique_ptr<PassTimes> times;

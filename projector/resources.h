@@ -8,31 +8,31 @@
 
 namespace limn::projector {
 
-/// What passes read and write.
+/// Everything that passes read and write.
 enum class Resource {
-  scene,              ///< triangles, materials and where parts stand: GpuScene
-  viewpoints,         ///< what projectors and the eye see, and from where: Sights
-  occlusion,          ///< how much of the projectors' light arrives: OcclusionMaps
-  lens,               ///< rays of the imager that is drawn: GpuLens
-  room_light,         ///< what parts are shaded by: RoomLighting
-  projector,          ///< which projector is drawn: ProjectorIndex
-  hit_cache,          ///< what the centres of its pixels see, and their shares of the light: HitCache
-  light_balance,      ///< how colours become light: LightBalance
-  albedo,             ///< of the prototype: PrototypeAlbedo
-  contact_shadow,     ///< distances from parts: ContactShadow
-  composite_weights,  ///< how much of each part a composite draws: CompositeWeights
-  light,              ///< linear light that earlier passes drew, as a texture
-  response,           ///< display values of the projector, as a texture
-  camera_image,       ///< what a composite is laid over, as a texture
-  target,             ///< what the pass draws, as an image
-  work_list,          ///< pixels that the pass lists: PixelList
-  deferred_list,      ///< pixels that the pass leaves to another one: PixelList
-  depth,              ///< of a projector's ids: DepthOfIds
-  depth_edges,        ///< of one projector, as an image
-  all_depth_edges,    ///< of all projectors, as a texture
-  edge_marks,         ///< blocks beside whose depth edges another projector goes on, as an image
-  edge_rows,          ///< distances to them along rows, as an image
-  edge_fade,          ///< light that the projector keeps beside them, as an image
+  scene,              ///< Triangles, materials and poses of parts: GpuScene.
+  viewpoints,         ///< Visible triangles and positions of projectors and viewer: VisibilityBuffers.
+  occlusion,          ///< Share of the projectors' light that arrives: OcclusionMaps.
+  lens,               ///< Rays of the imager that is drawn: GpuLens.
+  room_light,         ///< Light that parts are shaded by: RoomLighting.
+  projector,          ///< Which projector is drawn: ProjectorIndex.
+  hit_cache,          ///< What the centres of its pixels see, and their blending shares: HitCache.
+  light_balance,      ///< How colours become light: LightBalance.
+  albedo,             ///< Albedo of the prototype: PrototypeAlbedo.
+  contact_shadow,     ///< Distance fields of parts: ContactShadow.
+  composite_weights,  ///< How much of each part a composite draws: CompositeWeights.
+  light,              ///< Linear light that earlier passes drew, as a texture.
+  response,           ///< Table of the projector's display values, as a texture.
+  camera_image,       ///< The image behind a composite, as a texture.
+  target,             ///< The image that the pass draws.
+  work_list,          ///< Pixels that the pass lists or processes: PixelList.
+  deferred_list,      ///< Pixels that the pass leaves to a later one: PixelList.
+  depth,              ///< Depth buffer of a projector's triangle ids: DepthOfIds.
+  depth_edges,        ///< Depth discontinuities of one projector, as an image.
+  all_depth_edges,    ///< Depth discontinuities of all projectors, as a texture.
+  edge_marks,         ///< Blocks at whose depth edges another projector takes over, as an image.
+  edge_rows,          ///< Distances to these blocks along rows, as an image.
+  edge_fade,          ///< Feathering weights near these blocks, as an image.
 };
 constexpr std::size_t k_resource_count = static_cast<std::size_t>(Resource::edge_fade) + 1;
 
@@ -43,7 +43,7 @@ struct Use {
   const Program& program;
 };
 
-/// Something that passes read or write. It knows its places in shaders/bindings.glsl and its uniforms.
+/// Something that passes read or write. It knows its slots in shaders/bindings.glsl and its uniforms.
 class Bindable {
  public:
   virtual void bind(const Use& use) const = 0;
@@ -55,7 +55,7 @@ class Bindable {
   Bindable& operator=(const Bindable&) = default;
 };
 
-/// What there is for passes of one drawing. Borrows all of it.
+/// The resources available to the passes of one drawing. Borrows all of them.
 class Resources {
  public:
   Resources with(Resource as, const Bindable& resource) const {
@@ -64,14 +64,14 @@ class Resources {
     return more;
   }
   Resources with(Resource as, const Bindable&& resource) const = delete;
-  /// Null when there is none.
+  /// Null when it holds no such resource.
   const Bindable* find(Resource as) const { return all_[static_cast<std::size_t>(as)]; }
 
  private:
   std::array<const Bindable*, k_resource_count> all_ = {};
 };
 
-/// A texture at its unit.
+/// A texture bound to a texture unit.
 class TextureAt final : public Bindable {
  public:
   TextureAt(int unit, const GlName& texture) : unit_(static_cast<GLuint>(unit)), texture_(*texture) {}
@@ -81,7 +81,7 @@ class TextureAt final : public Bindable {
   GLuint unit_, texture_;
 };
 
-/// A texture, or one layer of it, at its image unit.
+/// A texture, or one layer of it, bound to an image unit.
 class ImageAt final : public Bindable {
  public:
   ImageAt(int unit, const GlName& texture, GLenum format, int layer = 0)

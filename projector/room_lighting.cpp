@@ -5,8 +5,8 @@
 namespace limn::projector {
 namespace {
 
-// The light where no room is known: soft, and a lamp, in the viewer's frame above and behind the left
-// shoulder.
+// The light used where no room light is known: soft light and a lamp, which stands above and behind the
+// viewer's left shoulder (viewer's frame).
 constexpr double k_soft_below = 0.15, k_soft_above = 0.35, k_lamp = 0.65;
 const Eigen::Vector3d k_d_lamp_viewer = Eigen::Vector3d(-0.36, -0.64, -0.68).normalized();
 

@@ -10,19 +10,19 @@
 
 namespace limn::projector {
 
-/// The light that parts are shaded by (shaders/look.glsl): the room's where it is known, else soft light and
-/// a lamp that stand with the viewer.
+/// The light that parts are shaded by (shaders/look.glsl): the room's light if it is known, else soft light
+/// and a lamp that move with the viewer.
 class RoomLighting final : public Bindable {
  public:
   explicit RoomLighting(const std::optional<scene::RoomLight>& room);
-  /// For what is drawn next.
+  /// Sets the light for the next drawing.
   void place(const scene::PosedScene& posed, const Pose& scene_from_world, const Imager& viewer);
-  /// Resource::room_light.
+  /// Binds Resource::room_light.
   void bind(const Use& use) const override;
 
  private:
   std::optional<scene::RoomLight> room_;
-  scene::RoomLight viewer_light_;  // where no room is known
+  scene::RoomLight viewer_light_;  // used where no room light is known
   bool is_room_known_ = false;
   Eigen::Vector4f d_up_, soft_below_, soft_above_;  // scene frame
   std::vector<Eigen::Vector4f> d_lamps_, lamps_;

@@ -77,7 +77,7 @@ void SceneCache::prepare(const scene::PosedScene& posed, FromProjectors needed) 
 void SceneCache::draw_from_eye(const Imager& viewer) {
   if (eye_kind_ == EyeKind::eye && is_same(eye_.imager_from_world, viewer.imager_from_world)) return;
   const Pose scene_from_viewer = scene_from_world_ * viewer.imager_from_world.inverse();
-  const PassTimes::Scope scope(times_, "ids from the eye");
+  const PassTimes::Scope scope(times_, "ids from the viewer");
   visibility_.draw_from_eye(scene_, runs_, scene_from_world_, scene_from_viewer.translation,
                             scene_from_viewer.rotation * -Eigen::Vector3d::UnitY());
   eye_kind_ = EyeKind::eye;

@@ -8,7 +8,7 @@
 namespace limn::projector {
 namespace {
 
-// A shader's text with its includes in place; the files in the order of their numbers in #line.
+// A shader's text with its includes inserted, and the files in the order of their numbers in #line.
 struct Unrolled {
   std::string text;
   std::vector<std::string> files;
@@ -52,7 +52,7 @@ Result<GlName> compile(GLenum stage, const std::string& file, Defines defines = 
   for (std::size_t i = 0; i < k_define_names.size(); ++i)
     if (defines.contains(static_cast<Define>(i)))
       definitions += fmt::format("#define {}\n", k_define_names[i]);
-  if (!definitions.empty())  // after the first line, which says the version
+  if (!definitions.empty())  // after the first line, which is #version
     source.text.insert(source.text.find('\n') + 1, definitions + "#line 2 0\n");
   GlName shader(glCreateShader(stage), [](GLuint n) { glDeleteShader(n); });
   const char* text = source.text.c_str();
@@ -67,7 +67,8 @@ Result<GlName> compile(GLenum stage, const std::string& file, Defines defines = 
                message);
 }
 
-// The location of each uniform by its name, without the uniforms of blocks, which have none.
+// Calls `use` with the name and location of each uniform. Uniforms in blocks are skipped, because they have
+// no location.
 template <class Use>
 void for_each_uniform(GLuint program, const Use& use) {
   GLint count = 0;

@@ -15,22 +15,23 @@
 
 namespace limn::projector {
 
-/// File name -> text of everything in shaders/, put into the program at build time.
+/// File name -> text of all files in shaders/, embedded in the program at build time.
 const std::map<std::string, std::string>& embedded_shaders();
 
-/// A linked vertex and fragment shader, or a compute shader. Where its uniforms are is looked up once, when
-/// it is linked.
+/// A linked vertex and fragment shader, or a compute shader. The locations of its uniforms are read once,
+/// when it is linked.
 class Program {
  public:
-  /// By file names in shaders/. `#include "x.glsl"` is replaced by the file once, with `#line` directives, so
-  /// that the driver's messages name the true line. Error: the driver's message with file names.
+  /// Links files of shaders/. The first `#include "x.glsl"` of a file is replaced by its text, further ones
+  /// by nothing. `#line` directives make the driver's messages name the true line. Error: the driver's
+  /// message with file names.
   static Result<Program> link(const std::string& vertex_file, const std::string& fragment_file);
 
-  /// A compute shader, likewise.
+  /// The same for a compute shader, compiled with `defines`.
   static Result<Program> link_compute(const std::string& file, Defines defines = {});
 
   void use() const { glUseProgram(*name_); }
-  // A uniform that this program does not use is left alone.
+  // A uniform that this program does not use is ignored.
   void set(const char* uniform, int value) const { glProgramUniform1i(*name_, location_of(uniform), value); }
   void set(const char* uniform, int x, int y) const {
     glProgramUniform2i(*name_, location_of(uniform), x, y);
@@ -44,7 +45,7 @@ class Program {
   void set(const char* uniform, const Eigen::Vector4f& v) const {
     glProgramUniform4fv(*name_, location_of(uniform), 1, v.data());
   }
-  /// The first entries of an array.
+  /// Sets the first entries of an array.
   void set_vectors(const char* uniform, std::span<const Eigen::Vector4f> vectors) const {
     if (vectors.empty()) return;
     glProgramUniform4fv(*name_, location_of(uniform), static_cast<GLsizei>(vectors.size()),
@@ -62,14 +63,14 @@ class Program {
 
  private:
   struct Uniform {
-    std::string name;  // an array's without its index
+    std::string name;  // for an array without "[0]"
     GLint location = -1;
   };
   // -1 for a uniform that this program does not use; GL ignores setting it.
   GLint location_of(std::string_view uniform) const;
   static Result<Program> linked(std::span<const GlName> shaders, const std::string& files);
   GlName name_;
-  std::vector<Uniform> uniforms_;  // by name
+  std::vector<Uniform> uniforms_;  // sorted by name
 };
 
 }  // namespace limn::projector

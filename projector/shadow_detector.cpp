@@ -12,37 +12,44 @@
 namespace limn::projector {
 namespace {
 
-// Beliefs before anything was seen, for light that is 1 at full scale and irradiance that is 1 at a typical
-// patch: nothing is known of the room and the albedo, projectors are alike.
+// The prior of a patch's model, for light that is 1 at full scale and irradiance that is 1 at a typical
+// patch. Room light and albedo are unknown; the projectors are assumed to be alike.
 constexpr float k_offset = 0.03F, k_offset_stddev = 0.15F;
 constexpr float k_gain = 0.5F, k_albedo_stddev = 0.5F, k_projector_stddev = 0.04F;
-constexpr float k_noise = 0.0012F;  // of a patch's light: shot noise of 64 pixels, and rounding
-constexpr float k_drift = 0.002F;   // share by which what a patch looks like may change from frame to frame
-constexpr float k_offset_unmodelled = 0.01F;  // of the room's light: people walk in it
-constexpr std::uint8_t k_too_bright = 250;    // level
-constexpr float k_least_weight = 0.02F;       // of an unlit patch among lit ones
-constexpr float k_most_cost = 25;   // of a patch, so that none decides alone: five standard deviations
-constexpr float k_unlike_cost = 9;  // nothing explains what costs more
-constexpr float k_like_cost = 4;    // what costs less has not changed
-constexpr float k_change_cost = 3;  // of another state of a projector than the last
-constexpr float k_least_vote = 1;   // by which a cell's votes must differ to change it
+// Standard deviation of a patch's light: shot noise of 64 pixels, and rounding.
+constexpr float k_noise = 0.0012F;
+constexpr float k_drift = 0.002F;  // process noise: relative change of a patch's model from frame to frame
+// Standard deviation of the room light, relative: people walk through it.
+constexpr float k_offset_unmodelled = 0.01F;
+constexpr std::uint8_t k_too_bright = 250;  // grey level that counts as overexposed
+constexpr float k_least_weight = 0.02F;     // weight of a patch without light among illuminated ones
+// Limit for each patch, so that none decides alone: five standard deviations.
+constexpr float k_most_cost = 25;
+constexpr float k_unlike_cost = 9;  // a patch with a higher cost fits no explanation
+constexpr float k_like_cost = 4;    // a patch with a lower cost has not changed
+constexpr float k_change_cost = 3;  // cost of a change of one projector's state
+constexpr float k_least_vote = 1;   // least difference of a cell's votes that changes its state
 constexpr float k_most_vote = 10;
-constexpr float k_most_others = 5, k_few_others = 2;  // blocked cells among the eight around one
-constexpr float k_stale_votes = 0.5F;    // what is left of a camera's votes when the next frame is another's
-constexpr std::uint8_t k_patience = 60;  // frames that nothing explains a patch; then it is learned afresh
-constexpr std::uint8_t k_no_label = 255, k_unlike = 254, k_dark = 253;  // beside sets of projectors
+// Limits for the blocked cells among the eight neighbours.
+constexpr float k_most_others = 5, k_few_others = 2;
+constexpr float k_stale_votes = 0.5F;  // factor for old votes when the next frame arrives
+// After this many frames without an explanation, the patch is learned afresh.
+constexpr std::uint8_t k_patience = 60;
+// Labels that are not sets of projectors.
+constexpr std::uint8_t k_no_label = 255, k_unlike = 254, k_dark = 253;
 constexpr float k_infinity = 1e30F;
-constexpr std::size_t k_all_sets = 4;         // projectors; of more no three are blocked in one place
-constexpr std::size_t k_most_projectors = 7;  // whose sets are labels
+constexpr std::size_t k_all_sets = 4;  // with more projectors, no three are assumed blocked at one point
+constexpr std::size_t k_most_projectors = 7;  // so that all sets of projectors fit into the labels
 
-// Of neighbours in a row that both have one.
+// Median distance between horizontal neighbours that both have a value.
 double typical_distance(const cv::Mat& places, int dimensions) {
   std::vector<double> distances;
   for (int row = 0; row < places.rows; ++row)
     for (int column = 1; column < places.cols; ++column) {
       const auto& a = places.at<cv::Vec4f>(row, column - 1);
       const auto& b = places.at<cv::Vec4f>(row, column);
-      const int given = dimensions == 3 ? 3 : 2;  // irradiance of a projector, w of points
+      // Channel that says whether there is a value: the irradiance, or w of a point.
+      const int given = dimensions == 3 ? 3 : 2;
       if (!(a[given] > 0 && b[given] > 0)) continue;
       double sum = 0;
       for (int k = 0; k < dimensions; ++k) sum += std::pow(static_cast<double>(a[k] - b[k]), 2);
@@ -51,7 +58,7 @@ double typical_distance(const cv::Mat& places, int dimensions) {
   return median(std::move(distances), 1.0);
 }
 
-// Mean light of the patches.
+// Mean light of each patch.
 cv::Mat in_patches(const cv::Mat& levels, const cv::Mat& light_of_level, const cv::Size& patches) {
   cv::Mat light, out;
   cv::LUT(levels, light_of_level, light);
@@ -67,7 +74,7 @@ cv::Mat too_bright(const cv::Mat& levels, const cv::Size& patches) {
   return channels[0] | channels[1] | channels[2];
 }
 
-// Blocked cells and those around them get 0, two cells further all is 1.
+// Blocked cells and the cells around them become 0; two cells further all is 1.
 cv::Mat softened(const cv::Mat& blocked) {
   cv::Mat grown, soft;
   cv::dilate(blocked, grown, cv::getStructuringElement(cv::MORPH_RECT, {5, 5}));
@@ -80,7 +87,8 @@ int cells(int pixels, int cell_px) { return (pixels + cell_px - 1) / cell_px; }
 
 float square(float value) { return value * value; }
 
-// What a belief makes of the light that arrives, `x` (1 for the offset, then each projector's).
+// The light that a model predicts for the arriving light `x` (1 for the offset, then one value for each
+// projector).
 struct Foretold {
   float mean = 0, variance = 0;
 };
@@ -96,7 +104,7 @@ Foretold foretold(const float* belief, const float* x, std::size_t d) {
   return out;
 }
 
-// Takes in that the light was `light`, of so much variance (Kalman's update).
+// Updates the model with the measured light and its variance (Kalman filter).
 void take_in(float light, const float* x, float variance, std::size_t d, float* belief) {
   float* covariance = belief + d;
   const Foretold f = foretold(belief, x, d);
@@ -115,40 +123,43 @@ void take_in(float light, const float* x, float variance, std::size_t d, float* 
   }
 }
 
-// A projector and the cells of its image.
+// One projector with the cells of its image.
 struct Source {
   int width = 0, height = 0;
-  cv::Mat light;    // CV_32FC3, 1 x 256: of display values (BGR), black's included
-  cv::Mat blocked;  // CV_8U, a pixel a cell: 1 where no light arrives
+  cv::Mat light;    // CV_32FC3, 1 x 256: light of each display value (BGR), including the black level
+  cv::Mat blocked;  // CV_8U, one pixel for each cell: 1 where no light arrives
   cv::Mat map;
 };
 
 struct Watch {
   Imager imager;
-  cv::Mat light;  // CV_32F, 1 x 256: of levels
+  cv::Mat light;  // CV_32F, 1 x 256: light of each grey level
   IlluminatedPatches patches;
-  double spacing_m = 0;  // of patches on the prototype
+  double spacing_m = 0;  // typical distance of neighbouring patches on the prototype
   double typical_irradiance = 1;
-  std::vector<int> footprints;  // of a patch in each projector's image, its pixels a side
+  std::vector<int> footprints;  // side of a patch in each projector's image, in projector pixels
   int channels = 0;
-  // A patch and channel: mean (offset, then gains), covariance, the light that it was last learned in.
+  // For each patch and channel: mean (offset, then gains), covariance, and the projectors' light at the last
+  // update.
   std::vector<float> beliefs;
-  std::vector<std::uint8_t> unlike;  // frames in a row that nothing explained, a patch
-  std::vector<cv::Mat> votes;        // a projector: CV_32FC2, a pixel a cell, for free and for blocked
+  std::vector<std::uint8_t> unlike;  // for each patch: number of consecutive frames without an explanation
+  // For each projector CV_32FC2, one pixel for each cell: votes for free and for blocked.
+  std::vector<cv::Mat> votes;
 };
 
-// One frame, patch by patch.
+// The evaluation of one frame, patch by patch.
 struct Sight {
-  cv::Mat light;                 // CV_32F, channels of the camera
-  std::vector<cv::Mat> given;    // by each projector, if all arrives: irradiance x light, likewise
-  cv::Mat usable;                // CV_8U
-  std::vector<cv::Mat> costs;    // CV_32F, an explanation: around each patch
-  std::vector<cv::Mat> misfits;  // the same but for what one that predicts less pays
-  cv::Mat labels;                // CV_8U: the set of projectors that are blocked, k_unlike or k_no_label
-  std::vector<cv::Mat> gaps;     // a projector: CV_32F, by how much that explains better than otherwise
+  cv::Mat light;                 // CV_32F, with the camera's number of channels: measured light
+  std::vector<cv::Mat> given;    // same type: irradiance x light from each projector if all of it arrives
+  cv::Mat usable;                // CV_8U: illuminated by a projector and not overexposed
+  std::vector<cv::Mat> costs;    // CV_32F for each explanation: its cost around each patch
+  std::vector<cv::Mat> misfits;  // the same without the logarithm of the variance
+  cv::Mat labels;                // CV_8U: the set of blocked projectors, or k_unlike, k_dark or k_no_label
+  // CV_32F for each projector: by how much the label's cost is lower than that of the alternative.
+  std::vector<cv::Mat> gaps;
 };
 
-// Where the patch of a point was before the prototype moved.
+// The index of the patch that a point of the prototype had before the prototype moved.
 std::optional<std::size_t> patch_of(const Watch& watch, const cv::Vec4f& point) {
   if (!(point[3] > 0)) return std::nullopt;
   const IlluminatedPatches& patches = watch.patches;
@@ -161,7 +172,7 @@ std::optional<std::size_t> patch_of(const Watch& watch, const cv::Vec4f& point) 
   const auto& q = patches.points.at<cv::Vec4f>(row, column);
   const bool is_same =
       q[3] > 0 && (Eigen::Vector3f(q[0], q[1], q[2]).cast<double>() - p).norm() < watch.spacing_m;
-  if (!is_same) return std::nullopt;  // another side of the prototype hid it
+  if (!is_same) return std::nullopt;  // the point was hidden by another side of the prototype
   return static_cast<std::size_t>(row * patches.points.cols + column);
 }
 
@@ -171,7 +182,7 @@ struct ShadowDetector::Impl {
   ShadowDetectorOptions options;
   std::vector<Source> sources;
   std::vector<Watch> watches;
-  std::vector<unsigned> explanations;  // sets of projectors that are blocked, as bits
+  std::vector<unsigned> explanations;  // the sets of blocked projectors that are tried, as bits
 
   Impl(const Rig& rig, const ShadowDetectorOptions& options_in) : options(options_in) {
     LIMN_CHECK(options.cell_px > 0 && rig.projectors.size() <= k_most_projectors);
@@ -266,7 +277,7 @@ Sight ShadowDetector::Impl::sight_of(const Watch& watch,
   return viewpoint;
 }
 
-// The variance of a patch's light beside that of its belief.
+// The variance of a patch's light in addition to the model's own variance.
 float ShadowDetector::Impl::variance_of(const float* belief, const float* x) const {
   const std::size_t d = dimensions();
   const float* last = belief + d + d * d;
@@ -276,8 +287,8 @@ float ShadowDetector::Impl::variance_of(const float* belief, const float* x) con
          square(static_cast<float>(options.unmodelled) * change);
 }
 
-// What each explanation costs: minus twice the logarithm of its likelihood, mean of the channels and of the
-// patches around, those that are lit before all.
+// Computes the cost of each explanation: minus twice its log-likelihood, averaged over the channels and the
+// neighbouring patches. Brightly illuminated patches have the highest weight.
 void ShadowDetector::Impl::explain(const Watch& watch, Sight* viewpoint) const {
   const std::size_t n = sources.size(), d = dimensions();
   const auto channels = static_cast<std::size_t>(watch.channels);
@@ -329,7 +340,7 @@ void ShadowDetector::Impl::explain(const Watch& watch, Sight* viewpoint) const {
     }
 }
 
-// Sets of projectors that reach a patch, and those of them whose light did not arrive at the last frame.
+// The set of projectors that reach a patch, and the subset whose light was blocked at the last frame.
 std::pair<unsigned, unsigned> ShadowDetector::Impl::reached_and_blocked(const Watch& watch,
                                                                         int row,
                                                                         int column) const {
@@ -343,8 +354,9 @@ std::pair<unsigned, unsigned> ShadowDetector::Impl::reached_and_blocked(const Wa
   return {reached, blocked};
 }
 
-// The explanation that costs least around each patch, a change included. Where no light arrives at all nobody
-// can help, and it may be a dark thing before the camera: the state stays.
+// Chooses the explanation with the least cost around each patch; each change of a projector's state adds to
+// the cost. Where no light arrives at all (k_dark), the state stays: no projector can fill the shadow, and it
+// may be a dark thing before the camera.
 void ShadowDetector::Impl::choose(const Watch& watch, Sight* viewpoint) const {
   const cv::Size size = viewpoint->light.size();
   viewpoint->labels = cv::Mat(size, CV_8U, cv::Scalar(k_no_label));
@@ -416,7 +428,7 @@ bool ShadowDetector::Impl::count_votes() {
         std::uint8_t& blocked = counted.at<std::uint8_t>(row, column);
         if (vote[1 - blocked] > vote[blocked] + k_least_vote) blocked = 1 - blocked;
       }
-    // Cells that nobody sees follow most of those around them; one alone is no shadow.
+    // A cell that no camera sees follows the majority of its neighbours. A single blocked cell is no shadow.
     cv::Mat neighbours;
     counted.convertTo(neighbours, CV_32F);
     cv::boxFilter(neighbours, neighbours, CV_32F, {3, 3}, {-1, -1}, false, cv::BORDER_REPLICATE);
@@ -436,7 +448,7 @@ bool ShadowDetector::Impl::count_votes() {
   return changed;
 }
 
-// Patches that are explained, as all around them, and as at the last frame.
+// Updates the models of patches that have the same explanation as all patches around them.
 void ShadowDetector::Impl::learn(const Sight& viewpoint, Watch* watch) const {
   const std::size_t n = sources.size(), d = dimensions();
   const auto channels = static_cast<std::size_t>(watch->channels);

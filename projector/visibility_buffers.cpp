@@ -9,11 +9,11 @@
 namespace limn::projector {
 namespace {
 
-// Texels of ids a pixel; more of them find thinner triangles.
+// Texels of the id image for each pixel of the imager, along one axis. More texels find thinner triangles.
 constexpr double k_oversampling = 1.5;
-// Most texels of a side of the eye's ids.
+// Side of the viewer's id image, texels.
 constexpr int k_eye_side = 2560;
-// Nodes of the pixel maps: 4-5 px a cell, within 0.01 px of the lens between them.
+// Nodes of the pixel maps. A cell is 4 to 5 px wide; interpolation differs from the lens by at most 0.01 px.
 constexpr int k_map_columns = 321, k_map_rows = 241;
 constexpr double k_on_surface = 0.002;  // m, as in shaders/on_surface.glsl
 // Share of the image's smaller side over which a projector fades towards its border.
@@ -29,7 +29,7 @@ bool is_part(const PlacedRun& placed) { return placed.owner != 0; }
 bool is_view_part(const PlacedRun& placed) { return placed.owner != 0 && !placed.on_surface; }
 bool is_surface_part(const PlacedRun& placed) { return placed.owner != 0 && placed.on_surface; }
 
-// The tangents that the wanted runs span; empty when there are none.
+// The tangents spanned by the runs for which `wanted` is true; empty when there are none.
 TangentRect spanned_by(const Pose& pinhole_from_scene,
                        const std::vector<PlacedRun>& runs,
                        bool (*wanted)(const PlacedRun&)) {
@@ -47,8 +47,9 @@ Eigen::AlignedBox3d box_of(const std::vector<PlacedRun>& runs, bool (*wanted)(co
   return box;
 }
 
-// The tangents of a frustum that holds all that an eye sees through a part's box, from the prototype's
-// nearest depth to its farthest. The prototype's when the box reaches behind the eye.
+// The tangents, in the pinhole view, of the part of the viewer's frustum through a part's box that lies
+// between the nearest and the farthest depth of the prototype. The prototype's tangents when the box reaches
+// behind the viewer.
 TangentRect spanned_behind(const Pose& pinhole_from_scene,
                            const PlacedRun& part,
                            const std::vector<PlacedRun>& runs,
@@ -75,7 +76,7 @@ TangentRect spanned_behind(const Pose& pinhole_from_scene,
   return tangents_spanned(pinhole_from_scene, out);
 }
 
-// The tangents that a twin's image covers.
+// The tangents that a pinhole view covers.
 TangentRect covered(const PinholeView& pinhole) {
   return {(Eigen::Vector2d::Constant(-0.5) - pinhole.centre) / pinhole.focal,
           (Eigen::Vector2d(pinhole.width, pinhole.height).array() - 0.5 - pinhole.centre.array()).matrix() /
@@ -91,7 +92,7 @@ std::array<Eigen::Vector3d, 8> corners_of(const Eigen::AlignedBox3d& box) {
 
 cv::Rect whole_of(const PinholeView& pinhole) { return {0, 0, pinhole.width, pinhole.height}; }
 
-// The texels of a twin's image around tangents.
+// The texels of a pinhole view that contain `rect`.
 cv::Rect texels_of(const PinholeView& pinhole, const TangentRect& rect) {
   if (rect.is_empty()) return {};
   const auto texel = [&](const Eigen::Vector2d& tangent) {
@@ -142,7 +143,8 @@ struct VisibilityBuffers::GpuViewpoint {
     quality.z() = static_cast<float>(layer);
   }
   void with_focus(const Focus& known, const Imager& imager) {
-    const double disc = known.aperture_m * imager.lens.fx();  // px, a metre before a lens focused at infinity
+    // px, at a distance of 1 m from a lens focused at infinity.
+    const double disc = known.aperture_m * imager.lens.fx();
     focus.head<2>() << static_cast<float>(disc / known.distance_m), static_cast<float>(disc);
   }
   void with_response(const ProjectorResponse& response) {
@@ -161,7 +163,7 @@ Result<VisibilityBuffers> VisibilityBuffers::create(const Rig& rig) {
   visibility.projectors_ = projectors;
   visibility.responses_ = rig.responses;
   visibility.focuses_ = rig.focuses;
-  const int count = static_cast<int>(projectors.size()) + 1;  // with the witness
+  const int count = static_cast<int>(projectors.size()) + 1;  // plus the reference camera
   visibility.pixel_maps_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_RG32F, k_map_columns, k_map_rows, count);
   for (std::size_t i = 0; i < projectors.size(); ++i) {
     GpuLens lens(projectors[i]);
@@ -205,7 +207,7 @@ void VisibilityBuffers::draw(const GpuScene& scene,
   glNamedFramebufferTextureLayer(*framebuffer_, GL_COLOR_ATTACHMENT0, *ids, 0, layer);
   glBindFramebuffer(GL_FRAMEBUFFER, *framebuffer_);
   glViewport(0, 0, pinhole.width, pinhole.height);
-  glEnable(GL_SCISSOR_TEST);  // clears what is read, no more
+  glEnable(GL_SCISSOR_TEST);  // only texels that are read are cleared
   glScissor(within.x, within.y, within.width, within.height);
   const GLuint nothing[4] = {};
   const float farthest = 0;
@@ -233,7 +235,7 @@ void VisibilityBuffers::draw(const GpuScene& scene,
     program.set("u_has_cut_outs", placed.run->has_cut_outs);
     program.set("u_focal", static_cast<float>(pinhole.focal));
     program.set("u_clip_from_owner", Eigen::Matrix4f(clip_from_owner.cast<float>()));
-    // Those in sight that stand together, at once.
+    // Consecutive visible clusters are drawn in one call.
     int first = placed.run->first, count = 0;
     for (const TriangleRun::Cluster& cluster : placed.run->clusters) {
       if (intersected(rect, tangents_spanned(twin_from_owner, corners_of(cluster.box))).is_empty()) continue;
@@ -247,7 +249,7 @@ void VisibilityBuffers::draw(const GpuScene& scene,
     draw_triangles(first, count);
   }
   glDisable(GL_DEPTH_TEST);
-  glFlush();  // softpipe hands what was drawn to compute programs no sooner
+  glFlush();  // softpipe makes drawn ids visible to compute programs only after a flush
 }
 
 void VisibilityBuffers::send(int index, const GpuViewpoint& viewpoint) {
@@ -260,7 +262,7 @@ void VisibilityBuffers::upload_pixel_map(int layer, const Imager& imager, const 
   glTextureSubImage3D(*pixel_maps_, 0, 0, 0, layer, map.cols, map.rows, 1, GL_RG, GL_FLOAT, map.data);
 }
 
-// Over the prototype: nothing else is lit.
+// It covers the prototype, because nothing else is illuminated.
 PinholeView VisibilityBuffers::projector_pinhole_view(std::size_t projector,
                                                       const std::vector<PlacedRun>& runs,
                                                       const Pose& scene_from_world) const {

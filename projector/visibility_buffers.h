@@ -13,71 +13,74 @@
 
 namespace limn::projector {
 
-/// A lens on the GPU: the rays of an imager.
+/// An imager's lens on the GPU: the rays of its pixels.
 struct GpuLens final : public Bindable {
   BakedLens baked;
   GlName tangents;
 
   explicit GpuLens(const Imager& imager);
-  /// Resource::lens.
+  /// Binds Resource::lens.
   void bind(const Use& use) const override;
 };
 
-/// Id images (shaders/ids.frag) from the eyes of all projectors and of one viewer or camera, and where
-/// those eyes are, as shaders/scene.glsl reads them. Layer 2 i of the projectors' ids is the prototype, 2 i +
-/// 1 the surface parts; layer 0 of the eye's ids is the prototype, 1 the parts. After the projectors' comes a
-/// witness: a camera that measured the prototype and keeps its place in the scene's frame.
+/// Images of triangle ids (shaders/ids.frag) from all projectors and from one viewer or camera, with the
+/// poses of these viewpoints, as shaders/scene.glsl reads them. Layer 2 i of the projectors' ids is the
+/// prototype, layer 2 i + 1 the surface parts; layer 0 of the viewer's ids is the prototype, layer 1 the
+/// parts. The layer after the projectors' is for the reference camera, which measured the prototype and keeps
+/// its pose in the scene's frame.
 class VisibilityBuffers final : public Bindable {
  public:
   static Result<VisibilityBuffers> create(const Rig& rig);
 
-  /// Draws the projectors' ids of the prototype; `with_soft_edges`: also where their light fades beside
-  /// edges, which only their own images need.
+  /// Draws the projectors' ids of the prototype. `with_soft_edges`: also computes the edge feathering, which
+  /// only the projectors' own images need.
   void draw_prototype_from_projectors(const GpuScene& scene,
                                       const std::vector<PlacedRun>& runs,
                                       const Pose& scene_from_world,
                                       bool with_soft_edges);
-  /// Draws their ids of the surface parts, once the prototype's are there for the same pose.
+  /// Draws the projectors' ids of the surface parts. The prototype's ids must have been drawn for the same
+  /// pose.
   void draw_surface_parts_from_projectors(const GpuScene& scene,
                                           const std::vector<PlacedRun>& runs,
                                           const Pose& scene_from_world);
-  /// Draws the ids from an imager's own eye, over its image; `parts_alone`: only where parts may be.
+  /// Draws the ids from an imager's own position, over its image. `parts_alone`: only where parts may be.
   void draw_from_imager(const GpuScene& scene,
                         const std::vector<PlacedRun>& runs,
                         const Pose& scene_from_world,
                         const Imager& imager,
                         const BakedLens& lens,
                         bool parts_alone);
-  /// Draws the ids from an eye, over its view parts, as finely as the projectors show them; `d_up_scene` is
-  /// any direction but the line of sight.
+  /// Draws the ids from a viewer's position, over its view parts, at the resolution at which the projectors
+  /// show them. `d_up_scene` is any direction that is not parallel to the viewing direction.
   void draw_from_eye(const GpuScene& scene,
                      const std::vector<PlacedRun>& runs,
                      const Pose& scene_from_world,
                      const Eigen::Vector3d& p_eye_scene,
                      const Eigen::Vector3d& d_up_scene);
 
-  /// Rectangles of the projector's image, outside of which it gives no light for the parts: each part's
-  /// own, where the eye sees the prototype behind it, or where it lies on the surface.
+  /// Rectangles of the projector's image, outside of which it gives no light for the parts. There is one for
+  /// each part: where the viewer sees the prototype behind it, or where it lies on the surface.
   void lit_rects(std::size_t projector,
                  const std::vector<PlacedRun>& runs,
                  const Pose& scene_from_world,
                  const Eigen::Vector3d& p_eye_scene,
                  std::vector<cv::Rect>* of_view,
                  std::vector<cv::Rect>* of_surface) const;
-  /// Rectangles of an imager's image, outside of which it sees none of the parts (and of the prototype),
-  /// nor anything within `around_m` of them.
+  /// Rectangles of an imager's image, outside of which it sees no part, nor anything within `around_m` of
+  /// one. `prototype_too` adds the prototype.
   std::vector<cv::Rect> visible_rects(const Imager& imager,
                                       const BakedLens& lens,
                                       const std::vector<PlacedRun>& runs,
                                       const Pose& scene_from_world,
                                       bool prototype_too,
                                       double around_m) const;
-  /// The rectangle of the image that the prototype lies in.
+  /// The rectangle of the projector's image that contains the prototype.
   cv::Rect prototype_rect(std::size_t projector,
                           const std::vector<PlacedRun>& runs,
                           const Pose& scene_from_world) const;
 
-  /// Draws the prototype's ids from a camera, and keeps them: `scene_from_world` is the camera's, for good.
+  /// Draws the prototype's ids from the reference camera and keeps them. The camera's pose in the scene is
+  /// fixed by this `scene_from_world`.
   void draw_from_reference_camera(const GpuScene& scene,
                                   const std::vector<PlacedRun>& runs,
                                   const Pose& scene_from_world,
@@ -85,10 +88,10 @@ class VisibilityBuffers final : public Bindable {
                                   const BakedLens& lens);
 
   const GpuLens& projector_lens(std::size_t i) const { return lenses_[i]; }
-  /// Index of the eye among the sights of the shaders.
+  /// Index of the viewer among the viewpoints in the shaders.
   int eye() const { return static_cast<int>(projectors_.size()); }
   int reference_camera() const { return eye() + 1; }
-  /// Resource::viewpoints.
+  /// Binds Resource::viewpoints.
   void bind(const Use& use) const override;
 
  private:
@@ -110,11 +113,11 @@ class VisibilityBuffers final : public Bindable {
   std::vector<ProjectorResponse> responses_;
   std::vector<Focus> focuses_;
   std::vector<GpuLens> lenses_;
-  Program program_, cut_program_;                  // of triangles whole, and of such as have pieces cut out
-  std::optional<EdgeFeathering> edge_feathering_;  // with several projectors
+  Program program_, cut_program_;  // for whole triangles, and for triangles with an alpha cutoff
+  std::optional<EdgeFeathering> edge_feathering_;  // only with several projectors
   GlName framebuffer_, depth_, projector_ids_, eye_ids_, pixel_maps_, visibility_, sight_texels_;
-  int ids_width_ = 1, ids_height_ = 1;    // room of the projectors' ids
-  std::vector<cv::Rect> surface_places_;  // texels of each projector's ids that surface parts are within
+  int ids_width_ = 1, ids_height_ = 1;    // size of the texture of the projectors' ids
+  std::vector<cv::Rect> surface_places_;  // texels of each projector's ids that may contain surface parts
 };
 
 }  // namespace limn::projector

@@ -1,23 +1,24 @@
-// From a part's colour to the light that one projector gives for it: distance, incidence and vignetting divided out, and
-// what the surface does to light (projector/compensation.h).
+// From a part's colour to the light that one projector gives for it. The influence of distance, incidence,
+// vignetting and the surface's colour is divided out (projector/compensation.h).
 #include "bindings.glsl"
 
-const int k_as_it_is = 0;  // else by geometry or, where BY_MEASUREMENT is defined, by measurement
+const int k_as_it_is = 0;  // Compensation::none. Other values: by geometry or, if BY_MEASUREMENT is defined,
+                           // by measurement.
 uniform int u_compensation;
-uniform float u_level;      // irradiance (1/m^2) that a colour of 1 is to look like on the mean surface
-uniform bool u_even_black;  // gives the black light of projectors that do not reach a point
+uniform float u_level;      // irradiance (1/m^2) on the mean surface that a colour of 1 stands for
+uniform bool u_even_black;  // adds the black level of projectors that do not reach a point
 uniform mat3 u_mean_mixing;
 #ifdef BY_MEASUREMENT
-uniform int u_witness;  // sight of the camera that measured the surface
-// Layer 3 i + c: what channel c of projector i gives in the camera at an irradiance of 1, a: 0 where unknown; the last
-// one: what is there without projectors.
+uniform int u_witness;  // index of the reference camera's viewpoint
+// Layer 3 i + c: the colour that the camera sees when channel c of projector i gives an irradiance of 1; a is
+// 0 where it is unknown. The last layer: the colour without projectors.
 layout(binding = k_colour_mixing_unit) uniform sampler2DArray s_mixing;
 #endif
-layout(binding = k_albedo_unit) uniform sampler2D s_albedo;  // of the prototype, over its mean
+layout(binding = k_albedo_unit) uniform sampler2D s_albedo;  // albedo of the prototype divided by its mean
 
 struct Surface {
-  mat3 mixing;  // columns: what red, green and blue light of irradiance 1 look like
-  vec3 offset;  // what is there without
+  mat3 mixing;  // columns: colours seen under red, green and blue light of irradiance 1
+  vec3 offset;  // colour seen without projectors
 };
 
 #ifdef BY_MEASUREMENT
@@ -33,7 +34,7 @@ vec4 mixing_at(vec2 px, int layer) {
   return mix(mix(a, b, f.x), mix(c, d, f.x), f.y);
 }
 
-// As measured for projector i or, where that one was not seen there, for another; else the mean.
+// As measured with projector i; where that is unknown, with another projector; else the mean.
 Surface surface_at(int i, vec3 p, Hit prototype) {
   Surface surface = Surface(u_mean_mixing, vec3(0));
   Sight witness = sight_at(u_witness);
@@ -55,14 +56,14 @@ Surface surface_at(int i, vec3 p, Hit prototype) {
 Surface surface_at(int i, vec3 p, Hit prototype) {
   vec2 uv = uv_of(prototype);
   vec3 albedo = texture(s_albedo, vec2(uv.x, 1.0 - uv.y)).rgb;
-  const float k_darkest = 0.02;  // of the mean: what is darker stays dark
+  const float k_darkest = 0.02;  // relative to the mean; darker surfaces are not compensated further
   albedo = max(albedo, vec3(k_darkest));
   return Surface(mat3(albedo.r, 0, 0, 0, albedo.g, 0, 0, 0, albedo.b), vec3(0));
 }
 #endif
 
-// Light over black of projector i at a place of the prototype, its share there; outside 0 ... 1 where it cannot give what
-// is wanted. `colour` has a: 0 where nothing is to be shown.
+// Light above its black level that projector i should give at a place of the prototype, where it has `share`.
+// The result is outside 0 to 1 where the projector cannot give it. `colour`.a is 0 where no part is shown.
 vec3 balanced(int i, vec4 colour, Share share, Place place, Hit prototype) {
   if (u_compensation == k_as_it_is && !u_even_black) return colour.rgb * share.share;
   if (share.share == 0.0) return vec3(0);

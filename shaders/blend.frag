@@ -1,6 +1,7 @@
 #version 450 core
-// How each pixel of a projector is to be blended. x: its share of the light at the prototype's point, y: light over its
-// black that makes up for projectors that do not reach the point; 0 where there is none.
+// Blending of each pixel of a projector. x: its share of the light at the prototype's point. y: light above
+// its own black level that replaces the black level of projectors that do not reach the point. 0 where the
+// pixel lights no point.
 #include "scene.glsl"
 #include "lens.glsl"
 #include "reach.glsl"

@@ -1,8 +1,8 @@
 #version 450 core
-// The parts laid over the camera's image in linear light, out in sRGB.
+// Draws the parts over the camera's image in linear light. The output is sRGB.
 #include "bindings.glsl"
 layout(location = 0) out vec4 o_srgb;
-layout(binding = k_light_unit) uniform sampler2D s_centre;          // the parts, linear light, a: coverage
+layout(binding = k_light_unit) uniform sampler2D s_centre;          // the parts in linear light, a: coverage
 layout(binding = k_camera_image_unit) uniform sampler2D s_picture;  // sRGB values as stored
 
 vec3 linear_from_srgb(vec3 c) { return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), greaterThan(c, vec3(0.04045))); }

@@ -1,5 +1,6 @@
-// How much of even light from all sides the view parts near a point keep from it (projector/contact_shadow.h).
-// Nothing where CONTACT_SHADOW is not defined: software GL would go through all of it.
+// How much of the uniform light from all sides nearby view parts keep from a point
+// (projector/contact_shadow.h). Compiled only if CONTACT_SHADOW is defined, because software GL would execute
+// a branch even if it is not taken.
 #include "bindings.glsl"
 
 #ifndef CONTACT_SHADOW
@@ -9,14 +10,14 @@ float contact_shadow(vec3 p, vec3 d_normal) { return 0.0; }
 const bool k_contact_shadow = true;
 
 struct Field {
-  vec4 lower;  // of the nodes, owner frame; w: 1 when the part is shown
+  vec4 lower;  // lower bound of the nodes, owner frame; w: 1 when the part is shown
   vec4 nodes_per_m;
-  vec4 first;  // node in the texture
+  vec4 first;  // first node in the texture
 };
-layout(std430, binding = k_distance_fields_buffer) readonly buffer Fields { Field s_fields[]; };  // by owner
+layout(std430, binding = k_distance_fields_buffer) readonly buffer Fields { Field s_fields[]; };  // indexed by owner
 layout(binding = k_distances_unit) uniform sampler3D s_distances;
-uniform float u_free;      // m; what is met this far off keeps no light
-uniform float u_widening;  // radius a length of the cones
+uniform float u_free;      // m; a surface at this distance blocks no light
+uniform float u_widening;  // radius of a cone divided by its length
 uniform int u_placement_count;
 
 const int k_field_nodes = 48;
@@ -26,13 +27,13 @@ float distance_to_part(Field field, vec3 q) {
   return texture(s_distances, (field.first.xyz + node + 0.5) / vec3(textureSize(s_distances, 0))).x;
 }
 
-// Share of light that the part of one owner keeps from a point with unit normal n, both in its frame.
+// Share of the light that one part keeps from the point q with unit normal n, both in the part's frame.
 float kept_by_part(Field field, vec3 q, vec3 n) {
   const float k_steps[4] = float[](0.07, 0.2, 0.45, 0.75);
   vec3 aside = normalize(abs(n.x) < 0.7 ? cross(n, vec3(1, 0, 0)) : cross(n, vec3(0, 1, 0)));
   vec3 beside = cross(n, aside);
   float kept = 0.0;
-  for (int cone = 0; cone < 6; ++cone) {  // one upright, five around it, by their shares of a cosine's light
+  for (int cone = 0; cone < 6; ++cone) {  // one along the normal and five around it, weighted by the cosine
     float turn = 1.2566371 * float(cone);
     vec3 d = cone == 5 ? n : 0.5 * n + 0.8660254 * (cos(turn) * aside + sin(turn) * beside);
     float blocked = 0.0;
@@ -46,7 +47,7 @@ float kept_by_part(Field field, vec3 q, vec3 n) {
   return kept;
 }
 
-// 0 where no part is near ... 1.
+// 0 where no part is near, up to 1.
 float contact_shadow(vec3 p, vec3 d_normal) {
   float left = 1.0;
   for (int i = 1; i < u_placement_count; ++i) {

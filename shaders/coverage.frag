@@ -1,5 +1,5 @@
 #version 450 core
-// For each viewer pixel: the part seen (owner, 0 none) and how it is shown (1 screen, 2 projected).
+// For each viewer pixel: the owner of the visible part (0: none) and how it is shown (1 screen, 2 projected).
 #include "seen.glsl"
 layout(location = 0) out vec2 o_seen;  // in 255ths
 

@@ -1,6 +1,7 @@
 #version 450 core
-// Lists the pixels of an image of one sample a pixel that need more: beside an edge of coverage or colour. KNOWN_SHARES: in
-// a projector's image those at whose centres the share of the light is not known are left to light_shares.comp.
+// Lists the pixels that need more than one sample: those beside an edge of coverage or colour in an image
+// with one sample for each pixel. KNOWN_SHARES: for a projector's image, pixels whose blending share is not
+// cached are also left to light_shares.comp.
 #include "bindings.glsl"
 #include "listed.glsl"
 #ifdef KNOWN_SHARES
@@ -9,8 +10,8 @@ layout(rgba32f, binding = k_cached_shares_image) uniform readonly image2D u_know
 #endif
 layout(local_size_x = 16, local_size_y = 4) in;
 layout(binding = k_light_unit) uniform sampler2D s_centre;  // linear light, a: coverage
-uniform ivec2 u_first, u_end;  // of the rectangle to look through
-uniform float u_least_step;  // of full light; a smaller one is no edge
+uniform ivec2 u_first, u_end;  // the rectangle to search
+uniform float u_least_step;  // smallest difference that counts as an edge, as a fraction of full light
 
 void main() {
   ivec2 at = u_first + ivec2(gl_GlobalInvocationID.xy);

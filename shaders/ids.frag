@@ -1,5 +1,5 @@
 #version 450 core
-// The id of the front triangle of every texel.
+// Writes the id of the nearest triangle in every texel.
 layout(location = 0) flat in uint i_id;
 layout(location = 0) out uint o_id;
 

@@ -1,5 +1,6 @@
 #version 450 core
-// Triangles of one owner, to be drawn as their ids. (gl_PrimitiveID would make software GL take its triangles apart.)
+// Triangles of one owner, which are drawn as their ids. (gl_PrimitiveID would be slower on software GL, which
+// would have to split its triangles.)
 layout(location = 0) in vec4 a_corner;
 layout(location = 0) flat out uint o_id;
 uniform mat4 u_clip_from_owner;

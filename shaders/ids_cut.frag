@@ -1,10 +1,10 @@
 #version 450 core
-// The id of the front triangle of every texel, without what is cut out.
+// Writes the id of the nearest triangle in every texel. Pieces below the alpha cutoff are discarded.
 #include "scene.glsl"
 layout(location = 0) in vec3 i_weights;
 layout(location = 1) flat in uint i_id;
 layout(location = 0) out uint o_id;
-uniform float u_focal;  // of the image of ids, texels
+uniform float u_focal;  // focal length of the id image, texels
 
 void main() {
   o_id = i_id;

@@ -1,5 +1,5 @@
 #version 450 core
-// Triangles of one owner that may have pieces cut out, to be drawn as their ids.
+// Triangles of one owner that may have an alpha cutoff, which are drawn as their ids.
 layout(location = 0) in vec4 a_corner;
 layout(location = 0) out vec3 o_weights;  // barycentric
 layout(location = 1) flat out uint o_id;

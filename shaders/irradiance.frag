@@ -1,5 +1,6 @@
 #version 450 core
-// How projector u_projector lights what the eye's pixels see of the prototype: irradiance, or 0 where it does not reach.
+// Irradiance from projector u_projector on the prototype, for each pixel of a camera; 0 where the projector
+// does not reach.
 #include "bindings.glsl"
 #include "scene.glsl"
 #include "lens.glsl"

@@ -1,5 +1,6 @@
 #version 450 core
-// For each block: how much light the projector keeps beside jumps of depth, 0 at one and in its neighbours, 1 far off.
+// For each block: the feathering weight of the projector near depth edges, 0 in a block with an edge and in
+// its neighbours, 1 far away.
 #include "bindings.glsl"
 #include "blocks.glsl"
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -15,6 +16,7 @@ void main() {
     float across = float(y - block.y), along = 255.0 * imageLoad(u_rows, ivec2(block.x, y)).r;
     nearest_2 = min(nearest_2, across * across + along * along);
   }
-  const float k_neighbours = 1.5;  // the corner ones, too: 0 wherever it is interpolated within a block with a jump
+  const float k_neighbours = 1.5;  // also the diagonal neighbours, so that interpolation gives 0 everywhere
+                                   // in a block with an edge
   imageStore(u_fade, block, vec4(smoothstep(k_neighbours, k_neighbours + float(k_fade), sqrt(nearest_2))));
 }

@@ -1,6 +1,7 @@
 #version 450 core
-// Marks those of the listed blocks, in which depth jumps in a projector's image, where another projector's light goes on:
-// there it hands its own over. Where the prototype ends for all of them there is nobody to hand it to.
+// The listed blocks contain a depth edge in one projector's image. Marks those where another projector lights
+// the surface beside the edge, so that it can take over. Where the prototype ends for all projectors, none
+// can take over.
 #include "bindings.glsl"
 #include "scene.glsl"
 #include "lens.glsl"
@@ -8,10 +9,11 @@
 #include "listed.glsl"
 layout(local_size_x = 64) in;
 layout(r8, binding = k_edge_marks_image) uniform writeonly image2D u_marks;
-layout(binding = k_depth_edges_unit) uniform sampler2DArray s_jumps;  // shaders/jumps.comp, for each projector
+// Output of shaders/jumps.comp for each projector.
+layout(binding = k_depth_edges_unit) uniform sampler2DArray s_jumps;
 uniform int u_projector;
 
-// Whether projector j sees a jump of depth in the blocks around a point (scene frame).
+// Whether projector j has a depth edge in the blocks around a point (scene frame).
 bool is_beside_jump(int j, vec3 p) {
   Sight sight = sight_at(j);
   vec3 q = (sight.sight_from_scene * vec4(p, 1)).xyz;
@@ -25,7 +27,7 @@ bool is_beside_jump(int j, vec3 p) {
   return is_beside;
 }
 
-// Whether another projector lights what this one sees in a texel, and sees no jump there.
+// Whether another projector lights the point that this one sees in a texel, and has no depth edge there.
 bool goes_on(vec2 texel) {
   Sight own = sight_at(u_projector);
   vec3 d = normalize(vec3((texel - own.focal_centre.zw) / own.focal_centre.xy, 1)) * mat3(own.sight_from_scene);

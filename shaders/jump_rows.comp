@@ -1,5 +1,5 @@
 #version 450 core
-// For each block: blocks to the nearest one of its row with a jump, k_farthest or beyond as k_farthest.
+// For each block: the distance, in blocks, to the nearest marked block in its row, at most k_farthest.
 #include "bindings.glsl"
 #include "blocks.glsl"
 layout(local_size_x = 8, local_size_y = 8) in;

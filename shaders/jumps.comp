@@ -1,14 +1,16 @@
 #version 450 core
-// Finds the jump of depth in each of the listed blocks, if there is one, and leaves those to shaders/jump_handed.comp.
+// Finds a depth edge in each of the listed blocks, and lists the blocks that have one for
+// shaders/jump_handed.comp.
 #include "bindings.glsl"
 #include "jumps.glsl"
 #include "listed.glsl"
 #include "rest.glsl"
 layout(local_size_x = 64) in;
-// Texels on the jump's near side (xy) and its far side (zw); x: -1 without a jump, z: nothing is there.
+// Texels on the near side of the edge (xy) and on its far side (zw). x: -1 without an edge; z: -1 when the
+// far side is empty.
 layout(rgba32f, binding = k_depth_edges_image) uniform writeonly image2D u_jumps;
 
-// Between the texels on both sides of one.
+// The two texels beside the texel `at`, the nearer one first.
 vec4 sides(ivec2 at, ivec2 step) {
   ivec2 first = clamp(at - step, ivec2(0), u_last), second = clamp(at + step, ivec2(0), u_last);
   float before = nearness(first), after = nearness(second);
@@ -17,7 +19,7 @@ vec4 sides(ivec2 at, ivec2 step) {
   return sides;
 }
 
-// The first in the rows of a block, along its row before along its column.
+// The first edge in a block, row by row; for each texel, along the row first, then along the column.
 vec4 jump(ivec2 first) {
   vec4 found = vec4(-1);
   int i = 0;

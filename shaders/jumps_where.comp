@@ -1,9 +1,9 @@
 #version 450 core
-// Lists the blocks of a depth image in which depth may jump, by every fourth texel.
+// Lists the blocks of a depth image that may contain a depth edge. Reads every fourth texel.
 #include "jumps.glsl"
 #include "listed.glsl"
 layout(local_size_x = 16, local_size_y = 4) in;
-uniform ivec2 u_first, u_end;  // of the blocks to look through
+uniform ivec2 u_first, u_end;  // the blocks to search
 
 bool may_jump(ivec2 first) {
   const int k_apart = 4;

@@ -1,16 +1,16 @@
-// What a projector's pixel centres see of the prototype and its share there, kept from image to image while the
-// prototype stays and light arrives as it did.
+// The hit cache: which point of the prototype each pixel centre of a projector sees, and the blending share
+// there. It is valid until the prototype moves or the occlusion changes.
 #include "bindings.glsl"
 
-// Id, bits of two weights, u_known_stamp of its time.
+// Triangle id, bits of two barycentric weights, and the u_known_stamp of the entry.
 layout(rgba32ui, binding = k_cached_hits_image) uniform uimage2D u_known_hits;
-// A Share; x: negative where unknown yet.
+// A Share; x is negative where it is not known yet.
 layout(rgba32f, binding = k_cached_shares_image) uniform image2D u_known_shares;
 uniform uint u_known_stamp;
 
 bool is_hit_known(ivec2 at) { return imageLoad(u_known_hits, at).w == u_known_stamp; }
 
-// Finds out what the centre sees. The share there is not known then.
+// Computes what the centre sees and caches it. The share there is then unknown.
 void learn_hit(ivec2 at) {
   Sight projector = sight_at(u_projector);
   Hit hit = first_hit(s_projector_ids, projector, 0, ray_of(projector, vec2(at)));
@@ -18,7 +18,7 @@ void learn_hit(ivec2 at) {
   imageStore(u_known_shares, at, vec4(-1));
 }
 
-// Where that has been found out.
+// The cached hit; is_hit_known must be true.
 Hit known_hit(ivec2 at) {
   uvec4 known = imageLoad(u_known_hits, at);
   vec2 weights = uintBitsToFloat(known.yz);
@@ -32,7 +32,7 @@ Share known_share(ivec2 at) {
   return Share(known.x, known.y, known.z, known.w);
 }
 
-// Where the centre sees something.
+// Computes and caches the share. The centre must see the prototype.
 Share learn_share(ivec2 at, Place place) {
   Share share = share_of(u_projector, place);
   imageStore(u_known_shares, at, vec4(share.share, share.irradiance, share.missing_black, share.blocked_black));

@@ -1,4 +1,5 @@
-// The light that one pixel sample of a projector should give. VIEW_PARTS, SURFACE_PARTS: what may be there.
+// The light that one sample of a projector's pixel should give. VIEW_PARTS, SURFACE_PARTS: which parts may be
+// visible.
 #include "bindings.glsl"
 #include "scene.glsl"
 #include "lens.glsl"
@@ -9,17 +10,18 @@
 
 layout(binding = k_eye_ids_unit) uniform usampler2DArray s_eye_ids;
 uniform int u_projector;
-uniform int u_eye;  // sight of the viewer
+uniform int u_eye;  // index of the viewer's viewpoint
 uniform int u_placement_count;
 #include "known.glsl"
 
-// Colour of the view part that the viewer sees before p; a: 0 when none, or when p is hidden from the viewer.
+// Colour of the view part that the viewer sees in front of p; a: 0 when there is none, or when p is hidden
+// from the viewer.
 vec4 view_colour(vec3 p, vec3 d_normal, float footprint) {
   Sight eye = sight_at(u_eye);
   vec3 d = p - eye.p_eye.xyz;
   float t = length(d);
   d /= t;
-  if (dot(d_normal, d) >= 0.0) return vec4(0);  // the viewer looks at the other side
+  if (dot(d_normal, d) >= 0.0) return vec4(0);  // the viewer sees the other side
   Hit hit = first_hit(s_eye_ids, eye, 1, d);
   if (hit.id == 0u || hit.t > t || owner_at(owner_of(hit.id)).upper.w > 0.5) return vec4(0);
   if (is_hidden(s_eye_ids, eye, p)) return vec4(0);
@@ -32,16 +34,16 @@ vec4 surface_colour(Place place, float footprint) {
   return hit.id == 0u ? vec4(0) : vec4(radiance_on_surface(hit, place.d_smooth, footprint), 1);
 }
 
-// The share at a pixel's centre, good for samples of the pixel that meet the same smooth surface: there it changes by less
-// than what falls on either side evens out.
+// The share at a pixel's centre. It is used for all samples of the pixel that hit the same smooth surface;
+// the differences within the pixel are small and cancel.
 struct CentreShare {
-  float t;      // m along the centre's ray; 0: none
-  vec3 d_flat;  // of the place there
+  float t;      // distance along the centre's ray (m); 0: no share
+  vec3 d_flat;  // triangle normal of the place there
   Share share;
 };
 
-// None where the ray meets nothing, where the share is not known, and where black is to be even, which begins and ends
-// within a pixel.
+// There is none where the ray hits nothing, where the share is not known, and with even black, whose light
+// begins and ends within a pixel.
 CentreShare centre_share(ivec2 at) {
   CentreShare none = CentreShare(0.0, vec3(0), Share(0.0, 0.0, 0.0, 0.0));
   Hit prototype = known_hit(at);
@@ -51,12 +53,13 @@ CentreShare centre_share(ivec2 at) {
 }
 
 bool is_beside(CentreShare centre, Hit hit, Place place, float footprint) {
-  const float k_steepest = 4.0;    // m of depth a m across, 76 degrees
-  const float k_same_side = 0.99;  // cosine between triangles, 8 degrees
+  const float k_steepest = 4.0;    // slope: depth divided by width, 76 degrees
+  const float k_same_side = 0.99;  // cosine of the angle between triangles, 8 degrees
   return abs(hit.t - centre.t) < k_steepest * footprint && dot(place.d_flat, centre.d_flat) > k_same_side;
 }
 
-// Colour that is to be seen at a place, t along the projector's ray; a: 0 where there is none.
+// The colour that should be visible at a place at distance t along the projector's ray; a: 0 where there is
+// none.
 vec4 wanted_colour(Place place, float t) {
   float footprint = t / sight_at(u_projector).quality.x;
   vec4 colour = vec4(0);
@@ -69,13 +72,13 @@ vec4 wanted_colour(Place place, float t) {
   return colour;
 }
 
-// A sample of a pixel.
+// One sample of a projector's pixel.
 struct Sample {
   Hit prototype;
   Place place;
-  vec4 colour;     // as wanted_colour
-  bool is_lit;     // it gives light
-  bool is_beside;  // the centre's share is good for it
+  vec4 colour;     // result of wanted_colour
+  bool is_lit;     // the sample gives light
+  bool is_beside;  // the centre's share can be used
 };
 
 Sample sample_at(vec2 px, CentreShare centre) {
@@ -88,12 +91,13 @@ Sample sample_at(vec2 px, CentreShare centre) {
   return Sample(prototype, place, colour, is_lit, is_beside(centre, prototype, place, prototype.t / projector.quality.x));
 }
 
-// rgb: light; a: coverage by what is to be lit.
+// rgb: light; a: coverage.
 vec4 light_of(Sample lit, Share share) {
   return vec4(balanced(u_projector, lit.colour, share, lit.place, lit.prototype), 1);
 }
 
-// False only where a centre gives no light for certain: no part is seen there from the viewer's eye, and none lies there.
+// False only if the pixel's centre certainly gives no light: the viewer sees no part there, and none lies on
+// the surface.
 bool may_give_light(ivec2 at) {
   Hit prototype = known_hit(at);
   if (prototype.id == 0u) return false;

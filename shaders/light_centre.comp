@@ -1,6 +1,6 @@
 #version 450 core
-// A projector's image: the listed pixels, one sample each at their centres. Where the share of the light is not known yet,
-// the image gets the colour that is to be seen, and the pixel is left to light_shares.comp.
+// Draws a projector's image: one sample at the centre of each listed pixel. Where the share is not cached
+// yet, the part's colour is stored instead of the light, and the pixel is left to light_shares.comp.
 #include "bindings.glsl"
 #include "light.glsl"
 #include "listed.glsl"

@@ -1,6 +1,6 @@
 #version 450 core
-// A projector's image: the listed pixels by many samples. Those for which the centre's share is not good enough are left
-// to light_rest.comp.
+// Draws a projector's image: several samples for each listed pixel. Pixels with samples that cannot use the
+// centre's share are left to light_rest.comp.
 #include "bindings.glsl"
 #include "light.glsl"
 #include "listed.glsl"

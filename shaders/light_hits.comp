@@ -1,5 +1,6 @@
 #version 450 core
-// Finds out what the centres of a projector's pixels see of the prototype: in a rectangle, or (LISTED) of those listed.
+// Computes where the rays of a projector's pixel centres hit the prototype, for a rectangle or (LISTED) for
+// listed pixels.
 #include "light.glsl"
 #ifdef LISTED
 #include "listed.glsl"
@@ -10,7 +11,7 @@ void main() {
 }
 #else
 layout(local_size_x = 16, local_size_y = 4) in;
-uniform ivec2 u_first, u_end;  // of the rectangle
+uniform ivec2 u_first, u_end;  // the rectangle
 
 void main() {
   ivec2 at = u_first + ivec2(gl_GlobalInvocationID.xy);

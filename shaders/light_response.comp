@@ -1,19 +1,19 @@
 #version 450 core
-// A projector's image from its light, in the listed pixels: display values by the projector's response. Alpha says what
-// was clipped.
+// Converts a projector's light into display values by its response, for the listed pixels. Alpha says where
+// it was clipped.
 #include "bindings.glsl"
 #include "scene.glsl"
 #include "listed.glsl"
 layout(local_size_x = 64) in;
 layout(rgba8, binding = k_target_image) uniform writeonly image2D u_display;
 layout(binding = k_light_unit) uniform sampler2D s_centre;  // linear light, a: coverage
-// Display value over the root of light, evenly spaced from 0 to 1.
+// Display value as a function of the square root of light, evenly spaced from 0 to 1.
 layout(binding = k_response_unit) uniform sampler2D s_response;
 uniform int u_projector;
-uniform bool u_is_balanced;    // light counts over black, and bands are dithered
+uniform bool u_is_balanced;    // light is relative to the black level, and is dithered against banding
 
-// Even noise of 0 ... 1 that is as even as can be over any few pixels (Bayer 1973, the 4 x 4 matrix): of 15 % of black that
-// a level is apart, an eye that blurs it by a pixel or two is left with less than 1 %.
+// Ordered dithering with the 4 x 4 matrix (Bayer 1973), values 0 to 1. In the dark, levels differ by up to 15
+// %; after the viewer's blur of one or two pixels less than 1 % is left.
 const float k_dither[16] = float[](0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5);
 float dither(ivec2 at) { return (k_dither[4 * (at.y & 3) + (at.x & 3)] + 0.5) / 16.0; }
 
@@ -33,7 +33,7 @@ void main() {
   if (!is_listed()) return;
   ivec2 at = listed_pixel();
   vec4 light = texelFetch(s_centre, at, 0);
-  // 1: brighter than light can be is wanted, 0.5: darker.
+  // 1: the wanted light is brighter than possible, 0.5: darker than possible.
   const float k_tolerance = 0.004;
   float clipped = any(greaterThan(light.rgb, vec3(1.0 + k_tolerance))) ? 1.0
                   : any(lessThan(light.rgb, vec3(-k_tolerance)))       ? 0.5
@@ -41,7 +41,7 @@ void main() {
   float black = u_is_balanced ? sight_at(u_projector).quality.w : 0.0;
   vec3 value = light.a > 0.0 ? display_value(black + (1.0 - black) * light.rgb) : vec3(0);
   if (u_is_balanced) {
-    // Without noise smooth light would have bands of whole levels; black and white stay what they are.
+    // Dithering avoids bands of whole levels in smooth light. Full black and full white are not changed.
     vec3 inner = step(vec3(0.5 / 255.0), value) * step(value, vec3(254.5 / 255.0));
     value += inner * (dither(at) - 0.5) / 255.0;
   }

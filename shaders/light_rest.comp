@@ -1,6 +1,6 @@
 #version 450 core
-// A projector's image: the listed pixels by many samples, each with a share of its own where the centre's is not good
-// enough for it.
+// Draws a projector's image: several samples for each listed pixel. A sample that cannot use the centre's
+// share computes its own.
 #include "bindings.glsl"
 #include "light.glsl"
 #include "listed.glsl"

@@ -1,6 +1,6 @@
 #version 450 core
-// Shares of the light at the centres of the listed pixels; and their light, where the image has the colour that is to be
-// seen there.
+// Computes and caches the shares at the centres of the listed pixels. Where the image holds a part's colour,
+// replaces it by the light.
 #include "bindings.glsl"
 #include "light.glsl"
 #include "listed.glsl"

@@ -1,9 +1,9 @@
 #version 450 core
-// Lists the pixels of a projector of whose centres it is not known what they see.
+// Lists the pixels of a projector whose hits are not cached.
 #include "light.glsl"
 #include "listed.glsl"
 layout(local_size_x = 16, local_size_y = 4) in;
-uniform ivec2 u_first, u_end;  // of the rectangle to look through
+uniform ivec2 u_first, u_end;  // the rectangle to search
 
 void main() {
   ivec2 at = u_first + ivec2(gl_GlobalInvocationID.xy);

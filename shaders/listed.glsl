@@ -1,9 +1,9 @@
-// Pixels that want work, listed by one pass and worked through by the next: programs of their own are cheaper than
-// branches. The head is what glDispatchComputeIndirect reads. Groups stand in rows: some drivers take no more than 65535
-// side by side, which are the pixels of half a 4K image.
+// A list of pixels, filled by one pass and processed by the next. Separate programs are cheaper than
+// branches. Its head holds the group counts that glDispatchComputeIndirect reads. The groups form a 2D grid,
+// because some drivers allow at most 65535 groups in one dimension, which is half a 4K image.
 #include "bindings.glsl"
 
-const uint k_group = 64u, k_row = 1024u;  // pixels of a group, groups of a row
+const uint k_group = 64u, k_row = 1024u;  // pixels in a group, groups in a row
 layout(std430, binding = k_work_list_buffer) buffer List {
   uint s_list_count;
   uint s_list_groups[3];
@@ -18,7 +18,8 @@ void list_pixel(ivec2 at) {
   atomicMax(s_list_groups[1], i / (k_group * k_row) + 1u);
 }
 
-// Of the list that a program works through: this invocation's place in it, whether there is one, and its pixel.
+// For a program that processes the list: the index of this invocation, whether it has an entry, and its
+// pixel.
 uint listed_index() {
   return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * k_group + gl_LocalInvocationIndex;
 }

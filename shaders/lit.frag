@@ -1,7 +1,7 @@
 #version 450 core
-// What lights the middle of each square patch of the eye's image. rgb: pixel of projector u_projector and its irradiance
-// there, 0 where it does not reach; for no projector (-1) the prototype's point in the scene's frame. a: 0 where the eye
-// sees no prototype.
+// The light at the centre of each square patch of a camera's image. rgb: pixel of projector u_projector (rg)
+// and its irradiance there (b), 0 where it does not reach; for u_projector = -1, the prototype's point in the
+// scene's frame. a: 0 where the camera does not see the prototype.
 #include "bindings.glsl"
 #include "scene.glsl"
 #include "lens.glsl"
@@ -9,7 +9,7 @@
 layout(location = 0) out vec4 o_lit;
 layout(binding = k_eye_ids_unit) uniform usampler2DArray s_eye_ids;
 uniform int u_eye, u_projector;
-uniform float u_side;  // of a patch, pixels
+uniform float u_side;  // side of a patch, pixels
 
 void main() {
   Sight eye = sight_at(u_eye);

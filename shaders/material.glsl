@@ -1,17 +1,18 @@
-// What a part's material is at a hit. Maps beyond the colour (glTF 2.0's) are read where SURFACE_MAPS is defined:
-// software GL would go through all of it.
+// The material of a part at a hit. The other maps of glTF 2.0 are read only if SURFACE_MAPS is defined,
+// because software GL would execute the code even if it is not needed.
 #include "bindings.glsl"
 
 struct Finish {
   vec3 base;                // linear
   float metallic, roughness;
-  bool is_plain;            // diffuse alone
-  float open;               // share of soft light that arrives
-  vec3 emitted;             // light of its own
-  vec3 n_smooth, n;         // unit, interpolated and as the map of normals has it, scene frame, not yet turned to an eye
+  bool is_plain;            // purely diffuse
+  float open;               // share of soft light that arrives (occlusion map)
+  vec3 emitted;             // emitted light
+  vec3 n_smooth, n;         // unit normals in the scene's frame: interpolated, and with the normal map; not
+                            // yet turned to the viewer
 };
 
-// Own colour at a hit; `footprint` is the side (m) of the pixel's patch on the surface.
+// Base colour at a hit; `footprint` is the side (m) of the pixel's patch on the surface.
 vec3 base_colour(Hit hit, float footprint) {
   Material material = s_materials[material_of(hit.id)];
   vec4 wanted = owner_at(owner_of(hit.id)).colour;
@@ -34,7 +35,7 @@ vec3 map_at(Hit hit, float footprint, float layer) {
   return textureLod(s_maps, vec3(uv.x, 1.0 - uv.y, layer), lod).rgb;
 }
 
-// The normal of a map, frame of the hit's owner.
+// The normal from the normal map, in the frame of the hit's owner.
 vec3 mapped_normal_in_owner(Hit hit, vec3 n, Material material, float footprint) {
   uint first = 3u * (hit.id - 1u) + uint(material.more.x);
   vec4 tangent = mat3x4(normal(first), normal(first + 1u), normal(first + 2u)) * hit.weights;
@@ -65,7 +66,8 @@ void read_maps(Hit hit, Material material, float footprint, inout Finish finish)
 void read_maps(Hit hit, Material material, float footprint, inout Finish finish) {}
 #endif
 
-// Of what is not unlit. A metalness or roughness that people chose is the whole part's, maps or not.
+// The finish of a material that is not unlit. An override of metalness or roughness applies to the whole part
+// and replaces the maps.
 Finish finish_at(Hit hit, float footprint) {
   Material material = s_materials[material_of(hit.id)];
   vec2 wanted = owner_at(owner_of(hit.id)).look.xy;

@@ -1,6 +1,6 @@
-// Surface parts on the prototype: found along the prototype's normal.
+// Finds surface parts on the prototype, along the prototype's normal.
 
-const float k_on_surface = 0.002;  // m; a surface part within this of the prototype is on it
+const float k_on_surface = 0.002;  // m; a surface part is on the prototype if it is within this distance
 
 bool may_hold_surface_part(vec3 p, int placement_count) {
   int i = 1;
@@ -14,14 +14,15 @@ bool may_hold_surface_part(vec3 p, int placement_count) {
   return may_hold;
 }
 
-// The surface part on the prototype's point p with unit normal d_normal: the hit of the normal line with a triangle
-// within 2 mm, nearest first. The triangles tried are those that the sight sees around the line; where they are all
-// missed in the middle of a part, at the corner of many, the one missed by least serves.
+// The surface part at the prototype's point p with unit normal d_normal: the nearest intersection of the
+// normal line with a triangle within 2 mm. Only triangles in the projector's id image around the line are
+// tested. In the middle of a part, where many triangles meet in a corner, rounding may miss all of them; then
+// the one missed by least is used.
 Hit surface_part_at(usampler2DArray s_ids, Sight sight, vec3 p, vec3 d_normal) {
   const float k_heights[5] = float[](0.0, 0.5, -0.5, 1.0, -1.0);
   Hit best = k_no_hit, missed = k_no_hit;
-  float missed_by = 0.5;  // of a triangle's height
-  bool in_middle = false, is_through = false;  // what is cut out
+  float missed_by = 0.5;  // as a fraction of a triangle's height
+  bool in_middle = false, is_through = false;  // hit a piece below the alpha cutoff
   uvec4 tried = uvec4(0);
   int height = 0;
   do {

@@ -1,8 +1,8 @@
-// The parts as a camera sees them, linear light, a: coverage; of those that are not to be whole what light cannot show,
-// and a share of the rest. A shadow covers without giving light.
+// The parts as a camera sees them, in linear light; a: coverage. What projected light cannot show is drawn
+// fully, the rest with the part's weight. A contact shadow has coverage but no light.
 #include "seen.glsl"
 #include "contact.glsl"
-uniform uint u_whole[64];  // a byte an owner, in 255ths: how much of what light can show is drawn
+uniform uint u_whole[64];  // weights of what projected light can show: one byte for each owner, 255 is all
 
 float whole_share(uint owner) {
   return owner < 256u ? float(u_whole[owner / 4u] >> (owner % 4u * 8u) & 255u) / 255.0 : 0.0;
@@ -15,20 +15,20 @@ vec4 shadow_at(vec3 d) {
   return vec4(0, 0, 0, contact_shadow(eye.p_eye.xyz + prototype.t * d, facing_normal(prototype, d)));
 }
 
-// Whether the screen shows a part at px that light might have shown.
+// Whether a part at px must be shown by the screen.
 bool is_left_to_screen(vec2 px) {
   Seen seen = in_sight_at(px);
   return seen.how == k_screen || (seen.how == k_if_reached && !is_reached(seen.behind));
 }
 
-// `whole`: what light can show is drawn, too.
+// `whole`: also draws what light can show.
 vec4 part_seen(Seen seen, bool whole) {
   if (seen.how == k_nothing) return k_contact_shadow ? shadow_at(seen.d) : vec4(0);
   float share = seen.how == k_if_reached && !whole ? whole_share(owner_of(seen.part.id)) : 1.0;
   if (share < 1.0 && !is_reached(seen.behind)) share = 1.0;
   if (share == 0.0) return vec4(0);
   float footprint = seen.part.t / sight_at(u_eye).quality.x;
-  if (owner_at(owner_of(seen.part.id)).upper.w > 0.5) {  // as the projectors show it
+  if (owner_at(owner_of(seen.part.id)).upper.w > 0.5) {  // shaded as the projectors show it
     return share * vec4(radiance_on_surface(seen.part, smooth_normal(seen.part), footprint), 1);
   }
   return share * vec4(look_along(seen.d, seen.part, footprint), 1);

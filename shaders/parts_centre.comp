@@ -1,5 +1,5 @@
 #version 450 core
-// A composite: the listed pixels, one sample each at their centres.
+// Draws a composite: one sample at the centre of each listed pixel.
 #include "bindings.glsl"
 #include "parts.glsl"
 #include "listed.glsl"

@@ -1,6 +1,6 @@
 #version 450 core
-// A composite: the listed pixels by many samples. Those with a part that is not drawn whole are left to parts_rest.comp,
-// too.
+// Draws a composite: several samples for each listed pixel. Pixels with a part that is not drawn whole are
+// also left to parts_rest.comp.
 #include "bindings.glsl"
 #include "parts.glsl"
 #include "listed.glsl"

@@ -1,6 +1,7 @@
 #version 450 core
-// A composite: light ends within a pixel of the projector's, and a pixel half of light, half of screen would be dark. Of
-// the listed pixels those beside what is left to the screen get the part whole, over its light.
+// Draws a composite at the limits of projected light. Light ends within a projector's pixel, so a camera
+// pixel that is half light and half screen would be dark. Listed pixels beside a place that is left to the
+// screen are therefore drawn whole, over the light.
 #include "bindings.glsl"
 #include "parts.glsl"
 #include "listed.glsl"
@@ -11,7 +12,7 @@ layout(rgba32f, binding = k_target_image) uniform writeonly image2D u_image;
 void main() {
   if (!is_listed()) return;
   ivec2 at = listed_pixel();
-  const float k_around = 3.0;  // pixels across that are looked at
+  const float k_around = 3.0;  // width of the neighbourhood that is searched, pixels
   bool whole = false;
   int k = 0;
   do {

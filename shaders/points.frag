@@ -1,5 +1,5 @@
 #version 450 core
-// The prototype's point that each pixel of a projector lights, in the scene's frame; w: 0 where there is none.
+// The prototype's point lit by each pixel of a projector, in the scene's frame; w: 0 where there is none.
 #include "bindings.glsl"
 #include "scene.glsl"
 #include "lens.glsl"

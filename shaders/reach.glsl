@@ -3,20 +3,22 @@
 #include "blocks.glsl"
 
 layout(binding = k_projector_ids_unit) uniform usampler2DArray s_projector_ids;
-// For each projector: pixels over a grid of tangents.
+// For each projector: its pixels over a grid of tangents.
 layout(binding = k_pixel_maps_unit) uniform sampler2DArray s_pixel_maps;
-// For each projector, over its image: how much of its light arrives.
+// For each projector, over its image: the share of its light that arrives.
 layout(binding = k_occlusion_unit) uniform sampler2DArray s_arriving;
-// For each projector, over its ids: share of its light kept beside edges and shadows.
+// For each projector, over its id image: feathering weight near edges and shadows.
 layout(binding = k_edge_fade_unit) uniform sampler2DArray s_kept;
 uniform int u_projector_count;
 
-// Weight beside shadows, of what is elsewhere: the step where light ends stays below it. Less would hand light over
-// within a few pixels where two projectors have shadows.
+// Smallest feathering weight beside shadows, relative to elsewhere. The remaining step where light ends is
+// below it. With a smaller value, light would change between projectors within a few pixels where two of them
+// have shadows.
 const float k_least_kept = 0.01;
-const float k_least_share = 1e-4;  // at the very border, so that a projector alone there still gives its light
+const float k_least_share = 1e-4;  // weight at the image border, so that a projector that is alone there
+                                   // still gives its light
 
-// Pixel of a tangent in a projector's own image.
+// The pixel of a projector's own image for a tangent.
 vec2 pixel_of(Sight projector, vec2 tangent) {
   vec2 node = (tangent - projector.map.xy) * projector.map.zw;
   ivec2 nodes = textureSize(s_pixel_maps, 0).xy;
@@ -29,7 +31,7 @@ vec2 pixel_of(Sight projector, vec2 tangent) {
                  texelFetch(s_pixel_maps, ivec3(first + ivec2(1, 1), layer), 0).xy, node - vec2(first));
 }
 
-// Gain of a projector's light in its pixel (core/photometric_response.h, Vignetting).
+// Vignetting gain of a projector's pixel (core/photometric_response.h).
 float vignetting(Sight projector, vec2 px) {
   vec2 half_size = 0.5 * projector.size.zw;
   vec2 q = (px + 0.5 - half_size) / length(half_size);
@@ -37,14 +39,14 @@ float vignetting(Sight projector, vec2 px) {
   return 1.0 + dot(projector.vignetting.xy, q) + q2 * (projector.vignetting.z + q2 * projector.vignetting.w);
 }
 
-// A point of the prototype with two unit normals, of its triangle and of the smooth surface that the mesh stands for, both
-// turned to the side that counts.
+// A point of the prototype with two unit normals: of its triangle, and of the smooth surface. Both are turned
+// to the visible side.
 struct Place {
   vec3 p, d_flat, d_smooth;
 };
 
-// Where a ray along d meets the prototype: on its triangle, also where the ray just missed that. The scene's frame is the
-// prototype's.
+// The place where a ray along d hits the prototype. The point is on the triangle, even if the ray just missed
+// it. The scene's frame is the prototype's.
 Place place_at(Hit hit, vec3 d) {
   uint first = 3u * (hit.id - 1u);
   vec3 p = mat3(corner(first).xyz, corner(first + 1u).xyz, corner(first + 2u).xyz) * hit.weights;
@@ -54,30 +56,33 @@ Place place_at(Hit hit, vec3 d) {
   return place;
 }
 
-// How much wider a pixel's light lies at a depth than its square, area by area: a square of side 1 has a variance of
-// 1 / 12, a disc of diameter d one of d^2 / 16.
+// Ratio of the area of a defocused pixel at this depth to that of a sharp one. A square of side 1 has a
+// variance of 1 / 12, a disc of diameter d one of d^2 / 16.
 float spread(Sight projector, float depth) {
-  float disc = (projector.focus.x * depth - projector.focus.y) / depth;  // divided last: drivers divide inexactly
+  // The division comes last, because drivers divide inexactly.
+  float disc = (projector.focus.x * depth - projector.focus.y) / depth;
   return 1.0 + 0.75 * disc * disc;
 }
 
 // How projector j lights a place.
 struct Reach {
-  float quality;     // pixels a square metre, fewer where they are out of focus, times the cosine once more against
-                     // grazing light, fading towards the image's border, the prototype's edges and its shadows; 0 where
-                     // its light does not fall: turned away, outside, in a shadow
-  float irradiance;  // of white, where 1 m away and head on is 1 (1/m^2); also where p is outside or in a shadow
-  float arriving;    // of its light on the way to p, 0 ... 1: the rest is in somebody's shadow
+  float quality;     // pixels for each square metre, fewer where they are out of focus; multiplied by the
+                     // cosine a second time to avoid grazing light; fades towards the image's border and near
+                     // depth edges; 0 where its light does not fall: turned away, outside the image, in a
+                     // shadow
+  float irradiance;  // irradiance of white (1/m^2, 1 at normal incidence at 1 m); also set where p is outside
+                     // the image or in a shadow
+  float arriving;    // share of its light that arrives at p, 0 to 1; a person's shadow takes the rest
 };
 
-// `is_seen`: it is known that the prototype does not hide the place from it.
+// `is_seen`: the place is known to be visible from the projector.
 Reach reach(int j, Place place, bool is_seen) {
   Sight projector = sight_at(j);
   vec3 to_eye = projector.p_eye.xyz - place.p;
   float distance_2 = dot(to_eye, to_eye);
   vec3 q = (projector.sight_from_scene * vec4(place.p, 1)).xyz;
   if (dot(place.d_flat, to_eye) <= 0.0 || q.z <= 0.0) return Reach(0.0, 0.0, 1.0);
-  const float k_least_cosine = 0.01;  // where the smooth surface looks away and its triangle does not
+  const float k_least_cosine = 0.01;  // for a smooth normal that faces away although its triangle does not
   float cosine = max(k_least_cosine, dot(place.d_smooth, to_eye) * inversesqrt(distance_2));
   vec2 px = pixel_of(projector, q.xy / q.z);
   vec2 last = projector.size.zw - 0.5;
@@ -98,7 +103,7 @@ Reach reach(int j, Place place, bool is_seen) {
   return reach;
 }
 
-// Whether projector j's light falls on a place: reach(j, place, false).quality > 0, for less.
+// Whether projector j's light falls on a place. Cheaper than reach(j, place, false).quality > 0.
 bool reaches(int j, Place place) {
   Sight projector = sight_at(j);
   vec3 q = (projector.sight_from_scene * vec4(place.p, 1)).xyz;
@@ -117,22 +122,25 @@ bool is_reached(Place place) {
   return is_lit;
 }
 
-// What projector i is to give at a place that it sees.
+// The part of the light that projector i gives at a place that it sees.
 struct Share {
-  float share;          // of the light there; what arrives of all that reach the place sums to one
-  float irradiance;     // as Reach
-  float missing_black;  // irradiance that black gives where every projector reaches, and that is missing there
-  float blocked_black;  // of it, what would arrive but for somebody's shadow
+  float share;          // share of the light there; the arriving shares of all projectors that reach the
+                        // place sum to one
+  float irradiance;     // as in Reach
+  float missing_black;  // missing irradiance of black levels: from projectors that do not reach the place or
+                        // are blocked
+  float blocked_black;  // the part of missing_black that a person's shadow blocks
 };
 
-// Where light is blocked others give it, and the blocked projector keeps watch: so little that nothing flashes when the
-// shadow goes, enough for a camera to see that it has gone. Where nobody else reaches it goes on. Weights fall by
-// powers, so that a change of what arrives is as soft where others hardly reach.
+// Where light is blocked, other projectors give it. The blocked projector keeps a small probe share: so
+// little that nothing flashes when the shadow goes, and enough for a camera to see that the shadow has gone.
+// Where no other projector reaches, it gives all its light. Weights fall exponentially with the blocked
+// share, so that the transition is equally smooth where others hardly reach.
 const float k_blocked = 1e-3;   // weight of a blocked projector against others
-const float k_watch = 0.07;     // of the light, all that keep watch together
-const float k_well_in = 0.25;   // share of the light above which a projector keeps its watch whole
+const float k_watch = 0.07;     // share of the light that all blocked projectors together keep as a probe
+const float k_well_in = 0.25;   // share of the quality above which a projector keeps its full probe share
 
-// Weight of a projector against others.
+// Blending weight of a projector.
 float weight_of(Reach reach) { return reach.quality * pow(k_blocked, 1.0 - reach.arriving); }
 
 Share share_of(int i, Place place) {
@@ -141,7 +149,7 @@ Share share_of(int i, Place place) {
   float own_blocked = 1.0 - own.arriving, blocked = own.quality > 0.0 ? own_blocked : 0.0;
   float black = sight_at(i).quality.w * own.irradiance;
   Share share = Share(0.0, own.irradiance, own.quality > 0.0 ? 0.0 : black, black * blocked);
-  int j = i == 0 ? 1 : 0;  // the others
+  int j = i == 0 ? 1 : 0;  // the other projectors
   if (u_projector_count > 1) {
     do {
       Reach reach = reach(j, place, false);
@@ -165,7 +173,7 @@ Share share_of(int i, Place place) {
   return share;
 }
 
-// Light over its own black that the projector gives for black that is missing.
+// Light above its own black level with which the projector replaces missing black light.
 float black_lift(Share share, float missing) {
   return share.share == 0.0 ? 0.0 : share.share * missing / share.irradiance;
 }

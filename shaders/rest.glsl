@@ -1,10 +1,10 @@
-// Pixels that a pass leaves to another one, which does what few of them need.
+// A list of pixels that a pass leaves to a later one, for work that only few pixels need.
 #include "bindings.glsl"
 
 layout(std430, binding = k_deferred_list_buffer) buffer Rest {
   uint s_rest_count;
   uint s_rest_groups[3];
-  uint s_rest[];  // as shaders/listed.glsl, which reads it
+  uint s_rest[];  // same format as shaders/listed.glsl, which reads it
 };
 
 void leave_pixel(ivec2 at) {

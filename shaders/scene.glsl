@@ -1,13 +1,14 @@
-// The triangles of the prototype and of every variant, and where they stand. A triangle's number counts from 0 over
-// all of them; an id is the number + 1, so that 0 means none. "scene" is the frame that rays are cast in. What is read
-// most comes from texel buffers: software GL reads them several times faster than storage buffers, whose lanes it
-// loads one by one.
+// The triangles of the prototype and of every variant, and their poses. All triangles are numbered from 0; an
+// id is the number + 1, so that 0 means none. "scene" is the coordinate frame in which rays are cast. Data
+// that is read often is in texel buffers: software GL reads them several times faster than storage buffers,
+// because it loads the lanes of storage buffers one by one.
 #include "bindings.glsl"
 
-layout(binding = k_corners_unit) uniform samplerBuffer s_corners;  // 3 a triangle: p in its owner's frame, u
-layout(binding = k_normals_unit) uniform samplerBuffer s_normals;  // 3 a triangle: unit normal, v
-// 5 a triangle: owner (0 prototype, slot + 1), material, ids of the triangles across the sides that lie opposite each
-// corner (0 where the mesh ends)
+// 3 for each triangle: p in its owner's frame, u.
+layout(binding = k_corners_unit) uniform samplerBuffer s_corners;
+layout(binding = k_normals_unit) uniform samplerBuffer s_normals;  // 3 for each triangle: unit normal, v
+// 5 for each triangle: owner (0 prototype, slot + 1), material, and for each corner the id of the triangle
+// across the opposite side (0 where the mesh ends)
 layout(binding = k_triangles_unit) uniform usamplerBuffer s_triangles;
 
 vec4 corner(uint i) { return texelFetch(s_corners, int(i)); }
@@ -18,25 +19,26 @@ uint beside(uint id, int side) { return texelFetch(s_triangles, int(5u * (id - 1
 
 struct Material {
   vec4 colour;  // linear light; a: 1 when unlit
-  vec4 look;    // texture layer (-1 when it has none), metallic, roughness, alpha below which there is nothing
+  vec4 look;    // texture layer (-1 when it has none), metallic, roughness, alpha cutoff
   vec4 emitted; // linear light; a: layer of s_looks that multiplies it, or -1
-  vec4 maps;    // layers of s_maps, or -1: of occlusion, roughness and metalness, and of normals; scale of the normals'
-                // x and y, strength of the occlusion
-  ivec4 more;   // added to the number of a corner: where its tangent is in s_normals (w: handedness); 1 when there is a
-                // map of roughness and metalness
+  vec4 maps;    // layers of s_maps, or -1: occlusion, roughness and metalness (x); normals (y); scale of the
+                // normals' x and y (z); strength of the occlusion (w)
+  ivec4 more;   // x: offset from a corner's number to its tangent in s_normals (the tangent's w is its
+                // handedness); y: 1 when there is a map of roughness and metalness
 };
 layout(std430, binding = k_materials_buffer) readonly buffer Materials { Material s_materials[]; };
-layout(binding = k_colour_maps_unit) uniform sampler2DArray s_looks;  // all textures, one a layer, sRGB decoded on reading
-uniform bool u_has_cut_outs;  // whether any alpha of s_looks means anything
+// Colour textures, one in each layer; sRGB is decoded on reading.
+layout(binding = k_colour_maps_unit) uniform sampler2DArray s_looks;
+uniform bool u_has_cut_outs;  // whether any material has an alpha cutoff
 
 struct Owner {
   mat4 owner_from_scene;
-  vec4 lower;  // of its bounds, owner frame; w: 1 when it is shown
-  vec4 upper;  // w: 1 when its mode is surface
-  vec4 colour; // linear light, instead of its materials' where w is 1
-  vec4 look;   // metallic, roughness, instead of its materials' where not negative
+  vec4 lower;  // lower bound, owner frame; w: 1 when the part is shown
+  vec4 upper;  // upper bound; w: 1 when its mode is surface
+  vec4 colour; // override of the materials' colour, linear light, where w is 1
+  vec4 look;   // overrides of metallic and roughness, where not negative
 };
-layout(binding = k_placements_unit) uniform samplerBuffer s_placements;  // 8 an owner
+layout(binding = k_placements_unit) uniform samplerBuffer s_placements;  // 8 for each owner
 
 mat4 matrix_at(samplerBuffer texels, int first) {
   return mat4(texelFetch(texels, first), texelFetch(texels, first + 1), texelFetch(texels, first + 2),
@@ -49,20 +51,20 @@ Owner owner_at(uint owner) {
                texelFetch(s_placements, first + 6), texelFetch(s_placements, first + 7));
 }
 
-// A place that rays start from, with the ids that a pinhole image from there holds: layer 0 the prototype, layer 1
-// the parts. Pixel (0,0) is the centre of the top-left texel.
+// A viewpoint: where rays start, with the ids that a pinhole image from there holds: layer 0 the prototype,
+// layer 1 the parts. Pixel (0,0) is the centre of the top-left texel.
 struct Sight {
   mat4 sight_from_scene;
   vec4 focal_centre;  // fx, fy, cx, cy of the pinhole image
-  vec4 p_eye;         // scene frame; w: first layer of its ids
-  vec4 size;          // of the pinhole image; zw: of the imager's own image
-  vec4 map;           // tangents of the first node of the imager's pixel map, nodes per tangent
-  vec4 quality;       // focal length of the imager (px), width of the soft border (px), layer of its pixel map, light of
-                      // black as a share of white
-  vec4 vignetting;    // tilt (xy), r2, r4 of core/photometric_response.h
-  vec4 focus;         // a point's disc at depth z is |x - y / z| pixels wide
+  vec4 p_eye;         // position in the scene's frame; w: first layer of its ids
+  vec4 size;          // xy: size of the pinhole image; zw: size of the imager's own image
+  vec4 map;           // xy: tangents of the first node of the imager's pixel map; zw: nodes per tangent
+  vec4 quality;       // focal length of the imager (px), width of the soft border (px), layer of its pixel
+                      // map, black level as a share of white
+  vec4 vignetting;    // tilt (xy), r2, r4 as in core/photometric_response.h
+  vec4 focus;         // the blur disc of a point at depth z has a diameter of |x - y / z| pixels
 };
-layout(binding = k_viewpoints_unit) uniform samplerBuffer s_sights;  // 11 a sight
+layout(binding = k_viewpoints_unit) uniform samplerBuffer s_sights;  // 11 for each viewpoint
 
 Sight sight_at(int i) {
   int first = 11 * i;
@@ -73,21 +75,22 @@ Sight sight_at(int i) {
 
 struct Hit {
   uint id;       // 0: nothing
-  float t;       // metres along the unit direction
+  float t;       // distance along the unit direction (m)
   vec3 weights;  // barycentric
-  float slack;   // of the weights: what rounding may have moved them by
+  float slack;   // largest rounding error of the weights
 };
 const Hit k_no_hit = Hit(0u, 1e30, vec3(0), 0.0);
 
-const float k_rounding = 2e-6;     // m; of single precision a few metres away, closes cracks between neighbours
-const float k_same_place = 1e-4;   // m; nearer than this two hits are one surface
+const float k_rounding = 2e-6;     // m; rounding of single precision at some metres; closes cracks between
+                                   // neighbouring triangles
+const float k_same_place = 1e-4;   // m; hits closer than this are one surface
 
 vec3 to_owner(uint owner, vec3 p) { return (owner_at(owner).owner_from_scene * vec4(p, 1)).xyz; }
 vec3 turned_to_owner(uint owner, vec3 d) { return mat3(owner_at(owner).owner_from_scene) * d; }
 vec3 turned_to_scene(uint owner, vec3 d) { return d * mat3(owner_at(owner).owner_from_scene); }
 
-// Where the ray from o along w (unit length, both in the frame of the triangle's owner) meets the plane of a triangle.
-// False when it runs along it.
+// Intersects the ray from o along w (unit length, both in the frame of the triangle's owner) with the plane
+// of a triangle. False when the ray is parallel to it.
 bool plane_hit_in_owner(uint id, vec3 o, vec3 w, out Hit hit) {
   uint first = 3u * (id - 1u);
   vec3 a = corner(first).xyz - o;
@@ -99,7 +102,7 @@ bool plane_hit_in_owner(uint id, vec3 o, vec3 w, out Hit hit) {
   if (along == 0.0) return false;
   hit.id = id;
   hit.t = dot(n, a) / along;
-  vec3 m = cross(w, a);  // twice the signed areas seen from the ray
+  vec3 m = cross(w, a);  // its products with the sides are twice the signed areas seen along the ray
   hit.weights.y = -dot(m, ac) / along;
   hit.weights.z = dot(m, ab) / along;
   hit.weights.x = 1.0 - hit.weights.y - hit.weights.z;
@@ -113,15 +116,15 @@ bool plane_hit(uint id, vec3 p_origin, vec3 d, out Hit hit) {
   return plane_hit_in_owner(id, to_owner(owner, p_origin), turned_to_owner(owner, d), hit);
 }
 
-// The same of the prototype, whose frame is the scene's.
+// The same for the prototype, whose frame is the scene's.
 bool prototype_plane_hit(uint id, vec3 p_origin, vec3 d, out Hit hit) {
   return plane_hit_in_owner(id, p_origin, d, hit);
 }
 
 bool is_inside(Hit hit) { return all(greaterThanEqual(hit.weights, vec3(-hit.slack))); }
 
-// Whether a triangle, as seen along w (frame of its owner), is thinner than two texels of the sight: then texels can miss
-// it.
+// Whether a triangle, as seen along w (frame of its owner), is thinner than two texels of the id image, so
+// that all texels may miss it.
 bool is_thin(uint id, float t, vec3 w, Sight sight) {
   uint first = 3u * (id - 1u);
   vec3 a = corner(first).xyz, b = corner(first + 1u).xyz, c = corner(first + 2u).xyz;
@@ -130,7 +133,7 @@ bool is_thin(uint id, float t, vec3 w, Sight sight) {
   return area * sight.focal_centre.x < 2.0 * t * side;
 }
 
-// Texels around the direction d: ids, the nearest first, and their bilinear weights.
+// The ids of the four texels around the direction d, the nearest texel first, and their bilinear weights.
 uvec4 ids_around(usampler2DArray s_ids, Sight sight, int layer, vec3 d, out vec4 share) {
   share = vec4(1, 0, 0, 0);
   vec3 q = mat3(sight.sight_from_scene) * d;
@@ -151,7 +154,7 @@ uvec4 ids_around(usampler2DArray s_ids, Sight sight, int layer, vec3 d, out vec4
   return ids;
 }
 
-// The same ids, each once, those that are none last: loops over them end early.
+// The same ids without duplicates, with zeros last, so that loops over them end early.
 uvec4 each_once(uvec4 ids) {
   if (ids.y == ids.x) ids.y = 0u;
   if (ids.z == ids.x || ids.z == ids.y) ids.z = 0u;
@@ -172,7 +175,8 @@ vec2 uv_of(Hit hit) {
                 vec2(corner(first + 2u).w, normal(first + 2u).w)) * hit.weights;
 }
 
-// Level of detail of a texture of so many texels whose pixel covers a patch with sides of `footprint` (m).
+// Level of detail of a texture of size `texels` for a pixel that covers a patch with sides of `footprint`
+// (m).
 float lod_of(vec2 texels, Hit hit, float footprint) {
   uint first = 3u * (hit.id - 1u);
   vec3 ab = corner(first + 1u).xyz - corner(first).xyz;
@@ -187,7 +191,8 @@ float lod_of(vec2 texels, Hit hit, float footprint) {
 
 float texture_lod(Hit hit, float footprint) { return lod_of(vec2(textureSize(s_looks, 0).xy), hit, footprint); }
 
-// Whether the material of what is hit has nothing there; `footprint` is the side (m) of a pixel's patch on the surface.
+// Whether the texture's alpha at the hit is below the material's cutoff; `footprint` is the side (m) of a
+// pixel's patch on the surface.
 bool is_cut_out(Hit hit, float footprint) {
   if (!u_has_cut_outs) return false;
   vec4 look = s_materials[material_of(hit.id)].look;
@@ -196,23 +201,25 @@ bool is_cut_out(Hit hit, float footprint) {
   return textureLod(s_looks, vec3(uv.x, 1.0 - uv.y, look.x), texture_lod(hit, footprint)).a < look.w;
 }
 
-// Where a ray (frame of the owner) that meets a triangle's plane beside it is taken to meet the triangle: on the plane, or
-// at its nearest point where the plane is too steep to be trusted beyond it.
+// Moves the hit of a ray that meets a triangle's plane just outside the triangle (frame of the owner) onto
+// the triangle. The distance stays that of the plane, or becomes that of the nearest point of the triangle
+// where the plane is too steep to extrapolate.
 Hit moved_beside(Hit hit, vec3 o, vec3 w, Sight sight) {
   hit.weights = max(hit.weights, vec3(0));
   hit.weights /= hit.weights.x + hit.weights.y + hit.weights.z;
   uint first = 3u * (hit.id - 1u);
   vec3 p = mat3(corner(first).xyz, corner(first + 1u).xyz, corner(first + 2u).xyz) * hit.weights;
   float t = dot(p - o, w);
-  const float k_steepest = 4.0;  // texels of depth a texel, 76 degrees
+  const float k_steepest = 4.0;  // slope: texels of depth for each texel, 76 degrees
   if (!(abs(hit.t - t) < k_steepest * t / sight.focal_centre.x)) hit.t = t;
   return hit;
 }
 
-// First surface that the ray from the sight's eye meets: exactly, by intersecting the triangles that the texels
-// around it saw. Triangles thinner than texels can all be missed: then the texels decide, by bilinear coverage. Parts
-// may have pieces cut out, the prototype has none. (Software GL goes through all of a branch that nobody takes, and once
-// too often through a loop that asks before its body: what is rare is a further round of a loop that asks after it.)
+// The first surface that a ray from the viewpoint hits. It is exact: the triangles in the four id texels
+// around the ray are intersected. Triangles thinner than a texel may all be missed; then the texels decide,
+// by bilinear coverage. Parts may have an alpha cutoff, the prototype has none. (Software GL executes
+// branches that no lane takes, and executes a loop once too often if its condition comes first. So rare work
+// is a further round of a do-while loop.)
 Hit first_hit(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
   vec4 share;
   uvec4 ids = ids_around(s_ids, sight, layer, d, share);
@@ -221,10 +228,10 @@ Hit first_hit(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
   uvec4 left = each_once(ids);
   uint nearest = left.x;
   bool is_covered = dot(share, vec4(notEqual(ids, uvec4(0)))) >= 0.5, is_whole = all(notEqual(ids, uvec4(0)));
-  bool is_through = false;  // what is cut out
-  bool is_beside = false;   // all were missed: the nearest once more
+  bool is_through = false;  // hit a piece below the alpha cutoff
+  bool is_beside = false;   // all were missed: the nearest is tried once more
   do {
-    vec3 o = sight.p_eye.xyz, w = d;  // of the owner's frame; the prototype's is the scene's
+    vec3 o = sight.p_eye.xyz, w = d;  // in the owner's frame; the prototype's is the scene's
     if (layer != 0) {
       uint owner = owner_of(left.x);
       o = to_owner(owner, o);
@@ -251,7 +258,7 @@ Hit first_hit(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
   return best;
 }
 
-// Whether the prototype hides p (a point on it) from the sight's eye.
+// Whether the prototype hides p (a point on it) from the viewpoint.
 bool is_hidden(usampler2DArray s_ids, Sight sight, vec3 p) {
   vec3 d = p - sight.p_eye.xyz;
   float t = length(d);
@@ -261,8 +268,9 @@ bool is_hidden(usampler2DArray s_ids, Sight sight, vec3 p) {
   float texel = t / sight.focal_centre.x;
   float slack = k_same_place + (exact ? 1e-5 * t : 2.0 * texel);
   if (hit.id != 0u && hit.t < t - slack) return true;
-  // Or in or beside another triangle that a texel saw: where a smooth surface turns away its last triangles are seen so
-  // much aslant that texels miss them.
+  // The ray may also hit another triangle of the texels, or a neighbour of one: at a silhouette of a smooth
+  // surface, the last triangles are seen at such a grazing angle that texels miss them. The loop walks from
+  // each triangle across its sides towards the ray.
   vec4 share;
   uvec4 left = each_once(ids_around(s_ids, sight, 0, d, share));
   if (left.y == 0u) return false;
@@ -283,7 +291,8 @@ bool is_hidden(usampler2DArray s_ids, Sight sight, vec3 p) {
       } else {
         vec3 w = beside_it.weights;
         next = beside(id, w.x < w.y ? (w.x < w.z ? 0 : 2) : w.y < w.z ? 1 : 2);
-        if (next == from || ++step == k_most_steps) next = 0u;  // folded back: the ray passes beside both
+        // The walk turned back: the ray passes beside both triangles.
+        if (next == from || ++step == k_most_steps) next = 0u;
       }
     }
     from = id;
@@ -315,20 +324,21 @@ vec3 smooth_normal_in_owner(Hit hit) {
 vec3 flat_normal(uint id) { return turned_to_scene(owner_of(id), flat_normal_in_owner(id)); }
 vec3 smooth_normal(Hit hit) { return turned_to_scene(owner_of(hit.id), smooth_normal_in_owner(hit)); }
 
-// -1 where d comes from behind the corners' normals, as the triangle is turned, else 1.
+// -1 if the corners' normals point away from the side of the triangle that a ray along d hits, else 1.
 float side_seen(vec3 n_smooth, Hit hit, vec3 d) {
   vec3 flat_one = flat_normal(hit.id);
   if (dot(flat_one, d) > 0.0) flat_one = -flat_one;
   return dot(n_smooth, flat_one) < 0.0 ? -1.0 : 1.0;
 }
 
-// A normal that looks aside where it would look along d.
+// The normal n, turned perpendicular to d if it would face away from the viewer.
 vec3 not_away(vec3 n, vec3 d) {
   float away = dot(n, d);
   return away > 0.0 ? normalize(n - away * d) : n;
 }
 
-// The interpolated normal turned to where d comes from, as its triangle is; at a silhouette it looks aside, not away.
+// The interpolated normal, turned to the side from which d comes. At a silhouette it is perpendicular to d at
+// most.
 vec3 facing_normal(Hit hit, vec3 d) {
   vec3 n = smooth_normal(hit);
   return not_away(side_seen(n, hit, d) * n, d);

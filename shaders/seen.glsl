@@ -1,4 +1,4 @@
-// What an imager (viewer or camera) sees of the parts at a pixel sample, and whether light can show it.
+// Which part an imager (viewer or camera) sees at a pixel sample, and whether projected light can show it.
 #include "bindings.glsl"
 #include "scene.glsl"
 #include "lens.glsl"
@@ -15,11 +15,11 @@ struct Seen {
   int how;
   Hit part;
   vec3 d;
-  Place behind;  // of the prototype, behind the part, where `how` is k_if_reached
+  Place behind;  // the prototype's place behind the part, if `how` is k_if_reached
 };
 
-// The part at px that the prototype does not hide. A surface part counts as visible within 2 mm behind the surface.
-// k_if_reached: projected if light reaches the prototype there, else left to the screen.
+// The part at px, unless the prototype hides it. A surface part counts as visible up to 2 mm behind the
+// surface. k_if_reached: projected if light reaches the prototype there, else left to the screen.
 Seen in_sight_at(vec2 px) {
   Sight eye = sight_at(u_eye);
   vec3 d = ray_of(eye, px);
@@ -32,7 +32,8 @@ Seen in_sight_at(vec2 px) {
     return seen;
   }
   Place behind = place_at(prototype, d);
-  float height = (prototype.t - seen.part.t) * -dot(behind.d_flat, d);  // of the part over the surface
+  // Height of the part above the surface.
+  float height = (prototype.t - seen.part.t) * -dot(behind.d_flat, d);
   if (height < (on_surface ? -k_on_surface : -k_same_place)) return seen;
   bool shown = !on_surface || height <= k_on_surface;
   seen.how = shown ? k_if_reached : k_screen;

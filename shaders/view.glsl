@@ -1,4 +1,4 @@
-// Prototype and parts as a virtual camera sees them, linear light, a: coverage.
+// Prototype and parts as a virtual camera sees them, in linear light; a: coverage.
 #include "bindings.glsl"
 #include "scene.glsl"
 #include "lens.glsl"
@@ -7,14 +7,14 @@
 
 layout(binding = k_eye_ids_unit) uniform usampler2DArray s_eye_ids;
 uniform int u_eye;
-layout(binding = k_albedo_unit) uniform sampler2D s_albedo;  // of the prototype, over its mean
+layout(binding = k_albedo_unit) uniform sampler2D s_albedo;  // albedo of the prototype divided by its mean
 uniform float u_mean_albedo;
 
 vec4 view_at(vec2 px) {
   Sight eye = sight_at(u_eye);
   vec3 d = ray_of(eye, px);
   Hit part = first_hit(s_eye_ids, eye, 1, d), prototype = first_hit(s_eye_ids, eye, 0, d);
-  // A part that lies on the surface is seen before it.
+  // A part that lies on the surface is drawn in front of it.
   const float k_on_it = 0.002;
   if (part.id != 0u && (prototype.id == 0u || part.t < prototype.t + k_on_it)) {
     return vec4(look_along(d, part, part.t / eye.quality.x), 1);

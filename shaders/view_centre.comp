@@ -1,5 +1,5 @@
 #version 450 core
-// A virtual camera's image: the listed pixels, one sample each at their centres.
+// Draws a virtual camera's image: one sample at the centre of each listed pixel.
 #include "bindings.glsl"
 #include "view.glsl"
 #include "listed.glsl"

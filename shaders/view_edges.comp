@@ -1,5 +1,5 @@
 #version 450 core
-// A virtual camera's image: the listed pixels by many samples.
+// Draws a virtual camera's image: several samples for each listed pixel.
 #include "bindings.glsl"
 #include "view.glsl"
 #include "listed.glsl"

@@ -3,7 +3,7 @@
 #include "view.glsl"
 #include "listed.glsl"
 layout(local_size_x = 16, local_size_y = 4) in;
-uniform ivec2 u_first, u_end;  // of the rectangle to look through
+uniform ivec2 u_first, u_end;  // the rectangle to search
 
 void main() {
   ivec2 at = u_first + ivec2(gl_GlobalInvocationID.xy);

@@ -18,17 +18,19 @@ using Eigen::Vector3d;
 using Eigen::Vector3f;
 
 constexpr double k_pi = std::numbers::pi;
-constexpr double k_half_width = 0.30, k_half_height = 0.20;  // m, of the panel
+constexpr double k_half_width = 0.30, k_half_height = 0.20;  // panel, m
 constexpr double k_marker_size = 0.040;                      // m, black square
-constexpr double k_plate_side = 1.3 * k_marker_size;         // with its white margin
-constexpr double k_plate_gap = 0.3e-3;                       // m, least distance of a plate to the clay
-constexpr double k_trim_lift = 0.1e-3;  // m above the clay: above float noise, below sight
+constexpr double k_plate_side = 1.3 * k_marker_size;         // plate with its white margin
+constexpr double k_plate_gap = 0.3e-3;                       // least distance of a plate from the clay, m
+// Height above the clay, m: above the noise of floats, but not visible.
+constexpr double k_trim_lift = 0.1e-3;
 
 double sigmoid(double x) { return 1 / (1 + std::exp(-x)); }
 
-double rounded(double v) { return std::round(v * 1e6) / 1e6; }  // to the micrometre, so that files are stable
+// To the micrometre, so that the files are reproducible.
+double rounded(double v) { return std::round(v * 1e6) / 1e6; }
 
-// Height of the clay over the door's plane, m. (x, y) within the outline.
+// Height of the clay above the door's plane, m. (x, y) must be inside the outline.
 double height(double x, double y) {
   const double barrel = -0.046 * std::pow(y / k_half_height, 2) - 0.030 * std::pow(x / k_half_width, 2);
   const double swage = 0.060 + 0.07 * (x + 0.1) - y;         // the crease rises towards the rear
@@ -40,8 +42,7 @@ double height(double x, double y) {
   return 0.045 + barrel + shoulder + ridge + sill + recess;
 }
 
-// Outline: (s, t) in [-1, 1]² to the door's plane; corners are rounded, the front edge leans, the top is
-// bowed.
+// Maps (s, t) in [-1, 1]² to the door's plane: rounded corners, an inclined front edge, a curved top.
 Vector2d outlined(double s, double t) {
   const double narrowing = 1 - 0.05 * std::pow(std::abs(t), 7),
                lowering = 1 - 0.07 * std::pow(std::abs(s), 7);
@@ -49,7 +50,7 @@ Vector2d outlined(double s, double t) {
   return {s * k_half_width * narrowing + 0.012 * t * (s < 0 ? -s : 0), t * k_half_height * lowering + bow};
 }
 
-// The clay rolls over towards its edges.
+// The drop of the rounded edges of the clay.
 double edge_drop(double s, double t) {
   const auto roll = [](double e) {
     const double depth = std::clamp((std::abs(e) - 0.965) / 0.035, 0.0, 1.0);
@@ -63,7 +64,7 @@ Vector3d clay(double s, double t) {
   return {p.x(), p.y(), height(p.x(), p.y()) - edge_drop(s, t)};
 }
 
-// Grid lines in [-1, 1]: even, and closer where the edge rolls over.
+// Grid lines in [-1, 1]: evenly spaced, and closer at the rounded edges.
 std::vector<double> grid_lines(int count) {
   std::vector<double> lines;
   const std::vector<double> roll = {0.965, 0.974, 0.982, 0.989, 0.994, 0.998, 1.0};
@@ -86,8 +87,8 @@ void add_triangle(
   mesh.triangle_materials.push_back(material);
 }
 
-// Quadrilaterals between consecutive rows of `columns` vertices each, counter-clockwise when seen from where
-// rows run up and columns run right.
+// Adds quadrilaterals between consecutive rows of `columns` vertices. They are counter-clockwise when seen
+// with rows running up and columns running right.
 void add_grid(scene::Mesh& mesh,
               std::uint32_t first,
               int columns,
@@ -122,7 +123,7 @@ void add_front(scene::Mesh& mesh, const std::vector<double>& columns, const std:
   add_grid(mesh, 0, static_cast<int>(columns.size()), static_cast<int>(rows.size()), 0);
 }
 
-// Sides down to a flat back, so that the door is a solid block of clay.
+// Adds sides and a flat back, so that the door is a solid block of clay.
 void add_sides_and_back(scene::Mesh& mesh,
                         const std::vector<double>& columns,
                         const std::vector<double>& rows) {
@@ -169,7 +170,7 @@ scene::Mesh door_mesh() {
   return mesh;
 }
 
-// Height of the triangles themselves, looked up by a ray against z.
+// The height of the triangulated surface, found by a ray along -z.
 class Clay {
  public:
   explicit Clay(const scene::Mesh& mesh) : scene_(std::vector<MeshInstance>{{&mesh, Pose()}}) {}
@@ -183,8 +184,8 @@ class Clay {
   RayScene scene_;
 };
 
-// A flat plate that touches the clay around (x, y): least-squares plane, moved out until it is clear of the
-// clay. Marker frame: x right, y down, z into the door.
+// The pose of a flat plate on the clay around (x, y): a least-squares plane, moved outwards until it is clear
+// of the clay. Marker frame: x right, y down, z into the door.
 Pose plate_on(const Clay& clay, double x, double y) {
   constexpr int k_half = 6;
   std::vector<Vector3d> points;
@@ -222,8 +223,8 @@ std::uint16_t add_material(scene::Mesh& mesh, const Vector3f& rgb) {
 
 constexpr int k_around = 56;  // vertices of a ring
 
-// Rings of vertices p(k, angle), joined to a skin with smooth normals. Rings run so that the outside is to
-// the right of increasing k when angles run counter-clockwise; `flip` turns the skin inside out.
+// Adds rings of vertices p(k, angle), joined to a surface with smooth normals. When angles run
+// counter-clockwise, the outside is to the right of increasing k.
 void add_rings(scene::Mesh& mesh,
                int rings,
                const std::function<Vector3d(double, double)>& p,
@@ -254,11 +255,11 @@ void add_disc(scene::Mesh& mesh,
 
 struct MirrorStyle {
   std::string name;
-  double half_width, half_height, depth;  // m, of the housing
+  double half_width, half_height, depth;  // of the housing, m
   double roundness;                       // superellipse: 2 round … 6 boxy
-  double taper;                           // share by which the inner side is lower
-  Vector3d centre;                        // of the glass, in the part's frame
-  double turn;                            // of the glass from facing the onlooker towards the rear, radians
+  double taper;                           // relative reduction in height of the inner side
+  Vector3d centre;                        // centre of the glass, in the part's frame
+  double turn;                            // rotation of the glass, from facing the viewer towards the rear
   double foot_radius, arm_radius;
   Vector3f paint, arm, rim, glass;  // linear RGB
 };
@@ -311,8 +312,8 @@ const std::vector<MirrorStyle>& mirror_styles() {
 
 double signed_power(double v, double exponent) { return std::copysign(std::pow(std::abs(v), exponent), v); }
 
-// Foot on the door at the origin, an arm, a domed housing with a rim and a glass that faces onlooker and
-// rear.
+// A foot on the door at the origin, an arm, and a domed housing with a rim and a glass that faces the viewer
+// and the rear.
 scene::Mesh mirror_mesh(const MirrorStyle& style) {
   scene::Mesh mesh;
   mesh.materials.clear();
@@ -361,7 +362,7 @@ scene::Mesh mirror_mesh(const MirrorStyle& style) {
   return mesh;
 }
 
-// A strip along the lower flank, laid on the door's own triangles: chrome between two dark lines.
+// A strip along the lower flank that lies on the door's own triangles: chrome between two dark lines.
 scene::Mesh trim_mesh(const Clay& clay, const Pose& prototype_from_part) {
   scene::Mesh mesh;
   mesh.materials.clear();
@@ -391,8 +392,8 @@ scene::Mesh trim_mesh(const Clay& clay, const Pose& prototype_from_part) {
   return mesh;
 }
 
-// A marker and a part that stand `right` and `up` of it; the part's axes are the door's (x right, y up, z
-// out).
+// The pose of a part that stands `right` and `up` of its marker; the part's axes are the door's (x right, y
+// up, z out).
 Pose marker_from_upright(double right, double up) {
   return Pose(Eigen::Quaterniond(0, 1, 0, 0), Vector3d(right, -up, 0));
 }
@@ -416,7 +417,7 @@ scene::Prototype door_prototype() {
   return prototype;
 }
 
-// Marker poses as scene.json will hold them.
+// A pose as scene.json holds it.
 nlohmann::ordered_json pose_json(const Pose& pose) {
   const auto digits = [](double v) { return std::round(v * 1e9) / 1e9; };
   const auto& q = pose.rotation;
@@ -438,8 +439,8 @@ nlohmann::ordered_json slot_json(const scene::Slot& slot) {
   return json;
 }
 
-// A designer's eye: right of the middle, standing height above the table, one and a half metres away. World
-// frame as in config/worlds: z up, the door faces -y.
+// A designer's eye: right of the middle, at standing height above the table, 1.5 m away. World frame as in
+// config/worlds: z up, the door faces -y.
 constexpr int k_viewer_size[2] = {1280, 800};
 constexpr double k_viewer_fov_deg = 36;
 Pose world_from_viewer() {
@@ -461,7 +462,7 @@ std::map<std::string, Pose> slot_places(const Clay& clay) {
           {"trim", plate_on(clay, k_trim_marker[0], k_trim_marker[1])}};
 }
 
-// Where a perfect tracker puts a slot's part, laying onto the surface included.
+// Where a perfect tracker puts a slot's part, including the projection onto the surface.
 Pose prototype_from_part(const scene::Scene& scene, const std::string& slot, const Clay& clay) {
   std::vector<Track> tracks(2);
   tracks[0].body = "prototype";

@@ -7,7 +7,7 @@
 namespace limn::sim {
 namespace {
 
-constexpr int k_direction_step = 8;  // px between exact directions
+constexpr int k_direction_step = 8;  // pixels between exact directions
 
 std::array<double, 4> weights(double t) {
   return {((-0.5 * t + 1) * t - 0.5) * t, ((1.5 * t - 2.5) * t) * t + 1, ((-1.5 * t + 2) * t + 0.5) * t,

@@ -9,13 +9,13 @@
 
 namespace limn::sim {
 
-/// World directions of any sub-pixel place of an imager, a pixel beyond its border included: exact ones on a
-/// grid, cubic interpolation (Catmull-Rom) between them, which errs below 1e-8 rad.
+/// World directions for any sub-pixel position of an imager, up to one pixel beyond its border. They are
+/// exact on a grid and interpolated by cubics (Catmull-Rom) in between; the error is below 1e-8 rad.
 class Directions {
  public:
   explicit Directions(const Imager& imager);
 
-  /// Unit; NaN where the lens has none.
+  /// Unit direction; NaN where the lens has none.
   Eigen::Vector3f at(double x, double y) const;
   /// Directions of pixels (x0, y), (x0 + 1, y), …
   void row(double x0, double y, std::span<Eigen::Vector3f> d) const;

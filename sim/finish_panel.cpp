@@ -18,13 +18,13 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double k_width = 0.5, k_height = 0.34, k_bow = 0.06;  // m
-constexpr double k_plate_lift = 0.0004;                         // m; on the surface, clear of its triangles
-constexpr int k_texels = 64;                                    // a side: two pixels of a camera or more each
+constexpr double k_plate_lift = 0.0004;  // m; on the surface, but clear of its triangles
+constexpr int k_texels = 64;             // texels for each side; each texel covers at least two camera pixels
 
-// Of the panel, m.
+// Height of the curved panel, m.
 double bowed(double x) { return -k_bow * std::pow(2 * x / k_width, 2); }
 
-// A sheet over u, v of 0 ... 1 with the normals and uvs of its points.
+// A sheet over u, v from 0 to 1, with normals and uvs.
 scene::Mesh sheet(int columns, int rows, const std::function<Vector3d(double, double)>& at) {
   scene::Mesh mesh;
   constexpr double k_step = 1e-4;
@@ -33,7 +33,7 @@ scene::Mesh sheet(int columns, int rows, const std::function<Vector3d(double, do
       const double u = static_cast<double>(c) / columns, v = static_cast<double>(r) / rows;
       const Vector3d n = (at(u + k_step, v) - at(u - k_step, v)).cross(at(u, v + k_step) - at(u, v - k_step));
       mesh.positions.push_back((at(u, v) * 1e6).array().round().matrix().cast<float>() /
-                               1e6F);  // stable files
+                               1e6F);  // rounded, so that the files are reproducible
       mesh.normals.push_back(n.normalized().cast<float>());
       mesh.uvs.push_back(Vector2d(u, v).cast<float>());
     }
@@ -47,7 +47,7 @@ scene::Mesh sheet(int columns, int rows, const std::function<Vector3d(double, do
   return mesh;
 }
 
-// A texture by what it has at u, v: red, green, blue of 0 ... 1.
+// A texture from a function that gives red, green and blue (0 to 1) at u, v.
 scene::Texture painted(const std::function<Vector3d(const Vector2d&)>& rgb_at) {
   cv::Mat image(k_texels, k_texels, CV_8UC3);
   for (int row = 0; row < k_texels; ++row)
@@ -59,7 +59,7 @@ scene::Texture painted(const std::function<Vector3d(const Vector2d&)>& rgb_at) {
   return {image, ""};
 }
 
-// Normals of a relief: its slopes along u and v.
+// The normal map of a relief, given by its slopes along u and v.
 scene::Texture relief(const std::function<Vector2d(const Vector2d&)>& slopes_at) {
   return painted([&](const Vector2d& uv) {
     const Vector2d slopes = slopes_at(uv);
@@ -70,10 +70,10 @@ scene::Texture relief(const std::function<Vector2d(const Vector2d&)>& slopes_at)
 
 double wave(double turns) { return std::sin(2 * std::numbers::pi * turns); }
 
-// 0 ... 1 over 8 texels around `at`.
+// A smooth step from 0 to 1 over about 8 texels around `at`.
 double step(double value, double at) { return 1 / (1 + std::exp((at - value) * k_texels)); }
 
-// Gold in an oval, lacquer around it, hammered, with a line that glows.
+// A hammered cushion: a gold oval with lacquer around it and a glowing line.
 scene::Mesh emblem() {
   scene::Mesh mesh = sheet(24, 16, [](double u, double v) {
     const auto fall = [](double t) { return 1 - std::pow(std::abs(2 * t - 1), 4); };
@@ -101,7 +101,7 @@ scene::Mesh emblem() {
   return mesh;
 }
 
-// Fluted steel that lies on the panel.
+// A plate of fluted steel that lies on the panel.
 scene::Mesh plate() {
   scene::Mesh mesh = sheet(24, 2, [](double u, double v) {
     const double x = 0.2 * (u - 0.5), y = 0.06 * (v - 0.5);

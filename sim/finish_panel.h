@@ -5,10 +5,10 @@
 
 namespace limn::sim {
 
-/// Meshes with all textures of glTF's metallic-roughness materials, to judge looks by: file name -> glb
-/// (metres). `panel`, a bowed board of 0.5 x 0.34 m as the prototype, x right, y up, z out of it, its middle
-/// at the origin; `emblem`, a cushion to stand before it, and `plate`, a sheet that lies on the panel with
-/// its middle on the panel's. config/scenes/finishes holds what this makes; a test compares them.
+/// Meshes that use all textures of glTF's metallic-roughness materials, for testing the shading: file name ->
+/// glb (metres). `panel` is the prototype, a curved board of 0.5 x 0.34 m with its middle at the origin; x
+/// right, y up, z out of it. `emblem` is a cushion that stands in front of it. `plate` is a sheet that lies
+/// on the panel, middle on middle. config/scenes/finishes holds these files; a test compares them.
 std::map<std::string, std::string> finish_panel_files();
 
 }  // namespace limn::sim

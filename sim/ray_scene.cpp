@@ -13,8 +13,9 @@
 namespace limn::sim {
 namespace {
 
-constexpr float k_behind_cut_out = 1e-6F;  // m, at 1 m: where a ray goes on
-constexpr double k_surface_gap = 1e-4;     // m; below it a shadow ray's own surface is not an occluder
+// A ray continues behind a cut-out after this share of its distance, but at least after this length (m).
+constexpr float k_behind_cut_out = 1e-6F;
+constexpr double k_surface_gap = 1e-4;  // m; nearer surfaces do not occlude a shadow ray
 
 RTCRay ray_between(const Eigen::Vector3f& from, const Eigen::Vector3f& d, float near, float far) {
   RTCRay ray{};
@@ -34,7 +35,7 @@ struct Placed {
   const scene::Mesh* mesh = nullptr;
   Pose world_from_mesh;
   std::vector<Eigen::Vector3f>
-      positions;  // in the world; shared with Embree, which may read 4 bytes past the end
+      positions;  // in the world frame; shared with Embree, which may read 4 bytes past the end
 };
 
 RTCGeometry geometry_of(RTCDevice device, Placed& placed) {
@@ -83,7 +84,7 @@ struct RayScene::Impl {
     const double approach = n.dot(d);
     const double exact = n.dot(corner(hit, 0) - p_origin) / approach;
     const double traced = static_cast<double>(found.ray.tfar);
-    // Edge-on triangles have no usable plane; the traced distance is as good as it gets there.
+    // Triangles seen edge-on have no usable plane; for them the traced distance is the best value.
     hit.distance = std::abs(exact - traced) < 1e-3 ? exact : traced;
     return hit;
   }
@@ -115,7 +116,7 @@ RayScene::RayScene(RayScene&&) noexcept = default;
 RayScene& RayScene::operator=(RayScene&&) noexcept = default;
 
 Hit RayScene::first_hit(const Ray& ray) const {
-  constexpr int k_most_cut_out = 64;  // layers that a ray goes through
+  constexpr int k_most_cut_out = 64;  // number of cut-out layers that a ray passes
   float from = 0;
   for (int layer = 0; layer < k_most_cut_out; ++layer) {
     RTCIntersectContext context;
@@ -171,7 +172,8 @@ void RayScene::reached(const Eigen::Vector3d& p_light,
   }
   rtcOccluded1M(impl_->scene, &context, queries.data(), static_cast<unsigned>(queries.size()),
                 sizeof(RTCRay));
-  for (std::size_t i = 0; i < p.size(); ++i) reached[i] = queries[i].tfar >= 0 ? 1 : 0;  // blocked: -infinity
+  // Embree sets tfar to -infinity where the ray is blocked.
+  for (std::size_t i = 0; i < p.size(); ++i) reached[i] = queries[i].tfar >= 0 ? 1 : 0;
 }
 
 bool RayScene::reached(const Eigen::Vector3d& p_light, const Eigen::Vector3d& p) const {

@@ -12,22 +12,22 @@
 
 namespace limn::sim {
 
-/// A mesh in its place.
+/// A mesh with its pose.
 struct MeshInstance {
   const scene::Mesh* mesh = nullptr;
   Pose world_from_mesh;
 };
 
-/// Where a ray first meets a surface. `distance` (m) is exact for the triangle that was hit: computed in
+/// Where a ray first hits a surface. `distance` (m) is exact for the triangle that was hit: computed in
 /// double precision from its plane, not taken from the ray tracer's single precision.
 struct Hit {
-  int object = -1;  ///< index of the placed mesh; -1: nothing
+  int object = -1;  ///< Index of the mesh instance; -1: nothing.
   int triangle = -1;
   double distance = 0;
-  Eigen::Vector2f barycentric = {0, 0};  ///< weights of the triangle's second and third corner
+  Eigen::Vector2f barycentric = {0, 0};  ///< Weights of the triangle's second and third corner.
 };
 
-/// Triangles in the world, ready for rays (Embree). Queries are safe from several threads.
+/// Triangles in the world frame, prepared for ray queries (Embree). Queries are thread-safe.
 class RayScene {
  public:
   explicit RayScene(std::span<const MeshInstance> meshes);
@@ -35,27 +35,29 @@ class RayScene {
   RayScene(RayScene&&) noexcept;
   RayScene& operator=(RayScene&&) noexcept;
 
-  /// Goes through what a material cuts out; many rays at once and light do not.
+  /// The first hit of a ray. The ray passes through pieces below a material's alpha cutoff. first_hits() and
+  /// reached() ignore the cutoff.
   Hit first_hit(const Ray& ray) const;
-  /// Many rays from one point; directions that are NaN hit nothing.
+  /// First hits of many rays from one point. Directions that are NaN hit nothing.
   void first_hits(const Eigen::Vector3d& p_origin,
                   std::span<const Eigen::Vector3f> d,
                   std::span<Hit> hits) const;
-  /// Whether the straight line from each point (on a surface) to p_light is free: what lies within 0.1 mm of
-  /// the point does not count.
+  /// Whether the line from each point (on a surface) to p_light is free. Surfaces within 0.1 mm of the point
+  /// are ignored.
   void reached(const Eigen::Vector3d& p_light,
                std::span<const Eigen::Vector3f> p,
                std::span<std::uint8_t> reached) const;
   bool reached(const Eigen::Vector3d& p_light, const Eigen::Vector3d& p) const;
 
-  /// Geometric normal of the triangle, by its corners' order, unit.
+  /// Unit geometric normal of the triangle; its sign follows the order of the corners.
   Eigen::Vector3d face_normal(const Hit& hit) const;
-  /// Normal interpolated from the mesh's, unit; the geometric one when the mesh has none.
+  /// Unit normal interpolated from the mesh's normals; the geometric one when the mesh has none.
   Eigen::Vector3d shading_normal(const Hit& hit) const;
-  /// Normal that lies so many lengths along the mesh's tangent, its bitangent and the interpolated normal
-  /// (the first two made perpendicular to that), unit; the interpolated one when the mesh has no tangents.
+  /// Unit normal from a normal map: `along` holds its components along tangent, bitangent and interpolated
+  /// normal (tangent and bitangent are made perpendicular to the normal). The interpolated normal when the
+  /// mesh has no tangents.
   Eigen::Vector3d mapped_normal(const Hit& hit, const Eigen::Vector3d& along) const;
-  /// Coordinates in the image of the mesh's uv; zero when it has none.
+  /// Texture coordinates interpolated from the mesh; zero when it has none.
   Eigen::Vector2f uv(const Hit& hit) const;
 
  private:

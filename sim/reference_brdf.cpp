@@ -11,34 +11,37 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Where no room is known: soft light around the viewer's up direction and a lamp above the left shoulder.
+// The light if no room light is known: soft light around the viewer's up direction and a lamp above the left
+// shoulder.
 constexpr double k_soft_below = 0.15, k_soft_above = 0.35, k_lamp = 0.65;
 const Vector3d k_d_lamp_viewer = Vector3d(-0.36, -0.64, -0.68).normalized();
 
-constexpr double k_dielectric = 0.04;       // mirrored head on, glTF 2.0
-constexpr double k_lamp_roughness = 0.2;    // lamps have a size: no surface mirrors one more sharply
-constexpr double k_least_roughness = 0.03;  // what is smoother mirrors soft light alike
-constexpr double k_horizon_height = 0.3;    // the soft light's horizon is wide: all is `above` from there on
-constexpr int k_directions = 256;           // of mirrored soft light: right to 0.4 %, see part_look_test
+constexpr double k_dielectric = 0.04;       // reflectance at normal incidence, glTF 2.0
+constexpr double k_lamp_roughness = 0.2;    // smallest roughness for lamps, because real lamps have a size
+constexpr double k_least_roughness = 0.03;  // smoother surfaces reflect soft light equally
+// The soft light's horizon is wide: all light from this height on is `above`.
+constexpr double k_horizon_height = 0.3;
+// Directions of reflected soft light: accurate to 0.4 %, see reference_brdf_test.
+constexpr int k_directions = 256;
 constexpr int k_fresnel_directions = 1024, k_fresnel_nodes = 65;
 
 Vector3d bgr(const Vector3d& rgb) { return rgb.reverse(); }
 
-// Points of the unit square, the more the evener (the additive sequence of the plastic number).
+// Point i of a low-discrepancy sequence in the unit square (additive sequence of the plastic number).
 Eigen::Vector2d even_point(int i) {
   constexpr double k_x = 0.7548776662466927, k_y = 0.5698402909980532;
   const double x = 0.5 + k_x * i, y = 0.5 + k_y * i;
   return {x - std::floor(x), y - std::floor(y)};
 }
 
-// Soft light from a direction; of a white diffuse surface that faces it, if it came from everywhere.
+// Soft light from direction d, as the light of a white diffuse surface in uniform light of this strength.
 Vector3d soft_from(const scene::RoomLight& room, const Vector3d& d) {
   const double height = std::clamp(d.dot(room.d_up_world) / k_horizon_height, -1.0, 1.0);
   const double above = 0.5 + 0.75 * height - 0.25 * height * height * height;
   return bgr(room.below_rgb + above * (room.above_rgb - room.below_rgb));
 }
 
-// All of it on a white diffuse surface.
+// All soft light reflected by a white diffuse surface.
 Vector3d soft_on(const scene::RoomLight& room, const Vector3d& n) {
   const double above = (1 + n.dot(room.d_up_world)) / 2;
   return bgr((1 - above) * room.below_rgb + above * room.above_rgb);
@@ -53,7 +56,7 @@ Vector3d fresnel(const Vector3d& head_on, double cosine) {
   return head_on + (Vector3d::Ones() - head_on) * schlick(cosine);
 }
 
-// Smith's height-correlated visibility over GGX's slopes: G / (4 NL NV).
+// Smith's height-correlated visibility for GGX: G / (4 NL NV).
 double visibility(double nl, double nv, double alpha) {
   const auto root = [&](double c) { return std::sqrt(alpha * alpha + (1 - alpha * alpha) * c * c); };
   return 0.5 / (nl * root(nv) + nv * root(nl));
@@ -64,7 +67,8 @@ double ggx(double nh, double alpha) {
   return alpha * alpha / (std::numbers::pi * f * f);
 }
 
-// Mean of Schlick's term over all light that a diffuse surface gets, by the cosine to the eye.
+// Mean of Schlick's term over all light that a diffuse surface receives, as a function of the cosine to the
+// viewer.
 double mean_schlick(double cosine) {
   static const std::array<double, k_fresnel_nodes> table = [] {
     std::array<double, k_fresnel_nodes> means{};
@@ -87,7 +91,7 @@ double mean_schlick(double cosine) {
   return (1 - share) * table[node] + share * table[node + 1];
 }
 
-// Slopes of half vectors along u and v as GGX of alpha 1 has them.
+// Slopes of half vectors along u and v, distributed as GGX with alpha 1.
 const std::array<Eigen::Vector2d, k_directions>& slopes() {
   static const std::array<Eigen::Vector2d, k_directions> all = [] {
     std::array<Eigen::Vector2d, k_directions> made;
@@ -102,7 +106,7 @@ const std::array<Eigen::Vector2d, k_directions>& slopes() {
   return all;
 }
 
-// Over half vectors as GGX has them: the brighter the lobe, the more directions.
+// The reflected soft light, by importance sampling of GGX half vectors.
 Vector3d mirrored_soft(const SurfaceMaterial& substance,
                        const Vector3d& head_on,
                        const Vector3d& n,
@@ -118,7 +122,7 @@ Vector3d mirrored_soft(const SurfaceMaterial& substance,
     const Vector3d d = 2 * vh * h - d_eye;
     const double nl = n.dot(d);
     if (nl <= 0 || vh <= 0) continue;
-    // Half vectors are as dense as D nh; directions are 4 vh as thin.
+    // The density of half vectors is D nh; that of directions is lower by the factor 4 vh.
     sum += soft_from(room, d).cwiseProduct(fresnel(head_on, vh)) *
            (visibility(nl, nv, alpha) * nl * 4 * vh / nh);
   }
@@ -154,7 +158,7 @@ Vector3d shaded(const SurfaceMaterial& substance,
   for (const scene::RoomLight::Lamp& lamp : room.lamps) {
     const double nl = n.dot(lamp.d_world);
     if (nl <= 0) continue;
-    Vector3d reflected = diffuse;  // times pi, for so is a lamp's strength
+    Vector3d reflected = diffuse;  // without 1 / pi, because a lamp's strength contains the factor pi
     if (!substance.is_plain) {
       const Vector3d h = (d_eye + lamp.d_world).normalized();
       const Vector3d mirrored = fresnel(head_on, d_eye.dot(h));

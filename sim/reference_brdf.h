@@ -8,17 +8,19 @@
 
 namespace limn::sim {
 
-/// The light that parts are shaded by (config/README.md, `light` of a scene). World frame.
+/// The light by which parts are shaded (config/README.md, `light` of a scene). World frame.
 struct PartsLight {
   scene::RoomLight room;
-  bool is_known = false;  ///< it is a room's; else it stands with a viewer
+  bool is_known = false;  ///< It is a room's light; else it moves with the viewer.
 
-  /// Soft light around the eye's up direction and a lamp above its left shoulder.
+  /// The light that moves with a viewer: soft light around the viewer's up direction and a lamp above the
+  /// left shoulder.
   static PartsLight beside(const Imager& eye);
 };
 
-/// What a surface of unit normal n, on the side of the eye, looks like from there, linear BGR: the
-/// metallic-roughness material of glTF 2.0 (appendix B), the mirrored soft light as a sum over directions.
+/// The colour of a surface seen from direction d_eye, linear BGR; n is its unit normal on the viewer's side.
+/// Uses the metallic-roughness material of glTF 2.0 (appendix B); the reflected soft light is a sum over
+/// directions.
 Eigen::Vector3d shaded(const SurfaceMaterial& substance,
                        const Eigen::Vector3d& n,
                        const Eigen::Vector3d& d_eye,

@@ -13,9 +13,12 @@
 namespace limn::sim {
 namespace {
 
-constexpr double k_on_surface = 2e-3;   // m; a surface part this near is on the prototype (docs/formats.md)
-constexpr int k_sub_samples = 8;        // a side of a pixel on an edge: its cover is then right to 1/128
-constexpr float k_same_light = 0.004F;  // of full light, 1/255: samples that differ by less are one colour
+// m; a surface part within this distance is on the prototype (docs/formats.md).
+constexpr double k_on_surface = 2e-3;
+// Samples along each side of a pixel on an edge: its cover is then accurate to 1/128.
+constexpr int k_sub_samples = 8;
+// Share of full light, 1/255: samples that differ by less count as one colour.
+constexpr float k_same_light = 0.004F;
 
 std::vector<MeshInstance> prototype_of(const World& world) {
   const Object* prototype = world.find("prototype");
@@ -29,7 +32,7 @@ Eigen::Vector3d turned_against(const Eigen::Vector3d& n, const Eigen::Vector3d& 
   return n.dot(d) > 0 ? Eigen::Vector3d(-n) : n;
 }
 
-// A normal that looks away along d looks aside instead: at a silhouette.
+// The normal n, turned perpendicular to d if it would face away from the viewer (at a silhouette).
 Eigen::Vector3d aside(const Eigen::Vector3d& n, const Eigen::Vector3d& d) {
   return n.dot(d) > 0 ? Eigen::Vector3d((n - n.dot(d) * d).normalized()) : n;
 }
@@ -53,7 +56,8 @@ ReferenceRenderer::ReferenceRenderer(const World& world, const scene::PosedScene
   }
 }
 
-// A pixel whose corners agree with its centre is one sample; others are averaged over a grid.
+// A pixel whose corners agree with its centre gets one sample; other pixels are averaged over a grid of
+// samples.
 template <class SampleAt>
 PartImage ReferenceRenderer::averaged(const Imager& imager, const SampleAt& sample_at) {
   const Directions directions(imager);
@@ -87,7 +91,7 @@ PartImage ReferenceRenderer::averaged(const Imager& imager, const SampleAt& samp
     constexpr float k_share = 1.0F / (k_sub_samples * k_sub_samples);
     return std::pair<Eigen::Vector3f, float>(light * k_share, cover * k_share);
   };
-  constexpr int k_strip = 16;  // rows; the corner row between strips is traced twice
+  constexpr int k_strip = 16;  // rows of a strip; the corner row between strips is traced twice
   cv::parallel_for_({0, (imager.height + k_strip - 1) / k_strip}, [&](const cv::Range& strips) {
     for (int row = strips.start * k_strip; row < std::min(imager.height, strips.end * k_strip); ++row) {
       const std::vector<Sample> above = corner_row(row), below = corner_row(row + 1);
@@ -120,7 +124,7 @@ ReferenceRenderer::Nearest ReferenceRenderer::nearest_part(const Ray& ray) const
   return nearest;
 }
 
-// Whether the prototype hides the part that a ray meets first; a surface part may lie 2 mm within it.
+// Whether the prototype hides the part that a ray hits first. A surface part may lie up to 2 mm inside it.
 bool ReferenceRenderer::is_hidden(const Nearest& nearest, const Ray& ray, const Hit& behind) const {
   if (behind.object < 0) return false;
   const double cosine = std::abs(prototype_.face_normal(behind).dot(ray.d));
@@ -141,7 +145,8 @@ Eigen::Vector3f ReferenceRenderer::radiance_along(const Eigen::Vector3d& d,
   return shaded(substance, n, -d, light.room).cast<float>();
 }
 
-// Where no room is known light comes from along the normal of the prototype, and nothing is mirrored.
+// If no room light is known, the light comes along the prototype's normal and nothing is reflected
+// specularly.
 Eigen::Vector3f ReferenceRenderer::radiance_on_surface(const Nearest& nearest,
                                                        const Eigen::Vector3d& d_normal) const {
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
@@ -156,12 +161,12 @@ Eigen::Vector3f ReferenceRenderer::radiance_on_surface(const Nearest& nearest,
   return (substance.base.cwiseProduct(light) + substance.emitted).cast<float>();
 }
 
-// The view part that the viewer sees before p, a point of the prototype.
+// The view part that the viewer sees in front of p, a point of the prototype.
 ReferenceRenderer::Sample ReferenceRenderer::view_sample(const Eigen::Vector3d& p,
                                                          const Eigen::Vector3d& n_face) const {
   const double distance = (p - p_eye_).norm();
   const Ray ray{p_eye_, (p - p_eye_) / distance};
-  if (n_face.dot(ray.d) >= 0) return {};  // the viewer looks at the other side
+  if (n_face.dot(ray.d) >= 0) return {};  // the viewer sees the other side
   const Nearest nearest = nearest_part(ray);
   if (nearest.part < 0 || nearest.hit.distance > distance) return {};
   if (parts_[static_cast<std::size_t>(nearest.part)].on_surface) return {};

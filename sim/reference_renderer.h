@@ -12,36 +12,38 @@
 
 namespace limn::sim {
 
-/// Parts in an image: linear light (CV_32FC3, BGR) and the share of each pixel that they cover (CV_32F). The
-/// mean over the pixel's area, so light is already multiplied by cover.
+/// Parts in an image: linear light (CV_32FC3, BGR) and the share of each pixel that they cover (CV_32F). Both
+/// are means over the pixel's area, so light is already multiplied by cover.
 struct PartImage {
   cv::Mat light;
   cv::Mat cover;
 };
 
-/// What each pixel's centre shows: `front` (CV_16S) is the index of the part seen, -1 where none is;
-/// `contested` (CV_8U) is 255 where the ray meets a part and something else, so that their order matters.
+/// What each pixel's centre shows. `front` (CV_16S) is the index of the visible part, -1 for none;
+/// `contested` (CV_8U) is 255 where the ray hits a part and something else, so that their depth order
+/// matters.
 struct DepthOrder {
   cv::Mat front;
   cv::Mat contested;
 };
 
-/// What the parts of a posed scene ask for, by rays: which light is to fall on the prototype, how the parts
-/// look over an image. The judge of what projector/ draws; it follows the same conventions (scene/scene.h,
-/// shaders/look.glsl) in code of its own. Only the prototype hides and shadows.
-/// Borrows the world and its scene's meshes, which must outlive it unchanged.
+/// A ray tracer that computes which light should fall on the prototype, and how the parts look in an imager.
+/// It is the reference for projector/: it follows the same conventions (scene/scene.h, shaders/look.glsl),
+/// but shares no code with it. Only the prototype occludes and casts shadows. Borrows the world and its
+/// scene's meshes, which must outlive it unchanged.
 class ReferenceRenderer {
  public:
-  /// `viewer` is whose eye `view` parts are drawn for, and beside whom the lamp stands that shades parts
-  /// where neither they nor the scene name a room's light.
+  /// `view` parts are drawn for `viewer`. If no room light is given, the lamp that shades the parts stands
+  /// beside the viewer.
   ReferenceRenderer(const World& world, const scene::PosedScene& parts, const Imager& viewer);
 
-  /// The light that projector `index` is to give if it were alone: for each point that a pixel lights the
-  /// colour of the view part that the viewer sees before it, else of the surface part within 2 mm of it.
+  /// The light that projector `index` should give if it were the only one. For each point that a pixel
+  /// lights: the colour of the view part that the viewer sees in front of it, else that of the surface part
+  /// within 2 mm of it.
   PartImage projector_image(std::size_t index) const;
 
-  /// The parts as an imager sees them, those that the prototype hides left out; where no room's light is
-  /// known the shading lamp stands with the imager.
+  /// The parts as an imager sees them, without those that the prototype hides. If no room light is known, the
+  /// lamp moves with the imager.
   PartImage parts_image(const Imager& imager) const;
 
   DepthOrder depth_order(const Imager& imager) const;

@@ -11,11 +11,12 @@
 namespace limn::sim {
 namespace {
 
-constexpr int k_grey = -1;               // channel of a grey camera
-constexpr double k_blur_step_px = 0.25;  // defocus is rounded to this stdev: its edge spreads differ by < 1 %
-constexpr int k_blur_levels = 40;        // up to 10 px, far beyond any use
+constexpr int k_grey = -1;               // stands for the channel of a grey camera
+constexpr double k_blur_step_px = 0.25;  // the defocus blur is rounded to multiples of this standard
+                                         // deviation; edge spreads differ by < 1 %
+constexpr int k_blur_levels = 40;        // up to 10 px, more than is ever needed
 
-// The light of one projector in one colour channel, ready for lookups.
+// The light of one projector in one colour channel, prepared for lookups.
 class Beam {
  public:
   Beam(const Imager& projector, const ProjectorEffects& effects, const cv::Mat& shown, int channel)
@@ -30,7 +31,7 @@ class Beam {
     if (!dark_) sharp_ = light_of(shown, channel);
   }
 
-  /// Makes the blurred images that these samples need; before at().
+  /// Computes the blurred images that these samples need. To be called before at().
   void prepare(std::span<const ProjectorView> views) {
     if (dark_) return;
     std::array<bool, k_blur_levels> used{};
@@ -48,9 +49,9 @@ class Beam {
   }
 
  private:
-  static constexpr int k_pad = 24;  // px of darkness around the panel, for the blur to spill into
+  static constexpr int k_pad = 24;  // black pixels around the panel, into which the blur can spread
 
-  // Light of all display values, CV_32F or CV_32FC3 (BGR), as many channels as the image has.
+  // Light of all display values, CV_32F or CV_32FC3 (BGR), with as many channels as the image.
   cv::Mat light_of_values(int channels) const {
     cv::Mat light(1, 256, CV_32FC(channels));
     for (int v = 0; v < 256; ++v)
@@ -91,13 +92,14 @@ class Beam {
     return result;
   }
 
-  // A disc of diameter D has a stdev of D / 4; D = aperture |depth - focus| / focus on the surface.
+  // A disc of diameter D has a standard deviation of D / 4; D = aperture |depth - focus| / focus on the
+  // surface.
   std::size_t level_of(float depth) const {
     const float level = std::abs(blur_at_focus_ - blur_levels_m_ / depth) + 0.5F;
     return std::min<std::size_t>(static_cast<std::size_t>(level), k_blur_levels - 1);
   }
 
-  // Bilinear: the projector's square pixel averaged over a camera pixel of like size.
+  // Bilinear lookup: it averages the projector's square pixels over a camera pixel of similar size.
   float lookup(const ProjectorView& view) const {
     const cv::Mat& light = levels_[level_of(view.depth)];
     const float x = view.u + k_pad, y = view.v + k_pad;
@@ -122,7 +124,7 @@ class Beam {
   ProjectorEffects effects_;
   bool dark_;
   float black_ = 0;
-  float vignetting_ = 0;                         // per squared pixel from the panel's middle
+  float vignetting_ = 0;                         // for each squared pixel of distance from the panel's middle
   float blur_levels_m_ = 0, blur_at_focus_ = 0;  // blur level = |blur_at_focus - blur_levels_m / depth|
   cv::Mat sharp_;
   std::array<cv::Mat, k_blur_levels> levels_;
@@ -146,7 +148,7 @@ std::vector<Beam> beams_of(const World& world,
   return beams;
 }
 
-// What the gain of a view is to be multiplied by where falloff or incidence is switched off.
+// The factor for the gain of a view if falloff or incidence is switched off.
 float unphysical_gain(const World& world, const Samples& samples, std::size_t projector, std::size_t i) {
   const ProjectorEffects& effects = world.projector_effects[projector];
   if (effects.falloff && effects.incidence) return 1;
@@ -189,7 +191,7 @@ cv::Mat channel_light(const World& world,
   return light;
 }
 
-// Exposure and vignetting: quadratic in the distance from the image's middle.
+// Applies exposure and vignetting, which is quadratic in the distance from the image's middle.
 void expose_row(const CameraEffects& effects, cv::Mat& signal, int r) {
   const auto width = static_cast<float>(signal.cols), height = static_cast<float>(signal.rows);
   const auto exposure = static_cast<float>(effects.exposure);
@@ -210,7 +212,7 @@ void in_row_strips(int rows, const std::function<void(const cv::Range&)>& work) 
   });
 }
 
-// 65536 quantiles of the normal distribution: a 16-bit random number picks one. Found by Newton's method.
+// 65536 quantiles of the normal distribution, computed by Newton's method. A 16-bit random number picks one.
 const std::vector<float>& normal_quantiles() {
   static const std::vector<float> table = [] {
     std::vector<float> t(65536);
@@ -228,7 +230,7 @@ const std::vector<float>& normal_quantiles() {
   return table;
 }
 
-// Sebastiano Vigna's splitmix64: a different, well mixed number for every state.
+// Sebastiano Vigna's splitmix64: gives a different, well mixed number for every input.
 std::uint64_t mixed(std::uint64_t z) {
   z += 0x9e3779b97f4a7c15U;
   z = (z ^ (z >> 30U)) * 0xbf58476d1ce4e5b9U;
@@ -236,7 +238,7 @@ std::uint64_t mixed(std::uint64_t z) {
   return z ^ (z >> 31U);
 }
 
-// 8-bit level (before rounding) of linear signal 0..1 in 65536 steps, for the sRGB curve.
+// 8-bit level (before rounding) of the sRGB curve, for linear signal 0..1 in 65536 steps.
 const std::vector<float>& srgb_from_linear() {
   static const std::vector<float> table = [] {
     std::vector<float> t(65536);
@@ -273,7 +275,7 @@ void digitise_row(
   }
 }
 
-// Colour filters that overlap.
+// Applies the overlap of the camera's colour filters.
 void mix(const CameraEffects& effects, cv::Mat* light) {
   if (effects.sensitivity == Eigen::Matrix3d::Identity()) return;
   cv::Matx33f matrix;
@@ -308,7 +310,7 @@ cv::Mat exposed(const World& world, int camera, const cv::Mat& light) {
   cv::Mat signal(light.size(), light.type());
   const int side = 2 * static_cast<int>(std::ceil(4 * effects.psf_px)) + 1;
   in_row_strips(light.rows, [&](const cv::Range& rows) {
-    cv::Mat strip = signal.rowRange(rows);  // the filter sees the rows beyond its strip
+    cv::Mat strip = signal.rowRange(rows);  // the filter also reads rows outside its strip
     if (effects.psf_px > 0)
       cv::GaussianBlur(light.rowRange(rows), strip, {side, side}, effects.psf_px, effects.psf_px,
                        cv::BORDER_REPLICATE);

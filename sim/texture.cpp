@@ -20,7 +20,7 @@ const std::array<float, 256>& linear_from_srgb() {
   return table;
 }
 
-// Linear BGR of a texture's pixel; coordinates beyond the border take the border's.
+// Linear BGR of a texture's pixel; coordinates are clamped to the image.
 Eigen::Vector3f texel(const cv::Mat& texture, int x, int y) {
   const auto& linear = linear_from_srgb();
   x = std::clamp(x, 0, texture.cols - 1);
@@ -32,12 +32,12 @@ Eigen::Vector3f texel(const cv::Mat& texture, int x, int y) {
 
 int repeated(int at, int count) { return (at % count + count) % count; }
 
-// The same; beyond the border the texture repeats.
+// The same, but the texture repeats beyond its border.
 Eigen::Vector3f repeated_texel(const cv::Mat& texture, int x, int y) {
   return texel(texture, repeated(x, texture.cols), repeated(y, texture.rows));
 }
 
-// The numbers in a pixel, 0 ... 1, BGR.
+// The stored values of a pixel, 0 to 1, BGR, not linearised.
 Eigen::Vector3f repeated_numbers(const cv::Mat& texture, int x, int y) {
   const auto& p = texture.at<cv::Vec3b>(repeated(y, texture.rows), repeated(x, texture.cols));
   return Eigen::Vector3f(p[0], p[1], p[2]) / 255;
@@ -48,7 +48,7 @@ float alpha_of_texel(const cv::Mat& texture, int x, int y) {
   return static_cast<float>(p[3]) / 255;
 }
 
-// Between the middles of texels, v up.
+// Interpolates between the centres of texels; v points up.
 template <typename TexelAt>
 auto between_texels(const cv::Mat& texture, const Eigen::Vector2f& uv, const TexelAt& at) {
   using Value = decltype(at(texture, 0, 0));

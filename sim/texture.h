@@ -8,25 +8,26 @@
 namespace limn::sim {
 
 /// Linear BGR of a texture (8-bit sRGB; grey, BGR or BGRA) at uv, interpolated between its pixels, or with
-/// `sharp` the pixel's; beyond the border the border's.
+/// `sharp` that of the nearest pixel. Outside, the border is repeated.
 Eigen::Vector3f textured(const cv::Mat& texture, const Eigen::Vector2f& uv, bool sharp);
 
-/// Whether a mesh's material has nothing at a place of a triangle.
+/// Whether the material's alpha at a place of a triangle is below its cutoff.
 bool is_cut_out(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv);
 
-/// Linear BGR of a mesh's own material at a place of a triangle. Beyond its border a texture repeats, as in
+/// Linear BGR of a mesh's own material at a place of a triangle. Textures repeat beyond their borders, as in
 /// glTF.
 Eigen::Vector3f material_albedo(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv);
 
-/// What glTF 2.0 says of a surface at a place of a triangle, textures and factors multiplied.
+/// The glTF 2.0 material at a place of a triangle, with textures and factors multiplied.
 struct SurfaceMaterial {
-  Eigen::Vector3d base;  ///< colour, linear BGR
+  Eigen::Vector3d base;  ///< Base colour, linear BGR.
   bool is_unlit = false;
   double metallic = 0, roughness = 1;
-  bool is_plain = false;    ///< diffuse alone: neither metal nor gloss, and no texture of them
-  double open = 1;          ///< share of soft light that occlusion leaves
-  Eigen::Vector3d emitted;  ///< light of its own, linear BGR
-  Eigen::Vector3d along;  ///< its normal: along tangent, bitangent and the mesh's normal; not of unit length
+  bool is_plain = false;    ///< Purely diffuse: neither metal nor gloss, and no texture of them.
+  double open = 1;          ///< Share of soft light that the occlusion map leaves.
+  Eigen::Vector3d emitted;  ///< Emitted light, linear BGR.
+  Eigen::Vector3d along;  ///< Normal from the normal map: components along tangent, bitangent and the mesh's
+                          ///< normal; not of unit length.
 };
 SurfaceMaterial surface_material(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv);
 

@@ -13,13 +13,14 @@
 namespace limn::sim {
 namespace {
 
-constexpr int k_edge_samples = 32;      // of a pixel on an edge: an edge's place is then known to 1/64 px
-constexpr float k_same_albedo = 0.02F;  // samples of one pixel that differ by less are one surface
+// Samples of a pixel on an edge: the edge's position is then known to 1/64 px.
+constexpr int k_edge_samples = 32;
+constexpr float k_same_albedo = 0.02F;  // samples of one pixel that differ by less count as one surface
 constexpr float k_same_normal = 0.99F;  // cosine, about 8°
 constexpr float k_same_depth = 1e-3F;   // m, departure from a plane within one pixel
 constexpr int k_lamp_points = 12;       // spread evenly over a lamp's disc
 
-// What one ray sees.
+// The surface that one ray hits.
 struct Surface {
   int object = -1;
   float distance = 0;
@@ -37,7 +38,7 @@ struct LampPoint {
 std::vector<LampPoint> points_of(const Lamp& lamp) {
   if (lamp.radius_m <= 0) return {{lamp.p_world, lamp.illuminance_at_1m}};
   std::vector<LampPoint> points;
-  constexpr double k_golden_angle = 2.399963229728653;  // sunflower: equal areas, no rows
+  constexpr double k_golden_angle = 2.399963229728653;  // sunflower pattern: equal areas, no rows
   for (int k = 0; k < k_lamp_points; ++k) {
     const double radius = lamp.radius_m * std::sqrt((k + 0.5) / k_lamp_points), angle = k * k_golden_angle;
     points.push_back({lamp.p_world + radius * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0),
@@ -52,7 +53,7 @@ std::vector<MeshInstance> placed(const std::vector<Object>& objects) {
   return meshes;
 }
 
-// One camera's view while it is being traced.
+// The state while one camera's view is traced.
 class Tracer {
  public:
   Tracer(const World& world, int camera)
@@ -140,7 +141,7 @@ class Tracer {
     return std::abs(depth - centre.distance) < k_same_depth;
   }
 
-  // Light reaches the side of the surface that the camera sees.
+  // Whether the light is on the side of the surface that the camera sees.
   static bool faces(const Surface& s, const Eigen::Vector3d& p_light) {
     return s.n_face.dot(p_light.cast<float>() - s.p) > 0;
   }
@@ -164,7 +165,8 @@ class Tracer {
   }
   float ambient_light(const Surface& s) const {
     return s.object < 0 ? 0
-                        : static_cast<float>(world_.room.ambient) * (0.75F + 0.25F * s.n.z());  // sky above
+                        // More light from above.
+                        : static_cast<float>(world_.room.ambient) * (0.75F + 0.25F * s.n.z());
   }
 
   void first_samples() {
@@ -173,7 +175,7 @@ class Tracer {
     edge_.assign(count, 0);
     room_.assign(count, 0);
     lit_.assign(world_.rig.projectors.size(), std::vector<std::uint8_t>(count, 0));
-    constexpr int k_strip = 16;  // rows; the corner row between strips is traced twice
+    constexpr int k_strip = 16;  // rows of a strip; the corner row between strips is traced twice
     cv::parallel_for_({0, (imager_.height + k_strip - 1) / k_strip}, [&](const cv::Range& strips) {
       for (int strip = strips.start; strip < strips.end; ++strip)
         trace_rows(strip * k_strip, std::min(imager_.height, (strip + 1) * k_strip));
@@ -217,7 +219,7 @@ class Tracer {
     }
   }
 
-  // Where a projector's light ends between two pixels, both are edges.
+  // Where a projector's light ends between two pixels, both are marked as edges.
   void mark_shadow_edges() {
     const int width = imager_.width, height = imager_.height;
     for (const auto& lit : lit_)
@@ -243,7 +245,8 @@ class Tracer {
     });
   }
 
-  // A (0,2)-sequence (van der Corput, Sobol): each of 32 columns and 32 rows of the pixel is met once.
+  // Sample k of a (0,2)-sequence (van der Corput, Sobol): each of 32 columns and 32 rows of the pixel gets
+  // one sample.
   static Eigen::Vector2d sub_sample(unsigned k) {
     double x = 0, y = 0;
     for (unsigned bit = 0; bit < 5; ++bit)
@@ -351,7 +354,7 @@ class Tracer {
       samples_.projectors[k][i].gain = group.lit[k] / group.count;
   }
 
-  // The projectors' geometry of a sample, through their true lenses.
+  // Computes how the projectors light a sample, by their true lenses.
   void view(std::size_t i) {
     if (samples_.object[i] < 0) return;
     const Eigen::Vector3d p = samples_.p_world[i].cast<double>();
@@ -370,7 +373,8 @@ class Tracer {
       view.v = static_cast<float>(px->y());
       view.depth = static_cast<float>(p_projector.z());
       const float cosine = std::max(0.0F, samples_.n_world[i].dot(towards.normalized().cast<float>()));
-      view.gain *= cosine / static_cast<float>(towards.squaredNorm());  // was: the share that is reached
+      // Until here, gain was the unshadowed share.
+      view.gain *= cosine / static_cast<float>(towards.squaredNorm());
     }
   }
 
@@ -381,10 +385,10 @@ class Tracer {
   Eigen::Vector3d p_eye_;
   std::vector<LampPoint> lamps_;
   std::vector<Eigen::Vector3d> p_projectors_;
-  std::vector<Surface> surfaces_;  // of pixel centres
+  std::vector<Surface> surfaces_;  // at pixel centres
   std::vector<std::uint8_t> edge_;
   std::vector<float> room_;
-  std::vector<std::vector<std::uint8_t>> lit_;  // per projector, of pixel centres
+  std::vector<std::vector<std::uint8_t>> lit_;  // for each projector, at pixel centres
   std::vector<Refined> refined_;
   Samples samples_;
 };

@@ -8,29 +8,29 @@
 
 namespace limn::sim {
 
-/// How a projector sees one sample: everything that its light needs apart from the image shown.
+/// How one projector lights one sample: everything that is needed for its light except the image shown.
 struct ProjectorView {
-  float u = 0, v = 0;  ///< pixel, through the true lens
-  float gain = 0;   ///< share that is reached (shadow rays, facing) x cosine of incidence / distance², 1/m²
-  float depth = 1;  ///< along the projector's axis, m
+  float u = 0, v = 0;  ///< Pixel, by the true lens.
+  float gain = 0;      ///< Unshadowed share x cosine of incidence / distance², 1/m².
+  float depth = 1;     ///< Along the projector's axis, m.
 };
 
-/// What a camera's pixels see, traced once per geometry; showing another image is a lookup. Sample i <
-/// width * height is the first of pixel i; further samples of pixels on edges follow, sorted by pixel. Arrays
-/// run in parallel.
+/// What a camera's pixels see. It is traced once for each geometry; other projected images only need lookups.
+/// Sample i < width * height is the first sample of pixel i; further samples of pixels on edges follow,
+/// sorted by pixel. All arrays have the same length and order.
 struct Samples {
   int camera = 0;
   int width = 0;
   int height = 0;
-  std::vector<std::int32_t> pixel;                     ///< row * width + column
-  std::vector<float> weight;                           ///< share of the pixel; those of one pixel sum to 1
-  std::vector<std::int16_t> object;                    ///< index into World::objects; -1: nothing was hit
-  std::vector<Eigen::Vector3f> p_world;                ///< mean hit point
-  std::vector<Eigen::Vector3f> n_world;                ///< unit normal towards the camera
-  std::vector<Eigen::Vector3f> albedo;                 ///< linear BGR
-  std::vector<float> grey;                             ///< weight x mean albedo, what a grey camera sees
-  std::vector<float> room_light;                       ///< illuminance by the room
-  std::vector<std::vector<ProjectorView>> projectors;  ///< per projector
+  std::vector<std::int32_t> pixel;       ///< Row * width + column.
+  std::vector<float> weight;             ///< Share of the pixel; the weights of one pixel sum to 1.
+  std::vector<std::int16_t> object;      ///< Index into World::objects; -1: nothing was hit.
+  std::vector<Eigen::Vector3f> p_world;  ///< Mean hit point.
+  std::vector<Eigen::Vector3f> n_world;  ///< Unit normal towards the camera.
+  std::vector<Eigen::Vector3f> albedo;   ///< Linear BGR.
+  std::vector<float> grey;               ///< Weight x mean albedo: what a grey camera sees.
+  std::vector<float> room_light;         ///< Illuminance by the room.
+  std::vector<std::vector<ProjectorView>> projectors;  ///< One entry for each projector.
   std::size_t size() const { return pixel.size(); }
 };
 

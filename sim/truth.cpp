@@ -13,7 +13,8 @@
 namespace limn::sim {
 namespace {
 
-constexpr double k_surface_reach = 2e-3;  // m; a surface part this near is on the prototype (docs/formats.md)
+// m; a surface part within this distance is on the prototype (docs/formats.md).
+constexpr double k_surface_reach = 2e-3;
 
 std::vector<MeshInstance> physical_meshes(const World& world) {
   std::vector<MeshInstance> meshes;
@@ -27,7 +28,7 @@ std::vector<MeshInstance> prototype_mesh(const World& world) {
   return {{prototype->mesh.get(), prototype->world_from_object}};
 }
 
-// The slot and the mesh of the chosen variant of a posed part; the world's scene must have both.
+// The slot and the mesh of a posed part's variant; the world's scene must have both.
 std::pair<const scene::Slot*, const scene::Mesh*> shape_of(const World& world, const scene::PosedPart& part) {
   LIMN_CHECK(world.scene.has_value());
   const scene::Slot* slot = world.scene->find_slot(part.slot);

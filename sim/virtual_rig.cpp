@@ -107,7 +107,7 @@ Result<Stamp> VirtualRig::show(int projector, const cv::Mat& image) {
   const cv::Size size = this->projector(projector).size();
   if (image.size() != size || (image.type() != CV_8UC1 && image.type() != CV_8UC3))
     return error(
-        "{}: expected an 8-bit grey or BGR picture of {}x{}, found {}x{} with {} channels. Draw it at the "
+        "{}: expected an 8-bit grey or BGR image of {}x{}, found {}x{} with {} channels. Draw it at the "
         "projector's size.",
         this->projector(projector).name(), size.width, size.height, image.cols, image.rows, image.channels());
   const Stamp shown_at = shifted(now_, options_.display_delay_s);
@@ -140,7 +140,7 @@ Stamp VirtualRig::next_exposure() const {
 std::vector<Frame> VirtualRig::expose(std::span<const int> cameras) {
   const Stamp captured_at = next_exposure();
   const std::vector<cv::Mat> shown = images_at(captured_at);
-  for (auto& queue : shown_)  // what an earlier image covered is gone
+  for (auto& queue : shown_)  // images that a newer one has replaced are dropped
     while (queue.size() > 1 && queue[1].shown_at <= captured_at) queue.erase(queue.begin());
   std::vector<Frame> frames;
   for (const int camera : cameras)

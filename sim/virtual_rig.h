@@ -14,46 +14,46 @@
 namespace limn::sim {
 
 struct VirtualRigOptions {
-  double display_delay_s = 0.033;  ///< from show() to light on the surface
-  double camera_delay_s = 0.020;   ///< from exposure to next() returning
+  double display_delay_s = 0.033;  ///< From show() to light on the surface.
+  double camera_delay_s = 0.020;   ///< From the exposure to the return of next().
   double frame_period_s = 1 / 30.0;
-  /// A capture waits until what was shown last is on the surface before it grabs; false: frames come at the
-  /// camera's pace whatever is on its way (the live session).
+  /// True: a grab waits until the image shown last is on the surface, as captures need. False: frames come at
+  /// the camera's rate, even while an image is on its way (live session).
   bool grab_waits_for_light = true;
 };
 
-/// A world whose cameras and projectors are devices, on a virtual clock: nothing sleeps, every run is the
-/// same. One thread at a time. Devices borrow the rig and must not outlive it.
+/// A world whose cameras and projectors behave as devices on a virtual clock. Nothing sleeps, and every run
+/// is identical. To be used by one thread at a time. Devices borrow the rig and must not outlive it.
 class VirtualRig {
  public:
   explicit VirtualRig(World world, const VirtualRigOptions& options = {});
   ~VirtualRig();
 
-  /// `index` counts in world().rig.cameras and .projectors.
+  /// `index` refers to world().rig.cameras or .projectors.
   device::CameraSource& camera(int index);
   device::Display& projector(int index);
 
   const World& world() const { return world_; }
-  /// For changes of any kind; what was traced is forgotten.
+  /// The world, for changes of any kind. Discards the traced samples.
   World& edit();
   /// Moves an object of the world ("board", "prototype" with all that is attached to it).
   void move(const std::string& object, const Pose& world_from_object);
   /// Adds an object, or replaces the one of that name.
   void place(const Object& object);
   void remove(const std::string& object);
-  /// A camera's sensor settings; changing them (colour, exposure, encoding) keeps what was traced.
+  /// A camera's sensor settings. Changing them (colour, exposure, encoding) keeps the traced samples.
   CameraEffects& camera_effects(int camera) {
     return world_.camera_effects.at(static_cast<std::size_t>(camera));
   }
-  /// For calibration: the prototype is carried out of the room, cameras deliver grey. restore_prototype()
-  /// undoes it.
+  /// For calibration: removes the prototype from the room and makes the cameras deliver grey frames.
+  /// restore_prototype() undoes both.
   void remove_prototype();
   void restore_prototype();
-  /// All projectors black.
+  /// Makes all projectors black.
   void darken();
 
-  /// Frames of these cameras, exposed at one moment, as a trigger line makes them; waits as their next()
-  /// does. None: a frame period passes.
+  /// Frames of these cameras, all exposed at one moment, as with a trigger line. Advances the clock as their
+  /// next() does. With no cameras, one frame period passes.
   std::vector<Frame> expose(std::span<const int> cameras);
   /// The moment of the next exposure.
   Stamp next_exposure() const;
@@ -61,7 +61,7 @@ class VirtualRig {
   Stamp now() const { return now_; }
   void advance(double seconds) { now_ = shifted(now_, seconds); }
 
-  /// What `camera` sees, traced at the first call after a change.
+  /// What `camera` sees. Traced at the first call after a change.
   const Samples& samples(int camera);
 
  private:
@@ -80,9 +80,10 @@ class VirtualRig {
   VirtualRigOptions options_;
   Stamp now_;
   std::uint64_t frames_ = 0;
-  std::optional<Pose> prototype_home_;  // set while the stage is clear
+  std::optional<Pose> prototype_home_;  // set while the prototype is removed
   std::vector<CameraEffects> effects_home_;
-  std::vector<std::vector<ShownImage>> shown_;  // per projector, oldest first; the first is on the surface
+  // For each projector, oldest first; the first one is on the surface.
+  std::vector<std::vector<ShownImage>> shown_;
   std::vector<std::optional<Samples>> samples_;
   std::vector<std::unique_ptr<Camera>> cameras_;
   std::vector<std::unique_ptr<Projector>> projectors_;

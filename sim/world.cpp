@@ -12,7 +12,7 @@
 namespace limn::sim {
 namespace {
 
-// A printed marker: reflectance of paper and ink, white margin as a share of the marker's side.
+// The print of a marker: reflectance of paper and ink, and the white margin as a share of the marker's side.
 struct MarkerPaper {
   double white = 0.85;
   double black = 0.04;
@@ -37,7 +37,7 @@ double not_negative(const ConfigNode& node) {
   return value;
 }
 
-// Not negative, and small enough that a blur of it can be worked out.
+// A number that is not negative and at most `most`, so that a blur of this size can be computed.
 double at_most(double most, const ConfigNode& node) {
   const double value = not_negative(node);
   if (value > most) node.problem(fmt::format("expected at most {}, found {}.", most, value));
@@ -52,7 +52,7 @@ Lens read_lens(const ConfigNode& node) {
   return lens ? *lens : Lens{};
 }
 
-// Either the pose itself or an eye that looks at a target.
+// Reads either the pose itself, or an eye point and a target.
 Pose read_imager_pose(const ConfigNode& node) {
   if (const auto pose = node.find("imager_from_world")) return pose->pose();
   const Eigen::Vector3d p_eye = node.at("eye_m").vector3(), p_target = node.at("target_m").vector3();
@@ -60,8 +60,8 @@ Pose read_imager_pose(const ConfigNode& node) {
   if (d.norm() < 1e-6 || d.head<2>().norm() < 1e-6 * d.norm()) {
     node.at("target_m")
         .problem(
-            "expected a target apart from the eye and not straight above or below it, found such a one. Give "
-            "imager_from_world instead.");
+            "expected a target that is neither at eye_m nor vertically above or below it, found one that is. "
+            "Give imager_from_world instead.");
     return {};
   }
   return looking_at(p_eye, p_target, Eigen::Vector3d::UnitZ());
@@ -72,7 +72,8 @@ Imager read_imager(const ConfigNode& node) {
   imager.name = node.at("name").text();
   if (imager.name.empty() || imager.name.starts_with('.') || imager.name.find('/') != std::string::npos)
     node.at("name").problem(fmt::format(
-        "expected a name without slashes or a dot in front (files are named after it), found '{}'.",
+        "expected a name without slashes that does not begin with a dot (files are named after it), found "
+        "'{}'.",
         imager.name));
   const ConfigNode size = node.at("size");
   std::vector<double> sides = size.numbers(2);
@@ -84,7 +85,7 @@ Imager read_imager(const ConfigNode& node) {
   return imager;
 }
 
-// Three rows of [red, green, blue] for the camera's red, green and blue, as BGR x BGR.
+// Reads three rows of [red, green, blue] for the camera's red, green and blue. The result is BGR x BGR.
 Eigen::Matrix3d read_sensitivity(const ConfigNode& node) {
   Eigen::Matrix3d rgb = Eigen::Matrix3d::Identity();
   const auto rows = node.items();
@@ -125,7 +126,7 @@ ProjectorEffects read_projector_effects(const ConfigNode& node) {
   if (const auto v = node.find("gamma")) effects.gamma = v->positive();
   if (const auto v = node.find("channel_gamma")) {
     effects.channel_gamma = v->vector3().reverse();
-    if (effects.channel_gamma.minCoeff() <= 0) v->problem("expected three numbers that are positive.");
+    if (effects.channel_gamma.minCoeff() <= 0) v->problem("expected three positive numbers.");
   }
   if (const auto v = node.find("s_curve")) effects.s_curve = share(*v);
   if (const auto v = node.find("black_level")) effects.black_level = share(*v);
@@ -138,7 +139,7 @@ ProjectorEffects read_projector_effects(const ConfigNode& node) {
 
 void own_name(const ConfigNode& node, const std::string& name, std::set<std::string>* names) {
   if (!names->insert(name).second)
-    node.at("name").problem(fmt::format("expected a name of its own, found '{}' twice.", name));
+    node.at("name").problem(fmt::format("expected a unique name, found '{}' twice.", name));
 }
 
 void read_devices(const ConfigNode& root, World* world) {
@@ -202,7 +203,7 @@ std::shared_ptr<const scene::Mesh> box_mesh(const Eigen::Vector3d& size) {
   return mesh;
 }
 
-// A number, or [red, green, blue].
+// Reads a number or [red, green, blue].
 Eigen::Vector3d read_albedo(const ConfigNode& node) {
   if (!node.is_array()) return Eigen::Vector3d::Constant(share(node));
   const Eigen::Vector3d rgb = node.vector3();
@@ -227,7 +228,7 @@ Object read_object(const ConfigNode& node, const Pose& world_from_prototype) {
     size = node.at("box_m").vector3();
   }
   if (size.minCoeff() <= 0) {
-    node.problem("expected sides that are positive, in metres.");
+    node.problem("expected positive sides, in metres.");
     size.setOnes();
   }
   object.mesh = node.find("rectangle_m") ? sheet_mesh(size.x(), size.y()) : box_mesh(size);
@@ -258,7 +259,7 @@ std::vector<SlotPlace> read_slot_places(const ConfigNode& node) {
   return places;
 }
 
-// A marker that carries nothing in the scene.
+// A marker that carries no part of the scene.
 struct LoosePlace {
   BodyMarker marker;
   bool on_prototype = false;
@@ -278,14 +279,14 @@ std::vector<LoosePlace> read_loose_places(const ConfigNode& node) {
   return places;
 }
 
-// The marker's image, fine enough, with its white margin around it.
+// A marker's image in sufficient resolution, with its white margin.
 struct Plate {
   cv::Mat image;
   double side_m;
 };
 
 Plate plate_of(const cv::Mat& marker, double size_m, const MarkerPaper& paper) {
-  constexpr int k_fine_px = 400;  // the margin is rounded to a whole pixel of this
+  constexpr int k_fine_px = 400;  // least resolution; the margin is rounded to whole pixels of it
   const int scale = std::max(1, (k_fine_px + marker.cols - 1) / marker.cols);
   cv::Mat fine, sheet;
   fine.create(marker.rows * scale, marker.cols * scale, CV_8U);

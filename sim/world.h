@@ -20,64 +20,65 @@
 
 namespace limn::sim {
 
-/// How a camera turns linear light into numbers. The defaults are an ideal, noise-free sensor; each effect is
-/// off at its default.
+/// How a camera turns linear light into numbers. The defaults are an ideal sensor without noise: each effect
+/// is off.
 struct CameraEffects {
-  bool colour = false;     ///< BGR frames instead of grey ones
-  double exposure = 1;     ///< share of full scale per unit of light (albedo x illuminance)
-  double psf_px = 0;       ///< stdev of the lens' Gaussian blur; 0: off
-  double vignetting = 0;   ///< share of light lost in the image's corners, quadratic in radius; 0: off
-  double full_well_e = 0;  ///< electrons at full scale: shot noise variance = signal / full_well_e; 0: off
-  double read_noise = 0;   ///< stdev in 8-bit levels of linear signal; 0: off
-  double black_level = 0;  ///< 8-bit level of no light
-  bool srgb = false;       ///< encodes by the sRGB curve instead of linearly
-  /// What blue, green and red light give in the camera's blue, green and red (rows): a colour camera's
-  /// filters overlap. Identity: off. A grey camera has none.
+  bool colour = false;    ///< BGR frames instead of grey ones.
+  double exposure = 1;    ///< Share of full scale for each unit of light (albedo x illuminance).
+  double psf_px = 0;      ///< Standard deviation of the lens's Gaussian blur; 0: off.
+  double vignetting = 0;  ///< Share of light lost in the image's corners, quadratic in radius; 0: off.
+  /// Electrons at full scale; the variance of shot noise is signal / full_well_e; 0: off.
+  double full_well_e = 0;
+  double read_noise = 0;   ///< Standard deviation in 8-bit levels of linear signal; 0: off.
+  double black_level = 0;  ///< 8-bit level without light.
+  bool srgb = false;       ///< Encodes by the sRGB curve instead of linearly.
+  /// Colour mixing of a colour camera, whose filters overlap: the rows are the camera's blue, green and red,
+  /// the columns blue, green and red light. Identity: off. Not used by a grey camera.
   Eigen::Matrix3d sensitivity = Eigen::Matrix3d::Identity();
 };
 
 /// How a projector turns display values into light. Each effect is off at its default.
 struct ProjectorEffects {
-  double illuminance_at_1m = 1;               ///< of full white, 1 m away, head on
-  double gamma = 1;                           ///< light = value^gamma; 1: off
-  Eigen::Vector3d channel_gamma = {1, 1, 1};  ///< of blue, green, red: multiplies gamma; 1: off
-  double s_curve = 0;      ///< share of smoothstep(value) mixed into the response: films, LCDs; 0: off
-  double black_level = 0;  ///< light of black, as a share of white; 0: off
-  double vignetting = 0;   ///< share of light lost in the panel's corners, quadratic in radius; 0: off
-  double focus_m = 1;      ///< depth of sharp focus
-  double aperture_m = 0;   ///< diameter of the exit pupil, for defocus; 0: off
-  bool falloff = true;     ///< light falls with the square of the distance; false: as at 1 m
-  bool incidence = true;   ///< light falls with the cosine of incidence; false: as head on
+  double illuminance_at_1m = 1;               ///< Illuminance of full white at 1 m and normal incidence.
+  double gamma = 1;                           ///< light = value^gamma; 1: off.
+  Eigen::Vector3d channel_gamma = {1, 1, 1};  ///< Factors on gamma for blue, green, red; 1: off.
+  double s_curve = 0;      ///< Share of smoothstep(value) in the response, as with films and LCDs; 0: off.
+  double black_level = 0;  ///< Light of black, as a share of white; 0: off.
+  double vignetting = 0;   ///< Share of light lost in the panel's corners, quadratic in radius; 0: off.
+  double focus_m = 1;      ///< Depth of sharp focus.
+  double aperture_m = 0;   ///< Diameter of the exit pupil, for defocus; 0: off.
+  bool falloff = true;     ///< Light falls with the square of the distance; false: as at 1 m.
+  bool incidence = true;   ///< Light falls with the cosine of incidence; false: as at normal incidence.
 };
 
-/// A physical thing. Diffuse: reflects albedo x illuminance.
+/// A physical object. It is diffuse: it reflects albedo x illuminance.
 struct Object {
   std::string name;
   std::shared_ptr<const scene::Mesh> mesh;
   Pose world_from_object;
-  Eigen::Vector3d albedo = {0.8, 0.8, 0.8};  ///< linear BGR reflectance where the texture is white
-  double ink_albedo = 0;                     ///< reflectance where the texture is black
-  cv::Mat texture;                           ///< 8-bit sRGB, grey or BGR, in the mesh's uv; empty: plain
-  bool sharp_texture = false;  ///< pixels are little squares (printed cells) instead of interpolated
-  bool by_material = false;    ///< takes the mesh's own materials instead of albedo and texture
-  std::optional<Pose> prototype_from_object;  ///< moves with the prototype when set
+  Eigen::Vector3d albedo = {0.8, 0.8, 0.8};  ///< Linear BGR reflectance where the texture is white.
+  double ink_albedo = 0;                     ///< Reflectance where the texture is black.
+  cv::Mat texture;                           ///< 8-bit sRGB, grey or BGR, in the mesh's uv; empty: plain.
+  bool sharp_texture = false;                ///< Pixels are small squares (printed cells), not interpolated.
+  bool by_material = false;                  ///< Uses the mesh's own materials instead of albedo and texture.
+  std::optional<Pose> prototype_from_object;  ///< When set, the object moves with the prototype.
 };
 
-/// A marker that physically stands in the world: its frame is its object's.
+/// A physical marker in the world. Its frame is that of its object.
 struct PlacedMarker {
   MarkerName marker;
   double size_m = 0;
   std::string object;
 };
 
-/// A small lamp: illuminance on a surface head on, 1 m away. `radius_m` softens its shadows.
+/// A small lamp. Its illuminance is that at 1 m and normal incidence. `radius_m` softens its shadows.
 struct Lamp {
   Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
   double illuminance_at_1m = 0;
   double radius_m = 0;
 };
 
-/// Light of the room apart from projectors: the ambient part reaches every surface, more from above.
+/// Light of the room other than from projectors. The ambient part reaches every surface, more from above.
 struct Room {
   double ambient = 0;
   std::vector<Lamp> lamps;
@@ -85,22 +86,23 @@ struct Room {
 
 /// Everything that the virtual rig knows to be true. World frame: metres, z up, z = 0 is the table's top.
 struct World {
-  Rig rig;                                          ///< true lenses and places
-  std::vector<CameraEffects> camera_effects;        ///< one per rig.cameras
-  std::vector<ProjectorEffects> projector_effects;  ///< one per rig.projectors
+  Rig rig;                                          ///< True lenses and poses.
+  std::vector<CameraEffects> camera_effects;        ///< One for each of rig.cameras.
+  std::vector<ProjectorEffects> projector_effects;  ///< One for each of rig.projectors.
   std::vector<Object> objects;
   std::vector<PlacedMarker> markers;
   Room room;
   std::uint64_t seed = 1;
 
-  std::optional<scene::Scene> scene;  ///< what is to be shown; its parts are NOT among the objects
+  std::optional<scene::Scene> scene;  ///< The virtual content. Its parts are NOT among the objects.
   Pose world_from_prototype;
 
   const Object* find(const std::string& object) const;
   Object* find(const std::string& object);
 };
 
-/// Grey 8-bit image of a marker's black square alone, without margin: its edge is the marker's edge.
+/// Makes a grey 8-bit image of a marker's black square without a margin: the image's edge is the marker's
+/// edge.
 using MarkerImage = std::function<Result<cv::Mat>(const MarkerName&)>;
 
 /// Reads a limn.world/1 file and the scene that it names; `marker_image` draws its markers. The prototype
@@ -110,11 +112,11 @@ Result<World> load_world(const std::filesystem::path& path,
                          const MarkerImage& marker_image,
                          std::vector<scene::SkippedVariant>* skipped_variants = nullptr);
 
-/// The same world seen by ideal devices: no blur, noise, vignetting, gamma, black level; exposure is kept.
+/// The same world with ideal devices: no blur, noise, vignetting, gamma or black level. The exposure is kept.
 World without_effects(World world);
 
 /// A flat sheet: frame at its centre, x right, y down, z away from the printed face (as a marker's).
-/// `image` (8-bit sRGB; may be empty) covers it wholly, its pixels are little squares. The back is plain.
+/// `image` (8-bit sRGB; may be empty) covers it completely; its pixels are small squares. The back is plain.
 Object sheet(const std::string& name,
              double width_m,
              double height_m,
@@ -130,7 +132,8 @@ Status add_marker(World& world,
 /// Moves the prototype and everything attached to it.
 void move_prototype(World& world, const Pose& world_from_prototype);
 
-/// Where the slots' markers truly put their parts: what a perfect tracker would report.
+/// The true poses of the parts, from the true poses of the slots' markers: what a perfect tracker would
+/// report.
 scene::PosedScene true_poses(const World& world, std::span<const std::string> variants = {});
 
 /// world_from_marker of a placed marker; nullopt when there is none of that name.

@@ -9,14 +9,15 @@
 
 namespace limn::test {
 
-/// The bytes as a file of this name in a folder of this process (in memory where the system has such).
+/// Writes the bytes to a file of this name in a folder of this process (in memory, if the system has
+/// /dev/shm).
 std::filesystem::path fuzzed_file(const std::uint8_t* bytes, std::size_t size, const std::string& name);
 
-/// A message for a person: it names the file. Throws otherwise.
+/// Checks a message for people: it must name the file. Throws otherwise.
 void check_message(const std::string& message, const std::filesystem::path& file);
 
-/// What holds for every camera that a reader lets through: sizes and values that the rest can work with, and
-/// rays that go there and back. Throws otherwise.
+/// Checks a camera that a reader accepted: sizes and values must be usable, and rays must survive a round
+/// trip. Throws otherwise.
 void check_imager(const Imager& imager);
 
 /// Reads the bytes as a camera file of this name and checks the camera, or the message.
@@ -24,5 +25,5 @@ void check_camera(const std::uint8_t* bytes, std::size_t size, const std::string
 
 }  // namespace limn::test
 
-/// libFuzzer's entry: a target reads the bytes, and throws or dies where it should not.
+/// libFuzzer's entry point. A target reads the bytes; an exception or a crash is a finding.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size);

@@ -1,5 +1,5 @@
-// MPCDI, as an archive or its XML alone. An archive's checksums would refuse every change inside it, so lines
-// of %% part the bytes into files, too, which are packed: mpcdi.xml, then 1, 2, … for maps.
+// MPCDI, as an archive or only its XML. An archive's checksums would reject every mutation inside it. So
+// lines of %% also divide the bytes into files, which are then packed: mpcdi.xml, then 1, 2, … for maps.
 #include "exchange/mpcdi_reader.h"
 #include "exchange/zip.h"
 #include "tests/fuzz/fuzz_file.h"

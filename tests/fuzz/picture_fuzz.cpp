@@ -1,6 +1,7 @@
-// Small grey images: three bytes, then the levels row by row. The first byte is the width; of the second
-// the lower three bits say how many pixels wide a level is drawn, the others choose the lens; the third's
-// lower bits: blurred, srgb, followed, trained from; its upper four all set: larger than most.
+// Small grey images: three bytes, then the levels row by row. The first byte is the width. The lower three
+// bits of the second byte are the width in pixels at which a level is drawn; the others choose the lens. The
+// lower four bits of the third byte: blurred, sRGB, also follow markers, also train a template. If its upper
+// four bits are all set, the image may be larger.
 #include <opencv2/imgproc.hpp>
 
 #include "tests/fuzz/fuzz_file.h"
@@ -15,7 +16,8 @@ using namespace limn;
 constexpr int k_max_pixels = 80 * 80;
 constexpr int k_max_large_pixels = 160 * 120;
 
-// Images of one level a byte, each drawn `scale` x `scale` pixels; blurred so that edges have a slope.
+// An image with one level for each byte, drawn as `scale` x `scale` pixels; blurred, so that edges have a
+// slope.
 cv::Mat image_of(const std::uint8_t* levels, std::size_t count, int width, int scale, bool blurred) {
   const int height = static_cast<int>(count) / width;
   if (height == 0) return {};
@@ -42,7 +44,7 @@ Lens lens_for(const cv::Mat& grey, bool bent) {
   return Lens::create("LENSMODEL_OPENCV8", {f, f, cx, cy, -0.35, 0.1, 1e-2, -1e-2, 0.02, 0, 0, 0}).value();
 }
 
-// No image may make anything but sound detections and poses.
+// Every image must give valid detections and poses, or none.
 void check(const tracker::Detection& detection, const Lens* lens) {
   LIMN_CHECK(detection.score >= 0 && detection.score <= 1 && !detection.marker.id.empty());
   for (std::size_t i = 0; i < 4; ++i) {
@@ -55,7 +57,7 @@ void check(const tracker::Detection& detection, const Lens* lens) {
     LIMN_CHECK(pose.camera_from_marker.is_finite() && pose.covariance.allFinite());
 }
 
-// Also where the image has moved on, and once more from there.
+// Follows the markers after the image has shifted, and once more after a second shift.
 void check_followed(tracker::Detector& detector,
                     const cv::Mat& grey,
                     const Lens* lens,

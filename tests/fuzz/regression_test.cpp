@@ -1,4 +1,4 @@
-// A fuzz target on its seeds and on some thousand mutations of them: the same ones every time.
+// Runs a fuzz target on its seeds and on some thousand mutations of them, the same ones every time.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,7 +23,7 @@ std::vector<std::string> seeds() {
   return contents;
 }
 
-// Draws places and pieces of texts.
+// Draws random positions and pieces of text.
 class Mutator {
  public:
   explicit Mutator(const std::vector<std::string>& seeds) : seeds_(seeds) {}
@@ -74,7 +74,7 @@ class Mutator {
   }
 };
 
-// A crash leaves its input where fuzzed_file put it.
+// After a crash the input remains where fuzzed_file put it.
 void feed(const std::string& input) {
   const auto* bytes = reinterpret_cast<const std::uint8_t*>(input.data());
   test::fuzzed_file(bytes, input.size(), "input");
@@ -82,7 +82,7 @@ void feed(const std::string& input) {
   if (!testing::Test::HasFailure()) return;
   const auto kept = test::test_folder() / "input";
   ASSERT_TRUE(write_file(kept, input));
-  FAIL() << "the input lies in " << kept;
+  FAIL() << "the input is kept in " << kept;
 }
 
 TEST(Fuzz, SeedsAndMutationsOfThemAreReadOrRefused) {

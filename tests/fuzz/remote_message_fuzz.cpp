@@ -1,4 +1,4 @@
-// What guests of the remote send: messages, bodies, paths, cookies, frames.
+// Everything that guests of the remote send: messages, bodies, paths, cookies, frames.
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
@@ -9,7 +9,7 @@
 namespace limn::apps {
 namespace {
 
-// Told to the guest as JSON: UTF-8, short, and what was expected.
+// A refusal is sent to the guest as JSON: it must be UTF-8, short, and say what was expected.
 void check_refusal(const std::string& message) {
   LIMN_CHECK(message.find("expected") != std::string::npos && message.size() < 500);
   static_cast<void>(nlohmann::json(message).dump());

@@ -1,4 +1,4 @@
-// What a guest's tablet sends as its image: decoded or refused, and looked at like any other.
+// An image that a guest's tablet sends: it is decoded or refused, and a decoded one is localised.
 #include "remote/tablet/tablet_image.h"
 #include "remote/tablet/tablet_localizer.h"
 #include "tests/fuzz/fuzz_file.h"
@@ -8,7 +8,7 @@ namespace {
 
 using namespace limn;
 
-// A body of four markers about the origin, and one of a single marker beside it.
+// A body with four markers around the origin, and a body with one marker beside it.
 std::vector<Body> bodies() {
   std::vector<Body> out = {{"prototype", {}}, {"mirror", {}}};
   for (int i = 0; i < 4; ++i) {
@@ -41,7 +41,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
   }
   LIMN_CHECK(image->type() == CV_8UC3 && std::max(image->cols, image->rows) <= apps::k_drawn_side);
   apps::TabletLocalizer eye(families);
-  for (int i = 0; i < 2; ++i) {  // the second time with what it learnt
+  for (int i = 0; i < 2; ++i) {  // the second time with the learned lens
     const apps::TabletPose sight = eye.look(*image, known, where);
     eye.learn();
     LIMN_CHECK(sight.view.has_value() == sight.why.empty());

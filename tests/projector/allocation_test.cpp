@@ -1,5 +1,5 @@
-// What drawing a projector's image asks of the heap once the renderer's buffers have grown to it, and what
-// a large mesh asks while it goes to the GPU.
+// Heap use: allocations while a projector's image is drawn, after the renderer's buffers have reached their
+// size, and memory needed to upload a large mesh to the GPU.
 #include <gtest/gtest.h>
 #include <malloc.h>
 
@@ -14,7 +14,7 @@
 #include "projector/renderer.h"
 
 namespace {
-// Of this thread: drivers have their own.
+// Counted for this thread only, because drivers have threads of their own.
 thread_local long allocations = 0, bytes_now = 0, bytes_most = 0;
 
 void* counted(std::size_t size) {
@@ -100,14 +100,14 @@ TEST_F(Allocation, StopsAfterTheFirstImages) {
       for (std::size_t i = 0; i < 2; ++i) drawing->draw_projector(i, posed, viewer);
       count = allocations - before;
     }
-    return count;  // of the last frame
+    return count;  // count of the last frame
   };
   const long still = asked([](int) {});
   const long part_moves =
       asked([&](int frame) { posed.parts[0].world_from_part.translation.x() = 1e-3 * frame; });
   const long all_moves =
       asked([&](int frame) { posed.world_from_prototype->translation.x() = 1e-3 * frame; });
-  std::cout << "allocations a frame of two projectors: still " << still << ", a part moves " << part_moves
+  std::cout << "allocations for a frame of two projectors: still " << still << ", a part moves " << part_moves
             << ", the prototype moves " << all_moves << "\n";
   EXPECT_EQ(still, 0);
   EXPECT_EQ(part_moves, 0);
@@ -119,14 +119,14 @@ TEST_F(Allocation, OfALargeMeshIsBoundedByItsTriangles) {
   const auto triangles = static_cast<double>(scene.prototype->mesh.triangles.size());
   ASSERT_GT(triangles, 199000);
   const Rig rig = two_projectors();
-  ASSERT_TRUE(Renderer::create(scene_of(2), rig));  // the driver's own first things
+  ASSERT_TRUE(Renderer::create(scene_of(2), rig));  // first use, for the driver's own allocations
   const long before = bytes_now;
   bytes_most = bytes_now;
   const auto drawing = Renderer::create(scene, rig);
   ASSERT_TRUE(drawing) << drawing.message();
   const double most = static_cast<double>(bytes_most - before) / triangles;
-  std::cout << "bytes a triangle: at most " << most << "\n";
-  EXPECT_LT(most, 127);  // 116 of them corners, normals, owners and neighbours, once
+  std::cout << "bytes for each triangle: at most " << most << "\n";
+  EXPECT_LT(most, 127);  // 116 of them are one copy of corners, normals, owners and neighbours
 }
 
 }  // namespace

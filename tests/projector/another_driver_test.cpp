@@ -1,5 +1,5 @@
-// Other drivers draw the same as Mesa's llvmpipe: softpipe, which shares neither rasteriser nor compiler of
-// shaders with it, and zink, which draws by Vulkan.
+// Other drivers must draw the same as Mesa's llvmpipe: softpipe, which shares neither rasteriser nor shader
+// compiler with it, and zink, which draws with Vulkan.
 #include <epoxy/gl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Gold, steel and lacquer by maps, one part off the surface, one on it.
+// Gold, steel and lacquer with textures; one part stands off the surface, one lies on it.
 Scene finishes() {
   Scene scene = scene::load_scene(fs::path(LIMN_SOURCE_DIR) / "config/scenes/finishes").value();
   scene.prototype = scene::Prototype{grid(12, 9,
@@ -35,7 +35,7 @@ Scene finishes() {
   return scene;
 }
 
-// softpipe is slow.
+// Half the resolution, because softpipe is slow.
 Imager half_as_large(Imager imager) {
   std::vector<double> values = imager.lens.values;
   for (std::size_t i = 0; i < 4; ++i) values[i] /= 2;
@@ -72,9 +72,10 @@ std::map<std::string, cv::Mat> images() {
   return out;
 }
 
-using Settings = std::map<std::string, std::string>;  // of the environment, beside the driver's name
+using Settings = std::map<std::string, std::string>;  // environment variables besides the driver's name
 
-// In a process of its own, as a process keeps its driver; false when Mesa has no such driver here.
+// Draws in a separate process, because a process keeps its driver. Returns false when Mesa has no such driver
+// here.
 bool draw_with(const std::string& driver, const Settings& settings, const fs::path& folder) {
   const pid_t child = fork();
   if (child == 0) {
@@ -94,13 +95,14 @@ bool draw_with(const std::string& driver, const Settings& settings, const fs::pa
   return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
-// "On another machine at most 2 levels on 0.1 % of pixels": those of the part, as most of an image is black.
+// The limit between machines is 2 levels in 0.1 % of the pixels. Only pixels of parts count, because most of
+// an image is black.
 void expect_same_images(const std::string& driver, const Settings& settings) {
   const fs::path folder = test::test_folder();
   for (const std::string& drawn_by : {std::string("llvmpipe"), driver}) {
     fs::create_directories(folder / drawn_by);
     if (!draw_with(drawn_by, drawn_by == driver ? settings : Settings(), folder / drawn_by))
-      GTEST_SKIP() << "Mesa's " << drawn_by << " is not here";
+      GTEST_SKIP() << "Mesa's driver " << drawn_by << " is not installed";
   }
   int compared = 0;
   for (const auto& file : fs::directory_iterator(folder / "llvmpipe")) {
@@ -125,14 +127,14 @@ void expect_same_images(const std::string& driver, const Settings& settings) {
 }
 
 TEST(AnotherDriver, OfScalarShadersDrawsTheSame) {
-  // It says 3.3, and does what is asked of it here.
+  // softpipe reports OpenGL 3.3, but supports everything that is used here.
   expect_same_images("softpipe",
                      {{"MESA_GL_VERSION_OVERRIDE", "4.5"}, {"MESA_GLSL_VERSION_OVERRIDE", "450"}});
 }
 
 TEST(AnotherDriver, OfVulkanDrawsTheSame) {
-  // With a variant of each program by its uniforms' values, as it has for software (Mesa 22.3 to 25.0), it
-  // now and then takes one of other values.
+  // For software rendering zink compiles variants of programs for the values of their uniforms (Mesa 22.3 to
+  // 25.0), and sometimes uses the variant of other values. This setting turns that off.
   expect_same_images("zink", {{"MESA_LOADER_DRIVER_OVERRIDE", "zink"}, {"ZINK_INLINE_UNIFORMS", "0"}});
 }
 

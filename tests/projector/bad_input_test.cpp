@@ -1,4 +1,4 @@
-// Things that go wrong with a scene, a rig or the driver: named, and survived.
+// Bad scenes, rigs and drivers: errors are named, and the program survives them.
 #include <epoxy/gl.h>
 
 #include <Eigen/Geometry>
@@ -131,11 +131,11 @@ TEST_F(BadInput, AnAlbedoBeyondTheLimitIsNamedAndReduced) {
 
 TEST_F(BadInput, MoreTrianglesThanTheDriverHoldsAreRefused) {
   const std::size_t most = GpuScene::most_triangles();
-  EXPECT_GT(most, 10'000U);  // GL 4.5 promises 65536 texels
+  EXPECT_GT(most, 10'000U);  // GL 4.5 guarantees 65536 texels
   if (most > 40'000'000) GTEST_SKIP() << "this driver holds " << most;
   scene::Scene scene = wall_and_part();
   scene::Mesh& mesh = scene.prototype->mesh;
-  mesh.tangents.resize(mesh.positions.size());  // its triangles count twice
+  mesh.tangents.resize(mesh.positions.size());  // with tangents, its triangles count twice
   const std::size_t parts = 2, fits = (most - parts) / 2, count = 2 * (fits + 1) + parts;
   mesh.triangles.resize(fits + 1, {0, 2, 1});
   mesh.triangle_materials.resize(fits + 1, 0);
@@ -190,10 +190,10 @@ TEST(LostContext, ARendererIsMadeAnewFromSceneAndRig) {
   std::optional<Renderer> drawing;
   std::vector<cv::Mat> images;
   for (int life = 0; life < 3; ++life) {
-    drawing.reset();  // in this order, as for a context that is lost
+    drawing.reset();  // the same order as for a lost context
     context.reset();
     if (life > 0) {
-      EXPECT_GT(brightest(images.back()), 150);  // the last good image is nobody's but ours
+      EXPECT_GT(brightest(images.back()), 150);  // the last good image is an independent copy
     }
     auto made = device::GlContext::create();
     ASSERT_TRUE(made) << made.message();

@@ -57,7 +57,7 @@ TEST(Bake, ResponseTableInvertsTheMeasuredLight) {
   for (int k = 0; k < table.cols; k += 64) {
     const double light = std::pow(k / 1024.0, 2);
     const auto& entry = table.at<cv::Vec3f>(0, k);
-    // Red is stored at 17 levels: between them the table is straight.
+    // Red is stored at 17 levels; between them the table is linear.
     EXPECT_NEAR(entry[0], std::sqrt(light), 0.033);
     EXPECT_NEAR(entry[1], light, 1e-5);
     EXPECT_NEAR(entry[2], std::max(0.0, (light - 0.02) / 0.98), 1e-5);

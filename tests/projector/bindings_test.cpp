@@ -1,4 +1,4 @@
-// Where textures, images and buffers are bound: C++ and GLSL say the same, and say it once.
+// Binding slots of textures, images and buffers: C++ and GLSL use the same constants, defined once.
 #include "projector/bindings.h"
 
 #include <gtest/gtest.h>
@@ -44,7 +44,7 @@ std::vector<std::smatch> matches(const std::string& text, const std::regex& patt
   return {std::sregex_iterator(text.begin(), text.end(), pattern), std::sregex_iterator()};
 }
 
-// Of bindings.glsl: name -> number.
+// The constants of bindings.glsl: name -> number.
 std::map<std::string, int> bindings() {
   static const std::regex pattern(R"(const int (k_\w+) = (\d+);)");
   static const std::string text = text_of(fs::path(LIMN_SOURCE_DIR) / "shaders/bindings.glsl");
@@ -55,7 +55,7 @@ std::map<std::string, int> bindings() {
 
 std::string kind_of(const std::string& name) { return name.substr(name.rfind('_') + 1); }
 
-// All that shaders bind, declared as the language asks for it.
+// Matches every declaration in a shader that is bound to a slot.
 const std::regex& bound() {
   static const std::regex pattern(
       R"((?:layout\(([^)]*)\) )?(?:uniform (?:readonly |writeonly )?[iu]?(sampler|image)\w+ \w+;|(?:readonly )?(buffer) \w+ \{))");
@@ -73,11 +73,12 @@ TEST(Bindings, ShadersNameEachPlaceByItsKind) {
       const std::string layout = match[1], kind = match[2].matched ? match[2] : match[3];
       std::smatch name;
       ASSERT_TRUE(std::regex_search(layout, name, named))
-          << file << ": " << match[0] << " has no named place";
+          << file << ": " << match[0] << ": expected a slot named in bindings.glsl";
       EXPECT_TRUE(bindings().contains(name[1])) << file << ": " << name[1] << " is not in bindings.glsl";
       EXPECT_EQ(kind_of(name[1]), kinds.at(kind)) << file << ": " << match[0];
     }
-    EXPECT_FALSE(std::regex_search(text, std::regex(R"(binding = \d)"))) << file << " has a bare number";
+    EXPECT_FALSE(std::regex_search(text, std::regex(R"(binding = \d)")))
+        << file << ": expected a slot named in bindings.glsl, found a bare number";
   }
   EXPECT_GT(seen, 40) << "the shaders were not found";
 }
@@ -88,8 +89,8 @@ TEST(Bindings, AreUsedByShadersAndByTheProgramAlike) {
   for (const auto& [file, text] : cpp_files()) in_program += text;
   for (const auto& [name, number] : bindings()) {
     const std::regex word("\\b" + name + "\\b");
-    EXPECT_TRUE(std::regex_search(in_shaders, word)) << name << ": no shader binds it";
-    EXPECT_TRUE(std::regex_search(in_program, word)) << name << ": nothing in projector/ is bound to it";
+    EXPECT_TRUE(std::regex_search(in_shaders, word)) << name << ": no shader uses it";
+    EXPECT_TRUE(std::regex_search(in_program, word)) << name << ": nothing in projector/ uses it";
   }
   EXPECT_GT(bindings().size(), 20u) << "bindings.glsl was not found";
   EXPECT_EQ(bindings().at("k_brdf_lut_unit"), k_brdf_lut_unit);  // both languages read the same file
@@ -101,7 +102,7 @@ TEST(Bindings, HaveAPlaceEachWithinWhatGlPromises) {
   for (const auto& [name, number] : bindings()) {
     EXPECT_LT(number, promised.at(kind_of(name))) << name;
     const auto [other, is_new] = taken.emplace(std::pair(kind_of(name), number), name);
-    EXPECT_TRUE(is_new) << name << " has the place of " << other->second;
+    EXPECT_TRUE(is_new) << name << " has the same number as " << other->second;
   }
 }
 

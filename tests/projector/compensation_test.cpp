@@ -1,4 +1,5 @@
-// Parts on a printed, curved prototype in a lit room: photographed and judged by the ray tracer.
+// Parts on a printed, curved prototype in a room with light. The ray tracer makes the photographs, and its
+// images are the reference.
 #include "projector/compensation.h"
 
 #include <fmt/format.h>
@@ -24,7 +25,7 @@ using Eigen::Vector3d;
 
 constexpr double k_width = 0.5, k_height = 0.36, k_bulge = 0.06;  // m
 
-// A sheet that bulges towards the devices (-z), uv over its whole.
+// A sheet that bulges towards the devices (-z); the uvs cover all of it.
 std::shared_ptr<scene::Mesh> bulged(double towards_m = 0) {
   constexpr int k_cells = 48;
   auto mesh = std::make_shared<scene::Mesh>();
@@ -51,7 +52,7 @@ std::shared_ptr<scene::Mesh> bulged(double towards_m = 0) {
   return mesh;
 }
 
-// Coloured stripes, discs and a light ground, as printed.
+// The print on the prototype: coloured stripes and discs on a light ground.
 cv::Mat print() {
   cv::Mat image(360, 500, CV_8UC3, cv::Scalar(215, 222, 226));
   for (int i = 0; i < 5; ++i)
@@ -62,7 +63,7 @@ cv::Mat print() {
   return image;
 }
 
-// What designers want to see there: soft colours, and letters.
+// The image that designers want to see there: soft colours and letters.
 cv::Mat paint() {
   cv::Mat image(360, 500, CV_8UC3);
   for (int y = 0; y < image.rows; ++y)
@@ -126,7 +127,7 @@ scene::Scene painted_scene(const cv::Mat& paint) {
   return scene;
 }
 
-// sRGB values 0 ... 1 of light over `white` (BGR).
+// sRGB values (0 to 1) of light relative to `white` (BGR).
 cv::Mat encoded(const cv::Mat& light, const cv::Scalar& white) {
   cv::Mat out = light.clone();
   for (auto& pixel : cv::Mat_<cv::Vec3f>(out))
@@ -140,7 +141,7 @@ double psnr(const cv::Mat& a, const cv::Mat& b, const cv::Mat& where) {
   return -20 * std::log10(rms);
 }
 
-// Structural similarity, Gaussian window of 1.5 px (Wang et al. 2004), mean over `where`.
+// Structural similarity with a Gaussian window of 1.5 px (Wang et al. 2004), mean over `where`.
 double ssim(const cv::Mat& a, const cv::Mat& b, const cv::Mat& where) {
   constexpr double k_c1 = 0.01 * 0.01, k_c2 = 0.03 * 0.03;
   const auto mean = [](const cv::Mat& m) {
@@ -175,7 +176,7 @@ Rig true_rig(const sim::World& world) {
   return rig;
 }
 
-// Light of the prototype in the camera without noise; NaN beside it and at its edges. `shown` are the
+// Light of the prototype in the camera, without noise; NaN beside it and at its edges. `shown` holds the
 // projectors' images.
 cv::Mat light_on_prototype(const sim::World& world, const std::vector<cv::Mat>& shown) {
   const sim::Samples samples = sim::trace(world, 0);
@@ -191,7 +192,7 @@ cv::Mat light_on_prototype(const sim::World& world, const std::vector<cv::Mat>& 
   return green;
 }
 
-// The value that a share of an image's numbers lie below.
+// A quantile: the value below which this share of an image's numbers lies.
 double at_share(const cv::Mat& image, double share) {
   std::vector<float> values;
   for (const float value : cv::Mat_<float>(image))
@@ -200,8 +201,8 @@ double at_share(const cv::Mat& image, double share) {
   return values.at(static_cast<std::size_t>(share * static_cast<double>(values.size() - 1)));
 }
 
-// The largest change of light within 4 pixels along rows or columns, but for the worst in 1000; as an eye
-// sees it that does not resolve the projectors' pixels.
+// The largest change of light within 4 pixels along rows or columns (99.9 % quantile), after a blur: people
+// do not resolve the projectors' pixels.
 double largest_step(const cv::Mat& image) {
   cv::Mat light;
   cv::GaussianBlur(image, light, {7, 7}, 1);
@@ -215,7 +216,7 @@ double largest_step(const cv::Mat& image) {
   return at_share(steps, 0.999);
 }
 
-// A bare prototype of one albedo, two equal projectors whose images end on it.
+// A prototype of uniform albedo, and two equal projectors whose images end on it.
 sim::World bare_world() {
   sim::World world = printed_world();
   world.objects[0].texture = cv::Mat();
@@ -246,10 +247,10 @@ TEST_F(CompensationTest, OneColourIsEvenAcrossTwoProjectors) {
     const cv::Mat light = light_on_prototype(world, images);
     return (at_share(light, 0.995) - at_share(light, 0.005)) / at_share(light, 0.5);
   };
-  // Bright enough to leave no step of 8 bits over half a percent, dim enough to be reached everywhere.
+  // Bright enough that one 8-bit step is less than half a percent, and dim enough to be reached everywhere.
   const double with = shone({.compensation = Compensation::geometry, .level = 0.45});
   const double without = shone({});
-  fmt::print("99 % of the light within {:.4f} of its middle, without compensation {:.4f}\n", with, without);
+  fmt::print("99 % of the light within {:.4f} of its mean, without compensation {:.4f}\n", with, without);
   EXPECT_LT(with, 0.04);
   EXPECT_GT(without, 0.2);
 }
@@ -270,7 +271,7 @@ TEST_F(CompensationTest, BlackIsEvenAcrossTwoProjectors) {
     return light_on_prototype(world, images);
   };
   const cv::Mat uneven = shone(false), even = shone(true);
-  const double one = at_share(uneven, 0.02);  // where only one projector's black is
+  const double one = at_share(uneven, 0.02);  // where only one projector's black level is visible
   fmt::print("black: steps of {:.3f} of one projector's, {:.3f} without\n", largest_step(even) / one,
              largest_step(uneven) / one);
   EXPECT_GT(largest_step(uneven), 0.5 * one);
@@ -278,12 +279,12 @@ TEST_F(CompensationTest, BlackIsEvenAcrossTwoProjectors) {
 }
 
 struct Judged {
-  double psnr_db, ssim;  // where light can give what is wanted
+  double psnr_db, ssim;  // where projected light can give the wanted colour
   double psnr_without_db;
   double in_gamut_share;
 };
 
-// Measured in one place, painted in another.
+// The surface is measured in one pose and the part is projected in another.
 Judged painted_over_print(const Pose& new_from_old) {
   sim::World world = printed_world();
   const scene::Scene scene = painted_scene(paint());
@@ -301,7 +302,7 @@ Judged painted_over_print(const Pose& new_from_old) {
   posed.world_from_prototype = world.world_from_prototype;
   posed.parts.push_back({"paint", "a", world.world_from_prototype});
 
-  // What is wanted: the paint as the prototype's own colours.
+  // The wanted result: a prototype with these colours.
   sim::World wanted_world = world;
   wanted_world.objects[0].texture = paint();
   const sim::Samples samples = sim::trace(world, 0), wanted_samples = sim::trace(wanted_world, 0);
@@ -333,7 +334,7 @@ Judged painted_over_print(const Pose& new_from_old) {
     }
     return cv::Mat(sim::ideal_light(world, samples, images));
   };
-  // As bright as it comes out best, channel by channel: the camera's white is not ours to judge.
+  // Each channel is scaled for the best fit, because the camera's white is not under test.
   const auto judged = [&](const cv::Mat& light, const cv::Mat& where, double* similarity) {
     std::vector<cv::Mat> seen, ideal;
     cv::split(light, seen);

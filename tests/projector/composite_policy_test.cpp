@@ -18,7 +18,7 @@ PartCoverage covered(const std::string& slot, double share, int pixels = 1000) {
 Composite what_of(const std::vector<CompositePolicy>& policies, const std::string& slot) {
   for (const CompositePolicy& treatment : policies)
     if (treatment.slot == slot) return treatment.what;
-  ADD_FAILURE() << slot << " has no treatment";
+  ADD_FAILURE() << slot << " has no policy";
   return Composite::rest;
 }
 
@@ -53,7 +53,7 @@ TEST(CompositePolicy, APartLostFromSightStaysAsItIs) {
   EXPECT_EQ(what_of(policies, "mirror"), Composite::rest);
 }
 
-// Coverage that jumps about at 60 frames a second, with frames of 5 ms to 100 ms.
+// Random coverage, with frame times from 5 ms to 100 ms.
 TEST(CompositePolicy, NeverChangesTwiceWithinTheHold) {
   auto rng = test::test_rng();
   std::uniform_real_distribution<double> share(0, 1), seconds(0.005, 0.1);
@@ -87,21 +87,21 @@ TEST(CompositePolicy, OnePassesIntoTheOtherWithinTheFadeWhateverTheStepsOfTime) 
     const CompositePolicyOptions options{0.3, 0.5, 0, 0.4};
     PartCoverage part = covered("mirror", 0.9);
     auto policies = updated_policies({}, std::span(&part, 1), 0, options);
-    EXPECT_EQ(policies[0].whole(), 0) << "there is nothing to pass from at first";
+    EXPECT_EQ(policies[0].whole(), 0) << "at first there is nothing to fade from";
     part = covered("mirror", 0.1);
     policies = updated_policies(policies, std::span(&part, 1), step, options);
     EXPECT_EQ(policies[0].what, Composite::full);
-    EXPECT_EQ(policies[0].whole(), 0) << "at the change what showed still shows";
+    EXPECT_EQ(policies[0].whole(), 0) << "a cross-fade starts from the previous state";
     for (double seconds = step; seconds < 0.2; seconds += step) {
       policies = updated_policies(policies, std::span(&part, 1), step, options);
       EXPECT_NEAR(policies[0].whole(), seconds / options.fade_s, 1e-9);
     }
-    part = covered("mirror", 0.9);  // and back before it has passed
+    part = covered("mirror", 0.9);  // back again during the cross-fade
     const double before = policies[0].whole();
     policies = updated_policies(policies, std::span(&part, 1), step, options);
     EXPECT_EQ(policies[0].what, Composite::rest);
     EXPECT_NEAR(policies[0].whole(), before + step / options.fade_s, 1e-9);
-    policies = updated_policies(policies, {}, 1, options);  // also while it is out of sight
+    policies = updated_policies(policies, {}, 1, options);  // also while the part is not visible
     EXPECT_EQ(policies[0].whole(), 0);
   }
 }

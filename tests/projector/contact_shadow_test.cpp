@@ -17,7 +17,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using scene::Mesh;
 
-// A box, each side with corners of its own.
+// A box; each side has its own corners.
 Mesh box(const Vector3d& lower, const Vector3d& upper) {
   Mesh mesh;
   for (int axis = 0; axis < 3; ++axis)
@@ -38,7 +38,7 @@ Mesh box(const Vector3d& lower, const Vector3d& upper) {
   return mesh;
 }
 
-// A board at z = 0 that is seen from -z, and a block before it, `gap` off.
+// A board at z = 0, seen from -z, and a block in front of it at a distance of `gap`.
 scene::Scene block_before_a_board(double gap, scene::Mode mode) {
   scene::Scene scene;
   scene.prototype = scene::Prototype{box({-0.25, -0.2, 0}, {0.25, 0.2, 0.01}), {}, 0.8, {}};
@@ -104,7 +104,8 @@ TEST(DistanceField, IsTheDistanceFromABoxOnBothSides) {
   EXPECT_LT(worst, 1e-6);
 }
 
-// Of even light from all sides of a board's point: what the block keeps, less from farther off.
+// The share of uniform light from all sides that the block keeps from a point of the board; farther parts of
+// the block count less.
 double traced_shadow(const sim::RayScene& block, const Vector3d& p) {
   constexpr int k_rings = 16, k_turns = 32;
   double kept = 0;
@@ -128,7 +129,7 @@ TEST_F(ContactShadowTest, IsNearTheOneThatRaysFind) {
     const sim::MeshInstance board{&scene.prototype->mesh, Pose()};
     const sim::MeshInstance placed{&scene.slots[0].variants[0].mesh, world_from_block};
     const sim::RayScene block(std::span(&placed, 1)), prototype(std::span(&board, 1));
-    const auto sees_block = [&](int column, int row) {  // within a pixel
+    const auto sees_block = [&](int column, int row) {  // sees the block within one pixel
       for (const Vector2d& d : {Vector2d(-1, -1), {1, -1}, {-1, 1}, {1, 1}})
         if (block.first_hit(*rig.cameras[0].ray(Vector2d(column, row) + d)).object >= 0) return true;
       return false;
@@ -153,7 +154,7 @@ TEST_F(ContactShadowTest, IsNearTheOneThatRaysFind) {
         ++count;
       }
     const double rms = std::sqrt(squares / std::max(1, count));
-    std::cout << "gap " << 1e3 * gap << " mm: " << count << " places, RMS " << rms << ", worst " << worst
+    std::cout << "gap " << 1e3 * gap << " mm: " << count << " points, RMS " << rms << ", worst " << worst
               << ", darkest " << darkest << ", by rays " << darkest_truth << "\n";
     EXPECT_GT(count, 300);
     EXPECT_LT(rms, 0.05);

@@ -1,4 +1,4 @@
-// Where a projector looks for light.
+// The rectangles in which a projector may give light.
 #include "projector/light_layer.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ std::vector<cv::Rect> some_rectangles(std::mt19937* random, int most) {
   return rectangles;
 }
 
-// How many of the rectangles each pixel lies in.
+// For each pixel, the number of rectangles that contain it.
 cv::Mat counted(const std::vector<cv::Rect>& rectangles) {
   cv::Mat count = cv::Mat::zeros(60, 80, CV_8U);
   for (const cv::Rect& r : rectangles) count(r) += 1;
@@ -38,7 +38,7 @@ TEST(PlacesByMode, HaveEachPixelOnceAndByTheModesThatAskForIt) {
     }
     in_both += cv::countNonZero(expected[2]);
   }
-  EXPECT_GT(in_both, 5000);  // they do lie over each other
+  EXPECT_GT(in_both, 5000);  // the rectangles do overlap
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// What parts are made of: metal and gloss, textures and maps, what is cut out.
+// Materials of parts: metal and gloss, textures and maps, alpha cutoff.
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
@@ -16,8 +16,8 @@ namespace {
 
 using MaterialsTest = RendererTest;
 
-// Mirrored light of strength pi towards d_eye, of what a colour mirrors head on: GGX, Smith, Fresnel
-// (glTF 2.0, appendix B).
+// Light of strength pi reflected towards d_eye by a surface with reflectance `head_on` at normal incidence:
+// GGX, Smith, Fresnel (glTF 2.0, appendix B).
 Vector3d mirrored(const Vector3d& head_on,
                   double roughness,
                   const Vector3d& n,
@@ -32,8 +32,8 @@ Vector3d mirrored(const Vector3d& head_on,
   return nl * a2 / (peak * peak) * 0.5 / visible * fresnel;
 }
 
-// The look of shaders/look.glsl spelled once more, the soft light direction by direction: below and above a
-// horizon that is soft over heights from -0.3 to 0.3, one lamp.
+// A second implementation of shaders/look.glsl that sums the soft light over directions. Its horizon is
+// smooth over heights from -0.3 to 0.3; there is one lamp.
 Vector3d lit(const Vector3d& base,
              double metallic,
              double roughness,
@@ -56,7 +56,8 @@ Vector3d lit(const Vector3d& base,
                    angle = 2 * M_PI * (k + 0.5) / k_steps;
       const Vector3d d = ring * (std::cos(angle) * d_u + std::sin(angle) * d_v) + z * n;
       const double t = std::clamp((d.dot(room.d_up_world) + 0.3) / 0.6, 0.0, 1.0);
-      const Vector3d light = soft(t * t * (3 - 2 * t)) * (2.0 / (k_rings * k_steps));  // solid angle over pi
+      // Solid angle divided by pi.
+      const Vector3d light = soft(t * t * (3 - 2 * t)) * (2.0 / (k_rings * k_steps));
       colour += mirrored(head_on, roughness, n, d_eye, d).cwiseProduct(light);
     }
   const Vector3d& d_lamp = room.lamps[0].d_world;
@@ -94,11 +95,12 @@ TEST_F(MaterialsTest, MetalAndGlossAreAsInGltf) {
   }
 }
 
-// A sheet of 0.2 x 0.2 m in four fields, two by two, that differ in their maps alone.
-constexpr double k_normal_scale = 0.5, k_flat = k_normal_scale * (2 * 128 / 255.0 - 1);  // 8 bits have no 0
+// A sheet of 0.2 x 0.2 m with four fields, two by two, which differ only in their maps.
+// 8 bits cannot store 0 exactly.
+constexpr double k_normal_scale = 0.5, k_flat = k_normal_scale * (2 * 128 / 255.0 - 1);
 struct Field {
   double metallic = 0, roughness = 0.6, open = 1;
-  Vector3d along = {k_flat, k_flat, 1};  // the map's normal: to the right, up, out of the sheet
+  Vector3d along = {k_flat, k_flat, 1};  // the map's normal: right, up, out of the sheet
   double glow = 0;
 };
 constexpr double k_field_glow = 100 / 255.0;
@@ -125,7 +127,7 @@ Mesh fields(double z) {
           glow = image({});
   field(rough, 0).setTo(cv::Scalar(255, 102, 0));
   field(normals, 1).setTo(cv::Scalar(220, 60, 200));
-  field(open, 2).setTo(cv::Scalar(255, 255, 51));  // of which the strength takes 5 / 8
+  field(open, 2).setTo(cv::Scalar(255, 255, 51));  // the strength of the occlusion is 5 / 8
   field(glow, 3).setTo(cv::Scalar(188, 188, 188));
   material.metallic = material.roughness = 1;
   material.emitted = Eigen::Vector3f::Constant(static_cast<float>(k_field_glow));
@@ -141,7 +143,7 @@ Mesh fields(double z) {
 
 Vector3d middle_of_field(int k, double z) { return {k % 2 ? 0.05 : -0.05, k / 2 ? 0.05 : -0.05, z}; }
 
-// Of the middle of a field, the sheet facing -z with up -y.
+// The expected colour in the middle of field k; the sheet faces -z, up is -y.
 Vector3d wanted_of_field(int k, const Vector3d& d_eye, const scene::RoomLight& room) {
   const Field& field = k_fields[k];
   const Vector3d n = Vector3d(field.along.x(), -field.along.y(), -field.along.z()).normalized();
@@ -149,7 +151,8 @@ Vector3d wanted_of_field(int k, const Vector3d& d_eye, const scene::RoomLight& r
          Vector3d::Constant(field.glow * k_field_glow * linear_from_srgb(188 / 255.0));
 }
 
-// Levels between an image's colour where p is and a wanted colour, by the encoding of what shows it.
+// The difference in levels between an image's colour at point p and a wanted colour, in the encoding of the
+// device that shows it.
 double levels_off(const cv::Mat& bgr,
                   const Imager& imager,
                   const Vector3d& p,
@@ -193,7 +196,7 @@ TEST_F(MaterialsTest, MapsOfASurfaceAreReadInLightCompositesAndViews) {
       EXPECT_LT(levels_off(composite, eye, p, seen, srgb), 1.5);
       EXPECT_LT(levels_off(view, eye, p, wanted_of_field(k, d_eye, room), srgb), 1.5);
       const Vector3d p_lit =
-          on_surface ? p : Vector3d(p - d_viewer * (z / d_viewer.z()));  // where the viewer sees it
+          on_surface ? p : Vector3d(p - d_viewer * (z / d_viewer.z()));  // where the viewer sees the field
       EXPECT_LT(
           levels_off(light, projector, p_lit, wanted_of_field(k, on_surface ? d_up : d_viewer, room), gamma),
           1.5);
@@ -201,7 +204,8 @@ TEST_F(MaterialsTest, MapsOfASurfaceAreReadInLightCompositesAndViews) {
   }
 }
 
-// A scene without maps is drawn by programs without them; one part's maps change nothing of the others.
+// A scene without maps is drawn by programs without maps. The maps of one part must not change the other
+// parts.
 TEST_F(MaterialsTest, MapsOfOnePartLeaveOthersAsTheyAre) {
   const Mesh plain = coloured(sheet(0.1, 0.1, -0.02), {0.3f, 0.6f, 0.1f}, false);
   Mesh glossy = coloured(sheet(0.1, 0.1, -0.03), {0.3f, 0.6f, 0.1f}, false);
@@ -224,14 +228,14 @@ TEST_F(MaterialsTest, MapsOfOnePartLeaveOthersAsTheyAre) {
             0);
 }
 
-// What people chose instead is drawn as if the files had said it, and what they chose not as the files say.
+// Material overrides are drawn as if they were in the files; everything else stays as in the files.
 TEST_F(MaterialsTest, DrawsOtherMaterialsAndLightFromImageToImage) {
   const scene::RoomLight evening{
       k_up, {0.05, 0.08, 0.1}, {0.3, 0.28, 0.25}, {{Vector3d(0.2, -0.5, -1).normalized(), {0.5, 0.45, 0.4}}}};
   Mesh own = coloured(sheet(0.5, 0.4), {0.2f, 0.4f, 0.6f}, true), other = own;
   other.materials[0] = {
       .base_colour = {0.7f, 0.45f, 0.2f}, .metallic = 0.5f, .roughness = 0.3f, .texture = {}};
-  // A trim behind it shows that other slots keep their own.
+  // A trim behind it shows that other slots keep their materials.
   Mesh trim = coloured(sheet(0.1, 0.7, 0.01), {0.1f, 0.5f, 0.1f}, false);
   const std::vector<scene::Slot> slots = {slot("panel", scene::Mode::view, own),
                                           slot("trim", scene::Mode::view, trim)};
@@ -257,13 +261,13 @@ TEST_F(MaterialsTest, DrawsOtherMaterialsAndLightFromImageToImage) {
   EXPECT_NE(own_in_other_light.at<cv::Vec3b>(60, 320), before.at<cv::Vec3b>(60, 320));    // the trim
   posed.light.reset();
   EXPECT_EQ(cv::norm(before, seen(), cv::NORM_INF), 0);
-  // A colour alone leaves an unlit part unlit.
+  // An override of only the colour leaves an unlit part unlit.
   posed.parts[0].material.base_colour = Vector3d(1, 0, 0);
   EXPECT_EQ(seen().at<cv::Vec3b>(240, 240), cv::Vec3b(0, 0, 255));
 }
 
 TEST_F(MaterialsTest, TextureStandsTheRightWayUp) {
-  // Left half red, top half bright, as seen by a viewer whose image's down is +y.
+  // The left half is red and the top half is bright for a viewer with +y down in the image.
   Mesh part = coloured(sheet(0.2, 0.2, -0.001), {1, 1, 1});
   for (const auto& p : part.positions) part.uvs.push_back({p.x() / 0.2f + 0.5f, 0.5f - p.y() / 0.2f});
   cv::Mat texture(64, 64, CV_8UC3, cv::Scalar(0, 0, 255));
@@ -284,7 +288,7 @@ TEST_F(MaterialsTest, TextureStandsTheRightWayUp) {
   EXPECT_NEAR(colour_at(-0.05, 0.05)[2], 128, 1);
 }
 
-// A ring on a sheet of 0.2 x 0.2 m: what is beside it is cut out, in a colour that must not be seen.
+// A ring on a sheet of 0.2 x 0.2 m. The rest is cut out, and has a colour that must not be visible.
 constexpr double k_ring_in = 0.04, k_ring_out = 0.08;
 bool is_on_ring(double x, double y) { return std::hypot(x, y) > k_ring_in && std::hypot(x, y) < k_ring_out; }
 
@@ -303,7 +307,7 @@ Mesh ring(double z, const cv::Scalar& colour_bgr) {
 }
 
 TEST_F(MaterialsTest, WhatAMaterialCutsOutIsNotThere) {
-  // Through the hole in the ring another part is seen, and the camera's image around it.
+  // Another part is visible through the hole in the ring, and the camera's image around the ring.
   const cv::Scalar red(0, 0, 255), grey(90, 90, 90);
   const Scene scene = scene_of(
       sheet(0.5, 0.4), {slot("ring", scene::Mode::view, ring(-0.05, red)),
@@ -326,7 +330,7 @@ TEST_F(MaterialsTest, WhatAMaterialCutsOutIsNotThere) {
       const auto& colour = found.at<cv::Vec3b>(row, column);
       ring_expected += pixel_mean(column, row, [&](const Vector2d& px) { return seen_at(px) == 2 ? 1 : 0; });
       ring_found += colour[2] == 90 ? 0 : light_of(colour[2]);
-      bool is_inside = true;  // no edge within a pixel
+      bool is_inside = true;  // whether there is no edge within a pixel
       for (int k = 0; k < 9 && is_inside; ++k)
         is_inside = seen_at(Vector2d(column + k % 3 - 1, row + k / 3 - 1)) == seen;
       if (!is_inside) continue;
@@ -338,7 +342,7 @@ TEST_F(MaterialsTest, WhatAMaterialCutsOutIsNotThere) {
     }
   EXPECT_EQ(wrong, 0);
   EXPECT_GT(green, 500);
-  EXPECT_NEAR(ring_found, ring_expected, 0.01 * ring_expected);  // edges by their share
+  EXPECT_NEAR(ring_found, ring_expected, 0.01 * ring_expected);  // pixels at edges count by their share
 }
 
 TEST_F(MaterialsTest, WhatAMaterialCutsOutGivesNoLight) {
@@ -362,7 +366,8 @@ TEST_F(MaterialsTest, WhatAMaterialCutsOutGivesNoLight) {
         };
         const bool expected = expected_at(Vector2d(column, row));
         const bool is_lit = light.at<cv::Vec3b>(row, column)[1] > 0;
-        const bool is_bright = light_of(light.at<cv::Vec3b>(row, column)[1]) > 0.2;  // half of a half share
+        // Half of the light of a half share.
+        const bool is_bright = light_of(light.at<cv::Vec3b>(row, column)[1]) > 0.2;
         same += expected && is_bright;
         either += expected || is_bright;
         bool is_near = false;
@@ -375,7 +380,7 @@ TEST_F(MaterialsTest, WhatAMaterialCutsOutGivesNoLight) {
   }
 }
 
-// The judge goes through what is cut out, too.
+// The reference ray tracer also passes through cut-outs.
 TEST_F(MaterialsTest, CutOutPartsAgreeWithARayTracer) {
   const Mesh part = ring(-0.05, {0, 0, 255});
   const Scene scene = scene_of(sheet(0.5, 0.4), {slot("ring", scene::Mode::view, part)});

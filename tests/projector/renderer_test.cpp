@@ -52,7 +52,7 @@ TEST_F(RendererTest, SurfacePointsOfAPlaneAreOnTheExactRays) {
 
 TEST_F(RendererTest, SurfacePointsOfADenseSphereReachItsSilhouette) {
   constexpr double k_radius = 0.15;
-  // Triangles well below a pixel near the poles, so that the ids miss most of them.
+  // Near the poles the triangles are much smaller than a pixel, so that the ids miss most of them.
   const Scene scene =
       scene_of(grid(300, 300,
                     [](double u, double v) {
@@ -74,17 +74,18 @@ TEST_F(RendererTest, SurfacePointsOfADenseSphereReachItsSilhouette) {
       if (std::isnan(found[0]) == (off_axis < k_radius)) ++disagreeing;
       if (std::isnan(found[0])) continue;
       ++seen;
-      if (off_axis > 0.99 * k_radius) continue;  // grazing beyond 82 degrees: texels see slivers
+      // Grazing angles beyond 82 degrees, where texels see very thin triangles.
+      if (off_axis > 0.99 * k_radius) continue;
       worst = std::max(worst, std::abs(Vector3d(found[0], found[1], found[2]).norm() - k_radius));
     }
   }
   EXPECT_GT(seen, 40000);
-  EXPECT_LT(disagreeing, 150);  // 0.2 px of a silhouette of some 800 px
-  EXPECT_LT(worst, 6e-5);       // chords of 300 segments sink by 1 to 4e-5 m
+  EXPECT_LT(disagreeing, 150);  // 0.2 px along a silhouette of some 800 px
+  EXPECT_LT(worst, 6e-5);       // chords of 300 segments lie 1 to 4e-5 m below the circle
 }
 
 TEST_F(RendererTest, ViewPartStandsWhereTheViewersEyeSeesIt) {
-  // 50 mm off the surface, overhanging its right edge.
+  // The part is 50 mm off the surface and overhangs its right edge.
   const Eigen::Vector3f colour(0.25f, 0.5f, 0.75f);
   const Scene scene = scene_of(
       sheet(0.5, 0.4), {slot("mirror", scene::Mode::view, coloured(sheet(0.16, 0.1, -0.05), colour))});
@@ -110,7 +111,7 @@ TEST_F(RendererTest, ViewPartStandsWhereTheViewersEyeSeesIt) {
       }
     }
     EXPECT_GT(cv::sum(expected)[0], 3000);
-    // A column of the sixteen samples may fall on the other side of an edge.
+    // One column of the sixteen samples may lie on the other side of an edge.
     EXPECT_TRUE(test::image_near(light, expected, 1e-4, 4.2 / 16, "light"));
   }
 }
@@ -170,7 +171,7 @@ TEST_F(RendererTest, PartBehindThePrototypeGetsNoLightAndIsCutInTheComposite) {
     }
   }
   EXPECT_GT(drawn, 2000);
-  EXPECT_LT(wrong, 40);  // half-covered pixels of an outline of some 400
+  EXPECT_LT(wrong, 40);  // half-covered pixels on an outline of some 400 pixels
 }
 
 TEST_F(RendererTest, CoverageSplitsAPartWhereTheSurfaceEnds) {
@@ -239,7 +240,8 @@ TEST_F(RendererTest, CompositeDrawsPartsThroughTheCamerasLens) {
       expected.at<double>(row, column) = pixel_mean(column, row, seen);
       const bool is_drawn = rest.at<cv::Vec3b>(row, column)[0] > 187;  // more than half of its light
       rest_pixels += is_drawn;
-      const auto is_off = [&](int beside_px) {  // the sheet behind, there or beside
+      // Whether the sheet behind ends there, or `beside_px` pixels away.
+      const auto is_off = [&](int beside_px) {
         return !on_sheet(*rig.cameras[0].ray(Vector2d(column, row)), 0.3 + 0.003 * beside_px,
                          0.3 + 0.003 * beside_px, 0);
       };
@@ -251,7 +253,7 @@ TEST_F(RendererTest, CompositeDrawsPartsThroughTheCamerasLens) {
   EXPECT_GT(cv::sum(expected)[0], 20000);
   EXPECT_TRUE(test::image_near(found, expected, 1e-4, 3.2 / 8, "composite"));
   EXPECT_GT(rest_pixels, 3000);
-  EXPECT_LT(wrong_rest, 80);  // half-covered pixels of an outline of some 1000
+  EXPECT_LT(wrong_rest, 80);  // half-covered pixels on an outline of some 1000 pixels
 }
 
 TEST_F(RendererTest, EachPartOfACompositeIsTreatedInItsOwnWay) {
@@ -318,7 +320,8 @@ TEST_F(RendererTest, WhereNoPartIsTheCompositeIsTheCamerasImage) {
 }
 
 TEST_F(RendererTest, LightOfTwoProjectorsSumsToThePartsColour) {
-  // A white sheet over everything that both reach; 0.5 so that both clipping and rounding would show.
+  // A grey sheet over everything that both projectors reach; 0.5, so that both clipping and rounding would be
+  // visible.
   const Scene scene = scene_of(
       sheet(0.9, 0.7), {slot("paint", scene::Mode::surface, coloured(sheet(0.9, 0.7), {0.5f, 0.5f, 0.5f}))});
   const PosedScene posed = posed_at_origin(scene);
@@ -348,7 +351,7 @@ TEST_F(RendererTest, LightOfTwoProjectorsSumsToThePartsColour) {
       const auto border = [](const Vector2d& q) {
         return std::min({q.x(), q.y(), 639 - q.x(), 399 - q.y()});
       };
-      // Where two borders cross, the shares turn from 0 to 1 around one point.
+      // Where two borders cross, the shares change from 0 to 1 around one point.
       if (std::max(border(px), border(Vector2d(column, row))) < 8) continue;
       if (rig.projectors[1].contains(px)) {
         const cv::Mat map(1, 1, CV_32FC2, cv::Scalar(px.x(), px.y()));
@@ -365,14 +368,14 @@ TEST_F(RendererTest, LightOfTwoProjectorsSumsToThePartsColour) {
   }
   EXPECT_GT(both, 50000);
   EXPECT_GT(alone, 5000);
-  EXPECT_LT(worst, 0.02);       // 8 bits at half light are 1.3 % of it, twice over
-  EXPECT_LT(worst_step, 0.02);  // the bar for seams, docs: 2 % in linear light
+  EXPECT_LT(worst, 0.02);       // twice the 8-bit rounding, which is 1.3 % at half light
+  EXPECT_LT(worst_step, 0.02);  // the limit for seams in the docs: 2 % in linear light
 }
 
 TEST_F(RendererTest, BlendSharesTheLightAndMakesUpForMissingBlack) {
   const Scene scene = scene_of(sheet(1.1, 0.7), {});
   const PosedScene posed = posed_at_origin(scene);
-  // Side by side, so that a point's pixel in one is 320 pixels beside that in the other.
+  // The projectors stand side by side, so that a point's pixels in the two images are 320 pixels apart.
   constexpr int k_shift = 320;
   const double black[2] = {0.004, 0.01};
   const Vector3d p_eye[2] = {{-0.2, 0, -1}, {0.2, 0, -1}};
@@ -416,12 +419,11 @@ TEST_F(RendererTest, BlendSharesTheLightAndMakesUpForMissingBlack) {
   EXPECT_GT(both, 100000);
   EXPECT_GT(alone, 100000);
   EXPECT_GT(nowhere, 5000);
-  EXPECT_LT(worst, 1e-3);  // a hundredth of a pixel in the soft border
+  EXPECT_LT(worst, 1e-3);  // equals a hundredth of a pixel in the soft border
   EXPECT_LT(worst_lift, 1e-4);
 }
 
-// Two projectors that differ in nothing but where they are sharp: light is shared by how finely it can be
-// drawn.
+// Two projectors that differ only in their focus distance: the light is shared by how finely each can draw.
 TEST_F(RendererTest, AProjectorOutOfFocusGivesLessOfTheLight) {
   const Scene scene = scene_of(sheet(1.1, 0.7), {});
   const PosedScene posed = posed_at_origin(scene);
@@ -461,7 +463,7 @@ TEST_F(RendererTest, AProjectorOutOfFocusGivesLessOfTheLight) {
 }
 
 TEST_F(RendererTest, ProjectorInTheOthersShadowGivesAllTheLight) {
-  // A post before the plate keeps the right projector's light from a strip of it.
+  // A post in front of the plate keeps the right projector's light from a strip of the plate.
   Mesh mesh = sheet(0.5, 0.4);
   const Mesh post = sheet(0.04, 0.4, -0.15);
   const auto offset = static_cast<std::uint32_t>(mesh.positions.size());
@@ -489,7 +491,7 @@ TEST_F(RendererTest, ProjectorInTheOthersShadowGivesAllTheLight) {
       const Ray to_right{p_right, (p_surface - p_right).normalized()};
       const auto px = rig.projectors[1].project(p_surface);
       const double soft = std::min({px->x(), px->y(), 639 - px->x(), 399 - px->y()});
-      // A millimetre away from the shadow's outline and inside the plate.
+      // Only points at least a millimetre away from the shadow's outline and inside the plate.
       if (std::abs(p[0]) > 0.245f || std::abs(p[1]) > 0.195f || soft < 60) continue;
       if (on_sheet(to_right, 0.036, 0.396, -0.15)) {
         ++shadowed;
@@ -503,7 +505,8 @@ TEST_F(RendererTest, ProjectorInTheOthersShadowGivesAllTheLight) {
   EXPECT_GT(dim, 10000);
 }
 
-// The last triangles of a ball before its outline are seen so much aslant that no texel of ids sees them.
+// The last triangles of a ball before its outline are seen at such a grazing angle that no id texel contains
+// them.
 TEST_F(RendererTest, ABallsShadowReachesAsFarAsItsOutline) {
   const Vector3d p_ball(0, 0, -0.12);
   constexpr double k_radius = 0.05;
@@ -547,7 +550,8 @@ TEST_F(RendererTest, ABallsShadowReachesAsFarAsItsOutline) {
       const auto px = rig.projectors[1].project(Vector3d(p[0], p[1], p[2]));
       if (!px || !rig.projectors[1].contains(*px)) continue;
       const bool in_shadow = !truth.reached(p_right, Vector3d(p[0], p[1], p[2]));
-      const bool made_up = blend.at<cv::Vec2f>(row, column)[1] > 0;  // for the right one's black
+      // Replaces the right projector's black level.
+      const bool made_up = blend.at<cv::Vec2f>(row, column)[1] > 0;
       shadowed += in_shadow;
       lit_in_shadow += in_shadow && !made_up;
       dark_in_light += !in_shadow && made_up;
@@ -607,7 +611,7 @@ TEST_F(RendererTest, NothingIsDrawnAgainUntilSomethingChanges) {
   EXPECT_FALSE(drawn.pass_times().empty());
   const cv::Mat from_there = drawn.projector_image(0, posed, viewer_from({-0.1, -0.2, -1.4}));
   EXPECT_GT(cv::norm(from_there, drawn.projector_image(0, posed, viewer), cv::NORM_INF), 10);
-  // Parts over another image: only laid over it.
+  // With another image behind them, the parts are not drawn again.
   const cv::Mat dark = cv::Mat::zeros(480, 640, CV_8UC1), bright(480, 640, CV_8UC1, cv::Scalar(200));
   const cv::Mat over_dark = drawn.composite(0, dark, posed, Composite::full);
   (void)drawn.pass_times();
@@ -625,7 +629,7 @@ TEST_F(RendererTest, NothingIsDrawnAgainUntilSomethingChanges) {
   EXPECT_GT(cv::norm(plain, drawn.projector_image(0, posed, viewer), cv::NORM_INF), 5);
 }
 
-// Whatever is kept from image to image.
+// No cache may change an image.
 TEST_F(RendererTest, AnImageAfterOthersIsTheSameAsTheFirstOfItsKind) {
   const Scene scene =
       scene_of(sheet(0.5, 0.4),
@@ -671,10 +675,11 @@ TEST_F(RendererTest, WhatMovesIsDrawnQuicklyAndWholeOnceItStandsStill) {
   drawn.set_quick_motion(true);
   (void)drawn.projector_image(0, posed, viewer);
   const cv::Mat quick = drawn.projector_image(0, moved, viewer);
-  EXPECT_GT(cv::norm(quick, whole, cv::NORM_INF), 0) << "edges by half the samples";
+  EXPECT_GT(cv::norm(quick, whole, cv::NORM_INF), 0) << "expected edges with half the samples";
   cv::Mat apart;
   cv::extractChannel(cv::abs(quick - whole), apart, 1);
-  EXPECT_LT(cv::countNonZero(apart), 0.03 * static_cast<double>(quick.total())) << "and edges alone";
+  EXPECT_LT(cv::countNonZero(apart), 0.03 * static_cast<double>(quick.total()))
+      << "expected differences only at edges";
   EXPECT_EQ(cv::norm(drawn.projector_image(0, moved, viewer), whole, cv::NORM_INF), 0);
   EXPECT_EQ(cv::norm(drawn.projector_image(0, moved, viewer), whole, cv::NORM_INF), 0);
 }
@@ -699,12 +704,12 @@ TEST_F(RendererTest, SceneWithoutPrototypeOrProjectorsIsClassicAugmentedReality)
   EXPECT_EQ(coverage[0].off_surface_share, 1);
 }
 
-// The judge of the whole door: Embree, which shares no code with the renderer.
+// The reference for the whole door is Embree, which shares no code with the renderer.
 TEST_F(RendererTest, DoorsCoverageAgreesWithARayTracer) {
   const auto loaded = scene::load_scene(std::filesystem::path(LIMN_SOURCE_DIR) / "config/scenes/door");
   ASSERT_TRUE(loaded) << loaded.message();
   const Scene& scene = *loaded;
-  // The door's front looks to +z with y up: turn it into this room.
+  // The door's front faces +z with y up, so it is turned into this room's frame.
   const Pose turned(Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, Vector3d::UnitX())), Vector3d::Zero());
   PosedScene posed;
   posed.world_from_prototype = turned;

@@ -1,4 +1,4 @@
-// Light that somebody's shadow keeps from the prototype, and how others give it.
+// A person's shadow on the prototype, and how other projectors fill it.
 #include "projector/shadow_detector.h"
 
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ scene::Mesh sheet(double width, double height) {
 class ArrivingTest : public test::GlTest {};
 
 TEST_F(ArrivingTest, OthersGiveTheLightOfABlockedProjector) {
-  // Side by side, so that a point's pixel in one is 320 pixels beside that in the other.
+  // The projectors stand side by side, so that a point's pixels in the two images are 320 pixels apart.
   constexpr int k_shift = 320;
   Rig rig;
   for (const double x : {-0.2, 0.2}) {
@@ -49,7 +49,7 @@ TEST_F(ArrivingTest, OthersGiveTheLightOfABlockedProjector) {
   ASSERT_TRUE(drawing) << drawing.message();
   const cv::Mat before = drawing->blend(0, posed);
 
-  // Rows above are blocked, rows below are free, between them it changes over one of 20 cells.
+  // The upper rows are blocked and the lower rows are free; the change is over one of 20 cells.
   cv::Mat map(20, 8, CV_8U, cv::Scalar(255));
   map.rowRange(0, 10).setTo(0);
   drawing->set_occlusion(0, map);
@@ -61,12 +61,12 @@ TEST_F(ArrivingTest, OthersGiveTheLightOfABlockedProjector) {
       const float share = own.at<cv::Vec2f>(row, column)[0], full = before.at<cv::Vec2f>(row, column)[0];
       if (full == 0) continue;  // beside the sheet
       if (column < k_shift) {
-        EXPECT_NEAR(share, 1, 1e-6) << row << " " << column;  // nobody else reaches
+        EXPECT_NEAR(share, 1, 1e-6) << row << " " << column;  // no other projector reaches
         ++alone;
         continue;
       }
       const float rest = other.at<cv::Vec2f>(row, column - k_shift)[0];
-      const bool reached_well = 1 - full > 0.02F;  // not at the very border of the other's image
+      const bool reached_well = 1 - full > 0.02F;  // not at the border of the other projector's image
       if (row < 200 - k_half_ramp && reached_well) {
         EXPECT_GT(rest, 0.94F) << row << " " << column;
         EXPECT_NEAR(share, std::max(0.07F * std::min(1.0F, 4 * full), 1 - rest), 1e-4)
@@ -88,8 +88,8 @@ TEST_F(ArrivingTest, OthersGiveTheLightOfABlockedProjector) {
   EXPECT_EQ(cv::norm(cv::Mat(drawing->blend(0, posed)), before, cv::NORM_INF), 0);
 }
 
-// A wall in a lit room, painted by two projectors of unlike strength and seen by a grey sRGB camera whose
-// response nobody has measured.
+// A wall in a room with light, two projectors of different brightness, and a grey sRGB camera without a
+// measured response.
 class Room {
  public:
   Room() {
@@ -150,7 +150,7 @@ class Room {
     posed = {world.world_from_prototype, {{part, "a", world.world_from_prototype * prototype_from_part}}};
   }
 
-  // A hand that faces along d.
+  // A hand on the line from p_eye to p_target, facing along it.
   static sim::Object hand(const Vector3d& p_eye, const Vector3d& p_target, double at) {
     Pose pose = looking_at(p_eye, p_target, Vector3d::UnitZ()).inverse();
     pose.translation = p_eye + at * (p_target - p_eye);

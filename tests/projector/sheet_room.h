@@ -1,6 +1,6 @@
 #pragma once
 
-// A room of plain sheets, in which what is to be drawn is known by a formula, and a renderer for it.
+// A room of plain sheets, for which the correct image is known by a formula, and a renderer for it.
 #include <cmath>
 #include <functional>
 #include <optional>
@@ -23,7 +23,7 @@ using scene::PosedScene;
 using scene::Scene;
 using scene::Slot;
 
-// The room: the prototype's front looks towards -z, where projectors, viewer and camera stand.
+// The room: the prototype's front faces -z, where projectors, viewer and camera stand.
 inline const Vector3d k_up(0, -1, 0);
 
 inline Mesh grid(int columns, int rows, const std::function<Vector3d(double, double)>& at) {
@@ -45,7 +45,7 @@ inline Mesh grid(int columns, int rows, const std::function<Vector3d(double, dou
   return mesh;
 }
 
-// A rectangle in a plane of constant z, its middle at the origin.
+// A rectangle in a plane of constant z; its middle is on the z axis.
 inline Mesh sheet(double width, double height, double z = 0, int cells = 7) {
   return grid(cells, cells,
               [=](double u, double v) { return Vector3d((u - 0.5) * width, (v - 0.5) * height, z); });
@@ -107,10 +107,10 @@ inline PosedScene posed_at_origin(const Scene& scene) {
   return posed;
 }
 
-// Light of an 8-bit display value, gamma 2.2.
+// The light of an 8-bit display value, gamma 2.2.
 inline double light_of(std::uint8_t value) { return std::pow(value / 255.0, 2.2); }
 
-// Where the ray meets the rectangle of a sheet() at z; nullopt beside it.
+// Where the ray hits the rectangle of a sheet() at z; nullopt if it misses.
 inline std::optional<Vector3d> on_sheet(const Ray& ray, double width, double height, double z) {
   const double t = (z - ray.p_origin.z()) / ray.d.z();
   const Vector3d p = ray.p_origin + t * ray.d;
@@ -118,12 +118,12 @@ inline std::optional<Vector3d> on_sheet(const Ray& ray, double width, double hei
   return p;
 }
 
-// Mean of f over the eight places of a pixel that the renderer samples, too.
+// Mean of f over the eight sample positions in a pixel that the renderer uses.
 inline double pixel_mean(int column, int row, const std::function<double(const Vector2d&)>& f) {
   const double first = f(Vector2d(column - 0.5, row - 0.5));
   if (first == f(Vector2d(column + 0.5, row - 0.5)) && first == f(Vector2d(column - 0.5, row + 0.5)) &&
       first == f(Vector2d(column + 0.5, row + 0.5))) {
-    return first;  // no corner of a sheet pokes into a pixel
+    return first;  // no corner of a sheet lies inside a pixel
   }
   double sum = 0;
   constexpr int k_rows[] = {3, 6, 0, 5, 2, 7, 1, 4};

@@ -1,4 +1,5 @@
-// The renderer's warp against one made on the CPU: a map by the projector's lens (mrcal), then cv::remap.
+// Compares the renderer's warp with one made on the CPU: a map from the projector's lens (mrcal), then
+// cv::remap.
 #include <Eigen/Dense>
 #include <cmath>
 #include <iostream>
@@ -20,7 +21,7 @@ constexpr double k_wall[2] = {0.5, 0.4}, k_part[2] = {0.3, 0.24};  // m, sides
 constexpr int k_texture[2] = {250, 200};                           // texels
 constexpr double k_stand_off = 0.05;                               // m, of the view part
 
-// Linear light of the part at x, y (m, from its middle).
+// Linear light of the part at x, y (m, relative to its middle).
 Vector3d pattern_rgb(double x, double y) {
   const double a = std::sin(2 * M_PI * x / 0.042), b = std::sin(2 * M_PI * y / 0.038);
   return {0.4 + 0.25 * a, 0.4 + 0.25 * b, 0.4 + 0.12 * (a + b)};
@@ -39,7 +40,7 @@ scene::Mesh sheet(const double (&sides)[2], double z) {
   return mesh;
 }
 
-// As an image, linear light, CV_32FC3 BGR.
+// The pattern as an image: linear light, CV_32FC3 BGR.
 cv::Mat pattern_image() {
   cv::Mat image(k_texture[1], k_texture[0], CV_32FC3);
   for (int row = 0; row < image.rows; ++row)
@@ -72,10 +73,10 @@ scene::Scene wall_with(scene::Mode mode) {
   return scene;
 }
 
-// Where the ray meets the plane of this z.
+// Where the ray hits the plane of this z.
 Vector3d on_plane(const Vector3d& p, const Vector3d& d, double z) { return p + (z - p.z()) / d.z() * d; }
 
-// First pass of a view part: its image from the viewer's eye.
+// First pass for a view part: its image from the viewer's position.
 cv::Mat eye_image(const Imager& viewer) {
   const Vector3d p_eye = viewer.imager_from_world.inverse().translation;
   cv::Mat image(viewer.height, viewer.width, CV_32FC3);
@@ -88,7 +89,8 @@ cv::Mat eye_image(const Imager& viewer) {
   return image;
 }
 
-// Second pass: which pixel of `source` each pixel of the projector shows; `inside` is 255 where the part is.
+// Second pass: the pixel of `source` that each pixel of the projector shows. `inside` is 255 where the part
+// is.
 struct Warp {
   cv::Mat map, inside;
 };
@@ -116,7 +118,7 @@ Warp warp_of(const Imager& projector, const Imager& viewer, scene::Mode mode, co
   return warp;
 }
 
-// The projector's image by cv::remap, display values of gamma 2.2 before rounding.
+// The projector's image by cv::remap: display values (gamma 2.2) before rounding.
 cv::Mat remapped(const cv::Mat& source, const Warp& warp) {
   cv::Mat light, levels;
   cv::remap(source, light, warp.map, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_CONSTANT);
@@ -124,8 +126,8 @@ cv::Mat remapped(const cv::Mat& source, const Warp& warp) {
   return 255 * levels;
 }
 
-// How far `found` is shifted against `expected` (px), worst of the squares of `side` pixels that lie inside:
-// least squares over all channels' gradients.
+// The shift of `found` against `expected` (px) in each square of `side` pixels that lies inside: least
+// squares over the gradients of all channels.
 std::vector<Vector2d> shifts_px(const cv::Mat& found,
                                 const cv::Mat& expected,
                                 const cv::Mat& inside,
@@ -138,7 +140,8 @@ std::vector<Vector2d> shifts_px(const cv::Mat& found,
     for (int x = 0; x + side <= found.cols; x += side) {
       const cv::Rect square(x, y, side, side);
       if (cv::countNonZero(inside(square)) < side * side) continue;
-      Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();  // shift, and levels brighter all over
+      // unknowns: shift, and a constant difference in levels.
+      Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
       Vector3d right = Vector3d::Zero();
       for (int row = y; row < y + side; ++row)
         for (int column = x; column < x + side; ++column)
@@ -204,11 +207,11 @@ TEST_F(WarpTest, IsWhatRemapMakesOfTheLens) {
                 << " lens values"
                 << ": mean " << mean[1] << " levels, " << 100 * over << " % over 2; worst shift of "
                 << shifts.size() << " squares " << worst_of(shifts) << " px\n";
-      EXPECT_LT(mean[1], 0.6);  // rounding texture, image and places (to 1/32 by cv::remap)
+      EXPECT_LT(mean[1], 0.6);  // rounding of texture, image and positions (to 1/32 by cv::remap)
       EXPECT_LT(over, 1e-3);
       EXPECT_GT(shifts.size(), 15u);
       EXPECT_LT(worst_of(shifts), 0.05);
-      // Light where the part is, and nowhere else but at its outline.
+      // There is light where the part is, and elsewhere only at its outline.
       cv::Mat lit, wrong;
       cv::extractChannel(found, lit, 1);
       wrong = ((lit > 0) != (warp.inside > 0));
@@ -217,7 +220,7 @@ TEST_F(WarpTest, IsWhatRemapMakesOfTheLens) {
                        cv::getStructuringElement(cv::MORPH_RECT, {3, 3}));
       EXPECT_EQ(cv::countNonZero(wrong & (outline == 0)), 0);
 
-      // The measure tells a tenth of a pixel.
+      // The measure must detect a shift of a tenth of a pixel.
       const cv::Mat shifted = remapped(source, warp_of(projector, viewer, mode, {0.1, 0}));
       for (const Vector2d& shift : shifts_px(found, shifted, inside, 40))
         EXPECT_LT((shift - Vector2d(0.1, 0)).norm(), 0.05);

@@ -27,7 +27,7 @@ void expect_same_mesh(const scene::Mesh& found, const scene::Mesh& expected, con
     ASSERT_LT((found.positions[i] - expected.positions[i]).norm(), 1e-6f) << name << ", vertex " << i;
 }
 
-// Compared as shapes to a micrometre, not as bytes: another processor's sine differs in its last bit.
+// Shapes are compared to a micrometre, not bytes: another processor's sine differs in its last bit.
 TEST(CarDoor, TheCommittedFilesAreWhatTheGeneratorMakes) {
   const auto files = sim::car_door_files();
   const fs::path made = test_folder();
@@ -61,7 +61,7 @@ TEST(CarDoor, TheLoadedSceneIsTheOneInMemory) {
   EXPECT_EQ(loaded->slots[1].mode, scene::Mode::surface);
   const scene::Mesh &a = loaded->prototype->mesh, &b = made.prototype->mesh;
   for (std::size_t t = 0; t < b.triangles.size();
-       ++t)  // the loader may number corners anew, and turn a triangle
+       ++t)  // the loader may renumber corners and rotate a triangle's corners
     for (std::size_t k = 0; k < 3; ++k) {
       const auto gap = [&](std::size_t j) {
         return (a.positions[a.triangles[t][j]] - b.positions[b.triangles[t][k]]).norm();
@@ -133,7 +133,7 @@ TEST(CarDoor, PlatesTouchTheClayAndAreClearOfIt) {
       }
     EXPECT_GT(least, 0.1_mm);
     EXPECT_LT(least, 0.6_mm);
-    EXPECT_LT(most, 4.0_mm);  // curvature below a plate's corners
+    EXPECT_LT(most, 4.0_mm);  // curvature of the clay below a plate's corners
   }
 }
 
@@ -147,7 +147,7 @@ TEST(CarDoor, TheWorldsStandTheSlotMarkersWhereTheGeneratorSays) {
   }
 }
 
-// In place, moved by 150 mm and turned by 40°, the studio's camera sees the markers well enough and both
+// With the door in place, moved by 150 mm and turned by 40°, the studio's camera sees enough markers and both
 // projectors reach the door.
 TEST(CarDoor, TheStudioSeesTheDoorInItsWholeWorkingVolume) {
   sim::World world = sim::load_world(k_config / "worlds" / "studio.json", plain_marker).value();
@@ -187,7 +187,7 @@ TEST(CarDoor, TheStudioSeesTheDoorInItsWholeWorkingVolume) {
   }
 }
 
-// The designer sees every mirror partly before the door and partly beyond its edge.
+// The designer sees every mirror partly in front of the door and partly beyond its edge.
 TEST(CarDoor, EveryMirrorOverhangsTheDoorInPart) {
   const sim::World world = sim::load_world(k_config / "worlds" / "studio.json", plain_marker).value();
   for (const scene::Variant& variant : world.scene->slots[0].variants) {

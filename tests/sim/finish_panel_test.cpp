@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 const fs::path k_finishes = fs::path(LIMN_SOURCE_DIR) / "config/scenes/finishes";
 
-// Compared as shapes and images, not as bytes: another processor's sine differs in its last bit.
+// Shapes and images are compared, not bytes: another processor's sine differs in its last bit.
 TEST(FinishPanel, TheCommittedFilesAreWhatTheGeneratorMakes) {
   const fs::path made = test::test_folder();
   for (const auto& [name, content] : sim::finish_panel_files()) {

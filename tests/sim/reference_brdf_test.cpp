@@ -39,13 +39,13 @@ scene::RoomLight even_light(double strength) {
 TEST(ReferenceBrdf, ALampHeadOnIsMirroredAsGgxSays) {
   scene::RoomLight room;
   room.lamps = {{k_up, Vector3d(0.3, 0.2, 0.1)}};
-  // pi D V = 1 / (4 alpha^2) where light, eye and normal are one; alpha = 0.5^2.
+  // pi D V = 1 / (4 alpha^2) when light, viewing direction and normal are the same; alpha = 0.5^2.
   const Vector3d metal = shaded(substance({0.2, 0.4, 0.8}, 1, 0.5), k_up, k_up, room);
   EXPECT_TRUE(test::near(metal, 4 * Vector3d(0.2 * 0.1, 0.4 * 0.2, 0.8 * 0.3), 1e-9));
-  // 4 % of white in front of what is left of the colour.
+  // 4 % reflected white light, over the remaining diffuse colour.
   const Vector3d gloss = shaded(substance({0.2, 0.4, 0.8}, 0, 0.5), k_up, k_up, room);
   EXPECT_NEAR(gloss.x(), 0.1 * (0.96 * 0.2 + 0.04 * 4), 1e-9);
-  // A lamp has a size.
+  // A lamp has a size, so smoother surfaces do not differ.
   const auto smooth = [&](double roughness) {
     return shaded(substance({1, 1, 1}, 1, roughness), k_up, k_up, room);
   };
@@ -64,7 +64,7 @@ TEST(ReferenceBrdf, InEvenLightNoMetalIsBrighterThanItAndASmoothOneIsAsBright) {
     }
 }
 
-// The same direction by direction over the half space, without half vectors.
+// The reflected soft light as a sum over directions of the hemisphere, without half vectors.
 Vector3d mirrored_by_rings(const SurfaceMaterial& s,
                            const Vector3d& n,
                            const Vector3d& d_eye,
@@ -147,7 +147,8 @@ TEST(ReferenceBrdf, TexturesAndFactorsAreMultipliedAndRepeat) {
   for (const Eigen::Vector2f& uv : {Eigen::Vector2f(0.75F, 0.75F), {1.75F, -0.25F}}) {
     EXPECT_NEAR(surface_material(mesh, 0, uv).roughness, 1, 1e-6);
   }
-  EXPECT_NEAR(surface_material(mesh, 0, {0, 0.75F}).roughness, 0.7, 1e-6);  // half way to its repetition
+  // Half way between the texture and its repetition.
+  EXPECT_NEAR(surface_material(mesh, 0, {0, 0.75F}).roughness, 0.7, 1e-6);
 }
 
 }  // namespace

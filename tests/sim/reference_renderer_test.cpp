@@ -55,7 +55,7 @@ Imager eye_at(const Eigen::Vector3d& p_eye) {
   return viewer_imager(looking_at(p_eye, {0, 0, 1}, -Eigen::Vector3d::UnitY()).inverse(), 320, 240, 40);
 }
 
-// Mean place of the covered pixels and their number, edges by their share.
+// Centroid of the covered pixels and their number; pixels at edges count by their share.
 std::pair<Eigen::Vector2d, double> centroid(const cv::Mat& cover) {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   for (int row = 0; row < cover.rows; ++row)
@@ -66,8 +66,8 @@ std::pair<Eigen::Vector2d, double> centroid(const cv::Mat& cover) {
 }
 
 TEST(ReferenceRenderer, LightOfAViewPartLiesWhereTheEyeSeesItOnThePlane) {
-  // 0.1 m before the plane, 0.08 x 0.06 m: from an eye at x = 0.5 at the plane's z - 1, it covers a rectangle
-  // 1 / 0.9 times as large, shifted by the eye's 0.5 * (1 - 1 / 0.9).
+  // The part is 0.1 m in front of the plane, 0.08 x 0.06 m. Seen by a viewer at x = 0.5 and 1 m from the
+  // plane, it covers a rectangle that is 1 / 0.9 times as large, shifted by 0.5 * (1 - 1 / 0.9).
   const World world = plane_world(scene::Mode::view, sheet_at(0.08, 0.06, 0.05, -0.1));
   const ReferenceRenderer reference(world, posed(world), eye_at({0.5, 0, 0}));
   const PartImage image = reference.projector_image(0);
@@ -93,7 +93,7 @@ TEST(ReferenceRenderer, WhatThePrototypeHidesFromTheEyeGetsNoLight) {
   World world = plane_world(scene::Mode::view, sheet_at(0.08, 0.06, 0.05, -0.1));
   const Imager eye = eye_at({0.5, 0, 0});
   EXPECT_GT(cv::countNonZero(ReferenceRenderer(world, posed(world), eye).projector_image(0).cover), 500);
-  // A flap of the prototype half way to the eye, beside the projector's image.
+  // A flap of the prototype half way to the viewer, outside the projector's image.
   scene::Mesh flapped = *world.objects[0].mesh;
   const scene::Mesh flap = sheet_at(0.12, 0.12, 0.35, -0.7);
   flapped.positions.insert(flapped.positions.end(), flap.positions.begin(), flap.positions.end());
@@ -121,7 +121,7 @@ TEST(ReferenceRenderer, SurfacePartsAreLitForEveryEyeWithinTwoMillimetresOnly) {
 }
 
 TEST(ReferenceRenderer, SeenPartsCoverTheirEdgesInPart) {
-  // From column 139.75 to column 171.75.
+  // The part covers columns 139.75 to 171.75.
   const World world =
       plane_world(scene::Mode::view, sheet_at(32 / 400.0 * 0.9, 24 / 400.0 * 0.9, -3.75 / 400.0 * 0.9, -0.1));
   const PartImage seen =
@@ -142,16 +142,16 @@ TEST(ReferenceRenderer, ShadingFollowsTheLampOverTheEyesLeftShoulder) {
     turned.parts[0].world_from_part = world.world_from_prototype * turn;
     return ReferenceRenderer(world, turned, camera).parts_image(camera).light.at<cv::Vec3f>(119, 159)[0];
   };
-  // Facing the eye: soft light half way between 0.15 and 0.35, and the lamp's cosine 0.68 / |(.36, .64,
+  // Facing the viewer: soft light half way between 0.15 and 0.35, and the lamp's cosine 0.68 / |(.36, .64,
   // .68)|.
   EXPECT_NEAR(middle(Pose()), 0.25 + 0.65 * 0.68 / std::sqrt(0.36 * 0.36 + 0.64 * 0.64 + 0.68 * 0.68), 1e-4);
   const auto tilted = [&](double w) {
     return middle(Pose(exp_rotation({w, 0, 0}), Eigen::Vector3d::Zero()));
   };
-  EXPECT_GT(tilted(-0.4), tilted(0.4) + 0.2) << "what looks up is brighter";
+  EXPECT_GT(tilted(-0.4), tilted(0.4) + 0.2) << "a surface that faces up must be brighter";
 }
 
-// A sheet that faces the eye and whose map of normals looks half to its texture's right and up.
+// A sheet that faces the viewer; its normal map is tilted half towards the texture's right and up.
 scene::Mesh mapped_sheet() {
   scene::Mesh part = sheet_at(0.2, 0.2, 0, -0.1);
   for (const auto& p : part.positions) part.uvs.emplace_back(p.x() / 0.2F + 0.5F, 0.5F - p.y() / 0.2F);

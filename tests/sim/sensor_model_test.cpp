@@ -16,7 +16,7 @@ using Images = std::vector<cv::Mat>;
 
 Images flat(int value) { return {cv::Mat(150, 200, CV_8U, cv::Scalar(value))}; }
 
-// Light of the wall with one effect set, beside the same without: the ratio at a few lit pixels.
+// Compares the light of the wall with and without one effect, as a ratio at a few illuminated pixels.
 struct Fixture {
   sim::World world = small_world();
   sim::Samples samples = sim::trace(world, 0);
@@ -85,7 +85,8 @@ TEST(Photograph, ChannelsMayHaveResponsesOfTheirOwn) {
 TEST(Photograph, ACamerasColoursOverlap) {
   Fixture f;
   f.world.camera_effects[0].colour = true;
-  f.world.camera_effects[0].sensitivity << 0.9, 0.1, 0, 0, 0.8, 0.2, 0, 0, 1;  // its green sees a little red
+  // The camera's green also sees a little red.
+  f.world.camera_effects[0].sensitivity << 0.9, 0.1, 0, 0, 0.8, 0.2, 0, 0, 1;
   const Images red = {cv::Mat(150, 200, CV_8UC3, cv::Scalar(0, 0, 255))};
   const auto seen = sim::ideal_light(f.world, f.samples, red).at<cv::Vec3f>(120, 160);
   EXPECT_EQ(seen[0], 0);
@@ -144,7 +145,8 @@ TEST(Photograph, DefocusWidensAnEdgeByTheDiscOfConfusion) {
   f.world.projector_effects[0].focus_m = 0.8;
   f.world.projector_effects[0].aperture_m = 0.02;
   const auto blurred = spread();
-  const double disc_px = 2000 * 0.02 * (1 / 0.8 - 1 / 1.0);  // 10 px across: stdev a quarter
+  // 10 px diameter; the standard deviation is a quarter of it.
+  const double disc_px = 2000 * 0.02 * (1 / 0.8 - 1 / 1.0);
   EXPECT_NEAR(blurred.second * blurred.second - sharp.second * sharp.second, std::pow(disc_px / 4, 2), 0.3);
   EXPECT_NEAR(blurred.first, sharp.first, 2e-3 * sharp.first);  // no light lost
 }
@@ -189,7 +191,8 @@ TEST(Photograph, BlackLevelAndEncodingShiftLevelsAsStated) {
   EXPECT_EQ(sim::digitised(world, 0, flat_signal(1), 1).at<std::uint8_t>(5, 5), 255);
   world.camera_effects[0].black_level = 0;
   world.camera_effects[0].srgb = true;
-  EXPECT_EQ(sim::digitised(world, 0, flat_signal(0.2140), 1).at<std::uint8_t>(5, 5), 127);  // sRGB's middle
+  // The middle of the sRGB range.
+  EXPECT_EQ(sim::digitised(world, 0, flat_signal(0.2140), 1).at<std::uint8_t>(5, 5), 127);
 }
 
 TEST(Photograph, ReadNoiseHasTheInjectedDeviationAtEveryLevel) {
@@ -198,8 +201,8 @@ TEST(Photograph, ReadNoiseHasTheInjectedDeviationAtEveryLevel) {
   for (const double value : {0.2, 0.7}) {
     const auto [mean, variance] = mean_and_variance(sim::digitised(world, 0, flat_signal(value), 5));
     EXPECT_NEAR(mean, value * 255, 0.05);
-    EXPECT_NEAR(std::sqrt(variance - 1.0 / 12), 3,
-                0.02);  // a whole-level rounding adds 1/12; 300 000 pixels: 0.004
+    // Rounding to whole levels adds 1/12; the standard deviation for 300 000 pixels is 0.004.
+    EXPECT_NEAR(std::sqrt(variance - 1.0 / 12), 3, 0.02);
   }
 }
 

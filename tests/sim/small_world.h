@@ -6,14 +6,14 @@
 
 namespace limn::test {
 
-/// Turns a sheet so that it faces -y, upright (z up): its x is the world's, its z is +y.
+/// The pose of an upright sheet (z up) that faces -y: its x is the world's x, its z is the world's +y.
 inline Pose facing_minus_y(double x, double y, double z) {
   return Pose(Eigen::Quaterniond(Eigen::AngleAxisd(-std::numbers::pi / 2, Eigen::Vector3d::UnitX())),
               {x, y, z});
 }
 
-/// A white wall at y = `wall_y`, seen by a camera at the origin (320 x 240) and lit by a distorted projector
-/// beside it (200 x 150); both look along +y. No effects, no room light.
+/// A white wall at y = `wall_y`, a camera at the origin (320 x 240), and beside it a projector with lens
+/// distortion (200 x 150); both face +y. No effects, no room light.
 inline sim::World small_world(double wall_y = 1.0) {
   sim::World world;
   const Pose camera_from_world = looking_at({0, 0, 0}, {0, 1, 0}, Eigen::Vector3d::UnitZ());

@@ -13,7 +13,7 @@ namespace {
 
 using namespace test;
 
-// Where the camera's pixel meets the wall at y = 1, by hand.
+// Where the camera's pixel hits the wall, computed by hand.
 Eigen::Vector3d wall_point(const sim::World& world, int column, int row, double wall_y = 1) {
   const Ray ray = *world.rig.cameras[0].ray(Eigen::Vector2d(column, row));
   return ray.p_origin + ray.d * (wall_y / ray.d.y());
@@ -85,7 +85,7 @@ TEST(Trace, AnOccluderCastsItsShadowWhereGeometrySays) {
 TEST(Trace, AnOutOfSightProjectorGivesNoLight) {
   sim::World world = small_world();
   world.rig.projectors[0].imager_from_world = looking_at({0.3, 2, 0.1}, {0, 1, 0}, Eigen::Vector3d::UnitZ());
-  const sim::Samples samples = sim::trace(world, 0);  // it lights the wall's back
+  const sim::Samples samples = sim::trace(world, 0);  // the projector lights the wall's back
   for (const sim::ProjectorView& view : samples.projectors[0]) ASSERT_EQ(view.gain, 0);
 }
 
@@ -103,8 +103,8 @@ TEST(Trace, WeightsOfEveryPixelSumToOne) {
   for (const float s : sum) ASSERT_NEAR(s, 1, 1e-5);
 }
 
-// Edges of a black square in a white margin, found by the moment of intensity along rows: each lies where its
-// projected line crosses the row.
+// The edges of a black square in a white margin are found by moments of intensity along rows. Each must lie
+// where its projected line crosses the row.
 TEST(Trace, MarkerEdgesLieWhereTheTruthSays) {
   sim::World world = small_world();
   world.room.ambient = 1;
@@ -126,7 +126,7 @@ TEST(Trace, MarkerEdgesLieWhereTheTruthSays) {
       const double x_true = a.x() + (b.x() - a.x()) * (row - a.y()) / (b.y() - a.y());
       const int middle = static_cast<int>(std::lround(x_true)), reach = 7;
       const float left = light.at<float>(row, middle - reach), right = light.at<float>(row, middle + reach);
-      double share = 0;  // of the right-hand level within the window
+      double share = 0;  // share of the right-hand level within the window
       for (int c = middle - reach; c <= middle + reach; ++c)
         share += (light.at<float>(row, c) - left) / (right - left);
       const double x = middle + reach + 0.5 - share;
@@ -136,7 +136,8 @@ TEST(Trace, MarkerEdgesLieWhereTheTruthSays) {
     }
   }
   ASSERT_GT(count, 100);
-  EXPECT_LT(std::sqrt(squares / count), 0.02);  // 32 sub-samples a pixel: up to 1/64 px each
+  // With 32 sub-samples in a pixel, each edge is accurate to 1/64 px.
+  EXPECT_LT(std::sqrt(squares / count), 0.02);
   EXPECT_LT(std::abs(sum / count), 0.004);
 }
 

@@ -13,7 +13,7 @@ namespace {
 
 using namespace test;
 
-// A square of side 0.2 m, frame at its centre, facing -z, as a part of the slot "part".
+// A scene with one part in the slot "part": a square of side 0.2 m, frame at its centre, facing -z.
 scene::Scene one_part_scene(scene::Mode mode) {
   scene::Slot slot;
   slot.name = "part";
@@ -26,8 +26,8 @@ scene::Scene one_part_scene(scene::Mode mode) {
   return scene;
 }
 
-// The prototype is a square of side 0.4 m at y = 1 before a wall; the part stands `gap` before the prototype,
-// half over its right edge.
+// The prototype is a square of side 0.4 m at y = 1 in front of a wall. The part stands `gap` in front of the
+// prototype; half of it extends beyond the right edge.
 struct Stage {
   sim::World world = small_world(1.5);
   scene::PosedScene parts;
@@ -87,7 +87,7 @@ TEST(Truth, AShadowOfThePrototypeItselfIsOffSurface) {
   stage.world.rig.projectors[0].imager_from_world =
       looking_at({0.3, 3, 0.1}, {0, 1, 0}, Eigen::Vector3d::UnitZ());
   const cv::Mat mask = sim::Truth(stage.world, stage.parts).part_mask(stage.world.rig.cameras[0], "part");
-  EXPECT_EQ(cv::countNonZero(mask == 255), 0);  // lit from behind only
+  EXPECT_EQ(cv::countNonZero(mask == 255), 0);  // illuminated from behind only
   EXPECT_GT(cv::countNonZero(mask == 128), 5000);
 }
 
@@ -122,7 +122,8 @@ TEST(Truth, ObjectImageNamesTheNearestThing) {
 
 TEST(Truth, SurfacePointsAreUniformByAreaAndOnTheMesh) {
   scene::Mesh mesh =
-      *sim::sheet("", 1, 1, {}, Pose()).mesh;  // two triangles; a third of thrice the area beside them
+      // Two triangles of this sheet; a third one beside them has three times the area.
+      *sim::sheet("", 1, 1, {}, Pose()).mesh;
   mesh.positions.insert(mesh.positions.end(), {{1, 0, 0}, {3, 0, 0}, {1, 3, 0}});
   mesh.normals.insert(mesh.normals.end(), 3, {0, 0, -1});
   mesh.triangles.push_back({4, 5, 6});

@@ -83,7 +83,7 @@ TEST(VirtualRig, AClearStageComesBack) {
   rig.remove_prototype();
   const cv::Mat clear = rig.camera(0).next().value().image;
   EXPECT_EQ(clear.channels(), 1);
-  for (const auto object : rig.samples(0).object) ASSERT_EQ(object, 0);  // the wall alone
+  for (const auto object : rig.samples(0).object) ASSERT_EQ(object, 0);  // only the wall
   rig.restore_prototype();
   EXPECT_TRUE(image_near(rig.camera(0).next().value().image, before, 0, 0, "restored"));
 }
