@@ -11,7 +11,7 @@
 namespace limn::apps {
 namespace {
 
-constexpr int k_width = 960;  // of an image, pixels
+constexpr int k_width = 960;  // largest width of an image, pixels
 
 constexpr const char* k_sheet_style = R"(
 body { margin: 0 auto; max-width: 1320px; padding: 2rem 1.5rem 4rem; background: #14161a; color: #e8e6e1;

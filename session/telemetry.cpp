@@ -28,7 +28,7 @@ svg { width: 100%; height: 140px; background: #1b1e24; border-radius: 4px; }
 polyline { fill: none; stroke: #7fb4ff; stroke-width: 1.5; } text { fill: #a9a69f; font-size: 12px; }
 )";
 
-// A line over the session, in a box of 1000 x 140.
+// A line chart over the session's time, in a box of 1000 x 140.
 std::string chart(const std::string& title,
                   const std::vector<std::pair<double, double>>& points,
                   const std::string& unit) {
@@ -73,13 +73,16 @@ double Quantiles::at(double share) const {
 }
 
 Telemetry::Telemetry()
-    : measures_{{"detect", "ms", "finding markers", {}},
+    : measures_{{"detect", "ms", "detecting markers", {}},
                 {"filter", "ms", "poses and motions", {}},
-                {"paint", "ms", "projector pictures", {}},
-                {"screen", "ms", "the screen's picture", {}},
-                {"record", "ms", "handing over to the recording", {}},
+                {"paint", "ms", "drawing the projectors' images", {}},
+                {"screen", "ms", "drawing the screens' images", {}},
+                {"record", "ms", "passing data to the recording", {}},
                 {"latency", "ms", "from the camera's exposure to light on the surface", {}},
-                {"placement", "mm", "of the parts from their true places, RMS (virtual rig)", {}}} {}
+                {"placement",
+                 "mm",
+                 "RMS distance of the parts from their true positions (virtual rig only)",
+                 {}}} {}
 
 Result<Telemetry> Telemetry::create(const std::filesystem::path& folder) {
   Telemetry out;
@@ -111,7 +114,7 @@ void Telemetry::add(const ShownFrame& frame) {
   if (const auto news = csv_.news()) note(frame.shown_at, *news);
 }
 
-// When there are too many slices, two become one.
+// When there are too many slices, every two neighbours are merged.
 void Telemetry::add_to_slice(const ShownFrame& frame, double latency_ms) {
   const double at_s = seconds_between(begun_at_, frame.shown_at);
   if (slices_.empty() || at_s >= slices_.back().begins_s + slice_s_) slices_.push_back({at_s, 0, 0, 0, 0});
@@ -158,8 +161,9 @@ Status Telemetry::write_page(const std::filesystem::path& path, const std::strin
   const nlohmann::ordered_json json = summary();
   std::string html = fmt::format(
       "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>{0}</title><style>{1}</style>"
-      "<h1>{0}</h1><p class=\"lead\">{2:.1f} s, {3} pictures shown, {4} camera frames missed, {5} pictures "
-      "with a lost body.</p>\n<table><tr><th>what</th><th>median</th><th>95 %</th><th>99 %</th></tr>\n",
+      "<h1>{0}</h1><p class=\"lead\">{2:.1f} s, {3} images shown, {4} camera frames missed, {5} images "
+      "with a lost body.</p>\n<table><tr><th>measurement</th><th>median</th><th>95 %</th><th>99 "
+      "%</th></tr>\n",
       escaped(title), k_telemetry_style, json["seconds"].get<double>(), frames_, missed_, with_lost_);
   for (const Measure& measure : measures_) {
     if (measure.all.count() == 0) continue;
@@ -176,10 +180,11 @@ Status Telemetry::write_page(const std::filesystem::path& path, const std::strin
     paint.emplace_back(slice.begins_s, slice.paint_ms);
     placement.emplace_back(slice.begins_s, slice.placement_mm);
   }
-  html += chart("Camera to light, the worst in each slice", latency, "ms");
-  html += chart("Painting, the worst in each slice", paint, "ms");
-  html += chart("Parts from their true places, the worst in each slice", placement, "mm");
-  html += "<h2>What happened</h2><table>\n";
+  html += chart("Latency from camera to light, maximum of each time slice", latency, "ms");
+  html += chart("Time to draw the projectors' images, maximum of each time slice", paint, "ms");
+  html +=
+      chart("Distance of the parts from their true positions, maximum of each time slice", placement, "mm");
+  html += "<h2>Messages</h2><table>\n";
   for (const auto& [at_s, what] : notes_)
     html += fmt::format("<tr><td class=\"n\">{:.2f} s</td><td>{}</td></tr>\n", at_s, escaped(what));
   return write_file(path, html + "</table></html>\n");

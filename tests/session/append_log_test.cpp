@@ -34,7 +34,7 @@ TEST(AppendLog, LinesWaitWhileTheDiskIsFull) {
     }
     add("4\n");
     EXPECT_EQ(read_file(path).value(), all);
-    EXPECT_EQ(file->news(), "rows.csv is written again");
+    EXPECT_EQ(file->news(), "rows.csv can be written again.");
     add("5\n");
     file->add("6\n", shifted(Stamp{}, at_s + 0.1));
     all += "6\n";

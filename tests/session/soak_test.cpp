@@ -160,8 +160,8 @@ TEST(Soak, ALongSessionWithAllThatGoesWrong) {
     resized += what.find("found one of 320x240") != std::string::npos;
     stepped += what.find("clock has stepped") != std::string::npos;
     moved += what.find("has moved") != std::string::npos;
-    full += what.find("Its lines wait") != std::string::npos;
-    written_again += what.find("is written again") != std::string::npos;
+    full += what.find("Its lines are kept") != std::string::npos;
+    written_again += what.find("can be written again") != std::string::npos;
   }
   std::printf("%.0f s, memory %.1f MiB", seconds, end_mib);
   if (minute_mib > 0)
