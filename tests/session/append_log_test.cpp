@@ -30,7 +30,7 @@ TEST(AppendLog, LinesWaitWhileTheDiskIsFull) {
       ASSERT_TRUE(news);
       EXPECT_NE(news->find("rows.csv: expected to write here"), std::string::npos) << *news;
       add("333\n");
-      EXPECT_FALSE(file->news()) << "told once";
+      EXPECT_FALSE(file->news()) << "each message comes once";
     }
     add("4\n");
     EXPECT_EQ(read_file(path).value(), all);
@@ -39,7 +39,7 @@ TEST(AppendLog, LinesWaitWhileTheDiskIsFull) {
     file->add("6\n", shifted(Stamp{}, at_s + 0.1));
     all += "6\n";
   }
-  EXPECT_EQ(read_file(path).value(), all) << "the last lines at the end";
+  EXPECT_EQ(read_file(path).value(), all) << "the destructor writes the last lines";
 }
 
 TEST(AppendLog, OfTooManyLinesTheNewestAreKept) {
