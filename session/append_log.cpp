@@ -60,8 +60,8 @@ void AppendLog::flush() {
 
 std::optional<std::string> AppendLog::news() {
   if (std::exchange(is_told_, true)) return std::nullopt;
-  if (!is_stuck_) return path_.filename().string() + " is written again";
-  return why_ + " Its lines wait.";
+  if (!is_stuck_) return path_.filename().string() + " can be written again.";
+  return why_ + " Its lines are kept and written later.";
 }
 
 }  // namespace limn::apps

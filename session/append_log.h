@@ -10,12 +10,13 @@
 
 namespace limn::apps {
 
-/// A text file that grows line by line and is written about once a second. While it cannot be written (a full
-/// disk) the lines wait and are written later; of more than a megabyte the oldest are lost.
+/// A text file to which lines are appended; it is written about once a second. While it cannot be written (a
+/// full disk), the lines are kept in memory and written later; beyond one megabyte the oldest lines are
+/// dropped.
 class AppendLog {
  public:
-  AppendLog() = default;  ///< no file: lines are forgotten
-  /// A new file with its first line.
+  AppendLog() = default;  ///< Without a file: lines are discarded.
+  /// Creates a file with this first line.
   static Result<AppendLog> create(const std::filesystem::path& path, std::string_view first_line);
   AppendLog(AppendLog&& other) noexcept;
   AppendLog& operator=(AppendLog&& other) noexcept;
@@ -25,7 +26,7 @@ class AppendLog {
   void add(std::string_view line, Stamp at);
   void flush();
 
-  /// Once when lines begin to wait, and once when they are written again: a sentence that tells it.
+  /// A message when writing begins to fail, and one when it works again, each once; otherwise nullopt.
   std::optional<std::string> news();
 
  private:

@@ -33,7 +33,8 @@ CameraThreads::~CameraThreads() {
       continue;
     }
     running.thread.detach();
-    log_warning("live: {} did not come back from its driver; it is left.", running.camera);
+    log_warning("live: the driver of {} does not respond; the session ends without closing this camera.",
+                running.camera);
   }
 }
 
@@ -43,7 +44,7 @@ void CameraThreads::add(std::unique_ptr<device::CameraSource> camera, std::size_
   running.thread =
       std::thread([camera = std::move(camera), number, shared = shared_, ended = std::move(ended)]() mutable {
         grab(camera.get(), number, shared.get());
-        camera.reset();  // which may take its time, too
+        camera.reset();  // closing the camera may take long, too
         ended.set_value();
       });
   running_.push_back(std::move(running));

@@ -15,26 +15,27 @@
 
 namespace limn::apps {
 
-/// By camera.
+/// Frames by the name of their camera.
 using Frames = std::map<std::string, Frame>;
 
-/// A thread for each camera of a session, which takes its frames and puts them on the session's clock. The
-/// newest of each waits for whoever asks; older ones are dropped and counted.
+/// Runs one thread for each camera of a session. It reads the camera's frames and converts their stamps to
+/// the session's clock. Only the newest frame of each camera is kept until take(); older ones are dropped and
+/// counted.
 class CameraThreads {
  public:
   explicit CameraThreads(std::shared_ptr<DeviceHealth> health);
-  /// Takes no longer than k_patience: a camera that does not come back from its driver by then (one that was
-  /// lost may be searched for for many seconds) is left behind with its thread, and that is told.
+  /// Takes no longer than k_patience. A camera whose driver has not returned by then (the search for a lost
+  /// camera can take many seconds) is abandoned with its thread, with a warning in the log.
   ~CameraThreads();
 
   static constexpr std::chrono::milliseconds k_patience{500};
 
-  /// `number`: as `health` calls it.
+  /// `number`: the camera's number in `health`.
   void add(std::unique_ptr<device::CameraSource> camera, std::size_t number);
 
-  /// The newest frames that were not taken yet; waits for one for so long.
+  /// The newest frames that were not taken yet; waits up to `wait` for one.
   std::optional<Frames> take(std::chrono::nanoseconds wait);
-  /// Frames that were dropped since the last call.
+  /// Number of frames that were dropped since the last call.
   std::size_t missed();
 
  private:
@@ -46,7 +47,7 @@ class CameraThreads {
   };
   static void grab(device::CameraSource* camera, std::size_t number, Shared* shared);
 
-  std::shared_ptr<Shared> shared_;  // with threads that are left behind
+  std::shared_ptr<Shared> shared_;  // shared with abandoned threads
   std::vector<Running> running_;
 };
 

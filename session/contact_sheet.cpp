@@ -12,7 +12,7 @@
 namespace limn::apps {
 namespace {
 
-constexpr int k_width = 960;  // of an image, pixels
+constexpr int k_width = 960;  // largest width of an image, pixels
 
 constexpr const char* k_sheet_style = R"(
 .looks { display: grid; grid-template-columns: repeat(auto-fill, minmax(26rem, 1fr)); gap: 1.6rem; margin-top: 1rem; }

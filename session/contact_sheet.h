@@ -8,8 +8,8 @@
 
 namespace limn::apps {
 
-/// A self-contained page of a project's looks for a review: each one's image (NAME.png in `folder`) and
-/// variants. Looks without an image are listed without.
+/// Writes a self-contained HTML page for a review of a project's looks: each look's image (NAME.png in
+/// `folder`) and its variants. A look without an image file is listed without an image.
 Status write_contact_sheet(std::span<const scene::Look> looks,
                            const std::filesystem::path& folder,
                            const std::filesystem::path& page);

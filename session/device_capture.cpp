@@ -5,10 +5,10 @@
 namespace limn::apps {
 namespace {
 
-constexpr auto k_grab_wait =
-    std::chrono::milliseconds(50);            // for a frame, before it is asked whether all is over
-constexpr double k_patience_s = 5;            // for an image
-constexpr double k_longest_exposure_s = 0.1;  // while a camera's period is not known
+// Wait for a frame before is_ended_ is checked again.
+constexpr auto k_grab_wait = std::chrono::milliseconds(50);
+constexpr double k_patience_s = 5;            // longest wait for an image
+constexpr double k_longest_exposure_s = 0.1;  // assumed while a camera's period is not known
 
 std::vector<std::string> device_names(const std::vector<Imager>& imagers) {
   std::vector<std::string> out;
@@ -54,11 +54,13 @@ void DeviceCapture::pause_perception(Session* session) {
     session->take(std::move(*last.watched), last.moments);
 }
 
-// One projector shows an image, the others nothing.
+// Shows an image on one projector, and black on the others.
 Status DeviceCapture::show_pattern(std::size_t projector, const cv::Mat& image) {
   for (std::size_t i = 0; i < devices_->projectors.size(); ++i) {
     device::Display* display = devices_->projectors[i].get();
-    if (!display) return error("{}: expected a projector that works, found none.", projector_names_[i]);
+    if (!display)
+      return error("{}: expected a working projector, found none. Check its cable and its power.",
+                   projector_names_[i]);
     const Stamp begun = now();
     LIMN_TRY(const Stamp shown_at,
              display->show(i == projector ? image : cv::Mat(display->size(), CV_8UC1, cv::Scalar(0))));
@@ -67,7 +69,8 @@ Status DeviceCapture::show_pattern(std::size_t projector, const cv::Mat& image) 
   return {};
 }
 
-// An image whose whole exposure lies after what was shown last: a stamp is of an exposure's middle.
+// Returns an image whose whole exposure lies after the last pattern was shown; a stamp is the middle of an
+// exposure.
 Result<cv::Mat> DeviceCapture::grab(const std::string& camera) {
   const Stamp begun = now();
   for (;;) {
@@ -86,7 +89,7 @@ Result<cv::Mat> DeviceCapture::grab(const std::string& camera) {
       return found->second.frame.image;
     if (is_ended_) return error("the session was ended.");
     if (seconds_between(begun, now()) > k_patience_s)
-      return error("{}: expected a picture within {} s, found none.", camera, k_patience_s);
+      return error("{}: expected an image within {} s, found none. Check its cable.", camera, k_patience_s);
   }
 }
 

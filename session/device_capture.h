@@ -13,11 +13,11 @@
 
 namespace limn::apps {
 
-/// The cameras and displays of a session on devices, as its recalibration captures with them. Frames are
-/// shown again while the result is computed.
+/// Gives a live recalibration access to the cameras and displays of a session on devices. The session shows
+/// frames again while the result is computed.
 class DeviceCapture final : public CaptureDevices {
  public:
-  /// Borrows all of them. `rig`: the names and the order of the devices.
+  /// Borrows all of them except `rig`, which gives the names and the order of the devices.
   DeviceCapture(SessionDevices* devices,
                 CameraThreads* cameras,
                 PerceptionThread* perception,
@@ -44,8 +44,8 @@ class DeviceCapture final : public CaptureDevices {
   std::vector<std::string> camera_names_, projector_names_;
   const std::atomic<bool>& is_ended_;
   std::map<std::string, Grabbed> grabbed_;
-  std::vector<double> latency_s_;  // of the projectors
-  Stamp on_surface_at_;            // what was shown last is on the surface
+  std::vector<double> latency_s_;  // one per projector
+  Stamp on_surface_at_;            // when the light of the last pattern is on the surface
 };
 
 }  // namespace limn::apps

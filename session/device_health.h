@@ -6,30 +6,30 @@
 
 namespace limn::apps {
 
-/// How a device of a session is.
+/// The state of one device of a session.
 struct DeviceState {
   std::string name;
   std::string kind;  ///< camera, projector, screen, keys
   bool works = true;
-  std::string why = {};    ///< it does not work
+  std::string why = {};    ///< why it does not work; may be empty
   std::size_t images = 0;  ///< taken or shown so far
 };
 
-/// Which devices work. From several threads, but for add().
+/// Keeps track of which devices work. Safe from several threads, except for add().
 class DeviceHealth {
  public:
-  /// Adds a device; returns what it is called by from then on.
+  /// Adds a device; returns its number for the other calls.
   std::size_t add(DeviceState device);
 
-  /// It took or showed an image.
+  /// The device captured or showed an image.
   void works(std::size_t device);
-  /// It did not; `why` may be empty.
+  /// The device failed; `why` may be empty.
   void fails(std::size_t device, const std::string& why);
-  /// Something else that people are to know.
+  /// Adds another message for people.
   void note(const std::string& what);
 
   std::vector<DeviceState> all() const;
-  /// What to tell since the last call: devices that went or came back, each change once.
+  /// The messages since the last call: devices that failed or work again (each change once), and notes.
   std::vector<std::string> news();
 
  private:

@@ -15,11 +15,12 @@
 namespace limn::apps {
 namespace {
 
-constexpr auto k_wait = std::chrono::milliseconds(50);  // for news, before the next image is made anyway
-constexpr double k_blend = 0.1;                         // of a new time into the expected one
+// Wait for new percepts; after it a frame is made without them.
+constexpr auto k_wait = std::chrono::milliseconds(50);
+constexpr double k_blend = 0.1;  // weight of a new time in the expected one
 
-// The machine's clock. Light arrives when a frame is painted and its display has shown it: as long as that
-// took lately.
+// The machine's clock. The light of a frame arrives after drawing and display have taken as long as they did
+// recently.
 class DeviceClock final : public FrameClock {
  public:
   Stamp now() const override { return limn::now(); }
@@ -35,7 +36,7 @@ class DeviceClock final : public FrameClock {
   double paint_s_ = 0.02, display_s_ = 0.02;
 };
 
-// What the thread that perceives has found last.
+// The newest results of the perception thread.
 class DeviceSource final : public FrameSource {
  public:
   DeviceSource(double seconds, CameraThreads* cameras, PerceptionThread* perception)
@@ -55,7 +56,7 @@ class DeviceSource final : public FrameSource {
   PerceptionThread* perception_;
 };
 
-// Projectors and screens. One that fails is told of and tried again.
+// Projectors and screens. One that fails is reported and tried again.
 class DeviceSink final : public FrameSink {
  public:
   DeviceSink(SessionDevices* devices, const Session* session, DeviceHealth* health, DeviceClock* clock)
@@ -86,7 +87,7 @@ class DeviceSink final : public FrameSink {
     return out;
   }
 
-  // `off` is black.
+  // A screen that shows `off` is black.
   void show_screens(const std::map<scene::Screen, cv::Mat>& images) override {
     for (std::size_t i = 0; i < devices_->screens.size(); ++i) {
       device::Display* screen = devices_->screens[i].get();
@@ -106,14 +107,14 @@ class DeviceSink final : public FrameSink {
   void note(std::size_t number, const Result<Stamp>& shown_at) {
     shown_at ? health_->works(number) : health_->fails(number, shown_at.message());
   }
-  // The image as large as the screen takes it, with black bars.
+  // The image scaled to fit the screen, with black bars.
   static cv::Mat fitted(const cv::Mat& image, cv::Size size);
 
   SessionDevices* devices_;
   const Session* session_;
   DeviceHealth* health_;
   DeviceClock* clock_;
-  std::vector<std::size_t> projectors_, screens_;  // as health_ calls them
+  std::vector<std::size_t> projectors_, screens_;  // in health_
 };
 
 cv::Mat DeviceSink::fitted(const cv::Mat& image, cv::Size size) {
@@ -126,7 +127,7 @@ cv::Mat DeviceSink::fitted(const cv::Mat& image, cv::Size size) {
   return out;
 }
 
-// Cameras, which go to threads of their own; null ones are missing.
+// Hands the cameras to their threads; null ones are missing.
 void start_cameras(SessionDevices* devices, DeviceHealth* health, CameraThreads* threads) {
   std::vector<std::size_t> numbers;
   for (const auto& camera : devices->cameras)

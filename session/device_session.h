@@ -14,28 +14,30 @@
 
 namespace limn::apps {
 
-/// Opened devices of a session, which takes the cameras with it. A camera that is missing at first, or a
-/// display, is null: the session goes on without it.
+/// The opened devices of a session. The session takes ownership of the cameras. A camera or display that
+/// could not be opened is null; the session runs without it.
 struct SessionDevices {
-  std::vector<std::unique_ptr<device::CameraSource>> cameras;  ///< of the rig's names
+  std::vector<std::unique_ptr<device::CameraSource>> cameras;  ///< named as in the rig
   std::vector<std::unique_ptr<device::Display>> projectors;    ///< in the rig's order
-  std::vector<std::unique_ptr<device::Display>> screens;       ///< show what ShowState::screen says
+  std::vector<std::unique_ptr<device::Display>> screens;       ///< each shows what scene::screen_content says
   std::vector<device::KeySource> keys = {};
   std::vector<DeviceState> missing = {};  ///< what could not be opened, and why
-  Keys* chosen = nullptr;                 ///< what keys do, shared with the operator's; null: their own
+  /// Key bindings and chosen slot, shared with the operator console; null: the keys get their own.
+  Keys* chosen = nullptr;
 };
 
-/// Plays a session on devices, in real time, until `seconds` are over (0: no end), `is_ended`, or a client
-/// ends it; at least a camera and a projector must be there. A thread for each camera takes its newest frame,
-/// one thread perceives, this one (its GL context current) runs the frame loop. Newest wins, nothing queues:
-/// what was not taken in time is dropped and counted. Devices that fail are told of, once, and tried again.
-/// Sources with stamps of their own (images, videos) are played at their pace.
+/// Runs a session on devices in real time until `seconds` have passed (0: no limit), `is_ended` is set, or a
+/// client ends it. At least one camera and one projector must work. Each camera has a thread that reads its
+/// frames, one thread runs perception, and the calling thread (its GL context current) runs the frame loop.
+/// Nothing is queued: only the newest frame is kept, and a frame that is not used in time is dropped and
+/// counted. A device that fails is reported once and tried again. Sources with stamps of their own (image
+/// files, videos) are played at their own pace.
 Status play_on_devices(SessionDevices* devices,
                        double seconds,
                        const std::atomic<bool>& is_ended,
                        const SessionParts& parts);
 
-/// Error: no camera that works, or no projector.
+/// Error: no camera works, or no projector works.
 Status check_devices(const SessionDevices& devices);
 
 }  // namespace limn::apps

@@ -8,19 +8,20 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_cells_a_second = 60;  // that are compared
-constexpr double k_look_s = 0.3;         // between the beginnings of two looks
-constexpr double k_rests_s = 0.5;        // before a prototype that was moved is looked at
-constexpr double k_before_s = 0.25;      // light that differs from that so long ago is not looked at
-constexpr double k_holds_s = 3;          // before something is said, or taken back
-constexpr double k_paper = 1.8;          // side of what is left out around a marker, in its sides
-constexpr double k_least_px = 1.5;       // of a displacement that matters
+constexpr double k_cells_a_second = 60;  // cells that are compared per second
+constexpr double k_look_s = 0.3;         // between the starts of two comparisons
+constexpr double k_rests_s = 0.5;        // how long a prototype must rest before it is compared
+constexpr double k_before_s = 0.25;      // light that has changed within this time is not compared
+constexpr double k_holds_s = 3;          // how long a finding must hold before drift_ changes
+constexpr double k_paper = 1.8;          // side of the area that is left out around a marker, in marker sides
+constexpr double k_least_px = 1.5;       // smaller displacements do not matter
 constexpr double k_least_contrast = 0.3;
 constexpr double k_least_likeness = 0.3;
-constexpr double k_least_gain = 0.1;  // of what is not explained by all in its place, that a move explains
-constexpr double k_as_good = 0.92;    // of the best gain: as good an explanation
+// Share of what the calibrated poses do not explain that the motion of a device must explain.
+constexpr double k_least_gain = 0.1;
+constexpr double k_as_good = 0.92;  // devices with this share of the best gain explain it equally well
 
-// Markers with their paper.
+// The outlines of markers with their paper, in pixels.
 std::vector<std::vector<cv::Point>> papers(const std::vector<tracker::Detection>& detections) {
   std::vector<std::vector<cv::Point>> out;
   for (const tracker::Detection& detection : detections) {
@@ -42,10 +43,10 @@ std::string sentence(const Drift& drift) {
   std::string names;
   for (const std::string& name : drift.devices) names += (names.empty() ? "" : " or ") + name;
   return fmt::format(
-      "{} has moved since the calibration: light lies {:.1f} px ({:.1f} mm) beside its place. Put it back, "
-      "or ask for repair: 15 s of patterns on the prototype as it stands, and the session goes on with a "
-      "mended "
-      "rig (with one camera and one projector end it, and let limn recheck look at the board).",
+      "{} has moved since the calibration: the projected light is off by {:.1f} px ({:.1f} mm). Put it back, "
+      "or start a repair: it shows patterns on the prototype for about 15 s, then the session continues "
+      "with a corrected rig. (With only one camera and one projector, end the session instead and run limn "
+      "recheck with the board.)",
       names, drift.px, drift.mm);
 }
 
@@ -53,7 +54,7 @@ std::optional<std::string> DriftNotices::news(const std::optional<Drift>& drift)
   const bool is_news = drift.has_value() != told_.has_value() || (drift && drift->devices != told_->devices);
   if (!is_news) return std::nullopt;
   told_ = drift;
-  return drift ? sentence(*drift) : "all light is where the rig says again";
+  return drift ? sentence(*drift) : "All devices are back in their calibrated position.";
 }
 
 DriftWatch::DriftWatch(const Rig& rig) : rig_(rig) {
@@ -94,8 +95,8 @@ void DriftWatch::look(const Percepts& watched,
   lights_[turn_].begin(frame, *now, *before, papers(watched.detections[turn_]));
 }
 
-// The device that, moved, explains best what all cameras see; none where none is better than all in its
-// place.
+// Finds the device whose motion explains best what all cameras see; nullopt if no motion explains it better
+// than the calibrated poses.
 std::optional<Drift> DriftWatch::judged() const {
   struct Candidate {
     std::string device;

@@ -13,35 +13,38 @@
 
 namespace limn::apps {
 
-/// A device that does not stand where the rig says any more.
+/// A device that is no longer at its calibrated pose.
 struct Drift {
-  std::vector<std::string> devices;  ///< one of these: with one camera and one projector nobody can say which
-  double px = 0;                     ///< by which its light lies beside its place, camera pixels
-  double mm = 0;                     ///< the same on the prototype
+  /// One of these has moved. With one camera and one projector nobody can say which.
+  std::vector<std::string> devices;
+  double px = 0;  ///< displacement of its light in the camera's image, pixels
+  double mm = 0;  ///< the same on the prototype
 
   bool operator==(const Drift&) const = default;
 };
 
-/// What is wrong and what to do, in two sentences.
+/// A message that says what is wrong and what to do.
 std::string sentence(const Drift& drift);
 
-/// What people were told of drift.
+/// Decides when people get a message about drift, and remembers the last one.
 class DriftNotices {
  public:
-  /// The sentence to tell when what has moved is another device than was told.
+  /// A message when another device has moved than was last reported, or when all are back in place; otherwise
+  /// nullopt.
   std::optional<std::string> news(const std::optional<Drift>& drift);
-  /// What has moved, as far as people were told.
+  /// The drift that was last reported.
   const std::optional<Drift>& told() const { return told_; }
-  /// The rig is another one: nothing is said of it yet.
+  /// To be called when the rig is replaced: nothing has been reported about the new one yet.
   void forget() { told_.reset(); }
 
  private:
   std::optional<Drift> told_;
 };
 
-/// Watches by the light itself whether cameras and projectors stand where the rig says: of all devices the
-/// one that, moved, explains best what all cameras see. Some cells of an image are compared at each call, so
-/// that none takes long. Sees only while the prototype rests and something with edges is shown.
+/// Detects from the projected light whether cameras and projectors are still at their calibrated poses: it
+/// looks for the device whose motion explains best what all cameras see. Each call compares only some cells
+/// of an image, so that none takes long. Works only while the prototype rests and something with edges is
+/// projected.
 class DriftWatch {
  public:
   explicit DriftWatch(const Rig& rig);
@@ -51,7 +54,8 @@ class DriftWatch {
             const ProjectionHistory& shown,
             projector::Renderer* renderer);
 
-  /// What has moved, once that has held for some seconds, until it stands right again for as long.
+  /// The moved device. It is set after it was found for some seconds (k_holds_s), and cleared after the
+  /// device was back in place for as long.
   const std::optional<Drift>& drift() const { return drift_; }
 
  private:
@@ -59,14 +63,14 @@ class DriftWatch {
   void settle(std::optional<Drift> found, Stamp at);
 
   Rig rig_;
-  std::vector<projector::MisalignmentDetector> lights_;  // one a camera
-  std::size_t turn_ = 0;                                 // the camera that is looked at
-  Stamp began_at_, compared_at_;                         // its look
-  std::optional<Pose> placed_;                           // world_from_prototype that light was predicted for
-  std::optional<Pose> rests_;                            // where the prototype is
+  std::vector<projector::MisalignmentDetector> lights_;  // one per camera
+  std::size_t turn_ = 0;                                 // index of the camera that is compared
+  Stamp began_at_, compared_at_;                         // start and newest step of its comparison
+  std::optional<Pose> placed_;  // world_from_prototype for which the light was predicted
+  std::optional<Pose> rests_;   // world_from_prototype where it rests
   Stamp rests_since_;
   std::optional<Drift> drift_;
-  std::optional<Stamp> differs_since_;  // what is found from drift_
+  std::optional<Stamp> differs_since_;  // since when the findings differ from drift_
 };
 
 }  // namespace limn::apps

@@ -10,7 +10,8 @@
 namespace limn::apps {
 namespace {
 
-// Of the marker's side: well away from its paper, so that light there does not hide the marker from cameras.
+// In marker sides. Ring and word are well away from the marker's paper, so that their light does not hide the
+// marker from cameras.
 constexpr double k_ring_radius = 1.3, k_ring_width = 0.06;
 constexpr double k_word_height = 0.45, k_word_gap = 0.95;
 constexpr int k_font = cv::FONT_HERSHEY_DUPLEX;

@@ -7,16 +7,17 @@
 
 namespace limn::apps {
 
-/// How squarely a projector's light meets a marker: the cosine, 0 where it does not reach. Signs are the
-/// affair of the projector that reaches a marker best: on a curved surface two would draw two.
+/// Cosine of the angle at which a projector's light meets a marker; 0 if the light does not reach it. Only
+/// the projector with the largest cosine draws beside a marker: on a curved surface two would draw everything
+/// twice.
 double head_on(const Imager& projector, const Pose& world_from_marker);
 
-/// Small signs beside a marker, in light. Frame: the marker's (x right, y down, z into the paper), as
-/// `world_from_marker` places it; `size_m` is the marker's side. Drawn into an 8-bit BGR display image of
-/// `projector`, brighter of the two. `strength`
-/// (0 … 1) is the share of full light.
+/// The functions below draw small signs beside a marker into an 8-bit BGR display image of `projector`; of
+/// the old and the new value, each pixel keeps the brighter one. `world_from_marker`: the pose of the
+/// marker's frame (x right, y down, z into the paper). `size_m`: the marker's side. `strength`: share of the
+/// full display value (0 … 1).
 
-/// A ring around the marker's paper.
+/// Draws a ring around the marker's paper.
 void draw_ring(const Imager& projector,
                const Pose& world_from_marker,
                double size_m,
@@ -24,7 +25,7 @@ void draw_ring(const Imager& projector,
                double strength,
                cv::Mat* image);
 
-/// A word above the marker, half as high as its side.
+/// Draws a word above the marker, about half as high as the marker's side.
 void draw_word(const Imager& projector,
                const Pose& world_from_marker,
                double size_m,

@@ -41,7 +41,7 @@ void FileWriter::run() {
   for (;;) {
     changed_.wait(lock, [&] { return is_closing_ || !jobs_.empty(); });
     if (jobs_.empty()) return;
-    const std::function<Status()>& job = jobs_.front();  // stays where it is when others are added
+    const std::function<Status()>& job = jobs_.front();  // stays valid when jobs are added
     lock.unlock();
     const Status done = job();
     lock.lock();

@@ -12,22 +12,22 @@
 
 namespace limn::apps {
 
-/// Changes files on a thread of its own, one thing after the other in the order in which they were asked for,
-/// so that nobody who draws waits for a disk. Nothing is dropped.
+/// Runs file changes on a thread of its own, one after the other in the order of add(), so that the render
+/// thread never waits for the disk. Nothing is dropped.
 class FileWriter {
  public:
   FileWriter();
-  ~FileWriter();  ///< does what is queued
+  ~FileWriter();  ///< finishes the queued jobs
   FileWriter(const FileWriter&) = delete;
   FileWriter& operator=(const FileWriter&) = delete;
 
   /// Returns at once. Jobs must not throw.
   void add(std::function<Status()> job);
-  /// Whether something is not done yet.
+  /// Whether some jobs are not finished yet.
   bool is_busy() const;
-  /// Waits until all is done.
+  /// Waits until all jobs are finished.
   void finish();
-  /// What could not be done since the last call.
+  /// Messages of the jobs that failed since the last call.
   std::vector<std::string> failures();
 
  private:
@@ -35,7 +35,7 @@ class FileWriter {
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<std::function<Status()>> jobs_;  // the first one is being done
+  std::deque<std::function<Status()>> jobs_;  // the first one is running
   std::vector<std::string> failures_;
   bool is_closing_ = false;
   std::thread thread_;

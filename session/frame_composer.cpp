@@ -10,9 +10,10 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_sign = 0.7;  // display value of signs: bright ones could hide markers from cameras
+// Display value of rings and words, as a share; brighter ones could hide markers from cameras.
+constexpr double k_sign = 0.7;
 const cv::Scalar k_green(90, 220, 90), k_amber(40, 170, 255), k_red(60, 60, 255), k_blue(255, 190, 110);
-constexpr double k_other_waiting = 0.4;  // light of those that are not next, as a share
+constexpr double k_other_waiting = 0.4;  // strength of the rings of waiting markers that are not next
 
 Eigen::AlignedBox3d box_of(const scene::Scene& scene) {
   Eigen::AlignedBox3d box;
@@ -81,7 +82,7 @@ const ComposedFrame& FrameComposer::compose(const FrameInput& input) {
   if (show_state.frozen && !show_state.blackout && !is_black_) return painted_;
   is_black_ = show_state.blackout;
 
-  // Compose: which part stands where, what fades, whose eye it is for, whose shadow falls on it.
+  // Compose: poses of the parts, fades, viewpoint, shadows on the prototype.
   painted_.tracks = input.tracks;
   keep_still(fading_.shown().world_from_prototype, prototype_box_, &painted_.tracks);
   painted_.posed = scene::compose_scene(subject_->scene, show_state, painted_.tracks);
@@ -90,7 +91,7 @@ const ComposedFrame& FrameComposer::compose(const FrameInput& input) {
   if (options_.refill && subject_->rig.projectors.size() > 1)
     shadows_.look(input.watched, painted_.posed, shown_, &renderer_);
 
-  // Draw: parts, what lies on the surface, no light on markers, signs beside markers.
+  // Draw: parts, overlays on the surface, no light on markers, signs beside markers.
   const std::vector<Overlay> on_surface = surface_overlays(show_state);
   for (std::size_t i = 0; i < painted_.projectors.size(); ++i) {
     cv::Mat& image = painted_.projectors[i];
@@ -136,7 +137,7 @@ void FrameComposer::keep_off_markers(const FrameInput& input) {
   }
 }
 
-// Another look left of a line, and a grid.
+// The split view (another look left of a line) and the grid.
 std::vector<Overlay> FrameComposer::surface_overlays(const scene::ShowState& show_state) const {
   std::vector<Overlay> out;
   if (!painted_.posed.world_from_prototype || show_state.blackout) return out;
@@ -147,7 +148,8 @@ std::vector<Overlay> FrameComposer::surface_overlays(const scene::ShowState& sho
   return out;
 }
 
-// Where a part was lost, how its marker is seen, which variant it shows now, and which markers wait for one.
+// Rings where a part was lost, for tracking states and for markers that wait for a part, and names of
+// variants.
 std::vector<Overlay> FrameComposer::marker_overlays(const FrameInput& input) const {
   std::vector<Overlay> out;
   const Stamp at = painted_.shown_at;
@@ -186,7 +188,7 @@ std::vector<Overlay> FrameComposer::marker_overlays(const FrameInput& input) con
   return out;
 }
 
-// The projector that reaches a marker best; nullopt when none does.
+// The projector whose light meets a marker most directly; nullopt when none reaches it.
 std::optional<std::size_t> FrameComposer::best_projector(const Pose& world_from_marker) const {
   std::optional<std::size_t> best;
   double most = 0;

@@ -24,64 +24,63 @@
 
 namespace limn::apps {
 
-/// What is shown at a moment.
+/// The images that are shown at one moment, and what they are made of.
 struct ComposedFrame {
   std::vector<cv::Mat> projectors;  ///< in the rig's order, CV_8UC3
   std::vector<Track> tracks;        ///< predicted to shown_at
-  scene::PosedScene posed;          ///< what the tracks and the show state make of the scene
+  scene::PosedScene posed;          ///< the scene posed by the tracks and the show state
   Stamp painted_at, shown_at;
-  std::string follows;  ///< the guest whose tablet `view` parts are drawn for; empty: the scene's own viewer
-  Imager viewer = {};   ///< whose eye they are drawn for
-  /// That eye's place while a guest has part in it, or it is on its way back.
+  std::string follows;  ///< the guest whose tablet is the viewpoint; empty: the scene's own viewer
+  Imager viewer = {};   ///< an imager at the viewpoint that `view` parts are drawn for
+  /// The viewpoint (world frame, m) while it depends on a guest's tablet or moves back from it.
   std::optional<Eigen::Vector3d> p_guest_eye_world = {};
 };
 
-/// What projectors show: what was painted, and overlays over it. Images that nothing is drawn over are the
-/// painted ones themselves.
+/// The composed images with overlays drawn over them. Without overlays they share the memory of `painted`.
 std::vector<cv::Mat> with_overlays(const ComposedFrame& painted,
                                    const Rig& rig,
                                    std::span<const Overlay> overlays);
 
-/// Loose markers that lie still for a second and carry no slot: they glow. The last one is the one that a
-/// `pair` without a marker means.
+/// Loose markers that have been still for a second and carry no slot; a ring of light marks them. `pair`
+/// without a marker uses the last one.
 std::vector<LooseMarker> waiting_markers(const scene::Scene& scene,
                                          const scene::ShowState& show_state,
                                          const Percepts& watched);
 
-/// The projector side of a session: motions of bodies + show state -> projector images and the screen's.
-/// Holds what fades; the same calls give the same images. A GL context must be current at every call and at
-/// destruction.
+/// The projector side of a session: motions of bodies + show state -> images for projectors and screens.
+/// Keeps the state of what fades; the same calls give the same images. A GL context must be current at every
+/// call and at destruction.
 class FrameComposer {
  public:
   static Result<FrameComposer> create(const scene::Scene& scene,
                                       const Rig& rig,
                                       const ComposeOptions& options = {});
 
-  /// Projector images for the moment at which their light arrives. Stamps must not go back.
+  /// Composes the projectors' images for the moment at which their light arrives. Stamps must not go back.
   const ComposedFrame& compose(const FrameInput& input);
 
-  /// Whether the light lies where the rig says, as the same frames show it that were painted for last. When
-  /// the prototype has come to rest this takes longer than an image: call it when that is shown.
+  /// Checks by the projected light whether a device has moved, with the frames that compose() used last.
+  /// After the prototype has come to rest this takes longer than a frame: call it when the images are shown.
   void look_for_drift(const Percepts& watched);
 
-  /// A large screen's image for the newest frame of camera 0; empty before the first frame and for
-  /// Screen::off. `tracks`: Prediction::at_image.
+  /// A screen's image for the newest frame of camera 0; empty before the first frame and for Screen::off.
+  /// `tracks`: Prediction::at_image.
   cv::Mat screen(const Percepts& watched,
                  std::span<const Track> tracks,
                  const scene::ShowState& show_state,
                  scene::Screen what);
 
-  /// The prototype's point (its own frame, m) that each pixel of a projector lights, CV_32FC3, as painted
-  /// last; NaN where none, and on markers.
+  /// For each pixel of a projector, the point of the prototype (its frame, m) that it illuminates in the last
+  /// composed frame, CV_32FC3. NaN where there is none, and on markers.
   cv::Mat free_surface(std::size_t projector);
 
-  /// What was painted last.
+  /// The last composed frame.
   const ComposedFrame& painted() const { return painted_; }
-  /// A device that was nudged.
+  /// The device that has moved, if any.
   const std::optional<Drift>& drift() const { return drifts_.drift(); }
 
  private:
-  // What the parts of a painter refer to stays where it is when the painter moves.
+  // The members point to these, which must keep their address when the composer is moved.
   struct Subject {
     scene::Scene scene;
     Rig rig;
@@ -101,7 +100,7 @@ class FrameComposer {
   projector::Renderer renderer_;
   ComposeOptions options_;
   std::vector<Body> bodies_;
-  Eigen::AlignedBox3d prototype_box_;  // its own frame
+  Eigen::AlignedBox3d prototype_box_;  // in the prototype's frame
   ViewpointSelector viewpoints_;
   PartFading fading_;
   ScreenComposer screens_;
@@ -109,7 +108,7 @@ class FrameComposer {
   ShadowWatch shadows_;
   DriftWatch drifts_;
   ComposedFrame painted_;
-  bool is_black_ = false;  // by blackout, which goes before a freeze
+  bool is_black_ = false;  // in a blackout, which has priority over a freeze
 };
 
 }  // namespace limn::apps

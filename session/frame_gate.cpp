@@ -15,16 +15,16 @@ std::optional<Frame> FrameGate::taken(Result<Frame> sent, Stamp now) {
     return std::nullopt;
   }
   if (sent->image.size() != size_) {
-    health_->fails(number_,
-                   fmt::format("expected pictures of {}x{}, found one of {}x{}. Set the mode that the "
-                               "rig was measured in.",
-                               size_.width, size_.height, sent->image.cols, sent->image.rows));
+    health_->fails(
+        number_, fmt::format("expected images of {}x{} pixels, found one of {}x{}. Set the camera mode that "
+                             "the rig was calibrated with.",
+                             size_.width, size_.height, sent->image.cols, sent->image.rows));
     return std::nullopt;
   }
   health_->works(number_);
   const SourceClock::Time time = clock_.on_session_clock(sent->captured_at, now);
   if (time.has_stepped)
-    health_->note(camera_ + "'s clock has stepped; its pictures are taken to be as late as before");
+    health_->note(camera_ + "'s clock has stepped; its images are assumed to have the same delay as before");
   sent->captured_at = time.captured_at;
   return std::move(*sent);
 }

@@ -11,17 +11,18 @@
 
 namespace limn::apps {
 
-/// What a session takes of what one camera sends: images of the size that the rig was measured in, with
-/// stamps on the session's clock.
+/// Checks the frames of one camera: accepts images of the size that the rig was calibrated with, and converts
+/// their stamps to the session's clock.
 class FrameGate {
  public:
-  /// `number`: as `health`, which is borrowed, calls the camera.
+  /// `number`: the camera's number in `health`, which is borrowed.
   FrameGate(std::string camera, cv::Size size, std::size_t number, DeviceHealth* health);
 
-  /// nullopt: the image cannot be used, and `health` is told why.
+  /// The accepted frame. nullopt: the image cannot be used; the reason is reported to `health`.
   std::optional<Frame> taken(Result<Frame> sent, Stamp now);
 
-  /// Its stamps are of a clock of its own: such sources are played at their pace.
+  /// Whether its stamps come from another clock than the session's; such sources are played at their own
+  /// pace.
   bool is_of_other_clock() const { return clock_.is_other(); }
 
  private:

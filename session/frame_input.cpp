@@ -3,7 +3,7 @@
 namespace limn::apps {
 namespace {
 
-// The watcher's own prediction serves for the filter's.
+// Perception has already predicted with the filter to captured_at; its tracks are reused.
 std::vector<Track> tracks_at(const Percepts& watched, const ComposeOptions& options, Stamp at) {
   if (at == watched.captured_at && options.prediction == tracker::Prediction::filtered) return watched.tracks;
   return tracker::predicted(watched.motions, at, options.prediction, options.motion);

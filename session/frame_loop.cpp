@@ -19,11 +19,11 @@ Status FrameLoop::run(const std::atomic<bool>& is_ended, const std::function<voi
   return {};
 }
 
-// The same order on devices, on the virtual rig and in a replay.
+// The order is the same on devices, on the virtual rig and in a replay.
 Result<bool> FrameLoop::step() {
   Session& session = parts_.session;
 
-  // Recalibrate, where somebody asked for it. While it captures, the projectors' light is its own.
+  // Recalibrate, if somebody has asked for it. No frames are composed while it uses the projectors.
   recalibration_.step(setting_.clock);
   if (recalibration_.holds_light()) {
     hear_clients();
@@ -35,29 +35,30 @@ Result<bool> FrameLoop::step() {
   LIMN_TRY(Perceived perceived, setting_.source.perceive());
   if (perceived.watched) session.take(std::move(*perceived.watched), perceived.moments);
 
-  // Edit: what a script, a recording, files and people change.
+  // Edit: changes by a script, a recording, files and people.
   LIMN_TRY_STATUS(setting_.source.edit(&session));
   hear_clients();
   LIMN_TRY(const std::optional<FrameTimes> times, setting_.clock.next_frame());
   if (!times) return true;
 
-  // Predict, once: where every body is when this frame's light arrives. What was edited just now counts.
+  // Predict, once: where every body is when this frame's light arrives. Edits of this frame already count.
   const FrameInput input = session.predict(*times);
 
-  // Compose and draw the projectors' images (Painter::compose).
+  // Compose and draw the projectors' images (FrameComposer::compose).
   const ComposedFrame& painted = session.compose(input);
 
-  // Overlay what clients want to be seen on the prototype alone.
+  // Add the clients' overlays to the projected light only.
   const std::vector<cv::Mat> light = with_overlays(painted, session.setup().rig, client_overlays());
 
-  // Show: the projectors first, for people look there.
+  // Show: the projectors first, because people look at them.
   LIMN_TRY_STATUS(setting_.sink.show(painted, light));
   const Stamp begun = now();
   const std::map<scene::Screen, cv::Mat> screens = screen_images();
   const double screen_ms = screens.empty() ? -1 : milliseconds_since(begun);
   setting_.sink.show_screens(screens);
 
-  // Monitor: whether light lies where the rig says, and which devices work. No light waits for this.
+  // Monitor: has a device moved, which devices work? This comes after the frame is shown and does not delay
+  // it.
   session.look_for_drift(times->now);
   note_devices();
   session.tell_unwritten(times->now);
@@ -72,7 +73,7 @@ Result<bool> FrameLoop::step() {
   const bool is_anything_seen = session.watched().captured_at != Stamp{};
   if (is_anything_seen) parts_.output.shown(shown, painted);
 
-  // Tell people.
+  // Update the clients.
   const auto screen = screens.find(session.show_state().screen);
   return tell_clients(is_anything_seen ? &shown : nullptr,
                       screen == screens.end() ? cv::Mat() : screen->second);
@@ -83,7 +84,7 @@ void FrameLoop::hear_clients() {
     client->hear({parts_.session, parts_.output.telemetry(), setting_.health, setting_.clock.now()});
 }
 
-// False: one of them has ended the session.
+// False: a client has ended the session.
 bool FrameLoop::tell_clients(const ShownFrame* shown, const cv::Mat& screen) {
   bool goes_on = true;
   for (SessionClient* client : parts_.clients) {
@@ -101,7 +102,7 @@ std::vector<Overlay> FrameLoop::client_overlays() {
   return out;
 }
 
-// Each choice of what a screen shows is drawn once.
+// Draws each kind of screen image once.
 std::map<scene::Screen, cv::Mat> FrameLoop::screen_images() {
   std::set<scene::Screen> wanted = setting_.sink.wanted_screens();
   for (const SessionClient* client : parts_.clients)

@@ -19,76 +19,76 @@
 
 namespace limn::apps {
 
-/// What every session consists of, wherever it takes place.
+/// The parts of every session: on devices, on a virtual rig, or in a replay.
 struct SessionParts {
   Perception& perception;
   Session& session;
   SessionOutput& output;
-  std::vector<SessionClient*> clients = {};  ///< in the order in which they are heard and told
+  std::vector<SessionClient*> clients = {};  ///< in the order in which they are called
 };
 
-/// The time that a session goes by: of the machine, of the virtual rig, or of a recording.
+/// The clock of a session: the machine's, the virtual rig's, or a recording's.
 class FrameClock {
  public:
   virtual ~FrameClock() = default;
   virtual Stamp now() const = 0;
-  /// The moments of the frame that comes next; nullopt: no image is due yet. Error: the session cannot go on.
+  /// The times of the next frame; nullopt: no frame is due yet. Error: the session cannot go on.
   virtual Result<std::optional<FrameTimes>> next_frame() = 0;
 };
 
-/// What is new from the cameras.
+/// New percepts from the cameras.
 struct Perceived {
-  std::optional<Percepts> watched;  ///< nullopt: nothing is
-  std::size_t moments = 0;          ///< calls of Watcher::watch so far
-  int missed = 0;                   ///< camera frames that never came or were not looked at
-  double record_ms = 0;             ///< what it cost to hand the frames to the recording
+  std::optional<Percepts> watched;  ///< nullopt: nothing is new
+  std::size_t moments = 0;          ///< number of calls of Perception::watch so far
+  int missed = 0;                   ///< camera frames that never arrived or were not processed
+  double record_ms = 0;             ///< time to pass the frames to the recording
 };
 
-/// Where perceptions, and edits that nobody sends, come from: cameras, a virtual room with its script, or a
+/// Where percepts, and edits that no client sends, come from: cameras, a virtual room with its script, or a
 /// recording.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
-  /// Nothing more will come.
+  /// Whether nothing more will come.
   virtual bool is_over() const = 0;
-  /// The newest perception that was not taken yet; may wait for one for a moment.
+  /// The newest percepts that were not taken yet; may wait a moment for them.
   virtual Result<Perceived> perceive() = 0;
-  /// Changes the session as a script or a recording says.
+  /// Applies the edits of a script or a recording.
   virtual Status edit(Session*) { return {}; }
 };
 
-/// Where images go: projectors and screens, or a comparison with a recording.
+/// Where images go: to projectors and screens, or into a comparison with a recording.
 class FrameSink {
  public:
   virtual ~FrameSink() = default;
-  /// Shows `light`, an image a projector: what was painted, and what clients have drawn over it. Error: the
+  /// Shows `light`, one image per projector: the composed images with the clients' overlays. Error: the
   /// session cannot go on.
   virtual Status show(const ComposedFrame& painted, const std::vector<cv::Mat>& light) = 0;
-  /// Which images show_screens() wants of this frame.
+  /// The screen images that show_screens() needs for this frame.
   virtual std::set<scene::Screen> wanted_screens() const { return {}; }
   virtual void show_screens(const std::map<scene::Screen, cv::Mat>&) {}
-  /// How far parts are from their true places, mm; -1: nobody knows.
+  /// RMS distance of the parts from their true positions, mm; -1: unknown.
   virtual double placement_mm(const ComposedFrame&) const { return -1; }
 };
 
-/// Where a session takes place. What differs between devices, the virtual rig and a replay is all in here.
+/// Everything that differs between a session on devices, on the virtual rig, and in a replay.
 struct FrameSetting {
   FrameClock& clock;
   FrameSource& source;
   FrameSink& sink;
   DeviceHealth& health;
-  CaptureDevices* capture = nullptr;  ///< null: nobody can recalibrate here
+  CaptureDevices* capture = nullptr;  ///< null: recalibration is not possible
 };
 
-/// The frame loop: what happens in a session, in which order.
+/// The frame loop: states what happens in a session, in which order.
 class FrameLoop {
  public:
   FrameLoop(SessionParts parts, FrameSetting setting);
 
-  /// Plays frames until the source is over, `is_ended`, or a client ends the session. `after_each` may be
-  /// empty.
+  /// Runs frames until the source is over, `is_ended` is set, or a client ends the session. `after_each` may
+  /// be empty.
   Status run(const std::atomic<bool>& is_ended, const std::function<void()>& after_each = {});
-  /// One frame. False: a client ended the session.
+  /// Runs one frame. False: a client ended the session.
   Result<bool> step();
 
  private:

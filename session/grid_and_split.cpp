@@ -16,11 +16,12 @@ using Eigen::Vector3f;
 
 constexpr float k_grid_m = 0.010F;
 constexpr int k_strong_every = 5;
-constexpr float k_weak = 90, k_strong = 180, k_split = 160;    // display values
-constexpr auto k_gamma = static_cast<float>(k_display_gamma);  // near enough for lines of two projectors
-constexpr float k_line_px = 1, k_strong_px = 1.6F;             // half as wide as a line with its soft edges
+constexpr float k_weak = 90, k_strong = 180, k_split = 160;  // display values
+// Accurate enough for lines that two projectors share.
+constexpr auto k_gamma = static_cast<float>(k_display_gamma);
+constexpr float k_line_px = 1, k_strong_px = 1.6F;  // half the width of a line with its soft edges
 
-// How far the surface's point goes from one pixel to the next, to the right and down; zero at edges.
+// Steps of the surface point from one pixel to the next, to the right and down; zero at edges.
 struct Steps {
   Vector3f right = Vector3f::Zero(), down = Vector3f::Zero();
 };
@@ -45,10 +46,10 @@ Steps steps_at(const cv::Mat& points, int x, int y) {
   return steps;
 }
 
-// Display value of the lines at a point.
+// Display value of the grid lines at a point.
 float line_value(const Vector3f& p, const Steps& steps) {
   const Vector3f normal = steps.right.cross(steps.down).cwiseAbs();
-  int across = 0;  // this coordinate's lines would be contours of the surface
+  int across = 0;  // the coordinate along the normal; its lines would be contours of the surface
   normal.maxCoeff(&across);
   float value = 0;
   for (int axis = 0; axis < 3; ++axis) {

@@ -9,23 +9,25 @@
 
 namespace limn::apps {
 
-/// Lines on the prototype's surface where its own coordinates are multiples of 10 mm, stronger ones at every
-/// 50: of the two coordinates that run along the surface. Added to an 8-bit BGR display image, brighter of
-/// the two. `points`: the prototype's point (m) that each of its pixels lights, CV_32FC3, NaN where none;
-/// `share`: of the light there that is this projector's, CV_32FC2 (projector::Renderer::blend).
+/// Draws grid lines on the prototype's surface at multiples of 10 mm of its own coordinates, stronger ones at
+/// multiples of 50 mm, for the two coordinates that run along the surface. Draws into an 8-bit BGR display
+/// image; each pixel keeps the brighter value. `points`: the point of the prototype (its frame, m) that each
+/// pixel illuminates, CV_32FC3, NaN where none. `share`: this projector's share of the light there, CV_32FC2
+/// (projector::Renderer::blend).
 void draw_grid(const cv::Mat& points, const cv::Mat& share, cv::Mat* image);
 
-/// Pixels that light points with x below `x_m` from `left`, others from `right`, with a thin line between
-/// them. Where nothing is lit the brighter one stays.
+/// Joins two images: pixels that illuminate points with x below `x_m` come from `left`, others from `right`,
+/// with a thin line between them. A pixel that illuminates no point gets the brighter value.
 cv::Mat split_at(const cv::Mat& points, double x_m, const cv::Mat& left, const cv::Mat& right);
 
-/// Pixels on the side of a straight line where a x + b y + c < 0 from `left`, others from `right`, with a
-/// thin line between them. 8-bit BGR, of one size.
+/// Joins two images along a straight line: pixels where a x + b y + c < 0 come from `left`, others from
+/// `right`, with a thin line between them. 8-bit BGR, of the same size.
 cv::Mat split_along(const cv::Vec3d& abc, const cv::Mat& left, const cv::Mat& right);
 
-/// Where an imager's image is split: the line on the prototype `split_mm` beside the middle of its box (its
-/// own frame), as if that were flat there; a x + b y + c is negative where the prototype's x is smaller.
-/// nullopt where it is not seen.
+/// The line that splits an imager's image: it is the image of the line on the prototype that lies `split_mm`
+/// in x beside the middle of its box (prototype frame), as if the prototype were flat there. a x + b y + c is
+/// negative where the prototype's x is smaller. nullopt: the prototype has no pose, or the line is not in
+/// view.
 std::optional<cv::Vec3d> split_line(const Imager& imager,
                                     const scene::PosedScene& posed,
                                     const Eigen::AlignedBox3d& prototype_box,

@@ -16,7 +16,7 @@ KeyClient::KeyClient(std::vector<device::KeySource>& sources,
 void KeyClient::hear(const SessionMoment& moment) {
   for (Source& source : sources_) {
     const auto pressed = source.keys->poll_pressed_keys();
-    if (static_cast<bool>(pressed) == source.is_gone)  // it went, or it came back
+    if (static_cast<bool>(pressed) == source.is_gone)  // the source failed, or works again
       pressed ? health_->works(source.number) : health_->fails(source.number, pressed.message());
     source.is_gone = !pressed;
     if (!pressed) continue;

@@ -9,10 +9,10 @@
 
 namespace limn::apps {
 
-/// Hands the edits of clickers, pedals and keyboards to a session.
+/// Sends the key presses of clickers, pedals and keyboards to a session as edits.
 class KeyClient final : public SessionClient {
  public:
-  /// `keys`: what keys do, shared with the operator's; null: their own.
+  /// `keys`: key bindings and chosen slot, shared with the operator console; null: own ones.
   KeyClient(std::vector<device::KeySource>& sources,
             const scene::Scene& scene,
             Keys* keys,
@@ -24,7 +24,7 @@ class KeyClient final : public SessionClient {
  private:
   struct Source {
     device::KeySource* keys;
-    std::size_t number;  // as health_ calls it
+    std::size_t number;  // in health_
     bool is_gone = false;
   };
   void edit(int key, const Source& source, const SessionMoment& moment);

@@ -8,11 +8,11 @@
 
 namespace limn::apps {
 
-/// A mailbox for one value between threads: the newest wins, nothing queues.
+/// Passes one value between threads: a new value replaces the old one, nothing is queued.
 template <class T>
 class Latest {
  public:
-  /// Replaces what was not taken. `merge(old, new)` may save of it what must not be lost.
+  /// Replaces a value that was not taken. `merge(old, new)` may copy to the new one what must not be lost.
   void put(T value, const std::function<void(const T&, T&)>& merge = {}) {
     {
       const std::lock_guard lock(mutex_);
@@ -22,7 +22,7 @@ class Latest {
     changed_.notify_all();
   }
 
-  /// The newest value that was not taken yet; waits for one for so long. nullopt: none came.
+  /// The newest value that was not taken yet; waits up to `wait` for one. nullopt: none came.
   std::optional<T> take(std::chrono::nanoseconds wait) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, wait, [&] { return value_.has_value(); });

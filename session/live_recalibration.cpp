@@ -8,20 +8,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int k_niceness = 10;  // while it computes: light goes first
+constexpr int k_niceness = 10;  // of the computation, so that drawing has priority
 constexpr auto k_look_again = std::chrono::milliseconds(5);
 constexpr const char* k_ended = "the session was ended.";
 
-// The rig with what has moved, in words.
+// A sentence about what has moved.
 std::string words_of(const calib::RigCheck& result, const fs::path& folder) {
   if (result.verdict == calib::RigVerdict::sound)
-    return "repair: nothing has moved; the session goes on with its rig";
+    return "repair: no device has moved; the session continues with the same rig";
   const calib::Move& move = result.candidates.front();
   std::string others;
   for (std::size_t i = 1; i < result.candidates.size(); ++i) others += " or " + result.candidates[i].device;
   return fmt::format(
-      "repair: {}{} was turned by {:.2f} degrees and moved by {:.1f} mm; the session goes on with the mended "
-      "rig. It is in {} for the next one.",
+      "repair: {}{} was turned by {:.2f} degrees and moved by {:.1f} mm; the session continues with a "
+      "corrected rig. It is saved in {} for the next session.",
       move.device, others, move.degrees, move.mm, folder.string());
 }
 
@@ -73,7 +73,7 @@ LiveRecalibration::~LiveRecalibration() {
   while (result_.valid() && result_.wait_for(k_look_again) != std::future_status::ready) executor_.serve();
 }
 
-// The same, done in serve(); errors from the moment at which it is over.
+// The same functions, executed by serve(). After cancellation they return errors.
 Surroundings LiveRecalibration::through_errands(Surroundings around) {
   Surroundings out;
   out.stage.show = [this, show = around.stage.show](int projector, const cv::Mat& image) {
@@ -122,9 +122,10 @@ void apply_recalibration(const Result<Rechecked>& checked,
                          Perception* perception,
                          Session* session) {
   session->set_recalibration_progress("");
-  static_cast<void>(session->take_recalibration_request());  // who asked meanwhile has it
+  // A request that was made during this recalibration is served by it.
+  static_cast<void>(session->take_recalibration_request());
   const Status mended = mend(checked, folder, at, perception, session);
-  if (!mended) session->warn(at, "repair: " + mended.message() + " The session goes on with its rig.");
+  if (!mended) session->warn(at, "repair: " + mended.message() + " The session continues with the same rig.");
 }
 
 }  // namespace limn::apps

@@ -17,31 +17,32 @@
 
 namespace limn::apps {
 
-/// Where mended rigs of a session go: a new folder in `out`, in Limn's own folder without one.
+/// A new folder for a corrected rig of a session: in `out`, or in Limn's own folder if `out` is empty.
 Result<std::filesystem::path> recalibration_folder(const std::filesystem::path& out);
 
-/// The rig of a running session is checked by the prototype as it stands (wizard/capture/rig_recheck.h), with
-/// the session's own devices, on a thread of its own: what it shows and photographs is done by serve(), so
-/// that the session's thread answers people in between. When all is photographed the session may paint again
-/// while the rest is computed, with low priority.
+/// Rechecks the rig of a running session with patterns on the prototype as it stands
+/// (wizard/capture/rig_recheck.h), using the session's own devices. The recheck runs on a thread of its own;
+/// its device calls are executed by serve() on the session's thread, which can respond to people in between.
+/// After the last photograph the session may show frames again while the result is computed with low
+/// priority.
 class LiveRecalibration {
  public:
-  /// `around` needs stage, written and use_latency, which store images in the writer that it is given.
+  /// `around` must set stage, written and use_latency; its images go to the writer that it is given.
   LiveRecalibration(const Rig& rig,
                     std::filesystem::path folder,
                     const std::function<Surroundings(ImageWriter*)>& around);
-  /// Ends it where it is; a second at most.
+  /// Cancels the recheck; this takes a second at most.
   ~LiveRecalibration();
   LiveRecalibration(const LiveRecalibration&) = delete;
   LiveRecalibration& operator=(const LiveRecalibration&) = delete;
 
-  /// Does what is wanted of the devices, now or within `wait`.
+  /// Executes a device call that is pending or comes within `wait`.
   void serve(std::chrono::nanoseconds wait) { executor_.serve(wait); }
-  /// Whether the devices are its own.
+  /// Whether it still uses the devices.
   bool is_capturing() const { return is_capturing_; }
-  /// How far it is: "12 of 44 patterns", "computing".
+  /// The progress in words: "12 of 44 patterns", "computing".
   std::string words() const;
-  /// What came of it, once, when it is over.
+  /// The result when it is finished, once; otherwise nullopt.
   std::optional<Result<Rechecked>> take();
 
   const std::filesystem::path& folder() const { return folder_; }
@@ -58,9 +59,9 @@ class LiveRecalibration {
   std::future<Result<Rechecked>> result_;
 };
 
-/// Where one device has moved, watcher and session go on with the mended rig, which is in `folder` for the
-/// next session; what could not be done is told, and the session goes on as it was. Nobody may use the
-/// watcher meanwhile.
+/// If a device has moved, perception and session continue with the corrected rig, which is kept in `folder`
+/// for the next session. A failure is reported, and the session continues as before. Nothing else may use
+/// `perception` during the call.
 void apply_recalibration(const Result<Rechecked>& checked,
                          const std::filesystem::path& folder,
                          Stamp at,

@@ -14,8 +14,9 @@ namespace {
 constexpr int k_width = 1600, k_height = 1000;
 constexpr int k_escape = 256;  // GLFW's code
 constexpr std::size_t k_recent = 600, k_notices = 100;
-constexpr double k_module_px = 12;  // of a QR code, so that its edges stay sharp when it is drawn smaller
-constexpr double k_pace_s = 1;      // over which devices' images are counted
+// Side of a QR code's module: its edges stay sharp when the code is drawn smaller.
+constexpr double k_module_px = 12;
+constexpr double k_pace_s = 1;  // time over which image rates are measured
 
 std::string list_of(const std::vector<BodyMarker>& markers) {
   std::vector<std::string> texts;

@@ -18,27 +18,27 @@
 
 namespace limn::apps {
 
-/// What the window shows of an invitation, with the codes that phones read.
+/// The invitation as the window shows it, with QR codes for phones.
 OperatorView::Remote shown(const Invitation& invitation);
 
-/// Where the operator of a session sits: its window and keys. Belongs to the session's thread; the session's
-/// GL context stays current.
+/// The operator's window and keys. Belongs to the session's thread; the session's GL context stays current.
 class OperatorConsole : public SessionClient {
  public:
   static Result<OperatorConsole> open(const device::Desktop& desktop, const scene::Scene& scene);
 
-  /// From now on the window says how guests come in. The remote outlives this.
+  /// From now on the window shows how guests connect. `remote` must outlive this object.
   void invite(RemoteLink* remote);
 
-  /// What keys do; one slot is chosen for all of them.
+  /// The key bindings; all sources of keys share one chosen slot.
   Keys& keys() { return keys_; }
 
-  /// An image was shown.
+  /// To be called for each frame that was shown.
   void shown(const ShownFrame& frame);
-  /// Whether the window is to be drawn anew at the next serve(), with a screen's image.
+  /// Whether the next serve() redraws the window and needs a screen's image.
   bool is_due() const { return window_.is_due(screen_s_); }
-  /// Edits of keys and of the window go to the session; what cannot be done becomes a note. Draws the window
-  /// when it is due. `screen`: its newest image; empty: as before. False: the operator ends the session.
+  /// Sends the edits of keys and of the window to the session; an edit that fails becomes a note. Draws the
+  /// window when it is due. `screen`: the screen's newest image; empty: unchanged. False: the operator ends
+  /// the session.
   bool serve(
       Session* session, Telemetry* telemetry, const DeviceHealth& health, const cv::Mat& screen, Stamp now);
 
@@ -62,7 +62,7 @@ class OperatorConsole : public SessionClient {
   std::optional<OperatorView::Remote> remote_;
   std::deque<ShownFrame> recent_;
   cv::Mat screen_;
-  double screen_s_ = 0;  // what it cost
+  double screen_s_ = 0;  // time to draw the screen's image
   bool ends_session_ = false;
   std::optional<Stamp> begun_at_;
   struct Pace {

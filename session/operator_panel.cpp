@@ -14,15 +14,16 @@ namespace {
 
 using scene::ActionId;
 
-constexpr float k_small_share = 0.32F, k_most_small = 0.25F;  // of all the images' height and width
-constexpr float k_most_split_mm = 2000;                       // by dragging
-constexpr double k_plain = 0.8;        // colour of a material before somebody chooses one, linear
-constexpr std::size_t k_points = 300;  // of the plot: images
+// Limits of a small image: share of the height and of the width of the area for images.
+constexpr float k_small_share = 0.32F, k_most_small = 0.25F;
+constexpr float k_most_split_mm = 2000;  // limit for dragging the line
+constexpr double k_plain = 0.8;          // assumed colour of a part without an override, linear
+constexpr std::size_t k_points = 300;    // frames in the plot
 
-// The names of Screen in words, in its order.
-const char* const k_screens[] = {"camera and what light cannot show",
-                                 "camera and whole parts",
-                                 "camera alone",
+// Labels for the values of Screen, in their order.
+const char* const k_screens[] = {"camera + what light cannot show",
+                                 "camera + whole parts",
+                                 "camera only",
                                  "as the viewer sees it",
                                  "stereo",
                                  "nothing"};
@@ -39,7 +40,7 @@ ImU32 colour_of(const std::optional<Track>& track) {
 std::string words_of(const std::optional<Track>& track) {
   if (!track) return "not seen yet";
   return track->tracking == TrackingState::measured       ? "tracked"
-         : track->tracking == TrackingState::extrapolated ? "carried on"
+         : track->tracking == TrackingState::extrapolated ? "extrapolated"
                                                           : "lost";
 }
 
@@ -51,7 +52,7 @@ void dot(const Gui& gui, ImU32 colour) {
   ImGui::SameLine(0, 0.5F * gui.em());
 }
 
-// Text at the right end of the line.
+// Draws text at the right end of the line.
 void right_text(ImU32 colour, const std::string& text) {
   const float width = ImGui::CalcTextSize(text.c_str()).x;
   ImGui::SameLine(std::max(ImGui::GetCursorPosX(), ImGui::GetWindowContentRegionMax().x - width));
@@ -60,7 +61,7 @@ void right_text(ImU32 colour, const std::string& text) {
   ImGui::PopStyleColor();
 }
 
-// A small button behind what stands in the line; lit when something was chosen with it.
+// A small button after the line's text; highlighted when something was chosen with it.
 bool small_button(const Gui& gui, const char* name, bool is_lit) {
   ImGui::SameLine(0, 0.8F * gui.em());
   ImGui::PushStyleColor(ImGuiCol_Text, is_lit ? colour::k_blue : colour::k_quiet);
@@ -73,7 +74,7 @@ double latency_ms(const ShownFrame& frame) {
   return 1e3 * seconds_between(frame.captured_at, frame.shown_at);
 }
 
-// The newest images of about a second.
+// The frames of the last second.
 std::vector<ShownFrame> last_second(const std::vector<ShownFrame>& recent) {
   std::vector<ShownFrame> out;
   for (const ShownFrame& frame : recent)
@@ -105,7 +106,7 @@ std::string clock_of(double seconds) {
                        : fmt::format("{}:{:02}", whole / 60, whole % 60);
 }
 
-// The end of a scale that a value fits into: 1, 2 or 5 times a power of ten.
+// The end of a scale for a value: 1, 2 or 5 times a power of ten.
 double round_above(double value) {
   const double power = std::pow(10, std::floor(std::log10(std::max(1e-9, value))));
   for (const double step : {1.0, 2.0, 5.0})
@@ -143,11 +144,11 @@ void draw_plot(const std::vector<ShownFrame>& recent, ImVec2 size) {
   draw.AddText({at.x + 6, at.y + 1}, colour::k_quiet, fmt::format("{:.0f} ms", top).c_str());
 }
 
-// Times of the stages, and the plot of how long light took after the camera.
+// The times of the stages, and a plot of the latency.
 void draw_telemetry(const Gui& gui, const OperatorView& view) {
-  heading(gui, "Camera to light");
+  heading(gui, "Latency, camera to light");
   if (view.recent.empty()) {
-    ImGui::TextDisabled("nothing shown yet");
+    ImGui::TextDisabled("no frame shown yet");
     return;
   }
   const std::vector<ShownFrame> second = last_second(view.recent);
@@ -162,7 +163,7 @@ void draw_telemetry(const Gui& gui, const OperatorView& view) {
   draw_plot(view.recent, {room.x, std::max(2 * gui.em(), room.y - lines)});
   std::string stages;
   const std::pair<const char*, double (*)(const ShownFrame&)> all[] = {
-      {"find", [](const ShownFrame& f) { return f.detect_ms; }},
+      {"detect", [](const ShownFrame& f) { return f.detect_ms; }},
       {"pose", [](const ShownFrame& f) { return f.filter_ms; }},
       {"paint", [](const ShownFrame& f) { return f.paint_ms; }},
       {"screen", [](const ShownFrame& f) { return f.screen_ms; }},
@@ -172,7 +173,7 @@ void draw_telemetry(const Gui& gui, const OperatorView& view) {
       stages += fmt::format("{}{} {:.1f}", stages.empty() ? "" : " · ", name, ms);
   text_within(room.x, colour::k_quiet, stages + " ms");
   text_within(room.x, missed + lost > 0 ? colour::k_warn : colour::k_quiet,
-              fmt::format("missed {} · lost {} · of {} pictures", missed, lost, view.recent.size()));
+              fmt::format("{} frames missed · bodies lost in {} of {}", missed, lost, view.recent.size()));
 }
 
 void draw_notices(const Gui& gui, const OperatorView& view) {
@@ -251,7 +252,8 @@ void OperatorPanel::draw_bar(const Gui& gui, const OperatorView& view) {
     ImGui::SameLine();
     if (toggle("Repair " + view.moved, true, colour::k_bad, size)) ask(ActionId::repair);
     if (ImGui::IsItemHovered())
-      ImGui::SetTooltip("%s", "It has moved. Patterns on the prototype for some 15 s.");
+      ImGui::SetTooltip("%s",
+                        "This device has moved. A repair shows patterns on the prototype for about 15 s.");
   }
   if (view.remote) {
     ImGui::SameLine();
@@ -278,7 +280,7 @@ void OperatorPanel::draw_bar(const Gui& gui, const OperatorView& view) {
   ImGui::PopStyleVar();
 }
 
-// True when it was clicked.
+// Returns true when the image was clicked.
 bool OperatorPanel::draw_image(Gui& gui,
                                const OperatorView::Image& image,
                                const OperatorView& view,
@@ -308,13 +310,13 @@ bool OperatorPanel::draw_image(Gui& gui,
   if (is_gone)
     draw.AddRectFilled(inner_corner, {corner.x + size.x, corner.y + size.y}, IM_COL32(20, 22, 26, 170));
   if (image.image.empty())
-    label_at({inner_corner.x + 10, inner_corner.y + 8}, colour::k_quiet, "no picture yet");
+    label_at({inner_corner.x + 10, inner_corner.y + 8}, colour::k_quiet, "no image yet");
   ImGui::PopClipRect();
   ImGui::SetCursorScreenPos(inner_corner);
   return ImGui::InvisibleButton(texture.c_str(), {std::max(1.F, inner.x), std::max(1.F, inner.y)});
 }
 
-// One image large, all of them small below; a click makes one of those the large one.
+// Draws one image large and all of them small below; a click on a small one makes it the large one.
 void OperatorPanel::draw_images(Gui& gui, const OperatorView& view, ImVec2 size) {
   std::vector<const OperatorView::Image*> all;
   for (const OperatorView::Image& image : view.cameras) all.push_back(&image);
@@ -337,7 +339,7 @@ void OperatorPanel::draw_images(Gui& gui, const OperatorView& view, ImVec2 size)
   }
 }
 
-// In place of the images: a code for a phone's camera, and the same to type.
+// Draws, in place of the images, the QR code for a phone's camera, and the address and PIN to type.
 void OperatorPanel::draw_remote(Gui& gui, const OperatorView& view, ImVec2 size) {
   const OperatorView::Remote& remote = *view.remote;
   if (remote.entrances.empty()) return;
@@ -353,7 +355,7 @@ void OperatorPanel::draw_remote(Gui& gui, const OperatorView& view, ImVec2 size)
   ImGui::PushFont(gui.heading());
   ImGui::TextUnformatted(remote.url.c_str());
   ImGui::PopFont();
-  ImGui::TextDisabled("The code pairs for the role that is lit.");
+  ImGui::TextDisabled("The code pairs with the highlighted role.");
   ImGui::Dummy({0, 0.4F * gui.em()});
   for (std::size_t i = 0; i < remote.entrances.size(); ++i)
     if (toggle(fmt::format("{}   {}", remote.entrances[i].pin, remote.entrances[i].role),
@@ -361,7 +363,7 @@ void OperatorPanel::draw_remote(Gui& gui, const OperatorView& view, ImVec2 size)
       entrance_ = i;
   if (!view.projectors.empty()) {
     ImGui::Dummy({0, 0.4F * gui.em()});
-    ImGui::TextDisabled("For 60 s in the light of");
+    ImGui::TextDisabled("Project the code for 60 s with");
     for (const OperatorView::Image& projector : view.projectors)
       if (toggle(projector.name, projector.name == remote.projector, colour::k_warn,
                  {12 * gui.em(), 1.9F * gui.em()}))
@@ -369,7 +371,8 @@ void OperatorPanel::draw_remote(Gui& gui, const OperatorView& view, ImVec2 size)
   }
   draw_viewers(gui, view);
   const std::pair<const char*, const std::string&> fingerprints[] = {
-      {"SHA-256 of the certificate", remote.fingerprint}, {"and of /limn.crt", remote.authority_fingerprint}};
+      {"SHA-256 of the certificate", remote.fingerprint},
+      {"SHA-256 of /limn.crt", remote.authority_fingerprint}};
   for (const auto& [what, fingerprint] : fingerprints) {
     if (fingerprint.empty()) continue;
     ImGui::Dummy({0, 0.4F * gui.em()});
@@ -381,14 +384,14 @@ void OperatorPanel::draw_remote(Gui& gui, const OperatorView& view, ImVec2 size)
   ImGui::EndChild();
 }
 
-// Whose eye view parts are drawn for: of the scene's own viewer and of guests with a tablet.
+// Lets the operator choose the viewpoint for `view` parts: the scene's own viewer or a guest's tablet.
 void OperatorPanel::draw_viewers(const Gui& gui, const OperatorView& view) {
   const std::string& chosen = view.show_state.viewer;
   std::vector<std::string> all = view.windows;
   if (!chosen.empty() && std::find(all.begin(), all.end(), chosen) == all.end()) all.push_back(chosen);
   ImGui::Dummy({0, 0.8F * gui.em()});
-  heading(gui, "View parts are drawn for");
-  if (all.empty()) ImGui::TextDisabled("the scene's own viewer: no guest's window is open");
+  heading(gui, "Viewpoint for the parts");
+  if (all.empty()) ImGui::TextDisabled("the scene's own viewer: no tablet view is open");
   if (all.empty()) return;
   const ImVec2 size{18 * gui.em(), 1.9F * gui.em()};
   if (toggle("the scene's own viewer", chosen.empty(), colour::k_blue, size)) ask(ActionId::viewer);
@@ -397,7 +400,7 @@ void OperatorPanel::draw_viewers(const Gui& gui, const OperatorView& view) {
     if (toggle(guest + "'s tablet", guest == chosen, colour::k_blue, size)) ask(ActionId::viewer, "", guest);
     ImGui::PopID();
     if (guest != chosen || guest == view.follows) continue;
-    ImGui::TextDisabled("sees no markers: the scene's own viewer meanwhile");
+    ImGui::TextDisabled("sees no markers; the scene's own viewer is used");
   }
 }
 
@@ -431,17 +434,17 @@ void OperatorPanel::draw_slots(const Gui& gui, const OperatorView& view) {
     if (ImGui::Button("▶", arrow)) ask(ActionId::next_variant, slot.name);
     if (slot.is_held && ImGui::Button("follow the marker again", {-1, 0})) ask(ActionId::release, slot.name);
     if (!view.waiting.empty() &&
-        ImGui::Button(fmt::format("let {} carry it", view.waiting.back()).c_str(), {-1, 0}))
+        ImGui::Button(fmt::format("pair with {}", view.waiting.back()).c_str(), {-1, 0}))
       ask(ActionId::pair, slot.name, view.waiting.back());
     if (const auto& carrier = view.show_state.slots[i].marker)
-      if (ImGui::Button(fmt::format("no longer {}", carrier->text()).c_str(), {-1, 0}))
+      if (ImGui::Button(fmt::format("unpair {}", carrier->text()).c_str(), {-1, 0}))
         ask(ActionId::unpair, slot.name);
     ImGui::PopID();
   }
-  if (view.slots.empty()) ImGui::TextDisabled("the scene has none");
+  if (view.slots.empty()) ImGui::TextDisabled("the scene has no slots");
 }
 
-// Colour, metalness and roughness of a part, in a box that opens.
+// A popup for a part's colour, metalness and roughness.
 void OperatorPanel::draw_material(const Gui& gui,
                                   const std::string& slot,
                                   const scene::MaterialOverride& now) {
@@ -459,11 +462,11 @@ void OperatorPanel::draw_material(const Gui& gui,
   if (ImGui::SliderFloat("rough", &roughness, 0, 1, "%.2f"))
     wanted.roughness = std::clamp(roughness, 0.F, 1.F);
   if (wanted != now) ask(ActionId::material, slot, scene::format_material_override(wanted));
-  if (ImGui::Button("as its file says", {-1, 0})) ask(ActionId::material, slot);
+  if (ImGui::Button("reset to the file", {-1, 0})) ask(ActionId::material, slot);
   ImGui::EndPopup();
 }
 
-// The light that parts are shaded by, in a box that opens.
+// A popup for the light that parts are shaded by.
 void OperatorPanel::draw_light(const Gui& gui, const scene::ShowState& show_state) {
   if (small_button(gui, "light", show_state.light.has_value())) ImGui::OpenPopup("light");
   const auto numbers = show_state.light
@@ -482,7 +485,7 @@ void OperatorPanel::draw_light(const Gui& gui, const scene::ShowState& show_stat
     ask(ActionId::light, "",
         fmt::format("{:.0f} {:.0f} {:.2f} {:.2f} {:.2f}", light_[0], light_[1], light_[2], light_[3],
                     light_[4]));
-  if (ImGui::Button("the scene's own", {-1, 0})) ask(ActionId::light);
+  if (ImGui::Button("reset to the scene", {-1, 0})) ask(ActionId::light);
   ImGui::EndPopup();
 }
 
@@ -491,7 +494,7 @@ void OperatorPanel::draw_looks(const Gui& gui, const OperatorView& view) {
   draw_light(gui, view.show_state);
   const float save = 4 * gui.em();
   ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x - save - ImGui::GetStyle().ItemSpacing.x);
-  const bool is_entered = ImGui::InputTextWithHint("##name", "a new look", look_.data(), look_.size(),
+  const bool is_entered = ImGui::InputTextWithHint("##name", "name of a new look", look_.data(), look_.size(),
                                                    ImGuiInputTextFlags_EnterReturnsTrue);
   ImGui::SameLine();
   if (ImGui::Button("Save", {save, 0}) || is_entered) {
@@ -517,11 +520,10 @@ void OperatorPanel::draw_looks(const Gui& gui, const OperatorView& view) {
     ImGui::PopID();
   }
   if (const auto& gone = view.show_state.deleted_look)
-    if (ImGui::Button(fmt::format("bring {} back", gone->name).c_str(), {-1, 0}))
-      ask(ActionId::undelete_look);
+    if (ImGui::Button(fmt::format("undelete {}", gone->name).c_str(), {-1, 0})) ask(ActionId::undelete_look);
 }
 
-// The look shown before the present one, in its place or left of a line.
+// Controls that compare with the previous look: in its place, or left of a line.
 void OperatorPanel::draw_comparison(const Gui& gui, const scene::ShowState& show_state) {
   if (show_state.other_look.empty()) return;
   const float room = ImGui::GetContentRegionAvail().x, gap = ImGui::GetStyle().ItemSpacing.x;
@@ -536,7 +538,7 @@ void OperatorPanel::draw_comparison(const Gui& gui, const scene::ShowState& show
     ask(ActionId::split_at, "", fmt::format("{:.1f}", mm));
 }
 
-// Whether the session is to end: a clicker's stray Escape must not end it.
+// Asks whether to end the session: a stray Escape from a clicker must not end it.
 void OperatorPanel::draw_question(const Gui& gui) {
   constexpr const char* k_name = "End the session?";
   if (asks_to_end_ && !ImGui::IsPopupOpen(k_name)) ImGui::OpenPopup(k_name);
@@ -544,7 +546,7 @@ void OperatorPanel::draw_question(const Gui& gui) {
   ImGui::SetNextWindowPos({size.x / 2, size.y / 2}, ImGuiCond_Always, {0.5F, 0.5F});
   if (!ImGui::BeginPopupModal(k_name, nullptr, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove))
     return;
-  ImGui::TextUnformatted("The projectors go dark; everything is saved.");
+  ImGui::TextUnformatted("The projectors will go dark. Everything is saved.");
   ImGui::Dummy({0, 0.3F * gui.em()});
   const ImVec2 button{8 * gui.em(), 1.9F * gui.em()};
   if (ImGui::Button("End", button)) asked_.ends = true;

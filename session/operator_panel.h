@@ -8,13 +8,13 @@
 
 namespace limn::apps {
 
-/// The operator's window, drawn: OperatorView -> ImGui -> what the person asked for. Holds only what belongs
-/// to looking: which image is large, a name half typed.
+/// Draws the operator's window: OperatorView -> ImGui -> what the operator requests. Keeps only the state of
+/// the window itself, such as the large image's name and a half-typed look name.
 class OperatorPanel {
  public:
-  /// Within a frame of `gui`.
+  /// To be called within a frame of `gui`.
   OperatorAsked draw(Gui& gui, const OperatorView& view);
-  /// Asks whether the session is to end; asked again, goes on.
+  /// Opens the question whether to end the session; called again, closes it.
   void ask_to_end() { asks_to_end_ = !asks_to_end_; }
 
  private:
@@ -39,12 +39,12 @@ class OperatorPanel {
   }
 
   OperatorAsked asked_;
-  std::string large_;  // an image's name; empty: the first
+  std::string large_;  // the large image's name; empty: the first
   std::array<char, 65> look_{};
-  std::array<float, 5> light_ = {30, 45, 0.65F, 0.35F, 0.15F};  // as last asked for, in the action's order
+  std::array<float, 5> light_ = {30, 45, 0.65F, 0.35F, 0.15F};  // as last requested, in the action's order
   bool asks_to_end_ = false;
   bool shows_remote_ = false;
-  std::size_t entrance_ = 1;  // whose code is shown
+  std::size_t entrance_ = 1;  // index of the role whose code is shown
 };
 
 }  // namespace limn::apps

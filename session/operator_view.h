@@ -15,7 +15,7 @@
 
 namespace limn::apps {
 
-/// What the operator sees of a session at a moment.
+/// What the operator's window shows of a session at one moment.
 struct OperatorView {
   struct Found {
     std::string marker;  ///< its id
@@ -29,7 +29,7 @@ struct OperatorView {
   };
   struct Device {
     DeviceState state;
-    std::optional<double> per_second;  ///< images, by the session's clock; none yet: absent
+    std::optional<double> per_second;  ///< image rate by the session's clock; absent: not known yet
   };
   struct Body {
     std::string name;
@@ -39,50 +39,51 @@ struct OperatorView {
   struct Slot {
     std::string name;
     std::vector<std::string> variants;
-    bool is_chosen = false;  ///< the keys' slot
-    bool is_held = false;    ///< by a look or a nudge, not where its marker puts it
+    bool is_chosen = false;  ///< keys act on this slot
+    bool is_held = false;    ///< its pose is changed by a look or a nudge
   };
   struct Notice {
     double at_s = 0;
     std::string text;
   };
-  /// How guests come in (docs/remote.md).
+  /// How guests connect (docs/remote.md).
   struct Remote {
     struct Entrance {
       std::string role, pin;
-      cv::Mat code;  ///< QR code of the page that pairs by itself
+      cv::Mat code;  ///< QR code of the page that pairs without typing
     };
     std::string url;
-    std::string fingerprint;            ///< of the certificate; empty without
-    std::string authority_fingerprint;  ///< of /limn.crt, likewise
+    std::string fingerprint;            ///< fingerprint of the certificate; empty without TLS
+    std::string authority_fingerprint;  ///< fingerprint of /limn.crt; empty without TLS
     std::vector<Entrance> entrances;
-    std::string projector = {};  ///< that shows a code; empty: none
+    std::string projector = {};  ///< the projector that shows a code; empty: none
   };
-  double at_s = 0;  ///< of the session's clock, since it began
+  double at_s = 0;  ///< by the session's clock, since the session began
   std::vector<Image> cameras, projectors;
   Image screen;
   std::vector<Device> devices;
   std::vector<Body> bodies;
   std::vector<Slot> slots;
-  std::vector<std::string> waiting;       ///< loose markers that may carry a part, the next one last
-  std::vector<std::string> windows = {};  ///< guests whose tablets can be the eye
-  std::string follows = {};               ///< the one whose tablet it is; empty: the scene's own viewer
+  std::vector<std::string> waiting;       ///< loose markers that may be paired; `pair` uses the last one
+  std::vector<std::string> windows = {};  ///< guests whose tablets can be the viewpoint
+  /// The guest whose tablet is the viewpoint; empty: the scene's own viewer.
+  std::string follows = {};
   scene::ShowState show_state;
-  std::vector<ShownFrame> recent;  ///< images shown, the newest last
+  std::vector<ShownFrame> recent;  ///< shown frames, the newest last
   std::vector<Notice> notices;     ///< the newest last
   std::optional<Remote> remote = {};
-  std::string moved = {};  ///< devices that do not stand where the rig says; empty: none is known of
-  std::string recalibration_progress = {};  ///< how far a repair is; empty: there is none
+  std::string moved = {};                   ///< devices that have moved; empty: none is known
+  std::string recalibration_progress = {};  ///< progress of a repair; empty: none is running
 };
 
-/// What a person asked for.
+/// What the operator requests.
 struct OperatorAsked {
   struct Code {
     std::string projector, role;
   };
   std::vector<scene::Edit> edits;
-  std::optional<Code> code = {};  ///< that a projector is to show
-  bool ends = false;              ///< the session
+  std::optional<Code> code = {};  ///< a code that a projector shall show
+  bool ends = false;              ///< whether to end the session
 };
 
 }  // namespace limn::apps

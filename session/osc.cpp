@@ -55,12 +55,12 @@ bool is_printable(const std::string& text) {
   });
 }
 
-// For a message to people.
+// The text as it may appear in a message to people.
 std::string printable(const std::string& text) {
   return is_printable(text) ? text.substr(0, k_longest_text) : "?";
 }
 
-// Of the padded text that begins at `at`; nullopt: it has no end.
+// Reads the padded text that begins at `at`; nullopt: it has no end.
 std::optional<std::string> text_at(std::span<const std::uint8_t> bytes, std::size_t at) {
   const auto begin = bytes.begin() + static_cast<std::ptrdiff_t>(std::min(at, bytes.size()));
   const auto end = std::find(begin, bytes.end(), 0);
@@ -68,7 +68,7 @@ std::optional<std::string> text_at(std::span<const std::uint8_t> bytes, std::siz
   return std::string(begin, end);
 }
 
-// A message's type letters; nullopt: it is no message.
+// The type letters of a message; nullopt: it is not a message.
 std::optional<std::string> types_of(std::span<const std::uint8_t> bytes) {
   const auto path = text_at(bytes, 0);
   if (!path || path->empty() || path->front() != '/') return std::nullopt;
@@ -77,11 +77,12 @@ std::optional<std::string> types_of(std::span<const std::uint8_t> bytes) {
   return types->substr(1);
 }
 
-// What actions take. liblo (0.31) gets no others: it reads beyond the end of a blob that was cut off.
+// The types that actions use. Other types are not passed to liblo (0.31): it reads beyond the end of a blob
+// that was cut off.
 const std::string k_known_types = {LO_INT32,  LO_INT64,  LO_FLOAT, LO_DOUBLE,
                                    LO_STRING, LO_SYMBOL, LO_TRUE,  LO_FALSE};
 
-// One argument, of the types that are understood.
+// One argument of a known type.
 struct Argument {
   char type;
   const void* value;
@@ -104,7 +105,7 @@ struct Argument {
     if (type != LO_STRING && type != LO_SYMBOL) return std::nullopt;
     return std::string(reinterpret_cast<const char*>(value));
   }
-  // liblo's values lie at multiples of 4 bytes, whatever they are.
+  // liblo aligns all values to 4 bytes only, whatever their type.
   template <class T>
   T as() const {
     T out;
@@ -113,7 +114,7 @@ struct Argument {
   }
 };
 
-// What is still to be read of a message's arguments.
+// Reads a message's arguments one after the other.
 struct Reader {
   std::string path;
   std::vector<Argument> arguments;
@@ -205,21 +206,21 @@ const std::vector<OscAddress>& osc_told() {
   static const std::vector<OscAddress> all = {
       {"/limn/state/variant", "slot (text); variant (text)", "which variant a slot shows"},
       {"/limn/state/pose", "slot (text); x, y, z in mm; quaternion w, x, y, z",
-       "where the part is on the prototype (its mesh's frame; the world's without a prototype)"},
+       "the part's pose in the prototype's frame (in the world frame without a prototype)"},
       {"/limn/state/lost", "slot (text)", "the part is not shown: its marker is not seen"},
       {"/limn/state/prototype", "x, y, z in mm; quaternion w, x, y, z",
-       "where the prototype is in the world"},
+       "the prototype's pose in the world frame"},
       {"/limn/state/look", "name (text; empty: none)", "the look last saved or restored"},
-      {"/limn/state/looks", "number from 0; how many there are; name (text)", "a look, of all that are kept"},
-      {"/limn/state/blackout", "0 or 1", "no light"},
-      {"/limn/state/freeze", "0 or 1", "what is shown stays"},
-      {"/limn/state/marker_states", "0 or 1", "rings around markers"},
+      {"/limn/state/looks", "number from 0; how many there are; name (text)", "one of the saved looks"},
+      {"/limn/state/blackout", "0 or 1", "1: the projectors give no light"},
+      {"/limn/state/freeze", "0 or 1", "1: the images are frozen"},
+      {"/limn/state/marker_states", "0 or 1", "1: rings are shown around markers"},
       {"/limn/state/screen", "rest, full, camera, view, stereo or off (text)",
        "what was last chosen for all screens"},
       {"/limn/state/output", "a screen (text); rest, full, camera, view, stereo or off (text)",
        "what that screen shows"},
       {"/limn/state/viewer", "name (text; empty: the scene's own viewer)",
-       "the guest whose tablet view parts are drawn for"},
+       "the guest whose tablet is the viewpoint"},
   };
   return all;
 }

@@ -11,29 +11,30 @@
 
 namespace limn::apps {
 
-/// An address of Open Sound Control 1.0 that a live session hears or tells on.
+/// An address of Open Sound Control 1.0 that a live session receives or sends.
 struct OscAddress {
   std::string path;       ///< "/limn/next_variant"
-  std::string arguments;  ///< in words, as docs/osc.md has them
+  std::string arguments;  ///< in words, as in docs/osc.md
   std::string what;
-  std::string role = {};  ///< that the action needs on the remote; nobody asks for it here
+  /// The role that the action needs on the remote; OSC does not check it.
+  std::string role = {};
 };
 
-/// What a session hears: one for each of scene::actions(), in their order.
+/// The addresses that a session receives: one for each of scene::actions(), in their order.
 std::vector<OscAddress> osc_heard();
-/// What it tells.
+/// The addresses that a session sends.
 const std::vector<OscAddress>& osc_told();
 
-/// The longest datagram that is looked at, bytes.
+/// Longer datagrams are refused; bytes.
 constexpr std::size_t k_longest_osc = 1024;
 
-/// The edit that a datagram asks for. Slots, variants and looks are the scene's affair (scene::edited).
-/// Error, naming the address where there is one: no message of OSC, a bundle, longer than k_longest_osc, an
-/// unknown address, arguments of other number or type than the action takes, numbers that are not finite,
-/// text that is not printable or longer than 200 bytes.
+/// The edit that a datagram requests. Whether its slot, variant or look exists is not checked here, but in
+/// scene::command_of and apply_edit. Error (it names the address if there is one): not a message of OSC, a
+/// bundle, longer than k_longest_osc, an unknown address, another number or type of arguments than the action
+/// takes, numbers that are not finite, text that is not printable or longer than 200 bytes.
 Result<scene::Edit> edit_of_osc(std::span<const std::uint8_t> datagram);
 
-/// A message as bytes.
+/// Encodes a message.
 using OscValue = std::variant<int, float, std::string>;
 std::vector<std::uint8_t> osc_message(const std::string& path, const std::vector<OscValue>& arguments);
 

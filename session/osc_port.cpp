@@ -13,7 +13,7 @@ namespace {
 constexpr auto k_longest_hearing = std::chrono::milliseconds(5);
 constexpr auto k_between_refusals = std::chrono::seconds(1);
 constexpr auto k_between_all = std::chrono::seconds(1);
-constexpr float k_same_mm = 0.05F, k_same_turn = 0.0003F;  // a quaternion's, 0.03 degrees
+constexpr float k_same_mm = 0.05F, k_same_turn = 0.0003F;  // of a quaternion: 0.03 degrees
 
 std::vector<OscValue> values_of(const Pose& pose) {
   const Eigen::Vector3f mm = (1e3 * pose.translation).cast<float>();
@@ -22,7 +22,7 @@ std::vector<OscValue> values_of(const Pose& pose) {
   return {mm.x(), mm.y(), mm.z(), q.w(), q.x(), q.y(), q.z()};
 }
 
-// Poses that differ by what a tracker trembles are the same.
+// Poses that differ only by tracking noise count as the same.
 bool is_same(const std::vector<OscValue>& a, const std::vector<OscValue>& b) {
   if (a.size() != b.size()) return false;
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -46,7 +46,7 @@ Result<OscPort> OscPort::open(const std::string& hear, const std::string& tell) 
     auto socket = UdpSocket::hearing(*place);
     if (!socket) return named("--osc", socket.error());
     out.ear_ = std::move(*socket);
-    log_info("live: hears OSC at {}, UDP port {}", place->host, out.port());
+    log_info("live: receives OSC at {}, UDP port {}", place->host, out.port());
   }
   if (!tell.empty()) {
     const auto place = net_place(tell, "127.0.0.1");
@@ -69,7 +69,7 @@ void OscPort::hear(Session* session, Telemetry* telemetry, Stamp at) {
     const Status done = edit ? session->edit(*edit, "osc", at) : Status(edit.error());
     if (!done) refuse(done.message(), telemetry, at);
   }
-  if (untold_ > 0 && at - *refused_at_ >= k_between_refusals) refuse("as before", telemetry, at);
+  if (untold_ > 0 && at - *refused_at_ >= k_between_refusals) refuse("further messages", telemetry, at);
 }
 
 void OscPort::refuse(const std::string& why, Telemetry* telemetry, Stamp at) {

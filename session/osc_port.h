@@ -14,26 +14,27 @@
 
 namespace limn::apps {
 
-/// A session's ear and mouth for other programs (docs/osc.md), over UDP. Belongs to the session's thread and
-/// never waits. What it has not heard yet lies in the system's buffer for this socket, which does not grow:
-/// when that is full, datagrams are lost.
+/// Receives edits from other programs and sends them the session's state, by OSC over UDP (docs/osc.md).
+/// Belongs to the session's thread and never waits. Datagrams that were not read yet are in the system's
+/// buffer for the socket, which does not grow: when it is full, datagrams are lost.
 class OscPort : public SessionClient {
  public:
-  /// `hear`: PORT on the loopback, or ADDRESS:PORT; `tell`: HOST:PORT; empty: not. Port 0 to hear: any free
-  /// one. Errors name the option.
+  /// `hear`: PORT on the loopback interface, or ADDRESS:PORT; port 0: any free one. `tell`: HOST:PORT. An
+  /// empty text: receives or sends nothing. Errors name the option.
   static Result<OscPort> open(const std::string& hear, const std::string& tell);
 
-  /// Edits of the messages that wait, at most k_most_at_once of them and for at most 5 ms; the others wait
-  /// for the next call. What cannot be done is told, at most once a second, with how many more there were.
-  /// `at`: this moment on the session's clock.
+  /// Applies the edits of the messages that wait, at most k_most_at_once of them and for at most 5 ms; the
+  /// others wait for the next call. Refused messages are reported at most once a second, with the number of
+  /// further ones. `at`: the session's present time.
   void hear(Session* session, Telemetry* telemetry, Stamp at);
-  /// What has changed since it was told last; once a second everything, for datagrams get lost.
+  /// Sends what has changed since it was last sent; once a second it sends everything, because datagrams get
+  /// lost.
   void tell(const Session& session, Stamp at);
 
   void hear(const SessionMoment& moment) override { hear(&moment.session, &moment.telemetry, moment.at); }
   void tell(const SessionMoment& moment) override { tell(moment.session, moment.at); }
 
-  /// The port that it hears on, 0: none.
+  /// The port on which it receives; 0: none.
   int port() const { return ear_ ? ear_->port() : 0; }
 
   static constexpr int k_most_at_once = 64;
@@ -44,7 +45,7 @@ class OscPort : public SessionClient {
 
   std::optional<UdpSocket> ear_, mouth_;
   std::optional<Stamp> refused_at_;
-  std::size_t untold_ = 0;  // refusals
+  std::size_t untold_ = 0;  // refusals that were not reported yet
   std::map<std::string, std::vector<OscValue>> told_;
   std::optional<Stamp> told_all_at_;
 };

@@ -9,8 +9,8 @@
 namespace limn::apps {
 namespace {
 
-constexpr int k_sign_finer =
-    3;  // a sign is drawn so many times larger and made smaller, so that edges are even
+// A sign is drawn this many times larger and then made smaller, so that its edges are smooth.
+constexpr int k_sign_finer = 3;
 
 // Draws one overlay after the other into a projector's image.
 class OverlayPen {
@@ -50,7 +50,7 @@ class OverlayPen {
   }
 
  private:
-  // The prototype's point that each pixel lights.
+  // The point of the prototype that each pixel illuminates.
   const cv::Mat& points() {
     if (!points_) points_ = target_.renderer->surface_points(target_.projector, target_.posed);
     return *points_;
@@ -87,7 +87,8 @@ void draw_pairing_overlay(const cv::Mat& sign,
   const std::array<cv::Point2f, 4> from = {
       {{-0.5F, -0.5F}, {width, -0.5F}, {width, height}, {-0.5F, height}}};
   const cv::Mat turn = cv::getPerspectiveTransform(from.data(), corners.data());
-  // Many of the sign's pixels to one of the image's: drawn larger and made smaller, so that edges are even.
+  // Many of the sign's pixels fall on one pixel of the image: it is drawn larger and made smaller, so that
+  // edges are smooth.
   const cv::Mat larger = (cv::Mat_<double>(3, 3) << k_sign_finer, 0, 0.5 * (k_sign_finer - 1),  //
                           0, k_sign_finer, 0.5 * (k_sign_finer - 1),                            //
                           0, 0, 1);

@@ -15,28 +15,28 @@
 
 namespace limn::apps {
 
-// What is drawn over the projectors' images of the parts: values, in the order in which they are drawn. Who
-// wants something drawn adds to a list; only draw() draws.
+// Overlays are drawn over the projectors' images of the parts. They are values in a list, in drawing order;
+// only draw() draws them.
 
-/// Left of a line on the prototype another look is shown.
+/// Shows another look left of a line on the prototype.
 struct SplitOverlay {
   scene::PosedScene left;
-  double x_m = 0;  ///< of the line, in the prototype's frame
+  double x_m = 0;  ///< x of the line in the prototype's frame
 };
 
 /// Lines on the prototype, every 10 mm.
 struct GridOverlay {};
 
-/// A ring around a marker, by one projector.
+/// A ring around a marker, drawn by one projector.
 struct RingOverlay {
   std::size_t projector = 0;
   Pose world_from_marker;
-  double size_m = 0;  ///< of the marker
+  double size_m = 0;  ///< the marker's side
   cv::Scalar colour;
-  double strength = 1;  ///< share of full light
+  double strength = 1;  ///< share of the full display value
 };
 
-/// A word above a marker, by one projector.
+/// A word above a marker, drawn by one projector.
 struct WordOverlay {
   std::size_t projector = 0;
   Pose world_from_marker;
@@ -45,14 +45,15 @@ struct WordOverlay {
   double strength = 1;
 };
 
-/// Where a sign lies on the prototype, in its frame, m: as wide as d_right is long, as high as d_down.
+/// The rectangle of a sign on the prototype, in the prototype's frame, m. d_right and d_down are its full
+/// width and height, not unit vectors.
 struct OverlayPlace {
   Eigen::Vector3d p_corner = Eigen::Vector3d::Zero();  ///< top left
   Eigen::Vector3d d_right = Eigen::Vector3d::Zero(), d_down = Eigen::Vector3d::Zero();
 };
 
-/// An image on the prototype, undistorted, or without a place in the middle of a projector's image, pixel for
-/// pixel. 8-bit BGR.
+/// An 8-bit BGR image. With a place, it appears there undistorted on the prototype; without one, it is copied
+/// pixel by pixel into the middle of the projector's image.
 struct SignOverlay {
   std::size_t projector = 0;
   cv::Mat image;
@@ -61,23 +62,23 @@ struct SignOverlay {
 
 using Overlay = std::variant<SplitOverlay, GridOverlay, RingOverlay, WordOverlay, SignOverlay>;
 
-/// A projector's image of a frame, which overlays are drawn into.
+/// A projector's image that overlays are drawn into.
 struct OverlayTarget {
   std::size_t projector = 0;
   const Imager& imager;
   const scene::PosedScene& posed;
   cv::Mat* image;
-  /// For split and grid, which depend on the surface: the renderer that drew the image, and whose eye it was
-  /// drawn for. Null: they are left out.
+  /// Split and grid depend on the surface: they need the renderer that drew the image, and the viewer for
+  /// whom it was drawn. Null: they are left out.
   projector::Renderer* renderer = nullptr;
   const Imager* viewer = nullptr;
 };
 
-/// Draws those that are this projector's.
+/// Draws the overlays that belong to this projector.
 void draw(std::span<const Overlay> overlays, const OverlayTarget& target);
 
-/// Draws a sign into a projector's image so that it lies there undistorted. Nothing is drawn where a corner
-/// is not in the projector's view.
+/// Draws a sign into a projector's image so that it appears undistorted at its place. Draws nothing if a
+/// corner cannot be projected.
 void draw_pairing_overlay(const cv::Mat& sign,
                           const OverlayPlace& place,
                           const Imager& projector,

@@ -7,9 +7,9 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_fading_gamma = 2.2;  // near enough to mix what fades
+constexpr double k_fading_gamma = 2.2;  // accurate enough to mix fading images
 
-// base + share of what `with` adds to it, in linear light.
+// base + share * (with - base), in linear light.
 cv::Mat mixed(const cv::Mat& base, const cv::Mat& with, double share) {
   std::array<float, 256> light{};
   for (int i = 0; i < 256; ++i)

@@ -14,11 +14,11 @@
 
 namespace limn::apps {
 
-/// What is left of what was shown a moment ago: light of parts whose marker was lost goes away softly, and
-/// names of variants that were chosen lately stand by their markers.
+/// Effects that last for a moment: parts whose marker was lost fade out, and the names of variants that were
+/// chosen just now are shown beside their markers.
 class PartFading {
  public:
-  /// The variant that a slot shows since a moment.
+  /// The name of a variant that was chosen, and when.
   struct Label {
     std::string text;
     Stamp since;
@@ -26,20 +26,20 @@ class PartFading {
 
   explicit PartFading(const ComposeOptions& options) : options_(options) {}
 
-  /// What is shown from `at` on. Stamps must not go back.
+  /// Notes what is shown from `at` on. Stamps must not go back.
   void note(const scene::Scene& scene,
             const scene::PosedScene& posed,
             const scene::ShowState& show_state,
             Stamp at);
 
-  /// A projector's image of the parts that were noted last, and of those that fade a share.
+  /// A projector's image of the parts that were noted last, with the parts that are fading mixed in.
   cv::Mat image(std::size_t projector, const Imager& viewer, Stamp at, projector::Renderer* renderer) const;
 
-  /// What was noted last.
+  /// The posed scene that was noted last.
   const scene::PosedScene& shown() const { return shown_; }
-  /// When the part of a slot was lost, if that was lately.
+  /// When the part of a slot was lost; nullopt: not recently.
   std::optional<Stamp> lost_at(const std::string& slot) const;
-  /// Null: it shows that variant for long.
+  /// The label of a slot; null: its variant was not changed recently.
   const Label* label(const std::string& slot) const;
 
  private:
@@ -57,8 +57,8 @@ class PartFading {
   ComposeOptions options_;
   scene::PosedScene shown_;
   std::map<std::string, Fading> fading_;         // by slot
-  std::optional<Gone> gone_;                     // all, since the prototype was lost
-  std::map<std::string, std::string> variants_;  // last shown
+  std::optional<Gone> gone_;                     // the whole scene, if the prototype was lost
+  std::map<std::string, std::string> variants_;  // last shown, by slot
   std::map<std::string, Label> labels_;
 };
 

@@ -16,17 +16,17 @@
 namespace limn::apps {
 namespace {
 
-// Loose markers: a body from the fifth image on, forgotten after two seconds.
+// A loose marker is tracked after it was seen in this many moments, and forgotten when unseen for this long.
 constexpr int k_known_after = 5;
 constexpr double k_forgotten_s = 2;
 constexpr double k_still_m = 0.005, k_still_rad = 5 * std::numbers::pi / 180;
 constexpr double k_lying_m = 0.01, k_lying_rad = 45 * std::numbers::pi / 180;
-constexpr double k_once_s = 0.4;  // two cameras that see one gesture within it
-// While all of the scene's markers are seen, searches are so many times rarer, and every second one alone
-// looks for markers that are partly covered.
+constexpr double k_once_s = 0.4;  // gestures of two cameras within this time are one use
+// While all of the scene's markers are seen, full searches are k_rarer times rarer. Only every
+// k_covered_every-th search also looks for partly covered markers.
 constexpr int k_rarer = 3;
 constexpr int k_covered_every = 2;
-// Between images, as shares of the one before: a longer one says nothing of the next.
+// If the time between images grows by more than this factor, markers are not extrapolated.
 constexpr double k_like_moments = 3;
 
 Result<tracker::Gesture> gesture_of(const scene::Control& control) {
@@ -40,7 +40,7 @@ Result<tracker::Gesture> gesture_of(const scene::Control& control) {
                control.marker.text(), control.gesture);
 }
 
-// By more than its corners' noise.
+// Whether a marker has moved by more than its corners' noise.
 bool has_moved(const tracker::Detection& now, const tracker::Detection& before) {
   constexpr double k_deviations = 3;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -51,7 +51,7 @@ bool has_moved(const tracker::Detection& now, const tracker::Detection& before) 
   return false;
 }
 
-// Where markers should be after another `seconds`, as they moved in the `seconds_before`.
+// Predicts markers `seconds` ahead, with the image motion that they had in the `seconds_before`.
 std::vector<tracker::Detection> foretold(const std::vector<tracker::Detection>& last,
                                          const std::vector<tracker::Detection>& before,
                                          double seconds,
@@ -59,7 +59,7 @@ std::vector<tracker::Detection> foretold(const std::vector<tracker::Detection>& 
   std::vector<tracker::Detection> next = last;
   if (!(seconds_before > 0 && seconds > 0 && seconds < k_like_moments * seconds_before)) return next;
   for (tracker::Detection& marker : next) {
-    const tracker::Detection* was = nullptr;  // the nearest of that name
+    const tracker::Detection* was = nullptr;  // the nearest earlier one with that name
     const auto moved = [&](const tracker::Detection& other) {
       return (marker.corners_px[0] - other.corners_px[0]).norm();
     };
@@ -72,7 +72,7 @@ std::vector<tracker::Detection> foretold(const std::vector<tracker::Detection>& 
   return next;
 }
 
-// What to look for: bodies and controls.
+// The families of all bodies and controls.
 std::vector<std::string> families_of(const scene::Scene& scene, std::vector<Body> bodies) {
   for (const scene::Control& control : scene.controls)
     bodies.push_back({"(control)", {{control.marker, 0, Pose{}}}});
@@ -143,8 +143,8 @@ const Percepts& Perception::watch(std::span<const Frame> frames) {
   return watched_;
 }
 
-// Markers are followed where they should be by now; all of the image is searched for others now and then,
-// and when one is gone.
+// Follows known markers near their predicted positions. Searches the whole image for others from time to
+// time, and when a marker is gone.
 void Perception::look(std::size_t camera, const Frame& frame) {
   Eye& eye = eyes_[camera];
   const Lens* lens = &rig_.cameras[camera].lens;
@@ -165,7 +165,7 @@ void Perception::look(std::size_t camera, const Frame& frame) {
   eye.until_search = (all_are_seen() ? k_rarer : 1) * options_.full_scan_every;
 }
 
-// Whether some camera sees each of the markers that bodies and controls use.
+// Whether each marker that bodies and controls use is seen by some camera.
 bool Perception::all_are_seen() const {
   return std::all_of(used_.begin(), used_.end(), [&](const MarkerName& used) {
     return std::any_of(watched_.detections.begin(), watched_.detections.end(), [&](const auto& of_camera) {
@@ -176,7 +176,7 @@ bool Perception::all_are_seen() const {
   });
 }
 
-// Markers of the scene's families that nothing in it uses.
+// Notes seen markers that the scene does not use (of the scene's families).
 void Perception::note_loose(std::span<const std::size_t> cameras) {
   const Stamp at = watched_.captured_at;
   std::vector<MarkerName> seen;
@@ -202,7 +202,7 @@ void Perception::note_loose(std::span<const std::size_t> cameras) {
   }
 }
 
-// Which of them lie still.
+// Updates the poses of loose markers, and since when each is still.
 void Perception::follow_loose() {
   watched_.loose.clear();
   if (loose_.empty()) return;
@@ -225,8 +225,9 @@ void Perception::follow_loose() {
                    [](const LooseMarker& a, const LooseMarker& b) { return a.still_since < b.still_since; });
 }
 
-// A control is used when one camera sees the gesture and none of the others sees the marker uncovered. Of
-// controls that are hidden together the last one is meant: an arm hides the others on the hand's way there.
+// A control is used when one camera sees the gesture and no other camera sees the marker uncovered. If
+// several controls are hidden together, only the one hidden last counts: the arm hides the others on the
+// hand's way.
 void Perception::read_gestures(std::span<const std::size_t> cameras) {
   for (const std::size_t camera : cameras) {
     std::vector<tracker::GestureReader>& gestures = eyes_[camera].gestures;

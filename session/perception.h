@@ -16,51 +16,53 @@
 
 namespace limn::apps {
 
-/// A control of the scene (by its index) was used: `steps` is -1 for a turn backwards.
+/// A use of a control of the scene. `control` is its index; `steps` is -1 for a turn backwards.
 struct ControlUse {
   std::size_t control = 0;
   int steps = 1;
 };
 
-/// A marker that lies still for so long may be paired.
+/// A marker may be paired after it has been still for this long; seconds.
 inline constexpr double k_lies_after_s = 1;
 
-/// A marker that carries nothing in the scene, seen for a while. Its body is scene::loose_body(marker).
+/// A marker that carries nothing in the scene and has been seen for a while. Its body is
+/// scene::loose_body(marker).
 struct LooseMarker {
   MarkerName marker;
   Pose world_from_marker;
-  /// It has not been moved by 5 mm or 5 degrees since; once it lies, by 10 mm or 45 degrees: what is offered
-  /// must not come and go with a small marker's noise in depth and tilt.
+  /// Since then the marker has moved by less than 5 mm and 5 degrees. After k_lies_after_s the limits are 10
+  /// mm and 45 degrees, so that the offer to pair does not come and go with a small marker's noise in depth
+  /// and tilt.
   Stamp still_since;
 };
 
-/// What is known after a moment's images.
+/// The results of perception after the frames of one moment.
 struct Percepts {
   std::vector<Frame> frames;                                ///< newest of each camera, in the rig's order
-  std::vector<std::vector<tracker::Detection>> detections;  ///< in them
+  std::vector<std::vector<tracker::Detection>> detections;  ///< in these frames, one list per camera
   std::vector<tracker::BodyFilter> motions;
-  std::vector<LooseMarker> loose;  ///< seen in the newest images; the one that lies longest first
-  std::vector<ControlUse> uses;    ///< made in this moment
+  std::vector<LooseMarker> loose;  ///< tracked loose markers, the one that is still for longest first
+  std::vector<ControlUse> uses;    ///< control uses of this moment
   Stamp captured_at;
-  std::vector<Track> tracks;  ///< where bodies are at captured_at, by the filter
+  std::vector<Track> tracks;  ///< filtered tracks at captured_at
   double detect_ms = 0, filter_ms = 0;
 };
 
 struct PerceptionOptions {
-  /// Every how many images of a camera all of it is searched, a third as often while all markers of the
-  /// scene are seen; between, markers are followed where they should be by now. Higher is faster and finds
-  /// new markers later.
+  /// In every N-th image of a camera the whole image is searched for markers; a third as often while all
+  /// markers of the scene are seen. In between, markers are followed near their predicted positions only.
+  /// Higher is faster and finds new markers later.
   int full_scan_every = 3;
   tracker::MotionModel motion;
-  int most_loose = 8;  ///< markers that carry nothing; more are not looked at
+  int most_loose = 8;  ///< at most so many loose markers; further ones are ignored
 };
 
-/// How large loose markers are taken to be: as the scene's first slot's, m; 0 without slots: none are looked
-/// at.
+/// The side that loose markers are assumed to have: that of the scene's first slot, m. 0 without slots: loose
+/// markers are ignored.
 double loose_size_m(const scene::Scene& scene);
 
-/// The camera side of a session: frames -> markers -> motions of bodies, and gestures of control markers.
-/// The same frames give the same answers; no clock but the frames' stamps.
+/// The camera side of a session: frames -> markers -> motions of bodies, and gestures of control markers. Its
+/// only clock is the frames' stamps, so the same frames give the same results.
 class Perception {
  public:
   /// Error: a family that cannot be loaded, a control whose gesture is unknown.
@@ -68,24 +70,24 @@ class Perception {
                                    const Rig& rig,
                                    const PerceptionOptions& options = {});
 
-  /// Takes frames of one moment (at most one a camera; cameras without one keep what they saw). The result
-  /// stays valid until the next call.
+  /// Processes the frames of one moment, at most one per camera; a camera without a frame keeps its last
+  /// detections. The result stays valid until the next call.
   const Percepts& watch(std::span<const Frame> frames);
   const Percepts& watched() const { return watched_; }
 
  private:
   struct Eye {
     tracker::Detector detector;
-    std::vector<tracker::GestureReader> gestures;  // one a control
+    std::vector<tracker::GestureReader> gestures;  // one per control
     int until_search = 0, searches = 0;
-    std::vector<tracker::Detection> before = {};  // in the image before the newest
-    Stamp seen_at = {};                           // the newest
-    double seconds = 0;                           // between the two
+    std::vector<tracker::Detection> before = {};  // detections in the image before the newest
+    Stamp seen_at = {};                           // stamp of the newest image
+    double seconds = 0;                           // time between the last two images
     cv::Mat grey = {};                            // the newest image
   };
   struct Loose {
     MarkerName marker;
-    int moments = 0;  // that showed it
+    int moments = 0;  // number of moments in which it was seen
     Stamp seen_at;
     std::optional<Pose> anchor;
     Stamp still_since;
@@ -101,10 +103,10 @@ class Perception {
   PerceptionOptions options_;
   std::vector<Body> bodies_;
   double loose_size_m_ = 0;
-  std::vector<MarkerName> used_;  // by bodies and controls
+  std::vector<MarkerName> used_;  // markers of bodies and controls
   std::vector<Loose> loose_;
-  std::vector<Eye> eyes_;       // one a camera
-  std::vector<Stamp> used_at_;  // one a control
+  std::vector<Eye> eyes_;       // one per camera
+  std::vector<Stamp> used_at_;  // one per control
   Percepts watched_;
 };
 

@@ -5,7 +5,8 @@
 namespace limn::apps {
 namespace {
 
-constexpr auto k_frames_wait = std::chrono::milliseconds(50);  // for frames, before it is asked to stop again
+// Wait for frames before is_stopping_ is checked again.
+constexpr auto k_frames_wait = std::chrono::milliseconds(50);
 
 }  // namespace
 

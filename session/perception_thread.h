@@ -14,18 +14,18 @@
 
 namespace limn::apps {
 
-/// Perceives on a thread of its own what cameras see; the newest perception waits for whoever asks. Gestures
-/// of those that nobody asked for are kept.
+/// Runs perception on a thread of its own and keeps the newest percepts for take(). Control uses of percepts
+/// that were not taken are kept.
 class PerceptionThread {
  public:
-  /// Begins at once. Borrows all of them; `recorder` may be null.
+  /// Starts at once. Borrows all arguments; `recorder` may be null.
   PerceptionThread(Perception* perception, CameraThreads* cameras, Recorder* recorder, DeviceHealth* health);
   ~PerceptionThread() { stop(); }
 
-  /// The newest perception that was not taken yet; waits for one for so long.
+  /// The newest percepts that were not taken yet; waits up to `wait` for them.
   Perceived take(std::chrono::nanoseconds wait);
 
-  /// Between stop() and start() the watcher is free to be replaced.
+  /// Between stop() and start() the perception object may be replaced.
   void start();
   void stop();
 
@@ -40,7 +40,7 @@ class PerceptionThread {
   CameraThreads* cameras_;
   Recorder* recorder_;
   DeviceHealth* health_;
-  std::size_t moments_ = 0;  // the thread's own
+  std::size_t moments_ = 0;  // used by the thread only
   Latest<Seen> seen_;
   std::atomic<bool> is_stopping_ = false;
   std::thread thread_;

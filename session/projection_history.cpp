@@ -5,13 +5,13 @@
 namespace limn::apps {
 namespace {
 
-constexpr std::size_t k_most = 30;  // between paint and their light in a frame: a second's
+constexpr std::size_t k_most = 30;  // about a second: longer than until a camera sees an image
 
 }  // namespace
 
 void ProjectionHistory::add(const std::vector<cv::Mat>& images, Stamp shown_at) {
   Shown shown;
-  if (shown_.size() == k_most) {  // its memory serves again
+  if (shown_.size() == k_most) {  // its memory is reused
     shown = std::move(shown_.front());
     shown_.pop_front();
   }

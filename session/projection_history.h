@@ -8,12 +8,13 @@
 
 namespace limn::apps {
 
-/// What the projectors showed lately, so that each frame can be compared with the images that lit it.
+/// The images that the projectors showed recently, so that each camera frame can be compared with the images
+/// that were projected when it was captured.
 class ProjectionHistory {
  public:
-  /// From `shown_at` on; later than all before.
+  /// Adds the images that are shown from `shown_at` on, which must be later than all before.
   void add(const std::vector<cv::Mat>& images, Stamp shown_at);
-  /// On the prototype at a moment, one a projector; null when that is not known.
+  /// The images that were shown at a moment, one per projector; null: not known.
   const std::vector<cv::Mat>* at(Stamp moment) const;
 
  private:

@@ -5,8 +5,8 @@
 namespace limn::apps {
 namespace {
 
-constexpr auto k_errand_wait =
-    std::chrono::milliseconds(10);  // for what a recalibration wants of the devices
+// Wait for a device call of a recalibration.
+constexpr auto k_errand_wait = std::chrono::milliseconds(10);
 
 }  // namespace
 

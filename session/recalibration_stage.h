@@ -11,33 +11,34 @@ namespace limn::apps {
 
 class FrameClock;
 
-/// The devices of a running session, as its recalibration captures with them.
+/// The devices of a running session, as its recalibration uses them.
 class CaptureDevices {
  public:
   virtual ~CaptureDevices() = default;
-  /// What a Repair needs of the devices; images go to `writer`.
+  /// The device functions that a LiveRecalibration needs; images go to `writer`.
   virtual Surroundings surroundings(ImageWriter* writer) = 0;
-  /// From now on nothing is perceived, for cameras see patterns. The session takes what was perceived before.
+  /// Stops perception, because the cameras will see patterns. The session receives the last percepts from
+  /// before.
   virtual void pause_perception(Session* session) = 0;
   virtual void resume_perception() = 0;
-  /// Whether no frame is shown while the result is computed either: the clock stands meanwhile.
+  /// Whether no frames are shown while the result is computed either; the clock stands still meanwhile.
   virtual bool waits_for_result() const = 0;
 };
 
-/// The frame loop's first stage: recalibrates the rig of a running session when somebody asks for it
-/// (session/live_recalibration.h), with the session's own devices.
+/// The frame loop's first stage: recalibrates the rig of a running session on request, with the session's own
+/// devices (session/live_recalibration.h).
 class RecalibrationStage {
  public:
-  /// Borrows all of them. `devices` may be null: what is asked for is left alone.
+  /// Borrows all of them. `devices` may be null: requests are ignored then.
   RecalibrationStage(Perception* perception,
                      Session* session,
                      SessionOutput* output,
                      CaptureDevices* devices);
 
-  /// Begins one that was asked for, does what a running one wants of the devices (10 ms at most, and a
-  /// pattern's time), and lets the session go on with the mended rig of one that is over.
+  /// Starts a requested recalibration; executes the device calls of a running one (waits 10 ms at most for
+  /// one, which may show a pattern); applies the result of a finished one.
   void step(const FrameClock& clock);
-  /// Whether the projectors' light is its own: no frame is to be composed.
+  /// Whether it uses the projectors, so that no frame may be composed.
   bool holds_light() const {
     return recalibration_ && (devices_->waits_for_result() || recalibration_->is_capturing());
   }

@@ -82,8 +82,9 @@ Result<std::unique_ptr<Recorder>> Recorder::create(const fs::path& folder, const
   std::unique_ptr<Recorder> out(new Recorder(folder));
   out->events_.open(folder / "events.jsonl");
   if (!out->events_)
-    return error("{}: expected a file that can be written, found none. Look at rights and space.",
-                 (folder / "events.jsonl").string());
+    return error(
+        "{}: expected a file that can be written, found none. Check the permissions and the free disk space.",
+        (folder / "events.jsonl").string());
   LIMN_TRY_STATUS(write_file(folder / "session.json", setup_json(setup).dump(2) + "\n"));
   return out;
 }
@@ -97,7 +98,7 @@ void Recorder::watched(std::span<const Frame> frames) {
         fmt::format("frames/{}/{:06}.{}", frame.camera, frames_++, frame.jpeg ? "jpg" : "png");
     if (!(frame.jpeg ? images_.offer(folder_ / file, frame.jpeg)
                      : images_.offer(folder_ / file, frame.image)))
-      return end("the disk is full or too slow for the cameras' pictures");
+      return end("the disk is full or too slow for the cameras' images");
     event["watch"].push_back(
         {{"camera", frame.camera}, {"file", file}, {"captured_at_ns", nanoseconds(frame.captured_at)}});
   }
@@ -119,7 +120,7 @@ Rig Recorder::mended(Rig rig, std::size_t moments) {
   const Status saved = save_whole_rig(rig, folder_ / copy);
   Result<Rig> read = saved ? load_rig(folder_ / copy) : Result<Rig>(saved.error());
   if (!read) {
-    end("the mended rig could not be written");
+    end("the corrected rig could not be written");
     return rig;
   }
   write({{"rig", copy}, {"moments", moments}});
@@ -165,7 +166,7 @@ std::optional<std::string> Recorder::ended() const {
 Status Recorder::finish() { return images_.finish(); }
 
 std::uint64_t fingerprint(std::span<const cv::Mat> images) {
-  std::uint64_t hash = 0xcbf29ce484222325;  // FNV-1a's, over words of eight bytes
+  std::uint64_t hash = 0xcbf29ce484222325;  // FNV-1a's offset, here over words of eight bytes
   const auto add = [&](std::uint64_t word) {
     hash = (hash ^ word) * 0x100000001b3;
     hash ^= hash >> 29;
@@ -245,7 +246,7 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   const fs::path rig = root.at("rig").path_inside(), scene = root.at("scene").path_inside();
   LIMN_TRY_STATUS(config.status());
   LIMN_TRY(setup.rig, load_rig(rig));
-  std::vector<scene::SkippedVariant> skipped_variants;  // as the session left it out
+  std::vector<scene::SkippedVariant> skipped_variants;  // the session has left them out, too
   LIMN_TRY(setup.scene, scene::load_scene(scene, &skipped_variants));
   return setup;
 }

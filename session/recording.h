@@ -19,40 +19,43 @@
 
 namespace limn::apps {
 
-/// What a session's images depend on beside frames and edits.
+/// Everything that a session's images depend on besides frames and edits.
 struct SessionSetup {
   Rig rig;
   scene::Scene scene;
   PerceptionOptions watch;
   ComposeOptions paint;
-  std::vector<std::string> screens = {};  ///< names of displays that are no projectors
+  std::vector<std::string> screens = {};  ///< names of the displays that are not projectors
 };
 
-/// Writes a session's folder (limn.session/1): rig and scene as they were, frames as the JPEG that a camera
-/// sent, others as PNG, and events.jsonl, what happened in its order: frames watched, edits, where a tablet
-/// looked from that was followed, images painted with their poses. Frames are written on a thread of their
-/// own; when the disk is full or too slow for them the recording ends there, complete up
-/// to that moment, and says so, and the session goes on. Safe from several threads.
+/// Writes the recording of a session (limn.session/1): the rig and the scene as they were at its start; the
+/// camera frames, as the camera's own JPEG or else as PNG; and events.jsonl, which lists what happened in its
+/// order: perceived frames, edits, positions of tablets that the viewpoint depends on, and composed frames
+/// with their poses. Frames are written on a thread of their own. When the disk is full or too slow, the
+/// recording ends: it is complete up to that moment, ended() says why, and the session goes on. Safe from
+/// several threads.
 class Recorder {
  public:
   /// Error: the folder cannot be written, or holds a session already.
   static Result<std::unique_ptr<Recorder>> create(const std::filesystem::path& folder,
                                                   const SessionSetup& setup);
 
-  /// Frames of one moment, as Watcher::watch takes them.
+  /// Records the frames of one moment, as they are passed to Perception::watch.
   void watched(std::span<const Frame> frames);
-  /// The scene's files have changed: they are copied as they are now.
+  /// To be called when the scene's files have changed: copies them as they are now.
   void shown(const scene::Scene& scene);
-  /// Another rig from now on; returns it as replay will read it, to the last bit. `moments` as of edited().
+  /// Records the rig that is used from now on; returns it as a replay will read it, to the last bit.
+  /// `moments`: as in edited().
   Rig mended(Rig rig, std::size_t moments);
-  /// `moments` counts the calls of watched() that the session knew of.
+  /// Records an edit. `moments`: the number of calls of watched() whose percepts the session had received.
   void edited(const scene::Edit& edit, const std::string& source, std::size_t moments);
-  /// Where a guest's tablet looks from that is followed; nullopt: nowhere any more.
+  /// Records the position (world frame, m) of a guest's tablet that the viewpoint depends on; nullopt: it has
+  /// none any more.
   void saw(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at);
-  /// `moments` as of edited().
+  /// Records a composed frame. `moments`: as in edited().
   void painted(const ComposedFrame& painted, std::size_t moments);
 
-  /// Why it ended before the session, if it did.
+  /// Why the recording ended before the session; nullopt: it did not.
   std::optional<std::string> ended() const;
   /// Waits until all is on disk.
   Status finish();
@@ -60,7 +63,7 @@ class Recorder {
  private:
   explicit Recorder(const std::filesystem::path& folder);
   void write(const nlohmann::ordered_json& event);  // call with mutex_ held
-  void end(const std::string& why);                 // likewise
+  void end(const std::string& why);                 // call with mutex_ held
 
   std::filesystem::path folder_;
   ImageWriter images_;
@@ -70,16 +73,17 @@ class Recorder {
   std::optional<std::string> ended_;
 };
 
-/// Of 8-bit images, to tell whether two are the same.
+/// A hash of 8-bit images, to tell whether two images are the same.
 std::uint64_t fingerprint(std::span<const cv::Mat> images);
 
-/// A line of events.jsonl that replay compares: shown_at and the tracks, numbers in full.
+/// The part of a line of events.jsonl that a replay compares: stamps, tracks and parts, with all digits.
 nlohmann::ordered_json pose_log(const ComposedFrame& painted);
 
-/// Reads a frame's file, but its camera's name and its stamp, as it was watched. Error: damaged, or none.
+/// Reads the image of a recorded frame; the camera's name and the stamp are not in the file. Error: the file
+/// is damaged or missing.
 Result<Frame> load_frame(const std::filesystem::path& file);
 
-/// Reads what a session was set up with. Error: no session, another schema, a damaged file.
+/// Reads the setup of a recorded session. Error: no session, another schema, a damaged file.
 Result<SessionSetup> load_setup(const std::filesystem::path& folder);
 
 }  // namespace limn::apps

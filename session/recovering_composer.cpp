@@ -33,11 +33,10 @@ std::optional<std::string> RecoveringComposer::compose_anew(const FrameInput& in
       renewed = composer.error();
     }
   }
-  if (renewed) return "the graphics card lost what it drew; it was drawn anew";
+  if (renewed) return "the graphics driver was reset; all images were drawn again";
   if (!was_drawing) return std::nullopt;
-  return fmt::format(
-      "the graphics card lost what it drew; the last picture stays until it can draw again: {}",
-      renewed.message());
+  return fmt::format("the graphics driver was reset; the last images stay until drawing works again: {}",
+                     renewed.message());
 }
 
 }  // namespace limn::apps

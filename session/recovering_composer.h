@@ -10,29 +10,30 @@
 
 namespace limn::apps {
 
-/// A frame composer that outlives its GL context: what is drawn while the context is lost is never shown, the
-/// last good images stay, and all is drawn anew in the next context, tried once a second.
+/// A frame composer that survives the loss of its GL context. An image that was drawn while the context was
+/// lost is never shown: the last good images stay until all can be drawn again in a new context, which is
+/// tried once a second.
 class RecoveringComposer {
  public:
-  /// How a GL context that the driver took away is noticed, and replaced by another.
+  /// How the loss of a GL context is noticed, and how the context is replaced.
   struct Drawing {
     std::function<bool()> is_lost;
-    std::function<Status()> renew;  ///< called when nothing lives in the old one any more
+    std::function<Status()> renew;  ///< called after all objects in the old context were destroyed
   };
 
   explicit RecoveringComposer(FrameComposer composer);
 
-  /// Without it a lost context is not noticed.
+  /// Without this call a lost context is not noticed.
   void survive_losses(Drawing drawing) { drawing_ = std::move(drawing); }
 
-  /// `setup`: what a painter in another context is made for. Returns what people are to be told.
+  /// `setup`: what a composer in a new context is created for. Returns a message for people, if there is one.
   std::optional<std::string> compose(const FrameInput& input, const SessionSetup& setup);
-  /// What was painted last.
+  /// The last composed frame.
   const ComposedFrame& painted() const { return painted_; }
 
-  /// Null while there is nothing to draw with.
+  /// Null while there is no GL context.
   FrameComposer* composer() { return composer_ ? &*composer_ : nullptr; }
-  /// Goes on with a painter for another scene or rig.
+  /// Continues with a composer for another scene or rig.
   void replace(FrameComposer composer) { composer_ = std::move(composer); }
 
  private:

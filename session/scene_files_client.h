@@ -7,7 +7,7 @@
 
 namespace limn::apps {
 
-/// Shows a scene anew when somebody has changed its files.
+/// Loads and shows the scene again when its files have changed.
 class SceneFilesClient final : public SessionClient {
  public:
   explicit SceneFilesClient(std::filesystem::path folder) : files_(std::move(folder)) {}

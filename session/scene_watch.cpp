@@ -6,13 +6,14 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr auto k_look_every = std::chrono::milliseconds(100);
-constexpr auto k_left_alone = std::chrono::milliseconds(150);  // a file that is still being written grows
+// Files must be unchanged for this long: a file that is being written still grows.
+constexpr auto k_left_alone = std::chrono::milliseconds(150);
 
 }  // namespace
 
 SceneWatch::SceneWatch(fs::path folder) : folder_(std::move(folder)), loaded_(listed()), seen_(loaded_) {}
 
-// All files but looks, pairings and comments, which the session writes itself.
+// Lists all files except looks, pairings and comments, which the session and the remote write.
 SceneWatch::Files SceneWatch::listed() const {
   Files files;
   std::error_code none;

@@ -14,20 +14,20 @@
 
 namespace limn::apps {
 
-/// A scene as its files are now, and what of it cannot be loaded.
+/// A scene as its files are now, and the variants that cannot be loaded.
 struct SceneNews {
   scene::Scene scene;
   std::vector<scene::SkippedVariant> skipped_variants;
 };
 
-/// Watches a scene's folder while a session runs: files that are added, saved or taken away load the scene
-/// anew, on a thread of its own, once they have been left alone for a moment.
+/// Watches a scene's folder while a session runs. When files were added, saved or removed, and have not
+/// changed for a moment since, it loads the scene again on a thread of its own.
 class SceneWatch {
  public:
   explicit SceneWatch(std::filesystem::path folder);
 
-  /// The scene as it is now, when it has changed; an error when what is there cannot be loaded (once for each
-  /// change). Looks at the folder ten times a second at most, and never waits.
+  /// The scene after its files have changed, or an error if it cannot be loaded; once for each change. Checks
+  /// the folder ten times a second at most, and never waits.
   std::optional<Result<SceneNews>> news();
 
  private:

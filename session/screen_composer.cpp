@@ -8,7 +8,7 @@
 namespace limn::apps {
 namespace {
 
-const cv::Scalar k_background(40, 36, 34);  // of views: a dark room
+const cv::Scalar k_background(40, 36, 34);  // background of rendered views: a dark room
 
 Imager moved_eye(Imager imager, double right_m) {
   imager.imager_from_world.translation.x() -= right_m;

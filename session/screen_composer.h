@@ -16,19 +16,19 @@
 
 namespace limn::apps {
 
-/// What a screen's image is made of.
+/// The input for a screen's image.
 struct ScreenInput {
   const Frame& frame;  ///< camera 0's newest
   const scene::ShowState& show_state;
-  std::vector<Track> tracks;  ///< at that frame's stamp, carried as the show state pairs markers
-  const Imager& viewer;       ///< whose eye `view` parts are drawn for; of width 0: camera 0's
+  std::vector<Track> tracks;  ///< at that frame's stamp, assigned to slots as the show state pairs markers
+  const Imager& viewer;       ///< viewpoint that `view` parts are drawn for; width 0: camera 0's
 };
 
-/// Composes images for screens that stand beside the prototype. Holds how parts were treated last, so that
-/// they do not flicker.
+/// Composes images for screens that stand beside the prototype. Remembers the last composite policies, so
+/// that parts do not flicker.
 class ScreenComposer {
  public:
-  /// Borrows scene and rig. `prototype_box`: its own frame.
+  /// Borrows scene and rig. `prototype_box`: in the prototype's frame.
   ScreenComposer(const scene::Scene* scene,
                  const Rig* rig,
                  const ComposeOptions& options,

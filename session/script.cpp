@@ -18,7 +18,7 @@ constexpr double k_most_periods = 1000;
 constexpr double k_largest_side_px = 16384, k_largest_step_s = 1e6;
 constexpr double k_hand_albedo = 0.35;
 constexpr double k_hand_above_m = 0.006;
-// A hand in a projector's light: so far along the way to the prototype's middle, and its size.
+// A hand in a projector's light: its place as a share of the way to the prototype's middle, and its size.
 constexpr double k_block_at = 0.6, k_block_width_m = 0.09, k_block_height_m = 0.18;
 
 bool is_same(const Pose& a, const Pose& b) {
@@ -34,7 +34,8 @@ double time_of(const ConfigNode& node) {
 void read_span(const ConfigNode& node, double* from_s, double* until_s) {
   *from_s = time_of(node.at("at_s"));
   *until_s = time_of(node.at("until_s"));
-  if (*until_s <= *from_s) node.at("until_s").problem("expected a later moment than at_s, found none.");
+  if (*until_s <= *from_s)
+    node.at("until_s").problem("expected a time later than at_s, found an earlier one or the same.");
 }
 
 cv::Size size_of(const ConfigNode& node) {
@@ -96,7 +97,7 @@ void read_event(const ConfigNode& node, Script* script) {
     const double step_s = node.at("seconds").number();
     if (std::abs(step_s) > k_largest_step_s)
       node.at("seconds").problem(
-          fmt::format("expected at most {} either way, found {}.", k_largest_step_s, step_s));
+          fmt::format("expected at most {} s in either direction, found {}.", k_largest_step_s, step_s));
     script->clock_steps.push_back({stepped->text(), time_of(node.at("at_s")), step_s});
   } else if (const auto edit = node.find("edit")) {
     node.only({"at_s", "edit"});
@@ -114,7 +115,7 @@ Status in_room(const char* what, const std::string& name, const std::vector<std:
                name);
 }
 
-// The same events again and again, `period_s` apart, until the end.
+// Repeats the events every `period_s` until the end.
 Script repeated(const Script& once, double period_s) {
   Script all;
   all.seconds = once.seconds;
@@ -162,8 +163,8 @@ Result<Script> load_script(const std::filesystem::path& path) {
   if (const auto again = root.find("again_every_s")) {
     period_s = again->positive();
     if (once.seconds > k_most_periods * period_s)
-      again->problem(fmt::format("expected at least {} s for {} s, found {}.", once.seconds / k_most_periods,
-                                 once.seconds, period_s));
+      again->problem(fmt::format("expected a period of at least {} s for a session of {} s, found {}.",
+                                 once.seconds / k_most_periods, once.seconds, period_s));
   }
   LIMN_TRY_STATUS(config.status());
   Script script = repeated(once, period_s);
@@ -247,7 +248,7 @@ void ScriptedRoom::set(double at_s) {
   }
 }
 
-// Devices that were nudged, and those put back.
+// Moves devices that are nudged, and puts back the others.
 void ScriptedRoom::nudge(double at_s) {
   for (const auto& [name, imager_from_world] : devices_) {
     Pose place = imager_from_world;
@@ -262,7 +263,7 @@ void ScriptedRoom::nudge(double at_s) {
   }
 }
 
-// Puts a hand there, or takes it away. One that is not due is never drawn: there may be thousands.
+// Adds a hand to the room or removes it. One that is not due is never created: there may be thousands.
 void ScriptedRoom::put(const std::string& name, bool is_due, const std::function<sim::Object()>& hand) {
   const bool is_there = rig_->world().find(name) != nullptr;
   if (is_there && !is_due) rig_->remove(name);

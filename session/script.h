@@ -14,17 +14,18 @@
 
 namespace limn::apps {
 
-/// What happens in a virtual session, and when (limn.script/1; config/README.md says its keys). Times are
+/// The scripted events of a virtual session (limn.script/1; config/README.md explains the keys). Times are
 /// seconds of the session's clock.
 struct Script {
-  /// A marker's object goes to and fro: moved along a direction of its own frame. It stays where it then is.
+  /// A marker's object swings to and fro along a direction of its own frame; at until_s it stays where it is.
   struct Sway {
     std::string marker;
     double from_s = 0, until_s = 0;
     Eigen::Vector3d amplitude_m = Eigen::Vector3d::Zero();
     double hz = 0.5;
   };
-  /// From then on the marker stands elsewhere: moved and turned in its home's frame. At once.
+  /// From at_s on the marker stands elsewhere, at this pose in the frame of its original place. It jumps
+  /// there.
   struct Move {
     std::string marker;
     double at_s = 0;
@@ -50,13 +51,13 @@ struct Script {
     double from_s = 0, until_s = 0;
     cv::Size size;
   };
-  /// From then on a camera's stamps are so much later, or earlier.
+  /// From at_s on a camera's stamps are later by step_s; a negative step makes them earlier.
   struct ClockStep {
     std::string camera;
     double at_s = 0;
     double step_s = 0;
   };
-  /// A camera or projector is knocked out of its place, where the rig has it, and later put back.
+  /// A camera or projector is knocked out of its calibrated pose, and later put back.
   struct Nudge {
     std::string device;
     double from_s = 0, until_s = 0;
@@ -76,25 +77,26 @@ struct Script {
   std::vector<Nudge> nudges;
   std::vector<Resize> resizes;
   std::vector<ClockStep> clock_steps;
-  std::vector<Action> edits;  ///< in the order of time
+  std::vector<Action> edits;  ///< in the order of their times
 
   bool is_plugged(const std::string& device, double at_s) const;
 };
 
 Result<Script> load_script(const std::filesystem::path& path);
 
-/// Plays a script in a virtual rig: what stands where at a moment.
+/// Plays a script in a virtual rig: puts everything where it stands at a moment.
 class ScriptedRoom {
  public:
-  /// Error: a marker or device that does not stand in the room.
+  /// Error: the script names a marker or device that is not in the room.
   static Result<ScriptedRoom> create(Script script, sim::VirtualRig* rig);
 
   const Script& script() const { return script_; }
-  /// Sets the room to a moment.
+  /// Sets the room to its state at a moment.
   void set(double at_s);
-  /// What its camera sends of a frame that was exposed at a moment.
+  /// The frame that the camera sends for one that was exposed at a moment: resizing and clock steps are
+  /// applied.
   Frame sent(Frame exposed, double at_s) const;
-  /// Where the script has a placed marker at a moment, in the world.
+  /// The scripted pose of a placed marker at a moment, in the world frame.
   Pose world_from_marker(const MarkerName& marker, double at_s) const;
 
  private:
@@ -110,7 +112,7 @@ class ScriptedRoom {
   Script script_;
   sim::VirtualRig* rig_ = nullptr;
   std::vector<Home> homes_;
-  std::vector<std::pair<std::string, Pose>> devices_;  // imager_from_world, where nothing was nudged
+  std::vector<std::pair<std::string, Pose>> devices_;  // imager_from_world without a nudge
 };
 
 }  // namespace limn::apps

@@ -11,10 +11,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A turn backwards undoes what a turn forwards does.
+// A turn backwards triggers the opposite of the control's action, if there is one.
 scene::Edit edit_of(const scene::Control& control, int steps) {
   const scene::Action* action = scene::find_action(control.action);
-  LIMN_CHECK(action != nullptr);  // Session::create() has seen to it
+  LIMN_CHECK(action != nullptr);  // Session::create() has checked it
   return scene::make_edit(steps > 0 ? action->id : action->opposite.value_or(action->id), control.slot);
 }
 
@@ -24,7 +24,7 @@ std::vector<std::string> variant_names(const scene::Slot& slot) {
   return names;
 }
 
-// Whether the same markers carry the same bodies and act alike.
+// Whether both scenes have the same markers on the same bodies, and the same controls.
 bool is_carried_alike(const scene::Scene& a, const scene::Scene& b) {
   const auto carriers = [](const scene::Scene& scene) {
     std::string text;
@@ -91,7 +91,7 @@ Session::Session(
   show_state_.d_front_world = world_from_camera * -Eigen::Vector3d::UnitZ();
 }
 
-// Of parts that were dropped in, once each.
+// Asks for the units of parts that were added without one, once for each question.
 void Session::ask_units() {
   for (const scene::Slot& slot : setup_.scene.slots)
     for (const scene::Variant& variant : slot.variants) {
@@ -128,7 +128,7 @@ Status Session::edit(const scene::Edit& wanted, const std::string& source, Stamp
   LIMN_TRY(scene::Command command, scene::command_of(setup_.scene, edit));
   if (auto* marker = std::get_if<std::optional<MarkerName>>(&command.value); marker && !*marker)
     if (const auto waiting = waiting_markers(setup_.scene, show_state_, watched_); !waiting.empty()) {
-      *marker = waiting.back().marker;  // the one that glows; it is recorded by its name
+      *marker = waiting.back().marker;  // this name is also what is recorded
       edit.value = (*marker)->text();
     }
   LIMN_TRY(scene::ShowState changed, scene::apply_edit(setup_.scene, show_state_, painted().posed, command));
@@ -153,8 +153,8 @@ void Session::see(const std::string& guest, const std::optional<Eigen::Vector3d>
 Status Session::show(scene::Scene scene, Stamp at) {
   if (!is_carried_alike(setup_.scene, scene))
     return error(
-        "{}: expected the markers, slots and controls that the session began with, found others. Begin a "
-        "new session to take them; this one goes on with the parts as they were.",
+        "{}: expected the markers, slots and controls that the session began with, found others. Start a "
+        "new session to use them; this one continues with the parts as they were.",
         (scene.folder / "scene.json").string());
   LIMN_TRY(FrameComposer composer, FrameComposer::create(scene, setup_.rig, setup_.paint));
   for (std::size_t i = 0; i < scene.slots.size(); ++i) {
@@ -169,7 +169,7 @@ Status Session::show(scene::Scene scene, Stamp at) {
     if (!is_in(now, shown)) shown = now.front();
   }
   if (recorder_) recorder_->shown(scene);
-  if (telemetry_) telemetry_->note(at, "the scene's files have changed; it was loaded anew");
+  if (telemetry_) telemetry_->note(at, "the scene's files have changed; the scene was loaded again");
   composer_.replace(std::move(composer));
   setup_.scene = std::move(scene);
   ++scenes_;
@@ -197,7 +197,8 @@ void Session::show_news(SceneWatch* files, Stamp at) {
   warn(at, what);
 }
 
-// A part that is shown and cannot be loaded any more stays; one that never could be is no reason.
+// Shows the new scene, unless a variant that the session has cannot be loaded any more. A variant that never
+// could be loaded is only reported.
 Status Session::show_if_whole(SceneNews news, Stamp at) {
   for (const scene::SkippedVariant& skipped_variants : news.skipped_variants) {
     const scene::Slot* slot = setup_.scene.find_slot(skipped_variants.slot);

@@ -35,7 +35,7 @@ Result<SessionOutput> SessionOutput::open(const std::filesystem::path& out,
   }
   if (!record.empty()) {
     LIMN_TRY(output.recorder_, Recorder::create(record, *setup));
-    const std::filesystem::path project = setup->scene.folder;  // its looks are the project's
+    const std::filesystem::path project = setup->scene.folder;  // looks are still kept in the project
     LIMN_TRY(*setup, load_setup(record));
     setup->scene.folder = project;
   }
@@ -55,7 +55,7 @@ void SessionOutput::shown(const ShownFrame& frame, const ComposedFrame& painted)
               *ended);
 }
 
-// In the prototype's frame where there is one, else in the world's.
+// Poses are in the prototype's frame if it has a pose, otherwise in the world frame.
 void SessionOutput::add_poses(const ComposedFrame& painted) {
   const Pose from_world =
       painted.posed.world_from_prototype ? painted.posed.world_from_prototype->inverse() : Pose{};
@@ -85,7 +85,7 @@ Status SessionOutput::close(Session* session, bool as_json) {
   return written ? recorded : written;
 }
 
-// What a session leaves in its folder.
+// Writes the files that a session leaves in its folder.
 Status SessionOutput::write_end(Session* session, const nlohmann::ordered_json& json) const {
   if (out_.empty()) return {};
   const std::vector<cv::Mat>& images = session->painted().projectors;
@@ -95,7 +95,7 @@ Status SessionOutput::write_end(Session* session, const nlohmann::ordered_json& 
   if (const cv::Mat screen = session->screen(); !screen.empty())
     LIMN_TRY_STATUS(write_png(out_ / "screen.png", screen));
   LIMN_TRY_STATUS(write_file(out_ / "session.json", json.dump(2) + "\n"));
-  return telemetry_.write_page(out_ / "session.html", "A session of Limn");
+  return telemetry_.write_page(out_ / "session.html", "Limn session");
 }
 
 }  // namespace limn::apps

@@ -15,18 +15,18 @@ namespace limn::apps {
 /// Everything that a session writes while it runs.
 class SessionOutput {
  public:
-  /// `out`: folder for telemetry.csv and poses.csv; `record`: for the recording; empty: none. With a
-  /// recording `setup` becomes what replay will read of it, to the last bit.
+  /// `out`: folder for telemetry.csv and poses.csv. `record`: folder for the recording. Empty: none. With a
+  /// recording, `setup` becomes what a replay will read, to the last bit.
   static Result<SessionOutput> open(const std::filesystem::path& out,
                                     const std::filesystem::path& record,
                                     SessionSetup* setup);
 
   Telemetry& telemetry() { return telemetry_; }
-  Recorder* recorder() { return recorder_.get(); }  ///< null without one
+  Recorder* recorder() { return recorder_.get(); }  ///< null without a recording
 
   const std::filesystem::path& out() const { return out_; }  ///< empty: none
 
-  /// One image shown. Says once that the recording ended.
+  /// To be called for each shown frame. Reports once if the recording has ended.
   void shown(const ShownFrame& frame, const ComposedFrame& painted);
 
   /// Waits for the recording; writes session.json, session.html, the last images; prints the summary.

@@ -12,13 +12,14 @@
 
 namespace limn::apps {
 
-/// Light lost to somebody's shadow, found in the cameras' frames and given to the renderer to make up for.
+/// Finds light that people block, from the cameras' frames, and tells the renderer, which fills it in with
+/// other projectors.
 class ShadowWatch {
  public:
   explicit ShadowWatch(const Rig& rig);
 
-  /// Takes in frames that were not seen yet and tells the renderer how much of each projector's light
-  /// arrives. Nothing happens without a prototype in `posed`.
+  /// Processes new frames, and sets in the renderer how much of each projector's light arrives. Does nothing
+  /// without a prototype in `posed`.
   void look(const Percepts& watched,
             const scene::PosedScene& posed,
             const ProjectionHistory& shown,
@@ -27,8 +28,8 @@ class ShadowWatch {
  private:
   Rig rig_;
   projector::ShadowDetector arriving_;
-  std::vector<Stamp> seen_at_;  // newest frame of each camera
-  std::optional<Pose> placed_;  // world_from_prototype that the patches are for
+  std::vector<Stamp> seen_at_;  // stamp of each camera's newest processed frame
+  std::optional<Pose> placed_;  // world_from_prototype for which the patches were made
 };
 
 }  // namespace limn::apps

@@ -13,9 +13,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* k_pairings = "pairings.json";
-constexpr const char* k_deleted = "deleted";  // in the folder of looks
+constexpr const char* k_deleted = "deleted";  // subfolder of the folder of looks
 
-// What is not there is not moved.
+// Moves a look's files; a file that does not exist is skipped.
 Status move_look(const std::string& name, const fs::path& from, const fs::path& to) {
   LIMN_TRY_STATUS(make_folder(to));
   std::error_code failed;
@@ -37,7 +37,7 @@ Status write_look(const fs::path& folder,
   return image.empty() ? Status() : write_png(folder / (name + ".png"), image);
 }
 
-// Empty: there is no such look.
+// The JSON text of a look; empty: there is no such look.
 std::string json_of(const std::vector<scene::Look>& looks, const std::string& name) {
   for (const scene::Look& look : looks)
     if (look.name == name) return scene::look_json(look);
@@ -59,13 +59,14 @@ scene::ShowState ShowStore::loaded(const scene::Scene& scene, scene::ShowState s
     if (look)
       show_state.looks.push_back(std::move(*look));
     else
-      log_warning("live: {} The look is left alone.", look.message());
+      log_warning("live: {} This look is not used; its file was not changed.", look.message());
   }
   const fs::path file = scene.folder / k_pairings;
   if (!fs::exists(file, none)) return show_state;
   auto paired = scene::with_pairings(file, scene, show_state);
   if (paired) return std::move(*paired);
-  log_warning("live: {} The scene's own markers carry the parts.", paired.message());
+  log_warning("live: {} The saved pairings are not used; the scene's own markers carry the parts.",
+              paired.message());
   return show_state;
 }
 
@@ -94,13 +95,13 @@ void ShowStore::keep_pairings(const scene::Scene& scene,
   });
 }
 
-// The part comes anew when SceneWatch sees the answer.
+// SceneWatch notices the new file and loads the part again.
 void ShowStore::keep_unit(const scene::Scene& scene, const scene::Slot& slot, const scene::PartUnit& unit) {
   writer_->add([file = scene.folder / "slots" / slot.name / "units.json",
                 text = scene::units_json(slot, unit.part, unit.unit)] { return write_file(file, text); });
 }
 
-// Looks that were saved or deleted, and the page of all.
+// Saves or moves the files of looks that were saved, deleted or restored, and writes the overview page.
 void ShowStore::keep_looks(const fs::path& folder,
                            const scene::ShowState& before,
                            const scene::ShowState& after,

@@ -14,19 +14,20 @@
 
 namespace limn::apps {
 
-/// What of a session stays in its scene's folder: looks with their images and the page of all (looks/), which
-/// marker carries which part (pairings.json), and answers about units (slots/SLOT/units.json). Files are
-/// changed on a thread of its own, in order; each is either old or complete.
+/// Keeps in the scene's folder what a session leaves there: looks with their images and an overview page
+/// (looks/), which marker carries which part (pairings.json), and answers about units
+/// (slots/SLOT/units.json). Files are changed on a thread of its own, in order; each file is either old or
+/// complete.
 class ShowStore {
  public:
-  /// `keeps`: false only reads.
+  /// `keeps`: false: nothing is written.
   explicit ShowStore(bool keeps);
 
-  /// A show state with the looks and pairings that are in the scene's folder. Damaged ones are named in the
-  /// log and left alone.
+  /// The show state with the looks and pairings of the scene's folder. Damaged ones are reported in the log
+  /// and not changed.
   static scene::ShowState loaded(const scene::Scene& scene, scene::ShowState show_state);
 
-  /// Keeps what an edit has changed. `look_image` is called for a look that was saved, at once; it may return
+  /// Saves what an edit has changed. `look_image` is called at once for a look that was saved; it may return
   /// an empty image.
   void keep(const scene::Scene& scene,
             const scene::ShowState& before,
@@ -36,9 +37,9 @@ class ShowStore {
 
   /// Whether something is not on the disk yet.
   bool is_busy() const { return writer_ && writer_->is_busy(); }
-  /// Waits until all is.
+  /// Waits until all is on the disk.
   void finish();
-  /// What could not be written since the last call.
+  /// Messages about what could not be written since the last call.
   std::vector<std::string> failures();
 
  private:

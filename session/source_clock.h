@@ -7,14 +7,14 @@
 
 namespace limn::apps {
 
-/// Puts a camera's stamps on the session's clock: those of a clock of its own (a video's, a camera's that was
-/// set wrong) are moved so that the first is now. A clock that steps is moved anew, so that its images are
-/// on their way for as long as they were before.
+/// Converts a camera's stamps to the session's clock. Stamps of another clock (a video's, or a camera clock
+/// that is set wrong) are shifted so that the first one is now. When a clock steps, the shift is chosen again
+/// so that images have the same delay as before.
 class SourceClock {
  public:
   struct Time {
     Stamp captured_at;         ///< on the session's clock
-    bool has_stepped = false;  ///< this stamp did not fit to those before
+    bool has_stepped = false;  ///< this stamp does not fit the ones before
   };
 
   Time on_session_clock(Stamp captured_at, Stamp now) {
@@ -27,14 +27,14 @@ class SourceClock {
     return {shifted(captured_at, *offset_s_), has_stepped};
   }
 
-  /// Whether it is another clock than the session's: such sources are played at their pace.
+  /// Whether it is another clock than the session's: such sources are played at their own pace.
   bool is_other() const { return offset_s_ && *offset_s_ != 0; }
 
  private:
-  // No camera's image is from later than a moment from now, or is so long on its way.
+  // A stamp fits if its image is less than k_ahead_s in the future and less than k_behind_s late.
   static constexpr double k_ahead_s = 2, k_behind_s = 5;
   std::optional<double> offset_s_;
-  double behind_s_ = 0;  // as the newest that fitted was
+  double behind_s_ = 0;  // delay of the newest stamp that fitted
 };
 
 }  // namespace limn::apps

@@ -6,7 +6,7 @@ namespace limn::apps {
 namespace {
 
 constexpr double k_trembles_m = 0.5e-3, k_trembles_rad = 1e-3;
-constexpr double k_stays_m = 0.1e-3;  // an eighth of a pixel where 1280 pixels light a metre
+constexpr double k_stays_m = 0.1e-3;  // an eighth of a projector pixel at 1280 pixels per metre
 
 }  // namespace
 

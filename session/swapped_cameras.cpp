@@ -11,10 +11,11 @@ namespace {
 
 constexpr double k_compare_cameras_every_s = 2;
 
-// Residuals of what all cameras see of one body: those of cameras in their places, and of others.
+// RMS residual of a body that several cameras see: at most k_right_px with correct camera names, at least
+// k_wrong_px with exchanged ones.
 constexpr double k_right_px = 3, k_wrong_px = 12;
 
-// How badly the bodies that several cameras see fit; 0 when there are none.
+// The largest RMS residual of the bodies that several cameras see; 0 when there are none.
 double misfit_px(std::span<const Body> bodies,
                  std::span<const Imager* const> cameras,
                  std::span<const std::vector<tracker::Detection>> detections,
@@ -69,8 +70,8 @@ std::optional<std::string> SwappedCamerasCheck::check(
   if (!swapped) return std::nullopt;
   has_told_ = true;
   return fmt::format(
-      "{} and {} seem to be exchanged: each sees what the other should. Exchange their cables, or their "
-      "addresses in the devices file.",
+      "{} and {} seem to be exchanged: each sees what the other should see. Exchange their cables, "
+      "or their addresses in the devices file.",
       swapped->first, swapped->second);
 }
 

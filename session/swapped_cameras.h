@@ -13,24 +13,25 @@
 
 namespace limn::apps {
 
-/// Two cameras whose images come under each other's names: as named, they see a body in two places; with
-/// the two exchanged all of them see it in one. `detections`: of one moment, a camera each in the rig's
-/// order. None where no body is seen by two cameras, and where an exchange does not explain what is seen.
+/// Finds two cameras whose images come under each other's names: with these names they see a body in two
+/// places, with the names exchanged all cameras see it in one place. `detections`: of one moment, one list
+/// per camera in the rig's order. nullopt: no body is seen by two cameras, the cameras agree, or an exchange
+/// does not make them agree.
 std::optional<std::pair<std::string, std::string>> swapped_cameras(
     const Rig& rig,
     std::span<const Body> bodies,
     std::span<const std::vector<tracker::Detection>> detections,
     Stamp captured_at);
 
-/// Looks for swapped cameras while a session runs, now and then, until some were found.
+/// Checks for swapped cameras from time to time while a session runs, until some were found.
 class SwappedCamerasCheck {
  public:
-  /// What people are to be told, once.
+  /// A message for people, once; otherwise nullopt.
   std::optional<std::string> check(const Rig& rig,
                                    std::span<const Body> bodies,
                                    std::span<const std::vector<tracker::Detection>> detections,
                                    Stamp captured_at);
-  /// The rig is another one from now on.
+  /// To be called when the rig was replaced: checks again.
   void begin_anew(Stamp at);
 
  private:

@@ -10,19 +10,20 @@
 
 namespace limn::apps {
 
-/// Which guests' tablets see markers, and where those look from that light goes by.
+/// Keeps track of the guests whose tablets see markers, and of the positions of the tablets that the
+/// viewpoint depends on.
 class TabletRegistry {
  public:
-  /// `p_eye_world`: nullopt: the window is closed. `goes_by_it`: whether light goes by this guest's eye.
-  /// True: what places() says has changed.
+  /// `p_eye_world`: the tablet's position; nullopt: its window is closed. `goes_by_it`: whether the viewpoint
+  /// depends on this guest. True: places() has changed.
   bool note(const std::string& guest,
             const std::optional<Eigen::Vector3d>& p_eye_world,
             bool goes_by_it,
             Stamp at);
 
-  /// Guests whose windows have seen markers and are open.
+  /// Guests whose tablet views have seen markers and are open.
   const std::set<std::string>& windows() const { return windows_; }
-  /// One a guest that light goes by.
+  /// One per guest that the viewpoint depends on.
   std::span<const TabletViewpoint> places() const { return places_; }
 
  private:

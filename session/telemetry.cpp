@@ -22,7 +22,7 @@ svg { width: 100%; height: 140px; background: #1b1e24; border-radius: 4px; }
 polyline { fill: none; stroke: #7fb4ff; stroke-width: 1.5; } text { fill: #a9a69f; font-size: 12px; }
 )";
 
-// A line over the session, in a box of 1000 x 140.
+// A line chart over the session's time, in a box of 1000 x 140.
 std::string chart(const std::string& title,
                   const std::vector<std::pair<double, double>>& points,
                   const std::string& unit) {
@@ -66,13 +66,16 @@ double Quantiles::at(double share) const {
 }
 
 Telemetry::Telemetry()
-    : measures_{{"detect", "ms", "finding markers", {}},
+    : measures_{{"detect", "ms", "detecting markers", {}},
                 {"filter", "ms", "poses and motions", {}},
-                {"paint", "ms", "projector pictures", {}},
-                {"screen", "ms", "the screen's picture", {}},
-                {"record", "ms", "handing over to the recording", {}},
+                {"paint", "ms", "drawing the projectors' images", {}},
+                {"screen", "ms", "drawing the screens' images", {}},
+                {"record", "ms", "passing data to the recording", {}},
                 {"latency", "ms", "from the camera's exposure to light on the surface", {}},
-                {"placement", "mm", "of the parts from their true places, RMS (virtual rig)", {}}} {}
+                {"placement",
+                 "mm",
+                 "RMS distance of the parts from their true positions (virtual rig only)",
+                 {}}} {}
 
 Result<Telemetry> Telemetry::create(const std::filesystem::path& folder) {
   Telemetry out;
@@ -104,7 +107,7 @@ void Telemetry::add(const ShownFrame& frame) {
   if (const auto news = csv_.news()) note(frame.shown_at, *news);
 }
 
-// When there are too many slices, two become one.
+// When there are too many slices, every two neighbours are merged.
 void Telemetry::add_to_slice(const ShownFrame& frame, double latency_ms) {
   const double at_s = seconds_between(begun_at_, frame.shown_at);
   if (slices_.empty() || at_s >= slices_.back().begins_s + slice_s_) slices_.push_back({at_s, 0, 0, 0, 0});
@@ -154,8 +157,8 @@ Status Telemetry::write_page(const std::filesystem::path& path, const std::strin
       "lost "
       "body.</p>\n",
       escaped(title), json["seconds"].get<double>(), frames_, missed_, with_lost_);
-  const HtmlRow headings = {text_cell("measured"), text_cell("median", "number"), text_cell("95 %", "number"),
-                            text_cell("99 %", "number")};
+  const HtmlRow headings = {text_cell("measurement"), text_cell("median", "number"),
+                            text_cell("95 %", "number"), text_cell("99 %", "number")};
   std::vector<HtmlRow> rows;
   for (const Measure& measure : measures_) {
     if (measure.all.count() == 0) continue;
@@ -171,13 +174,14 @@ Status Telemetry::write_page(const std::filesystem::path& path, const std::strin
     paint.emplace_back(slice.begins_s, slice.paint_ms);
     placement.emplace_back(slice.begins_s, slice.placement_mm);
   }
-  html += chart("Camera to light, the worst in each slice", latency, "ms");
-  html += chart("Painting, the worst in each slice", paint, "ms");
-  html += chart("Parts from their true places, the worst in each slice", placement, "mm");
+  html += chart("Latency from camera to light, maximum of each time slice", latency, "ms");
+  html += chart("Time to draw the projectors' images, maximum of each time slice", paint, "ms");
+  html +=
+      chart("Distance of the parts from their true positions, maximum of each time slice", placement, "mm");
   rows.clear();
   for (const auto& [at_s, what] : notes_)
     rows.push_back({text_cell(fmt::format("{:.2f} s", at_s), "number"), text_cell(what)});
-  html += "<h2>Events</h2>\n" + html_table({}, rows);
+  html += "<h2>Messages</h2>\n" + html_table({}, rows);
   return write_file(path, html_page(title, HtmlColours::dark, k_telemetry_style, html));
 }
 

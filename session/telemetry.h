@@ -16,7 +16,7 @@ namespace limn::apps {
 class Quantiles {
  public:
   void add(double value);
-  /// NaN while there are none.
+  /// The value that `share` (0 … 1) of the values do not exceed; NaN while there are none.
   double at(double share) const;
   double mean() const { return count_ > 0 ? sum_ / static_cast<double>(count_) : 0; }
   std::size_t count() const { return count_; }
@@ -27,31 +27,31 @@ class Quantiles {
   double sum_ = 0, least_ = 0, most_ = 0;
 };
 
-/// One image's way from the camera to the light.
+/// Measurements of one frame, from the camera to the projected light.
 struct ShownFrame {
-  Stamp captured_at;  ///< of the newest camera image in it
+  Stamp captured_at;  ///< of the newest camera image that was used
   Stamp shown_at;
   double detect_ms = 0, filter_ms = 0, paint_ms = 0, screen_ms = 0, record_ms = 0;
   int markers = 0;           ///< in the newest images
-  int lost = 0;              ///< bodies
-  int missed = 0;            ///< camera images that never came or were not looked at
-  double placement_mm = -1;  ///< RMS over the parts, from their true places; -1: not known
+  int lost = 0;              ///< number of lost bodies
+  int missed = 0;            ///< camera images that never arrived or were not processed
+  double placement_mm = -1;  ///< RMS distance of the parts from their true positions; -1: unknown
 };
 
-/// What a session measured of itself, in memory that does not grow with time.
+/// What a session has measured, in memory that does not grow with time.
 class Telemetry {
  public:
-  /// Begins telemetry.csv in the folder, one row an image shown; an empty path writes nothing.
+  /// Starts telemetry.csv in the folder, one row per shown frame; with an empty path nothing is written.
   static Result<Telemetry> create(const std::filesystem::path& folder);
 
   void add(const ShownFrame& frame);
-  /// Something worth telling: a device gone, a look saved. The last 500 are kept.
+  /// Adds a note, for example about a device that failed or a look that was saved. The last 500 are kept.
   void note(Stamp at, const std::string& what);
-  /// The notes kept, with the seconds of the session's clock.
+  /// The notes that are kept, with their seconds on the session's clock.
   const std::vector<std::pair<double, std::string>>& notes() const { return notes_; }
 
   nlohmann::ordered_json summary() const;
-  /// A page for people: the summary, how times went over the session, what happened.
+  /// Writes a page for people: the summary, charts of times over the session, and the notes.
   Status write_page(const std::filesystem::path& path, const std::string& title) const;
 
  private:
@@ -59,7 +59,7 @@ class Telemetry {
     std::string name, unit, what;
     Quantiles all;
   };
-  struct Slice {  // of the session, some seconds
+  struct Slice {  // a time slice of the session
     double begins_s = 0, latency_ms = 0, paint_ms = 0, placement_mm = 0;
     int count = 0;
   };

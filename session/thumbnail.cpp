@@ -10,7 +10,8 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_half_angle = 15 * std::numbers::pi / 180;  // of the image; near enough to parallel
+// Half the view angle; the projection is nearly parallel.
+constexpr double k_half_angle = 15 * std::numbers::pi / 180;
 constexpr double k_margin = 1.06;
 const cv::Scalar k_ground(34, 29, 27);
 

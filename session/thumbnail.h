@@ -8,9 +8,9 @@
 
 namespace limn::apps {
 
-/// A variant by itself, as one sees it in front of its marker from a little above and to the right, filling
-/// `side_px` x `side_px` pixels, sRGB BGR over a dark ground. `renderer` was made of `scene`; its GL context
-/// must be current. Empty: the scene has no such variant.
+/// Renders a variant alone, seen in front of its marker from a little above and to the right, so that it
+/// fills `side_px` x `side_px` pixels; sRGB BGR on a dark background. `renderer` must be made for `scene`,
+/// and its GL context must be current. Empty: the scene has no such variant.
 cv::Mat draw_thumbnail(projector::Renderer* renderer,
                        const scene::Scene& scene,
                        const std::string& slot,

@@ -93,7 +93,7 @@ std::optional<std::size_t> UdpSocket::next(std::span<std::uint8_t> bytes) {
 }
 
 void UdpSocket::send(std::span<const std::uint8_t> bytes) {
-  // An error here is the last datagram's (nobody hears): this one is sent again.
+  // An error here belongs to the previous datagram (nobody received it): this one is sent again.
   if (::send(handle_, bytes.data(), bytes.size(), MSG_NOSIGNAL) < 0 && errno == ECONNREFUSED)
     static_cast<void>(::send(handle_, bytes.data(), bytes.size(), MSG_NOSIGNAL));
 }

@@ -15,26 +15,28 @@ struct NetPlace {
   std::string host;
   std::string port;
 };
-/// A port alone has `default_host`. Error: no port from 1 to 65535 (with `or_any`, 0: any free one), an
-/// empty host.
+/// Parses HOST:PORT; a port alone gets `default_host`. Error: not a port from 1 to 65535 (with `or_any` 0 is
+/// allowed too: any free port), or an empty host.
 Result<NetPlace> net_place(const std::string& text, const std::string& default_host, bool or_any = false);
 
 /// A UDP socket that never waits.
 class UdpSocket {
  public:
-  /// Hears what is sent to a numeric address of this machine. Error: no such address here, the port is taken.
+  /// Opens a socket that receives at a numeric address of this machine. Error: this machine has no such
+  /// address, or the port is in use.
   static Result<UdpSocket> hearing(const NetPlace& place);
-  /// Sends to a host. Error: a host without an address.
+  /// Opens a socket that sends to a host. Error: the host has no address.
   static Result<UdpSocket> sending(const NetPlace& place);
   UdpSocket(UdpSocket&& other) noexcept;
   UdpSocket& operator=(UdpSocket&& other) noexcept;
   ~UdpSocket();
 
-  /// The next datagram into `bytes`, which is filled as far as it goes; its true length. nullopt: none waits.
+  /// Reads the next datagram into `bytes`, cut off where it is longer; returns its full length. nullopt: none
+  /// waits.
   std::optional<std::size_t> next(std::span<std::uint8_t> bytes);
-  /// Lost when nobody hears it or the network is busy.
+  /// Sends a datagram. It is lost when nobody receives it or the network is busy.
   void send(std::span<const std::uint8_t> bytes);
-  /// The port that it hears on.
+  /// The port on which it receives.
   int port() const;
 
  private:

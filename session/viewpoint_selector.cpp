@@ -6,10 +6,10 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_glide_s = 0.1;  // in which a guest's eye is followed to a third of its way
+constexpr double k_glide_s = 0.1;  // after this time a third of the way to a guest's new position remains
 constexpr const char* k_still_eye = "the scene's own";
 
-// What a guest is called among the viewers.
+// The name of a guest's viewpoint among the viewers'.
 std::string guest_eye(const std::string& guest) { return "guest " + guest; }
 
 }  // namespace
@@ -30,19 +30,20 @@ const SelectedViewpoint& ViewpointSelector::select(const scene::PosedScene& pose
   return selected_;
 }
 
-// Where the scene's own eye stands still: its only viewer if that is fixed, the first camera's without
-// viewers. Null: viewers move, or share an eye.
+// The scene's own viewer if it never moves: its only viewer if that is fixed, or the first camera if there
+// are no viewers. Null: viewers move, or share a viewpoint.
 const Imager* ViewpointSelector::still_viewer() const {
   if (scene_->viewers.size() == 1 && scene_->viewers[0].fixed) return &*scene_->viewers[0].fixed;
   return scene_->viewers.empty() ? &stand_in() : nullptr;
 }
 
-// Looks until somebody is seen.
+// The viewpoint that is used until a viewer is seen.
 const Imager& ViewpointSelector::stand_in() const {
   return rig_->cameras.empty() ? rig_->projectors[0] : rig_->cameras[0];
 }
 
-// Of guests whose tablets have seen markers lately: of the one who is followed, else of the scene's viewers.
+// Viewpoints of guests whose tablets have seen markers recently: only that of the followed guest, or else
+// those of guests among the scene's viewers.
 std::vector<scene::Viewpoint> ViewpointSelector::guests_eyes(const FrameInput& input) const {
   std::vector<scene::Viewpoint> eyes;
   const auto add = [&](const TabletViewpoint& place, double weight) {
@@ -57,7 +58,7 @@ std::vector<scene::Viewpoint> ViewpointSelector::guests_eyes(const FrameInput& i
   return eyes;
 }
 
-// A guest's eye is known some ten times a second: between, and where it trembles, it is followed smoothly.
+// A guest's position is known about ten times a second and is noisy, so it is smoothed over time.
 void ViewpointSelector::glide(std::vector<scene::Viewpoint>* guests, double seconds) {
   const double step = 1 - std::exp(-seconds / k_glide_s);
   for (scene::Viewpoint& eye : *guests)
@@ -66,8 +67,8 @@ void ViewpointSelector::glide(std::vector<scene::Viewpoint>* guests, double seco
   gliding_ = *guests;
 }
 
-// The scene's own viewer if it stands still, else one at the eye that all viewers share, which moves calmly;
-// a guest's, alone, while one is followed.
+// The scene's own viewer if it stands still, otherwise an imager at the viewpoint that all viewers share and
+// that moves smoothly. While a guest is followed, only that guest's viewpoint counts.
 Imager ViewpointSelector::viewer_for(const scene::PosedScene& posed,
                                      std::vector<scene::Viewpoint> guests,
                                      Stamp at) {
@@ -90,7 +91,7 @@ Imager ViewpointSelector::viewer_for(const scene::PosedScene& posed,
   shared_eye_ = scene::updated_viewpoint(shared_eye_, eyes, *p_middle, seconds);
   const bool is_back = guests.empty() && std::none_of(shared_eye_.shares.begin(), shared_eye_.shares.end(),
                                                       [](const auto& share) {
-                                                        return share.viewer.empty();  // of one who is gone
+                                                        return share.viewer.empty();  // a viewer who is gone
                                                       });
   if (is_back) is_away_ = false;
   if (is_back && still) {

@@ -16,24 +16,25 @@
 
 namespace limn::apps {
 
-/// Whose eye `view` parts are drawn for in a frame.
+/// The viewpoint that `view` parts are drawn for in a frame.
 struct SelectedViewpoint {
-  Imager viewer = {};   ///< an imager at that eye
-  std::string follows;  ///< the guest whose tablet it is, alone; empty: nobody's
-  /// That eye's place while a guest has part in it, or it is on its way back.
+  Imager viewer = {};   ///< an imager at the viewpoint
+  std::string follows;  ///< the guest whose tablet alone is the viewpoint; empty: none
+  /// The viewpoint (world frame, m) while it depends on a guest's tablet or moves back from it.
   std::optional<Eigen::Vector3d> p_guest_eye_world = {};
 };
 
-/// Selects the eye: the scene's own viewer, one that all viewers share, or the tablet of the guest whom the
-/// show state names. It passes from one to the next as between viewers (scene/viewpoint.h) and never jumps.
+/// Selects the viewpoint: the scene's own viewer, the shared viewpoint of all viewers, or the tablet of the
+/// guest whom the show state names. It passes from one to the next as between viewers (scene/viewpoint.h) and
+/// never jumps.
 class ViewpointSelector {
  public:
   /// Borrows both.
   ViewpointSelector(const scene::Scene* scene, const Rig* rig);
 
-  /// Stamps must not go back. A guest's place counts while it is new.
+  /// Stamps must not go back. Tablet positions older than k_guest_place_lasts_s are ignored.
   const SelectedViewpoint& select(const scene::PosedScene& posed, const FrameInput& input);
-  /// The newest one; its viewer's width is 0 before the first.
+  /// The last result of select(); its viewer's width is 0 before the first.
   const SelectedViewpoint& selected() const { return selected_; }
 
  private:
@@ -49,8 +50,8 @@ class ViewpointSelector {
   SelectedViewpoint selected_;
   scene::SharedViewpoint shared_eye_;
   Stamp eye_at_;
-  std::vector<scene::Viewpoint> gliding_;  // guests' eyes, as they are followed
-  bool is_away_ = false;                   // a guest has part in the eye, or it is on its way back
+  std::vector<scene::Viewpoint> gliding_;  // smoothed viewpoints of the guests
+  bool is_away_ = false;                   // the viewpoint depends on a guest, or moves back
 };
 
 }  // namespace limn::apps

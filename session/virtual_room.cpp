@@ -11,12 +11,13 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_tilt_rad =
-    15 * std::numbers::pi / 180;   // a marker seen from straight ahead says little of its tilt
-constexpr double k_fill = 0.6;     // of camera 0's image, where nothing else says how far
-constexpr double k_spacing = 2.2;  // of slots' markers, in their sides
+// The tilt of a marker is poorly measured when it is seen frontally, so the prototype is tilted.
+constexpr double k_tilt_rad = 15 * std::numbers::pi / 180;
+// Share of camera 0's width that the prototype fills if nothing else determines its distance.
+constexpr double k_fill = 0.6;
+constexpr double k_spacing = 2.2;  // distance between slots' markers, in their sides
 constexpr double k_control_size_m = 0.04;
-constexpr double k_paper_m = 0.0005;  // above the prototype
+constexpr double k_paper_m = 0.0005;  // height of the paper above the prototype
 
 Eigen::AlignedBox3d bounds(const scene::Mesh& mesh) {
   Eigen::AlignedBox3d box;
@@ -24,7 +25,7 @@ Eigen::AlignedBox3d bounds(const scene::Mesh& mesh) {
   return box;
 }
 
-// The mean of the markers' axes: how the prototype faces.
+// The mean of the markers' orientations: the direction in which the prototype faces.
 Eigen::Quaterniond prototype_from_face(const scene::Prototype& prototype) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (const BodyMarker& marker : prototype.markers) sum += marker.body_from_marker.rotation_matrix();
@@ -32,8 +33,8 @@ Eigen::Quaterniond prototype_from_face(const scene::Prototype& prototype) {
   return Eigen::Quaterniond(nearest_rotation(sum));
 }
 
-// The point nearest to all lines of sight; so far before camera 0 that the prototype fills its image where
-// the lines (nearly) run beside each other or meet behind it.
+// The point nearest to all optical axes. If they are nearly parallel or meet behind camera 0, a point on
+// camera 0's axis at which the prototype fills its image.
 Eigen::Vector3d middle_of_sight(const Rig& rig, double prototype_size_m) {
   Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
@@ -58,7 +59,7 @@ Eigen::Vector3d middle_of_sight(const Rig& rig, double prototype_size_m) {
   return camera.imager_from_world.inverse() * Eigen::Vector3d(0, 0, depth);
 }
 
-// Places for the slots' markers: on the mesh, in a row before its middle, apart from all others.
+// Poses for the slots' markers on the mesh, from its middle outwards, without overlap.
 std::vector<BodyMarker> slot_markers(const scene::Scene& scene,
                                      const Eigen::Quaterniond& prototype_from_face) {
   const scene::Prototype& prototype = *scene.prototype;

@@ -16,8 +16,8 @@ namespace {
 
 double seconds_of(Stamp at) { return seconds_between(Stamp{}, at); }
 
-// RMS distance of the parts' origins from where they truly are when the light arrives, on the prototype; -1
-// when none is shown.
+// RMS distance (mm, on the prototype) of the parts' origins from their true positions when the light arrives;
+// -1 when no part is shown.
 double placement_mm(const ComposedFrame& painted,
                     const Session& session,
                     const ScriptedRoom& room,
@@ -65,7 +65,7 @@ class VirtualClock final : public FrameClock {
   const sim::VirtualRig* rig_;
 };
 
-// Each perception is of the room's next exposure; edits are the script's.
+// Each perception uses the room's next exposure; edits come from the script.
 class VirtualSource final : public FrameSource {
  public:
   VirtualSource(double end_s,
@@ -107,11 +107,11 @@ class VirtualSource final : public FrameSource {
     return {};
   }
 
-  // While it is paused the session is not over, however late it is.
+  // While it is paused the session is not over, whatever the time.
   void pause(bool is_paused) { is_paused_ = is_paused; }
 
  private:
-  // What is taken of this moment's images.
+  // The accepted frames of this moment.
   std::vector<Frame> exposed() {
     std::vector<int> plugged;
     const std::vector<Imager>& cameras = rig_->world().rig.cameras;
@@ -135,14 +135,14 @@ class VirtualSource final : public FrameSource {
   Perception* perception_;
   Recorder* recorder_;
   DeviceHealth* health_;
-  std::vector<std::size_t> cameras_;  // as health_ calls them
-  std::vector<FrameGate> gates_;      // of cameras_
+  std::vector<std::size_t> cameras_;  // in health_
+  std::vector<FrameGate> gates_;      // one per entry of cameras_
   Stamp exposed_at_;
   std::size_t moments_ = 0, edited_ = 0;
   bool is_paused_ = false;
 };
 
-// The virtual projectors, of which the script may unplug some.
+// The virtual projectors; the script may unplug some of them.
 class VirtualSink final : public FrameSink {
  public:
   VirtualSink(sim::VirtualRig* rig, const ScriptedRoom* room, const Session* session, DeviceHealth* health)
@@ -176,10 +176,11 @@ class VirtualSink final : public FrameSink {
   const ScriptedRoom* room_;
   const Session* session_;
   DeviceHealth* health_;
-  std::vector<std::size_t> projectors_;  // as health_ calls them
+  std::vector<std::size_t> projectors_;  // in health_
 };
 
-// The clock goes on while patterns are shown and stands while the rest is computed; the room stays as it is.
+// The clock runs while patterns are shown and stands still while the result is computed; the room does not
+// change.
 class VirtualCapture final : public CaptureDevices {
  public:
   VirtualCapture(sim::VirtualRig* rig, VirtualSource* source) : rig_(rig), source_(source) {}

@@ -9,11 +9,12 @@
 
 namespace limn::apps {
 
-/// The virtual rig's delays: 60 ms from a camera's exposure to the light of what was made of it.
+/// The virtual rig's delays: together 60 ms from a camera's exposure to the projected light that is made from
+/// it.
 constexpr double k_virtual_camera_s = 0.020, k_virtual_display_s = 0.040;
 
-/// Plays a session on a virtual rig, on its clock: nothing sleeps, every run is the same. Each frame is made
-/// of one exposure. Ends at `end_s` of the clock, with `is_ended`, or when a client ends it.
+/// Runs a session on a virtual rig, on its clock: nothing sleeps, and every run is the same. Each frame is
+/// made of one exposure. Ends at `end_s` of the clock, when `is_ended` is set, or when a client ends it.
 Status play_virtually(double end_s,
                       const std::atomic<bool>& is_ended,
                       sim::VirtualRig* rig,

@@ -30,16 +30,16 @@ TEST(AppendLog, LinesWaitWhileTheDiskIsFull) {
       ASSERT_TRUE(news);
       EXPECT_NE(news->find("rows.csv: expected to write here"), std::string::npos) << *news;
       add("333\n");
-      EXPECT_FALSE(file->news()) << "told once";
+      EXPECT_FALSE(file->news()) << "each message comes once";
     }
     add("4\n");
     EXPECT_EQ(read_file(path).value(), all);
-    EXPECT_EQ(file->news(), "rows.csv is written again");
+    EXPECT_EQ(file->news(), "rows.csv can be written again.");
     add("5\n");
     file->add("6\n", shifted(Stamp{}, at_s + 0.1));
     all += "6\n";
   }
-  EXPECT_EQ(read_file(path).value(), all) << "the last lines at the end";
+  EXPECT_EQ(read_file(path).value(), all) << "the destructor writes the last lines";
 }
 
 TEST(AppendLog, OfTooManyLinesTheNewestAreKept) {

@@ -1,5 +1,5 @@
-// A camera or projector that was nudged during a session is noticed, by the light alone; hands are not taken
-// for it. LIMN_SOAK_S: seconds of hands (12); 3600 are an hour.
+// A camera or projector that was nudged during a session is detected by its light alone; hands must not be
+// mistaken for it. LIMN_SOAK_S: seconds with hands (default 12; an hour is 3600).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -34,7 +34,7 @@ struct RendererInput {
   Drift drift;
 };
 
-// What a session in the studio finds moved while all this happens.
+// The drifts that a session in the studio reports during these events.
 std::vector<RendererInput> found(const json& events, double seconds) {
   const fs::path file = test::test_folder() / "script.json";
   const json script = {{"schema", "limn.script/1"}, {"seconds", seconds}, {"events", events}};
@@ -85,7 +85,7 @@ json sway(const std::string& marker, const Eigen::Vector3d& amplitude_m, double 
           {"hz", 1}};
 }
 
-// Hands are held into the light and a part is moved to and fro, then something is nudged.
+// Hands are held into the light and a part is moved to and fro; then a device is nudged.
 std::vector<RendererInput> found_after_hands(const json& nudge, double seconds) {
   return found({hand("block", "projector0", 0.5, k_hands_s), hand("cover", "aruco_4x4_50:1", 1, k_hands_s),
                 sway("aruco_4x4_50:0", {0.02, 0, 0}, 1, 2.5), nudge},
@@ -108,7 +108,7 @@ TEST(Drift, AProjectorIsNamedUntilItStandsRightAgain) {
   EXPECT_GT(told[1].at_s, 8);
 }
 
-// Its light has hardly any edge across the way in which it moved.
+// This projector's light has hardly any edge across its direction of motion.
 TEST(Drift, TheOtherProjectorIsNamed) {
   expect_named(found_after_hands(nudge("projector1", {0, 0.25, 0}), 11), "projector1");
 }
@@ -122,8 +122,8 @@ double soak_s() {
   return wanted ? std::max(12.0, std::strtod(wanted, nullptr)) : 12;
 }
 
-// Hands come into the light and onto markers and move parts, some at a time and never long apart. That a
-// nudge after it all is found shows that it was looked for all the time.
+// Hands come into the light and onto markers and move parts, some at the same time and never long apart. The
+// nudge after all of it must be found: this shows that the watch was active all the time.
 TEST(Drift, HandsAreNone) {
   auto rng = test::test_rng();
   const auto uniform = [&](double low, double high) {

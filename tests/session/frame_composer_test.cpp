@@ -19,8 +19,8 @@ namespace {
 using namespace test::literals;
 namespace fs = std::filesystem;
 
-// Its markers are measured a little otherwise in every image; a move of less than half a millimetre is
-// shown.
+// Its markers are measured slightly differently in every image, and it must not move with that noise. A real
+// move of less than half a millimetre must be shown.
 TEST(FrameComposer, APrototypeThatStandsStillIsShownWhereItWas) {
   sim::World world =
       sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();

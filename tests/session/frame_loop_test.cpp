@@ -1,4 +1,4 @@
-// The order of a frame, the same wherever a session takes place.
+// The order of a frame is the same wherever a session runs.
 #include "session/frame_loop.h"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@
 namespace limn::apps {
 namespace {
 
-// Clock, source, sink and client that note what is asked of them.
+// Clock, source, sink and client in one; they note which functions are called.
 class Notes final : public FrameClock, public FrameSource, public FrameSink, public SessionClient {
  public:
   Notes(sim::VirtualRig* rig, Perception* perception) : rig_(rig), perception_(perception) {}
@@ -39,7 +39,8 @@ class Notes final : public FrameClock, public FrameSource, public FrameSink, pub
   }
   Status edit(Session* session) override {
     said += "edit ";
-    EXPECT_EQ(session->watched().captured_at, perception_->watched().captured_at) << "perceived before";
+    EXPECT_EQ(session->watched().captured_at, perception_->watched().captured_at)
+        << "perceive() comes before edit()";
     return session->edit({"grid", "", "toggle"}, "test", now());
   }
   Status show(const ComposedFrame& painted, const std::vector<cv::Mat>& light) override {
@@ -108,13 +109,13 @@ class AFrameLoop : public testing::Test {
 TEST_F(AFrameLoop, GoesInOneOrder) {
   ASSERT_TRUE(played(1));
   EXPECT_EQ(notes_->said, "perceive edit hear overlay show no-screens tell-shown ");
-  EXPECT_TRUE(session_->show_state().grid) << "what is edited counts in the same frame";
+  EXPECT_TRUE(session_->show_state().grid) << "an edit counts in the same frame";
 }
 
 TEST_F(AFrameLoop, OverlaysAreInTheLightAndNotInWhatWasPainted) {
   ASSERT_TRUE(played(1));
   EXPECT_TRUE(notes_->covered);
-  EXPECT_TRUE(notes_->same) << "another projector's light is what was painted";
+  EXPECT_TRUE(notes_->same) << "the other projector's image has no overlay";
 }
 
 TEST_F(AFrameLoop, TakesInWhatChangesWhenNoImageIsDue) {

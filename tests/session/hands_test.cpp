@@ -1,6 +1,6 @@
-// Hands over a table with control markers, as the camera side of a session sees them: images at 30 a
-// second, gestures that must act once and hands that pass, stop and work, which must not. LIMN_SOAK_S:
-// seconds of the images' clock (60); an hour gives the numbers of docs/measurements.md.
+// Hands over a table with control markers, seen by the camera side of a session at 30 frames a second.
+// Gestures must act once; hands that pass, stop and work must not act. LIMN_SOAK_S: seconds of the frames'
+// clock (default 60); an hour gives the numbers of docs/measurements.md.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,10 +20,10 @@ namespace {
 using namespace test::literals;
 
 constexpr double k_frame_s = 1 / 30.0;
-constexpr int k_side = 320;  // of the image; a pixel is a millimetre of the table
+constexpr int k_side = 320;  // side of the image; a pixel is a millimetre of the table
 constexpr double k_table_s = 100;
 constexpr double k_arrives_mm_s = 1000;
-constexpr std::size_t k_cover = 0, k_turn = 1, k_lay = 2;  // the controls
+constexpr std::size_t k_cover = 0, k_turn = 1, k_lay = 2;  // indices of the controls
 
 double soak_s() {
   const char* wanted = std::getenv("LIMN_SOAK_S");
@@ -66,7 +66,7 @@ class Table {
     draw();
   }
 
-  // The next image: the bare table, or with a hand and its forearm from outside over it.
+  // The next frame: the bare table, or with a hand and its forearm that reach in from outside.
   std::vector<ControlUse> see() { return watched(light_); }
   std::vector<ControlUse> see_hand(const Eigen::Vector2d& px_hand, double arm) {
     return watched(with_hand(px_hand, arm));
@@ -100,7 +100,7 @@ class Table {
       cv::line(out, point(px_fold - across), point(px_fold + across), cv::Scalar(70), 5, cv::LINE_8, 4);
     }
     cv::circle(out, point(px_hand), 16 * 38, cv::Scalar(105), cv::FILLED, cv::LINE_8, 4);
-    for (int finger = 0; finger < 4; ++finger)  // what moves with the hand
+    for (int finger = 0; finger < 4; ++finger)  // fingers, which move with the hand
       cv::line(out, point(px_hand + 30 * direction(arm + 2.6 + 0.35 * finger)), point(px_hand),
                cv::Scalar(80), 3, cv::LINE_8, 4);
     cv::GaussianBlur(out, out, {}, 0.8);
@@ -121,7 +121,7 @@ class Table {
   double now_s_ = 0;
 };
 
-// How a hand goes to and fro that holds something, by some millimetres.
+// A hand that holds something moves to and fro by some millimetres.
 struct Work {
   explicit Work(Table* table)
       : mm(table->uniform(4, 8)), rad_s(table->uniform(6, 12)), phase(table->uniform(0, 6.28)) {}
@@ -131,7 +131,7 @@ struct Work {
   double mm, rad_s, phase;
 };
 
-// A hand that comes from outside, does something at a control and goes again.
+// A hand that comes from outside, does something at a control and leaves.
 class Hand {
  public:
   Hand(Table* table, std::size_t control)
@@ -154,7 +154,7 @@ class Hand {
     for (double t = 0; t < 0.6; t += k_frame_s) note(table_->see());
   }
 
-  // What was used meanwhile, and how long after it came.
+  // The control uses during this, and how long after the hand's arrival the first one came.
   const std::vector<ControlUse>& uses() const { return uses_; }
   double first_use_s() const { return used_s_ - came_s_; }
 
@@ -230,7 +230,7 @@ TEST(Hands, GesturesActOnceAndSoon) {
   EXPECT_LE(latest_s, 0.100);
 }
 
-// Hands pass over the controls, a third of which stop above one and work.
+// Hands pass over the controls; a third of them stop above one and work there.
 TEST(Hands, ThatPassDoNotAct) {
   auto rng = test::test_rng();
   int passed = 0, acts = 0;

@@ -1,4 +1,4 @@
-// Keys do the actions that have them, to the slot that is chosen.
+// Keys trigger the actions that they belong to, for the chosen slot.
 #include "session/keys.h"
 
 #include <gtest/gtest.h>

@@ -42,7 +42,7 @@ namespace fs = std::filesystem;
 using namespace test::literals;
 using nlohmann::json;
 
-constexpr double k_mended_s = 5.4;  // what a repair takes of the virtual clock, and half a second
+constexpr double k_mended_s = 5.4;  // time of a repair on the virtual clock, plus half a second
 TEST(Live, ASessionIsReplayedToTheLastDigit) {
   const fs::path folder = test::test_folder();
   LiveOptions options;
@@ -66,7 +66,7 @@ TEST(Live, ASessionIsReplayedToTheLastDigit) {
   const json summary = read_json(folder / "out/session.json");
   EXPECT_EQ(summary.at("pictures"), 21);
   EXPECT_LT(summary.at("placement_mm").at("median").get<double>(), 0.3);
-  EXPECT_NEAR(summary.at("latency_ms").at("median").get<double>(), 60, 1.5);  // the quantiles' bins
+  EXPECT_NEAR(summary.at("latency_ms").at("median").get<double>(), 60, 1.5);  // the bins are 2 % wide
   EXPECT_NE(read_file(folder / "out/session.html").value().find("next_variant mirror (script)"),
             std::string::npos);
   EXPECT_TRUE(fs::exists(folder / "out/projector-projector0.png"));
@@ -81,7 +81,7 @@ TEST(Live, ASessionIsReplayedToTheLastDigit) {
   EXPECT_TRUE(replayed.ok()) << replayed.message();
   EXPECT_EQ(poses, lines_of(folder / "replayed/poses.csv"));
 
-  // A digit of a pose, a bit of a frame, an end in the middle of a line: named.
+  // A replay must name each damage: a changed digit of a pose, a changed bit of a frame, a cut line.
   auto events = lines_of(folder / "recording/events.jsonl");
   const auto with = [&](const std::vector<std::string>& lines) {
     std::string text;
@@ -104,7 +104,8 @@ TEST(Live, ASessionIsReplayedToTheLastDigit) {
   EXPECT_NE(damaged.message().find("events.jsonl:5"), std::string::npos) << damaged.message();
 }
 
-// A projector is nudged; asked for it, the session looks at the prototype and goes on with a rig that knows.
+// A projector is nudged. On request the session measures it on the prototype and continues with a corrected
+// rig.
 TEST(Live, GoesOnWithAMendedRig) {
   const fs::path folder = test::test_folder();
   LiveOptions options;
@@ -135,8 +136,8 @@ TEST(Live, GoesOnWithAMendedRig) {
             load_rig(folder / "recording/rig")->projectors[0].imager_from_world.matrix());
   const std::string page = read_file(folder / "out/session.html").value();
   EXPECT_NE(page.find("projector1 was turned by 0.2"), std::string::npos);
-  EXPECT_FALSE(fs::exists(folder / "out/repaired-2")) << "in a blackout no light is given";
-  // What people had chosen is still shown.
+  EXPECT_FALSE(fs::exists(folder / "out/repaired-2")) << "the repair during the blackout is refused";
+  // The variant that was chosen before the repair is still shown.
   const auto poses = lines_of(folder / "out/poses.csv");
   EXPECT_NE(poses[poses.size() - 2].find(",mirror,sport,"), std::string::npos) << poses[poses.size() - 2];
 
@@ -144,7 +145,7 @@ TEST(Live, GoesOnWithAMendedRig) {
   replay.session = folder / "recording";
   const Status replayed = run_replay(replay);
   EXPECT_TRUE(replayed.ok()) << replayed.message();
-  // It is the mended rig that was gone on with.
+  // The session really continued with the corrected rig: with the old one the replay differs.
   fs::copy(folder / "recording/rig", folder / "recording/rig-2",
            fs::copy_options::recursive | fs::copy_options::overwrite_existing);
   const Status other = run_replay(replay);
@@ -153,7 +154,7 @@ TEST(Live, GoesOnWithAMendedRig) {
       << other.message();
 }
 
-// Another program's edits come at any moment, are in the recording, and come again at the same one.
+// Edits of another program come at any moment; they are recorded and replayed at the same moment.
 TEST(Live, HearsAndTellsByOscAndIsReplayed) {
   const fs::path folder = test::test_folder();
   auto told = UdpSocket::hearing({"127.0.0.1", "0"});
@@ -178,7 +179,7 @@ TEST(Live, HearsAndTellsByOscAndIsReplayed) {
           return true;
       return false;
     };
-    // Said again until it was heard; what comes once it is told of was heard as well.
+    // Repeats a message until its effect is reported; messages sent before it were then received, too.
     const auto say = [&](const std::string& path, const std::vector<OscValue>& values,
                          const std::string& answer) {
       for (int i = 0; i < 600; ++i) {
@@ -210,7 +211,7 @@ TEST(Live, HearsAndTellsByOscAndIsReplayed) {
   EXPECT_TRUE(replayed.ok()) << replayed.message();
 }
 
-// The driver takes the GL context away: what was shown stays, and is drawn anew when there is another.
+// The driver takes the GL context away: the shown images stay, and they are drawn again in a new context.
 TEST(Live, DrawsAnewWhenTheGraphicsCardLostIt) {
   const sim::World world = studio(0.34);
   SessionSetup setup{world.rig, *world.scene, {}, {}};
@@ -247,7 +248,7 @@ TEST(Live, DrawsAnewWhenTheGraphicsCardLostIt) {
   session->take(perception->watch(rig.expose(std::span(&camera, 1))), 2);
   const cv::Mat anew = session->paint(rig.now(), shifted(rig.now(), 0.03)).projectors[0].clone();
   Telemetry unused = Telemetry::create({}).value();
-  auto fresh = Session::create(setup, &unused, nullptr, false);  // that has lost nothing
+  auto fresh = Session::create(setup, &unused, nullptr, false);  // this one has never lost its context
   ASSERT_TRUE(fresh);
   fresh->take(perception->watched(), 1);
   const cv::Mat expected = fresh->paint(rig.now(), shifted(rig.now(), 0.03)).projectors[0];
@@ -257,10 +258,10 @@ TEST(Live, DrawsAnewWhenTheGraphicsCardLostIt) {
   const json notes = telemetry.summary().at("notes");
   ASSERT_EQ(notes.size(), 2u) << notes.dump();
   EXPECT_NE(notes[0].at("what").get<std::string>().find("there is no card"), std::string::npos);
-  EXPECT_NE(notes[1].at("what").get<std::string>().find("drawn anew"), std::string::npos);
+  EXPECT_NE(notes[1].at("what").get<std::string>().find("drawn again"), std::string::npos);
 }
 
-// Remembers what it was shown.
+// A display that keeps the last shown image.
 class Canvas : public device::Display {
  public:
   Canvas(std::string name, cv::Size size) : name_(std::move(name)), size_(size) {}
@@ -277,7 +278,7 @@ class Canvas : public device::Display {
   cv::Size size_;
 };
 
-// Three screens of one devices file; a recording knows them.
+// Three screens, as in a devices file; the recording has their names.
 TEST(Live, EachScreenShowsWhatWasChosenForIt) {
   const fs::path folder = test::test_folder();
   const sim::World world = studio(0.34);
@@ -313,7 +314,7 @@ TEST(Live, EachScreenShowsWhatWasChosenForIt) {
   ASSERT_TRUE(played) << played.message();
   for (const Canvas* screen : screens) ASSERT_FALSE(screen->shown.empty()) << screen->name();
   EXPECT_EQ(cv::norm(screens[0]->shown, seen, cv::NORM_INF), 0);
-  EXPECT_GT(cv::norm(screens[1]->shown, seen, cv::NORM_INF), 50) << "with parts";
+  EXPECT_GT(cv::norm(screens[1]->shown, seen, cv::NORM_INF), 50) << "this screen shows parts";
   EXPECT_EQ(cv::countNonZero(screens[2]->shown.reshape(1)), 0);
   ASSERT_TRUE(output->close(&*session, false));
   ReplayOptions replay;
@@ -322,7 +323,7 @@ TEST(Live, EachScreenShowsWhatWasChosenForIt) {
   EXPECT_TRUE(replayed.ok()) << replayed.message();
 }
 
-// A camera goes and comes back: parts are carried on, fade, and are there again.
+// A camera fails and works again: parts are extrapolated, fade out, and are shown again.
 TEST(Live, GoesOnWithoutItsCamera) {
   const fs::path folder = test::test_folder();
   LiveOptions options;
@@ -341,13 +342,13 @@ TEST(Live, GoesOnWithoutItsCamera) {
     if (const json event = json::parse(line); event.contains("paint"))
       dark += event["paint"]["parts"].empty();
   EXPECT_GT(dark, 15);
-  // Nothing is left on where nothing is known, and in the end all is there again.
+  // Without tracks nothing is shown; at the end everything is shown again.
   EXPECT_GT(cv::countNonZero(read_grey_image(folder / "out/projector-projector0.png").value()), 1000);
   EXPECT_NE(read_file(folder / "out/session.html").value().find("camera0 is back"), std::string::npos);
 }
 
-// Images of a size that the rig was not measured in are none, and said to be; a camera whose clock steps is
-// as good as before.
+// Images of another size than the rig was calibrated with are refused, with a message. A camera whose clock
+// steps is used as before.
 TEST(Live, GoesOnWhenItsCamerasImagesAndClockChange) {
   const fs::path folder = test::test_folder();
   const auto lived = [&](const std::string& name, double duration_s, const json& events) {
@@ -382,13 +383,12 @@ TEST(Live, GoesOnWhenItsCamerasImagesAndClockChange) {
   std::vector<std::string> notes;
   for (const json& note : resized.at("notes")) notes.push_back(note.at("what"));
   ASSERT_EQ(notes.size(), 2u);
-  EXPECT_NE(notes[0].find("expected pictures of 960x540, found one of 640x480"), std::string::npos)
-      << notes[0];
+  EXPECT_NE(notes[0].find("960x540 pixels, found one of 640x480"), std::string::npos) << notes[0];
   EXPECT_EQ(notes[1], "camera0 is back");
   EXPECT_GT(cv::countNonZero(last_light("resized").reshape(1)), 1000);
 }
 
-// A hand in one projector's light: the other gives what is lost. Without a hand nothing changes.
+// A hand is in one projector's light: the other projector fills in. Without a hand nothing changes.
 TEST(Live, RefillsASomebodysShadow) {
   const fs::path folder = test::test_folder();
   const auto light = [&](const std::string& name, bool refill, const json& events) {
@@ -409,7 +409,7 @@ TEST(Live, RefillsASomebodysShadow) {
   EXPECT_GT(more, 1.02);
 }
 
-// Looks are files beside the scene, and a page for a review.
+// Looks are saved as files beside the scene, with an overview page for a review.
 TEST(Live, KeepsLooks) {
   const fs::path folder = test::test_folder();
   copy_studio_to(folder);
@@ -446,14 +446,14 @@ TEST(Live, KeepsLooks) {
   EXPECT_FALSE(calm.at("slots").at("mirror").contains("material"));
   EXPECT_EQ(bold.at("slots").at("mirror").at("material").at("base_colour").size(), 3u);
   EXPECT_EQ(bold.at("light").at("lamps").at(0).at("strength"), json({0.9, 0.9, 0.9}));
-  const auto green = [](const cv::Mat& bgr) {  // pixels
+  const auto green = [](const cv::Mat& bgr) {  // number of green pixels
     int count = 0;
     for (const cv::Vec3b& c : cv::Mat_<cv::Vec3b>(bgr)) count += c[1] > 1.5 * std::max(c[0], c[2]) + 20;
     return count;
   };
   EXPECT_GT(green(bold_image), green(calm_image) + 500);
 
-  // The next session knows them.
+  // The next session loads the saved looks.
   options.script =
       written(folder / "next.json", script_of(0.2, json::array({edit(0.1, "restore_look", "bold")})));
   options.out = folder / "out";
@@ -470,7 +470,7 @@ TEST(Live, KeepsLooks) {
   EXPECT_GT(green(read_image(options.out / "projector-projector0.png").value()), 100);
 }
 
-// A part is dropped into its slot's folder, then spoilt, while the session runs.
+// A part is added to its slot's folder, then damaged, while the session runs.
 TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
   const fs::path folder = test::test_folder();
   copy_studio_to(folder);
@@ -525,7 +525,7 @@ TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
   person.join();
   ASSERT_TRUE(lived.ok()) << lived.message();
   const std::string page = read_file(folder / "out/session.html").value();
-  EXPECT_NE(page.find("loaded anew"), std::string::npos);
+  EXPECT_NE(page.find("loaded again"), std::string::npos);
   EXPECT_NE(page.find("The parts stay as they were"), std::string::npos);
   std::string last;
   for (const std::string& line : lines_of(folder / "out/poses.csv"))
@@ -537,7 +537,7 @@ TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
   EXPECT_TRUE(replayed.ok()) << replayed.message();
 }
 
-// A second camera beside the first, and their cables exchanged.
+// There is a second camera beside the first, and their cables are exchanged.
 TEST(Live, KnowsCamerasThatWereExchanged) {
   sim::World world = studio(0.5);
   Imager second = world.rig.cameras[0];
@@ -569,7 +569,7 @@ TEST(Live, KnowsCamerasThatWereExchanged) {
   auto session = Session::create({world.rig, *world.scene, {}, {}}, &telemetry, nullptr, false);
   auto perception = Perception::create(*world.scene, world.rig);
   ASSERT_TRUE(context && session && perception);
-  for (const int moment : {1, 2}) {  // told once
+  for (const int moment : {1, 2}) {  // it is reported once only
     for (Frame& frame : frames) frame.captured_at = shifted(frame.captured_at, 5);
     session->take(perception->watch(frames), static_cast<std::size_t>(moment));
   }
@@ -578,8 +578,8 @@ TEST(Live, KnowsCamerasThatWereExchanged) {
   EXPECT_EQ(notes[0].at("what").get<std::string>().find("camera0 and camera1 seem to be exchanged"), 0u);
 }
 
-// Somebody's fixed place, a cap with a marker and guests' tablets share the eye; whoever comes, goes or is
-// lost from sight moves it slowly.
+// A fixed viewer, a cap with a marker and guests' tablets share a viewpoint; it moves slowly when a viewer
+// comes, goes or is no longer seen.
 TEST(Live, ViewersOfAllKindsShareAnEyeThatNeverJumps) {
   constexpr double k_period_s = 0.1, k_fade_s = 0.8;
   constexpr const char* k_cap = "aruco_4x4_50:9";
@@ -615,7 +615,7 @@ TEST(Live, ViewersOfAllKindsShareAnEyeThatNeverJumps) {
   std::size_t moments = 0;
   std::optional<Eigen::Vector3d> p_before;
   double farthest_m = 0;
-  // The eye then, with these tablets seeing markers.
+  // The viewpoint at `end_s`, while these tablets see markers.
   const auto eye_at = [&](double end_s, const std::map<std::string, Eigen::Vector3d>& guests) {
     while (seconds_between(Stamp{}, rig.next_exposure()) < end_s) {
       room->set(seconds_between(Stamp{}, rig.next_exposure()));
@@ -631,7 +631,7 @@ TEST(Live, ViewersOfAllKindsShareAnEyeThatNeverJumps) {
     }
     return *p_before;
   };
-  // All stand on one side of the door: each counts by weight over distance.
+  // All viewers stand on one side of the door: each counts by weight divided by distance.
   using Weighted = std::vector<std::pair<Eigen::Vector3d, double>>;
   const auto off_mm = [&](const Eigen::Vector3d& p_eye, const Weighted& eyes) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -707,7 +707,7 @@ TEST(Live, SaysWhatIsWrong) {
     script.script = written(folder / "d.json", script_of(1, json::array({event})));
     EXPECT_NE(message(script).find(why), std::string::npos) << event << message(script);
   }
-  LiveOptions other_rig;  // of other devices
+  LiveOptions other_rig;  // it has another projector size
   sim::World world = studio(1);
   world.rig.projectors[1].width = 1024;
   ASSERT_TRUE(save_rig(world.rig, folder / "rig"));

@@ -15,7 +15,7 @@
 #include "tests/gui/gui_canvas.h"
 #include "tests/support/matchers.h"
 #include "tracker/marker_image.h"
-// X's macros go last.
+// X defines macros; include it last.
 #include "tests/gui/x_person.h"
 
 namespace limn::apps {
@@ -28,7 +28,7 @@ bool has_display() { return std::getenv("DISPLAY") != nullptr; }
 
 const cv::Scalar k_orange(30, 120, 230), k_violet(200, 60, 140), k_teal(140, 160, 40);
 
-// A session as it is after ten seconds: a camera gone, a body lost, a look saved.
+// A view of a session: one camera failed, one body is lost, a look was saved.
 OperatorView a_view() {
   OperatorView view;
   view.at_s = 754;
@@ -84,7 +84,7 @@ const cv::Point2f k_material(885, 102), k_light(820, 286);  // their buttons
 
 cv::Vec3b around(const cv::Mat& image, int x, int y) { return image.at<cv::Vec3b>(y, x); }
 
-// The box of pixels of a colour; empty where there are none.
+// The bounding box of the pixels of a colour; empty if there are none.
 cv::Rect box_of(const cv::Mat& image, const cv::Scalar& colour) {
   cv::Mat mask;
   cv::inRange(image, colour - cv::Scalar::all(3), colour + cv::Scalar::all(3), mask);
@@ -109,7 +109,7 @@ TEST(OperatorPanel, ShowsImagesUndistortedWithTheirMarkers) {
       ASSERT_GT(box.width, size.width / 12) << size;
       EXPECT_NEAR(1.0 * box.width / box.height, colour == k_violet ? 1.6 : 16.0 / 9, 0.05) << size;
     }
-    // The large image is the first camera's; the marker's outline stands where the marker is in it.
+    // The large image is the first camera's; the outline of the marker is drawn at the marker.
     const cv::Rect camera = box_of(image(cv::Rect(0, 0, size.width, size.height / 2)), k_orange);
     ASSERT_GT(camera.width, size.width / 2) << size;
     const double scale = camera.width / 1280.0;
@@ -122,7 +122,7 @@ TEST(OperatorPanel, ShowsImagesUndistortedWithTheirMarkers) {
   }
 }
 
-// What a person can ask for, by clicking wherever there may be a button.
+// All edits that can be requested by clicks in this area.
 std::set<std::string> reachable(const OperatorView& view, cv::Size size, const cv::Rect& area, int columns) {
   test::GuiCanvas canvas(size);
   std::set<std::string> all;
@@ -149,7 +149,7 @@ TEST(OperatorPanel, EditsAreAClickAway) {
   EXPECT_FALSE(bar.contains("repair"));
   view.moved = "projector1";
   EXPECT_TRUE(reachable(view, {1000, 640}, {420, 25, 60, 10}, 3).contains("repair"));
-  view.recalibration_progress = "12 of 44 patterns";  // which stands in its place
+  view.recalibration_progress = "12 of 44 patterns";  // is shown in place of the button
   EXPECT_FALSE(reachable(view, {1000, 640}, {420, 25, 60, 10}, 3).contains("repair"));
   view.recalibration_progress.clear();
   view.moved.clear();
@@ -158,10 +158,10 @@ TEST(OperatorPanel, EditsAreAClickAway) {
   for (const char* edit : {"next_variant mirror", "previous_variant mirror", "next_variant grille",
                            "release mirror", "save_look", "restore_look sport and bars"})
     EXPECT_TRUE(column.contains(edit)) << edit;
-  EXPECT_FALSE(column.contains("release grille")) << "it is where its marker puts it";
+  EXPECT_FALSE(column.contains("release grille")) << "only its marker determines its pose";
 }
 
-// Two looks were shown, one was deleted, a loose marker lies there, another one carries the grille.
+// Two looks were shown, one was deleted, a loose marker is seen, and another marker carries the grille.
 TEST(OperatorPanel, PairsAndComparesByClicks) {
   OperatorView view = a_view();
   view.waiting = {"aruco_4x4_50:7"};
@@ -178,7 +178,8 @@ TEST(OperatorPanel, PairsAndComparesByClicks) {
   for (const char* edit : {"pair mirror aruco_4x4_50:7", "pair grille aruco_4x4_50:7", "unpair grille",
                            "flip", "split", "undelete_look"})
     EXPECT_TRUE(column.contains(edit)) << edit;
-  EXPECT_FALSE(column.contains("unpair mirror")) << "its own marker carries it";
+  EXPECT_FALSE(column.contains("unpair mirror"))
+      << "its own marker carries it, so there is nothing to unpair";
 }
 
 TEST(OperatorPanel, AnImageGrowsWhenClicked) {
@@ -194,7 +195,7 @@ TEST(OperatorPanel, AnImageGrowsWhenClicked) {
   EXPECT_GT(box_of(canvas.image(), k_violet).width, 2 * before.width);
 }
 
-// Whether the code of a text is the bright square in the window.
+// Whether the window shows the QR code of this text.
 bool shows_code(const cv::Mat& image, const std::string& text) {
   const cv::Rect box = box_of(image(cv::Rect(0, 50, 720, 720)), cv::Scalar::all(255)) + cv::Point(0, 50);
   const cv::Mat code = qr_code(text);
@@ -232,7 +233,7 @@ TEST(OperatorPanel, InvitesGuestsByACodeOrByPin) {
   canvas.keep("operator-remote-operate");
   EXPECT_TRUE(shows_code(canvas.image(), page + "345678"));
 
-  // Below: a projector that shows the code, and whose eye view parts are drawn for.
+  // Below: the projector that shows the code, and the viewpoint for `view` parts.
   view.windows = {"Ann", "Ben"};
   view.show_state.viewer = "Ann";
   view.follows = "Ann";
@@ -246,13 +247,13 @@ TEST(OperatorPanel, InvitesGuestsByACodeOrByPin) {
       for (const scene::Edit& edit : now.edits) asked.insert(edit.action + " " + edit.value);
       if (now.code) asked.insert("code " + now.code->role + " " + now.code->projector);
     });
-  EXPECT_TRUE(asked.contains("viewer ")) << "the scene's own";
+  EXPECT_TRUE(asked.contains("viewer ")) << "the scene's own viewer";
   EXPECT_TRUE(asked.contains("viewer Ann"));
   EXPECT_TRUE(asked.contains("viewer Ben"));
   EXPECT_TRUE(asked.contains("code operate " + view.projectors[0].name));
 }
 
-// A box opens where its button is clicked; clicks in it set what a slider then shows.
+// A popup opens where its button is clicked; clicks on its sliders request edits.
 TEST(OperatorPanel, MaterialsAndLightAreSetInABox) {
   OperatorView view = a_view();
   test::GuiCanvas canvas({1000, 640});
@@ -267,7 +268,7 @@ TEST(OperatorPanel, MaterialsAndLightAreSetInABox) {
     for (int i = 0; i < 2; ++i) canvas.draw(draw);
     canvas.keep(image);
     for (float y = button.y + 14; y < button.y + 224; y += 12) canvas.click({750, y}, draw);
-    canvas.click({5, 635}, draw);  // away: it closes
+    canvas.click({5, 635}, draw);  // a click elsewhere closes it
     return asked;
   };
   const auto has = [](const std::set<std::string>& asked, const std::string& begin) {
@@ -277,12 +278,12 @@ TEST(OperatorPanel, MaterialsAndLightAreSetInABox) {
   const std::set<std::string> material = asked_in(k_material, "operator-material");
   EXPECT_TRUE(has(material, "material|mirror|- 0.")) << "metal";
   EXPECT_TRUE(has(material, "material|mirror|- - 0.")) << "rough";
-  EXPECT_TRUE(material.contains("material|mirror|")) << "as its file says";
+  EXPECT_TRUE(material.contains("material|mirror|")) << "reset to the file";
   view.show_state.slots[0].material = {Eigen::Vector3d(1, 0, 0), std::nullopt, 0.5};
   EXPECT_TRUE(has(asked_in(k_material, "operator-material-red"), "material|mirror|#ff0000 0."))
-      << "the rest stays";
+      << "the other values stay";
   const std::set<std::string> light = asked_in(k_light, "operator-light");
-  EXPECT_TRUE(light.contains("light||")) << "the scene's own";
+  EXPECT_TRUE(light.contains("light||")) << "reset to the scene";
   int lights = 0;
   for (const std::string& edit : light) {
     if (edit == "light||" || !edit.starts_with("light||")) continue;
@@ -304,11 +305,11 @@ TEST(OperatorPanel, AsksBeforeItEnds) {
   EXPECT_FALSE(ends);
   panel.ask_to_end();  // Escape again
   for (int i = 0; i < 3; ++i) canvas.draw(draw);
-  canvas.click({30, 25}, draw);  // the window is the person's again
+  canvas.click({30, 25}, draw);  // the question is closed: this click is on the window again
   EXPECT_FALSE(ends);
 }
 
-// A person at a session's window while it runs: plays `acts` once the window is there, then closes it.
+// A person uses a session's window while it runs: does `acts` once the window exists, then closes it.
 std::string session_with(LiveOptions options,
                          const fs::path& out,
                          const std::function<void(test::XPerson*)>& acts) {
@@ -319,7 +320,7 @@ std::string session_with(LiveOptions options,
     for (int i = 0; i < 300 && !x.finds("Limn"); ++i) std::this_thread::sleep_for(milliseconds(100));
     std::this_thread::sleep_for(milliseconds(2000));
     acts(&x);
-    std::this_thread::sleep_for(milliseconds(3000));  // an image at least, on a busy machine
+    std::this_thread::sleep_for(milliseconds(3000));  // long enough for one image on a busy machine
     x.close();
   });
   const Status played = run_live(options);

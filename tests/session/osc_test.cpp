@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 
 std::vector<std::uint8_t> bytes_of(const std::string& text) { return {text.begin(), text.end()}; }
 
-// A message by hand, so that wrong ones can be made, too.
+// Encodes a message by hand, so that wrong ones can be made, too.
 std::vector<std::uint8_t> raw(const std::string& path,
                               const std::string& types,
                               const std::string& arguments) {
@@ -50,7 +50,7 @@ TEST(Osc, TheTableTheDocumentationAndTheActionsAgree) {
   for (std::string line; std::getline(lines, line);)
     if (line.rfind("| `/limn/", 0) == 0) {
       const std::string path = line.substr(3, line.find('`', 3) - 3);
-      EXPECT_TRUE(rows.emplace(path, line).second) << path << " stands there twice";
+      EXPECT_TRUE(rows.emplace(path, line).second) << path << " is in the table twice";
     }
   std::size_t wanted = 0;
   const auto check = [&](const std::vector<OscAddress>& addresses) {
@@ -58,19 +58,19 @@ TEST(Osc, TheTableTheDocumentationAndTheActionsAgree) {
       const std::string row =
           fmt::format("| `{}` | {} | {} |{}", address.path, address.arguments, address.what,
                       address.role.empty() ? "" : " " + address.role + " |");
-      EXPECT_EQ(rows[address.path], row) << "docs/osc.md wants this row:\n" << row;
+      EXPECT_EQ(rows[address.path], row) << "docs/osc.md must contain this row:\n" << row;
       ++wanted;
     }
   };
   check(osc_heard());
   check(osc_told());
-  EXPECT_EQ(rows.size(), wanted) << "docs/osc.md has an address that is not there";
+  EXPECT_EQ(rows.size(), wanted) << "docs/osc.md has an address that does not exist";
   ASSERT_EQ(osc_heard().size(), scene::actions().size());
   for (std::size_t i = 0; i < osc_heard().size(); ++i)
     EXPECT_EQ(osc_heard()[i].path, fmt::format("/limn/{}", scene::actions()[i].name));
 }
 
-// The least message of each action, made of what the action takes, is an edit of it.
+// A minimal message for each action, with the arguments that the action takes, gives an edit of that action.
 TEST(Osc, EveryActionHasAMessage) {
   for (const scene::Action& action : scene::actions()) {
     std::vector<OscValue> arguments;
@@ -116,7 +116,7 @@ TEST(Osc, NumbersOfEveryKindAreNumbers) {
   EXPECT_EQ(value("/limn/blackout", "i", "\0\0\0\0"s), "off");
   EXPECT_EQ(value("/limn/blackout", "f", "\x3f\x80\0\0"s), "on");
   EXPECT_EQ(value("/limn/blackout", "s", "toggle\0\0"s), "toggle");
-  // 1, -2 as 64 bits, 0.5 as a double.
+  // The values 1, -2 (64 bits) and 0.5 (double).
   EXPECT_EQ(
       value("/limn/nudge", "sihd",
             "mirror\0\0"s + "\0\0\0\1"s + "\xff\xff\xff\xff\xff\xff\xff\xfe"s + "\x3f\xe0\0\0\0\0\0\0"s),
@@ -138,7 +138,8 @@ TEST(Osc, RefusesWithAReason) {
   has(refusal(raw("/limn/next_variant", "i", "\0\0\0\1"s)), "found an argument of type 'i'");
   has(refusal(raw("/limn/next_variant", "ss", "a\0\0\0b\0\0\0"s)), "expected 1 arguments at most, found 2");
   has(refusal(raw("/limn/freeze", "b", "\0\0\0\4abcd"s)), "found an argument of type 'b'");
-  has(refusal(raw("/limn/freeze", "b", "")), "found an argument of type 'b'");  // cut off: not for liblo
+  // A blob that is cut off must not reach liblo.
+  has(refusal(raw("/limn/freeze", "b", "")), "found an argument of type 'b'");
   has(refusal(bytes_of("/limn/freeze\0\0\0\0"s)), "expected a message of Open Sound Control");
   has(refusal(osc_message("/limn/nudge", {"mirror", 1, 2})), "found no more arguments");
   has(refusal(osc_message("/limn/place", {"mirror", 1, 2, 3, 1, 0, 0})), "expected a number, found no more");
@@ -156,7 +157,7 @@ TEST(Osc, RefusesWithAReason) {
     EXPECT_FALSE(edit_of_osc(std::span(good).first(cut))) << cut;
 }
 
-// Bytes spoilt at random: an edit or a reason, nothing else.
+// Randomly changed bytes give an edit or a reason, nothing else.
 TEST(Osc, SurvivesSpoiltBytes) {
   auto rng = test::test_rng();
   std::size_t taken = 0, refused = 0;
@@ -212,7 +213,7 @@ class AnOscSession : public testing::Test {
     session_.emplace(std::move(*session));
   }
 
-  // Its notes.
+  // The notes of the session.
   std::string page() {
     const fs::path file = test::test_folder() / "page.html";
     EXPECT_TRUE(telemetry_->write_page(file, "x").ok());
@@ -244,7 +245,7 @@ TEST_F(AnOscSession, HearsAnotherPrograms) {
   EXPECT_TRUE(
       test::near(session_->show_state().slots[0].nudge, Eigen::Vector3d(0.001, 0.002, -0.0035), 1e-9));
 
-  // A pose: as it is told, and where the part then is.
+  // A pose, in the form in which the session sends poses; the part is then there.
   ASSERT_GT(lo_send(to, "/limn/place", "sfffffff", "mirror", 20.0, -30.0, 12.5, 1.2, 0.0, 1.2, 0.0), 0);
   hear();
   const auto& pin = session_->show_state().slots[0].pin;
@@ -255,7 +256,7 @@ TEST_F(AnOscSession, HearsAnotherPrograms) {
       1e-6, 1e-6));
   EXPECT_TRUE(session_->show_state().slots[0].nudge.isZero());
 
-  // One screen, and all.
+  // The content of one screen, and of all.
   ASSERT_GT(lo_send(to, "/limn/screen", "s", "camera"), 0);
   ASSERT_GT(lo_send(to, "/limn/screen", "ss", "full", "wall"), 0);
   hear();
@@ -263,7 +264,7 @@ TEST_F(AnOscSession, HearsAnotherPrograms) {
   EXPECT_EQ(scene::screen_content(session_->show_state(), "wall"), scene::Screen::full);
   EXPECT_EQ(scene::screen_content(session_->show_state(), "desk"), scene::Screen::camera);
 
-  // What the scene does not have changes nothing and is told.
+  // A variant that the scene does not have changes nothing and is reported.
   ASSERT_GT(lo_send(to, "/limn/choose_variant", "ss", "mirror", "no such"), 0);
   hear();
   EXPECT_EQ(session_->show_state().slots[0].variant, variants[1].name);
@@ -285,8 +286,8 @@ TEST_F(AnOscSession, AFloodIsTakenInPortionsAndToldOnce) {
     EXPECT_LE(now_mm - moved_mm, OscPort::k_most_at_once + 1e-6);
     if (calls > 0 && now_mm == moved_mm && moved_mm == before_mm) break;
   }
-  EXPECT_GT(moved_mm, OscPort::k_most_at_once);  // the rest waited, and was taken later
-  EXPECT_LT(moved_mm, 2999);                     // what the buffer could not hold is gone
+  EXPECT_GT(moved_mm, OscPort::k_most_at_once);  // the others waited and were applied later
+  EXPECT_LT(moved_mm, 2999);                     // messages beyond the buffer's size are lost
   for (int i = 0; i < 200; ++i) lo_send(to, "/limn/dance", "");
   for (int i = 0; i < 10; ++i) port->hear(&*session_, &*telemetry_, Stamp{});
   const std::string text = page();
@@ -333,7 +334,7 @@ TEST_F(AnOscSession, TellsWhatChanges) {
   const auto all = heard();
   for (const OscAddress& address : osc_told()) {
     if (address.path == "/limn/state/pose" || address.path == "/limn/state/prototype")
-      continue;  // none is seen
+      continue;  // no marker is seen
     EXPECT_TRUE(std::any_of(all.begin(), all.end(), [&](const std::string& line) {
       return line.rfind(address.path + " ", 0) == 0;
     })) << address.path;
@@ -352,7 +353,7 @@ TEST_F(AnOscSession, TellsWhatChanges) {
   ASSERT_TRUE(session_->edit({"freeze", "", "off"}, "test", Stamp{}).ok());
   heard();
 
-  // An image in which everything is seen, then the poses.
+  // After a frame in which everything is seen, the poses are sent.
   sim::World world =
       sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
   ASSERT_TRUE(scale_resolution(0.5, &world.rig).ok());
@@ -376,7 +377,8 @@ TEST_F(AnOscSession, TellsWhatChanges) {
   })) << begin;
   EXPECT_TRUE(heard().empty());
   EXPECT_TRUE(heard(shifted(Stamp{}, 0.9)).empty());
-  EXPECT_GT(heard(shifted(Stamp{}, 1)).size(), all.size());  // everything again, for those who came later
+  // Everything is sent again, for programs that started later.
+  EXPECT_GT(heard(shifted(Stamp{}, 1)).size(), all.size());
   lo_server_free(ear);
 }
 

@@ -1,4 +1,4 @@
-// Markers that carry nothing are paired with parts; two looks are compared; lines help to place things.
+// Markers that carry nothing are paired with parts; two looks are compared; the grid is drawn.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -27,11 +27,11 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 const MarkerName k_nine{"aruco_4x4_50", "9"};
-const Eigen::Vector3d k_laid(0.12, -0.03, 0.052);  // on the door, its frame
+const Eigen::Vector3d k_laid(0.12, -0.03, 0.052);  // in the door's frame
 
 json read_json(const fs::path& path) { return json::parse(read_file(path).value(), nullptr, true, true); }
 
-// The studio in a folder, world.json and door/, with a marker on the door that carries nothing.
+// Copies the studio into a folder (world.json and door/) and adds a marker on the door that carries nothing.
 fs::path studio_in(const fs::path& folder) {
   const fs::path config = fs::path(LIMN_SOURCE_DIR) / "config";
   fs::copy(config / "scenes/door", folder / "door");
@@ -47,7 +47,7 @@ fs::path studio_in(const fs::path& folder) {
   return folder / "world.json";
 }
 
-// Where poses.csv has a part at last, mm on the prototype.
+// The last position of a part in poses.csv, mm in the prototype's frame.
 Eigen::Vector3d last_place(const fs::path& csv, const std::string& slot) {
   std::ifstream file(csv);
   Eigen::Vector3d mm = Eigen::Vector3d::Constant(NAN);
@@ -60,7 +60,7 @@ Eigen::Vector3d last_place(const fs::path& csv, const std::string& slot) {
   return mm;
 }
 
-// A small marker's depth and tilt waver by more than the 5 mm by which one that is laid down settles.
+// The depth and tilt of a small marker vary by more than the 5 mm below which a marker counts as still.
 TEST(Pairing, AMarkerThatLiesIsOfferedUntilItIsTakenAway) {
   auto rng = test::test_rng();
   const auto scene = scene::load_scene(fs::path(LIMN_SOURCE_DIR) / "config/scenes/door");
@@ -110,7 +110,7 @@ TEST(Pairing, AMarkerThatLiesStillIsPairedAndStaysSo) {
   EXPECT_NE(page.find("pair mirror aruco_4x4_50:9 (script)"), std::string::npos);
   const auto first = page.find("pair mirror");
   EXPECT_EQ(page.find("pair mirror", first + 1), std::string::npos);
-  // The part stands where the marker lies, by its marker_from_part.
+  // The part is at the marker, displaced by its marker_from_part.
   const auto scene = scene::load_scene(folder / "door");
   ASSERT_TRUE(scene);
   const double offset_mm = 1e3 * scene->find_slot("mirror")->marker_from_part.translation.norm();
@@ -122,7 +122,7 @@ TEST(Pairing, AMarkerThatLiesStillIsPairedAndStaysSo) {
   const Status replayed = run_replay(replay);
   EXPECT_TRUE(replayed.ok()) << replayed.message();
 
-  // The next session knows, too, until it is told otherwise.
+  // The next session keeps the pairing until it is undone.
   LiveOptions next = options;
   next.record.clear();
   next.out = folder / "next";
@@ -139,7 +139,7 @@ TEST(Pairing, AMarkerThatLiesStillIsPairedAndStaysSo) {
   EXPECT_FALSE(fs::exists(folder / "door/pairings.json"));
 }
 
-// A session that is stepped by hand, with the truth at hand.
+// A session that is stepped by the test, with the ground truth.
 class ASession : public testing::Test {
  protected:
   void SetUp() override {
@@ -183,7 +183,7 @@ class ASession : public testing::Test {
     ASSERT_TRUE(done.ok()) << done.message();
   }
 
-  // The prototype's true surface under a projector's pixel, its frame; nullopt: none.
+  // The true surface point of the prototype under a projector's pixel, in its frame; nullopt: none.
   struct Under {
     Eigen::Vector3d p, n;
   };
@@ -197,7 +197,7 @@ class ASession : public testing::Test {
                  prototype_from_world.rotation * rays().face_normal(hit)};
   }
 
-  // Where markers keep the light out.
+  // The pixels that are kept dark for markers.
   bool is_by_a_marker(const Eigen::Vector3d& p) {
     for (const sim::PlacedMarker& placed : world_.markers) {
       const Pose world_from_marker = world_.find(placed.object)->world_from_object;
@@ -239,7 +239,7 @@ TEST_F(ASession, AMarkerGlowsOnceItLiesStillForASecond) {
   EXPECT_EQ(waiting[0].marker, k_nine);
   const Eigen::Vector3d p_true = world_.world_from_prototype * k_laid;
   EXPECT_TRUE(test::near(waiting[0].world_from_marker.translation, p_true, 0.01));
-  // A ring of light around it, by one projector.
+  // A ring of light surrounds the marker, from one projector.
   int lit = 0;
   for (std::size_t i = 0; i < 2; ++i) {
     const cv::Mat after = painted(i);
@@ -273,7 +273,7 @@ TEST_F(ASession, AGridOfMillimetresLiesOnThePrototype) {
   EXPECT_TRUE(write_png(folder_ / "grid.png", with).ok());
   cv::Mat more;
   cv::subtract(with, plain, more);
-  // Beside edges light is handed over to the other projector.
+  // Near edges the other projector takes over.
   const auto is_at_an_edge = [&](int x, int y) {
     constexpr int k_beside = 40;
     return !point_under(0, x - k_beside, y) || !point_under(0, x + k_beside, y) ||
@@ -286,7 +286,7 @@ TEST_F(ASession, AGridOfMillimetresLiesOnThePrototype) {
       lit += is_lit;
       const auto under = point_under(0, x, y);
       astray += is_lit && !under;
-      // The door's front looks along z: lines of x and y. Parts and markers keep theirs.
+      // The door's front faces along z, so there are lines of x and y. Parts and markers keep their pixels.
       if (!under || std::abs(under->n.z()) < 0.9 || cv::norm(plain.at<cv::Vec3b>(y, x)) > 0 ||
           is_by_a_marker(under->p) || is_at_an_edge(x, y))
         continue;
@@ -328,7 +328,7 @@ TEST_F(ASession, TwoLooksStandOnTheTwoSidesOfALine) {
   };
   EXPECT_GT(other_pixels(a, b), 3000);
   edit("flip", "", "");
-  EXPECT_LT(other_pixels(a, calm()), 0.02 * other_pixels(a, b));  // edges tremble
+  EXPECT_LT(other_pixels(a, calm()), 0.02 * other_pixels(a, b));  // edges vary with tracking noise
   edit("flip", "", "");
   edit("split", "", "on");
   edit("split_at", "", "-40");
@@ -342,7 +342,7 @@ TEST_F(ASession, TwoLooksStandOnTheTwoSidesOfALine) {
   for (int y = 0; y < split.rows; ++y)
     for (int x = 0; x < split.cols; ++x) {
       if (cv::norm(a.at<cv::Vec3b>(y, x), b.at<cv::Vec3b>(y, x), cv::NORM_INF) < 60)
-        continue;  // alike in both
+        continue;  // the same in both
       const auto under = point_under(0, x, y);
       if (!under || std::abs(under->p.x() - line_m) < 0.002) continue;
       const bool is_left = under->p.x() < line_m;
@@ -377,7 +377,7 @@ TEST_F(ASession, SplitsTheScreenAsTheSurface) {
   painted();
   edit("save_look", "", "B");
   const cv::Mat b = screen("b");
-  // The line goes through the middle of where they differ.
+  // The line goes through the middle of the area where the looks differ.
   edit("split", "", "on");
   int crossed = 0;
   for (double mm = -280; mm <= -120; mm += 40) {
@@ -400,7 +400,7 @@ TEST_F(ASession, SplitsTheScreenAsTheSurface) {
     if (of_a > 100 && of_b > 100) {
       ++crossed;
       if (crossed == 2) screen("split");
-      EXPECT_LT(x_a / of_a, x_b / of_b) << "left is A";
+      EXPECT_LT(x_a / of_a, x_b / of_b) << "look A is on the left";
       EXPECT_LT(of_neither, 0.1 * (of_a + of_b));
     }
   }

@@ -19,7 +19,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Light on a marker in a hand arrives where the marker then is: 0.5 Hz, 0.25 m/s at most, 60 ms late.
+// Light for a marker in a hand must arrive where the marker is then: motion at 0.5 Hz with at most 0.25 m/s,
+// 60 ms latency.
 TEST(Perception, PredictionMakesUpForTheLag) {
   constexpr double k_lag_s = 0.060, k_begins_s = 0.5, k_ends_s = 2.0, k_runs_s = 2.4;
   constexpr double k_amplitude_m = 0.25 / (2 * M_PI * 0.5);
@@ -36,7 +37,8 @@ TEST(Perception, PredictionMakesUpForTheLag) {
   const Pose world_from_marker = *sim::world_from_marker(world, marker);
   const Eigen::Vector3d p_eye = world.rig.cameras[0].imager_from_world.inverse().translation;
   const Pose camera_from_world = looking_at(p_eye, world_from_marker.translation, Eigen::Vector3d::UnitZ());
-  world.rig.cameras[0] = viewer_imager(camera_from_world.inverse(), 640, 320, 11);  // the marker: 62 px
+  // The marker's side is 62 px.
+  world.rig.cameras[0] = viewer_imager(camera_from_world.inverse(), 640, 320, 11);
   world.rig.cameras[0].name = "camera0";
   sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
   auto room = ScriptedRoom::create(*script, &rig);
@@ -67,7 +69,7 @@ TEST(Perception, PredictionMakesUpForTheLag) {
       held += std::pow(off(tracker::Prediction::hold), 2);
       ++moving;
     }
-    if (shown_s >= k_ends_s) overshoot_m = std::max(overshoot_m, now);  // at the turn, where it stops
+    if (shown_s >= k_ends_s) overshoot_m = std::max(overshoot_m, now);  // after it has stopped
   }
   const double filtered_mm = 1e3 * std::sqrt(filtered / moving), held_mm = 1e3 * std::sqrt(held / moving);
   std::printf("in motion %.2f mm RMS, without prediction %.2f; after the stop at most %.2f; still %.3f\n",
@@ -109,10 +111,10 @@ TEST(Perception, LooksForCoveredMarkersWhileOneIsMissing) {
   std::optional<tracker::Detection> found;
   int images = 0;
   for (; images < 3 && !found; ++images) found = found_in(covered);
-  ASSERT_TRUE(found) << "in " << images << " pictures";
+  ASSERT_TRUE(found) << "in " << images << " images";
 }
 
-// A camera that is swung round: markers are found where they should be by now, not searched for.
+// A camera is turned quickly: markers are followed at their predicted positions, not searched for.
 TEST(Perception, FollowsMarkersThatMoveByMoreThanHalfTheirSideAnImage) {
   sim::World world = studio(1);
   sim::VirtualRig rig(world, {.grab_waits_for_light = false});

@@ -1,4 +1,4 @@
-// Looks, pairings and units on the disk, written while nobody waits for it.
+// Looks, pairings and units are written to the disk without delaying the caller.
 #include "session/show_store.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 
-// The door's scene in a folder of its own.
+// A copy of the door's scene in a folder of its own.
 scene::Scene door_in(const fs::path& folder) {
   fs::copy(fs::path(LIMN_SOURCE_DIR) / "config/scenes/door", folder / "door", fs::copy_options::recursive);
   fs::remove_all(folder / "door/looks");
@@ -45,7 +45,7 @@ TEST(FileWriter, DoesEverythingInOrderBeforeItGoes) {
         done.push_back(i);
         return {};
       });
-    EXPECT_LT(std::chrono::steady_clock::now() - begun, 80ms) << "nobody waits for the disk";
+    EXPECT_LT(std::chrono::steady_clock::now() - begun, 80ms) << "the caller does not wait for the disk";
     EXPECT_TRUE(writer.is_busy());
   }
   ASSERT_EQ(done.size(), 20u);
@@ -67,8 +67,8 @@ TEST(FileWriter, TellsEachFailureOnceAndGoesOn) {
   EXPECT_TRUE(writer.failures().empty());
 }
 
-// A look that is saved, deleted and brought back at once is there in the end, with its image, and so it is
-// for the next session.
+// A look that is saved, deleted and restored at once exists at the end, with its image, also for the next
+// session.
 TEST(ShowStore, KeepsLooksInTheOrderOfEdits) {
   const fs::path folder = test::test_folder();
   const scene::Scene scene = door_in(folder);

@@ -1,6 +1,6 @@
-// A long session in which things go wrong again and again: cameras and projectors come and go, images come
-// in another size, a camera's clock steps, hands cover markers and hide the light, files break and are
-// mended, the disk is full for a while. LIMN_SOAK_S: seconds of the session's clock (20).
+// A long session with repeated failures: cameras and projectors fail and work again, images come in another
+// size, a camera's clock steps, hands cover markers and block the light, files are damaged and repaired, the
+// disk is full for a while. LIMN_SOAK_S: seconds of the session's clock (default 20).
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -83,7 +83,7 @@ json events() {
           clock_step(17, 3595)};
 }
 
-// Last whole row of a session's telemetry.csv; empty before the first.
+// The last whole row of a session's telemetry.csv; empty before the first.
 std::vector<double> last_row(const fs::path& path) {
   std::ifstream file(path, std::ios::ate);
   const auto size = file.tellg();
@@ -117,7 +117,8 @@ TEST(Soak, ALongSessionWithAllThatGoesWrong) {
 
   std::atomic<bool> has_ended = false;
   double minute_mib = 0;
-  // Somebody saves a part, sometimes half of it; fills the disk, while nobody saves; and watches the memory.
+  // Another thread saves a part, sometimes a damaged one, fills the disk at other times, and measures the
+  // memory.
   std::thread outside([&] {
     const auto begun = std::chrono::steady_clock::now();
     double filled_at_s = -k_period_s;
@@ -131,7 +132,7 @@ TEST(Soak, ALongSessionWithAllThatGoesWrong) {
           full.emplace(100);
           filled_at_s = at_s;
         }
-        // 1.6 s of the session, at its pace so far.
+        // Waits for 1.6 s of the session's clock, at its speed so far.
         const double waited_s = full ? 1.6 * milliseconds_since(begun) / 1e3 / at_s : 0.1;
         std::this_thread::sleep_for(std::chrono::duration<double>(waited_s));
       }
@@ -141,7 +142,7 @@ TEST(Soak, ALongSessionWithAllThatGoesWrong) {
   });
   LiveOptions options;
   options.resolution = 0.34;
-  options.frame_period_s = 0.2;  // below the 0.3 s after which a marker is lost, and its motion begins anew
+  options.frame_period_s = 0.2;  // below 0.3 s, after which a marker is lost and its filter starts again
   options.world = folder / "world.json";
   options.script = folder / "script.json";
   options.out = folder / "out";
@@ -160,8 +161,8 @@ TEST(Soak, ALongSessionWithAllThatGoesWrong) {
     resized += what.find("found one of 320x240") != std::string::npos;
     stepped += what.find("clock has stepped") != std::string::npos;
     moved += what.find("has moved") != std::string::npos;
-    full += what.find("Its lines wait") != std::string::npos;
-    written_again += what.find("is written again") != std::string::npos;
+    full += what.find("Its lines are kept") != std::string::npos;
+    written_again += what.find("can be written again") != std::string::npos;
   }
   std::printf("%.0f s, memory %.1f MiB", seconds, end_mib);
   if (minute_mib > 0)
@@ -171,7 +172,7 @@ TEST(Soak, ALongSessionWithAllThatGoesWrong) {
               summary.at("placement_mm").at("p95").get<double>(),
               summary.at("placement_mm").at("p99").get<double>());
   EXPECT_GE(gone, 3);
-  EXPECT_LE(std::abs(gone - back), seconds > 1000 ? 2 : 0);  // of a long session the newest notes are kept
+  EXPECT_LE(std::abs(gone - back), seconds > 1000 ? 2 : 0);  // a long session keeps only its newest notes
   EXPECT_GE(resized, 1);
   EXPECT_GE(stepped, 3);
   EXPECT_EQ(moved, 0);
@@ -179,7 +180,7 @@ TEST(Soak, ALongSessionWithAllThatGoesWrong) {
   EXPECT_LE(std::abs(written_again - full), seconds > 1000 ? 2 : 0);
   std::ifstream rows(csv);
   const auto lines = std::count(std::istreambuf_iterator<char>(rows), {}, '\n');
-  EXPECT_EQ(static_cast<double>(lines), 1 + summary.at("pictures").get<double>()) << "none is lost";
+  EXPECT_EQ(static_cast<double>(lines), 1 + summary.at("pictures").get<double>()) << "no row is lost";
   EXPECT_GT(summary.at("seconds").get<double>(), seconds - 1);
   EXPECT_LT(summary.at("placement_mm").at("median").get<double>(), 1);
   EXPECT_LT(summary.at("placement_mm").at("p95").get<double>(), 5);

@@ -46,7 +46,7 @@ inline std::vector<std::string> lines_of(const std::filesystem::path& path) {
   return lines;
 }
 
-// The studio and its scene, to be changed: world.json and door/.
+// Copies the studio and its scene, so that they can be changed: world.json and door/.
 inline void copy_studio_to(const std::filesystem::path& folder) {
   const std::filesystem::path config = std::filesystem::path(LIMN_SOURCE_DIR) / "config";
   std::filesystem::copy(config / "scenes/door", folder / "door");

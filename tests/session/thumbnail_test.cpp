@@ -11,7 +11,7 @@
 namespace limn::apps {
 namespace {
 
-// Each variant fills its image without being cut off, and is told from the others.
+// Each variant fills its image without being cut off, and differs from the others.
 TEST(Thumbnail, ShowsEachVariantWhole) {
   const auto scene = scene::load_scene(std::filesystem::path(LIMN_SOURCE_DIR) / "config/scenes/door");
   ASSERT_TRUE(scene) << scene.message();

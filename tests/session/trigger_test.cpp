@@ -1,5 +1,5 @@
-// From a person's trigger (a key, OSC, a button) to the first light that shows what it changed, on the
-// virtual rig's clock; by the wall, where software draws: limn bench live.
+// Measures the time from a person's trigger (a key, OSC, a button) to the first light that shows the change,
+// on the virtual rig's clock. For real time with a software renderer, see limn bench live.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,7 +26,7 @@ struct ShownVariant {
   std::string variant;
 };
 
-// Of a slot's part, image by image.
+// The variants that a slot showed, frame by frame.
 std::vector<ShownVariant> shown_variants(const fs::path& poses_csv, const std::string& slot) {
   std::ifstream file(poses_csv);
   std::vector<ShownVariant> shown;
@@ -45,7 +45,7 @@ TEST(Trigger, IsSeenWithinATenthOfASecond) {
   std::vector<double> triggers_s;
   json events = json::array();
   for (int i = 0; i < k_triggers; ++i) {
-    triggers_s.push_back(0.4 + 0.1013 * i);  // at any moment of an image
+    triggers_s.push_back(0.4 + 0.1013 * i);  // at different moments of the frame period
     events.push_back(
         {{"at_s", triggers_s.back()}, {"edit", {{"action", "next_variant"}, {"slot", "mirror"}}}});
   }
