@@ -16,7 +16,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double k_margin_m = 0.35, k_tick_m = 0.5;
-constexpr double k_view_px = 620;  // of the longer side of a drawing
+constexpr double k_view_px = 620;  // longer side of a drawing
 
 constexpr const char* k_plan_style = R"(
 :root { color-scheme: light dark; --ground: #fbfaf8; --text: #1d1f23; --faint: #6b6862; --line: #dddad3;
@@ -35,13 +35,13 @@ svg { max-width: 100%; height: auto; font: 13px system-ui, sans-serif; } svg tex
 .bad { color: var(--bad); } pre { overflow-x: auto; padding: 1rem; border: 1px solid var(--line); border-radius: 4px; }
 )";
 
-// Two of the world's axes as they lie in a drawing: to the right, and up.
+// A drawing's caption, and the world axes that point right and up in it.
 struct View {
   const char* caption;
   int right, up;
 };
 
-// World metres to pixels of a drawing.
+// Maps world coordinates (m) to a drawing's pixels.
 struct Sheet {
   View view;
   Vector2d low, high;
@@ -53,7 +53,7 @@ struct Sheet {
   Vector2d size() const { return (high - low) * px_per_m; }
 };
 
-// What an imager reaches, up to the far end of the volume: its corners' rays.
+// Points on the rays of an imager's corners, at the depth of the volume's far end.
 std::vector<Vector3d> reach_of(const Imager& imager, const DescribedRig& described) {
   const Pose world_from_imager = imager.imager_from_world.inverse();
   const double far_m =
@@ -66,7 +66,7 @@ std::vector<Vector3d> reach_of(const Imager& imager, const DescribedRig& describ
   return corners;
 }
 
-// The outline of points in a drawing (Andrew 1979, monotone chain).
+// The convex hull of points in a drawing (Andrew 1979, monotone chain).
 std::vector<Vector2d> hull(std::vector<Vector2d> points) {
   std::sort(points.begin(), points.end(), [](const Vector2d& a, const Vector2d& b) {
     return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
@@ -144,9 +144,8 @@ std::string plan_page(const DescribedRig& described, const PredictedAccuracy& pr
       "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" "
       "content=\"width=device-width\"><title>The rig as planned</title><style>{}</style><h1>The rig as "
       "planned</h1>\n"
-      "<p class=\"lead\">Foreseen by playing its calibration with the noise of real pictures. Room light, "
-      "defocus and "
-      "a board that bends are not in it.</p>\n",
+      "<p class=\"lead\">Predicted by simulating its calibration with the noise of real images. Room light, "
+      "defocus and a bent board are not included.</p>\n",
       k_plan_style);
   for (std::size_t i = 0; i < predicted_accuracy.error_mm.size(); ++i) {
     const double mm = predicted_accuracy.error_mm[i];
