@@ -44,10 +44,10 @@ class DeviceBackend {
   Devices devices_;
   calib::Board board_;
   std::atomic<WizardWish>* wish_;
-  std::vector<double> latency_s_;  // of each projector
+  std::vector<double> latency_s_;  // latency of each projector
   std::vector<bool> is_black_;
   std::vector<StillBoard> boards_;  // for each camera
-  std::vector<Stamp> captured_at_;  // of each camera's newest frame
+  std::vector<Stamp> captured_at_;  // stamp of each camera's newest frame
   std::vector<double> period_s_;    // frame period of each camera
   Stamp lit_at_;                    // when the images shown last are on the surface
 };

@@ -17,8 +17,8 @@ constexpr double k_guard_s = 0.001;  // added to a measured latency
 // A virtual rig's devices and the latencies measured so far.
 struct VirtualStage {
   sim::VirtualRig* rig = nullptr;
-  std::vector<double> latency_s;  // of each projector
-  std::vector<cv::Mat> frames;    // of one exposure of all cameras; empty once grabbed
+  std::vector<double> latency_s;  // latency of each projector
+  std::vector<cv::Mat> frames;    // one exposure of all cameras; an image is empty once grabbed
   Stamp lit_at;                   // when the image shown last is on the surface
 
   Status show(int projector, const cv::Mat& image) {

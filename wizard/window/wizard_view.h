@@ -56,7 +56,7 @@ struct WizardView {
   int pose = 0, poses = 0;  ///< index of the current pose; number of planned poses
   std::string place;        ///< where to hold the board, as text
   bool is_capturing = false;
-  int images = 0, images_of = 0;  ///< of this pose: captured, and needed in all
+  int images = 0, images_of = 0;  ///< images of this pose: captured, and needed in all
   std::vector<Judged> judged;
   std::string advice;  ///< whether more poses help
   std::vector<calib::Fault> faults;
@@ -65,7 +65,7 @@ struct WizardView {
   std::string verdict;  ///< as a sentence, once there is a rig
   calib::Verdict worth = calib::Verdict::reject;
   std::vector<std::string> to_do;     ///< the report's advice
-  std::vector<calib::ErrorMap> maps;  ///< of the rig
+  std::vector<calib::ErrorMap> maps;  ///< predicted errors of the rig
   bool is_leaving = false, is_over = false;
   std::string failure;  ///< why the run failed; empty: it did not
 };
