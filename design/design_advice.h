@@ -7,8 +7,8 @@
 
 namespace limn::apps {
 
-/// What limits the described rig and what to do about it, a sentence each, most hurtful first; empty:
-/// nothing.
+/// What limits the described rig and what to do about it, one sentence for each, the most important first;
+/// empty: nothing does.
 std::vector<std::string> design_advice(const PredictedAccuracy& predicted_accuracy,
                                        const DescribedRig& described);
 

@@ -64,7 +64,7 @@ std::string design_json(const PredictedAccuracy& predicted_accuracy) {
 
 std::string design_table(const PredictedAccuracy& predicted_accuracy, const DescribedRig& described) {
   std::string out;
-  out += fmt::format("{:<14} {:>8} {:>9} {:>14} {:>7} {:>9} {:>7}\n", "", "away, m", "pixel, mm",
+  out += fmt::format("{:<14} {:>8} {:>9} {:>14} {:>7} {:>9} {:>7}\n", "", "dist., m", "pixel, mm",
                      "on surface, mm", "steep", "coverage", "lux");
   for (const auto* imagers : {&predicted_accuracy.cameras, &predicted_accuracy.projectors}) {
     for (const PredictedImager& imager : *imagers)
@@ -77,12 +77,11 @@ std::string design_table(const PredictedAccuracy& predicted_accuracy, const Desc
                        pair.projector, pair.angle_deg, 100 * pair.coverage);
   for (const PredictedMarker& marker : predicted_accuracy.markers)
     out += fmt::format(
-        "{}: a {:g} mm marker is {:.0f} px ({:.0f} at the far end), placed within {:.2f} mm across the view "
-        "and "
-        "{:.2f} mm along it (95 %)\n",
+        "{}: a {:g} mm marker is {:.0f} px ({:.0f} at the far end), located within {:.2f} mm across the view "
+        "and {:.2f} mm along it (95 %)\n",
         marker.camera, 1000 * described.marker_m, marker.side_px, marker.farthest_px, marker.across_mm,
         marker.along_mm);
-  out += fmt::format("{} and a projector at least reach {:.0f} % of the volume\n",
+  out += fmt::format("{} and at least one projector reach {:.0f} % of the volume\n",
                      described.rig.cameras.front().name, 100 * predicted_accuracy.coverage);
   for (std::size_t i = 0; i < predicted_accuracy.error_mm.size(); ++i)
     out += fmt::format(

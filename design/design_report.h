@@ -6,7 +6,7 @@
 
 namespace limn::apps {
 
-/// What `limn plan` prints: the table.
+/// The text that `limn plan` prints.
 std::string design_table(const PredictedAccuracy& predicted_accuracy, const DescribedRig& described);
 
 /// The same as JSON (plan.json), without a newline at its end.

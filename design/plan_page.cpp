@@ -17,7 +17,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double k_margin_m = 0.35, k_tick_m = 0.5;
-constexpr double k_view_px = 620;  // of the longer side of a drawing
+constexpr double k_view_px = 620;  // longer side of a drawing
 
 constexpr const char* k_plan_style = R"(
 :root { --camera: #1f66b1; --projector: #b36b00; }
@@ -31,13 +31,13 @@ svg { max-width: 100%; height: auto; font: 13px system-ui, sans-serif; } svg tex
 pre { overflow-x: auto; padding: 1rem; border: 1px solid var(--line); border-radius: 4px; }
 )";
 
-// Two of the world's axes as they lie in a drawing: to the right, and up.
+// A drawing's caption, and the world axes that point right and up in it.
 struct View {
   const char* caption;
   int right, up;
 };
 
-// World metres to pixels of a drawing.
+// Maps world coordinates (m) to a drawing's pixels.
 struct Sheet {
   View view;
   Vector2d low, high;
@@ -49,7 +49,7 @@ struct Sheet {
   Vector2d size() const { return (high - low) * px_per_m; }
 };
 
-// What an imager reaches, up to the far end of the volume: its corners' rays.
+// Points on the rays of an imager's corners, at the depth of the volume's far end.
 std::vector<Vector3d> reach_of(const Imager& imager, const DescribedRig& described) {
   const Pose world_from_imager = imager.imager_from_world.inverse();
   const double far_m =
@@ -62,7 +62,7 @@ std::vector<Vector3d> reach_of(const Imager& imager, const DescribedRig& describ
   return corners;
 }
 
-// The outline of points in a drawing (Andrew 1979, monotone chain).
+// The convex hull of points in a drawing (Andrew 1979, monotone chain).
 std::vector<Vector2d> hull(std::vector<Vector2d> points) {
   std::sort(points.begin(), points.end(), [](const Vector2d& a, const Vector2d& b) {
     return a.x() != b.x() ? a.x() < b.x() : a.y() < b.y();
@@ -129,8 +129,7 @@ std::string view_svg(const View& view, const DescribedRig& described) {
 std::string plan_page(const DescribedRig& described, const PredictedAccuracy& predicted_accuracy) {
   std::string html =
       "<h1>Rig design</h1>\n<p class=\"lead\">The accuracy is predicted by a simulated calibration with the "
-      "noise of "
-      "real images. Room light, defocus and a bending board are not simulated.</p>\n";
+      "noise of real images. Room light, defocus and a bending board are not simulated.</p>\n";
   for (std::size_t i = 0; i < predicted_accuracy.error_mm.size(); ++i) {
     const double mm = predicted_accuracy.error_mm[i];
     const char* worth = mm <= calib::k_good_mm ? "good" : mm <= calib::k_usable_mm ? "doubt" : "bad";

@@ -6,8 +6,8 @@
 
 namespace limn::apps {
 
-/// plan.html of `limn plan`: self-contained, the rig from above and from the side to scale, how far light may
-/// be off, the table and what limits.
+/// The page plan.html of `limn plan`: the rig from above and from the side to scale, the predicted errors,
+/// the advice and the table. It needs no other file.
 std::string plan_page(const DescribedRig& described, const PredictedAccuracy& predicted_accuracy);
 
 }  // namespace limn::apps

@@ -10,13 +10,14 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Of somebody in front (at -y of what is looked at) who goes to the right and up by these angles.
+// Direction from the volume's centre to a position that is turned by these angles to the right and up from
+// the front (-y).
 Vector3d direction_of(const ConfigNode& node) {
   const double right = k_degree * node.at("right_deg").number(), up = k_degree * node.at("up_deg").number();
   return {std::sin(right) * std::cos(up), -std::cos(right) * std::cos(up), std::sin(up)};
 }
 
-// The place that it is seen from: eye_m, or around the middle of the volume.
+// The imager's position: eye_m, or relative to the volume's centre.
 Vector3d place_of(const ConfigNode& node, const Vector3d& p_centre) {
   const auto from = node.find("from");
   if (!from) return node.at("eye_m").vector3();
@@ -38,7 +39,7 @@ Imager imager_of(const ConfigNode& node, const Vector3d& p_centre) {
   const auto fov = node.find("fov_deg"), throw_ratio = node.find("throw");
   if (fov.has_value() == throw_ratio.has_value()) {
     node.problem(
-        "expected either fov_deg (horizontal) or throw (distance / picture width), found both or none.");
+        "expected either fov_deg (horizontal) or throw (distance / image width), found both or none.");
   } else if (fov) {
     const double degrees = fov->positive();
     if (degrees >= 150) fov->problem(fmt::format("expected less than 150 degrees, found {}.", degrees));
@@ -54,7 +55,7 @@ Imager imager_of(const ConfigNode& node, const Vector3d& p_centre) {
   const auto target = node.find("target_m");
   const Vector3d p_target = target ? target->vector3() : p_centre;
   if ((p_target - p_eye).norm() < 0.01) {
-    node.problem("expected a target away from the eye, found both in one place.");
+    node.problem("expected a target at some distance from the imager, found both in one place.");
   } else {
     imager.imager_from_world = upright_looking_at(p_eye, p_target);
   }
@@ -108,9 +109,9 @@ Result<DescribedRig> load_described(const std::filesystem::path& path) {
     const auto lumens = node.find("lumens");
     described.lumens.push_back(lumens ? lumens->positive() : 0);
   }
-  if (described.rig.cameras.empty()) root.at("cameras").problem("expected a camera at least, found none.");
+  if (described.rig.cameras.empty()) root.at("cameras").problem("expected at least one camera, found none.");
   if (described.rig.projectors.empty())
-    root.at("projectors").problem("expected a projector at least, found none.");
+    root.at("projectors").problem("expected at least one projector, found none.");
   LIMN_TRY_STATUS(config.status());
   return described;
 }

@@ -24,10 +24,10 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double k_two_sided_95 = 1.96;  // standard deviations
-const std::array<Vector2d, 4> k_corners = {
-    Vector2d(-1, -1), {1, -1}, {1, 1}, {-1, 1}};  // of a marker, halves of its side
+// A marker's corners, in halves of its side.
+const std::array<Vector2d, 4> k_corners = {Vector2d(-1, -1), {1, -1}, {1, 1}, {-1, 1}};
 
-// The cosine between an imager's ray to a point and the lit side's normal; 0 when it looks away.
+// The cosine between an imager's ray to a point and the lit side's normal; 0 if it is behind that side.
 double facing(const DescribedRig& described, const Imager& imager, const Vector3d& p_world) {
   return std::max(0.0, described.d_front.dot((eye_of(imager) - p_world).normalized()));
 }
@@ -65,7 +65,7 @@ std::vector<PredictedPair> pairs_of(const DescribedRig& described, const std::ve
   return pairs;
 }
 
-// Where a marker's corners come to lie in the image: on the lit side, upright.
+// The corners of a marker in the image; nullopt if the camera cannot project one.
 std::optional<std::array<Vector2d, 4>> corners_of(const DescribedRig& described,
                                                   const Imager& camera,
                                                   const Pose& world_from_marker) {
@@ -85,7 +85,7 @@ Pose marker_at(const DescribedRig& described, const Vector3d& p_world) {
   return Pose(facing.inverse().rotation, p_world);
 }
 
-// The shortest side.
+// The marker's shortest side in the image.
 double side_px(const std::array<Vector2d, 4>& corners) {
   double shortest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < 4; ++i)
@@ -93,7 +93,8 @@ double side_px(const std::array<Vector2d, 4>& corners) {
   return shortest;
 }
 
-// By the covariance that the tracker itself gives a marker's pose. nullopt: the camera does not see it.
+// The errors follow from the covariance that the tracker states for a marker's pose. nullopt: the camera does
+// not see the marker.
 std::optional<PredictedMarker> marker_of(const DescribedRig& described,
                                          const Imager& camera,
                                          const std::vector<Vector3d>& points) {

@@ -10,11 +10,11 @@ namespace limn::apps {
 
 constexpr double k_degree = std::numbers::pi / 180;
 
-/// Where an imager stands, world frame.
+/// Position of an imager, world frame.
 Eigen::Vector3d eye_of(const Imager& imager);
 
-/// Looking from the eye at the target (imager_from_world), world z up in the image; straight down or up, what
-/// is away from the front.
+/// Pose (imager_from_world) of an imager at p_eye that points at p_target, with the world's z axis up in the
+/// image. If it points straight down or up, the world's y axis (away from the front) is up instead.
 Pose upright_looking_at(const Eigen::Vector3d& p_eye, const Eigen::Vector3d& p_target);
 
 /// Whether a point lies in the imager's image.

@@ -17,12 +17,12 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double k_board_tilt = 25 * k_degree;  // of placements, largest: as config/README.md advises
-constexpr double k_least_facing = 0.26;         // cosine of 75 degrees: beyond it boards are not read
-constexpr int k_least_corners = 12;             // of a board that a camera reads
+constexpr double k_board_tilt = 25 * k_degree;  // largest tilt of a board pose, as config/README.md advises
+constexpr double k_least_facing = 0.26;         // cosine of 75 degrees; more oblique boards are not detected
+constexpr int k_least_corners = 12;             // minimum for a board that a camera detects
 constexpr std::uint64_t k_noise_seed = 20261122;
 
-// Share i of a sequence that fills [-1, 1] evenly (van der Corput's).
+// Element i of van der Corput's sequence, which fills [-1, 1] evenly.
 double spread(int i, int base) {
   double share = 0, step = 1;
   for (int n = i + 1; n > 0; n /= base) {
@@ -32,7 +32,7 @@ double spread(int i, int base) {
   return 2 * share - 1;
 }
 
-// The board all over the volume, facing the middle of all devices, tilted in turn to all sides.
+// Board poses all over the volume, facing the mean position of all devices and tilted to all sides in turn.
 std::vector<Pose> board_places(const DescribedRig& described) {
   Vector3d p_devices = Vector3d::Zero();
   for (const Imager& camera : described.rig.cameras) p_devices += eye_of(camera);
@@ -63,7 +63,7 @@ calib::ImagerView view(const Imager& imager) {
   return {imager.lens.model, imager.lens.values, imager.imager_from_world};
 }
 
-// What one camera and the projectors would find on the board in one place.
+// Adds what one camera and the projectors would find on the board in one pose.
 void observe_place(const DescribedRig& described,
                    int pose,
                    int camera_index,
@@ -89,7 +89,7 @@ void observe_place(const DescribedRig& described,
   seen->corners.insert(seen->corners.end(), corners.begin(), corners.end());
   for (std::size_t p = 0; p < described.rig.projectors.size(); ++p) {
     const Imager& projector = described.rig.projectors[p];
-    for (int cell = 0; cell < 4 * board.columns * board.rows; ++cell) {  // half squares
+    for (int cell = 0; cell < 4 * board.columns * board.rows; ++cell) {  // cells of half a square
       const Vector3d p_board((cell % (2 * board.columns) + 0.5) * board.square_m / 2,
                              (cell / (2 * board.columns) + 0.5) * board.square_m / 2, 0);
       const auto px = image_of(p_board);

@@ -5,8 +5,8 @@
 
 namespace limn::apps {
 
-/// What the described rig would observe while it is calibrated: board placements all over the volume, what
-/// cameras and projectors would see of them with normal noise. The same description gives the same numbers.
+/// Observations of the described rig during its calibration: board poses all over the volume, and the corners
+/// and matches that its devices would find, with normal noise. The same description gives the same numbers.
 calib::Observations simulated_observations(const DescribedRig& described);
 
 }  // namespace limn::apps

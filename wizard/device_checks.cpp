@@ -16,9 +16,10 @@ class Checks {
     step(WizardStep::outputs, WizardState::runs, "");
     LIMN_TRY(out.light, measured_exposure(captures_, around_.stage));
     if (audience_.lit) audience_.lit(out.light);
-    report_progress(WizardStep::outputs, unseen(out.light),
-                    fmt::format("{} of {} seen", captures_.projectors.size() - unseen(out.light).size(),
-                                captures_.projectors.size()));
+    report_progress(
+        WizardStep::outputs, unseen(out.light),
+        fmt::format("{} of {} projectors seen", captures_.projectors.size() - unseen(out.light).size(),
+                    captures_.projectors.size()));
     std::vector<std::string> advice;
     double bright = 255, saturated = 0, blur_px = 0;
     for (const ExposureReading& seen : out.light) {
@@ -29,9 +30,9 @@ class Checks {
       saturated = std::max(saturated, seen.saturated);
       blur_px = std::max(blur_px, seen.blur_px);
     }
-    report_progress(
-        WizardStep::exposure, advice,
-        fmt::format("level {:.0f}, {:.1f} % saturated, edges {:.1f} px", bright, 100 * saturated, blur_px));
+    report_progress(WizardStep::exposure, advice,
+                    fmt::format("grey level {:.0f}, {:.1f} % saturated, edge blur {:.1f} px", bright,
+                                100 * saturated, blur_px));
     return {};
   }
 
@@ -58,7 +59,7 @@ class Checks {
   CheckedDevices out;
 
  private:
-  // The one that sees most of a projector's light; none when none does.
+  // The camera that sees most of a projector's light; none if no camera sees it.
   std::optional<int> best_camera(const std::string& projector) const {
     double most = 0;
     std::optional<int> best;
@@ -74,7 +75,7 @@ class Checks {
     if (audience_.step) audience_.step(which, state, words);
   }
 
-  // The end of a step: what is wrong, or how it is.
+  // Ends a step: reports its problems, or else its result.
   void report_progress(WizardStep which, const std::vector<std::string>& problems, const std::string& words) {
     for (const std::string& problem : problems) audience_.say("advice: " + problem);
     audience_.say(fmt::format("{}: {}", to_text(which), words));

@@ -12,16 +12,16 @@
 
 namespace limn::apps {
 
-/// What the wizard found out before the first pose.
+/// Results of the checks before the first pose.
 struct CheckedDevices {
-  std::vector<ExposureReading> light;  ///< projector by projector, of every camera
-  std::vector<std::optional<DisplayLatency>>
-      latency;  ///< of each projector; none: no camera sees it, or it jitters
+  std::vector<ExposureReading> light;  ///< projector by projector, one for every camera
+  /// For each projector; none if no camera sees it or the measurement failed.
+  std::vector<std::optional<DisplayLatency>> latency;
 };
 
-/// Outputs identify themselves, exposure and focus are judged, latencies measured and handed to the
-/// surroundings, a line each to the audience. What is wrong is told with what to do; only a device that fails
-/// is an error.
+/// Lets every projector show its number, checks exposure and focus, measures the display latencies and passes
+/// them to `surroundings`. `audience` gets one line for each step. Problems are reported with advice; only a
+/// device that fails is an error.
 Result<CheckedDevices> checked_devices(const calib::CaptureSet& captures,
                                        const Surroundings& surroundings,
                                        const WizardAudience& audience);

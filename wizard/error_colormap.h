@@ -5,8 +5,8 @@
 
 namespace limn::apps {
 
-/// Red, green, blue for a predicted error: green up to a quarter of a millimetre (calib::k_fine_mm), amber at
-/// one (k_good_mm), red from three on (k_usable_mm).
+/// Red, green and blue for a predicted error: green up to 0.25 mm (calib::k_fine_mm), amber at 1 mm
+/// (calib::k_good_mm), red from 3 mm (calib::k_usable_mm).
 std::array<std::uint8_t, 3> error_rgb(double mm);
 
 }  // namespace limn::apps

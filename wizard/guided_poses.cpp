@@ -6,8 +6,8 @@
 namespace limn::apps {
 namespace {
 
-// Share of the image's width and height where the board's middle is seen, its distance as a multiple of the
-// middle one, and how its face is turned about the image's axes.
+// Position of the board's centre as shares of the image's width and height, its distance as a multiple of the
+// middle distance, and its rotations about the camera's axes.
 struct Stance {
   double across, down, distance, about_x_deg, about_y_deg, turned_deg;
 };
@@ -18,8 +18,8 @@ constexpr Stance k_stances[] = {
     {0.50, 0.66, 1.25, -30, 0, 0},   {0.26, 0.30, 1.35, 10, 30, 20},    {0.74, 0.30, 1.35, 10, -30, -20},
     {0.26, 0.70, 1.35, -10, 30, 0},  {0.74, 0.70, 1.35, -10, -30, 0},   {0.50, 0.50, 0.80, 15, 15, 90}};
 
-constexpr double k_fill = 0.5;   // of the image's height or width, by the board
-constexpr double k_focal = 1.2;  // of the image's width: some 45 degrees across
+constexpr double k_fill = 0.5;   // share of the image's width or height that the board fills
+constexpr double k_focal = 1.2;  // focal length as a share of the image's width: about 45 degrees across
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180; }
 

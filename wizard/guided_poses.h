@@ -7,13 +7,12 @@
 
 namespace limn::apps {
 
-/// Where to hold a board before a camera that nothing is known of yet: an imager of ordinary field of view
-/// that stands in for it.
+/// An imager with a typical field of view, used in place of a camera whose lens is not known yet.
 Imager assumed_camera(const std::string& name, int width, int height);
 
-/// Places of a board (world_from_board) that hold a calibration well, in the order of their use: all over the
-/// camera's image, near and far, tilted to all sides. The board fills half of the image's width or
-/// height in the middle of them.
+/// Board poses (world_from_board) that determine a calibration well, in the order of use: all over the
+/// camera's image, near and far, tilted to all sides. At the middle distance the board fills half of the
+/// image's width or height.
 std::vector<Pose> guided_poses(const Imager& camera, const calib::Board& board);
 
 }  // namespace limn::apps

@@ -14,21 +14,21 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double k_frontal_deg = 5;     // less is told as facing the camera
-constexpr double k_turned_deg = 10;     // in the image; less is told as upright
-constexpr double k_little_depth = 0.1;  // of the distance; poses that differ less are neither near nor far
-constexpr double k_both = 0.4;          // of the larger direction: the smaller one is told, too
+constexpr double k_frontal_deg = 5;     // a smaller tilt is described as facing the camera
+constexpr double k_turned_deg = 10;     // a smaller turn in the image is not mentioned
+constexpr double k_little_depth = 0.1;  // share of the least distance; below it, no pose is near or far
+constexpr double k_both = 0.4;          // ratio of the two components; below it, the smaller is not mentioned
 
 double degrees(double radians) { return radians * 180 / std::numbers::pi; }
 
 Vector3d p_centre(const calib::Board& board) { return {board.width_m() / 2, board.height_m() / 2, 0}; }
 
-// Which third of 0..1, "" for the middle one.
+// The word for the first or last third of 0..1; "" for the middle third.
 std::string third(double share, const char* first, const char* last) {
   return share < 1.0 / 3 ? first : share > 2.0 / 3 ? last : "";
 }
 
-// "up", "left", "up and left": where a direction in the image points.
+// A direction in the image as text: "up", "left", "up and left".
 std::string direction(const Vector2d& d) {
   const std::string vertical = d.y() < 0 ? "up" : "down", horizontal = d.x() < 0 ? "left" : "right";
   const double x = std::abs(d.x()), y = std::abs(d.y());
@@ -54,7 +54,7 @@ std::string turn(const Pose& camera_from_board) {
 
 std::string place(const Imager& camera, const Vector3d& p_world) {
   const auto px = camera.project(p_world);
-  if (!px || !camera.contains(*px)) return "outside its picture";
+  if (!px || !camera.contains(*px)) return "outside its image";
   const std::string across = third((px->x() + 0.5) / camera.width, "left", "right"),
                     down = third((px->y() + 0.5) / camera.height, "high", "low");
   if (across.empty() && down.empty()) return "middle";

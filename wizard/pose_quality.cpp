@@ -7,9 +7,9 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_settled = 0.05;  // of the predicted error, over two poses
+constexpr double k_settled = 0.05;  // share; the error has settled if it fell by less over two poses
 
-// Faults that another pose may cure; the others are cured by hands.
+// Whether another pose may cure the fault; a person has to cure the others.
 bool wants_poses(const calib::Fault& fault) {
   return fault.name == "few_poses" || fault.name == "little_tilt" || fault.name == "low_coverage";
 }
@@ -21,7 +21,7 @@ double predicted_mm(const calib::Assessment& assessment) {
 }
 
 std::string more_helps(const std::vector<PoseJudged>& poses) {
-  if (poses.empty() || !poses.back().assessment) return "too few for a rig";
+  if (poses.empty() || !poses.back().assessment) return "too few poses to solve a rig";
   const calib::Assessment& last = *poses.back().assessment;
   for (const calib::Fault& fault : last.faults)
     if (wants_poses(fault)) return fault.name;
@@ -29,11 +29,11 @@ std::string more_helps(const std::vector<PoseJudged>& poses) {
   const double mm = predicted_mm(last);
   if (mm <= calib::k_fine_mm) return "";
   if (!calib::rests_on_enough_poses(last, static_cast<int>(poses.size())))
-    return "few leave little to judge by";
+    return "too few poses to judge the accuracy";
   const auto earlier = poses.size() < 3 ? nullptr : &poses[poses.size() - 3].assessment;
   if (earlier == nullptr || !*earlier) return "the predicted error may still fall";
   const bool has_settled = mm > (1 - k_settled) * predicted_mm(**earlier);
-  return has_settled ? "" : "the predicted error still falls";
+  return has_settled ? "" : "the predicted error is still falling";
 }
 
 }  // namespace limn::apps

@@ -9,24 +9,25 @@
 
 namespace limn::apps {
 
-/// What the captures up to one pose are worth.
+/// Quality of the calibration from all captures up to one pose.
 struct PoseJudged {
-  std::string pose;      ///< its name
-  bool before = false;   ///< it was captured by an earlier run
-  double capture_s = 0;  ///< of the cameras' clock, all projectors
-  /// None: no solution comes of these poses yet, and `unsolved` says why.
+  std::string pose;      ///< name of the pose
+  bool before = false;   ///< captured by an earlier run
+  double capture_s = 0;  ///< duration of the capture with all projectors, s on the cameras' clock
+  /// None: these poses give no solution yet, and `unsolved` says why.
   std::optional<calib::Assessment> assessment;
   std::string unsolved;
-  std::optional<Rig> rig = {};  ///< of these poses, before models are chosen; world: camera 0
-  std::string more_helps;       ///< why more poses help; empty: they are enough
+  std::optional<Rig> rig = {};  ///< solved before lens models are selected; world: camera 0
+  std::string more_helps;       ///< why more poses help; empty: these are enough
 };
 
-/// The largest of its projectors' predicted errors.
+/// The largest predicted error of all projectors, mm.
 double predicted_mm(const calib::Assessment& assessment);
 
-/// Why more poses help after the last of `poses`, in a few words; empty when they are enough: the rig is good
-/// without a fault that only more poses cure, and the predicted error is a quarter of a millimetre at most
-/// or, with as many poses as the report asks for, fell by less than a twentieth over the last two.
+/// Why more poses after the last of `poses` help, in a few words; empty if they are enough. They are enough
+/// when the rig is good, has no fault that only more poses cure, and the predicted error either is at most
+/// 0.25 mm (calib::k_fine_mm) or has fallen by less than a twentieth over the last two poses; the latter
+/// counts only with as many poses as the report asks for.
 std::string more_helps(const std::vector<PoseJudged>& poses);
 
 }  // namespace limn::apps

@@ -18,10 +18,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t k_told = 3;  // differences from the CAD; all are in align.json
-constexpr double k_white = 0.9;    // of a colour's white, left out on the prototype
+constexpr std::size_t k_told = 3;  // number of warnings that are printed; all are in align.json
+constexpr double k_white = 0.9;    // share of a colour's white part that is not projected
 
-// The colour without its white, which room light and projectors' black give it again.
+// The error's colour without most of its white, because room light and the projectors' black level add white.
 cv::Vec3d light_bgr(double mm) {
   const auto [red, green, blue] = error_rgb(mm);
   const cv::Vec3d bgr(blue, green, red);
@@ -36,7 +36,7 @@ class Steps {
 
   Result<std::optional<PrototypeSeen>> run() {
     step(WizardStep::scan, WizardState::runs, "waiting for the prototype");
-    audience_.say("scan: take the board away and put the prototype where it will stand");
+    audience_.say("scan: remove the board and put the prototype in its working position");
     LIMN_TRY(const bool is_there, around_.stand(nullptr));
     if (!is_there) {
       for (const WizardStep skipped : {WizardStep::scan, WizardStep::align, WizardStep::paint})
@@ -64,11 +64,11 @@ class Steps {
     calib::CaptureSet captures = steps_.captures;
     captures.folder = out_ / "captures";
     std::error_code ignored;
-    fs::remove_all(captures.folder, ignored);  // of a prototype that may have stood elsewhere
+    fs::remove_all(captures.folder, ignored);  // the prototype may have stood elsewhere
     LIMN_TRY_STATUS(calib::begin_captures(captures));
     calib::CaptureBackend stage = around_.stage;
     stage.show = [&](int projector, const cv::Mat& image) -> Status {
-      if (audience_.wish && *audience_.wish == WizardWish::leave) return error("left while it was captured.");
+      if (audience_.wish && *audience_.wish == WizardWish::leave) return error("stopped during the capture.");
       return around_.stage.show(projector, image);
     };
     const Status captured = calib::capture_pose(captures, 0, stage);
@@ -81,7 +81,7 @@ class Steps {
     seen_.scan_stddev_mm = 1e3 * static_cast<double>(median(scan_.points.stddevs));
     seen_.warnings = scan_.warnings;
     end(WizardStep::scan,
-        fmt::format("{} points, standard deviation {:.3f} mm", seen_.points, seen_.scan_stddev_mm));
+        fmt::format("{} points, median standard deviation {:.3f} mm", seen_.points, seen_.scan_stddev_mm));
     return {};
   }
 
@@ -101,7 +101,7 @@ class Steps {
           captures_.cameras[i].name + "=" +
           calib::image_path(captures_, 0, 0, static_cast<int>(i), captures_.patterns[0].white()).string());
     auto aligned = written_alignment(command);
-    if (!aligned) {  // no marker is seen
+    if (!aligned) {  // perhaps no marker is visible: search without a start
       command.frames.clear();
       aligned = written_alignment(command);
     }
@@ -116,14 +116,14 @@ class Steps {
     for (std::size_t i = 0; i < std::min(k_told, aligned->warnings.size()); ++i)
       audience_.say("advice: " + aligned->warnings[i]);
     if (aligned->warnings.size() > k_told)
-      audience_.say(fmt::format("advice: {} more in {}", aligned->warnings.size() - k_told,
+      audience_.say(fmt::format("advice: {} more warnings are in {}", aligned->warnings.size() - k_told,
                                 (out_ / "align.json").string()));
     end(WizardStep::align,
-        fmt::format("within {:.2f} mm RMS of the CAD, from {}", *seen_.align_rms_mm, aligned->how));
+        fmt::format("scan and CAD differ by {:.2f} mm RMS (start: {})", *seen_.align_rms_mm, aligned->how));
     return {};
   }
 
-  // The CAD where it was found, else what was scanned.
+  // The scene with the CAD if it was aligned, else with the scan's mesh.
   Result<scene::Scene> painted_scene() const {
     scene::Scene scene;
     if (world_from_prototype_) {
@@ -139,7 +139,7 @@ class Steps {
     return scene;
   }
 
-  // How far light may be off at a point that several projectors may reach: the worst of them.
+  // The largest predicted error of all projectors at a point; NaN where it is not known.
   double worst_mm(const Eigen::Vector3d& p_world) const {
     const Imager& camera = rig_.cameras.front();
     const auto px = camera.project(p_world);
@@ -182,8 +182,8 @@ class Steps {
     }
     if (all_mm.empty())
       return error(
-          "paint: expected light on the prototype where the boards were, found none. Hold boards where it "
-          "stands, or move it there.");
+          "paint: expected projected light on the prototype in the volume where the boards were held, found "
+          "none. Calibrate with boards where it stands, or move it there.");
     seen_.painted_p95_mm = quantile(all_mm, 0.95);
     seen_.painted_good =
         static_cast<double>(
@@ -194,8 +194,9 @@ class Steps {
       LIMN_TRY(const cv::Mat image, around_.stage.grab(static_cast<int>(i)));
       LIMN_TRY_STATUS(write_png(out_ / ("painted-" + rig_.cameras[i].name + ".png"), image));
     }
-    end(WizardStep::paint, fmt::format("light within {:.2f} mm on 95 % of it; {:.0f} % within {:g} mm",
-                                       seen_.painted_p95_mm, 100 * seen_.painted_good, calib::k_good_mm));
+    end(WizardStep::paint,
+        fmt::format("predicted error at most {:.2f} mm on 95 % of its surface; {:.0f} % within {:g} mm",
+                    seen_.painted_p95_mm, 100 * seen_.painted_good, calib::k_good_mm));
     return {};
   }
 

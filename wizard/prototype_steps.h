@@ -14,29 +14,29 @@
 
 namespace limn::apps {
 
-/// What the wizard's last steps work with.
+/// Input of the wizard's last steps: scan, alignment and painting.
 struct PrototypeSteps {
-  std::filesystem::path rig;    ///< folder that is solved; the steps write into its folder `scan`
-  std::filesystem::path scene;  ///< whose prototype is laid onto the scan; empty: the scan alone
+  std::filesystem::path rig;    ///< solved rig folder; the steps write into its folder `scan`
+  std::filesystem::path scene;  ///< its prototype is aligned with the scan; empty: no alignment
   calib::CaptureSet captures;   ///< planned: devices and patterns
   std::vector<calib::ErrorMap> maps;
 };
 
-/// What came of the prototype.
+/// Results of these steps.
 struct PrototypeSeen {
-  std::size_t points = 0;              ///< of the scan
-  double scan_stddev_mm = 0;           ///< median
-  std::optional<double> align_rms_mm;  ///< of the scan from the CAD; none: not aligned
-  double painted_p95_mm = 0;           ///< predicted error of light on it
-  double painted_good = 0;             ///< share of it with at most calib::k_good_mm
+  std::size_t points = 0;              ///< number of points of the scan
+  double scan_stddev_mm = 0;           ///< median of the points' standard deviations
+  std::optional<double> align_rms_mm;  ///< RMS distance of scan and CAD; none: not aligned
+  double painted_p95_mm = 0;           ///< 95th percentile of light's predicted error on the prototype
+  double painted_good = 0;             ///< share of the lit pixels with at most calib::k_good_mm
   std::vector<std::string> warnings;
 };
 
-/// After the rig is solved: the prototype is waited for and scanned, the scene's CAD laid onto the scan (from
-/// its markers where they are seen, else from a search), and every projector paints onto it how far light may
-/// be off there (error_rgb). Files in `scan`: those of limn scan and limn align, captures/,
-/// painted-CAMERA.png and projector-NAME.png. nullopt: a person skipped it. An alignment that is not found is
-/// told, and the scan is painted. Needs a machine that can draw (device::GlContext).
+/// Runs after the rig is solved. Waits for the prototype, scans it, aligns the scene's CAD with the scan (the
+/// start comes from visible markers, else from a search), and then every projector shows the predicted error
+/// on the prototype as colours (error_rgb). Files in `scan`: those of limn scan and limn align, captures/,
+/// painted-CAMERA.png and projector-NAME.png. nullopt: a person skipped it. If no alignment is found, this is
+/// reported, and the scan is painted. Needs a machine that can draw (device::GlContext).
 Result<std::optional<PrototypeSeen>> prototype_seen(const PrototypeSteps& steps,
                                                     const Surroundings& surroundings,
                                                     const WizardAudience& audience);

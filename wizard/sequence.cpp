@@ -30,7 +30,7 @@ using Say = std::function<void(const std::string&)>;
 
 constexpr const char* k_latency = "latency.json";  // beside capture.json
 
-// How long each projector was waited for, on the cameras' clock.
+// Measures how long the capture takes with each projector, on the cameras' clock.
 class CaptureClock {
  public:
   CaptureClock(std::size_t projectors, std::function<Stamp()> now)
@@ -59,7 +59,7 @@ class CaptureClock {
   int showing_ = -1;
 };
 
-// Ends early, with an error, when a person wishes to repeat or to leave.
+// Stops with an error when a person asks to check again, to repeat or to leave.
 Status capture(const calib::CaptureSet& captures,
                int pose,
                const Surroundings& around,
@@ -80,7 +80,7 @@ Status capture(const calib::CaptureSet& captures,
   return done ? written : done;
 }
 
-// The solve after each pose: one lens model for all, for models are chosen when all poses are there.
+// Solves after each pose with one lens model for all devices; models are selected at the end.
 Status judge(const calib::Observed& observed, PoseJudged* judged) {
   const calib::SolveOptions options;
   LIMN_TRY(calib::Solution solution, calib::solve(observed.observations, options));
@@ -95,13 +95,13 @@ std::string line_of(const PoseJudged& judged) {
   std::vector<std::string> seen;
   for (const calib::DeviceQuality& device : judged.assessment->devices)
     seen.push_back(fmt::format("{} {:.0f} %", device.name, 100 * device.coverage));
-  return fmt::format("{}held-out {:.3f} px, predicted {:.2f} mm (95 %), boards over {}; {}", name,
-                     judged.assessment->held_out.rms_px, predicted_mm(*judged.assessment),
-                     fmt::join(seen, ", "),
-                     judged.more_helps.empty() ? "enough" : "more poses help: " + judged.more_helps);
+  return fmt::format(
+      "{}held-out error {:.3f} px, predicted error {:.2f} mm (95 %), coverage {}; {}", name,
+      judged.assessment->held_out.rms_px, predicted_mm(*judged.assessment), fmt::join(seen, ", "),
+      judged.more_helps.empty() ? "these poses are enough" : "more poses help: " + judged.more_helps);
 }
 
-// Says faults when they come and when they go, not at each pose.
+// Reports faults when they appear and when they are gone, not after each pose.
 class FaultTeller {
  public:
   explicit FaultTeller(const Say& say) : say_(say) {}
@@ -121,7 +121,7 @@ class FaultTeller {
   std::set<std::string> told_;
 };
 
-// A run of the wizard, from pose to pose.
+// One run of the wizard, pose by pose.
 class Run {
  public:
   Run(const calib::CaptureSet& captures, const Surroundings& around, const WizardAudience& audience)
@@ -152,7 +152,7 @@ class Run {
   }
 
   bool is_enough() const { return !poses_.empty() && poses_.back().more_helps.empty(); }
-  // Whether no more poses are wanted; the wish is followed then.
+  // Whether a person asked to finish; this clears the request.
   bool is_to_finish() { return followed(WizardWish::finish); }
   std::vector<PoseJudged> poses() const { return poses_; }
   std::vector<std::pair<std::string, double>> capture_s() const {
@@ -172,15 +172,16 @@ class Run {
 
   bool is_left() const { return audience_.wish && *audience_.wish == WizardWish::leave; }
   static Status left_in(const calib::CapturedPose& files) {
-    return error("calibrate: left in {}. What was captured is kept; the same command goes on from there.",
-                 files.name);
+    return error(
+        "calibrate: left in {}. The captured images are kept; the same command continues from there.",
+        files.name);
   }
 
   void step(WizardStep which, WizardState state, const std::string& words) {
     if (audience_.step) audience_.step(which, state, words);
   }
 
-  // Devices, once in a run; their latencies are kept beside the captures.
+  // Checks the devices, once in a run; their latencies are stored beside the captures.
   Status check() {
     LIMN_TRY(const CheckedDevices checked, checked_devices(captures_, around_, audience_));
     are_checked_ = true;
@@ -193,10 +194,11 @@ class Run {
     return write_file(captures_.folder / k_latency, json.dump(2) + "\n");
   }
 
-  // The images of a pose, from the beginning as often as that is wished for.
+  // Captures a pose, again from its first image each time that a person asks for it.
   Status take(int number, const std::string& place, const calib::CapturedPose& files) {
     for (bool is_again = true; is_again;) {
-      audience_.say(fmt::format("{}: hold the board {}", files.name, place));
+      audience_.say(
+          fmt::format("{}: hold the board as follows in the first camera's image: {}", files.name, place));
       if (audience_.aims) audience_.aims(number);
       step(WizardStep::board, WizardState::runs, files.name);
       remove_images(files);
@@ -233,13 +235,13 @@ class Run {
   const Surroundings& around_;
   const WizardAudience& audience_;
   FaultTeller faults_;
-  bool are_checked_ = false;  // the devices
+  bool are_checked_ = false;  // whether the devices are
   CaptureClock clock_;
   std::optional<calib::Observed> observed_;
   std::vector<PoseJudged> poses_;
 };
 
-// The rig as limn solve makes it of the complete poses.
+// Solves the complete poses as limn solve does.
 Result<calib::Report> solve_all(const WizardOptions& options, const calib::CaptureSet& captures, int poses) {
   SolveCommandOptions solving{.captures = captures.folder, .out = options.out};
   for (int pose = 0; pose < poses; ++pose) {
@@ -250,7 +252,7 @@ Result<calib::Report> solve_all(const WizardOptions& options, const calib::Captu
   return solved(solving);
 }
 
-// What an earlier run, or this one, has measured; empty where none has.
+// The latencies that this run or an earlier one measured; empty if none did.
 Result<std::vector<std::pair<std::string, double>>> kept_latencies(const fs::path& path) {
   std::vector<std::pair<std::string, double>> latency_s;
   if (!fs::exists(path)) return latency_s;
@@ -261,7 +263,7 @@ Result<std::vector<std::pair<std::string, double>>> kept_latencies(const fs::pat
   return latency_s;
 }
 
-// Into the rig's provenance.
+// Stores the latencies in the rig's provenance.
 Status add_to_rig(const std::vector<std::pair<std::string, double>>& latency_s, const fs::path& folder) {
   if (latency_s.empty()) return {};
   LIMN_TRY(Rig rig, load_rig(folder));
@@ -313,7 +315,7 @@ Result<Calibrated> calibrated(const WizardOptions& options,
     if (seen)
       done.prototype = std::move(*seen);
     else
-      done.no_prototype = seen.message();  // the rig stays what it is
+      done.no_prototype = seen.message();  // the rig is complete without it
   }
   done.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return done;

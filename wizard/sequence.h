@@ -17,32 +17,32 @@
 namespace limn::apps {
 
 struct WizardOptions {
-  std::filesystem::path out;         ///< the rig folder; its captures/ keeps every image
-  std::filesystem::path scene = {};  ///< of the prototype; empty: the scan is painted without a CAD
-  bool scan = false;                 ///< scan the prototype at the end, and paint it
-  bool all = false;                  ///< take every pose of the plan, although fewer are enough
+  std::filesystem::path out;         ///< the rig folder; all images stay in its captures/
+  std::filesystem::path scene = {};  ///< the prototype's scene; empty: the scan is not aligned with a CAD
+  bool scan = false;                 ///< scan the prototype at the end and show the predicted error on it
+  bool all = false;                  ///< capture every pose of the plan, even if fewer are enough
 };
 
-/// What a run of the wizard gave.
+/// Results of a run of the wizard.
 struct Calibrated {
   std::vector<PoseJudged> poses;
   calib::Report report;  ///< as limn solve writes it
-  /// Of the captures taken by this run, on the cameras' clock: by name of the projector.
+  /// Duration of this run's captures, s on the cameras' clock, by name of the projector.
   std::vector<std::pair<std::string, double>> capture_s;
-  /// Measured, from show to light, by name of the projector; those of an earlier run where this one captured
-  /// nothing.
+  /// Measured display latency, s from show() to light, by name of the projector; from an earlier run if this
+  /// one captured nothing.
   std::vector<std::pair<std::string, double>> latency_s;
-  std::optional<PrototypeSeen> prototype;  ///< none: not asked for, skipped, or `no_prototype` says why
-  std::string no_prototype;
-  double seconds = 0;  ///< the run, by the wall
+  std::optional<PrototypeSeen> prototype;  ///< none: not asked for, skipped or failed
+  std::string no_prototype;                ///< why the prototype's steps failed; empty: they did not
+  double seconds = 0;                      ///< duration of the run, wall clock
 };
 
-/// The sequence: pose after pose of `captures` (planned, its folder is options.out / "captures"; begun or
-/// not) is captured unless it is there already, decoded, solved and judged, with a line each to `audience`;
-/// before the first one that is captured the devices are checked (wizard/device_checks.h). Then the rig is
-/// solved as limn solve does it. `places`: where each pose's board is to be held, in words. Captures that
-/// another plan made are an error that says what differs; `plan_json` describes this one. Whatever fails,
-/// images on the disk stay there, and the next run goes on from them; leaving is an error, too.
+/// Runs the wizard. Each pose of `captures` (planned; its folder is options.out / "captures", new or partly
+/// filled) is captured unless it is already there, then decoded, solved and judged; `audience` gets one line
+/// for each. The devices are checked before the first capture (wizard/device_checks.h). At the end the rig is
+/// solved as limn solve does it. `places`: for each pose, where to hold the board, as text. Captures of
+/// another plan are an error that says what differs; `plan_json` describes this plan. After a failure, the
+/// images stay on the disk, and the next run continues from them. If a person leaves, this is an error, too.
 Result<Calibrated> calibrated(const WizardOptions& options,
                               const std::string& plan_json,
                               const calib::CaptureSet& captures,

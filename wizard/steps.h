@@ -20,18 +20,18 @@ constexpr std::size_t k_wizard_steps = 10;
 std::string to_text(WizardStep step);
 enum class WizardState { waits, runs, done, fails };
 
-/// Who watches the wizard; functions may be empty, but for `say`.
+/// Functions that the wizard calls while it works; all except `say` may be empty.
 struct WizardAudience {
   std::function<void(const std::string& line)> say;
   std::function<void(WizardStep step, WizardState state, const std::string& words)> step = nullptr;
   std::function<void(const std::vector<ExposureReading>&)> lit = nullptr;
-  std::function<void(int pose)> aims = nullptr;                ///< a pose's images are taken from now on
-  std::function<void(const calib::Report&)> solved = nullptr;  ///< the rig is saved; the prototype may follow
-  std::function<void(int pose)> judges = nullptr;              ///< it is decoded and judged from now on
-  /// Observations are of all poses so far.
+  std::function<void(int pose)> aims = nullptr;                ///< the capture of a pose begins
+  std::function<void(const calib::Report&)> solved = nullptr;  ///< the rig is saved
+  std::function<void(int pose)> judges = nullptr;              ///< decoding and judging of a pose begin
+  /// A pose was judged; the observations are those of all poses so far.
   std::function<void(const PoseJudged&, const calib::Observations&, const std::vector<calib::Fault>&)>
       judged = nullptr;
-  std::atomic<WizardWish>* wish = nullptr;  ///< none again once it is followed
+  std::atomic<WizardWish>* wish = nullptr;  ///< a person's request; set to none when it is followed
 };
 
 }  // namespace limn::apps

@@ -129,7 +129,7 @@ FaultBench FaultBench::create(const std::string& name, int poses) {
   std::ifstream file(config / "plans" / (name + ".json"));
   const nlohmann::json plan = nlohmann::json::parse(file, nullptr, true, true);
   const calib::Board planned = calib::Board::parse(plan.at("board")).value();
-  // As wide as the planned board: squares of about 20 camera pixels, of which every second is paper alone.
+  // As wide as the planned board: squares of about 20 camera pixels; every second one is only paper.
   bench.board =
       calib::Board::parse(fmt::format("chessboard:8x5:{}mm", std::lround(planned.width_m() * 1000 / 9)))
           .value();

@@ -42,8 +42,8 @@ std::vector<Eigen::Vector3d> markers(double depth_m) {
   return points;
 }
 
-// The pose of a camera that views the markers from about `distance_m`, up to `angle` off their normal, aimed
-// up to `past_m` beside their centre.
+// The pose of a camera that views the markers from about `distance_m`, up to `angle` off their normal,
+// pointed up to `past_m` beside their centre.
 Pose drawn_place(Rng* rng, double distance_m, double angle, double past_m = 0.1) {
   const double turn = between(rng, 0, 2 * std::numbers::pi), tilt = between(rng, 0, angle);
   const double distance = distance_m * between(rng, 0.75, 1.25);

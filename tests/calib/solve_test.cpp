@@ -193,7 +193,7 @@ TEST(Assess, HeldOutErrorIsTheNoiseOfTheCells) {
   const auto score = cross_validate(world.observations, {}, *solution);
   ASSERT_TRUE(score.ok()) << score.message();
   EXPECT_EQ(score->poses.size(), 8U);
-  EXPECT_GT(score->rms_px, 0.1 * std::sqrt(2.0) * 0.97);  // of the 2-vector
+  EXPECT_GT(score->rms_px, 0.1 * std::sqrt(2.0) * 0.97);  // RMS of the 2-vector
   EXPECT_LT(score->rms_px, 0.1 * std::sqrt(2.0) * 1.15);
   // 0.1 px at 1600 px focal length and 1.1 m are 0.07 mm; 95 % of a Rayleigh distribution is 2.45 times that.
   Observed observed{world.observations, {{0, 0, 0, 1000, 900, 2}}, {}, 0, 0};

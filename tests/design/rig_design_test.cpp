@@ -23,18 +23,20 @@ PredictedAccuracy predicted_accuracy(const DescribedRig& described) {
   return found ? *found : PredictedAccuracy{};
 }
 
-// Of foresee_truth_test, which measures what comes of the same rig: here only what can be worked out by hand.
+// rig_design_truth_test compares predictions with the same rig's true errors; here are only values that can
+// be computed by hand.
 TEST(Foresee, TellsSizesOfTheBench) {
   const auto described = load_described(k_described / "bench.json");
   ASSERT_TRUE(described) << described.message();
   const PredictedAccuracy found = predicted_accuracy(*described);
   ASSERT_EQ(found.cameras.size(), 1u);
   ASSERT_EQ(found.projectors.size(), 1u);
-  // 1.273 m along the projector's level axis over 1523 px; 1.376 m from camera to middle over 1620 px.
+  // 1.273 m along the projector's level axis, divided by 1523 px; 1.376 m from the camera to the centre,
+  // divided by 1620 px.
   EXPECT_NEAR(found.projectors[0].pixel_mm, 0.836, 0.003);
   EXPECT_NEAR(found.cameras[0].pixel_mm, 0.849, 0.003);
   EXPECT_NEAR(found.cameras[0].distance_m, std::hypot(0.32, 1.32, 0.22), 1e-9);
-  // The lit side looks to -y.
+  // The lit side faces -y.
   const double cosine = 1.32 / std::hypot(0.32, 1.32, 0.22);
   EXPECT_NEAR(found.cameras[0].steep_deg, std::acos(cosine) * 180 / M_PI, 1e-6);
   EXPECT_NEAR(found.cameras[0].surface_mm, found.cameras[0].pixel_mm / cosine, 1e-9);
@@ -53,7 +55,7 @@ TEST(Foresee, TheExamplesLoadAndTheNumbersRepeat) {
   EXPECT_EQ(predicted_accuracy(*described).error_mm, predicted_accuracy(*described).error_mm);
 }
 
-// Everything that was described stands on the page, which needs nothing else.
+// Everything that was described is on the page, which needs no other file.
 TEST(Foresee, APageShowsTheRig) {
   const fs::path out = test::test_folder() / "plan";
   testing::internal::CaptureStdout();
@@ -80,7 +82,7 @@ TEST(Foresee, NoiseAndNarrowAnglesCostWhatTheyMust) {
   for (double* px : {&noisy.corner_px, &noisy.match_px, &noisy.marker_px}) *px *= 10;
   const PredictedAccuracy rough = predicted_accuracy(noisy);
   EXPECT_NEAR(rough.calibration_mm[0] / before.calibration_mm[0], 10, 3);
-  // Measuring a thing is never believed to be better than 0.03 px; here it is 0.06 px.
+  // The measurement of the prototype is never assumed to be better than 0.03 px; here it is 0.06 px.
   EXPECT_NEAR(rough.measuring_mm[0] / before.measuring_mm[0], 2, 0.3);
   EXPECT_NEAR(rough.markers[0].across_mm / before.markers[0].across_mm, 10, 0.2);
   EXPECT_GT(before.markers[0].along_mm, 3 * before.markers[0].across_mm);
@@ -93,7 +95,7 @@ TEST(Foresee, NoiseAndNarrowAnglesCostWhatTheyMust) {
   EXPECT_NE(dark.advice[0].find("the projectors reach"), std::string::npos) << dark.advice[0];
 }
 
-// Each wrong, alone, is named by what it is about, and the mended rig is free of that advice.
+// Each problem alone is named, and the corrected rig gets no such advice.
 TEST(Foresee, NamesWhatIsTooSmallFarSteepOrDim) {
   const auto described = load_described(k_described / "bench.json");
   ASSERT_TRUE(described) << described.message();
@@ -112,7 +114,7 @@ TEST(Foresee, NamesWhatIsTooSmallFarSteepOrDim) {
   EXPECT_FALSE(has(advice_of(small), "too small"));
 
   DescribedRig steep = *described;
-  steep.d_front = Eigen::Vector3d(-1, 0, 0);  // camera and projector stand beside this side
+  steep.d_front = Eigen::Vector3d(-1, 0, 0);  // camera and projector see this side at a grazing angle
   EXPECT_TRUE(has(advice_of(steep), "camera0: too steep")) << advice_of(steep);
   EXPECT_TRUE(has(advice_of(steep), "projector0: too steep")) << advice_of(steep);
 
@@ -150,7 +152,7 @@ TEST(Foresee, WrongFilesAreNamedByKey) {
   EXPECT_NE(message_with("\"eye_m\": [0.24, -1.25, 0.06]", "\"eye_m\": [0, 0, 0.06]").find("in one place"),
             std::string::npos);
   EXPECT_NE(message_with("charuco:11x8:35mm", "paper").find("board"), std::string::npos);
-  // Around the middle of the volume: 2 m away, 30 degrees to the right as one stands in front.
+  // Relative to the centre of the volume: 2 m away, 30 degrees to the right for a person in front.
   ASSERT_EQ(message_with("\"eye_m\": [-0.32, -1.32, 0.62]",
                          "\"from\": {\"distance_m\": 2, \"right_deg\": 30, \"up_deg\": 0}"),
             "");
@@ -160,7 +162,7 @@ TEST(Foresee, WrongFilesAreNamedByKey) {
   ASSERT_EQ(message_with("\"eye_m\": [-0.32, -1.32, 0.62]", "\"eye_m\": [0, 0, 2]"), "");
   const auto px = load_described(file)->rig.cameras[0].project({0, 0.1, 0.4});
   ASSERT_TRUE(px.has_value());
-  EXPECT_LT(px->y(), 500);  // what is away from the front is up
+  EXPECT_LT(px->y(), 500);  // the direction away from the front is up
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// What `limn plan` foresees of a described rig, against what then comes of it on the virtual rig.
+// Compares what `limn plan` predicts for a described rig with the result on the virtual rig.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -47,8 +47,8 @@ void expect_within_two(double found, double expected, const std::string& what) {
 
 json read_json(const fs::path& path) { return json::parse(read_file(path).value(), nullptr, true, true); }
 
-// Calibrates on the plan's virtual rig and compares; `described` may leave the noise to what the report
-// found.
+// Calibrates on the plan's virtual rig and compares. Without `own_noise`, the noise of `described` is
+// replaced by the noise that the report found.
 void check_rig(DescribedRig described,
                const fs::path& plan,
                const fs::path& world_file,
@@ -77,19 +77,19 @@ void check_rig(DescribedRig described,
     pair.cameras = {rig->cameras[0]};
     pair.projectors = {rig->projectors[i]};
     auto rng = test::test_rng();
-    // Things are measured as well as markers are: 0.03 px.
+    // The prototype is measured as well as markers are: 0.03 px.
     const double true_mm =
         test::p95(test::landed(truth, pair, test::prototype_mesh(test::Prototype::panel), 0.03, 1000, &rng)
                       .pooled_mm());
     const double reported_mm = report["predicted_error_mm"]["per_projector"][rig->projectors[i].name];
-    std::printf("%s, %s: foreseen %.3f mm (calibration %.3f, measuring %.3f), reported %.3f, true %.3f\n",
+    std::printf("%s, %s: predicted %.3f mm (calibration %.3f, measuring %.3f), reported %.3f, true %.3f\n",
                 plan.stem().c_str(), rig->projectors[i].name.c_str(), predicted_accuracy->error_mm[i],
                 predicted_accuracy->calibration_mm[i], predicted_accuracy->measuring_mm[i], reported_mm,
                 true_mm);
     expect_within_two(predicted_accuracy->error_mm[i], reported_mm,
                       rig->projectors[i].name + " as the report states it");
     expect_within_two(predicted_accuracy->error_mm[i], true_mm, rig->projectors[i].name + " as it truly is");
-    // Sizes, from the true rig.
+    // The pixel sizes are compared with the true rig's.
     const Imager& projector = world->rig.projectors[i];
     const Eigen::Vector3d p = projector.imager_from_world * described.p_centre;
     EXPECT_NEAR(predicted_accuracy->projectors[i].pixel_mm, 1000 * p.z() / projector.lens.fx(),
@@ -97,7 +97,7 @@ void check_rig(DescribedRig described,
   }
 }
 
-// Pixels a side by `share`; the same field of view.
+// Scales an imager's width and height by `share`; its field of view stays.
 void shrink(double share, json* imager) {
   for (auto& side : (*imager)["size"]) side = static_cast<int>(share * side.get<int>());
   auto& values = (*imager)["lens"]["values"];
@@ -105,7 +105,7 @@ void shrink(double share, json* imager) {
   for (std::size_t i = 2; i < 4; ++i) values[i] = share * (values[i].get<double>() + 0.5) - 0.5;
 }
 
-// The bench with fewer pixels, for time's sake; the noise is as found, the rest as described.
+// The bench with fewer pixels, to save time. The noise is that of the report, the rest is as described.
 TEST(ForeseeTruth, ACoarseBenchComesOutAsForeseen) {
   const fs::path folder = test::test_folder();
   json world = read_json(k_config / "worlds/bench.json"), plan = read_json(k_config / "plans/bench.json"),
@@ -125,10 +125,10 @@ TEST(ForeseeTruth, ACoarseBenchComesOutAsForeseen) {
   check_rig(*loaded, folder / "plan.json", folder / "world.json", false, folder / "rig");
 }
 
-// At full size, minutes each: LIMN_RIGS=bench or studio.
+// Takes minutes at full size: LIMN_RIGS=bench or studio selects the rig.
 TEST(ForeseeTruth, ARigOfTheExamplesComesOutAsForeseen) {
   const char* name = std::getenv("LIMN_RIGS");
-  if (!name) GTEST_SKIP() << "takes minutes a rig: LIMN_RIGS is not set";
+  if (!name) GTEST_SKIP() << "takes minutes for each rig: LIMN_RIGS is not set";
   const std::string file = std::string(name) + ".json";
   const auto described = load_described(k_config / "described" / file);
   ASSERT_TRUE(described) << described.message();

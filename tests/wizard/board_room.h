@@ -13,13 +13,13 @@
 
 namespace limn::test {
 
-/// A virtual room with one camera, one projector, and a person who carries the board to where it is wanted.
+/// A virtual room with one camera, one projector, and a person who carries the board to the next pose.
 struct BoardRoom {
   apps::Plan plan;
   sim::VirtualRig rig;
   Pose from, to;
-  int steps_left = 0;            // of the person
-  int moved = 0;                 // patterns shown while the board moved
+  int steps_left = 0;            // until the board is there
+  int moved = 0;                 // number of patterns shown while the board moved
   std::function<void()> person;  // acts before each frame; may be empty
 
   explicit BoardRoom(const apps::Plan& wanted, double display_delay_s = 0.12)
@@ -62,7 +62,7 @@ class BoardRoomCamera : public device::CameraSource {
   BoardRoom* room_;
 };
 
-/// Tells when it has swapped, not when its light leaves.
+/// Its show() returns the moment of the call, not the moment when light appears.
 class BoardRoomProjector : public device::Display {
  public:
   explicit BoardRoomProjector(BoardRoom* room) : room_(room) {}

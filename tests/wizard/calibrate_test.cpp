@@ -40,7 +40,7 @@ std::size_t images_in(const fs::path& folder) {
   return count;
 }
 
-// The prototype was scanned, its CAD laid onto it, and it is lit green.
+// The prototype was scanned, its CAD is aligned, and green light falls on it.
 void expect_prototype(const json& done, const fs::path& rig, const fs::path& world_file) {
   ASSERT_TRUE(done.contains("prototype")) << done;
   EXPECT_GT(done["prototype"]["points"].get<int>(), 10000);
@@ -63,13 +63,13 @@ void expect_prototype(const json& done, const fs::path& rig, const fs::path& wor
   }
   EXPECT_GT(lit, light.total() / 10);
   EXPECT_EQ(green, lit);
-  // The camera sees that light on the prototype, and black beside it.
+  // The camera sees this light on the prototype, and black beside it.
   const cv::Mat seen = read_grey_image(rig / "scan/painted-camera0.png").value();
   EXPECT_GT(cv::countNonZero(seen > 80), static_cast<int>(seen.total() / 12));
   EXPECT_LT(cv::countNonZero(seen > 80), static_cast<int>(seen.total() / 3));
 }
 
-// One wizard's life: from nothing, left in the middle of a pose, another plan.
+// Calibrates from nothing, then continues after an interrupted pose, then refuses another plan.
 TEST(Calibrate, GoesFromNothingToAGoodRigAndOnFromWhereItWasLeft) {
   const fs::path folder = test::test_folder(), plan = small_plan(folder), out = folder / "rig";
   const CalibrateOptions options{.plan = plan, .out = out, .json = true};
@@ -79,14 +79,14 @@ TEST(Calibrate, GoesFromNothingToAGoodRigAndOnFromWhereItWasLeft) {
   const auto rig = load_rig(out);
   ASSERT_TRUE(rig.ok()) << rig.message();
   EXPECT_NEAR(rig->projectors[0].lens.fx(), 380, 4);
-  // The rig's latency, within 2 ms of the virtual projector's; the captures waited no longer than for it.
+  // The measured latency is within 2 ms of the virtual projector's.
   EXPECT_NEAR(first["latency_ms"]["projector0"].get<double>(), 33, 2);
   EXPECT_NEAR(read_json(out / "rig.json")["provenance"]["display_latency_ms"]["projector0"].get<double>(), 33,
               2);
   EXPECT_TRUE(fs::exists(out / "report.html"));
   EXPECT_EQ(read_json(out / "report.json")["verdict"], "good");
 
-  // It stopped when poses no longer helped: good, with poses left.
+  // It stopped when more poses no longer helped: the rig is good, and poses of the plan are left.
   const json& poses = first["poses"];
   ASSERT_GE(poses.size(), 5U);
   EXPECT_LT(poses.size(), 9U);
@@ -98,13 +98,13 @@ TEST(Calibrate, GoesFromNothingToAGoodRigAndOnFromWhereItWasLeft) {
     EXPECT_GT(poses[i]["coverage"]["projector0"].get<double>(), 0.2);
     EXPECT_EQ(poses[i]["more_helps"].get<std::string>().empty(), i + 1 == poses.size()) << poses[i];
   }
-  // 36 images a pose, one every two frames of 1/30 s, and what the last one waits.
+  // 36 images for each pose, one every two frames of 1/30 s, and the wait for the last one.
   const double capture_s = first["capture_s"]["projector0"];
   EXPECT_NEAR(capture_s, static_cast<double>(poses.size()) * 36 * 2 / 30.0, 1);
   const fs::path captures = out / "captures";
   ASSERT_EQ(images_in(captures), poses.size() * 36);
 
-  // Left within pose 2: what is complete stays as it is, pose 2 is captured again as a whole.
+  // Interrupted in pose 2: complete poses stay as they are, and pose 2 is captured again completely.
   const auto written_at = [&](const char* file) { return fs::last_write_time(captures / file); };
   const auto kept = written_at("pose01/camera0/035.png"), torn = written_at("pose02/camera0/000.png");
   fs::remove(captures / "pose02/camera0/035.png");
@@ -124,7 +124,7 @@ TEST(Calibrate, GoesFromNothingToAGoodRigAndOnFromWhereItWasLeft) {
   EXPECT_NEAR(second["capture_s"]["projector0"].get<double>(), 36 * 2 / 30.0, 0.2);
   EXPECT_TRUE(fs::exists(out / "rig.json"));
 
-  // Another plan: refused with what differs, and nothing changes.
+  // Another plan is refused; the message says what differs, and nothing changes.
   json other = read_json(plan);
   other["board"] = "charuco:8x6:56mm";
   ASSERT_TRUE(write_file(plan, other.dump(2)).ok());
@@ -167,7 +167,7 @@ TEST(Calibrate, PosesHelpUntilTheRigIsGoodAndItsErrorFallsNoMore) {
   EXPECT_FALSE(more_helps({judged(0.8)}).empty()) << "nothing to compare with";
   EXPECT_FALSE(more_helps({judged(0.8), judged(0.7), judged(0.7)}).empty()) << "fell by an eighth";
   std::vector<PoseJudged> settled(7, judged(0.79));
-  EXPECT_FALSE(more_helps(settled).empty()) << "too few to judge by";
+  EXPECT_FALSE(more_helps(settled).empty()) << "too few to judge the accuracy";
   settled.push_back(judged(0.78));
   EXPECT_TRUE(more_helps(settled).empty());
   EXPECT_TRUE(more_helps({judged(0.8), judged(0.4), judged(0.2)}).empty()) << "fine enough";
@@ -179,21 +179,21 @@ TEST(Calibrate, PosesHelpUntilTheRigIsGoodAndItsErrorFallsNoMore) {
 TEST(Calibrate, TellsPlacesAsTheCameraSeesThem) {
   const Imager camera{"camera0", 640, 480, Lens::pinhole(600, 600, 319.5, 239.5), Pose()};
   const calib::Board board = calib::Board::parse("charuco:8x6:40mm").value();
-  // The board's middle at p, turned by r about the camera's axes.
+  // A board pose with the board's centre at p, rotated by r about the camera's axes.
   const auto held = [&](const Vector3d& r, const Vector3d& p) {
     return Pose(exp_rotation(r), p) *
            Pose(Eigen::Quaterniond::Identity(), {-board.width_m() / 2, -board.height_m() / 2, 0});
   };
   const auto words = pose_instructions(
       camera, board,
-      {held({0, 0, 0}, {0, 0, 1}), held({0.5, 0, 0}, {-0.5, 0, 1.5}),  // its upper edge goes nearer
-       held({0, 0.5, 0}, {0, 0.5, 2}),                                 // its right edge goes nearer
+      {held({0, 0, 0}, {0, 0, 1}), held({0.5, 0, 0}, {-0.5, 0, 1.5}),  // its upper edge is nearer
+       held({0, 0.5, 0}, {0, 0.5, 2}),                                 // its right edge is nearer
        held({0, 0, 0.5}, {0, 0, 1}), held({0, 0, 0}, {3, 0, 1})});
   EXPECT_EQ(words[0], "middle, near (1.00 m), facing the camera");
   EXPECT_EQ(words[1].substr(0, 20), "left, near (1.58 m),");
   EXPECT_EQ(words[2], "low (2.06 m), tilted 32 degrees down and left");
   EXPECT_NE(words[3].find("turned 29 degrees clockwise"), std::string::npos) << words[3];
-  EXPECT_EQ(words[4].substr(0, 19), "outside its picture");
+  EXPECT_EQ(words[4].substr(0, 19), "outside its image, ");
 }
 
 }  // namespace

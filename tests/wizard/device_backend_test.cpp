@@ -21,7 +21,7 @@ namespace {
 
 using State = StillBoard::State;
 
-// Corners of a board that hangs at x, trembling by so much.
+// Corners of a board at x, displaced by `tremble` (px).
 std::vector<calib::BoardCorner> corners_at(double x, double tremble) {
   std::vector<calib::BoardCorner> corners;
   for (int i = 0; i < 20; ++i)
@@ -46,10 +46,10 @@ TEST(StillBoard, IsStillWhenItRestsInANewPlace) {
   EXPECT_EQ(take(120, 0), State::known);
   EXPECT_EQ(take(125, 0), State::moving);
   for (int i = 0; i < 40; ++i) take(125, 0);
-  EXPECT_EQ(take(125, 0), State::known) << "5 pixels are no other place";
+  EXPECT_EQ(take(125, 0), State::known) << "5 pixels away is not a new place";
   for (int i = 0; i < 40; ++i) take(190, 0);
   EXPECT_EQ(take(190, 0), State::still);
-  for (int i = 0; i < 40; ++i) EXPECT_NE(take(190, i % 2 ? 1 : -1), State::still) << "a hand that trembles";
+  for (int i = 0; i < 40; ++i) EXPECT_NE(take(190, i % 2 ? 1 : -1), State::still) << "the hand trembles";
 }
 
 TEST(StillRoom, RestsWhenNothingMovesForAWhile) {
@@ -65,7 +65,7 @@ TEST(StillRoom, RestsWhenNothingMovesForAWhile) {
     at_s += 0.1;
     return room.take(image, shifted(Stamp{}, at_s));
   };
-  for (int i = 0; i < 200; ++i) ASSERT_FALSE(rests_after(i)) << "a hand goes through the picture";
+  for (int i = 0; i < 200; ++i) ASSERT_FALSE(rests_after(i)) << "a hand moves through the image";
   int waited = 0;
   while (!rests_after(-1)) ASSERT_LT(++waited, 100);
   EXPECT_NEAR(0.1 * waited, StillRoom::k_rest_s, 0.3);
@@ -82,7 +82,7 @@ TEST(DeviceBackend, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
   const auto places =
       pose_instructions(room.rig.world().rig.cameras[0], room.plan.board, room.plan.world_from_board);
   std::string lines;
-  std::optional<Rig> last;  // as of the poses so far
+  std::optional<Rig> last;  // solved from the poses so far
   const auto done = calibrated(
       options, "{\"schema\": \"limn.captured_plan/1\"}", captures, places, stage.surroundings(&writer),
       {.say = [&](const std::string& line) { lines += line + "\n"; },
@@ -100,7 +100,7 @@ TEST(DeviceBackend, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
   ASSERT_TRUE(last);
   EXPECT_NEAR(last->cameras[0].lens.fx(), room.rig.world().rig.cameras[0].lens.fx(), 10);
 
-  // A recheck by the same devices, of what stands there.
+  // A recheck with the same devices of whatever stands there.
   const Rig rig = load_rig(options.out).value();
   const calib::CaptureSet again = calib::plan_captures(
       folder / "again", captures.cameras, captures.projectors, captures.board, "gray", {.inverses = false});
@@ -113,8 +113,8 @@ TEST(DeviceBackend, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
   EXPECT_EQ(checked->result.verdict, calib::RigVerdict::sound);
 }
 
-// A place was planned for a guessed lens: laid onto its outline the board is elsewhere, which the rig tells,
-// and from there it is predicted where the other cameras see it.
+// The poses were planned for an assumed lens. A board that is held on the planned outline is in another pose,
+// which follows from the rig; from this pose the outlines in the other cameras are predicted.
 TEST(GuidedPoses, AreShownToAllCamerasOnceThereIsARig) {
   const calib::Board board = calib::Board::parse("charuco:11x8:25mm").value();
   const Imager assumed = assumed_camera("camera0", 1280, 1024);
@@ -135,14 +135,15 @@ TEST(GuidedPoses, AreShownToAllCamerasOnceThereIsARig) {
     ASSERT_EQ(shown[i][0].size(), 4U) << i;
     for (std::size_t k = 0; k < 4; ++k)
       EXPECT_LT((shown[i][0][k] - wanted[i][0][k]).norm(), 25) << i << " " << k;
-    EXPECT_GT(places[i].translation.norm(), 1.15 * planned[i].translation.norm()) << "farther away, as large";
-    // Where the other camera sees the board that lies there.
+    EXPECT_GT(places[i].translation.norm(), 1.15 * planned[i].translation.norm())
+        << "farther away, and as large in the image";
+    // The other camera's outline is that of the board in this pose.
     ASSERT_EQ(shown[i][1].size(), 4U) << i;
     const auto px = rig.cameras[1].project(places[i] * Eigen::Vector3d(board.width_m(), board.height_m(), 0));
     EXPECT_LT((shown[i][1][2] - *px).norm(), 1e-6);
     EXPECT_GT((shown[i][1][2] - shown[i][0][2]).norm(), 20);
   }
-  // Behind a camera it is not shown.
+  // There is no outline if the board is behind the camera.
   rig.cameras[1].imager_from_world = Pose(exp_rotation({0, 3.1, 0}), {0, 0, 0});
   for (const auto& cameras : outlines(board, places, rig.cameras)) EXPECT_TRUE(cameras[1].empty());
 }

@@ -15,7 +15,7 @@
 namespace limn::apps {
 namespace {
 
-// The bench, its board held in the plan's first pose.
+// The bench with its board in the plan's first pose.
 struct Bench {
   Plan plan;
   calib::CaptureSet captures;
@@ -86,7 +86,7 @@ TEST(LightCheck, NamesAProjectorThatNoCameraSees) {
   EXPECT_EQ(sentences[0].substr(0, 11), "projector0:");
 }
 
-// The rig's projector and camera, flashing.
+// The rig's projector and camera for a latency measurement.
 FlashStage flashes(sim::VirtualRig* rig) {
   rig->darken();
   const auto show = [rig](bool white) -> Result<Stamp> {

@@ -14,7 +14,7 @@ inline nlohmann::json read_json(const std::filesystem::path& path) {
   return nlohmann::json::parse(read_file(path).value(), nullptr, true, true);
 }
 
-// Pixels a side by `share`; the same field of view.
+// Scales an imager's width and height by `share`; its field of view stays.
 inline void shrink(double share, nlohmann::json* imager) {
   for (auto& side : (*imager)["size"]) side = static_cast<int>(share * side.get<int>());
   auto& values = (*imager)["lens"]["values"];
@@ -22,7 +22,7 @@ inline void shrink(double share, nlohmann::json* imager) {
   for (std::size_t i = 2; i < 4; ++i) values[i] = share * (values[i].get<double>() + 0.5) - 0.5;
 }
 
-// The bench's plan and world with fewer pixels, in `folder`.
+// Writes the bench's plan and world with fewer pixels into `folder` and returns the plan's path.
 inline std::filesystem::path small_plan(const std::filesystem::path& folder) {
   const std::filesystem::path config = std::filesystem::path(LIMN_SOURCE_DIR) / "config";
   nlohmann::json world = read_json(config / "worlds/bench.json"),

@@ -14,7 +14,7 @@
 #include "tests/wizard/board_room.h"
 #include "tests/wizard/small_plan.h"
 #include "wizard/window/wizard_panel.h"
-// X's macros go last.
+// X's macros must come last.
 #include "apps/calibrate.h"
 #include "tests/gui/x_person.h"
 #include "wizard/capture/virtual_capture.h"
@@ -31,14 +31,15 @@ bool has_display() { return std::getenv("DISPLAY") != nullptr; }
 
 WizardView a_view() {
   WizardView view;
-  view.steps = {{{State::done, "virtual rig: 2 cameras, 1 projector"},
-                 {State::done, "2 of 2 seen"},
-                 {State::fails,
-                  "camera0: 12 % of what projector0 lights is saturated. Shorten the exposure to a half."},
-                 {State::done, "projector0 33.1 ms, projector1 33.2 ms"},
-                 {State::runs, "pose04"},
-                 {},
-                 {}}};
+  view.steps = {
+      {{State::done, "virtual rig: 2 cameras, 1 projector"},
+       {State::done, "2 of 2 projectors seen"},
+       {State::fails,
+        "camera0: 12 % of the pixels that projector0 lights are saturated. Shorten the exposure to half."},
+       {State::done, "projector0 33.1 ms, projector1 33.2 ms"},
+       {State::runs, "pose04"},
+       {},
+       {}}};
   std::vector<Vector2d> seen, lit;
   for (int i = 0; i < 600; ++i) {
     seen.emplace_back(300 + i % 30 * 20, 200 + i / 30 * 20);
@@ -59,7 +60,7 @@ WizardView a_view() {
   view.images = 31;
   view.images_of = 144;
   view.judged = {{"pose00", {}, {}}, {"pose01", {}, {}}, {"pose02", 0.9, 4.2}, {"pose03", 0.31, 0.8}};
-  view.advice = "More poses help: the predicted error still falls.";
+  view.advice = "More poses help: the predicted error is still falling.";
   view.faults = {{"little_tilt", "boards were tilted by 11 degrees at most", "tilt the board more"}};
   return view;
 }
@@ -93,7 +94,7 @@ TEST(WizardPanel, ShowsWhereTheBoardIsAndWhereItIsToGo) {
   canvas.keep("wizard-two");
 }
 
-// A view at the end, with an error map.
+// The view at the end, with an error map.
 WizardView an_end() {
   WizardView view = a_view();
   view.is_over = view.has_rig = true;
@@ -155,7 +156,7 @@ TEST(WizardCells, CountPointsWhereTheyLie) {
   EXPECT_DOUBLE_EQ(cells.share(), 2 / 50.0);
 }
 
-// Clicks on the last button at the foot of the window.
+// Clicks the last button at the bottom of the window.
 void leave(test::XPerson* x) {
   x->move(980, 975);
   std::this_thread::sleep_for(milliseconds(500));
@@ -194,14 +195,14 @@ TEST(WizardWindow, IsLeftAndGoesOnUntilTheRigIsGood) {
   const Status done = with_person([&](test::XPerson*) {
     for (int i = 0; i < 2400 && !fs::exists(out / "report.html"); ++i)
       std::this_thread::sleep_for(milliseconds(50));
-    std::this_thread::sleep_for(milliseconds(2000));  // the result shows
+    std::this_thread::sleep_for(milliseconds(2000));  // the result is visible
   });
   EXPECT_TRUE(done.ok()) << (done ? "" : done.message());
   EXPECT_TRUE(load_rig(out).ok());
 }
 
-// The same on devices, as a room has them: the devices are looked at, and somebody carries the board from
-// place to place until there is a rig to look at; then it is left by a click.
+// The same with real devices' backend: the devices are checked, and a person carries the board from place to
+// place until three poses are captured; then a click leaves the wizard.
 TEST(WizardWindow, TakesPosesOfDevicesAndIsLeft) {
   if (!has_display()) GTEST_SKIP() << "no display: WizardWindow.TakesPosesOfDevicesAndIsLeft";
   const fs::path folder = test::test_folder(), out = folder / "rig";

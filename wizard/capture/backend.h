@@ -12,24 +12,24 @@
 
 namespace limn::apps {
 
-/// What the wizard needs from outside: functions, so that a virtual rig and devices in a room are alike.
+/// The devices as the wizard uses them: functions, so that virtual and real rigs work alike.
 struct Surroundings {
-  /// Told of the board in a camera's image while it is waited for; may be empty.
+  /// Called during the wait for the board with each camera image and the corners found in it; may be empty.
   using Seen = std::function<void(int camera, const cv::Mat&, const std::vector<calib::BoardCorner>&)>;
-  /// Returns when the board is where this pose wants it, and still.
+  /// Returns when the board is in place for this pose, and still.
   std::function<Status(int pose, const Seen& seen)> hold;
   calib::CaptureBackend stage;
-  std::function<Status()> written;  ///< returns when every image that was stored is on the disk
-  std::function<Stamp()> now;       ///< of the cameras' clock
+  std::function<Status()> written;  ///< returns when all stored images are on the disk
+  std::function<Stamp()> now;       ///< the cameras' clock
   /// Returns when the board is gone and the prototype stands still; false: a person skipped it. Empty: there
   /// is no prototype.
   std::function<Result<bool>(const Seen& seen)> stand = nullptr;
-  /// All projectors show an image each, which is visible to the next grab.
+  /// Every projector shows its image; the next grab sees them.
   std::function<Status(const std::vector<cv::Mat>&)> paint = nullptr;
-  /// One projector and one camera, the others dark.
+  /// One projector and one camera for a latency measurement; the other projectors are dark.
   std::function<FlashStage(int projector, int camera)> flashes;
-  /// From now on an image is on the surface so long after it was shown; before, the longest that is
-  /// measured.
+  /// Sets the time from show() until an image is on the surface. Before the first call it is the longest that
+  /// can be measured (FlashOptions::limit_s).
   std::function<void(int projector, double seconds)> use_latency;
 };
 

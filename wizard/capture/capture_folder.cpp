@@ -20,7 +20,8 @@ using nlohmann::ordered_json;
 
 constexpr const char* k_taken_by = "plan.json";  // beside capture.json
 
-// Every leaf of two plans that differs, the first alone: "plan.board: captured with …, this plan says …".
+// The first value that differs between two plans, as text: "plan.board: captured with …, this plan says …";
+// empty if none differs.
 std::string difference(const nlohmann::json& then, const nlohmann::json& now) {
   const auto leaves_then = then.flatten(), leaves_now = now.flatten();
   std::set<std::string> keys;
@@ -39,7 +40,7 @@ std::string difference(const nlohmann::json& then, const nlohmann::json& now) {
   return "";
 }
 
-// A plan may have grown at its end: what was captured is still its beginning.
+// The plan `now` without the poses that it has got at its end since `then`.
 nlohmann::json beginning(nlohmann::json now, const nlohmann::json& then) {
   const nlohmann::json::json_pointer poses("/plan/world_from_board");
   if (!now.contains(poses) || !then.contains(poses)) return now;
@@ -82,15 +83,16 @@ Status open_captures(const calib::CaptureSet& captures, const std::string& plan_
   const fs::path taken_by = captures.folder / k_taken_by, begun = captures.folder / "capture.json";
   if (fs::exists(begun)) {
     if (!fs::exists(taken_by))
-      return error("{}: expected captures of limn calibrate, found others (no {}). Choose another --out.",
-                   captures.folder.string(), k_taken_by);
+      return error(
+          "{}: expected captures of limn calibrate, found other captures (no {}). Choose another --out.",
+          captures.folder.string(), k_taken_by);
     LIMN_TRY(const Config config, Config::load(taken_by, "limn.captured_plan/1"));
     const nlohmann::json then = config.root().json();
     const std::string differs = difference(then, beginning(nlohmann::json::parse(plan_json), then));
     if (!differs.empty())
       return error(
-          "{}: expected captures of this plan, found those of another: {}. Choose another --out, or "
-          "calibrate with the plan that began them.",
+          "{}: expected captures of this plan, found those of another plan: {}. Choose another --out, or "
+          "calibrate with the plan of these captures.",
           captures.folder.string(), differs);
   }
   LIMN_TRY_STATUS(make_folder(captures.folder));

@@ -7,7 +7,7 @@
 namespace limn::apps {
 namespace {
 
-// response.json, relative to the plan's folder; empty where it is not asked for.
+// Reads the code and its options. Returns the path of response.json; empty if the plan names none.
 std::filesystem::path read_code(const Config& config, Plan* plan) {
   const ConfigNode root = config.root();
   const auto code = root.find("code");
@@ -16,7 +16,7 @@ std::filesystem::path read_code(const Config& config, Plan* plan) {
   if (!options) return {};
   options->only(calib::code_option_keys(plan->code));
   plan->code_options = calib::read_code_options(*options);
-  constexpr int k_any_side = 64;  // the options' range does not depend on the projector
+  constexpr int k_any_side = 64;  // the options' valid range does not depend on the projector's size
   const auto patterns = calib::Patterns::create(plan->code, k_any_side, k_any_side, plan->code_options);
   if (!patterns) options->problem(patterns.message());
   const auto response = options->find("response");

@@ -12,17 +12,16 @@
 
 namespace limn::apps {
 
-/// What to capture (limn.plan/1): on which rig, with which board and code, and, for a virtual rig, where the
-/// board is held.
+/// What to capture (limn.plan/1): the rig, the board and the code, and the board poses for a virtual rig.
 struct Plan {
   std::filesystem::path world;  ///< the virtual rig's world file
   calib::Board board;
   std::string code = "gray";
   calib::CodeOptions code_options;
-  std::vector<ProjectorResponse>
-      responses;                       ///< measured, for phase; empty: waves are drawn by code_options.gamma
+  /// Measured responses for the code phase; empty: waves are drawn with code_options.gamma.
+  std::vector<ProjectorResponse> responses;
   std::vector<Pose> world_from_board;  ///< board frame as in calib/board/board.h
-  bool response = false;               ///< also the response images, of the prototype
+  bool response = false;               ///< also capture the response images, of the prototype
 };
 
 /// Reads a plan; `world` is relative to the plan's folder.

@@ -12,7 +12,7 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_patience_s = 10;  // for a camera's frame
+constexpr double k_patience_s = 10;  // maximum wait for a camera's frame
 constexpr double k_retry_s = 0.1;
 
 cv::Mat level(const device::Display& display, int value) {
@@ -61,7 +61,7 @@ Surroundings DeviceBackend::surroundings(ImageWriter* writer) {
               }};
 }
 
-// The next frame, waited for with some patience.
+// The next frame; tries again for k_patience_s if there is none.
 Result<Frame> DeviceBackend::next(std::size_t camera) {
   const Stamp begun = devices_.now();
   for (;;) {
@@ -103,8 +103,8 @@ Status DeviceBackend::show(std::size_t projector, const cv::Mat& image) {
   return {};
 }
 
-// A frame whose whole exposure lies after what was shown last: a stamp is of the middle of an exposure, which
-// is a frame period long at most.
+// The first frame whose whole exposure lies after the last change of light. A stamp is the middle of an
+// exposure, and an exposure lasts at most one frame period.
 Result<cv::Mat> DeviceBackend::grab(std::size_t camera) {
   for (;;) {
     LIMN_TRY(const Frame frame, next(camera));
@@ -112,7 +112,8 @@ Result<cv::Mat> DeviceBackend::grab(std::size_t camera) {
   }
 }
 
-// All projectors light the board until it is seen still in a new place: by one camera, and moving in none.
+// Lights the board with all projectors until it is still in a new place for at least one camera and moves for
+// no camera.
 Status DeviceBackend::hold(const Surroundings::Seen& seen) {
   LIMN_TRY_STATUS(light_all(255));
   for (;;) {
@@ -133,7 +134,8 @@ Status DeviceBackend::hold(const Surroundings::Seen& seen) {
   }
 }
 
-// Until no camera sees the board and nothing moves in any, or a person says that the prototype stands.
+// Waits until no camera sees the board and nothing moves in any image, or until a person says that the
+// prototype is in place.
 Result<bool> DeviceBackend::stand(const Surroundings::Seen& seen) {
   LIMN_TRY_STATUS(light_all(255));
   std::vector<StillRoom> rooms(devices_.cameras.size());
@@ -173,13 +175,14 @@ Result<DeviceBackend::Devices> opened_devices(const Devices& named, const Result
   }
   for (device::DisplayConfig wanted : named.displays) {
     if (!wanted.name.starts_with("projector")) continue;
-    wanted.latency_s = 0;  // the stage adds it
+    wanted.latency_s = 0;  // DeviceBackend adds the measured latency
     LIMN_TRY(auto display, device::open_display(wanted, desktop ? &*desktop : nullptr));
     open.projectors.push_back(std::move(display));
   }
   if (open.cameras.empty() || open.projectors.empty())
-    return error("{}: expected a camera and a display whose name begins with projector, found none.",
-                 named.file.string());
+    return error(
+        "{}: expected at least one camera and one display whose name begins with projector, found too few.",
+        named.file.string());
   return open;
 }
 

@@ -16,20 +16,20 @@
 
 namespace limn::apps {
 
-/// Cameras and projectors in a room as the wizard's surroundings. Displays must be opened without a latency
-/// of their own: it is measured.
+/// Real cameras and projectors as the wizard's surroundings. Displays must be opened with a latency of 0,
+/// because the wizard measures it.
 class DeviceBackend {
  public:
   struct Devices {
     std::vector<std::unique_ptr<device::CameraSource>> cameras;
     std::vector<std::unique_ptr<device::Display>> projectors;
     std::function<Stamp()> now;                ///< the cameras' clock
-    std::function<void(double seconds)> wait;  ///< lets that clock go on
+    std::function<void(double seconds)> wait;  ///< waits this long on that clock
   };
-  /// `wish`: any ends the waiting for a board; may be null.
+  /// `wish`: a person's request, which ends the wait for a board; may be null.
   DeviceBackend(Devices devices, const calib::Board& board, std::atomic<WizardWish>* wish);
 
-  /// This must stay where it is as long as they are used; images go to `writer`.
+  /// They refer to this object, which must not move or end before them. Images go to `writer`.
   Surroundings surroundings(ImageWriter* writer);
 
  private:
@@ -44,18 +44,19 @@ class DeviceBackend {
   Devices devices_;
   calib::Board board_;
   std::atomic<WizardWish>* wish_;
-  std::vector<double> latency_s_;  // of the projectors
+  std::vector<double> latency_s_;  // latency of each projector
   std::vector<bool> is_black_;
-  std::vector<StillBoard> boards_;  // as each camera sees it
-  std::vector<Stamp> captured_at_;  // the newest frame of each camera
-  std::vector<double> period_s_;    // of each camera's frames
-  Stamp lit_at_;                    // what was shown last is on the surface
+  std::vector<StillBoard> boards_;  // for each camera
+  std::vector<Stamp> captured_at_;  // stamp of each camera's newest frame
+  std::vector<double> period_s_;    // frame period of each camera
+  Stamp lit_at_;                    // when the images shown last are on the surface
 };
 
-/// Cameras and projectors of a devices file; every one must work, and there must be some of both.
+/// Opens the cameras and projectors of a devices file. Error: one does not work, or there is not at
+/// least one of each.
 Result<DeviceBackend::Devices> opened_devices(const Devices& named, const Result<device::Desktop>& desktop);
 
-/// As captures name them.
+/// The devices' names and sizes, as captures list them.
 template <typename AllDevices>
 std::vector<calib::CapturedDevice> captured_devices(const AllDevices& all) {
   std::vector<calib::CapturedDevice> list;

@@ -9,18 +9,18 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_least_levels = 10;   // between black and white, of pixels that count as lit
-constexpr double k_least_share = 1e-3;  // of the image that must be lit
+constexpr double k_least_levels = 10;   // minimum of white minus black for a pixel that sees the light
+constexpr double k_least_share = 1e-3;  // share of the image that must see the light
 
-// What the camera shows of black and of white, and where they differ.
+// The camera's mean grey levels for black and white, over the pixels where they differ.
 struct Levels {
   cv::Mat mask;
   double black = 0, white = 0;
-  double period_s = 0;  // between frames
+  double period_s = 0;  // frame period
   double lit_share(const cv::Mat& grey) const { return (cv::mean(grey, mask)[0] - black) / (white - black); }
 };
 
-// The last frame of a while that begins with a change of the light.
+// Changes the light and returns the last frame after `seconds`. Also measures the frame period.
 Result<Frame> settled(const FlashStage& stage, bool white, double seconds, double* period_s) {
   LIMN_TRY(const Stamp shown_at, stage.show(white));
   LIMN_TRY(Frame frame, stage.next());
@@ -44,15 +44,15 @@ Result<Levels> levels_of(const FlashStage& stage, double limit_s) {
   levels.mask = difference > std::max(k_least_levels, most / 2);
   if (cv::countNonZero(levels.mask) < k_least_share * static_cast<double>(levels.mask.total()))
     return error(
-        "{}: expected to see the display flash, found no difference between white and black. Aim it at what "
-        "the display lights, and dim the room.",
+        "{}: expected to see the display flash, found no difference between white and black. Point it at "
+        "the surface that the display lights, and darken the room.",
         dark.camera);
   levels.black = cv::mean(black, levels.mask)[0];
   levels.white = cv::mean(white, levels.mask)[0];
   return levels;
 }
 
-// Seconds between which a flash was lit.
+// The interval in which a flash's light appeared, s after show().
 struct Span {
   double low = 0, high = 0;
 };
@@ -66,10 +66,12 @@ Result<Span> flash(const FlashStage& stage, const Levels& levels, bool white, do
     if ((levels.lit_share(to_grey(frame.image)) > 0.5) == white) return Span{before_s, at_s};
     before_s = std::max(0.0, at_s);
   }
-  return error("{}", "display: expected light to follow what is shown, found none in time. Check its cable.");
+  return error(
+      "{}",
+      "display: expected its light to change with the image, found no change in time. Check its cable.");
 }
 
-// The span that most flashes allow.
+// The interval that most flashes allow.
 DisplayLatency most_agreed(const std::vector<Span>& spans) {
   DisplayLatency best;
   for (const Span& begins : spans) {
@@ -100,8 +102,8 @@ Result<DisplayLatency> measured_latency(const FlashStage& stage, const FlashOpti
   const DisplayLatency latency = most_agreed(spans);
   if (2 * latency.flashes < options.flashes)
     return error(
-        "display: expected flashes that agree on a latency, found {} of {}. Is the camera's exposure longer "
-        "than a frame, or the display's picture improved by itself (game mode helps)?",
+        "display: expected flashes that agree on one latency, found that {} of {} do. Make the camera's "
+        "exposure shorter than its frame period, and switch off the display's image processing (game mode).",
         latency.flashes, options.flashes);
   return latency;
 }

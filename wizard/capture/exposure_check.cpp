@@ -15,16 +15,16 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_lit_levels = 12;    // white over black, of a lit pixel
-constexpr double k_least_lit = 0.005;  // of the image
+constexpr double k_lit_levels = 12;    // minimum of white minus black for a lit pixel
+constexpr double k_least_lit = 0.005;  // share of the image; below it, the camera does not see the projector
 constexpr int k_full = 253;            // grey level that counts as saturated
-constexpr double k_many = 0.02;        // of the lit pixels
-constexpr double k_dark = 90;          // level that a tenth of the lit pixels should exceed
-constexpr double k_wanted = 170;       // … and where it is well placed
+constexpr double k_many = 0.02;        // share of the lit pixels that may be saturated
+constexpr double k_dark = 90;          // minimum grey level that a tenth of the lit pixels should reach
+constexpr double k_wanted = 170;       // best value of that level
 constexpr double k_blurred_px = 2.5;   // half a cell of the board's markers in a small image
-constexpr int k_squares = 16;          // across the projector's image
+constexpr int k_squares = 16;          // number of squares across the projector's image
 
-// Sigma of the edges between dark and lit squares; 0 when there are too few.
+// Standard deviation of the blur of the squares' edges, camera pixels; 0 if there are too few edges.
 double blur_of(const cv::Mat& black, const cv::Mat& white, const cv::Mat& pattern, const cv::Mat& lit) {
   cv::Mat range, share;
   cv::subtract(white, black, range, cv::noArray(), CV_32F);
@@ -54,18 +54,18 @@ std::vector<std::string> ExposureReading::advice() const {
   if (lit < k_least_lit) return all;
   if (saturated > k_many)
     all.push_back(fmt::format(
-        "{}: {:.0f} % of what {} lights is saturated. Shorten the exposure to a half, or close the "
+        "{}: {:.0f} % of the pixels that {} lights are saturated. Shorten the exposure to half, or close the "
         "aperture.",
         camera, 100 * saturated, projector));
   else if (bright < k_dark)
     all.push_back(fmt::format(
-        "{}: the light of {} reaches grey level {:.0f} of 255. Lengthen the exposure {:.1f} times, or "
+        "{}: the light of {} only reaches grey level {:.0f} of 255. Lengthen the exposure {:.1f} times, or "
         "open the aperture.",
         camera, projector, bright, k_wanted / std::max(1.0, bright)));
   if (blur_px > k_blurred_px)
     all.push_back(
-        fmt::format("{}: edges that {} shows are {:.1f} pixels soft. Focus the projector where the board is, "
-                    "then the camera.",
+        fmt::format("{}: edges that {} projects are blurred by {:.1f} pixels. Focus the projector on the "
+                    "board, then the camera.",
                     camera, projector, blur_px));
   return all;
 }
@@ -139,9 +139,8 @@ std::vector<std::string> unseen(const std::vector<ExposureReading>& seen) {
   for (const auto& [projector, lit] : most)
     if (lit < k_least_lit)
       sentences.push_back(
-          fmt::format("{}: expected its light in a camera's picture, found none. Switch it on, open its lens "
-                      "cap, and aim it "
-                      "at what the cameras see.",
+          fmt::format("{}: expected its light in a camera's image, found none. Switch it on, remove its lens "
+                      "cap, and point it at what the cameras see.",
                       projector));
   return sentences;
 }

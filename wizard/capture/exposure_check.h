@@ -10,32 +10,32 @@
 
 namespace limn::apps {
 
-/// What a camera sees of one projector's light.
+/// How a camera sees the light of one projector.
 struct ExposureReading {
   std::string camera, projector;
-  double lit = 0;        ///< share of the image that white makes brighter
-  double saturated = 0;  ///< of the lit pixels, under white
-  double bright = 0;     ///< grey level that a tenth of the lit pixels exceeds, under white
-  double blur_px = 0;    ///< sigma of edges that the projector shows, camera pixels; 0: no edge was seen
-  std::vector<int> histogram;  ///< of the lit pixels, under white, 256 levels
+  double lit = 0;        ///< share of the image that is brighter under white than under black
+  double saturated = 0;  ///< share of these lit pixels that white saturates
+  double bright = 0;     ///< grey level that a tenth of the lit pixels reaches under white
+  double blur_px = 0;  ///< standard deviation of the blur of projected edges, camera pixels; 0: no edge found
+  std::vector<int> histogram;  ///< grey levels of the lit pixels under white, 256 counts
 
-  /// What is wrong and what to do about it; empty: nothing.
+  /// Sentences that say what is wrong and what to do; empty: nothing is wrong.
   std::vector<std::string> advice() const;
 };
 
-/// Judges a camera's images (8-bit, of one size) of a projector's black, white and black and white squares
-/// (squares()). Pure.
+/// Evaluates a camera's images (8-bit, of equal size) of a projector's black, white and squares(). Leaves the
+/// names empty. Pure.
 ExposureReading judged_exposure(const cv::Mat& black, const cv::Mat& white, const cv::Mat& squares);
 
-/// The image of squares that judged_exposure() wants.
+/// The image of black and white squares that judged_exposure() needs.
 cv::Mat squares(int width, int height);
 
-/// Each projector in turn shows its number and colour (for people), then black, white and squares; what every
-/// camera sees of it, projector by projector. Error: a device fails.
+/// Each projector in turn shows its number and colour (for people), then black, white and squares. Returns
+/// how every camera sees it, projector by projector. Error: a device fails.
 Result<std::vector<ExposureReading>> measured_exposure(const calib::CaptureSet& captures,
                                                        const calib::CaptureBackend& stage);
 
-/// Projectors that no camera sees, a sentence each; empty: all are seen.
+/// One sentence for each projector that no camera sees; empty: all are seen.
 std::vector<std::string> unseen(const std::vector<ExposureReading>& seen);
 
 }  // namespace limn::apps

@@ -8,10 +8,10 @@
 
 namespace limn::apps {
 
-/// What one other thread wants done in the main thread, where windows and monitors live.
+/// Runs functions of one other thread in the main thread, which owns windows and monitors.
 class MainThreadExecutor {
  public:
-  /// Of the other thread: returns when the main thread has done it.
+  /// Called by the other thread. Returns when the main thread has run the function.
   void run(const std::function<void()>& errand) {
     std::unique_lock lock(mutex_);
     errand_ = &errand;
@@ -19,7 +19,7 @@ class MainThreadExecutor {
     done_.wait(lock, [this] { return errand_ == nullptr; });
   }
 
-  /// Of the main thread: does what is wanted, if anything is or comes in so long.
+  /// Called by the main thread. Runs the function that waits or arrives within `wait`, if there is one.
   void serve(std::chrono::nanoseconds wait = {}) {
     std::unique_lock lock(mutex_);
     if (!wanted_.wait_for(lock, wait, [this] { return errand_ != nullptr; })) return;

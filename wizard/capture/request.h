@@ -2,15 +2,15 @@
 
 namespace limn::apps {
 
-/// What a person asks of a running wizard.
+/// A person's request to a running wizard.
 enum class WizardWish {
   none,
-  check,   ///< look at outputs, exposure and latency again, then take the images of this pose again
-  repeat,  ///< take the images of this pose again
-  finish,  ///< take no more poses: solve
-  scan,    ///< the prototype stands there: scan it
-  skip,    ///< leave out what is waited for
-  leave    ///< stop; what was captured stays, the next run goes on from there
+  check,   ///< check outputs, exposure and latency again, then capture this pose again
+  repeat,  ///< capture this pose again
+  finish,  ///< capture no more poses: solve
+  scan,    ///< the prototype is in place: scan it
+  skip,    ///< do not wait for the prototype: leave out its steps
+  leave    ///< stop; the captured images stay, and the next run continues from them
 };
 
 }  // namespace limn::apps

@@ -18,12 +18,12 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-// A rig that predicts pixels better than this has not been asked outside its poses.
+// Minimum of the rig's own error, px: a smaller held-out error holds only near the calibration's poses.
 constexpr double k_least_rig_px = 0.05;
-constexpr double k_guard_s = 0.001;  // beyond a measured latency
+constexpr double k_guard_s = 0.001;  // added to a measured latency
 constexpr const char* k_code_in_place = "gray";
 const calib::CodeOptions k_sparse{.inverses = false};
-constexpr const char* k_any_board = "charuco:11x8:25mm";  // of a rig that does not tell its own
+constexpr const char* k_any_board = "charuco:11x8:25mm";  // for a rig whose provenance names no board
 
 double rounded(double v) { return std::round(v * 1e4) / 1e4; }
 
@@ -32,7 +32,7 @@ Json provenance_of(const Rig& rig) {
   return provenance.is_object() ? provenance : Json::object();
 }
 
-// How well the rig predicts, and how its board is bent, as its solve noted them.
+// The rig's own error and the bend of its board, as its solve stored them.
 calib::RigCheckOptions options_for(const Rig& rig, const calib::Board& board) {
   calib::RigCheckOptions options;
   const Json provenance = provenance_of(rig);
@@ -95,7 +95,8 @@ Json json_of(const Rechecked& checked, const std::vector<std::string>& poses) {
           {"pictures", checked.images}};
 }
 
-// The rig with its first candidate's pose re-solved. What was known about errors is no longer so.
+// The checked rig, whose first candidate has a re-solved pose, with a note of it in its provenance. Its
+// stored covariance is removed, because it is no longer right.
 Rig repaired(const calib::RigCheck& result) {
   Rig rig = result.rig;
   if (result.candidates.empty()) return rig;
@@ -129,11 +130,12 @@ std::string recheck_sentence(const calib::RigCheck& result) {
   using calib::RigVerdict;
   if (result.verdict == RigVerdict::sound) return "sound: nothing has moved";
   if (result.verdict == RigVerdict::unexplained)
-    return "no move of one device explains what is seen: several have moved, or a lens was turned";
+    return "no move of one device explains the observations: several devices have moved, or a lens was "
+           "turned";
   std::string names;
   for (const calib::Move& move : result.candidates) names += (names.empty() ? "" : " or ") + move.device;
   if (result.verdict == RigVerdict::moved) return names + " has moved";
-  return names + " has moved relative to the other; a board that stands still (--still) tells which";
+  return names + " has moved relative to the other; a board that stands still (--still) shows which one";
 }
 
 Status check_explained(const calib::RigCheck& result) {

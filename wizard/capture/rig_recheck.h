@@ -15,48 +15,48 @@ namespace limn::apps {
 
 struct Rechecked {
   calib::RigCheck result;
-  int images = 0;  ///< shown and photographed, all cameras at once
+  int images = 0;  ///< number of images shown; all cameras photograph each
 };
 
-/// What captures say of a rig, and how recheck.json says it.
+/// The result of a rig check, and the text of recheck.json.
 struct CheckedRig {
-  Rechecked rechecked;  ///< its rig is the mended one
+  Rechecked rechecked;  ///< its rig is the corrected one
   std::string json;
 };
 
-/// Checks a rig by the captures in `folder` and writes recheck.json into `out`. `still`: an earlier
-/// recheck.json whose boards have not been touched since; empty: none. Error also when `should_continue`,
-/// which is asked now and then, says false.
+/// Checks a rig with the captures in `folder` and writes recheck.json into `out`. `still`: an earlier
+/// recheck.json whose boards have not been touched since; empty: none. `should_continue` is called from time
+/// to time; it is an error, too, if it returns false.
 Result<CheckedRig> recheck_rig(const Rig& rig,
                                const std::filesystem::path& folder,
                                const std::filesystem::path& still,
                                const std::filesystem::path& out,
                                const std::function<bool()>& should_continue = {});
 
-/// What a recheck found, as a sentence.
+/// The result as a sentence.
 std::string recheck_sentence(const calib::RigCheck& result);
 
-/// Error: no move of a single device explains what is seen.
+/// Error: no move of a single device explains the observations.
 Status check_explained(const calib::RigCheck& result);
 
-/// The board that the rig was calibrated with, should that be in view.
+/// The board that the rig was calibrated with; a default board if its provenance names none.
 Result<calib::Board> calibration_board(const Rig& rig);
 
-/// One pose of whatever stands before the devices of `around`, into the captures' folder; the projectors'
-/// latencies as the rig has them.
+/// Captures one pose of whatever stands in front of the devices of `around` into the captures' folder, with
+/// the display latencies in the rig's provenance.
 Status captured_once(const calib::CaptureSet& captures, const Rig& rig, const Surroundings& around);
 
-/// The prototype as it stands, captured once by devices that are open already (those of `around`, with the
-/// names and in the order of the rig's; of it stage, written and use_latency are needed), against the rig.
-/// The result's rig is the mended one; it, recheck.json and captures/ are in `folder`. Error, and no rig is
-/// written: no single move explains what is seen, or `should_continue`, which is asked now and then, says
-/// false.
+/// Captures the prototype once as it stands and checks the rig with it. The devices of `around` are already
+/// open and have the rig's names and order; only stage, written and use_latency are needed. The result's rig
+/// is the corrected one; it, recheck.json and captures/ are written to `folder`. Error, and no rig is
+/// written: no move of a single device explains the observations, or `should_continue`, which is called from
+/// time to time, returns false.
 Result<Rechecked> rechecked_in_place(const Rig& rig,
                                      const Surroundings& around,
                                      const std::filesystem::path& folder,
                                      const std::function<bool()>& should_continue = {});
 
-/// How many images that shows.
+/// The number of images that rechecked_in_place() shows.
 int recheck_images(const Rig& rig);
 
 }  // namespace limn::apps

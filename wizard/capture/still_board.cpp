@@ -8,13 +8,14 @@ namespace limn::apps {
 namespace {
 
 constexpr std::size_t k_least_corners = 8;
-constexpr double k_still_px = 0.7;    // a hand that trembles more blurs the patterns' edges
-constexpr double k_still_s = 0.8;     // for so long
-constexpr double k_elsewhere = 0.08;  // of the board's diagonal in the image, by the corner that moved most
+constexpr double k_still_px = 0.7;  // px; more movement blurs the patterns' edges
+constexpr double k_still_s = 0.8;   // seconds that the board must be still
+// Share of the board's diagonal in the image: in a new place, at least one corner has moved by more.
+constexpr double k_elsewhere = 0.08;
 
 using Corners = std::map<int, Eigen::Vector2d>;
 
-// How far the corner that moved most has moved; infinite when fewer than half are in both.
+// The largest movement of a corner, px; infinite if fewer than half of a's corners are in both.
 double most_moved(const Corners& a, const Corners& b) {
   double most = 0;
   std::size_t common = 0;

@@ -8,19 +8,19 @@
 
 namespace limn::apps {
 
-/// Tells when a board is held still in a new place, from its corners in one camera's frames.
+/// Detects that a board is held still in a new place, from its corners in one camera's frames.
 class StillBoard {
  public:
-  enum class State { unseen, moving, known, still };  ///< known: still where it was captured
+  enum class State { unseen, moving, known, still };  ///< known: still where it was captured last
 
-  /// The corners of the next frame; stamps must not go back.
+  /// Adds the corners of the next frame; stamps must not decrease.
   State take(const std::vector<calib::BoardCorner>& corners, Stamp at);
-  /// Where the board is seen now has been captured: the next place must be another.
+  /// The board has been captured where it is now; the next place must be a different one.
   void captured() { captured_ = last_; }
 
  private:
   using Corners = std::map<int, Eigen::Vector2d>;  // by id
-  Corners last_, still_, captured_;                // still_: since `since_`
+  Corners last_, still_, captured_;                // still_: the corners at `since_`
   Stamp since_;
 };
 

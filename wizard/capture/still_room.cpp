@@ -7,9 +7,9 @@
 namespace limn::apps {
 namespace {
 
-constexpr int k_width = 160;       // of the small image: noise and flicker of single pixels are gone
-constexpr double k_levels = 8;     // of 255: more than noise
-constexpr double k_share = 0.002;  // of the image: a hand at its edge
+constexpr int k_width = 160;       // width of the small image, in which noise of single pixels averages out
+constexpr double k_levels = 8;     // on the scale of 255; larger changes are not noise
+constexpr double k_share = 0.002;  // share of the image; a hand at its edge changes more
 
 }  // namespace
 

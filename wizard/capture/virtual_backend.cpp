@@ -12,14 +12,14 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_guard_s = 0.001;  // beyond a measured latency
+constexpr double k_guard_s = 0.001;  // added to a measured latency
 
-// A virtual rig's devices with what is known of their latencies.
+// A virtual rig's devices and the latencies measured so far.
 struct VirtualStage {
   sim::VirtualRig* rig = nullptr;
-  std::vector<double> latency_s;  // of the projectors
-  std::vector<cv::Mat> frames;    // of one exposure of all cameras, not grabbed yet
-  Stamp lit_at;                   // what was shown last is on the surface
+  std::vector<double> latency_s;  // latency of each projector
+  std::vector<cv::Mat> frames;    // one exposure of all cameras; an image is empty once grabbed
+  Stamp lit_at;                   // when the image shown last is on the surface
 
   Status show(int projector, const cv::Mat& image) {
     rig->darken();
@@ -41,7 +41,7 @@ struct VirtualStage {
     return std::exchange(wanted, cv::Mat());
   }
 
-  // The board as it is held, in white light.
+  // Gives `seen` every camera's image of the board in white light.
   Status look(const calib::Board& board, const Surroundings::Seen& seen) {
     LIMN_TRY_STATUS(show(0, cv::Mat(rig->projector(0).size(), CV_8UC1, cv::Scalar(255))));
     for (int i = 0; i < static_cast<int>(frames.size()); ++i) {
@@ -51,7 +51,7 @@ struct VirtualStage {
     return {};
   }
 
-  // The board is gone, the prototype back where the world has it.
+  // Removes the board and puts the prototype back where the world has it.
   Result<bool> stand(const Surroundings::Seen& seen) {
     rig->remove("board");
     rig->restore_prototype();

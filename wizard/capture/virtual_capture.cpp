@@ -15,7 +15,7 @@ std::vector<calib::CapturedDevice> devices(const std::vector<Imager>& imagers) {
   return devices;
 }
 
-// Captures one pose for each call of `set_up`, which changes the stage.
+// Captures `pose_count` poses; before each, `set_up` arranges the world.
 Status capture_poses(const calib::CaptureSet& captures,
                      int pose_count,
                      const std::function<void(int)>& set_up,

@@ -12,27 +12,26 @@
 
 namespace limn::apps {
 
-/// The board as a thing in the world, called "board".
+/// The board as an object of the world, named "board".
 sim::Object board_object(const calib::Board& board, const Pose& world_from_board);
 
-/// The captures folder that a plan makes of this rig, still without poses.
+/// The capture set of a plan for this rig, still without poses.
 Result<calib::CaptureSet> planned(const Plan& plan,
                                   const sim::VirtualRig& rig,
                                   const std::filesystem::path& out);
 
-/// The rig's devices as calib asks for them; images go to `writer`.
+/// The rig's devices as a capture backend; images go to `writer`.
 calib::CaptureBackend stage_of(sim::VirtualRig* rig,
                                ImageWriter* writer,
                                calib::ReportProgress report_progress);
 
-/// Captures the response images of whatever stands before the rig.
+/// Captures the response images of whatever stands in front of the rig.
 Status capture_lit(const calib::CaptureSet& captures, sim::VirtualRig* rig);
 
-/// Captures every pose of the plan with the board in a virtual rig, whose prototype is put away meanwhile.
+/// Captures every pose of the plan with the board in a virtual rig; the prototype is removed meanwhile.
 Status capture_virtually(const Plan& plan, sim::VirtualRig* rig, const std::filesystem::path& out);
 
-/// Captures the world's prototype itself, standing at each of the places in turn, without a board: scene
-/// captures (limn scan).
+/// Captures the world's prototype at each of these poses, without a board: scene captures (limn scan).
 Status capture_prototype(const Plan& plan,
                          const std::vector<Pose>& world_from_prototype,
                          sim::VirtualRig* rig,

@@ -11,7 +11,7 @@ struct PixelSize {
   int height = 0;
 };
 
-/// "1280x800" as numbers; anything else is wrong usage of --projector.
+/// Parses a size such as "1280x800"; anything else is a usage error of --projector.
 Result<PixelSize> parse_pixel_size(const std::string& text);
 
 }  // namespace limn::apps

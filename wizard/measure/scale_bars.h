@@ -7,13 +7,13 @@
 
 namespace limn::apps {
 
-/// The markers of the lengths as the tracker finds them in every camera's white images of every pose; the
-/// first projector's that shows one. An unknown family is an error.
+/// The scale bars' markers as the tracker finds them, for every pose and camera: each marker in the white
+/// image of the first projector that shows it. Error: an unknown family.
 Result<std::vector<calib::DetectedMark>> scale_bar_marks(const calib::CaptureSet& captures,
                                                          const Rig& rig,
                                                          const std::vector<calib::ScaleBar>& lengths);
 
-/// The lengths of capture.json and of the command line.
+/// The scale bars of capture.json and of the command line.
 Result<std::vector<calib::ScaleBar>> scale_bar_lengths(const calib::CaptureSet& captures,
                                                        const std::vector<std::string>& options);
 

@@ -27,15 +27,15 @@ namespace fs = std::filesystem;
 using Eigen::Vector3d;
 
 constexpr int k_image_width = 1200, k_image_height = 800;
-constexpr double k_residual_reach_m = 0.02;  // further from the mesh is another thing
-constexpr double k_colour_limit_mm = 2;      // end of the residual map's colours
-constexpr double k_symmetric = 0.9;          // a rival that explains this share of the best pose's points
-constexpr std::size_t k_told = 12;           // differences printed; all are in align.json
+constexpr double k_residual_reach_m = 0.02;  // points further from the mesh belong to another object
+constexpr double k_colour_limit_mm = 2;      // end of the residual map's colour scale
+constexpr double k_symmetric = 0.9;  // share of the best pose's points; a warning if a rival pose fits more
+constexpr std::size_t k_told = 12;   // number of differences printed; all are in align.json
 
 // A pose and how it was found.
 struct Start {
   Pose world_from_prototype;
-  std::optional<Matrix6d> covariance;  // of markers
+  std::optional<Matrix6d> covariance;  // only if it comes from markers
   std::string how;
 };
 
@@ -61,7 +61,7 @@ Result<Start> start_from_picks(const fs::path& path, double metres_per_unit) {
   return Start{*pose, std::nullopt, "points"};
 }
 
-// CAMERA=PICTURE, read and of the camera's size.
+// A --frame argument CAMERA=PICTURE: the camera, and the image, which has the camera's size.
 struct Shot {
   const Imager* camera = nullptr;
   cv::Mat image;
@@ -75,12 +75,12 @@ Result<Shot> read_shot(const std::string& argument, const Rig& rig) {
     return usage_error("--frame {}: expected CAMERA=PICTURE with a camera of the rig.", argument);
   LIMN_TRY(cv::Mat image, read_grey_image(argument.substr(equals + 1)));
   if (image.cols != camera->width || image.rows != camera->height)
-    return error("{}: expected a picture of {}'s size {}x{}, found {}x{}.", argument.substr(equals + 1), name,
+    return error("{}: expected an image of {}'s size {}x{}, found {}x{}.", argument.substr(equals + 1), name,
                  camera->width, camera->height, image.cols, image.rows);
   return Shot{&*camera, std::move(image)};
 }
 
-// Where a body stands in the frames, by all cameras' markers at once.
+// The pose of a body from its markers in all frames.
 Result<Track> track_in_frames(const AlignOptions& command, const Body& body, const fs::path& family_folder) {
   LIMN_TRY(const Rig rig, load_rig(command.rig));
   LIMN_TRY(tracker::Families families,
@@ -98,7 +98,7 @@ Result<Track> track_in_frames(const AlignOptions& command, const Body& body, con
   const auto track = tracker::world_from_body(body, views, Stamp{});
   if (!track)
     return error(
-        "--frame: expected markers of the prototype in the picture, found none of its {}. Look at light and "
+        "--frame: expected markers of the prototype in the images, found none of its {}. Check light and "
         "focus.",
         body.markers.size());
   return *track;
@@ -119,7 +119,7 @@ Result<Start> start_from_markers(const AlignOptions& command) {
   return Start{track.world_from_body, track.covariance, fmt::format("{} markers", track.marker_count)};
 }
 
-// The body's markers on the CAD, once that was found to stand there.
+// Writes the poses of the body's markers on the CAD, which stands at `world_from_prototype`.
 Status write_markers(const AlignOptions& command, const Pose& world_from_prototype) {
   LIMN_TRY(std::vector<BodyMarker> markers, scene::load_marker_file(command.body));
   LIMN_TRY(const Track track, track_in_frames(command, {"body", markers}, command.body.parent_path()));
@@ -128,7 +128,8 @@ Status write_markers(const AlignOptions& command, const Pose& world_from_prototy
   return write_file(command.out / "markers.json", scene::marker_file_json(markers));
 }
 
-// A scene gives its mesh alone without frames, and where the frames are for another body.
+// Whether the scene's markers give the start. Without frames, or with frames for another body, the scene only
+// gives its mesh.
 bool starts_from_markers(const AlignOptions& command) {
   const bool is_mesh_alone = command.mesh.empty() && (command.frames.empty() || !command.body.empty());
   return !command.scene.empty() && !is_mesh_alone;
@@ -146,7 +147,7 @@ Status checked(const AlignOptions& command) {
   if (starts > 1) return usage_error("expected one of --start, --points, --scene, found {}.", starts);
   if (command.scan.empty() && command.scene.empty())
     return usage_error(
-        "expected --scan SCAN.ply, or --scene, --rig and --frame to take the markers' answer alone.");
+        "expected --scan SCAN.ply, or --scene, --rig and --frame to get the pose from markers alone.");
   return {};
 }
 
@@ -176,7 +177,7 @@ Result<MeshAligned> align(const AlignOptions& command,
              calib::refined_registration(mesh, index, scan, start->world_from_prototype));
     result.how = start->how;
   } else {
-    log_info("align: no start given, looking everywhere");
+    log_info("align: no start given; the whole scan is searched");
     const auto found = calib::global_registration(mesh, index, scan);
     if (!found) return error("{}: {}", command.scan.string(), found.message());
     result.registration = found->registration;
@@ -185,22 +186,22 @@ Result<MeshAligned> align(const AlignOptions& command,
       const double turn =
           angle_between(found->rival->rotation, found->registration.world_from_prototype.rotation);
       result.warnings.push_back(fmt::format(
-          "another pose, turned by {:.0f} degrees, explains {:.0f} % as many points: the shape is "
-          "symmetric or too little of it was scanned. Check the picture, or give --start.",
+          "another pose, turned by {:.0f} degrees, fits {:.0f} % as many points: the shape is symmetric or "
+          "too little of it was scanned. Check residual.png, or give --start.",
           turn * 180 / M_PI, 100 * found->rival_share));
     }
   }
   for (const std::string& free : result.registration.free_directions)
     result.warnings.push_back(fmt::format(
-        "the scanned shape does not hold the fit against a {} (prototype's axes): that part of the "
-        "pose comes from the start alone. Scan more of it, or use markers.",
+        "the scanned shape does not determine a {} (prototype's axes): that part of the pose comes from "
+        "the start alone. Scan more of it, or use markers.",
         free));
   return result;
 }
 
 std::string text_of(const calib::Difference& d) {
   return fmt::format(
-      "{:.1f} cm2 around ({:.0f}, {:.0f}, {:.0f}) mm of the prototype: the scan stands {:.1f} mm {} the CAD "
+      "{:.1f} cm2 around ({:.0f}, {:.0f}, {:.0f}) mm of the prototype: the scan lies {:.1f} mm {} the CAD "
       "(up to {:.1f} mm)",
       1e4 * d.area_m2, 1e3 * d.p_prototype.x(), 1e3 * d.p_prototype.y(), 1e3 * d.p_prototype.z(),
       1e3 * std::abs(d.mean_m), d.mean_m > 0 ? "outside" : "inside", 1e3 * std::abs(d.worst_m));
@@ -234,7 +235,7 @@ nlohmann::ordered_json json_of(const MeshAligned& aligned,
   return json;
 }
 
-// The scan's points near the mesh in the colours of their residuals, in the prototype's frame.
+// The scan's points near the mesh, coloured by their residuals, in the prototype's frame.
 scene::ScanSurface coloured(const scene::ScanSurface& scan,
                             const std::vector<float>& residuals,
                             const Pose& world_from_prototype) {
@@ -256,7 +257,7 @@ Status write_images(const scene::ScanSurface& map, const fs::path& out) {
   for (const auto& n : map.normals) d_seen += n.cast<double>();
   d_seen.normalize();
   const Vector3d up = std::abs(d_seen.y()) < 0.9 ? Vector3d::UnitY() : Vector3d::UnitZ();
-  const std::string caption = "scan over the CAD: red stands outside, blue inside";
+  const std::string caption = "scan and CAD: red is outside the CAD, blue inside";
   for (const auto& [name, turn] : {std::pair{"residual.png", 0.0}, std::pair{"residual-side.png", 0.9}}) {
     const Vector3d d_from = Eigen::AngleAxisd(turn, up) * d_seen;
     const auto viewer = scene::preview_viewer(map, d_from, up, k_image_width, k_image_height);
@@ -271,7 +272,7 @@ Status write_pose(const Pose& world_from_prototype, const fs::path& out) {
   return write_file(out / "poses.json", poses.dump(2) + "\n");
 }
 
-// The markers' answer alone.
+// Writes the pose that the markers alone give.
 Result<MeshAligned> written_markers_pose(const Start& start, const AlignOptions& command, double seconds) {
   MeshAligned aligned;
   aligned.registration.world_from_prototype = start.world_from_prototype;
@@ -283,7 +284,7 @@ Result<MeshAligned> written_markers_pose(const Start& start, const AlignOptions&
   return aligned;
 }
 
-// The mesh that is laid onto the scan: the CAD file, or the scene's prototype.
+// The mesh to align with the scan: the CAD file, or the scene's prototype.
 Result<scene::Mesh> mesh_of(const AlignOptions& command) {
   if (!command.mesh.empty()) return scene::load_mesh(command.mesh, command.units);
   LIMN_TRY(scene::Scene scene, scene::load_scene(command.scene));
@@ -316,7 +317,7 @@ Result<MeshAligned> written_alignment(const AlignOptions& command) {
     aligned.warnings.push_back(text_of(differences[i]));
   if (differences.size() > k_told)
     aligned.warnings.push_back(
-        fmt::format("{} smaller regions differ, too: see align.json", differences.size() - k_told));
+        fmt::format("{} smaller regions also differ: see align.json", differences.size() - k_told));
 
   LIMN_TRY_STATUS(make_folder(command.out));
   const scene::ScanSurface map = coloured(scan, residuals, aligned.registration.world_from_prototype);

@@ -10,32 +10,33 @@
 namespace limn::apps {
 
 struct AlignOptions {
-  std::filesystem::path scan;  ///< PLY, or the folder of limn scan; empty: the markers' answer alone
+  std::filesystem::path scan;  ///< PLY, or the folder of limn scan; empty: the pose comes from markers
   std::string scan_units = "m";
   std::filesystem::path mesh;    ///< empty: the scene's prototype
-  std::string units;             ///< of mesh
+  std::string units;             ///< units of the mesh
   std::filesystem::path start;   ///< POSES.json, or {"world_from_prototype": POSE}
   std::filesystem::path points;  ///< limn.picks/1
-  std::filesystem::path scene;   ///< its prototype's markers give the start, in frames of a rig
-  std::filesystem::path
-      body;  ///< markers that stand anywhere on the thing (limn.body/1): where they are on the CAD
+  std::filesystem::path scene;   ///< its prototype's markers in `frames` give the start
+  /// Markers anywhere on the scanned object (limn.body/1); their poses on the CAD are computed.
+  std::filesystem::path body;
   std::filesystem::path rig;
-  std::vector<std::string> frames;  ///< CAMERA=PICTURE, of the thing as it was scanned
-  double least_mm = 1;              ///< smaller differences are not told
+  std::vector<std::string> frames;  ///< CAMERA=PICTURE, images of the object as it was scanned
+  double least_mm = 1;              ///< smaller differences are not reported
   std::filesystem::path out;
 };
 
-/// Where a mesh was found to stand.
+/// The result of an alignment.
 struct MeshAligned {
   calib::Registration registration;
-  std::string how;                    ///< what it started from
-  std::vector<std::string> warnings;  ///< symmetric or free shapes, and where the CAD and the scan differ
+  std::string how;                    ///< where the start came from
+  std::vector<std::string> warnings;  ///< symmetry, undetermined directions, differences of CAD and scan
 };
 
-/// Where a CAD mesh stands in the scan: poses.json (POSES.json), align.json with its covariance,
-/// residual.ply, residual.png and residual-side.png, and warnings where the CAD and the scan differ. With a
-/// body also markers.json (limn.markers/1), for a scene's prototype.markers. Without a start the whole scan
-/// is searched. Everything is worked out before the first file is written.
+/// Finds the pose of a CAD mesh in the scan and writes poses.json (which can be given as POSES.json),
+/// align.json with the covariance, residual.ply, residual.png and residual-side.png; warns where the CAD and
+/// the scan differ. With a body it also writes markers.json (limn.markers/1), for a scene's
+/// prototype.markers. Without a start the whole scan is searched. The alignment is computed before the first
+/// file is written.
 Result<MeshAligned> written_alignment(const AlignOptions& command);
 
 }  // namespace limn::apps

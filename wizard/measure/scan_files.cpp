@@ -16,7 +16,7 @@ namespace limn::apps {
 namespace {
 
 constexpr int k_preview_width = 1200, k_preview_height = 800;
-constexpr double k_deviation_limit_mm = 0.5;  // end of the colours of the deviation map
+constexpr double k_deviation_limit_mm = 0.5;  // end of the deviation map's colour scale
 
 double percentile(std::vector<float> values, double share) {
   if (values.empty()) return 0;
@@ -77,7 +77,7 @@ nlohmann::ordered_json scan_json(const calib::Scan& scan, double seconds) {
   return json;
 }
 
-// The camera's own image of what it measured: lit from beside it, nothing where there is no point.
+// The measured surface in its camera's image, shaded by a light beside the camera; dark without a point.
 cv::Mat shaded(const calib::RangeView& view) {
   const Eigen::Vector3d d_light =
       view.camera.imager_from_world.rotation.conjugate() * Eigen::Vector3d(-0.45, -0.6, -1).normalized();
@@ -114,7 +114,7 @@ Status write_images(const calib::Scan& scan, const std::filesystem::path& out) {
   const Pose& camera_from_world = scan.views.front().view.camera.imager_from_world;
   const Eigen::Quaterniond world_from_camera = camera_from_world.rotation.conjugate();
   const Eigen::Vector3d d_from =
-      world_from_camera * Eigen::Vector3d(0.5, -0.35, -1);  // beside the camera, above it
+      world_from_camera * Eigen::Vector3d(0.5, -0.35, -1);  // from beside and above the camera
   const scene::ConnectedComponents pieces = scene::connected_components(scan.mesh);
   std::vector<bool> largest;
   for (const int piece : pieces.of_vertex) largest.push_back(piece == 0);

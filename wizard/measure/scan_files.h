@@ -9,14 +9,14 @@
 
 namespace limn::apps {
 
-/// Measures the surface as calib::scanned does and writes points.ply, mesh.ply (metres, the rig's world),
+/// Measures the surface with calib::scan_captures and writes points.ply, mesh.ply (metres, the rig's world),
 /// scan.json and images into `out`. Everything is measured before the first file is written.
 Result<calib::Scan> written_scan(const calib::CaptureSet& captures,
                                  const Rig& rig,
                                  const calib::ScanOptions& options,
                                  const std::filesystem::path& out);
 
-/// The standard deviation that this share (0 to 1) of the scan's points does not exceed; 0 without points.
+/// The quantile `share` (0 to 1) of the points' standard deviations, mm; 0 without points.
 double stddev_mm(const calib::Scan& scan, double share);
 
 }  // namespace limn::apps

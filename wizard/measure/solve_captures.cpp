@@ -61,8 +61,7 @@ Status check_models(const SolveCommandOptions& options) {
   return {};
 }
 
-// The known lengths as light measures them; what is wrong with them is a fault, and nothing with a fault of
-// scale is good.
+// Measures the scale bars. A wrong length is a fault, and a rig with a fault of scale is never "good".
 Status check_lengths(const calib::CaptureSet& captures,
                      const std::vector<calib::ScaleBar>& lengths,
                      calib::Report* report) {
@@ -78,7 +77,7 @@ Status check_lengths(const calib::CaptureSet& captures,
   return {};
 }
 
-// What kept a rig from being made, with the faults that explain it; they also stand in report.json.
+// The error of a failed solve with the faults that explain it, which are also written to report.json.
 Error explained(const Error& failure,
                 const std::vector<calib::Fault>& faults,
                 const SolveCommandOptions& options) {
@@ -88,7 +87,7 @@ Error explained(const Error& failure,
   return error("{}\n{}", failure.message, calib::to_text(faults));
 }
 
-// What the rig says against the one that it replaces.
+// Adds the faults that show when the rig is compared with the one that it replaces.
 void compare_with_earlier(const SolveCommandOptions& options,
                           const calib::Solution& solution,
                           calib::Assessment* assessment) {
@@ -97,8 +96,7 @@ void compare_with_earlier(const SolveCommandOptions& options,
   if (earlier) calib::add_faults(calib::faults_against(*earlier, solution.rig), assessment);
 }
 
-// What the lit boards say of how light falls off towards corners; only cameras whose encoding is known can
-// tell.
+// Measures the vignetting from the illuminated boards; only with cameras whose encoding is known.
 Status measure_vignetting(const calib::CaptureSet& captures,
                           const calib::Report& report,
                           RigResponses* responses) {
@@ -132,7 +130,7 @@ Result<calib::Report> solved(const SolveCommandOptions& options) {
   solving = choice->options;
   calib::Solution* const solution = &choice->solution;
   const double solve_seconds = seconds_since(solving_begun);
-  log_info("solved in {} steps, judging by held-out poses", solution->iterations);
+  log_info("solved in {} iterations; measuring the held-out error", solution->iterations);
   const auto judging_begun = Clock::now();
   calib::Assessment assessment = calib::assess(observed, *solution, std::move(choice->held_out));
   compare_with_earlier(options, *solution, &assessment);

@@ -13,22 +13,23 @@ struct SolveCommandOptions {
   std::filesystem::path captures;
   std::filesystem::path out;
   std::vector<std::string> skip_poses = {};  ///< names of poses to leave out
-  /// A lens model's name for all cameras, all projectors; "auto": each device's by held-out error.
+  /// Lens model of all cameras, and of all projectors; "auto": selected for each device by held-out error.
   std::string camera_model = "auto";
   std::string projector_model = "auto";
-  /// Lengths that the cameras can see, "apriltag_36h11:3 apriltag_36h11:7 250mm" each, besides
-  /// capture.json's.
+  /// Scale bars that the cameras see, each as "apriltag_36h11:3 apriltag_36h11:7 250mm", in addition to those
+  /// of capture.json.
   std::vector<std::string> scale_bar_lengths = {};
 
-  std::string import_format = {};  ///< "opencv-gray": somebody else's captures; then also
-  std::string projector = {};      ///< the projector's size, "1024x768"
-  std::string board = {};          ///< "chessboard:9x7:75mm"
+  /// "opencv-gray": captures of another program, which need the members below; empty: captures of Limn.
+  std::string import_format = {};
+  std::string projector = {};  ///< the projector's size, "1024x768"
+  std::string board = {};      ///< "chessboard:9x7:75mm"
   std::string poses = "pose*";
   std::string shots = "*.png";
 };
 
-/// Captures -> rig folder (rig.json, .cameramodel files, report.json, report.html, observations.json).
-/// Nothing is written unless everything is solved.
+/// Solves captures and writes the rig folder (rig.json, .cameramodel files, report.json, report.html,
+/// observations.json). If the solve fails, at most report.json is written, with the faults that explain it.
 Result<calib::Report> solved(const SolveCommandOptions& options);
 
 }  // namespace limn::apps

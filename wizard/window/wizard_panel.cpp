@@ -48,7 +48,7 @@ void draw_steps(const Gui& gui, const WizardView& view) {
   gap(gui);
   static const std::array<const char*, k_wizard_steps> k_names = {
       "Devices", "Outputs", "Exposure and focus", "Display latency", "Board", "Solve",
-      "Result",  "Scan",    "Alignment",          "Painted"};
+      "Result",  "Scan",    "Alignment",          "Painting"};
   for (std::size_t i = 0; i < view.steps.size(); ++i) {
     const WizardView::Step& step = view.steps[i];
     const ImVec2 at = ImGui::GetCursorScreenPos();
@@ -68,7 +68,7 @@ void draw_steps(const Gui& gui, const WizardView& view) {
   }
 }
 
-// Seen cells as a veil: the more often, the denser.
+// Draws the cells where boards were seen as a translucent layer, denser where they were seen more often.
 void draw_cells(const SeenCells& seen, const PlacedImage& placed, ImU32 colour) {
   if (seen.columns == 0 || seen.rows == 0) return;
   const float w = placed.size.x / static_cast<float>(seen.columns),
@@ -97,8 +97,9 @@ void draw_camera(
   const float caption = 1.35F * gui.em();
   const ImVec2 inner{corner.x, corner.y + caption};
   const ImVec2 end{corner.x + size.x, corner.y + size.y};
-  draw.AddText(corner, colour::k_quiet,
-               fmt::format("{} · boards seen over {:.0f} %", camera.name, 100 * camera.seen.share()).c_str());
+  draw.AddText(
+      corner, colour::k_quiet,
+      fmt::format("{} · covered by boards: {:.0f} %", camera.name, 100 * camera.seen.share()).c_str());
   draw.AddRectFilled(inner, end, IM_COL32(12, 13, 15, 255), 3);
   ImGui::PushClipRect(inner, end, true);
   const cv::Mat empty(camera.height, camera.width, CV_8UC1, cv::Scalar(12));
@@ -112,7 +113,7 @@ void draw_camera(
   ImGui::PopClipRect();
 }
 
-// Cameras side by side, as large as they fit.
+// Draws the cameras' images side by side, as large as fits.
 void draw_cameras(Gui& gui, const WizardView& view, ImVec2 size) {
   if (view.cameras.empty()) return;
   const float space = 0.5F * gui.em();
@@ -153,7 +154,7 @@ void draw_projectors(const Gui& gui, const WizardView& view, ImVec2 size) {
   ImGui::SetCursorScreenPos({at.x, at.y + size.y});
 }
 
-// A curve over the poses on a logarithmic scale, its newest value in figures.
+// Draws a curve over the poses on a logarithmic scale, and its newest value as a number.
 void draw_curve(const Gui& gui,
                 const std::string& name,
                 const std::vector<std::optional<double>>& values,
@@ -194,7 +195,7 @@ void draw_curve(const Gui& gui,
     draw.AddCircleFilled(point, 4, colour::k_blue);
     before = point;
   }
-  // Where no curve is yet, or where it has been.
+  // The label stands on the right while the curve is short, later on the left.
   const std::string words = fmt::format("good: {:g}", limit);
   const float width = ImGui::CalcTextSize(words.c_str()).x;
   label_at({values.size() <= 5 ? at.x + size.x - width - 6 : at.x + 6,
@@ -210,20 +211,20 @@ void draw_progress(const Gui& gui, const WizardView& view) {
   }
   const float height = 4.2F * gui.em();
   heading(gui, fmt::format("After {} of {} poses", view.judged.size(), view.poses));
-  draw_curve(gui, "unseen poses off by", px, "px", calib::k_good_px, height);
-  draw_curve(gui, "light, 95 % within", mm, "mm", calib::k_good_mm, height);
+  draw_curve(gui, "held-out error", px, "px", calib::k_good_px, height);
+  draw_curve(gui, "light error (95 %)", mm, "mm", calib::k_good_mm, height);
   if (!view.advice.empty()) paragraph(colour::k_text, view.advice);
 }
 
-// How light fills the grey levels of each camera.
+// Draws the histogram of each camera's grey levels under each projector's light.
 void draw_light(const Gui& gui, const WizardView& view) {
   if (view.light.empty()) return;
   heading(gui, "Exposure");
   for (const ExposureReading& seen : view.light) {
     paragraph(colour::k_quiet,
-              seen.lit > 0 ? fmt::format("{}, light of {}: {:.1f} % saturated, edges {:.1f} px", seen.camera,
-                                         seen.projector, 100 * seen.saturated, seen.blur_px)
-                           : fmt::format("{} sees no light of {}", seen.camera, seen.projector));
+              seen.lit > 0 ? fmt::format("{}, light of {}: {:.1f} % saturated, edge blur {:.1f} px",
+                                         seen.camera, seen.projector, 100 * seen.saturated, seen.blur_px)
+                           : fmt::format("{} sees no light from {}", seen.camera, seen.projector));
     const ImVec2 at = ImGui::GetCursorScreenPos(), size{ImGui::GetContentRegionAvail().x, 3 * gui.em()};
     ImGui::Dummy(size);
     ImDrawList& draw = *ImGui::GetWindowDrawList();
@@ -245,8 +246,8 @@ void draw_light(const Gui& gui, const WizardView& view) {
 
 void draw_faults(const Gui& gui, const WizardView& view) {
   if (view.faults.empty() && view.to_do.empty()) return;
-  heading(gui, !view.faults.empty()                 ? "To put right"
-               : view.worth == calib::Verdict::good ? "To make it better still"
+  heading(gui, !view.faults.empty()                 ? "Problems to fix"
+               : view.worth == calib::Verdict::good ? "Possible improvements"
                                                     : "Advice");
   for (const calib::Fault& fault : view.faults) {
     std::string advice = fault.advice + ".";
@@ -260,7 +261,7 @@ void draw_faults(const Gui& gui, const WizardView& view) {
   for (const std::string& sentence : view.to_do) paragraph(colour::k_text, sentence);
 }
 
-// Light's predicted error over camera 0's image, the middle plane of each projector's map.
+// Draws light's predicted error over camera 0's image: the middle plane of each projector's map.
 void draw_maps(Gui& gui, const WizardView& view, ImVec2 size) {
   const float space = 0.5F * gui.em(), caption = 1.35F * gui.em();
   const float width = (size.x + space) / static_cast<float>(view.maps.size()) - space;
@@ -271,7 +272,7 @@ void draw_maps(Gui& gui, const WizardView& view, ImVec2 size) {
     if (map.planes.empty() || map.columns < 1 || map.rows < 1) continue;
     const calib::ErrorMap::Plane& plane = map.planes[map.planes.size() / 2];
     const ImVec2 corner{at.x + static_cast<float>(i) * (width + space), at.y};
-    const std::string words = fmt::format("{} at {:.2f} m · {:.2f} mm at worst",
+    const std::string words = fmt::format("{} at {:.2f} m · at most {:.2f} mm",
                                           view.projectors[static_cast<std::size_t>(map.projector)].name,
                                           plane.depth_m, map.worst_mm());
     draw.AddText(corner, colour::k_quiet, words.c_str());
@@ -297,12 +298,12 @@ void draw_images_taken(const Gui& gui, const WizardView& view) {
   ImGui::PopStyleColor();
 }
 
-// What to do next, large, above the images.
+// Draws what to do next, in large letters above the images.
 void draw_task(const Gui& gui, const WizardView& view) {
   if (view.is_over) {
     const bool has_rig = view.failure.empty();
     ImGui::PushStyleColor(ImGuiCol_Text, has_rig ? colour_of(view.worth) : colour::k_bad);
-    heading(gui, has_rig ? fmt::format("The rig is {}", calib::to_text(view.worth)) : "No rig");
+    heading(gui, has_rig ? fmt::format("The rig is {}", calib::to_text(view.worth)) : "No rig was made");
     ImGui::PopStyleColor();
     paragraph(colour::k_text, has_rig ? view.verdict : view.failure);
     const WizardView::Step& painted = view.steps[static_cast<std::size_t>(WizardStep::paint)];
@@ -311,22 +312,22 @@ void draw_task(const Gui& gui, const WizardView& view) {
   }
   if (view.is_leaving) {
     heading(gui, "Leaving");
-    paragraph(colour::k_quiet, "What was captured is kept; the same command goes on from there.");
+    paragraph(colour::k_quiet, "The captured images are kept; the same command continues from there.");
     return;
   }
   if (view.has_rig) {
-    heading(gui, view.awaits_prototype ? "Put the prototype where it will stand"
-                                       : "Leave the prototype where it is: it is measured");
+    heading(gui, view.awaits_prototype ? "Put the prototype in its working position"
+                                       : "Do not move the prototype: it is being scanned");
     if (view.awaits_prototype)
       paragraph(colour::k_quiet,
-                fmt::format("Take the board away. The scan begins when nothing has moved for {:.0f} s.",
+                fmt::format("Remove the board. The scan starts when nothing has moved for {:.0f} s.",
                             StillRoom::k_rest_s));
     draw_images_taken(gui, view);
     return;
   }
   if (view.place.empty()) {
-    heading(gui, "Getting ready");
-    paragraph(colour::k_quiet, "The devices are looked at before the first pose.");
+    heading(gui, "Preparing");
+    paragraph(colour::k_quiet, "The devices are checked before the first pose.");
     return;
   }
   const auto is_checked = [&](WizardStep step) {
@@ -334,9 +335,9 @@ void draw_task(const Gui& gui, const WizardView& view) {
   };
   const bool is_checking = is_checked(WizardStep::outputs) || is_checked(WizardStep::latency);
   heading(gui, fmt::format("Pose {} of {}: {}", view.pose + 1, view.poses,
-                           is_checking         ? "hold the board there while the devices are looked at"
+                           is_checking         ? "hold the board still while the devices are checked"
                            : view.is_capturing ? "hold the board still"
-                                               : "looking at what was captured"));
+                                               : "evaluating the images"));
   paragraph(colour::k_text, "Board: " + view.place);
   if (view.is_capturing) draw_images_taken(gui, view);
 }
@@ -357,19 +358,20 @@ WizardWish draw_buttons(const Gui& gui, const WizardView& view) {
     if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", what);
   };
   if (view.has_rig) {
-    button("Scan now", view.awaits_prototype, "the prototype stands there", WizardWish::scan);
+    button("Scan now", view.awaits_prototype, "The prototype is in place: start the scan", WizardWish::scan);
     ImGui::SameLine();
-    button("Skip", view.awaits_prototype, "ends with the rig, which is saved", WizardWish::skip);
+    button("Skip", view.awaits_prototype, "Finish without a scan; the rig is saved", WizardWish::skip);
     return wish;
   }
-  button("Check again", view.is_capturing, "outputs, exposure and latency, then this pose",
-         WizardWish::check);
+  button("Check again", view.is_capturing,
+         "Check outputs, exposure and latency again, then capture this pose again", WizardWish::check);
   ImGui::SameLine();
-  button("Repeat pose", view.is_capturing, "takes this pose's pictures again", WizardWish::repeat);
+  button("Repeat pose", view.is_capturing, "Capture this pose again", WizardWish::repeat);
   ImGui::SameLine();
-  button("Finish", !view.judged.empty(), "solves with the poses so far", WizardWish::finish);
+  button("Finish", !view.judged.empty(), "Solve with the poses captured so far", WizardWish::finish);
   ImGui::SameLine();
-  button("Leave", true, "what is captured stays; goes on from there the next time", WizardWish::leave);
+  button("Leave", true, "Stop; the captured images are kept, and the next run continues from there",
+         WizardWish::leave);
   return wish;
 }
 

@@ -6,7 +6,7 @@
 
 namespace limn::apps {
 
-/// The wizard's window, drawn within a frame of `gui`. Returns what the person wishes.
+/// Draws the wizard's window within a frame of `gui`. Returns the person's request.
 WizardWish draw_wizard(Gui& gui, const WizardView& view);
 
 }  // namespace limn::apps

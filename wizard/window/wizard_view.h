@@ -14,30 +14,30 @@
 
 namespace limn::apps {
 
-/// Where in an imager's image boards were seen: counts in cells of a grid over the image, row by row.
+/// Where boards were seen in an imager's image: a count for each cell of a grid over the image, row by row.
 struct SeenCells {
   int columns = 0, rows = 0;
   std::vector<int> counts;
-  /// Share of the cells with at least one.
+  /// Share of the cells with a count of at least one.
   double share() const;
 };
 
-/// The cells of one imager: points of `px` in an image of width x height, `columns` across.
+/// Counts the points `px` of an image of width x height; `columns` is the number of cells across.
 SeenCells cells_of(const std::vector<Eigen::Vector2d>& px, int width, int height, int columns = 24);
 
-/// What the wizard's window shows at a moment.
+/// The content of the wizard's window at one moment.
 struct WizardView {
   struct Step {
     WizardState state = WizardState::waits;
-    std::string words = {};  ///< what came of it
+    std::string words = {};  ///< the result, or the state, as text
   };
   struct Camera {
     std::string name;
     int width = 0, height = 0;
-    cv::Mat image = {};                         ///< newest, 8-bit grey or BGR; empty: none yet
-    std::vector<Eigen::Vector2d> corners = {};  ///< of the board, as last found
-    std::vector<Eigen::Vector2d> target =
-        {};  ///< outline of where to hold the board; empty: not in this image
+    cv::Mat image = {};                         ///< newest image, 8-bit grey or BGR; empty: none yet
+    std::vector<Eigen::Vector2d> corners = {};  ///< corners of the board as last found
+    /// Outline of the board where it should be held; empty: not in this image.
+    std::vector<Eigen::Vector2d> target = {};
     SeenCells seen = {};
   };
   struct Projector {
@@ -50,24 +50,24 @@ struct WizardView {
     std::optional<double> held_out_px, predicted_mm;  ///< none: no rig yet
   };
   std::array<Step, k_wizard_steps> steps;  ///< in the order of WizardStep
-  std::vector<ExposureReading> light;      ///< as the exposure step saw it
+  std::vector<ExposureReading> light;      ///< results of the exposure step
   std::vector<Camera> cameras;
   std::vector<Projector> projectors;
-  int pose = 0, poses = 0;  ///< number of the pose in work, of how many planned
-  std::string place;        ///< where to hold the board, in words
+  int pose = 0, poses = 0;  ///< index of the current pose; number of planned poses
+  std::string place;        ///< where to hold the board, as text
   bool is_capturing = false;
-  int images = 0, images_of = 0;  ///< of this pose
+  int images = 0, images_of = 0;  ///< images of this pose: captured, and needed in all
   std::vector<Judged> judged;
   std::string advice;  ///< whether more poses help
   std::vector<calib::Fault> faults;
   bool has_rig = false;
   bool awaits_prototype = false;
-  std::string verdict;  ///< in words, once there is a rig
+  std::string verdict;  ///< as a sentence, once there is a rig
   calib::Verdict worth = calib::Verdict::reject;
   std::vector<std::string> to_do;     ///< the report's advice
-  std::vector<calib::ErrorMap> maps;  ///< of the rig
+  std::vector<calib::ErrorMap> maps;  ///< predicted errors of the rig
   bool is_leaving = false, is_over = false;
-  std::string failure;  ///< why it ended without a rig; empty: it did not
+  std::string failure;  ///< why the run failed; empty: it did not
 };
 
 }  // namespace limn::apps

@@ -14,9 +14,9 @@ namespace {
 
 using State = WizardState;
 
-constexpr auto k_pause = std::chrono::milliseconds(2);  // errands wait no longer
+constexpr auto k_pause = std::chrono::milliseconds(2);  // maximum wait for the executor
 
-// What worker and window share.
+// The state that the worker thread and the window share.
 class Stand {
  public:
   Stand(const WizardPlan& plan, std::atomic<WizardWish>* wish)
@@ -64,13 +64,13 @@ class Stand {
             .wish = wish_};
   }
 
-  // There is a rig.
+  // The rig has been solved.
   void solved(const calib::Report& report, std::size_t poses) {
     const std::lock_guard lock(mutex_);
     view_.is_capturing = false;
     view_.has_rig = true;
     for (std::size_t i = 0; i <= static_cast<std::size_t>(WizardStep::result); ++i) {
-      if (view_.steps[i].state == State::waits) view_.steps[i].words = "by an earlier run";
+      if (view_.steps[i].state == State::waits) view_.steps[i].words = "done by an earlier run";
       if (view_.steps[i].state != State::fails) view_.steps[i].state = State::done;
     }
     step(WizardStep::board).words = fmt::format("{} poses", poses);
@@ -84,7 +84,7 @@ class Stand {
     view_.advice.clear();
   }
 
-  // The same surroundings, with the images passing by here.
+  // The same surroundings; their images are copied into the view.
   Surroundings watched(Surroundings around) {
     const auto grab = around.stage.grab;
     around.stage.grab = [this, grab](int camera) -> Result<cv::Mat> {
@@ -206,7 +206,7 @@ class Stand {
   WizardView::Step& step(WizardStep which) { return view_.steps.at(static_cast<std::size_t>(which)); }
 
   const WizardPlan& plan_;
-  std::vector<std::vector<std::vector<Eigen::Vector2d>>> targets_;  // as far as they are known
+  std::vector<std::vector<std::vector<Eigen::Vector2d>>> targets_;  // those known so far
   mutable std::mutex mutex_;
   WizardView view_;
   std::atomic<WizardWish>* wish_;

@@ -15,23 +15,23 @@
 
 namespace limn::apps {
 
-/// What the wizard's window is told beforehand.
+/// What the wizard's window needs to know at the start.
 struct WizardPlan {
   calib::CaptureSet captures;       ///< planned
-  std::vector<std::string> places;  ///< where each pose's board is to be held, in words
-  /// The same as the board's outline in each camera's image, pixels; empty where it would not be seen.
+  std::vector<std::string> places;  ///< for each pose, where to hold the board, as text
+  /// The board's outline there in each camera's image, pixels; empty if the camera would not see it.
   std::vector<std::vector<std::vector<Eigen::Vector2d>>> targets;  ///< [pose][camera]
-  std::string devices;                                             ///< what was found, in words
-  /// The targets once a rig is known; empty: they are known beforehand.
+  std::string devices;                                             ///< the devices that were found, as text
+  /// Computes new targets from a rig solved so far; empty: `targets` stay as they are.
   std::function<std::vector<std::vector<std::vector<Eigen::Vector2d>>>(const Rig&)> targets_by = nullptr;
 };
 
-/// The wizard's work, as calibrated() with these surroundings and this audience.
+/// The wizard's work: calibrated() with these surroundings and this audience.
 using WizardWork = std::function<Result<Calibrated>(const Surroundings&, const WizardAudience&)>;
 
-/// Does the work in a thread of its own while the window shows it, until the person closes the window; what
-/// the work wants done in this thread meanwhile comes by `errands`. `say` gets the lines, too. `wish`: the
-/// person's. Closed early, the work is left: its error comes back.
+/// Runs the work in a thread of its own and shows it in the window until the person closes the window.
+/// `executor` runs what the work needs done in this thread. `say` gets the lines of text, too. `wish` gets
+/// the person's requests. If the window is closed early, the work stops, and its error is returned.
 Result<Calibrated> calibrated_in_window(GuiWindow* window,
                                         const WizardPlan& plan,
                                         const Surroundings& surroundings,
