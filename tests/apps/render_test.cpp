@@ -323,7 +323,7 @@ TEST_F(RenderDoor, MistakesAreErrors) {
   wrong.poses.clear();
   failed(wrong, true, "--poses");
   wrong.frames = {"camera0"};
-  failed(wrong, true, "CAMERA=PICTURE");
+  failed(wrong, true, "CAMERA=");
   wrong.frames = {"camera7=x.png"};
   failed(wrong, true, "camera0");
   wrong.frames = {"camera0=" + (folder / "nowhere.png").string()};
