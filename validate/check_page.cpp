@@ -100,12 +100,13 @@ Status write_check_page(std::span<const CheckResult> results,
                         const std::filesystem::path& path) {
   const auto failed = std::count_if(results.begin(), results.end(), [](const auto& r) { return !r.good(); });
   std::string html = fmt::format(
-      "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" "
-      "content=\"width=device-width\"><title>Limn checks</title>\n<style>{}</style>\n<h1>Limn checks: "
-      "{}</h1>\n"
-      "<p class=\"lead\">What the renderer drew ({}), judged by a ray tracer that shares no code with it. "
-      "The most "
-      "strained limit comes first.</p>\n",
+      "<!doctype html>\n"
+      "<html lang=\"en\"><meta charset=\"utf-8\"><meta name=\"viewport\" "
+      "content=\"width=device-width\"><title>Limn checks</title>\n"
+      "<style>{}</style>\n"
+      "<h1>Limn checks: {}</h1>\n"
+      "<p class=\"lead\">What the renderer drew ({}), compared with a ray tracer that shares no code with "
+      "it. The readings that use most of their limit come first.</p>\n",
       k_check_style,
       failed == 0 ? fmt::format("all {} passed", results.size())
                   : fmt::format("{} of {} failed", failed, results.size()),

@@ -28,7 +28,7 @@ figcaption { margin-top: .5rem; color: #a9a69f; } figcaption b { color: #e8e6e1;
 )";
 
 std::string rows_html(const std::vector<DemoRow>& rows) {
-  std::string html = "<table><tr><th>measured</th><th>value</th><th>asked for</th></tr>\n";
+  std::string html = "<table><tr><th>measured</th><th>value</th><th>limit</th></tr>\n";
   for (const DemoRow& row : rows) {
     const char* colour = row.limit.empty() ? "" : row.good ? " good" : " bad";
     html += fmt::format("<tr><td>{}</td><td class=\"value{}\">{}</td><td>{}</td></tr>\n", escaped(row.what),
