@@ -362,13 +362,15 @@ void add_recheck(CLI::App& app, Run& run) {
       "recheck",
       "Find out whether a camera or projector of a calibrated rig has moved, which one and how far");
   command->footer(
-      "Needs captures of the board in one pose, or of the prototype alone if at least three devices see it. "
-      "The pose\n"
-      "of the device that has moved is solved again; its lens is kept. The rig folder is also written if "
-      "nothing has\n"
-      "moved. If no single move explains the captures, only recheck.json is written. With one camera and one "
-      "projector,\n"
-      "only a board that has not been touched since an earlier recheck shows which of them has moved.\n"
+      "Needs captures of the board in one pose, or of the prototype alone if it is covered by at least three "
+      "devices\n"
+      "(cameras and projectors). The pose of the device that has moved is solved again; its lens is kept. "
+      "The rig folder\n"
+      "is also written if nothing has moved. If no single move explains the captures, only recheck.json is "
+      "written. With\n"
+      "one camera and one projector, only a board that has not been touched since an earlier recheck shows "
+      "which of them\n"
+      "has moved.\n"
       "Example: limn recheck --devices devices.json --rig rig --out rig-repaired\n"
       "Example: limn recheck captures --rig rig --out rig-repaired\n"
       "Example: limn recheck captures --rig rig --still rig-repaired/recheck.json --out rig-again\n"

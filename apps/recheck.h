@@ -22,10 +22,10 @@ struct RecheckCommand {
   bool json = false;                 ///< Prints recheck.json instead of a table.
 };
 
-/// Compares captures of the board, or of the prototype alone if at least three devices see it, with a
-/// calibrated rig: has a camera or a projector moved? Writes the rig folder with the solved pose of that
-/// device, and recheck.json. Error when no single move explains the captures; then only recheck.json is
-/// written.
+/// Compares captures of the board, or of the prototype alone if it is covered by at least three devices
+/// (cameras and projectors), with a calibrated rig: has a camera or a projector moved? Writes the rig folder
+/// with the solved pose of that device, and recheck.json. Error when no single move explains the captures;
+/// then only recheck.json is written.
 Result<Rechecked> rechecked(const RecheckCommand& command);
 
 /// `limn recheck`: calls rechecked() and prints a table.

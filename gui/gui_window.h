@@ -17,7 +17,7 @@ namespace limn::apps {
 /// the current GL context and never waits for the monitor.
 class GuiWindow {
  public:
-  /// Of the given size, but no larger than the largest monitor.
+  /// Opens a window of this size, but no larger than the largest monitor.
   static Result<GuiWindow> open(const device::Desktop& desktop,
                                 const std::string& title,
                                 int width,

@@ -41,7 +41,7 @@ struct Check {
   std::string about;
   std::vector<CheckLimit> limits;
   Imager viewer;                                      ///< View parts are drawn for its viewpoint.
-  std::vector<scene::SharedViewpoint::Share> shares;  ///< Of the viewers, if several share it.
+  std::vector<scene::SharedViewpoint::Share> shares;  ///< Shares of the viewers in it; empty for one.
   Hand hand;                                          ///< The hand that shades in `refill_…`.
 
   sim::World truth;         ///< The true world, with the injected nudges.

@@ -77,7 +77,7 @@ class Stages {
 // What the session knows (never the ground truth), and the renderer that it draws with.
 struct Session {
   Rig rig;
-  double held_out_px;  // of its calibration
+  double held_out_px;  // held-out error of its calibration
   scene::Scene scene;
   std::vector<Body> bodies;
   tracker::Detector detector;

@@ -26,9 +26,9 @@ struct Hand {
 
 /// One frame of a session with a hand in the light, as the ray tracer measures it.
 struct ShadowFillFrame {
-  std::string phase;  ///< "still", "stays", "moves", "gone"
-  double share = 1;   ///< Of the light that the shadow takes and others can give: the share that is filled.
-  double flash = 0;   ///< Light above that without the hand, as a share of it, in the worst pixel.
+  std::string phase;        ///< "still", "stays", "moves", "gone"
+  double share = 1;         ///< Filled share of the lost light that other projectors can give.
+  double flash = 0;         ///< Light above that without the hand, as a share of it, in the worst pixel.
   double image_change = 0;  ///< Largest change in levels of the projectors' images from those without a hand.
 };
 

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 using namespace test;
 using Json = nlohmann::json;
 
-constexpr double k_share = 0.375;  // of each device's image sides: 480 x 384 and 480 x 300 pixels
+constexpr double k_share = 0.375;  // scale of each device's image sides: 480 x 384 and 480 x 300 pixels
 constexpr int k_poses = 6;
 
 Json json_at(const fs::path& path) {

@@ -198,7 +198,7 @@ TEST_F(RenderDoor, SeveralViewersShareTheEyeOfThoseOnTheNearestOnesSide) {
                               looking_at(p_eye, {0, 0, 0}, {0, 1, 0}).inverse(), 45));
   const cv::Mat shared = light(files), near_alone = light({files[0]});
   EXPECT_EQ(cv::norm(shared, light({files[0], files[1]}), cv::NORM_INF), 0)
-      << "who stands at another side does not count";
+      << "a viewer on another side does not count";
   EXPECT_GT(cv::norm(shared, near_alone, cv::NORM_INF), 20);
 
   const scene::Scene scene = scene::load_scene(options.scene).value();
